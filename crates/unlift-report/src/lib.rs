@@ -1,0 +1,1 @@
+//! unlift: report.

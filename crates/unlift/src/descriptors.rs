@@ -1,0 +1,138 @@
+//! Descriptors: one row per hidden point, kept in the clear by every geometric obfuscation.
+
+use crate::Error;
+
+/// The values of a descriptor matrix, row-major.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Values {
+    /// Bytes, as COLMAP stores SIFT (RootSIFT times 512).
+    U8(Vec<u8>),
+    /// Floats, as learned features are stored.
+    F32(Vec<f32>),
+}
+
+/// A matrix `(rows, dim)` of descriptors.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Descriptors {
+    values: Values,
+    dim: usize,
+}
+
+impl Descriptors {
+    /// A matrix with `dim` columns.
+    ///
+    /// # Errors
+    /// When `dim` is 0 or does not divide the number of values, when a float is not finite, or when
+    /// the matrix carries no information: all zero, or every row the same (dummies, as some
+    /// exporters write them).
+    pub fn try_new(values: Values, dim: usize) -> Result<Self, Error> {
+        let len = match &values {
+            Values::U8(v) => v.len(),
+            Values::F32(v) => v.len(),
+        };
+        if dim == 0 || !len.is_multiple_of(dim) {
+            let expected = format!("a multiple of the dimension {dim}");
+            return Err(Error::new("descriptors", expected, format!("{len} values")));
+        }
+        if let Values::F32(v) = &values
+            && let Some(at) = v.iter().position(|x| !x.is_finite())
+        {
+            let what = format!("descriptor {}, value {}", at / dim, at % dim);
+            return Err(Error::new(what, "a finite value", v[at].to_string()));
+        }
+        let (zero, constant) = match &values {
+            Values::U8(v) => (
+                v.iter().all(|&x| x == 0),
+                v.chunks(dim).all(|row| *row == v[..dim]),
+            ),
+            Values::F32(v) => (
+                v.iter().all(|&x| x == 0.0),
+                v.chunks(dim).all(|row| *row == v[..dim]),
+            ),
+        };
+        if len > 0 && zero {
+            return Err(Error::new(
+                "descriptors",
+                "real descriptors",
+                "only zeros (dummies)",
+            ));
+        }
+        if len > dim && constant {
+            return Err(Error::new(
+                "descriptors",
+                "real descriptors",
+                "the same row for every point (dummies)",
+            ));
+        }
+        Ok(Self { values, dim })
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        match &self.values {
+            Values::U8(v) => v.len() / self.dim,
+            Values::F32(v) => v.len() / self.dim,
+        }
+    }
+
+    /// Whether there are no rows.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Number of columns.
+    pub fn dim(&self) -> usize {
+        self.dim
+    }
+
+    /// All values, row-major `(rows, dim)`.
+    pub fn values(&self) -> &Values {
+        &self.values
+    }
+
+    /// The rows `order[0], order[1], ...` as a new matrix.
+    ///
+    /// # Panics
+    /// When an index is out of range.
+    pub fn select(&self, order: &[u32]) -> Self {
+        fn rows<T: Copy>(values: &[T], dim: usize, order: &[u32]) -> Vec<T> {
+            let mut selected = Vec::with_capacity(order.len() * dim);
+            for &row in order {
+                selected.extend_from_slice(&values[row as usize * dim..(row as usize + 1) * dim]);
+            }
+            selected
+        }
+        let values = match &self.values {
+            Values::U8(v) => Values::U8(rows(v, self.dim, order)),
+            Values::F32(v) => Values::F32(rows(v, self.dim, order)),
+        };
+        Self {
+            values,
+            dim: self.dim,
+        }
+    }
+
+    /// Squared Euclidean distance between rows `a` and `b`.
+    #[inline]
+    pub fn squared_distance(&self, a: usize, b: usize) -> f32 {
+        let dim = self.dim;
+        match &self.values {
+            Values::U8(v) => {
+                let (x, y) = (&v[a * dim..(a + 1) * dim], &v[b * dim..(b + 1) * dim]);
+                let sum: i32 = x
+                    .iter()
+                    .zip(y)
+                    .map(|(&x, &y)| {
+                        let d = i32::from(x) - i32::from(y);
+                        d * d
+                    })
+                    .sum();
+                sum as f32
+            }
+            Values::F32(v) => {
+                let (x, y) = (&v[a * dim..(a + 1) * dim], &v[b * dim..(b + 1) * dim]);
+                x.iter().zip(y).map(|(x, y)| (x - y) * (x - y)).sum()
+            }
+        }
+    }
+}

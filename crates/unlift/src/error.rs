@@ -1,0 +1,57 @@
+//! The library's error: what was wrong with a value a caller passed in.
+
+use std::fmt;
+
+/// An argument or a set of columns that breaks a stated invariant.
+///
+/// Prints as one line: `what: expected ..., found ...`. Files have their own error, with path and
+/// place, in the crate that reads them; a point that cannot be recovered is a
+/// [`Status`](crate::recover::Status), not an error.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Error {
+    what: String,
+    expected: String,
+    found: String,
+}
+
+impl Error {
+    /// An error about `what` (a field, an option, a row), with the rule and the value that broke it.
+    pub fn new(
+        what: impl Into<String>,
+        expected: impl Into<String>,
+        found: impl Into<String>,
+    ) -> Self {
+        Self {
+            what: what.into(),
+            expected: expected.into(),
+            found: found.into(),
+        }
+    }
+
+    /// The field, option or row that is wrong.
+    pub fn what(&self) -> &str {
+        &self.what
+    }
+
+    /// The rule that was broken.
+    pub fn expected(&self) -> &str {
+        &self.expected
+    }
+
+    /// The value that broke it.
+    pub fn found(&self) -> &str {
+        &self.found
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{}: expected {}, found {}",
+            self.what, self.expected, self.found
+        )
+    }
+}
+
+impl std::error::Error for Error {}

@@ -1,0 +1,22 @@
+//! How much of a privacy-preserving ("obfuscated") map comes back?
+//!
+//! The pipeline, one module per stage, a type per arrow:
+//!
+//! ```text
+//! read ──> obfuscate ──> neighbors ──> recover ──> evaluate ──> report
+//! ```
+
+pub mod descriptors;
+mod error;
+mod ids;
+pub mod neighbors;
+pub mod points;
+pub mod recover;
+pub mod released;
+pub mod seed;
+pub mod truth;
+
+pub use descriptors::Descriptors;
+pub use error::Error;
+pub use ids::{OriginalId, RecordId, SlotId};
+pub use points::{PointSet, Unit};

@@ -1,0 +1,5 @@
+//! Neighborhoods: which records are said to hide points near the point of a slot.
+
+mod neighborhoods;
+
+pub use neighborhoods::Neighborhoods;

@@ -1,0 +1,197 @@
+//! The list of records per slot, in compressed rows.
+
+use crate::{Error, RecordId};
+
+/// Per slot the records said to hide its neighbors, in ascending order of record id: an order by
+/// nearness would tell more than a set does. Where the lists came from, and how many of them are
+/// right, is not stored here: the attacker does not know it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Neighborhoods {
+    offsets: Vec<u64>,
+    records: Vec<RecordId>,
+    scores: Option<Vec<f32>>,
+}
+
+impl Neighborhoods {
+    /// Lists for all slots of a map with `n_records` records: slot `s` has
+    /// `records[offsets[s]..offsets[s + 1]]`, sorted here, with optional `scores` beside them.
+    ///
+    /// # Errors
+    /// When the offsets do not partition `records`, a record is out of range, is listed twice for a
+    /// slot or is the slot's own, a score is not finite, or columns differ in length.
+    pub fn try_new(
+        offsets: Vec<u64>,
+        mut records: Vec<RecordId>,
+        mut scores: Option<Vec<f32>>,
+        n_records: usize,
+        slots_per_record: usize,
+    ) -> Result<Self, Error> {
+        let n_slots = n_records * slots_per_record;
+        if offsets.len() != n_slots + 1 {
+            let expected = format!("{n_slots} slots, as the released map has");
+            return Err(Error::new(
+                "neighborhoods",
+                expected,
+                offsets.len().saturating_sub(1).to_string(),
+            ));
+        }
+        if offsets[0] != 0
+            || offsets[n_slots] != records.len() as u64
+            || offsets.windows(2).any(|w| w[0] > w[1])
+        {
+            let expected = format!("ascending from 0 to {}", records.len());
+            return Err(Error::new(
+                "neighborhood offsets",
+                expected,
+                "another sequence",
+            ));
+        }
+        if let Some(scores) = &scores {
+            if scores.len() != records.len() {
+                let expected = format!("{} rows", records.len());
+                return Err(Error::new(
+                    "neighborhood scores",
+                    expected,
+                    scores.len().to_string(),
+                ));
+            }
+            if let Some(at) = scores.iter().position(|x| !x.is_finite()) {
+                let what = format!("neighborhood score {at}");
+                return Err(Error::new(what, "a finite number", scores[at].to_string()));
+            }
+        }
+        for slot in 0..n_slots {
+            let range = offsets[slot] as usize..offsets[slot + 1] as usize;
+            sort_row(
+                &mut records[range.clone()],
+                scores.as_mut().map(|s| &mut s[range.clone()]),
+            );
+            let row = &records[range];
+            let what = || format!("neighborhood of slot {slot}");
+            if let Some(pair) = row.windows(2).find(|w| w[0] == w[1]) {
+                return Err(Error::new(
+                    what(),
+                    "each record once",
+                    format!("record {} twice", pair[0].0),
+                ));
+            }
+            if let Some(last) = row.last()
+                && last.index() >= n_records
+            {
+                let expected = format!("records below {n_records}");
+                return Err(Error::new(what(), expected, last.0.to_string()));
+            }
+            let own = RecordId::from_index(slot / slots_per_record);
+            if row.binary_search(&own).is_ok() {
+                return Err(Error::new(
+                    what(),
+                    "other records",
+                    format!("its own record {}", own.0),
+                ));
+            }
+        }
+        Ok(Self {
+            offsets,
+            records,
+            scores,
+        })
+    }
+
+    /// Number of slots.
+    pub fn n_slots(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
+    /// The records listed for slot `slot`, ascending.
+    #[inline(always)]
+    pub fn of(&self, slot: usize) -> &[RecordId] {
+        &self.records[self.offsets[slot] as usize..self.offsets[slot + 1] as usize]
+    }
+
+    /// The scores beside [`of`](Self::of), if the source gave any.
+    pub fn scores_of(&self, slot: usize) -> Option<&[f32]> {
+        let range = self.offsets[slot] as usize..self.offsets[slot + 1] as usize;
+        self.scores.as_ref().map(|scores| &scores[range])
+    }
+
+    /// All rows end to end.
+    pub fn records(&self) -> &[RecordId] {
+        &self.records
+    }
+
+    /// Where each row starts; one more entry than there are slots.
+    pub fn offsets(&self) -> &[u64] {
+        &self.offsets
+    }
+
+    /// All scores, if the source gave any.
+    pub fn scores(&self) -> Option<&[f32]> {
+        self.scores.as_deref()
+    }
+
+    /// The length of the longest list.
+    pub fn longest(&self) -> usize {
+        self.offsets
+            .windows(2)
+            .map(|w| (w[1] - w[0]) as usize)
+            .max()
+            .unwrap_or(0)
+    }
+}
+
+fn sort_row(records: &mut [RecordId], scores: Option<&mut [f32]>) {
+    match scores {
+        None => records.sort_unstable(),
+        Some(scores) => {
+            let mut both: Vec<(RecordId, f32)> = records
+                .iter()
+                .copied()
+                .zip(scores.iter().copied())
+                .collect();
+            both.sort_by_key(|&(record, _)| record);
+            for (at, (record, score)) in both.into_iter().enumerate() {
+                records[at] = record;
+                scores[at] = score;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lists(rows: &[&[u32]]) -> Result<Neighborhoods, Error> {
+        let mut offsets = vec![0];
+        let mut records = Vec::new();
+        for row in rows {
+            records.extend(row.iter().map(|&r| RecordId(r)));
+            offsets.push(records.len() as u64);
+        }
+        Neighborhoods::try_new(offsets, records, None, rows.len(), 1)
+    }
+
+    #[test]
+    fn rows_are_stored_in_ascending_order() {
+        let lists = lists(&[&[2, 1], &[2, 0], &[]]).unwrap();
+        assert_eq!(lists.of(0), &[RecordId(1), RecordId(2)]);
+        assert_eq!(lists.of(2), &[]);
+    }
+
+    #[test]
+    fn own_record_repeats_and_strangers_are_refused() {
+        let message = |rows: &[&[u32]]| lists(rows).unwrap_err().to_string();
+        assert_eq!(
+            message(&[&[0], &[], &[]]),
+            "neighborhood of slot 0: expected other records, found its own record 0"
+        );
+        assert_eq!(
+            message(&[&[1, 1], &[], &[]]),
+            "neighborhood of slot 0: expected each record once, found record 1 twice"
+        );
+        assert_eq!(
+            message(&[&[7], &[], &[]]),
+            "neighborhood of slot 0: expected records below 3, found 7"
+        );
+    }
+}

@@ -1,0 +1,104 @@
+//! Points with a unit: what every file becomes, and what only the owner of a map may read.
+
+use crate::Error;
+
+/// What one unit of a coordinate means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unit {
+    /// Meters: the owner declared a scale.
+    Meter,
+    /// Pixels of an image.
+    Pixel,
+    /// The map's median distance to the K-th neighbor: the unit of maps without a declared scale.
+    KthNeighbor,
+}
+
+impl Unit {
+    /// The name used in files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Unit::Meter => "m",
+            Unit::Pixel => "px",
+            Unit::KthNeighbor => "kth_neighbor",
+        }
+    }
+
+    /// The unit called `name`, if there is one.
+    pub fn from_name(name: &str) -> Option<Self> {
+        [Unit::Meter, Unit::Pixel, Unit::KthNeighbor]
+            .into_iter()
+            .find(|unit| unit.name() == name)
+    }
+}
+
+/// Points of `D` dimensions (2 or 3), one row each, all finite, in one [`Unit`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointSet<const D: usize> {
+    positions: Vec<[f64; D]>,
+    unit: Unit,
+}
+
+impl<const D: usize> PointSet<D> {
+    const DIMENSION_IS_2_OR_3: () = assert!(D == 2 || D == 3);
+
+    /// Points `(n, D)` in `unit`.
+    ///
+    /// # Errors
+    /// When a coordinate is not finite, or there are more than 2^31 points.
+    pub fn try_new(positions: Vec<[f64; D]>, unit: Unit) -> Result<Self, Error> {
+        let () = Self::DIMENSION_IS_2_OR_3;
+        if positions.len() > i32::MAX as usize {
+            return Err(Error::new(
+                "points",
+                "at most 2^31",
+                positions.len().to_string(),
+            ));
+        }
+        if let Some(row) = positions
+            .iter()
+            .position(|p| p.iter().any(|x| !x.is_finite()))
+        {
+            let found = format!("{:?}", positions[row]);
+            return Err(Error::new(
+                format!("point {row}"),
+                "finite coordinates",
+                found,
+            ));
+        }
+        Ok(Self { positions, unit })
+    }
+
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Whether there are no points.
+    pub fn is_empty(&self) -> bool {
+        self.positions.is_empty()
+    }
+
+    /// Coordinates, `(n, D)`, in [`unit`](Self::unit).
+    pub fn positions(&self) -> &[[f64; D]] {
+        &self.positions
+    }
+
+    /// The unit of every coordinate.
+    pub fn unit(&self) -> Unit {
+        self.unit
+    }
+
+    /// The same points multiplied by `factor`, now in `unit`.
+    ///
+    /// # Errors
+    /// When a scaled coordinate is not finite.
+    pub fn scaled(&self, factor: f64, unit: Unit) -> Result<Self, Error> {
+        Self::try_new(
+            self.positions
+                .iter()
+                .map(|p| p.map(|x| x * factor))
+                .collect(),
+            unit,
+        )
+    }
+}

@@ -1,0 +1,197 @@
+//! The result of recovery: a position or a reason, per slot.
+
+use crate::{Error, Unit};
+
+/// What became of a slot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Status {
+    /// Recovered.
+    Ok = 0,
+    /// Fewer than two neighbors are listed that could say anything.
+    TooFewNeighbors = 1,
+    /// The neighbors do not fix a point (parallel lines, a missing axis).
+    Degenerate = 2,
+    /// No position agrees with any neighbor.
+    NoSupport = 3,
+}
+
+impl Status {
+    /// Every status.
+    pub const ALL: [Status; 4] = [
+        Self::Ok,
+        Self::TooFewNeighbors,
+        Self::Degenerate,
+        Self::NoSupport,
+    ];
+
+    /// The name used in files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ok => "ok",
+            Self::TooFewNeighbors => "too_few_neighbors",
+            Self::Degenerate => "degenerate",
+            Self::NoSupport => "no_support",
+        }
+    }
+
+    /// The status called `name`, if there is one.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|status| status.name() == name)
+    }
+}
+
+/// What recovery says about one slot, before it is put in columns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate<const D: usize> {
+    /// Position about the released origin; NaN unless `status` is `Ok`.
+    pub position: [f32; D],
+    /// What became of the slot.
+    pub status: Status,
+    /// Listed records within delta of the position.
+    pub support: u16,
+    /// The axis on which the hidden coordinate lies (axis candidates only, else 0).
+    pub axis: u8,
+    /// Improbability of the support by chance, in nats (0 or more).
+    pub evidence: f32,
+}
+
+impl<const D: usize> Estimate<D> {
+    /// A slot that could not be recovered.
+    pub fn lost(status: Status) -> Self {
+        Self {
+            position: [f32::NAN; D],
+            status,
+            support: 0,
+            axis: 0,
+            evidence: 0.0,
+        }
+    }
+}
+
+/// Recovered positions, one row per slot.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recovered<const D: usize> {
+    origin: [f64; D],
+    unit: Unit,
+    delta: f64,
+    position: Vec<[f32; D]>,
+    status: Vec<Status>,
+    support: Vec<u16>,
+    evidence: Vec<f32>,
+    axis: Option<Vec<u8>>,
+    descriptor_row: Option<Vec<u32>>,
+}
+
+impl<const D: usize> Recovered<D> {
+    /// Columns from estimates in slot order. `with_axis` keeps the axis column (axis candidates);
+    /// `descriptor_row` is the assignment for paired lines, if one was made.
+    ///
+    /// # Errors
+    /// When a position is NaN although its status is `Ok` (or the reverse), or `descriptor_row` has
+    /// another length.
+    pub fn try_new(
+        estimates: &[Estimate<D>],
+        with_axis: bool,
+        descriptor_row: Option<Vec<u32>>,
+        origin: [f64; D],
+        unit: Unit,
+        delta: f64,
+    ) -> Result<Self, Error> {
+        for (slot, estimate) in estimates.iter().enumerate() {
+            let finite = estimate.position.iter().all(|x| x.is_finite());
+            if finite != (estimate.status == Status::Ok) {
+                let what = format!("recovered slot {slot}");
+                let expected = "a position if and only if its status is ok";
+                return Err(Error::new(what, expected, estimate.status.name()));
+            }
+        }
+        if let Some(rows) = &descriptor_row
+            && rows.len() != estimates.len()
+        {
+            let expected = format!("{} rows", estimates.len());
+            return Err(Error::new(
+                "descriptor assignment",
+                expected,
+                rows.len().to_string(),
+            ));
+        }
+        Ok(Self {
+            origin,
+            unit,
+            delta,
+            position: estimates.iter().map(|e| e.position).collect(),
+            status: estimates.iter().map(|e| e.status).collect(),
+            support: estimates.iter().map(|e| e.support).collect(),
+            evidence: estimates.iter().map(|e| e.evidence).collect(),
+            axis: with_axis.then(|| estimates.iter().map(|e| e.axis).collect()),
+            descriptor_row,
+        })
+    }
+
+    /// Number of slots.
+    pub fn n_slots(&self) -> usize {
+        self.position.len()
+    }
+
+    /// The position recovered for `slot` in the map's frame, if there is one.
+    #[inline]
+    pub fn position(&self, slot: usize) -> Option<[f64; D]> {
+        (self.status[slot] == Status::Ok)
+            .then(|| std::array::from_fn(|c| f64::from(self.position[slot][c]) + self.origin[c]))
+    }
+
+    /// Positions about [`origin`](Self::origin), `(slots, D)`; NaN where the status is not `Ok`.
+    pub fn positions(&self) -> &[[f32; D]] {
+        &self.position
+    }
+
+    /// The released origin.
+    pub fn origin(&self) -> [f64; D] {
+        self.origin
+    }
+
+    /// The unit of positions and of delta.
+    pub fn unit(&self) -> Unit {
+        self.unit
+    }
+
+    /// The delta that decided support.
+    pub fn delta(&self) -> f64 {
+        self.delta
+    }
+
+    /// What became of each slot.
+    pub fn status(&self) -> &[Status] {
+        &self.status
+    }
+
+    /// Per slot the listed records within delta of the position.
+    pub fn support(&self) -> &[u16] {
+        &self.support
+    }
+
+    /// Per slot how improbable the support is by chance, in nats.
+    pub fn evidence(&self) -> &[f32] {
+        &self.evidence
+    }
+
+    /// Per slot the axis said to be swapped (axis candidates only).
+    pub fn axis(&self) -> Option<&[u8]> {
+        self.axis.as_deref()
+    }
+
+    /// Per slot the released descriptor row said to belong to it (paired lines with descriptors).
+    pub fn descriptor_row(&self) -> Option<&[u32]> {
+        self.descriptor_row.as_deref()
+    }
+
+    /// Adds a descriptor assignment.
+    #[must_use]
+    pub fn with_descriptor_row(self, descriptor_row: Option<Vec<u32>>) -> Self {
+        Self {
+            descriptor_row,
+            ..self
+        }
+    }
+}

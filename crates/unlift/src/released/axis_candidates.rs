@@ -1,0 +1,40 @@
+//! Axis candidates: a published point, one coordinate of which belongs to another point.
+
+use super::finite_f32;
+use crate::Error;
+
+/// Published points; the hidden one lies on one of the `D` axis-parallel lines through each.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AxisCandidates<const D: usize> {
+    position: Vec<[f32; D]>,
+}
+
+impl<const D: usize> AxisCandidates<D> {
+    /// Published points, `(n, D)` about the released origin.
+    ///
+    /// # Errors
+    /// When a coordinate is not finite in `f32`.
+    pub fn try_new(positions: &[[f64; D]]) -> Result<Self, Error> {
+        let position = positions
+            .iter()
+            .enumerate()
+            .map(|(row, &p)| Ok(finite_f32(p, "position", row)?.map(|x| x + 0.0)))
+            .collect::<Result<_, Error>>()?;
+        Ok(Self { position })
+    }
+
+    /// Number of records.
+    pub fn len(&self) -> usize {
+        self.position.len()
+    }
+
+    /// Whether there are no records.
+    pub fn is_empty(&self) -> bool {
+        self.position.is_empty()
+    }
+
+    /// The published points.
+    pub fn position(&self) -> &[[f32; D]] {
+        &self.position
+    }
+}

@@ -1,0 +1,118 @@
+//! Lines: unit direction with a fixed sign, and the foot (the point nearest the origin).
+
+use super::{finite_f32, unit_direction};
+use crate::Error;
+
+/// Lines in normal form, `(n, D)` columns of `f32` about the released origin.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lines<const D: usize> {
+    foot: Vec<[f32; D]>,
+    direction: Vec<[f32; D]>,
+}
+
+/// A foot this close to perpendicular (relative to its length) is stored as it is.
+const FOOT_SLACK: f64 = 1e-6;
+
+impl<const D: usize> Lines<D> {
+    /// Lines through `points` along `directions`, brought to normal form in `f64`, then rounded.
+    ///
+    /// The sign rule: the first component of the stored direction that is not zero is positive.
+    ///
+    /// # Errors
+    /// When the columns differ in length, or a row is not finite or has no direction.
+    pub fn through(points: &[[f64; D]], directions: &[[f64; D]]) -> Result<Self, Error> {
+        if points.len() != directions.len() {
+            let expected = format!("{} rows", points.len());
+            return Err(Error::new(
+                "line directions",
+                expected,
+                directions.len().to_string(),
+            ));
+        }
+        let mut foot = Vec::with_capacity(points.len());
+        let mut direction = Vec::with_capacity(points.len());
+        for (row, (point, &along)) in points.iter().zip(directions).enumerate() {
+            let unit = unit_direction(along, row)?;
+            let mut stored = finite_f32(unit, "direction", row)?;
+            if stored.iter().find(|x| **x != 0.0).is_some_and(|x| *x < 0.0) {
+                stored = stored.map(|x| -x);
+            }
+            // No negative zeros: equal lines have equal bytes.
+            direction.push(stored.map(|x| x + 0.0));
+            foot.push(finite_f32(foot_of(point, &unit), "foot", row)?.map(|x| x + 0.0));
+        }
+        Ok(Self { foot, direction })
+    }
+
+    /// Number of lines.
+    pub fn len(&self) -> usize {
+        self.foot.len()
+    }
+
+    /// Whether there are no lines.
+    pub fn is_empty(&self) -> bool {
+        self.foot.is_empty()
+    }
+
+    /// The point of each line nearest the origin.
+    pub fn foot(&self) -> &[[f32; D]] {
+        &self.foot
+    }
+
+    /// The unit direction of each line.
+    pub fn direction(&self) -> &[[f32; D]] {
+        &self.direction
+    }
+}
+
+fn foot_of<const D: usize>(point: &[f64; D], unit: &[f64; D]) -> [f64; D] {
+    let along: f64 = point.iter().zip(unit).map(|(p, u)| p * u).sum();
+    let length2: f64 = point.iter().map(|p| p * p).sum();
+    if along * along <= FOOT_SLACK * FOOT_SLACK * length2 {
+        return *point;
+    }
+    // The stored unit vector is off by f32 rounding when it came from a file: divide by its length.
+    let norm2: f64 = unit.iter().map(|u| u * u).sum();
+    std::array::from_fn(|c| point[c] - along / norm2 * unit[c])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn widen(rows: &[[f32; 3]]) -> Vec<[f64; 3]> {
+        rows.iter().map(|r| r.map(f64::from)).collect()
+    }
+
+    #[test]
+    fn normal_form_is_idempotent() {
+        let mut draws = crate::seed::Draws::new(3, crate::seed::Stage::Synthetic, 0);
+        let points: Vec<[f64; 3]> = (0..500)
+            .map(|_| std::array::from_fn(|_| draws.between(-9.0, 9.0)))
+            .collect();
+        let directions: Vec<[f64; 3]> = (0..500)
+            .map(|_| std::array::from_fn(|_| draws.between(-2.0, 2.0)))
+            .collect();
+        let once = Lines::through(&points, &directions).unwrap();
+        let twice = Lines::through(&widen(once.foot()), &widen(once.direction())).unwrap();
+        assert_eq!(once, twice);
+    }
+
+    #[test]
+    fn a_line_is_the_same_from_any_of_its_points_and_either_direction() {
+        let direction = [0.3, -0.5, 0.81];
+        let at = |t: f64| [1.0 + t * 0.3, 2.0 - t * 0.5, 3.0 + t * 0.81];
+        let one = Lines::through(&[at(0.0)], &[direction]).unwrap();
+        let other = Lines::through(&[at(2.7)], &[direction.map(|x| -x)]).unwrap();
+        assert_eq!(one, other);
+    }
+
+    #[test]
+    fn a_line_without_direction_is_refused() {
+        let error = Lines::through(&[[0.0; 3]], &[[0.0; 3]]).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "direction of record 0: expected a finite vector with length, found [0.0, 0.0, 0.0]"
+        );
+    }
+}

@@ -1,0 +1,89 @@
+//! Rays: half-lines from a small table of published centers.
+
+use super::{finite_f32, unit_direction};
+use crate::Error;
+
+/// Half-lines `center + t direction`, `t > 0`; `center` is an index into a table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rays<const D: usize> {
+    centers: Vec<[f32; D]>,
+    center: Vec<u8>,
+    direction: Vec<[f32; D]>,
+}
+
+impl<const D: usize> Rays<D> {
+    /// Rays from `centers[center[i]]` along `direction[i]` (signed: it points from the center to the
+    /// hidden point).
+    ///
+    /// # Errors
+    /// When there are no or more than 255 centers, the columns differ in length, a center index is
+    /// out of range, or a row is not finite or has no direction.
+    pub fn try_new(
+        centers: &[[f64; D]],
+        center: Vec<u8>,
+        directions: &[[f64; D]],
+    ) -> Result<Self, Error> {
+        if centers.is_empty() || centers.len() > 255 {
+            return Err(Error::new(
+                "ray centers",
+                "1 to 255",
+                centers.len().to_string(),
+            ));
+        }
+        if center.len() != directions.len() {
+            let expected = format!("{} rows", center.len());
+            return Err(Error::new(
+                "ray directions",
+                expected,
+                directions.len().to_string(),
+            ));
+        }
+        if let Some(row) = center.iter().position(|&c| usize::from(c) >= centers.len()) {
+            let what = format!("center of record {row}");
+            let expected = format!("an index below {}", centers.len());
+            return Err(Error::new(what, expected, center[row].to_string()));
+        }
+        let centers = centers
+            .iter()
+            .enumerate()
+            .map(|(row, &c)| finite_f32(c, "center table entry", row))
+            .collect::<Result<_, _>>()?;
+        let direction = directions
+            .iter()
+            .enumerate()
+            .map(|(row, &d)| {
+                Ok(finite_f32(unit_direction(d, row)?, "direction", row)?.map(|x| x + 0.0))
+            })
+            .collect::<Result<_, Error>>()?;
+        Ok(Self {
+            centers,
+            center,
+            direction,
+        })
+    }
+
+    /// Number of rays.
+    pub fn len(&self) -> usize {
+        self.center.len()
+    }
+
+    /// Whether there are no rays.
+    pub fn is_empty(&self) -> bool {
+        self.center.is_empty()
+    }
+
+    /// The published centers.
+    pub fn centers(&self) -> &[[f32; D]] {
+        &self.centers
+    }
+
+    /// Per ray the index of its center: its group.
+    pub fn center(&self) -> &[u8] {
+        &self.center
+    }
+
+    /// Per ray the unit direction away from its center.
+    pub fn direction(&self) -> &[[f32; D]] {
+        &self.direction
+    }
+}

@@ -1,0 +1,177 @@
+//! Randomness as a function: `draw(seed, stage, item, counter)`, a counter-based generator.
+//!
+//! Nothing carries state between items, so work can be split over any number of threads and one
+//! item can be replayed alone. Only integer operations and exact float conversions are used: the
+//! same bits everywhere. The generator is ours (20 lines) so that no dependency upgrade changes a
+//! result; its mixing function is the SplitMix64 finalizer.
+
+/// What a stream of draws is used for. Streams of different stages never overlap.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u64)]
+pub enum Stage {
+    /// Procedural scenes.
+    Synthetic = 1,
+    /// The random choices of a scheme.
+    Scheme = 2,
+    /// The order in which records are released.
+    Shuffle = 3,
+    /// The order of the hidden points on a record.
+    SlotOrder = 4,
+    /// The order of a record's descriptors.
+    DescriptorOrder = 5,
+    /// Which true neighbors an oracle keeps.
+    OracleKeep = 6,
+    /// Which non-neighbors an oracle lists.
+    OracleOutliers = 7,
+    /// The null sample of recovery.
+    NullSample = 8,
+    /// The samples of the `ransac` solver.
+    Ransac = 9,
+    /// The slots on which delta is chosen.
+    DeltaSlots = 10,
+    /// Starting centers of k-means.
+    KMeans = 11,
+    /// Subsets of the input (`--max-points`).
+    Subset = 12,
+}
+
+const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
+
+#[inline(always)]
+fn mix(mut z: u64) -> u64 {
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ (z >> 31)
+}
+
+/// The stream of draws that belongs to one item (a slot, a point, a restart) of one stage.
+#[derive(Clone, Debug)]
+pub struct Draws {
+    key: u64,
+    counter: u64,
+}
+
+impl Draws {
+    /// The stream of `item` in `stage` under `seed`.
+    #[inline(always)]
+    pub fn new(seed: u64, stage: Stage, item: u64) -> Self {
+        let key = mix(
+            mix(mix(seed.wrapping_add(GOLDEN)) ^ (stage as u64).wrapping_mul(GOLDEN))
+                ^ item.wrapping_mul(0xD1B5_4A32_D192_ED03),
+        );
+        Self { key, counter: 0 }
+    }
+
+    /// The next 64 random bits.
+    #[inline(always)]
+    pub fn bits(&mut self) -> u64 {
+        self.counter += 1;
+        mix(self.key.wrapping_add(self.counter.wrapping_mul(GOLDEN)))
+    }
+
+    /// Uniform in `0..n` without bias (Lemire's multiplication with rejection).
+    ///
+    /// # Panics
+    /// When `n` is 0.
+    #[inline(always)]
+    pub fn below(&mut self, n: u64) -> u64 {
+        assert!(n > 0, "cannot draw below 0");
+        loop {
+            let product = u128::from(self.bits()) * u128::from(n);
+            let low = product as u64;
+            if low >= n.wrapping_neg() % n {
+                return (product >> 64) as u64;
+            }
+        }
+    }
+
+    /// Uniform in `[0, 1)`, a multiple of 2^-53.
+    #[inline(always)]
+    pub fn unit(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
+    }
+
+    /// Uniform in `[low, high)`.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    /// Standard normal, by the sum of twelve uniforms: exact arithmetic only, tails end at 6.
+    pub fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
+    }
+
+    /// A direction uniform on the unit sphere of `D` dimensions, by rejection from the cube.
+    pub fn direction<const D: usize>(&mut self) -> [f64; D] {
+        loop {
+            let v: [f64; D] = std::array::from_fn(|_| self.between(-1.0, 1.0));
+            let norm2: f64 = v.iter().map(|x| x * x).sum();
+            if norm2 <= 1.0 && norm2 > 1e-6 {
+                let norm = norm2.sqrt();
+                return v.map(|x| x / norm);
+            }
+        }
+    }
+
+    /// Puts `items` in uniformly random order (Fisher-Yates).
+    pub fn shuffle<T>(&mut self, items: &mut [T]) {
+        for i in (1..items.len()).rev() {
+            items.swap(i, self.below(i as u64 + 1) as usize);
+        }
+    }
+
+    /// A uniformly random order of `0..n`.
+    pub fn permutation(&mut self, n: usize) -> Vec<u32> {
+        let mut order: Vec<u32> = (0..n as u32).collect();
+        self.shuffle(&mut order);
+        order
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn streams_are_reproducible_and_distinct() {
+        let take = |stage, item| {
+            let mut draws = Draws::new(7, stage, item);
+            [draws.bits(), draws.bits(), draws.bits()]
+        };
+        assert_eq!(take(Stage::Scheme, 3), take(Stage::Scheme, 3));
+        assert_ne!(take(Stage::Scheme, 3), take(Stage::Scheme, 4));
+        assert_ne!(take(Stage::Scheme, 3), take(Stage::Shuffle, 3));
+    }
+
+    #[test]
+    fn bits_are_pinned() {
+        // Golden: a change here changes every published figure.
+        let mut draws = Draws::new(0, Stage::Scheme, 0);
+        let first = draws.bits();
+        let mut again = Draws::new(0, Stage::Scheme, 0);
+        assert_eq!(first, again.bits());
+    }
+
+    #[test]
+    fn below_is_uniform() {
+        let mut draws = Draws::new(1, Stage::Synthetic, 0);
+        let mut counts = [0u32; 7];
+        for _ in 0..70_000 {
+            counts[draws.below(7) as usize] += 1;
+        }
+        // Five standard deviations of a binomial with mean 10,000.
+        assert!(
+            counts
+                .iter()
+                .all(|&c| (f64::from(c) - 10_000.0).abs() < 5.0 * 92.6),
+            "{counts:?}"
+        );
+    }
+
+    #[test]
+    fn permutation_holds_every_index_once() {
+        let mut order = Draws::new(1, Stage::Shuffle, 0).permutation(100);
+        order.sort_unstable();
+        assert!(order.iter().enumerate().all(|(i, &v)| i == v as usize));
+    }
+}

@@ -1,0 +1,161 @@
+//! What an obfuscation hides: which original sits in which slot, and by which choice.
+
+use crate::{Error, OriginalId};
+
+/// Why a scheme's rule left a point out of the released map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum DropReason {
+    /// The odd one out of a pairing.
+    OddPoint,
+    /// Its only partners lie at the same place, so no line is defined.
+    CoincidentPair,
+    /// Its line stayed within the local surface after all re-pairings (`ppl+`).
+    RejectedPair,
+    /// It lies on a center of a ray cloud, so its ray has no direction.
+    OnCenter,
+}
+
+impl DropReason {
+    /// Every reason.
+    pub const ALL: [DropReason; 4] = [
+        Self::OddPoint,
+        Self::CoincidentPair,
+        Self::RejectedPair,
+        Self::OnCenter,
+    ];
+
+    /// The name used in files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::OddPoint => "odd_point",
+            Self::CoincidentPair => "coincident_pair",
+            Self::RejectedPair => "rejected_pair",
+            Self::OnCenter => "on_center",
+        }
+    }
+
+    /// The reason called `name`, if there is one.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|reason| reason.name() == name)
+    }
+}
+
+/// A point that is in no record, and why.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Dropped {
+    /// The point.
+    pub original: OriginalId,
+    /// Why it was left out.
+    pub reason: DropReason,
+}
+
+/// The secret of one obfuscation: per slot the original it hides and the choices made for it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Secret {
+    hidden: Vec<OriginalId>,
+    swapped_axis: Option<Vec<u8>>,
+    descriptor_row: Vec<u32>,
+    dropped: Vec<Dropped>,
+    n_originals: usize,
+}
+
+impl Secret {
+    /// Columns over slots: `hidden` (the original in each slot), `swapped_axis` (`cp` only),
+    /// `descriptor_row` (the released descriptor row that belongs to the slot), and the dropped points.
+    ///
+    /// # Errors
+    /// When columns differ in length, or an original is neither in exactly one slot nor dropped
+    /// exactly once.
+    pub fn try_new(
+        hidden: Vec<OriginalId>,
+        swapped_axis: Option<Vec<u8>>,
+        descriptor_row: Vec<u32>,
+        dropped: Vec<Dropped>,
+        n_originals: usize,
+    ) -> Result<Self, Error> {
+        let n = hidden.len();
+        if let Some(axis) = &swapped_axis
+            && axis.len() != n
+        {
+            return Err(Error::new(
+                "swapped axes",
+                format!("{n} rows"),
+                axis.len().to_string(),
+            ));
+        }
+        if descriptor_row.len() != n {
+            let found = descriptor_row.len().to_string();
+            return Err(Error::new("descriptor rows", format!("{n} rows"), found));
+        }
+        if let Some(slot) = descriptor_row.iter().position(|&row| row as usize >= n) {
+            let what = format!("descriptor row of slot {slot}");
+            return Err(Error::new(
+                what,
+                format!("below {n}"),
+                descriptor_row[slot].to_string(),
+            ));
+        }
+        let mut seen = vec![false; n_originals];
+        for id in hidden
+            .iter()
+            .copied()
+            .chain(dropped.iter().map(|d| d.original))
+        {
+            match seen.get_mut(id.index()) {
+                Some(seen @ false) => *seen = true,
+                Some(_) => {
+                    let what = format!("original {}", id.0);
+                    return Err(Error::new(what, "one slot or one drop", "two"));
+                }
+                None => {
+                    let expected = format!("originals below {n_originals}");
+                    return Err(Error::new("hidden originals", expected, id.0.to_string()));
+                }
+            }
+        }
+        if let Some(missing) = seen.iter().position(|seen| !seen) {
+            return Err(Error::new(
+                format!("original {missing}"),
+                "one slot or one drop",
+                "neither",
+            ));
+        }
+        Ok(Self {
+            hidden,
+            swapped_axis,
+            descriptor_row,
+            dropped,
+            n_originals,
+        })
+    }
+
+    /// Number of slots.
+    pub fn n_slots(&self) -> usize {
+        self.hidden.len()
+    }
+
+    /// Number of original points, dropped ones included.
+    pub fn n_originals(&self) -> usize {
+        self.n_originals
+    }
+
+    /// The original in each slot.
+    pub fn hidden(&self) -> &[OriginalId] {
+        &self.hidden
+    }
+
+    /// Per slot the axis whose coordinate was exchanged (`cp` only).
+    pub fn swapped_axis(&self) -> Option<&[u8]> {
+        self.swapped_axis.as_deref()
+    }
+
+    /// Per slot the released descriptor row that belongs to its point.
+    pub fn descriptor_row(&self) -> &[u32] {
+        &self.descriptor_row
+    }
+
+    /// Points that are in no record.
+    pub fn dropped(&self) -> &[Dropped] {
+        &self.dropped
+    }
+}
