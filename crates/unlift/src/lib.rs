@@ -8,8 +8,10 @@
 
 pub mod descriptors;
 mod error;
+pub mod geometry;
 mod ids;
 pub mod neighbors;
+pub mod obfuscate;
 pub mod points;
 pub mod recover;
 pub mod released;

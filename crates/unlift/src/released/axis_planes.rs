@@ -43,6 +43,14 @@ impl<const D: usize> AxisPlanes<D> {
         Ok(Self { axis, offset })
     }
 
+    /// The rows `order[0], order[1], ...`.
+    pub(crate) fn select(&self, order: &[u32]) -> Self {
+        Self {
+            axis: super::rows(&self.axis, order),
+            offset: super::rows(&self.offset, order),
+        }
+    }
+
     /// Number of planes.
     pub fn len(&self) -> usize {
         self.axis.len()

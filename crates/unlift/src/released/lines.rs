@@ -44,6 +44,14 @@ impl<const D: usize> Lines<D> {
         Ok(Self { foot, direction })
     }
 
+    /// The rows `order[0], order[1], ...`.
+    pub(crate) fn select(&self, order: &[u32]) -> Self {
+        Self {
+            foot: super::rows(&self.foot, order),
+            direction: super::rows(&self.direction, order),
+        }
+    }
+
     /// Number of lines.
     pub fn len(&self) -> usize {
         self.foot.len()

@@ -44,6 +44,16 @@ impl<const D: usize> Obfuscation<D> {
         self.len() == 0
     }
 
+    /// The records `order[0], order[1], ...`.
+    pub(crate) fn select(&self, order: &[u32]) -> Self {
+        match self {
+            Self::Lines(lines) => Self::Lines(lines.select(order)),
+            Self::Rays(rays) => Self::Rays(rays.select(order)),
+            Self::AxisPlanes(planes) => Self::AxisPlanes(planes.select(order)),
+            Self::AxisCandidates(candidates) => Self::AxisCandidates(candidates.select(order)),
+        }
+    }
+
     /// The family's name in files.
     pub fn family(&self) -> &'static str {
         match self {
@@ -154,6 +164,11 @@ impl<const D: usize> Released<D> {
     pub fn descriptors(&self) -> Option<&Descriptors> {
         self.descriptors.as_ref()
     }
+}
+
+/// The rows `order[0], order[1], ...` of one column.
+fn rows<T: Copy>(column: &[T], order: &[u32]) -> Vec<T> {
+    order.iter().map(|&row| column[row as usize]).collect()
 }
 
 /// Directions closer to unit length than this (in squared length) are stored as they are, so that

@@ -62,6 +62,15 @@ impl<const D: usize> Rays<D> {
         })
     }
 
+    /// The rows `order[0], order[1], ...`.
+    pub(crate) fn select(&self, order: &[u32]) -> Self {
+        Self {
+            centers: self.centers.clone(),
+            center: super::rows(&self.center, order),
+            direction: super::rows(&self.direction, order),
+        }
+    }
+
     /// Number of rays.
     pub fn len(&self) -> usize {
         self.center.len()
