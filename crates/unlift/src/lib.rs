@@ -16,6 +16,7 @@ pub mod points;
 pub mod recover;
 pub mod released;
 pub mod seed;
+mod simd;
 pub mod truth;
 
 pub use descriptors::Descriptors;

@@ -35,9 +35,7 @@ impl<const D: usize> Bounds<D> {
 
     /// The longest side.
     pub fn longest_side(&self) -> f64 {
-        (0..D)
-            .map(|c| self.high[c] - self.low[c])
-            .fold(0.0, f64::max)
+        (0..D).map(|c| self.high[c] - self.low[c]).fold(0.0, f64::max)
     }
 
     /// The range of `t` for which `point + t direction` lies in the box; `None` when the line misses it.
@@ -88,22 +86,15 @@ mod tests {
 
     #[test]
     fn the_origin_follows_a_georeferenced_map() {
-        let points: Vec<[f64; 3]> = (0..100)
-            .map(|i| [1e6 + f64::from(i) * 0.1, -5e6, 300.0 + f64::from(i % 7)])
-            .collect();
+        let points: Vec<[f64; 3]> =
+            (0..100).map(|i| [1e6 + f64::from(i) * 0.1, -5e6, 300.0 + f64::from(i % 7)]).collect();
         let origin = rounded_origin(&points);
-        assert!(
-            (origin[0] - 1e6).abs() <= 10.0 && (origin[1] + 5e6).abs() <= 1.0,
-            "{origin:?}"
-        );
+        assert!((origin[0] - 1e6).abs() <= 10.0 && (origin[1] + 5e6).abs() <= 1.0, "{origin:?}");
     }
 
     #[test]
     fn a_line_is_clipped_to_the_box() {
-        let bounds = Bounds {
-            low: [0.0; 2],
-            high: [2.0, 1.0],
-        };
+        let bounds = Bounds { low: [0.0; 2], high: [2.0, 1.0] };
         assert_eq!(bounds.clip(&[-1.0, 0.5], &[1.0, 0.0]), Some((1.0, 3.0)));
         assert_eq!(bounds.clip(&[-1.0, 1.5], &[1.0, 0.0]), None);
     }

@@ -54,10 +54,7 @@ fn spread_start<const D: usize>(
     let mut centers = vec![points[draws.below(points.len() as u64) as usize]];
     while centers.len() < k {
         let weight = |p: &[f64; D]| {
-            centers
-                .iter()
-                .map(|c| squared_distance(p, c))
-                .fold(f64::INFINITY, f64::min)
+            centers.iter().map(|c| squared_distance(p, c)).fold(f64::INFINITY, f64::min)
         };
         let total: f64 = points.iter().map(weight).sum();
         let mut left = draws.unit() * total;

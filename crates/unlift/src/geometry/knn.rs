@@ -46,11 +46,7 @@ impl<'a, const D: usize> Knn<'a, D> {
         let Some(count) = NonZero::new(ask) else {
             return;
         };
-        let results = self
-            .tree
-            .query(query)
-            .nearest_n::<SquaredEuclidean<f64>>(count)
-            .execute();
+        let results = self.tree.query(query).nearest_n::<SquaredEuclidean<f64>>(count).execute();
         // The last distance decides whether a tie may go on beyond what was returned.
         let complete = results.len() < ask;
         let push = |item: usize, found: &mut Vec<(f64, u32)>| {
@@ -114,9 +110,8 @@ mod tests {
     fn equals_brute_force_with_many_ties() {
         let mut draws = Draws::new(5, Stage::Synthetic, 0);
         // A coarse lattice: most distances tie, many points coincide.
-        let points: Vec<[f64; 3]> = (0..800)
-            .map(|_| std::array::from_fn(|_| draws.below(6) as f64))
-            .collect();
+        let points: Vec<[f64; 3]> =
+            (0..800).map(|_| std::array::from_fn(|_| draws.below(6) as f64)).collect();
         let knn = Knn::new(&points).unwrap();
         let mut found = Vec::new();
         for row in 0..points.len() {

@@ -39,10 +39,7 @@ impl TrueNeighbors {
         let n_slots = secret.n_slots();
         let n_records = n_slots / slots_per_record;
         if k == 0 || n_records < k + 1 {
-            let expected = format!(
-                "between 1 and {} (other records)",
-                n_records.saturating_sub(1)
-            );
+            let expected = format!("between 1 and {} (other records)", n_records.saturating_sub(1));
             return Err(Error::new("k", expected, k.to_string()));
         }
         let mut record_of = vec![None; secret.n_originals()];
@@ -79,12 +76,7 @@ impl TrueNeighbors {
                 row.copy_from_slice(chosen);
             },
         );
-        Ok(Self {
-            k,
-            n_records,
-            slots_per_record,
-            records,
-        })
+        Ok(Self { k, n_records, slots_per_record, records })
     }
 
     /// Neighborhoods of which `round(inlier_ratio * K)` entries are true neighbors, uniformly
@@ -95,11 +87,7 @@ impl TrueNeighbors {
     /// When the ratio is not in `[0, 1]`, or there are too few non-neighbors.
     pub fn at_inlier_ratio(&self, inlier_ratio: f64, seed: u64) -> Result<Neighborhoods, Error> {
         if !(0.0..=1.0).contains(&inlier_ratio) {
-            return Err(Error::new(
-                "inlier ratio",
-                "0 to 1",
-                inlier_ratio.to_string(),
-            ));
+            return Err(Error::new("inlier ratio", "0 to 1", inlier_ratio.to_string()));
         }
         let keep = (inlier_ratio * self.k as f64).round() as usize;
         let outliers = self.k - keep;
@@ -110,41 +98,30 @@ impl TrueNeighbors {
             return Err(Error::new(what, expected, strangers.to_string()));
         }
         let mut records = vec![RecordId(0); self.records.len()];
-        records
-            .par_chunks_mut(self.k)
-            .enumerate()
-            .for_each_init(Vec::new, |order, (slot, row)| {
-                let near = &self.records[slot * self.k..(slot + 1) * self.k];
-                let own = RecordId::from_index(slot / self.slots_per_record);
-                order.clear();
-                order.extend_from_slice(near);
-                Draws::new(seed, Stage::OracleKeep, slot as u64).shuffle(order);
-                row[..keep].copy_from_slice(&order[..keep]);
-                let mut draws = Draws::new(seed, Stage::OracleOutliers, slot as u64);
-                let mut at = keep;
-                while at < self.k {
-                    let stranger = RecordId(draws.below(self.n_records as u64) as u32);
-                    if stranger != own
-                        && !near.contains(&stranger)
-                        && !row[keep..at].contains(&stranger)
-                    {
-                        row[at] = stranger;
-                        at += 1;
-                    }
+        records.par_chunks_mut(self.k).enumerate().for_each_init(Vec::new, |order, (slot, row)| {
+            let near = &self.records[slot * self.k..(slot + 1) * self.k];
+            let own = RecordId::from_index(slot / self.slots_per_record);
+            order.clear();
+            order.extend_from_slice(near);
+            Draws::new(seed, Stage::OracleKeep, slot as u64).shuffle(order);
+            row[..keep].copy_from_slice(&order[..keep]);
+            let mut draws = Draws::new(seed, Stage::OracleOutliers, slot as u64);
+            let mut at = keep;
+            while at < self.k {
+                let stranger = RecordId(draws.below(self.n_records as u64) as u32);
+                if stranger != own
+                    && !near.contains(&stranger)
+                    && !row[keep..at].contains(&stranger)
+                {
+                    row[at] = stranger;
+                    at += 1;
                 }
-                row.sort_unstable();
-            });
+            }
+            row.sort_unstable();
+        });
         let n_slots = self.n_records * self.slots_per_record;
-        let offsets = (0..=n_slots as u64)
-            .map(|slot| slot * self.k as u64)
-            .collect();
-        Neighborhoods::try_new(
-            offsets,
-            records,
-            None,
-            self.n_records,
-            self.slots_per_record,
-        )
+        let offsets = (0..=n_slots as u64).map(|slot| slot * self.k as u64).collect();
+        Neighborhoods::try_new(offsets, records, None, self.n_records, self.slots_per_record)
     }
 
     /// The share of listed entries that are true neighbors, over all slots with a list.
@@ -154,17 +131,10 @@ impl TrueNeighbors {
             .map(|slot| {
                 let near = &self.records[slot * self.k..(slot + 1) * self.k];
                 let listed = lists.of(slot);
-                (
-                    listed.iter().filter(|record| near.contains(record)).count(),
-                    listed.len(),
-                )
+                (listed.iter().filter(|record| near.contains(record)).count(), listed.len())
             })
             .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
-        if listed == 0 {
-            0.0
-        } else {
-            hits as f64 / listed as f64
-        }
+        if listed == 0 { 0.0 } else { hits as f64 / listed as f64 }
     }
 }
 
@@ -191,19 +161,11 @@ pub fn from_points(
     let n = secret.n_originals();
     if offsets.len() != n + 1 {
         let found = offsets.len().saturating_sub(1).to_string();
-        return Err(Error::new(
-            "neighbors by point",
-            format!("{n} rows, one per point"),
-            found,
-        ));
+        return Err(Error::new("neighbors by point", format!("{n} rows, one per point"), found));
     }
     if let Some(at) = neighbors.iter().position(|&id| id as usize >= n) {
         let what = format!("neighbor entry {at}");
-        return Err(Error::new(
-            what,
-            format!("points below {n}"),
-            neighbors[at].to_string(),
-        ));
+        return Err(Error::new(what, format!("points below {n}"), neighbors[at].to_string()));
     }
     let mut record_of = vec![None; n];
     for (slot, original) in secret.hidden().iter().enumerate() {

@@ -36,13 +36,10 @@ pub const SCHEMES: &[Entry] = &[
 /// # Errors
 /// When there is none; the message lists all.
 pub fn scheme(name: &str) -> Result<&'static Entry, Error> {
-    SCHEMES
-        .iter()
-        .find(|entry| entry.name == name)
-        .ok_or_else(|| {
-            let names: Vec<&str> = SCHEMES.iter().map(|entry| entry.name).collect();
-            Error::new("scheme", format!("one of {}", names.join(", ")), name)
-        })
+    SCHEMES.iter().find(|entry| entry.name == name).ok_or_else(|| {
+        let names: Vec<&str> = SCHEMES.iter().map(|entry| entry.name).collect();
+        Error::new("scheme", format!("one of {}", names.join(", ")), name)
+    })
 }
 
 /// A row of the registry: a scheme and what is known about it.
@@ -65,9 +62,7 @@ pub struct Entry {
 
 impl std::fmt::Debug for Entry {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Entry")
-            .field("name", &self.name)
-            .finish_non_exhaustive()
+        f.debug_struct("Entry").field("name", &self.name).finish_non_exhaustive()
     }
 }
 
@@ -85,11 +80,7 @@ impl SchemeOptions {
     /// Names the first field out of range.
     pub fn check(&self) -> Result<(), Error> {
         if !(self.voxel.is_finite() && self.voxel > 0.0) {
-            return Err(Error::new(
-                "voxel",
-                "a positive length",
-                self.voxel.to_string(),
-            ));
+            return Err(Error::new("voxel", "a positive length", self.voxel.to_string()));
         }
         Ok(())
     }
@@ -143,11 +134,7 @@ pub fn obfuscate<const D: usize>(
         && descriptors.len() != points.len()
     {
         let expected = format!("{} rows, one per point", points.len());
-        return Err(Error::new(
-            "descriptors",
-            expected,
-            descriptors.len().to_string(),
-        ));
+        return Err(Error::new("descriptors", expected, descriptors.len().to_string()));
     }
     let origin = rounded_origin(points.positions());
     let local: Vec<[f64; D]> = points.positions().iter().map(|p| sub(p, &origin)).collect();
@@ -157,10 +144,7 @@ pub fn obfuscate<const D: usize>(
     let n_records = lifted.obfuscation.len();
     let order = Draws::new(seed, Stage::Shuffle, 0).permutation(n_records);
     let mut hidden = Vec::with_capacity(n_records * slots);
-    let mut swapped_axis = lifted
-        .swapped_axis
-        .as_ref()
-        .map(|_| Vec::with_capacity(n_records));
+    let mut swapped_axis = lifted.swapped_axis.as_ref().map(|_| Vec::with_capacity(n_records));
     let mut descriptor_row = Vec::with_capacity(n_records * slots);
     for (record, &from) in order.iter().enumerate() {
         let mut slot_order: Vec<usize> = (0..slots).collect();
@@ -190,12 +174,7 @@ pub fn obfuscate<const D: usize>(
         points.unit(),
         released_descriptors,
     )?;
-    let secret = Secret::try_new(
-        hidden,
-        swapped_axis,
-        descriptor_row,
-        lifted.dropped,
-        points.len(),
-    )?;
+    let secret =
+        Secret::try_new(hidden, swapped_axis, descriptor_row, lifted.dropped, points.len())?;
     Ok((released, secret))
 }

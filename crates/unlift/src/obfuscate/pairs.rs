@@ -12,10 +12,7 @@ pub(super) fn random_pairs(n: usize, draws: &mut Draws) -> (Vec<[OriginalId; 2]>
     let pairs = pairs.iter().map(|pair| pair.map(OriginalId)).collect();
     let dropped = odd
         .iter()
-        .map(|&id| Dropped {
-            original: OriginalId(id),
-            reason: DropReason::OddPoint,
-        })
+        .map(|&id| Dropped { original: OriginalId(id), reason: DropReason::OddPoint })
         .collect();
     (pairs, dropped)
 }
@@ -33,11 +30,7 @@ pub(super) fn pair_again(
     draws.shuffle(&mut pool);
     let (mut accepted, mut still_refused) = (Vec::new(), Vec::new());
     for pair in pool.as_chunks::<2>().0 {
-        if accept(pair) {
-            accepted.push(*pair)
-        } else {
-            still_refused.push(*pair)
-        }
+        if accept(pair) { accepted.push(*pair) } else { still_refused.push(*pair) }
     }
     for (at, pair) in accepted.iter().chain(&still_refused).enumerate() {
         pairs[start + at] = *pair;
@@ -59,9 +52,5 @@ pub(super) fn refused_last(
 
 /// Both points of each pair, dropped for `reason`.
 pub(super) fn drop_pairs(pairs: &[[OriginalId; 2]], reason: DropReason) -> Vec<Dropped> {
-    pairs
-        .as_flattened()
-        .iter()
-        .map(|&original| Dropped { original, reason })
-        .collect()
+    pairs.as_flattened().iter().map(|&original| Dropped { original, reason }).collect()
 }

@@ -24,11 +24,8 @@ impl Scheme<3> for Plane {
     fn lift(&self, points: &[[f64; 3]], _: &SchemeOptions, seed: u64) -> Result<Lifted<3>, Error> {
         let mut axis: Vec<u8> = (0..points.len()).map(|i| (i % 3) as u8).collect();
         Draws::new(seed, Stage::Scheme, 0).shuffle(&mut axis);
-        let offset: Vec<f64> = points
-            .iter()
-            .zip(&axis)
-            .map(|(point, &a)| point[usize::from(a)])
-            .collect();
+        let offset: Vec<f64> =
+            points.iter().zip(&axis).map(|(point, &a)| point[usize::from(a)]).collect();
         Ok(Lifted {
             obfuscation: Obfuscation::AxisPlanes(AxisPlanes::try_new(axis, &offset)?),
             slots_per_record: 1,

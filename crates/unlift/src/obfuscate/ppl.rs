@@ -71,10 +71,8 @@ pub(super) fn lines_through(
     dropped: Vec<Dropped>,
 ) -> Result<Lifted<3>, Error> {
     let through: Vec<[f64; 3]> = pairs.iter().map(|[a, _]| points[a.index()]).collect();
-    let direction: Vec<[f64; 3]> = pairs
-        .iter()
-        .map(|[a, b]| sub(&points[b.index()], &points[a.index()]))
-        .collect();
+    let direction: Vec<[f64; 3]> =
+        pairs.iter().map(|[a, b]| sub(&points[b.index()], &points[a.index()])).collect();
     Ok(Lifted {
         obfuscation: Obfuscation::Lines(Lines::through(&through, &direction)?),
         slots_per_record: 2,

@@ -86,10 +86,7 @@ fn normals(points: &[[f64; 3]]) -> Result<Vec<Option<[f64; 3]>>, Error> {
         .into_par_iter()
         .map_init(Vec::new, |found, row| {
             knn.nearest(row, k, found);
-            local_normal(
-                &points[row],
-                found.iter().map(|&(_, at)| points[at as usize]),
-            )
+            local_normal(&points[row], found.iter().map(|&(_, at)| points[at as usize]))
         })
         .collect())
 }

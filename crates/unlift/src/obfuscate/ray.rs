@@ -41,18 +41,11 @@ pub(super) fn from_centers(
     choose: impl Fn(usize, &[f64; 3]) -> usize,
 ) -> Result<Lifted<3>, Error> {
     if points.len() < 2 {
-        return Err(Error::new(
-            "points",
-            "at least 2 for two centers",
-            points.len().to_string(),
-        ));
+        return Err(Error::new("points", "at least 2 for two centers", points.len().to_string()));
     }
     let centers = kmeans(points, 2, RESTARTS, seed);
     // What is stored is the center in f32; the ray starts there.
-    let centers: Vec<[f64; 3]> = centers
-        .iter()
-        .map(|c| c.map(|x| f64::from(x as f32)))
-        .collect();
+    let centers: Vec<[f64; 3]> = centers.iter().map(|c| c.map(|x| f64::from(x as f32))).collect();
     let (mut hidden, mut dropped) = (Vec::new(), Vec::new());
     let (mut center, mut direction) = (Vec::new(), Vec::new());
     for (row, point) in points.iter().enumerate() {
@@ -61,10 +54,7 @@ pub(super) fn from_centers(
         let along = sub(point, &centers[chosen]);
         let length2 = dot(&along, &along);
         if length2 <= 1e-24 * dot(point, point) {
-            dropped.push(Dropped {
-                original,
-                reason: DropReason::OnCenter,
-            });
+            dropped.push(Dropped { original, reason: DropReason::OnCenter });
             continue;
         }
         hidden.push(original);

@@ -25,9 +25,7 @@ impl<const D: usize> AxisCandidates<D> {
 
     /// The rows `order[0], order[1], ...`.
     pub(crate) fn select(&self, order: &[u32]) -> Self {
-        Self {
-            position: super::rows(&self.position, order),
-        }
+        Self { position: super::rows(&self.position, order) }
     }
 
     /// Number of records.
