@@ -1,1 +1,5 @@
 //! unlift: io.
+
+mod error;
+
+pub use error::{Error, Place};
