@@ -26,6 +26,8 @@ pub(crate) struct Bytes {
     path: PathBuf,
     reader: BufReader<File>,
     part: Part,
+    /// Where the value that was read last begins.
+    value_at: u64,
     at: u64,
     len: u64,
 }
@@ -50,6 +52,7 @@ impl Bytes {
             path: path.to_owned(),
             reader,
             part: Part::Header,
+            value_at: at,
             at,
             len,
         }
@@ -65,8 +68,13 @@ impl Bytes {
         self.len.saturating_sub(self.at)
     }
 
-    /// An error at this byte.
+    /// An error in the value that was read last.
     pub fn error(&self, expected: impl Into<String>, found: impl Into<String>) -> Error {
+        self.error_at(self.value_at, expected, found)
+    }
+
+    /// An error in what follows.
+    pub fn error_ahead(&self, expected: impl Into<String>, found: impl Into<String>) -> Error {
         self.error_at(self.at, expected, found)
     }
 
@@ -89,12 +97,14 @@ impl Bytes {
             1 => "1 byte before the end of the file".to_owned(),
             n => format!("{n} bytes before the end of the file"),
         };
-        Err(self.error(format!("{bytes} bytes of {what}"), found))
+        let unit = if bytes == 1 { "byte" } else { "bytes" };
+        Err(self.error_ahead(format!("{bytes} {unit} of {what}"), found))
     }
 
     /// Fills `buffer` with the next bytes, which are the `what` of this part.
     pub fn fill(&mut self, buffer: &mut [u8], what: &str) -> Result<(), Error> {
         self.check(buffer.len() as u64, what)?;
+        self.value_at = self.at;
         self.reader
             .read_exact(buffer)
             .map_err(|e| Error::read(&self.path, e))?;
@@ -109,6 +119,7 @@ impl Bytes {
         self.reader
             .seek_relative(offset)
             .map_err(|e| Error::read(&self.path, e))?;
+        self.value_at = self.at;
         self.at += bytes;
         Ok(())
     }
@@ -142,18 +153,25 @@ impl Bytes {
     /// The next `N` little-endian doubles.
     pub fn doubles<const N: usize>(&mut self, what: &str) -> Result<[f64; N], Error> {
         self.check(8 * N as u64, what)?;
+        let start = self.at;
         let mut values = [0.0; N];
         for value in &mut values {
             *value = f64::from_le_bytes(self.array(what)?);
         }
+        self.value_at = start;
         Ok(values)
     }
 
     /// Bytes up to the next zero byte, which is not part of them.
     pub fn zero_terminated(&mut self, what: &str) -> Result<Vec<u8>, Error> {
+        let start = self.at;
         let mut bytes = Vec::new();
         loop {
-            match self.u8(&format!("{what} with its closing zero"))? {
+            if self.remaining() == 0 {
+                let expected = format!("a zero byte at the end of the {what}");
+                return Err(self.error_at(start, expected, "end of file"));
+            }
+            match self.u8(what)? {
                 0 => return Ok(bytes),
                 byte => bytes.push(byte),
             }
@@ -165,26 +183,34 @@ impl Bytes {
     /// # Errors
     /// When the rest of the file cannot hold that many: so nothing is allocated for a false count.
     pub fn count(&mut self, what: &str, bytes_each: u64) -> Result<u64, Error> {
-        let at = self.at;
-        let count = self.u64(&format!("the number of {what}"))?;
-        self.check_count(at, count, what, bytes_each)
+        if self.remaining() < 8 {
+            self.check(8, &format!("the number of {what}"))?;
+        }
+        let count = self.u64(what)?;
+        self.check_count(count, what, bytes_each)
     }
 
     /// The same for a count stored as `u32`.
     pub fn count_u32(&mut self, what: &str, bytes_each: u64) -> Result<u64, Error> {
-        let at = self.at;
-        let count = self.u32(&format!("the number of {what}"))?;
-        self.check_count(at, u64::from(count), what, bytes_each)
+        if self.remaining() < 4 {
+            self.check(4, &format!("the number of {what}"))?;
+        }
+        let count = self.u32(what)?;
+        self.check_count(u64::from(count), what, bytes_each)
     }
 
-    fn check_count(&self, at: u64, count: u64, what: &str, each: u64) -> Result<u64, Error> {
-        let most = self.remaining() / each;
-        if count > most {
-            let left = self.remaining();
-            let expected = format!("at most {most} {what} ({left} bytes are left)");
-            return Err(self.error_at(at, expected, count.to_string()));
+    fn check_count(&self, count: u64, what: &str, bytes_each: u64) -> Result<u64, Error> {
+        let left = self.remaining();
+        let most = left / bytes_each;
+        if count <= most {
+            return Ok(count);
         }
-        Ok(count)
+        let is_text = |b: &u8| b.is_ascii_graphic() || b.is_ascii_whitespace();
+        if self.value_at == 0 && count.to_le_bytes().iter().all(is_text) {
+            return Err(self.error(format!("binary data (the number of {what})"), "text"));
+        }
+        let expected = format!("at most {most} for the number of {what} ({left} bytes are left)");
+        Err(self.error(expected, count.to_string()))
     }
 
     /// # Errors
@@ -193,8 +219,8 @@ impl Bytes {
         self.part = Part::End;
         match self.remaining() {
             0 => Ok(()),
-            1 => Err(self.error("end of file", "1 more byte")),
-            n => Err(self.error("end of file", format!("{n} more bytes"))),
+            1 => Err(self.error_ahead("end of file", "1 more byte")),
+            n => Err(self.error_ahead("end of file", format!("{n} more bytes"))),
         }
     }
 }

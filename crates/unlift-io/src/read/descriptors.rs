@@ -59,7 +59,7 @@ fn binary(path: &Path, input: &Input) -> Result<Descriptors, Error> {
     let row_bytes = 8 + u64::from(dim);
     if dim == 0 || n.checked_mul(row_bytes) != Some(bytes.remaining()) {
         let expected = format!("{n} ids and rows of {dim} bytes");
-        return Err(bytes.error(expected, format!("{} bytes", bytes.remaining())));
+        return Err(bytes.error_ahead(expected, format!("{} bytes", bytes.remaining())));
     }
     let dim = dim as usize;
     let mut row_of_id = HashMap::with_capacity(n as usize);

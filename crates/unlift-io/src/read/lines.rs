@@ -68,6 +68,12 @@ impl Lines {
         self.line.trim_ascii()
     }
 
+    /// The current line without its end: between tabs, a first field may be empty.
+    pub fn untrimmed(&self) -> &[u8] {
+        let line = self.line.strip_suffix(b"\n").unwrap_or(&self.line);
+        line.strip_suffix(b"\r").unwrap_or(line)
+    }
+
     /// An error in the current line.
     pub fn error(&self, expected: impl Into<String>, found: impl Into<String>) -> Error {
         Error::new(&self.path, Place::Line(self.number), expected, found)

@@ -32,7 +32,7 @@ pub fn read(path: &Path) -> Result<Vec<[f64; 3]>, Error> {
     };
     if u64::from(len) > bytes.remaining() {
         let expected = format!("a header of {len} bytes");
-        return Err(bytes.error(expected, format!("{} bytes", bytes.remaining())));
+        return Err(bytes.error_ahead(expected, format!("{} bytes", bytes.remaining())));
     }
     let mut header = vec![0; len as usize];
     bytes.fill(&mut header, "header")?;
@@ -59,7 +59,7 @@ pub fn read(path: &Path) -> Result<Vec<[f64; 3]>, Error> {
         .ok_or_else(|| bytes.error("an array of shape (n, 3)", quoted(shape.as_bytes())))?;
     if n.checked_mul(3 * size) != Some(bytes.remaining()) {
         let expected = format!("{n} rows of {} bytes", 3 * size);
-        return Err(bytes.error(expected, format!("{} bytes", bytes.remaining())));
+        return Err(bytes.error_ahead(expected, format!("{} bytes", bytes.remaining())));
     }
 
     let n = n as usize;

@@ -172,9 +172,12 @@ fn header(path: &Path, reader: &mut BufReader<std::fs::File>) -> Result<Header, 
                 });
             }
             [b"property", ref rest @ ..] => {
-                let element = elements
-                    .last_mut()
-                    .ok_or_else(|| error("an element before its properties", quoted(&line)))?;
+                let element = elements.last_mut().ok_or_else(|| {
+                    error(
+                        "an element before its properties",
+                        quoted(line.trim_ascii()),
+                    )
+                })?;
                 let (name, scalar) = match *rest {
                     [kind, name] => {
                         let scalar = Scalar::from_name(kind)
@@ -330,7 +333,7 @@ fn binary(
         size.filter(|&s| s <= bytes.remaining()).ok_or_else(|| {
             let name = String::from_utf8_lossy(&element.name);
             let expected = format!("{} rows of {name}, {stride} bytes each", element.count);
-            bytes.error(expected, format!("{} bytes", bytes.remaining()))
+            bytes.error_ahead(expected, format!("{} bytes", bytes.remaining()))
         })
     };
     for element in &header.elements[..header.vertex] {

@@ -56,7 +56,7 @@ pub fn read(path: &Path) -> Result<Vec<[f64; 3]>, Error> {
             continue;
         }
         if separator.is_none() {
-            let fields = Separator::of_header(lines.line()).split(lines.line());
+            let fields = Separator::of_header(lines.line()).split(lines.untrimmed());
             if fields.iter().all(|field| number::<f64>(field).is_none()) && fields.len() > 1 {
                 separator = Some(Separator::of_header(lines.line()));
                 columns = named_columns(&lines, &fields)?;
@@ -65,7 +65,7 @@ pub fn read(path: &Path) -> Result<Vec<[f64; 3]>, Error> {
             }
         }
         let separator = *separator.get_or_insert_with(|| Separator::of(lines.line()));
-        let fields = separator.split(lines.line());
+        let fields = separator.split(lines.untrimmed());
         let mut position = [0.0_f64; 3];
         for ((value, column), name) in position.iter_mut().zip(columns).zip(["x", "y", "z"]) {
             let Some(field) = fields.get(column) else {
