@@ -1,5 +1,9 @@
 //! unlift: io.
 
+pub mod atomic;
+pub mod clouds;
 mod error;
+pub mod hash;
+pub mod stage;
 
 pub use error::{Error, Place};
