@@ -1,6 +1,13 @@
-//! unlift: io.
+//! Files of unlift: maps in ([`read`]), stages in and out ([`stage`]), clouds out ([`clouds`]).
+//!
+//! Bad input gets one line that names the file, the place, what was expected and what was found;
+//! outputs appear whole or not at all ([`atomic`]).
 
+pub mod atomic;
+pub mod clouds;
 mod error;
+pub mod hash;
 pub mod read;
+pub mod stage;
 
 pub use error::{Error, Place};
