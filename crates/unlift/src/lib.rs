@@ -14,6 +14,7 @@ pub mod points;
 pub mod recover;
 pub mod released;
 pub mod seed;
+pub mod synthetic;
 pub mod truth;
 
 pub use descriptors::Descriptors;
