@@ -41,21 +41,13 @@ impl Descriptors {
             return Err(Error::new(what, "a finite value", v[at].to_string()));
         }
         let (zero, constant) = match &values {
-            Values::U8(v) => (
-                v.iter().all(|&x| x == 0),
-                v.chunks(dim).all(|row| *row == v[..dim]),
-            ),
-            Values::F32(v) => (
-                v.iter().all(|&x| x == 0.0),
-                v.chunks(dim).all(|row| *row == v[..dim]),
-            ),
+            Values::U8(v) => (v.iter().all(|&x| x == 0), v.chunks(dim).all(|row| *row == v[..dim])),
+            Values::F32(v) => {
+                (v.iter().all(|&x| x == 0.0), v.chunks(dim).all(|row| *row == v[..dim]))
+            }
         };
         if len > 0 && zero {
-            return Err(Error::new(
-                "descriptors",
-                "real descriptors",
-                "only zeros (dummies)",
-            ));
+            return Err(Error::new("descriptors", "real descriptors", "only zeros (dummies)"));
         }
         if len > dim && constant {
             return Err(Error::new(
@@ -106,10 +98,7 @@ impl Descriptors {
             Values::U8(v) => Values::U8(rows(v, self.dim, order)),
             Values::F32(v) => Values::F32(rows(v, self.dim, order)),
         };
-        Self {
-            values,
-            dim: self.dim,
-        }
+        Self { values, dim: self.dim }
     }
 
     /// Squared Euclidean distance between rows `a` and `b`.

@@ -21,11 +21,7 @@ impl Error {
         expected: impl Into<String>,
         found: impl Into<String>,
     ) -> Self {
-        Self {
-            what: what.into(),
-            expected: expected.into(),
-            found: found.into(),
-        }
+        Self { what: what.into(), expected: expected.into(), found: found.into() }
     }
 
     /// The field, option or row that is wrong.
@@ -46,11 +42,7 @@ impl Error {
 
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{}: expected {}, found {}",
-            self.what, self.expected, self.found
-        )
+        write!(f, "{}: expected {}, found {}", self.what, self.expected, self.found)
     }
 }
 

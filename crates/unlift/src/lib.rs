@@ -8,12 +8,15 @@
 
 pub mod descriptors;
 mod error;
+pub mod geometry;
 mod ids;
 pub mod neighbors;
+pub mod obfuscate;
 pub mod points;
 pub mod recover;
 pub mod released;
 pub mod seed;
+mod simd;
 pub mod synthetic;
 pub mod truth;
 

@@ -25,9 +25,7 @@ impl Unit {
 
     /// The unit called `name`, if there is one.
     pub fn from_name(name: &str) -> Option<Self> {
-        [Unit::Meter, Unit::Pixel, Unit::KthNeighbor]
-            .into_iter()
-            .find(|unit| unit.name() == name)
+        [Unit::Meter, Unit::Pixel, Unit::KthNeighbor].into_iter().find(|unit| unit.name() == name)
     }
 }
 
@@ -48,22 +46,11 @@ impl<const D: usize> PointSet<D> {
     pub fn try_new(positions: Vec<[f64; D]>, unit: Unit) -> Result<Self, Error> {
         let () = Self::DIMENSION_IS_2_OR_3;
         if positions.len() > i32::MAX as usize {
-            return Err(Error::new(
-                "points",
-                "at most 2^31",
-                positions.len().to_string(),
-            ));
+            return Err(Error::new("points", "at most 2^31", positions.len().to_string()));
         }
-        if let Some(row) = positions
-            .iter()
-            .position(|p| p.iter().any(|x| !x.is_finite()))
-        {
+        if let Some(row) = positions.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
             let found = format!("{:?}", positions[row]);
-            return Err(Error::new(
-                format!("point {row}"),
-                "finite coordinates",
-                found,
-            ));
+            return Err(Error::new(format!("point {row}"), "finite coordinates", found));
         }
         Ok(Self { positions, unit })
     }
@@ -93,12 +80,6 @@ impl<const D: usize> PointSet<D> {
     /// # Errors
     /// When a scaled coordinate is not finite.
     pub fn scaled(&self, factor: f64, unit: Unit) -> Result<Self, Error> {
-        Self::try_new(
-            self.positions
-                .iter()
-                .map(|p| p.map(|x| x * factor))
-                .collect(),
-            unit,
-        )
+        Self::try_new(self.positions.iter().map(|p| p.map(|x| x * factor)).collect(), unit)
     }
 }

@@ -55,10 +55,8 @@ impl Draws {
     /// The stream of `item` in `stage` under `seed`.
     #[inline(always)]
     pub fn new(seed: u64, stage: Stage, item: u64) -> Self {
-        let key = mix(
-            mix(mix(seed.wrapping_add(GOLDEN)) ^ (stage as u64).wrapping_mul(GOLDEN))
-                ^ item.wrapping_mul(0xD1B5_4A32_D192_ED03),
-        );
+        let key = mix(mix(mix(seed.wrapping_add(GOLDEN)) ^ (stage as u64).wrapping_mul(GOLDEN))
+            ^ item.wrapping_mul(0xD1B5_4A32_D192_ED03));
         Self { key, counter: 0 }
     }
 
@@ -160,12 +158,7 @@ mod tests {
             counts[draws.below(7) as usize] += 1;
         }
         // Five standard deviations of a binomial with mean 10,000.
-        assert!(
-            counts
-                .iter()
-                .all(|&c| (f64::from(c) - 10_000.0).abs() < 5.0 * 92.6),
-            "{counts:?}"
-        );
+        assert!(counts.iter().all(|&c| (f64::from(c) - 10_000.0).abs() < 5.0 * 92.6), "{counts:?}");
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Neighborhoods: which records are said to hide points near the point of a slot.
 
 mod neighborhoods;
+pub mod oracle;
 
 pub use neighborhoods::Neighborhoods;

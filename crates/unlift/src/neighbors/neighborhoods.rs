@@ -40,20 +40,12 @@ impl Neighborhoods {
             || offsets.windows(2).any(|w| w[0] > w[1])
         {
             let expected = format!("ascending from 0 to {}", records.len());
-            return Err(Error::new(
-                "neighborhood offsets",
-                expected,
-                "another sequence",
-            ));
+            return Err(Error::new("neighborhood offsets", expected, "another sequence"));
         }
         if let Some(scores) = &scores {
             if scores.len() != records.len() {
                 let expected = format!("{} rows", records.len());
-                return Err(Error::new(
-                    "neighborhood scores",
-                    expected,
-                    scores.len().to_string(),
-                ));
+                return Err(Error::new("neighborhood scores", expected, scores.len().to_string()));
             }
             if let Some(at) = scores.iter().position(|x| !x.is_finite()) {
                 let what = format!("neighborhood score {at}");
@@ -62,10 +54,7 @@ impl Neighborhoods {
         }
         for slot in 0..n_slots {
             let range = offsets[slot] as usize..offsets[slot + 1] as usize;
-            sort_row(
-                &mut records[range.clone()],
-                scores.as_mut().map(|s| &mut s[range.clone()]),
-            );
+            sort_row(&mut records[range.clone()], scores.as_mut().map(|s| &mut s[range.clone()]));
             let row = &records[range];
             let what = || format!("neighborhood of slot {slot}");
             if let Some(pair) = row.windows(2).find(|w| w[0] == w[1]) {
@@ -90,11 +79,7 @@ impl Neighborhoods {
                 ));
             }
         }
-        Ok(Self {
-            offsets,
-            records,
-            scores,
-        })
+        Ok(Self { offsets, records, scores })
     }
 
     /// Number of slots.
@@ -131,11 +116,7 @@ impl Neighborhoods {
 
     /// The length of the longest list.
     pub fn longest(&self) -> usize {
-        self.offsets
-            .windows(2)
-            .map(|w| (w[1] - w[0]) as usize)
-            .max()
-            .unwrap_or(0)
+        self.offsets.windows(2).map(|w| (w[1] - w[0]) as usize).max().unwrap_or(0)
     }
 }
 
@@ -143,11 +124,8 @@ fn sort_row(records: &mut [RecordId], scores: Option<&mut [f32]>) {
     match scores {
         None => records.sort_unstable(),
         Some(scores) => {
-            let mut both: Vec<(RecordId, f32)> = records
-                .iter()
-                .copied()
-                .zip(scores.iter().copied())
-                .collect();
+            let mut both: Vec<(RecordId, f32)> =
+                records.iter().copied().zip(scores.iter().copied()).collect();
             both.sort_by_key(|&(record, _)| record);
             for (at, (record, score)) in both.into_iter().enumerate() {
                 records[at] = record;

@@ -18,12 +18,8 @@ pub enum Status {
 
 impl Status {
     /// Every status.
-    pub const ALL: [Status; 4] = [
-        Self::Ok,
-        Self::TooFewNeighbors,
-        Self::Degenerate,
-        Self::NoSupport,
-    ];
+    pub const ALL: [Status; 4] =
+        [Self::Ok, Self::TooFewNeighbors, Self::Degenerate, Self::NoSupport];
 
     /// The name used in files and reports.
     pub fn name(self) -> &'static str {
@@ -59,13 +55,7 @@ pub struct Estimate<const D: usize> {
 impl<const D: usize> Estimate<D> {
     /// A slot that could not be recovered.
     pub fn lost(status: Status) -> Self {
-        Self {
-            position: [f32::NAN; D],
-            status,
-            support: 0,
-            axis: 0,
-            evidence: 0.0,
-        }
+        Self { position: [f32::NAN; D], status, support: 0, axis: 0, evidence: 0.0 }
     }
 }
 
@@ -110,11 +100,7 @@ impl<const D: usize> Recovered<D> {
             && rows.len() != estimates.len()
         {
             let expected = format!("{} rows", estimates.len());
-            return Err(Error::new(
-                "descriptor assignment",
-                expected,
-                rows.len().to_string(),
-            ));
+            return Err(Error::new("descriptor assignment", expected, rows.len().to_string()));
         }
         Ok(Self {
             origin,
@@ -189,9 +175,6 @@ impl<const D: usize> Recovered<D> {
     /// Adds a descriptor assignment.
     #[must_use]
     pub fn with_descriptor_row(self, descriptor_row: Option<Vec<u32>>) -> Self {
-        Self {
-            descriptor_row,
-            ..self
-        }
+        Self { descriptor_row, ..self }
     }
 }

@@ -23,6 +23,11 @@ impl<const D: usize> AxisCandidates<D> {
         Ok(Self { position })
     }
 
+    /// The rows `order[0], order[1], ...`.
+    pub(crate) fn select(&self, order: &[u32]) -> Self {
+        Self { position: super::rows(&self.position, order) }
+    }
+
     /// Number of records.
     pub fn len(&self) -> usize {
         self.position.len()

@@ -17,19 +17,11 @@ impl<const D: usize> AxisPlanes<D> {
     pub fn try_new(axis: Vec<u8>, offset: &[f64]) -> Result<Self, Error> {
         if axis.len() != offset.len() {
             let expected = format!("{} rows", axis.len());
-            return Err(Error::new(
-                "plane offsets",
-                expected,
-                offset.len().to_string(),
-            ));
+            return Err(Error::new("plane offsets", expected, offset.len().to_string()));
         }
         if let Some(row) = axis.iter().position(|&a| usize::from(a) >= D) {
             let what = format!("axis of record {row}");
-            return Err(Error::new(
-                what,
-                format!("below {D}"),
-                axis[row].to_string(),
-            ));
+            return Err(Error::new(what, format!("below {D}"), axis[row].to_string()));
         }
         let offset: Vec<f32> = offset.iter().map(|&x| x as f32 + 0.0).collect();
         if let Some(row) = offset.iter().position(|x| !x.is_finite()) {
@@ -41,6 +33,11 @@ impl<const D: usize> AxisPlanes<D> {
             ));
         }
         Ok(Self { axis, offset })
+    }
+
+    /// The rows `order[0], order[1], ...`.
+    pub(crate) fn select(&self, order: &[u32]) -> Self {
+        Self { axis: super::rows(&self.axis, order), offset: super::rows(&self.offset, order) }
     }
 
     /// Number of planes.

@@ -23,11 +23,7 @@ impl<const D: usize> Lines<D> {
     pub fn through(points: &[[f64; D]], directions: &[[f64; D]]) -> Result<Self, Error> {
         if points.len() != directions.len() {
             let expected = format!("{} rows", points.len());
-            return Err(Error::new(
-                "line directions",
-                expected,
-                directions.len().to_string(),
-            ));
+            return Err(Error::new("line directions", expected, directions.len().to_string()));
         }
         let mut foot = Vec::with_capacity(points.len());
         let mut direction = Vec::with_capacity(points.len());
@@ -42,6 +38,14 @@ impl<const D: usize> Lines<D> {
             foot.push(finite_f32(foot_of(point, &unit), "foot", row)?.map(|x| x + 0.0));
         }
         Ok(Self { foot, direction })
+    }
+
+    /// The rows `order[0], order[1], ...`.
+    pub(crate) fn select(&self, order: &[u32]) -> Self {
+        Self {
+            foot: super::rows(&self.foot, order),
+            direction: super::rows(&self.direction, order),
+        }
     }
 
     /// Number of lines.
@@ -87,12 +91,10 @@ mod tests {
     #[test]
     fn normal_form_is_idempotent() {
         let mut draws = crate::seed::Draws::new(3, crate::seed::Stage::Synthetic, 0);
-        let points: Vec<[f64; 3]> = (0..500)
-            .map(|_| std::array::from_fn(|_| draws.between(-9.0, 9.0)))
-            .collect();
-        let directions: Vec<[f64; 3]> = (0..500)
-            .map(|_| std::array::from_fn(|_| draws.between(-2.0, 2.0)))
-            .collect();
+        let points: Vec<[f64; 3]> =
+            (0..500).map(|_| std::array::from_fn(|_| draws.between(-9.0, 9.0))).collect();
+        let directions: Vec<[f64; 3]> =
+            (0..500).map(|_| std::array::from_fn(|_| draws.between(-2.0, 2.0))).collect();
         let once = Lines::through(&points, &directions).unwrap();
         let twice = Lines::through(&widen(once.foot()), &widen(once.direction())).unwrap();
         assert_eq!(once, twice);

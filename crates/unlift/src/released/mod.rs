@@ -44,6 +44,16 @@ impl<const D: usize> Obfuscation<D> {
         self.len() == 0
     }
 
+    /// The records `order[0], order[1], ...`.
+    pub(crate) fn select(&self, order: &[u32]) -> Self {
+        match self {
+            Self::Lines(lines) => Self::Lines(lines.select(order)),
+            Self::Rays(rays) => Self::Rays(rays.select(order)),
+            Self::AxisPlanes(planes) => Self::AxisPlanes(planes.select(order)),
+            Self::AxisCandidates(candidates) => Self::AxisCandidates(candidates.select(order)),
+        }
+    }
+
     /// The family's name in files.
     pub fn family(&self) -> &'static str {
         match self {
@@ -80,44 +90,22 @@ impl<const D: usize> Released<D> {
         unit: Unit,
         descriptors: Option<Descriptors>,
     ) -> Result<Self, Error> {
-        let most = if matches!(obfuscation, Obfuscation::Lines(_)) {
-            2
-        } else {
-            1
-        };
+        let most = if matches!(obfuscation, Obfuscation::Lines(_)) { 2 } else { 1 };
         if slots_per_record == 0 || slots_per_record > most {
             let expected = format!("1 to {most} for {}", obfuscation.family());
-            return Err(Error::new(
-                "slots per record",
-                expected,
-                slots_per_record.to_string(),
-            ));
+            return Err(Error::new("slots per record", expected, slots_per_record.to_string()));
         }
         if !origin.iter().all(|x| x.is_finite()) {
-            return Err(Error::new(
-                "origin",
-                "finite coordinates",
-                format!("{origin:?}"),
-            ));
+            return Err(Error::new("origin", "finite coordinates", format!("{origin:?}")));
         }
         let n_slots = obfuscation.len() * slots_per_record;
         if let Some(descriptors) = &descriptors
             && descriptors.len() != n_slots
         {
             let expected = format!("{n_slots} rows, one per slot");
-            return Err(Error::new(
-                "descriptors",
-                expected,
-                descriptors.len().to_string(),
-            ));
+            return Err(Error::new("descriptors", expected, descriptors.len().to_string()));
         }
-        Ok(Self {
-            obfuscation,
-            slots_per_record,
-            origin,
-            unit,
-            descriptors,
-        })
+        Ok(Self { obfuscation, slots_per_record, origin, unit, descriptors })
     }
 
     /// The records, about [`origin`](Self::origin).
@@ -156,6 +144,11 @@ impl<const D: usize> Released<D> {
     }
 }
 
+/// The rows `order[0], order[1], ...` of one column.
+fn rows<T: Copy>(column: &[T], order: &[u32]) -> Vec<T> {
+    order.iter().map(|&row| column[row as usize]).collect()
+}
+
 /// Directions closer to unit length than this (in squared length) are stored as they are, so that
 /// normalizing twice changes no bit. `f32` rounding of a unit vector stays below it.
 const UNIT_SLACK: f64 = 6e-7;
@@ -168,11 +161,7 @@ fn unit_direction<const D: usize>(v: [f64; D], row: usize) -> Result<[f64; D], E
     let norm2: f64 = v.iter().map(|x| x * x).sum();
     if !norm2.is_finite() || norm2 <= 0.0 {
         let what = format!("direction of record {row}");
-        return Err(Error::new(
-            what,
-            "a finite vector with length",
-            format!("{v:?}"),
-        ));
+        return Err(Error::new(what, "a finite vector with length", format!("{v:?}")));
     }
     if (norm2 - 1.0).abs() <= UNIT_SLACK {
         return Ok(v);
@@ -188,10 +177,6 @@ fn finite_f32<const D: usize>(v: [f64; D], what: &str, row: usize) -> Result<[f3
         Ok(rounded)
     } else {
         let what = format!("{what} of record {row}");
-        Err(Error::new(
-            what,
-            "coordinates in the range of f32",
-            format!("{v:?}"),
-        ))
+        Err(Error::new(what, "coordinates in the range of f32", format!("{v:?}")))
     }
 }

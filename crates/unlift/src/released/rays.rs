@@ -24,19 +24,11 @@ impl<const D: usize> Rays<D> {
         directions: &[[f64; D]],
     ) -> Result<Self, Error> {
         if centers.is_empty() || centers.len() > 255 {
-            return Err(Error::new(
-                "ray centers",
-                "1 to 255",
-                centers.len().to_string(),
-            ));
+            return Err(Error::new("ray centers", "1 to 255", centers.len().to_string()));
         }
         if center.len() != directions.len() {
             let expected = format!("{} rows", center.len());
-            return Err(Error::new(
-                "ray directions",
-                expected,
-                directions.len().to_string(),
-            ));
+            return Err(Error::new("ray directions", expected, directions.len().to_string()));
         }
         if let Some(row) = center.iter().position(|&c| usize::from(c) >= centers.len()) {
             let what = format!("center of record {row}");
@@ -55,11 +47,16 @@ impl<const D: usize> Rays<D> {
                 Ok(finite_f32(unit_direction(d, row)?, "direction", row)?.map(|x| x + 0.0))
             })
             .collect::<Result<_, Error>>()?;
-        Ok(Self {
-            centers,
-            center,
-            direction,
-        })
+        Ok(Self { centers, center, direction })
+    }
+
+    /// The rows `order[0], order[1], ...`.
+    pub(crate) fn select(&self, order: &[u32]) -> Self {
+        Self {
+            centers: self.centers.clone(),
+            center: super::rows(&self.center, order),
+            direction: super::rows(&self.direction, order),
+        }
     }
 
     /// Number of rays.

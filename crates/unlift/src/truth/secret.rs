@@ -17,12 +17,8 @@ pub enum DropReason {
 
 impl DropReason {
     /// Every reason.
-    pub const ALL: [DropReason; 4] = [
-        Self::OddPoint,
-        Self::CoincidentPair,
-        Self::RejectedPair,
-        Self::OnCenter,
-    ];
+    pub const ALL: [DropReason; 4] =
+        [Self::OddPoint, Self::CoincidentPair, Self::RejectedPair, Self::OnCenter];
 
     /// The name used in files and reports.
     pub fn name(self) -> &'static str {
@@ -77,11 +73,7 @@ impl Secret {
         if let Some(axis) = &swapped_axis
             && axis.len() != n
         {
-            return Err(Error::new(
-                "swapped axes",
-                format!("{n} rows"),
-                axis.len().to_string(),
-            ));
+            return Err(Error::new("swapped axes", format!("{n} rows"), axis.len().to_string()));
         }
         if descriptor_row.len() != n {
             let found = descriptor_row.len().to_string();
@@ -89,18 +81,10 @@ impl Secret {
         }
         if let Some(slot) = descriptor_row.iter().position(|&row| row as usize >= n) {
             let what = format!("descriptor row of slot {slot}");
-            return Err(Error::new(
-                what,
-                format!("below {n}"),
-                descriptor_row[slot].to_string(),
-            ));
+            return Err(Error::new(what, format!("below {n}"), descriptor_row[slot].to_string()));
         }
         let mut seen = vec![false; n_originals];
-        for id in hidden
-            .iter()
-            .copied()
-            .chain(dropped.iter().map(|d| d.original))
-        {
+        for id in hidden.iter().copied().chain(dropped.iter().map(|d| d.original)) {
             match seen.get_mut(id.index()) {
                 Some(seen @ false) => *seen = true,
                 Some(_) => {
@@ -120,13 +104,7 @@ impl Secret {
                 "neither",
             ));
         }
-        Ok(Self {
-            hidden,
-            swapped_axis,
-            descriptor_row,
-            dropped,
-            n_originals,
-        })
+        Ok(Self { hidden, swapped_axis, descriptor_row, dropped, n_originals })
     }
 
     /// Number of slots.

@@ -1,0 +1,108 @@
+//! Where a map lies and how far it reaches, robust to far outliers.
+
+use super::vector::{median, quantile};
+
+/// An axis-aligned box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds<const D: usize> {
+    /// Smallest coordinates.
+    pub low: [f64; D],
+    /// Largest coordinates.
+    pub high: [f64; D],
+}
+
+impl<const D: usize> Bounds<D> {
+    /// The box between the quantiles `q` and `1 - q` of each coordinate (the 1-99 % box of
+    /// `q = 0.01`); `None` without points.
+    pub fn quantiles(points: &[[f64; D]], q: f64) -> Option<Self> {
+        if points.is_empty() {
+            return None;
+        }
+        let (mut low, mut high) = ([0.0; D], [0.0; D]);
+        for c in 0..D {
+            let mut column: Vec<f64> = points.iter().map(|p| p[c]).collect();
+            column.sort_unstable_by(f64::total_cmp);
+            low[c] = quantile(&column, q);
+            high[c] = quantile(&column, 1.0 - q);
+        }
+        Some(Self { low, high })
+    }
+
+    /// The middle of the box.
+    pub fn center(&self) -> [f64; D] {
+        std::array::from_fn(|c| 0.5 * (self.low[c] + self.high[c]))
+    }
+
+    /// The longest side.
+    pub fn longest_side(&self) -> f64 {
+        (0..D).map(|c| self.high[c] - self.low[c]).fold(0.0, f64::max)
+    }
+
+    /// The range of `t` for which `point + t direction` lies in the box; `None` when the line misses it.
+    pub fn clip(&self, point: &[f64; D], direction: &[f64; D]) -> Option<(f64, f64)> {
+        let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
+        for c in 0..D {
+            if direction[c] == 0.0 {
+                if point[c] < self.low[c] || point[c] > self.high[c] {
+                    return None;
+                }
+                continue;
+            }
+            let one = (self.low[c] - point[c]) / direction[c];
+            let other = (self.high[c] - point[c]) / direction[c];
+            from = from.max(one.min(other));
+            to = to.min(one.max(other));
+        }
+        (from <= to && from.is_finite() && to.is_finite()).then_some((from, to))
+    }
+}
+
+/// The origin a map is released about: its coordinate-wise median, rounded so coarsely that it
+/// tells nothing about a single point (to a power of two near an eighth of the spread), and so
+/// close that `f32` coordinates about it are exact enough for georeferenced maps.
+pub fn rounded_origin<const D: usize>(points: &[[f64; D]]) -> [f64; D] {
+    let Some(bounds) = Bounds::quantiles(points, 0.1) else {
+        return [0.0; D];
+    };
+    let step = power_of_two_below(bounds.longest_side() / 8.0);
+    std::array::from_fn(|c| {
+        let mut column: Vec<f64> = points.iter().map(|p| p[c]).collect();
+        (median(&mut column) / step).round() * step + 0.0
+    })
+}
+
+/// The largest power of two not above `x`, or 1 when there is none.
+fn power_of_two_below(x: f64) -> f64 {
+    if !(x.is_normal() && x > 0.0) {
+        return 1.0;
+    }
+    // Clearing the mantissa is exact, unlike 2^floor(log2 x).
+    f64::from_bits(x.to_bits() & 0x7FF0_0000_0000_0000)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_origin_follows_a_georeferenced_map() {
+        let points: Vec<[f64; 3]> =
+            (0..100).map(|i| [1e6 + f64::from(i) * 0.1, -5e6, 300.0 + f64::from(i % 7)]).collect();
+        let origin = rounded_origin(&points);
+        assert!((origin[0] - 1e6).abs() <= 10.0 && (origin[1] + 5e6).abs() <= 1.0, "{origin:?}");
+    }
+
+    #[test]
+    fn a_line_is_clipped_to_the_box() {
+        let bounds = Bounds { low: [0.0; 2], high: [2.0, 1.0] };
+        assert_eq!(bounds.clip(&[-1.0, 0.5], &[1.0, 0.0]), Some((1.0, 3.0)));
+        assert_eq!(bounds.clip(&[-1.0, 1.5], &[1.0, 0.0]), None);
+    }
+
+    #[test]
+    fn powers_of_two() {
+        assert_eq!(power_of_two_below(0.7), 0.5);
+        assert_eq!(power_of_two_below(8.0), 8.0);
+        assert_eq!(power_of_two_below(0.0), 1.0);
+    }
+}

@@ -1,0 +1,129 @@
+//! k-means with several restarts, as ray clouds choose their centers.
+
+use rayon::prelude::*;
+
+use super::vector::squared_distance;
+use crate::seed::{Draws, Stage};
+
+/// Lloyd rounds before a restart gives up converging (scikit-learn's default).
+const MAX_ROUNDS: usize = 300;
+
+/// The `k` centers of the best of `restarts` runs of Lloyd's algorithm, each from a k-means++ start.
+/// Deterministic in `seed`; restarts run in parallel, sums inside one run in row order.
+///
+/// # Panics
+/// When `points` is empty or `k` or `restarts` is 0.
+pub fn kmeans<const D: usize>(
+    points: &[[f64; D]],
+    k: usize,
+    restarts: u64,
+    seed: u64,
+) -> Vec<[f64; D]> {
+    assert!(!points.is_empty() && k > 0 && restarts > 0);
+    let runs: Vec<(f64, Vec<[f64; D]>)> = (0..restarts)
+        .into_par_iter()
+        .map(|restart| lloyd(points, spread_start(points, k, seed, restart)))
+        .collect();
+    let mut best = 0;
+    for run in 1..runs.len() {
+        if runs[run].0 < runs[best].0 {
+            best = run;
+        }
+    }
+    let mut centers = runs[best].1.clone();
+    // An order of the centers that does not depend on which restart won.
+    centers.sort_unstable_by(|a, b| {
+        a.iter()
+            .zip(b)
+            .map(|(x, y)| x.total_cmp(y))
+            .find(|o| o.is_ne())
+            .unwrap_or(std::cmp::Ordering::Equal)
+    });
+    centers
+}
+
+/// k-means++: each further center is drawn with probability proportional to its squared distance
+/// from the centers so far.
+fn spread_start<const D: usize>(
+    points: &[[f64; D]],
+    k: usize,
+    seed: u64,
+    restart: u64,
+) -> Vec<[f64; D]> {
+    let mut draws = Draws::new(seed, Stage::KMeans, restart);
+    let mut centers = vec![points[draws.below(points.len() as u64) as usize]];
+    while centers.len() < k {
+        let weight = |p: &[f64; D]| {
+            centers.iter().map(|c| squared_distance(p, c)).fold(f64::INFINITY, f64::min)
+        };
+        let total: f64 = points.iter().map(weight).sum();
+        let mut left = draws.unit() * total;
+        let chosen = points.iter().position(|p| {
+            left -= weight(p);
+            left <= 0.0
+        });
+        centers.push(points[chosen.unwrap_or(points.len() - 1)]);
+    }
+    centers
+}
+
+fn lloyd<const D: usize>(points: &[[f64; D]], mut centers: Vec<[f64; D]>) -> (f64, Vec<[f64; D]>) {
+    let mut cost = f64::INFINITY;
+    for _ in 0..MAX_ROUNDS {
+        let mut sums = vec![[0.0; D]; centers.len()];
+        let mut counts = vec![0u64; centers.len()];
+        let mut new_cost = 0.0;
+        for point in points {
+            let (at, distance) = nearest(point, &centers);
+            new_cost += distance;
+            counts[at] += 1;
+            for c in 0..D {
+                sums[at][c] += point[c];
+            }
+        }
+        for (at, center) in centers.iter_mut().enumerate() {
+            if counts[at] > 0 {
+                *center = sums[at].map(|s| s / counts[at] as f64);
+            }
+        }
+        let converged = new_cost >= cost * (1.0 - 1e-9);
+        cost = new_cost;
+        if converged {
+            break;
+        }
+    }
+    (cost, centers)
+}
+
+/// Index of the nearest center (the first of equals) and the squared distance to it.
+pub fn nearest<const D: usize>(point: &[f64; D], centers: &[[f64; D]]) -> (usize, f64) {
+    let mut best = (0, f64::INFINITY);
+    for (at, center) in centers.iter().enumerate() {
+        let distance = squared_distance(point, center);
+        if distance < best.1 {
+            best = (at, distance);
+        }
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_clouds_give_their_two_means() {
+        let mut draws = Draws::new(2, Stage::Synthetic, 0);
+        let mut points = Vec::new();
+        for center in [[-5.0, 1.0, 0.0], [7.0, 0.0, 2.0]] {
+            for _ in 0..500 {
+                points.push(center.map(|x: f64| x + draws.between(-1.0, 1.0)));
+            }
+        }
+        let centers = kmeans(&points, 2, 10, 0);
+        assert!(
+            (centers[0][0] + 5.0).abs() < 0.2 && (centers[1][0] - 7.0).abs() < 0.2,
+            "{centers:?}"
+        );
+    }
+}

@@ -1,0 +1,7 @@
+//! Pure mathematics on `[f64; D]` and `[f32; D]`: knows no stage of the pipeline.
+
+pub mod frame;
+pub mod kmeans;
+pub mod knn;
+pub mod normal;
+pub mod vector;

@@ -1,0 +1,47 @@
+//! `cp`: random pairs exchange one coordinate.
+
+use super::pairs::random_pairs;
+use super::{Entry, Lifted, Scheme, SchemeOptions};
+use crate::Error;
+use crate::released::{AxisCandidates, Obfuscation};
+use crate::seed::{Draws, Stage};
+
+/// Coordinate permutation.
+#[derive(Clone, Copy, Debug)]
+pub struct Cp;
+
+/// The registry row.
+pub const ENTRY: Entry = Entry {
+    name: "cp",
+    summary: "random pairs exchange one random coordinate",
+    source: "Pan et al., Privacy Preserving Localization via Coordinate Permutations, ICCV 2023",
+    hidden: "which coordinate was exchanged, and its value",
+    patents: "none found",
+    in_2d: None,
+    in_3d: Some(&Cp),
+};
+
+impl<const D: usize> Scheme<D> for Cp {
+    fn lift(&self, points: &[[f64; D]], _: &SchemeOptions, seed: u64) -> Result<Lifted<D>, Error> {
+        let (pairs, dropped) = random_pairs(points.len(), &mut Draws::new(seed, Stage::Scheme, 0));
+        let (mut positions, mut hidden) = (Vec::new(), Vec::new());
+        let mut swapped_axis = Vec::new();
+        for (at, pair) in pairs.iter().enumerate() {
+            let axis = Draws::new(seed, Stage::Scheme, 1 + at as u64).below(D as u64) as usize;
+            for (one, other) in [(pair[0], pair[1]), (pair[1], pair[0])] {
+                let mut position = points[one.index()];
+                position[axis] = points[other.index()][axis];
+                positions.push(position);
+                hidden.push(one);
+                swapped_axis.push(axis as u8);
+            }
+        }
+        Ok(Lifted {
+            obfuscation: Obfuscation::AxisCandidates(AxisCandidates::try_new(&positions)?),
+            slots_per_record: 1,
+            hidden,
+            swapped_axis: Some(swapped_axis),
+            dropped,
+        })
+    }
+}

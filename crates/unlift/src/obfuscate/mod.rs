@@ -1,0 +1,180 @@
+//! The owner's side: originals in, released records and a secret out. One scheme per file.
+//!
+//! A scheme only states its rule ([`Scheme::lift`]); what every scheme needs to be free of truth
+//! (the origin, the normal form, the order of records, slots and descriptors) happens here, once.
+
+mod pairs;
+
+pub mod cp;
+pub mod olc;
+pub mod plane;
+pub mod ppl;
+pub mod ppl_plus;
+pub mod ray;
+pub mod ray_voxel;
+
+use crate::geometry::{frame::rounded_origin, vector::sub};
+use crate::released::{Obfuscation, Released};
+use crate::seed::{Draws, Stage};
+use crate::truth::{Dropped, Original, Secret};
+use crate::{Descriptors, Error, OriginalId};
+
+/// All schemes, in the order of the paper's tables. A file that is missing here fails
+/// `tests/architecture.rs`.
+pub const SCHEMES: &[Entry] = &[
+    olc::ENTRY,
+    ppl::ENTRY,
+    ppl_plus::ENTRY,
+    ray::ENTRY,
+    ray_voxel::ENTRY,
+    plane::ENTRY,
+    cp::ENTRY,
+];
+
+/// The scheme users call `name`.
+///
+/// # Errors
+/// When there is none; the message lists all.
+pub fn scheme(name: &str) -> Result<&'static Entry, Error> {
+    SCHEMES.iter().find(|entry| entry.name == name).ok_or_else(|| {
+        let names: Vec<&str> = SCHEMES.iter().map(|entry| entry.name).collect();
+        Error::new("scheme", format!("one of {}", names.join(", ")), name)
+    })
+}
+
+/// A row of the registry: a scheme and what is known about it.
+pub struct Entry {
+    /// The name users know it by.
+    pub name: &'static str,
+    /// The rule in one line.
+    pub summary: &'static str,
+    /// Where it was published.
+    pub source: &'static str,
+    /// What of a point stays secret.
+    pub hidden: &'static str,
+    /// Patents its authors state (facts, no legal advice).
+    pub patents: &'static str,
+    /// The scheme on keypoints, if it is defined there.
+    pub in_2d: Option<&'static dyn Scheme<2>>,
+    /// The scheme on map points, if it is defined there.
+    pub in_3d: Option<&'static dyn Scheme<3>>,
+}
+
+impl std::fmt::Debug for Entry {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Entry").field("name", &self.name).finish_non_exhaustive()
+    }
+}
+
+/// Parameters of schemes, in the unit of the points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SchemeOptions {
+    /// Edge of a voxel of `ray-voxel`. The paper's authors use 0.5 m.
+    pub voxel: f64,
+}
+
+impl SchemeOptions {
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// Names the first field out of range.
+    pub fn check(&self) -> Result<(), Error> {
+        if !(self.voxel.is_finite() && self.voxel > 0.0) {
+            return Err(Error::new("voxel", "a positive length", self.voxel.to_string()));
+        }
+        Ok(())
+    }
+}
+
+/// A rule for hiding points: the only public seam of the library.
+pub trait Scheme<const D: usize>: Sync {
+    /// Hides `points` (given about the released origin). Every original ends up in exactly one slot
+    /// or among the dropped ones, with a reason; no record is empty.
+    ///
+    /// # Errors
+    /// When the points cannot be hidden by this rule at all.
+    fn lift(
+        &self,
+        points: &[[f64; D]],
+        options: &SchemeOptions,
+        seed: u64,
+    ) -> Result<Lifted<D>, Error>;
+}
+
+/// What a scheme makes of the originals, before anything is shuffled.
+#[derive(Clone, Debug)]
+pub struct Lifted<const D: usize> {
+    /// The records.
+    pub obfuscation: Obfuscation<D>,
+    /// Hidden points per record: 2 for paired lines, else 1.
+    pub slots_per_record: usize,
+    /// The original of each slot, record by record.
+    pub hidden: Vec<OriginalId>,
+    /// Per slot the exchanged axis (`cp`).
+    pub swapped_axis: Option<Vec<u8>>,
+    /// Originals in no record.
+    pub dropped: Vec<Dropped>,
+}
+
+/// Hides `original` by `scheme`: what is released, and the secret beside it. `descriptors` has one
+/// row per original.
+///
+/// # Errors
+/// When options are out of range, rows disagree, or the scheme cannot hide these points.
+pub fn obfuscate<const D: usize>(
+    scheme: &dyn Scheme<D>,
+    original: &Original<D>,
+    descriptors: Option<&Descriptors>,
+    options: &SchemeOptions,
+    seed: u64,
+) -> Result<(Released<D>, Secret), Error> {
+    options.check()?;
+    let points = original.reveal();
+    if let Some(descriptors) = descriptors
+        && descriptors.len() != points.len()
+    {
+        let expected = format!("{} rows, one per point", points.len());
+        return Err(Error::new("descriptors", expected, descriptors.len().to_string()));
+    }
+    let origin = rounded_origin(points.positions());
+    let local: Vec<[f64; D]> = points.positions().iter().map(|p| sub(p, &origin)).collect();
+    let lifted = scheme.lift(&local, options, seed)?;
+
+    let slots = lifted.slots_per_record;
+    let n_records = lifted.obfuscation.len();
+    let order = Draws::new(seed, Stage::Shuffle, 0).permutation(n_records);
+    let mut hidden = Vec::with_capacity(n_records * slots);
+    let mut swapped_axis = lifted.swapped_axis.as_ref().map(|_| Vec::with_capacity(n_records));
+    let mut descriptor_row = Vec::with_capacity(n_records * slots);
+    for (record, &from) in order.iter().enumerate() {
+        let mut slot_order: Vec<usize> = (0..slots).collect();
+        Draws::new(seed, Stage::SlotOrder, record as u64).shuffle(&mut slot_order);
+        let mut rows: Vec<u32> = (0..slots).map(|s| (record * slots + s) as u32).collect();
+        Draws::new(seed, Stage::DescriptorOrder, record as u64).shuffle(&mut rows);
+        for slot in slot_order {
+            hidden.push(lifted.hidden[from as usize * slots + slot]);
+        }
+        descriptor_row.extend(rows);
+        if let (Some(kept), Some(axes)) = (&mut swapped_axis, &lifted.swapped_axis) {
+            kept.push(axes[from as usize]);
+        }
+    }
+    let released_descriptors = descriptors.map(|descriptors| {
+        // Released row r holds the descriptor of the original whose slot was given row r.
+        let mut source = vec![0; hidden.len()];
+        for (slot, &row) in descriptor_row.iter().enumerate() {
+            source[row as usize] = hidden[slot].0;
+        }
+        descriptors.select(&source)
+    });
+    let released = Released::try_new(
+        lifted.obfuscation.select(&order),
+        slots,
+        origin,
+        points.unit(),
+        released_descriptors,
+    )?;
+    let secret =
+        Secret::try_new(hidden, swapped_axis, descriptor_row, lifted.dropped, points.len())?;
+    Ok((released, secret))
+}

@@ -1,0 +1,36 @@
+//! `olc`: a uniformly random line through every point.
+
+use super::{Entry, Lifted, Scheme, SchemeOptions};
+use crate::released::{Lines, Obfuscation};
+use crate::seed::{Draws, Stage};
+use crate::{Error, OriginalId};
+
+/// Random lines ("oriented line clouds").
+#[derive(Clone, Copy, Debug)]
+pub struct Olc;
+
+/// The registry row.
+pub const ENTRY: Entry = Entry {
+    name: "olc",
+    summary: "a random line through every point",
+    source: "Speciale et al., Privacy Preserving Image-Based Localization, CVPR 2019",
+    hidden: "the position along the line (1 of 3 coordinates)",
+    patents: "EP 3818501 B1 / WO 2020/009829 \"3D line clouds\", Microsoft (US 16/025,120)",
+    in_2d: None,
+    in_3d: Some(&Olc),
+};
+
+impl<const D: usize> Scheme<D> for Olc {
+    fn lift(&self, points: &[[f64; D]], _: &SchemeOptions, seed: u64) -> Result<Lifted<D>, Error> {
+        let directions: Vec<[f64; D]> = (0..points.len())
+            .map(|i| Draws::new(seed, Stage::Scheme, i as u64).direction())
+            .collect();
+        Ok(Lifted {
+            obfuscation: Obfuscation::Lines(Lines::through(points, &directions)?),
+            slots_per_record: 1,
+            hidden: (0..points.len()).map(OriginalId::from_index).collect(),
+            swapped_axis: None,
+            dropped: Vec::new(),
+        })
+    }
+}

@@ -1,0 +1,56 @@
+//! Random pairings, shared by the schemes that hide two points together.
+
+use crate::OriginalId;
+use crate::seed::Draws;
+use crate::truth::{DropReason, Dropped};
+
+/// A uniformly random pairing of `0..n`: consecutive entries of a random permutation, and the odd
+/// one out (a random one, not the last of the file as in published code).
+pub(super) fn random_pairs(n: usize, draws: &mut Draws) -> (Vec<[OriginalId; 2]>, Vec<Dropped>) {
+    let order = draws.permutation(n);
+    let (pairs, odd) = order.as_chunks::<2>();
+    let pairs = pairs.iter().map(|pair| pair.map(OriginalId)).collect();
+    let dropped = odd
+        .iter()
+        .map(|&id| Dropped { original: OriginalId(id), reason: DropReason::OddPoint })
+        .collect();
+    (pairs, dropped)
+}
+
+/// Takes the pairs that `accept` refuses, pools their points and pairs them anew.
+/// Returns how many pairs are still refused; those stand at the end of `pairs`.
+pub(super) fn pair_again(
+    pairs: &mut [[OriginalId; 2]],
+    refused: usize,
+    draws: &mut Draws,
+    accept: impl Fn(&[OriginalId; 2]) -> bool,
+) -> usize {
+    let start = pairs.len() - refused;
+    let mut pool: Vec<OriginalId> = pairs[start..].as_flattened().to_vec();
+    draws.shuffle(&mut pool);
+    let (mut accepted, mut still_refused) = (Vec::new(), Vec::new());
+    for pair in pool.as_chunks::<2>().0 {
+        if accept(pair) { accepted.push(*pair) } else { still_refused.push(*pair) }
+    }
+    for (at, pair) in accepted.iter().chain(&still_refused).enumerate() {
+        pairs[start + at] = *pair;
+    }
+    still_refused.len()
+}
+
+/// Moves the pairs that `accept` refuses to the end and counts them.
+pub(super) fn refused_last(
+    pairs: &mut Vec<[OriginalId; 2]>,
+    accept: impl Fn(&[OriginalId; 2]) -> bool,
+) -> usize {
+    let (accepted, refused): (Vec<_>, Vec<_>) = pairs.iter().copied().partition(|p| accept(p));
+    pairs.clear();
+    pairs.extend(accepted);
+    pairs.extend(&refused);
+    refused.len()
+}
+
+/// Both points of each pair, dropped for `reason`.
+pub(super) fn drop_pairs(pairs: &[[OriginalId; 2]], reason: DropReason) -> Vec<Dropped> {
+    pairs.as_flattened().iter().map(|&original| Dropped { original, reason }).collect()
+}

@@ -1,0 +1,37 @@
+//! `plane`: of every point one coordinate is kept, on one of three servers.
+
+use super::{Entry, Lifted, Scheme, SchemeOptions};
+use crate::released::{AxisPlanes, Obfuscation};
+use crate::seed::{Draws, Stage};
+use crate::{Error, OriginalId};
+
+/// Partial localization: random thirds, one per axis. The attacker holds all three.
+#[derive(Clone, Copy, Debug)]
+pub struct Plane;
+
+/// The registry row.
+pub const ENTRY: Entry = Entry {
+    name: "plane",
+    summary: "an axis-parallel plane through every point, the axis drawn in equal thirds",
+    source: "Geppert et al., Privacy Preserving Partial Localization, CVPR 2022",
+    hidden: "two of three coordinates",
+    patents: "none found",
+    in_2d: None,
+    in_3d: Some(&Plane),
+};
+
+impl Scheme<3> for Plane {
+    fn lift(&self, points: &[[f64; 3]], _: &SchemeOptions, seed: u64) -> Result<Lifted<3>, Error> {
+        let mut axis: Vec<u8> = (0..points.len()).map(|i| (i % 3) as u8).collect();
+        Draws::new(seed, Stage::Scheme, 0).shuffle(&mut axis);
+        let offset: Vec<f64> =
+            points.iter().zip(&axis).map(|(point, &a)| point[usize::from(a)]).collect();
+        Ok(Lifted {
+            obfuscation: Obfuscation::AxisPlanes(AxisPlanes::try_new(axis, &offset)?),
+            slots_per_record: 1,
+            hidden: (0..points.len()).map(OriginalId::from_index).collect(),
+            swapped_axis: None,
+            dropped: Vec::new(),
+        })
+    }
+}

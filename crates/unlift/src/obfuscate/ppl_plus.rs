@@ -1,0 +1,92 @@
+//! `ppl+`: paired-point lifting that avoids lines within local surfaces.
+//!
+//! Deviation from the published code, on purpose: there the normal is computed from a row of the
+//! wrong matrix and depends on the orientation of the map; here it is the direction in which the
+//! neighbors spread least, which is the rule the authors describe.
+
+use rayon::prelude::*;
+
+use super::pairs::{drop_pairs, pair_again, random_pairs, refused_last};
+use super::ppl::{lines_through, separate};
+use super::{Entry, Lifted, Scheme, SchemeOptions};
+use crate::geometry::knn::Knn;
+use crate::geometry::normal::local_normal;
+use crate::geometry::vector::{dot, sub};
+use crate::seed::{Draws, Stage};
+use crate::truth::DropReason;
+use crate::{Error, OriginalId};
+
+/// Paired-point lifting with plane rejection.
+#[derive(Clone, Copy, Debug)]
+pub struct PplPlus;
+
+/// The registry row.
+pub const ENTRY: Entry = Entry {
+    name: "ppl+",
+    summary: "as ppl, but no line lies within the local surface of its first point",
+    source: "Lee et al., Paired-Point Lifting for Enhanced Privacy-Preserving Visual Localization, CVPR 2023",
+    hidden: "two positions along the line and which descriptor is whose",
+    patents: "as ppl",
+    in_2d: None,
+    in_3d: Some(&PplPlus),
+};
+
+/// Re-pairing rounds at most.
+const MAX_ROUNDS: usize = 1000;
+/// Fewer refused pairs than this end the re-pairing.
+const FEW_PAIRS: usize = 10;
+/// Rounds before a stall is looked for, and the rounds without change that make one.
+const STALL: (usize, usize) = (100, 50);
+/// sin(20 degrees): a line closer to the surface than 20 degrees is refused.
+const SIN_20_DEGREES: f64 = 0.342_020_143_325_668_7;
+
+impl Scheme<3> for PplPlus {
+    fn lift(&self, points: &[[f64; 3]], _: &SchemeOptions, seed: u64) -> Result<Lifted<3>, Error> {
+        let normals = normals(points)?;
+        let on_surface = |pair: &[OriginalId; 2]| {
+            let [a, b] = pair.map(|id| points[id.index()]);
+            let along = sub(&b, &a);
+            normals[pair[0].index()].is_some_and(|normal| {
+                dot(&along, &normal).abs() <= SIN_20_DEGREES * dot(&along, &along).sqrt()
+            })
+        };
+        let mut draws = Draws::new(seed, Stage::Scheme, 0);
+        let (mut pairs, mut dropped) = random_pairs(points.len(), &mut draws);
+        let accept = |pair: &[OriginalId; 2]| !on_surface(pair);
+        let mut refused = refused_last(&mut pairs, accept);
+        let mut unchanged = 0;
+        for round in 1..=MAX_ROUNDS {
+            if refused < FEW_PAIRS {
+                break;
+            }
+            let before = refused;
+            refused = pair_again(&mut pairs, refused, &mut draws, accept);
+            unchanged = if refused == before { unchanged + 1 } else { 0 };
+            if round > STALL.0 && unchanged >= STALL.1 {
+                break;
+            }
+        }
+        let kept = pairs.len() - refused;
+        dropped.extend(drop_pairs(&pairs[kept..], DropReason::RejectedPair));
+        pairs.truncate(kept);
+        dropped.extend(separate(points, &mut pairs, &mut draws));
+        lines_through(points, &pairs, dropped)
+    }
+}
+
+/// Per point the normal of the surface through its K = min(1 % of the points, 100) nearest
+/// neighbors, K even and at least 4.
+fn normals(points: &[[f64; 3]]) -> Result<Vec<Option<[f64; 3]>>, Error> {
+    if points.is_empty() {
+        return Ok(Vec::new());
+    }
+    let k = (points.len() / 100).clamp(4, 100) & !1;
+    let knn = Knn::new(points)?;
+    Ok((0..points.len())
+        .into_par_iter()
+        .map_init(Vec::new, |found, row| {
+            knn.nearest(row, k, found);
+            local_normal(&points[row], found.iter().map(|&(_, at)| points[at as usize]))
+        })
+        .collect())
+}

@@ -1,0 +1,72 @@
+//! `ray`: a half-line from one of two centers, chosen at random for every point.
+
+use super::{Entry, Lifted, Scheme, SchemeOptions};
+use crate::geometry::kmeans::kmeans;
+use crate::geometry::vector::{dot, sub};
+use crate::released::{Obfuscation, Rays};
+use crate::seed::{Draws, Stage};
+use crate::truth::{DropReason, Dropped};
+use crate::{Error, OriginalId};
+
+/// Ray clouds.
+#[derive(Clone, Copy, Debug)]
+pub struct Ray;
+
+/// The registry row.
+pub const ENTRY: Entry = Entry {
+    name: "ray",
+    summary: "a half-line from one of two k-means centers, drawn at random",
+    source: "Moon et al., Efficient Privacy-Preserving Visual Localization Using 3D Ray Clouds, CVPR 2024",
+    hidden: "the range from the center (1 of 3 coordinates)",
+    patents: "US 2025/0329045 A1; PCT application declared by its authors",
+    in_2d: None,
+    in_3d: Some(&Ray),
+};
+
+/// Restarts of k-means (scikit-learn's `n_init` in the authors' code).
+const RESTARTS: u64 = 10;
+
+impl Scheme<3> for Ray {
+    fn lift(&self, points: &[[f64; 3]], _: &SchemeOptions, seed: u64) -> Result<Lifted<3>, Error> {
+        from_centers(points, seed, |row, _| {
+            Draws::new(seed, Stage::Scheme, row as u64).below(2) as usize
+        })
+    }
+}
+
+/// The rays from two k-means centers to every point; `choose` gives the center of a row.
+pub(super) fn from_centers(
+    points: &[[f64; 3]],
+    seed: u64,
+    choose: impl Fn(usize, &[f64; 3]) -> usize,
+) -> Result<Lifted<3>, Error> {
+    if points.len() < 2 {
+        return Err(Error::new("points", "at least 2 for two centers", points.len().to_string()));
+    }
+    let centers = kmeans(points, 2, RESTARTS, seed);
+    // What is stored is the center in f32; the ray starts there.
+    let centers: Vec<[f64; 3]> = centers.iter().map(|c| c.map(|x| f64::from(x as f32))).collect();
+    let (mut hidden, mut dropped) = (Vec::new(), Vec::new());
+    let (mut center, mut direction) = (Vec::new(), Vec::new());
+    for (row, point) in points.iter().enumerate() {
+        let original = OriginalId::from_index(row);
+        let chosen = choose(row, point);
+        let along = sub(point, &centers[chosen]);
+        let length2 = dot(&along, &along);
+        if length2 <= 1e-24 * dot(point, point) {
+            dropped.push(Dropped { original, reason: DropReason::OnCenter });
+            continue;
+        }
+        hidden.push(original);
+        center.push(chosen as u8);
+        let length = length2.sqrt();
+        direction.push(along.map(|x| x / length));
+    }
+    Ok(Lifted {
+        obfuscation: Obfuscation::Rays(Rays::try_new(&centers, center, &direction)?),
+        slots_per_record: 1,
+        hidden,
+        swapped_axis: None,
+        dropped,
+    })
+}

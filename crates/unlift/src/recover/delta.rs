@@ -1,0 +1,79 @@
+//! Delta from attacker-side data alone: the one whose consensus is least probable by chance.
+//!
+//! Some slots are solved along a geometric ladder of deltas that starts at the extent of the
+//! records, so that a scaled map takes scaled steps. A small delta makes chance agreement rare but
+//! loses true neighbors; a large one keeps them but agrees with everything. What counts is the mean
+//! evidence in excess of what the same slots yield with lists mixed from other slots': the
+//! number of places tried, uneven density and the noise of the null sample are in both.
+
+use super::chunks::{CHUNK, Chunks};
+use super::consensus;
+use super::family::Family;
+use super::lists::Lists;
+use crate::neighbors::Neighborhoods;
+use crate::seed::{Draws, Stage};
+
+/// Chunks solved per delta.
+const SAMPLE: usize = 12;
+/// Halvings of the extent that the coarse ladder spans.
+const HALVINGS: u32 = 14;
+/// Steps per octave of the fine ladder.
+const FINE: i32 = 3;
+
+/// The delta with the best mean evidence; `None` for an empty map or one without extent.
+pub(crate) fn choose<const D: usize>(
+    family: &Family<'_, D>,
+    lists: &Neighborhoods,
+    seed: u64,
+) -> Option<f64> {
+    let extent = family.extent();
+    if lists.n_slots() == 0 || !(extent.is_finite() && extent > 0.0) {
+        return None;
+    }
+    let chunks = sample_chunks(lists.n_slots(), seed);
+    let mean_evidence = |lists: Lists<'_>, delta: f64| {
+        let solved = consensus::solve(family, lists, delta as f32, seed, Chunks::Some(&chunks));
+        solved.iter().map(|e| f64::from(e.evidence)).sum::<f64>() / solved.len() as f64
+    };
+    let value = |delta: f64| {
+        mean_evidence(Lists::given(lists), delta) - mean_evidence(Lists::mixed(lists), delta)
+    };
+    let best_of = |deltas: &[f64]| {
+        let values: Vec<f64> = deltas.iter().map(|&delta| value(delta)).collect();
+        let mut best = 0;
+        for at in 1..values.len() {
+            if values[at] > values[best] {
+                best = at;
+            }
+        }
+        deltas[best]
+    };
+    // From large to small; once well below the maximum, smaller deltas only lose more neighbors.
+    let (mut coarse, mut most) = (extent, f64::NEG_INFINITY);
+    for step in 1..=HALVINGS {
+        let delta = extent / f64::from(1u32 << step);
+        let value = value(delta);
+        if value > most {
+            (coarse, most) = (delta, value);
+        } else if most > 0.0 && value < 0.5 * most {
+            break;
+        }
+    }
+    let fine: Vec<f64> = (1 - FINE..FINE)
+        .map(|step| coarse * libm::exp2(f64::from(step) / f64::from(FINE)))
+        .collect();
+    Some(best_of(&fine))
+}
+
+fn sample_chunks(n_slots: usize, seed: u64) -> Vec<usize> {
+    let n_chunks = n_slots.div_ceil(CHUNK);
+    let mut chunks: Vec<usize> = if n_chunks <= SAMPLE {
+        (0..n_chunks).collect()
+    } else {
+        let mut draws = Draws::new(seed, Stage::DeltaSlots, 0);
+        (0..SAMPLE).map(|_| draws.below(n_chunks as u64) as usize).collect()
+    };
+    chunks.sort_unstable();
+    chunks.dedup();
+    chunks
+}

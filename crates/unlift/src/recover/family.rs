@@ -1,0 +1,90 @@
+//! A released map prepared for solving: one row per record, whatever its family.
+
+use super::line_rows::{LineRow, from_lines, from_rays};
+use super::plane_windows::SortedPlanes;
+use crate::geometry::vector::median;
+use crate::released::{AxisPlanes, Obfuscation, Released};
+
+/// Records in the form the solvers read.
+#[derive(Debug)]
+pub(crate) enum Family<'a, const D: usize> {
+    /// Lines, one or two slots each; rays, told apart by their group.
+    Lines { rows: Vec<LineRow<D>>, slots_per_record: usize },
+    /// Axis planes, with the order of their offsets.
+    Planes { planes: &'a AxisPlanes<D>, sorted: SortedPlanes },
+    /// Axis candidates.
+    Candidates { rows: &'a [[f32; D]] },
+}
+
+impl<'a, const D: usize> Family<'a, D> {
+    /// The records of `released`.
+    pub(crate) fn new(released: &'a Released<D>) -> Self {
+        let slots_per_record = released.slots_per_record();
+        match released.obfuscation() {
+            Obfuscation::Lines(lines) => Self::Lines { rows: from_lines(lines), slots_per_record },
+            Obfuscation::Rays(rays) => Self::Lines { rows: from_rays(rays), slots_per_record },
+            Obfuscation::AxisPlanes(planes) => {
+                Self::Planes { planes, sorted: SortedPlanes::new(planes) }
+            }
+            Obfuscation::AxisCandidates(candidates) => {
+                Self::Candidates { rows: candidates.position() }
+            }
+        }
+    }
+
+    /// A length of the order of the map's size, from the records alone; 0 for an empty map.
+    ///
+    /// Lines: the median distance of the feet from the origin. Rays: the largest distance between
+    /// centers. Planes and candidates: the largest interquartile range over the axes.
+    pub(crate) fn extent(&self) -> f64 {
+        match self {
+            Self::Lines { rows, .. } => {
+                let Some(first) = rows.first() else {
+                    return 0.0;
+                };
+                if first.is_ray() {
+                    return ray_extent(rows);
+                }
+                let mut lengths: Vec<f64> = rows.iter().map(|row| length(&row.through)).collect();
+                median(&mut lengths)
+            }
+            Self::Planes { planes, sorted } => sorted.interquartile_range(planes),
+            Self::Candidates { rows } => (0..D)
+                .map(|axis| {
+                    let mut column: Vec<f32> = rows.iter().map(|row| row[axis]).collect();
+                    column.sort_unstable_by(f32::total_cmp);
+                    interquartile_range(&column)
+                })
+                .fold(0.0, f64::max),
+        }
+    }
+}
+
+/// The distance between the quartiles of sorted values.
+pub(super) fn interquartile_range(sorted: &[f32]) -> f64 {
+    let Some(last) = sorted.len().checked_sub(1) else {
+        return 0.0;
+    };
+    f64::from(sorted[last - last / 4]) - f64::from(sorted[last / 4])
+}
+
+fn length<const D: usize>(v: &[f32; D]) -> f64 {
+    v.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>().sqrt()
+}
+
+fn ray_extent<const D: usize>(rows: &[LineRow<D>]) -> f64 {
+    let mut centers: Vec<&LineRow<D>> = Vec::new();
+    for row in rows {
+        if !centers.iter().any(|center| center.group == row.group) {
+            centers.push(row);
+        }
+    }
+    let mut largest = 0.0;
+    for (at, a) in centers.iter().enumerate() {
+        for b in &centers[..at] {
+            let apart: [f32; D] = std::array::from_fn(|c| a.through[c] - b.through[c]);
+            largest = f64::max(largest, length(&apart));
+        }
+    }
+    largest
+}

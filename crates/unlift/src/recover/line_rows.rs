@@ -1,0 +1,155 @@
+//! Lines and rays as rows of one table, and their sections with a feasible line.
+
+use super::sections::{NO_VOTE, Sections};
+use crate::RecordId;
+use crate::released::{Lines, Rays};
+
+/// One line or ray: half a cache line, so that a neighbor costs one memory access.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(32))]
+pub(crate) struct LineRow<const D: usize> {
+    /// A point of the line: the foot, or the center of a ray.
+    pub(crate) through: [f32; D],
+    /// Unit direction; signed for rays.
+    pub(crate) direction: [f32; D],
+    /// The center of a ray, or [`NO_GROUP`].
+    pub(crate) group: u32,
+}
+
+/// The group of lines, which all may vote for each other.
+pub(crate) const NO_GROUP: u32 = u32::MAX;
+
+/// Squared sines below this count as parallel: such a record does not tell where along the line.
+const PARALLEL: f32 = 1e-6;
+
+/// All records as rows.
+pub(crate) fn from_lines<const D: usize>(lines: &Lines<D>) -> Vec<LineRow<D>> {
+    lines
+        .foot()
+        .iter()
+        .zip(lines.direction())
+        .map(|(&through, &direction)| LineRow { through, direction, group: NO_GROUP })
+        .collect()
+}
+
+/// All records as rows.
+pub(crate) fn from_rays<const D: usize>(rays: &Rays<D>) -> Vec<LineRow<D>> {
+    rays.center()
+        .iter()
+        .zip(rays.direction())
+        .map(|(&center, &direction)| LineRow {
+            through: rays.centers()[usize::from(center)],
+            direction,
+            group: u32::from(center),
+        })
+        .collect()
+}
+
+impl<const D: usize> LineRow<D> {
+    /// Whether this is a half-line.
+    #[inline(always)]
+    pub(crate) fn is_ray(&self) -> bool {
+        self.group != NO_GROUP
+    }
+
+    /// Whether this record is evidence for a point on `own`: rays of one center meet trivially.
+    #[inline(always)]
+    pub(crate) fn may_vote_for(&self, own: &Self) -> bool {
+        !own.is_ray() || self.group != own.group
+    }
+
+    /// Where half-lines begin to count.
+    #[inline(always)]
+    pub(crate) fn floor(&self) -> f32 {
+        if self.group == NO_GROUP { f32::NEG_INFINITY } else { 0.0 }
+    }
+
+    /// The point at parameter `t`.
+    #[inline(always)]
+    pub(crate) fn at(&self, t: f32) -> [f32; D] {
+        std::array::from_fn(|c| self.through[c] + t * self.direction[c])
+    }
+}
+
+/// Neighbors gathered into one column per coordinate: the section loop then runs over whole vectors.
+#[derive(Clone, Debug)]
+pub(crate) struct LineColumns<const D: usize> {
+    through: [Vec<f32>; D],
+    direction: [Vec<f32>; D],
+    group: Vec<u32>,
+}
+
+impl<const D: usize> Default for LineColumns<D> {
+    fn default() -> Self {
+        Self {
+            through: std::array::from_fn(|_| Vec::new()),
+            direction: std::array::from_fn(|_| Vec::new()),
+            group: Vec::new(),
+        }
+    }
+}
+
+impl<const D: usize> LineColumns<D> {
+    /// Gathers `records` from `rows`.
+    #[inline(always)]
+    pub(crate) fn gather(&mut self, rows: &[LineRow<D>], records: &[RecordId]) {
+        let n = records.len();
+        for c in 0..D {
+            self.through[c].resize(n, 0.0);
+            self.direction[c].resize(n, 0.0);
+        }
+        self.group.resize(n, NO_GROUP);
+        for (j, record) in records.iter().enumerate() {
+            let row = &rows[record.index()];
+            for c in 0..D {
+                self.through[c][j] = row.through[c];
+                self.direction[c][j] = row.direction[c];
+            }
+            self.group[j] = row.group;
+        }
+    }
+
+    /// The sections of the gathered records with `own`.
+    ///
+    /// With `v` and `u` the parts of `own.through - through` and `own.direction` perpendicular to
+    /// the record, the squared distance is `|v + t u|^2`: no difference of large squares, so that
+    /// `f32` suffices far from the origin.
+    #[inline(always)]
+    pub(crate) fn sections(&self, own: &LineRow<D>, out: &mut Sections) {
+        let n = self.group.len();
+        out.resize(n);
+        let through: [&[f32]; D] = std::array::from_fn(|c| &self.through[c][..n]);
+        let direction: [&[f32]; D] = std::array::from_fn(|c| &self.direction[c][..n]);
+        let group = &self.group[..n];
+        let (at, miss2, bend) = (&mut out.at[..n], &mut out.miss2[..n], &mut out.bend[..n]);
+        let rays = own.is_ray();
+        for j in 0..n {
+            let (mut w_e, mut d_e) = (0.0, 0.0);
+            for c in 0..D {
+                w_e += (own.through[c] - through[c][j]) * direction[c][j];
+                d_e += own.direction[c] * direction[c][j];
+            }
+            let (mut v_u, mut u_u) = (0.0, 0.0);
+            for c in 0..D {
+                let v = own.through[c] - through[c][j] - w_e * direction[c][j];
+                let u = own.direction[c] - d_e * direction[c][j];
+                v_u += v * u;
+                u_u += u * u;
+            }
+            let parallel = u_u < PARALLEL;
+            let t = if parallel { 0.0 } else { -v_u / u_u };
+            let mut miss = 0.0;
+            for c in 0..D {
+                let v = own.through[c] - through[c][j] - w_e * direction[c][j];
+                let u = own.direction[c] - d_e * direction[c][j];
+                let m = v + t * u;
+                miss += m * m;
+            }
+            // Rays of one center meet trivially; a closest approach behind a center is none.
+            let behind = rays & ((group[j] == own.group) | (w_e + t * d_e <= 0.0));
+            at[j] = t;
+            miss2[j] = if parallel | behind { NO_VOTE } else { miss };
+            bend[j] = if parallel { 1.0 } else { u_u };
+        }
+    }
+}

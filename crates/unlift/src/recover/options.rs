@@ -1,0 +1,78 @@
+//! What a user may choose about recovery.
+
+use crate::Error;
+
+/// A recovery method.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Solver {
+    /// The position that agrees with the listed records least probably by chance: exact, no
+    /// sampling, the same cost at every inlier ratio.
+    Consensus,
+    /// The paper's sampling loop (section 4), for comparison.
+    Ransac,
+}
+
+impl Solver {
+    /// Every solver.
+    pub const ALL: [Solver; 2] = [Self::Consensus, Self::Ransac];
+
+    /// The name users know it by.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Consensus => "consensus",
+            Self::Ransac => "ransac",
+        }
+    }
+
+    /// The solver called `name`.
+    ///
+    /// # Errors
+    /// When there is none; the message lists all.
+    pub fn from_name(name: &str) -> Result<Self, Error> {
+        Self::ALL.into_iter().find(|solver| solver.name() == name).ok_or_else(|| {
+            let names = Self::ALL.map(Self::name).join(", ");
+            Error::new("solver", format!("one of {names}"), name)
+        })
+    }
+}
+
+/// The distance up to which a listed record supports a position, in the unit of the map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Delta {
+    /// Chosen from the released map and the neighborhoods alone.
+    Auto,
+    /// Given.
+    Fixed(f64),
+}
+
+/// Options of recovery.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RecoverOptions {
+    /// The method.
+    pub solver: Solver,
+    /// The distance that decides support.
+    pub delta: Delta,
+    /// The attacker's own seed: null samples and random trials.
+    pub seed: u64,
+}
+
+impl Default for RecoverOptions {
+    fn default() -> Self {
+        Self { solver: Solver::Consensus, delta: Delta::Auto, seed: 0 }
+    }
+}
+
+impl RecoverOptions {
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// Names the first field out of range.
+    pub fn check(&self) -> Result<(), Error> {
+        match self.delta {
+            Delta::Fixed(delta) if !(delta.is_finite() && delta > 0.0) => {
+                Err(Error::new("delta", "a positive length", delta.to_string()))
+            }
+            _ => Ok(()),
+        }
+    }
+}
