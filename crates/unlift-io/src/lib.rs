@@ -1,1 +1,6 @@
 //! unlift: io.
+
+mod error;
+pub mod read;
+
+pub use error::{Error, Place};

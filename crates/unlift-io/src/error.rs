@@ -1,0 +1,229 @@
+//! The crate's error: a file that is not what it should be, as one line for the person who has it.
+
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Where in a file something is wrong.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// The file (or folder) as a whole.
+    Whole,
+    /// A line of a text file, counted from 1.
+    Line(u64),
+    /// A byte of a binary file, counted from 0, inside what `what` names (`record 12`, `header`).
+    Byte {
+        /// What was being read: `record 12`, `header`.
+        what: String,
+        /// Offset of the first byte of it.
+        at: u64,
+    },
+    /// Anything else that has a name: a column, a table, a row.
+    Named(String),
+}
+
+impl From<&str> for Place {
+    fn from(name: &str) -> Self {
+        Self::from(name.to_owned())
+    }
+}
+
+impl From<String> for Place {
+    /// A named place; the empty name is the whole file.
+    fn from(name: String) -> Self {
+        if name.is_empty() {
+            Self::Whole
+        } else {
+            Self::Named(name)
+        }
+    }
+}
+
+/// A file that cannot be read or written, or that does not hold what it should.
+///
+/// Prints as one line: `points.txt:17: expected 3 coordinates, found 2`, or
+/// `points3D.bin: record 12 (byte 4711): expected 8 bytes, found end of file`. Control characters
+/// in names and values are escaped, so that it stays one line whatever the file holds.
+#[derive(Debug)]
+pub struct Error {
+    path: PathBuf,
+    kind: Kind,
+}
+
+#[derive(Debug)]
+enum Kind {
+    Content {
+        place: Place,
+        expected: String,
+        found: String,
+    },
+    Read(io::Error),
+    Write(io::Error),
+    Core(unlift::Error),
+}
+
+impl Error {
+    /// An error about the contents of `path`: the rule at `place`, and what stood there instead.
+    ///
+    /// An empty string as `place` means the whole file.
+    pub fn new(
+        path: impl Into<PathBuf>,
+        place: impl Into<Place>,
+        expected: impl Into<String>,
+        found: impl Into<String>,
+    ) -> Self {
+        Self {
+            path: path.into(),
+            kind: Kind::Content {
+                place: place.into(),
+                expected: expected.into(),
+                found: found.into(),
+            },
+        }
+    }
+
+    /// `path` could not be read: missing, a folder, no permission, or a broken disk.
+    pub fn read(path: impl Into<PathBuf>, source: io::Error) -> Self {
+        Self {
+            path: path.into(),
+            kind: Kind::Read(source),
+        }
+    }
+
+    /// `path` could not be written.
+    pub fn write(path: impl Into<PathBuf>, source: io::Error) -> Self {
+        Self {
+            path: path.into(),
+            kind: Kind::Write(source),
+        }
+    }
+
+    /// The library refused values that came from `path`.
+    pub fn core(path: impl Into<PathBuf>, source: unlift::Error) -> Self {
+        Self {
+            path: path.into(),
+            kind: Kind::Core(source),
+        }
+    }
+
+    /// The file or folder the error is about.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        OneLine(&self.path.to_string_lossy()).fmt(f)?;
+        match &self.kind {
+            Kind::Content {
+                place,
+                expected,
+                found,
+            } => {
+                match place {
+                    Place::Whole => {}
+                    Place::Line(line) => write!(f, ":{line}")?,
+                    Place::Byte { what, at } => write!(f, ": {} (byte {at})", OneLine(what))?,
+                    Place::Named(name) => write!(f, ": {}", OneLine(name))?,
+                }
+                let (expected, found) = (OneLine(expected), OneLine(found));
+                write!(f, ": expected {expected}, found {found}")
+            }
+            // The usual causes in our own words: those of the system differ between platforms.
+            Kind::Read(source) => match source.kind() {
+                io::ErrorKind::NotFound => write!(f, ": expected a file or folder, found nothing"),
+                io::ErrorKind::IsADirectory => write!(f, ": expected a file, found a folder"),
+                io::ErrorKind::NotADirectory => write!(f, ": expected a folder, found a file"),
+                io::ErrorKind::PermissionDenied => {
+                    write!(f, ": expected a readable file, found no permission to read")
+                }
+                _ => write!(f, ": cannot read: {}", OneLine(&source.to_string())),
+            },
+            Kind::Write(source) => match source.kind() {
+                io::ErrorKind::PermissionDenied => {
+                    write!(
+                        f,
+                        ": expected a writable place, found no permission to write"
+                    )
+                }
+                io::ErrorKind::StorageFull => {
+                    write!(f, ": expected space to write, found a full disk")
+                }
+                _ => write!(f, ": cannot write: {}", OneLine(&source.to_string())),
+            },
+            Kind::Core(source) => write!(f, ": {}", OneLine(&source.to_string())),
+        }
+    }
+}
+
+impl std::error::Error for Error {
+    // The text above already holds the cause, so that a caller who prints the chain does not print it twice.
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        None
+    }
+}
+
+/// Text with its control characters escaped.
+struct OneLine<'a>(&'a str);
+
+impl fmt::Display for OneLine<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for c in self.0.chars() {
+            if c.is_control() {
+                write!(f, "{}", c.escape_default())?;
+            } else {
+                write!(f, "{c}")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_prints_one_line() {
+        let core = || unlift::Error::new("point 3", "finite coordinates", "[NaN, 0.0, 0.0]");
+        let byte = Place::Byte {
+            what: "record 12".into(),
+            at: 4711,
+        };
+        let io = |kind| io::Error::new(kind, "other\ntext");
+        let table = [
+            (
+                Error::new("points.txt", Place::Line(17), "3 coordinates", "2"),
+                "points.txt:17: expected 3 coordinates, found 2",
+            ),
+            (
+                Error::new("points3D.bin", byte, "8 bytes", "end of file"),
+                "points3D.bin: record 12 (byte 4711): expected 8 bytes, found end of file",
+            ),
+            (
+                Error::new("a.ply", "", "a number", "x\ny"),
+                "a.ply: expected a number, found x\\ny",
+            ),
+            (
+                Error::read("a.ply", io(io::ErrorKind::NotFound)),
+                "a.ply: expected a file or folder, found nothing",
+            ),
+            (
+                Error::read("a\nb", io(io::ErrorKind::Other)),
+                "a\\nb: cannot read: other\\ntext",
+            ),
+            (
+                Error::write("out", io(io::ErrorKind::Other)),
+                "out: cannot write: other\\ntext",
+            ),
+            (
+                Error::core("a.csv", core()),
+                "a.csv: point 3: expected finite coordinates, found [NaN, 0.0, 0.0]",
+            ),
+        ];
+        for (error, line) in table {
+            assert_eq!(error.to_string(), line);
+        }
+    }
+}

@@ -1,0 +1,226 @@
+//! Binary files: buffered, and never trusting a declared size before the file is known to hold it.
+
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Place};
+
+/// Opens `path` for reading.
+///
+/// # Errors
+/// When it is missing, a folder, or may not be read.
+pub(crate) fn open_file(path: &Path) -> Result<(File, u64), Error> {
+    let file = File::open(path).map_err(|e| Error::read(path, e))?;
+    let metadata = file.metadata().map_err(|e| Error::read(path, e))?;
+    if metadata.is_dir() {
+        return Err(Error::new(path, "", "a file", "a folder"));
+    }
+    Ok((file, metadata.len()))
+}
+
+/// A little-endian reader that knows where it is and how much is left.
+///
+/// Every error names the part of the file that was being read, and the byte.
+pub(crate) struct Bytes {
+    path: PathBuf,
+    reader: BufReader<File>,
+    part: Part,
+    /// Where the value that was read last begins.
+    value_at: u64,
+    at: u64,
+    len: u64,
+}
+
+/// What is being read; formatted only when something is wrong.
+enum Part {
+    Header,
+    Record(u64),
+    End,
+}
+
+impl Bytes {
+    /// A reader at the start of `path`.
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        let (file, len) = open_file(path)?;
+        Ok(Self::continuing(path, BufReader::new(file), 0, len))
+    }
+
+    /// A reader of a file of `len` bytes of which `at` were already read from `reader`.
+    pub fn continuing(path: &Path, reader: BufReader<File>, at: u64, len: u64) -> Self {
+        Self {
+            path: path.to_owned(),
+            reader,
+            part: Part::Header,
+            value_at: at,
+            at,
+            len,
+        }
+    }
+
+    /// Errors from here on name record `number`, counted from 1.
+    pub fn record(&mut self, number: u64) {
+        self.part = Part::Record(number);
+    }
+
+    /// Bytes between here and the end of the file.
+    pub fn remaining(&self) -> u64 {
+        self.len.saturating_sub(self.at)
+    }
+
+    /// An error in the value that was read last.
+    pub fn error(&self, expected: impl Into<String>, found: impl Into<String>) -> Error {
+        self.error_at(self.value_at, expected, found)
+    }
+
+    /// An error in what follows.
+    pub fn error_ahead(&self, expected: impl Into<String>, found: impl Into<String>) -> Error {
+        self.error_at(self.at, expected, found)
+    }
+
+    fn error_at(&self, at: u64, expected: impl Into<String>, found: impl Into<String>) -> Error {
+        let what = match self.part {
+            Part::Header => "header".to_owned(),
+            Part::Record(number) => format!("record {number}"),
+            Part::End => "end".to_owned(),
+        };
+        Error::new(&self.path, Place::Byte { what, at }, expected, found)
+    }
+
+    fn check(&self, bytes: u64, what: &str) -> Result<(), Error> {
+        let left = self.remaining();
+        if bytes <= left {
+            return Ok(());
+        }
+        let found = match left {
+            0 => "end of file".to_owned(),
+            1 => "1 byte before the end of the file".to_owned(),
+            n => format!("{n} bytes before the end of the file"),
+        };
+        let unit = if bytes == 1 { "byte" } else { "bytes" };
+        Err(self.error_ahead(format!("{bytes} {unit} of {what}"), found))
+    }
+
+    /// Fills `buffer` with the next bytes, which are the `what` of this part.
+    pub fn fill(&mut self, buffer: &mut [u8], what: &str) -> Result<(), Error> {
+        self.check(buffer.len() as u64, what)?;
+        self.value_at = self.at;
+        self.reader
+            .read_exact(buffer)
+            .map_err(|e| Error::read(&self.path, e))?;
+        self.at += buffer.len() as u64;
+        Ok(())
+    }
+
+    /// Skips `bytes`, which are the `what` of this part.
+    pub fn skip(&mut self, bytes: u64, what: &str) -> Result<(), Error> {
+        self.check(bytes, what)?;
+        let offset = i64::try_from(bytes).expect("bounded by the size of the file");
+        self.reader
+            .seek_relative(offset)
+            .map_err(|e| Error::read(&self.path, e))?;
+        self.value_at = self.at;
+        self.at += bytes;
+        Ok(())
+    }
+
+    fn array<const N: usize>(&mut self, what: &str) -> Result<[u8; N], Error> {
+        let mut buffer = [0; N];
+        self.fill(&mut buffer, what)?;
+        Ok(buffer)
+    }
+
+    /// The next byte.
+    pub fn u8(&mut self, what: &str) -> Result<u8, Error> {
+        Ok(self.array::<1>(what)?[0])
+    }
+
+    /// The next little-endian `u32`.
+    pub fn u32(&mut self, what: &str) -> Result<u32, Error> {
+        self.array(what).map(u32::from_le_bytes)
+    }
+
+    /// The next little-endian `i32`.
+    pub fn i32(&mut self, what: &str) -> Result<i32, Error> {
+        self.array(what).map(i32::from_le_bytes)
+    }
+
+    /// The next little-endian `u64`.
+    pub fn u64(&mut self, what: &str) -> Result<u64, Error> {
+        self.array(what).map(u64::from_le_bytes)
+    }
+
+    /// The next `N` little-endian doubles.
+    pub fn doubles<const N: usize>(&mut self, what: &str) -> Result<[f64; N], Error> {
+        self.check(8 * N as u64, what)?;
+        let start = self.at;
+        let mut values = [0.0; N];
+        for value in &mut values {
+            *value = f64::from_le_bytes(self.array(what)?);
+        }
+        self.value_at = start;
+        Ok(values)
+    }
+
+    /// Bytes up to the next zero byte, which is not part of them.
+    pub fn zero_terminated(&mut self, what: &str) -> Result<Vec<u8>, Error> {
+        let start = self.at;
+        let mut bytes = Vec::new();
+        loop {
+            if self.remaining() == 0 {
+                let expected = format!("a zero byte at the end of the {what}");
+                return Err(self.error_at(start, expected, "end of file"));
+            }
+            match self.u8(what)? {
+                0 => return Ok(bytes),
+                byte => bytes.push(byte),
+            }
+        }
+    }
+
+    /// The next `u64`, the number of `what` that follow, each of at least `bytes_each` bytes.
+    ///
+    /// # Errors
+    /// When the rest of the file cannot hold that many: so nothing is allocated for a false count.
+    pub fn count(&mut self, what: &str, bytes_each: u64) -> Result<u64, Error> {
+        if self.remaining() < 8 {
+            self.check(8, &format!("the number of {what}"))?;
+        }
+        let count = self.u64(what)?;
+        self.check_count(count, what, bytes_each)
+    }
+
+    /// The same for a count stored as `u32`.
+    pub fn count_u32(&mut self, what: &str, bytes_each: u64) -> Result<u64, Error> {
+        if self.remaining() < 4 {
+            self.check(4, &format!("the number of {what}"))?;
+        }
+        let count = self.u32(what)?;
+        self.check_count(u64::from(count), what, bytes_each)
+    }
+
+    fn check_count(&self, count: u64, what: &str, bytes_each: u64) -> Result<u64, Error> {
+        let left = self.remaining();
+        let most = left / bytes_each;
+        if count <= most {
+            return Ok(count);
+        }
+        let is_text = |b: &u8| b.is_ascii_graphic() || b.is_ascii_whitespace();
+        if self.value_at == 0 && count.to_le_bytes().iter().all(is_text) {
+            return Err(self.error(format!("binary data (the number of {what})"), "text"));
+        }
+        let expected = format!("at most {most} for the number of {what} ({left} bytes are left)");
+        Err(self.error(expected, count.to_string()))
+    }
+
+    /// # Errors
+    /// When something follows.
+    pub fn end(&mut self) -> Result<(), Error> {
+        self.part = Part::End;
+        match self.remaining() {
+            0 => Ok(()),
+            1 => Err(self.error_ahead("end of file", "1 more byte")),
+            n => Err(self.error_ahead("end of file", format!("{n} more bytes"))),
+        }
+    }
+}

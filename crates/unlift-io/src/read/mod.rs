@@ -1,0 +1,197 @@
+//! The first stage: a map in somebody else's format becomes positions, ids and camera centers.
+
+mod bytes;
+pub mod colmap;
+mod database;
+mod descriptors;
+mod lines;
+mod npy;
+mod ply;
+mod table;
+
+use std::path::{Path, PathBuf};
+
+pub use descriptors::descriptors;
+
+use crate::error::Error;
+
+/// A map as it was read, in the units of its file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Input {
+    /// Points `(n, 3)`, all finite, at least one. COLMAP's are in ascending order of their ids,
+    /// others in the order of the file.
+    pub positions: Vec<[f64; 3]>,
+    /// Ids `(n,)`, ascending: those of COLMAP's points, else the row, from 0.
+    pub ids: Vec<u64>,
+    /// Camera centers `(m, 3)`; empty when the format has none.
+    pub cameras: Vec<[f64; 3]>,
+    /// Every file that was read, for hashes in a report.
+    pub files: Vec<PathBuf>,
+    /// The name of the format, for people: `COLMAP binary`, `ply ascii`.
+    pub format: &'static str,
+    /// What was found but not used, one line each.
+    pub skipped: Vec<String>,
+    /// The folder of the COLMAP model, when the input is one: descriptors are found through its tracks.
+    pub model: Option<PathBuf>,
+    /// The COLMAP database in the folder that was given, if there is one.
+    pub database: Option<PathBuf>,
+}
+
+/// Where a COLMAP model may lie in a project folder, in the order of search.
+const MODEL_FOLDERS: [&str; 5] = ["", "sparse/0", "sparse", "0", "model"];
+
+/// Reads the map at `path`: a COLMAP model folder or a project folder that holds one, or a point cloud
+/// as `.ply`, `.csv`, `.xyz`, `.txt` or `.npy`.
+///
+/// # Errors
+/// When nothing readable is there, a file is malformed, a coordinate is not finite, or there is no point.
+pub fn open(path: &Path) -> Result<Input, Error> {
+    let metadata = std::fs::metadata(path).map_err(|e| Error::read(path, e))?;
+    let input = if metadata.is_dir() {
+        folder(path)?
+    } else {
+        file(path)?
+    };
+    if input.positions.is_empty() {
+        let file = input.files.last().map_or(path, PathBuf::as_path);
+        return Err(Error::new(file, "", "at least one point", "none"));
+    }
+    Ok(input)
+}
+
+fn file(path: &Path) -> Result<Input, Error> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let (positions, format) = match (&*stem, &*extension.to_ascii_lowercase()) {
+        ("points3D", "bin" | "txt") => return colmap_points(path),
+        ("cameras" | "images" | "rigs" | "frames", "bin" | "txt") => {
+            let found = "another file of a COLMAP model (give its folder)";
+            return Err(Error::new(path, "", "a file with points", found));
+        }
+        (_, "ply") => ply::read(path)?,
+        (_, "csv" | "xyz" | "txt") => (table::read(path)?, "table"),
+        (_, "npy") => (npy::read(path)?, "npy"),
+        (_, other) => {
+            let expected = "a COLMAP folder or a .ply, .csv, .xyz, .txt or .npy file";
+            let found = match other {
+                "" => "a file without extension".to_owned(),
+                other => format!("a .{other} file"),
+            };
+            return Err(Error::new(path, "", expected, found));
+        }
+    };
+    Ok(Input {
+        ids: (0..positions.len() as u64).collect(),
+        positions,
+        files: vec![path.to_owned()],
+        format,
+        ..Input::default()
+    })
+}
+
+/// `points3D` given by itself.
+fn colmap_points(path: &Path) -> Result<Input, Error> {
+    let points = colmap::read_points(path, false)?;
+    Ok(Input {
+        positions: points.positions,
+        ids: points.ids,
+        files: vec![path.to_owned()],
+        format: "COLMAP points",
+        skipped: vec!["camera centers: give the folder of the model to have them".to_owned()],
+        ..Input::default()
+    })
+}
+
+fn folder(path: &Path) -> Result<Input, Error> {
+    for sub in MODEL_FOLDERS {
+        let model = if sub.is_empty() {
+            path.to_owned()
+        } else {
+            path.join(sub)
+        };
+        for (extension, format) in [("bin", "COLMAP binary"), ("txt", "COLMAP text")] {
+            if model.join(format!("points3D.{extension}")).is_file() {
+                let mut input = colmap_model(&model, extension)?;
+                input.format = format;
+                input.database = Some(path.join("database.db")).filter(|db| db.is_file());
+                note_other_models(&mut input, path, &model, extension);
+                return Ok(input);
+            }
+        }
+    }
+    let expected = "points3D.bin or points3D.txt in it, in sparse/0, sparse, 0 or model";
+    Err(Error::new(path, "", expected, "none"))
+}
+
+fn colmap_model(model: &Path, extension: &str) -> Result<Input, Error> {
+    let mut input = Input {
+        model: Some(model.to_owned()),
+        ..Input::default()
+    };
+    let path = |name: &str| model.join(format!("{name}.{extension}"));
+    let mut present = |name: &str| {
+        let path = path(name);
+        let there = path.is_file();
+        if there {
+            input.files.push(path.clone());
+        }
+        there.then_some(path)
+    };
+    let cameras = present("cameras");
+    let images = present("images");
+    let rigs = present("rigs");
+    let frames = present("frames");
+    let points = present("points3D").expect("found by the caller");
+
+    let cameras = cameras
+        .map(|path| colmap::read_cameras(&path))
+        .transpose()?;
+    if let Some(path) = images {
+        let images = colmap::read_images(&path)?;
+        for image in &images {
+            let id = image.camera_id;
+            if let Some(cameras) = &cameras
+                && cameras.binary_search_by_key(&id, |c| c.id).is_err()
+            {
+                let place = format!("image {}", image.id);
+                let expected = format!("the id of a camera in cameras.{extension}");
+                return Err(Error::new(path, place, expected, id.to_string()));
+            }
+        }
+        input.cameras = images.iter().map(|image| image.center).collect();
+    } else {
+        let note = format!("camera centers: there is no images.{extension}");
+        input.skipped.push(note);
+    }
+    // Nothing an audit needs is in these two, so that a fault in them is told but not fatal.
+    for check in [
+        rigs.map(|path| colmap::check_rigs(&path)),
+        frames.map(|path| colmap::check_frames(&path)),
+    ] {
+        if let Some(Err(error)) = check {
+            input.skipped.push(error.to_string());
+        }
+    }
+    let points = colmap::read_points(&points, false)?;
+    input.ids = points.ids;
+    input.positions = points.positions;
+    Ok(input)
+}
+
+/// Notes the models and forms beside the one that was read: people should know which one was audited.
+fn note_other_models(input: &mut Input, path: &Path, model: &Path, extension: &str) {
+    if extension == "bin" && model.join("points3D.txt").is_file() {
+        let note = "points3D.txt: the binary form beside it was read";
+        input.skipped.push(note.to_owned());
+    }
+    for number in 1.. {
+        let other = path.join("sparse").join(number.to_string());
+        if !other.join("points3D.bin").is_file() && !other.join("points3D.txt").is_file() {
+            break;
+        }
+        if other != model {
+            let note = format!("sparse/{number}: another model, give its path to read it");
+            input.skipped.push(note);
+        }
+    }
+}

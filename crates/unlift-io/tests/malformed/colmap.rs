@@ -1,0 +1,237 @@
+//! COLMAP models: every record cut, every count and number falsified.
+
+use super::{MANY, Row, alone, appended, fixture, patched, row};
+
+/// The classic model, whose files the rows cut and change.
+pub const MODEL: &str = "project/sparse/0";
+
+fn model_file(name: &str) -> Vec<u8> {
+    fixture(&format!("{MODEL}/{name}"))
+}
+
+/// The first `n` bytes of a file of the model.
+fn cut(name: &str, n: usize) -> Vec<u8> {
+    model_file(name)[..n].to_vec()
+}
+
+/// The classic model with one file replaced.
+fn in_model(what: &'static str, name: &'static str, bytes: Vec<u8>, line: &'static str) -> Row {
+    let mut files: Vec<_> = ["cameras.bin", "images.bin", "points3D.bin"]
+        .into_iter()
+        .map(|name| (name, model_file(name)))
+        .collect();
+    files.iter_mut().find(|f| f.0 == name).unwrap().1 = bytes;
+    row(what, files, "", line)
+}
+
+/// Offsets in the classic model: a count of 8 bytes, then records.
+mod at {
+    /// In `points3D.bin`: id, coordinates, color, error, number of observations, observations.
+    pub const POINT: usize = 8;
+    pub const X: usize = POINT + 8;
+    pub const COLOR: usize = X + 24;
+    pub const ERROR: usize = COLOR + 3;
+    pub const N_TRACK: usize = ERROR + 8;
+    pub const TRACK: usize = N_TRACK + 8;
+    /// In `images.bin`: id, rotation, translation, camera, name, number of 2D points, 2D points.
+    pub const IMAGE: usize = 8;
+    pub const ROTATION: usize = IMAGE + 4;
+    pub const TRANSLATION: usize = ROTATION + 32;
+    pub const IMAGE_CAMERA: usize = TRANSLATION + 24;
+    pub const NAME: usize = IMAGE_CAMERA + 4;
+    pub const N_POINTS2D: usize = NAME + "küche/ä 0.jpg".len() + 1;
+    /// In `cameras.bin`: id, model, width, height, parameters.
+    pub const CAMERA: usize = 8;
+    pub const CAMERA_MODEL: usize = CAMERA + 4;
+    pub const WIDTH: usize = CAMERA_MODEL + 4;
+    pub const HEIGHT: usize = WIDTH + 8;
+    pub const PARAMS: usize = HEIGHT + 8;
+}
+
+#[rustfmt::skip] // A row is read as a row.
+pub fn binary() -> Vec<Row> {
+    let nan = f64::NAN.to_le_bytes();
+    let points = || model_file("points3D.bin");
+    let images = || model_file("images.bin");
+    let cameras = || model_file("cameras.bin");
+    let point_rows = [
+        ("empty", cut("points3D.bin", 0),
+            "points3D.bin: header (byte 0): expected 8 bytes of the number of points, found end of file"),
+        ("cut in the count", cut("points3D.bin", 5),
+            "points3D.bin: header (byte 0): expected 8 bytes of the number of points, found 5 bytes before the end of the file"),
+        ("cut after the count", cut("points3D.bin", at::POINT),
+            "points3D.bin: header (byte 0): expected at most 0 for the number of points (0 bytes are left), found 6"),
+        ("NaN", patched(points(), at::X, &nan),
+            "points3D.bin: record 1 (byte 16): expected finite coordinates of point 2, found [NaN, 4.649684750233829, -4.352846916476389]"),
+        ("count of 10^18", patched(points(), 0, &MANY),
+            "points3D.bin: header (byte 0): expected at most 8 for the number of points (426 bytes are left), found 1000000000000000000"),
+        ("one point too many", patched(points(), 0, &[7]),
+            "points3D.bin: record 7 (byte 434): expected 8 bytes of point id, found end of file"),
+        ("one point too few", patched(points(), 0, &[5]),
+            "points3D.bin: end (byte 367): expected end of file, found 67 more bytes"),
+        ("track of 10^18", patched(points(), at::N_TRACK, &MANY),
+            "points3D.bin: record 1 (byte 51): expected at most 46 for the number of observations (375 bytes are left), found 1000000000000000000"),
+        ("trailing byte", appended(points(), b"x"),
+            "points3D.bin: end (byte 434): expected end of file, found 1 more byte"),
+        ("repeated id", patched(points(), at::POINT, &[3]),
+            "points3D.bin: point 3: expected each id once, found it again"),
+        ("text where binary is expected", b"# 3D point list\n1 0 0 0 0 0 0 0\n".to_vec(),
+            "points3D.bin: header (byte 0): expected binary data (the number of points), found text"),
+        ("no points", vec![0; 8], "points3D.bin: expected at least one point, found none"),
+    ];
+    let image_rows = [
+        ("empty", cut("images.bin", 0),
+            "images.bin: header (byte 0): expected 8 bytes of the number of images, found end of file"),
+        ("cut in the last 2D points", cut("images.bin", images().len() - 1),
+            "images.bin: record 3 (byte 630): expected at most 7 for the number of 2D points (191 bytes are left), found 8"),
+        ("NaN rotation", patched(images(), at::ROTATION, &nan),
+            "images.bin: record 1 (byte 44): expected a finite pose of image 1, found [NaN, 0.144524286912638, 0.45859493447525507, -0.05452847088216712] [0.41835250088922316, -0.37602715054974273, 0.06756920600942723]"),
+        ("zero rotation", patched(images(), at::ROTATION, &[0; 32]),
+            "images.bin: record 1 (byte 44): expected a finite pose of image 1, found [0.0, 0.0, 0.0, 0.0] [0.41835250088922316, -0.37602715054974273, 0.06756920600942723]"),
+        ("count of 10^18", patched(images(), 0, &MANY),
+            "images.bin: header (byte 0): expected at most 11 for the number of images (822 bytes are left), found 1000000000000000000"),
+        ("2D points of 10^18", patched(images(), at::N_POINTS2D, &MANY),
+            "images.bin: record 1 (byte 88): expected at most 30 for the number of 2D points (734 bytes are left), found 1000000000000000000"),
+        ("name without end", { let name_to_end = vec![b'a'; images().len() - at::NAME]; patched(images(), at::NAME, &name_to_end) },
+            "images.bin: record 1 (byte 72): expected a zero byte at the end of the image name, found end of file"),
+        ("unknown camera", patched(images(), at::IMAGE_CAMERA, &[9]),
+            "images.bin: image 1: expected the id of a camera in cameras.bin, found 9"),
+        ("trailing bytes", appended(images(), &[0; 9]),
+            "images.bin: end (byte 830): expected end of file, found 9 more bytes"),
+        ("repeated id", patched(images(), at::IMAGE, &[2]),
+            "images.bin: image 2: expected each id once, found it again"),
+    ];
+    let camera_rows = [
+        ("empty", cut("cameras.bin", 0),
+            "cameras.bin: header (byte 0): expected 8 bytes of the number of cameras, found end of file"),
+        ("unknown model", patched(cameras(), at::CAMERA_MODEL, &[99]),
+            "cameras.bin: record 1 (byte 12): expected a camera model of COLMAP (0 to 17) for camera 1, found 99"),
+        ("negative model", patched(cameras(), at::CAMERA_MODEL, &[255; 4]),
+            "cameras.bin: record 1 (byte 12): expected a camera model of COLMAP (0 to 17) for camera 1, found -1"),
+        ("longer model", patched(cameras(), at::CAMERA_MODEL, &[11]),
+            "cameras.bin: record 1 (byte 64): expected 8 bytes of a parameter, found end of file"),
+        ("shorter model", patched(cameras(), at::CAMERA_MODEL, &[0]),
+            "cameras.bin: end (byte 56): expected end of file, found 8 more bytes"),
+        ("count of 10^18", patched(cameras(), 0, &MANY),
+            "cameras.bin: header (byte 0): expected at most 1 for the number of cameras (56 bytes are left), found 1000000000000000000"),
+    ];
+    let all = [
+        ("points3D.bin", point_rows.to_vec()),
+        ("images.bin", image_rows.to_vec()),
+        ("cameras.bin", camera_rows.to_vec()),
+    ];
+    all.into_iter()
+        .flat_map(|(name, rows)| {
+            rows.into_iter()
+                .map(move |(what, bytes, line)| in_model(what, name, bytes, line))
+        })
+        .collect()
+}
+
+/// The last record of each file cut inside every field. (Cut in an earlier one, a file is refused by
+/// its count or by the next record, which the sweeps below cover.)
+#[rustfmt::skip] // A row is read as a row.
+pub fn last_record_cuts() -> Vec<Row> {
+    let files = [
+        model_file("points3D.bin"),
+        model_file("images.bin"),
+        model_file("cameras.bin"),
+    ];
+    let names = ["points3D.bin", "images.bin", "cameras.bin"];
+    // The last point has a track of two, the last image a name of six bytes and eight 2D points.
+    let starts = [
+        files[0].len() - (at::TRACK - at::POINT) - 2 * 8,
+        files[1].len() - (at::NAME - at::IMAGE) - 7 - 8 - 8 * 24,
+        at::CAMERA,
+    ];
+    let (rotation, translation) = (at::ROTATION - at::IMAGE, at::TRANSLATION - at::IMAGE);
+    let (camera, name) = (at::IMAGE_CAMERA - at::IMAGE, at::NAME - at::IMAGE);
+    let rows: Vec<(&str, usize, usize, &str)> = vec![
+        ("before the last point", 0, 0,
+            "points3D.bin: record 6 (byte 367): expected 8 bytes of point id, found end of file"),
+        ("point id", 0, 7,
+            "points3D.bin: record 6 (byte 367): expected 8 bytes of point id, found 7 bytes before the end of the file"),
+        ("coordinates", 0, at::COLOR - at::POINT - 1,
+            "points3D.bin: record 6 (byte 375): expected 24 bytes of coordinates, found 23 bytes before the end of the file"),
+        ("color", 0, at::ERROR - at::POINT - 1,
+            "points3D.bin: record 6 (byte 399): expected 3 bytes of color, found 2 bytes before the end of the file"),
+        ("reprojection error", 0, at::N_TRACK - at::POINT - 1,
+            "points3D.bin: record 6 (byte 402): expected 8 bytes of reprojection error, found 7 bytes before the end of the file"),
+        ("number of observations", 0, at::TRACK - at::POINT - 1,
+            "points3D.bin: record 6 (byte 410): expected 8 bytes of the number of observations, found 7 bytes before the end of the file"),
+        ("observations", 0, at::TRACK - at::POINT + 2 * 8 - 1,
+            "points3D.bin: record 6 (byte 410): expected at most 1 for the number of observations (15 bytes are left), found 2"),
+        ("before the last image", 1, 0,
+            "images.bin: record 3 (byte 559): expected 4 bytes of image id, found end of file"),
+        ("image id", 1, rotation - 1,
+            "images.bin: record 3 (byte 559): expected 4 bytes of image id, found 3 bytes before the end of the file"),
+        ("rotation", 1, translation - 1,
+            "images.bin: record 3 (byte 563): expected 32 bytes of rotation, found 31 bytes before the end of the file"),
+        ("translation", 1, camera - 1,
+            "images.bin: record 3 (byte 595): expected 24 bytes of translation, found 23 bytes before the end of the file"),
+        ("camera of the image", 1, name - 1,
+            "images.bin: record 3 (byte 619): expected 4 bytes of camera id, found 3 bytes before the end of the file"),
+        ("name", 1, name + 6,
+            "images.bin: record 3 (byte 623): expected a zero byte at the end of the image name, found end of file"),
+        ("number of 2D points", 1, name + 7 + 7,
+            "images.bin: record 3 (byte 630): expected 8 bytes of the number of 2D points, found 7 bytes before the end of the file"),
+        ("2D points", 1, name + 7 + 8 + 8 * 24 - 1,
+            "images.bin: record 3 (byte 630): expected at most 7 for the number of 2D points (191 bytes are left), found 8"),
+        ("parameters", 2, at::PARAMS - at::CAMERA + 4 * 8 - 1,
+            "cameras.bin: record 1 (byte 56): expected 8 bytes of a parameter, found 7 bytes before the end of the file"),
+    ];
+    rows.into_iter()
+        .map(|(what, file, end, line)| {
+            let bytes = files[file][..starts[file] + end].to_vec();
+            in_model(what, names[file], bytes, line)
+        })
+        .collect()
+}
+
+#[rustfmt::skip] // A row is read as a row.
+pub fn text() -> Vec<Row> {
+    let points = |what, text: &str, line| alone(what, "points3D.txt", text, line);
+    let model = |what, name, text: &str, line| {
+        let files = vec![
+            (name, text.as_bytes().to_vec()),
+            ("points3D.txt", b"1 0 0 0 0 0 0 0".to_vec()),
+        ];
+        row(what, files, "", line)
+    };
+    let long = format!("1 0 0 {} 0 0 0 0", "9a".repeat(60));
+    vec![
+        points("empty text", "", "points3D.txt: expected at least one point, found none"),
+        points("only comments", "# nothing\n", "points3D.txt: expected at least one point, found none"),
+        points("two coordinates", "# c\n1 2 3\n",
+            "points3D.txt:2: expected 3 coordinates, found end of line"),
+        points("not a number", "1 2 3 abc 0 0 0 0\n",
+            "points3D.txt:1: expected 3 coordinates, found \"abc\""),
+        points("long word", &long,
+            "points3D.txt:1: expected 3 coordinates, found \"9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a9a...\""),
+        points("NaN", "1 0 0 0 0 0 0 0\n7 NaN 0 0 0 0 0 0\n",
+            "points3D.txt:2: expected finite coordinates of point 7, found [NaN, 0.0, 0.0]"),
+        points("infinite", "7 0 -inf 0 0 0 0 0\n",
+            "points3D.txt:1: expected finite coordinates of point 7, found [0.0, -inf, 0.0]"),
+        points("negative id", "-7 0 0 0 0 0 0 0\n", "points3D.txt:1: expected a point id, found \"-7\""),
+        points("no error", "7 0 0 0 0 0 0\n",
+            "points3D.txt:1: expected a reprojection error, found end of line"),
+        points("half an observation", "7 0 0 0 0 0 0 0 1 2 3\n",
+            "points3D.txt:1: expected observations of 2 numbers (image id, 2D point), found 3 numbers"),
+        points("binary where text is expected", "\u{6}\0\0\0\0\0\0\0\u{2}\0\0\n",
+            "points3D.txt:1: expected text, found binary data"),
+        model("unknown camera model", "cameras.txt", "1 WIDE 640 480 1 2 3\n",
+            "cameras.txt:1: expected a camera model of COLMAP for camera 1, found \"WIDE\""),
+        model("parameter missing", "cameras.txt", "1 PINHOLE 640 480 1 2 3\n",
+            "cameras.txt:1: expected 4 parameters of PINHOLE, found 3"),
+        model("no width", "cameras.txt", "1 PINHOLE\n",
+            "cameras.txt:1: expected a width in pixels, found end of line"),
+        model("pose cut", "images.txt", "1 1 0 0 0 1 2\n\n",
+            "images.txt:1: expected a translation (3 numbers), found end of line"),
+        model("zero rotation", "images.txt", "1 0 0 0 0 1 2 3 1 a.jpg\n\n",
+            "images.txt:1: expected a finite pose of image 1, found [0.0, 0.0, 0.0, 0.0] [1.0, 2.0, 3.0]"),
+        model("no name", "images.txt", "1 1 0 0 0 1 2 3 1\n\n",
+            "images.txt:1: expected an image name, found end of line"),
+        model("2D points cut", "images.txt", "1 1 0 0 0 1 2 3 1 a.jpg\n1 2 3 4\n",
+            "images.txt:2: expected 2D points of 3 numbers (x, y, point id), found 4 numbers"),
+    ]
+}

@@ -1,0 +1,77 @@
+//! Real maps, where they are at hand: sums as pycolmap and NumPy give them.
+
+use std::path::{Path, PathBuf};
+
+use unlift::descriptors::Values;
+use unlift_io::read;
+
+/// The folder of a data set, or a message that the test is skipped.
+fn dataset(name: &str) -> Option<PathBuf> {
+    let data = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data");
+    let path = Path::new(data).join(name);
+    if !path.is_dir() {
+        eprintln!("skipped: the data set {name} is not beside the repository");
+        return None;
+    }
+    Some(path)
+}
+
+struct Expected {
+    n: usize,
+    n_cameras: usize,
+    id_sum: u64,
+    sum: [f64; 3],
+    camera_sum: [f64; 3],
+    descriptor_sum: u64,
+}
+
+fn check(name: &str, expected: &Expected) {
+    let Some(path) = dataset(name) else { return };
+    let input = read::open(&path).unwrap();
+    assert_eq!(input.positions.len(), expected.n);
+    assert_eq!(input.cameras.len(), expected.n_cameras);
+    assert_eq!(input.ids.iter().sum::<u64>(), expected.id_sum);
+    for axis in 0..3 {
+        let sum = |rows: &[[f64; 3]]| rows.iter().map(|p| p[axis]).sum::<f64>();
+        // Sums of 10^4 doubles of size 10 in another order differ in the last bits only.
+        assert!((sum(&input.positions) - expected.sum[axis]).abs() < 1e-6);
+        assert!((sum(&input.cameras) - expected.camera_sum[axis]).abs() < 1e-9);
+    }
+    let descriptors = read::descriptors(&path.join("descriptors.bin"), &input).unwrap();
+    assert_eq!((descriptors.len(), descriptors.dim()), (expected.n, 128));
+    let Values::U8(bytes) = descriptors.values() else {
+        panic!("bytes expected");
+    };
+    let sum: u64 = bytes.iter().map(|&b| u64::from(b)).sum();
+    assert_eq!(sum, expected.descriptor_sum);
+}
+
+#[test]
+fn redkitchen_reads_as_pycolmap_reads_it() {
+    check(
+        "redkitchen",
+        &Expected {
+            n: 21_149,
+            n_cameras: 114,
+            id_sum: 457_420_110,
+            sum: [-14724.929303410438, -6123.789441610717, 51644.81699450455],
+            camera_sum: [-43.05353627242874, -31.937187957432283, 90.64668314637804],
+            descriptor_sum: 88_317_746,
+        },
+    );
+}
+
+#[test]
+fn castle_reads_as_pycolmap_reads_it() {
+    check(
+        "castle",
+        &Expected {
+            n: 6_224,
+            n_cameras: 11,
+            id_sum: 19_826_437,
+            sum: [-19920.427404514652, 2174.7605237991306, 63821.610508611295],
+            camera_sum: [-2.9480235564438795, 0.6448085497825612, 3.522803738595307],
+            descriptor_sum: 27_924_921,
+        },
+    );
+}
