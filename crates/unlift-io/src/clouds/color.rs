@@ -1,0 +1,51 @@
+//! The colors of errors.
+
+/// Viridis (matplotlib, CC0) at nine even steps: even to the eye, also in gray and to the color-blind.
+const VIRIDIS: [[u8; 3]; 9] = [
+    [0x44, 0x01, 0x54],
+    [0x47, 0x2d, 0x7b],
+    [0x3b, 0x52, 0x8b],
+    [0x2c, 0x72, 0x8e],
+    [0x21, 0x91, 0x8c],
+    [0x28, 0xae, 0x80],
+    [0x5e, 0xc9, 0x62],
+    [0xad, 0xdc, 0x30],
+    [0xfd, 0xe7, 0x25],
+];
+
+/// The color of an error: dark violet at 0, through green at half, to yellow at `full_scale` and
+/// beyond. Linear between nine steps of viridis; an error that is not a number is yellow.
+pub fn error_color(error: f64, full_scale: f64) -> [u8; 3] {
+    let last = VIRIDIS.len() - 1;
+    let share = error / full_scale;
+    if !(share < 1.0) {
+        return VIRIDIS[last];
+    }
+    let at = share.max(0.0) * last as f64;
+    let step = (at as usize).min(last - 1);
+    let part = at - step as f64;
+    std::array::from_fn(|c| {
+        let (low, high) = (f64::from(VIRIDIS[step][c]), f64::from(VIRIDIS[step + 1][c]));
+        (low + part * (high - low)).round() as u8
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ramp_runs_from_violet_to_yellow() {
+        assert_eq!(error_color(0.0, 0.25), [0x44, 0x01, 0x54]);
+        assert_eq!(error_color(0.125, 0.25), [0x21, 0x91, 0x8c]);
+        assert_eq!(error_color(0.25, 0.25), [0xfd, 0xe7, 0x25]);
+        assert_eq!(error_color(99.0, 0.25), [0xfd, 0xe7, 0x25]);
+    }
+
+    #[test]
+    fn odd_values_have_a_color() {
+        assert_eq!(error_color(f64::NAN, 1.0), [0xfd, 0xe7, 0x25]);
+        assert_eq!(error_color(-1.0, 1.0), [0x44, 0x01, 0x54]);
+        assert_eq!(error_color(0.0, 0.0), [0xfd, 0xe7, 0x25]);
+    }
+}

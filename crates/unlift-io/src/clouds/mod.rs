@@ -1,0 +1,11 @@
+//! Pictures of points and lines for any viewer: PLY clouds colored by error, OBJ lines in a box.
+
+mod color;
+mod obj;
+mod ply;
+mod segments;
+
+pub use color::error_color;
+pub use obj::write_lines;
+pub use ply::{write_points, write_recovered};
+pub use segments::{Segment, clip_line_to_box, clip_ray_to_box, record_segments};

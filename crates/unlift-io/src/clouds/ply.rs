@@ -1,0 +1,112 @@
+//! Point clouds as binary PLY.
+
+use super::error_color;
+use crate::{Error, atomic};
+use std::io::{self, Write};
+use std::path::Path;
+
+/// Writes `points` `(n, D)` as binary little-endian PLY (`double x, y, z`; z is 0 in 2D), with
+/// `colors` `(n, 3)` as `uchar red, green, blue` when given.
+///
+/// # Errors
+/// When a coordinate is not finite, `colors` has another length, or the file cannot be written.
+pub fn write_points<const D: usize>(
+    path: &Path,
+    points: &[[f64; D]],
+    colors: Option<&[[u8; 3]]>,
+) -> Result<(), Error> {
+    if let Some(colors) = colors
+        && colors.len() != points.len()
+    {
+        let expected = format!("{} colors", points.len());
+        return Err(Error::new(path, "", expected, colors.len().to_string()));
+    }
+    for (row, point) in points.iter().enumerate() {
+        finite(path, row, point)?;
+    }
+    atomic::write_file(path, |w| {
+        header(w, points.len(), colors.is_some(), false)?;
+        for (row, point) in points.iter().enumerate() {
+            coordinates(w, point)?;
+            if let Some(colors) = colors {
+                w.write_all(&colors[row])?;
+            }
+        }
+        Ok(())
+    })
+}
+
+/// Writes recovered points as PLY, colored by their `errors` (distance to the original): the columns
+/// of [`write_points`], then `float error`. Lost points (`None`) are omitted.
+///
+/// Colors are those of [`error_color`] with `full_scale`, in the unit of the points.
+///
+/// # Errors
+/// When a coordinate is not finite, `errors` has another length, or the file cannot be written.
+pub fn write_recovered<const D: usize>(
+    path: &Path,
+    points: &[Option<[f64; D]>],
+    errors: &[f64],
+    full_scale: f64,
+) -> Result<(), Error> {
+    if errors.len() != points.len() {
+        let expected = format!("{} errors", points.len());
+        return Err(Error::new(path, "", expected, errors.len().to_string()));
+    }
+    for (row, point) in points.iter().enumerate() {
+        if let Some(point) = point {
+            finite(path, row, point)?;
+        }
+    }
+    let n_found = points.iter().flatten().count();
+    atomic::write_file(path, |w| {
+        header(w, n_found, true, true)?;
+        for (point, &error) in points.iter().zip(errors) {
+            if let Some(point) = point {
+                coordinates(w, point)?;
+                w.write_all(&error_color(error, full_scale))?;
+                w.write_all(&(error as f32).to_le_bytes())?;
+            }
+        }
+        Ok(())
+    })
+}
+
+fn header(w: &mut impl Write, n: usize, colored: bool, with_error: bool) -> io::Result<()> {
+    write!(
+        w,
+        "ply\nformat binary_little_endian 1.0\nelement vertex {n}\n"
+    )?;
+    for axis in ["x", "y", "z"] {
+        writeln!(w, "property double {axis}")?;
+    }
+    if colored {
+        for color in ["red", "green", "blue"] {
+            writeln!(w, "property uchar {color}")?;
+        }
+    }
+    if with_error {
+        writeln!(w, "property float error")?;
+    }
+    writeln!(w, "end_header")
+}
+
+fn coordinates<const D: usize>(w: &mut impl Write, point: &[f64; D]) -> io::Result<()> {
+    for axis in 0..3 {
+        w.write_all(&point.get(axis).copied().unwrap_or(0.0).to_le_bytes())?;
+    }
+    Ok(())
+}
+
+fn finite<const D: usize>(path: &Path, row: usize, point: &[f64; D]) -> Result<(), Error> {
+    if point.iter().all(|x| x.is_finite()) {
+        return Ok(());
+    }
+    let found = format!("{point:?}");
+    Err(Error::new(
+        path,
+        format!("point {row}"),
+        "finite coordinates",
+        found,
+    ))
+}

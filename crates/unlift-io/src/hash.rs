@@ -1,0 +1,107 @@
+//! Hashes of input files, so that a result names exactly what it came from.
+
+use crate::Error;
+use sha2::{Digest, Sha256};
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+/// The SHA-256 of one file's content, as 64 hexadecimal digits; read in pieces.
+///
+/// # Errors
+/// When the file cannot be read.
+pub fn hash_file(path: &Path) -> Result<String, Error> {
+    let failed = |source| Error::read(path, source);
+    let mut file = File::open(path).map_err(failed)?;
+    let mut hasher = Sha256::new();
+    let mut piece = vec![0; 1 << 16];
+    loop {
+        match file.read(&mut piece) {
+            Ok(0) => return Ok(hex(hasher)),
+            Ok(n) => hasher.update(&piece[..n]),
+            Err(source) if source.kind() == std::io::ErrorKind::Interrupted => {}
+            Err(source) => return Err(failed(source)),
+        }
+    }
+}
+
+/// One SHA-256, as 64 hexadecimal digits, over the names and contents of `paths`.
+///
+/// The rule: the SHA-256 of the lines `HASH  NAME\n`, one per file in ascending byte order of its
+/// name without folders (then of its hash); what `sha256sum` prints in the folder of the files, in
+/// the C locale:
+///
+/// ```sh
+/// sha256sum cameras.bin images.bin points3D.bin | sha256sum
+/// ```
+///
+/// # Errors
+/// When a file cannot be read.
+pub fn hash_files<P: AsRef<Path>>(paths: &[P]) -> Result<String, Error> {
+    let mut lines = Vec::with_capacity(paths.len());
+    for path in paths {
+        let path = path.as_ref();
+        let name = path.file_name().unwrap_or_default();
+        lines.push((name.to_string_lossy().into_owned(), hash_file(path)?));
+    }
+    lines.sort();
+    let mut hasher = Sha256::new();
+    for (name, hash) in lines {
+        hasher.update(format!("{hash}  {name}\n"));
+    }
+    Ok(hex(hasher))
+}
+
+fn hex(hasher: Sha256) -> String {
+    hasher
+        .finalize()
+        .iter()
+        .map(|b| format!("{b:02x}"))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn a_file_has_its_published_hash() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("abc");
+        fs::write(&path, "abc").unwrap();
+        // FIPS 180-2, appendix B.1.
+        let published = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(hash_file(&path).unwrap(), published);
+    }
+
+    #[test]
+    fn a_list_hashes_as_sha256sum_does_in_any_order() {
+        let folder = tempfile::tempdir().unwrap();
+        let [a, b] = ["a", "b"].map(|name| folder.path().join(name));
+        fs::write(&a, "abc").unwrap();
+        fs::write(&b, "").unwrap();
+        // printf abc > a; printf '' > b; sha256sum a b | sha256sum
+        let expected = "09c7e0b8a02d027d95ec0375a600ed4ad4d6b26a1c93f16d9150cab5fec761a6";
+        assert_eq!(hash_files(&[&a, &b]).unwrap(), expected);
+        assert_eq!(hash_files(&[&b, &a]).unwrap(), expected);
+    }
+
+    #[test]
+    fn a_name_counts() {
+        let folder = tempfile::tempdir().unwrap();
+        let [a, b] = ["a", "b"].map(|name| folder.path().join(name));
+        fs::write(&a, "abc").unwrap();
+        fs::write(&b, "abc").unwrap();
+        assert_ne!(hash_files(&[&a]).unwrap(), hash_files(&[&b]).unwrap());
+    }
+
+    #[test]
+    fn a_missing_file_is_named() {
+        let error = hash_files(&["missing.bin"]).unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "missing.bin: expected a file or folder, found nothing"
+        );
+    }
+}

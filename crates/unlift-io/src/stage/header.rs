@@ -1,0 +1,262 @@
+//! What kind of stage file this is: the JSON object under the metadata key `unlift`.
+
+use super::table::Table;
+use crate::Error;
+use serde_json::{Map, Value, json};
+use std::fmt;
+use std::path::Path;
+use unlift::Unit;
+
+/// The Parquet key-value metadata key that holds the JSON object.
+pub(super) const KEY: &str = "unlift";
+
+/// The version written, and the only one read.
+pub(super) const VERSION: u64 = 1;
+
+/// What a stage file holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// An obfuscated map: the attacker's side.
+    Released,
+    /// Originals and the secret of an obfuscation: the owner's side.
+    Truth,
+    /// Lists of records, one per slot.
+    Neighborhoods,
+    /// Lists of original points, one per point.
+    PointNeighborhoods,
+    /// Recovered points, one per slot.
+    Recovered,
+}
+
+impl Kind {
+    /// Every kind.
+    pub const ALL: [Kind; 5] = [
+        Self::Released,
+        Self::Truth,
+        Self::Neighborhoods,
+        Self::PointNeighborhoods,
+        Self::Recovered,
+    ];
+
+    /// The name used in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Released => "released",
+            Self::Truth => "truth",
+            Self::Neighborhoods => "neighborhoods",
+            Self::PointNeighborhoods => "point_neighborhoods",
+            Self::Recovered => "recovered",
+        }
+    }
+
+    /// The kind called `name`, if there is one.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+
+    /// Whether the columns alone say what the file is, so that the metadata may be missing (engines
+    /// such as Spark cannot write it).
+    pub(super) fn needs_metadata(self) -> bool {
+        !matches!(self, Self::Neighborhoods | Self::PointNeighborhoods)
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Released => "a released map",
+            Self::Truth => "a truth file",
+            Self::Neighborhoods => "neighborhoods of slots",
+            Self::PointNeighborhoods => "neighborhoods of points",
+            Self::Recovered => "a file of recovered points",
+        })
+    }
+}
+
+/// What can be said of a stage file without reading its columns.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Header {
+    /// What the file holds.
+    pub kind: Kind,
+    /// 2 or 3, where the kind has a dimension.
+    pub dimension: Option<usize>,
+    /// Number of rows: records, slots or points, as the kind has them.
+    pub n_rows: u64,
+}
+
+/// Reads kind, dimension and number of rows of the stage file `path`: what decides which reader and
+/// which `D` to call.
+///
+/// # Errors
+/// When the file is not a Parquet file, or not a stage file of a known kind and version.
+pub fn peek(path: &Path) -> Result<Header, Error> {
+    let table = Table::open(path)?;
+    let kind = table.kind()?;
+    let dimension = match kind {
+        Kind::Neighborhoods | Kind::PointNeighborhoods => None,
+        Kind::Released | Kind::Truth | Kind::Recovered => Some(table.meta().dimension()?),
+    };
+    let n_rows = table.n_rows();
+    Ok(Header {
+        kind,
+        dimension,
+        n_rows,
+    })
+}
+
+/// The metadata object of a file, with the file's name for messages.
+#[derive(Debug)]
+pub(super) struct Meta<'a> {
+    path: &'a Path,
+    object: Map<String, Value>,
+}
+
+impl<'a> Meta<'a> {
+    /// Parses `text`; no text is an empty object.
+    pub(super) fn parse(path: &'a Path, text: Option<&str>) -> Result<Self, Error> {
+        let place = "metadata unlift";
+        let object = match text.map(serde_json::from_str::<Value>) {
+            None => Map::new(),
+            Some(Ok(Value::Object(object))) => object,
+            Some(Ok(other)) => {
+                return Err(Error::new(path, place, "a JSON object", short(&other)));
+            }
+            Some(Err(error)) => {
+                return Err(Error::new(path, place, "a JSON object", error.to_string()));
+            }
+        };
+        Ok(Self { path, object })
+    }
+
+    /// Kind of the file as declared; `None` when nothing is declared.
+    pub(super) fn kind(&self) -> Result<Option<Kind>, Error> {
+        if self.object.is_empty() {
+            return Ok(None);
+        }
+        let Some(version) = self.object.get("version") else {
+            return Err(self.wrong("version", VERSION.to_string()));
+        };
+        if version.as_u64() != Some(VERSION) {
+            return Err(self.wrong("version", VERSION.to_string()));
+        }
+        let names: Vec<&str> = Kind::ALL.into_iter().map(Kind::name).collect();
+        let kind = self.text("kind").and_then(Kind::from_name);
+        match kind {
+            Some(kind) => Ok(Some(kind)),
+            None => Err(self.wrong("kind", format!("one of {}", names.join(", ")))),
+        }
+    }
+
+    /// 2 or 3.
+    pub(super) fn dimension(&self) -> Result<usize, Error> {
+        match self.object.get("dimension").and_then(Value::as_u64) {
+            Some(2) => Ok(2),
+            Some(3) => Ok(3),
+            _ => Err(self.wrong("dimension", "2 or 3")),
+        }
+    }
+
+    /// Refuses a file of another dimension than `D`.
+    pub(super) fn expect_dimension<const D: usize>(&self) -> Result<(), Error> {
+        if self.dimension()? == D {
+            Ok(())
+        } else {
+            Err(self.wrong("dimension", D.to_string()))
+        }
+    }
+
+    /// The unit of every length.
+    pub(super) fn unit(&self) -> Result<Unit, Error> {
+        let unit = self.text("unit").and_then(Unit::from_name);
+        unit.ok_or_else(|| self.wrong("unit", "m, px or kth_neighbor"))
+    }
+
+    /// The origin; 0 when it is not given.
+    pub(super) fn origin<const D: usize>(&self) -> Result<[f64; D], Error> {
+        match self.object.get("origin") {
+            None => Ok([0.0; D]),
+            Some(value) => {
+                vector(value).ok_or_else(|| self.wrong("origin", format!("a list of {D} numbers")))
+            }
+        }
+    }
+
+    /// The table of centers of a ray cloud.
+    pub(super) fn centers<const D: usize>(&self) -> Result<Vec<[f64; D]>, Error> {
+        let rows = self.object.get("centers").and_then(Value::as_array);
+        let rows = rows.and_then(|rows| rows.iter().map(vector).collect());
+        rows.ok_or_else(|| self.wrong("centers", format!("a list of lists of {D} numbers")))
+    }
+
+    /// A text, if the key is there and is one.
+    pub(super) fn text(&self, key: &str) -> Option<&str> {
+        self.object.get(key).and_then(Value::as_str)
+    }
+
+    /// A whole number of at least 1; 1 when it is not given.
+    pub(super) fn count_or_1(&self, key: &str) -> Result<usize, Error> {
+        match self.object.get(key) {
+            None => Ok(1),
+            Some(value) => match value.as_u64().and_then(|n| usize::try_from(n).ok()) {
+                Some(n) if n >= 1 => Ok(n),
+                _ => Err(self.wrong(key, "a whole number of at least 1")),
+            },
+        }
+    }
+
+    /// A number of at least 0; 0 when it is not given.
+    pub(super) fn number_or_0(&self, key: &str) -> Result<f64, Error> {
+        match self.object.get(key) {
+            None => Ok(0.0),
+            Some(value) => match value.as_f64() {
+                Some(x) if x >= 0.0 => Ok(x),
+                _ => Err(self.wrong(key, "a number of at least 0")),
+            },
+        }
+    }
+
+    /// The error about `key`.
+    pub(super) fn wrong(&self, key: &str, expected: impl Into<String>) -> Error {
+        let found = self.object.get(key).map_or("nothing".into(), short);
+        Error::new(
+            self.path,
+            format!("metadata unlift, {key}"),
+            expected,
+            found,
+        )
+    }
+}
+
+fn vector<const D: usize>(value: &Value) -> Option<[f64; D]> {
+    let row: Option<Vec<f64>> = value.as_array()?.iter().map(Value::as_f64).collect();
+    row?.try_into().ok()
+}
+
+/// The first characters of a JSON value: enough to recognize it.
+fn short(value: &Value) -> String {
+    let text = value.to_string();
+    match text.char_indices().nth(60) {
+        Some((at, _)) => format!("{}...", &text[..at]),
+        None => text,
+    }
+}
+
+/// The metadata of a file of `kind`, to be completed.
+pub(super) fn new_meta(kind: Kind) -> Map<String, Value> {
+    let mut object = Map::new();
+    object.insert("kind".into(), json!(kind.name()));
+    object.insert("version".into(), json!(VERSION));
+    object
+}
+
+/// `meta` as text. Keys are written in alphabetical order whatever map `serde_json` is built with,
+/// so that equal values make equal bytes.
+pub(super) fn to_text(meta: Map<String, Value>) -> String {
+    let mut entries: Vec<(String, Value)> = meta.into_iter().collect();
+    entries.sort_by(|a, b| a.0.cmp(&b.0));
+    let entries: Vec<String> = entries
+        .into_iter()
+        .map(|(key, value)| format!("{}:{value}", Value::String(key)))
+        .collect();
+    format!("{{{}}}", entries.join(","))
+}

@@ -1,0 +1,27 @@
+//! Stage files: what passes between the commands, as Parquet tables.
+//!
+//! One file per kind, described for writers in other languages in `docs/formats.md`. A file holds
+//! one kind only, and released maps, neighborhoods and recovered points hold nothing of the truth:
+//! no ids, names or times of their source, so that equal values make equal bytes.
+//!
+//! Readers take any integer width, float or double, any kind of list, and ignore columns and
+//! metadata they do not know. Everything else that is not as documented is one line naming the
+//! file, the column and row (counted from 0), what was expected and what was found.
+
+mod column;
+mod header;
+mod neighborhoods;
+mod order;
+mod recovered;
+mod released;
+mod table;
+mod truth;
+mod write;
+
+pub use header::{Header, Kind, peek};
+pub use neighborhoods::{
+    PointNeighborhoods, read_neighborhoods, read_point_neighborhoods, write_neighborhoods,
+};
+pub use recovered::{read_recovered, write_recovered};
+pub use released::{read_released, write_released};
+pub use truth::{read_truth, write_truth};

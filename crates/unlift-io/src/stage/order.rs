@@ -1,0 +1,38 @@
+//! Rows that say which slot or point they are about may stand in any order.
+
+use crate::Error;
+use std::path::Path;
+
+/// The row of each key from 0 to `n - 1`, where row `r` has key `keys[r]`; `None` where no row has
+/// it.
+///
+/// # Errors
+/// When two rows have the same key. `column` names the keys in the message; keys are below `n`.
+pub(super) fn rows_by_key(
+    path: &Path,
+    column: &str,
+    keys: &[u32],
+    n: usize,
+) -> Result<Vec<Option<u32>>, Error> {
+    let mut rows = vec![None; n];
+    for (row, &key) in keys.iter().enumerate() {
+        let place = &mut rows[key as usize];
+        if let Some(earlier) = place {
+            let place = format!("column {column}, row {row}");
+            let expected = format!("each {column} once");
+            let found = format!("{key} as in row {earlier}");
+            return Err(Error::new(path, place, expected, found));
+        }
+        *place = Some(row as u32);
+    }
+    Ok(rows)
+}
+
+/// The row of each of as many keys as there are rows.
+///
+/// # Errors
+/// As [`rows_by_key`]; then no key is missing either.
+pub(super) fn permutation(path: &Path, column: &str, keys: &[u32]) -> Result<Vec<u32>, Error> {
+    let rows = rows_by_key(path, column, keys, keys.len())?;
+    Ok(rows.into_iter().flatten().collect())
+}

@@ -1,0 +1,200 @@
+//! Recovered points: a position or a reason, per slot.
+
+use super::column::{Batch, Type, coordinate_names};
+use super::header::{Kind, new_meta, to_text};
+use super::order::permutation;
+use super::table::Table;
+use super::write::{field, numbers, optional_numbers, write_table};
+use crate::Error;
+use arrow_array::types::{Float32Type, Float64Type, UInt8Type, UInt16Type, UInt32Type};
+use arrow_array::{ArrayRef, StringArray};
+use arrow_schema::DataType::{Float32, Float64, UInt8, UInt16, UInt32, Utf8};
+use arrow_schema::Field;
+use serde_json::json;
+use std::path::Path;
+use std::sync::Arc;
+use unlift::recover::{Estimate, Recovered, Status};
+
+/// Writes recovered points, one row per slot; positions in the map's frame (the origin is added).
+///
+/// Adding the origin loses digits of points that lie within 2^-29 of its size from it (2 mm at
+/// coordinates of 10^6 m), by at most 10^-10 m there; no position in the map's frame changes.
+///
+/// # Errors
+/// When an evidence or delta is not finite, or the file cannot be written.
+pub fn write_recovered<const D: usize>(path: &Path, recovered: &Recovered<D>) -> Result<(), Error> {
+    let finite = |x: &f32| x.is_finite();
+    if let Some(slot) = recovered.evidence().iter().position(|x| !finite(x)) {
+        let found = recovered.evidence()[slot].to_string();
+        let place = format!("column evidence, row {slot}");
+        return Err(Error::new(path, place, "a finite number", found));
+    }
+    if !(recovered.delta().is_finite() && recovered.delta() >= 0.0) {
+        let found = recovered.delta().to_string();
+        return Err(Error::new(path, "delta", "a number of at least 0", found));
+    }
+    let mut meta = new_meta(Kind::Recovered);
+    meta.insert("dimension".into(), json!(D));
+    meta.insert("origin".into(), json!(recovered.origin().to_vec()));
+    meta.insert("unit".into(), json!(recovered.unit().name()));
+    meta.insert("delta".into(), json!(recovered.delta()));
+    let mut fields = vec![field("slot", UInt32)];
+    fields.extend(coordinate_names::<D>("").map(|name| Field::new(name, Float64, true)));
+    fields.push(field("status", Utf8));
+    fields.push(field("support", UInt16));
+    fields.push(field("evidence", Float32));
+    fields.extend(recovered.axis().map(|_| field("axis", UInt8)));
+    fields.extend(
+        recovered
+            .descriptor_row()
+            .map(|_| field("descriptor_row", UInt32)),
+    );
+    write_table(path, to_text(meta), fields, recovered.n_slots(), |slots| {
+        let mut columns = vec![numbers::<UInt32Type>(slots.clone().map(|slot| slot as u32))];
+        columns.extend((0..D).map(|axis| {
+            let positions = slots.clone().map(|slot| recovered.position(slot));
+            optional_numbers::<Float64Type>(positions.map(|p| p.map(|p| p[axis])))
+        }));
+        let status = recovered.status()[slots.clone()].iter().map(|s| s.name());
+        columns.push(Arc::new(StringArray::from_iter_values(status)) as ArrayRef);
+        let support = &recovered.support()[slots.clone()];
+        columns.push(numbers::<UInt16Type>(support.iter().copied()));
+        let evidence = &recovered.evidence()[slots.clone()];
+        columns.push(numbers::<Float32Type>(evidence.iter().copied()));
+        if let Some(axis) = recovered.axis() {
+            columns.push(numbers::<UInt8Type>(axis[slots.clone()].iter().copied()));
+        }
+        if let Some(row) = recovered.descriptor_row() {
+            columns.push(numbers::<UInt32Type>(row[slots].iter().copied()));
+        }
+        columns
+    })
+}
+
+/// Reads recovered points of dimension `D` (see [`peek`](super::peek)).
+///
+/// Only the coordinates are needed: without `status`, a point is `ok` or, where they are null,
+/// `no_support`; `support` and `evidence` default to 0. Rows are in slot order or, when there is a
+/// column `slot`, in any.
+///
+/// # Errors
+/// When the file is not as `docs/formats.md` describes it.
+pub fn read_recovered<const D: usize>(path: &Path) -> Result<Recovered<D>, Error> {
+    let table = Table::open_kind(path, Kind::Recovered)?;
+    let meta = table.meta();
+    meta.expect_dimension::<D>()?;
+    let (origin, unit, delta) = (
+        meta.origin::<D>()?,
+        meta.unit()?,
+        meta.number_or_0("delta")?,
+    );
+    let coordinates = coordinate_names::<D>("");
+    let mut columns: Vec<(&str, Type)> = vec![];
+    columns.extend(coordinates.iter().map(|name| (name.as_str(), Type::Float)));
+    let optional = [
+        ("slot", Type::Integer),
+        ("status", Type::Text),
+        ("support", Type::Integer),
+        ("evidence", Type::Float),
+        ("axis", Type::Integer),
+        ("descriptor_row", Type::Integer),
+    ];
+    columns.extend(optional.into_iter().filter(|(name, _)| table.has(name)));
+    let mut estimates: Vec<Estimate<D>> = Vec::new();
+    let (mut slots, mut rows): (Vec<u32>, Vec<u32>) = (Vec::new(), Vec::new());
+    let n_slots = table.n_rows();
+    table.read(&columns, |batch| {
+        if table.has("slot") {
+            slots.extend(batch.integers("slot", n_slots)?);
+        }
+        if table.has("descriptor_row") {
+            rows.extend(batch.integers("descriptor_row", n_slots)?);
+        }
+        read_estimates(&table, batch, &coordinates, &origin, &mut estimates)
+    })?;
+    if table.has("slot") {
+        let order = permutation(path, "slot", &slots)?;
+        estimates = order.iter().map(|&row| estimates[row as usize]).collect();
+        if !rows.is_empty() {
+            rows = order.iter().map(|&row| rows[row as usize]).collect();
+        }
+    }
+    let rows = table.has("descriptor_row").then_some(rows);
+    let with_axis = table.has("axis");
+    Recovered::try_new(&estimates, with_axis, rows, origin, unit, delta)
+        .map_err(|source| Error::core(path, source))
+}
+
+/// The estimates of one batch, appended to `to`.
+fn read_estimates<const D: usize>(
+    table: &Table,
+    batch: &Batch<'_>,
+    coordinates: &[String; D],
+    origin: &[f64; D],
+    to: &mut Vec<Estimate<D>>,
+) -> Result<(), Error> {
+    let mut position: [Vec<Option<f64>>; D] = std::array::from_fn(|_| Vec::new());
+    for (column, name) in position.iter_mut().zip(coordinates) {
+        *column = batch.optional_floats(name)?;
+    }
+    let status = table.has("status").then(|| batch.texts("status"));
+    let integers = |name, below| match table.has(name) {
+        true => batch.integers(name, below),
+        false => Ok(vec![0; batch.len()]),
+    };
+    let support = integers("support", 1 << 16)?;
+    let axis = integers("axis", D as u64)?;
+    let evidence = match table.has("evidence") {
+        true => batch.floats("evidence")?,
+        false => vec![0.0; batch.len()],
+    };
+    for row in 0..batch.len() {
+        let found = position[0][row].is_some();
+        let mut about_origin = [f32::NAN; D];
+        for (at, name) in coordinates.iter().enumerate() {
+            match position[at][row] {
+                Some(x) if found => {
+                    about_origin[at] = (x - origin[at]) as f32;
+                    if !about_origin[at].is_finite() {
+                        let expected = "a number in the range of f32 about the origin";
+                        return Err(batch.wrong(name, row, expected, x.to_string()));
+                    }
+                }
+                None if !found => {}
+                Some(x) => return Err(batch.wrong(name, row, "null as in x", x.to_string())),
+                None => return Err(batch.wrong(name, row, "a number as in x", "null")),
+            }
+        }
+        let status = match &status {
+            Some(names) => read_status(batch, row, names[row], found)?,
+            None if found => Status::Ok,
+            None => Status::NoSupport,
+        };
+        to.push(Estimate {
+            position: about_origin,
+            status,
+            support: support[row] as u16,
+            axis: axis[row] as u8,
+            evidence: evidence[row] as f32,
+        });
+    }
+    Ok(())
+}
+
+fn read_status(
+    batch: &Batch<'_>,
+    row: usize,
+    name: Option<&str>,
+    has_position: bool,
+) -> Result<Status, Error> {
+    let wrong = |expected: String| batch.wrong("status", row, expected, name.unwrap_or("null"));
+    let Some(status) = name.and_then(Status::from_name) else {
+        let names = Status::ALL.map(Status::name).join(", ");
+        return Err(wrong(format!("one of {names}")));
+    };
+    match (status == Status::Ok, has_position) {
+        (true, false) => Err(wrong("a reason, as x is null".into())),
+        (false, true) => Err(wrong("ok, as x is not null".into())),
+        _ => Ok(status),
+    }
+}

@@ -1,0 +1,316 @@
+//! Released maps: records by family, and descriptors.
+
+use super::column::{Batch, Type, coordinate_names};
+use super::header::{Kind, new_meta, to_text};
+use super::table::Table;
+use super::write::{field, list_field, lists, numbers, write_table};
+use crate::Error;
+use arrow_array::ArrayRef;
+use arrow_array::types::{Float32Type, UInt8Type};
+use arrow_schema::DataType::{Float32, UInt8};
+use arrow_schema::Field;
+use serde_json::json;
+use std::ops::Range;
+use std::path::Path;
+use unlift::Descriptors;
+use unlift::descriptors::Values;
+use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
+
+/// The longest descriptor that is read: known ones have up to 4,096 values.
+const MOST_VALUES: u64 = 1 << 16;
+
+/// Writes a released map, one row per record.
+///
+/// Nothing of the truth is in it: no ids, names or times, and records in the order of `released`.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_released<const D: usize>(path: &Path, released: &Released<D>) -> Result<(), Error> {
+    let obfuscation = released.obfuscation();
+    let per_record = released.slots_per_record();
+    let mut meta = new_meta(Kind::Released);
+    meta.insert("family".into(), json!(obfuscation.family()));
+    meta.insert("dimension".into(), json!(D));
+    meta.insert("slots_per_record".into(), json!(per_record));
+    meta.insert("origin".into(), json!(released.origin().to_vec()));
+    meta.insert("unit".into(), json!(released.unit().name()));
+    let mut fields: Vec<Field> = Vec::new();
+    let mut vector = |prefix| {
+        let names = coordinate_names::<D>(prefix);
+        fields.extend(names.map(|name| field(name, Float32)));
+    };
+    match obfuscation {
+        Obfuscation::Lines(_) => {
+            vector("foot_");
+            vector("direction_");
+        }
+        Obfuscation::Rays(rays) => {
+            let centers = rays.centers().iter();
+            let centers: Vec<Vec<f64>> = centers.map(|c| c.map(f64::from).to_vec()).collect();
+            meta.insert("centers".into(), json!(centers));
+            vector("direction_");
+            fields.insert(0, field("center", UInt8));
+        }
+        Obfuscation::AxisPlanes(_) => {
+            fields.extend([field("axis", UInt8), field("offset", Float32)]);
+        }
+        Obfuscation::AxisCandidates(_) => vector(""),
+    }
+    if let Some(descriptors) = released.descriptors() {
+        let of = match descriptors.values() {
+            Values::U8(_) => UInt8,
+            Values::F32(_) => Float32,
+        };
+        fields.extend(descriptor_names(per_record).map(|name| list_field(name, of.clone())));
+    }
+    write_table(path, to_text(meta), fields, released.n_records(), |rows| {
+        let mut columns = record_columns(obfuscation, rows.clone());
+        if let Some(descriptors) = released.descriptors() {
+            let slots =
+                (0..per_record).map(|k| descriptor_column(descriptors, &rows, per_record, k));
+            columns.extend(slots);
+        }
+        columns
+    })
+}
+
+/// Reads a released map of dimension `D` (see [`peek`](super::peek)).
+///
+/// Directions need not have unit length, nor feet lie nearest the origin: records are brought to
+/// normal form. A map without records has no descriptors.
+///
+/// # Errors
+/// When the file is not a released map of this dimension as `docs/formats.md` describes it.
+pub fn read_released<const D: usize>(path: &Path) -> Result<Released<D>, Error> {
+    let core = |source| Error::core(path, source);
+    let table = Table::open_kind(path, Kind::Released)?;
+    let meta = table.meta();
+    meta.expect_dimension::<D>()?;
+    let (origin, unit) = (meta.origin::<D>()?, meta.unit()?);
+    let per_record = meta.count_or_1("slots_per_record")?;
+    if per_record > 2 {
+        return Err(meta.wrong("slots_per_record", "1 or 2"));
+    }
+    let obfuscation = match meta.text("family") {
+        Some("lines") => read_lines(path, &table)?,
+        Some("rays") => read_rays(path, &table)?,
+        Some("axis_planes") => read_axis_planes(path, &table)?,
+        Some("axis_candidates") => {
+            let [position] = read_vectors(&table, [""])?;
+            Obfuscation::AxisCandidates(AxisCandidates::try_new(&position).map_err(core)?)
+        }
+        _ => {
+            let expected = "lines, rays, axis_planes or axis_candidates";
+            return Err(meta.wrong("family", expected));
+        }
+    };
+    let descriptors = read_descriptors(path, &table, per_record)?;
+    Released::try_new(obfuscation, per_record, origin, unit, descriptors).map_err(core)
+}
+
+fn record_columns<const D: usize>(
+    obfuscation: &Obfuscation<D>,
+    rows: Range<usize>,
+) -> Vec<ArrayRef> {
+    match obfuscation {
+        Obfuscation::Lines(lines) => {
+            let mut columns = vector_columns(&lines.foot()[rows.clone()]);
+            columns.extend(vector_columns(&lines.direction()[rows]));
+            columns
+        }
+        Obfuscation::Rays(rays) => {
+            let center = rays.center()[rows.clone()].iter().copied();
+            let mut columns = vec![numbers::<UInt8Type>(center)];
+            columns.extend(vector_columns(&rays.direction()[rows]));
+            columns
+        }
+        Obfuscation::AxisPlanes(planes) => vec![
+            numbers::<UInt8Type>(planes.axis()[rows.clone()].iter().copied()),
+            numbers::<Float32Type>(planes.offset()[rows].iter().copied()),
+        ],
+        Obfuscation::AxisCandidates(candidates) => vector_columns(&candidates.position()[rows]),
+    }
+}
+
+fn vector_columns<const D: usize>(rows: &[[f32; D]]) -> Vec<ArrayRef> {
+    let column = |axis: usize| numbers::<Float32Type>(rows.iter().map(move |row| row[axis]));
+    (0..D).map(column).collect()
+}
+
+/// `descriptor`, or one column per slot: `descriptor_0`, `descriptor_1`.
+fn descriptor_names(per_record: usize) -> impl Iterator<Item = String> {
+    (0..per_record).map(move |slot| match per_record {
+        1 => "descriptor".into(),
+        _ => format!("descriptor_{slot}"),
+    })
+}
+
+/// The descriptors of slot `k` of the records `rows`.
+fn descriptor_column(
+    descriptors: &Descriptors,
+    rows: &Range<usize>,
+    per_record: usize,
+    k: usize,
+) -> ArrayRef {
+    fn cut<'a, T: Copy>(
+        values: &'a [T],
+        dim: usize,
+        slots: impl Iterator<Item = usize> + 'a,
+    ) -> impl Iterator<Item = T> + 'a {
+        slots.flat_map(move |slot| values[slot * dim..(slot + 1) * dim].iter().copied())
+    }
+    let dim = descriptors.dim();
+    let lengths = std::iter::repeat_n(dim, rows.len());
+    let slots = rows.clone().map(move |record| record * per_record + k);
+    match descriptors.values() {
+        Values::U8(values) => lists::<UInt8Type>(cut(values, dim, slots), lengths),
+        Values::F32(values) => lists::<Float32Type>(cut(values, dim, slots), lengths),
+    }
+}
+
+fn read_lines<const D: usize>(path: &Path, table: &Table) -> Result<Obfuscation<D>, Error> {
+    let [foot, direction] = read_vectors(table, ["foot_", "direction_"])?;
+    let lines = Lines::through(&foot, &direction);
+    lines
+        .map(Obfuscation::Lines)
+        .map_err(|source| Error::core(path, source))
+}
+
+fn read_rays<const D: usize>(path: &Path, table: &Table) -> Result<Obfuscation<D>, Error> {
+    let centers = table.meta().centers::<D>()?;
+    if centers.is_empty() || centers.len() > 255 {
+        return Err(table.meta().wrong("centers", "1 to 255 centers"));
+    }
+    let mut center: Vec<u8> = Vec::new();
+    table.read(&[("center", Type::Integer)], |batch| {
+        let rows = batch.integers("center", centers.len() as u64)?;
+        center.extend(rows.into_iter().map(|c| c as u8));
+        Ok(())
+    })?;
+    let [direction] = read_vectors(table, ["direction_"])?;
+    let rays = Rays::try_new(&centers, center, &direction);
+    rays.map(Obfuscation::Rays)
+        .map_err(|source| Error::core(path, source))
+}
+
+fn read_axis_planes<const D: usize>(path: &Path, table: &Table) -> Result<Obfuscation<D>, Error> {
+    let (mut axis, mut offset): (Vec<u8>, Vec<f64>) = (Vec::new(), Vec::new());
+    let columns = [("axis", Type::Integer), ("offset", Type::Float)];
+    table.read(&columns, |batch| {
+        let rows = batch.integers("axis", D as u64)?;
+        axis.extend(rows.into_iter().map(|a| a as u8));
+        offset.extend(batch.floats("offset")?);
+        Ok(())
+    })?;
+    let planes = AxisPlanes::try_new(axis, &offset);
+    planes
+        .map(Obfuscation::AxisPlanes)
+        .map_err(|source| Error::core(path, source))
+}
+
+/// Vector columns by their prefixes.
+fn read_vectors<const D: usize, const N: usize>(
+    table: &Table,
+    prefixes: [&str; N],
+) -> Result<[Vec<[f64; D]>; N], Error> {
+    let names = prefixes.map(coordinate_names::<D>);
+    let columns: Vec<(&str, Type)> = names
+        .iter()
+        .flatten()
+        .map(|name| (name.as_str(), Type::Float))
+        .collect();
+    let mut vectors: [Vec<[f64; D]>; N] = std::array::from_fn(|_| Vec::new());
+    table.read(&columns, |batch| {
+        for (names, to) in names.iter().zip(&mut vectors) {
+            batch.vectors(names, to)?;
+        }
+        Ok(())
+    })?;
+    Ok(vectors)
+}
+
+/// The descriptor columns, if there is any: bytes from integers, `f32` from floats.
+fn read_descriptors(
+    path: &Path,
+    table: &Table,
+    per_record: usize,
+) -> Result<Option<Descriptors>, Error> {
+    let names: Vec<String> = descriptor_names(per_record).collect();
+    if !names.iter().any(|name| table.has(name)) || table.n_rows() == 0 {
+        return Ok(None);
+    }
+    let bytes = table.is(&names[0], Type::Integers);
+    // Either is good for the first column, and the second must be like it.
+    let class = match bytes {
+        true => Type::Integers,
+        false if table.is(&names[0], Type::Floats) => Type::Floats,
+        false => Type::Numbers,
+    };
+    let columns: Vec<(&str, Type)> = names.iter().map(|name| (name.as_str(), class)).collect();
+    let (mut u8s, mut f32s) = (Vec::new(), Vec::new());
+    let mut dim = None;
+    table.read(&columns, |batch| {
+        let mut read = Vec::with_capacity(per_record);
+        for name in &names {
+            read.push(DescriptorRows::read(batch, name, bytes, &mut dim)?);
+        }
+        let dim = dim.unwrap_or(0);
+        for row in 0..batch.len() {
+            let range = row * dim..(row + 1) * dim;
+            for slot in &read {
+                match slot {
+                    DescriptorRows::U8(values) => {
+                        u8s.extend(values[range.clone()].iter().map(|&x| x as u8));
+                    }
+                    DescriptorRows::F32(values) => f32s.extend_from_slice(&values[range.clone()]),
+                }
+            }
+        }
+        Ok(())
+    })?;
+    let values = if bytes {
+        Values::U8(u8s)
+    } else {
+        Values::F32(f32s)
+    };
+    let descriptors = Descriptors::try_new(values, dim.unwrap_or(0));
+    descriptors
+        .map(Some)
+        .map_err(|source| Error::core(path, source))
+}
+
+/// One descriptor column of a batch, rows end to end.
+enum DescriptorRows {
+    /// Below 256.
+    U8(Vec<u32>),
+    F32(Vec<f32>),
+}
+
+impl DescriptorRows {
+    /// Reads the column `name`; every row must have `dim` values, set by the first row read.
+    fn read(
+        batch: &Batch<'_>,
+        name: &str,
+        bytes: bool,
+        dim: &mut Option<usize>,
+    ) -> Result<Self, Error> {
+        let (rows, lengths) = if bytes {
+            let (mut offsets, mut values) = (vec![0], Vec::new());
+            batch.integer_lists(name, 256, MOST_VALUES, &mut offsets, &mut values)?;
+            let lengths = offsets.windows(2).map(|w| (w[1] - w[0]) as usize).collect();
+            (Self::U8(values), lengths)
+        } else {
+            let mut values = Vec::new();
+            let lengths: Vec<usize> = batch.float_lists(name, &mut values)?;
+            (Self::F32(values), lengths)
+        };
+        for (row, &length) in lengths.iter().enumerate() {
+            let dim = *dim.get_or_insert(length);
+            if length == 0 || length != dim {
+                let expected = format!("{} values as in every row", dim.max(1));
+                return Err(batch.wrong(name, row, expected, length.to_string()));
+            }
+        }
+        Ok(rows)
+    }
+}

@@ -1,0 +1,129 @@
+//! Columns to a Parquet file: equal values, equal bytes.
+
+use crate::{Error, atomic};
+use arrow_array::types::ArrowPrimitiveType;
+use arrow_array::{Array, ArrayRef, ListArray, PrimitiveArray, RecordBatch};
+use arrow_buffer::OffsetBuffer;
+use arrow_schema::{DataType, Field, Schema};
+use parquet::arrow::ArrowWriter;
+use parquet::arrow::arrow_writer::ArrowWriterOptions;
+use parquet::basic::Compression;
+use parquet::errors::ParquetError;
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::schema::types::ColumnPath;
+use std::io;
+use std::ops::Range;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Rows that are turned into columns at a time.
+const CHUNK_ROWS: usize = 1 << 14;
+
+/// Row groups end after this many rows, so that an engine can give them to many machines.
+const GROUP_ROWS: usize = 1 << 20;
+
+/// They end earlier at this many bytes: a row group is held in memory until it is whole.
+const GROUP_BYTES: usize = 256 << 20;
+
+/// Writes `n_rows` rows; `columns` gives those of a range, in the order of `fields`.
+pub(super) fn write_table(
+    path: &Path,
+    meta: String,
+    fields: Vec<Field>,
+    n_rows: usize,
+    columns: impl Fn(Range<usize>) -> Vec<ArrayRef>,
+) -> Result<(), Error> {
+    let properties = properties(meta, &fields);
+    let schema = Arc::new(Schema::new(fields));
+    atomic::write_file(path, |file| {
+        let options = ArrowWriterOptions::new()
+            .with_properties(properties)
+            .with_skip_arrow_metadata(true);
+        let mut writer =
+            ArrowWriter::try_new_with_options(file, schema.clone(), options).map_err(to_io)?;
+        let mut start = 0;
+        while start < n_rows {
+            let end = n_rows.min(start + CHUNK_ROWS);
+            let batch = RecordBatch::try_new(schema.clone(), columns(start..end));
+            writer
+                .write(&batch.map_err(io::Error::other)?)
+                .map_err(to_io)?;
+            start = end;
+        }
+        writer.close().map_err(to_io)?;
+        Ok(())
+    })
+}
+
+/// A column of numbers or text without nulls.
+pub(super) fn field(name: impl Into<String>, of: DataType) -> Field {
+    Field::new(name, of, false)
+}
+
+/// A column of lists without nulls.
+pub(super) fn list_field(name: impl Into<String>, of: DataType) -> Field {
+    Field::new_list(name, Field::new("element", of, false), false)
+}
+
+/// A column of numbers.
+pub(super) fn numbers<T: ArrowPrimitiveType>(
+    values: impl IntoIterator<Item = T::Native>,
+) -> ArrayRef {
+    Arc::new(PrimitiveArray::<T>::from_iter_values(values))
+}
+
+/// A column of numbers and nulls.
+pub(super) fn optional_numbers<T: ArrowPrimitiveType>(
+    values: impl IntoIterator<Item = Option<T::Native>>,
+) -> ArrayRef {
+    Arc::new(values.into_iter().collect::<PrimitiveArray<T>>())
+}
+
+/// A column of lists, `values` cut at `lengths`.
+pub(super) fn lists<T: ArrowPrimitiveType>(
+    values: impl IntoIterator<Item = T::Native>,
+    lengths: impl IntoIterator<Item = usize>,
+) -> ArrayRef {
+    let values = PrimitiveArray::<T>::from_iter_values(values);
+    let of = Arc::new(Field::new("element", values.data_type().clone(), false));
+    let offsets = OffsetBuffer::from_lengths(lengths);
+    Arc::new(ListArray::new(of, offsets, Arc::new(values), None))
+}
+
+fn properties(meta: String, fields: &[Field]) -> WriterProperties {
+    let mut properties = WriterProperties::builder()
+        // Not the version of a crate: an upgrade changes no byte by its name.
+        .set_created_by("unlift version 1".into())
+        .set_compression(Compression::SNAPPY)
+        .set_max_row_group_row_count(Some(GROUP_ROWS))
+        .set_max_row_group_bytes(Some(GROUP_BYTES))
+        .set_statistics_enabled(EnabledStatistics::None)
+        .set_offset_index_disabled(true)
+        .set_dictionary_enabled(false)
+        .set_key_value_metadata(Some(vec![KeyValue::new(super::header::KEY.into(), meta)]));
+    for field in fields {
+        let name = field.name().clone();
+        // Parquet has no 8-bit values: bytes and names take a fourth of the room in a dictionary.
+        let path = match field.data_type() {
+            DataType::UInt8 | DataType::Utf8 => vec![name],
+            DataType::List(of) if *of.data_type() == DataType::UInt8 => {
+                vec![name, "list".into(), "element".into()]
+            }
+            _ => continue,
+        };
+        properties = properties.set_column_dictionary_enabled(ColumnPath::new(path), true);
+    }
+    properties.build()
+}
+
+/// The disk's own error where there is one, so that a full disk is called so.
+fn to_io(error: ParquetError) -> io::Error {
+    match error {
+        ParquetError::External(source) => match source.downcast::<io::Error>() {
+            Ok(source) => *source,
+            Err(source) => io::Error::other(source),
+        },
+        other => io::Error::other(other),
+    }
+}
