@@ -1,1 +1,12 @@
-//! unlift: report.
+//! What an audit found, as a document and as a page.
+//!
+//! [`document`] holds the structs of `audit.json`; everything else here only shows them:
+//! nothing is measured in this crate, and a number on the page is a number of the document.
+
+mod check;
+pub mod document;
+mod error;
+mod round;
+
+pub use document::Document;
+pub use error::Error;
