@@ -6,7 +6,11 @@
 mod check;
 pub mod document;
 mod error;
+pub mod paper;
 mod round;
+pub mod scene;
+mod words;
 
 pub use document::Document;
 pub use error::Error;
+pub use scene::Scene3d;
