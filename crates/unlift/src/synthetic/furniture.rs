@@ -46,10 +46,8 @@ pub(super) fn tall_cabinet(scene: &mut Scene, place: &Place, width: f64, draws: 
     scene.block(place, [0.0; 3], body, Faces::Standing, Texture::WOOD);
     for i in 0..2 {
         let x = 0.02 + i as f64 * 0.5 * width;
-        let (low, high) = (
-            [x, depth, 0.08],
-            [x + 0.5 * width - 0.04, depth + 0.015, height - 0.03],
-        );
+        let (low, high) =
+            ([x, depth, 0.08], [x + 0.5 * width - 0.04, depth + 0.015, height - 0.03]);
         scene.shell(place, low, high, Faces::Standing, Texture::WOOD);
         let handle = [0.5 * width - 0.06 + i as f64 * 0.09, depth + 0.015, 0.9];
         let end = [handle[0] + 0.02, handle[1] + 0.03, 1.05];
@@ -57,14 +55,7 @@ pub(super) fn tall_cabinet(scene: &mut Scene, place: &Place, width: f64, draws: 
     }
     let top = place.then([0.0, 0.0, height], [1.0, 0.0]);
     let count = 1 + draws.below(3) as usize;
-    objects::scatter(
-        scene,
-        &top,
-        [0.05, 0.05],
-        [width - 0.05, depth - 0.05],
-        count,
-        draws,
-    );
+    objects::scatter(scene, &top, [0.05, 0.05], [width - 0.05, depth - 0.05], count, draws);
 }
 
 /// A low cabinet with drawers and things on top.
@@ -87,27 +78,14 @@ pub(super) fn sideboard(scene: &mut Scene, place: &Place, width: f64, draws: &mu
     }
     let top = place.then([0.0, 0.0, height], [1.0, 0.0]);
     let count = 4 + draws.below(3) as usize;
-    objects::scatter(
-        scene,
-        &top,
-        [0.05, 0.05],
-        [width - 0.05, depth - 0.03],
-        count,
-        draws,
-    );
+    objects::scatter(scene, &top, [0.05, 0.05], [width - 0.05, depth - 0.03], count, draws);
 }
 
 /// A desk with a screen, a keyboard and clutter.
 pub(super) fn desk(scene: &mut Scene, place: &Place, width: f64, draws: &mut Draws) {
     let (depth, height) = (draws.between(0.6, 0.7), 0.74);
     let top = [width, depth, height];
-    scene.block(
-        place,
-        [0.0, 0.02, height - 0.03],
-        top,
-        Faces::All,
-        Texture::WOOD,
-    );
+    scene.block(place, [0.0, 0.02, height - 0.03], top, Faces::All, Texture::WOOD);
     for x in [0.0, width - 0.04] {
         let (low, high) = ([x, 0.04, 0.0], [x + 0.04, depth - 0.02, height - 0.03]);
         scene.block(place, low, high, Faces::All, Texture::WOOD);
@@ -118,29 +96,9 @@ pub(super) fn desk(scene: &mut Scene, place: &Place, width: f64, draws: &mut Dra
     let x = draws.between(0.35, width - 0.65);
     objects::screen(scene, &surface.then([x, 0.14, 0.0], [1.0, 0.0]));
     let keyboard = ([x - 0.1, 0.36, 0.0], [x + 0.33, 0.5, 0.02]);
-    scene.block(
-        &surface,
-        keyboard.0,
-        keyboard.1,
-        Faces::Standing,
-        Texture::PRINT,
-    );
-    objects::scatter(
-        scene,
-        &surface,
-        [0.02, 0.05],
-        [x - 0.12, depth - 0.05],
-        2,
-        draws,
-    );
-    objects::scatter(
-        scene,
-        &surface,
-        [x + 0.48, 0.05],
-        [width - 0.02, depth - 0.05],
-        2,
-        draws,
-    );
+    scene.block(&surface, keyboard.0, keyboard.1, Faces::Standing, Texture::PRINT);
+    objects::scatter(scene, &surface, [0.02, 0.05], [x - 0.12, depth - 0.05], 2, draws);
+    objects::scatter(scene, &surface, [x + 0.48, 0.05], [width - 0.02, depth - 0.05], 2, draws);
 }
 
 /// A sofa with cushions.
@@ -164,13 +122,7 @@ pub(super) fn sofa(scene: &mut Scene, place: &Place, width: f64, draws: &mut Dra
     }
     // A blanket over an arm.
     let blanket = ([width - 0.2, 0.4, 0.45], [width + 0.01, 0.72, 0.612]);
-    scene.shell(
-        place,
-        blanket.0,
-        blanket.1,
-        Faces::Standing,
-        Texture::PATTERN,
-    );
+    scene.shell(place, blanket.0, blanket.1, Faces::Standing, Texture::PATTERN);
 }
 
 /// A chair; the sitter looks along `y`.
@@ -186,22 +138,10 @@ pub(super) fn chair(scene: &mut Scene, place: &Place, draws: &mut Draws) {
     }
     let board = ([-half, -half, seat - 0.03], [half, half, seat]);
     scene.block(place, board.0, board.1, Faces::All, Texture::WOOD);
-    let cushion = (
-        [-half + 0.03, -half + 0.05, seat],
-        [half - 0.03, half - 0.02, seat + 0.03],
-    );
-    scene.shell(
-        place,
-        cushion.0,
-        cushion.1,
-        Faces::Standing,
-        Texture::FABRIC,
-    );
+    let cushion = ([-half + 0.03, -half + 0.05, seat], [half - 0.03, half - 0.02, seat + 0.03]);
+    scene.shell(place, cushion.0, cushion.1, Faces::Standing, Texture::FABRIC);
     for z in [0.58, 0.7, 0.82] {
-        let (low, high) = (
-            [-half, -half, z],
-            [half, -half + 0.025, (z + 0.07).min(back)],
-        );
+        let (low, high) = ([-half, -half, z], [half, -half + 0.025, (z + 0.07).min(back)]);
         scene.block(place, low, high, Faces::All, Texture::WOOD);
     }
 }
@@ -219,23 +159,10 @@ pub(super) fn table(scene: &mut Scene, place: &Place, length: f64, depth: f64, d
         scene.block(place, low, high, Faces::Standing, Texture::WOOD);
     }
     let runner = ([-x + 0.1, -0.17, height], [x - 0.1, 0.17, height + 0.003]);
-    scene.shell(
-        place,
-        runner.0,
-        runner.1,
-        Faces::FrontAndTop,
-        Texture::PATTERN,
-    );
+    scene.shell(place, runner.0, runner.1, Faces::FrontAndTop, Texture::PATTERN);
     let surface = place.then([0.0, 0.0, height + 0.003], [1.0, 0.0]);
     let count = 6 + draws.below(4) as usize;
-    objects::scatter(
-        scene,
-        &surface,
-        [0.06 - x, 0.05 - y],
-        [x - 0.06, y - 0.05],
-        count,
-        draws,
-    );
+    objects::scatter(scene, &surface, [0.06 - x, 0.05 - y], [x - 0.06, y - 0.05], count, draws);
 }
 
 /// A rug under the table.
@@ -249,14 +176,7 @@ pub(super) fn rug(scene: &mut Scene, place: &Place, draws: &mut Draws) {
 pub(super) fn floor_lamp(scene: &mut Scene, place: &Place, draws: &mut Draws) {
     let height = draws.between(1.35, 1.6);
     scene.tube(place, [0.0; 3], 0.15, 0.15, 0.025, Texture::SMOOTH);
-    scene.tube(
-        place,
-        [0.0, 0.0, 0.025],
-        0.015,
-        0.015,
-        height,
-        Texture::SMOOTH,
-    );
+    scene.tube(place, [0.0, 0.0, 0.025], 0.015, 0.015, height, Texture::SMOOTH);
     scene.tube(place, [0.0, 0.0, height], 0.21, 0.14, 0.28, Texture::FABRIC);
 }
 
@@ -265,28 +185,14 @@ pub(super) fn pendant(scene: &mut Scene, place: &Place, ceiling: f64) {
     let foot = ceiling - 0.95;
     scene.tube(place, [0.0, 0.0, foot], 0.22, 0.06, 0.2, Texture::PATTERN);
     let cord = ceiling - foot - 0.2;
-    scene.tube(
-        place,
-        [0.0, 0.0, foot + 0.2],
-        0.008,
-        0.008,
-        cord,
-        Texture::SMOOTH,
-    );
+    scene.tube(place, [0.0, 0.0, foot + 0.2], 0.008, 0.008, cord, Texture::SMOOTH);
 }
 
 /// A plant in a pot.
 pub(super) fn plant(scene: &mut Scene, place: &Place, draws: &mut Draws) {
     scene.tube(place, [0.0; 3], 0.13, 0.17, 0.3, Texture::SMOOTH);
     let soil = ([-0.15, -0.15, 0.29], [0.3, 0.0, 0.0], [0.0, 0.3, 0.0]);
-    scene.outlined(
-        place,
-        soil.0,
-        soil.1,
-        soil.2,
-        Outline::Ellipse,
-        Texture::PRINT,
-    );
+    scene.outlined(place, soil.0, soil.1, soil.2, Outline::Ellipse, Texture::PRINT);
     for _ in 0..50 {
         let out: [f64; 3] = draws.direction();
         let reach = draws.between(0.06, 0.26);

@@ -95,10 +95,7 @@ mod tests {
     /// Points in the room's own axes, from its middle.
     fn along_walls(room: &Room) -> Vec<[f64; 3]> {
         let [cos, sin] = surfaces::turn(HALF_YAW_TANGENT);
-        room.points
-            .iter()
-            .map(|&p| rotate([cos, -sin], p))
-            .collect()
+        room.points.iter().map(|&p| rotate([cos, -sin], p)).collect()
     }
 
     #[test]
@@ -154,10 +151,7 @@ mod tests {
                 let mut column: Vec<f64> = points.iter().map(|p| p[axis]).collect();
                 column.sort_unstable_by(f64::total_cmp);
                 let extent = column[9_800] - column[200];
-                assert!(
-                    (extent - expected).abs() < 0.7,
-                    "seed {seed}, axis {axis}: {extent}"
-                );
+                assert!((extent - expected).abs() < 0.7, "seed {seed}, axis {axis}: {extent}");
             }
         }
     }

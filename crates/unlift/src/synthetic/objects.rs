@@ -62,13 +62,7 @@ fn thing(scene: &mut Scene, place: &Place, draws: &mut Draws) {
         _ => {
             // A magazine lying open.
             let high = [0.1, 0.08, 0.01];
-            scene.block(
-                place,
-                [-0.1, -0.08, 0.0],
-                high,
-                Faces::Standing,
-                Texture::PRINT,
-            );
+            scene.block(place, [-0.1, -0.08, 0.0], high, Faces::Standing, Texture::PRINT);
         }
     }
 }
@@ -76,18 +70,9 @@ fn thing(scene: &mut Scene, place: &Place, draws: &mut Draws) {
 fn pile_of_books(scene: &mut Scene, place: &Place, draws: &mut Draws) {
     let mut z = 0.0;
     for _ in 0..2 + draws.below(4) {
-        let high = [
-            draws.between(0.07, 0.1),
-            draws.between(0.05, 0.08),
-            z + draws.between(0.015, 0.04),
-        ];
-        scene.block(
-            place,
-            [-high[0], -high[1], z],
-            high,
-            Faces::Standing,
-            Texture::PRINT,
-        );
+        let high =
+            [draws.between(0.07, 0.1), draws.between(0.05, 0.08), z + draws.between(0.015, 0.04)];
+        scene.block(place, [-high[0], -high[1], z], high, Faces::Standing, Texture::PRINT);
         z = high[2];
     }
 }
@@ -150,13 +135,7 @@ pub(super) fn shelf_row(
             // A storage box.
             1 => {
                 let high = [x + w, depth - 0.02, clear * draws.between(0.5, 0.8)];
-                scene.block(
-                    place,
-                    [x, 0.08, 0.0],
-                    high,
-                    Faces::Standing,
-                    Texture::PATTERN,
-                );
+                scene.block(place, [x, 0.08, 0.0], high, Faces::Standing, Texture::PATTERN);
             }
             2 => {
                 let height = clear * draws.between(0.4, 0.75);
@@ -167,13 +146,7 @@ pub(super) fn shelf_row(
             _ => {
                 let front = depth - draws.between(0.015, 0.06);
                 let high = [x + w - 0.001, front, clear * draws.between(0.62, 0.93)];
-                scene.shell(
-                    place,
-                    [x, 0.08, 0.0],
-                    high,
-                    Faces::FrontAndTop,
-                    Texture::PRINT,
-                );
+                scene.shell(place, [x, 0.08, 0.0], high, Faces::FrontAndTop, Texture::PRINT);
             }
         }
         x += w;

@@ -11,11 +11,7 @@ const CORNER: f64 = 0.85;
 /// The furnished room of `seed`.
 pub(super) fn furnished(seed: u64) -> Scene {
     let mut draws = draws(seed, Purpose::Layout, 0);
-    let size = [
-        draws.between(4.8, 5.3),
-        draws.between(3.8, 4.2),
-        draws.between(2.5, 2.7),
-    ];
+    let size = [draws.between(4.8, 5.3), draws.between(3.8, 4.2), draws.between(2.5, 2.7)];
     let mut scene = Scene::new(size);
     let walls = shell(&mut scene);
 
@@ -50,33 +46,19 @@ fn shell(scene: &mut Scene) -> [Place; 4] {
         let (x, z) = ([length, 0.0, 0.0], [0.0, 0.0, h]);
         scene.sheet(place, [0.0; 3], z, x, Texture::PAINT);
         let baseboard = [length, 0.012, 0.07];
-        scene.shell(
-            place,
-            [0.0; 3],
-            baseboard,
-            Faces::FrontAndTop,
-            Texture::SMOOTH,
-        );
+        scene.shell(place, [0.0; 3], baseboard, Faces::FrontAndTop, Texture::SMOOTH);
     }
     walls
 }
 
 /// Bookshelf, tall cabinet and a plant, in any order.
 fn storage_wall(scene: &mut Scene, wall: &Place, length: f64, draws: &mut Draws) {
-    let widths = [
-        draws.between(1.5, 1.9),
-        draws.between(0.85, 1.1),
-        draws.between(0.4, 0.5),
-    ];
+    let widths = [draws.between(1.5, 1.9), draws.between(0.85, 1.1), draws.between(0.4, 0.5)];
     let starts = side_by_side(widths, 0.08, length - 0.08, draws);
     let at = |i: usize| straight(wall, starts[i]);
     piece::bookshelf(scene, &at(0), widths[0], draws);
     piece::tall_cabinet(scene, &at(1), widths[1], draws);
-    piece::plant(
-        scene,
-        &wall.then([starts[2] + 0.5 * widths[2], 0.3, 0.0], [1.0, 0.0]),
-        draws,
-    );
+    piece::plant(scene, &wall.then([starts[2] + 0.5 * widths[2], 0.3, 0.0], [1.0, 0.0]), draws);
 }
 
 /// Sideboard with pictures above, door and floor lamp, in any order.
@@ -87,11 +69,7 @@ fn door_wall(scene: &mut Scene, wall: &Place, length: f64, draws: &mut Draws) {
     piece::sideboard(scene, &at(0), widths[0], draws);
     piece::pictures(scene, &at(0), widths[0], 1.35, draws);
     piece::door(scene, &at(1), widths[1]);
-    piece::floor_lamp(
-        scene,
-        &wall.then([starts[2] + 0.22, 0.28, 0.0], [1.0, 0.0]),
-        draws,
-    );
+    piece::floor_lamp(scene, &wall.then([starts[2] + 0.22, 0.28, 0.0], [1.0, 0.0]), draws);
 }
 
 /// Window, and a desk with its chair before it.

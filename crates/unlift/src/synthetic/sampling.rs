@@ -21,11 +21,7 @@ pub(super) fn points(seed: u64, n: usize, scene: &Scene, cameras: &[Camera]) -> 
         .map(|i| {
             let mut draws = draws(seed, Purpose::FirstPoint, i);
             let seen = sources.seen_point(scene, cameras, &mut draws);
-            if i < n_outliers {
-                outlier(seen, scene, &mut draws)
-            } else {
-                noisy(seen, &mut draws)
-            }
+            if i < n_outliers { outlier(seen, scene, &mut draws) } else { noisy(seen, &mut draws) }
         })
         .collect();
     let order = draws(seed, Purpose::Copies, 0).permutation(points.len());
@@ -112,11 +108,7 @@ impl Sources {
 
     fn push(&mut self, surface: usize, kind: Kind, weight: f64) {
         let cumulated = self.0.last().map_or(0.0, |s| s.cumulated) + weight;
-        self.0.push(Source {
-            surface,
-            kind,
-            cumulated,
-        });
+        self.0.push(Source { surface, kind, cumulated });
     }
 
     /// A surface point that enough photos see; the more see it, the likelier.
@@ -158,9 +150,5 @@ fn on_outline(u: f64, v: f64, draws: &mut Draws) -> (f64, f64) {
         let share = (inset / side).min(0.5);
         if far { 1.0 - share } else { share }
     };
-    if draws.unit() * (u + v) < u {
-        (draws.unit(), edge(v))
-    } else {
-        (edge(u), draws.unit())
-    }
+    if draws.unit() * (u + v) < u { (draws.unit(), edge(v)) } else { (edge(u), draws.unit()) }
 }

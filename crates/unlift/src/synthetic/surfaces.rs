@@ -36,11 +36,7 @@ pub(super) fn norm(a: [f64; 3]) -> f64 {
 }
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// How many points a surface attracts, in relative numbers: what a feature detector finds there.
@@ -60,13 +56,7 @@ pub(super) struct Texture {
 
 impl Texture {
     const fn new(even: f64, outline: f64, patches: f64, per_patch: f64, patch_radius: f64) -> Self {
-        Self {
-            even,
-            outline,
-            patches,
-            per_patch,
-            patch_radius,
-        }
+        Self { even, outline, patches, per_patch, patch_radius }
     }
 
     /// Painted walls and ceilings.
@@ -154,10 +144,7 @@ impl Place {
     /// The place at `offset` of this one, turned further by `turn`.
     pub(super) fn then(&self, offset: [f64; 3], turn: Turn) -> Self {
         let ([a, b], [c, d]) = (self.turn, turn);
-        Self {
-            origin: self.point(offset),
-            turn: [a * c - b * d, b * c + a * d],
-        }
+        Self { origin: self.point(offset), turn: [a * c - b * d, b * c + a * d] }
     }
 
     /// A point of the piece in the room.
@@ -225,11 +212,7 @@ pub(super) struct Scene {
 impl Scene {
     /// An empty scene.
     pub(super) fn new(size: [f64; 3]) -> Self {
-        Self {
-            size,
-            surfaces: Vec::new(),
-            blockers: Vec::new(),
-        }
+        Self { size, surfaces: Vec::new(), blockers: Vec::new() }
     }
 
     /// Whether something stands between a camera and a surface point.
@@ -281,11 +264,7 @@ impl Scene {
         texture: Texture,
     ) {
         self.shell(place, low, high, faces, texture);
-        self.blockers.push(Blocker {
-            place: *place,
-            low,
-            high,
-        });
+        self.blockers.push(Blocker { place: *place, low, high });
     }
 
     /// Adds the faces of a box that hides next to nothing: flat against something, or one of many.
@@ -331,10 +310,7 @@ impl Scene {
             on_circle[i] = [x, y];
         }
         // The seams between the twelve sides are no edges that a detector would find.
-        let side = Texture {
-            outline: texture.outline / 8.0,
-            ..texture
-        };
+        let side = Texture { outline: texture.outline / 8.0, ..texture };
         for pair in on_circle.windows(2) {
             let foot = |p: [f64; 2]| add(middle, [radius * p[0], radius * p[1], 0.0]);
             let lean = [
@@ -362,10 +338,7 @@ impl Scene {
 mod tests {
     use super::*;
 
-    const HERE: Place = Place {
-        origin: [0.0; 3],
-        turn: [1.0, 0.0],
-    };
+    const HERE: Place = Place { origin: [0.0; 3], turn: [1.0, 0.0] };
 
     #[test]
     fn faces_of_a_block_look_outwards() {
@@ -404,9 +377,7 @@ mod tests {
     #[test]
     fn places_chain() {
         let quarter = turn(1.0);
-        let place = HERE
-            .then([1.0, 0.0, 0.0], quarter)
-            .then([1.0, 0.0, 0.0], quarter);
+        let place = HERE.then([1.0, 0.0, 0.0], quarter).then([1.0, 0.0, 0.0], quarter);
         assert_eq!(place.point([1.0, 0.0, 0.0]), [0.0, 1.0, 0.0]);
     }
 }

@@ -40,10 +40,7 @@ pub(super) fn walk(seed: u64, scene: &Scene) -> Vec<Camera> {
                 draws.between(-0.9, 0.35),
             ];
             let look = [aim[0], aim[1], aim[2] * norm([aim[0], aim[1], 0.0])];
-            Camera {
-                center,
-                look: scale(look, 1.0 / norm(look)),
-            }
+            Camera { center, look: scale(look, 1.0 / norm(look)) }
         })
         .collect()
 }
