@@ -47,9 +47,7 @@ pub fn write_file(
     writer.flush().map_err(failed)?;
     writer.get_ref().sync_all().map_err(failed)?;
     drop(writer);
-    temporary_path
-        .persist(&target)
-        .map_err(|refused| failed(refused.error))
+    temporary_path.persist(&target).map_err(|refused| failed(refused.error))
 }
 
 /// A folder that is built in a temporary sibling and takes its place on [`commit`](Self::commit).
@@ -79,12 +77,7 @@ impl OutputDir {
         refuse_strangers(&target, marker)?;
         let parent = parent_of(&target).to_owned();
         let created_parents = create_parents(&parent).map_err(failed)?;
-        let mut output = Self {
-            target,
-            marker: marker.to_owned(),
-            staging: None,
-            created_parents,
-        };
+        let mut output = Self { target, marker: marker.to_owned(), staging: None, created_parents };
         let prefix = hidden_prefix(&output.target);
         let mut builder = tempfile::Builder::new();
         builder.prefix(&prefix).suffix(".partial");
@@ -168,12 +161,7 @@ fn refuse_strangers(target: &Path, marker: &str) -> Result<(), Error> {
     if empty || target.join(marker).is_file() {
         return Ok(());
     }
-    Err(Error::new(
-        target,
-        "",
-        expected(),
-        "a folder of other files",
-    ))
+    Err(Error::new(target, "", expected(), "a folder of other files"))
 }
 
 /// Creates `folder` and its missing parents; returns what was created, outermost first.
@@ -233,10 +221,7 @@ mod tests {
             Err(io::Error::other("lost power"))
         };
         let error = write_file(&path, broken).unwrap_err().to_string();
-        assert!(
-            error.ends_with("a.bin: cannot write: lost power"),
-            "{error}"
-        );
+        assert!(error.ends_with("a.bin: cannot write: lost power"), "{error}");
         assert_eq!(fs::read(&path).unwrap(), b"old");
         assert_eq!(entries(folder.path()), ["a.bin"]);
     }
@@ -245,11 +230,7 @@ mod tests {
     fn a_folder_is_not_replaced_by_a_file() {
         let folder = tempfile::tempdir().unwrap();
         let error = write_file(folder.path(), |_| Ok(())).unwrap_err();
-        assert!(
-            error
-                .to_string()
-                .ends_with(": expected a file, found a folder")
-        );
+        assert!(error.to_string().ends_with(": expected a file, found a folder"));
     }
 
     #[cfg(unix)]
@@ -282,15 +263,9 @@ mod tests {
     fn an_empty_folder_is_taken_and_parents_are_made() {
         let folder = tempfile::tempdir().unwrap();
         let target = folder.path().join("a/b/out");
-        OutputDir::create(&target, "audit.json")
-            .unwrap()
-            .commit()
-            .unwrap();
+        OutputDir::create(&target, "audit.json").unwrap().commit().unwrap();
         assert!(target.is_dir());
-        OutputDir::create(&target, "audit.json")
-            .unwrap()
-            .commit()
-            .unwrap();
+        OutputDir::create(&target, "audit.json").unwrap().commit().unwrap();
         assert_eq!(entries(&folder.path().join("a/b")), ["out"]);
     }
 
@@ -313,10 +288,7 @@ mod tests {
             error.to_string().split_once(": ").unwrap().1.to_owned()
         };
         let rule = "expected an empty folder or an earlier output (with audit.json), found";
-        assert_eq!(
-            refused(folder.path()),
-            format!("{rule} a folder of other files")
-        );
+        assert_eq!(refused(folder.path()), format!("{rule} a folder of other files"));
         assert_eq!(refused(&file), format!("{rule} a file"));
         assert_eq!(entries(folder.path()), ["notes.txt"]);
     }

@@ -31,11 +31,7 @@ impl From<&str> for Place {
 impl From<String> for Place {
     /// A named place; the empty name is the whole file.
     fn from(name: String) -> Self {
-        if name.is_empty() {
-            Self::Whole
-        } else {
-            Self::Named(name)
-        }
+        if name.is_empty() { Self::Whole } else { Self::Named(name) }
     }
 }
 
@@ -52,11 +48,7 @@ pub struct Error {
 
 #[derive(Debug)]
 enum Kind {
-    Content {
-        place: Place,
-        expected: String,
-        found: String,
-    },
+    Content { place: Place, expected: String, found: String },
     Read(io::Error),
     Write(io::Error),
     Core(unlift::Error),
@@ -84,26 +76,17 @@ impl Error {
 
     /// `path` could not be read: missing, a folder, no permission, or a broken disk.
     pub fn read(path: impl Into<PathBuf>, source: io::Error) -> Self {
-        Self {
-            path: path.into(),
-            kind: Kind::Read(source),
-        }
+        Self { path: path.into(), kind: Kind::Read(source) }
     }
 
     /// `path` could not be written.
     pub fn write(path: impl Into<PathBuf>, source: io::Error) -> Self {
-        Self {
-            path: path.into(),
-            kind: Kind::Write(source),
-        }
+        Self { path: path.into(), kind: Kind::Write(source) }
     }
 
     /// The library refused values that came from `path`.
     pub fn core(path: impl Into<PathBuf>, source: unlift::Error) -> Self {
-        Self {
-            path: path.into(),
-            kind: Kind::Core(source),
-        }
+        Self { path: path.into(), kind: Kind::Core(source) }
     }
 
     /// The file or folder the error is about.
@@ -116,11 +99,7 @@ impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         OneLine(&self.path.to_string_lossy()).fmt(f)?;
         match &self.kind {
-            Kind::Content {
-                place,
-                expected,
-                found,
-            } => {
+            Kind::Content { place, expected, found } => {
                 match place {
                     Place::Whole => {}
                     Place::Line(line) => write!(f, ":{line}")?,
@@ -142,10 +121,7 @@ impl fmt::Display for Error {
             },
             Kind::Write(source) => match source.kind() {
                 io::ErrorKind::PermissionDenied => {
-                    write!(
-                        f,
-                        ": expected a writable place, found no permission to write"
-                    )
+                    write!(f, ": expected a writable place, found no permission to write")
                 }
                 io::ErrorKind::StorageFull => {
                     write!(f, ": expected space to write, found a full disk")
@@ -187,10 +163,7 @@ mod tests {
     #[test]
     fn every_kind_prints_one_line() {
         let core = || unlift::Error::new("point 3", "finite coordinates", "[NaN, 0.0, 0.0]");
-        let byte = Place::Byte {
-            what: "record 12".into(),
-            at: 4711,
-        };
+        let byte = Place::Byte { what: "record 12".into(), at: 4711 };
         let io = |kind| io::Error::new(kind, "other\ntext");
         let table = [
             (
@@ -201,22 +174,13 @@ mod tests {
                 Error::new("points3D.bin", byte, "8 bytes", "end of file"),
                 "points3D.bin: record 12 (byte 4711): expected 8 bytes, found end of file",
             ),
-            (
-                Error::new("a.ply", "", "a number", "x\ny"),
-                "a.ply: expected a number, found x\\ny",
-            ),
+            (Error::new("a.ply", "", "a number", "x\ny"), "a.ply: expected a number, found x\\ny"),
             (
                 Error::read("a.ply", io(io::ErrorKind::NotFound)),
                 "a.ply: expected a file or folder, found nothing",
             ),
-            (
-                Error::read("a\nb", io(io::ErrorKind::Other)),
-                "a\\nb: cannot read: other\\ntext",
-            ),
-            (
-                Error::write("out", io(io::ErrorKind::Other)),
-                "out: cannot write: other\\ntext",
-            ),
+            (Error::read("a\nb", io(io::ErrorKind::Other)), "a\\nb: cannot read: other\\ntext"),
+            (Error::write("out", io(io::ErrorKind::Other)), "out: cannot write: other\\ntext"),
             (
                 Error::core("a.csv", core()),
                 "a.csv: point 3: expected finite coordinates, found [NaN, 0.0, 0.0]",

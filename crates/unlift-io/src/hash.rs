@@ -53,11 +53,7 @@ pub fn hash_files<P: AsRef<Path>>(paths: &[P]) -> Result<String, Error> {
 }
 
 fn hex(hasher: Sha256) -> String {
-    hasher
-        .finalize()
-        .iter()
-        .map(|b| format!("{b:02x}"))
-        .collect()
+    hasher.finalize().iter().map(|b| format!("{b:02x}")).collect()
 }
 
 #[cfg(test)]
@@ -99,9 +95,6 @@ mod tests {
     #[test]
     fn a_missing_file_is_named() {
         let error = hash_files(&["missing.bin"]).unwrap_err().to_string();
-        assert_eq!(
-            error,
-            "missing.bin: expected a file or folder, found nothing"
-        );
+        assert_eq!(error, "missing.bin: expected a file or folder, found nothing");
     }
 }

@@ -1,4 +1,7 @@
-//! unlift: io.
+//! Files of unlift: maps in ([`read`]), stages in and out ([`stage`]), clouds out ([`clouds`]).
+//!
+//! Bad input gets one line that names the file, the place, what was expected and what was found;
+//! outputs appear whole or not at all ([`atomic`]).
 
 pub mod atomic;
 pub mod clouds;

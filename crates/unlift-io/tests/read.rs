@@ -8,9 +8,7 @@ use unlift::descriptors::Values;
 use unlift_io::read::{self, Input, colmap};
 
 fn data(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/data")
-        .join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
 }
 
 fn write(name: &str, contents: impl AsRef<[u8]>) -> (TempDir, PathBuf) {
@@ -30,22 +28,12 @@ fn binary_and_text_models_are_equal() {
     let (bin, txt) = (data("rig-bin"), data("rig-txt"));
     let file = |folder: &Path, name: &str, e: &str| folder.join(format!("{name}.{e}"));
     let cameras = colmap::read_cameras(&file(&bin, "cameras", "bin")).unwrap();
-    assert_eq!(
-        cameras,
-        colmap::read_cameras(&file(&txt, "cameras", "txt")).unwrap()
-    );
+    assert_eq!(cameras, colmap::read_cameras(&file(&txt, "cameras", "txt")).unwrap());
     let ids: Vec<i32> = cameras.iter().map(|c| c.model.id).collect();
-    assert_eq!(
-        ids,
-        (0..18).collect::<Vec<_>>(),
-        "one camera of every model"
-    );
+    assert_eq!(ids, (0..18).collect::<Vec<_>>(), "one camera of every model");
 
     let images = colmap::read_images(&file(&bin, "images", "bin")).unwrap();
-    assert_eq!(
-        images,
-        colmap::read_images(&file(&txt, "images", "txt")).unwrap()
-    );
+    assert_eq!(images, colmap::read_images(&file(&txt, "images", "txt")).unwrap());
     assert_eq!(images[0].name, "küche/ä 0.jpg".as_bytes());
     assert_eq!(images[0].n_points2d, 4);
 
@@ -73,11 +61,7 @@ fn model_folders_open_with_centers_ids_and_files() {
     assert_eq!((&bin.skipped, &txt.skipped), (&vec![], &vec![]));
     assert_eq!((bin.database, bin.positions.len()), (None, 8));
     // pycolmap: `image.projection_center()` of image 20, the last; the sum of `point3D.xyz`.
-    let center = [
-        -0.18425494062287595,
-        0.11058267526290974,
-        0.11110621415901362,
-    ];
+    let center = [-0.18425494062287595, 0.11058267526290974, 0.11110621415901362];
     close(*bin.cameras.last().unwrap(), center, 1e-12);
     let sum = [-14.46619668331794, -9.942024018235283, -17.581669871119047];
     close(total(&bin.positions), sum, 1e-12);
@@ -101,29 +85,17 @@ fn a_project_folder_leads_to_its_model_and_database() {
     assert_eq!(input.cameras.len(), 3);
     assert_eq!(input.model, Some(project.join("sparse/0")));
     assert_eq!(input.database, Some(project.join("database.db")));
-    assert_eq!(
-        input.files.len(),
-        3,
-        "the classic layout: {:?}",
-        input.files
-    );
+    assert_eq!(input.files.len(), 3, "the classic layout: {:?}", input.files);
     let direct = read::open(&project.join("sparse/0")).unwrap();
     assert_eq!(direct.positions, input.positions);
     let alone = read::open(&project.join("sparse/0/points3D.bin")).unwrap();
-    assert_eq!(
-        (&alone.positions, &alone.ids),
-        (&input.positions, &input.ids)
-    );
+    assert_eq!((&alone.positions, &alone.ids), (&input.positions, &input.ids));
 }
 
 #[test]
 fn what_lies_beside_the_model_is_noted_or_ignored() {
     let dir = tempfile::tempdir().unwrap();
-    for (from, to) in [
-        ("rig-bin", "sparse/0"),
-        ("rig-txt", "sparse/0"),
-        ("rig-bin", "sparse/1"),
-    ] {
+    for (from, to) in [("rig-bin", "sparse/0"), ("rig-txt", "sparse/0"), ("rig-bin", "sparse/1")] {
         let to = dir.path().join(to);
         fs::create_dir_all(&to).unwrap();
         for file in fs::read_dir(data(from)).unwrap() {
@@ -164,10 +136,7 @@ fn text_models_may_have_no_2d_points_and_windows_line_ends() {
     let images = colmap::read_images(&path).unwrap();
     assert_eq!(images[0].name, b"a b.jpg");
     assert_eq!(images[0].center, [-1.0, -2.0, -3.0]);
-    assert_eq!(
-        (images[1].name.as_slice(), images[1].n_points2d),
-        (&b"c.jpg"[..], 0)
-    );
+    assert_eq!((images[1].name.as_slice(), images[1].n_points2d), (&b"c.jpg"[..], 0));
 }
 
 const POINTS: [[f64; 3]; 2] = [[0.5, -1.25, 3.0], [1e6, 2.0, -0.0625]];
@@ -261,15 +230,10 @@ fn tables_read_the_same_in_every_form() {
 
 #[test]
 fn arrays_read_the_same_in_every_form() {
-    let expected: Vec<[f64; 3]> = (0..4)
-        .map(|row| std::array::from_fn(|column| (3 * row + column) as f64 / 8.0))
-        .collect();
+    let expected: Vec<[f64; 3]> =
+        (0..4).map(|row| std::array::from_fn(|column| (3 * row + column) as f64 / 8.0)).collect();
     for name in ["f8.npy", "f4-big-endian.npy", "f8-fortran.npy"] {
-        assert_eq!(
-            read::open(&data(name)).unwrap().positions,
-            expected,
-            "{name}"
-        );
+        assert_eq!(read::open(&data(name)).unwrap().positions, expected, "{name}");
     }
 }
 
@@ -319,9 +283,7 @@ fn a_database_without_types_is_read_as_bytes() {
     let path = dir.path().join("a?b#c%20 d.db");
     fs::copy(data("project/database.db"), &path).unwrap();
     let database = rusqlite::Connection::open(&path).unwrap();
-    database
-        .execute_batch("ALTER TABLE descriptors DROP COLUMN type")
-        .unwrap();
+    database.execute_batch("ALTER TABLE descriptors DROP COLUMN type").unwrap();
     database.close().unwrap();
     let input = read::open(&data("project")).unwrap();
     let expected = read::descriptors(&data("project/descriptors.bin"), &input).unwrap();
@@ -343,8 +305,5 @@ fn a_database_in_write_ahead_mode_is_read_whole() {
         .unwrap();
     let input = read::open(&data("project")).unwrap();
     let error = read::descriptors(&path, &input).unwrap_err().to_string();
-    assert!(
-        error.contains("no such image"),
-        "the journal counts: {error}"
-    );
+    assert!(error.contains("no such image"), "the journal counts: {error}");
 }

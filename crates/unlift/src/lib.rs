@@ -6,8 +6,10 @@
 //! read ──> obfuscate ──> neighbors ──> recover ──> evaluate ──> report
 //! ```
 
+pub mod audit;
 pub mod descriptors;
 mod error;
+pub mod evaluate;
 pub mod geometry;
 mod ids;
 pub mod neighbors;

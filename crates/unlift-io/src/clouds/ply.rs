@@ -73,10 +73,7 @@ pub fn write_recovered<const D: usize>(
 }
 
 fn header(w: &mut impl Write, n: usize, colored: bool, with_error: bool) -> io::Result<()> {
-    write!(
-        w,
-        "ply\nformat binary_little_endian 1.0\nelement vertex {n}\n"
-    )?;
+    write!(w, "ply\nformat binary_little_endian 1.0\nelement vertex {n}\n")?;
     for axis in ["x", "y", "z"] {
         writeln!(w, "property double {axis}")?;
     }
@@ -103,10 +100,5 @@ fn finite<const D: usize>(path: &Path, row: usize, point: &[f64; D]) -> Result<(
         return Ok(());
     }
     let found = format!("{point:?}");
-    Err(Error::new(
-        path,
-        format!("point {row}"),
-        "finite coordinates",
-        found,
-    ))
+    Err(Error::new(path, format!("point {row}"), "finite coordinates", found))
 }

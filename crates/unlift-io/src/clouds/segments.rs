@@ -103,10 +103,7 @@ mod tests {
     fn a_ray_starts_at_its_center() {
         let segment = clip_ray_to_box(&[0.5, 1.0, 1.0], &[0.0, 1.0, 0.0], &LOW, &HIGH);
         assert_eq!(segment, Some([[0.5, 1.0, 1.0], [0.5, 2.0, 1.0]]));
-        assert_eq!(
-            clip_ray_to_box(&[0.5, 9.0, 1.0], &[0.0, 1.0, 0.0], &LOW, &HIGH),
-            None
-        );
+        assert_eq!(clip_ray_to_box(&[0.5, 9.0, 1.0], &[0.0, 1.0, 0.0], &LOW, &HIGH), None);
     }
 
     #[test]

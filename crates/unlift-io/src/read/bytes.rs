@@ -48,14 +48,7 @@ impl Bytes {
 
     /// A reader of a file of `len` bytes of which `at` were already read from `reader`.
     pub fn continuing(path: &Path, reader: BufReader<File>, at: u64, len: u64) -> Self {
-        Self {
-            path: path.to_owned(),
-            reader,
-            part: Part::Header,
-            value_at: at,
-            at,
-            len,
-        }
+        Self { path: path.to_owned(), reader, part: Part::Header, value_at: at, at, len }
     }
 
     /// Errors from here on name record `number`, counted from 1.
@@ -105,9 +98,7 @@ impl Bytes {
     pub fn fill(&mut self, buffer: &mut [u8], what: &str) -> Result<(), Error> {
         self.check(buffer.len() as u64, what)?;
         self.value_at = self.at;
-        self.reader
-            .read_exact(buffer)
-            .map_err(|e| Error::read(&self.path, e))?;
+        self.reader.read_exact(buffer).map_err(|e| Error::read(&self.path, e))?;
         self.at += buffer.len() as u64;
         Ok(())
     }
@@ -116,9 +107,7 @@ impl Bytes {
     pub fn skip(&mut self, bytes: u64, what: &str) -> Result<(), Error> {
         self.check(bytes, what)?;
         let offset = i64::try_from(bytes).expect("bounded by the size of the file");
-        self.reader
-            .seek_relative(offset)
-            .map_err(|e| Error::read(&self.path, e))?;
+        self.reader.seek_relative(offset).map_err(|e| Error::read(&self.path, e))?;
         self.value_at = self.at;
         self.at += bytes;
         Ok(())

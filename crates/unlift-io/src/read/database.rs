@@ -39,12 +39,7 @@ struct Rows {
 pub fn descriptors(path: &Path, input: &Input) -> Result<Descriptors, Error> {
     let Some(points_path) = input.files.iter().find(|file| is_points(file)) else {
         let expected = "a COLMAP model, whose tracks lead to a database";
-        return Err(Error::new(
-            path,
-            "",
-            expected,
-            format!("{} points", input.format),
-        ));
+        return Err(Error::new(path, "", expected, format!("{} points", input.format)));
     };
     let points = colmap::read_points(points_path, true)?;
     let tracks = points.tracks.expect("asked for");
@@ -55,12 +50,7 @@ pub fn descriptors(path: &Path, input: &Input) -> Result<Descriptors, Error> {
         .iter()
         .map(|id| {
             row_of_id.get(id).copied().ok_or_else(|| {
-                Error::new(
-                    points_path,
-                    format!("point {id}"),
-                    "its track",
-                    "no such point",
-                )
+                Error::new(points_path, format!("point {id}"), "its track", "no such point")
             })
         })
         .collect::<Result<Vec<_>, _>>()?;
@@ -74,9 +64,7 @@ fn is_points(file: &Path) -> bool {
 /// Names of the model's images by their id in the model, read beside the points.
 fn images_of(points_path: &Path) -> Result<HashMap<u32, Vec<u8>>, Error> {
     let extension = points_path.extension().unwrap_or_default();
-    let path = points_path
-        .with_file_name("images")
-        .with_extension(extension);
+    let path = points_path.with_file_name("images").with_extension(extension);
     let images = colmap::read_images(&path)?;
     Ok(images.into_iter().map(|i| (i.id, i.name)).collect())
 }
@@ -110,12 +98,7 @@ fn mean_over_tracks(
         let Some(name) = names.get(&image) else {
             let place = format!("point {}", ids[seen[0].2]);
             let expected = "images of the model in its track";
-            return Err(Error::new(
-                database.path,
-                place,
-                expected,
-                format!("image {image}"),
-            ));
+            return Err(Error::new(database.path, place, expected, format!("image {image}")));
         };
         let stored = database.rows(name)?;
         let this = (stored.kind, stored.row_bytes);
@@ -195,30 +178,17 @@ impl<'a> Database<'a> {
             Connection::open_with_flags(uri(path), flags).map_err(|e| refuse(path, "", &e))?;
         let image_ids = (|| {
             let mut statement = connection.prepare("SELECT image_id, name FROM images")?;
-            let rows = statement.query_map([], |row| {
-                Ok((row.get_ref(1)?.as_bytes()?.to_vec(), row.get(0)?))
-            })?;
+            let rows = statement
+                .query_map([], |row| Ok((row.get_ref(1)?.as_bytes()?.to_vec(), row.get(0)?)))?;
             rows.collect::<rusqlite::Result<HashMap<_, _>>>()
         })()
         .map_err(|e| refuse(path, "table images", &e))?;
-        let has_type = connection
-            .prepare("SELECT type FROM descriptors LIMIT 0")
-            .is_ok();
-        Ok(Self {
-            path,
-            connection,
-            image_ids,
-            has_type,
-        })
+        let has_type = connection.prepare("SELECT type FROM descriptors LIMIT 0").is_ok();
+        Ok(Self { path, connection, image_ids, has_type })
     }
 
     fn error(&self, name: &[u8], expected: impl Into<String>, found: impl Into<String>) -> Error {
-        Error::new(
-            self.path,
-            format!("image {}", quoted(name)),
-            expected,
-            found,
-        )
+        Error::new(self.path, format!("image {}", quoted(name)), expected, found)
     }
 
     /// The descriptors of the image called `name`.
@@ -259,12 +229,7 @@ impl<'a> Database<'a> {
             let expected = format!("{n} descriptors of {row_bytes} bytes");
             return Err(self.error(name, expected, format!("{} bytes", data.len())));
         }
-        Ok(Rows {
-            kind,
-            n,
-            row_bytes,
-            data,
-        })
+        Ok(Rows { kind, n, row_bytes, data })
     }
 }
 

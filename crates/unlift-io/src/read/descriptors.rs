@@ -76,12 +76,7 @@ fn binary(path: &Path, input: &Input) -> Result<Descriptors, Error> {
     for id in &input.ids {
         let Some(&row) = row_of_id.get(id) else {
             let found = format!("none among {n}");
-            return Err(Error::new(
-                path,
-                format!("point {id}"),
-                "a descriptor",
-                found,
-            ));
+            return Err(Error::new(path, format!("point {id}"), "a descriptor", found));
         };
         values.extend_from_slice(&all[row * dim..(row + 1) * dim]);
     }

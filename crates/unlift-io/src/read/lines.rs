@@ -24,12 +24,7 @@ impl Lines {
 
     /// A reader of a file of which `number` lines were already read from `reader`.
     pub fn continuing(path: &Path, reader: BufReader<File>, number: u64) -> Self {
-        Self {
-            path: path.to_owned(),
-            reader,
-            line: Vec::new(),
-            number,
-        }
+        Self { path: path.to_owned(), reader, line: Vec::new(), number }
     }
 
     /// Reads the next line, whatever it holds; false at the end of the file.
@@ -88,8 +83,7 @@ impl Lines {
 
 /// Words of a line between spaces and tabs.
 pub(crate) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
-    line.split(u8::is_ascii_whitespace)
-        .filter(|word| !word.is_empty())
+    line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
 }
 
 /// The number written as `word`, if it is one.

@@ -47,11 +47,7 @@ const MODEL_FOLDERS: [&str; 5] = ["", "sparse/0", "sparse", "0", "model"];
 /// When nothing readable is there, a file is malformed, a coordinate is not finite, or there is no point.
 pub fn open(path: &Path) -> Result<Input, Error> {
     let metadata = std::fs::metadata(path).map_err(|e| Error::read(path, e))?;
-    let input = if metadata.is_dir() {
-        folder(path)?
-    } else {
-        file(path)?
-    };
+    let input = if metadata.is_dir() { folder(path)? } else { file(path)? };
     if input.positions.is_empty() {
         let file = input.files.last().map_or(path, PathBuf::as_path);
         return Err(Error::new(file, "", "at least one point", "none"));
@@ -104,11 +100,7 @@ fn colmap_points(path: &Path) -> Result<Input, Error> {
 
 fn folder(path: &Path) -> Result<Input, Error> {
     for sub in MODEL_FOLDERS {
-        let model = if sub.is_empty() {
-            path.to_owned()
-        } else {
-            path.join(sub)
-        };
+        let model = if sub.is_empty() { path.to_owned() } else { path.join(sub) };
         for (extension, format) in [("bin", "COLMAP binary"), ("txt", "COLMAP text")] {
             if model.join(format!("points3D.{extension}")).is_file() {
                 let mut input = colmap_model(&model, extension)?;
@@ -124,10 +116,7 @@ fn folder(path: &Path) -> Result<Input, Error> {
 }
 
 fn colmap_model(model: &Path, extension: &str) -> Result<Input, Error> {
-    let mut input = Input {
-        model: Some(model.to_owned()),
-        ..Input::default()
-    };
+    let mut input = Input { model: Some(model.to_owned()), ..Input::default() };
     let path = |name: &str| model.join(format!("{name}.{extension}"));
     let mut present = |name: &str| {
         let path = path(name);
@@ -143,9 +132,7 @@ fn colmap_model(model: &Path, extension: &str) -> Result<Input, Error> {
     let frames = present("frames");
     let points = present("points3D").expect("found by the caller");
 
-    let cameras = cameras
-        .map(|path| colmap::read_cameras(&path))
-        .transpose()?;
+    let cameras = cameras.map(|path| colmap::read_cameras(&path)).transpose()?;
     if let Some(path) = images {
         let images = colmap::read_images(&path)?;
         for image in &images {
@@ -164,10 +151,9 @@ fn colmap_model(model: &Path, extension: &str) -> Result<Input, Error> {
         input.skipped.push(note);
     }
     // Nothing an audit needs is in these two, so that a fault in them is told but not fatal.
-    for check in [
-        rigs.map(|path| colmap::check_rigs(&path)),
-        frames.map(|path| colmap::check_frames(&path)),
-    ] {
+    for check in
+        [rigs.map(|path| colmap::check_rigs(&path)), frames.map(|path| colmap::check_frames(&path))]
+    {
         if let Some(Err(error)) = check {
             input.skipped.push(error.to_string());
         }

@@ -76,11 +76,7 @@ pub fn read(path: &Path) -> Result<Vec<[f64; 3]>, Error> {
             [a, b, c, d, e, f, g, h] => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
             _ => unreachable!("4 or 8 bytes"),
         };
-        let (row, column) = if fortran {
-            (i % n, i / n)
-        } else {
-            (i / 3, i % 3)
-        };
+        let (row, column) = if fortran { (i % n, i / n) } else { (i / 3, i % 3) };
         if !value.is_finite() {
             let expected = format!("a finite coordinate of point {row}");
             return Err(bytes.error(expected, value.to_string()));

@@ -66,10 +66,7 @@ impl Element {
 
     /// Bytes of one row in a binary file, without lists.
     fn stride(&self) -> usize {
-        self.properties
-            .iter()
-            .map(|(_, scalar)| scalar.map_or(0, Scalar::size))
-            .sum()
+        self.properties.iter().map(|(_, scalar)| scalar.map_or(0, Scalar::size)).sum()
     }
 }
 
@@ -107,10 +104,7 @@ pub fn read(path: &Path) -> Result<(Vec<[f64; 3]>, &'static str), Error> {
             let positions = ascii(path, reader, &header, len)?;
             Ok((positions, "ply ascii"))
         }
-        Encoding::Little => Ok((
-            binary(path, reader, &header, len)?,
-            "ply binary little endian",
-        )),
+        Encoding::Little => Ok((binary(path, reader, &header, len)?, "ply binary little endian")),
         Encoding::Big => Ok((binary(path, reader, &header, len)?, "ply binary big endian")),
     }
 }
@@ -125,9 +119,7 @@ fn header(path: &Path, reader: &mut BufReader<std::fs::File>) -> Result<Header, 
     let mut line = Vec::new();
     loop {
         line.clear();
-        let read = limited
-            .read_until(b'\n', &mut line)
-            .map_err(|e| Error::read(path, e))?;
+        let read = limited.read_until(b'\n', &mut line).map_err(|e| Error::read(path, e))?;
         n_lines += 1;
         n_bytes += read as u64;
         let error =
@@ -143,10 +135,7 @@ fn header(path: &Path, reader: &mut BufReader<std::fs::File>) -> Result<Header, 
             continue;
         }
         if !line.ends_with(b"\n") {
-            return Err(error(
-                "a header that ends with end_header",
-                "end of file".into(),
-            ));
+            return Err(error("a header that ends with end_header", "end of file".into()));
         }
         let words: Vec<&[u8]> = words(&line).collect();
         match words[..] {
@@ -165,18 +154,11 @@ fn header(path: &Path, reader: &mut BufReader<std::fs::File>) -> Result<Header, 
             [b"element", name, count] => {
                 let count =
                     number(count).ok_or_else(|| error("the number of elements", quoted(count)))?;
-                elements.push(Element {
-                    name: name.to_vec(),
-                    count,
-                    properties: Vec::new(),
-                });
+                elements.push(Element { name: name.to_vec(), count, properties: Vec::new() });
             }
             [b"property", ref rest @ ..] => {
                 let element = elements.last_mut().ok_or_else(|| {
-                    error(
-                        "an element before its properties",
-                        quoted(line.trim_ascii()),
-                    )
+                    error("an element before its properties", quoted(line.trim_ascii()))
                 })?;
                 let (name, scalar) = match *rest {
                     [kind, name] => {
@@ -212,11 +194,7 @@ fn header(path: &Path, reader: &mut BufReader<std::fs::File>) -> Result<Header, 
         let found = format!("{} with a list property", quoted(&list.name));
         return Err(refuse("elements of fixed size before vertex", found));
     }
-    let mut axes = [Axis {
-        property: 0,
-        offset: 0,
-        is_f64: false,
-    }; 3];
+    let mut axes = [Axis { property: 0, offset: 0, is_f64: false }; 3];
     for (axis, name) in axes.iter_mut().zip(["x", "y", "z"]) {
         let mut offset = 0;
         let mut found = None;
@@ -235,20 +213,9 @@ fn header(path: &Path, reader: &mut BufReader<std::fs::File>) -> Result<Header, 
             Scalar::F64 => true,
             _ => return Err(refuse(&expected, "an integer type".into())),
         };
-        *axis = Axis {
-            property,
-            offset,
-            is_f64,
-        };
+        *axis = Axis { property, offset, is_f64 };
     }
-    Ok(Header {
-        encoding,
-        elements,
-        vertex,
-        axes,
-        n_lines,
-        n_bytes,
-    })
+    Ok(Header { encoding, elements, vertex, axes, n_lines, n_bytes })
 }
 
 fn ascii(
@@ -263,12 +230,7 @@ fn ascii(
     let most = (len - header.n_bytes + 1) / (2 * n_properties as u64);
     if vertex.count > most {
         let expected = format!("at most {most} vertices (by the size of the file)");
-        return Err(Error::new(
-            path,
-            "header",
-            expected,
-            vertex.count.to_string(),
-        ));
+        return Err(Error::new(path, "header", expected, vertex.count.to_string()));
     }
     let mut lines = Lines::continuing(path, reader, header.n_lines);
     let advance = |lines: &mut Lines, what: &str, row: u64, count: u64| loop {
@@ -365,17 +327,9 @@ fn coordinate(row: &[u8], axis: Axis, big: bool) -> f64 {
     let at = |n: usize| &row[axis.offset..axis.offset + n];
     if axis.is_f64 {
         let bits: [u8; 8] = at(8).try_into().expect("eight bytes");
-        if big {
-            f64::from_be_bytes(bits)
-        } else {
-            f64::from_le_bytes(bits)
-        }
+        if big { f64::from_be_bytes(bits) } else { f64::from_le_bytes(bits) }
     } else {
         let bits: [u8; 4] = at(4).try_into().expect("four bytes");
-        f64::from(if big {
-            f32::from_be_bytes(bits)
-        } else {
-            f32::from_le_bytes(bits)
-        })
+        f64::from(if big { f32::from_be_bytes(bits) } else { f32::from_le_bytes(bits) })
     }
 }

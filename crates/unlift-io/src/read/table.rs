@@ -15,10 +15,7 @@ enum Separator {
 
 impl Separator {
     fn of(line: &[u8]) -> Self {
-        [b';', b',']
-            .into_iter()
-            .find(|byte| line.contains(byte))
-            .map_or(Self::Space, Self::Byte)
+        [b';', b','].into_iter().find(|byte| line.contains(byte)).map_or(Self::Space, Self::Byte)
     }
 
     /// The separator of a header line: names may hold spaces and fields may be empty, so that a tab counts.

@@ -74,11 +74,7 @@ pub(super) struct Batch<'a> {
 
 impl<'a> Batch<'a> {
     pub(super) fn new(path: &'a Path, batch: &'a RecordBatch, first_row: u64) -> Self {
-        Self {
-            path,
-            batch,
-            first_row,
-        }
+        Self { path, batch, first_row }
     }
 
     /// Number of rows here.
@@ -231,11 +227,7 @@ impl<'a> Batch<'a> {
     fn lists(&self, name: &str) -> Result<Lists, Error> {
         self.no_null(name, "a list")?;
         let lists = self.column(name).as_list::<i32>();
-        let ends: Vec<usize> = lists
-            .value_offsets()
-            .iter()
-            .map(|&at| at as usize)
-            .collect();
+        let ends: Vec<usize> = lists.value_offsets().iter().map(|&at| at as usize).collect();
         let values = lists.values();
         if values.null_count() > 0 {
             let holds_null =

@@ -97,11 +97,7 @@ pub fn peek(path: &Path) -> Result<Header, Error> {
         Kind::Released | Kind::Truth | Kind::Recovered => Some(table.meta().dimension()?),
     };
     let n_rows = table.n_rows();
-    Ok(Header {
-        kind,
-        dimension,
-        n_rows,
-    })
+    Ok(Header { kind, dimension, n_rows })
 }
 
 /// The metadata object of a file, with the file's name for messages.
@@ -158,11 +154,7 @@ impl<'a> Meta<'a> {
 
     /// Refuses a file of another dimension than `D`.
     pub(super) fn expect_dimension<const D: usize>(&self) -> Result<(), Error> {
-        if self.dimension()? == D {
-            Ok(())
-        } else {
-            Err(self.wrong("dimension", D.to_string()))
-        }
+        if self.dimension()? == D { Ok(()) } else { Err(self.wrong("dimension", D.to_string())) }
     }
 
     /// The unit of every length.
@@ -218,12 +210,7 @@ impl<'a> Meta<'a> {
     /// The error about `key`.
     pub(super) fn wrong(&self, key: &str, expected: impl Into<String>) -> Error {
         let found = self.object.get(key).map_or("nothing".into(), short);
-        Error::new(
-            self.path,
-            format!("metadata unlift, {key}"),
-            expected,
-            found,
-        )
+        Error::new(self.path, format!("metadata unlift, {key}"), expected, found)
     }
 }
 
@@ -254,9 +241,7 @@ pub(super) fn new_meta(kind: Kind) -> Map<String, Value> {
 pub(super) fn to_text(meta: Map<String, Value>) -> String {
     let mut entries: Vec<(String, Value)> = meta.into_iter().collect();
     entries.sort_by(|a, b| a.0.cmp(&b.0));
-    let entries: Vec<String> = entries
-        .into_iter()
-        .map(|(key, value)| format!("{}:{value}", Value::String(key)))
-        .collect();
+    let entries: Vec<String> =
+        entries.into_iter().map(|(key, value)| format!("{}:{value}", Value::String(key))).collect();
     format!("{{{}}}", entries.join(","))
 }

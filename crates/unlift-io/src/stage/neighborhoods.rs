@@ -72,10 +72,7 @@ pub fn write_neighborhoods(path: &Path, neighborhoods: &Neighborhoods) -> Result
             lists::<UInt32Type>(records, lengths()),
         ];
         if let Some(scores) = neighborhoods.scores() {
-            columns.push(lists::<Float32Type>(
-                scores[values].iter().copied(),
-                lengths(),
-            ));
+            columns.push(lists::<Float32Type>(scores[values].iter().copied(), lengths()));
         }
         columns
     })
@@ -106,23 +103,11 @@ pub fn read_neighborhoods(
     for slot in 0..n_slots {
         // The core checks this too, but cannot name the file's column.
         let own = (slot / slots_per_record) as u32;
-        check_list(
-            path,
-            "records",
-            ("slot", slot),
-            ("record", own),
-            lists.of(slot),
-        )?;
+        check_list(path, "records", ("slot", slot), ("record", own), lists.of(slot))?;
     }
     let records = lists.ids.into_iter().map(RecordId).collect();
-    Neighborhoods::try_new(
-        lists.offsets,
-        records,
-        lists.scores,
-        n_records,
-        slots_per_record,
-    )
-    .map_err(|source| Error::core(path, source))
+    Neighborhoods::try_new(lists.offsets, records, lists.scores, n_records, slots_per_record)
+        .map_err(|source| Error::core(path, source))
 }
 
 /// Reads neighborhoods in the point form: columns `point`, `neighbors` (both rows of the original
@@ -147,11 +132,7 @@ pub fn read_point_neighborhoods(path: &Path, n_points: usize) -> Result<PointNei
         let own = ("point", point as u32);
         check_list(path, "neighbors", ("point", point), own, lists.of(point))?;
     }
-    Ok(PointNeighborhoods {
-        offsets: lists.offsets,
-        neighbors: lists.ids,
-        scores: lists.scores,
-    })
+    Ok(PointNeighborhoods { offsets: lists.offsets, neighbors: lists.ids, scores: lists.scores })
 }
 
 /// Lists as they stand in a file.
@@ -201,12 +182,7 @@ impl Lists {
             Ok(())
         })?;
         let scores = with_scores.then_some(scores);
-        Ok(Self {
-            keys,
-            offsets,
-            ids,
-            scores,
-        })
+        Ok(Self { keys, offsets, ids, scores })
     }
 
     /// The lists of keys 0 to `n - 1` in this order; those that no row has are empty.
@@ -265,9 +241,6 @@ fn check_list(
     sorted.sort_unstable();
     match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
         None => Ok(()),
-        Some(pair) => wrong(
-            format!("each {word} once"),
-            format!("{word} {} twice", pair[0]),
-        ),
+        Some(pair) => wrong(format!("each {word} once"), format!("{word} {} twice", pair[0])),
     }
 }

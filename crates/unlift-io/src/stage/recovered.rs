@@ -44,11 +44,7 @@ pub fn write_recovered<const D: usize>(path: &Path, recovered: &Recovered<D>) ->
     fields.push(field("support", UInt16));
     fields.push(field("evidence", Float32));
     fields.extend(recovered.axis().map(|_| field("axis", UInt8)));
-    fields.extend(
-        recovered
-            .descriptor_row()
-            .map(|_| field("descriptor_row", UInt32)),
-    );
+    fields.extend(recovered.descriptor_row().map(|_| field("descriptor_row", UInt32)));
     write_table(path, to_text(meta), fields, recovered.n_slots(), |slots| {
         let mut columns = vec![numbers::<UInt32Type>(slots.clone().map(|slot| slot as u32))];
         columns.extend((0..D).map(|axis| {
@@ -83,11 +79,7 @@ pub fn read_recovered<const D: usize>(path: &Path) -> Result<Recovered<D>, Error
     let table = Table::open_kind(path, Kind::Recovered)?;
     let meta = table.meta();
     meta.expect_dimension::<D>()?;
-    let (origin, unit, delta) = (
-        meta.origin::<D>()?,
-        meta.unit()?,
-        meta.number_or_0("delta")?,
-    );
+    let (origin, unit, delta) = (meta.origin::<D>()?, meta.unit()?, meta.number_or_0("delta")?);
     let coordinates = coordinate_names::<D>("");
     let mut columns: Vec<(&str, Type)> = vec![];
     columns.extend(coordinates.iter().map(|name| (name.as_str(), Type::Float)));

@@ -171,9 +171,7 @@ fn descriptor_column(
 fn read_lines<const D: usize>(path: &Path, table: &Table) -> Result<Obfuscation<D>, Error> {
     let [foot, direction] = read_vectors(table, ["foot_", "direction_"])?;
     let lines = Lines::through(&foot, &direction);
-    lines
-        .map(Obfuscation::Lines)
-        .map_err(|source| Error::core(path, source))
+    lines.map(Obfuscation::Lines).map_err(|source| Error::core(path, source))
 }
 
 fn read_rays<const D: usize>(path: &Path, table: &Table) -> Result<Obfuscation<D>, Error> {
@@ -189,8 +187,7 @@ fn read_rays<const D: usize>(path: &Path, table: &Table) -> Result<Obfuscation<D
     })?;
     let [direction] = read_vectors(table, ["direction_"])?;
     let rays = Rays::try_new(&centers, center, &direction);
-    rays.map(Obfuscation::Rays)
-        .map_err(|source| Error::core(path, source))
+    rays.map(Obfuscation::Rays).map_err(|source| Error::core(path, source))
 }
 
 fn read_axis_planes<const D: usize>(path: &Path, table: &Table) -> Result<Obfuscation<D>, Error> {
@@ -203,9 +200,7 @@ fn read_axis_planes<const D: usize>(path: &Path, table: &Table) -> Result<Obfusc
         Ok(())
     })?;
     let planes = AxisPlanes::try_new(axis, &offset);
-    planes
-        .map(Obfuscation::AxisPlanes)
-        .map_err(|source| Error::core(path, source))
+    planes.map(Obfuscation::AxisPlanes).map_err(|source| Error::core(path, source))
 }
 
 /// Vector columns by their prefixes.
@@ -214,11 +209,8 @@ fn read_vectors<const D: usize, const N: usize>(
     prefixes: [&str; N],
 ) -> Result<[Vec<[f64; D]>; N], Error> {
     let names = prefixes.map(coordinate_names::<D>);
-    let columns: Vec<(&str, Type)> = names
-        .iter()
-        .flatten()
-        .map(|name| (name.as_str(), Type::Float))
-        .collect();
+    let columns: Vec<(&str, Type)> =
+        names.iter().flatten().map(|name| (name.as_str(), Type::Float)).collect();
     let mut vectors: [Vec<[f64; D]>; N] = std::array::from_fn(|_| Vec::new());
     table.read(&columns, |batch| {
         for (names, to) in names.iter().zip(&mut vectors) {
@@ -268,15 +260,9 @@ fn read_descriptors(
         }
         Ok(())
     })?;
-    let values = if bytes {
-        Values::U8(u8s)
-    } else {
-        Values::F32(f32s)
-    };
+    let values = if bytes { Values::U8(u8s) } else { Values::F32(f32s) };
     let descriptors = Descriptors::try_new(values, dim.unwrap_or(0));
-    descriptors
-        .map(Some)
-        .map_err(|source| Error::core(path, source))
+    descriptors.map(Some).map_err(|source| Error::core(path, source))
 }
 
 /// One descriptor column of a batch, rows end to end.

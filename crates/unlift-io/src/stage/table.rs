@@ -49,24 +49,13 @@ impl<'a> Table<'a> {
             Ok(n_rows) if n_rows <= most => n_rows,
             _ => {
                 let expected = format!("at most {most} rows in {} bytes", found.len());
-                return Err(Error::new(
-                    path,
-                    "",
-                    expected,
-                    footer.num_rows().to_string(),
-                ));
+                return Err(Error::new(path, "", expected, footer.num_rows().to_string()));
             }
         };
         let entries = footer.key_value_metadata();
         let entry = entries.and_then(|all| all.iter().find(|entry| entry.key == KEY));
         let meta = Meta::parse(path, entry.and_then(|entry| entry.value.as_deref()))?;
-        Ok(Self {
-            path,
-            file,
-            parquet,
-            meta,
-            n_rows,
-        })
+        Ok(Self { path, file, parquet, meta, n_rows })
     }
 
     /// Opens `path`, which should hold `kind`.
@@ -95,12 +84,7 @@ impl<'a> Table<'a> {
         if self.has("records") {
             return Ok(Kind::Neighborhoods);
         }
-        Err(Error::new(
-            self.path,
-            "",
-            "a stage file of unlift",
-            NO_METADATA,
-        ))
+        Err(Error::new(self.path, "", "a stage file of unlift", NO_METADATA))
     }
 
     /// The metadata object.
@@ -140,10 +124,7 @@ impl<'a> Table<'a> {
             let builder =
                 ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.parquet.clone());
             let mask = ProjectionMask::roots(builder.parquet_schema(), roots);
-            builder
-                .with_projection(mask)
-                .with_batch_size(BATCH_ROWS)
-                .build()
+            builder.with_projection(mask).with_batch_size(BATCH_ROWS).build()
         })?;
         let mut first_row = 0;
         while let Some(batch) = guarded(self.path, || reader.next().transpose())? {
@@ -160,12 +141,7 @@ impl<'a> Table<'a> {
     /// The index of the column `name`, which must be there once and be of type `class`.
     fn find(&self, name: &str, class: Type) -> Result<usize, Error> {
         let wrong = |found: String| {
-            Error::new(
-                self.path,
-                format!("column {name}"),
-                class.to_string(),
-                found,
-            )
+            Error::new(self.path, format!("column {name}"), class.to_string(), found)
         };
         let fields = self.parquet.schema().fields().iter().enumerate();
         let mut named = fields.filter(|(_, field)| field.name() == name);

@@ -58,9 +58,7 @@ pub fn write_truth<const D: usize>(
             let axes = rows.clone().map(|row| slot(row).map(|s| axes[s]));
             columns.push(optional_numbers::<UInt8Type>(axes));
         }
-        let descriptor_rows = rows
-            .clone()
-            .map(|row| slot(row).map(|s| secret.descriptor_row()[s]));
+        let descriptor_rows = rows.clone().map(|row| slot(row).map(|s| secret.descriptor_row()[s]));
         columns.push(optional_numbers::<UInt32Type>(descriptor_rows));
         let reasons =
             rows.map(|row| Some(secret.dropped()[row.checked_sub(n_slots)?].reason.name()));

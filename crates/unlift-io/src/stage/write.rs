@@ -37,18 +37,15 @@ pub(super) fn write_table(
     let properties = properties(meta, &fields);
     let schema = Arc::new(Schema::new(fields));
     atomic::write_file(path, |file| {
-        let options = ArrowWriterOptions::new()
-            .with_properties(properties)
-            .with_skip_arrow_metadata(true);
+        let options =
+            ArrowWriterOptions::new().with_properties(properties).with_skip_arrow_metadata(true);
         let mut writer =
             ArrowWriter::try_new_with_options(file, schema.clone(), options).map_err(to_io)?;
         let mut start = 0;
         while start < n_rows {
             let end = n_rows.min(start + CHUNK_ROWS);
             let batch = RecordBatch::try_new(schema.clone(), columns(start..end));
-            writer
-                .write(&batch.map_err(io::Error::other)?)
-                .map_err(to_io)?;
+            writer.write(&batch.map_err(io::Error::other)?).map_err(to_io)?;
             start = end;
         }
         writer.close().map_err(to_io)?;

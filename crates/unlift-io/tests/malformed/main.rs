@@ -46,12 +46,7 @@ fn row(
     open: &'static str,
     line: &'static str,
 ) -> Row {
-    Row {
-        what,
-        files,
-        open,
-        line,
-    }
+    Row { what, files, open, line }
 }
 
 /// A single file of any kind.
@@ -75,11 +70,7 @@ fn make(dir: &Path, row: &Row) -> PathBuf {
             fs::write(path, bytes).unwrap();
         }
     }
-    if row.open.is_empty() {
-        dir.to_owned()
-    } else {
-        dir.join(row.open)
-    }
+    if row.open.is_empty() { dir.to_owned() } else { dir.join(row.open) }
 }
 
 /// The error without the temporary folder.

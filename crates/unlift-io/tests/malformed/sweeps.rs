@@ -117,11 +117,7 @@ fn files_with_any_byte_changed_open_or_are_refused() {
 fn descriptors_cut_at_any_length_or_with_any_byte_changed_are_read_or_refused() {
     let input = read::open(&fixtures().join("project")).unwrap();
     // Databases in steps: SQLite has tests of its own.
-    for (name, step) in [
-        ("descriptors.bin", 1),
-        ("database.db", 37),
-        ("floats.db", 37),
-    ] {
+    for (name, step) in [("descriptors.bin", 1), ("database.db", 37), ("floats.db", 37)] {
         sweep("project", name, |_, _, path, original| {
             let mut file = InPlace::open(path);
             for at in (0..original.len()).step_by(step) {

@@ -19,6 +19,8 @@ const SAMPLE: usize = 12;
 const HALVINGS: u32 = 14;
 /// Steps per octave of the fine ladder.
 const FINE: i32 = 3;
+/// Deltas whose excess evidence reaches this share of the largest are as good.
+const NEAR_MOST: f64 = 0.97;
 
 /// The delta with the best mean evidence; `None` for an empty map or one without extent.
 pub(crate) fn choose<const D: usize>(
@@ -38,16 +40,6 @@ pub(crate) fn choose<const D: usize>(
     let value = |delta: f64| {
         mean_evidence(Lists::given(lists), delta) - mean_evidence(Lists::mixed(lists), delta)
     };
-    let best_of = |deltas: &[f64]| {
-        let values: Vec<f64> = deltas.iter().map(|&delta| value(delta)).collect();
-        let mut best = 0;
-        for at in 1..values.len() {
-            if values[at] > values[best] {
-                best = at;
-            }
-        }
-        deltas[best]
-    };
     // From large to small; once well below the maximum, smaller deltas only lose more neighbors.
     let (mut coarse, mut most) = (extent, f64::NEG_INFINITY);
     for step in 1..=HALVINGS {
@@ -59,10 +51,13 @@ pub(crate) fn choose<const D: usize>(
             break;
         }
     }
-    let fine: Vec<f64> = (1 - FINE..FINE)
+    let fine: Vec<(f64, f64)> = (1 - FINE..2 * FINE)
         .map(|step| coarse * libm::exp2(f64::from(step) / f64::from(FINE)))
+        .map(|delta| (delta, value(delta)))
         .collect();
-    Some(best_of(&fine))
+    let most = fine.iter().map(|&(_, value)| value).fold(f64::NEG_INFINITY, f64::max);
+    // The maximum is flat, and a wider support is the steadier one: the largest near the maximum.
+    fine.iter().rev().find(|&&(_, value)| value >= NEAR_MOST * most || value == most).map(|x| x.0)
 }
 
 fn sample_chunks(n_slots: usize, seed: u64) -> Vec<usize> {

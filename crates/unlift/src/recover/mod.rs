@@ -1,5 +1,6 @@
 //! The attacker: records and neighborhoods in, positions out. Never imports `truth`.
 
+mod assign;
 mod candidate_rows;
 mod chance;
 mod chunks;
@@ -11,10 +12,12 @@ mod lists;
 mod null_sample;
 mod options;
 mod plane_windows;
+mod ransac;
 mod recovered;
 mod sections;
 
 pub use options::{Delta, RecoverOptions, Solver};
+pub use ransac::TrialHistogram;
 pub use recovered::{Estimate, Recovered, Status};
 
 use crate::Error;
@@ -45,14 +48,20 @@ pub fn recover<const D: usize>(
         Delta::Fixed(delta) => delta,
         Delta::Auto => delta::choose(&family, lists, options.seed).unwrap_or(1.0),
     };
-    let estimates = match options.solver {
+    let (estimates, trials) = match options.solver {
         Solver::Consensus => {
-            consensus::solve(&family, Lists::given(lists), delta as f32, options.seed, Chunks::All)
+            let given = Lists::given(lists);
+            let solved = consensus::solve(&family, given, delta as f32, options.seed, Chunks::All);
+            (solved, None)
         }
         Solver::Ransac => {
-            consensus::solve(&family, Lists::given(lists), delta as f32, options.seed, Chunks::All)
+            let (solved, trials) = ransac::solve(&family, lists, delta as f32, options.seed);
+            (solved, Some(trials))
         }
     };
     let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
-    Recovered::try_new(&estimates, with_axis, None, released.origin(), released.unit(), delta)
+    let descriptor_row = assign::descriptor_rows(released, lists);
+    let (origin, unit) = (released.origin(), released.unit());
+    Recovered::try_new(&estimates, with_axis, descriptor_row, origin, unit, delta)
+        .map(|recovered| recovered.with_trials(trials))
 }

@@ -1,5 +1,6 @@
 //! The result of recovery: a position or a reason, per slot.
 
+use super::TrialHistogram;
 use crate::{Error, Unit};
 
 /// What became of a slot.
@@ -71,6 +72,7 @@ pub struct Recovered<const D: usize> {
     evidence: Vec<f32>,
     axis: Option<Vec<u8>>,
     descriptor_row: Option<Vec<u32>>,
+    trials: Option<TrialHistogram>,
 }
 
 impl<const D: usize> Recovered<D> {
@@ -112,6 +114,7 @@ impl<const D: usize> Recovered<D> {
             evidence: estimates.iter().map(|e| e.evidence).collect(),
             axis: with_axis.then(|| estimates.iter().map(|e| e.axis).collect()),
             descriptor_row,
+            trials: None,
         })
     }
 
@@ -170,6 +173,17 @@ impl<const D: usize> Recovered<D> {
     /// Per slot the released descriptor row said to belong to it (paired lines with descriptors).
     pub fn descriptor_row(&self) -> Option<&[u32]> {
         self.descriptor_row.as_deref()
+    }
+
+    /// How many trials the slots took (`ransac` only; not stored in files).
+    pub fn trials(&self) -> Option<&TrialHistogram> {
+        self.trials.as_ref()
+    }
+
+    /// Adds how many trials the slots took.
+    #[must_use]
+    pub(crate) fn with_trials(self, trials: Option<TrialHistogram>) -> Self {
+        Self { trials, ..self }
     }
 
     /// Adds a descriptor assignment.

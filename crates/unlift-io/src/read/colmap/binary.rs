@@ -34,13 +34,7 @@ pub fn cameras(path: &Path) -> Result<Vec<Camera>, Error> {
         let params = (0..model.n_params)
             .map(|_| Ok(bytes.doubles::<1>("a parameter")?[0]))
             .collect::<Result<_, Error>>()?;
-        cameras.push(Camera {
-            id,
-            model,
-            width_px,
-            height_px,
-            params,
-        });
+        cameras.push(Camera { id, model, width_px, height_px, params });
     }
     bytes.end()?;
     Ok(cameras)
@@ -63,13 +57,7 @@ pub fn images(path: &Path) -> Result<Vec<Image>, Error> {
         let name = bytes.zero_terminated("image name")?;
         let n_points2d = bytes.count("2D points", POINT2D_BYTES)?;
         bytes.skip(n_points2d * POINT2D_BYTES, "2D points")?;
-        images.push(Image {
-            id,
-            name,
-            camera_id,
-            center,
-            n_points2d,
-        });
+        images.push(Image { id, name, camera_id, center, n_points2d });
     }
     bytes.end()?;
     Ok(images)
@@ -105,11 +93,7 @@ pub fn points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
         positions.push(position);
     }
     bytes.end()?;
-    Ok(Points {
-        ids,
-        positions,
-        tracks,
-    })
+    Ok(Points { ids, positions, tracks })
 }
 
 pub fn rigs(path: &Path) -> Result<u64, Error> {

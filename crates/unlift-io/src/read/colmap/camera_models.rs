@@ -57,10 +57,7 @@ mod tests {
     fn row_is_id() {
         for (row, model) in CAMERA_MODELS.iter().enumerate() {
             assert_eq!(CameraModel::from_id(row as i32), Some(model));
-            assert_eq!(
-                CameraModel::from_name(model.name.as_bytes()).unwrap().id,
-                row as i32
-            );
+            assert_eq!(CameraModel::from_name(model.name.as_bytes()).unwrap().id, row as i32);
         }
         assert_eq!(CameraModel::from_id(-1), None);
     }

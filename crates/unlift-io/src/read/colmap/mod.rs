@@ -67,10 +67,7 @@ pub struct Tracks {
 
 impl Tracks {
     fn new() -> Self {
-        Self {
-            offsets: vec![0],
-            observations: Vec::new(),
-        }
+        Self { offsets: vec![0], observations: Vec::new() }
     }
 
     /// Observations of the point in `row`.
@@ -84,8 +81,7 @@ impl Tracks {
 
 /// Whether `path` is text, by its extension.
 fn is_text(path: &Path) -> bool {
-    path.extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("txt"))
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("txt"))
 }
 
 /// Reads `cameras.bin` or `cameras.txt`, by ascending id.
@@ -93,11 +89,7 @@ fn is_text(path: &Path) -> bool {
 /// # Errors
 /// When the file cannot be read, is malformed, names an unknown model or repeats an id.
 pub fn read_cameras(path: &Path) -> Result<Vec<Camera>, Error> {
-    let mut cameras = if is_text(path) {
-        text::cameras(path)?
-    } else {
-        binary::cameras(path)?
-    };
+    let mut cameras = if is_text(path) { text::cameras(path)? } else { binary::cameras(path)? };
     cameras.sort_by_key(|c| c.id);
     refuse_repeated(path, "camera", cameras.iter().map(|c| u64::from(c.id)))?;
     Ok(cameras)
@@ -108,11 +100,7 @@ pub fn read_cameras(path: &Path) -> Result<Vec<Camera>, Error> {
 /// # Errors
 /// When the file cannot be read, is malformed, has a pose that is not finite or repeats an id.
 pub fn read_images(path: &Path) -> Result<Vec<Image>, Error> {
-    let mut images = if is_text(path) {
-        text::images(path)?
-    } else {
-        binary::images(path)?
-    };
+    let mut images = if is_text(path) { text::images(path)? } else { binary::images(path)? };
     images.sort_by_key(|i| i.id);
     refuse_repeated(path, "image", images.iter().map(|i| u64::from(i.id)))?;
     Ok(images)
@@ -139,11 +127,7 @@ pub fn read_points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
 /// # Errors
 /// When the file cannot be read or is malformed.
 pub fn check_rigs(path: &Path) -> Result<u64, Error> {
-    if is_text(path) {
-        text::rigs(path)
-    } else {
-        binary::rigs(path)
-    }
+    if is_text(path) { text::rigs(path) } else { binary::rigs(path) }
 }
 
 /// Reads through `frames.bin` or `frames.txt`; the number of frames.
@@ -151,11 +135,7 @@ pub fn check_rigs(path: &Path) -> Result<u64, Error> {
 /// # Errors
 /// When the file cannot be read or is malformed.
 pub fn check_frames(path: &Path) -> Result<u64, Error> {
-    if is_text(path) {
-        text::frames(path)
-    } else {
-        binary::frames(path)
-    }
+    if is_text(path) { text::frames(path) } else { binary::frames(path) }
 }
 
 fn refuse_repeated(
@@ -202,21 +182,9 @@ fn center([w, x, y, z]: [f64; 4], t: [f64; 3]) -> Option<[f64; 3]> {
     let norm2 = w * w + x * x + y * y + z * z;
     // Rotating by the conjugate, with the norm divided out once: files hold norms like 0.9999999.
     let r = [
-        [
-            w * w + x * x - y * y - z * z,
-            2.0 * (x * y - w * z),
-            2.0 * (x * z + w * y),
-        ],
-        [
-            2.0 * (x * y + w * z),
-            w * w - x * x + y * y - z * z,
-            2.0 * (y * z - w * x),
-        ],
-        [
-            2.0 * (x * z - w * y),
-            2.0 * (y * z + w * x),
-            w * w - x * x - y * y + z * z,
-        ],
+        [w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z],
     ];
     let c: [f64; 3] =
         std::array::from_fn(|j| -(r[0][j] * t[0] + r[1][j] * t[1] + r[2][j] * t[2]) / norm2);

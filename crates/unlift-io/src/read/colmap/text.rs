@@ -12,9 +12,7 @@ fn next<'a, T: std::str::FromStr>(
     words: &mut impl Iterator<Item = &'a [u8]>,
     what: &str,
 ) -> Result<T, Error> {
-    let word = words
-        .next()
-        .ok_or_else(|| lines.error(what, "end of line"))?;
+    let word = words.next().ok_or_else(|| lines.error(what, "end of line"))?;
     number(word).ok_or_else(|| lines.error(what, quoted(word)))
 }
 
@@ -50,13 +48,7 @@ pub fn cameras(path: &Path) -> Result<Vec<Camera>, Error> {
             let expected = format!("{} parameters of {}", model.n_params, model.name);
             return Err(lines.error(expected, params.len().to_string()));
         }
-        cameras.push(Camera {
-            id,
-            model,
-            width_px,
-            height_px,
-            params,
-        });
+        cameras.push(Camera { id, model, width_px, height_px, params });
     }
     Ok(cameras)
 }
@@ -80,22 +72,12 @@ pub fn images(path: &Path) -> Result<Vec<Image>, Error> {
             return Err(lines.error("an image name", "end of line"));
         }
         // The line of 2D points may be empty, and some tools leave it out after the last image.
-        let n_words = if lines.advance()? {
-            self::words(lines.line()).count()
-        } else {
-            0
-        };
+        let n_words = if lines.advance()? { self::words(lines.line()).count() } else { 0 };
         if !n_words.is_multiple_of(3) {
             let expected = "2D points of 3 numbers (x, y, point id)";
             return Err(lines.error(expected, format!("{n_words} numbers")));
         }
-        images.push(Image {
-            id,
-            name,
-            camera_id,
-            center,
-            n_points2d: n_words as u64 / 3,
-        });
+        images.push(Image { id, name, camera_id, center, n_points2d: n_words as u64 / 3 });
     }
     Ok(images)
 }
@@ -111,10 +93,7 @@ fn after_words(mut line: &[u8], n: usize) -> &[u8] {
 
 pub fn points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
     let mut lines = Lines::open(path)?;
-    let mut points = Points {
-        tracks: with_tracks.then(Tracks::new),
-        ..Points::default()
-    };
+    let mut points = Points { tracks: with_tracks.then(Tracks::new), ..Points::default() };
     while lines.advance_to_data()? {
         let mut words = words(lines.line());
         let id: u64 = next(&lines, &mut words, "a point id")?;

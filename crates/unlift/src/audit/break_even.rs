@@ -1,0 +1,100 @@
+//! One number per scheme that a reader remembers: how bad may neighborhoods be so that half of the
+//! points still come back?
+
+use super::plan::Plan;
+use super::row::Row;
+
+/// How sure the ratio is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bound {
+    /// Interpolated between two tested ratios.
+    Interpolated,
+    /// More than half come back even at the lowest tested ratio, which is given.
+    BelowTested,
+    /// Fewer than half come back even at the highest tested ratio, which is given.
+    AboveTested,
+}
+
+impl Bound {
+    /// The name used in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Interpolated => "interpolated",
+            Self::BelowTested => "below_tested",
+            Self::AboveTested => "above_tested",
+        }
+    }
+}
+
+/// The smallest inlier ratio at which half of the points come back within a threshold.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BreakEven {
+    /// Scheme name.
+    pub scheme: &'static str,
+    /// Solver name.
+    pub solver: &'static str,
+    /// Threshold label.
+    pub threshold: String,
+    /// The ratio, linearly interpolated, or the tested ratio that bounds it.
+    pub inlier_ratio: f64,
+    /// What the ratio means.
+    pub bound: Bound,
+}
+
+/// Break-even ratios within the first threshold, for every scheme and solver with oracle rows.
+pub fn break_even(plan: &Plan, rows: &[Row]) -> Vec<BreakEven> {
+    let mut result = Vec::new();
+    for scheme in &plan.schemes {
+        for solver in &plan.solvers {
+            let mut curve: Vec<(f64, f64)> = rows
+                .iter()
+                .filter(|r| r.scheme == scheme.name && r.solver == solver.name())
+                .filter(|r| r.oracle_noise.is_some())
+                .map(|r| (r.inlier_ratio, r.recovered_percent[0]))
+                .collect();
+            curve.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
+            if let Some((inlier_ratio, bound)) = crossing(&curve) {
+                let threshold = plan.thresholds[0].label.clone();
+                let (scheme, solver) = (scheme.name, solver.name());
+                result.push(BreakEven { scheme, solver, threshold, inlier_ratio, bound });
+            }
+        }
+    }
+    result
+}
+
+/// Walks from the highest ratio down to where the share first falls below one half.
+fn crossing(curve: &[(f64, f64)]) -> Option<(f64, Bound)> {
+    let (first, last) = (curve.first()?, curve.last()?);
+    if first.1 < 50.0 {
+        return Some((first.0, Bound::AboveTested));
+    }
+    let below = curve.windows(2).find(|w| w[1].1 < 50.0);
+    Some(match below {
+        None => (last.0, Bound::BelowTested),
+        Some(w) => {
+            let share = (w[0].1 - 50.0) / (w[0].1 - w[1].1);
+            (w[0].0 + share * (w[1].0 - w[0].0), Bound::Interpolated)
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_crossing_is_interpolated() {
+        let curve = [(1.0, 90.0), (0.5, 70.0), (0.3, 40.0), (0.1, 10.0)];
+        let (ratio, bound) = crossing(&curve).unwrap();
+        assert!((ratio - (0.5 - 0.2 * 20.0 / 30.0)).abs() < 1e-12);
+        assert_eq!(bound, Bound::Interpolated);
+    }
+
+    #[test]
+    fn curves_that_do_not_cross_give_bounds() {
+        assert_eq!(crossing(&[(1.0, 90.0), (0.1, 60.0)]), Some((0.1, Bound::BelowTested)));
+        assert_eq!(crossing(&[(1.0, 40.0), (0.1, 10.0)]), Some((1.0, Bound::AboveTested)));
+        assert_eq!(crossing(&[]), None);
+    }
+}

@@ -1,0 +1,132 @@
+//! What is to be audited.
+
+use crate::obfuscate::{Entry, SchemeOptions};
+use crate::recover::{Delta, Solver};
+use crate::{Error, Unit};
+
+/// An error below which a point counts as recovered.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Threshold {
+    /// As the user typed it: the key in reports.
+    pub label: String,
+    /// In the unit of the points.
+    pub value: f64,
+}
+
+impl Threshold {
+    /// Reads a positive number and keeps its text.
+    ///
+    /// # Errors
+    /// When `text` is not a positive number.
+    pub fn parse(text: &str) -> Result<Self, Error> {
+        match text.trim().parse::<f64>() {
+            Ok(value) if value.is_finite() && value > 0.0 => {
+                Ok(Self { label: text.trim().to_owned(), value })
+            }
+            _ => Err(Error::new("threshold", "a positive number", format!("{text:?}"))),
+        }
+    }
+}
+
+/// Neighbors of every original, by row, as an owner lists them from any source.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointNeighbors {
+    /// The name of the source in reports.
+    pub name: String,
+    /// Where each point's list starts; one more entry than there are points.
+    pub offsets: Vec<u64>,
+    /// Rows of originals.
+    pub neighbors: Vec<u32>,
+    /// Confidence per entry, if the source gave any.
+    pub scores: Option<Vec<f32>>,
+}
+
+/// Where the attacker's neighborhoods come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Source {
+    /// From the originals, at each inlier ratio of the plan.
+    Oracle,
+    /// Given; the inlier ratio is measured.
+    Given(PointNeighbors),
+}
+
+/// A plan: every combination of scheme, source, inlier ratio and solver becomes a row.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Schemes to audit.
+    pub schemes: Vec<&'static Entry>,
+    /// Parameters of schemes.
+    pub scheme_options: SchemeOptions,
+    /// Where neighborhoods come from.
+    pub source: Source,
+    /// Shares of true neighbors (oracle).
+    pub inlier_ratios: Vec<f64>,
+    /// Neighbors per slot (oracle), and what "true neighbor" means when a ratio is measured.
+    pub k: usize,
+    /// Recovery methods.
+    pub solvers: Vec<Solver>,
+    /// The distance that decides support.
+    pub delta: Delta,
+    /// When a point counts as recovered.
+    pub thresholds: Vec<Threshold>,
+    /// The seed of the first repeat; the others count up.
+    pub seed: u64,
+    /// How many seeds are averaged.
+    pub repeats: u32,
+}
+
+impl Plan {
+    /// The plan of a default audit of points in `unit`: all 3D schemes, six inlier ratios, K = 50.
+    pub fn new(unit: Unit) -> Self {
+        let (voxel, thresholds) = match unit {
+            Unit::Meter => (0.5, ["0.10", "0.25"]),
+            Unit::KthNeighbor => (5.0, ["1.0", "2.5"]),
+            Unit::Pixel => (50.0, ["10", "25"]),
+        };
+        let threshold = |label: &str| Threshold {
+            label: label.to_owned(),
+            value: label.parse().unwrap_or(1.0),
+        };
+        Self {
+            schemes: crate::obfuscate::SCHEMES.iter().filter(|s| s.in_3d.is_some()).collect(),
+            scheme_options: SchemeOptions { voxel },
+            source: Source::Oracle,
+            inlier_ratios: vec![1.0, 0.75, 0.5, 0.3, 0.2, 0.1],
+            k: 50,
+            solvers: vec![Solver::Consensus],
+            delta: Delta::Auto,
+            thresholds: thresholds.map(threshold).to_vec(),
+            seed: 0,
+            repeats: 1,
+        }
+    }
+
+    /// Checks every field against the map it is meant for.
+    ///
+    /// # Errors
+    /// Names the first field out of range.
+    pub fn check(&self, n_points: usize) -> Result<(), Error> {
+        self.scheme_options.check()?;
+        if n_points < self.k + 1 {
+            let expected = format!("at least K + 1 = {}", self.k + 1);
+            return Err(Error::new("points", expected, n_points.to_string()));
+        }
+        if let Some(ratio) = self.inlier_ratios.iter().find(|r| !(0.0..=1.0).contains(*r)) {
+            return Err(Error::new("inlier ratio", "0 to 1", ratio.to_string()));
+        }
+        if self.repeats == 0 {
+            return Err(Error::new("repeats", "at least 1", "0"));
+        }
+        for (what, empty) in [
+            ("schemes", self.schemes.is_empty()),
+            ("inlier ratios", self.inlier_ratios.is_empty()),
+            ("solvers", self.solvers.is_empty()),
+            ("thresholds", self.thresholds.is_empty()),
+        ] {
+            if empty {
+                return Err(Error::new(what, "at least one", "none"));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,111 @@
+//! One result: a scheme, a source of neighborhoods, an inlier ratio and a solver.
+
+use std::collections::BTreeMap;
+
+use super::plan::Threshold;
+use crate::Unit;
+use crate::evaluate::Accuracy;
+
+/// Percentiles of the error that a row keeps.
+pub const PERCENTILES: [f64; 5] = [50.0, 75.0, 90.0, 95.0, 99.0];
+
+/// A row of an audit. Means over repeats, where there are several; counts are of the first repeat.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// Scheme name.
+    pub scheme: &'static str,
+    /// Source of the neighborhoods: `oracle` or a name.
+    pub neighbors: String,
+    /// Noise model of the oracle; `None` for other sources.
+    pub oracle_noise: Option<&'static str>,
+    /// As requested (oracle) or measured.
+    pub inlier_ratio: f64,
+    /// Neighbors per slot.
+    pub k: usize,
+    /// Solver name.
+    pub solver: &'static str,
+    /// The distance that decided support, in the unit of the points.
+    pub delta: f64,
+    /// The unit of lengths.
+    pub unit: Unit,
+    /// Released points.
+    pub n_points: usize,
+    /// Points that could not be recovered, by reason.
+    pub lost: BTreeMap<&'static str, usize>,
+    /// Points the scheme left out, by reason.
+    pub dropped: BTreeMap<&'static str, usize>,
+    /// Percentage recovered within each threshold, in the plan's order.
+    pub recovered_percent: Vec<f64>,
+    /// The same for an attacker without neighborhoods.
+    pub blind_percent: Vec<f64>,
+    /// Share of exchanged axes named (`cp`).
+    pub axis_accuracy_percent: Option<f64>,
+    /// Share of descriptors given to their own point (paired lines with descriptors).
+    pub assignment_accuracy_percent: Option<f64>,
+    /// Errors at [`PERCENTILES`]; `None` where that many points were lost.
+    pub error_percentiles: Vec<Option<f64>>,
+    /// (trials at most, slots) of the sampling loop (`ransac`).
+    pub ransac_trials: Option<Vec<(u32, u64)>>,
+    /// Spread over repeats, if there are several.
+    pub repeats: Option<Repeats>,
+}
+
+/// Spread over seeds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Repeats {
+    /// Number of seeds.
+    pub n: u32,
+    /// Standard deviation of each recovered percentage (with n - 1).
+    pub recovered_percent_std: Vec<f64>,
+}
+
+impl Row {
+    /// Points that could not be recovered.
+    pub fn n_lost(&self) -> usize {
+        self.lost.values().sum()
+    }
+
+    pub(super) fn fill(&mut self, accuracy: &Accuracy, blind: &Accuracy, thresholds: &[Threshold]) {
+        let within = |accuracy: &Accuracy| {
+            thresholds.iter().map(|t| accuracy.percent_within(t.value)).collect()
+        };
+        self.n_points = accuracy.n_points();
+        self.lost = accuracy.lost.iter().map(|(status, &n)| (status.name(), n)).collect();
+        self.recovered_percent = within(accuracy);
+        self.blind_percent = within(blind);
+        self.axis_accuracy_percent = accuracy.axis_percent;
+        self.assignment_accuracy_percent = accuracy.assignment_percent;
+        self.error_percentiles = PERCENTILES.map(|p| accuracy.percentile(p)).to_vec();
+    }
+
+    /// The mean of the same row over several seeds.
+    pub(super) fn mean(rows: &[Row]) -> Row {
+        let mut mean = rows[0].clone();
+        if rows.len() < 2 {
+            return mean;
+        }
+        let n = rows.len() as f64;
+        let average = |value: &dyn Fn(&Row) -> Option<f64>| {
+            let values: Option<Vec<f64>> = rows.iter().map(value).collect();
+            values.map(|values| values.iter().sum::<f64>() / n)
+        };
+        let columns = mean.recovered_percent.len();
+        let mut std = Vec::new();
+        for c in 0..columns {
+            let m = average(&|r| Some(r.recovered_percent[c])).unwrap_or(0.0);
+            let squares: f64 = rows.iter().map(|r| (r.recovered_percent[c] - m).powi(2)).sum();
+            std.push((squares / (n - 1.0)).sqrt());
+            mean.recovered_percent[c] = m;
+            mean.blind_percent[c] = average(&|r| Some(r.blind_percent[c])).unwrap_or(0.0);
+        }
+        for p in 0..mean.error_percentiles.len() {
+            mean.error_percentiles[p] = average(&|r| r.error_percentiles[p]);
+        }
+        mean.delta = average(&|r| Some(r.delta)).unwrap_or(mean.delta);
+        mean.inlier_ratio = average(&|r| Some(r.inlier_ratio)).unwrap_or(mean.inlier_ratio);
+        mean.axis_accuracy_percent = average(&|r| r.axis_accuracy_percent);
+        mean.assignment_accuracy_percent = average(&|r| r.assignment_accuracy_percent);
+        mean.repeats = Some(Repeats { n: rows.len() as u32, recovered_percent_std: std });
+        mean
+    }
+}

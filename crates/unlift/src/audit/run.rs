@@ -1,0 +1,254 @@
+//! The pipeline, chained in memory.
+
+use std::time::Instant;
+
+use super::break_even::{BreakEven, break_even};
+use super::plan::{Plan, PointNeighbors, Source};
+use super::row::Row;
+use crate::evaluate::{Accuracy, blind, evaluate};
+use crate::neighbors::Neighborhoods;
+use crate::neighbors::oracle::{self, TrueNeighbors};
+use crate::obfuscate::{Entry, obfuscate};
+use crate::recover::{RecoverOptions, Recovered, Solver, recover};
+use crate::released::Released;
+use crate::truth::{DropReason, Original, Secret};
+use crate::{Descriptors, Error};
+
+/// Everything known about one row of one repeat, for whoever writes clouds or draws pictures.
+pub struct Cell<'a> {
+    /// The row of this repeat.
+    pub row: &'a Row,
+    /// Which repeat, from 0.
+    pub repeat: u32,
+    /// The truth.
+    pub original: &'a Original<3>,
+    /// The secret of this obfuscation.
+    pub secret: &'a Secret,
+    /// What the attacker saw.
+    pub released: &'a Released<3>,
+    /// What the attacker got.
+    pub recovered: &'a Recovered<3>,
+    /// Error per slot.
+    pub accuracy: &'a Accuracy,
+}
+
+/// Hears how an audit goes.
+pub trait Observer {
+    /// `done` of `total` cells are finished; `what` comes next.
+    fn progress(&mut self, done: usize, total: usize, what: &str) {
+        let _ = (done, total, what);
+    }
+
+    /// One cell is finished.
+    fn cell(&mut self, cell: &Cell<'_>) {
+        let _ = cell;
+    }
+}
+
+/// An observer that does nothing.
+#[derive(Clone, Copy, Debug)]
+pub struct Silent;
+
+impl Observer for Silent {}
+
+/// Where the time went. Never part of results.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Seconds {
+    /// Searching nearest neighbors of the originals.
+    pub search: f64,
+    /// Obfuscating, over all schemes and repeats.
+    pub obfuscate: f64,
+    /// Making neighborhoods.
+    pub neighbors: f64,
+    /// Recovering.
+    pub recover: f64,
+    /// Evaluating, the blind attacker included.
+    pub evaluate: f64,
+    /// Recovery per row, summed over repeats.
+    pub rows: Vec<f64>,
+}
+
+/// What an audit found.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// One row per scheme, inlier ratio and solver, in this order.
+    pub rows: Vec<Row>,
+    /// The ratio at which half of the points come back, per scheme and solver.
+    pub break_even: Vec<BreakEven>,
+    /// Where the time went.
+    pub seconds: Seconds,
+}
+
+/// Runs `plan` on the owner's map. `descriptors` has one row per original.
+///
+/// Rows depend on the map, the descriptors and the plan alone: the same bytes for any number of
+/// threads.
+///
+/// # Errors
+/// When the plan does not fit the map, or a scheme cannot hide it.
+pub fn run(
+    original: &Original<3>,
+    descriptors: Option<&Descriptors>,
+    plan: &Plan,
+    observer: &mut dyn Observer,
+) -> Result<Outcome, Error> {
+    plan.check(original.len())?;
+    let mut clock = Clock::default();
+    let search = clock.time(|s| &mut s.search, || oracle::search(original))?;
+    let per_scheme = match plan.source {
+        Source::Oracle => plan.inlier_ratios.len(),
+        Source::Given(_) => 1,
+    } * plan.solvers.len();
+    let total = per_scheme * plan.schemes.len() * plan.repeats as usize;
+    let mut done = 0;
+    let mut rows = Vec::new();
+    for entry in &plan.schemes {
+        let mut by_repeat: Vec<Vec<Row>> = Vec::new();
+        let mut seconds = vec![0.0; per_scheme];
+        for repeat in 0..plan.repeats {
+            let seed = plan.seed.wrapping_add(u64::from(repeat));
+            let hidden = hide(entry, original, descriptors, plan, seed, &mut clock)?;
+            let near = clock.time(
+                |s| &mut s.neighbors,
+                || TrueNeighbors::new(&search, &hidden.1, hidden.0.slots_per_record(), plan.k),
+            )?;
+            let baseline =
+                clock.time(|s| &mut s.evaluate, || Ok(blind(&hidden.0, original, &hidden.1)))?;
+            let mut repeat_rows = Vec::new();
+            let ratios: Vec<Option<f64>> = match plan.source {
+                Source::Oracle => plan.inlier_ratios.iter().map(|&r| Some(r)).collect(),
+                Source::Given(_) => vec![None],
+            };
+            for ratio in ratios {
+                let lists = clock.time(
+                    |s| &mut s.neighbors,
+                    || match (&plan.source, ratio) {
+                        (Source::Given(given), _) => translate(given, &hidden.1, &hidden.0),
+                        (Source::Oracle, ratio) => near.at_inlier_ratio(ratio.unwrap_or(1.0), seed),
+                    },
+                )?;
+                let measured = ratio.unwrap_or_else(|| near.measured_inlier_ratio(&lists));
+                for &solver in &plan.solvers {
+                    let what = format!("{} at {measured:.2}, {}", entry.name, solver.name());
+                    observer.progress(done, total, &what);
+                    let options = RecoverOptions { solver, delta: plan.delta, seed };
+                    let started = Instant::now();
+                    let recovered = recover(&hidden.0, &lists, &options)?;
+                    let took = started.elapsed().as_secs_f64();
+                    seconds[repeat_rows.len()] += took;
+                    clock.seconds.recover += took;
+                    let accuracy = clock
+                        .time(|s| &mut s.evaluate, || evaluate(&recovered, original, &hidden.1))?;
+                    let mut row = blank(entry, plan, solver, measured, &recovered, &hidden.1);
+                    row.fill(&accuracy, &baseline, &plan.thresholds);
+                    observer.cell(&Cell {
+                        row: &row,
+                        repeat,
+                        original,
+                        secret: &hidden.1,
+                        released: &hidden.0,
+                        recovered: &recovered,
+                        accuracy: &accuracy,
+                    });
+                    repeat_rows.push(row);
+                    done += 1;
+                }
+            }
+            by_repeat.push(repeat_rows);
+        }
+        for at in 0..per_scheme {
+            let same: Vec<Row> = by_repeat.iter().map(|rows| rows[at].clone()).collect();
+            rows.push(Row::mean(&same));
+        }
+        clock.seconds.rows.extend(seconds);
+    }
+    observer.progress(done, total, "done");
+    let break_even = break_even(plan, &rows);
+    Ok(Outcome { rows, break_even, seconds: clock.seconds })
+}
+
+fn hide(
+    entry: &Entry,
+    original: &Original<3>,
+    descriptors: Option<&Descriptors>,
+    plan: &Plan,
+    seed: u64,
+    clock: &mut Clock,
+) -> Result<(Released<3>, Secret), Error> {
+    let scheme =
+        entry.in_3d.ok_or_else(|| Error::new("scheme", "one for 3D points", entry.name))?;
+    clock.time(
+        |s| &mut s.obfuscate,
+        || obfuscate(scheme, original, descriptors, &plan.scheme_options, seed),
+    )
+}
+
+fn translate(
+    given: &PointNeighbors,
+    secret: &Secret,
+    released: &Released<3>,
+) -> Result<Neighborhoods, Error> {
+    let scores = given.scores.as_deref();
+    let slots = released.slots_per_record();
+    oracle::from_points(&given.offsets, &given.neighbors, scores, secret, slots)
+}
+
+/// A row with everything but the measurements.
+fn blank(
+    entry: &Entry,
+    plan: &Plan,
+    solver: Solver,
+    inlier_ratio: f64,
+    recovered: &Recovered<3>,
+    secret: &Secret,
+) -> Row {
+    let (neighbors, oracle_noise) = match &plan.source {
+        Source::Oracle => ("oracle".to_owned(), Some("uniform")),
+        Source::Given(given) => (given.name.clone(), None),
+    };
+    let mut dropped = std::collections::BTreeMap::new();
+    for reason in DropReason::ALL {
+        let n = secret.dropped().iter().filter(|d| d.reason == reason).count();
+        if n > 0 {
+            dropped.insert(reason.name(), n);
+        }
+    }
+    Row {
+        scheme: entry.name,
+        neighbors,
+        oracle_noise,
+        inlier_ratio,
+        k: plan.k,
+        solver: solver.name(),
+        delta: recovered.delta(),
+        unit: recovered.unit(),
+        n_points: recovered.n_slots(),
+        lost: Default::default(),
+        dropped,
+        recovered_percent: Vec::new(),
+        blind_percent: Vec::new(),
+        axis_accuracy_percent: None,
+        assignment_accuracy_percent: None,
+        error_percentiles: Vec::new(),
+        ransac_trials: recovered.trials().map(|trials| trials.bins().collect()),
+        repeats: None,
+    }
+}
+
+#[derive(Default)]
+struct Clock {
+    seconds: Seconds,
+}
+
+impl Clock {
+    fn time<T>(
+        &mut self,
+        stage: impl Fn(&mut Seconds) -> &mut f64,
+        work: impl FnOnce() -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        let started = Instant::now();
+        let result = work();
+        *stage(&mut self.seconds) += started.elapsed().as_secs_f64();
+        result
+    }
+}

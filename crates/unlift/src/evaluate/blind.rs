@@ -1,0 +1,100 @@
+//! What an attacker gets without any neighborhood: the baseline a leak must exceed.
+
+use std::collections::BTreeMap;
+
+use super::Accuracy;
+use crate::geometry::frame::Bounds;
+use crate::geometry::vector::{along, distance, dot, sub, widen};
+use crate::released::{Obfuscation, Released};
+use crate::truth::{Original, Secret};
+
+/// The errors of a blind attacker, who knows the records and the 1-99 % box of the originals (more
+/// than an attacker would: the baseline is generous).
+///
+/// One rule per family:
+/// - lines: the middle of the line's segment in the box; the point of the line nearest the box's
+///   center when it misses the box;
+/// - rays: the same on the half-line;
+/// - axis planes: the box's center, moved onto the plane;
+/// - axis candidates: the published point itself.
+pub fn blind<const D: usize>(
+    released: &Released<D>,
+    original: &Original<D>,
+    secret: &Secret,
+) -> Accuracy {
+    let points = original.reveal().positions();
+    let origin = released.origin();
+    let local: Vec<[f64; D]> = points.iter().map(|p| sub(p, &origin)).collect();
+    let guess = guesses(released, &local);
+    let errors = secret
+        .hidden()
+        .iter()
+        .enumerate()
+        .map(|(slot, original)| {
+            distance(&guess[slot / released.slots_per_record()], &local[original.index()])
+        })
+        .collect();
+    Accuracy::new(errors, BTreeMap::new(), None, None)
+}
+
+/// One guess per record, about the released origin.
+fn guesses<const D: usize>(released: &Released<D>, local: &[[f64; D]]) -> Vec<[f64; D]> {
+    let Some(bounds) = Bounds::quantiles(local, 0.01) else { return Vec::new() };
+    let center = bounds.center();
+    match released.obfuscation() {
+        Obfuscation::Lines(lines) => lines
+            .foot()
+            .iter()
+            .zip(lines.direction())
+            .map(|(p, d)| middle(&bounds, &widen(p), &widen(d), f64::NEG_INFINITY))
+            .collect(),
+        Obfuscation::Rays(rays) => rays
+            .center()
+            .iter()
+            .zip(rays.direction())
+            .map(|(&c, d)| middle(&bounds, &widen(&rays.centers()[usize::from(c)]), &widen(d), 0.0))
+            .collect(),
+        Obfuscation::AxisPlanes(planes) => planes
+            .axis()
+            .iter()
+            .zip(planes.offset())
+            .map(|(&axis, &offset)| {
+                let mut guess = center;
+                guess[usize::from(axis)] = f64::from(offset);
+                guess
+            })
+            .collect(),
+        Obfuscation::AxisCandidates(candidates) => {
+            candidates.position().iter().map(widen).collect()
+        }
+    }
+}
+
+/// The middle of what the box leaves of a line from parameter `from` on.
+fn middle<const D: usize>(
+    bounds: &Bounds<D>,
+    point: &[f64; D],
+    direction: &[f64; D],
+    from: f64,
+) -> [f64; D] {
+    let segment = bounds.clip(point, direction).map(|(a, b)| (a.max(from), b));
+    let t = match segment {
+        Some((a, b)) if a <= b => 0.5 * (a + b),
+        _ => dot(&sub(&bounds.center(), point), direction).max(from),
+    };
+    along(point, t, direction)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_middle_of_a_half_line_starts_at_its_center() {
+        let bounds = Bounds { low: [0.0; 3], high: [4.0; 3] };
+        let guess = middle(&bounds, &[1.0, 2.0, 2.0], &[1.0, 0.0, 0.0], 0.0);
+        assert_eq!(guess, [2.5, 2.0, 2.0]);
+        let line = middle(&bounds, &[1.0, 2.0, 2.0], &[1.0, 0.0, 0.0], f64::NEG_INFINITY);
+        assert_eq!(line, [2.0, 2.0, 2.0]);
+    }
+}
