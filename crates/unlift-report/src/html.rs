@@ -114,6 +114,8 @@ pub fn render(
         losses: loss_list.into_iter().flatten().collect(),
         times: tables::times(&document),
         options: options_text,
+        command: document.run.command.as_deref(),
+        other_sha256: document.input.other_sha256.iter().collect(),
         seconds: words::seconds(document.run.seconds.total),
         memory: document.run.peak_memory_bytes.map(words::bytes),
         document: &document,
@@ -149,6 +151,9 @@ struct Page<'a> {
     losses: Vec<Table>,
     times: Option<Table>,
     options: Vec<(String, String)>,
+    command: Option<&'a str>,
+    /// (role, SHA-256) of further input files.
+    other_sha256: Vec<(&'a String, &'a String)>,
     seconds: String,
     memory: Option<String>,
     document: &'a Document,

@@ -164,7 +164,8 @@ impl Browser {
             _ => false,
         };
         if complaint {
-            self.complaints.push(event.to_string());
+            let text = &params["exceptionDetails"]["exception"]["description"];
+            self.complaints.push(text.as_str().map_or_else(|| event.to_string(), str::to_owned));
         }
     }
 
@@ -193,7 +194,7 @@ impl Browser {
             "Page.navigate",
             json!({"url": format!("file://{}", file.display())}),
         );
-        self.wait_for("document.documentElement.dataset.ready === '1'");
+        self.wait_for("document.documentElement?.dataset.ready === '1'");
     }
 
     pub fn wait_for(&mut self, condition: &str) {
