@@ -214,19 +214,23 @@ fn subject(document: &Document) -> Subject {
     }
 }
 
-/// The last two parts of a path: `redkitchen/model` says more than `model`.
+/// The part of a path that names the map: `room` of `maps/room/sparse/0`.
 fn short_name(path: &str) -> String {
-    let parts: Vec<&str> = path
+    let says_little = |part: &&str| {
+        matches!(
+            *part,
+            "" | "." | ".." | "sparse" | "model" | "dense" | "colmap"
+        ) || part.bytes().all(|byte| byte.is_ascii_digit())
+    };
+    let mut parts = path
         .split(['/', '\\'])
-        .filter(|part| !part.is_empty() && *part != ".")
-        .collect();
-    let named = parts
-        .iter()
         .rev()
-        .take(2)
-        .rev()
-        .filter(|part| **part != "..");
-    named.copied().collect::<Vec<_>>().join("/")
+        .filter(|part| !part.is_empty());
+    let name = parts
+        .clone()
+        .find(|part| !says_little(part))
+        .or_else(|| parts.next());
+    name.unwrap_or(path).to_owned()
 }
 
 fn gate_words(gate: &GateResult) -> GateWords {

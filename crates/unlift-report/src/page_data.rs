@@ -190,6 +190,6 @@ fn percentile_points(row: &crate::document::Row) -> Vec<(f64, f64)> {
                 .map(|threshold: f64| (threshold, percent)),
         );
     }
-    points.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.total_cmp(&b.0)));
+    points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     points
 }

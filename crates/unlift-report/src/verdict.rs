@@ -124,10 +124,10 @@ fn amount(recovered: f64, blind: f64) -> &'static str {
 fn gain(recovered: f64, blind: f64) -> String {
     let guess = words::significant(blind, 2);
     if recovered - blind < GAIN_THAT_COUNTS {
-        return format!("An attacker who only guesses gets {guess} %: nothing was gained here.");
+        return format!("A blind guess gets {guess} %: the neighbors added nothing here.");
     }
     let points = words::at_least(recovered - blind);
-    format!("{points} points above an attacker who only guesses ({guess} %).")
+    format!("A blind guess gets {guess} %; the neighbors add {points} percentage points.")
 }
 
 fn break_even_sentence(point: &BreakEven) -> String {
@@ -135,15 +135,13 @@ fn break_even_sentence(point: &BreakEven) -> String {
         (Bound::Interpolated, Some(ratio)) => {
             format!("Half of the points come back when only {ratio} % of neighbors are right.")
         }
-        (Bound::BelowTested, Some(ratio)) => format!(
-            "Half of the points come back even at {ratio} % right neighbors, the fewest tested."
-        ),
-        (Bound::AboveTested, Some(ratio)) => {
-            format!(
-                "Less than half of the points came back at every ratio tested, up to {ratio} %."
-            )
+        (Bound::BelowTested, Some(ratio)) => {
+            format!("Half come back even at the fewest tested, {ratio} % right neighbors.")
         }
-        (_, None) => "Less than half of the points came back at every ratio tested.".to_owned(),
+        (Bound::AboveTested, Some(ratio)) => {
+            format!("Less than half came back at every ratio tested, up to {ratio} %.")
+        }
+        (_, None) => "Less than half came back at every ratio tested.".to_owned(),
     }
 }
 

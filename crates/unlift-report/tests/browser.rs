@@ -159,20 +159,26 @@ fn pictures_are_taken_when_asked_for() {
             (390, "light"),
             (390, "dark"),
         ] {
-            browser.emulate(width, 900, color_scheme);
+            browser.emulate(width, 1000, color_scheme);
             browser.open(&file.0);
             let shot =
                 |kind: &str| folder.join(format!("{name}-{width}-{color_scheme}-{kind}.png"));
-            std::fs::write(shot("fold"), browser.screenshot(false)).expect("a picture");
-            // A window as tall as the page: canvases beyond the viewport are not painted.
-            let height = browser.evaluate("document.documentElement.scrollHeight");
-            browser.emulate(
-                width,
-                height.as_u64().expect("a height") as u32,
-                color_scheme,
-            );
-            browser.open(&file.0);
-            std::fs::write(shot("page"), browser.screenshot(true)).expect("a picture");
+            std::fs::write(shot("fold"), browser.screenshot()).expect("a picture");
+            for section in [
+                "curves",
+                "distribution",
+                "scene",
+                "numbers",
+                "losses",
+                "reading",
+            ] {
+                browser.emulate(width, 1400, color_scheme);
+                browser.evaluate(&format!(
+                    "document.getElementById('{section}').scrollIntoView({{behavior: 'instant'}})"
+                ));
+                std::thread::sleep(std::time::Duration::from_millis(300));
+                std::fs::write(shot(section), browser.screenshot()).expect("a picture");
+            }
         }
     }
 }

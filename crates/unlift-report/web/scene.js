@@ -12,6 +12,8 @@
   const MISS = ["#ffb14a", "#b3331a"];
   /** Decades of error drawn on either side of the threshold. */
   const DECADES = 1.5;
+  /** In degrees; from 2.9 radii away a scene just fits. */
+  const FIELD_OF_VIEW = 36;
 
   const POINT_VERTEX = `
     attribute float error;
@@ -41,7 +43,7 @@
       float t = clamp(vError, -1.0, 1.0);
       vec3 graded = t <= 0.0 ? mix(ramp[0], ramp[1], t + 1.0) : mix(ramp[2], ramp[3], t);
       vec3 color = byError ? graded : flatColor;
-      float fade = 0.62 * clamp((vDepth - near) / (far - near), 0.0, 1.0);
+      float fade = 0.45 * clamp((vDepth - near) / (far - near), 0.0, 1.0);
       gl_FragColor = vec4(mix(color, background, fade), 1.0);
     }`;
 
@@ -117,13 +119,13 @@
       const { low, high, up } = this.data;
       this.radius = 0.5 * Math.hypot(...low.map((x, i) => high[i] - x));
       this.scene = new THREE.Scene();
-      this.camera = new THREE.PerspectiveCamera(45, 1, this.radius / 200, this.radius * 20);
+      this.camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW, 1, this.radius / 200, this.radius * 30);
       this.up = new THREE.Vector3(...up).normalize();
       this.camera.up.copy(this.up);
       // Any direction across `up` will do for a start; then a little above the horizon.
       const across = Math.abs(up[0]) < 0.8 * Math.hypot(...up) ? new THREE.Vector3(1, 0.35, 0) : new THREE.Vector3(0.35, 0, 1);
       across.addScaledVector(this.up, -across.dot(this.up)).normalize();
-      this.camera.position.copy(across).addScaledVector(this.up, 0.55).normalize().multiplyScalar(this.radius * 1.9);
+      this.camera.position.copy(across).addScaledVector(this.up, 0.55).normalize().multiplyScalar(this.radius * 2.9);
       this.controls = new THREE.OrbitControls(this.camera, canvas);
       this.controls.enableZoom = false;
       this.controls.addEventListener("change", () => this.render());
@@ -137,7 +139,7 @@
       new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
     }
 
-    pointsMaterial(flatColor, byError, size = 0.011) {
+    pointsMaterial(flatColor, byError, size = 0.013) {
       return new THREE.ShaderMaterial({
         vertexShader: POINT_VERTEX,
         fragmentShader: POINT_FRAGMENT,
@@ -147,8 +149,8 @@
           flatColor: { value: rgb(flatColor) },
           background: { value: rgb(BACKGROUND) },
           byError: { value: byError },
-          near: { value: this.radius },
-          far: { value: this.radius * 3 },
+          near: { value: this.radius * 2 },
+          far: { value: this.radius * 4 },
           ramp: { value: [...HIT, ...MISS].map(rgb) },
         },
       });
@@ -187,7 +189,7 @@
       return this.layer(`released ${scheme}`, () => {
         const corners = entry.kind === "segments" ? 2 : 4;
         const geometry = geometryOfLines(decode(this.data, entry.block, corners * entry.count), corners);
-        const material = new THREE.LineBasicMaterial({ color: "#c9b3ff", transparent: true, opacity: 0.22, depthWrite: false });
+        const material = new THREE.LineBasicMaterial({ color: "#c9b3ff", transparent: true, opacity: 0.15, depthWrite: false });
         return { object: new THREE.LineSegments(geometry, material), drawn: entry.count };
       });
     }
@@ -229,8 +231,9 @@
         const h = wide ? height : height / this.panes.length;
         const [x, y] = wide ? [index * w, 0] : [0, (this.panes.length - 1 - index) * h];
         this.camera.aspect = w / h;
-        // Keep the whole scene in a narrow pane: widen the angle instead of moving the camera.
-        this.camera.fov = w >= h ? 45 : Math.min(80, (2 * Math.atan(Math.tan(Math.PI / 8) * Math.min(h / w, 2.2)) * 180) / Math.PI);
+        // The whole scene fits a narrow pane, too: there the width decides, not the height.
+        const half = Math.tan((FIELD_OF_VIEW * Math.PI) / 360) / Math.min(1, this.camera.aspect);
+        this.camera.fov = (Math.atan(half) * 360) / Math.PI;
         this.camera.updateProjectionMatrix();
         const distance = this.camera.position.distanceTo(this.controls.target);
         for (const { object } of this.layers.values()) {

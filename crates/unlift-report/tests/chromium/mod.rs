@@ -165,7 +165,10 @@ impl Browser {
         };
         if complaint {
             let text = &params["exceptionDetails"]["exception"]["description"];
-            self.complaints.push(text.as_str().map_or_else(|| event.to_string(), str::to_owned));
+            self.complaints.push(
+                text.as_str()
+                    .map_or_else(|| event.to_string(), str::to_owned),
+            );
         }
     }
 
@@ -209,10 +212,9 @@ impl Browser {
         }
     }
 
-    /// A picture of the whole page, as PNG.
-    pub fn screenshot(&mut self, whole: bool) -> Vec<u8> {
-        let params = json!({"format": "png", "captureBeyondViewport": whole});
-        let result = self.call("Page.captureScreenshot", params);
+    /// A picture of the window, as PNG.
+    pub fn screenshot(&mut self) -> Vec<u8> {
+        let result = self.call("Page.captureScreenshot", json!({"format": "png"}));
         let data = result["data"].as_str().expect("a picture");
         base64::engine::general_purpose::STANDARD
             .decode(data)

@@ -148,17 +148,21 @@ fn row(s: usize, r: usize, solver: &str, thresholds: [&str; 2], unit: LengthUnit
             .zip(values)
             .collect()
     };
-    let spread = 1.0 + (100.0 - share(0)) / 25.0;
-    let percentiles = [
-        ("50", 0.011),
-        ("75", 0.03),
-        ("90", 0.085),
-        ("95", 0.19),
-        ("99", 0.8),
+    // Error over percent, straight on a log scale between the shares within the thresholds.
+    let known = [
+        (0.5, 0.002),
+        (share(0), 0.10),
+        (share(1), 0.25),
+        (99.8, 3.0),
     ];
-    let percentiles = percentiles.map(|(name, error)| {
-        let value = (share(0) > 30.0 || name == "50").then_some(error * spread * scale);
-        (name.to_owned(), value)
+    let percentiles = ["50", "75", "90", "95", "99"].map(|name| {
+        let percent: f64 = name.parse().expect("a number");
+        let after = known.windows(2).find(|pair| percent <= pair[1].0);
+        let error = after.map(|pair| {
+            let ((p, e), (q, f)) = (pair[0], pair[1]);
+            e * (f / e as f64).powf((percent - p) / (q - p)) * scale
+        });
+        (name.to_owned(), error)
     });
     let lost = 12 + 40 * r as u64;
     let has = |schemes: &[&str], value: f64| schemes.contains(&SCHEMES[s]).then_some(value);
