@@ -7,6 +7,9 @@ pub enum Error {
     /// The text is not an `audit.json` of this schema.
     #[error("audit.json: {0}")]
     Json(#[from] serde_json::Error),
+    /// The page could not be rendered.
+    #[error("report.html: {0}")]
+    Template(#[from] minijinja::Error),
     /// The document was written by another version of the format.
     #[error("audit.json: expected schema {expected}, found {found}")]
     Schema {

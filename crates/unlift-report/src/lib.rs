@@ -6,11 +6,19 @@
 mod check;
 pub mod document;
 mod error;
+mod html;
+mod page_data;
 pub mod paper;
 mod round;
 pub mod scene;
+mod share;
+mod tables;
+mod text;
+mod verdict;
 mod words;
 
 pub use document::Document;
 pub use error::Error;
+pub use html::{ErrorCdf, RenderOptions, render};
 pub use scene::Scene3d;
+pub use text::text_table;

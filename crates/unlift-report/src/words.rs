@@ -97,13 +97,9 @@ pub(crate) fn when_right(ratio: f64) -> String {
     }
 }
 
-/// An inlier ratio as a percentage without the sign.
+/// An inlier ratio as a percentage without the sign, to two digits.
 pub(crate) fn ratio_percent(ratio: f64) -> String {
-    significant(ratio * 100.0, 2.max(significant_digits_above(ratio)))
-}
-
-fn significant_digits_above(ratio: f64) -> usize {
-    if ratio >= 1.0 { 3 } else { 2 }
+    significant(ratio * 100.0, 2)
 }
 
 /// A reason in words: `odd_point` reads "odd point".
