@@ -13,10 +13,7 @@ impl Document {
     /// [`Error::Invalid`] with the place of the first broken rule.
     pub fn check(&self) -> Result<(), Error> {
         if self.schema != SCHEMA {
-            return Err(Error::Schema {
-                expected: SCHEMA,
-                found: self.schema.into(),
-            });
+            return Err(Error::Schema { expected: SCHEMA, found: self.schema.into() });
         }
         if let Some(scale) = self.input.scale_m_per_unit {
             positive("input.scale_m_per_unit", scale)?;
@@ -26,16 +23,9 @@ impl Document {
         }
         for (i, row) in self.results.iter().enumerate() {
             check_row(&format!("results[{i}]"), row)?;
-            if let Some(j) = self.results[..i]
-                .iter()
-                .position(|other| same_key(other, row))
-            {
+            if let Some(j) = self.results[..i].iter().position(|other| same_key(other, row)) {
                 let found = format!("the combination of results[{j}] again");
-                return Err(invalid(
-                    format!("results[{i}]"),
-                    "a combination of its own",
-                    found,
-                ));
+                return Err(invalid(format!("results[{i}]"), "a combination of its own", found));
             }
         }
         for (i, point) in self.break_even.iter().enumerate() {
@@ -55,11 +45,7 @@ impl Document {
         finite("run.seconds.total", seconds.total)?;
         if !seconds.rows.is_empty() && seconds.rows.len() != self.results.len() {
             let expected = format!("{} rows, as in results", self.results.len());
-            return Err(invalid(
-                "run.seconds.rows",
-                expected,
-                seconds.rows.len().to_string(),
-            ));
+            return Err(invalid("run.seconds.rows", expected, seconds.rows.len().to_string()));
         }
         for (i, stages) in seconds.rows.iter().enumerate() {
             for (stage, &value) in stages {
@@ -75,19 +61,12 @@ impl Document {
 
 fn check_row(place: &str, row: &Row) -> Result<(), Error> {
     between(&format!("{place}.inlier_ratio"), row.inlier_ratio, 0.0, 1.0)?;
-    percentages(
-        &format!("{place}.recovered_percent"),
-        &row.recovered_percent,
-    )?;
+    percentages(&format!("{place}.recovered_percent"), &row.recovered_percent)?;
     percentages(&format!("{place}.blind_percent"), &row.blind_percent)?;
     if !row.blind_percent.keys().eq(row.recovered_percent.keys()) {
         let keys = |map: &ByThreshold| map.keys().cloned().collect::<Vec<_>>().join(", ");
         let expected = format!("the thresholds {}", keys(&row.recovered_percent));
-        return Err(invalid(
-            format!("{place}.blind_percent"),
-            expected,
-            keys(&row.blind_percent),
-        ));
+        return Err(invalid(format!("{place}.blind_percent"), expected, keys(&row.blind_percent)));
     }
     let lost: u64 = row.lost.values().sum();
     // With repeats each count is a rounded mean, and rounded parts need not add up.
@@ -100,20 +79,13 @@ fn check_row(place: &str, row: &Row) -> Result<(), Error> {
     }
     if row.n_lost > row.n_points {
         let expected = format!("at most {}", row.n_points);
-        return Err(invalid(
-            format!("{place}.n_lost"),
-            expected,
-            row.n_lost.to_string(),
-        ));
+        return Err(invalid(format!("{place}.n_lost"), expected, row.n_lost.to_string()));
     }
     let optional = [
         ("delta", row.delta),
         ("median_error", row.median_error),
         ("axis_accuracy_percent", row.axis_accuracy_percent),
-        (
-            "assignment_accuracy_percent",
-            row.assignment_accuracy_percent,
-        ),
+        ("assignment_accuracy_percent", row.assignment_accuracy_percent),
     ];
     for (field, value) in optional {
         if let Some(value) = value {
@@ -122,10 +94,7 @@ fn check_row(place: &str, row: &Row) -> Result<(), Error> {
     }
     for (percentile, value) in &row.error_percentiles {
         if let Some(value) = value {
-            finite(
-                &format!("{place}.error_percentiles[{percentile:?}]"),
-                *value,
-            )?;
+            finite(&format!("{place}.error_percentiles[{percentile:?}]"), *value)?;
         }
     }
     if let Some(spread) = &row.std {
@@ -160,11 +129,7 @@ fn between(place: &str, value: f64, low: f64, high: f64) -> Result<(), Error> {
     if (low..=high).contains(&value) {
         return Ok(());
     }
-    Err(invalid(
-        place,
-        format!("a number from {low} to {high}"),
-        value.to_string(),
-    ))
+    Err(invalid(place, format!("a number from {low} to {high}"), value.to_string()))
 }
 
 fn positive(place: &str, value: f64) -> Result<(), Error> {
@@ -186,9 +151,5 @@ fn invalid(
     expected: impl Into<String>,
     found: impl Into<String>,
 ) -> Error {
-    Error::Invalid {
-        place: place.into(),
-        expected: expected.into(),
-        found: found.into(),
-    }
+    Error::Invalid { place: place.into(), expected: expected.into(), found: found.into() }
 }

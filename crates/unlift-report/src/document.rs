@@ -251,10 +251,7 @@ impl Document {
         // Asked first: a later schema would fail on some missing field, which helps nobody.
         if let Some(found) = value.get("schema").and_then(serde_json::Value::as_u64) {
             if found != u64::from(SCHEMA) {
-                return Err(Error::Schema {
-                    expected: SCHEMA,
-                    found,
-                });
+                return Err(Error::Schema { expected: SCHEMA, found });
             }
         }
         let document: Self = serde_json::from_value(value)?;

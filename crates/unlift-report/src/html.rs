@@ -61,24 +61,15 @@ pub fn render(
     options: &RenderOptions,
 ) -> Result<String, Error> {
     document.check()?;
-    let document = if options.share_safe {
-        document.share_safe()
-    } else {
-        document.clone()
-    };
+    let document = if options.share_safe { document.share_safe() } else { document.clone() };
     let scene = scene.filter(|scene| !options.share_safe && !scene.originals.is_empty());
-    let error_unit = tables::thresholds(&document)
-        .first()
-        .and_then(|typed| typed.parse().ok());
+    let error_unit = tables::thresholds(&document).first().and_then(|typed| typed.parse().ok());
     let encoded = scene.map(|scene| encode(scene, error_unit.unwrap_or(1.0)));
     let page_data = page_data(&document, encoded.as_ref(), options);
     let data = serde_json::to_string(&page_data)?;
     let verdict = verdict::verdict(&document);
-    let options_text: Vec<(String, String)> = document
-        .options
-        .iter()
-        .map(|(name, value)| (name.clone(), plain(value)))
-        .collect();
+    let options_text: Vec<(String, String)> =
+        document.options.iter().map(|(name, value)| (name.clone(), plain(value))).collect();
     let table_list = [
         Some(tables::recovered(&document)),
         Some(tables::errors(&document)),
@@ -91,10 +82,7 @@ pub fn render(
         bundle: BUNDLE,
         scripts: SCRIPTS,
         data: script_text(&data),
-        blocks: encoded
-            .as_ref()
-            .map(|scene| scene.blocks.as_slice())
-            .unwrap_or_default(),
+        blocks: encoded.as_ref().map(|scene| scene.blocks.as_slice()).unwrap_or_default(),
         scene: encoded.as_ref().map(|scene| SceneWords {
             n_points: words::thousands(scene.n_points),
             n_drawn: words::thousands(scene.n_drawn as u64),
@@ -102,11 +90,7 @@ pub fn render(
         }),
         share_safe: options.share_safe,
         subject: subject(&document),
-        slots: verdict
-            .cards
-            .iter()
-            .map(|card| slot(&document, &card.scheme))
-            .collect(),
+        slots: verdict.cards.iter().map(|card| slot(&document, &card.scheme)).collect(),
         verdict,
         gates: document.gates.iter().map(gate_words).collect(),
         published: page_data.has_published(),
@@ -189,47 +173,29 @@ struct Subject {
 fn subject(document: &Document) -> Subject {
     let input = &document.input;
     let k = document.results.first().map_or(50, |row| row.k);
-    let metric = document
-        .results
-        .first()
-        .is_none_or(|row| row.unit == LengthUnit::Meter);
+    let metric = document.results.first().is_none_or(|row| row.unit == LengthUnit::Meter);
     let unit = match (metric, input.scale_m_per_unit, input.unit_in_map_units) {
         (true, Some(scale), _) => {
             format!("Meters, by the declared scale of {scale} m per map unit.")
         }
         (true, None, _) => "Meters.".to_owned(),
-        (false, _, Some(unit)) => format!(
-            "One neighbor distance is {} map units.",
-            words::significant(unit, 4)
-        ),
+        (false, _, Some(unit)) => {
+            format!("One neighbor distance is {} map units.", words::significant(unit, 4))
+        }
         (false, _, None) => String::new(),
     };
     let name = input.path.as_deref().map(short_name);
-    Subject {
-        name,
-        n_points: words::thousands(input.n_points),
-        metric,
-        unit,
-        k,
-    }
+    Subject { name, n_points: words::thousands(input.n_points), metric, unit, k }
 }
 
 /// The part of a path that names the map: `room` of `maps/room/sparse/0`.
 fn short_name(path: &str) -> String {
     let says_little = |part: &&str| {
-        matches!(
-            *part,
-            "" | "." | ".." | "sparse" | "model" | "dense" | "colmap"
-        ) || part.bytes().all(|byte| byte.is_ascii_digit())
+        matches!(*part, "" | "." | ".." | "sparse" | "model" | "dense" | "colmap")
+            || part.bytes().all(|byte| byte.is_ascii_digit())
     };
-    let mut parts = path
-        .split(['/', '\\'])
-        .rev()
-        .filter(|part| !part.is_empty());
-    let name = parts
-        .clone()
-        .find(|part| !says_little(part))
-        .or_else(|| parts.next());
+    let mut parts = path.split(['/', '\\']).rev().filter(|part| !part.is_empty());
+    let name = parts.clone().find(|part| !says_little(part)).or_else(|| parts.next());
     name.unwrap_or(path).to_owned()
 }
 
@@ -253,7 +219,5 @@ fn plain(value: &serde_json::Value) -> String {
 
 /// JSON that may stand inside a script element: no `<` can end or open one.
 fn script_text(json: &str) -> String {
-    json.replace('<', "\\u003c")
-        .replace('>', "\\u003e")
-        .replace('&', "\\u0026")
+    json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026")
 }

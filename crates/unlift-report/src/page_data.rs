@@ -88,10 +88,7 @@ pub(crate) fn page_data<'a>(
 ) -> PageData<'a> {
     let thresholds = tables::thresholds(document);
     let by_threshold = |map: &crate::document::ByThreshold| {
-        thresholds
-            .iter()
-            .map(|typed| map.get(typed).copied())
-            .collect::<Vec<_>>()
+        thresholds.iter().map(|typed| map.get(typed).copied()).collect::<Vec<_>>()
     };
     let rows = document.results.iter().enumerate().map(|(index, row)| {
         let cdf = options.error_cdf.iter().find(|cdf| cdf.row == index);
@@ -142,53 +139,30 @@ pub(crate) fn page_data<'a>(
 /// Published curves whose scheme was tested and whose threshold is one of ours; none without a
 /// declared scale.
 fn published(document: &Document, thresholds: &[String]) -> Vec<PublishedData> {
-    let metric = document
-        .results
-        .iter()
-        .all(|row| row.unit == LengthUnit::Meter);
+    let metric = document.results.iter().all(|row| row.unit == LengthUnit::Meter);
     if !metric {
         return Vec::new();
     }
     let same = |typed: &String, curve: &PublishedCurve| {
-        typed
-            .parse::<f64>()
-            .is_ok_and(|value| (value - curve.threshold_m).abs() < 1e-9)
+        typed.parse::<f64>().is_ok_and(|value| (value - curve.threshold_m).abs() < 1e-9)
     };
     let tested = |scheme: &str| document.results.iter().any(|row| row.scheme == scheme);
-    let curves = published_3d()
-        .into_iter()
-        .filter(|curve| tested(curve.scheme));
+    let curves = published_3d().into_iter().filter(|curve| tested(curve.scheme));
     let matched = curves.filter_map(|curve| {
         let threshold = thresholds.iter().position(|typed| same(typed, &curve))?;
-        let PublishedCurve {
-            dataset,
-            scheme,
-            points,
-            ..
-        } = curve;
-        Some(PublishedData {
-            dataset,
-            scheme,
-            threshold,
-            points,
-        })
+        let PublishedCurve { dataset, scheme, points, .. } = curve;
+        Some(PublishedData { dataset, scheme, threshold, points })
     });
     matched.collect()
 }
 
 fn percentile_points(row: &crate::document::Row) -> Vec<(f64, f64)> {
     let points = row.error_percentiles.iter();
-    let mut points: Vec<(f64, f64)> = points
-        .filter_map(|(percent, error)| Some(((*error)?, percent.parse().ok()?)))
-        .collect();
+    let mut points: Vec<(f64, f64)> =
+        points.filter_map(|(percent, error)| Some(((*error)?, percent.parse().ok()?))).collect();
     // The shares within the thresholds are points of the same curve.
     for (typed, &percent) in &row.recovered_percent {
-        points.extend(
-            typed
-                .parse()
-                .ok()
-                .map(|threshold: f64| (threshold, percent)),
-        );
+        points.extend(typed.parse().ok().map(|threshold: f64| (threshold, percent)));
     }
     points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     points

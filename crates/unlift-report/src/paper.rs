@@ -39,12 +39,9 @@ pub fn published_3d() -> Vec<PublishedCurve> {
         };
         match curves.iter_mut().find(|curve| same(curve)) {
             Some(curve) => curve.points.push(point),
-            None => curves.push(PublishedCurve {
-                dataset,
-                scheme,
-                threshold_m,
-                points: vec![point],
-            }),
+            None => {
+                curves.push(PublishedCurve { dataset, scheme, threshold_m, points: vec![point] })
+            }
         }
     }
     curves

@@ -13,19 +13,14 @@ pub(crate) fn round(value: f64) -> f64 {
         return value;
     }
     // Through decimal text: exact where `(value * 10^n).round() / 10^n` leaves a tail of nines.
-    format!("{value:.*e}", SIGNIFICANT_DIGITS - 1)
-        .parse()
-        .unwrap_or(value)
+    format!("{value:.*e}", SIGNIFICANT_DIGITS - 1).parse().unwrap_or(value)
 }
 
 /// Rounds every float inside `value`; integers keep all their digits.
 pub(crate) fn round_floats(value: &mut Value) {
     match value {
         Value::Number(number) if number.is_f64() => {
-            if let Some(rounded) = number
-                .as_f64()
-                .map(round)
-                .and_then(serde_json::Number::from_f64)
+            if let Some(rounded) = number.as_f64().map(round).and_then(serde_json::Number::from_f64)
             {
                 *number = rounded;
             }

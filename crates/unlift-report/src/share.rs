@@ -36,9 +36,7 @@ fn withhold(option: &str, value: &mut Value) {
         }
         Value::Array(items) => items.iter_mut().for_each(|item| withhold(option, item)),
         Value::Object(fields) => {
-            fields
-                .iter_mut()
-                .for_each(|(name, field)| withhold(name, field));
+            fields.iter_mut().for_each(|(name, field)| withhold(name, field));
         }
         Value::Null | Value::Bool(_) | Value::Number(_) => {}
     }

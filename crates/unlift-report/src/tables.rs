@@ -26,42 +26,25 @@ pub(crate) fn recovered(document: &Document) -> Table {
         head.push(format!("within {}, %", threshold_text(document, typed)));
     }
     for typed in &thresholds {
-        head.push(format!(
-            "blind, within {}, %",
-            threshold_text(document, typed)
-        ));
+        head.push(format!("blind, within {}, %", threshold_text(document, typed)));
     }
     head.push("points".to_owned());
     let rows = document.results.iter().map(|row| {
         let mut cells = key_cells(row);
         cells.push(row.k.to_string());
-        cells.push(
-            row.delta
-                .map_or(NONE.into(), |delta| words::length(delta, row.unit)),
-        );
+        cells.push(row.delta.map_or(NONE.into(), |delta| words::length(delta, row.unit)));
         for typed in &thresholds {
-            let spread = row
-                .std
-                .as_ref()
-                .and_then(|std| std.recovered_percent.get(typed));
+            let spread = row.std.as_ref().and_then(|std| std.recovered_percent.get(typed));
             cells.push(percent_cell(row.recovered_percent.get(typed), spread));
         }
         for typed in &thresholds {
-            let spread = row
-                .std
-                .as_ref()
-                .and_then(|std| std.blind_percent.get(typed));
+            let spread = row.std.as_ref().and_then(|std| std.blind_percent.get(typed));
             cells.push(percent_cell(row.blind_percent.get(typed), spread));
         }
         cells.push(words::thousands(row.n_points));
         cells
     });
-    let repeats = document
-        .results
-        .iter()
-        .map(|row| row.repeats)
-        .max()
-        .unwrap_or(1);
+    let repeats = document.results.iter().map(|row| row.repeats).max().unwrap_or(1);
     let spread = if repeats > 1 {
         format!(" Mean ± standard deviation over {repeats} seeds.")
     } else {
@@ -79,11 +62,7 @@ pub(crate) fn recovered(document: &Document) -> Table {
 /// Percentiles of the error.
 pub(crate) fn errors(document: &Document) -> Table {
     let mut percentiles: Vec<&String> = Vec::new();
-    for key in document
-        .results
-        .iter()
-        .flat_map(|row| row.error_percentiles.keys())
-    {
+    for key in document.results.iter().flat_map(|row| row.error_percentiles.keys()) {
         if !percentiles.contains(&key) {
             percentiles.push(key);
         }
@@ -177,11 +156,7 @@ pub(crate) fn trials(document: &Document) -> Option<Table> {
         let text: Vec<String> = bins
             .iter()
             .map(|(bound, count)| {
-                format!(
-                    "≤ {}: {}",
-                    words::thousands(*bound),
-                    words::thousands(*count)
-                )
+                format!("≤ {}: {}", words::thousands(*bound), words::thousands(*count))
             })
             .collect();
         let mut cells = key_cells(row);
@@ -209,40 +184,23 @@ pub(crate) fn times(document: &Document) -> Option<Table> {
     if stages.is_empty() {
         return None;
     }
-    let rows = document
-        .results
-        .iter()
-        .zip(&seconds.rows)
-        .map(|(row, times)| {
-            let mut cells = key_cells(row);
-            let text = |stage: &&String| {
-                times
-                    .get(*stage)
-                    .map_or(NONE.into(), |s| words::significant(*s, 3))
-            };
-            cells.extend(stages.iter().map(text));
-            cells
-        });
+    let rows = document.results.iter().zip(&seconds.rows).map(|(row, times)| {
+        let mut cells = key_cells(row);
+        let text =
+            |stage: &&String| times.get(*stage).map_or(NONE.into(), |s| words::significant(*s, 3));
+        cells.extend(stages.iter().map(text));
+        cells
+    });
     let rows = rows.collect();
     let mut head = texts(&["scheme", "solver", "neighbors right"]);
     head.extend(stages.iter().map(|stage| format!("{stage}, s")));
-    Some(Table {
-        id: "times",
-        caption: "Seconds by stage.".to_owned(),
-        head,
-        rows,
-        labels: 2,
-    })
+    Some(Table { id: "times", caption: "Seconds by stage.".to_owned(), head, rows, labels: 2 })
 }
 
 /// Every threshold of the document, as typed, in order.
 pub(crate) fn thresholds(document: &Document) -> Vec<String> {
     let mut all: Vec<String> = Vec::new();
-    for typed in document
-        .results
-        .iter()
-        .flat_map(|row| row.recovered_percent.keys())
-    {
+    for typed in document.results.iter().flat_map(|row| row.recovered_percent.keys()) {
         if !all.contains(typed) {
             all.push(typed.clone());
         }

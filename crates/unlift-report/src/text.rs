@@ -10,11 +10,7 @@ use crate::{tables, verdict, words};
 pub fn text_table(document: &Document) -> String {
     let thresholds = tables::thresholds(document);
     let mut head = vec!["scheme".to_owned(), "solver".to_owned(), "right".to_owned()];
-    head.extend(
-        thresholds
-            .iter()
-            .map(|typed| format!("{typed} {}", unit(document))),
-    );
+    head.extend(thresholds.iter().map(|typed| format!("{typed} {}", unit(document))));
     head.extend(["blind".to_owned(), "break-even".to_owned()]);
     let mut lines = vec![head];
     for card in verdict::verdict(document).cards {
@@ -28,12 +24,7 @@ pub fn text_table(document: &Document) -> String {
             cells.push(value.map_or("-".into(), |v| format!("{} %", words::percent(*v))));
         }
         cells.push(format!("{} %", words::percent(card.blind)));
-        cells.push(break_even(
-            document,
-            row.scheme.as_str(),
-            &row.solver,
-            thresholds.first(),
-        ));
+        cells.push(break_even(document, row.scheme.as_str(), &row.solver, thresholds.first()));
         lines.push(cells);
     }
     align(&lines)

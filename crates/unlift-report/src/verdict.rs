@@ -48,31 +48,18 @@ pub(crate) fn verdict(document: &Document) -> Verdict {
     }
     // Stable: equal shares keep the document's order.
     cards.sort_by(|a, b| b.recovered.total_cmp(&a.recovered));
-    Verdict {
-        summary: summary(document, &cards),
-        cards,
-    }
+    Verdict { summary: summary(document, &cards), cards }
 }
 
 /// The row that speaks for `scheme`: nearest to the headline ratio, then the largest share.
 pub(crate) fn headline<'a>(document: &'a Document, scheme: &str) -> Option<&'a Row> {
     let away = |row: &Row| (row.inlier_ratio - HEADLINE_RATIO).abs();
-    let share = |row: &Row| {
-        row.recovered_percent
-            .values()
-            .next()
-            .copied()
-            .unwrap_or(0.0)
-    };
+    let share = |row: &Row| row.recovered_percent.values().next().copied().unwrap_or(0.0);
     document
         .results
         .iter()
         .filter(|row| row.scheme == scheme)
-        .min_by(|a, b| {
-            away(a)
-                .total_cmp(&away(b))
-                .then(share(b).total_cmp(&share(a)))
-        })
+        .min_by(|a, b| away(a).total_cmp(&away(b)).then(share(b).total_cmp(&share(a))))
 }
 
 fn card(document: &Document, row: &Row) -> Option<Card> {
@@ -152,10 +139,7 @@ fn summary(document: &Document, cards: &[Card]) -> String {
     let Some(row) = headline(document, &worst.scheme) else {
         return String::new();
     };
-    let within = row
-        .recovered_percent
-        .first()
-        .map(|(typed, _)| words::threshold(typed, row.unit));
+    let within = row.recovered_percent.first().map(|(typed, _)| words::threshold(typed, row.unit));
     let within = within.unwrap_or_default();
     let when = condition(row);
     if cards.len() == 1 {

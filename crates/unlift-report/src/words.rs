@@ -88,10 +88,7 @@ pub(crate) fn when_right(ratio: f64) -> String {
         (0.2, "when one neighbor in five is right"),
         (0.1, "when one neighbor in ten is right"),
     ];
-    match common
-        .iter()
-        .find(|(value, _)| (value - ratio).abs() < 1e-9)
-    {
+    match common.iter().find(|(value, _)| (value - ratio).abs() < 1e-9) {
         Some((_, words)) => (*words).to_owned(),
         None => format!("when {} % of the neighbors are right", ratio_percent(ratio)),
     }
@@ -148,14 +145,8 @@ mod tests {
         assert_eq!(threshold("0.10", LengthUnit::Meter), "10 cm");
         assert_eq!(threshold("0.005", LengthUnit::Meter), "5 mm");
         assert_eq!(threshold("2.5", LengthUnit::Meter), "2.5 m");
-        assert_eq!(
-            threshold("1.0", LengthUnit::KthNeighbor),
-            "1 neighbor distance"
-        );
-        assert_eq!(
-            threshold("2.5", LengthUnit::KthNeighbor),
-            "2.5 neighbor distances"
-        );
+        assert_eq!(threshold("1.0", LengthUnit::KthNeighbor), "1 neighbor distance");
+        assert_eq!(threshold("2.5", LengthUnit::KthNeighbor), "2.5 neighbor distances");
     }
 
     #[test]

@@ -52,20 +52,11 @@ fn curves_tables_and_canvas_are_there_without_errors_or_network() {
         browser.emulate(width, height, "light");
         browser.open(&file.0);
         // One overview, one chart per scheme, one of errors; each with drawn curves.
-        assert_eq!(
-            browser.evaluate("document.documentElement.dataset.charts"),
-            json!("9")
-        );
+        assert_eq!(browser.evaluate("document.documentElement.dataset.charts"), json!("9"));
         let empty = "[...document.querySelectorAll('.chart')].filter(c => c.querySelectorAll('svg path').length < 10).length";
         assert_eq!(browser.evaluate(empty), json!(0));
-        assert_eq!(
-            browser.evaluate("document.querySelectorAll('table').length >= 5"),
-            json!(true)
-        );
-        assert_eq!(
-            browser.evaluate("document.documentElement.dataset.scene"),
-            json!("drawn")
-        );
+        assert_eq!(browser.evaluate("document.querySelectorAll('table').length >= 5"), json!(true));
+        assert_eq!(browser.evaluate("document.documentElement.dataset.scene"), json!("drawn"));
         assert_eq!(
             browser.evaluate("+document.documentElement.dataset.scenePoints > 3000"),
             json!(true)
@@ -119,24 +110,13 @@ fn a_page_of_figures_only_has_curves_and_no_canvas() {
     let Some(mut browser) = browser() else { return };
     let document = sample::document(false);
     let scene = sample::scene(&document, 500);
-    let options = RenderOptions {
-        share_safe: true,
-        ..RenderOptions::default()
-    };
-    let file = PageFile::new(
-        "figures",
-        &render(&document, Some(&scene), &options).expect("a page"),
-    );
+    let options = RenderOptions { share_safe: true, ..RenderOptions::default() };
+    let file =
+        PageFile::new("figures", &render(&document, Some(&scene), &options).expect("a page"));
     browser.emulate(1280, 900, "light");
     browser.open(&file.0);
-    assert_eq!(
-        browser.evaluate("document.documentElement.dataset.charts"),
-        json!("9")
-    );
-    assert_eq!(
-        browser.evaluate("document.querySelector('canvas')"),
-        json!(null)
-    );
+    assert_eq!(browser.evaluate("document.documentElement.dataset.charts"), json!("9"));
+    assert_eq!(browser.evaluate("document.querySelector('canvas')"), json!(null));
     assert_eq!(browser.complaints, Vec::<String>::new());
 }
 
@@ -147,31 +127,18 @@ fn pictures_are_taken_when_asked_for() {
     };
     let Some(mut browser) = browser() else { return };
     let folder = PathBuf::from(folder);
-    let pages = [
-        ("metric", private_page(true)),
-        ("no-scale", private_page(false)),
-    ];
+    let pages = [("metric", private_page(true)), ("no-scale", private_page(false))];
     for (name, page) in pages {
         let file = PageFile::new(name, &page);
-        for (width, color_scheme) in [
-            (1280, "light"),
-            (1280, "dark"),
-            (390, "light"),
-            (390, "dark"),
-        ] {
+        for (width, color_scheme) in
+            [(1280, "light"), (1280, "dark"), (390, "light"), (390, "dark")]
+        {
             browser.emulate(width, 1000, color_scheme);
             browser.open(&file.0);
             let shot =
                 |kind: &str| folder.join(format!("{name}-{width}-{color_scheme}-{kind}.png"));
             std::fs::write(shot("fold"), browser.screenshot()).expect("a picture");
-            for section in [
-                "curves",
-                "distribution",
-                "scene",
-                "numbers",
-                "losses",
-                "reading",
-            ] {
+            for section in ["curves", "distribution", "scene", "numbers", "losses", "reading"] {
                 browser.emulate(width, 1400, color_scheme);
                 browser.evaluate(&format!(
                     "document.getElementById('{section}').scrollIntoView({{behavior: 'instant'}})"

@@ -19,10 +19,7 @@ fn thresholds_keep_their_spelling_and_order() {
     row.recovered_percent = [("0.250".to_owned(), 98.0), ("0.10".to_owned(), 93.0)].into();
     row.blind_percent = [("0.250".to_owned(), 2.0), ("0.10".to_owned(), 1.0)].into();
     let read = Document::from_json(&document.to_json().unwrap()).unwrap();
-    assert_eq!(
-        read.results[0].recovered_percent.keys().collect::<Vec<_>>(),
-        ["0.250", "0.10"]
-    );
+    assert_eq!(read.results[0].recovered_percent.keys().collect::<Vec<_>>(), ["0.250", "0.10"]);
 }
 
 #[test]
@@ -63,19 +60,7 @@ fn a_broken_rule_names_its_place() {
 
 #[test]
 fn another_schema_is_refused_by_its_number() {
-    let text = sample::document(true)
-        .to_json()
-        .unwrap()
-        .replace("\"schema\": 1", "\"schema\": 7");
+    let text = sample::document(true).to_json().unwrap().replace("\"schema\": 1", "\"schema\": 7");
     let error = Document::from_json(&text).unwrap_err();
-    assert!(
-        matches!(
-            error,
-            Error::Schema {
-                expected: 1,
-                found: 7
-            }
-        ),
-        "{error}"
-    );
+    assert!(matches!(error, Error::Schema { expected: 1, found: 7 }), "{error}");
 }

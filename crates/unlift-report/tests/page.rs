@@ -7,10 +7,7 @@ use unlift_report::document::Document;
 use unlift_report::{RenderOptions, Scene3d, render, text_table};
 
 fn page(document: &Document, scene: Option<&Scene3d>, share_safe: bool) -> String {
-    let options = RenderOptions {
-        share_safe,
-        ..RenderOptions::default()
-    };
+    let options = RenderOptions { share_safe, ..RenderOptions::default() };
     render(document, scene, &options).expect("a page")
 }
 
@@ -31,16 +28,8 @@ fn every_figure_stands_in_a_table() {
     let document = sample::document(true);
     let text = without_script(&page(&document, None, false));
     for row in &document.results {
-        for value in row
-            .recovered_percent
-            .values()
-            .chain(row.blind_percent.values())
-        {
-            assert!(
-                text.contains(&format!("<td>{value:.1}</td>")),
-                "{} {value}",
-                row.scheme
-            );
+        for value in row.recovered_percent.values().chain(row.blind_percent.values()) {
+            assert!(text.contains(&format!("<td>{value:.1}</td>")), "{} {value}", row.scheme);
         }
     }
     assert!(text.contains("12 degenerate"));
@@ -84,9 +73,7 @@ fn names_are_escaped_everywhere() {
         row.lost = [(evil.to_owned(), row.n_lost)].into();
     }
     let scene = sample::scene(&document, 50);
-    let before = page(&sample::document(true), Some(&scene), false)
-        .matches("<script")
-        .count();
+    let before = page(&sample::document(true), Some(&scene), false).matches("<script").count();
     let text = page(&document, Some(&scene), false);
     assert!(!text.contains("alert(1)</script>"));
     assert_eq!(text.matches("<script").count(), before);
@@ -99,12 +86,7 @@ fn a_page_to_share_holds_figures_only() {
     let private = page(&document, Some(&scene), false);
     let shared = page(&document, Some(&scene), true);
     assert!(private.contains("furnished-room") && private.contains("id=\"block-0\""));
-    for trace in [
-        "furnished-room",
-        "id=\"block-0\"",
-        "<canvas",
-        "unlift audit map",
-    ] {
+    for trace in ["furnished-room", "id=\"block-0\"", "<canvas", "unlift audit map"] {
         assert!(!shared.contains(trace), "{trace}");
     }
     assert!(shared.contains("Figures only.") && shared.contains("<td>92.3</td>"));
@@ -147,20 +129,14 @@ fn the_terminal_table_is_short_and_worst_first() {
     let table = text_table(&sample::document(true));
     let lines: Vec<&str> = table.lines().collect();
     assert_eq!(lines.len(), 8);
-    assert!(
-        lines[1].starts_with("olc  ") && lines[1].contains("92.3 %"),
-        "{table}"
-    );
+    assert!(lines[1].starts_with("olc  ") && lines[1].contains("92.3 %"), "{table}");
     assert!(lines.iter().all(|line| line.len() <= 100));
 }
 
 #[test]
 fn the_vendored_bundle_is_the_one_described() {
     let bundle = include_bytes!("../web/vendor/bundle.min.js");
-    let sum: String = Sha256::digest(bundle)
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect();
+    let sum: String = Sha256::digest(bundle).iter().map(|byte| format!("{byte:02x}")).collect();
     assert!(
         include_str!("../web/vendor/VENDOR.md").contains(&sum),
         "bundle.min.js has sha256 {sum}"

@@ -34,17 +34,11 @@ fn breaks(root: &Value, schema: &Value, value: &Value, place: &str) -> Vec<Strin
             "minimum" => value.as_f64().is_none_or(|x| x >= rule.as_f64().unwrap()),
             "maximum" => value.as_f64().is_none_or(|x| x <= rule.as_f64().unwrap()),
             "exclusiveMinimum" => value.as_f64().is_none_or(|x| x > rule.as_f64().unwrap()),
-            "minItems" => value
-                .as_array()
-                .is_none_or(|x| x.len() as u64 >= rule.as_u64().unwrap()),
-            "maxItems" => value
-                .as_array()
-                .is_none_or(|x| x.len() as u64 <= rule.as_u64().unwrap()),
+            "minItems" => value.as_array().is_none_or(|x| x.len() as u64 >= rule.as_u64().unwrap()),
+            "maxItems" => value.as_array().is_none_or(|x| x.len() as u64 <= rule.as_u64().unwrap()),
             "required" => {
                 let names = rule.as_array().expect("a list").iter();
-                names
-                    .map(|name| name.as_str().unwrap())
-                    .all(|name| value.get(name).is_some())
+                names.map(|name| name.as_str().unwrap()).all(|name| value.get(name).is_some())
             }
             "items" => {
                 for (i, item) in value.as_array().into_iter().flatten().enumerate() {
@@ -76,9 +70,7 @@ fn break_fields(
     let mut found = Vec::new();
     for (name, field) in value.as_object().into_iter().flatten() {
         let place = format!("{place}.{name}");
-        let named = schema
-            .get("properties")
-            .and_then(|properties| properties.get(name));
+        let named = schema.get("properties").and_then(|properties| properties.get(name));
         match (keyword, named, rule) {
             ("properties", Some(own), _) => found.extend(breaks(root, own, field, &place)),
             ("additionalProperties", None, Value::Bool(false)) => {
@@ -112,21 +104,13 @@ fn check(document: &Document) -> Vec<String> {
 #[test]
 fn documents_keep_the_schema() {
     assert_eq!(check(&sample::document(true)), Vec::<String>::new());
-    assert_eq!(
-        check(&sample::document(false).share_safe()),
-        Vec::<String>::new()
-    );
+    assert_eq!(check(&sample::document(false).share_safe()), Vec::<String>::new());
     let mut full = sample::document(true);
     full.results[0].repeats = 3;
-    full.results[0].std = Some(Spread {
-        median_error: Some(0.1),
-        ..Spread::default()
-    });
+    full.results[0].std = Some(Spread { median_error: Some(0.1), ..Spread::default() });
     full.results[0].delta = None;
     full.run.seconds.stages.insert("read".into(), 0.5);
-    full.input
-        .other_sha256
-        .insert("descriptors".into(), "00".into());
+    full.input.other_sha256.insert("descriptors".into(), "00".into());
     assert_eq!(check(&full), Vec::<String>::new());
 }
 

@@ -91,39 +91,20 @@ pub(crate) fn encode(scene: &Scene3d, error_unit: f32) -> Encoded {
     let originals = chosen.iter().map(|&i| scene.originals[i]);
     push(positions(&bounds, originals));
     let cameras = subsample(scene.cameras.len(), MAX_CAMERAS, 0);
-    push(positions(
-        &bounds,
-        cameras.iter().map(|&i| scene.cameras[i]),
-    ));
+    push(positions(&bounds, cameras.iter().map(|&i| scene.cameras[i])));
 
     let mut obfuscations = Vec::new();
     for ObfuscationView { scheme, shapes } in &scene.obfuscations {
         let (kind, bytes, count) = encode_shapes(&bounds, shapes);
         let block = push(bytes);
-        obfuscations.push(EncodedShapes {
-            scheme: scheme.clone(),
-            kind,
-            count,
-            block,
-        });
+        obfuscations.push(EncodedShapes { scheme: scheme.clone(), kind, count, block });
     }
     let mut views = Vec::new();
     for view in &scene.views {
         let (bytes, n_lost) = encode_view(&bounds, &scene.originals, view, &chosen, error_unit);
         let block = push(bytes);
-        let View {
-            scheme,
-            solver,
-            inlier_ratio,
-            ..
-        } = view.clone();
-        views.push(EncodedView {
-            scheme,
-            solver,
-            inlier_ratio,
-            n_lost,
-            block,
-        });
+        let View { scheme, solver, inlier_ratio, .. } = view.clone();
+        views.push(EncodedView { scheme, solver, inlier_ratio, n_lost, block });
     }
     Encoded {
         low: bounds.low,
@@ -161,25 +142,15 @@ fn encode_view(
 }
 
 fn encode_shapes(bounds: &SceneBox, shapes: &Shapes) -> (&'static str, Vec<u8>, usize) {
-    let max = if matches!(shapes, Shapes::Points(_)) {
-        MAX_SHAPE_POINTS
-    } else {
-        MAX_SHAPES
-    };
+    let max = if matches!(shapes, Shapes::Points(_)) { MAX_SHAPE_POINTS } else { MAX_SHAPES };
     let chosen = subsample(shapes.len(), max, 0);
     let count = chosen.len();
     let chosen = chosen.into_iter();
     match shapes {
-        Shapes::Segments(all) => (
-            "segments",
-            positions(bounds, chosen.flat_map(|i| all[i])),
-            count,
-        ),
-        Shapes::Patches(all) => (
-            "patches",
-            positions(bounds, chosen.flat_map(|i| all[i])),
-            count,
-        ),
+        Shapes::Segments(all) => {
+            ("segments", positions(bounds, chosen.flat_map(|i| all[i])), count)
+        }
+        Shapes::Patches(all) => ("patches", positions(bounds, chosen.flat_map(|i| all[i])), count),
         Shapes::Points(all) => ("points", positions(bounds, chosen.map(|i| all[i])), count),
     }
 }
@@ -217,11 +188,7 @@ fn error_byte(relative: f32) -> u8 {
 }
 
 fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a.iter()
-        .zip(b)
-        .map(|(x, y)| (x - y) * (x - y))
-        .sum::<f32>()
-        .sqrt()
+    a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f32>().sqrt()
 }
 
 #[cfg(test)]
@@ -229,9 +196,8 @@ mod tests {
     use super::*;
 
     fn scene(n: usize, n_views: usize) -> Scene3d {
-        let originals: Vec<[f32; 3]> = (0..n)
-            .map(|i| [i as f32, (i * 7 % 13) as f32, 0.5])
-            .collect();
+        let originals: Vec<[f32; 3]> =
+            (0..n).map(|i| [i as f32, (i * 7 % 13) as f32, 0.5]).collect();
         let view = View {
             scheme: "olc".into(),
             solver: "consensus".into(),
@@ -243,13 +209,7 @@ mod tests {
         Scene3d {
             cameras: originals.clone(),
             n_points: n as u64,
-            obfuscations: vec![
-                ObfuscationView {
-                    scheme: "plane".into(),
-                    shapes
-                };
-                7
-            ],
+            obfuscations: vec![ObfuscationView { scheme: "plane".into(), shapes }; 7],
             views: vec![view; n_views],
             up: None,
             originals,
@@ -260,30 +220,18 @@ mod tests {
     fn the_budget_holds_for_any_number_of_points_and_views() {
         for (n, n_views) in [(0, 0), (10, 1), (60_000, 7), (20_000, 84), (300, 5_000)] {
             let encoded = encode(&scene(n, n_views), 0.1);
-            let bytes: usize = encoded
-                .blocks
-                .iter()
-                .map(|block| block.len() + BYTES_PER_BLOCK)
-                .sum();
-            assert!(
-                bytes <= SCENE_BUDGET_BYTES,
-                "{n} points, {n_views} views: {bytes} bytes"
-            );
+            let bytes: usize =
+                encoded.blocks.iter().map(|block| block.len() + BYTES_PER_BLOCK).sum();
+            assert!(bytes <= SCENE_BUDGET_BYTES, "{n} points, {n_views} views: {bytes} bytes");
             assert_eq!(encoded.n_drawn, n.min(points_within_budget(n_views, 7)));
         }
-        assert!(
-            points_within_budget(42, 7) > 8_000,
-            "a usual audit shows a real cloud"
-        );
+        assert!(points_within_budget(42, 7) > 8_000, "a usual audit shows a real cloud");
         assert_eq!(points_within_budget(usize::MAX / 1_000, 7), 0);
     }
 
     #[test]
     fn a_position_survives_to_a_ten_thousandth_of_the_box() {
-        let bounds = SceneBox {
-            low: [-5.0, 0.0, 10.0],
-            high: [5.0, 1.0, 30.0],
-        };
+        let bounds = SceneBox { low: [-5.0, 0.0, 10.0], high: [5.0, 1.0, 30.0] };
         let cells = quantize(&bounds, [1.234, 0.5, 12.0]);
         for (axis, expected) in [1.234, 0.5, 12.0].into_iter().enumerate() {
             let side = bounds.high[axis] - bounds.low[axis];

@@ -18,11 +18,8 @@ impl SceneBox {
         let mut low = [-0.5; 3];
         let mut high = [0.5; 3];
         for axis in 0..3 {
-            let mut values: Vec<f32> = points
-                .iter()
-                .map(|p| p[axis])
-                .filter(|x| x.is_finite())
-                .collect();
+            let mut values: Vec<f32> =
+                points.iter().map(|p| p[axis]).filter(|x| x.is_finite()).collect();
             if values.is_empty() {
                 continue;
             }
@@ -31,9 +28,7 @@ impl SceneBox {
             low[axis] = values[last / 100];
             high[axis] = values[last - last / 100];
         }
-        let longest = (0..3)
-            .map(|axis| high[axis] - low[axis])
-            .fold(0.0, f32::max);
+        let longest = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f32::max);
         let margin = if longest > 0.0 { 0.1 * longest } else { 0.5 };
         for axis in 0..3 {
             low[axis] -= margin;
@@ -124,10 +119,7 @@ fn mix(seed: u64, counter: u64) -> u64 {
 mod tests {
     use super::*;
 
-    const CUBE: SceneBox = SceneBox {
-        low: [-1.0; 3],
-        high: [1.0; 3],
-    };
+    const CUBE: SceneBox = SceneBox { low: [-1.0; 3], high: [1.0; 3] };
 
     #[test]
     fn a_line_ends_at_the_faces() {
@@ -139,14 +131,8 @@ mod tests {
 
     #[test]
     fn a_ray_starts_at_its_center_or_at_a_face() {
-        assert_eq!(
-            CUBE.clip_ray([0.0; 3], [0.0, 0.0, 1.0]).unwrap()[0],
-            [0.0; 3]
-        );
-        assert_eq!(
-            CUBE.clip_ray([0.0, 0.0, -5.0], [0.0, 0.0, 1.0]).unwrap()[0],
-            [0.0, 0.0, -1.0]
-        );
+        assert_eq!(CUBE.clip_ray([0.0; 3], [0.0, 0.0, 1.0]).unwrap()[0], [0.0; 3]);
+        assert_eq!(CUBE.clip_ray([0.0, 0.0, -5.0], [0.0, 0.0, 1.0]).unwrap()[0], [0.0, 0.0, -1.0]);
         assert_eq!(CUBE.clip_ray([0.0, 0.0, 5.0], [0.0, 0.0, 1.0]), None);
     }
 
@@ -155,14 +141,8 @@ mod tests {
         let mut points: Vec<[f32; 3]> = (0..1000).map(|i| [i as f32 / 1000.0; 3]).collect();
         points.push([1e6, -1e6, f32::NAN]);
         let scene = SceneBox::robust(&points);
-        assert!(
-            scene.low.iter().all(|&x| (-0.2..0.0).contains(&x)),
-            "{scene:?}"
-        );
-        assert!(
-            scene.high.iter().all(|&x| (1.0..1.2).contains(&x)),
-            "{scene:?}"
-        );
+        assert!(scene.low.iter().all(|&x| (-0.2..0.0).contains(&x)), "{scene:?}");
+        assert!(scene.high.iter().all(|&x| (1.0..1.2).contains(&x)), "{scene:?}");
     }
 
     #[test]

@@ -11,13 +11,8 @@ use base64::Engine;
 use serde_json::{Value, json};
 use tungstenite::{Message, WebSocket};
 
-const NAMES: [&str; 5] = [
-    "chromium",
-    "chromium-browser",
-    "google-chrome",
-    "google-chrome-stable",
-    "chrome",
-];
+const NAMES: [&str; 5] =
+    ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome"];
 const FLAGS: [&str; 15] = [
     "--headless",
     "--no-sandbox",
@@ -44,9 +39,7 @@ pub fn find() -> Option<PathBuf> {
     }
     let path = std::env::var_os("PATH")?;
     let folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
-    let candidates = NAMES
-        .iter()
-        .flat_map(|name| folders.iter().map(move |dir| dir.join(name)));
+    let candidates = NAMES.iter().flat_map(|name| folders.iter().map(move |dir| dir.join(name)));
     candidates.into_iter().find(|candidate| candidate.is_file())
 }
 
@@ -89,15 +82,9 @@ impl Browser {
             let mut sink = Vec::new();
             let _ = stderr.read_to_end(&mut sink);
         });
-        let host = address
-            .trim_start_matches("ws://")
-            .split('/')
-            .next()
-            .expect("a host");
+        let host = address.trim_start_matches("ws://").split('/').next().expect("a host");
         let stream = TcpStream::connect(host).expect("the DevTools port is open");
-        stream
-            .set_read_timeout(Some(PATIENCE))
-            .expect("a timeout can be set");
+        stream.set_read_timeout(Some(PATIENCE)).expect("a timeout can be set");
         let (socket, _) = tungstenite::client(address.as_str(), stream).expect("a WebSocket");
         let mut browser = Self {
             child,
@@ -110,10 +97,7 @@ impl Browser {
         let target = browser.call("Target.createTarget", json!({"url": "about:blank"}));
         let attach = json!({"targetId": target["targetId"], "flatten": true});
         let attached = browser.call("Target.attachToTarget", attach);
-        browser.session = attached["sessionId"]
-            .as_str()
-            .expect("a session")
-            .to_owned();
+        browser.session = attached["sessionId"].as_str().expect("a session").to_owned();
         for domain in ["Page", "Runtime", "Log", "Network"] {
             browser.call(&format!("{domain}.enable"), json!({}));
         }
@@ -128,9 +112,7 @@ impl Browser {
         if !self.session.is_empty() {
             message["sessionId"] = json!(self.session);
         }
-        self.socket
-            .send(Message::text(message.to_string()))
-            .expect("the browser listens");
+        self.socket.send(Message::text(message.to_string())).expect("the browser listens");
         loop {
             let answer = self.socket.read().expect("the browser answers");
             let Message::Text(text) = answer else {
@@ -138,11 +120,7 @@ impl Browser {
             };
             let answer: Value = serde_json::from_str(&text).expect("an answer in JSON");
             if answer["id"] == json!(id) {
-                assert!(
-                    answer.get("error").is_none(),
-                    "{method}: {}",
-                    answer["error"]
-                );
+                assert!(answer.get("error").is_none(), "{method}: {}", answer["error"]);
                 return answer["result"].clone();
             }
             self.note(&answer);
@@ -157,18 +135,13 @@ impl Browser {
             Some("Log.entryAdded") => params["entry"]["level"] == "error",
             Some("Network.requestWillBeSent") => {
                 let url = params["request"]["url"].as_str().unwrap_or_default();
-                !["file:", "about:", "data:"]
-                    .iter()
-                    .any(|scheme| url.starts_with(scheme))
+                !["file:", "about:", "data:"].iter().any(|scheme| url.starts_with(scheme))
             }
             _ => false,
         };
         if complaint {
             let text = &params["exceptionDetails"]["exception"]["description"];
-            self.complaints.push(
-                text.as_str()
-                    .map_or_else(|| event.to_string(), str::to_owned),
-            );
+            self.complaints.push(text.as_str().map_or_else(|| event.to_string(), str::to_owned));
         }
     }
 
@@ -176,10 +149,7 @@ impl Browser {
     pub fn evaluate(&mut self, expression: &str) -> Value {
         let params = json!({"expression": expression, "returnByValue": true, "awaitPromise": true});
         let result = self.call("Runtime.evaluate", params);
-        assert!(
-            result.get("exceptionDetails").is_none(),
-            "{expression}: {result}"
-        );
+        assert!(result.get("exceptionDetails").is_none(), "{expression}: {result}");
         result["result"]["value"].clone()
     }
 
@@ -193,10 +163,7 @@ impl Browser {
 
     /// Opens a file and waits until its script says that it is done.
     pub fn open(&mut self, file: &Path) {
-        self.call(
-            "Page.navigate",
-            json!({"url": format!("file://{}", file.display())}),
-        );
+        self.call("Page.navigate", json!({"url": format!("file://{}", file.display())}));
         self.wait_for("document.documentElement?.dataset.ready === '1'");
     }
 
@@ -204,10 +171,7 @@ impl Browser {
         let start = Instant::now();
         while self.evaluate(condition) != json!(true) {
             let complaints = &self.complaints;
-            assert!(
-                start.elapsed() < PATIENCE,
-                "{condition} never came true: {complaints:?}"
-            );
+            assert!(start.elapsed() < PATIENCE, "{condition} never came true: {complaints:?}");
             std::thread::sleep(Duration::from_millis(50));
         }
     }
@@ -216,9 +180,7 @@ impl Browser {
     pub fn screenshot(&mut self) -> Vec<u8> {
         let result = self.call("Page.captureScreenshot", json!({"format": "png"}));
         let data = result["data"].as_str().expect("a picture");
-        base64::engine::general_purpose::STANDARD
-            .decode(data)
-            .expect("base64")
+        base64::engine::general_purpose::STANDARD.decode(data).expect("base64")
     }
 }
 

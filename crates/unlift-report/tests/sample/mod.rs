@@ -13,57 +13,21 @@ pub const RATIOS: [f64; 6] = [1.0, 0.75, 0.5, 0.3, 0.2, 0.1];
 
 /// Percent within the first and the second threshold, at each of [`RATIOS`].
 const SHARES: [[[f64; 6]; 2]; 7] = [
-    [
-        [93.4, 93.1, 92.3, 90.8, 89.0, 85.6],
-        [98.1, 98.0, 97.5, 96.4, 95.2, 93.3],
-    ],
-    [
-        [90.2, 89.9, 89.1, 86.2, 81.4, 70.3],
-        [96.4, 96.2, 96.0, 93.8, 90.1, 81.2],
-    ],
-    [
-        [90.9, 90.4, 89.7, 86.9, 82.0, 71.1],
-        [96.6, 96.4, 96.1, 94.0, 90.5, 81.7],
-    ],
-    [
-        [87.3, 86.8, 85.2, 80.7, 74.1, 58.4],
-        [95.2, 94.8, 93.6, 89.8, 84.0, 69.3],
-    ],
-    [
-        [86.1, 85.4, 83.3, 77.9, 70.2, 52.8],
-        [94.0, 93.5, 92.0, 87.1, 80.3, 63.9],
-    ],
-    [
-        [90.1, 89.0, 83.7, 66.4, 41.2, 11.8],
-        [97.2, 96.6, 92.4, 75.3, 50.1, 18.2],
-    ],
-    [
-        [89.3, 88.1, 85.4, 74.6, 60.3, 21.9],
-        [93.2, 92.3, 90.1, 80.2, 66.8, 27.5],
-    ],
+    [[93.4, 93.1, 92.3, 90.8, 89.0, 85.6], [98.1, 98.0, 97.5, 96.4, 95.2, 93.3]],
+    [[90.2, 89.9, 89.1, 86.2, 81.4, 70.3], [96.4, 96.2, 96.0, 93.8, 90.1, 81.2]],
+    [[90.9, 90.4, 89.7, 86.9, 82.0, 71.1], [96.6, 96.4, 96.1, 94.0, 90.5, 81.7]],
+    [[87.3, 86.8, 85.2, 80.7, 74.1, 58.4], [95.2, 94.8, 93.6, 89.8, 84.0, 69.3]],
+    [[86.1, 85.4, 83.3, 77.9, 70.2, 52.8], [94.0, 93.5, 92.0, 87.1, 80.3, 63.9]],
+    [[90.1, 89.0, 83.7, 66.4, 41.2, 11.8], [97.2, 96.6, 92.4, 75.3, 50.1, 18.2]],
+    [[89.3, 88.1, 85.4, 74.6, 60.3, 21.9], [93.2, 92.3, 90.1, 80.2, 66.8, 27.5]],
 ];
-const BLIND: [[f64; 2]; 7] = [
-    [1.9, 6.4],
-    [1.2, 6.0],
-    [1.1, 5.8],
-    [3.2, 9.7],
-    [5.9, 14.1],
-    [0.2, 1.1],
-    [4.8, 12.9],
-];
+const BLIND: [[f64; 2]; 7] =
+    [[1.9, 6.4], [1.2, 6.0], [1.1, 5.8], [3.2, 9.7], [5.9, 14.1], [0.2, 1.1], [4.8, 12.9]];
 
 /// A whole audit; without a scale lengths are neighbor distances.
 pub fn document(metric: bool) -> Document {
-    let thresholds = if metric {
-        ["0.10", "0.25"]
-    } else {
-        ["1.0", "2.5"]
-    };
-    let unit = if metric {
-        LengthUnit::Meter
-    } else {
-        LengthUnit::KthNeighbor
-    };
+    let thresholds = if metric { ["0.10", "0.25"] } else { ["1.0", "2.5"] };
+    let unit = if metric { LengthUnit::Meter } else { LengthUnit::KthNeighbor };
     let mut results = Vec::new();
     let mut break_even = Vec::new();
     for solver in ["consensus", "ransac"] {
@@ -75,11 +39,7 @@ pub fn document(metric: bool) -> Document {
                 solver: solver.into(),
                 threshold: threshold.into(),
                 inlier_ratio: Some(if last { 0.1 } else { 0.17 + 0.01 * s as f64 }),
-                bound: if last {
-                    Bound::BelowTested
-                } else {
-                    Bound::Interpolated
-                },
+                bound: if last { Bound::BelowTested } else { Bound::Interpolated },
             }));
         }
     }
@@ -114,47 +74,27 @@ pub fn document(metric: bool) -> Document {
         seed: 0,
         results,
         break_even,
-        gates: vec![
-            gate("ppl@0.5:0.10<=20", 89.1, 20.0),
-            gate("plane@0.1:0.10<=20", 11.8, 20.0),
-        ],
+        gates: vec![gate("ppl@0.5:0.10<=20", 89.1, 20.0), gate("plane@0.1:0.10<=20", 11.8, 20.0)],
         run: Run {
             command: Some(
                 "unlift audit map maps/furnished-room --scale 1 --solver consensus".into(),
             ),
             threads: 2,
             peak_memory_bytes: Some(412_000_000),
-            seconds: Seconds {
-                total: 41.7,
-                rows,
-                stages: IndexMap::new(),
-            },
+            seconds: Seconds { total: 41.7, rows, stages: IndexMap::new() },
         },
     }
 }
 
 fn row(s: usize, r: usize, solver: &str, thresholds: [&str; 2], unit: LengthUnit) -> Row {
-    let penalty = if solver == "ransac" {
-        0.4 + 1.1 * r as f64
-    } else {
-        0.0
-    };
+    let penalty = if solver == "ransac" { 0.4 + 1.1 * r as f64 } else { 0.0 };
     let share = |t: usize| ((SHARES[s][t][r] - penalty) * 10.0).round() / 10.0;
     let scale = if unit == LengthUnit::Meter { 1.0 } else { 10.0 };
     let by_threshold = |values: [f64; 2]| -> IndexMap<String, f64> {
-        thresholds
-            .iter()
-            .map(|t| (*t).to_owned())
-            .zip(values)
-            .collect()
+        thresholds.iter().map(|t| (*t).to_owned()).zip(values).collect()
     };
     // Error over percent, straight on a log scale between the shares within the thresholds.
-    let known = [
-        (0.5, 0.002),
-        (share(0), 0.10),
-        (share(1), 0.25),
-        (99.8, 3.0),
-    ];
+    let known = [(0.5, 0.002), (share(0), 0.10), (share(1), 0.25), (99.8, 3.0)];
     let percentiles = ["50", "75", "90", "95", "99"].map(|name| {
         let percent: f64 = name.parse().expect("a number");
         let after = known.windows(2).find(|pair| percent <= pair[1].0);
@@ -219,11 +159,7 @@ fn room(n: usize) -> Vec<[f32; 3]> {
     let point = |i: usize| {
         let at = |lane: u64| unit_random(8 * i as u64 + lane);
         // Furniture is denser than walls.
-        let which = if at(0) < 0.45 {
-            0
-        } else {
-            1 + (at(1) * 6.999) as usize
-        };
+        let which = if at(0) < 0.45 { 0 } else { 1 + (at(1) * 6.999) as usize };
         let (low, high) = boxes[which];
         let axis = (at(2) * 2.999) as usize;
         let mut p: [f32; 3] =
@@ -271,15 +207,10 @@ pub fn scene(document: &Document, n: usize) -> Scene3d {
                     .collect(),
             ),
             _ => Shapes::Segments(
-                indices
-                    .filter_map(|i| bounds.clip_line(originals[i], direction(i)))
-                    .collect(),
+                indices.filter_map(|i| bounds.clip_line(originals[i], direction(i))).collect(),
             ),
         };
-        ObfuscationView {
-            scheme: scheme.into(),
-            shapes,
-        }
+        ObfuscationView { scheme: scheme.into(), shapes }
     });
     let views = document.results.iter().enumerate().map(|(r, row)| {
         let share = row.recovered_percent[0] as f32 / 100.0;
@@ -288,11 +219,8 @@ pub fn scene(document: &Document, n: usize) -> Scene3d {
             if chance(0) < row.n_lost as f32 / row.n_points as f32 {
                 return [f32::NAN; 3];
             }
-            let size = if chance(1) < share {
-                0.05 * chance(2)
-            } else {
-                0.15 + 4.0 * chance(2).powi(3)
-            };
+            let size =
+                if chance(1) < share { 0.05 * chance(2) } else { 0.15 + 4.0 * chance(2).powi(3) };
             std::array::from_fn(|a| p[a] + size * (chance(3 + a as u64) - 0.5))
         });
         View {
