@@ -59,7 +59,8 @@ impl Gate {
     /// Says which part is wrong.
     pub fn parse(text: &str) -> Result<Self, String> {
         const FORM: &str = "SCHEME[@RATIO]:THRESHOLD[:gain]<=PERCENT";
-        let form = |what: &str| format!("expected {FORM} (for example ppl@0.5:0.10<=20), found {what}");
+        let form =
+            |what: &str| format!("expected {FORM} (for example ppl@0.5:0.10<=20), found {what}");
         let typed = text.trim();
         let (left, bound) = typed.split_once("<=").ok_or_else(|| form("no <="))?;
         let (rows, rest) = left.split_once(':').ok_or_else(|| form("no threshold"))?;
@@ -169,7 +170,8 @@ mod tests {
     #[test]
     fn each_wrong_part_is_named() {
         let message = |text: &str| Gate::parse(text).unwrap_err();
-        let form = "expected SCHEME[@RATIO]:THRESHOLD[:gain]<=PERCENT (for example ppl@0.5:0.10<=20)";
+        let form =
+            "expected SCHEME[@RATIO]:THRESHOLD[:gain]<=PERCENT (for example ppl@0.5:0.10<=20)";
         assert_eq!(message("ppl@0.5:0.10<20"), format!("{form}, found no <="));
         assert_eq!(message("ppl<=20"), format!("{form}, found no threshold"));
         assert_eq!(

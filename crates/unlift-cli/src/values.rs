@@ -2,18 +2,9 @@
 
 use std::path::PathBuf;
 
+use unlift::audit::Threshold;
 use unlift::obfuscate::{Entry, SCHEMES};
 use unlift::recover::{Delta, Solver};
-
-/// A distance below which a point counts as recovered, and how the user wrote it: reports use the
-/// typed form as the key.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TypedLength {
-    /// As typed.
-    pub typed: String,
-    /// In the unit of the audit.
-    pub value: f64,
-}
 
 /// Where neighborhoods come from.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -72,10 +63,9 @@ pub fn ratio(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A threshold.
-pub fn typed_length(text: &str) -> Result<TypedLength, String> {
-    let typed = text.trim();
-    Ok(TypedLength { typed: typed.to_owned(), value: positive(typed)? })
+/// A threshold; reports use its typed form as the key.
+pub fn threshold(text: &str) -> Result<Threshold, String> {
+    Threshold::parse(text).map_err(|_| format!("expected a number above 0, found {text}"))
 }
 
 /// `auto`, or a length.
@@ -83,7 +73,8 @@ pub fn delta(text: &str) -> Result<Delta, String> {
     if text.trim() == "auto" {
         return Ok(Delta::Auto);
     }
-    let value = positive(text).map_err(|_| format!("expected auto or a number above 0, found {text}"));
+    let value =
+        positive(text).map_err(|_| format!("expected auto or a number above 0, found {text}"));
     value.map(Delta::Fixed)
 }
 
@@ -126,14 +117,14 @@ mod tests {
 
     #[test]
     fn thresholds_keep_how_they_were_typed() {
-        let threshold = typed_length(" 0.10").unwrap();
-        assert_eq!(threshold, TypedLength { typed: "0.10".to_owned(), value: 0.1 });
+        let threshold = threshold(" 0.10").unwrap();
+        assert_eq!(threshold, Threshold { label: "0.10".to_owned(), value: 0.1 });
     }
 
     #[test]
     fn wrong_values_say_what_was_expected_and_found() {
         let texts = [
-            typed_length("-1").unwrap_err(),
+            threshold("-1").unwrap_err(),
             ratio("1.5").unwrap_err(),
             delta("wide").unwrap_err(),
             outlier_filter("20").unwrap_err(),
