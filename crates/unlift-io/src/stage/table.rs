@@ -1,6 +1,7 @@
 //! A Parquet file: opened, checked, and read batch by batch.
 
 use super::column::{Batch, Type};
+use super::guard::without_panic;
 use super::header::{KEY, Kind, Meta};
 use crate::Error;
 use parquet::arrow::ProjectionMask;
@@ -190,10 +191,9 @@ fn guarded<T, E: Into<ParquetError>>(
     path: &Path,
     step: impl FnOnce() -> Result<T, E>,
 ) -> Result<T, Error> {
-    let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(step));
-    let found = match result {
-        Ok(Ok(value)) => return Ok(value),
-        Ok(Err(error)) => match error.into() {
+    let found = match without_panic(step) {
+        Some(Ok(value)) => return Ok(value),
+        Some(Err(error)) => match error.into() {
             ParquetError::External(source) => source.to_string(),
             ParquetError::General(message)
             | ParquetError::NYI(message)
@@ -201,7 +201,7 @@ fn guarded<T, E: Into<ParquetError>>(
             | ParquetError::ArrowError(message) => message,
             other => other.to_string(),
         },
-        Err(_) => "damaged data".into(),
+        None => "damaged data".into(),
     };
     Err(Error::new(path, "", "readable Parquet data", found))
 }
