@@ -183,7 +183,8 @@ struct Subject {
     metric: bool,
     /// What one unit of this page is.
     unit: String,
-    k: u32,
+    /// "50th", of the neighbor whose distance is the unit.
+    kth: String,
 }
 
 fn subject(document: &Document) -> Subject {
@@ -210,7 +211,7 @@ fn subject(document: &Document) -> Subject {
         n_points: words::thousands(input.n_points),
         metric,
         unit,
-        k,
+        kth: words::ordinal(k),
     }
 }
 
