@@ -167,7 +167,8 @@ struct Subject {
     metric: bool,
     /// What one unit of this page is.
     unit: String,
-    k: u32,
+    /// "50th", of the neighbor whose distance is the unit.
+    kth: String,
 }
 
 fn subject(document: &Document) -> Subject {
@@ -185,7 +186,17 @@ fn subject(document: &Document) -> Subject {
         (false, _, None) => String::new(),
     };
     let name = input.path.as_deref().map(short_name);
+<<<<<<< HEAD
     Subject { name, n_points: words::thousands(input.n_points), metric, unit, k }
+=======
+    Subject {
+        name,
+        n_points: words::thousands(input.n_points),
+        metric,
+        unit,
+        kth: words::ordinal(k),
+    }
+>>>>>>> report
 }
 
 /// The part of a path that names the map: `room` of `maps/room/sparse/0`.

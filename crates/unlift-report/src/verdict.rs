@@ -123,7 +123,7 @@ fn break_even_sentence(point: &BreakEven) -> String {
             format!("Half of the points come back when only {ratio} % of neighbors are right.")
         }
         (Bound::BelowTested, Some(ratio)) => {
-            format!("Half come back even at the fewest tested, {ratio} % right neighbors.")
+            format!("Half come back even when {ratio} % are right, the fewest tested.")
         }
         (Bound::AboveTested, Some(ratio)) => {
             format!("Less than half came back at every ratio tested, up to {ratio} %.")

@@ -35,7 +35,7 @@ pub(crate) fn threshold(typed: &str, unit: LengthUnit) -> String {
     match (unit, typed.parse::<f64>()) {
         (LengthUnit::Meter, Ok(meters)) => meters_text(meters),
         (LengthUnit::Meter, Err(_)) => format!("{typed} m"),
-        (LengthUnit::KthNeighbor, Ok(value)) if value == 1.0 => "1 neighbor distance".to_owned(),
+        (LengthUnit::KthNeighbor, Ok(1.0)) => "1 neighbor distance".to_owned(),
         (LengthUnit::KthNeighbor, _) => format!("{typed} neighbor distances"),
     }
 }
@@ -109,12 +109,24 @@ pub(crate) fn thousands(count: u64) -> String {
     let digits = count.to_string();
     let mut text = String::with_capacity(digits.len() + digits.len() / 3);
     for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i) % 3 == 0 {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
             text.push(',');
         }
         text.push(digit);
     }
     text
+}
+
+/// 50 reads "50th".
+pub(crate) fn ordinal(number: u32) -> String {
+    let ending = match (number % 10, number % 100) {
+        (_, 11..=13) => "th",
+        (1, _) => "st",
+        (2, _) => "nd",
+        (3, _) => "rd",
+        _ => "th",
+    };
+    format!("{number}{ending}")
 }
 
 /// Seconds for people: `0.42 s`, `38 s`, `4 min 10 s`.

@@ -207,8 +207,8 @@ window.Unlift = window.Unlift || {};
     }
     for (const { label, value } of data.thresholds) {
       if (!(value > 0)) continue;
-      const upright = line(label, [[value, 0], [value, 100]], 4, { dash: "dotted", width: 1, mark: "none" });
-      series.push({ ...upright, silent: true, endLabel: { show: true, formatter: label, color: css("--soft"), fontSize: 11, offset: [-4, 6] } });
+      const upright = line(label, [[value, 100], [value, 0]], 4, { dash: "dotted", width: 1, mark: "none" });
+      series.push({ ...upright, silent: true, endLabel: { show: true, formatter: label, color: css("--soft"), fontSize: 11, offset: [-4, -9] } });
     }
     draw(node, {
       ...baseOption({ right: 26, top: 22 }),

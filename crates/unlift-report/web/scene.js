@@ -12,7 +12,7 @@
   const MISS = ["#ffb14a", "#b3331a"];
   /** Decades of error drawn on either side of the threshold. */
   const DECADES = 1.5;
-  /** In degrees; from 2.9 radii away a scene just fits. */
+  /** In degrees; from 2.5 radii away a usual scene just fits. */
   const FIELD_OF_VIEW = 36;
 
   const POINT_VERTEX = `
@@ -125,7 +125,7 @@
       // Any direction across `up` will do for a start; then a little above the horizon.
       const across = Math.abs(up[0]) < 0.8 * Math.hypot(...up) ? new THREE.Vector3(1, 0.35, 0) : new THREE.Vector3(0.35, 0, 1);
       across.addScaledVector(this.up, -across.dot(this.up)).normalize();
-      this.camera.position.copy(across).addScaledVector(this.up, 0.55).normalize().multiplyScalar(this.radius * 2.9);
+      this.camera.position.copy(across).addScaledVector(this.up, 0.55).normalize().multiplyScalar(this.radius * 2.5);
       this.controls = new THREE.OrbitControls(this.camera, canvas);
       this.controls.enableZoom = false;
       this.controls.addEventListener("change", () => this.render());

@@ -99,8 +99,8 @@ fn row(s: usize, r: usize, solver: &str, thresholds: [&str; 2], unit: LengthUnit
         let percent: f64 = name.parse().expect("a number");
         let after = known.windows(2).find(|pair| percent <= pair[1].0);
         let error = after.map(|pair| {
-            let ((p, e), (q, f)) = (pair[0], pair[1]);
-            e * (f / e as f64).powf((percent - p) / (q - p)) * scale
+            let ((p, e), (q, f)): ((f64, f64), (f64, f64)) = (pair[0], pair[1]);
+            e * (f / e).powf((percent - p) / (q - p)) * scale
         });
         (name.to_owned(), error)
     });
