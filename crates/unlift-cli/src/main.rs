@@ -1,11 +1,15 @@
 //! The command line of unlift: parse, call the library, print.
 
 mod args;
+mod clouds;
 mod commands;
+mod document;
 mod exit;
 mod gate;
+mod job;
 mod memory;
 mod output;
+mod pictures;
 mod prepare;
 mod progress;
 mod values;

@@ -249,20 +249,10 @@ impl Document {
     pub fn from_json(text: &str) -> Result<Self, Error> {
         let value: serde_json::Value = serde_json::from_str(text)?;
         // Asked first: a later schema would fail on some missing field, which helps nobody.
-<<<<<<< HEAD
-        if let Some(found) = value.get("schema").and_then(serde_json::Value::as_u64) {
-            if found != u64::from(SCHEMA) {
-                return Err(Error::Schema { expected: SCHEMA, found });
-            }
-=======
         if let Some(found) = value.get("schema").and_then(serde_json::Value::as_u64)
             && found != u64::from(SCHEMA)
         {
-            return Err(Error::Schema {
-                expected: SCHEMA,
-                found,
-            });
->>>>>>> report
+            return Err(Error::Schema { expected: SCHEMA, found });
         }
         let document: Self = serde_json::from_value(value)?;
         document.check()?;

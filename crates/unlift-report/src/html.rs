@@ -186,9 +186,6 @@ fn subject(document: &Document) -> Subject {
         (false, _, None) => String::new(),
     };
     let name = input.path.as_deref().map(short_name);
-<<<<<<< HEAD
-    Subject { name, n_points: words::thousands(input.n_points), metric, unit, k }
-=======
     Subject {
         name,
         n_points: words::thousands(input.n_points),
@@ -196,7 +193,6 @@ fn subject(document: &Document) -> Subject {
         unit,
         kth: words::ordinal(k),
     }
->>>>>>> report
 }
 
 /// The part of a path that names the map: `room` of `maps/room/sparse/0`.

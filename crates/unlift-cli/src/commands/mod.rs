@@ -1,5 +1,7 @@
 //! One file per command: parse, call the library, print.
 
+mod audit_map;
+mod demo;
 mod evaluate;
 mod neighbors;
 mod obfuscate;
@@ -20,9 +22,8 @@ use unlift_io::read::{self, Input};
 /// Whatever keeps it from its result; `exit` turns it into a line and a code.
 pub fn run(command: Command) -> anyhow::Result<Outcome> {
     match command {
-        Command::Demo(_) | Command::Audit(AuditCommand::Map(_)) => {
-            anyhow::bail!("audits are not wired up yet")
-        }
+        Command::Demo(args) => demo::run(&args),
+        Command::Audit(AuditCommand::Map(args)) => audit_map::run(*args),
         Command::Obfuscate(args) => obfuscate::run(&args),
         Command::Neighbors(NeighborsCommand::Oracle(args)) => neighbors::oracle(&args),
         Command::Recover(args) => recover::run(&args),
