@@ -8,6 +8,7 @@ use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder,
 };
+use parquet::basic::Compression;
 use parquet::errors::ParquetError;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -155,7 +156,26 @@ impl<'a> Table<'a> {
         if !class.admits(field.data_type()) {
             return Err(wrong(format!("type {}", field.data_type())));
         }
+        self.check_codec(name)?;
         Ok(at)
+    }
+
+    /// Refuses compression by code that this program was built without.
+    fn check_codec(&self, name: &str) -> Result<(), Error> {
+        let groups = self.parquet.metadata().row_groups().iter();
+        let chunks = groups.flat_map(|group| group.columns());
+        let mut of_column = chunks.filter(|chunk| chunk.column_path().parts()[0] == name);
+        let known = [Compression::UNCOMPRESSED, Compression::SNAPPY];
+        match of_column.find(|chunk| !known.contains(&chunk.compression())) {
+            None => Ok(()),
+            Some(chunk) => {
+                // `ZSTD(ZstdLevel(1))`: the level does not matter here.
+                let codec = chunk.compression().to_string();
+                let found = codec.split('(').next().unwrap_or_default();
+                let place = format!("column {name}");
+                Err(Error::new(self.path, place, "no compression or Snappy", found))
+            }
+        }
     }
 }
 

@@ -47,7 +47,9 @@ pq.write_table(pa.table({
     "records": pa.array([records[s] for s in shuffled], pa.large_list(pa.int64())),
     "scores": pa.array([[float(r) for r in records[s]] for s in shuffled], pa.list_(pa.float64())),
 }), "shuffled.parquet")
-pq.write_table(pa.table({"point": [5, 0], "neighbors": [[4, 3], [2, 1]]}), "points.parquet")
+lists = pa.table({"point": [5, 0], "neighbors": [[4, 3], [2, 1]]})
+pq.write_table(lists, "points.parquet")
+pq.write_table(lists, "zstd.parquet", compression="zstd")
 meta = {"kind": "recovered", "version": 1, "dimension": 2, "unit": "px"}
 found = pa.table({"x": pa.array([1.5, None], pa.float32()), "y": pa.array([2.5, None], pa.float32())})
 pq.write_table(found.replace_schema_metadata({"unlift": json.dumps(meta)}), "found.parquet")

@@ -1,7 +1,8 @@
 //! Files cut short or with bytes changed: an error, never a panic.
 
 use crate::maps;
-use std::fs;
+use std::fs::{self, OpenOptions};
+use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use unlift_io::{Error, stage};
 
@@ -35,15 +36,18 @@ fn cut_short_anywhere_is_an_error_of_one_line() {
     let folder = tempfile::tempdir().unwrap();
     for (path, read) in valid_files(folder.path()) {
         read(&path).unwrap();
-        let bytes = fs::read(&path).unwrap();
-        let cut = folder.path().join("cut.parquet");
-        let step = (bytes.len() / 300).max(1);
-        let near_end = bytes.len().saturating_sub(40)..bytes.len();
-        for length in (0..bytes.len()).step_by(step).chain(0..40).chain(near_end) {
-            fs::write(&cut, &bytes[..length]).unwrap();
-            let error = read(&cut).expect_err("a file cut short was read").to_string();
-            assert!(!error.contains('\n') && error.contains("cut.parquet"), "{error}");
-            assert!(stage::peek(&cut).is_err());
+        let length = fs::metadata(&path).unwrap().len() as usize;
+        let step = (length / 300).max(1);
+        let mut cuts: Vec<usize> = (0..length).step_by(step).chain(0..40).collect();
+        cuts.extend(length.saturating_sub(40)..length);
+        cuts.sort();
+        // Shorter and shorter in place: to rewrite a file may wait for the disk.
+        let file = OpenOptions::new().write(true).open(&path).unwrap();
+        for &cut in cuts.iter().rev() {
+            file.set_len(cut as u64).unwrap();
+            let error = read(&path).expect_err("a file cut short was read").to_string();
+            assert!(!error.contains('\n') && error.contains(".parquet: "), "{error}");
+            assert!(stage::peek(&path).is_err());
         }
     }
 }
@@ -51,22 +55,26 @@ fn cut_short_anywhere_is_an_error_of_one_line() {
 #[test]
 fn changed_bytes_are_an_error_or_another_value() {
     let folder = tempfile::tempdir().unwrap();
-    let changed = folder.path().join("changed.parquet");
     for (path, read) in valid_files(folder.path()) {
         let bytes = fs::read(&path).unwrap();
         // The footer, where the counts stand, whole; the data in steps.
         let footer = bytes.len().saturating_sub(800);
-        let step = (footer / 100).max(1);
+        let step = (footer / 300).max(1);
+        let mut file = OpenOptions::new().write(true).open(&path).unwrap();
+        let mut put = |at: usize, byte: u8| {
+            file.seek(SeekFrom::Start(at as u64)).unwrap();
+            file.write_all(&[byte]).unwrap();
+        };
         for at in (0..footer).step_by(step).chain(footer..bytes.len()) {
-            for mask in [0x01, 0xff] {
-                let mut bytes = bytes.clone();
-                bytes[at] ^= mask;
-                fs::write(&changed, &bytes).unwrap();
-                if let Err(error) = read(&changed) {
+            for mask in [0x01, 0x80, 0xff] {
+                put(at, bytes[at] ^ mask);
+                if let Err(error) = read(&path) {
                     assert!(!error.to_string().contains('\n'), "{error}");
                 }
+                put(at, bytes[at]);
             }
         }
+        read(&path).unwrap();
     }
 }
 

@@ -79,6 +79,13 @@ fn the_point_form_with_points_left_out() {
 }
 
 #[test]
+fn another_compression_is_named() {
+    let error = stage::read_point_neighborhoods(&file("zstd.parquet"), 6).unwrap_err().to_string();
+    let line = "zstd.parquet: column neighbors: expected no compression or Snappy, found ZSTD";
+    assert!(error.ends_with(line), "{error}");
+}
+
+#[test]
 fn recovered_points_with_coordinates_only() {
     let recovered = stage::read_recovered::<2>(&file("found.parquet")).unwrap();
     assert_eq!(recovered.status(), [Status::Ok, Status::NoSupport]);
