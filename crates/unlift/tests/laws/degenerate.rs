@@ -14,7 +14,7 @@ use crate::maps::*;
 fn harsh_options() -> Vec<RecoverOptions> {
     let mut options = all_options();
     for solver in Solver::ALL {
-        for delta in [1e-30, 1e-9, 1e9, 1e30] {
+        for delta in [1e-18, 1e-9, 1e9, 1e18] {
             options.push(RecoverOptions { solver, delta: Delta::Fixed(delta), seed: 0 });
         }
     }
@@ -47,6 +47,14 @@ fn statuses<const D: usize>(
         all.extend(recovered.status());
     }
     all
+}
+
+#[test]
+fn deltas_beyond_f32_are_refused() {
+    for delta in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-30, 1e30] {
+        let delta = Delta::Fixed(delta);
+        assert!(RecoverOptions { delta, ..Default::default() }.check().is_err(), "{delta:?}");
+    }
 }
 
 fn short_lists<const D: usize>(name: &str, scheme: &dyn Scheme<D>, seed: u64) {

@@ -34,8 +34,7 @@ fn a_line_forgets_its_point<const D: usize>(seed: u64, n: usize) {
 fn a_ray_forgets_its_range<const D: usize>(seed: u64, n: usize) {
     let mut draws = Draws::new(seed, Stage::Synthetic, 8);
     for _ in 0..n {
-        let center: [f64; D] =
-            std::array::from_fn(|_| f64::from(draws.between(-5.0, 5.0) as f32));
+        let center: [f64; D] = std::array::from_fn(|_| f64::from(draws.between(-5.0, 5.0) as f32));
         let point: [f64; D] = std::array::from_fn(|_| draws.between(-5.0, 5.0));
         let stored = |range: f64| {
             let moved = along(&center, range, &sub(&point, &center));
@@ -147,7 +146,10 @@ fn moving_along_the_record_changes_no_byte<const D: usize>(
                 // The exact direction: what a scheme of single lines draws for a point.
                 let direction = Draws::new(seed, Stage::Scheme, id as u64).direction::<D>();
                 let stored = lines.direction()[slot].map(f64::from);
-                assert!((dot(&direction, &stored).abs() - 1.0).abs() < 1e-6, "{name}: another draw");
+                assert!(
+                    (dot(&direction, &stored).abs() - 1.0).abs() < 1e-6,
+                    "{name}: another draw"
+                );
                 moved[id] = along(&points[id], by - 1.0, &direction);
             }
             Obfuscation::Lines(_) => {

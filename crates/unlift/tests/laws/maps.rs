@@ -16,7 +16,12 @@ pub const OUTSIDERS_2D: &[(&str, &dyn Scheme<2>)] =
 
 /// Few cases, really random ones; a failure prints its arguments.
 pub fn cases(n: u32) -> ProptestConfig {
-    ProptestConfig { cases: n, failure_persistence: None, ..ProptestConfig::default() }
+    ProptestConfig {
+        cases: n,
+        failure_persistence: None,
+        max_shrink_iters: 0,
+        ..ProptestConfig::default()
+    }
 }
 
 /// A hidden map with everything around it.

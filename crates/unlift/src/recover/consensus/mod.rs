@@ -52,3 +52,6 @@ pub(crate) fn refit(sections: &Sections, t: f32, delta2: f32) -> (f32, u32) {
     }
     (t, support)
 }
+
+#[cfg(test)]
+mod twin;
