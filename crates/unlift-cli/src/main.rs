@@ -1,3 +1,24 @@
-//! The command line of unlift.
+//! The command line of unlift: parse, call the library, print.
 
-fn main() {}
+mod args;
+mod clouds;
+mod commands;
+mod document;
+mod exit;
+mod gate;
+mod job;
+mod memory;
+mod output;
+mod pictures;
+mod prepare;
+mod progress;
+mod values;
+
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    // Usage errors end here, with exit code 2.
+    let cli = args::Cli::parse();
+    exit::finish(commands::run(cli.command))
+}

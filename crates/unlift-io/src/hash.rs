@@ -52,6 +52,15 @@ pub fn hash_files<P: AsRef<Path>>(paths: &[P]) -> Result<String, Error> {
     Ok(hex(hasher))
 }
 
+/// SHA-256 of positions made in memory: their coordinates in order, as little-endian `f64`.
+pub fn hash_positions(positions: &[[f64; 3]]) -> String {
+    let mut hasher = Sha256::new();
+    for coordinate in positions.as_flattened() {
+        hasher.update(coordinate.to_le_bytes());
+    }
+    hex(hasher)
+}
+
 fn hex(hasher: Sha256) -> String {
     hasher.finalize().iter().map(|b| format!("{b:02x}")).collect()
 }

@@ -1,1 +1,24 @@
-//! unlift: report.
+//! What an audit found, as a document and as a page.
+//!
+//! [`document`] holds the structs of `audit.json`; everything else here only shows them:
+//! nothing is measured in this crate, and a number on the page is a number of the document.
+
+mod check;
+pub mod document;
+mod error;
+mod html;
+mod page_data;
+pub mod paper;
+mod round;
+pub mod scene;
+mod share;
+mod tables;
+mod text;
+mod verdict;
+mod words;
+
+pub use document::Document;
+pub use error::Error;
+pub use html::{ErrorCdf, RenderOptions, render};
+pub use scene::Scene3d;
+pub use text::text_table;

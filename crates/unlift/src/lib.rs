@@ -19,6 +19,7 @@ pub mod recover;
 pub mod released;
 pub mod seed;
 mod simd;
+pub mod synthetic;
 pub mod truth;
 
 pub use descriptors::Descriptors;

@@ -18,7 +18,7 @@ const VIRIDIS: [[u8; 3]; 9] = [
 pub fn error_color(error: f64, full_scale: f64) -> [u8; 3] {
     let last = VIRIDIS.len() - 1;
     let share = error / full_scale;
-    if !(share < 1.0) {
+    if share.is_nan() || share >= 1.0 {
         return VIRIDIS[last];
     }
     let at = share.max(0.0) * last as f64;

@@ -77,8 +77,11 @@ fn clip<const D: usize>(
         from = from.max(a.min(b));
         to = to.min(a.max(b));
     }
-    // Also false for a line without direction (from minus to plus infinity) and for NaN.
-    if !(from < to && from.is_finite() && to.is_finite()) {
+    // A line without direction runs from minus to plus infinity here; `max` and `min` skip NaN.
+    let finite = |row: &[f64; D]| row.iter().all(|x| x.is_finite());
+    let bounded = from < to && from.is_finite() && to.is_finite();
+    let is_box = low.iter().zip(high).all(|(low, high)| low <= high);
+    if !(bounded && is_box && finite(point) && finite(direction)) {
         return None;
     }
     // Rounding may leave the box by an ulp: the ends are held inside it.
@@ -115,10 +118,15 @@ mod tests {
             ([0.5, 0.5, 0.5], [f64::NAN, 0.0, 1.0]),
         ] {
             let segment = clip_line_to_box(&point, &direction, &LOW, &HIGH);
-            assert!(segment.is_none_or(|s| s.iter().flatten().all(|x| x.is_finite())));
-            if direction[0].is_finite() {
-                assert_eq!(segment, None, "{point:?} {direction:?}");
-            }
+            assert_eq!(segment, None, "{point:?} {direction:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_box_holds_nothing() {
+        for high in [[1.0, -1.0, 1.0], [f64::NAN; 3]] {
+            let segment = clip_line_to_box(&[0.5; 3], &[0.0, 1.0, 0.0], &LOW, &high);
+            assert_eq!(segment, None);
         }
     }
 }

@@ -25,6 +25,9 @@ pub struct Input {
     pub ids: Vec<u64>,
     /// Camera centers `(m, 3)`; empty when the format has none.
     pub cameras: Vec<[f64; 3]>,
+    /// The mean of what is up in the photos, of unit length: up in the world, as people hold cameras;
+    /// `None` without cameras.
+    pub up: Option<[f64; 3]>,
     /// Every file that was read, for hashes in a report.
     pub files: Vec<PathBuf>,
     /// The name of the format, for people: `COLMAP binary`, `ply ascii`.
@@ -35,6 +38,12 @@ pub struct Input {
     pub model: Option<PathBuf>,
     /// The COLMAP database in the folder that was given, if there is one.
     pub database: Option<PathBuf>,
+}
+
+fn mean_direction(directions: impl Iterator<Item = [f64; 3]>) -> Option<[f64; 3]> {
+    let sum = directions.fold([0.0; 3], |s, d| std::array::from_fn(|c| s[c] + d[c]));
+    let length = sum.iter().map(|x| x * x).sum::<f64>().sqrt();
+    (length > 1e-9).then(|| sum.map(|x| x / length))
 }
 
 /// Where a COLMAP model may lie in a project folder, in the order of search.
@@ -146,6 +155,7 @@ fn colmap_model(model: &Path, extension: &str) -> Result<Input, Error> {
             }
         }
         input.cameras = images.iter().map(|image| image.center).collect();
+        input.up = mean_direction(images.iter().map(|image| image.up));
     } else {
         let note = format!("camera centers: there is no images.{extension}");
         input.skipped.push(note);

@@ -9,6 +9,7 @@
 //! file, the column and row (counted from 0), what was expected and what was found.
 
 mod column;
+mod guard;
 mod header;
 mod neighborhoods;
 mod order;

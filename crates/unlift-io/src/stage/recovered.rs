@@ -149,7 +149,7 @@ fn read_estimates<const D: usize>(
                     about_origin[at] = (x - origin[at]) as f32;
                     if !about_origin[at].is_finite() {
                         let expected = "a number in the range of f32 about the origin";
-                        return Err(batch.wrong(name, row, expected, x.to_string()));
+                        return Err(batch.wrong(name, row, expected, format!("{x:?}")));
                     }
                 }
                 None if !found => {}

@@ -1,12 +1,14 @@
 //! A Parquet file: opened, checked, and read batch by batch.
 
 use super::column::{Batch, Type};
+use super::guard::without_panic;
 use super::header::{KEY, Kind, Meta};
 use crate::Error;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder,
 };
+use parquet::basic::Compression;
 use parquet::errors::ParquetError;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -154,7 +156,26 @@ impl<'a> Table<'a> {
         if !class.admits(field.data_type()) {
             return Err(wrong(format!("type {}", field.data_type())));
         }
+        self.check_codec(name)?;
         Ok(at)
+    }
+
+    /// Refuses compression by code that this program was built without.
+    fn check_codec(&self, name: &str) -> Result<(), Error> {
+        let groups = self.parquet.metadata().row_groups().iter();
+        let chunks = groups.flat_map(|group| group.columns());
+        let mut of_column = chunks.filter(|chunk| chunk.column_path().parts()[0] == name);
+        let known = [Compression::UNCOMPRESSED, Compression::SNAPPY];
+        match of_column.find(|chunk| !known.contains(&chunk.compression())) {
+            None => Ok(()),
+            Some(chunk) => {
+                // `ZSTD(ZstdLevel(1))`: the level does not matter here.
+                let codec = chunk.compression().to_string();
+                let found = codec.split('(').next().unwrap_or_default();
+                let place = format!("column {name}");
+                Err(Error::new(self.path, place, "no compression or Snappy", found))
+            }
+        }
     }
 }
 
@@ -190,10 +211,9 @@ fn guarded<T, E: Into<ParquetError>>(
     path: &Path,
     step: impl FnOnce() -> Result<T, E>,
 ) -> Result<T, Error> {
-    let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(step));
-    let found = match result {
-        Ok(Ok(value)) => return Ok(value),
-        Ok(Err(error)) => match error.into() {
+    let found = match without_panic(step) {
+        Some(Ok(value)) => return Ok(value),
+        Some(Err(error)) => match error.into() {
             ParquetError::External(source) => source.to_string(),
             ParquetError::General(message)
             | ParquetError::NYI(message)
@@ -201,7 +221,7 @@ fn guarded<T, E: Into<ParquetError>>(
             | ParquetError::ArrowError(message) => message,
             other => other.to_string(),
         },
-        Err(_) => "damaged data".into(),
+        None => "damaged data".into(),
     };
     Err(Error::new(path, "", "readable Parquet data", found))
 }

@@ -37,8 +37,10 @@ pub(super) fn write_table(
     let properties = properties(meta, &fields);
     let schema = Arc::new(Schema::new(fields));
     atomic::write_file(path, |file| {
-        let options =
-            ArrowWriterOptions::new().with_properties(properties).with_skip_arrow_metadata(true);
+        let options = ArrowWriterOptions::new()
+            .with_properties(properties)
+            .with_schema_root("schema".into())
+            .with_skip_arrow_metadata(true);
         let mut writer =
             ArrowWriter::try_new_with_options(file, schema.clone(), options).map_err(to_io)?;
         let mut start = 0;

@@ -7,5 +7,5 @@ mod run;
 
 pub use break_even::{Bound, BreakEven, break_even};
 pub use plan::{Plan, PointNeighbors, Source, Threshold};
-pub use row::{Repeats, Row};
+pub use row::{PERCENTILES, Repeats, Row};
 pub use run::{Cell, Observer, Outcome, Seconds, Silent, run};

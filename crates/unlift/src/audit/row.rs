@@ -57,6 +57,10 @@ pub struct Repeats {
     pub n: u32,
     /// Standard deviation of each recovered percentage (with n - 1).
     pub recovered_percent_std: Vec<f64>,
+    /// The same of each blind percentage.
+    pub blind_percent_std: Vec<f64>,
+    /// The same of the median error; `None` where it is not known in every repeat.
+    pub median_error_std: Option<f64>,
 }
 
 impl Row {
@@ -89,14 +93,28 @@ impl Row {
             let values: Option<Vec<f64>> = rows.iter().map(value).collect();
             values.map(|values| values.iter().sum::<f64>() / n)
         };
-        let columns = mean.recovered_percent.len();
-        let mut std = Vec::new();
-        for c in 0..columns {
-            let m = average(&|r| Some(r.recovered_percent[c])).unwrap_or(0.0);
-            let squares: f64 = rows.iter().map(|r| (r.recovered_percent[c] - m).powi(2)).sum();
-            std.push((squares / (n - 1.0)).sqrt());
-            mean.recovered_percent[c] = m;
-            mean.blind_percent[c] = average(&|r| Some(r.blind_percent[c])).unwrap_or(0.0);
+        let spread = |value: &dyn Fn(&Row) -> Option<f64>| {
+            let m = average(value)?;
+            let squares: f64 = rows.iter().filter_map(value).map(|x| (x - m) * (x - m)).sum();
+            Some((squares / (n - 1.0)).sqrt())
+        };
+        let columns = 0..mean.recovered_percent.len();
+        let known = |x: Option<f64>| x.unwrap_or(0.0);
+        let repeats = Repeats {
+            n: rows.len() as u32,
+            recovered_percent_std: columns
+                .clone()
+                .map(|c| known(spread(&|r| Some(r.recovered_percent[c]))))
+                .collect(),
+            blind_percent_std: columns
+                .clone()
+                .map(|c| known(spread(&|r| Some(r.blind_percent[c]))))
+                .collect(),
+            median_error_std: spread(&|r| r.error_percentiles[0]),
+        };
+        for c in columns {
+            mean.recovered_percent[c] = known(average(&|r| Some(r.recovered_percent[c])));
+            mean.blind_percent[c] = known(average(&|r| Some(r.blind_percent[c])));
         }
         for p in 0..mean.error_percentiles.len() {
             mean.error_percentiles[p] = average(&|r| r.error_percentiles[p]);
@@ -105,7 +123,7 @@ impl Row {
         mean.inlier_ratio = average(&|r| Some(r.inlier_ratio)).unwrap_or(mean.inlier_ratio);
         mean.axis_accuracy_percent = average(&|r| r.axis_accuracy_percent);
         mean.assignment_accuracy_percent = average(&|r| r.assignment_accuracy_percent);
-        mean.repeats = Some(Repeats { n: rows.len() as u32, recovered_percent_std: std });
+        mean.repeats = Some(repeats);
         mean
     }
 }

@@ -71,7 +71,7 @@ impl TrueNeighbors {
                     if chosen.len() == k {
                         break;
                     }
-                    reach = 2 * reach;
+                    reach *= 2;
                 }
                 row.copy_from_slice(chosen);
             },

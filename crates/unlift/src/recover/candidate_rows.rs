@@ -19,13 +19,15 @@ impl<const D: usize> CandidateColumns<D> {
     /// Gathers `records` from `rows`.
     #[inline(always)]
     pub(crate) fn gather(&mut self, rows: &[[f32; D]], records: &[RecordId]) {
+        let n = records.len();
         for column in &mut self.position {
-            column.resize(records.len(), 0.0);
+            column.resize(n, 0.0);
         }
-        for (j, record) in records.iter().enumerate() {
-            let row = &rows[record.index()];
+        let position = self.position.each_mut().map(|column| &mut column[..n]);
+        for j in 0..n {
+            let row = &rows[records[j].index()];
             for c in 0..D {
-                self.position[c][j] = row[c];
+                position[c][j] = row[c];
             }
         }
     }
@@ -41,25 +43,23 @@ impl<const D: usize> CandidateColumns<D> {
         let n = self.position[0].len();
         out.resize(n);
         let position: [&[f32]; D] = std::array::from_fn(|c| &self.position[c][..n]);
+        let along = position[axis];
         let (at, miss2, bend) = (&mut out.at[..n], &mut out.miss2[..n], &mut out.bend[..n]);
+        // Factors instead of branches keep the loop in vectors.
+        let counts: [f32; D] = std::array::from_fn(|c| if c == axis { 0.0 } else { 1.0 });
         for j in 0..n {
             let (mut sum, mut largest) = (0.0f32, 0.0f32);
             for c in 0..D {
-                let d = if c == axis { 0.0 } else { position[c][j] - own[c] };
+                let d = (position[c][j] - own[c]) * counts[c];
                 sum += d * d;
                 largest = largest.max(d * d);
             }
-            let parallel = sum <= delta2;
             let crossing = (sum - largest).max(0.0);
-            at[j] = if parallel { 0.0 } else { position[axis][j] };
-            bend[j] = if parallel { 0.0 } else { 1.0 };
-            miss2[j] = if parallel {
-                sum
-            } else if crossing <= delta2 {
-                crossing
-            } else {
-                NO_VOTE
-            };
+            let free = if sum <= delta2 { 0.0 } else { 1.0 };
+            at[j] = along[j] * free;
+            bend[j] = free;
+            let miss = crossing + (1.0 - free) * (sum - crossing);
+            miss2[j] = if crossing > delta2 { NO_VOTE } else { miss };
         }
     }
 }

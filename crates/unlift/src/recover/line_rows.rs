@@ -94,18 +94,20 @@ impl<const D: usize> LineColumns<D> {
     #[inline(always)]
     pub(crate) fn gather(&mut self, rows: &[LineRow<D>], records: &[RecordId]) {
         let n = records.len();
-        for c in 0..D {
-            self.through[c].resize(n, 0.0);
-            self.direction[c].resize(n, 0.0);
+        for column in self.through.iter_mut().chain(&mut self.direction) {
+            column.resize(n, 0.0);
         }
         self.group.resize(n, NO_GROUP);
-        for (j, record) in records.iter().enumerate() {
-            let row = &rows[record.index()];
+        let through = self.through.each_mut().map(|column| &mut column[..n]);
+        let direction = self.direction.each_mut().map(|column| &mut column[..n]);
+        let group = &mut self.group[..n];
+        for j in 0..n {
+            let row = &rows[records[j].index()];
             for c in 0..D {
-                self.through[c][j] = row.through[c];
-                self.direction[c][j] = row.direction[c];
+                through[c][j] = row.through[c];
+                direction[c][j] = row.direction[c];
             }
-            self.group[j] = row.group;
+            group[j] = row.group;
         }
     }
 

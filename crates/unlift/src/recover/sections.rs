@@ -18,15 +18,24 @@ pub(crate) struct Sections {
 /// `miss2` of a record that says nothing here (parallel, same center, behind it).
 pub(crate) const NO_VOTE: f32 = f32::INFINITY;
 
+/// Columns are padded to a multiple of this many entries that do not vote, so that every loop runs
+/// over whole vectors, with the same order of additions whatever the machine.
+pub(crate) const LANES: usize = 8;
+
 impl Sections {
-    /// Makes room for `n` sections; every column must then be written.
+    /// Makes room for `n` sections, of which the first `n` must then be written; the padding is silent.
     #[inline(always)]
     pub(crate) fn resize(&mut self, n: usize) {
-        self.at.resize(n, 0.0);
-        self.miss2.resize(n, NO_VOTE);
-        self.bend.resize(n, 1.0);
+        let padded = n.next_multiple_of(LANES);
+        self.at.resize(padded, 0.0);
+        self.miss2.resize(padded, NO_VOTE);
+        self.bend.resize(padded, 1.0);
+        self.at[n..].fill(0.0);
+        self.miss2[n..].fill(NO_VOTE);
+        self.bend[n..].fill(1.0);
     }
 
+    /// Number of sections, padding included.
     #[inline(always)]
     pub(crate) fn len(&self) -> usize {
         self.at.len()
@@ -35,7 +44,7 @@ impl Sections {
     /// How many records say anything at all.
     #[inline(always)]
     pub(crate) fn n_voting(&self) -> usize {
-        self.miss2.iter().filter(|miss2| **miss2 < NO_VOTE).count()
+        self.miss2.iter().map(|&miss2| usize::from(miss2 < NO_VOTE)).sum()
     }
 
     /// Squared distance from `x(t)` to record `j`.
@@ -43,6 +52,28 @@ impl Sections {
     pub(crate) fn squared_distance(&self, j: usize, t: f32) -> f32 {
         let d = t - self.at[j];
         self.miss2[j] + self.bend[j] * d * d
+    }
+
+    /// One step of least squares over the records within `reach2` (squared) of `x(t)`: the shift of
+    /// `t` and the number of these records; no shift when none of them tells where.
+    #[inline(always)]
+    pub(crate) fn least_squares_step(&self, t: f32, reach2: f32) -> (f32, u32) {
+        let (mut weight, mut sum, mut n) = ([0.0f32; LANES], [0.0f32; LANES], [0u32; LANES]);
+        let (at, _) = self.at.as_chunks::<LANES>();
+        let (miss2, _) = self.miss2.as_chunks::<LANES>();
+        let (bend, _) = self.bend.as_chunks::<LANES>();
+        for ((at, miss2), bend) in at.iter().zip(miss2).zip(bend) {
+            for lane in 0..LANES {
+                let d = at[lane] - t;
+                let near = miss2[lane] + bend[lane] * d * d <= reach2;
+                weight[lane] += if near { bend[lane] } else { 0.0 };
+                sum[lane] += if near { bend[lane] * d } else { 0.0 };
+                n[lane] += u32::from(near);
+            }
+        }
+        let weight: f32 = weight.iter().sum();
+        let sum: f32 = sum.iter().sum();
+        (if weight > 0.0 { sum / weight } else { 0.0 }, n.iter().sum())
     }
 }
 
@@ -53,20 +84,15 @@ pub(crate) struct Intervals {
     pub(crate) high: Vec<f32>,
 }
 
-/// Columns are padded to a multiple of this many entries with empty intervals, so that counting
-/// runs over whole vectors.
-const LANES: usize = 8;
-
 impl Intervals {
     /// The intervals of `sections` at `delta`, as far as they lie above `floor`.
     #[inline(always)]
     pub(crate) fn fill(&mut self, sections: &Sections, delta2: f32, floor: f32) {
         let n = sections.len();
-        let padded = n.next_multiple_of(LANES);
-        self.low.resize(padded, f32::INFINITY);
-        self.high.resize(padded, f32::NEG_INFINITY);
+        self.low.resize(n, f32::INFINITY);
+        self.high.resize(n, f32::NEG_INFINITY);
         let (at, miss2, bend) = (&sections.at[..n], &sections.miss2[..n], &sections.bend[..n]);
-        let (low, high) = (&mut self.low[..padded], &mut self.high[..padded]);
+        let (low, high) = (&mut self.low[..n], &mut self.high[..n]);
         for j in 0..n {
             let room = delta2 - miss2[j];
             let half = (room.max(0.0) / bend[j]).sqrt();
@@ -74,10 +100,6 @@ impl Intervals {
             let empty = (room < 0.0) | (end < floor);
             low[j] = if empty { f32::INFINITY } else { (at[j] - half).max(floor) };
             high[j] = if empty { f32::NEG_INFINITY } else { end };
-        }
-        for j in n..padded {
-            low[j] = f32::INFINITY;
-            high[j] = f32::NEG_INFINITY;
         }
     }
 
@@ -115,8 +137,8 @@ const NULL_BLOCK: usize = 64;
 /// Starts of listed intervals in order of how many listed intervals contain them.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Starts {
-    /// (votes, index of the interval), most votes first, then by index.
-    order: Vec<(u32, u32)>,
+    /// Votes and (inverted) index of the interval in one integer: sorts by votes, then index.
+    order: Vec<u64>,
 }
 
 impl Starts {
@@ -137,13 +159,14 @@ impl Starts {
         self.order.clear();
         for (j, &t) in listed.low.iter().enumerate() {
             if t.is_finite() {
-                self.order.push((listed.count(0, n, t), j as u32));
+                self.order.push(u64::from(listed.count(0, n, t)) << 32 | u64::from(!(j as u32)));
             }
         }
-        self.order.sort_unstable_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
+        self.order.sort_unstable();
         let mut best: Option<Peak> = None;
-        for &(count, j) in &self.order {
-            let t = listed.low[j as usize];
+        for &key in self.order.iter().rev() {
+            let count = (key >> 32) as u32;
+            let t = listed.low[!(key as u32) as usize];
             let mut c = 0;
             let mut from = 0;
             // As more null records agree the score falls, then rises again towards 0 at most: once

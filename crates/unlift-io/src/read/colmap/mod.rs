@@ -41,6 +41,8 @@ pub struct Image {
     pub camera_id: u32,
     /// Position of the camera's center in the world, in units of the model.
     pub center: [f64; 3],
+    /// The direction in the world that is up in the photo, of unit length.
+    pub up: [f64; 3],
     /// Number of 2D points, triangulated or not.
     pub n_points2d: u64,
 }
@@ -176,9 +178,10 @@ fn sorted(points: Points) -> Points {
     }
 }
 
-/// The center `-R^T t` of a camera whose pose `x_cam = R x + t` is a quaternion (w, x, y, z) and `t`;
-/// `None` when it is not finite or the quaternion is zero.
-fn center([w, x, y, z]: [f64; 4], t: [f64; 3]) -> Option<[f64; 3]> {
+/// The center `-R^T t` of a camera whose pose `x_cam = R x + t` is a quaternion (w, x, y, z) and `t`,
+/// and where its image's up (the camera's -y) points; `None` when the center is not finite or the
+/// quaternion is zero.
+fn place([w, x, y, z]: [f64; 4], t: [f64; 3]) -> Option<([f64; 3], [f64; 3])> {
     let norm2 = w * w + x * x + y * y + z * z;
     // Rotating by the conjugate, with the norm divided out once: files hold norms like 0.9999999.
     let r = [
@@ -188,7 +191,7 @@ fn center([w, x, y, z]: [f64; 4], t: [f64; 3]) -> Option<[f64; 3]> {
     ];
     let c: [f64; 3] =
         std::array::from_fn(|j| -(r[0][j] * t[0] + r[1][j] * t[1] + r[2][j] * t[2]) / norm2);
-    c.iter().all(|x| x.is_finite()).then_some(c)
+    c.iter().all(|x| x.is_finite()).then(|| (c, r[1].map(|x| -x / norm2)))
 }
 
 #[cfg(test)]
@@ -199,12 +202,13 @@ mod tests {
     fn center_is_where_the_pose_maps_to_zero() {
         // A quarter turn about z: x_cam = (-y, x, z) + t.
         let half = 0.5_f64.sqrt();
-        let c = center([half, 0.0, 0.0, half], [1.0, 2.0, 3.0]).unwrap();
+        let (c, up) = place([half, 0.0, 0.0, half], [1.0, 2.0, 3.0]).unwrap();
         for (found, expected) in c.iter().zip([-2.0, 1.0, -3.0]) {
             assert!((found - expected).abs() < 1e-12, "{c:?}");
         }
-        assert_eq!(center([0.0; 4], [1.0, 2.0, 3.0]), None);
-        assert_eq!(center([1.0, 0.0, 0.0, 0.0], [f64::NAN; 3]), None);
+        assert!((up[0] + 1.0).abs() < 1e-12, "{up:?}");
+        assert_eq!(place([0.0; 4], [1.0, 2.0, 3.0]), None);
+        assert_eq!(place([1.0, 0.0, 0.0, 0.0], [f64::NAN; 3]), None);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Camera, CameraModel, Image, Points, Tracks, center};
+use super::{Camera, CameraModel, Image, Points, Tracks, place};
 use crate::error::Error;
 use crate::read::lines::{Lines, number, quoted, words};
 
@@ -61,7 +61,7 @@ pub fn images(path: &Path) -> Result<Vec<Image>, Error> {
         let id = next(&lines, &mut words, "an image id")?;
         let rotation = next_doubles(&lines, &mut words, "a rotation (4 numbers)")?;
         let translation = next_doubles(&lines, &mut words, "a translation (3 numbers)")?;
-        let Some(center) = center(rotation, translation) else {
+        let Some((center, up)) = place(rotation, translation) else {
             let expected = format!("a finite pose of image {id}");
             return Err(lines.error(expected, format!("{rotation:?} {translation:?}")));
         };
@@ -77,7 +77,7 @@ pub fn images(path: &Path) -> Result<Vec<Image>, Error> {
             let expected = "2D points of 3 numbers (x, y, point id)";
             return Err(lines.error(expected, format!("{n_words} numbers")));
         }
-        images.push(Image { id, name, camera_id, center, n_points2d: n_words as u64 / 3 });
+        images.push(Image { id, name, camera_id, center, up, n_points2d: n_words as u64 / 3 });
     }
     Ok(images)
 }

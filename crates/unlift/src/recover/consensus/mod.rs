@@ -33,24 +33,12 @@ pub(crate) fn solve<const D: usize>(
 /// and its support.
 #[inline(always)]
 pub(crate) fn refit(sections: &Sections, t: f32, delta2: f32) -> (f32, u32) {
-    let mut t = t;
-    let mut support = 0;
-    for _ in 0..2 {
-        let (mut weight, mut sum, mut n) = (0.0f32, 0.0f32, 0);
-        for j in 0..sections.len() {
-            // The start of an interval is at delta up to rounding: it counts as within.
-            if sections.squared_distance(j, t) <= delta2 * (1.0 + 1e-4) {
-                weight += sections.bend[j];
-                sum += sections.bend[j] * (sections.at[j] - t);
-                n += 1;
-            }
-        }
-        if weight > 0.0 {
-            t += sum / weight;
-            support = n;
-        }
-    }
-    (t, support)
+    // The start of an interval is at delta up to rounding: it counts as within.
+    let reach2 = delta2 * (1.0 + 1e-4);
+    let (shift, _) = sections.least_squares_step(t, reach2);
+    let t = t + shift;
+    let (shift, support) = sections.least_squares_step(t, reach2);
+    (t + shift, support)
 }
 
 #[cfg(test)]

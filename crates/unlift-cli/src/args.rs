@@ -1,0 +1,340 @@
+//! The command line as types. What a string means is in `values.rs`.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+use unlift::audit::Threshold;
+use unlift::obfuscate::Entry;
+use unlift::recover::{Delta, Solver};
+
+use crate::gate::Gate;
+use crate::values::{self, NeighborSource, OutlierFilter};
+
+/// How much of a privacy-preserving ("obfuscated") SfM map comes back?
+#[derive(Debug, Parser)]
+#[command(
+    name = "unlift",
+    version,
+    max_term_width = 100,
+    after_help = "\
+Examples:
+  unlift demo                                  audit a made-up room, no data needed
+  unlift audit map PROJECT/sparse/0 --scale 1  audit a COLMAP map that is in meters
+  unlift schemes                               what can be audited
+
+Exit codes: 0 done, 1 a gate failed, 2 usage, 3 bad input.
+Recovered points are as private as the original map."
+)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Audit a made-up furnished room under every scheme
+    Demo(DemoArgs),
+    /// Audit what you have
+    #[command(subcommand)]
+    Audit(AuditCommand),
+    /// Hide the points of a map by one scheme: a released file and a truth file
+    Obfuscate(ObfuscateArgs),
+    /// Make neighborhoods
+    #[command(subcommand)]
+    Neighbors(NeighborsCommand),
+    /// Recover the points of an obfuscated map, from released files alone
+    Recover(RecoverArgs),
+    /// Compare recovered points with the truth
+    Evaluate(EvaluateArgs),
+    /// List the schemes: family, what stays hidden, source, stated patents
+    Schemes,
+}
+
+/// What can be audited.
+#[derive(Debug, Subcommand)]
+pub enum AuditCommand {
+    /// Audit a 3D map: COLMAP, PLY, CSV, XYZ or NPY
+    // Boxed: ten times the size of the other commands.
+    Map(Box<AuditMapArgs>),
+}
+
+/// Options of `demo`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  unlift demo
+  unlift demo --out /tmp/room")]
+pub struct DemoArgs {
+    /// Folder to write: empty, missing, or an earlier audit (replaced whole)
+    #[arg(long, value_name = "DIR", default_value = "unlift-demo")]
+    pub out: PathBuf,
+    /// Threads to use [default: one per core]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+    /// No progress bars
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// What is read, and what one unit of it means: shared by `audit map` and `obfuscate`.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Input")]
+pub struct MapArgs {
+    /// Meters per unit of the map. Without it the unit is the median distance to the K-th neighbor
+    #[arg(long, value_name = "METERS_PER_UNIT", value_parser = values::positive)]
+    pub scale: Option<f64>,
+    /// Descriptors of the points: a file beginning with P3DESC01, or a COLMAP database
+    #[arg(long, value_name = "FILE")]
+    pub descriptors: Option<PathBuf>,
+    /// Use a random subset of at most this many points
+    #[arg(long, value_name = "N")]
+    pub max_points: Option<NonZeroUsize>,
+    /// Leave out points whose mean distance to this many neighbors exceeds the mean of all by more
+    /// than RATIO standard deviations [default when given: 20,2.0]
+    #[arg(long, value_name = "NEIGHBORS,RATIO", value_parser = values::outlier_filter,
+          num_args = 0..=1, require_equals = true, default_missing_value = "20,2.0")]
+    pub outlier_filter: Option<OutlierFilter>,
+    /// True neighbors per point
+    #[arg(long, value_name = "K", default_value = "50",
+          value_parser = clap::value_parser!(u16).range(1..))]
+    pub k: u16,
+    /// The integer that all randomness comes from
+    #[arg(long, value_name = "INTEGER", default_value_t = 0)]
+    pub seed: u64,
+}
+
+/// Options of `audit map`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  unlift audit map PROJECT --scale 1
+  unlift audit map cloud.ply --schemes ppl,ppl+ --inlier-ratios 1,0.5 --out ppl-audit
+  unlift audit map PROJECT --scale 1 --gate 'ppl@0.5:0.10<=20' --gate 'all:0.25:gain<=30'
+  unlift audit map PROJECT --neighbors neighbors.parquet --solver consensus,ransac
+  unlift audit map PROJECT --share-safe --json
+
+Gates: SCHEME[@RATIO]:THRESHOLD[:gain]<=PERCENT. SCHEME may be all; without @RATIO every inlier ratio
+counts; every solver counts; the largest figure decides. :gain bounds what recovery adds to a blind
+attacker, in percentage points. A gate that is about no row of the audit is a usage error.
+
+Exit codes: 0 done, 1 a gate failed, 2 usage, 3 bad input.")]
+pub struct AuditMapArgs {
+    /// A COLMAP model or project folder, or a .ply, .csv, .xyz, .txt or .npy file
+    #[arg(value_name = "PATH")]
+    pub path: PathBuf,
+    #[command(flatten)]
+    pub map: MapArgs,
+    /// Schemes to audit, by commas [default: all, see unlift schemes]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::scheme,
+          help_heading = "Attack")]
+    pub schemes: Vec<&'static Entry>,
+    /// Shares of true neighbors to try, by commas (oracle)
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::ratio,
+          default_value = "1,0.75,0.5,0.3,0.2,0.1", help_heading = "Attack")]
+    pub inlier_ratios: Vec<f64>,
+    /// Recovery methods, by commas or repeated: consensus, ransac
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
+          default_value = "consensus", help_heading = "Attack")]
+    pub solver: Vec<Solver>,
+    /// Where neighborhoods come from: oracle (made from the map itself), or a file
+    #[arg(long, value_name = "oracle|FILE", value_parser = values::neighbor_source,
+          default_value = "oracle", help_heading = "Attack")]
+    pub neighbors: NeighborSource,
+    /// Distance up to which a neighbor supports a position, in the unit of the audit
+    #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto",
+          help_heading = "Attack")]
+    pub delta: Delta,
+    /// Average over this many seeds
+    #[arg(long, value_name = "N", default_value = "1",
+          value_parser = clap::value_parser!(u32).range(1..), help_heading = "Attack")]
+    pub repeats: u32,
+    /// Errors up to which a point counts as recovered, by commas; kept as typed
+    /// [default: 0.10,0.25 with --scale, else 1.0,2.5]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold,
+          help_heading = "Result")]
+    pub thresholds: Vec<Threshold>,
+    /// Fail (exit code 1) when more than this comes back; repeatable, see below
+    #[arg(long, value_name = "GATE", value_parser = Gate::parse, help_heading = "Result")]
+    pub gate: Vec<Gate>,
+    /// Folder to write: empty, missing, or an earlier audit (replaced whole)
+    #[arg(long, value_name = "DIR", default_value = "unlift-audit", help_heading = "Result")]
+    pub out: PathBuf,
+    /// Also write original, obfuscated and recovered clouds (PLY, OBJ)
+    #[arg(long, help_heading = "Result", conflicts_with = "share_safe")]
+    pub write_clouds: bool,
+    /// A report that can be shown: figures only, no points, paths or names
+    #[arg(long, help_heading = "Result")]
+    pub share_safe: bool,
+    /// Print a summary as JSON on stdout in place of the table
+    #[arg(long, help_heading = "Result")]
+    pub json: bool,
+    /// Threads to use; never changes a figure [default: one per core]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+    /// No progress bars
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// Options of `obfuscate`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  unlift obfuscate PROJECT --scheme ppl --scale 1 --out hidden
+
+Writes hidden/released.parquet (what an attacker sees) and hidden/truth.parquet (keep it private).")]
+pub struct ObfuscateArgs {
+    /// A COLMAP model or project folder, or a .ply, .csv, .xyz, .txt or .npy file
+    #[arg(value_name = "MODEL")]
+    pub path: PathBuf,
+    /// The scheme, see unlift schemes
+    #[arg(long, value_name = "SCHEME", value_parser = values::scheme)]
+    pub scheme: &'static Entry,
+    /// Folder to write: empty, missing, or an earlier obfuscation (replaced whole)
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub map: MapArgs,
+}
+
+/// Sources of neighborhoods.
+#[derive(Debug, Subcommand)]
+pub enum NeighborsCommand {
+    /// From the truth, at a chosen inlier ratio: an attacker of stated quality
+    Oracle(OracleArgs),
+}
+
+/// Options of `neighbors oracle`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  unlift neighbors oracle hidden/truth.parquet --inlier-ratio 0.5 --out hidden/neighbors.parquet")]
+pub struct OracleArgs {
+    /// The truth.parquet of an obfuscation
+    #[arg(value_name = "TRUTH")]
+    pub truth: PathBuf,
+    /// The released map of the same obfuscation [default: released.parquet beside TRUTH]
+    #[arg(long, value_name = "FILE")]
+    pub released: Option<PathBuf>,
+    /// Share of true neighbors: round(RATIO x K) are kept, the others are random
+    #[arg(long, value_name = "RATIO", value_parser = values::ratio)]
+    pub inlier_ratio: f64,
+    /// Neighbors per hidden point
+    #[arg(long, value_name = "K", default_value = "50",
+          value_parser = clap::value_parser!(u16).range(1..))]
+    pub k: u16,
+    /// The integer that all randomness comes from
+    #[arg(long, value_name = "INTEGER", default_value_t = 0)]
+    pub seed: u64,
+    /// File to write
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+}
+
+/// Options of `recover`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  unlift recover hidden/released.parquet --neighbors hidden/neighbors.parquet --out back.parquet")]
+pub struct RecoverArgs {
+    /// A released map
+    #[arg(value_name = "OBFUSCATED")]
+    pub released: PathBuf,
+    /// Lists of records, one per hidden point
+    #[arg(long, value_name = "FILE")]
+    pub neighbors: PathBuf,
+    /// Recovery method: consensus or ransac
+    #[arg(long, value_name = "SOLVER", value_parser = values::solver, default_value = "consensus")]
+    pub solver: Solver,
+    /// Distance up to which a neighbor supports a position, in the unit of the map
+    #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto")]
+    pub delta: Delta,
+    /// The integer that all randomness comes from
+    #[arg(long, value_name = "INTEGER", default_value_t = 0)]
+    pub seed: u64,
+    /// Threads to use; never changes a result [default: one per core]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+    /// File to write
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+}
+
+/// Options of `evaluate`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  unlift evaluate back.parquet --truth hidden/truth.parquet
+  unlift evaluate back.parquet --truth hidden/truth.parquet --thresholds 0.05,0.10 --json")]
+pub struct EvaluateArgs {
+    /// Recovered points
+    #[arg(value_name = "RECOVERED")]
+    pub recovered: PathBuf,
+    /// The truth.parquet of the obfuscation
+    #[arg(long, value_name = "TRUTH")]
+    pub truth: PathBuf,
+    /// Errors up to which a point counts as recovered, by commas; kept as typed
+    /// [default: 0.10,0.25 in meters, else 1.0,2.5]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold)]
+    pub thresholds: Vec<Threshold>,
+    /// Print JSON in place of the table
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    fn audit(arguments: &[&str]) -> Result<AuditMapArgs, clap::Error> {
+        let line = ["unlift", "audit", "map", "PATH"].iter().chain(arguments);
+        match Cli::try_parse_from(line)?.command {
+            Command::Audit(AuditCommand::Map(args)) => Ok(*args),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn the_definition_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn defaults_are_those_of_the_documentation() {
+        let args = audit(&[]).unwrap();
+        assert_eq!(args.inlier_ratios, [1.0, 0.75, 0.5, 0.3, 0.2, 0.1]);
+        assert_eq!((args.map.k, args.map.seed, args.repeats), (50, 0, 1));
+        assert_eq!(args.solver, [Solver::Consensus]);
+        assert_eq!((args.delta, args.map.outlier_filter), (Delta::Auto, None));
+        assert_eq!(args.neighbors, NeighborSource::Oracle);
+        assert!(args.schemes.is_empty() && args.thresholds.is_empty());
+    }
+
+    #[test]
+    fn lists_are_split_at_commas_and_repeated_options_add_up() {
+        let args =
+            audit(&["--solver", "consensus", "--solver", "ransac", "--schemes=ppl+,cp"]).unwrap();
+        assert_eq!(args.solver, [Solver::Consensus, Solver::Ransac]);
+        let names: Vec<&str> = args.schemes.iter().map(|scheme| scheme.name).collect();
+        assert_eq!(names, ["ppl+", "cp"]);
+    }
+
+    #[test]
+    fn the_outlier_filter_has_a_default_when_named() {
+        let filter = |arguments: &[&str]| audit(arguments).unwrap().map.outlier_filter;
+        let usual = OutlierFilter { neighbors: 20, std_ratio: 2.0 };
+        assert_eq!(filter(&["--outlier-filter"]), Some(usual));
+        let strict = OutlierFilter { neighbors: 8, std_ratio: 1.5 };
+        assert_eq!(filter(&["--outlier-filter=8,1.5"]), Some(strict));
+    }
+
+    #[test]
+    fn private_clouds_and_a_shareable_report_exclude_each_other() {
+        let error = audit(&["--write-clouds", "--share-safe"]).unwrap_err();
+        assert_eq!(error.exit_code(), 2);
+    }
+}

@@ -1,0 +1,78 @@
+//! `--write-clouds`: what was hidden, how, and what came back, for any point cloud viewer.
+
+use std::path::{Path, PathBuf};
+
+use unlift::audit::Cell;
+use unlift::geometry::frame::Bounds;
+use unlift::released::{Obfuscation, Released};
+use unlift_io::Error;
+use unlift_io::clouds::{record_segments, write_lines, write_points, write_recovered};
+
+/// Writes clouds in map units, so that they lie on the owner's map.
+pub struct Clouds {
+    folder: PathBuf,
+    unit_in_map_units: f64,
+    schemes: Vec<&'static str>,
+}
+
+impl Clouds {
+    /// Clouds in the folder `clouds` below `out`.
+    pub fn new(out: &Path, unit_in_map_units: f64) -> Result<Self, Error> {
+        let folder = out.join("clouds");
+        std::fs::create_dir(&folder).map_err(|source| Error::write(&folder, source))?;
+        Ok(Self { folder, unit_in_map_units, schemes: Vec::new() })
+    }
+
+    /// Writes the clouds of one result; `full_scale` is the error at the end of the color ramp.
+    pub fn write(&mut self, cell: &Cell<'_>, full_scale: f64) -> Result<(), Error> {
+        let scale = self.unit_in_map_units;
+        let in_map = |p: &[f64; 3]| p.map(|x| x * scale);
+        let originals: Vec<[f64; 3]> =
+            cell.original.reveal().positions().iter().map(in_map).collect();
+        if self.schemes.is_empty() {
+            write_points(&self.folder.join("original.ply"), &originals, None)?;
+        }
+        let scheme = cell.row.scheme;
+        if !self.schemes.contains(&scheme) {
+            self.schemes.push(scheme);
+            self.write_obfuscated(scheme, cell.released, cell.original.reveal().positions())?;
+        }
+        let name =
+            format!("{scheme}-recovered-{:.2}-{}.ply", cell.row.inlier_ratio, cell.row.solver);
+        let points: Vec<Option<[f64; 3]>> = (0..cell.recovered.n_slots())
+            .map(|slot| cell.recovered.position(slot).map(|p| in_map(&p)))
+            .collect();
+        let errors: Vec<f64> = cell.accuracy.errors().iter().map(|e| e * scale).collect();
+        write_recovered(&self.folder.join(name), &points, &errors, full_scale * scale)
+    }
+
+    /// Lines and rays clipped to the 1-99 % box as OBJ; published points as PLY. Planes have no
+    /// finite shape and are left out.
+    fn write_obfuscated(
+        &self,
+        scheme: &str,
+        released: &Released<3>,
+        originals: &[[f64; 3]],
+    ) -> Result<(), Error> {
+        let scale = self.unit_in_map_units;
+        match released.obfuscation() {
+            Obfuscation::Lines(_) | Obfuscation::Rays(_) => {
+                let Some(bounds) = Bounds::quantiles(originals, 0.01) else { return Ok(()) };
+                let mut segments = record_segments(released, &bounds.low, &bounds.high);
+                for end in segments.iter_mut().flatten() {
+                    *end = end.map(|x| x * scale);
+                }
+                write_lines(&self.folder.join(format!("{scheme}-obfuscated.obj")), &segments)
+            }
+            Obfuscation::AxisCandidates(candidates) => {
+                let origin = released.origin();
+                let place = |p: &[f32; 3]| -> [f64; 3] {
+                    std::array::from_fn(|c| (f64::from(p[c]) + origin[c]) * scale)
+                };
+                let points: Vec<[f64; 3]> = candidates.position().iter().map(place).collect();
+                write_points(&self.folder.join(format!("{scheme}-obfuscated.ply")), &points, None)
+            }
+            Obfuscation::AxisPlanes(_) => Ok(()),
+        }
+    }
+}

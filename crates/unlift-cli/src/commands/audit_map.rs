@@ -1,0 +1,163 @@
+//! `unlift audit map`: a map in, one honest answer out.
+
+use std::path::Path;
+use std::time::Instant;
+
+use serde_json::{Map, Value, json};
+use unlift::audit::{Plan, PointNeighbors, Source};
+use unlift_io::hash::{hash_file, hash_files};
+use unlift_io::read;
+use unlift_io::stage::read_point_neighborhoods;
+use unlift_report::document::Input;
+
+use super::{open_map, with_threads};
+use crate::args::AuditMapArgs;
+use crate::exit::{Outcome, usage};
+use crate::job::{Finished, Job, open_out, ordered, perform};
+use crate::output::print;
+use crate::prepare::Prepared;
+use crate::values::{NeighborSource, all_schemes, distinct};
+
+/// Audits a map.
+pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
+    let started = Instant::now();
+    let out = open_out(&args.out)?;
+    let finished = with_threads(args.threads, || {
+        let (input, prepared) = open_map(&args.path, &args.map)?;
+        for note in &input.skipped {
+            eprintln!("unlift: note: {note}");
+        }
+        let scale = 1.0 / prepared.unit_in_map_units;
+        let job = Job {
+            original: &prepared.original,
+            descriptors: prepared.descriptors.as_ref(),
+            cameras: input.cameras.iter().map(|c| c.map(|x| x * scale)).collect(),
+            up: input.up,
+            plan: plan(&args, &prepared, input.positions.len())?,
+            input: provenance(&args, &input, &prepared)?,
+            options: more_options(&args),
+            gates: args.gate.clone(),
+            out: args.out.clone(),
+            unit_in_map_units: prepared.unit_in_map_units,
+            write_clouds: args.write_clouds,
+            share_safe: args.share_safe,
+            quiet: args.quiet,
+            started,
+        };
+        perform(job, out)
+    })?;
+    print(&if args.json { summary(&finished)? } else { finished.text() })?;
+    Ok(if finished.passed() { Outcome::Done } else { Outcome::GateFailed })
+}
+
+fn plan(args: &AuditMapArgs, prepared: &Prepared, n_read: usize) -> anyhow::Result<Plan> {
+    let usual = Plan::new(prepared.original.reveal().unit());
+    let schemes = if args.schemes.is_empty() { all_schemes() } else { args.schemes.clone() };
+    let thresholds = match args.thresholds.as_slice() {
+        [] => usual.thresholds.clone(),
+        given => given.to_vec(),
+    };
+    for (at, threshold) in thresholds.iter().enumerate() {
+        if thresholds[..at].iter().any(|other| other.value == threshold.value) {
+            return Err(usage(format!(
+                "--thresholds: expected each once, found {} again",
+                threshold.label
+            )));
+        }
+    }
+    let source = match &args.neighbors {
+        NeighborSource::Oracle => Source::Oracle,
+        NeighborSource::File(path) => {
+            Source::Given(by_point(path, args.share_safe, prepared, n_read)?)
+        }
+    };
+    Ok(Plan {
+        schemes: distinct(schemes, |a, b| a.name == b.name),
+        source,
+        inlier_ratios: distinct(args.inlier_ratios.clone(), |a, b| a == b),
+        k: usize::from(args.map.k),
+        solvers: distinct(args.solver.clone(), |a, b| a == b),
+        delta: args.delta,
+        thresholds,
+        seed: args.map.seed,
+        repeats: args.repeats,
+        ..usual
+    })
+}
+
+/// Lists by row of the file, for the rows that were kept.
+fn by_point(
+    path: &Path,
+    share_safe: bool,
+    prepared: &Prepared,
+    n_read: usize,
+) -> anyhow::Result<PointNeighbors> {
+    let lists = read_point_neighborhoods(path, n_read)?;
+    let mut kept_as = vec![None; n_read];
+    for (kept, &row) in prepared.rows.iter().enumerate() {
+        kept_as[row as usize] = Some(kept as u32);
+    }
+    let (mut offsets, mut neighbors) = (vec![0u64], Vec::new());
+    let mut scores = lists.scores().map(|_| Vec::new());
+    for &row in &prepared.rows {
+        let start = lists.offsets()[row as usize] as usize;
+        for (at, &neighbor) in lists.of(row as usize).iter().enumerate() {
+            if let Some(kept) = kept_as[neighbor as usize] {
+                neighbors.push(kept);
+                if let (Some(scores), Some(all)) = (&mut scores, lists.scores()) {
+                    scores.push(all[start + at]);
+                }
+            }
+        }
+        offsets.push(neighbors.len() as u64);
+    }
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let name = if share_safe { "file".to_owned() } else { stem };
+    Ok(PointNeighbors { name, offsets, neighbors, scores })
+}
+
+fn provenance(
+    args: &AuditMapArgs,
+    input: &read::Input,
+    prepared: &Prepared,
+) -> anyhow::Result<Input> {
+    let mut others = Vec::new();
+    if let Some(path) = &args.map.descriptors {
+        others.push(("descriptors".to_owned(), hash_file(path)?));
+    }
+    if let NeighborSource::File(path) = &args.neighbors {
+        others.push(("neighbors".to_owned(), hash_file(path)?));
+    }
+    Ok(Input {
+        path: Some(args.path.display().to_string()),
+        sha256: hash_files(&input.files)?,
+        n_points: prepared.original.len() as u64,
+        scale_m_per_unit: args.map.scale,
+        unit_in_map_units: Some(prepared.unit_in_map_units),
+        other_sha256: ordered(others),
+    })
+}
+
+/// Options that change the points, not the plan.
+fn more_options(args: &AuditMapArgs) -> Map<String, Value> {
+    let mut options = Map::new();
+    if let Some(most) = args.map.max_points {
+        options.insert("max_points".into(), json!(most.get()));
+    }
+    if let Some(filter) = args.map.outlier_filter {
+        let value = json!({ "neighbors": filter.neighbors, "std_ratio": filter.std_ratio });
+        options.insert("outlier_filter".into(), value);
+    }
+    options
+}
+
+/// What a script wants to know: the results and where the rest is.
+fn summary(finished: &Finished) -> anyhow::Result<String> {
+    let mut document: Value = serde_json::from_str(&finished.document.to_json()?)?;
+    let keep = ["unlift", "schema", "results", "break_even", "gates"];
+    if let Some(fields) = document.as_object_mut() {
+        fields.retain(|name, _| keep.contains(&name.as_str()));
+        fields.insert("report".into(), json!(finished.report.display().to_string()));
+    }
+    Ok(format!("{document:#}\n"))
+}

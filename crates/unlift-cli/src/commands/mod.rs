@@ -1,0 +1,67 @@
+//! One file per command: parse, call the library, print.
+
+mod audit_map;
+mod demo;
+mod evaluate;
+mod neighbors;
+mod obfuscate;
+mod recover;
+mod schemes;
+
+use std::num::NonZeroUsize;
+use std::path::Path;
+
+use crate::args::{AuditCommand, Command, MapArgs, NeighborsCommand};
+use crate::exit::{Outcome, advise};
+use crate::prepare::{self, Preparation, Prepared};
+use unlift_io::read::{self, Input};
+
+/// Runs one command.
+///
+/// # Errors
+/// Whatever keeps it from its result; `exit` turns it into a line and a code.
+pub fn run(command: Command) -> anyhow::Result<Outcome> {
+    match command {
+        Command::Demo(args) => demo::run(&args),
+        Command::Audit(AuditCommand::Map(args)) => audit_map::run(*args),
+        Command::Obfuscate(args) => obfuscate::run(&args),
+        Command::Neighbors(NeighborsCommand::Oracle(args)) => neighbors::oracle(&args),
+        Command::Recover(args) => recover::run(&args),
+        Command::Evaluate(args) => evaluate::run(&args),
+        Command::Schemes => schemes::run(),
+    }
+}
+
+/// Runs `work` on `threads` threads (all cores without a number); never changes a result.
+fn with_threads<T: Send>(
+    threads: Option<NonZeroUsize>,
+    work: impl FnOnce() -> anyhow::Result<T> + Send,
+) -> anyhow::Result<T> {
+    let n = threads.map_or(0, NonZeroUsize::get);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build()?;
+    pool.install(work)
+}
+
+/// Reads a map and makes it ready: the first step of `audit map` and `obfuscate`.
+fn open_map(path: &Path, args: &MapArgs) -> anyhow::Result<(Input, Prepared)> {
+    let input = read::open(path)?;
+    let descriptors =
+        args.descriptors.as_deref().map(|file| read::descriptors(file, &input)).transpose()?;
+    let preparation = Preparation {
+        scale: args.scale,
+        k: usize::from(args.k),
+        outlier_filter: args.outlier_filter,
+        max_points: args.max_points.map(NonZeroUsize::get),
+        seed: args.seed,
+    };
+    let prepared = prepare::prepare(&input.positions, descriptors.as_ref(), &preparation);
+    let prepared = prepared.map_err(|error| {
+        let few = error.what() == "points" && input.positions.len() > 2;
+        let error = unlift_io::Error::core(path, error);
+        if few {
+            return advise(error, "a smaller --k, or more points");
+        }
+        error.into()
+    })?;
+    Ok((input, prepared))
+}

@@ -1,0 +1,39 @@
+//! `unlift neighbors oracle`: the truth in, neighborhoods of a chosen quality out.
+
+use unlift::neighbors::oracle::{TrueNeighbors, search};
+use unlift_io::stage::{read_released, read_truth, write_neighborhoods};
+
+use super::obfuscate::RELEASED;
+use crate::args::OracleArgs;
+use crate::exit::{Outcome, advise};
+use crate::output::print;
+
+/// Makes neighborhoods at one inlier ratio.
+pub fn oracle(args: &OracleArgs) -> anyhow::Result<Outcome> {
+    let (original, secret) = read_truth::<3>(&args.truth)?;
+    let beside = || args.truth.with_file_name(RELEASED);
+    let released_path = args.released.clone().unwrap_or_else(beside);
+    // The truth does not say how many points share a record.
+    let released = read_released::<3>(&released_path).map_err(|error| match args.released {
+        None if !released_path.exists() => advise(error, "--released FILE"),
+        _ => error.into(),
+    })?;
+    if released.n_slots() != secret.n_slots() {
+        let expected = format!("{} hidden points, as in the truth", secret.n_slots());
+        let found = released.n_slots().to_string();
+        return Err(unlift_io::Error::new(released_path, "", expected, found).into());
+    }
+    let core = |error| unlift_io::Error::core(&args.truth, error);
+    let knn = search(&original).map_err(core)?;
+    let k = usize::from(args.k);
+    let near = TrueNeighbors::new(&knn, &secret, released.slots_per_record(), k).map_err(core)?;
+    let lists = near.at_inlier_ratio(args.inlier_ratio, args.seed).map_err(core)?;
+    write_neighborhoods(&args.out, &lists)?;
+    print(&format!(
+        "{} neighborhoods of {k} at inlier ratio {}, in {}\n",
+        lists.n_slots(),
+        args.inlier_ratio,
+        args.out.display()
+    ))?;
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,39 @@
+//! `unlift obfuscate`: a map in, a released file and a truth file out.
+
+use unlift::audit::Plan;
+use unlift::obfuscate::obfuscate;
+use unlift_io::atomic::OutputDir;
+use unlift_io::stage::{write_released, write_truth};
+
+use super::open_map;
+use crate::args::ObfuscateArgs;
+use crate::exit::{Outcome, usage};
+use crate::output::print;
+
+/// What the attacker sees, and what marks a folder as an earlier obfuscation.
+pub const RELEASED: &str = "released.parquet";
+/// What only the owner has.
+pub const TRUTH: &str = "truth.parquet";
+
+/// Hides a map by one scheme.
+pub fn run(args: &ObfuscateArgs) -> anyhow::Result<Outcome> {
+    let out = OutputDir::create(&args.out, RELEASED).map_err(|e| usage(format!("--out: {e}")))?;
+    let (_, prepared) = open_map(&args.path, &args.map)?;
+    let name = args.scheme.name;
+    let scheme = args.scheme.in_3d.ok_or_else(|| usage(format!("{name} is not for maps")))?;
+    let options = Plan::new(prepared.original.reveal().unit()).scheme_options;
+    let descriptors = prepared.descriptors.as_ref();
+    let hidden = obfuscate(scheme, &prepared.original, descriptors, &options, args.map.seed);
+    let (released, secret) = hidden.map_err(|e| unlift_io::Error::core(&args.path, e))?;
+    write_released(&out.path().join(RELEASED), &released)?;
+    write_truth(&out.path().join(TRUTH), &prepared.original, &secret)?;
+    out.commit()?;
+    print(&format!(
+        "{name}: {} points hidden in {} records, {} dropped, in {}\n",
+        released.n_slots(),
+        released.n_records(),
+        secret.dropped().len(),
+        args.out.display()
+    ))?;
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,169 @@
+//! An audit's outcome as the document that is written: names and shapes only, nothing is computed.
+
+use std::time::Instant;
+
+use serde_json::{Map, Value, json};
+use unlift::Unit;
+use unlift::audit::{self, Outcome, Plan, Row, Source, Threshold};
+use unlift::recover::Delta;
+use unlift_report::document as report;
+
+use crate::job::ordered;
+
+/// What an outcome does not know about itself.
+pub struct Provenance {
+    /// What was read.
+    pub input: report::Input,
+    /// Options for the record.
+    pub options: Map<String, Value>,
+    /// Gates and what they found.
+    pub gates: Vec<report::GateResult>,
+    /// When the command began.
+    pub started: Instant,
+}
+
+/// The plan and `more` as options for the record.
+pub fn options(plan: &Plan, more: Map<String, Value>) -> Map<String, Value> {
+    let names: Vec<&str> = plan.schemes.iter().map(|scheme| scheme.name).collect();
+    let labels: Vec<&str> = plan.thresholds.iter().map(|t| t.label.as_str()).collect();
+    let mut options = Map::new();
+    options.insert("schemes".into(), json!(names));
+    options.insert("voxel".into(), json!(plan.scheme_options.voxel));
+    let neighbors = match &plan.source {
+        Source::Oracle => "oracle",
+        Source::Given(given) => &given.name,
+    };
+    options.insert("neighbors".into(), json!(neighbors));
+    options.insert("inlier_ratios".into(), json!(plan.inlier_ratios));
+    options.insert("k".into(), json!(plan.k));
+    options
+        .insert("solver".into(), json!(plan.solvers.iter().map(|s| s.name()).collect::<Vec<_>>()));
+    let delta = match plan.delta {
+        Delta::Auto => json!("auto"),
+        Delta::Fixed(delta) => json!(delta),
+    };
+    options.insert("delta".into(), delta);
+    options.insert("thresholds".into(), json!(labels));
+    options.insert("repeats".into(), json!(plan.repeats));
+    options.extend(more);
+    options
+}
+
+/// The document of an audit.
+pub fn document(plan: &Plan, outcome: &Outcome, provenance: Provenance) -> report::Document {
+    let seconds = &outcome.seconds;
+    let stages = [
+        ("search", seconds.search),
+        ("obfuscate", seconds.obfuscate),
+        ("neighbors", seconds.neighbors),
+        ("recover", seconds.recover),
+        ("evaluate", seconds.evaluate),
+    ];
+    let line: Vec<String> = std::env::args().map(|word| quoted(&word)).collect();
+    report::Document {
+        unlift: env!("CARGO_PKG_VERSION").to_owned(),
+        schema: report::SCHEMA,
+        input: provenance.input,
+        options: provenance.options,
+        seed: plan.seed,
+        results: outcome.rows.iter().map(|r| row(r, &plan.thresholds)).collect(),
+        break_even: outcome.break_even.iter().map(break_even).collect(),
+        gates: provenance.gates,
+        run: report::Run {
+            command: Some(
+                ["unlift".to_owned()]
+                    .into_iter()
+                    .chain(line.into_iter().skip(1))
+                    .collect::<Vec<_>>()
+                    .join(" "),
+            ),
+            threads: rayon::current_num_threads() as u32,
+            peak_memory_bytes: crate::memory::peak_bytes(),
+            seconds: report::Seconds {
+                total: provenance.started.elapsed().as_secs_f64(),
+                rows: seconds.rows.iter().map(|&s| ordered([("recover".to_owned(), s)])).collect(),
+                stages: ordered(stages.map(|(name, s)| (name.to_owned(), s))),
+            },
+        },
+    }
+}
+
+fn row(row: &Row, thresholds: &[Threshold]) -> report::Row {
+    let by_threshold = |percents: &[f64]| {
+        ordered(thresholds.iter().map(|t| t.label.clone()).zip(percents.iter().copied()))
+    };
+    let by_reason = |counts: &std::collections::BTreeMap<&'static str, usize>| {
+        ordered(counts.iter().map(|(reason, &n)| ((*reason).to_owned(), n as u64)))
+    };
+    let label = |p: f64| format!("{p:.0}");
+    report::Row {
+        scheme: row.scheme.to_owned(),
+        neighbors: row.neighbors.clone(),
+        oracle_noise: row.oracle_noise.map(str::to_owned),
+        inlier_ratio: row.inlier_ratio,
+        k: row.k as u32,
+        solver: row.solver.to_owned(),
+        delta: Some(row.delta),
+        unit: match row.unit {
+            Unit::Meter => report::LengthUnit::Meter,
+            Unit::KthNeighbor | Unit::Pixel => report::LengthUnit::KthNeighbor,
+        },
+        n_points: row.n_points as u64,
+        n_lost: row.n_lost() as u64,
+        lost: by_reason(&row.lost),
+        dropped: by_reason(&row.dropped),
+        recovered_percent: by_threshold(&row.recovered_percent),
+        blind_percent: by_threshold(&row.blind_percent),
+        axis_accuracy_percent: row.axis_accuracy_percent,
+        assignment_accuracy_percent: row.assignment_accuracy_percent,
+        median_error: row.error_percentiles[0],
+        error_percentiles: ordered(
+            audit::PERCENTILES.iter().map(|&p| label(p)).zip(row.error_percentiles.iter().copied()),
+        ),
+        ransac_trials: row
+            .ransac_trials
+            .as_ref()
+            .map(|bins| bins.iter().map(|&(up_to, n)| (u64::from(up_to), n)).collect()),
+        repeats: row.repeats.as_ref().map_or(1, |r| r.n),
+        std: row.repeats.as_ref().map(|r| report::Spread {
+            recovered_percent: by_threshold(&r.recovered_percent_std),
+            blind_percent: by_threshold(&r.blind_percent_std),
+            median_error: r.median_error_std,
+        }),
+    }
+}
+
+fn break_even(row: &audit::BreakEven) -> report::BreakEven {
+    report::BreakEven {
+        scheme: row.scheme.to_owned(),
+        solver: row.solver.to_owned(),
+        threshold: row.threshold.clone(),
+        inlier_ratio: Some(row.inlier_ratio),
+        bound: match row.bound {
+            audit::Bound::Interpolated => report::Bound::Interpolated,
+            audit::Bound::BelowTested => report::Bound::BelowTested,
+            audit::Bound::AboveTested => report::Bound::AboveTested,
+        },
+    }
+}
+
+/// A word of the command line as a shell would need it.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@+%".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_quoted_for_a_shell() {
+        assert_eq!(quoted("ppl@0.5:0.10"), "ppl@0.5:0.10");
+        assert_eq!(quoted("a b"), "'a b'");
+        assert_eq!(quoted("it's<=1"), r"'it'\''s<=1'");
+    }
+}

@@ -1,0 +1,235 @@
+//! One audit from a prepared map to the files in its folder: what `audit map` and `demo` share.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use indexmap::IndexMap;
+use unlift::Descriptors;
+use unlift::audit::{Cell, Observer, Outcome, Plan, run};
+use unlift::truth::Original;
+use unlift_io::atomic::{OutputDir, write_file};
+use unlift_report::document::{Document, GateResult, Input};
+use unlift_report::{RenderOptions, render, text_table};
+
+use crate::clouds::Clouds;
+use crate::document::{self, Provenance};
+use crate::exit::usage;
+use crate::gate::{Candidate, Gate};
+use crate::pictures::Pictures;
+use crate::progress::Progress;
+
+/// Everything an audit needs.
+pub struct Job<'a> {
+    /// The points, in the unit of the audit.
+    pub original: &'a Original<3>,
+    /// One row per point.
+    pub descriptors: Option<&'a Descriptors>,
+    /// Camera centers in the unit of the audit, for the picture.
+    pub cameras: Vec<[f64; 3]>,
+    /// The direction that is up in the picture, where known.
+    pub up: Option<[f64; 3]>,
+    /// What is to be done.
+    pub plan: Plan,
+    /// What was read.
+    pub input: Input,
+    /// Options for the record, beside those in the plan.
+    pub options: serde_json::Map<String, serde_json::Value>,
+    /// Bounds to hold.
+    pub gates: Vec<Gate>,
+    /// Folder to write.
+    pub out: PathBuf,
+    /// Length of the audit's unit in map units; clouds are written in map units.
+    pub unit_in_map_units: f64,
+    /// Also write clouds.
+    pub write_clouds: bool,
+    /// Figures only.
+    pub share_safe: bool,
+    /// No progress bars.
+    pub quiet: bool,
+    /// When the command began.
+    pub started: Instant,
+}
+
+/// What an audit left behind.
+pub struct Finished {
+    /// The figures, as written.
+    pub document: Document,
+    /// Where the report is.
+    pub report: PathBuf,
+}
+
+impl Finished {
+    /// Whether every gate held.
+    pub fn passed(&self) -> bool {
+        self.document.gates.iter().all(|gate| gate.passed)
+    }
+
+    /// The short table, the gates that failed, and where the report is.
+    pub fn text(&self) -> String {
+        let mut text = text_table(&self.document);
+        for gate in &self.document.gates {
+            let (word, found) = (if gate.passed { "held" } else { "FAILED" }, gate.found_percent);
+            text.push_str(&format!("gate {}: {word}, found {found:.1} %\n", gate.gate));
+        }
+        text.push_str(&format!("\nreport: {}\n", self.report.display()));
+        text
+    }
+}
+
+/// The file that marks a folder as an audit.
+const MARKER: &str = "audit.json";
+
+/// Opens the folder an audit goes to: refused early, before anything is computed.
+pub fn open_out(out: &Path) -> anyhow::Result<OutputDir> {
+    OutputDir::create(out, MARKER).map_err(|error| usage(format!("--out: {error}")))
+}
+
+/// Runs the job and writes its folder, whole or not at all.
+pub fn perform(job: Job<'_>, out: OutputDir) -> anyhow::Result<Finished> {
+    check_gates(&job.gates, &job.plan)?;
+    let n_cells = n_cells(&job.plan);
+    let mut watcher = Watcher {
+        progress: Progress::new(job.quiet),
+        pictures: (!job.share_safe).then(|| Pictures::new(job.original, &job.plan, n_cells)),
+        curves: Vec::new(),
+        clouds: job
+            .write_clouds
+            .then(|| Clouds::new(out.path(), job.unit_in_map_units))
+            .transpose()?,
+        thresholds: job.plan.thresholds.iter().map(|t| t.value).collect(),
+        failed: None,
+    };
+    let outcome = run(job.original, job.descriptors, &job.plan, &mut watcher)?;
+    if let Some(error) = watcher.failed {
+        return Err(error.into());
+    }
+    drop(watcher.progress);
+    let gates = gate_results(&job.gates, &job.plan, &outcome);
+    let options = document::options(&job.plan, job.options);
+    let provenance = Provenance { input: job.input, options, gates, started: job.started };
+    let document = document::document(&job.plan, &outcome, provenance);
+    let shown = if job.share_safe { document.share_safe() } else { document };
+    let scene = watcher.pictures.map(|p| p.into_scene(&job.cameras, job.up));
+    let options = RenderOptions { share_safe: job.share_safe, error_cdf: watcher.curves };
+    let page = render(&shown, scene.as_ref(), &options)?;
+    let json = shown.to_json()?;
+    write_file(&out.path().join("report.html"), |w| std::io::Write::write_all(w, page.as_bytes()))?;
+    write_file(&out.path().join(MARKER), |w| std::io::Write::write_all(w, json.as_bytes()))?;
+    out.commit()?;
+    Ok(Finished { document: shown, report: job.out.join("report.html") })
+}
+
+fn n_cells(plan: &Plan) -> usize {
+    let ratios = match plan.source {
+        unlift::audit::Source::Oracle => plan.inlier_ratios.len(),
+        unlift::audit::Source::Given(_) => 1,
+    };
+    plan.schemes.len() * ratios * plan.solvers.len()
+}
+
+/// Rows that the plan will have, as gates see them.
+fn candidates<'a>(plan: &'a Plan, outcome: Option<&'a Outcome>) -> Vec<Candidate<'a>> {
+    let mut candidates = Vec::new();
+    if let Some(outcome) = outcome {
+        for row in &outcome.rows {
+            for (at, threshold) in plan.thresholds.iter().enumerate() {
+                candidates.push(Candidate {
+                    scheme: row.scheme,
+                    inlier_ratio: row.oracle_noise.is_some().then_some(row.inlier_ratio),
+                    threshold: threshold.value,
+                    recovered_percent: row.recovered_percent[at],
+                    blind_percent: row.blind_percent[at],
+                });
+            }
+        }
+        return candidates;
+    }
+    let ratios: Vec<Option<f64>> = match plan.source {
+        unlift::audit::Source::Oracle => plan.inlier_ratios.iter().map(|&r| Some(r)).collect(),
+        unlift::audit::Source::Given(_) => vec![None],
+    };
+    for scheme in &plan.schemes {
+        for &inlier_ratio in &ratios {
+            for threshold in &plan.thresholds {
+                candidates.push(Candidate {
+                    scheme: scheme.name,
+                    inlier_ratio,
+                    threshold: threshold.value,
+                    recovered_percent: 0.0,
+                    blind_percent: 0.0,
+                });
+            }
+        }
+    }
+    candidates
+}
+
+/// A gate about no row is told before the audit runs, not after.
+fn check_gates(gates: &[Gate], plan: &Plan) -> anyhow::Result<()> {
+    let rows = candidates(plan, None);
+    match gates.iter().find(|gate| gate.worst(rows.iter().copied()).is_none()) {
+        None => Ok(()),
+        Some(gate) => Err(usage(format!(
+            "--gate {}: expected a scheme, inlier ratio and threshold of this audit, found none \
+             that fits",
+            gate.typed
+        ))),
+    }
+}
+
+fn gate_results(gates: &[Gate], plan: &Plan, outcome: &Outcome) -> Vec<GateResult> {
+    let rows = candidates(plan, Some(outcome));
+    let result = |gate: &Gate| {
+        let found_percent = gate.worst(rows.iter().copied())?;
+        Some(GateResult {
+            gate: gate.typed.clone(),
+            found_percent,
+            bound_percent: gate.bound_percent,
+            passed: gate.passes(found_percent),
+        })
+    };
+    gates.iter().filter_map(result).collect()
+}
+
+/// Shows progress and keeps what the report draws.
+struct Watcher {
+    progress: Progress,
+    pictures: Option<Pictures>,
+    curves: Vec<unlift_report::ErrorCdf>,
+    clouds: Option<Clouds>,
+    thresholds: Vec<f64>,
+    failed: Option<unlift_io::Error>,
+}
+
+/// Points of an error curve.
+const CURVE_POINTS: i32 = 80;
+
+impl Observer for Watcher {
+    fn progress(&mut self, done: usize, total: usize, what: &str) {
+        self.progress.show(done, total, what);
+    }
+
+    fn cell(&mut self, cell: &Cell<'_>) {
+        if cell.repeat > 0 {
+            return;
+        }
+        let most = self.thresholds.iter().copied().fold(0.0, f64::max);
+        // From a hundredth of the largest threshold to ten times it, evenly on a logarithmic axis.
+        let at =
+            |step: i32| most * 10f64.powf(-2.0 + 3.0 * f64::from(step) / f64::from(CURVE_POINTS));
+        let points =
+            (0..=CURVE_POINTS).map(|s| (at(s), cell.accuracy.percent_within(at(s)))).collect();
+        self.curves.push(unlift_report::ErrorCdf { row: self.curves.len(), points });
+        if let Some(pictures) = &mut self.pictures {
+            pictures.add(cell);
+        }
+        if let (Some(clouds), None) = (&mut self.clouds, &self.failed) {
+            self.failed = clouds.write(cell, most).err();
+        }
+    }
+}
+
+/// An ordered map from pairs.
+pub fn ordered<V>(pairs: impl IntoIterator<Item = (String, V)>) -> IndexMap<String, V> {
+    pairs.into_iter().collect()
+}

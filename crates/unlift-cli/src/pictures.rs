@@ -1,0 +1,110 @@
+//! What the report's 3D view shows: a sample of points, hidden and recovered.
+
+use unlift::audit::{Cell, Plan};
+use unlift::released::{Obfuscation, Released};
+use unlift::truth::Original;
+use unlift_report::scene::{
+    ObfuscationView, Scene3d, SceneBox, Shapes, View, points_within_budget, subsample,
+};
+
+/// Points and shapes kept while an audit runs.
+pub struct Pictures {
+    sample: Vec<usize>,
+    /// The middle of the map: `f32` is enough about it, even for georeferenced maps.
+    middle: [f64; 3],
+    bounds: SceneBox,
+    scene: Scene3d,
+}
+
+/// Shapes drawn per scheme: more lines than this are a fog.
+const MOST_SHAPES: usize = 3_000;
+
+impl Pictures {
+    /// Chooses the points to show; `n_views` results will be shown on them.
+    pub fn new(original: &Original<3>, plan: &Plan, n_views: usize) -> Self {
+        let points = original.reveal().positions();
+        let most = points_within_budget(n_views, plan.schemes.len());
+        let sample = subsample(points.len(), most, plan.seed);
+        let middle = unlift::geometry::frame::rounded_origin(points);
+        let originals: Vec<[f32; 3]> =
+            sample.iter().map(|&at| near(&points[at], &middle)).collect();
+        let bounds = SceneBox::robust(&originals);
+        let scene = Scene3d { originals, n_points: points.len() as u64, ..Scene3d::default() };
+        Self { sample, middle, bounds, scene }
+    }
+
+    /// Keeps one result.
+    pub fn add(&mut self, cell: &Cell<'_>) {
+        let mut slot_of = vec![None; cell.original.len()];
+        for (slot, original) in cell.secret.hidden().iter().enumerate() {
+            slot_of[original.index()] = Some(slot);
+        }
+        if self.scene.obfuscations.iter().all(|view| view.scheme != cell.row.scheme) {
+            let slots = self.sample.iter().filter_map(|&at| slot_of[at]);
+            let mut records: Vec<usize> =
+                slots.map(|slot| slot / cell.released.slots_per_record()).collect();
+            records.sort_unstable();
+            records.dedup();
+            records.truncate(MOST_SHAPES);
+            let shapes = self.shapes(cell.released, &records);
+            self.scene
+                .obfuscations
+                .push(ObfuscationView { scheme: cell.row.scheme.to_owned(), shapes });
+        }
+        let recovered = self.sample.iter().map(|&at| {
+            let position = slot_of[at].and_then(|slot| cell.recovered.position(slot));
+            position.map_or([f32::NAN; 3], |p| near(&p, &self.middle))
+        });
+        self.scene.views.push(View {
+            scheme: cell.row.scheme.to_owned(),
+            solver: cell.row.solver.to_owned(),
+            inlier_ratio: cell.row.inlier_ratio,
+            recovered: recovered.collect(),
+        });
+    }
+
+    /// The finished scene; `cameras` in the unit of the audit.
+    pub fn into_scene(mut self, cameras: &[[f64; 3]], up: Option<[f64; 3]>) -> Scene3d {
+        self.scene.cameras = cameras.iter().map(|c| near(c, &self.middle)).collect();
+        self.scene.up = up.map(|v| v.map(|x| x as f32));
+        self.scene
+    }
+
+    fn shapes(&self, released: &Released<3>, records: &[usize]) -> Shapes {
+        let origin = released.origin();
+        let place = |p: &[f32; 3]| -> [f32; 3] {
+            std::array::from_fn(|c| (f64::from(p[c]) + origin[c] - self.middle[c]) as f32)
+        };
+        let bounds = &self.bounds;
+        match released.obfuscation() {
+            Obfuscation::Lines(lines) => Shapes::Segments(
+                records
+                    .iter()
+                    .filter_map(|&r| {
+                        bounds.clip_line(place(&lines.foot()[r]), lines.direction()[r])
+                    })
+                    .collect(),
+            ),
+            Obfuscation::Rays(rays) => {
+                let center = |r: usize| &rays.centers()[usize::from(rays.center()[r])];
+                let clip = |&r: &usize| bounds.clip_ray(place(center(r)), rays.direction()[r]);
+                Shapes::Segments(records.iter().filter_map(clip).collect())
+            }
+            Obfuscation::AxisPlanes(planes) => {
+                let patch = |&r: &usize| {
+                    let axis = usize::from(planes.axis()[r]);
+                    let shift = (origin[axis] - self.middle[axis]) as f32;
+                    bounds.axis_patch(axis, planes.offset()[r] + shift)
+                };
+                Shapes::Patches(records.iter().filter_map(patch).collect())
+            }
+            Obfuscation::AxisCandidates(candidates) => {
+                Shapes::Points(records.iter().map(|&r| place(&candidates.position()[r])).collect())
+            }
+        }
+    }
+}
+
+fn near(point: &[f64; 3], middle: &[f64; 3]) -> [f32; 3] {
+    std::array::from_fn(|c| (point[c] - middle[c]) as f32)
+}

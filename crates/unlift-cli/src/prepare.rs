@@ -1,0 +1,174 @@
+//! From a file's points to the points that are audited: filter, subset, unit.
+
+use unlift::geometry::knn::Knn;
+use unlift::seed::{Draws, Stage};
+use unlift::truth::Original;
+use unlift::{Descriptors, Error, PointSet, Unit};
+
+use crate::values::OutlierFilter;
+
+/// What to do with the points of a file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Preparation {
+    /// Meters per unit of the file; without it, the K-th neighbor distance becomes the unit.
+    pub scale: Option<f64>,
+    /// The K of that unit.
+    pub k: usize,
+    /// Statistical outlier removal, first.
+    pub outlier_filter: Option<OutlierFilter>,
+    /// Random subset, second.
+    pub max_points: Option<usize>,
+    /// Seed of the subset.
+    pub seed: u64,
+}
+
+/// Points ready for an audit.
+#[derive(Debug)]
+pub struct Prepared {
+    /// The points in the unit of the audit.
+    pub original: Original<3>,
+    /// One row per point.
+    pub descriptors: Option<Descriptors>,
+    /// Length of that unit in the units of the file.
+    pub unit_in_map_units: f64,
+    /// Which rows of the file were kept, ascending.
+    pub rows: Vec<u32>,
+}
+
+/// Filters, thins out and scales `positions` (and `descriptors` with them).
+///
+/// # Errors
+/// When fewer than K + 1 points are left, they coincide, or a scaled coordinate is not finite.
+pub fn prepare(
+    positions: &[[f64; 3]],
+    descriptors: Option<&Descriptors>,
+    preparation: &Preparation,
+) -> Result<Prepared, Error> {
+    let mut rows: Vec<u32> = (0..positions.len() as u32).collect();
+    if let Some(filter) = preparation.outlier_filter {
+        rows = without_outliers(positions, filter)?;
+    }
+    if let Some(most) = preparation.max_points
+        && rows.len() > most
+    {
+        Draws::new(preparation.seed, Stage::Subset, 0).shuffle(&mut rows);
+        rows.truncate(most);
+        rows.sort_unstable();
+    }
+    let k = preparation.k;
+    if rows.len() < k + 1 {
+        let expected = format!("at least {} (K + 1)", k + 1);
+        return Err(Error::new("points", expected, rows.len().to_string()));
+    }
+    let kept: Vec<[f64; 3]> = rows.iter().map(|&row| positions[row as usize]).collect();
+    let (unit_in_map_units, factor, unit) = match preparation.scale {
+        Some(scale) => (1.0 / scale, scale, Unit::Meter),
+        None => {
+            let distance = median_kth_distance(&kept, k)?;
+            (distance, 1.0 / distance, Unit::KthNeighbor)
+        }
+    };
+    let points = PointSet::try_new(kept, unit)?.scaled(factor, unit)?;
+    let descriptors = descriptors.map(|all| all.select(&rows));
+    Ok(Prepared { original: Original::new(points), descriptors, unit_in_map_units, rows })
+}
+
+/// The median over all points of the distance to the `k`-th nearest other point.
+fn median_kth_distance(points: &[[f64; 3]], k: usize) -> Result<f64, Error> {
+    let knn = Knn::new(points)?;
+    let mut found = Vec::new();
+    let mut distances: Vec<f64> = (0..points.len())
+        .map(|row| {
+            knn.nearest(row, k, &mut found);
+            found[k - 1].0.sqrt()
+        })
+        .collect();
+    let median = unlift::geometry::vector::median(&mut distances);
+    if median > 0.0 && (1.0 / median).is_finite() {
+        return Ok(median);
+    }
+    let what = format!("median distance to neighbor {k}");
+    Err(Error::new(what, "more than 0 (points that do not coincide)", median.to_string()))
+}
+
+/// The rows whose mean distance to their nearest neighbors is usual.
+fn without_outliers(points: &[[f64; 3]], filter: OutlierFilter) -> Result<Vec<u32>, Error> {
+    let n = filter.neighbors;
+    if points.len() < n + 1 {
+        let expected = format!("at least {} for the outlier filter", n + 1);
+        return Err(Error::new("points", expected, points.len().to_string()));
+    }
+    let knn = Knn::new(points)?;
+    let mut found = Vec::new();
+    let means: Vec<f64> = (0..points.len())
+        .map(|row| {
+            knn.nearest(row, n, &mut found);
+            found.iter().map(|(squared, _)| squared.sqrt()).sum::<f64>() / n as f64
+        })
+        .collect();
+    let mean = means.iter().sum::<f64>() / means.len() as f64;
+    let variance = means.iter().map(|m| (m - mean) * (m - mean)).sum::<f64>() / means.len() as f64;
+    let limit = mean + filter.std_ratio * variance.sqrt();
+    Ok((0..points.len() as u32).filter(|&row| means[row as usize] <= limit).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PLAIN: Preparation =
+        Preparation { scale: None, k: 2, outlier_filter: None, max_points: None, seed: 0 };
+
+    /// Points 0.5 apart on a line: the second neighbor is 0.5 away but at the ends.
+    fn line(n: usize) -> Vec<[f64; 3]> {
+        (0..n).map(|i| [0.5 * i as f64, 0.0, 0.0]).collect()
+    }
+
+    #[test]
+    fn without_a_scale_the_unit_is_the_kth_neighbor() {
+        let prepared = prepare(&line(9), None, &PLAIN).unwrap();
+        assert_eq!(prepared.unit_in_map_units, 0.5);
+        let points = prepared.original.reveal();
+        assert_eq!(points.unit(), Unit::KthNeighbor);
+        assert_eq!(points.positions()[3], [3.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn a_scale_gives_meters() {
+        let scaled = Preparation { scale: Some(4.0), ..PLAIN };
+        let prepared = prepare(&line(9), None, &scaled).unwrap();
+        assert_eq!(prepared.unit_in_map_units, 0.25);
+        assert_eq!(prepared.original.reveal().positions()[3], [6.0, 0.0, 0.0]);
+        assert_eq!(prepared.original.reveal().unit(), Unit::Meter);
+    }
+
+    #[test]
+    fn too_few_points_are_told() {
+        let error = prepare(&line(2), None, &PLAIN).unwrap_err();
+        assert_eq!(error.to_string(), "points: expected at least 3 (K + 1), found 2");
+    }
+
+    #[test]
+    fn coincident_points_have_no_unit() {
+        let error = prepare(&[[1.0; 3]; 5], None, &PLAIN).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "median distance to neighbor 2: \
+             expected more than 0 (points that do not coincide), found 0"
+        );
+    }
+
+    #[test]
+    fn the_filter_drops_the_far_point_and_the_subset_keeps_order() {
+        let mut points = line(30);
+        points.push([500.0, 0.0, 0.0]);
+        let filter = Some(OutlierFilter { neighbors: 3, std_ratio: 2.0 });
+        let prepared =
+            prepare(&points, None, &Preparation { outlier_filter: filter, ..PLAIN }).unwrap();
+        assert_eq!(prepared.rows, (0..30).collect::<Vec<u32>>());
+        let prepared =
+            prepare(&points, None, &Preparation { max_points: Some(10), ..PLAIN }).unwrap();
+        assert_eq!(prepared.rows.len(), 10);
+        assert!(prepared.rows.is_sorted());
+    }
+}

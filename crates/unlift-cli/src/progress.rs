@@ -1,0 +1,45 @@
+//! Progress on stderr: only on a terminal, and only for what takes longer than a second.
+
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+/// Shorter work shows nothing.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// A progress bar that appears once it is worth it.
+pub struct Progress {
+    bar: ProgressBar,
+    started: Instant,
+    wanted: bool,
+}
+
+impl Progress {
+    /// A bar for work that begins now; none at all when `quiet` or when stderr is no terminal.
+    pub fn new(quiet: bool) -> Self {
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
+        let template = "{bar:30} {pos}/{len} {wide_msg}";
+        bar.set_style(ProgressStyle::with_template(template).expect("the template is ours"));
+        Self { bar, started: Instant::now(), wanted: !quiet && std::io::stderr().is_terminal() }
+    }
+
+    /// `done` of `total` steps are made; `what` is next.
+    pub fn show(&mut self, done: usize, total: usize, what: &str) {
+        if !self.wanted {
+            return;
+        }
+        if self.bar.is_hidden() && self.started.elapsed() >= PATIENCE {
+            self.bar.set_draw_target(ProgressDrawTarget::stderr());
+        }
+        self.bar.set_length(total as u64);
+        self.bar.set_position(done as u64);
+        self.bar.set_message(what.to_owned());
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}

@@ -1,0 +1,154 @@
+//! Strings become types, here and in `gate.rs` and nowhere else.
+
+use std::path::PathBuf;
+
+use unlift::audit::Threshold;
+use unlift::obfuscate::{Entry, SCHEMES};
+use unlift::recover::{Delta, Solver};
+
+/// Where neighborhoods come from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum NeighborSource {
+    /// Made from the originals at chosen inlier ratios.
+    Oracle,
+    /// Lists by point or by record, in a file.
+    File(PathBuf),
+}
+
+/// Statistical outlier removal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OutlierFilter {
+    /// Neighbors whose mean distance is judged.
+    pub neighbors: usize,
+    /// Points beyond the mean of that distance by this many standard deviations go.
+    pub std_ratio: f64,
+}
+
+/// A scheme by its name.
+pub fn scheme(text: &str) -> Result<&'static Entry, String> {
+    let entry = unlift::obfuscate::scheme(text).map_err(|error| expected(&error))?;
+    match entry.in_3d {
+        Some(_) => Ok(entry),
+        None => Err(format!("expected a scheme for maps, found {text} (for images only)")),
+    }
+}
+
+/// Every scheme that is defined on maps.
+pub fn all_schemes() -> Vec<&'static Entry> {
+    SCHEMES.iter().filter(|entry| entry.in_3d.is_some()).collect()
+}
+
+/// A solver by its name.
+pub fn solver(text: &str) -> Result<Solver, String> {
+    Solver::from_name(text).map_err(|error| expected(&error))
+}
+
+fn expected(error: &unlift::Error) -> String {
+    format!("expected {}, found {}", error.expected(), error.found())
+}
+
+/// A finite number above zero.
+pub fn positive(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err(format!("expected a number above 0, found {text}")),
+    }
+}
+
+/// A share from 0 to 1.
+pub fn ratio(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),
+        _ => Err(format!("expected a number from 0 to 1, found {text}")),
+    }
+}
+
+/// A threshold; reports use its typed form as the key.
+pub fn threshold(text: &str) -> Result<Threshold, String> {
+    Threshold::parse(text).map_err(|_| format!("expected a number above 0, found {text}"))
+}
+
+/// `auto`, or a length.
+pub fn delta(text: &str) -> Result<Delta, String> {
+    if text.trim() == "auto" {
+        return Ok(Delta::Auto);
+    }
+    let value =
+        positive(text).map_err(|_| format!("expected auto or a number above 0, found {text}"));
+    value.map(Delta::Fixed)
+}
+
+/// `oracle`, or a file.
+pub fn neighbor_source(text: &str) -> Result<NeighborSource, String> {
+    match text {
+        "" => Err("expected oracle or a file".to_owned()),
+        "oracle" => Ok(NeighborSource::Oracle),
+        path => Ok(NeighborSource::File(path.into())),
+    }
+}
+
+/// `NEIGHBORS,RATIO`, for example `20,2.0`.
+pub fn outlier_filter(text: &str) -> Result<OutlierFilter, String> {
+    let fields = text.split_once(',').and_then(|(neighbors, std_ratio)| {
+        Some((neighbors.trim().parse::<usize>().ok()?, positive(std_ratio).ok()?))
+    });
+    match fields {
+        Some((neighbors, std_ratio)) if neighbors > 0 => Ok(OutlierFilter { neighbors, std_ratio }),
+        _ => Err(format!(
+            "expected NEIGHBORS,RATIO with both above 0 (for example 20,2.0), found {text}"
+        )),
+    }
+}
+
+/// `items` without those that repeat an earlier one: an audit has one row per combination.
+pub fn distinct<T>(items: Vec<T>, same: impl Fn(&T, &T) -> bool) -> Vec<T> {
+    let mut kept: Vec<T> = Vec::with_capacity(items.len());
+    for item in items {
+        if !kept.iter().any(|earlier| same(earlier, &item)) {
+            kept.push(item);
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thresholds_keep_how_they_were_typed() {
+        let threshold = threshold(" 0.10").unwrap();
+        assert_eq!(threshold, Threshold { label: "0.10".to_owned(), value: 0.1 });
+    }
+
+    #[test]
+    fn wrong_values_say_what_was_expected_and_found() {
+        let texts = [
+            threshold("-1").unwrap_err(),
+            ratio("1.5").unwrap_err(),
+            delta("wide").unwrap_err(),
+            outlier_filter("20").unwrap_err(),
+            scheme("pppl").unwrap_err(),
+            solver("magic").unwrap_err(),
+        ];
+        assert_eq!(
+            texts.join("\n"),
+            "expected a number above 0, found -1\n\
+             expected a number from 0 to 1, found 1.5\n\
+             expected auto or a number above 0, found wide\n\
+             expected NEIGHBORS,RATIO with both above 0 (for example 20,2.0), found 20\n\
+             expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, found pppl\n\
+             expected one of consensus, ransac, found magic"
+        );
+    }
+
+    #[test]
+    fn nan_and_infinity_are_no_lengths() {
+        assert!(positive("nan").is_err() && positive("inf").is_err() && ratio("nan").is_err());
+    }
+
+    #[test]
+    fn repeats_fall_away_in_order() {
+        assert_eq!(distinct(vec![1.0, 0.5, 1.0], |a, b| a == b), [1.0, 0.5]);
+    }
+}

@@ -1,0 +1,9 @@
+//! Stage files, as a user of the public API sees them.
+
+mod damaged;
+mod malformed;
+mod malformed_lists;
+mod maps;
+mod round_trip;
+mod tables;
+mod third_party;

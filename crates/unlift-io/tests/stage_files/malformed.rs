@@ -1,0 +1,229 @@
+//! Every way a released map can differ from docs/formats.md, and the line that says so.
+
+use crate::tables::{
+    Columns, check, float_lists, floats, ints, lists, maybe, message, texts, with, write,
+};
+use arrow_array::ArrayRef;
+use unlift_io::stage;
+
+const LINES: &str = r#"{"kind":"released","version":1,"family":"lines","dimension":2,"unit":"m"}"#;
+
+fn lines() -> Columns {
+    vec![
+        ("foot_x", floats([0.0, 1.0, 2.0])),
+        ("foot_y", floats([0.0, 1.0, 2.0])),
+        ("direction_x", floats([1.0, 0.6, 0.0])),
+        ("direction_y", floats([0.0, 0.8, 1.0])),
+    ]
+}
+
+fn released(meta: &str, columns: Columns) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.parquet");
+    write(&path, meta, columns);
+    message(&path, stage::read_released::<2>(&path))
+}
+
+#[test]
+fn the_valid_file_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.parquet");
+    write(&path, LINES, lines());
+    assert_eq!(stage::read_released::<2>(&path).unwrap().n_records(), 3);
+}
+
+#[test]
+fn metadata() {
+    let swap = |from: &str, to: &str| {
+        assert!(LINES.contains(from));
+        released(&LINES.replace(from, to), lines())
+    };
+    let plus = |text: &str| swap("\"m\"", &format!("\"m\",{text}"));
+    let kinds = "released, truth, neighborhoods, point_neighborhoods, recovered";
+    let families = "lines, rays, axis_planes or axis_candidates";
+    check(vec![
+        (
+            released("", lines()),
+            "expected a released map, found a Parquet file without metadata of unlift",
+        ),
+        (
+            released("{", lines()),
+            "metadata unlift: expected a JSON object, found EOF while parsing an object at line 1 column 1",
+        ),
+        (released("[1]", lines()), "metadata unlift: expected a JSON object, found [1]"),
+        (swap("\"released\"", "\"truth\""), "expected a released map, found a truth file"),
+        (
+            swap("\"released\"", "\"map\""),
+            &format!("metadata unlift, kind: expected one of {kinds}, found \"map\""),
+        ),
+        (
+            swap("\"kind\":\"released\",", ""),
+            &format!("metadata unlift, kind: expected one of {kinds}, found nothing"),
+        ),
+        (swap("\"version\":1", "\"version\":2"), "metadata unlift, version: expected 1, found 2"),
+        (swap("\"version\":1,", ""), "metadata unlift, version: expected 1, found nothing"),
+        (
+            swap("\"lines\"", "\"circles\""),
+            &format!("metadata unlift, family: expected {families}, found \"circles\""),
+        ),
+        (
+            swap("\"family\":\"lines\",", ""),
+            &format!("metadata unlift, family: expected {families}, found nothing"),
+        ),
+        (
+            swap("\"dimension\":2", "\"dimension\":3"),
+            "metadata unlift, dimension: expected 2, found 3",
+        ),
+        (
+            swap("\"dimension\":2", "\"dimension\":4"),
+            "metadata unlift, dimension: expected 2 or 3, found 4",
+        ),
+        (
+            swap("\"m\"", "\"cm\""),
+            "metadata unlift, unit: expected m, px or kth_neighbor, found \"cm\"",
+        ),
+        (
+            swap(",\"unit\":\"m\"", ""),
+            "metadata unlift, unit: expected m, px or kth_neighbor, found nothing",
+        ),
+        (
+            plus("\"origin\":[0,1,2]"),
+            "metadata unlift, origin: expected a list of 2 numbers, found [0,1,2]",
+        ),
+        (
+            plus("\"slots_per_record\":3"),
+            "metadata unlift, slots_per_record: expected 1 or 2, found 3",
+        ),
+        (
+            plus("\"slots_per_record\":0"),
+            "metadata unlift, slots_per_record: expected a whole number of at least 1, found 0",
+        ),
+    ]);
+}
+
+#[test]
+fn lines_columns() {
+    let foot = |column| released(LINES, with(lines(), "foot_x", column));
+    let direction = |column| released(LINES, with(lines(), "direction_y", Some(column)));
+    check(vec![
+        (foot(None), "column foot_x: expected floats, found no such column"),
+        (foot(Some(ints([1, 2, 3]))), "column foot_x: expected floats, found type Int64"),
+        (
+            foot(Some(texts([Some("1"), Some("2"), Some("3")]))),
+            "column foot_x: expected floats, found type Utf8",
+        ),
+        (
+            foot(Some(floats([0.0, f64::NAN, 0.0]))),
+            "column foot_x, row 1: expected a finite number, found NaN",
+        ),
+        (
+            foot(Some(maybe([Some(0.0), Some(1.0), None]))),
+            "column foot_x, row 2: expected a finite number, found null",
+        ),
+        (
+            foot(Some(floats([0.0, 0.0, 1e39]))),
+            "foot of record 2: expected coordinates in the range of f32, found [1e39, 2.0]",
+        ),
+        (
+            direction(floats([0.0, 0.8, 0.0])),
+            "direction of record 2: expected a finite vector with length, found [0.0, 0.0]",
+        ),
+    ]);
+}
+
+#[test]
+fn descriptors() {
+    let one = |column: ArrayRef| released(LINES, with(lines(), "descriptor", Some(column)));
+    let paired = LINES.replace("\"m\"", "\"m\",\"slots_per_record\":2");
+    let first = || with(lines(), "descriptor_0", Some(lists(&[&[1], &[2], &[3]])));
+    let two = |second| released(&paired, with(first(), "descriptor_1", second));
+    check(vec![
+        (
+            one(lists(&[&[1, 2], &[3, 4], &[5]])),
+            "column descriptor, row 2: expected 2 values as in every row, found 1",
+        ),
+        (
+            one(lists(&[&[], &[], &[]])),
+            "column descriptor, row 0: expected 1 values as in every row, found 0",
+        ),
+        (
+            one(lists(&[&[1, 2], &[3, 256], &[5, 6]])),
+            "column descriptor, row 1: expected a whole number below 256, found 256",
+        ),
+        (
+            one(float_lists(&[&[1.0], &[f64::INFINITY], &[2.0]])),
+            "column descriptor, row 1: expected finite numbers in the range of f32, found inf",
+        ),
+        (
+            one(lists(&[&[0], &[0], &[0]])),
+            "descriptors: expected real descriptors, found only zeros (dummies)",
+        ),
+        (
+            one(ints([1, 2, 3])),
+            "column descriptor: expected lists of integers or floats, found type Int64",
+        ),
+        (two(None), "column descriptor_1: expected lists of integers, found no such column"),
+        (
+            two(Some(float_lists(&[&[1.0], &[2.0], &[3.0]]))),
+            "column descriptor_1: expected lists of integers, found type List(Float64)",
+        ),
+        (
+            two(Some(lists(&[&[1], &[2], &[3, 4]]))),
+            "column descriptor_1, row 2: expected 1 values as in every row, found 2",
+        ),
+    ]);
+}
+
+#[test]
+fn other_families() {
+    let meta = |family: &str| LINES.replace("\"lines\"", &format!("\"{family}\""));
+    let rays = LINES.replace("\"lines\"", "\"rays\",\"centers\":[[0,0],[1,1]]");
+    let centers = |text: &str| rays.replace("[[0,0],[1,1]]", text);
+    let direction = || lines()[2..].to_vec();
+    let planes = |axis, offset| {
+        released(&meta("axis_planes"), vec![("axis", ints(axis)), ("offset", floats(offset))])
+    };
+    let point = || vec![("x", floats([0.0])), ("y", floats([0.0]))];
+    check(vec![
+        (
+            released(&rays, with(direction(), "center", Some(ints([0, 1, 2])))),
+            "column center, row 2: expected a whole number below 2, found 2",
+        ),
+        (released(&rays, direction()), "column center: expected integers, found no such column"),
+        (
+            released(&meta("rays"), direction()),
+            "metadata unlift, centers: expected a list of lists of 2 numbers, found nothing",
+        ),
+        (
+            released(&centers("[]"), direction()),
+            "metadata unlift, centers: expected 1 to 255 centers, found []",
+        ),
+        (
+            released(&centers("[[0,0],[1]]"), direction()),
+            "metadata unlift, centers: expected a list of lists of 2 numbers, found [[0,0],[1]]",
+        ),
+        (
+            planes([0, 1, 2], [0.0, 1.0, 2.0]),
+            "column axis, row 2: expected a whole number below 2, found 2",
+        ),
+        (
+            planes([0, 1, -1], [0.0, 1.0, 2.0]),
+            "column axis, row 2: expected a whole number below 2, found -1",
+        ),
+        (
+            planes([0, 1, 1], [0.0, 1e39, 2.0]),
+            "offset of record 1: expected a finite number in the range of f32, found inf",
+        ),
+        (
+            released(&meta("axis_candidates"), with(point(), "y", None)),
+            "column y: expected floats, found no such column",
+        ),
+        (
+            released(
+                &meta("axis_candidates").replace("\"m\"", "\"m\",\"slots_per_record\":2"),
+                point(),
+            ),
+            "slots per record: expected 1 to 1 for axis_candidates, found 2",
+        ),
+    ]);
+}

@@ -1,0 +1,117 @@
+//! Values of every kind, drawn from a seed.
+
+use unlift::descriptors::Values;
+use unlift::neighbors::Neighborhoods;
+use unlift::recover::{Estimate, Recovered, Status};
+use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
+use unlift::seed::{Draws, Stage};
+use unlift::truth::{DropReason, Dropped, Original, Secret};
+use unlift::{Descriptors, OriginalId, PointSet, RecordId, Unit};
+
+pub fn draws(seed: u64) -> Draws {
+    Draws::new(seed, Stage::Synthetic, 0)
+}
+
+pub fn points<const D: usize>(draws: &mut Draws, n: usize) -> Vec<[f64; D]> {
+    let mut point = || std::array::from_fn(|_| draws.between(-9.0, 9.0));
+    (0..n).map(|_| point()).collect()
+}
+
+fn descriptors(draws: &mut Draws, n: usize) -> Option<Descriptors> {
+    let dim = 1 + draws.below(200) as usize;
+    let values = match draws.below(3) {
+        0 => return None,
+        1 => Values::U8((0..n * dim).map(|_| draws.below(256) as u8).collect()),
+        _ => Values::F32((0..n * dim).map(|_| draws.normal() as f32).collect()),
+    };
+    Some(Descriptors::try_new(values, dim).unwrap())
+}
+
+/// One released map per family; lines with one and with two slots per record.
+pub fn released<const D: usize>(seed: u64, n: usize) -> Vec<Released<D>> {
+    let mut draws = draws(seed);
+    let directions =
+        |draws: &mut Draws| -> Vec<[f64; D]> { (0..n).map(|_| draws.direction()).collect() };
+    let indices = |draws: &mut Draws, below| (0..n).map(|_| draws.below(below) as u8).collect();
+    let mut families = Vec::new();
+    for slots in [1, 2] {
+        let feet = points(&mut draws, n);
+        let lines = Lines::through(&feet, &directions(&mut draws)).unwrap();
+        families.push((Obfuscation::Lines(lines), slots));
+    }
+    let centers = points(&mut draws, 3);
+    let center = indices(&mut draws, 3);
+    let rays = Rays::try_new(&centers, center, &directions(&mut draws)).unwrap();
+    families.push((Obfuscation::Rays(rays), 1));
+    let offsets: Vec<f64> = (0..n).map(|_| draws.between(-9.0, 9.0)).collect();
+    let planes = AxisPlanes::try_new(indices(&mut draws, D as u64), &offsets).unwrap();
+    families.push((Obfuscation::AxisPlanes(planes), 1));
+    let candidates = AxisCandidates::try_new(&points(&mut draws, n)).unwrap();
+    families.push((Obfuscation::AxisCandidates(candidates), 1));
+    let with_rest = |(obfuscation, slots)| {
+        let origin = std::array::from_fn(|_| draws.between(-4e6, 4e6));
+        let unit = [Unit::Meter, Unit::Pixel, Unit::KthNeighbor][draws.below(3) as usize];
+        let descriptors = descriptors(&mut draws, n * slots);
+        Released::try_new(obfuscation, slots, origin, unit, descriptors).unwrap()
+    };
+    families.into_iter().map(with_rest).collect()
+}
+
+/// A truth with `n` slots and a few dropped points; `swapped_axis` for every second seed.
+pub fn truth<const D: usize>(seed: u64, n: usize) -> (Original<D>, Secret) {
+    let mut draws = draws(seed);
+    let n_all = n + draws.below(6) as usize;
+    let original = PointSet::try_new(points(&mut draws, n_all), Unit::Meter).unwrap();
+    let order: Vec<OriginalId> = draws.permutation(n_all).into_iter().map(OriginalId).collect();
+    let dropped = order[n..].iter().map(|&original| {
+        let reason = DropReason::ALL[original.index() % DropReason::ALL.len()];
+        Dropped { original, reason }
+    });
+    let axes = (0..n).map(|_| draws.below(D as u64) as u8).collect();
+    let secret = Secret::try_new(
+        order[..n].to_vec(),
+        seed.is_multiple_of(2).then_some(axes),
+        draws.permutation(n),
+        dropped.collect(),
+        n_all,
+    );
+    (Original::new(original), secret.unwrap())
+}
+
+/// Lists of up to ten records; scores for every second seed.
+pub fn neighborhoods(seed: u64, n_records: usize, slots_per_record: usize) -> Neighborhoods {
+    let mut draws = draws(seed);
+    let (mut offsets, mut records, mut scores) = (vec![0], Vec::new(), Vec::new());
+    for slot in 0..n_records * slots_per_record {
+        let own = (slot / slots_per_record) as u32;
+        let length = draws.below(11.min(n_records as u64)) as usize;
+        let others = draws.permutation(n_records).into_iter().filter(|&r| r != own);
+        records.extend(others.take(length).map(RecordId));
+        offsets.push(records.len() as u64);
+    }
+    scores.extend(records.iter().map(|_| draws.normal() as f32));
+    let scores = seed.is_multiple_of(2).then_some(scores);
+    Neighborhoods::try_new(offsets, records, scores, n_records, slots_per_record).unwrap()
+}
+
+/// Recovered points, a fifth of them lost; axis and descriptor rows for every second seed.
+pub fn recovered<const D: usize>(seed: u64, n: usize) -> Recovered<D> {
+    let mut draws = draws(seed);
+    let estimates: Vec<Estimate<D>> = points::<D>(&mut draws, n)
+        .into_iter()
+        .map(|p| match draws.below(5) {
+            0 => Estimate::lost(Status::ALL[1 + draws.below(3) as usize]),
+            _ => Estimate {
+                position: p.map(|x| x as f32),
+                status: Status::Ok,
+                support: draws.below(1 << 16) as u16,
+                axis: draws.below(D as u64) as u8,
+                evidence: draws.unit() as f32,
+            },
+        })
+        .collect();
+    let odd = seed % 2 == 1;
+    let rows = odd.then(|| draws.permutation(n));
+    let origin = std::array::from_fn(|_| draws.between(-5.0, 5.0));
+    Recovered::try_new(&estimates, odd, rows, origin, Unit::Meter, 0.08).unwrap()
+}

@@ -1,0 +1,155 @@
+//! The rules of `audit.json` that its types cannot say.
+
+use crate::Error;
+use crate::document::{ByThreshold, Document, Row, SCHEMA};
+
+impl Document {
+    /// Checks the rules of the format: the schema, one row per combination, finite numbers,
+    /// percentages between 0 and 100, the same thresholds in every map of a row, lost points that
+    /// add up.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Invalid`] with the place of the first broken rule.
+    pub fn check(&self) -> Result<(), Error> {
+        if self.schema != SCHEMA {
+            return Err(Error::Schema { expected: SCHEMA, found: self.schema.into() });
+        }
+        if let Some(scale) = self.input.scale_m_per_unit {
+            positive("input.scale_m_per_unit", scale)?;
+        }
+        if let Some(unit) = self.input.unit_in_map_units {
+            positive("input.unit_in_map_units", unit)?;
+        }
+        for (i, row) in self.results.iter().enumerate() {
+            check_row(&format!("results[{i}]"), row)?;
+            if let Some(j) = self.results[..i].iter().position(|other| same_key(other, row)) {
+                let found = format!("the combination of results[{j}] again");
+                return Err(invalid(format!("results[{i}]"), "a combination of its own", found));
+            }
+        }
+        for (i, point) in self.break_even.iter().enumerate() {
+            if let Some(ratio) = point.inlier_ratio {
+                between(&format!("break_even[{i}].inlier_ratio"), ratio, 0.0, 1.0)?;
+            }
+        }
+        for (i, gate) in self.gates.iter().enumerate() {
+            finite(&format!("gates[{i}].found_percent"), gate.found_percent)?;
+            finite(&format!("gates[{i}].bound_percent"), gate.bound_percent)?;
+        }
+        self.check_run()
+    }
+
+    fn check_run(&self) -> Result<(), Error> {
+        let seconds = &self.run.seconds;
+        finite("run.seconds.total", seconds.total)?;
+        if !seconds.rows.is_empty() && seconds.rows.len() != self.results.len() {
+            let expected = format!("{} rows, as in results", self.results.len());
+            return Err(invalid("run.seconds.rows", expected, seconds.rows.len().to_string()));
+        }
+        for (i, stages) in seconds.rows.iter().enumerate() {
+            for (stage, &value) in stages {
+                finite(&format!("run.seconds.rows[{i}].{stage}"), value)?;
+            }
+        }
+        for (stage, &value) in &seconds.stages {
+            finite(&format!("run.seconds.stages.{stage}"), value)?;
+        }
+        Ok(())
+    }
+}
+
+fn check_row(place: &str, row: &Row) -> Result<(), Error> {
+    between(&format!("{place}.inlier_ratio"), row.inlier_ratio, 0.0, 1.0)?;
+    percentages(&format!("{place}.recovered_percent"), &row.recovered_percent)?;
+    percentages(&format!("{place}.blind_percent"), &row.blind_percent)?;
+    if !row.blind_percent.keys().eq(row.recovered_percent.keys()) {
+        let keys = |map: &ByThreshold| map.keys().cloned().collect::<Vec<_>>().join(", ");
+        let expected = format!("the thresholds {}", keys(&row.recovered_percent));
+        return Err(invalid(format!("{place}.blind_percent"), expected, keys(&row.blind_percent)));
+    }
+    let lost: u64 = row.lost.values().sum();
+    // With repeats each count is a rounded mean, and rounded parts need not add up.
+    if row.repeats == 1 && lost != row.n_lost {
+        return Err(invalid(
+            format!("{place}.lost"),
+            format!("a sum of {}", row.n_lost),
+            lost.to_string(),
+        ));
+    }
+    if row.n_lost > row.n_points {
+        let expected = format!("at most {}", row.n_points);
+        return Err(invalid(format!("{place}.n_lost"), expected, row.n_lost.to_string()));
+    }
+    let optional = [
+        ("delta", row.delta),
+        ("median_error", row.median_error),
+        ("axis_accuracy_percent", row.axis_accuracy_percent),
+        ("assignment_accuracy_percent", row.assignment_accuracy_percent),
+    ];
+    for (field, value) in optional {
+        if let Some(value) = value {
+            finite(&format!("{place}.{field}"), value)?;
+        }
+    }
+    for (percentile, value) in &row.error_percentiles {
+        if let Some(value) = value {
+            finite(&format!("{place}.error_percentiles[{percentile:?}]"), *value)?;
+        }
+    }
+    if let Some(spread) = &row.std {
+        let maps = [
+            ("recovered_percent", &spread.recovered_percent),
+            ("blind_percent", &spread.blind_percent),
+        ];
+        for (field, map) in maps {
+            percentages(&format!("{place}.std.{field}"), map)?;
+        }
+    }
+    Ok(())
+}
+
+fn same_key(a: &Row, b: &Row) -> bool {
+    a.scheme == b.scheme
+        && a.neighbors == b.neighbors
+        && a.oracle_noise == b.oracle_noise
+        && a.inlier_ratio == b.inlier_ratio
+        && a.k == b.k
+        && a.solver == b.solver
+}
+
+fn percentages(place: &str, map: &ByThreshold) -> Result<(), Error> {
+    for (threshold, &value) in map {
+        between(&format!("{place}[{threshold:?}]"), value, 0.0, 100.0)?;
+    }
+    Ok(())
+}
+
+fn between(place: &str, value: f64, low: f64, high: f64) -> Result<(), Error> {
+    if (low..=high).contains(&value) {
+        return Ok(());
+    }
+    Err(invalid(place, format!("a number from {low} to {high}"), value.to_string()))
+}
+
+fn positive(place: &str, value: f64) -> Result<(), Error> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(());
+    }
+    Err(invalid(place, "a number above zero", value.to_string()))
+}
+
+fn finite(place: &str, value: f64) -> Result<(), Error> {
+    if value.is_finite() {
+        return Ok(());
+    }
+    Err(invalid(place, "a finite number", value.to_string()))
+}
+
+fn invalid(
+    place: impl Into<String>,
+    expected: impl Into<String>,
+    found: impl Into<String>,
+) -> Error {
+    Error::Invalid { place: place.into(), expected: expected.into(), found: found.into() }
+}

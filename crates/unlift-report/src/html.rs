@@ -1,0 +1,230 @@
+//! The page: one file, no network, numbers readable without script.
+
+use minijinja::value::Serde;
+use minijinja::{AutoEscape, Environment, UndefinedBehavior};
+use serde::Serialize;
+
+use crate::document::{Document, GateResult, LengthUnit};
+use crate::page_data::{page_data, slot};
+use crate::scene::{Scene3d, encode};
+use crate::tables::Table;
+use crate::verdict::Verdict;
+use crate::{Error, paper, tables, verdict, words};
+
+/// The template and its parts, by the names they include each other with.
+const TEMPLATES: [(&str, &str); 5] = [
+    ("report.html", include_str!("../template/report.html")),
+    ("verdict.html", include_str!("../template/verdict.html")),
+    ("figures.html", include_str!("../template/figures.html")),
+    ("tables.html", include_str!("../template/tables.html")),
+    ("notes.html", include_str!("../template/notes.html")),
+];
+const STYLE: &str = include_str!("../template/style.css");
+const BUNDLE: &str = include_str!("../web/vendor/bundle.min.js");
+const SCRIPTS: [&str; 3] = [
+    include_str!("../web/charts.js"),
+    include_str!("../web/scene.js"),
+    include_str!("../web/report.js"),
+];
+
+/// How to draw the page.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct RenderOptions {
+    /// Leave out everything but figures: no points, paths, names, command line.
+    pub share_safe: bool,
+    /// Finer error curves than the percentiles of the document; may be empty.
+    pub error_cdf: Vec<ErrorCdf>,
+}
+
+/// The error curve of one row of the results.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ErrorCdf {
+    /// Index into [`Document::results`].
+    pub row: usize,
+    /// (error in the row's unit, percent of the released points within it), rising; a hundred
+    /// points are plenty.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// Draws `document` as one self-contained HTML page below 10 MB.
+///
+/// With [`RenderOptions::share_safe`] the scene is ignored and names are withheld, whatever the
+/// document holds.
+///
+/// # Errors
+///
+/// [`Error::Invalid`] or [`Error::Schema`] when the document breaks a rule of its format,
+/// [`Error::Template`] when the page cannot be rendered (a bug of this crate).
+pub fn render(
+    document: &Document,
+    scene: Option<&Scene3d>,
+    options: &RenderOptions,
+) -> Result<String, Error> {
+    document.check()?;
+    let document = if options.share_safe { document.share_safe() } else { document.clone() };
+    let scene = scene.filter(|scene| !options.share_safe && !scene.originals.is_empty());
+    let error_unit = tables::thresholds(&document).first().and_then(|typed| typed.parse().ok());
+    let encoded = scene.map(|scene| encode(scene, error_unit.unwrap_or(1.0)));
+    let page_data = page_data(&document, encoded.as_ref(), options);
+    let data = serde_json::to_string(&page_data)?;
+    let verdict = verdict::verdict(&document);
+    let options_text: Vec<(String, String)> =
+        document.options.iter().map(|(name, value)| (name.clone(), plain(value))).collect();
+    let table_list = [
+        Some(tables::recovered(&document)),
+        Some(tables::errors(&document)),
+        Some(tables::break_even(&document)).filter(|table| !table.rows.is_empty()),
+    ];
+    let loss_list = [Some(tables::losses(&document)), tables::trials(&document)];
+
+    let page = Page {
+        style: STYLE,
+        bundle: BUNDLE,
+        scripts: SCRIPTS,
+        data: script_text(&data),
+        blocks: encoded.as_ref().map(|scene| scene.blocks.as_slice()).unwrap_or_default(),
+        scene: encoded.as_ref().map(|scene| SceneWords {
+            n_points: words::thousands(scene.n_points),
+            n_drawn: words::thousands(scene.n_drawn as u64),
+            whole: scene.n_drawn as u64 >= scene.n_points,
+        }),
+        share_safe: options.share_safe,
+        subject: subject(&document),
+        slots: verdict.cards.iter().map(|card| slot(&document, &card.scheme)).collect(),
+        verdict,
+        gates: document.gates.iter().map(gate_words).collect(),
+        published: page_data.has_published(),
+        tables: table_list.into_iter().flatten().collect(),
+        losses: loss_list.into_iter().flatten().collect(),
+        times: tables::times(&document),
+        options: options_text,
+        command: document.run.command.as_deref(),
+        other_sha256: document.input.other_sha256.iter().collect(),
+        seconds: words::seconds(document.run.seconds.total),
+        memory: document.run.peak_memory_bytes.map(words::bytes),
+        document: &document,
+        attribution: paper::ATTRIBUTION,
+    };
+    let mut env = Environment::new();
+    env.set_undefined_behavior(UndefinedBehavior::Strict);
+    env.set_auto_escape_callback(|_| AutoEscape::Html);
+    for (name, source) in TEMPLATES {
+        env.add_template(name, source)?;
+    }
+    Ok(env.get_template("report.html")?.render(Serde(&page))?)
+}
+
+/// All that the template may print.
+#[derive(Debug, Serialize)]
+struct Page<'a> {
+    style: &'static str,
+    bundle: &'static str,
+    scripts: [&'static str; 3],
+    /// JSON for the script; free of `<`.
+    data: String,
+    blocks: &'a [String],
+    scene: Option<SceneWords>,
+    share_safe: bool,
+    subject: Subject,
+    verdict: Verdict,
+    /// Color and mark of each card's scheme.
+    slots: Vec<usize>,
+    gates: Vec<GateWords>,
+    published: bool,
+    tables: Vec<Table>,
+    losses: Vec<Table>,
+    times: Option<Table>,
+    options: Vec<(String, String)>,
+    command: Option<&'a str>,
+    /// (role, SHA-256) of further input files.
+    other_sha256: Vec<(&'a String, &'a String)>,
+    seconds: String,
+    memory: Option<String>,
+    document: &'a Document,
+    attribution: &'static str,
+}
+
+#[derive(Debug, Serialize)]
+struct SceneWords {
+    n_points: String,
+    n_drawn: String,
+    whole: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct GateWords {
+    gate: String,
+    passed: bool,
+    found: String,
+    bound: String,
+}
+
+#[derive(Debug, Serialize)]
+struct Subject {
+    /// Last part of the path: the whole path stands in the last section only.
+    name: Option<String>,
+    n_points: String,
+    metric: bool,
+    /// What one unit of this page is.
+    unit: String,
+    /// "50th", of the neighbor whose distance is the unit.
+    kth: String,
+}
+
+fn subject(document: &Document) -> Subject {
+    let input = &document.input;
+    let k = document.results.first().map_or(50, |row| row.k);
+    let metric = document.results.first().is_none_or(|row| row.unit == LengthUnit::Meter);
+    let unit = match (metric, input.scale_m_per_unit, input.unit_in_map_units) {
+        (true, Some(scale), _) => {
+            format!("Meters, by the declared scale of {scale} m per map unit.")
+        }
+        (true, None, _) => "Meters.".to_owned(),
+        (false, _, Some(unit)) => {
+            format!("One neighbor distance is {} map units.", words::significant(unit, 4))
+        }
+        (false, _, None) => String::new(),
+    };
+    let name = input.path.as_deref().map(short_name);
+    Subject {
+        name,
+        n_points: words::thousands(input.n_points),
+        metric,
+        unit,
+        kth: words::ordinal(k),
+    }
+}
+
+/// The part of a path that names the map: `room` of `maps/room/sparse/0`.
+fn short_name(path: &str) -> String {
+    let says_little = |part: &&str| {
+        matches!(*part, "" | "." | ".." | "sparse" | "model" | "dense" | "colmap")
+            || part.bytes().all(|byte| byte.is_ascii_digit())
+    };
+    let mut parts = path.split(['/', '\\']).rev().filter(|part| !part.is_empty());
+    let name = parts.clone().find(|part| !says_little(part)).or_else(|| parts.next());
+    name.unwrap_or(path).to_owned()
+}
+
+fn gate_words(gate: &GateResult) -> GateWords {
+    GateWords {
+        gate: gate.gate.clone(),
+        passed: gate.passed,
+        found: words::percent(gate.found_percent),
+        bound: words::significant(gate.bound_percent, 4),
+    }
+}
+
+fn plain(value: &serde_json::Value) -> String {
+    match value {
+        serde_json::Value::String(text) => text.clone(),
+        serde_json::Value::Array(items) => items.iter().map(plain).collect::<Vec<_>>().join(", "),
+        serde_json::Value::Null => "none".to_owned(),
+        other => other.to_string(),
+    }
+}
+
+/// JSON that may stand inside a script element: no `<` can end or open one.
+fn script_text(json: &str) -> String {
+    json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026")
+}

@@ -1,0 +1,169 @@
+//! The figures as the page's script reads them: the same numbers as the tables, by position.
+
+use serde::Serialize;
+
+use crate::document::{Document, LengthUnit};
+use crate::html::RenderOptions;
+use crate::paper::{PublishedCurve, published_3d};
+use crate::scene::Encoded;
+use crate::{tables, words};
+
+/// Schemes with a color and a mark of their own, the same on every page.
+const KNOWN_SCHEMES: [&str; 7] = ["olc", "ppl", "ppl+", "ray", "ray-voxel", "plane", "cp"];
+/// Colors and marks there are; further schemes reuse them in turn.
+const SLOTS: usize = 8;
+
+#[derive(Debug, Serialize)]
+pub(crate) struct PageData<'a> {
+    schemes: Vec<SchemeData>,
+    solvers: Vec<String>,
+    thresholds: Vec<ThresholdData>,
+    rows: Vec<RowData<'a>>,
+    published: Vec<PublishedData>,
+    /// `m`, or `nd` for multiples of the neighbor distance.
+    unit: &'static str,
+    scene: Option<&'a Encoded>,
+}
+
+impl PageData<'_> {
+    /// Whether any published curve stands beside ours.
+    pub(crate) fn has_published(&self) -> bool {
+        !self.published.is_empty()
+    }
+}
+
+#[derive(Debug, Serialize)]
+struct SchemeData {
+    name: String,
+    title: String,
+    slot: usize,
+}
+
+#[derive(Debug, Serialize)]
+struct ThresholdData {
+    label: String,
+    value: Option<f64>,
+}
+
+#[derive(Debug, Serialize)]
+struct RowData<'a> {
+    scheme: &'a str,
+    solver: &'a str,
+    ratio: f64,
+    oracle: bool,
+    recovered: Vec<Option<f64>>,
+    blind: Vec<Option<f64>>,
+    /// (error, percent of the points within it), rising.
+    errors: Vec<(f64, f64)>,
+}
+
+#[derive(Debug, Serialize)]
+struct PublishedData {
+    dataset: &'static str,
+    scheme: &'static str,
+    threshold: usize,
+    points: Vec<(f64, f64)>,
+}
+
+/// The color and mark of `scheme`; unknown ones take turns in the order they appear.
+pub(crate) fn slot(document: &Document, scheme: &str) -> usize {
+    if let Some(slot) = KNOWN_SCHEMES.iter().position(|known| *known == scheme) {
+        return slot;
+    }
+    let mut unknown: Vec<&str> = Vec::new();
+    for row in &document.results {
+        let name = row.scheme.as_str();
+        if !KNOWN_SCHEMES.contains(&name) && !unknown.contains(&name) {
+            unknown.push(name);
+        }
+    }
+    let turn = unknown.iter().position(|name| *name == scheme).unwrap_or(0);
+    (KNOWN_SCHEMES.len() + turn) % SLOTS
+}
+
+pub(crate) fn page_data<'a>(
+    document: &'a Document,
+    scene: Option<&'a Encoded>,
+    options: &RenderOptions,
+) -> PageData<'a> {
+    let thresholds = tables::thresholds(document);
+    let by_threshold = |map: &crate::document::ByThreshold| {
+        thresholds.iter().map(|typed| map.get(typed).copied()).collect::<Vec<_>>()
+    };
+    let rows = document.results.iter().enumerate().map(|(index, row)| {
+        let cdf = options.error_cdf.iter().find(|cdf| cdf.row == index);
+        RowData {
+            scheme: &row.scheme,
+            solver: &row.solver,
+            ratio: row.inlier_ratio,
+            oracle: row.neighbors == "oracle",
+            recovered: by_threshold(&row.recovered_percent),
+            blind: by_threshold(&row.blind_percent),
+            errors: cdf.map_or_else(|| percentile_points(row), |cdf| cdf.points.clone()),
+        }
+    });
+    let mut schemes: Vec<SchemeData> = Vec::new();
+    let mut solvers: Vec<String> = Vec::new();
+    for row in &document.results {
+        if !schemes.iter().any(|scheme| scheme.name == row.scheme) {
+            schemes.push(SchemeData {
+                name: row.scheme.clone(),
+                title: words::scheme_title(&row.scheme).to_owned(),
+                slot: slot(document, &row.scheme),
+            });
+        }
+        if !solvers.contains(&row.solver) {
+            solvers.push(row.solver.clone());
+        }
+    }
+    PageData {
+        rows: rows.collect(),
+        published: published(document, &thresholds),
+        thresholds: thresholds
+            .iter()
+            .map(|typed| ThresholdData {
+                label: tables::threshold_text(document, typed),
+                value: typed.parse().ok(),
+            })
+            .collect(),
+        unit: match document.results.first().map(|row| row.unit) {
+            Some(LengthUnit::KthNeighbor) => "nd",
+            _ => "m",
+        },
+        schemes,
+        solvers,
+        scene,
+    }
+}
+
+/// Published curves whose scheme was tested and whose threshold is one of ours; none without a
+/// declared scale.
+fn published(document: &Document, thresholds: &[String]) -> Vec<PublishedData> {
+    let metric = document.results.iter().all(|row| row.unit == LengthUnit::Meter);
+    if !metric {
+        return Vec::new();
+    }
+    let same = |typed: &String, curve: &PublishedCurve| {
+        typed.parse::<f64>().is_ok_and(|value| (value - curve.threshold_m).abs() < 1e-9)
+    };
+    let tested = |scheme: &str| document.results.iter().any(|row| row.scheme == scheme);
+    let curves = published_3d().into_iter().filter(|curve| tested(curve.scheme));
+    let matched = curves.filter_map(|curve| {
+        let threshold = thresholds.iter().position(|typed| same(typed, &curve))?;
+        let PublishedCurve { dataset, scheme, points, .. } = curve;
+        Some(PublishedData { dataset, scheme, threshold, points })
+    });
+    matched.collect()
+}
+
+fn percentile_points(row: &crate::document::Row) -> Vec<(f64, f64)> {
+    let points = row.error_percentiles.iter();
+    let mut points: Vec<(f64, f64)> =
+        points.filter_map(|(percent, error)| Some(((*error)?, percent.parse().ok()?))).collect();
+    // The shares within the thresholds are points of the same curve.
+    for (typed, &percent) in &row.recovered_percent {
+        points.extend(typed.parse().ok().map(|threshold: f64| (threshold, percent)));
+    }
+    points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    points
+}

@@ -1,0 +1,73 @@
+//! The figures of the paper this tool follows, to draw beside one's own.
+//!
+//! Source: supplementary tables "geometric accuracy" (SIFT) for 7-scenes, 12-scenes and Cambridge
+//! Landmarks. Those are other maps than the reader's, so only the trend compares.
+
+/// Who published the dashed curves.
+pub const ATTRIBUTION: &str = "Chelani et al., Obfuscation Based Privacy Preserving \
+    Representations are Recoverable Using Neighborhood Information, 3DV 2025";
+
+/// `published_3d.csv`: dataset, scheme, inlier ratio, threshold in meters, percent recovered.
+const TABLE: &str = include_str!("../published_3d.csv");
+
+/// Recovered share over inlier ratio, as printed for one dataset, scheme and threshold.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PublishedCurve {
+    /// `7-scenes`, `12-scenes` or `cambridge`.
+    pub dataset: &'static str,
+    /// The scheme's user-facing name.
+    pub scheme: &'static str,
+    /// Error below which a point counts as recovered.
+    pub threshold_m: f64,
+    /// (inlier ratio, percent of the points recovered), by falling ratio.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// All published curves in three dimensions, in the order of the table.
+pub fn published_3d() -> Vec<PublishedCurve> {
+    let mut curves: Vec<PublishedCurve> = Vec::new();
+    for line in TABLE.lines().skip(1) {
+        let cells: Vec<&'static str> = line.split(',').collect();
+        let [dataset, scheme, ratio, threshold, percent] = cells[..] else {
+            unreachable!("published_3d.csv: expected 5 cells in {line:?}");
+        };
+        let number = |cell: &str| cell.parse::<f64>().expect("published_3d.csv holds numbers");
+        let threshold_m = number(threshold);
+        let point = (number(ratio), number(percent));
+        let same = |c: &PublishedCurve| {
+            c.dataset == dataset && c.scheme == scheme && c.threshold_m == threshold_m
+        };
+        match curves.iter_mut().find(|curve| same(curve)) {
+            Some(curve) => curve.points.push(point),
+            None => {
+                curves.push(PublishedCurve { dataset, scheme, threshold_m, points: vec![point] })
+            }
+        }
+    }
+    curves
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_curve_has_the_six_ratios() {
+        let curves = published_3d();
+        assert_eq!(curves.len(), 3 * 6 * 2);
+        for curve in &curves {
+            let ratios: Vec<f64> = curve.points.iter().map(|point| point.0).collect();
+            assert_eq!(ratios, [1.0, 0.75, 0.5, 0.3, 0.2, 0.1], "{curve:?}");
+        }
+    }
+
+    #[test]
+    fn a_cell_is_as_printed() {
+        let curves = published_3d();
+        let cp = curves
+            .iter()
+            .find(|c| c.dataset == "7-scenes" && c.scheme == "cp" && c.threshold_m == 0.10)
+            .unwrap();
+        assert_eq!(cp.points[2], (0.5, 67.7));
+    }
+}

@@ -1,0 +1,46 @@
+//! Rounding to significant digits, so that a document's text is short and stable.
+
+use serde_json::Value;
+
+/// Significant decimal digits of every measured number in `audit.json`.
+///
+/// Six digits are a micron in a meter: far below any threshold, and far above the noise of a sum.
+pub const SIGNIFICANT_DIGITS: usize = 6;
+
+/// `value` rounded to [`SIGNIFICANT_DIGITS`]; zero and non-finite values stay as they are.
+pub(crate) fn round(value: f64) -> f64 {
+    if value == 0.0 || !value.is_finite() {
+        return value;
+    }
+    // Through decimal text: exact where `(value * 10^n).round() / 10^n` leaves a tail of nines.
+    format!("{value:.*e}", SIGNIFICANT_DIGITS - 1).parse().unwrap_or(value)
+}
+
+/// Rounds every float inside `value`; integers keep all their digits.
+pub(crate) fn round_floats(value: &mut Value) {
+    match value {
+        Value::Number(number) if number.is_f64() => {
+            if let Some(rounded) = number.as_f64().map(round).and_then(serde_json::Number::from_f64)
+            {
+                *number = rounded;
+            }
+        }
+        Value::Array(items) => items.iter_mut().for_each(round_floats),
+        Value::Object(fields) => fields.values_mut().for_each(round_floats),
+        _ => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn six_digits_are_kept_at_any_magnitude() {
+        assert_eq!(round(1.234_567_89), 1.234_57);
+        assert_eq!(round(89.123_456_7), 89.123_5);
+        assert_eq!(round(1.234_567_89e-9), 1.234_57e-9);
+        assert_eq!(round(-0.1 - 0.2), -0.3);
+        assert_eq!(round(0.0), 0.0);
+    }
+}

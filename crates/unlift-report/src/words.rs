@@ -1,0 +1,185 @@
+//! How numbers are said: thresholds, shares, ratios, schemes, reasons.
+
+use crate::document::LengthUnit;
+
+/// A scheme as a person would call it; unknown schemes are called by their short name.
+pub(crate) fn scheme_title(scheme: &str) -> &str {
+    match scheme {
+        "olc" => "Random lines",
+        "ppl" => "Paired-point lines",
+        "ppl+" => "Paired-point lines, plane-aware",
+        "ray" => "Ray cloud, two centers",
+        "ray-voxel" => "Ray cloud, voxel parity",
+        "plane" => "Axis-aligned planes",
+        "cp" => "Coordinate permutation",
+        other => other,
+    }
+}
+
+/// What a scheme publishes in place of a point, in a sentence; empty for unknown schemes.
+pub(crate) fn scheme_rule(scheme: &str) -> &'static str {
+    match scheme {
+        "olc" => "Each point becomes a line of random direction through it.",
+        "ppl" => "Two random points share the line through both.",
+        "ppl+" => "Two points share a line that leaves the surface around them.",
+        "ray" => "Each point becomes a ray from one of two published centers.",
+        "ray-voxel" => "As the ray cloud; the center follows the parity of the point's voxel.",
+        "plane" => "Each point keeps one coordinate of three.",
+        "cp" => "Two points swap one coordinate.",
+        _ => "",
+    }
+}
+
+/// A threshold as typed, in words of its unit: `10 cm`, `1.0 neighbor distance`.
+pub(crate) fn threshold(typed: &str, unit: LengthUnit) -> String {
+    match (unit, typed.parse::<f64>()) {
+        (LengthUnit::Meter, Ok(meters)) => meters_text(meters),
+        (LengthUnit::Meter, Err(_)) => format!("{typed} m"),
+        (LengthUnit::KthNeighbor, Ok(1.0)) => "1 neighbor distance".to_owned(),
+        (LengthUnit::KthNeighbor, _) => format!("{typed} neighbor distances"),
+    }
+}
+
+/// A length of the document's unit: centimeters below a meter, or multiples of the unit.
+pub(crate) fn length(value: f64, unit: LengthUnit) -> String {
+    match unit {
+        LengthUnit::Meter => meters_text(value),
+        LengthUnit::KthNeighbor => format!("{} nd", significant(value, 3)),
+    }
+}
+
+fn meters_text(meters: f64) -> String {
+    if meters >= 1.0 {
+        format!("{} m", significant(meters, 3))
+    } else if meters >= 0.01 || meters == 0.0 {
+        format!("{} cm", significant(meters * 100.0, 3))
+    } else {
+        format!("{} mm", significant(meters * 1000.0, 3))
+    }
+}
+
+/// `value` with at most `digits` significant digits and no trailing zeros.
+pub(crate) fn significant(value: f64, digits: usize) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return value.to_string();
+    }
+    let rounded: f64 = format!("{value:.*e}", digits - 1).parse().unwrap_or(value);
+    rounded.to_string()
+}
+
+/// A percentage for tables: one decimal.
+pub(crate) fn percent(value: f64) -> String {
+    format!("{value:.1}")
+}
+
+/// A whole percentage that can stand after "at least": rounded down.
+pub(crate) fn at_least(percent: f64) -> String {
+    // The small lift keeps 29.000000000000004 - 1e-13 style sums from losing a whole point.
+    format!("{:.0}", (percent + 1e-9).floor())
+}
+
+/// "when half of the neighbors are right", for any inlier ratio.
+pub(crate) fn when_right(ratio: f64) -> String {
+    let common = [
+        (1.0, "when all neighbors are right"),
+        (0.75, "when three of four neighbors are right"),
+        (0.5, "when half of the neighbors are right"),
+        (0.25, "when one neighbor in four is right"),
+        (0.2, "when one neighbor in five is right"),
+        (0.1, "when one neighbor in ten is right"),
+    ];
+    match common.iter().find(|(value, _)| (value - ratio).abs() < 1e-9) {
+        Some((_, words)) => (*words).to_owned(),
+        None => format!("when {} % of the neighbors are right", ratio_percent(ratio)),
+    }
+}
+
+/// An inlier ratio as a percentage without the sign, to two digits.
+pub(crate) fn ratio_percent(ratio: f64) -> String {
+    significant(ratio * 100.0, 2)
+}
+
+/// A reason in words: `odd_point` reads "odd point".
+pub(crate) fn reason(name: &str) -> String {
+    name.replace('_', " ")
+}
+
+/// 21149 reads "21,149".
+pub(crate) fn thousands(count: u64) -> String {
+    let digits = count.to_string();
+    let mut text = String::with_capacity(digits.len() + digits.len() / 3);
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// 50 reads "50th".
+pub(crate) fn ordinal(number: u32) -> String {
+    let ending = match (number % 10, number % 100) {
+        (_, 11..=13) => "th",
+        (1, _) => "st",
+        (2, _) => "nd",
+        (3, _) => "rd",
+        _ => "th",
+    };
+    format!("{number}{ending}")
+}
+
+/// Seconds for people: `0.42 s`, `38 s`, `4 min 10 s`.
+pub(crate) fn seconds(value: f64) -> String {
+    if value < 60.0 {
+        return format!("{} s", significant(value, 2));
+    }
+    let whole = value.round() as u64;
+    format!("{} min {} s", whole / 60, whole % 60)
+}
+
+/// Bytes for people, in powers of ten.
+pub(crate) fn bytes(count: u64) -> String {
+    let value = count as f64;
+    if value < 1e9 {
+        format!("{:.0} MB", (value / 1e6).ceil())
+    } else {
+        format!("{} GB", significant(value / 1e9, 3))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn centimeters_need_meters() {
+        assert_eq!(threshold("0.10", LengthUnit::Meter), "10 cm");
+        assert_eq!(threshold("0.005", LengthUnit::Meter), "5 mm");
+        assert_eq!(threshold("2.5", LengthUnit::Meter), "2.5 m");
+        assert_eq!(threshold("1.0", LengthUnit::KthNeighbor), "1 neighbor distance");
+        assert_eq!(threshold("2.5", LengthUnit::KthNeighbor), "2.5 neighbor distances");
+    }
+
+    #[test]
+    fn shares_are_rounded_down_after_at_least() {
+        assert_eq!(at_least(89.99), "89");
+        assert_eq!(at_least(100.0), "100");
+        assert_eq!(at_least(0.1 + 28.9), "29");
+    }
+
+    #[test]
+    fn ratios_read_as_words_or_percent() {
+        assert_eq!(when_right(0.5), "when half of the neighbors are right");
+        assert_eq!(when_right(0.3), "when 30 % of the neighbors are right");
+        assert_eq!(ratio_percent(0.071), "7.1");
+        assert_eq!(ratio_percent(1.0), "100");
+    }
+
+    #[test]
+    fn counts_are_grouped() {
+        assert_eq!(thousands(7), "7");
+        assert_eq!(thousands(21_149), "21,149");
+        assert_eq!(thousands(1_000_000), "1,000,000");
+    }
+}

@@ -1,0 +1,151 @@
+//! The page in a real browser: no errors, no network, and everything is there.
+//!
+//! Skipped with a message where no Chromium is installed; `CHROMIUM` names one. With
+//! `UNLIFT_SCREENSHOTS=DIR` pictures are written there, to be looked at.
+
+mod chromium;
+mod sample;
+
+use std::path::PathBuf;
+
+use chromium::Browser;
+use serde_json::json;
+use unlift_report::{RenderOptions, render};
+
+/// A file that is removed when the test is over.
+struct PageFile(PathBuf);
+
+impl PageFile {
+    fn new(name: &str, page: &str) -> Self {
+        let name = format!("unlift-report-{}-{name}.html", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        std::fs::write(&path, page).expect("the temporary folder takes a file");
+        Self(path)
+    }
+}
+
+impl Drop for PageFile {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.0);
+    }
+}
+
+fn browser() -> Option<Browser> {
+    let found = chromium::find();
+    if found.is_none() {
+        println!("skipped: no chromium on the PATH; CHROMIUM names one");
+    }
+    found.map(|program| Browser::start(&program))
+}
+
+fn private_page(metric: bool) -> String {
+    let document = sample::document(metric);
+    let scene = sample::scene(&document, 4_000);
+    render(&document, Some(&scene), &RenderOptions::default()).expect("a page")
+}
+
+#[test]
+fn curves_tables_and_canvas_are_there_without_errors_or_network() {
+    let Some(mut browser) = browser() else { return };
+    let file = PageFile::new("private", &private_page(true));
+    for (width, height) in [(1280, 900), (390, 844)] {
+        browser.emulate(width, height, "light");
+        browser.open(&file.0);
+        // One overview, one chart per scheme, one of errors; each with drawn curves.
+        assert_eq!(browser.evaluate("document.documentElement.dataset.charts"), json!("9"));
+        let empty = "[...document.querySelectorAll('.chart')].filter(c => c.querySelectorAll('svg path').length < 10).length";
+        assert_eq!(browser.evaluate(empty), json!(0));
+        assert_eq!(browser.evaluate("document.querySelectorAll('table').length >= 5"), json!(true));
+        assert_eq!(browser.evaluate("document.documentElement.dataset.scene"), json!("drawn"));
+        assert_eq!(
+            browser.evaluate("+document.documentElement.dataset.scenePoints > 3000"),
+            json!(true)
+        );
+        let wider = "document.documentElement.scrollWidth > document.documentElement.clientWidth";
+        assert_eq!(
+            browser.evaluate(wider),
+            json!(false),
+            "the page scrolls sideways at {width} px"
+        );
+        assert_eq!(browser.complaints, Vec::<String>::new());
+    }
+}
+
+#[test]
+fn the_canvas_shows_points_and_answers_every_choice() {
+    let Some(mut browser) = browser() else { return };
+    let file = PageFile::new("choices", &private_page(true));
+    browser.emulate(1280, 900, "dark");
+    browser.open(&file.0);
+    let choose_all = "document.querySelectorAll('.controls input').forEach(input => input.click())";
+    browser.evaluate(choose_all);
+    browser.evaluate("document.querySelector('#scene-controls input').click()");
+    browser.evaluate("document.querySelector('#stage').scrollIntoView()");
+    for key in ["ArrowLeft", "ArrowUp", "+", "-"] {
+        let press = format!(
+            "document.getElementById('canvas').dispatchEvent(new KeyboardEvent('keydown', {{key: '{key}'}}))"
+        );
+        browser.evaluate(&press);
+    }
+    // The drawing buffer is gone after the frame: read it in the same turn as the drawing.
+    let lit = "(() => {
+        const canvas = document.getElementById('canvas');
+        canvas.dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowRight'}));
+        const copy = document.createElement('canvas');
+        copy.width = canvas.width; copy.height = canvas.height;
+        const context = copy.getContext('2d');
+        context.drawImage(canvas, 0, 0);
+        const pixels = context.getImageData(0, 0, copy.width, copy.height).data;
+        let lit = 0;
+        for (let i = 0; i < pixels.length; i += 4) lit += pixels[i] + pixels[i + 1] + pixels[i + 2] > 150;
+        return lit;
+    })()";
+    let lit = browser.evaluate(lit).as_f64().expect("a number of pixels");
+    assert!(lit > 5_000.0, "{lit} pixels are lit");
+    assert_eq!(browser.complaints, Vec::<String>::new());
+}
+
+#[test]
+fn a_page_of_figures_only_has_curves_and_no_canvas() {
+    let Some(mut browser) = browser() else { return };
+    let document = sample::document(false);
+    let scene = sample::scene(&document, 500);
+    let options = RenderOptions { share_safe: true, ..RenderOptions::default() };
+    let file =
+        PageFile::new("figures", &render(&document, Some(&scene), &options).expect("a page"));
+    browser.emulate(1280, 900, "light");
+    browser.open(&file.0);
+    assert_eq!(browser.evaluate("document.documentElement.dataset.charts"), json!("9"));
+    assert_eq!(browser.evaluate("document.querySelector('canvas')"), json!(null));
+    assert_eq!(browser.complaints, Vec::<String>::new());
+}
+
+#[test]
+fn pictures_are_taken_when_asked_for() {
+    let Some(folder) = std::env::var_os("UNLIFT_SCREENSHOTS") else {
+        return;
+    };
+    let Some(mut browser) = browser() else { return };
+    let folder = PathBuf::from(folder);
+    let pages = [("metric", private_page(true)), ("no-scale", private_page(false))];
+    for (name, page) in pages {
+        let file = PageFile::new(name, &page);
+        for (width, color_scheme) in
+            [(1280, "light"), (1280, "dark"), (390, "light"), (390, "dark")]
+        {
+            browser.emulate(width, 1000, color_scheme);
+            browser.open(&file.0);
+            let shot =
+                |kind: &str| folder.join(format!("{name}-{width}-{color_scheme}-{kind}.png"));
+            std::fs::write(shot("fold"), browser.screenshot()).expect("a picture");
+            for section in ["curves", "distribution", "scene", "numbers", "losses", "reading"] {
+                browser.emulate(width, 1400, color_scheme);
+                browser.evaluate(&format!(
+                    "document.getElementById('{section}').scrollIntoView({{behavior: 'instant'}})"
+                ));
+                std::thread::sleep(std::time::Duration::from_millis(300));
+                std::fs::write(shot(section), browser.screenshot()).expect("a picture");
+            }
+        }
+    }
+}

@@ -1,0 +1,176 @@
+//! The room: its shell, and what stands where.
+
+use super::furniture as piece;
+use super::surfaces::{Faces, Place, Scene, Texture, turn};
+use super::{Purpose, draws};
+use crate::seed::Draws;
+
+/// Free space kept at the ends of a short wall, where the long walls' furniture stands.
+const CORNER: f64 = 0.85;
+
+/// The furnished room of `seed`.
+pub(super) fn furnished(seed: u64) -> Scene {
+    let mut draws = draws(seed, Purpose::Layout, 0);
+    let size = [draws.between(4.8, 5.3), draws.between(3.8, 4.2), draws.between(2.5, 2.7)];
+    let mut scene = Scene::new(size);
+    let walls = shell(&mut scene);
+
+    // Which of two opposite walls gets which furniture differs from room to room.
+    let mut long = [0, 2];
+    let mut short = [1, 3];
+    draws.shuffle(&mut long);
+    draws.shuffle(&mut short);
+    storage_wall(&mut scene, &walls[long[0]], size[0], &mut draws);
+    door_wall(&mut scene, &walls[long[1]], size[0], &mut draws);
+    desk_wall(&mut scene, &walls[short[0]], size[1], &mut draws);
+    sofa_wall(&mut scene, &walls[short[1]], size[1], &mut draws);
+    dining(&mut scene, size, &mut draws);
+    scene
+}
+
+/// Floor, ceiling and walls; returns a place per wall, at the left end of its foot as one faces it
+/// from behind (so that `x` runs along it and `y` into the room).
+fn shell(scene: &mut Scene) -> [Place; 4] {
+    let [l, w, h] = scene.size;
+    let wall = |origin, turn| Place { origin, turn };
+    let walls = [
+        wall([0.0, 0.0, 0.0], [1.0, 0.0]),
+        wall([l, 0.0, 0.0], [0.0, 1.0]),
+        wall([l, w, 0.0], [-1.0, 0.0]),
+        wall([0.0, w, 0.0], [0.0, -1.0]),
+    ];
+    let (x, y) = ([l, 0.0, 0.0], [0.0, w, 0.0]);
+    scene.sheet(&walls[0], [0.0; 3], x, y, Texture::FLOOR);
+    scene.sheet(&walls[0], [0.0, 0.0, h], y, x, Texture::PAINT);
+    for (place, length) in walls.iter().zip([l, w, l, w]) {
+        let (x, z) = ([length, 0.0, 0.0], [0.0, 0.0, h]);
+        scene.sheet(place, [0.0; 3], z, x, Texture::PAINT);
+        let baseboard = [length, 0.012, 0.07];
+        scene.shell(place, [0.0; 3], baseboard, Faces::FrontAndTop, Texture::SMOOTH);
+    }
+    walls
+}
+
+/// Bookshelf, tall cabinet and a plant, in any order.
+fn storage_wall(scene: &mut Scene, wall: &Place, length: f64, draws: &mut Draws) {
+    let widths = [draws.between(1.5, 1.9), draws.between(0.85, 1.1), draws.between(0.4, 0.5)];
+    let starts = side_by_side(widths, 0.08, length - 0.08, draws);
+    let at = |i: usize| straight(wall, starts[i]);
+    piece::bookshelf(scene, &at(0), widths[0], draws);
+    piece::tall_cabinet(scene, &at(1), widths[1], draws);
+    piece::plant(scene, &wall.then([starts[2] + 0.5 * widths[2], 0.3, 0.0], [1.0, 0.0]), draws);
+}
+
+/// Sideboard with pictures above, door and floor lamp, in any order.
+fn door_wall(scene: &mut Scene, wall: &Place, length: f64, draws: &mut Draws) {
+    let widths = [draws.between(1.4, 1.8), 0.95, 0.45];
+    let starts = side_by_side(widths, 0.08, length - 0.08, draws);
+    let at = |i: usize| straight(wall, starts[i]);
+    piece::sideboard(scene, &at(0), widths[0], draws);
+    piece::pictures(scene, &at(0), widths[0], 1.35, draws);
+    piece::door(scene, &at(1), widths[1]);
+    piece::floor_lamp(scene, &wall.then([starts[2] + 0.22, 0.28, 0.0], [1.0, 0.0]), draws);
+}
+
+/// Window, and a desk with its chair before it.
+fn desk_wall(scene: &mut Scene, wall: &Place, length: f64, draws: &mut Draws) {
+    let width = draws.between(1.2, 1.6);
+    let start = draws.between(CORNER, length - CORNER - width);
+    let place = straight(wall, start);
+    piece::window(scene, wall, 0.5 * length, draws);
+    piece::desk(scene, &place, width, draws);
+    let chair = [0.5 * width, 0.95, 0.0];
+    // Half a turn (a half angle of 90 degrees) more: the sitter faces the desk.
+    piece::chair(scene, &place.then(chair, [-1.0, 0.0]), draws);
+}
+
+/// Sofa below pictures.
+fn sofa_wall(scene: &mut Scene, wall: &Place, length: f64, draws: &mut Draws) {
+    let width = draws.between(1.7, 2.0);
+    let start = draws.between(CORNER, length - CORNER - width);
+    let place = straight(wall, start);
+    piece::sofa(scene, &place, width, draws);
+    piece::pictures(scene, &place, width, 1.3, draws);
+}
+
+/// Rug, table, chairs and a pendant lamp in the middle.
+fn dining(scene: &mut Scene, size: [f64; 3], draws: &mut Draws) {
+    let middle = Place {
+        origin: [
+            0.5 * size[0] + draws.between(-0.2, 0.2),
+            0.5 * size[1] + draws.between(-0.15, 0.15),
+            0.0,
+        ],
+        turn: turn(draws.between(-0.06, 0.06)),
+    };
+    let (length, depth) = (draws.between(1.25, 1.6), draws.between(0.75, 0.9));
+    piece::rug(scene, &middle, draws);
+    piece::table(scene, &middle, length, depth, draws);
+    for (x, side) in [(-0.25, -1.0), (0.25, -1.0), (-0.25, 1.0), (0.25, 1.0)] {
+        // Pushed in by a different amount and never quite straight.
+        let y = side * (0.5 * depth + draws.between(0.0, 0.22));
+        let small = turn(draws.between(-0.12, 0.12));
+        let towards = [-side * small[0], -side * small[1]];
+        let place = middle.then([x * length + draws.between(-0.05, 0.05), y, 0.0], towards);
+        piece::chair(scene, &place, draws);
+    }
+    piece::pendant(scene, &middle, size[2]);
+}
+
+fn straight(wall: &Place, x: f64) -> Place {
+    wall.then([x, 0.0, 0.0], [1.0, 0.0])
+}
+
+/// Where pieces of these widths begin when they stand in random order between `from` and `to`, the
+/// free space split at random.
+fn side_by_side(widths: [f64; 3], from: f64, to: f64, draws: &mut Draws) -> [f64; 3] {
+    let slack = (to - from - widths.iter().sum::<f64>()).max(0.0);
+    let gaps: [f64; 4] = std::array::from_fn(|_| 0.2 + draws.unit());
+    let per_gap = slack / gaps.iter().sum::<f64>();
+    let mut order = [0, 1, 2];
+    draws.shuffle(&mut order);
+    let mut starts = [0.0; 3];
+    let mut at = from;
+    for (gap, i) in gaps.into_iter().zip(order) {
+        at += gap * per_gap;
+        starts[i] = at;
+        at += widths[i];
+    }
+    starts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_surface_lies_in_the_room() {
+        for seed in 0..20 {
+            let scene = furnished(seed);
+            for surface in &scene.surfaces {
+                for (s, t) in [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0)] {
+                    let p = surface.at(s, t);
+                    for c in 0..3 {
+                        let inside = -0.01..scene.size[c] + 0.01;
+                        assert!(inside.contains(&p[c]), "seed {seed}: {surface:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn pieces_along_a_wall_do_not_overlap() {
+        let mut draws = draws(5, Purpose::Layout, 0);
+        for _ in 0..100 {
+            let widths = [1.9, 1.1, 0.5];
+            let starts = side_by_side(widths, 0.08, 4.7, &mut draws);
+            for i in 0..3 {
+                for j in 0..3 {
+                    assert!(i == j || starts[i] + widths[i] <= starts[j] || starts[j] < starts[i]);
+                }
+                assert!(starts[i] >= 0.08 && starts[i] + widths[i] <= 4.7 + 1e-9);
+            }
+        }
+    }
+}

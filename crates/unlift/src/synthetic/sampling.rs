@@ -1,0 +1,154 @@
+//! Points on the surfaces as structure from motion finds them, with its noise and its mistakes.
+
+use super::surfaces::{Scene, add, norm, scale, sub};
+use super::views::{MANY_VIEWS, Track, track};
+use super::{COINCIDENT_SHARE, Camera, OUTLIER_SHARE, Purpose, draws};
+use crate::seed::Draws;
+
+/// Photos that must see a point.
+const MIN_VIEWS: usize = 2;
+
+/// Tries per point; a scene in which this many fail is a mistake of ours, not of the seed.
+const MOST_TRIES: usize = 10_000;
+
+/// `n` points in random order: copies, outliers, and points on surfaces.
+pub(super) fn points(seed: u64, n: usize, scene: &Scene, cameras: &[Camera]) -> Vec<[f64; 3]> {
+    // A single point has nothing to be a copy of.
+    let n_copies = if n < 2 { 0 } else { share(n, COINCIDENT_SHARE) };
+    let n_outliers = share(n, OUTLIER_SHARE);
+    let sources = Sources::new(seed, scene);
+    let mut points: Vec<[f64; 3]> = (0..n - n_copies)
+        .map(|i| {
+            let mut draws = draws(seed, Purpose::FirstPoint, i);
+            let seen = sources.seen_point(scene, cameras, &mut draws);
+            if i < n_outliers { outlier(seen, scene, &mut draws) } else { noisy(seen, &mut draws) }
+        })
+        .collect();
+    let order = draws(seed, Purpose::Copies, 0).permutation(points.len());
+    for i in 0..n_copies {
+        points.push(points[order[i] as usize]);
+    }
+    draws(seed, Purpose::Order, 0).shuffle(&mut points);
+    points
+}
+
+fn share(n: usize, share: f64) -> usize {
+    (n as f64 * share).round() as usize
+}
+
+/// A true surface point and the photos that see it.
+struct Seen {
+    point: [f64; 3],
+    track: Track,
+}
+
+/// Triangulation error: along the viewing ray it grows with the square of the distance, across it
+/// linearly; one point in ten has a bad match among its views.
+fn noisy(seen: Seen, draws: &mut Draws) -> [f64; 3] {
+    let ray = sub(seen.point, seen.track.center);
+    let distance = norm(ray);
+    let bad = if draws.unit() < 0.1 { 3.5 } else { 1.0 };
+    let across = bad * (0.0006 + 0.0005 * distance);
+    let along = bad * (0.0008 + 0.0010 * distance * distance);
+    let depth = scale(ray, draws.normal() * along / distance);
+    let jitter = std::array::from_fn(|_| draws.normal() * across);
+    add(seen.point, add(depth, jitter))
+}
+
+/// A wrong match: beyond the room on a viewing ray, or anywhere within several rooms.
+fn outlier(seen: Seen, scene: &Scene, draws: &mut Draws) -> [f64; 3] {
+    if draws.unit() < 0.6 {
+        let ray = sub(seen.point, seen.track.center);
+        // 1 / u has the heavy tail of depths from nearly parallel rays.
+        let stretch = 1.8 / draws.between(0.3, 1.0);
+        let reach = 1.0 + scene.size[0] * (0.3 + stretch) / norm(ray);
+        return add(seen.track.center, scale(ray, reach));
+    }
+    std::array::from_fn(|c| scene.size[c] * (0.5 + draws.between(-2.5, 2.5)))
+}
+
+/// Something that yields points: a surface, its outline, or a patch of texture on it.
+struct Source {
+    surface: usize,
+    kind: Kind,
+    /// Sum of weights up to and including this source.
+    cumulated: f64,
+}
+
+enum Kind {
+    Even,
+    Outline,
+    Patch { s: f64, t: f64, radius: f64 },
+}
+
+struct Sources(Vec<Source>);
+
+impl Sources {
+    fn new(seed: u64, scene: &Scene) -> Self {
+        let mut sources = Self(Vec::new());
+        let mut draws = draws(seed, Purpose::Texture, 0);
+        for (index, surface) in scene.surfaces.iter().enumerate() {
+            let texture = surface.texture;
+            let area = surface.area();
+            let around = 2.0 * (norm(surface.u) + norm(surface.v));
+            // No two prints are alike: contrast varies from surface to surface.
+            let contrast = 0.3 + 2.0 * draws.unit() * draws.unit();
+            sources.push(index, Kind::Even, contrast * texture.even * area);
+            sources.push(index, Kind::Outline, contrast * texture.outline * around);
+            let n_patches = texture.patches * area + draws.unit();
+            for _ in 0..n_patches as usize {
+                let weight = contrast * texture.per_patch * draws.between(0.3, 1.7);
+                let radius = texture.patch_radius * draws.between(0.5, 1.5);
+                let (s, t) = (draws.unit(), draws.unit());
+                sources.push(index, Kind::Patch { s, t, radius }, weight);
+            }
+        }
+        sources
+    }
+
+    fn push(&mut self, surface: usize, kind: Kind, weight: f64) {
+        let cumulated = self.0.last().map_or(0.0, |s| s.cumulated) + weight;
+        self.0.push(Source { surface, kind, cumulated });
+    }
+
+    /// A surface point that enough photos see; the more see it, the likelier.
+    fn seen_point(&self, scene: &Scene, cameras: &[Camera], draws: &mut Draws) -> Seen {
+        let total = self.0.last().map_or(0.0, |s| s.cumulated);
+        for _ in 0..MOST_TRIES {
+            let at = draws.unit() * total;
+            let source = &self.0[self.0.partition_point(|s| s.cumulated <= at)];
+            let surface = &scene.surfaces[source.surface];
+            let (s, t) = match source.kind {
+                Kind::Even => (draws.unit(), draws.unit()),
+                Kind::Outline => on_outline(norm(surface.u), norm(surface.v), draws),
+                Kind::Patch { s, t, radius } => (
+                    s + draws.normal() * radius / norm(surface.u),
+                    t + draws.normal() * radius / norm(surface.v),
+                ),
+            };
+            if !surface.holds(s, t) {
+                continue;
+            }
+            let point = surface.at(s, t);
+            let first = draws.below(cameras.len() as u64) as usize;
+            if let Some(track) = track(scene, cameras, surface, point, first)
+                && track.n_views >= MIN_VIEWS
+                && draws.unit() * (MANY_VIEWS as f64) < track.n_views as f64
+            {
+                return Seen { point, track };
+            }
+        }
+        panic!("a furnished room has surfaces that are seen");
+    }
+}
+
+/// `(s, t)` within some millimeters of the outline of a parallelogram with these sides.
+fn on_outline(u: f64, v: f64, draws: &mut Draws) -> (f64, f64) {
+    let inset = draws.unit() * draws.unit() * 0.012;
+    let far = draws.unit() < 0.5;
+    let edge = |side: f64| {
+        let share = (inset / side).min(0.5);
+        if far { 1.0 - share } else { share }
+    };
+    if draws.unit() * (u + v) < u { (draws.unit(), edge(v)) } else { (edge(u), draws.unit()) }
+}

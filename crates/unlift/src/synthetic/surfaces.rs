@@ -1,0 +1,383 @@
+//! What a scene is made of: textured surfaces to sample, and boxes that hide what is behind them.
+
+/// Cosine and sine of a turn about `z`.
+pub(super) type Turn = [f64; 2];
+
+/// The turn whose half angle has the tangent `t`: exact arithmetic in place of `sin` and `cos`,
+/// which differ between platforms.
+pub(super) fn turn(t: f64) -> Turn {
+    let norm = 1.0 + t * t;
+    [(1.0 - t * t) / norm, 2.0 * t / norm]
+}
+
+/// `v` turned about `z`.
+pub(super) fn rotate([cos, sin]: Turn, v: [f64; 3]) -> [f64; 3] {
+    [cos * v[0] - sin * v[1], sin * v[0] + cos * v[1], v[2]]
+}
+
+pub(super) fn add(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|c| a[c] + b[c])
+}
+
+pub(super) fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|c| a[c] - b[c])
+}
+
+pub(super) fn scale(a: [f64; 3], s: f64) -> [f64; 3] {
+    a.map(|x| x * s)
+}
+
+pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(super) fn norm(a: [f64; 3]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// How many points a surface attracts, in relative numbers: what a feature detector finds there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Texture {
+    /// Points per square meter, everywhere.
+    pub(super) even: f64,
+    /// Points per meter of outline.
+    pub(super) outline: f64,
+    /// Patches (stains, prints, knots) per square meter.
+    pub(super) patches: f64,
+    /// Points per patch.
+    pub(super) per_patch: f64,
+    /// Standard deviation of a patch, in meters.
+    pub(super) patch_radius: f64,
+}
+
+impl Texture {
+    const fn new(even: f64, outline: f64, patches: f64, per_patch: f64, patch_radius: f64) -> Self {
+        Self { even, outline, patches, per_patch, patch_radius }
+    }
+
+    /// Painted walls and ceilings.
+    pub(super) const PAINT: Self = Self::new(1.5, 2.5, 0.4, 16.0, 0.03);
+    /// Smooth furniture: mostly its edges are seen.
+    pub(super) const SMOOTH: Self = Self::new(10.0, 18.0, 1.5, 22.0, 0.025);
+    /// Grained wood.
+    pub(super) const WOOD: Self = Self::new(22.0, 24.0, 7.0, 36.0, 0.03);
+    /// Floor boards.
+    pub(super) const FLOOR: Self = Self::new(5.0, 3.0, 1.5, 24.0, 0.04);
+    /// Upholstery.
+    pub(super) const FABRIC: Self = Self::new(45.0, 14.0, 8.0, 50.0, 0.035);
+    /// Woven patterns: rugs, cushions.
+    pub(super) const PATTERN: Self = Self::new(150.0, 50.0, 26.0, 80.0, 0.035);
+    /// Printed things: spines, covers, pictures, packages.
+    pub(super) const PRINT: Self = Self::new(2_100.0, 70.0, 150.0, 26.0, 0.016);
+    /// Leaves.
+    pub(super) const LEAVES: Self = Self::new(2_000.0, 150.0, 0.0, 0.0, 0.02);
+    /// Glass and screens: next to nothing but the frame.
+    pub(super) const GLASS: Self = Self::new(6.0, 60.0, 0.0, 0.0, 0.02);
+}
+
+/// The outline of a flat surface within its parallelogram.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Outline {
+    /// The whole parallelogram.
+    Full,
+    /// The ellipse that touches the middle of each edge.
+    Ellipse,
+}
+
+/// A flat surface that is seen from the side of its normal, `u x v`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Surface {
+    pub(super) corner: [f64; 3],
+    pub(super) u: [f64; 3],
+    pub(super) v: [f64; 3],
+    pub(super) outline: Outline,
+    pub(super) texture: Texture,
+}
+
+impl Surface {
+    /// The point at `(s, t)`, both 0 to 1.
+    pub(super) fn at(&self, s: f64, t: f64) -> [f64; 3] {
+        add(self.corner, add(scale(self.u, s), scale(self.v, t)))
+    }
+
+    /// Whether `(s, t)` lies on the surface.
+    pub(super) fn holds(&self, s: f64, t: f64) -> bool {
+        let within = (0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t);
+        match self.outline {
+            Outline::Full => within,
+            Outline::Ellipse => {
+                let (x, y) = (2.0 * s - 1.0, 2.0 * t - 1.0);
+                x * x + y * y <= 1.0
+            }
+        }
+    }
+
+    /// The unit normal.
+    pub(super) fn normal(&self) -> [f64; 3] {
+        let n = cross(self.u, self.v);
+        scale(n, 1.0 / norm(n))
+    }
+
+    /// Square meters.
+    pub(super) fn area(&self) -> f64 {
+        let full = norm(cross(self.u, self.v));
+        match self.outline {
+            Outline::Full => full,
+            // pi / 4, of which three digits are enough for a density.
+            Outline::Ellipse => 0.785 * full,
+        }
+    }
+}
+
+/// Where a piece stands: its own axes are right along a wall (x), into the room (y) and up (z).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub(super) origin: [f64; 3],
+    pub(super) turn: Turn,
+}
+
+impl Place {
+    /// The place at `offset` of this one, turned further by `turn`.
+    pub(super) fn then(&self, offset: [f64; 3], turn: Turn) -> Self {
+        let ([a, b], [c, d]) = (self.turn, turn);
+        Self { origin: self.point(offset), turn: [a * c - b * d, b * c + a * d] }
+    }
+
+    /// A point of the piece in the room.
+    pub(super) fn point(&self, p: [f64; 3]) -> [f64; 3] {
+        add(self.origin, rotate(self.turn, p))
+    }
+
+    /// A direction of the piece in the room.
+    pub(super) fn direction(&self, v: [f64; 3]) -> [f64; 3] {
+        rotate(self.turn, v)
+    }
+}
+
+/// A box that hides what is behind it.
+#[derive(Clone, Copy, Debug)]
+struct Blocker {
+    place: Place,
+    low: [f64; 3],
+    high: [f64; 3],
+}
+
+impl Blocker {
+    /// Whether the segment from `from` to `to` passes through the box.
+    fn blocks(&self, from: [f64; 3], to: [f64; 3]) -> bool {
+        let back = [self.place.turn[0], -self.place.turn[1]];
+        let start = rotate(back, sub(from, self.place.origin));
+        let along = rotate(back, sub(to, from));
+        let (mut enter, mut leave) = (0.0f64, 1.0f64);
+        for c in 0..3 {
+            if along[c] == 0.0 {
+                if start[c] < self.low[c] || start[c] > self.high[c] {
+                    return false;
+                }
+                continue;
+            }
+            let one = (self.low[c] - start[c]) / along[c];
+            let other = (self.high[c] - start[c]) / along[c];
+            enter = enter.max(one.min(other));
+            leave = leave.min(one.max(other));
+        }
+        enter <= leave
+    }
+}
+
+/// Which faces of a block are worth sampling.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Faces {
+    /// All but the bottom.
+    Standing,
+    /// All six.
+    All,
+    /// The one into the room and the top: things that stand side by side.
+    FrontAndTop,
+}
+
+/// Surfaces and blockers of a room whose corner is the origin, walls along the axes.
+#[derive(Clone, Debug)]
+pub(super) struct Scene {
+    /// Length, width and height in meters.
+    pub(super) size: [f64; 3],
+    pub(super) surfaces: Vec<Surface>,
+    blockers: Vec<Blocker>,
+}
+
+impl Scene {
+    /// An empty scene.
+    pub(super) fn new(size: [f64; 3]) -> Self {
+        Self { size, surfaces: Vec::new(), blockers: Vec::new() }
+    }
+
+    /// Whether something stands between a camera and a surface point.
+    pub(super) fn hides(&self, camera: [f64; 3], point: [f64; 3]) -> bool {
+        // Stop a centimeter short, so that a surface does not hide itself.
+        let ray = sub(camera, point);
+        let to = add(point, scale(ray, 0.01 / norm(ray)));
+        self.blockers.iter().any(|b| b.blocks(camera, to))
+    }
+
+    /// Adds the parallelogram at `corner` of `place`, seen from the side of `u x v`.
+    pub(super) fn sheet(
+        &mut self,
+        place: &Place,
+        corner: [f64; 3],
+        u: [f64; 3],
+        v: [f64; 3],
+        texture: Texture,
+    ) {
+        self.outlined(place, corner, u, v, Outline::Full, texture);
+    }
+
+    /// Adds a flat surface with an outline.
+    pub(super) fn outlined(
+        &mut self,
+        place: &Place,
+        corner: [f64; 3],
+        u: [f64; 3],
+        v: [f64; 3],
+        outline: Outline,
+        texture: Texture,
+    ) {
+        self.surfaces.push(Surface {
+            corner: place.point(corner),
+            u: place.direction(u),
+            v: place.direction(v),
+            outline,
+            texture,
+        });
+    }
+
+    /// Adds a solid box between two corners, which hides what is behind it.
+    pub(super) fn block(
+        &mut self,
+        place: &Place,
+        low: [f64; 3],
+        high: [f64; 3],
+        faces: Faces,
+        texture: Texture,
+    ) {
+        self.shell(place, low, high, faces, texture);
+        self.blockers.push(Blocker { place: *place, low, high });
+    }
+
+    /// Adds the faces of a box that hides next to nothing: flat against something, or one of many.
+    pub(super) fn shell(
+        &mut self,
+        place: &Place,
+        low: [f64; 3],
+        high: [f64; 3],
+        faces: Faces,
+        texture: Texture,
+    ) {
+        let [w, d, h] = sub(high, low);
+        let (x, y, z) = ([w, 0.0, 0.0], [0.0, d, 0.0], [0.0, 0.0, h]);
+        let (right, front, top) = (add(low, x), add(low, y), add(low, z));
+        self.sheet(place, front, z, x, texture);
+        self.sheet(place, top, x, y, texture);
+        if faces != Faces::FrontAndTop {
+            self.sheet(place, low, x, z, texture);
+            self.sheet(place, low, z, y, texture);
+            self.sheet(place, right, y, z, texture);
+        }
+        if faces == Faces::All {
+            self.sheet(place, low, y, x, texture);
+        }
+    }
+
+    /// Adds an upright tube of twelve sides around `middle` (of its foot), `radius` at the foot and
+    /// `top_radius` at the top.
+    pub(super) fn tube(
+        &mut self,
+        place: &Place,
+        middle: [f64; 3],
+        radius: f64,
+        top_radius: f64,
+        height: f64,
+        texture: Texture,
+    ) {
+        let mut on_circle = [[1.0, 0.0]; 13];
+        // 2 - sqrt(3) is the tangent of 15 degrees, half of a twelfth of a turn.
+        let step = turn(2.0 - 3.0f64.sqrt());
+        for i in 1..13 {
+            let [x, y, _] = rotate(step, [on_circle[i - 1][0], on_circle[i - 1][1], 0.0]);
+            on_circle[i] = [x, y];
+        }
+        // The seams between the twelve sides are no edges that a detector would find.
+        let side = Texture { outline: texture.outline / 8.0, ..texture };
+        for pair in on_circle.windows(2) {
+            let foot = |p: [f64; 2]| add(middle, [radius * p[0], radius * p[1], 0.0]);
+            let lean = [
+                (top_radius - radius) * 0.5 * (pair[0][0] + pair[1][0]),
+                (top_radius - radius) * 0.5 * (pair[0][1] + pair[1][1]),
+                height,
+            ];
+            let u = sub(foot(pair[1]), foot(pair[0]));
+            self.sheet(place, foot(pair[0]), u, lean, side);
+        }
+        let corner = add(middle, [-top_radius, -top_radius, height]);
+        let (u, v) = ([2.0 * top_radius, 0.0, 0.0], [0.0, 2.0 * top_radius, 0.0]);
+        self.outlined(place, corner, u, v, Outline::Ellipse, texture);
+        // The box inside the tube hides enough.
+        let inner = 0.7 * radius.max(top_radius);
+        self.blockers.push(Blocker {
+            place: *place,
+            low: sub(middle, [inner, inner, 0.0]),
+            high: add(middle, [inner, inner, height]),
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HERE: Place = Place { origin: [0.0; 3], turn: [1.0, 0.0] };
+
+    #[test]
+    fn faces_of_a_block_look_outwards() {
+        let mut scene = Scene::new([5.0; 3]);
+        scene.block(&HERE, [1.0; 3], [2.0, 3.0, 4.0], Faces::All, Texture::WOOD);
+        for face in &scene.surfaces {
+            let outwards = sub(face.at(0.5, 0.5), [1.5, 2.0, 2.5]);
+            assert!(dot(face.normal(), outwards) > 0.0, "{face:?}");
+        }
+        assert_eq!(scene.surfaces.len(), 6);
+    }
+
+    #[test]
+    fn a_tube_looks_outwards_and_closes() {
+        let mut scene = Scene::new([5.0; 3]);
+        scene.tube(&HERE, [1.0, 1.0, 0.0], 0.2, 0.1, 0.5, Texture::WOOD);
+        for face in &scene.surfaces {
+            let outwards = sub(face.at(0.5, 0.5), [1.0, 1.0, 0.25]);
+            assert!(dot(face.normal(), outwards) > 0.0, "{face:?}");
+        }
+        let around: f64 = scene.surfaces[..12].iter().map(|f| norm(f.u)).sum();
+        assert!((around - 2.0 * 0.2 * std::f64::consts::PI).abs() < 0.02);
+    }
+
+    #[test]
+    fn a_block_hides_what_is_behind_and_inside_but_not_its_own_face() {
+        let mut scene = Scene::new([5.0; 3]);
+        scene.block(&HERE, [1.0; 3], [2.0; 3], Faces::All, Texture::WOOD);
+        let camera = [0.0, 1.5, 1.5];
+        assert!(scene.hides(camera, [3.0, 1.5, 1.5]));
+        assert!(scene.hides(camera, [1.5, 1.5, 1.5]));
+        assert!(!scene.hides(camera, [1.0, 1.5, 1.5]));
+        assert!(!scene.hides(camera, [3.0, 4.5, 1.5]));
+    }
+
+    #[test]
+    fn places_chain() {
+        let quarter = turn(1.0);
+        let place = HERE.then([1.0, 0.0, 0.0], quarter).then([1.0, 0.0, 0.0], quarter);
+        assert_eq!(place.point([1.0, 0.0, 0.0]), [0.0, 1.0, 0.0]);
+    }
+}
