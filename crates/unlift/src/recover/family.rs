@@ -2,7 +2,7 @@
 
 use super::line_rows::{LineRow, from_lines, from_rays};
 use super::plane_windows::SortedPlanes;
-use crate::geometry::vector::median;
+use crate::geometry::vector::{along, dot, median, sub, widen};
 use crate::released::{AxisPlanes, Obfuscation, Released};
 
 /// Records in the form the solvers read.
@@ -34,7 +34,7 @@ impl<'a, const D: usize> Family<'a, D> {
 
     /// A length of the order of the map's size, from the records alone; 0 for an empty map.
     ///
-    /// Lines: the median distance of the feet from the origin. Rays: the largest distance between
+    /// Lines: their median distance from the place they pass nearest. Rays: the largest distance between
     /// centers. Planes and candidates: the largest interquartile range over the axes.
     pub(crate) fn extent(&self) -> f64 {
         match self {
@@ -42,11 +42,7 @@ impl<'a, const D: usize> Family<'a, D> {
                 let Some(first) = rows.first() else {
                     return 0.0;
                 };
-                if first.is_ray() {
-                    return ray_extent(rows);
-                }
-                let mut lengths: Vec<f64> = rows.iter().map(|row| length(&row.through)).collect();
-                median(&mut lengths)
+                if first.is_ray() { ray_extent(rows) } else { line_extent(rows) }
             }
             Self::Planes { planes, sorted } => sorted.interquartile_range(planes),
             Self::Candidates { rows } => (0..D)
@@ -70,6 +66,38 @@ pub(super) fn interquartile_range(sorted: &[f32]) -> f64 {
 
 fn length<const D: usize>(v: &[f32; D]) -> f64 {
     v.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>().sqrt()
+}
+
+/// Lines and rounds in which [`line_extent`] looks for the middle of a map.
+const MIDDLE: (usize, usize) = (1000, 60);
+
+/// The median distance of the lines from their middle. Distances from the origin would not do: it is
+/// rounded, so that a shifted or scaled map has it elsewhere.
+fn line_extent<const D: usize>(rows: &[LineRow<D>]) -> f64 {
+    let rows = &rows[..rows.len().min(MIDDLE.0)];
+    let offset = |row: &LineRow<D>, from: &[f64; D]| {
+        let (through, direction) = (widen(&row.through), widen(&row.direction));
+        let away = sub(&through, from);
+        along(&away, -dot(&away, &direction), &direction)
+    };
+    // Each round moves to the mean of the lines' nearest points; what is left of the start shrinks
+    // by the mean squared cosine with the lines, about a third.
+    let mut middle = [0.0; D];
+    for _ in 0..MIDDLE.1 {
+        let mut step = [0.0; D];
+        for row in rows {
+            step = along(&step, 1.0 / rows.len() as f64, &offset(row, &middle));
+        }
+        middle = along(&middle, 1.0, &step);
+    }
+    let mut distances: Vec<f64> = rows
+        .iter()
+        .map(|row| {
+            let away = offset(row, &middle);
+            dot(&away, &away).sqrt()
+        })
+        .collect();
+    median(&mut distances)
 }
 
 fn ray_extent<const D: usize>(rows: &[LineRow<D>]) -> f64 {

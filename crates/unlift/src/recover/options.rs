@@ -72,7 +72,12 @@ impl RecoverOptions {
             Delta::Fixed(delta) if !(delta.is_finite() && delta > 0.0) => {
                 Err(Error::new("delta", "a positive length", delta.to_string()))
             }
-            _ => Ok(()),
+            // Solvers compare squared distances in f32.
+            Delta::Fixed(delta) if !(delta as f32 * delta as f32).is_normal() => {
+                let expected = "a length whose square is in the range of f32";
+                Err(Error::new("delta", expected, delta.to_string()))
+            }
+            Delta::Fixed(_) | Delta::Auto => Ok(()),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Lines: unit direction with a fixed sign, and the foot (the point nearest the origin).
 
-use super::{finite_f32, unit_direction};
+use super::{finite_f32, is_f32, unit_direction};
 use crate::Error;
 
 /// Lines in normal form, `(n, D)` columns of `f32` about the released origin.
@@ -10,7 +10,7 @@ pub struct Lines<const D: usize> {
     direction: Vec<[f32; D]>,
 }
 
-/// A foot this close to perpendicular (relative to its length) is stored as it is.
+/// A stored foot this close to perpendicular (relative to its length) stays as it is.
 const FOOT_SLACK: f64 = 1e-6;
 
 impl<const D: usize> Lines<D> {
@@ -72,7 +72,8 @@ impl<const D: usize> Lines<D> {
 fn foot_of<const D: usize>(point: &[f64; D], unit: &[f64; D]) -> [f64; D] {
     let along: f64 = point.iter().zip(unit).map(|(p, u)| p * u).sum();
     let length2: f64 = point.iter().map(|p| p * p).sum();
-    if along * along <= FOOT_SLACK * FOOT_SLACK * length2 {
+    let stored = is_f32(point) && is_f32(unit);
+    if stored && along * along <= FOOT_SLACK * FOOT_SLACK * length2 {
         return *point;
     }
     // The stored unit vector is off by f32 rounding when it came from a file: divide by its length.

@@ -149,9 +149,15 @@ fn rows<T: Copy>(column: &[T], order: &[u32]) -> Vec<T> {
     order.iter().map(|&row| column[row as usize]).collect()
 }
 
-/// Directions closer to unit length than this (in squared length) are stored as they are, so that
+/// Stored directions closer to unit length than this (in squared length) stay as they are, so that
 /// normalizing twice changes no bit. `f32` rounding of a unit vector stays below it.
 const UNIT_SLACK: f64 = 6e-7;
+
+/// Whether `v` may have been stored before. Only then may a normal form keep it: a length near 1 or
+/// a point near its foot would otherwise show in the last bits.
+fn is_f32<const D: usize>(v: &[f64; D]) -> bool {
+    v.iter().all(|&x| f64::from(x as f32) == x)
+}
 
 /// The unit vector along `v`, as stored: left alone when it already is one up to `f32` rounding.
 ///
@@ -163,7 +169,7 @@ fn unit_direction<const D: usize>(v: [f64; D], row: usize) -> Result<[f64; D], E
         let what = format!("direction of record {row}");
         return Err(Error::new(what, "a finite vector with length", format!("{v:?}")));
     }
-    if (norm2 - 1.0).abs() <= UNIT_SLACK {
+    if is_f32(&v) && (norm2 - 1.0).abs() <= UNIT_SLACK {
         return Ok(v);
     }
     let norm = norm2.sqrt();

@@ -40,3 +40,6 @@ pub(crate) fn refit(sections: &Sections, t: f32, delta2: f32) -> (f32, u32) {
     let (shift, support) = sections.least_squares_step(t, reach2);
     (t + shift, support)
 }
+
+#[cfg(test)]
+mod twin;

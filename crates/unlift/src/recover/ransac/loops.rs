@@ -12,7 +12,7 @@ const CONFIDENCE: f64 = 0.99;
 #[inline(always)]
 fn trials_needed(inliers: u32, n: u32, size: u32) -> u32 {
     let mut all_inliers = 1.0;
-    for drawn in 0..size {
+    for drawn in 0..size.min(n) {
         all_inliers *= f64::from(inliers.saturating_sub(drawn)) / f64::from(n - drawn);
     }
     if all_inliers <= 0.0 {

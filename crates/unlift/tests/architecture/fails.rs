@@ -1,0 +1,112 @@
+//! Each check of the house can fail.
+
+use crate::rules::*;
+use crate::rust::{Source, code_of};
+
+fn source(path: &str, text: &str) -> Source {
+    Source { path: path.to_owned(), code: code_of(text) }
+}
+
+fn arrows(path: &str, text: &str) -> Vec<String> {
+    forbidden_arrows(&source(path, text))
+}
+
+#[test]
+fn arrows_against_the_stream_are_found_however_they_are_written() {
+    let wrong = [
+        ("recover/joint.rs", "use crate::truth::Original;"),
+        ("recover/joint.rs", "use crate::{Error, truth::Secret};"),
+        ("recover/joint.rs", "use crate::{\n    released::{Lines, Rays},\n    truth::Secret,\n};"),
+        ("recover/joint.rs", "use crate::{released as r, truth as t};"),
+        ("recover/joint.rs", "use super::super::truth;"),
+        ("recover/ransac/loops.rs", "use super::super::super::truth::Original;"),
+        ("recover/mod.rs", "fn f(secret: &crate::truth::Secret) {}"),
+        ("recover/mod.rs", "use crate::neighbors::oracle::TrueNeighbors;"),
+        ("recover/mod.rs", "use crate::neighbors::{Neighborhoods, oracle};"),
+        ("recover/mod.rs", "use crate::neighbors;"),
+        ("recover/mod.rs", "use crate::neighbors::*;"),
+        ("recover/mod.rs", "use crate::*;"),
+        ("recover/mod.rs", "use crate::evaluate::Accuracy;"),
+        ("recover/mod.rs", "use crate::obfuscate::SCHEMES;"),
+        ("geometry/knn.rs", "use crate::released::Lines;"),
+        ("points.rs", "use crate::truth::Original;"),
+        ("truth/secret.rs", "use crate::released::Released;"),
+        ("released/mod.rs", "use crate::truth::Secret;"),
+        ("neighbors/neighborhoods.rs", "use crate::truth::Secret;"),
+        ("neighbors/line_distance.rs", "use crate::truth::Secret;"),
+        ("neighbors/oracle.rs", "use crate::recover::Recovered;"),
+        ("obfuscate/olc.rs", "use crate::neighbors::Neighborhoods;"),
+        ("evaluate/mod.rs", "use crate::obfuscate::SCHEMES;"),
+        ("evaluate/mod.rs", "use crate::audit::Row;"),
+        ("new_stage/mod.rs", ""),
+    ];
+    for (path, text) in wrong {
+        assert!(!arrows(path, text).is_empty(), "{path}: {text}");
+    }
+}
+
+#[test]
+fn arrows_with_the_stream_pass() {
+    let right = [
+        ("recover/mod.rs", "use crate::neighbors::Neighborhoods;\nuse crate::{Error, RecordId};"),
+        ("recover/ransac/loops.rs", "use crate::recover::sections::{NO_VOTE, Sections};"),
+        ("recover/mod.rs", "//! Never imports `crate::truth`.\nconst A: &str = \"crate::truth\";"),
+        ("geometry/kmeans.rs", "use super::vector::dot;\nuse crate::seed::{Draws, Stage};"),
+        ("neighbors/oracle.rs", "use crate::truth::{Original, Secret};"),
+        ("audit/run.rs", "use crate::recover::{RecoverOptions as Options, recover};"),
+        ("seed.rs", "mod tests {\n    use super::*;\n}"),
+    ];
+    for (path, text) in right {
+        assert_eq!(arrows(path, text), Vec::<String>::new(), "{path}");
+    }
+}
+
+#[test]
+fn reveals_are_found() {
+    let reveal = "let points = original.reveal();";
+    assert_eq!(forbidden_reveals(&source("audit/run.rs", reveal)), ["audit/run.rs: `reveal`"]);
+    assert_eq!(forbidden_reveals(&source("recover/mod.rs", "map(Original::reveal)")).len(), 1);
+    assert_eq!(forbidden_reveals(&source("neighbors/neighborhoods.rs", reveal)).len(), 1);
+    assert!(forbidden_reveals(&source("neighbors/oracle.rs", reveal)).is_empty());
+    assert!(forbidden_reveals(&source("audit/run.rs", "// reveal()")).is_empty());
+}
+
+#[test]
+fn state_and_files_are_found_in_recovery() {
+    let state = |text: &str| forbidden_state(&source("recover/joint.rs", text)).len();
+    assert_eq!(state("static CACHE: Mutex<u32> = Mutex::new(0);"), 1);
+    assert_eq!(state("use std::fs::File;"), 1);
+    assert_eq!(state("use std::{env, io};"), 1);
+    assert_eq!(state("let text = std::fs::read_to_string(path);"), 1);
+    assert_eq!(state("fn quote() -> char { '\\'' }\nstatic X: u8 = b'\"';"), 1);
+    assert_eq!(state("fn name(&self) -> &'static str { \"static\" }"), 0);
+}
+
+#[test]
+fn unsafe_code_is_found() {
+    let block = "fn f() { unsafe { g() } }";
+    assert_eq!(forbidden_unsafe(&source("recover/lists.rs", block)).len(), 1);
+    assert!(forbidden_unsafe(&source("simd.rs", block)).is_empty());
+    assert!(forbidden_unsafe(&source("lib.rs", "#![deny(unsafe_code)]")).is_empty());
+}
+
+#[test]
+fn a_forgotten_scheme_is_found() {
+    let module = "pub const SCHEMES: &[Entry] = &[\n    olc::ENTRY,\n    cp::ENTRY,\n];";
+    assert!(unregistered(&["mod.rs", "pairs.rs", "cp.rs", "olc.rs"], module).is_empty());
+    let found = unregistered(&["mod.rs", "pairs.rs", "cp.rs", "olc.rs", "circles.rs"], module);
+    assert_eq!(found, ["obfuscate/circles.rs: not in SCHEMES"]);
+    assert_eq!(unregistered(&["ppl.rs"], "mod ppl;").len(), 1);
+}
+
+#[test]
+fn long_files_and_new_dependencies_are_found() {
+    let long = "x\n".repeat(401);
+    assert_eq!(counted_lines(&long), 401);
+    let tested = format!("{}#[cfg(test)]\nmod tests {{\n{long}}}\n", "x\n".repeat(9));
+    assert_eq!(counted_lines(&tested), 9);
+    let manifest = "[package]\nname = \"a\"\n\n[dependencies]\n# why\nlibm = \"0.2\"\n\
+                    unlift.workspace = true\n\n[dev-dependencies]\nproptest = \"1\"\n";
+    assert_eq!(manifest_names(manifest, "dependencies"), ["libm", "unlift"]);
+    assert_eq!(manifest_names(manifest, "dev-dependencies"), ["proptest"]);
+}

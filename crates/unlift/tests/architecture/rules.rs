@@ -1,0 +1,140 @@
+//! The rules, as tables and as checks over text.
+
+use std::collections::BTreeSet;
+
+use crate::rust::{Source, internal_paths, paths, tokens};
+
+/// What every module may import.
+const VOCABULARY: &[&str] = &["error", "ids", "seed", "points", "descriptors", "geometry", "simd"];
+/// What the root exports: vocabulary under shorter names.
+const ROOT_NAMES: &[&str] =
+    &["Error", "OriginalId", "RecordId", "SlotId", "PointSet", "Unit", "Descriptors"];
+
+/// Per module the stages it may import. A new module needs a row here, and a reason.
+const ARROWS: &[(&str, &[&str])] = &[
+    ("error", &[]),
+    ("ids", &[]),
+    ("seed", &[]),
+    ("points", &[]),
+    ("descriptors", &[]),
+    ("simd", &[]),
+    ("geometry", &[]),
+    ("synthetic", &[]),
+    ("truth", &[]),
+    ("released", &[]),
+    ("obfuscate", &["truth", "released"]),
+    ("neighbors", &["released"]),
+    ("neighbors/oracle.rs", &["truth", "released"]),
+    ("recover", &["released", "neighbors"]),
+    ("evaluate", &["truth", "released", "recover", "neighbors"]),
+    ("audit", &["truth", "released", "obfuscate", "neighbors", "recover", "evaluate", "synthetic"]),
+];
+
+/// Dependencies of the core: light, and known for long.
+pub const DEPENDENCIES: &[&str] = &["kiddo", "libm", "rayon", "nalgebra"];
+
+/// What a crate of this workspace may import of the others.
+pub const CRATES: &[(&str, &[&str])] = &[
+    ("unlift", &[]),
+    ("unlift-io", &["unlift"]),
+    ("unlift-report", &["unlift"]),
+    ("unlift-cli", &["unlift", "unlift-io", "unlift-report"]),
+];
+
+/// Lines of a file at most, its unit tests not counted.
+pub const MOST_LINES: usize = 400;
+
+/// Files of `obfuscate/` that are not schemes.
+pub const NO_SCHEMES: &[&str] = &["mod", "pairs"];
+
+/// Imports of `source` that no row of [`ARROWS`] allows.
+pub fn forbidden_arrows(source: &Source) -> Vec<String> {
+    let stage = source.path.split('/').next().unwrap_or_default().trim_end_matches(".rs");
+    if stage == "lib" {
+        return Vec::new();
+    }
+    let row = |name: &str| ARROWS.iter().find(|(module, _)| *module == name);
+    let Some((_, allowed)) = row(&source.path).or_else(|| row(stage)) else {
+        return vec![format!("{}: module `{stage}` has no row in ARROWS", source.path)];
+    };
+    let mut found = Vec::new();
+    for path in internal_paths(source) {
+        let to = path[0].as_str();
+        // Recovery takes lists as they are; how they were made is none of its business.
+        let only_the_type = stage != "recover"
+            || to != "neighbors"
+            || path.get(1).is_some_and(|item| item == "Neighborhoods");
+        let known = to == stage || VOCABULARY.contains(&to) || ROOT_NAMES.contains(&to);
+        if !(known || allowed.contains(&to) && only_the_type) {
+            found.push(format!("{}: imports {}", source.path, path.join("::")));
+        }
+    }
+    found
+}
+
+/// Calls that open the truth where no one may.
+pub fn forbidden_reveals(source: &Source) -> Vec<String> {
+    let may = ["obfuscate/", "evaluate/", "neighbors/oracle.rs", "truth/original.rs"];
+    if may.iter().any(|prefix| source.path.starts_with(prefix)) {
+        return Vec::new();
+    }
+    complain(source, &["reveal"])
+}
+
+/// Global state and the outside world, in recovery.
+pub fn forbidden_state(source: &Source) -> Vec<String> {
+    if !source.path.starts_with("recover/") {
+        return Vec::new();
+    }
+    let mut found = complain(source, &["static", "thread_local", "OnceLock", "LazyLock"]);
+    for path in paths(&source.code, &["std"]) {
+        if let Some(module @ ("fs" | "env" | "net" | "process" | "time")) =
+            path.get(1).map(String::as_str)
+        {
+            found.push(format!("{}: uses std::{module}", source.path));
+        }
+    }
+    found
+}
+
+/// `unsafe` outside the one file that may.
+pub fn forbidden_unsafe(source: &Source) -> Vec<String> {
+    if source.path == "simd.rs" { Vec::new() } else { complain(source, &["unsafe"]) }
+}
+
+fn complain(source: &Source, words: &[&str]) -> Vec<String> {
+    let tokens = tokens(&source.code);
+    let hit = |word: &&str| tokens.iter().any(|token| token == word);
+    words.iter().copied().filter(hit).map(|word| format!("{}: `{word}`", source.path)).collect()
+}
+
+/// Scheme files whose entry the registry `SCHEMES` in `module` does not list.
+pub fn unregistered(files: &[&str], module: &str) -> Vec<String> {
+    let registry = module.split("SCHEMES: &[Entry] = &[").nth(1).unwrap_or_default();
+    let registry = registry.split("];").next().unwrap_or_default();
+    let listed: BTreeSet<&str> =
+        registry.split(',').filter_map(|row| row.trim().strip_suffix("::ENTRY")).collect();
+    let stems = files.iter().filter_map(|file| file.strip_suffix(".rs"));
+    stems
+        .filter(|stem| !NO_SCHEMES.contains(stem) && !listed.contains(stem))
+        .map(|stem| format!("obfuscate/{stem}.rs: not in SCHEMES"))
+        .collect()
+}
+
+/// Lines of a file, the unit tests at its bottom not counted.
+pub fn counted_lines(text: &str) -> usize {
+    let bottom = text.find("#[cfg(test)]\nmod tests {").unwrap_or(text.len());
+    text[..bottom].lines().count()
+}
+
+/// Names under `[section]` of a manifest.
+pub fn manifest_names(manifest: &str, section: &str) -> Vec<String> {
+    let header = format!("[{section}]");
+    let body = manifest.lines().skip_while(|line| line.trim() != header).skip(1);
+    body.take_while(|line| !line.starts_with('['))
+        .filter(|line| !line.starts_with('#'))
+        .filter_map(|line| line.split(['=', '.']).next())
+        .map(|name| name.trim().to_owned())
+        .filter(|name| !name.is_empty())
+        .collect()
+}

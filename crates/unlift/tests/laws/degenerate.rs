@@ -1,0 +1,177 @@
+//! Inputs that fix nothing: a status, never a NaN, never a panic.
+
+use proptest::prelude::*;
+use unlift::Unit;
+use unlift::neighbors::Neighborhoods;
+use unlift::obfuscate::Scheme;
+use unlift::recover::{Delta, RecoverOptions, Solver, Status, recover};
+use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
+use unlift::seed::{Draws, Stage};
+
+use crate::maps::*;
+
+/// Both solvers; deltas from absurdly small to absurdly large.
+fn harsh_options() -> Vec<RecoverOptions> {
+    let mut options = all_options();
+    for solver in Solver::ALL {
+        for delta in [1e-18, 1e-9, 1e9, 1e18] {
+            options.push(RecoverOptions { solver, delta: Delta::Fixed(delta), seed: 0 });
+        }
+    }
+    options
+}
+
+/// Solves with all options and checks what a result may look like; returns the statuses.
+fn statuses<const D: usize>(
+    what: &str,
+    released: &Released<D>,
+    lists: &Neighborhoods,
+    options: &[RecoverOptions],
+) -> Vec<Status> {
+    let mut all = Vec::new();
+    for options in options {
+        let recovered = recover(released, lists, options)
+            .unwrap_or_else(|error| panic!("{what}, {options:?}: {error}"));
+        for slot in 0..recovered.n_slots() {
+            let ok = recovered.status()[slot] == Status::Ok;
+            let position = recovered.positions()[slot];
+            assert_eq!(ok, position.iter().all(|x| x.is_finite()), "{what}: {position:?}");
+            assert_eq!(ok, recovered.position(slot).is_some(), "{what}");
+            let evidence = recovered.evidence()[slot];
+            assert!(evidence >= 0.0 && evidence.is_finite(), "{what}: evidence {evidence}");
+            let listed = lists.of(slot).len();
+            let support = usize::from(recovered.support()[slot]);
+            assert!(support <= listed, "{what}: support {support} of {listed}");
+        }
+        assert!(recovered.delta().is_finite() && recovered.delta() > 0.0, "{what}");
+        all.extend(recovered.status());
+    }
+    all
+}
+
+#[test]
+fn deltas_beyond_f32_are_refused() {
+    for delta in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-30, 1e30] {
+        let delta = Delta::Fixed(delta);
+        assert!(RecoverOptions { delta, ..Default::default() }.check().is_err(), "{delta:?}");
+    }
+}
+
+fn short_lists<const D: usize>(name: &str, scheme: &dyn Scheme<D>, seed: u64) {
+    let hidden = hide(scheme, &room(seed, 120), seed);
+    let (n, per) = (hidden.released.n_slots(), hidden.released.slots_per_record());
+    let mut draws = Draws::new(seed, Stage::Synthetic, 30);
+    for length in [0, 1, 2, 3, 4] {
+        let row = |slot: usize| {
+            let mut row: Vec<u32> = (0..length)
+                .map(|_| draws.below(hidden.released.n_records() as u64) as u32)
+                .filter(|&record| record as usize != slot / per)
+                .collect();
+            row.sort_unstable();
+            row.dedup();
+            row
+        };
+        let lists = hidden.lists_of(&(0..n).map(row).collect::<Vec<_>>());
+        let what = format!("{name}, lists of {length}");
+        let got = statuses(&what, &hidden.released, &lists, &harsh_options());
+        if length < 2 {
+            assert!(got.iter().all(|&s| s == Status::TooFewNeighbors), "{what}: {got:?}");
+        }
+    }
+}
+
+fn coincident_maps<const D: usize>(name: &str, scheme: &dyn Scheme<D>, seed: u64) {
+    for (places, copies) in [(1, 30), (2, 15), (1, 2), (30, 1)] {
+        let hidden = hide(scheme, &piles(seed, places, copies, 0.0), seed);
+        let n = hidden.released.n_records();
+        let per = hidden.released.slots_per_record();
+        let row = |slot: usize| (0..n as u32).filter(|&r| r as usize != slot / per).collect();
+        let lists = hidden.lists_of(&(0..n * per).map(row).collect::<Vec<_>>());
+        let what = format!("{name}, {places} places");
+        statuses(&what, &hidden.released, &lists, &harsh_options());
+    }
+}
+
+/// Every record lists every other one.
+fn everyone<const D: usize>(obfuscation: Obfuscation<D>) -> (Released<D>, Neighborhoods) {
+    let n = obfuscation.len();
+    let rows: Vec<Vec<u32>> =
+        (0..n).map(|own| (0..n as u32).filter(|&r| r as usize != own).collect()).collect();
+    let released = Released::try_new(obfuscation, 1, [0.0; D], Unit::Meter, None).unwrap();
+    (released, lists_of(&rows, n, 1))
+}
+
+proptest! {
+    #![proptest_config(cases(3))]
+
+    #[test]
+    fn lists_of_a_few(seed: u64) {
+        over_schemes!(short_lists, seed);
+    }
+
+    #[test]
+    fn maps_of_coincident_points(seed: u64) {
+        over_schemes!(coincident_maps, seed);
+    }
+}
+
+#[test]
+fn parallel_lines_fix_no_point() {
+    let points: Vec<[f64; 3]> = uniform(3, 40);
+    let directions = vec![[0.3, -0.5, 0.81]; 40];
+    let (released, lists) =
+        everyone(Obfuscation::Lines(Lines::through(&points, &directions).unwrap()));
+    let got = statuses("parallel lines", &released, &lists, &all_options());
+    assert!(got.iter().all(|&status| status == Status::Degenerate), "{got:?}");
+    statuses("parallel lines", &released, &lists, &harsh_options());
+}
+
+#[test]
+fn rays_of_one_center_fix_no_point() {
+    let directions: Vec<[f64; 3]> = uniform(3, 40);
+    let rays = Rays::try_new(&[[1.0, 2.0, 3.0]], vec![0; 40], &directions).unwrap();
+    let (released, lists) = everyone(Obfuscation::Rays(rays));
+    let got = statuses("rays of one center", &released, &lists, &all_options());
+    assert!(got.iter().all(|&status| status == Status::TooFewNeighbors), "{got:?}");
+    statuses("rays of one center", &released, &lists, &harsh_options());
+}
+
+#[test]
+fn planes_of_one_axis_fix_no_point() {
+    let offsets: Vec<f64> = uniform::<3>(3, 40).iter().map(|p| p[0]).collect();
+    let planes = AxisPlanes::<3>::try_new(vec![0; 40], &offsets).unwrap();
+    let (released, lists) = everyone(Obfuscation::AxisPlanes(planes));
+    let got = statuses("planes of one axis", &released, &lists, &harsh_options());
+    assert!(got.iter().all(|&status| status == Status::Degenerate), "{got:?}");
+}
+
+#[test]
+fn identical_records_give_no_nan() {
+    let point = [1.5, -2.5, 0.25];
+    let lines = Lines::through(&[point; 30], &[[0.0, 1.0, 1.0]; 30]).unwrap();
+    let (released, lists) = everyone(Obfuscation::Lines(lines));
+    statuses("identical lines", &released, &lists, &harsh_options());
+    let rays = Rays::try_new(&[point, point], vec![0, 1].repeat(15), &[[0.0, 1.0, 0.0]; 30]);
+    let (released, lists) = everyone(Obfuscation::Rays(rays.unwrap()));
+    statuses("identical rays", &released, &lists, &harsh_options());
+    let candidates = AxisCandidates::try_new(&[point; 30]).unwrap();
+    let (released, lists) = everyone(Obfuscation::AxisCandidates(candidates));
+    statuses("identical candidates", &released, &lists, &harsh_options());
+    let planes = AxisPlanes::<3>::try_new(vec![0, 1, 2].repeat(10), &[1.0; 30]).unwrap();
+    let (released, lists) = everyone(Obfuscation::AxisPlanes(planes));
+    statuses("identical planes", &released, &lists, &harsh_options());
+}
+
+#[test]
+fn an_empty_map_is_recovered_at_once() {
+    let empty: &[[f64; 3]] = &[];
+    for obfuscation in [
+        Obfuscation::Lines(Lines::through(empty, empty).unwrap()),
+        Obfuscation::Rays(Rays::try_new(&[[0.0; 3]], vec![], empty).unwrap()),
+        Obfuscation::AxisPlanes(AxisPlanes::try_new(vec![], &[]).unwrap()),
+        Obfuscation::AxisCandidates(AxisCandidates::try_new(empty).unwrap()),
+    ] {
+        let (released, lists) = everyone(obfuscation);
+        assert_eq!(statuses("an empty map", &released, &lists, &harsh_options()), []);
+    }
+}

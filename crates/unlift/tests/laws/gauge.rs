@@ -1,0 +1,198 @@
+//! The stored form is free of truth (recovery.md, 5 a): with pairing, centers, planes and grids held
+//! fixed, moving an original along its own record changes no stored byte. Axis candidates are
+//! exempt: the hidden value is published on the partner.
+
+use proptest::prelude::*;
+use unlift::obfuscate::Scheme;
+use unlift::released::{AxisPlanes, Lines, Obfuscation, Rays};
+use unlift::seed::{Draws, Stage};
+
+use crate::maps::*;
+
+fn along<const D: usize>(point: &[f64; D], t: f64, direction: &[f64; D]) -> [f64; D] {
+    std::array::from_fn(|c| point[c] + t * direction[c])
+}
+
+fn sub<const D: usize>(a: &[f64; D], b: &[f64; D]) -> [f64; D] {
+    std::array::from_fn(|c| a[c] - b[c])
+}
+
+fn a_line_forgets_its_point<const D: usize>(seed: u64, n: usize) {
+    let mut draws = Draws::new(seed, Stage::Synthetic, 7);
+    for _ in 0..n {
+        let point: [f64; D] = std::array::from_fn(|_| draws.between(-5.0, 5.0));
+        let direction = draws.direction();
+        let stored = |t: f64| {
+            let lines = Lines::through(&[along(&point, t, &direction)], &[direction]).unwrap();
+            record_bytes(&Obfuscation::Lines(lines))
+        };
+        let t = draws.between(-9.0, 9.0);
+        assert_eq!(stored(0.0), stored(t), "{point:?} along {direction:?} by {t}");
+    }
+}
+
+fn a_ray_forgets_its_range<const D: usize>(seed: u64, n: usize) {
+    let mut draws = Draws::new(seed, Stage::Synthetic, 8);
+    for _ in 0..n {
+        let center: [f64; D] = std::array::from_fn(|_| f64::from(draws.between(-5.0, 5.0) as f32));
+        let point: [f64; D] = std::array::from_fn(|_| draws.between(-5.0, 5.0));
+        let stored = |range: f64| {
+            let moved = along(&center, range, &sub(&point, &center));
+            let rays = Rays::try_new(&[center], vec![0], &[sub(&moved, &center)]).unwrap();
+            record_bytes(&Obfuscation::Rays(rays))
+        };
+        let range = draws.between(0.05, 9.0);
+        assert_eq!(stored(1.0), stored(range), "{point:?} from {center:?} to {range}");
+    }
+}
+
+proptest! {
+    #![proptest_config(cases(8))]
+
+    #[test]
+    fn lines_forget_where_on_them_the_point_was(seed: u64) {
+        a_line_forgets_its_point::<3>(seed, 400);
+        a_line_forgets_its_point::<2>(seed, 400);
+    }
+
+    #[test]
+    fn rays_forget_the_range(seed: u64) {
+        a_ray_forgets_its_range::<3>(seed, 400);
+        a_ray_forgets_its_range::<2>(seed, 400);
+    }
+
+    #[test]
+    fn planes_keep_one_coordinate(point: [f32; 3], axis in 0usize..3) {
+        prop_assume!(point[axis].is_finite());
+        let offset = [f64::from(point[axis])];
+        let planes = AxisPlanes::<3>::try_new(vec![axis as u8], &offset).unwrap();
+        // Three bytes too few for anything but the axis and its coordinate.
+        prop_assert_eq!(record_bytes(&Obfuscation::AxisPlanes(planes)).len(), 5);
+    }
+}
+
+/// A point close to its own foot is where a shortcut of the normal form could show.
+#[test]
+fn lines_forget_points_near_the_foot() {
+    let mut draws = Draws::new(1, Stage::Synthetic, 9);
+    for _ in 0..2000 {
+        let direction: [f64; 3] = draws.direction();
+        let point: [f64; 3] = std::array::from_fn(|_| draws.between(-5.0, 5.0));
+        let foot = along(&point, -dot(&point, &direction), &direction);
+        let stored = |t: f64| {
+            let lines = Lines::through(&[along(&foot, t, &direction)], &[direction]).unwrap();
+            record_bytes(&Obfuscation::Lines(lines))
+        };
+        let t = norm(&foot) * draws.between(-1e-6, 1e-6);
+        assert_eq!(stored(1.0), stored(t), "{foot:?} along {direction:?} by {t}");
+    }
+}
+
+/// Two points nearly one unit apart are where a shortcut of normalization could show.
+#[test]
+fn directions_forget_lengths_near_one() {
+    let mut draws = Draws::new(1, Stage::Synthetic, 10);
+    for _ in 0..2000 {
+        let direction: [f64; 3] = draws.direction();
+        let point: [f64; 3] = std::array::from_fn(|_| draws.between(-5.0, 5.0));
+        let length = 1.0 + draws.between(-3e-7, 3e-7);
+        let stored = |length: f64| {
+            let lines = Lines::through(&[point], &[direction.map(|x| x * length)]).unwrap();
+            let rays = Rays::try_new(&[point], vec![0], &[direction.map(|x| x * length)]).unwrap();
+            let mut bytes = record_bytes(&Obfuscation::Lines(lines));
+            bytes.extend(record_bytes(&Obfuscation::Rays(rays)));
+            bytes
+        };
+        assert_eq!(stored(2.0), stored(length), "{direction:?} of length {length}");
+    }
+}
+
+/// Two clouds, each symmetric about its middle: moving opposite points by the same factor leaves
+/// the mean, and with it the centers of a ray cloud, where they are.
+fn symmetric_clouds<const D: usize>(seed: u64) -> Vec<[f64; D]> {
+    let mut draws = Draws::new(seed, Stage::Synthetic, 11);
+    let mut points = Vec::new();
+    for middle in [-4.0, 4.0] {
+        for _ in 0..60 {
+            let offset: [f64; D] = std::array::from_fn(|_| draws.between(-1.0, 1.0));
+            points.push(offset.map(|x| middle + x));
+            points.push(offset.map(|x| middle - x));
+        }
+    }
+    points
+}
+
+/// End to end: obfuscate, move one original (or an opposite pair) along its record, obfuscate again.
+fn moving_along_the_record_changes_no_byte<const D: usize>(
+    name: &str,
+    scheme: &dyn Scheme<D>,
+    seed: u64,
+) {
+    let points = symmetric_clouds::<D>(seed);
+    // One voxel holds everything: the grid is fixed.
+    let voxel = 1e3;
+    let before = try_hide(scheme, &points, voxel, seed).unwrap();
+    let origin = before.released.origin();
+    let original_of = |slot: usize| before.secret.hidden()[slot].index();
+    let slot_of = |id: usize| (0..before.secret.n_slots()).find(|&slot| original_of(slot) == id);
+    let mut draws = Draws::new(seed, Stage::Synthetic, 12);
+    let (mut tried, mut changed) = (0, 0);
+    for slot in 0..before.secret.n_slots() {
+        let id = original_of(slot);
+        let mut moved = points.clone();
+        let by = draws.between(0.6, 1.4);
+        match before.released.obfuscation() {
+            Obfuscation::Lines(lines) if before.released.slots_per_record() == 1 => {
+                // The exact direction: what a scheme of single lines draws for a point.
+                let direction = Draws::new(seed, Stage::Scheme, id as u64).direction::<D>();
+                let stored = lines.direction()[slot].map(f64::from);
+                assert!(
+                    (dot(&direction, &stored).abs() - 1.0).abs() < 1e-6,
+                    "{name}: another draw"
+                );
+                moved[id] = along(&points[id], by - 1.0, &direction);
+            }
+            Obfuscation::Lines(_) => {
+                let partner = points[original_of(slot ^ 1)];
+                moved[id] = along(&partner, by, &sub(&points[id], &partner));
+            }
+            Obfuscation::Rays(rays) => {
+                let Some(other) = slot_of(id ^ 1) else { continue };
+                let center_of = |slot: usize| rays.center()[slot];
+                let center = rays.centers()[usize::from(center_of(slot))].map(f64::from);
+                let center: [f64; D] = std::array::from_fn(|c| center[c] + origin[c]);
+                let middle = if id < points.len() / 2 { [-4.0; D] } else { [4.0; D] };
+                if center_of(slot) != center_of(other) || center != middle {
+                    continue;
+                }
+                for id in [id, id ^ 1] {
+                    moved[id] = along(&middle, by, &sub(&points[id], &middle));
+                }
+            }
+            Obfuscation::AxisPlanes(planes) => {
+                for c in (0..D).filter(|&c| c != usize::from(planes.axis()[slot])) {
+                    moved[id][c] += by - 1.0;
+                }
+            }
+            Obfuscation::AxisCandidates(_) => return,
+        }
+        let after = try_hide(scheme, &moved, voxel, seed).unwrap();
+        let fixed = after.secret == before.secret && after.released.origin() == origin;
+        let centers_fixed = match (before.released.obfuscation(), after.released.obfuscation()) {
+            (Obfuscation::Rays(a), Obfuscation::Rays(b)) => a.centers() == b.centers(),
+            _ => true,
+        };
+        if fixed && centers_fixed {
+            tried += 1;
+            changed +=
+                usize::from(released_bytes(&after.released) != released_bytes(&before.released));
+        }
+    }
+    assert!(tried >= 20, "{name}: only {tried} moves kept pairing and centers fixed");
+    assert_eq!(changed, 0, "{name}: {changed} of {tried} moves changed a stored byte");
+}
+
+#[test]
+fn gauge_end_to_end() {
+    over_schemes!(moving_along_the_record_changes_no_byte, 21);
+}

@@ -1,0 +1,29 @@
+//! Laws as property tests over all schemes (STYLE.md, habit 13): one body per law, run on every row
+//! of the registry, in every dimension it is defined for. A scheme is tested the moment it is
+//! registered; nobody writes copies per scheme.
+
+/// Runs `law(name, scheme, arguments..)` on every scheme in every dimension, and on the 2D
+/// implementations that are not registered yet.
+macro_rules! over_schemes {
+    ($law:ident $(, $argument:expr)*) => {
+        for entry in unlift::obfuscate::SCHEMES {
+            if let Some(scheme) = entry.in_3d {
+                $law::<3>(entry.name, scheme $(, $argument)*);
+            }
+            if let Some(scheme) = entry.in_2d {
+                $law::<2>(entry.name, scheme $(, $argument)*);
+            }
+        }
+        for (name, scheme) in crate::maps::OUTSIDERS_2D {
+            $law::<2>(name, *scheme $(, $argument)*);
+        }
+    };
+}
+
+mod degenerate;
+mod gauge;
+mod maps;
+mod pins;
+mod records;
+mod recovery;
+mod shares;

@@ -1,0 +1,265 @@
+//! Maps, lists and bytes that the laws share.
+
+use proptest::prelude::ProptestConfig;
+use unlift::neighbors::Neighborhoods;
+use unlift::neighbors::oracle::{self, TrueNeighbors};
+use unlift::obfuscate::{Scheme, SchemeOptions, cp::Cp, obfuscate, olc::Olc};
+use unlift::recover::{Delta, RecoverOptions, Recovered, Solver, recover};
+use unlift::released::{Obfuscation, Released};
+use unlift::seed::{Draws, Stage};
+use unlift::truth::{Original, Secret};
+use unlift::{Error, PointSet, RecordId, Unit};
+
+/// Implementations for keypoints that are not (yet) rows of the registry.
+pub const OUTSIDERS_2D: &[(&str, &dyn Scheme<2>)] =
+    &[("olc, as an outsider", &Olc), ("cp, as an outsider", &Cp)];
+
+/// Few cases, really random ones; a failure prints its arguments.
+pub fn cases(n: u32) -> ProptestConfig {
+    ProptestConfig {
+        cases: n,
+        failure_persistence: None,
+        max_shrink_iters: 0,
+        ..ProptestConfig::default()
+    }
+}
+
+/// A hidden map with everything around it.
+pub struct Hidden<const D: usize> {
+    pub original: Original<D>,
+    pub released: Released<D>,
+    pub secret: Secret,
+}
+
+/// Hides `points` with voxels of `voxel`.
+pub fn try_hide<const D: usize>(
+    scheme: &dyn Scheme<D>,
+    points: &[[f64; D]],
+    voxel: f64,
+    seed: u64,
+) -> Result<Hidden<D>, Error> {
+    let original = Original::new(PointSet::try_new(points.to_vec(), Unit::Meter)?);
+    let (released, secret) = obfuscate(scheme, &original, None, &SchemeOptions { voxel }, seed)?;
+    Ok(Hidden { original, released, secret })
+}
+
+/// [`try_hide`] with half-meter voxels.
+pub fn hide<const D: usize>(scheme: &dyn Scheme<D>, points: &[[f64; D]], seed: u64) -> Hidden<D> {
+    try_hide(scheme, points, 0.5, seed).unwrap()
+}
+
+impl<const D: usize> Hidden<D> {
+    /// The original of `slot`, about the released origin.
+    pub fn local(&self, slot: usize) -> [f64; D] {
+        let point = self.original.reveal().positions()[self.secret.hidden()[slot].index()];
+        std::array::from_fn(|c| point[c] - self.released.origin()[c])
+    }
+
+    /// True neighborhoods of size `k`.
+    pub fn near(&self, k: usize) -> TrueNeighbors {
+        let search = oracle::search(&self.original).unwrap();
+        TrueNeighbors::new(&search, &self.secret, self.released.slots_per_record(), k).unwrap()
+    }
+
+    /// Oracle lists.
+    pub fn lists(&self, k: usize, inlier_ratio: f64, seed: u64) -> Neighborhoods {
+        self.near(k).at_inlier_ratio(inlier_ratio, seed).unwrap()
+    }
+
+    /// Lists as given, row by row.
+    pub fn lists_of(&self, rows: &[Vec<u32>]) -> Neighborhoods {
+        lists_of(rows, self.released.n_records(), self.released.slots_per_record())
+    }
+
+    /// The distance of `point` (about the origin) from the feasible set of `record`.
+    pub fn distance(&self, record: usize, point: &[f64; D]) -> f64 {
+        distance_to_record(self.released.obfuscation(), record, point)
+    }
+}
+
+/// Lists as given, row by row, in any order.
+pub fn lists_of(rows: &[Vec<u32>], n_records: usize, slots_per_record: usize) -> Neighborhoods {
+    let mut offsets = vec![0];
+    let mut records = Vec::new();
+    for row in rows {
+        records.extend(row.iter().map(|&record| RecordId(record)));
+        offsets.push(records.len() as u64);
+    }
+    Neighborhoods::try_new(offsets, records, None, n_records, slots_per_record).unwrap()
+}
+
+/// Uniformly random lists of `k` records: neighborhoods that tell nothing.
+pub fn random_lists<const D: usize>(hidden: &Hidden<D>, k: usize, seed: u64) -> Neighborhoods {
+    let (n, per) = (hidden.released.n_records(), hidden.released.slots_per_record());
+    let row = |slot: usize| {
+        let mut draws = Draws::new(seed, Stage::Synthetic, slot as u64);
+        let mut row: Vec<u32> = Vec::new();
+        while row.len() < k {
+            let record = draws.below(n as u64) as u32;
+            if record as usize != slot / per && !row.contains(&record) {
+                row.push(record);
+            }
+        }
+        row
+    };
+    hidden.lists_of(&(0..hidden.released.n_slots()).map(row).collect::<Vec<_>>())
+}
+
+/// Both solvers, both ways to choose delta.
+pub fn all_options() -> Vec<RecoverOptions> {
+    let mut options = Vec::new();
+    for solver in Solver::ALL {
+        for delta in [Delta::Fixed(0.1), Delta::Auto] {
+            options.push(RecoverOptions { solver, delta, seed: 3 });
+        }
+    }
+    options
+}
+
+/// Recovery that must not fail.
+pub fn solve<const D: usize>(
+    released: &Released<D>,
+    lists: &Neighborhoods,
+    options: RecoverOptions,
+) -> Recovered<D> {
+    recover(released, lists, &options).unwrap()
+}
+
+/// Points of a room: walls, uneven clusters, scatter, and 3 % that coincide with another point.
+pub fn room<const D: usize>(seed: u64, n: usize) -> Vec<[f64; D]> {
+    let mut draws = Draws::new(seed, Stage::Synthetic, 1);
+    let size: [f64; D] = std::array::from_fn(|c| [6.0, 4.0, 2.5][c]);
+    let anywhere = |draws: &mut Draws| std::array::from_fn(|c| draws.between(0.0, size[c]));
+    let clusters: Vec<[f64; D]> = (0..6).map(|_| anywhere(&mut draws)).collect();
+    let mut points: Vec<[f64; D]> = Vec::with_capacity(n);
+    while points.len() < n {
+        let kind = draws.below(100);
+        let point = if kind < 3 && !points.is_empty() {
+            points[draws.below(points.len() as u64) as usize]
+        } else if kind < 45 {
+            let mut point = anywhere(&mut draws);
+            let wall = draws.below(D as u64) as usize;
+            point[wall] = size[wall] * draws.below(2) as f64;
+            point
+        } else if kind < 85 {
+            let center = clusters[draws.below(6) as usize];
+            center.map(|x| x + 0.25 * draws.normal())
+        } else {
+            anywhere(&mut draws)
+        };
+        points.push(point);
+    }
+    points
+}
+
+/// Points uniform in a box.
+pub fn uniform<const D: usize>(seed: u64, n: usize) -> Vec<[f64; D]> {
+    let mut draws = Draws::new(seed, Stage::Synthetic, 2);
+    (0..n).map(|_| std::array::from_fn(|c| draws.between(0.0, [6.0, 4.0, 3.0][c]))).collect()
+}
+
+/// `copies` points at each of `places` random places, each moved by up to `spread`.
+pub fn piles<const D: usize>(
+    seed: u64,
+    places: usize,
+    copies: usize,
+    spread: f64,
+) -> Vec<[f64; D]> {
+    let mut draws = Draws::new(seed, Stage::Synthetic, 3);
+    let centers: Vec<[f64; D]> = uniform(seed, places);
+    (0..places * copies)
+        .map(|i| centers[i / copies].map(|x| x + spread * draws.between(-1.0, 1.0)))
+        .collect()
+}
+
+/// The distance of `point` from what `record` leaves open.
+pub fn distance_to_record<const D: usize>(
+    obfuscation: &Obfuscation<D>,
+    record: usize,
+    point: &[f64; D],
+) -> f64 {
+    let from_line = |through: &[f32; D], direction: &[f32; D], floor: f64| {
+        let offset: [f64; D] = std::array::from_fn(|c| point[c] - f64::from(through[c]));
+        let direction = direction.map(f64::from);
+        let t = (dot(&offset, &direction) / dot(&direction, &direction)).max(floor);
+        let miss: [f64; D] = std::array::from_fn(|c| offset[c] - t * direction[c]);
+        dot(&miss, &miss).sqrt()
+    };
+    match obfuscation {
+        Obfuscation::Lines(lines) => {
+            from_line(&lines.foot()[record], &lines.direction()[record], f64::NEG_INFINITY)
+        }
+        Obfuscation::Rays(rays) => {
+            let center = rays.centers()[usize::from(rays.center()[record])];
+            from_line(&center, &rays.direction()[record], 0.0)
+        }
+        Obfuscation::AxisPlanes(planes) => {
+            let axis = usize::from(planes.axis()[record]);
+            (point[axis] - f64::from(planes.offset()[record])).abs()
+        }
+        Obfuscation::AxisCandidates(candidates) => {
+            let published = candidates.position()[record];
+            let off: [f64; D] = std::array::from_fn(|c| point[c] - f64::from(published[c]));
+            let along = |axis: usize| {
+                (0..D).filter(|&c| c != axis).map(|c| off[c] * off[c]).sum::<f64>().sqrt()
+            };
+            (0..D).map(along).fold(f64::INFINITY, f64::min)
+        }
+    }
+}
+
+/// Inner product.
+pub fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+/// Euclidean length.
+pub fn norm<const D: usize>(a: &[f64; D]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+/// Bits of rows of floats.
+fn push_rows<const D: usize>(bytes: &mut Vec<u8>, rows: &[[f32; D]]) {
+    bytes.extend(rows.as_flattened().iter().flat_map(|x| x.to_bits().to_le_bytes()));
+}
+
+/// Every stored bit of a family of records.
+pub fn record_bytes<const D: usize>(obfuscation: &Obfuscation<D>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    match obfuscation {
+        Obfuscation::Lines(lines) => {
+            push_rows(&mut bytes, lines.foot());
+            push_rows(&mut bytes, lines.direction());
+        }
+        Obfuscation::Rays(rays) => {
+            push_rows(&mut bytes, rays.centers());
+            bytes.extend(rays.center());
+            push_rows(&mut bytes, rays.direction());
+        }
+        Obfuscation::AxisPlanes(planes) => {
+            bytes.extend(planes.axis());
+            bytes.extend(planes.offset().iter().flat_map(|x| x.to_bits().to_le_bytes()));
+        }
+        Obfuscation::AxisCandidates(candidates) => push_rows(&mut bytes, candidates.position()),
+    }
+    bytes
+}
+
+/// Every bit of a released map (without descriptors).
+pub fn released_bytes<const D: usize>(released: &Released<D>) -> Vec<u8> {
+    let mut bytes = record_bytes(released.obfuscation());
+    bytes.extend(released.origin().iter().flat_map(|x| x.to_bits().to_le_bytes()));
+    bytes.push(released.slots_per_record() as u8);
+    bytes
+}
+
+/// Every bit of a recovered map.
+pub fn recovered_bytes<const D: usize>(recovered: &Recovered<D>) -> Vec<u8> {
+    let mut bytes = recovered.delta().to_bits().to_le_bytes().to_vec();
+    push_rows(&mut bytes, recovered.positions());
+    bytes.extend(recovered.status().iter().map(|&status| status as u8));
+    bytes.extend(recovered.support().iter().flat_map(|x| x.to_le_bytes()));
+    bytes.extend(recovered.evidence().iter().flat_map(|x| x.to_bits().to_le_bytes()));
+    bytes.extend(recovered.axis().unwrap_or_default());
+    bytes
+}

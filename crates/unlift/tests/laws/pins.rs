@@ -1,0 +1,46 @@
+//! Golden bytes: a change here changes every published figure. The numbers hold on every platform,
+//! since only exact operations and a portable logarithm feed them. A change on purpose is blessed by
+//! copying what the failing test prints, and shows in the diff.
+
+use unlift::obfuscate::SCHEMES;
+use unlift::recover::{Delta, RecoverOptions, Solver};
+
+use crate::maps::*;
+
+/// FNV-1a, 64 bits.
+fn hash(bytes: &[u8]) -> u64 {
+    bytes
+        .iter()
+        .fold(0xCBF2_9CE4_8422_2325, |h, &b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01B3))
+}
+
+/// (scheme, hash of the released map, hash of what consensus makes of it).
+const PINS: &[(&str, u64, u64)] = &[
+    ("olc", 0xbc5917367dfbbb82, 0x5a45ca322825b182),
+    ("ppl", 0x853f42e87f4d6ad1, 0xe52ea4c72067522f),
+    ("ppl+", 0x8baeff0579a41d47, 0x3b7777507515e52b),
+    ("ray", 0x8afdc7e564ab7e2f, 0xec8c2b041959ae71),
+    ("ray-voxel", 0x8b43b3092460bcbb, 0xc9374ce389341370),
+    ("plane", 0xed46e9680801a7de, 0x541d66711d3f1ced),
+    ("cp", 0x96a0f41fb6eaf080, 0xa79c6b2d51eef995),
+];
+
+#[test]
+fn bytes_are_pinned() {
+    let points = room::<3>(2026, 301);
+    let mut found = Vec::new();
+    for entry in SCHEMES {
+        let Some(scheme) = entry.in_3d else { continue };
+        let hidden = hide(scheme, &points, 0);
+        let lists = hidden.lists(20, 0.5, 0);
+        let options =
+            RecoverOptions { solver: Solver::Consensus, delta: Delta::Fixed(0.1), seed: 0 };
+        let recovered = solve(&hidden.released, &lists, options);
+        let hashes = (hash(&released_bytes(&hidden.released)), hash(&recovered_bytes(&recovered)));
+        found.push((entry.name, hashes.0, hashes.1));
+    }
+    let literal =
+        |(name, a, b): &(&str, u64, u64)| format!("    (\"{name}\", {a:#018x}, {b:#018x}),");
+    let printed: Vec<String> = found.iter().map(literal).collect();
+    assert!(found == PINS, "the bytes are now\n{}", printed.join("\n"));
+}

@@ -1,0 +1,80 @@
+//! Laws about shares of a whole map: equivariance, and random lists against the blind attacker.
+
+use unlift::evaluate::{blind, evaluate};
+use unlift::obfuscate::Scheme;
+use unlift::recover::{RecoverOptions, Solver};
+
+use crate::maps::*;
+
+/// Shares within 1 and 2.5 units of `scale` after recovery with everything on automatic.
+fn shares<const D: usize>(
+    scheme: &dyn Scheme<D>,
+    points: &[[f64; D]],
+    scale: f64,
+    solver: Solver,
+) -> [f64; 2] {
+    let hidden = try_hide(scheme, points, 0.5 * scale, 7).unwrap();
+    let lists = hidden.lists(30, 0.5, 7);
+    let options = RecoverOptions { solver, ..RecoverOptions::default() };
+    let recovered = solve(&hidden.released, &lists, options);
+    eprintln!(
+        "delta {} hash {}",
+        recovered.delta() / scale,
+        hidden.secret.hidden().iter().fold(0u32, |a, h| a.wrapping_mul(31).wrapping_add(h.0))
+    );
+    let accuracy = evaluate(&recovered, &hidden.original, &hidden.secret).unwrap();
+    [0.10, 0.25].map(|threshold| accuracy.percent_within(threshold * scale))
+}
+
+/// Shifting and scaling a map, its frame and its thresholds changes no share by more than 0.2
+/// points: rounding decides a few slots of 4,000 differently.
+fn shifted_and_scaled_maps_leak_the_same<const D: usize>(name: &str, scheme: &dyn Scheme<D>) {
+    let points: Vec<[f64; D]> = room(31, 4000);
+    let solver = Solver::Consensus;
+    let here = shares(scheme, &points, 1.0, solver);
+    assert!(here[0] > 10.0, "{name}: a map that does not come back shows nothing: {here:?}");
+    let scaled: Vec<[f64; D]> = points.iter().map(|p| p.map(|x| 7.3 * x)).collect();
+    let far: Vec<[f64; D]> = points.iter().map(|p| p.map(|x| x + 1e6)).collect();
+    for (how, there) in [
+        ("times 7.3", shares(scheme, &scaled, 7.3, solver)),
+        ("plus 1e6", shares(scheme, &far, 1.0, solver)),
+    ] {
+        for (a, b) in here.iter().zip(there) {
+            assert!((a - b).abs() <= 0.2, "{name}, {how}: {here:?} became {there:?}");
+        }
+    }
+}
+
+/// With lists that tell nothing, nothing scores above the blind attacker beyond noise. On a map of
+/// even density: where density differs, the records themselves tell it.
+fn random_lists_tell_nothing<const D: usize>(name: &str, scheme: &dyn Scheme<D>) {
+    let n = 3000;
+    let hidden = hide(scheme, &uniform(41, n), 7);
+    let lists = random_lists(&hidden, 20, 7);
+    let baseline = blind(&hidden.released, &hidden.original, &hidden.secret);
+    for options in all_options() {
+        let recovered = solve(&hidden.released, &lists, options);
+        let accuracy = evaluate(&recovered, &hidden.original, &hidden.secret).unwrap();
+        for threshold in [0.1, 0.25] {
+            let got = accuracy.percent_within(threshold);
+            let blind = baseline.percent_within(threshold);
+            // Four standard deviations of a difference of two binomial shares, and one slot.
+            let p = (blind / 100.0).clamp(0.001, 0.999);
+            let noise = 400.0 * (2.0 * p * (1.0 - p) / n as f64).sqrt() + 100.0 / n as f64;
+            assert!(
+                got <= blind + noise,
+                "{name}, {options:?}: {got:.2} % within {threshold}, blind {blind:.2} %"
+            );
+        }
+    }
+}
+
+#[test]
+fn equivariance() {
+    over_schemes!(shifted_and_scaled_maps_leak_the_same);
+}
+
+#[test]
+fn random_lists_yield_no_more_than_none() {
+    over_schemes!(random_lists_tell_nothing);
+}
