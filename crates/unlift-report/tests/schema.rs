@@ -132,8 +132,9 @@ fn the_schema_refuses_what_the_format_refuses() {
 
 #[test]
 fn the_example_of_the_documentation_is_a_document() {
-    let docs = include_str!("../../../docs/audit-json.md");
-    let (_, rest) = docs.split_once("```json\n").expect("an example");
+    let docs = include_str!("../../../docs/formats.md");
+    let (_, rest) = docs.split_once("## audit.json").expect("its section");
+    let (_, rest) = rest.split_once("```json\n").expect("an example");
     let (example, _) = rest.split_once("```").expect("an end");
     let document = Document::from_json(example).expect("a valid example");
     assert_eq!(check(&document), Vec::<String>::new());
