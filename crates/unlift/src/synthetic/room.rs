@@ -150,9 +150,9 @@ mod tests {
             for surface in &scene.surfaces {
                 for (s, t) in [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0)] {
                     let p = surface.at(s, t);
-                    for c in 0..3 {
-                        let inside = -0.01..scene.size[c] + 0.01;
-                        assert!(inside.contains(&p[c]), "seed {seed}: {surface:?}");
+                    for (x, size) in p.iter().zip(scene.size) {
+                        let inside = -0.01..size + 0.01;
+                        assert!(inside.contains(x), "seed {seed}: {surface:?}");
                     }
                 }
             }

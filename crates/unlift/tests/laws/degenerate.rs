@@ -151,13 +151,13 @@ fn identical_records_give_no_nan() {
     let lines = Lines::through(&[point; 30], &[[0.0, 1.0, 1.0]; 30]).unwrap();
     let (released, lists) = everyone(Obfuscation::Lines(lines));
     statuses("identical lines", &released, &lists, &harsh_options());
-    let rays = Rays::try_new(&[point, point], vec![0, 1].repeat(15), &[[0.0, 1.0, 0.0]; 30]);
+    let rays = Rays::try_new(&[point, point], [0, 1].repeat(15), &[[0.0, 1.0, 0.0]; 30]);
     let (released, lists) = everyone(Obfuscation::Rays(rays.unwrap()));
     statuses("identical rays", &released, &lists, &harsh_options());
     let candidates = AxisCandidates::try_new(&[point; 30]).unwrap();
     let (released, lists) = everyone(Obfuscation::AxisCandidates(candidates));
     statuses("identical candidates", &released, &lists, &harsh_options());
-    let planes = AxisPlanes::<3>::try_new(vec![0, 1, 2].repeat(10), &[1.0; 30]).unwrap();
+    let planes = AxisPlanes::<3>::try_new([0, 1, 2].repeat(10), &[1.0; 30]).unwrap();
     let (released, lists) = everyone(Obfuscation::AxisPlanes(planes));
     statuses("identical planes", &released, &lists, &harsh_options());
 }

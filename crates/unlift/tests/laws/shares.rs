@@ -17,11 +17,6 @@ fn shares<const D: usize>(
     let lists = hidden.lists(30, 0.5, 7);
     let options = RecoverOptions { solver, ..RecoverOptions::default() };
     let recovered = solve(&hidden.released, &lists, options);
-    eprintln!(
-        "delta {} hash {}",
-        recovered.delta() / scale,
-        hidden.secret.hidden().iter().fold(0u32, |a, h| a.wrapping_mul(31).wrapping_add(h.0))
-    );
     let accuracy = evaluate(&recovered, &hidden.original, &hidden.secret).unwrap();
     [0.10, 0.25].map(|threshold| accuracy.percent_within(threshold * scale))
 }
