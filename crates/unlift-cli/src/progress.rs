@@ -38,6 +38,25 @@ impl Progress {
     }
 }
 
+/// A sign of life for work whose steps cannot be counted; gone when dropped. Hidden where stderr is no
+/// terminal.
+pub struct Spinner(ProgressBar);
+
+impl Spinner {
+    /// Says `what` is being done.
+    pub fn new(what: &'static str) -> Self {
+        let bar = ProgressBar::new_spinner().with_message(what);
+        bar.enable_steady_tick(PATIENCE / 8);
+        Self(bar)
+    }
+}
+
+impl Drop for Spinner {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}
+
 impl Drop for Progress {
     fn drop(&mut self) {
         self.bar.finish_and_clear();

@@ -153,5 +153,5 @@ fn summary(document: &Document, cards: &[Card]) -> String {
         (m, n) => format!("{m} of {n} schemes give back most of their points"),
     };
     let (low, high) = (&best.at_least, &worst.at_least);
-    format!("{who}: {low} to {high} % within {within} {when}.")
+    format!("{who}; the shares run from {low} to {high} % within {within} {when}.")
 }

@@ -14,6 +14,7 @@ use std::path::Path;
 use crate::args::{AuditCommand, Command, MapArgs, NeighborsCommand};
 use crate::exit::{Outcome, advise};
 use crate::prepare::{self, Preparation, Prepared};
+use crate::progress::Spinner;
 use unlift_io::read::{self, Input};
 
 /// Runs one command.
@@ -44,6 +45,7 @@ fn with_threads<T: Send>(
 
 /// Reads a map and makes it ready: the first step of `audit map` and `obfuscate`.
 fn open_map(path: &Path, args: &MapArgs) -> anyhow::Result<(Input, Prepared)> {
+    let _alive = Spinner::new("reading the map");
     let input = read::open(path)?;
     let descriptors =
         args.descriptors.as_deref().map(|file| read::descriptors(file, &input)).transpose()?;

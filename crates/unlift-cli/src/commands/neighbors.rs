@@ -7,6 +7,7 @@ use super::obfuscate::RELEASED;
 use crate::args::OracleArgs;
 use crate::exit::{Outcome, advise};
 use crate::output::print;
+use crate::progress::Spinner;
 
 /// Makes neighborhoods at one inlier ratio.
 pub fn oracle(args: &OracleArgs) -> anyhow::Result<Outcome> {
@@ -23,12 +24,14 @@ pub fn oracle(args: &OracleArgs) -> anyhow::Result<Outcome> {
         let found = released.n_slots().to_string();
         return Err(unlift_io::Error::new(released_path, "", expected, found).into());
     }
+    let alive = Spinner::new("searching neighbors");
     let core = |error| unlift_io::Error::core(&args.truth, error);
     let knn = search(&original).map_err(core)?;
     let k = usize::from(args.k);
     let near = TrueNeighbors::new(&knn, &secret, released.slots_per_record(), k).map_err(core)?;
     let lists = near.at_inlier_ratio(args.inlier_ratio, args.seed).map_err(core)?;
     write_neighborhoods(&args.out, &lists)?;
+    drop(alive);
     print(&format!(
         "{} neighborhoods of {k} at inlier ratio {}, in {}\n",
         lists.n_slots(),

@@ -7,6 +7,7 @@ use super::with_threads;
 use crate::args::RecoverArgs;
 use crate::exit::Outcome;
 use crate::output::print;
+use crate::progress::Spinner;
 
 /// Recovers a released map.
 pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
@@ -14,11 +15,13 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
     let (records, slots) = (released.n_records(), released.slots_per_record());
     let lists = read_neighborhoods(&args.neighbors, records, slots)?;
     let options = RecoverOptions { solver: args.solver, delta: args.delta, seed: args.seed };
+    let alive = Spinner::new("recovering");
     let recovered = with_threads(args.threads, || {
         let result = recover(&released, &lists, &options);
         Ok(result.map_err(|error| unlift_io::Error::core(&args.released, error))?)
     })?;
     write_recovered(&args.out, &recovered)?;
+    drop(alive);
     let n = recovered.status().iter().filter(|&&status| status == Status::Ok).count();
     print(&format!(
         "{n} of {} points recovered with delta {:.4} {}, in {}\n",
