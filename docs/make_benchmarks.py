@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Writes the accuracy tables of docs/benchmarks.md from audits of the two real scenes.
+"""Writes the accuracy tables of docs/benchmarks.md and README.md from audits of the two real scenes.
 
     cargo build --release && python3 docs/make_benchmarks.py ../shared
 
 Needs the scenes (SHARED/data) and the paper's tables (SHARED/paper/tables); standard library only.
-Everything between the two markers of docs/benchmarks.md is replaced.
+Everything between the begin and end markers of the two files is replaced.
 """
 import csv, json, pathlib, subprocess, sys, tempfile
 
@@ -99,11 +99,15 @@ def main():
     for solver in ("consensus", "ransac"):
         out += [f"### Castle, `{solver}`", "", *table(castle["results"], solver), ""]
     out += [f"Cost of this audit (both solvers): {cost(castle)}.", ""]
-    path = ROOT / "docs/benchmarks.md"
-    begin, end = "<!-- accuracy: begin -->\n", "<!-- accuracy: end -->"
+    put(ROOT / "docs/benchmarks.md", "accuracy", out)
+    put(ROOT / "README.md", "results", [*table(rows, "consensus", published), ""])
+
+
+def put(path, name, lines):
+    begin, end = f"<!-- {name}: begin -->\n", f"<!-- {name}: end -->"
     text = path.read_text()
     head, tail = text.split(begin)[0], text.split(end)[1]
-    path.write_text(head + begin + "\n" + "\n".join(out) + "\n" + end + tail)
+    path.write_text(head + begin + "\n" + "\n".join(lines) + "\n" + end + tail)
 
 
 main()

@@ -16,7 +16,7 @@ use crate::values::{self, NeighborSource, OutlierFilter};
 #[command(
     name = "unlift",
     version,
-    max_term_width = 100,
+    term_width = 100,
     after_help = "\
 Examples:
   unlift demo                                  audit a made-up room, no data needed
@@ -172,10 +172,10 @@ pub struct AuditMapArgs {
     #[arg(long, help_heading = "Result")]
     pub json: bool,
     /// Threads to use; never changes a figure [default: one per core]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = "Run")]
     pub threads: Option<NonZeroUsize>,
     /// No progress bars
-    #[arg(long)]
+    #[arg(long, help_heading = "Run")]
     pub quiet: bool,
 }
 

@@ -1,0 +1,199 @@
+//! The program as a user runs it: exit codes, one-line errors, whole outputs, the same bytes.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+/// A folder of its own per test, with a small map in it.
+struct Place(tempfile::TempDir);
+
+impl Place {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let rows = unlift::synthetic::room(1, 700).points;
+        let text: String = rows.iter().map(|[x, y, z]| format!("{x},{y},{z}\n")).collect();
+        std::fs::write(folder.path().join("room.csv"), text).expect("a writable folder");
+        Self(folder)
+    }
+
+    fn path(&self) -> &Path {
+        self.0.path()
+    }
+
+    fn run(&self, line: &str) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_unlift"))
+            .args(line.split_whitespace())
+            .current_dir(self.path())
+            .output()
+            .expect("the program starts")
+    }
+
+    /// Standard output of a run that must end with `code`.
+    fn stdout(&self, line: &str, code: i32) -> String {
+        let output = self.run(line);
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{line}\n{stderr}");
+        String::from_utf8(output.stdout).expect("UTF-8")
+    }
+
+    /// The last line on standard error of a run that must end with `code` and print nothing else.
+    fn complaint(&self, line: &str, code: i32) -> String {
+        let output = self.run(line);
+        let stderr = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(code), "{line}\n{stderr}");
+        assert!(output.stdout.is_empty(), "{line}");
+        stderr.lines().next().unwrap_or_default().to_owned()
+    }
+
+    fn json(&self, file: &str) -> Value {
+        let text = std::fs::read_to_string(self.path().join(file)).expect("a written file");
+        serde_json::from_str(&text).expect("JSON")
+    }
+}
+
+const QUICK: &str = "--k 10 --schemes olc,ppl --inlier-ratios 1,0.5";
+
+#[test]
+fn an_audit_writes_its_folder_whole_and_again() {
+    let place = Place::new();
+    for _ in 0..2 {
+        let text = place.stdout(&format!("audit map room.csv --scale 1 {QUICK} --out a"), 0);
+        assert!(text.trim_end().ends_with("report: a/report.html"), "{text}");
+    }
+    let document = place.json("a/audit.json");
+    assert_eq!(document["schema"], 1);
+    assert_eq!(document["results"].as_array().map(Vec::len), Some(4));
+    assert_eq!(document["results"][0]["unit"], "m");
+    let left: Vec<PathBuf> =
+        std::fs::read_dir(place.path()).unwrap().map(|e| e.unwrap().path()).collect();
+    assert_eq!(left.len(), 2, "no temporary files: {left:?}");
+}
+
+#[test]
+fn results_are_the_same_bytes_for_any_number_of_threads() {
+    let place = Place::new();
+    let results = |threads: usize| {
+        let options = format!("{QUICK} --solver consensus,ransac --threads {threads}");
+        place.stdout(&format!("audit map room.csv {options} --out t{threads}"), 0);
+        let document = place.json(&format!("t{threads}/audit.json"));
+        (document["results"].to_string(), document["break_even"].to_string())
+    };
+    let one = results(1);
+    assert_eq!(one, results(2));
+    assert_eq!(one, results(8));
+}
+
+#[test]
+fn without_a_scale_no_centimeter_appears() {
+    let place = Place::new();
+    let text = place.stdout(&format!("audit map room.csv {QUICK} --out a"), 0);
+    assert!(!text.contains(" m ") && !text.contains("cm"), "{text}");
+    assert_eq!(place.json("a/audit.json")["results"][0]["unit"], "kth_neighbor");
+}
+
+#[test]
+fn gates_decide_the_exit_code() {
+    let place = Place::new();
+    let audit = format!("audit map room.csv --scale 1 {QUICK} --out a --gate");
+    place.stdout(&format!("{audit} all:0.25<=100"), 0);
+    let text = place.stdout(&format!("{audit} olc@1:0.25<=1"), 1);
+    assert!(text.contains("gate olc@1:0.25<=1: FAILED"), "{text}");
+    assert_eq!(place.json("a/audit.json")["gates"][0]["passed"], false);
+    assert_eq!(
+        place.complaint(&format!("{audit} olc@0.4:0.25<=1"), 2),
+        "unlift: --gate olc@0.4:0.25<=1: expected a scheme, inlier ratio and threshold of this \
+         audit, found none that fits"
+    );
+}
+
+#[test]
+fn a_shareable_report_names_nothing() {
+    let place = Place::new();
+    place.stdout(&format!("audit map room.csv --scale 1 {QUICK} --share-safe --out a"), 0);
+    for file in ["a/audit.json", "a/report.html"] {
+        let text = std::fs::read_to_string(place.path().join(file)).unwrap();
+        assert!(!text.contains("room.csv"), "{file}");
+    }
+    assert_eq!(place.json("a/audit.json")["input"]["path"], Value::Null);
+}
+
+#[test]
+fn the_stages_give_what_the_audit_gives() {
+    let place = Place::new();
+    place.stdout("obfuscate room.csv --scheme ppl --scale 1 --k 10 --out hidden", 0);
+    place.stdout(
+        "neighbors oracle hidden/truth.parquet --k 10 --inlier-ratio 0.5 --out lists.parquet",
+        0,
+    );
+    // The truth is out of reach while recovery runs.
+    std::fs::rename(place.path().join("hidden/truth.parquet"), place.path().join("away")).unwrap();
+    place.stdout(
+        "recover hidden/released.parquet --neighbors lists.parquet --out back.parquet",
+        0,
+    );
+    let text = place.stdout("evaluate back.parquet --truth away --json", 0);
+    let staged: Value = serde_json::from_str(&text).unwrap();
+    let audit = "audit map room.csv --scale 1 --k 10 --schemes ppl --inlier-ratios 0.5 --json";
+    let chained: Value = serde_json::from_str(&place.stdout(audit, 0)).unwrap();
+    let share = |value: &Value| value["recovered_percent"]["0.25"].as_f64().unwrap();
+    assert!((share(&staged) - share(&chained["results"][0])).abs() < 1e-3);
+}
+
+#[test]
+fn a_third_party_lists_neighbors_by_point() {
+    let place = Place::new();
+    let refused = place.complaint("audit map room.csv --neighbors room.csv --k 10", 3);
+    assert!(refused.starts_with("unlift: room.csv: expected a Parquet file"), "{refused}");
+}
+
+#[test]
+fn clouds_are_written_on_request() {
+    let place = Place::new();
+    place.stdout(&format!("audit map room.csv {QUICK} --write-clouds --out a"), 0);
+    for file in ["original.ply", "olc-obfuscated.obj", "ppl-recovered-0.50-consensus.ply"] {
+        assert!(place.path().join("a/clouds").join(file).is_file(), "{file}");
+    }
+}
+
+#[test]
+fn bad_input_is_one_line_and_loses_nothing() {
+    let place = Place::new();
+    std::fs::write(place.path().join("two.xyz"), "1 2 3\n4 5 6\n").unwrap();
+    std::fs::create_dir(place.path().join("mine")).unwrap();
+    std::fs::write(place.path().join("mine/file"), "precious").unwrap();
+    assert_eq!(
+        place.complaint("audit map nothing.ply", 3),
+        "unlift: nothing.ply: expected a file or folder, found nothing"
+    );
+    assert_eq!(
+        place.complaint("audit map two.xyz", 3),
+        "unlift: two.xyz: points: expected at least 51 (K + 1), found 2"
+    );
+    assert_eq!(
+        place.complaint("audit map room.csv --k 10 --out mine", 2),
+        "unlift: --out: mine: expected an empty folder or an earlier output (with audit.json), \
+         found a folder of other files"
+    );
+    assert!(place.path().join("mine/file").is_file());
+    assert!(!place.path().join("unlift-audit").exists());
+}
+
+#[test]
+fn help_is_part_of_the_interface() {
+    let place = Place::new();
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/snapshots");
+    for command in
+        ["", "demo", "audit map", "obfuscate", "neighbors oracle", "recover", "evaluate", "schemes"]
+    {
+        let text = place.stdout(&format!("{command} --help"), 0);
+        let name = if command.is_empty() { "unlift" } else { command }.replace(' ', "-");
+        let file = folder.join(format!("{name}.txt"));
+        if std::env::var_os("UPDATE_SNAPSHOTS").is_some() {
+            std::fs::write(&file, &text).expect("a writable snapshot");
+        }
+        let kept = std::fs::read_to_string(&file).expect("a snapshot (UPDATE_SNAPSHOTS=1)");
+        assert_eq!(text, kept, "{command}: UPDATE_SNAPSHOTS=1 re-blesses");
+        assert!(text.lines().all(|line| line.chars().count() <= 100), "{command}");
+    }
+}
