@@ -49,7 +49,7 @@ pub enum Command {
     Recover(RecoverArgs),
     /// Compare recovered points with the truth
     Evaluate(EvaluateArgs),
-    /// List the schemes: family, what stays hidden, source, stated patents
+    /// List the schemes: rule, what stays hidden, source, stated patents
     Schemes,
 }
 
@@ -101,9 +101,10 @@ pub struct MapArgs {
     #[arg(long, value_name = "K", default_value = "50",
           value_parser = clap::value_parser!(u16).range(1..))]
     pub k: u16,
-    /// The integer that all randomness comes from
-    #[arg(long, value_name = "INTEGER", default_value_t = 0)]
-    pub seed: u64,
+    /// The integer that all randomness comes from [default: 0 for audits, drawn anew by obfuscate,
+    /// where it is part of the secret]
+    #[arg(long, value_name = "INTEGER")]
+    pub seed: Option<u64>,
 }
 
 /// Options of `audit map`.
@@ -185,7 +186,8 @@ pub struct AuditMapArgs {
 Example:
   unlift obfuscate PROJECT --scheme ppl --scale 1 --out hidden
 
-Writes hidden/released.parquet (what an attacker sees) and hidden/truth.parquet (keep it private).")]
+Writes hidden/released.parquet (what an attacker sees) and hidden/truth.parquet (keep it private).
+The seed is part of the secret: who knows it undoes the order of the records, and cp entirely.")]
 pub struct ObfuscateArgs {
     /// A COLMAP model or project folder, or a .ply, .csv, .xyz, .txt or .npy file
     #[arg(value_name = "MODEL")]
@@ -194,7 +196,7 @@ pub struct ObfuscateArgs {
     #[arg(long, value_name = "SCHEME", value_parser = values::scheme)]
     pub scheme: &'static Entry,
     /// Folder to write: empty, missing, or an earlier obfuscation (replaced whole)
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", default_value = "unlift-obfuscated")]
     pub out: PathBuf,
     #[command(flatten)]
     pub map: MapArgs,
@@ -230,7 +232,7 @@ pub struct OracleArgs {
     #[arg(long, value_name = "INTEGER", default_value_t = 0)]
     pub seed: u64,
     /// File to write
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", default_value = "neighborhoods.parquet")]
     pub out: PathBuf,
 }
 
@@ -259,7 +261,7 @@ pub struct RecoverArgs {
     #[arg(long, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
     /// File to write
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", default_value = "recovered.parquet")]
     pub out: PathBuf,
 }
 
@@ -307,7 +309,7 @@ mod tests {
     fn defaults_are_those_of_the_documentation() {
         let args = audit(&[]).unwrap();
         assert_eq!(args.inlier_ratios, [1.0, 0.75, 0.5, 0.3, 0.2, 0.1]);
-        assert_eq!((args.map.k, args.map.seed, args.repeats), (50, 0, 1));
+        assert_eq!((args.map.k, args.map.seed, args.repeats), (50, None, 1));
         assert_eq!(args.solver, [Solver::Consensus]);
         assert_eq!((args.delta, args.map.outlier_filter), (Delta::Auto, None));
         assert_eq!(args.neighbors, NeighborSource::Oracle);

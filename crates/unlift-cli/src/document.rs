@@ -59,7 +59,8 @@ pub fn document(plan: &Plan, outcome: &Outcome, provenance: Provenance) -> repor
         ("recover", seconds.recover),
         ("evaluate", seconds.evaluate),
     ];
-    let line: Vec<String> = std::env::args().map(|word| quoted(&word)).collect();
+    let line: Vec<String> =
+        std::env::args_os().map(|word| quoted(&word.to_string_lossy())).collect();
     report::Document {
         unlift: env!("CARGO_PKG_VERSION").to_owned(),
         schema: report::SCHEMA,

@@ -13,7 +13,7 @@ use unlift_report::{RenderOptions, render, text_table};
 
 use crate::clouds::Clouds;
 use crate::document::{self, Provenance};
-use crate::exit::usage;
+use crate::exit::{advise, usage};
 use crate::gate::{Candidate, Gate};
 use crate::pictures::Pictures;
 use crate::progress::Progress;
@@ -87,7 +87,7 @@ pub fn open_out(out: &Path) -> anyhow::Result<OutputDir> {
 /// Runs the job and writes its folder, whole or not at all.
 pub fn perform(job: Job<'_>, out: OutputDir) -> anyhow::Result<Finished> {
     check_gates(&job.gates, &job.plan)?;
-    let n_cells = n_cells(&job.plan);
+    let n_cells = job.plan.schemes.len() * job.plan.ratios().len() * job.plan.solvers.len();
     let mut watcher = Watcher {
         progress: Progress::new(job.quiet),
         pictures: (!job.share_safe).then(|| Pictures::new(job.original, &job.plan, n_cells)),
@@ -99,12 +99,15 @@ pub fn perform(job: Job<'_>, out: OutputDir) -> anyhow::Result<Finished> {
         thresholds: job.plan.thresholds.iter().map(|t| t.value).collect(),
         failed: None,
     };
-    let outcome = run(job.original, job.descriptors, &job.plan, &mut watcher)?;
+    let outcome = run(job.original, job.descriptors, &job.plan, &mut watcher).map_err(|error| {
+        let file = job.input.path.clone().unwrap_or_default();
+        advise(unlift_io::Error::core(file, error), "a smaller --k, or fewer --schemes")
+    })?;
     if let Some(error) = watcher.failed {
         return Err(error.into());
     }
     drop(watcher.progress);
-    let gates = gate_results(&job.gates, &job.plan, &outcome);
+    let gates = gate_results(&job.gates, &job.plan, &outcome)?;
     let options = document::options(&job.plan, job.options);
     let provenance = Provenance { input: job.input, options, gates, started: job.started };
     let document = document::document(&job.plan, &outcome, provenance);
@@ -117,14 +120,6 @@ pub fn perform(job: Job<'_>, out: OutputDir) -> anyhow::Result<Finished> {
     write_file(&out.path().join(MARKER), |w| std::io::Write::write_all(w, json.as_bytes()))?;
     out.commit()?;
     Ok(Finished { document: shown, report: job.out.join("report.html") })
-}
-
-fn n_cells(plan: &Plan) -> usize {
-    let ratios = match plan.source {
-        unlift::audit::Source::Oracle => plan.inlier_ratios.len(),
-        unlift::audit::Source::Given(_) => 1,
-    };
-    plan.schemes.len() * ratios * plan.solvers.len()
 }
 
 /// Rows that the plan will have, as gates see them.
@@ -144,12 +139,8 @@ fn candidates<'a>(plan: &'a Plan, outcome: Option<&'a Outcome>) -> Vec<Candidate
         }
         return candidates;
     }
-    let ratios: Vec<Option<f64>> = match plan.source {
-        unlift::audit::Source::Oracle => plan.inlier_ratios.iter().map(|&r| Some(r)).collect(),
-        unlift::audit::Source::Given(_) => vec![None],
-    };
     for scheme in &plan.schemes {
-        for &inlier_ratio in &ratios {
+        for inlier_ratio in plan.ratios() {
             for threshold in &plan.thresholds {
                 candidates.push(Candidate {
                     scheme: scheme.name,
@@ -177,18 +168,21 @@ fn check_gates(gates: &[Gate], plan: &Plan) -> anyhow::Result<()> {
     }
 }
 
-fn gate_results(gates: &[Gate], plan: &Plan, outcome: &Outcome) -> Vec<GateResult> {
+fn gate_results(gates: &[Gate], plan: &Plan, outcome: &Outcome) -> anyhow::Result<Vec<GateResult>> {
     let rows = candidates(plan, Some(outcome));
     let result = |gate: &Gate| {
-        let found_percent = gate.worst(rows.iter().copied())?;
-        Some(GateResult {
+        // A gate that is about no row must never count as held.
+        let found = gate.worst(rows.iter().copied());
+        let found_percent = found
+            .ok_or_else(|| usage(format!("--gate {}: expected a row, found none", gate.typed)))?;
+        Ok(GateResult {
             gate: gate.typed.clone(),
             found_percent,
             bound_percent: gate.bound_percent,
             passed: gate.passes(found_percent),
         })
     };
-    gates.iter().filter_map(result).collect()
+    gates.iter().map(result).collect()
 }
 
 /// Shows progress and keeps what the report draws.

@@ -76,13 +76,7 @@ pub fn prepare(
 /// The median over all points of the distance to the `k`-th nearest other point.
 fn median_kth_distance(points: &[[f64; 3]], k: usize) -> Result<f64, Error> {
     let knn = Knn::new(points)?;
-    let mut found = Vec::new();
-    let mut distances: Vec<f64> = (0..points.len())
-        .map(|row| {
-            knn.nearest(row, k, &mut found);
-            found[k - 1].0.sqrt()
-        })
-        .collect();
+    let mut distances = knn.kth_distances(k);
     let median = unlift::geometry::vector::median(&mut distances);
     if median > 0.0 && (1.0 / median).is_finite() {
         return Ok(median);

@@ -11,7 +11,7 @@ use unlift::recover::{Delta, Solver};
 pub enum NeighborSource {
     /// Made from the originals at chosen inlier ratios.
     Oracle,
-    /// Lists by point or by record, in a file.
+    /// Lists by point, in a file.
     File(PathBuf),
 }
 

@@ -128,10 +128,7 @@ fn the_stages_give_what_the_audit_gives() {
     );
     // The truth is out of reach while recovery runs.
     std::fs::rename(place.path().join("hidden/truth.parquet"), place.path().join("away")).unwrap();
-    place.stdout(
-        "recover hidden/released.parquet --neighbors lists.parquet --out back.parquet",
-        0,
-    );
+    place.stdout("recover hidden/released.parquet --neighbors lists.parquet --out back.parquet", 0);
     let text = place.stdout("evaluate back.parquet --truth away --json", 0);
     let staged: Value = serde_json::from_str(&text).unwrap();
     let audit = "audit map room.csv --scale 1 --k 10 --schemes ppl --inlier-ratios 0.5 --json";

@@ -108,14 +108,9 @@ impl Descriptors {
         match &self.values {
             Values::U8(v) => {
                 let (x, y) = (&v[a * dim..(a + 1) * dim], &v[b * dim..(b + 1) * dim]);
-                let sum: i32 = x
-                    .iter()
-                    .zip(y)
-                    .map(|(&x, &y)| {
-                        let d = i32::from(x) - i32::from(y);
-                        d * d
-                    })
-                    .sum();
+                // 255^2 times 2^16 values still fits 32 bits; no descriptor is longer.
+                let square = |(&x, &y): (&u8, &u8)| u32::from(x.abs_diff(y)).pow(2);
+                let sum: u32 = x.iter().zip(y).map(square).sum();
                 sum as f32
             }
             Values::F32(v) => {

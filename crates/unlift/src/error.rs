@@ -24,6 +24,12 @@ impl Error {
         Self { what: what.into(), expected: expected.into(), found: found.into() }
     }
 
+    /// The same error as part of something larger: `place: what: expected ..., found ...`.
+    #[must_use]
+    pub fn within(self, place: &str) -> Self {
+        Self { what: format!("{place}: {}", self.what), ..self }
+    }
+
     /// The field, option or row that is wrong.
     pub fn what(&self) -> &str {
         &self.what

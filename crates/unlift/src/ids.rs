@@ -31,10 +31,6 @@ id! {
     OriginalId
 }
 id! {
-    /// The place of one hidden point on a record: record `r` has slots `r * slots_per_record ..`.
-    SlotId
-}
-id! {
     /// A row of the released map: what replaces one point (or two, for paired lines).
     RecordId
 }

@@ -24,5 +24,5 @@ pub mod truth;
 
 pub use descriptors::Descriptors;
 pub use error::Error;
-pub use ids::{OriginalId, RecordId, SlotId};
+pub use ids::{OriginalId, RecordId};
 pub use points::{PointSet, Unit};

@@ -42,11 +42,11 @@ impl<const D: usize> PointSet<D> {
     /// Points `(n, D)` in `unit`.
     ///
     /// # Errors
-    /// When a coordinate is not finite, or there are more than 2^31 points.
+    /// When a coordinate is not finite, or there are 2^31 points or more.
     pub fn try_new(positions: Vec<[f64; D]>, unit: Unit) -> Result<Self, Error> {
         let () = Self::DIMENSION_IS_2_OR_3;
         if positions.len() > i32::MAX as usize {
-            return Err(Error::new("points", "at most 2^31", positions.len().to_string()));
+            return Err(Error::new("points", "fewer than 2^31", positions.len().to_string()));
         }
         if let Some(row) = positions.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
             let found = format!("{:?}", positions[row]);

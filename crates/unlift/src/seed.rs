@@ -5,7 +5,7 @@
 //! same bits everywhere. The generator is ours (20 lines) so that no dependency upgrade changes a
 //! result; its mixing function is the SplitMix64 finalizer.
 
-/// What a stream of draws is used for. Streams of different stages never overlap.
+/// What a stream of draws is used for. Streams of different stages are unrelated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u64)]
 pub enum Stage {

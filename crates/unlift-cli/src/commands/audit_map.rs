@@ -67,9 +67,7 @@ fn plan(args: &AuditMapArgs, prepared: &Prepared, n_read: usize) -> anyhow::Resu
     }
     let source = match &args.neighbors {
         NeighborSource::Oracle => Source::Oracle,
-        NeighborSource::File(path) => {
-            Source::Given(by_point(path, args.share_safe, prepared, n_read)?)
-        }
+        NeighborSource::File(path) => Source::Given(by_point(path, prepared, n_read)?),
     };
     Ok(Plan {
         schemes: distinct(schemes, |a, b| a.name == b.name),
@@ -79,19 +77,14 @@ fn plan(args: &AuditMapArgs, prepared: &Prepared, n_read: usize) -> anyhow::Resu
         solvers: distinct(args.solver.clone(), |a, b| a == b),
         delta: args.delta,
         thresholds,
-        seed: args.map.seed,
+        seed: args.map.seed.unwrap_or(0),
         repeats: args.repeats,
         ..usual
     })
 }
 
 /// Lists by row of the file, for the rows that were kept.
-fn by_point(
-    path: &Path,
-    share_safe: bool,
-    prepared: &Prepared,
-    n_read: usize,
-) -> anyhow::Result<PointNeighbors> {
+fn by_point(path: &Path, prepared: &Prepared, n_read: usize) -> anyhow::Result<PointNeighbors> {
     let lists = read_point_neighborhoods(path, n_read)?;
     let mut kept_as = vec![None; n_read];
     for (kept, &row) in prepared.rows.iter().enumerate() {
@@ -111,8 +104,8 @@ fn by_point(
         }
         offsets.push(neighbors.len() as u64);
     }
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let name = if share_safe { "file".to_owned() } else { stem };
+    // Which file it was stands in the hashes; a file called oracle must not pass for one.
+    let name = "file".to_owned();
     Ok(PointNeighbors { name, offsets, neighbors, scores })
 }
 

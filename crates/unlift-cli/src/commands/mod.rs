@@ -52,7 +52,7 @@ fn open_map(path: &Path, args: &MapArgs) -> anyhow::Result<(Input, Prepared)> {
         k: usize::from(args.k),
         outlier_filter: args.outlier_filter,
         max_points: args.max_points.map(NonZeroUsize::get),
-        seed: args.seed,
+        seed: args.seed.unwrap_or(0),
     };
     let prepared = prepare::prepare(&input.positions, descriptors.as_ref(), &preparation);
     let prepared = prepared.map_err(|error| {

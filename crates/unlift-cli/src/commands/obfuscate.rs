@@ -15,6 +15,13 @@ pub const RELEASED: &str = "released.parquet";
 /// What only the owner has.
 pub const TRUTH: &str = "truth.parquet";
 
+/// A seed from the operating system's randomness (through the standard library's hash keys): whoever
+/// could guess it could undo the hiding.
+fn fresh_seed() -> u64 {
+    use std::hash::{BuildHasher, RandomState};
+    RandomState::new().hash_one(std::process::id())
+}
+
 /// Hides a map by one scheme.
 pub fn run(args: &ObfuscateArgs) -> anyhow::Result<Outcome> {
     let out = OutputDir::create(&args.out, RELEASED).map_err(|e| usage(format!("--out: {e}")))?;
@@ -23,7 +30,8 @@ pub fn run(args: &ObfuscateArgs) -> anyhow::Result<Outcome> {
     let scheme = args.scheme.in_3d.ok_or_else(|| usage(format!("{name} is not for maps")))?;
     let options = Plan::new(prepared.original.reveal().unit()).scheme_options;
     let descriptors = prepared.descriptors.as_ref();
-    let hidden = obfuscate(scheme, &prepared.original, descriptors, &options, args.map.seed);
+    let seed = args.map.seed.unwrap_or_else(fresh_seed);
+    let hidden = obfuscate(scheme, &prepared.original, descriptors, &options, seed);
     let (released, secret) = hidden.map_err(|e| unlift_io::Error::core(&args.path, e))?;
     write_released(&out.path().join(RELEASED), &released)?;
     write_truth(&out.path().join(TRUTH), &prepared.original, &secret)?;

@@ -61,7 +61,7 @@ pub struct Plan {
     pub source: Source,
     /// Shares of true neighbors (oracle).
     pub inlier_ratios: Vec<f64>,
-    /// Neighbors per slot (oracle), and what "true neighbor" means when a ratio is measured.
+    /// Neighbors per slot (oracle). For given lists, the longest list decides.
     pub k: usize,
     /// Recovery methods.
     pub solvers: Vec<Solver>,
@@ -98,6 +98,14 @@ impl Plan {
             thresholds: thresholds.map(threshold).to_vec(),
             seed: 0,
             repeats: 1,
+        }
+    }
+
+    /// The inlier ratios of the rows of one scheme and solver; `None` where it will be measured.
+    pub fn ratios(&self) -> Vec<Option<f64>> {
+        match self.source {
+            Source::Oracle => self.inlier_ratios.iter().map(|&ratio| Some(ratio)).collect(),
+            Source::Given(_) => vec![None],
         }
     }
 

@@ -20,7 +20,8 @@ pub struct Row {
     pub oracle_noise: Option<&'static str>,
     /// As requested (oracle) or measured.
     pub inlier_ratio: f64,
-    /// Neighbors per slot.
+    /// Neighbors per slot: of the oracle, or the longest of given lists. It is also how many nearest
+    /// records count as true neighbors when a ratio is measured.
     pub k: usize,
     /// Solver name.
     pub solver: &'static str,
@@ -120,7 +121,10 @@ impl Row {
             mean.error_percentiles[p] = average(&|r| r.error_percentiles[p]);
         }
         mean.delta = average(&|r| Some(r.delta)).unwrap_or(mean.delta);
-        mean.inlier_ratio = average(&|r| Some(r.inlier_ratio)).unwrap_or(mean.inlier_ratio);
+        // A requested ratio is a name, not a measurement: a mean would change its last bit.
+        if mean.oracle_noise.is_none() {
+            mean.inlier_ratio = known(average(&|r| Some(r.inlier_ratio)));
+        }
         mean.axis_accuracy_percent = average(&|r| r.axis_accuracy_percent);
         mean.assignment_accuracy_percent = average(&|r| r.assignment_accuracy_percent);
         mean.repeats = Some(repeats);

@@ -95,10 +95,7 @@ pub fn run(
     plan.check(original.len())?;
     let mut clock = Clock::default();
     let search = clock.time(|s| &mut s.search, || oracle::search(original))?;
-    let per_scheme = match plan.source {
-        Source::Oracle => plan.inlier_ratios.len(),
-        Source::Given(_) => 1,
-    } * plan.solvers.len();
+    let per_scheme = plan.ratios().len() * plan.solvers.len();
     let total = per_scheme * plan.schemes.len() * plan.repeats as usize;
     let mut done = 0;
     let mut rows = Vec::new();
@@ -107,31 +104,40 @@ pub fn run(
         let mut seconds = vec![0.0; per_scheme];
         for repeat in 0..plan.repeats {
             let seed = plan.seed.wrapping_add(u64::from(repeat));
-            let hidden = hide(entry, original, descriptors, plan, seed, &mut clock)?;
-            let near = clock.time(
-                |s| &mut s.neighbors,
-                || TrueNeighbors::new(&search, &hidden.1, hidden.0.slots_per_record(), plan.k),
-            )?;
+            let of_scheme = |error: Error| error.within(entry.name);
+            let hidden = hide(entry, original, descriptors, plan, seed, &mut clock);
+            let hidden = hidden.map_err(of_scheme)?;
             let baseline =
                 clock.time(|s| &mut s.evaluate, || Ok(blind(&hidden.0, original, &hidden.1)))?;
             let mut repeat_rows = Vec::new();
-            let ratios: Vec<Option<f64>> = match plan.source {
-                Source::Oracle => plan.inlier_ratios.iter().map(|&r| Some(r)).collect(),
-                Source::Given(_) => vec![None],
+            let slots = hidden.0.slots_per_record();
+            let (given, k) = match &plan.source {
+                Source::Oracle => (None, plan.k),
+                Source::Given(points) => {
+                    let lists = translate(points, &hidden.1, &hidden.0).map_err(of_scheme)?;
+                    let others = hidden.0.n_records().saturating_sub(1);
+                    let k = lists.longest().min(others).max(1);
+                    (Some(lists), k)
+                }
             };
-            for ratio in ratios {
+            let near = || TrueNeighbors::new(&search, &hidden.1, slots, k);
+            let near = clock.time(|s| &mut s.neighbors, near).map_err(of_scheme)?;
+            for ratio in plan.ratios() {
                 let lists = clock.time(
                     |s| &mut s.neighbors,
-                    || match (&plan.source, ratio) {
-                        (Source::Given(given), _) => translate(given, &hidden.1, &hidden.0),
-                        (Source::Oracle, ratio) => near.at_inlier_ratio(ratio.unwrap_or(1.0), seed),
+                    || match (&given, ratio) {
+                        (Some(lists), _) => Ok(lists.clone()),
+                        (None, ratio) => near.at_inlier_ratio(ratio.unwrap_or(1.0), seed),
                     },
-                )?;
+                );
+                let lists = lists.map_err(of_scheme)?;
                 let measured = ratio.unwrap_or_else(|| near.measured_inlier_ratio(&lists));
                 for &solver in &plan.solvers {
                     let what = format!("{} at {measured:.2}, {}", entry.name, solver.name());
                     observer.progress(done, total, &what);
-                    let options = RecoverOptions { solver, delta: plan.delta, seed };
+                    // The attacker's own seed: that of the obfuscation is the owner's secret.
+                    let attacker = u64::from(repeat);
+                    let options = RecoverOptions { solver, delta: plan.delta, seed: attacker };
                     let started = Instant::now();
                     let recovered = recover(&hidden.0, &lists, &options)?;
                     let took = started.elapsed().as_secs_f64();
@@ -139,7 +145,7 @@ pub fn run(
                     clock.seconds.recover += took;
                     let accuracy = clock
                         .time(|s| &mut s.evaluate, || evaluate(&recovered, original, &hidden.1))?;
-                    let mut row = blank(entry, plan, solver, measured, &recovered, &hidden.1);
+                    let mut row = blank(entry, plan, (k, solver), measured, &recovered, &hidden.1);
                     row.fill(&accuracy, &baseline, &plan.thresholds);
                     observer.cell(&Cell {
                         row: &row,
@@ -197,7 +203,7 @@ fn translate(
 fn blank(
     entry: &Entry,
     plan: &Plan,
-    solver: Solver,
+    (k, solver): (usize, Solver),
     inlier_ratio: f64,
     recovered: &Recovered<3>,
     secret: &Secret,
@@ -218,7 +224,7 @@ fn blank(
         neighbors,
         oracle_noise,
         inlier_ratio,
-        k: plan.k,
+        k,
         solver: solver.name(),
         delta: recovered.delta(),
         unit: recovered.unit(),

@@ -42,10 +42,7 @@ impl TrueNeighbors {
             let expected = format!("between 1 and {} (other records)", n_records.saturating_sub(1));
             return Err(Error::new("k", expected, k.to_string()));
         }
-        let mut record_of = vec![None; secret.n_originals()];
-        for (slot, original) in secret.hidden().iter().enumerate() {
-            record_of[original.index()] = Some(RecordId::from_index(slot / slots_per_record));
-        }
+        let record_of = record_of_originals(secret, slots_per_record);
         let mut records = vec![RecordId(0); n_slots * k];
         records.par_chunks_mut(k).enumerate().for_each_init(
             || (Vec::new(), Vec::new()),
@@ -138,6 +135,15 @@ impl TrueNeighbors {
     }
 }
 
+/// The record that hides each original; `None` for dropped ones.
+fn record_of_originals(secret: &Secret, slots_per_record: usize) -> Vec<Option<RecordId>> {
+    let mut record_of = vec![None; secret.n_originals()];
+    for (slot, original) in secret.hidden().iter().enumerate() {
+        record_of[original.index()] = Some(RecordId::from_index(slot / slots_per_record));
+    }
+    record_of
+}
+
 /// A search over the originals, for [`TrueNeighbors::new`]; built once per map.
 ///
 /// # Errors
@@ -167,10 +173,18 @@ pub fn from_points(
         let what = format!("neighbor entry {at}");
         return Err(Error::new(what, format!("points below {n}"), neighbors[at].to_string()));
     }
-    let mut record_of = vec![None; n];
-    for (slot, original) in secret.hidden().iter().enumerate() {
-        record_of[original.index()] = Some(RecordId::from_index(slot / slots_per_record));
+    let ascending = offsets[0] == 0 && offsets.windows(2).all(|w| w[0] <= w[1]);
+    if !ascending || offsets[n] != neighbors.len() as u64 {
+        let expected = format!("ascending from 0 to {}", neighbors.len());
+        return Err(Error::new("offsets of neighbors by point", expected, "another sequence"));
     }
+    if let Some(scores) = scores
+        && scores.len() != neighbors.len()
+    {
+        let expected = format!("{} rows", neighbors.len());
+        return Err(Error::new("scores of neighbors by point", expected, scores.len().to_string()));
+    }
+    let record_of = record_of_originals(secret, slots_per_record);
     let mut rows = vec![0u64];
     let mut records = Vec::new();
     let mut kept_scores = scores.map(|_| Vec::new());

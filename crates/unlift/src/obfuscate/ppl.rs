@@ -44,7 +44,7 @@ pub(super) fn apart(points: &[[f64; 3]], pair: &[OriginalId; 2]) -> bool {
 }
 
 /// Pairs coincident points anew; removes and returns those that stay coincident.
-pub(super) fn separate(
+fn separate(
     points: &[[f64; 3]],
     pairs: &mut Vec<[OriginalId; 2]>,
     draws: &mut Draws,

@@ -7,7 +7,7 @@
 use rayon::prelude::*;
 
 use super::pairs::{drop_pairs, pair_again, random_pairs, refused_last};
-use super::ppl::{lines_through, separate};
+use super::ppl::{apart, lines_through};
 use super::{Entry, Lifted, Scheme, SchemeOptions};
 use crate::geometry::knn::Knn;
 use crate::geometry::normal::local_normal;
@@ -52,7 +52,7 @@ impl Scheme<3> for PplPlus {
         };
         let mut draws = Draws::new(seed, Stage::Scheme, 0);
         let (mut pairs, mut dropped) = random_pairs(points.len(), &mut draws);
-        let accept = |pair: &[OriginalId; 2]| !on_surface(pair);
+        let accept = |pair: &[OriginalId; 2]| apart(points, pair) && !on_surface(pair);
         let mut refused = refused_last(&mut pairs, accept);
         let mut unchanged = 0;
         for round in 1..=MAX_ROUNDS {
@@ -67,9 +67,12 @@ impl Scheme<3> for PplPlus {
             }
         }
         let kept = pairs.len() - refused;
-        dropped.extend(drop_pairs(&pairs[kept..], DropReason::RejectedPair));
-        pairs.truncate(kept);
-        dropped.extend(separate(points, &mut pairs, &mut draws));
+        for pair in pairs.drain(kept..) {
+            let coincident = !apart(points, &pair);
+            let reason =
+                if coincident { DropReason::CoincidentPair } else { DropReason::RejectedPair };
+            dropped.extend(drop_pairs(&[pair], reason));
+        }
         lines_through(points, &pairs, dropped)
     }
 }

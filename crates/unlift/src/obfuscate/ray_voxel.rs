@@ -33,9 +33,8 @@ impl Scheme<3> for RayVoxel {
         }
         let start = low.map(|x| x - 0.5 * options.voxel);
         from_centers(points, seed, |_, point| {
-            let cells: i64 =
-                (0..3).map(|c| ((point[c] - start[c]) / options.voxel).floor() as i64).sum();
-            cells.rem_euclid(2) as usize
+            let cell = |c: usize| ((point[c] - start[c]) / options.voxel).floor();
+            (0..3).map(|c| cell(c).rem_euclid(2.0) as usize).sum::<usize>() % 2
         })
     }
 }

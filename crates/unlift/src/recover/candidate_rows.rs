@@ -59,7 +59,9 @@ impl<const D: usize> CandidateColumns<D> {
             at[j] = along[j] * free;
             bend[j] = free;
             let miss = crossing + (1.0 - free) * (sum - crossing);
-            miss2[j] = if crossing > delta2 { NO_VOTE } else { miss };
+            // Beyond the range of f32 the difference is no number, and no vote.
+            let near = (crossing <= delta2) & (sum < f32::INFINITY);
+            miss2[j] = if near { miss } else { NO_VOTE };
         }
     }
 }

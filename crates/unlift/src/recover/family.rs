@@ -74,7 +74,9 @@ const MIDDLE: (usize, usize) = (1000, 60);
 /// The median distance of the lines from their middle. Distances from the origin would not do: it is
 /// rounded, so that a shifted or scaled map has it elsewhere.
 fn line_extent<const D: usize>(rows: &[LineRow<D>]) -> f64 {
-    let rows = &rows[..rows.len().min(MIDDLE.0)];
+    // Spread over the file: a third party's map need not be in random order.
+    let every = rows.len().div_ceil(MIDDLE.0).max(1);
+    let rows: Vec<&LineRow<D>> = rows.iter().step_by(every).collect();
     let offset = |row: &LineRow<D>, from: &[f64; D]| {
         let (through, direction) = (widen(&row.through), widen(&row.direction));
         let away = sub(&through, from);
@@ -85,7 +87,7 @@ fn line_extent<const D: usize>(rows: &[LineRow<D>]) -> f64 {
     let mut middle = [0.0; D];
     for _ in 0..MIDDLE.1 {
         let mut step = [0.0; D];
-        for row in rows {
+        for row in &rows {
             step = along(&step, 1.0 / rows.len() as f64, &offset(row, &middle));
         }
         middle = along(&middle, 1.0, &step);

@@ -18,6 +18,7 @@ mod sections;
 
 pub use options::{Delta, RecoverOptions, Solver};
 pub use ransac::TrialHistogram;
+pub(crate) use recovered::stored_support;
 pub use recovered::{Estimate, Recovered, Status};
 
 use crate::Error;

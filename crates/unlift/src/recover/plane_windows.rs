@@ -66,8 +66,7 @@ impl WindowChance {
 }
 
 /// The final mean runs over this many deltas on either side of the window's own: where the window
-/// is sharp (few neighbors are needed to name it), a wider mean is steadier. Measured on real maps:
-/// 1 to 1.5 point more within the first threshold at inlier ratio 1, no loss at low ones.
+/// is sharp (few neighbors are needed to name it), a wider mean is steadier.
 const REFIT: f32 = 1.5;
 
 /// The window of one axis and why it was chosen.

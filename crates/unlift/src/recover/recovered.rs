@@ -45,12 +45,18 @@ pub struct Estimate<const D: usize> {
     pub position: [f32; D],
     /// What became of the slot.
     pub status: Status,
-    /// Listed records within delta of the position.
+    /// Listed records that the position was made of: within delta of it before the last refit (planes:
+    /// within 1.5 delta, summed over the free axes). Counts beyond 65,535 stay there.
     pub support: u16,
     /// The axis on which the hidden coordinate lies (axis candidates only, else 0).
     pub axis: u8,
     /// Improbability of the support by chance, in nats (0 or more).
     pub evidence: f32,
+}
+
+/// A count as it is stored.
+pub(crate) fn stored_support(count: u32) -> u16 {
+    u16::try_from(count).unwrap_or(u16::MAX)
 }
 
 impl<const D: usize> Estimate<D> {
@@ -155,7 +161,7 @@ impl<const D: usize> Recovered<D> {
         &self.status
     }
 
-    /// Per slot the listed records within delta of the position.
+    /// Per slot the listed records that its position was made of.
     pub fn support(&self) -> &[u16] {
         &self.support
     }
@@ -184,11 +190,5 @@ impl<const D: usize> Recovered<D> {
     #[must_use]
     pub(crate) fn with_trials(self, trials: Option<TrialHistogram>) -> Self {
         Self { trials, ..self }
-    }
-
-    /// Adds a descriptor assignment.
-    #[must_use]
-    pub fn with_descriptor_row(self, descriptor_row: Option<Vec<u32>>) -> Self {
-        Self { descriptor_row, ..self }
     }
 }

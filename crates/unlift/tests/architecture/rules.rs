@@ -7,8 +7,7 @@ use crate::rust::{Source, internal_paths, paths, tokens};
 /// What every module may import.
 const VOCABULARY: &[&str] = &["error", "ids", "seed", "points", "descriptors", "geometry", "simd"];
 /// What the root exports: vocabulary under shorter names.
-const ROOT_NAMES: &[&str] =
-    &["Error", "OriginalId", "RecordId", "SlotId", "PointSet", "Unit", "Descriptors"];
+const ROOT_NAMES: &[&str] = &["Error", "OriginalId", "RecordId", "PointSet", "Unit", "Descriptors"];
 
 /// Per module the stages it may import. A new module needs a row here, and a reason.
 const ARROWS: &[(&str, &[&str])] = &[

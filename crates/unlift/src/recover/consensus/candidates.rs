@@ -8,7 +8,7 @@ use crate::recover::chunks::{Chunks, solve_chunks};
 use crate::recover::lists::Lists;
 use crate::recover::null_sample::{NULL_RECORDS, draw};
 use crate::recover::sections::{Intervals, Sections, Starts};
-use crate::recover::{Estimate, Status};
+use crate::recover::{Estimate, Status, stored_support};
 use crate::simd::{Kernel, dispatch};
 
 /// Estimates for the slots of `chunks`.
@@ -98,7 +98,7 @@ fn solve_slot<const D: usize>(
             best = Estimate {
                 position,
                 status: Status::Ok,
-                support: support as u16,
+                support: stored_support(support),
                 axis: axis as u8,
                 evidence: peak.evidence,
             };

@@ -8,7 +8,7 @@ use crate::recover::line_rows::{LineColumns, LineRow};
 use crate::recover::lists::Lists;
 use crate::recover::null_sample::{NULL_RECORDS, draw};
 use crate::recover::sections::{Intervals, Sections, Starts};
-use crate::recover::{Estimate, Status};
+use crate::recover::{Estimate, Status, stored_support};
 use crate::simd::{Kernel, dispatch};
 
 /// Estimates for the slots of `chunks`.
@@ -104,7 +104,7 @@ fn solve_slot<const D: usize>(
     Estimate {
         position: own.at(t.max(own.floor())),
         status: Status::Ok,
-        support: support as u16,
+        support: stored_support(support),
         axis: 0,
         evidence: peak.evidence,
     }

@@ -4,7 +4,7 @@ use crate::RecordId;
 use crate::recover::chunks::{Chunks, solve_chunks};
 use crate::recover::lists::Lists;
 use crate::recover::plane_windows::{SortedPlanes, WindowChance, best_window};
-use crate::recover::{Estimate, Status};
+use crate::recover::{Estimate, Status, stored_support};
 use crate::released::AxisPlanes;
 
 /// Estimates for the slots of `chunks`.
@@ -56,7 +56,7 @@ fn solve_slot<const D: usize>(
             estimate.position[axis] = planes.offset()[slot];
         } else if let Some(window) = best_window(listed, chance, delta) {
             estimate.position[axis] = window.offset;
-            estimate.support += window.count as u16;
+            estimate.support = estimate.support.saturating_add(stored_support(window.count));
             estimate.evidence += window.evidence;
         } else {
             return Estimate::lost(if few { Status::TooFewNeighbors } else { Status::Degenerate });

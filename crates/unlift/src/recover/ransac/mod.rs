@@ -4,7 +4,7 @@
 //! listed records within delta of it are counted, and the position with the largest support is
 //! refined by least squares over that support. The number of trials follows the largest support
 //! found so far (draws without replacement, 99 % confidence) and ends at 10,000. What the paper
-//! leaves open is fixed here: samples of two records per unknown coordinate.
+//! leaves open is fixed here: samples of two records per unknown coordinate (planes may draw one twice).
 
 mod axis_vote;
 mod loops;
@@ -15,7 +15,7 @@ use super::chunks::{Chunks, solve_chunks};
 use super::family::Family;
 use super::line_rows::LineColumns;
 use super::sections::Sections;
-use super::{Estimate, Status};
+use super::{Estimate, Status, stored_support};
 use crate::RecordId;
 use crate::neighbors::Neighborhoods;
 use crate::released::AxisPlanes;
@@ -68,7 +68,10 @@ pub(crate) fn solve<const D: usize>(
             let trial = Trial { family, axes: &axes, lists, delta, slot, draws, scratch };
             let (solved, trials) = dispatch(trial);
             *estimate = solved;
-            note(trials);
+            // Slots that could not be tried at all are lost with a reason, not solved in no time.
+            if trials > 0 {
+                note(trials);
+            }
         }
     });
     (estimates, TrialHistogram { counts: bins.map(AtomicU64::into_inner) })
@@ -136,7 +139,7 @@ impl Found {
             Found::At { t, support } => Estimate {
                 position: place(t),
                 status: Status::Ok,
-                support: support as u16,
+                support: stored_support(support),
                 axis,
                 evidence: 0.0,
             },
@@ -181,7 +184,7 @@ impl<const D: usize> Trial<'_, D> {
         match scratch.plane_loop.run(&mut position, own, self.delta, &mut self.draws) {
             Err(status) => (Estimate::lost(status), 0),
             Ok((support, trials)) => {
-                let support = support as u16;
+                let support = stored_support(support);
                 let status = Status::Ok;
                 (Estimate { position, status, support, axis: 0, evidence: 0.0 }, trials)
             }
