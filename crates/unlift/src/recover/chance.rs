@@ -34,8 +34,10 @@ impl Chance {
         }
         let missed = k - n;
         let ln_k = self.ln[k];
-        n as f32 * (self.ln[n] - ln_k - self.ln_p[c])
-            + missed as f32 * (self.ln[missed] - ln_k - self.ln_not_p[c])
+        let evidence = n as f32 * (self.ln[n] - ln_k - self.ln_p[c])
+            + missed as f32 * (self.ln[missed] - ln_k - self.ln_not_p[c]);
+        // Just above chance the two terms cancel up to rounding.
+        evidence.max(0.0)
     }
 
     /// What decides between positions: evidence plus the logarithm of the prior. A point is likelier
@@ -60,7 +62,7 @@ pub(crate) fn evidence(n: usize, k: usize, p: f32) -> f32 {
     let missed = all - hits;
     let miss_term =
         if missed > 0.0 { missed * libm::logf(missed / (all * (1.0 - p))) } else { 0.0 };
-    hits * libm::logf(hits / (all * p)) + miss_term
+    (hits * libm::logf(hits / (all * p)) + miss_term).max(0.0)
 }
 
 #[cfg(test)]
