@@ -117,9 +117,9 @@ Examples:
   unlift audit map PROJECT --neighbors neighbors.parquet --solver consensus,ransac
   unlift audit map PROJECT --share-safe --json
 
-Gates: SCHEME[@RATIO]:THRESHOLD[:gain]<=PERCENT. SCHEME may be all; without @RATIO every inlier ratio
-counts; every solver counts; the largest figure decides. :gain bounds what recovery adds to a blind
-attacker, in percentage points. A gate that is about no row of the audit is a usage error.
+Gates: SCHEME[@RATIO]:THRESHOLD[:gain]<=PERCENT. SCHEME may be all; without @RATIO every ratio
+counts; every solver counts; the largest figure decides. :gain bounds what recovery adds to a
+blind attacker, in percentage points. A gate that is about no row of the audit is a usage error.
 
 Exit codes: 0 done, 1 a gate failed, 2 usage, 3 bad input.")]
 pub struct AuditMapArgs {

@@ -122,7 +122,7 @@ fn lines_columns() {
         ),
         (
             foot(Some(floats([0.0, 0.0, 1e39]))),
-            "foot of record 2: expected coordinates in the range of f32, found [1e39, 2.0]",
+            "foot of record 2: expected coordinates in the range of f32, found [1e39, 0.0]",
         ),
         (
             direction(floats([0.0, 0.8, 0.0])),
