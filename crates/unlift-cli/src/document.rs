@@ -2,13 +2,12 @@
 
 use std::time::Instant;
 
+use indexmap::IndexMap;
 use serde_json::{Map, Value, json};
 use unlift::Unit;
 use unlift::audit::{self, Outcome, Plan, Row, Source, Threshold};
 use unlift::recover::Delta;
 use unlift_report::document as report;
-
-use crate::job::ordered;
 
 /// What an outcome does not know about itself.
 pub struct Provenance {
@@ -155,6 +154,11 @@ fn quoted(word: &str) -> String {
         return word.to_owned();
     }
     format!("'{}'", word.replace('\'', r"'\''"))
+}
+
+/// An ordered map from pairs.
+pub fn ordered<V>(pairs: impl IntoIterator<Item = (String, V)>) -> IndexMap<String, V> {
+    pairs.into_iter().collect()
 }
 
 #[cfg(test)]

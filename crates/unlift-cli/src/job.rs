@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use indexmap::IndexMap;
 use unlift::Descriptors;
 use unlift::audit::{Cell, Observer, Outcome, Plan, run};
 use unlift::truth::Original;
@@ -221,9 +220,4 @@ impl Observer for Watcher {
             self.failed = clouds.write(cell, most).err();
         }
     }
-}
-
-/// An ordered map from pairs.
-pub fn ordered<V>(pairs: impl IntoIterator<Item = (String, V)>) -> IndexMap<String, V> {
-    pairs.into_iter().collect()
 }

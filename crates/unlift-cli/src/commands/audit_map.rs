@@ -12,8 +12,9 @@ use unlift_report::document::Input;
 
 use super::{open_map, with_threads};
 use crate::args::AuditMapArgs;
+use crate::document::ordered;
 use crate::exit::{Outcome, usage};
-use crate::job::{Finished, Job, open_out, ordered, perform};
+use crate::job::{Finished, Job, open_out, perform};
 use crate::output::print;
 use crate::prepare::Prepared;
 use crate::values::{NeighborSource, all_schemes, distinct};

@@ -1,5 +1,6 @@
 //! What of an endless line lies in a box.
 
+use unlift::geometry::frame::Bounds;
 use unlift::released::{Obfuscation, Released};
 
 /// The two ends of a piece of a line.
@@ -64,24 +65,12 @@ fn clip<const D: usize>(
     low: &[f64; D],
     high: &[f64; D],
 ) -> Option<Segment<D>> {
-    let (mut from, mut to) = (start, f64::INFINITY);
-    for axis in 0..D {
-        if direction[axis] == 0.0 {
-            if point[axis] < low[axis] || point[axis] > high[axis] {
-                return None;
-            }
-            continue;
-        }
-        let a = (low[axis] - point[axis]) / direction[axis];
-        let b = (high[axis] - point[axis]) / direction[axis];
-        from = from.max(a.min(b));
-        to = to.min(a.max(b));
-    }
-    // A line without direction runs from minus to plus infinity here; `max` and `min` skip NaN.
+    let bounds = Bounds { low: *low, high: *high };
     let finite = |row: &[f64; D]| row.iter().all(|x| x.is_finite());
-    let bounded = from < to && from.is_finite() && to.is_finite();
     let is_box = low.iter().zip(high).all(|(low, high)| low <= high);
-    if !(bounded && is_box && finite(point) && finite(direction)) {
+    let (from, to) = bounds.clip(point, direction)?;
+    let from = from.max(start);
+    if !(from < to && is_box && finite(point) && finite(direction)) {
         return None;
     }
     // Rounding may leave the box by an ulp: the ends are held inside it.

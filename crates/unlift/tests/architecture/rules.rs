@@ -25,8 +25,8 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("neighbors", &["released"]),
     ("neighbors/oracle.rs", &["truth", "released"]),
     ("recover", &["released", "neighbors"]),
-    ("evaluate", &["truth", "released", "recover", "neighbors"]),
-    ("audit", &["truth", "released", "obfuscate", "neighbors", "recover", "evaluate", "synthetic"]),
+    ("evaluate", &["truth", "released", "recover"]),
+    ("audit", &["truth", "released", "obfuscate", "neighbors", "recover", "evaluate"]),
 ];
 
 /// Dependencies of the core: light, and known for long.
@@ -36,7 +36,7 @@ pub const DEPENDENCIES: &[&str] = &["kiddo", "libm", "rayon", "nalgebra"];
 pub const CRATES: &[(&str, &[&str])] = &[
     ("unlift", &[]),
     ("unlift-io", &["unlift"]),
-    ("unlift-report", &["unlift"]),
+    ("unlift-report", &[]),
     ("unlift-cli", &["unlift", "unlift-io", "unlift-report"]),
 ];
 
