@@ -2,7 +2,8 @@
 //!
 //! Along `x(t)` the squared distance to record `j` is `miss2[j] + bend[j] (t - at[j])^2`: `at` is
 //! the parameter of the closest approach, `miss2` the squared distance there, `bend` the squared
-//! sine of the angle between the lines (1 when the record is seen square on). Within `delta` of a
+//! sine of the angle between the lines (1 when the record is seen square on, 0 when it agrees with
+//! every `t` alike, as a parallel axis of a candidate does). Within `delta` of a
 //! record is therefore an interval of `t`.
 
 use super::chance::Chance;
