@@ -138,7 +138,7 @@ fn the_stages_give_what_the_audit_gives() {
 }
 
 #[test]
-fn a_third_party_lists_neighbors_by_point() {
+fn neighbors_must_be_a_parquet_file() {
     let place = Place::new();
     let refused = place.complaint("audit map room.csv --neighbors room.csv --k 10", 3);
     assert!(refused.starts_with("unlift: room.csv: expected a Parquet file"), "{refused}");

@@ -96,7 +96,7 @@ fn lloyd<const D: usize>(points: &[[f64; D]], mut centers: Vec<[f64; D]>) -> (f6
 }
 
 /// Index of the nearest center (the first of equals) and the squared distance to it.
-pub fn nearest<const D: usize>(point: &[f64; D], centers: &[[f64; D]]) -> (usize, f64) {
+fn nearest<const D: usize>(point: &[f64; D], centers: &[[f64; D]]) -> (usize, f64) {
     let mut best = (0, f64::INFINITY);
     for (at, center) in centers.iter().enumerate() {
         let distance = squared_distance(point, center);

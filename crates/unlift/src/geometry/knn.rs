@@ -32,11 +32,6 @@ impl<'a, const D: usize> Knn<'a, D> {
         Ok(Self { tree, points })
     }
 
-    /// The points the tree was built over.
-    pub fn points(&self) -> &'a [[f64; D]] {
-        self.points
-    }
-
     /// The `k` nearest other rows of row `row` (fewer when there are fewer), as (squared distance,
     /// row) in canonical order, into `found`.
     pub fn nearest(&self, row: usize, k: usize, found: &mut Vec<(f64, u32)>) {
