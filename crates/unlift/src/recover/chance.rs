@@ -5,50 +5,48 @@
 //! bound on the tail, `k KL(n/k || p)` nats: it orders as the tail does, and splits into logarithms
 //! of integers, so four small tables replace one table per `k`.
 
-/// Tables of logarithms for lists of up to `longest` records and null samples of `m`.
+/// What lists of up to so many records need to weigh agreement.
 #[derive(Clone, Debug)]
-pub(crate) struct Chance {
+pub(crate) struct Improbability {
     ln: Vec<f32>,
-    ln_p: Vec<f32>,
-    ln_not_p: Vec<f32>,
 }
 
-impl Chance {
-    /// Tables for up to `longest` listed and exactly `m` null records.
-    pub(crate) fn new(longest: usize, m: usize) -> Self {
-        let p = |c: usize| (c as f64 + 0.5) / (m as f64 + 1.0);
-        Self {
-            ln: (0..=longest).map(|n| libm::log(n.max(1) as f64) as f32).collect(),
-            ln_p: (0..=m).map(|c| libm::log(p(c)) as f32).collect(),
-            ln_not_p: (0..=m).map(|c| libm::log(1.0 - p(c)) as f32).collect(),
-        }
+/// The chance that a random record agrees with a place.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Chance {
+    /// The probability.
+    pub(crate) p: f32,
+    /// Its logarithm.
+    pub(crate) ln_p: f32,
+}
+
+impl Improbability {
+    /// Tables for up to `longest` listed records.
+    pub(crate) fn new(longest: usize) -> Self {
+        Self { ln: (0..=longest).map(|n| libm::log(n.max(1) as f64) as f32).collect() }
     }
 
-    /// Evidence in nats that `n` of `k` listed records agree although `c` of the null records do; 0
-    /// when chance alone would give as many.
+    /// Evidence in nats that `n` of `k` listed records agree; 0 when chance alone would give as many.
     #[inline(always)]
-    pub(crate) fn evidence(&self, n: usize, k: usize, c: usize) -> f32 {
-        let m1 = self.ln_p.len() as f32;
-        if n == 0 || (n as f32) * m1 <= (c as f32 + 0.5) * (k as f32) {
+    pub(crate) fn evidence(&self, n: usize, k: usize, chance: Chance) -> f32 {
+        if n as f32 <= chance.p * k as f32 {
             return 0.0;
         }
         let missed = k - n;
         let ln_k = self.ln[k];
-        let evidence = n as f32 * (self.ln[n] - ln_k - self.ln_p[c])
-            + missed as f32 * (self.ln[missed] - ln_k - self.ln_not_p[c]);
+        let evidence = n as f32 * (self.ln[n] - ln_k - chance.ln_p)
+            + missed as f32 * (self.ln[missed] - ln_k - ln_not(chance.p));
         // Just above chance the two terms cancel up to rounding.
         evidence.max(0.0)
     }
+}
 
-    /// What decides between positions: evidence plus the logarithm of the prior. A point is likelier
-    /// to lie where the map is dense, and `p` itself measures density (without this, the empty
-    /// parts of a map, where two votes are already improbable, win too often).
-    ///
-    /// Falls as `c` grows, until agreement is no more than chance; never above 0 from there on.
-    #[inline(always)]
-    pub(crate) fn score(&self, n: usize, k: usize, c: usize) -> f32 {
-        self.evidence(n, k, c) + self.ln_p[c]
-    }
+/// `ln(1 - p)` for `p` up to a half, to 1e-5.
+#[inline(always)]
+fn ln_not(p: f32) -> f32 {
+    let z = p / (2.0 - p);
+    let z2 = z * z;
+    -2.0 * z * (1.0 + z2 * (1.0 / 3.0 + z2 * (0.2 + z2 / 7.0)))
 }
 
 /// Evidence in nats that `n` of `k` listed records agree where a random one does with probability

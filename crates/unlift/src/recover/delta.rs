@@ -17,15 +17,36 @@ use crate::seed::{Draws, Stage};
 const SAMPLE: usize = 12;
 /// Halvings of the extent that the coarse ladder spans.
 const HALVINGS: u32 = 14;
+/// Where a random record agrees with a typical place this often, its agreement tells nothing, and the
+/// density of records within delta is no longer that of the place.
+const TOO_WIDE: f32 = 0.04;
 /// Steps per octave of the fine ladder.
 const FINE: i32 = 3;
-/// Deltas whose excess evidence reaches this share of the largest are as good.
-const NEAR_MOST: f64 = 0.97;
+
+/// The maximum is flat: which of the deltas near it to take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Prefer {
+    /// The widest: a wider support is the steadier one.
+    Wide,
+    /// The narrowest: joint recovery looks for neighbors' estimates, which are sharper than records.
+    Narrow,
+}
+
+impl Prefer {
+    /// Deltas whose excess evidence reaches this share of the largest are as good.
+    fn near_most(self) -> f64 {
+        match self {
+            Self::Wide => 0.94,
+            Self::Narrow => 0.95,
+        }
+    }
+}
 
 /// The delta with the best mean evidence; `None` for an empty map or one without extent.
 pub(crate) fn choose<const D: usize>(
     family: &Family<'_, D>,
     lists: &Neighborhoods,
+    prefer: Prefer,
     seed: u64,
 ) -> Option<f64> {
     let extent = family.extent();
@@ -34,7 +55,7 @@ pub(crate) fn choose<const D: usize>(
     }
     let chunks = sample_chunks(lists.n_slots(), seed);
     let mean_evidence = |lists: Lists<'_>, delta: f64| {
-        let solved = consensus::solve(family, lists, delta as f32, seed, Chunks::Some(&chunks));
+        let solved = consensus::solve(family, lists, delta as f32, Chunks::Some(&chunks));
         solved.iter().map(|e| f64::from(e.evidence)).sum::<f64>() / solved.len() as f64
     };
     let value = |delta: f64| {
@@ -44,6 +65,9 @@ pub(crate) fn choose<const D: usize>(
     let (mut coarse, mut most) = (extent, f64::NEG_INFINITY);
     for step in 1..=HALVINGS {
         let delta = extent / f64::from(1u32 << step);
+        if family.typical_chance(delta as f32) > TOO_WIDE {
+            continue;
+        }
         let value = value(delta);
         if value > most {
             (coarse, most) = (delta, value);
@@ -56,8 +80,11 @@ pub(crate) fn choose<const D: usize>(
         .map(|delta| (delta, value(delta)))
         .collect();
     let most = fine.iter().map(|&(_, value)| value).fold(f64::NEG_INFINITY, f64::max);
-    // The maximum is flat, and a wider support is the steadier one: the largest near the maximum.
-    fine.iter().rev().find(|&&(_, value)| value >= NEAR_MOST * most || value == most).map(|x| x.0)
+    let near = |&&(_, value): &&(f64, f64)| value >= prefer.near_most() * most || value == most;
+    match prefer {
+        Prefer::Wide => fine.iter().rev().find(near).map(|x| x.0),
+        Prefer::Narrow => fine.iter().find(near).map(|x| x.0),
+    }
 }
 
 fn sample_chunks(n_slots: usize, seed: u64) -> Vec<usize> {

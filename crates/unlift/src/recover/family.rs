@@ -1,34 +1,52 @@
 //! A released map prepared for solving: one row per record, whatever its family.
 
+use super::chance_field::{self, CandidateField, ChanceField, tube};
 use super::line_rows::{LineRow, from_lines, from_rays};
 use super::plane_windows::SortedPlanes;
 use crate::geometry::vector::{along, dot, median, sub, widen};
+use crate::neighbors::Neighborhoods;
 use crate::released::{AxisPlanes, Obfuscation, Released};
 
 /// Records in the form the solvers read.
 #[derive(Debug)]
 pub(crate) enum Family<'a, const D: usize> {
     /// Lines, one or two slots each; rays, told apart by their group.
-    Lines { rows: Vec<LineRow<D>>, slots_per_record: usize },
+    Lines { rows: Vec<LineRow<D>>, slots_per_record: usize, chance: Vec<ChanceField<D>> },
     /// Axis planes, with the order of their offsets.
     Planes { planes: &'a AxisPlanes<D>, sorted: SortedPlanes },
     /// Axis candidates.
-    Candidates { rows: &'a [[f32; D]] },
+    Candidates { rows: &'a [[f32; D]], chance: CandidateField<D> },
 }
 
 impl<'a, const D: usize> Family<'a, D> {
-    /// The records of `released`.
-    pub(crate) fn new(released: &'a Released<D>) -> Self {
+    /// The records of `released`, with the chance that goes with `lists`.
+    pub(crate) fn new(released: &'a Released<D>, lists: &Neighborhoods) -> Self {
         let slots_per_record = released.slots_per_record();
+        let lines = |rows: Vec<LineRow<D>>| {
+            let chance = chance_field::of_lines(&rows, lists, slots_per_record);
+            Self::Lines { rows, slots_per_record, chance }
+        };
         match released.obfuscation() {
-            Obfuscation::Lines(lines) => Self::Lines { rows: from_lines(lines), slots_per_record },
-            Obfuscation::Rays(rays) => Self::Lines { rows: from_rays(rays), slots_per_record },
+            Obfuscation::Lines(records) => lines(from_lines(records)),
+            Obfuscation::Rays(records) => lines(from_rays(records)),
             Obfuscation::AxisPlanes(planes) => {
                 Self::Planes { planes, sorted: SortedPlanes::new(planes) }
             }
             Obfuscation::AxisCandidates(candidates) => {
-                Self::Candidates { rows: candidates.position() }
+                let rows = candidates.position();
+                Self::Candidates { rows, chance: chance_field::of_candidates(rows, lists) }
             }
+        }
+    }
+
+    /// How likely a random record agrees with a place where records are, at `delta`.
+    pub(crate) fn typical_chance(&self, delta: f32) -> f32 {
+        match self {
+            Self::Lines { chance, .. } => {
+                chance.iter().map(ChanceField::typical).fold(0.0, f32::max) * tube(D, delta)
+            }
+            Self::Planes { planes, sorted } => sorted.typical_chance(planes, delta),
+            Self::Candidates { chance, .. } => chance.typical() * tube(D, delta),
         }
     }
 
@@ -45,7 +63,7 @@ impl<'a, const D: usize> Family<'a, D> {
                 if first.is_ray() { ray_extent(rows) } else { line_extent(rows) }
             }
             Self::Planes { planes, sorted } => sorted.interquartile_range(planes),
-            Self::Candidates { rows } => (0..D)
+            Self::Candidates { rows, .. } => (0..D)
                 .map(|axis| {
                     let mut column: Vec<f32> = rows.iter().map(|row| row[axis]).collect();
                     column.sort_unstable_by(f32::total_cmp);

@@ -64,6 +64,17 @@ impl<const D: usize> LineRow<D> {
         if self.group == NO_GROUP { f32::NEG_INFINITY } else { 0.0 }
     }
 
+    /// The point of this line nearest to `other`; `None` when they are parallel or it lies behind a
+    /// center.
+    pub(crate) fn crossing(&self, other: &Self) -> Option<[f32; D]> {
+        let mut columns = LineColumns::default();
+        let mut sections = Sections::default();
+        columns.gather(&[*other], &[RecordId(0)]);
+        columns.sections(self, &mut sections);
+        let (t, miss2) = (sections.at[0], sections.miss2[0]);
+        (miss2 < NO_VOTE && t >= self.floor()).then(|| self.at(t))
+    }
+
     /// The point at parameter `t`.
     #[inline(always)]
     pub(crate) fn at(&self, t: f32) -> [f32; D] {

@@ -3,13 +3,15 @@
 mod assign;
 mod candidate_rows;
 mod chance;
+mod chance_field;
 mod chunks;
 mod consensus;
 mod delta;
 mod family;
+mod grid;
+mod joint;
 mod line_rows;
 mod lists;
-mod null_sample;
 mod options;
 mod plane_windows;
 mod ransac;
@@ -25,6 +27,7 @@ use crate::Error;
 use crate::neighbors::Neighborhoods;
 use crate::released::{Obfuscation, Released};
 use chunks::Chunks;
+use delta::Prefer;
 use family::Family;
 use lists::Lists;
 
@@ -44,21 +47,30 @@ pub fn recover<const D: usize>(
         let expected = format!("{} rows, one per slot", released.n_slots());
         return Err(Error::new("neighborhoods", expected, lists.n_slots().to_string()));
     }
-    let family = Family::new(released);
+    let family = Family::new(released, lists);
+    // Joint recovery also asks who lists whom, from the first pass on.
+    let graph = (options.solver == Solver::Joint)
+        .then(|| joint::Graph::new(lists, released.slots_per_record()));
+    let both_ways = match &graph {
+        Some(graph) if released.slots_per_record() == 1 => Some(graph.neighborhoods()?),
+        _ => None,
+    };
+    let used = both_ways.as_ref().unwrap_or(lists);
+    let prefer = if graph.is_some() { Prefer::Narrow } else { Prefer::Wide };
     let delta = match options.delta {
         Delta::Fixed(delta) => delta,
-        Delta::Auto => delta::choose(&family, lists, options.seed).unwrap_or(1.0),
+        Delta::Auto => delta::choose(&family, used, prefer, options.seed).unwrap_or(1.0),
     };
-    let (estimates, trials) = match options.solver {
-        Solver::Consensus => {
-            let given = Lists::given(lists);
-            let solved = consensus::solve(&family, given, delta as f32, options.seed, Chunks::All);
-            (solved, None)
+    let consensus = || consensus::solve(&family, Lists::given(used), delta as f32, Chunks::All);
+    let (estimates, trials) = match (options.solver, &graph) {
+        (Solver::Joint, Some(graph)) => {
+            (joint::solve(&family, graph, consensus(), delta as f32, options.seed), None)
         }
-        Solver::Ransac => {
+        (Solver::Ransac, _) => {
             let (solved, trials) = ransac::solve(&family, lists, delta as f32, options.seed);
             (solved, Some(trials))
         }
+        _ => (consensus(), None),
     };
     let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
     let descriptor_row = assign::descriptor_rows(released, lists);

@@ -8,18 +8,21 @@ pub enum Solver {
     /// The position that agrees with the listed records least probably by chance: exact, no
     /// sampling, the same cost at every inlier ratio.
     Consensus,
+    /// Consensus, then rounds in which the estimates of listed neighbors vote too.
+    Joint,
     /// The paper's sampling loop (section 4), for comparison.
     Ransac,
 }
 
 impl Solver {
     /// Every solver.
-    pub const ALL: [Solver; 2] = [Self::Consensus, Self::Ransac];
+    pub const ALL: [Solver; 3] = [Self::Consensus, Self::Joint, Self::Ransac];
 
     /// The name users know it by.
     pub fn name(self) -> &'static str {
         match self {
             Self::Consensus => "consensus",
+            Self::Joint => "joint",
             Self::Ransac => "ransac",
         }
     }

@@ -35,6 +35,15 @@ impl SortedPlanes {
     }
 }
 
+impl SortedPlanes {
+    /// How likely a random plane of any axis passes within `delta` of a typical place.
+    pub(crate) fn typical_chance<const D: usize>(&self, planes: &AxisPlanes<D>, delta: f32) -> f32 {
+        // Half of the planes of an axis lie within the interquartile range.
+        let range = self.interquartile_range(planes).max(f64::from(f32::MIN_POSITIVE));
+        (f64::from(delta) / range).min(0.5) as f32
+    }
+}
+
 /// How likely a random plane of the same axis falls into the window that starts at each plane.
 #[derive(Clone, Debug)]
 pub(crate) struct WindowChance {

@@ -6,7 +6,7 @@
 //! every `t` alike, as a parallel axis of a candidate does). Within `delta` of a
 //! record is therefore an interval of `t`.
 
-use super::chance::Chance;
+use super::chance::{Chance, Improbability};
 
 /// Sections of one list of records with one feasible line, in columns.
 #[derive(Clone, Debug, Default)]
@@ -132,58 +132,30 @@ pub(crate) struct Peak {
     pub(crate) score: f32,
 }
 
-/// Null records counted before a start that cannot win any more is given up.
-const NULL_BLOCK: usize = 64;
-
-/// Starts of listed intervals in order of how many listed intervals contain them.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Starts {
-    /// Votes and (inverted) index of the interval in one integer: sorts by votes, then index.
-    order: Vec<u64>,
-}
-
-impl Starts {
-    /// The start of a listed interval that maximizes evidence plus prior. The number of agreeing
-    /// records changes only at interval ends and is largest at some start, so no position has more
-    /// votes than the starts looked at.
-    ///
-    /// `k` listed records could vote. Ties are won by more votes, then by the lower record.
-    #[inline(always)]
-    pub(crate) fn best(
-        &mut self,
-        listed: &Intervals,
-        null: &Intervals,
-        k: usize,
-        chance: &Chance,
-    ) -> Option<Peak> {
-        let n = listed.low.len();
-        self.order.clear();
-        for (j, &t) in listed.low.iter().enumerate() {
-            if t.is_finite() {
-                self.order.push(u64::from(listed.count(0, n, t)) << 32 | u64::from(!(j as u32)));
-            }
+/// The start of a listed interval that maximizes evidence plus prior. The number of agreeing records
+/// changes only at interval ends and is largest at some start, so no position has more votes than the
+/// starts looked at.
+///
+/// `k` listed records could vote. The prior is the chance itself: a point is likelier to lie where the
+/// map is dense, and chance measures density (without it the empty parts of a map, where two votes are
+/// already improbable, win too often). Ties are won by the lower record.
+#[inline(always)]
+pub(crate) fn best_start(
+    listed: &Intervals,
+    k: usize,
+    improbability: &Improbability,
+    chance: impl Fn(f32) -> Chance,
+) -> Option<Peak> {
+    let n = listed.low.len();
+    let mut best: Option<Peak> = None;
+    for &t in listed.low.iter().filter(|t| t.is_finite()) {
+        let count = listed.count(0, n, t);
+        let chance = chance(t);
+        let evidence = improbability.evidence(count as usize, k, chance);
+        let score = evidence + chance.ln_p;
+        if best.is_none_or(|b| score > b.score) {
+            best = Some(Peak { t, count, evidence, score });
         }
-        self.order.sort_unstable();
-        let mut best: Option<Peak> = None;
-        for &key in self.order.iter().rev() {
-            let count = (key >> 32) as u32;
-            let t = listed.low[!(key as u32) as usize];
-            let mut c = 0;
-            let mut from = 0;
-            // As more null records agree the score falls, then rises again towards 0 at most: once
-            // it is below a best that is above 0, this start cannot win.
-            let mut score = chance.score(count as usize, k, c as usize);
-            while best.is_none_or(|b| score > b.score || b.score < 0.0) && from < null.low.len() {
-                let to = (from + NULL_BLOCK).min(null.low.len());
-                c += null.count(from, to, t);
-                score = chance.score(count as usize, k, c as usize);
-                from = to;
-            }
-            if best.is_none_or(|b| score > b.score) {
-                let evidence = chance.evidence(count as usize, k, c as usize);
-                best = Some(Peak { t, count, evidence, score });
-            }
-        }
-        best
     }
+    best
 }

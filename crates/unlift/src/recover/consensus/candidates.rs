@@ -3,45 +3,44 @@
 use super::refit;
 use crate::RecordId;
 use crate::recover::candidate_rows::CandidateColumns;
-use crate::recover::chance::Chance;
+use crate::recover::chance::Improbability;
+use crate::recover::chance_field::{CandidateField, tube};
 use crate::recover::chunks::{Chunks, solve_chunks};
 use crate::recover::lists::Lists;
-use crate::recover::null_sample::{NULL_RECORDS, draw};
-use crate::recover::sections::{Intervals, Sections, Starts};
+use crate::recover::sections::{Intervals, Sections, best_start};
 use crate::recover::{Estimate, Status, stored_support};
 use crate::simd::{Kernel, dispatch};
 
 /// Estimates for the slots of `chunks`.
 pub(super) fn solve<const D: usize>(
     rows: &[[f32; D]],
+    chance: &CandidateField<D>,
     lists: Lists<'_>,
     delta: f32,
-    seed: u64,
     chunks: Chunks<'_>,
 ) -> Vec<Estimate<D>> {
-    let chance = Chance::new(lists.longest(), NULL_RECORDS);
-    let problem = Problem { rows, lists, delta2: delta * delta, chance };
+    let improbability = Improbability::new(lists.longest());
+    let tube = tube(D, delta);
+    let problem = Problem { rows, chance, lists, delta2: delta * delta, tube, improbability };
     solve_chunks(lists.n_slots(), chunks, Scratch::default, |scratch, first, out| {
-        scratch.null.gather(rows, &draw(lists, first, seed, |_| true));
         dispatch(Chunk { problem: &problem, first, out, scratch });
     })
 }
 
 struct Problem<'a, const D: usize> {
     rows: &'a [[f32; D]],
+    chance: &'a CandidateField<D>,
     lists: Lists<'a>,
     delta2: f32,
-    chance: Chance,
+    tube: f32,
+    improbability: Improbability,
 }
 
 #[derive(Default)]
 struct Scratch<const D: usize> {
     listed: CandidateColumns<D>,
-    null: CandidateColumns<D>,
     sections: Sections,
     intervals: Intervals,
-    null_intervals: Intervals,
-    starts: Starts,
     buffer: Vec<RecordId>,
 }
 
@@ -72,7 +71,7 @@ fn solve_slot<const D: usize>(
     slot: usize,
     scratch: &mut Scratch<D>,
 ) -> Estimate<D> {
-    let Problem { rows, lists, delta2, chance } = problem;
+    let Problem { rows, chance, lists, delta2, tube, improbability } = problem;
     let own = &rows[slot];
     let listed = lists.of(slot, &mut scratch.buffer);
     if listed.len() < 2 {
@@ -82,12 +81,11 @@ fn solve_slot<const D: usize>(
     let mut best = Estimate::lost(Status::NoSupport);
     let mut best_score = f32::NEG_INFINITY;
     for axis in 0..D {
-        scratch.null.sections(own, axis, *delta2, &mut scratch.sections);
-        scratch.null_intervals.fill(&scratch.sections, *delta2, f32::NEG_INFINITY);
         scratch.listed.sections(own, axis, *delta2, &mut scratch.sections);
         scratch.intervals.fill(&scratch.sections, *delta2, f32::NEG_INFINITY);
-        let (listed_intervals, null) = (&scratch.intervals, &scratch.null_intervals);
-        let Some(peak) = scratch.starts.best(listed_intervals, null, listed.len(), chance) else {
+        let at =
+            |t: f32| chance.at(&std::array::from_fn(|c| if c == axis { t } else { own[c] }), *tube);
+        let Some(peak) = best_start(&scratch.intervals, listed.len(), improbability, at) else {
             continue;
         };
         if peak.score > best_score {

@@ -16,15 +16,16 @@ pub(crate) fn solve<const D: usize>(
     family: &Family<'_, D>,
     lists: Lists<'_>,
     delta: f32,
-    seed: u64,
     chunks: Chunks<'_>,
 ) -> Vec<Estimate<D>> {
     match family {
-        Family::Lines { rows, slots_per_record } => {
-            lines::solve(rows, *slots_per_record, lists, delta, seed, chunks)
+        Family::Lines { rows, slots_per_record, chance } => {
+            lines::solve(rows, *slots_per_record, chance, lists, delta, chunks)
         }
         Family::Planes { planes, sorted } => planes::solve(planes, sorted, lists, delta, chunks),
-        Family::Candidates { rows } => candidates::solve(rows, lists, delta, seed, chunks),
+        Family::Candidates { rows, chance } => {
+            candidates::solve(rows, chance, lists, delta, chunks)
+        }
     }
 }
 

@@ -58,7 +58,7 @@ pub(crate) fn solve<const D: usize>(
     };
     let n = lists.n_slots();
     let axes = match family {
-        Family::Candidates { rows } => axis_vote::vote(rows, lists),
+        Family::Candidates { rows, .. } => axis_vote::vote(rows, lists),
         _ => Vec::new(),
     };
     let estimates = solve_chunks(n, Chunks::All, Scratch::default, |scratch, first, out| {
@@ -103,7 +103,7 @@ impl<const D: usize> Kernel for Trial<'_, D> {
     fn run(mut self) -> Self::Output {
         let listed = self.lists.of(self.slot);
         match self.family {
-            Family::Lines { rows, slots_per_record } => {
+            Family::Lines { rows, slots_per_record, .. } => {
                 let own = &rows[self.slot / slots_per_record];
                 self.scratch.lines.gather(rows, listed);
                 self.scratch.lines.sections(own, &mut self.scratch.sections);
@@ -111,7 +111,7 @@ impl<const D: usize> Kernel for Trial<'_, D> {
                 let (found, trials) = self.on_line(may_vote);
                 (found.at(|t| own.at(t.max(own.floor())), 0), trials)
             }
-            Family::Candidates { rows } => {
+            Family::Candidates { rows, .. } => {
                 let axis = self.axes[self.slot];
                 let own = &rows[self.slot];
                 self.scratch.voted.gather(rows, self.axes, listed);

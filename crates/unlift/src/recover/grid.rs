@@ -1,0 +1,130 @@
+//! A dense grid over the part of space where a map lies: sums per cell, smoothed, looked up by place.
+
+/// Axis-parallel cells of one size over a box. Places outside belong to the nearest cell.
+#[derive(Clone, Debug)]
+pub(crate) struct Grid<const D: usize> {
+    low: [f32; D],
+    cell: f32,
+    dims: [usize; D],
+    pub(crate) values: Vec<f32>,
+}
+
+impl<const D: usize> Grid<D> {
+    /// About `n_cells` empty cells over the box from `low` to `high`; an axis without extent gets one.
+    pub(crate) fn over(low: [f32; D], high: [f32; D], n_cells: usize) -> Self {
+        let extent: [f64; D] =
+            std::array::from_fn(|c| (f64::from(high[c]) - f64::from(low[c])).max(0.0));
+        // A flat box has no volume: only axes with extent are divided.
+        let long: Vec<f64> = extent.into_iter().filter(|&e| e > 0.0).collect();
+        let mean = long.iter().map(|e| libm::pow(*e, 1.0 / long.len() as f64)).product::<f64>();
+        let per_axis = libm::pow(n_cells as f64, 1.0 / long.len().max(1) as f64);
+        let mut cell = (mean / per_axis).max(f64::from(f32::MIN_POSITIVE));
+        while long.iter().map(|e| (e / cell).ceil()).product::<f64>() > n_cells as f64 {
+            cell *= 1.05;
+        }
+        Self::of_cells(low, high, cell as f32)
+    }
+
+    /// Empty cells of a given size over the box from `low` to `high`, larger ones if it takes more than
+    /// `most`.
+    pub(crate) fn with_cell(low: [f32; D], high: [f32; D], cell: f32, most: usize) -> Self {
+        let cells =
+            (0..D).map(|c| f64::from((high[c] - low[c]) / cell).ceil().max(1.0)).product::<f64>();
+        if cells <= most as f64 {
+            Self::of_cells(low, high, cell)
+        } else {
+            Self::over(low, high, most)
+        }
+    }
+
+    fn of_cells(low: [f32; D], high: [f32; D], cell: f32) -> Self {
+        let dims = std::array::from_fn(|c| {
+            (((high[c] - low[c]) / cell).ceil() as usize).clamp(1, 1 << 20)
+        });
+        let values = vec![0.0; dims.iter().product()];
+        Self { low, cell, dims, values }
+    }
+
+    /// The edge of a cell.
+    pub(crate) fn cell(&self) -> f32 {
+        self.cell
+    }
+
+    /// The cell of `place`.
+    #[inline(always)]
+    pub(crate) fn index(&self, place: &[f32; D]) -> usize {
+        let mut index = 0;
+        for c in 0..D {
+            let at = (place[c] - self.low[c]) / self.cell;
+            // The cast saturates: far places, infinite ones included, land in border cells.
+            index = index * self.dims[c] + (at as usize).min(self.dims[c] - 1);
+        }
+        index
+    }
+
+    /// Adds `weight` at `place`, shared linearly among the cells around it.
+    pub(crate) fn spread(&mut self, place: &[f32; D], weight: f32) {
+        let mut first = [0usize; D];
+        let mut share = [0.0f32; D];
+        for c in 0..D {
+            let at =
+                ((place[c] - self.low[c]) / self.cell - 0.5).clamp(0.0, (self.dims[c] - 1) as f32);
+            first[c] = at as usize;
+            share[c] = at - first[c] as f32;
+        }
+        for corner in 0..1usize << D {
+            let (mut index, mut w) = (0, weight);
+            for c in 0..D {
+                let up = corner >> c & 1;
+                index = index * self.dims[c] + (first[c] + up).min(self.dims[c] - 1);
+                w *= if up == 1 { share[c] } else { 1.0 - share[c] };
+            }
+            self.values[index] += w;
+        }
+    }
+
+    /// The part `[from, to]` of the line `through + t direction` that lies inside, if any.
+    pub(crate) fn clip(
+        &self,
+        through: &[f32; D],
+        direction: &[f32; D],
+        mut from: f32,
+        mut to: f32,
+    ) -> Option<(f32, f32)> {
+        for c in 0..D {
+            let (low, high) = (self.low[c], self.low[c] + self.cell * self.dims[c] as f32);
+            if direction[c].abs() < 1e-12 {
+                if through[c] < low || through[c] > high {
+                    return None;
+                }
+                continue;
+            }
+            let (a, b) = ((low - through[c]) / direction[c], (high - through[c]) / direction[c]);
+            from = from.max(a.min(b));
+            to = to.min(a.max(b));
+        }
+        (from < to).then_some((from, to))
+    }
+
+    /// Replaces every value by the mean of its neighborhood, weights 1 2 1 along each axis.
+    pub(crate) fn smooth(&mut self) {
+        let mut stride = 1;
+        for c in (0..D).rev() {
+            let n = self.dims[c];
+            let block = stride * n;
+            for start in (0..self.values.len()).step_by(block) {
+                for inner in 0..stride {
+                    let at = |i: usize| start + inner + i * stride;
+                    let mut before = self.values[at(0)];
+                    for i in 0..n {
+                        let here = self.values[at(i)];
+                        let after = self.values[at((i + 1).min(n - 1))];
+                        self.values[at(i)] = 0.25 * (before + after) + 0.5 * here;
+                        before = here;
+                    }
+                }
+            }
+            stride = block;
+        }
+    }
+}

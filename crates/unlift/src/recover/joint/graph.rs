@@ -1,0 +1,214 @@
+//! The neighborhood graph as evidence: who lists whom, in both directions.
+//!
+//! A slot's own list names some of its neighbors; those who name its record are as likely to be
+//! neighbors. Whether an edge is named by one end, by the other or by both tells how likely it is true,
+//! and so do the scores of a source: edges of one class share an inlier ratio, which recovery learns.
+
+use rayon::prelude::*;
+
+use crate::neighbors::Neighborhoods;
+use crate::{Error, RecordId};
+
+/// Reverse entries of a row at most, as a multiple of the mean list: whoever is named by everyone is
+/// named by mistake.
+const MOST_REVERSE: usize = 3;
+
+/// Named by the slot, by the other end, by both.
+const FORWARD: usize = 0;
+const REVERSE: usize = 1;
+const MUTUAL: usize = 2;
+/// Classes of scores per direction.
+const SCORE_CLASSES: usize = 8;
+/// Classes of edges at most.
+pub(crate) const CLASSES: usize = 3 * SCORE_CLASSES;
+
+/// Whether an edge of this class says which record it leads to, but not which of its two slots: a list
+/// names records, while the slot that a list belongs to is known.
+#[inline(always)]
+pub(crate) fn either(class: u8, slots_per_record: usize) -> bool {
+    slots_per_record == 2 && usize::from(class) / SCORE_CLASSES != REVERSE
+}
+
+/// Whether an edge of this class was named by its other end alone. On a paired line it belongs to one of
+/// the two slots, nobody knows which.
+#[inline(always)]
+pub(crate) fn is_reverse(class: u8) -> bool {
+    usize::from(class) / SCORE_CLASSES == REVERSE
+}
+
+/// Rows of edges in order of their other ends, a class beside each.
+pub(crate) struct Graph {
+    offsets: Vec<u64>,
+    /// Slots; the first of a record's where it is not known which.
+    ends: Vec<u32>,
+    class: Vec<u8>,
+}
+
+impl Graph {
+    /// The edges of `lists`, in both directions.
+    pub(crate) fn new(lists: &Neighborhoods, slots_per_record: usize) -> Self {
+        let n_slots = lists.n_slots();
+        let score_class = score_classes(lists);
+        let named_by = NamedBy::new(lists, slots_per_record);
+        let most = MOST_REVERSE * lists.records().len().div_ceil(n_slots.max(1)).max(1);
+        let parts: Vec<Rows> = (0..n_slots.div_ceil(PART))
+            .into_par_iter()
+            .map(|part| {
+                let mut rows = Rows::default();
+                for slot in part * PART..((part + 1) * PART).min(n_slots) {
+                    rows.add(lists, &named_by, slot, slots_per_record, most, &score_class);
+                }
+                rows
+            })
+            .collect();
+        let total: usize = parts.iter().map(|rows| rows.ends.len()).sum();
+        let (mut offsets, mut ends, mut class) =
+            (Vec::with_capacity(n_slots + 1), Vec::with_capacity(total), Vec::with_capacity(total));
+        offsets.push(0);
+        for rows in parts {
+            let before = ends.len() as u64;
+            offsets.extend(rows.row_ends.iter().map(|&end| before + u64::from(end)));
+            ends.extend(rows.ends);
+            class.extend(rows.class);
+        }
+        Self { offsets, ends, class }
+    }
+
+    /// The other ends of the edges of `slot`, and the class of each.
+    #[inline(always)]
+    pub(crate) fn of(&self, slot: usize) -> (&[u32], &[u8]) {
+        let range = self.offsets[slot] as usize..self.offsets[slot + 1] as usize;
+        (&self.ends[range.clone()], &self.class[range])
+    }
+
+    /// The other end and the class of the edge at `at` of all edges.
+    #[inline(always)]
+    pub(crate) fn edge(&self, at: usize) -> (u32, u8) {
+        (self.ends[at], self.class[at])
+    }
+
+    /// Number of edges, both directions counted.
+    pub(crate) fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// How often each record is at the other end of an edge.
+    pub(crate) fn times_listed(&self, n_records: usize, slots_per_record: usize) -> Vec<u32> {
+        let mut counts = vec![0; n_records];
+        for &end in &self.ends {
+            counts[end as usize / slots_per_record] += 1;
+        }
+        counts
+    }
+
+    /// The edges as neighborhoods (records with one slot each).
+    pub(crate) fn neighborhoods(&self) -> Result<Neighborhoods, Error> {
+        let records = self.ends.iter().map(|&end| RecordId(end)).collect();
+        Neighborhoods::try_new(self.offsets.clone(), records, None, self.offsets.len() - 1, 1)
+    }
+}
+
+/// Slots whose rows are put together by one thread at a time.
+const PART: usize = 1 << 12;
+
+/// Per record the entries that name it, in order of slot.
+struct NamedBy {
+    offsets: Vec<u64>,
+    /// The slot that names it, and the place of the entry.
+    by: Vec<(u32, u32)>,
+}
+
+impl NamedBy {
+    fn new(lists: &Neighborhoods, slots_per_record: usize) -> Self {
+        let n_records = lists.n_slots() / slots_per_record;
+        let mut offsets = vec![0u64; n_records + 1];
+        for record in lists.records() {
+            offsets[record.index() + 1] += 1;
+        }
+        for r in 0..n_records {
+            offsets[r + 1] += offsets[r];
+        }
+        let mut next = offsets.clone();
+        let mut by = vec![(0, 0); lists.records().len()];
+        for slot in 0..lists.n_slots() {
+            let first = lists.offsets()[slot];
+            for (at, record) in lists.of(slot).iter().enumerate() {
+                let to = &mut next[record.index()];
+                by[*to as usize] = (slot as u32, (first + at as u64) as u32);
+                *to += 1;
+            }
+        }
+        Self { offsets, by }
+    }
+
+    fn of(&self, record: usize) -> &[(u32, u32)] {
+        &self.by[self.offsets[record] as usize..self.offsets[record + 1] as usize]
+    }
+}
+
+#[derive(Default)]
+struct Rows {
+    ends: Vec<u32>,
+    class: Vec<u8>,
+    row_ends: Vec<u32>,
+}
+
+impl Rows {
+    /// Merges the list of `slot` with the entries that name its record; both are in ascending order.
+    fn add(
+        &mut self,
+        lists: &Neighborhoods,
+        named_by: &NamedBy,
+        slot: usize,
+        slots_per_record: usize,
+        most: usize,
+        score_class: &impl Fn(usize) -> u8,
+    ) {
+        let first = lists.offsets()[slot] as usize;
+        let all = named_by.of(slot / slots_per_record);
+        // Slots are in random order: every so many of them are as good as any.
+        let mut reverse = all.iter().step_by(all.len().div_ceil(most).max(1)).peekable();
+        let class =
+            |direction: usize, entry: usize| (direction * SCORE_CLASSES) as u8 + score_class(entry);
+        for (at, record) in lists.of(slot).iter().enumerate() {
+            let slots = record.0 * slots_per_record as u32;
+            while let Some(&&(by, entry)) = reverse.peek()
+                && by < slots
+            {
+                self.push(by, class(REVERSE, entry as usize));
+                reverse.next();
+            }
+            let mut direction = FORWARD;
+            while reverse.peek().is_some_and(|(by, _)| *by < slots + slots_per_record as u32) {
+                direction = MUTUAL;
+                reverse.next();
+            }
+            self.push(slots, class(direction, first + at));
+        }
+        for &(by, entry) in reverse {
+            self.push(by, class(REVERSE, entry as usize));
+        }
+        self.row_ends.push(self.ends.len() as u32);
+    }
+
+    fn push(&mut self, end: u32, class: u8) {
+        self.ends.push(end);
+        self.class.push(class);
+    }
+}
+
+/// The class of the score of each entry: equal shares of all entries, by rank of score.
+fn score_classes(lists: &Neighborhoods) -> impl Fn(usize) -> u8 + Sync + '_ {
+    let bounds: Vec<f32> = lists.scores().map_or_else(Vec::new, |scores| {
+        let every = scores.len().div_ceil(1 << 16).max(1);
+        let mut sample: Vec<f32> = scores.iter().step_by(every).copied().collect();
+        sample.sort_unstable_by(f32::total_cmp);
+        (1..SCORE_CLASSES)
+            .filter_map(|c| sample.get(c * sample.len() / SCORE_CLASSES).copied())
+            .collect()
+    });
+    move |at| match lists.scores() {
+        Some(scores) => bounds.partition_point(|&bound| bound <= scores[at]) as u8,
+        None => 0,
+    }
+}

@@ -1,0 +1,178 @@
+//! How the estimates of true neighbors lie around a point: learned from the map itself.
+//!
+//! Listed records come from two populations: neighbors, whose estimates lie close, and others, which lie
+//! as dense as estimates do anywhere. The excess of close ones over chance tells the share of neighbors
+//! among the edges of each class and the radius within which half of them lie. Their density is taken
+//! as `(1 + r^2 / a^2)^-3`: flat where estimates are too uncertain to tell, with a heavy tail.
+
+use rayon::prelude::*;
+
+use super::density::Density;
+use super::graph::{CLASSES, Graph, either};
+use super::places::Places;
+use crate::seed::{Draws, Stage};
+
+/// Bins of the radius.
+const BINS: usize = 48;
+/// Random edges per slot.
+const RANDOM: usize = 32;
+/// Slots looked at.
+const SLOTS: usize = 1 << 13;
+/// The share of neighbors in a class is at most and at least this.
+const SHARE: (f64, f64) = (5e-4, 0.95);
+
+/// What is known about true neighbors.
+#[derive(Clone, Debug)]
+pub(crate) struct Law {
+    /// Half of the true neighbors' estimates lie within this radius (in units of local width).
+    pub(crate) radius: f32,
+    /// Per class: the odds of a true neighbor.
+    pub(crate) odds: [f32; CLASSES],
+    /// `(1 + r^2 / a^2)^-3`: 1 / a^2, and the density at the center.
+    pub(crate) inverse_a2: f32,
+    pub(crate) center: f32,
+}
+
+/// What the law is learned from.
+pub(crate) struct Look<'a, const D: usize> {
+    pub(crate) places: &'a Places<D>,
+    pub(crate) graph: &'a Graph,
+    pub(crate) density: &'a Density<D>,
+    pub(crate) slots_per_record: usize,
+    /// True neighbors are looked for within this many local widths.
+    pub(crate) reach: f32,
+    /// The radius of the law at most.
+    pub(crate) most_radius: f32,
+    pub(crate) seed: u64,
+}
+
+impl Law {
+    /// The law of the present places.
+    pub(crate) fn learn<const D: usize>(look: &Look<'_, D>) -> Self {
+        let n = look.places.len();
+        let every = n.div_ceil(SLOTS).max(1);
+        let slots: Vec<usize> =
+            (0..n).step_by(every).filter(|&slot| look.places.is_known(slot)).collect();
+        let parts: Vec<Tally> = slots
+            .par_chunks(256)
+            .map(|part| {
+                let mut tally = Tally::default();
+                part.iter().for_each(|&slot| tally.add(slot, look));
+                tally
+            })
+            .collect();
+        let mut total = Tally::default();
+        parts.iter().for_each(|part| total.merge(part));
+        total.law(look)
+    }
+}
+
+struct Tally {
+    /// Close edges per bin, and close random ones.
+    bins: [(f64, f64); BINS],
+    /// Edges and close ones, per class.
+    classes: [[f64; 2]; CLASSES],
+    /// Random edges that lead to one slot or to either of two, and close ones.
+    random: [[f64; 2]; 2],
+}
+
+impl Default for Tally {
+    fn default() -> Self {
+        let classes = [[0.0; 2]; CLASSES];
+        Self { bins: [(0.0, 0.0); BINS], classes, random: [[0.0; 2]; 2] }
+    }
+}
+
+impl Tally {
+    fn add<const D: usize>(&mut self, slot: usize, look: &Look<'_, D>) {
+        let x = look.places.of(slot);
+        let width = look.density.width(look.density.at(&x));
+        let scale = BINS as f32 / (width * look.reach);
+        let close = |end: u32, class: u8| {
+            let (d2, _) = look.places.nearest(end, either(class, look.slots_per_record), &x);
+            let bin = d2.sqrt() * scale;
+            (bin < BINS as f32).then_some(bin as usize)
+        };
+        let (ends, class) = look.graph.of(slot);
+        for (&end, &class) in ends.iter().zip(class) {
+            let of_class = &mut self.classes[usize::from(class)];
+            of_class[0] += 1.0;
+            if let Some(bin) = close(end, class) {
+                self.bins[bin].0 += 1.0;
+                of_class[1] += 1.0;
+            }
+        }
+        let mut draws = Draws::new(look.seed, Stage::NullSample, slot as u64);
+        // Random edges stand for as many as the slot has.
+        let share = ends.len() as f64 / RANDOM as f64;
+        for _ in 0..RANDOM {
+            let (end, class) = look.graph.edge(draws.below(look.graph.len() as u64) as usize);
+            let of_kind = &mut self.random[usize::from(either(class, look.slots_per_record))];
+            of_kind[0] += 1.0;
+            if let Some(bin) = close(end, class) {
+                self.bins[bin].1 += share;
+                of_kind[1] += 1.0;
+            }
+        }
+    }
+
+    fn merge(&mut self, other: &Self) {
+        for (a, b) in self.bins.iter_mut().zip(&other.bins) {
+            *a = (a.0 + b.0, a.1 + b.1);
+        }
+        for (a, b) in self.classes.iter_mut().zip(&other.classes) {
+            (0..2).for_each(|i| a[i] += b[i]);
+        }
+        for (a, b) in self.random.iter_mut().zip(&other.random) {
+            (0..2).for_each(|i| a[i] += b[i]);
+        }
+    }
+
+    fn law<const D: usize>(&self, look: &Look<'_, D>) -> Law {
+        let edges: f64 = self.classes.iter().map(|c| c[0]).sum::<f64>().max(1.0);
+        let found: f64 = self.bins.iter().map(|b| b.0).sum();
+        let by_chance: f64 = self.bins.iter().map(|b| b.1).sum();
+        let share = share_of(found / edges, by_chance / edges);
+        let chance = self.random.map(|[edges, found]| found / edges.max(1.0));
+        let excess =
+            self.bins.map(|(found, by_chance)| (found - (1.0 - share) * by_chance).max(0.0));
+        let half = 0.5 * excess.iter().sum::<f64>();
+        let (mut sum, mut radius) = (0.0, 0.5);
+        for (bin, e) in excess.iter().enumerate() {
+            if sum + e >= half && *e > 0.0 {
+                radius = (bin as f64 + (half - sum) / e) / BINS as f64;
+                break;
+            }
+            sum += e;
+        }
+        let radius = (radius as f32 * look.reach).min(look.most_radius).max(f32::MIN_POSITIVE);
+        let (median, mass) = profile(D);
+        let a = radius / median;
+        Law {
+            radius,
+            odds: std::array::from_fn(|class| {
+                let [edges, found] = self.classes[class];
+                let chance = chance[usize::from(either(class as u8, look.slots_per_record))];
+                let p = share_of(found / edges.max(1.0), chance);
+                (p / (1.0 - p)) as f32
+            }),
+            inverse_a2: 1.0 / (a * a),
+            center: 1.0 / (mass * a.powi(D as i32)),
+        }
+    }
+}
+
+/// The share of neighbors `p`, where `found` of the edges are close and random ones with `chance`: all
+/// neighbors are, and `chance` of the others.
+fn share_of(found: f64, chance: f64) -> f64 {
+    ((found - chance) / (1.0 - chance.min(0.99))).clamp(SHARE.0, SHARE.1)
+}
+
+/// Of `(1 + r^2)^-3` in so many dimensions: the radius that holds half of its mass, and the mass.
+fn profile(dimensions: usize) -> (f32, f32) {
+    use std::f32::consts::PI;
+    match dimensions {
+        2 => (0.643_594_25, PI / 2.0),
+        _ => (1.0, PI * PI / 4.0),
+    }
+}

@@ -1,0 +1,226 @@
+//! Where a slot may lie, as flat pieces: all that joint recovery knows of a record family.
+
+use crate::recover::chance_field::{CandidateField, ChanceField, tube};
+use crate::recover::line_rows::LineRow;
+use crate::recover::plane_windows::SortedPlanes;
+use crate::released::AxisPlanes;
+
+/// A flat piece of a feasible set: a line, a half-line or a plane.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Piece<const D: usize> {
+    /// A point of it; the end of a half-line.
+    pub(crate) through: [f32; D],
+    /// The projector onto its directions.
+    pub(crate) along: [[f32; D]; D],
+    /// The sense of a half-line; zero for others.
+    pub(crate) sense: [f32; D],
+}
+
+impl<const D: usize> Piece<D> {
+    fn line(through: [f32; D], direction: [f32; D], is_ray: bool) -> Self {
+        let along = std::array::from_fn(|r| std::array::from_fn(|c| direction[r] * direction[c]));
+        let sense = if is_ray { direction } else { [0.0; D] };
+        Self { through, along, sense }
+    }
+
+    /// The place of the piece nearest to `x`.
+    #[inline(always)]
+    pub(crate) fn project(&self, x: &[f32; D]) -> [f32; D] {
+        let mut ahead = 0.0;
+        for c in 0..D {
+            ahead += self.sense[c] * (x[c] - self.through[c]);
+        }
+        let keep = if ahead < 0.0 { 0.0 } else { 1.0 };
+        std::array::from_fn(|r| {
+            let mut moved = 0.0;
+            for c in 0..D {
+                moved += self.along[r][c] * (x[c] - self.through[c]);
+            }
+            self.through[r] + keep * moved
+        })
+    }
+}
+
+/// The feasible sets of a map.
+pub(crate) trait Pieces<const D: usize>: Sync {
+    /// Pieces per slot.
+    const PER_SLOT: usize;
+    /// How much an estimate counts along its own piece at most, against 1 across it.
+    const MOST_ALONG: f32;
+    /// How fast that falls with the number of votes.
+    const ALONG: f32;
+
+    /// Slots per record.
+    fn slots_per_record(&self) -> usize {
+        1
+    }
+    /// One piece of a slot.
+    fn piece(&self, slot: usize, piece: usize) -> Piece<D>;
+    /// Whether a record near a place is evidence for a point of `slot`.
+    fn may_vote(&self, slot: usize, record: usize) -> bool;
+    /// Squared distance from `x` to where `record` may lie.
+    fn record_distance2(&self, record: usize, x: &[f32; D]) -> f32;
+    /// The chance that a random record that may vote for `slot` passes within delta of `x`.
+    fn record_chance(&self, slot: usize, x: &[f32; D]) -> f32;
+}
+
+/// Lines and rays.
+pub(crate) struct LinePieces<'a, const D: usize> {
+    rows: &'a [LineRow<D>],
+    slots_per_record: usize,
+    chance: &'a [ChanceField<D>],
+    tube: f32,
+}
+
+impl<'a, const D: usize> LinePieces<'a, D> {
+    pub(crate) fn new(
+        rows: &'a [LineRow<D>],
+        slots_per_record: usize,
+        chance: &'a [ChanceField<D>],
+        delta: f32,
+    ) -> Self {
+        Self { rows, slots_per_record, chance, tube: tube(D, delta) }
+    }
+
+    #[inline(always)]
+    fn own(&self, slot: usize) -> &LineRow<D> {
+        &self.rows[slot / self.slots_per_record]
+    }
+}
+
+impl<const D: usize> Pieces<D> for LinePieces<'_, D> {
+    const PER_SLOT: usize = 1;
+    const MOST_ALONG: f32 = 0.35;
+    const ALONG: f32 = 50.0;
+
+    fn slots_per_record(&self) -> usize {
+        self.slots_per_record
+    }
+
+    #[inline(always)]
+    fn piece(&self, slot: usize, _: usize) -> Piece<D> {
+        let own = self.own(slot);
+        Piece::line(own.through, own.direction, own.is_ray())
+    }
+
+    #[inline(always)]
+    fn may_vote(&self, slot: usize, record: usize) -> bool {
+        self.rows[record].may_vote_for(self.own(slot))
+    }
+
+    #[inline(always)]
+    fn record_distance2(&self, record: usize, x: &[f32; D]) -> f32 {
+        let row = &self.rows[record];
+        let (mut t, mut square) = (0.0, 0.0);
+        for c in 0..D {
+            t += (x[c] - row.through[c]) * row.direction[c];
+        }
+        let t = t.max(row.floor());
+        for c in 0..D {
+            let d = x[c] - row.through[c] - t * row.direction[c];
+            square += d * d;
+        }
+        square
+    }
+
+    #[inline(always)]
+    fn record_chance(&self, slot: usize, x: &[f32; D]) -> f32 {
+        let own = self.own(slot);
+        let field = &self.chance[if own.is_ray() { own.group as usize } else { 0 }];
+        field.at(x, self.tube, 0.0).p
+    }
+}
+
+/// Axis planes.
+pub(crate) struct PlanePieces<'a, const D: usize> {
+    planes: &'a AxisPlanes<D>,
+    chance: f32,
+}
+
+impl<'a, const D: usize> PlanePieces<'a, D> {
+    pub(crate) fn new(planes: &'a AxisPlanes<D>, sorted: &SortedPlanes, delta: f32) -> Self {
+        let chance = sorted.typical_chance(planes, delta);
+        Self { planes, chance }
+    }
+}
+
+impl<const D: usize> Pieces<D> for PlanePieces<'_, D> {
+    const PER_SLOT: usize = 1;
+    const MOST_ALONG: f32 = 0.25;
+    const ALONG: f32 = 2.0;
+
+    #[inline(always)]
+    fn piece(&self, slot: usize, _: usize) -> Piece<D> {
+        let (own, offset) = (usize::from(self.planes.axis()[slot]), self.planes.offset()[slot]);
+        let at = |c: usize| if c == own { offset } else { 0.0 };
+        let along = |r: usize, c: usize| if r == c && r != own { 1.0 } else { 0.0 };
+        Piece {
+            through: std::array::from_fn(at),
+            along: std::array::from_fn(|r| std::array::from_fn(|c| along(r, c))),
+            sense: [0.0; D],
+        }
+    }
+
+    #[inline(always)]
+    fn may_vote(&self, slot: usize, record: usize) -> bool {
+        self.planes.axis()[slot] != self.planes.axis()[record]
+    }
+
+    #[inline(always)]
+    fn record_distance2(&self, record: usize, x: &[f32; D]) -> f32 {
+        let axis = usize::from(self.planes.axis()[record]);
+        let d = x[axis] - self.planes.offset()[record];
+        d * d
+    }
+
+    #[inline(always)]
+    fn record_chance(&self, _: usize, _: &[f32; D]) -> f32 {
+        self.chance
+    }
+}
+
+/// Axis candidates.
+pub(crate) struct CandidatePieces<'a, const D: usize> {
+    rows: &'a [[f32; D]],
+    chance: &'a CandidateField<D>,
+    tube: f32,
+}
+
+impl<'a, const D: usize> CandidatePieces<'a, D> {
+    pub(crate) fn new(rows: &'a [[f32; D]], chance: &'a CandidateField<D>, delta: f32) -> Self {
+        Self { rows, chance, tube: tube(D, delta) }
+    }
+}
+
+impl<const D: usize> Pieces<D> for CandidatePieces<'_, D> {
+    const PER_SLOT: usize = D;
+    const MOST_ALONG: f32 = 0.25;
+    const ALONG: f32 = 2.0;
+
+    #[inline(always)]
+    fn piece(&self, slot: usize, piece: usize) -> Piece<D> {
+        let direction = std::array::from_fn(|c| if c == piece { 1.0 } else { 0.0 });
+        Piece::line(self.rows[slot], direction, false)
+    }
+
+    #[inline(always)]
+    fn may_vote(&self, _: usize, _: usize) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn record_distance2(&self, record: usize, x: &[f32; D]) -> f32 {
+        let (mut sum, mut largest) = (0.0f32, 0.0f32);
+        for c in 0..D {
+            let d = x[c] - self.rows[record][c];
+            sum += d * d;
+            largest = largest.max(d * d);
+        }
+        (sum - largest).max(0.0)
+    }
+
+    #[inline(always)]
+    fn record_chance(&self, _: usize, x: &[f32; D]) -> f32 {
+        self.chance.at(x, self.tube).p
+    }
+}

@@ -1,0 +1,381 @@
+//! One slot in one round: candidates from neighbors' estimates, the likeliest of them, re-made.
+
+use super::density::Density;
+use super::graph::{Graph, either, is_reverse};
+use super::law::Law;
+use super::pieces::{Piece, Pieces};
+use super::places::{Places, distance2};
+use super::small::solve_symmetric;
+use crate::recover::sections::LANES;
+use crate::recover::{Estimate, Status, stored_support};
+
+/// Everything a round reads.
+pub(crate) struct Round<'a, const D: usize, P> {
+    pub(crate) pieces: &'a P,
+    pub(crate) graph: &'a Graph,
+    pub(crate) places: &'a Places<D>,
+    pub(crate) density: &'a Density<D>,
+    pub(crate) law: &'a Law,
+    /// Within this many local widths estimates enter the re-made position.
+    pub(crate) kernel: f32,
+    pub(crate) delta2: f32,
+}
+
+/// Estimates farther from a piece than this many radii of the law say nothing about it.
+const TUBE: f32 = 6.0;
+/// Candidates looked at per piece.
+const CANDIDATES: usize = 16;
+/// Records decide between the best candidates that lie within this many nats of each other.
+const DOUBT: f32 = 8.0;
+/// The share of neighbors whose estimate is wrong, though their record is near.
+const ASTRAY: f32 = 0.2;
+/// The weight of the density prior.
+const PRIOR: f32 = 0.5;
+
+/// Least squares steps.
+const STEPS: usize = 2;
+
+/// Columns of estimates near a piece.
+#[derive(Debug)]
+struct Near<const D: usize> {
+    x: [Vec<f32>; D],
+    odds: Vec<f32>,
+    /// The edge and the slot of each estimate.
+    from: Vec<(u32, u32)>,
+}
+
+impl<const D: usize> Default for Near<D> {
+    fn default() -> Self {
+        Self { x: std::array::from_fn(|_| Vec::new()), odds: Vec::new(), from: Vec::new() }
+    }
+}
+
+impl<const D: usize> Near<D> {
+    fn clear(&mut self) {
+        self.x.iter_mut().for_each(Vec::clear);
+        self.odds.clear();
+        self.from.clear();
+    }
+
+    #[inline(always)]
+    fn push(&mut self, x: &[f32; D], odds: f32, from: (u32, u32)) {
+        for c in 0..D {
+            self.x[c].push(x[c]);
+        }
+        self.odds.push(odds);
+        self.from.push(from);
+    }
+
+    #[inline(always)]
+    fn at(&self, i: usize) -> [f32; D] {
+        std::array::from_fn(|c| self.x[c][i])
+    }
+
+    /// Fills up the last vector with estimates that say nothing.
+    fn pad(&mut self) {
+        let n = self.odds.len().next_multiple_of(LANES);
+        self.x.iter_mut().for_each(|column| column.resize(n, 0.0));
+        self.odds.resize(n, 0.0);
+    }
+
+    /// The logarithm of how much likelier these estimates are about a point at `x` than by chance:
+    /// the sum of `ln(1 + odds * gain * (1 + r^2 / a^2)^-3)`.
+    #[inline(always)]
+    fn log_likelihood(&self, x: &[f32; D], gain: f32, inverse_a2: f32) -> f32 {
+        let mut sums = [0.0f32; LANES];
+        let (odds, _) = self.odds.as_chunks::<LANES>();
+        let columns: [&[[f32; LANES]]; D] =
+            std::array::from_fn(|c| &self.x[c].as_chunks::<LANES>().0[..odds.len()]);
+        for (i, odds) in odds.iter().enumerate() {
+            for lane in 0..LANES {
+                let mut r2 = 0.0;
+                for c in 0..D {
+                    let d = columns[c][i][lane] - x[c];
+                    r2 += d * d;
+                }
+                let q = 1.0 / (1.0 + r2 * inverse_a2);
+                sums[lane] += ln(1.0 + odds[lane] * gain * (q * q * q));
+            }
+        }
+        sums.iter().sum()
+    }
+}
+
+/// The logarithm of a positive number, to 2e-6: exponent plus a polynomial of the mantissa, without
+/// branches.
+#[inline(always)]
+fn ln(y: f32) -> f32 {
+    let bits = y.to_bits();
+    let exponent = (bits >> 23) as i32 - 127;
+    let m = f32::from_bits(bits & 0x007f_ffff | 0x3f80_0000) - 1.0;
+    // ln(1 + m) on [0, 1), zero at 0, fitted for the smallest largest error.
+    let p = m * (0.317_648_7 + m * (-0.193_760_2 + m * (0.085_569_24 - m * 0.018_338_63)));
+    exponent as f32 * std::f32::consts::LN_2 + m * (0.999_901_65 + m * (-0.497_875 + p))
+}
+
+/// A position that could win.
+#[derive(Clone, Copy, Debug)]
+struct Candidate<const D: usize> {
+    x: [f32; D],
+    piece: usize,
+    score: f32,
+    prior: f32,
+}
+
+/// Buffers of one thread.
+#[derive(Debug)]
+pub(crate) struct Scratch<const D: usize> {
+    near: [Near<D>; D],
+    best: Vec<Candidate<D>>,
+}
+
+impl<const D: usize> Default for Scratch<D> {
+    fn default() -> Self {
+        Self { near: std::array::from_fn(|_| Near::default()), best: Vec::new() }
+    }
+}
+
+impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
+    /// The new estimate of `slot`; the old one when no neighbor says anything.
+    #[inline(always)]
+    pub(crate) fn solve(
+        &self,
+        slot: usize,
+        old: &Estimate<D>,
+        scratch: &mut Scratch<D>,
+    ) -> Estimate<D> {
+        let partner = self.partner(slot);
+        scratch.best.clear();
+        for piece in 0..P::PER_SLOT {
+            let own = self.pieces.piece(slot, piece);
+            self.gather(slot, &own, &partner, &mut scratch.near[piece]);
+            let near = &scratch.near[piece];
+            let n = near.from.len();
+            let step = n.div_ceil(CANDIDATES).max(1);
+            for i in (0..n).step_by(step) {
+                let x = own.project(&near.at(i));
+                self.consider(near, x, piece, &mut scratch.best);
+            }
+            if old.status == Status::Ok && usize::from(old.axis) == piece {
+                self.consider(near, old.position, piece, &mut scratch.best);
+            }
+        }
+        let Some(first) = self.winner(slot, &scratch.best) else {
+            return *old;
+        };
+        let own = self.pieces.piece(slot, first.piece);
+        let near = &scratch.near[first.piece];
+        let mut x = first.x;
+        let mut support = 0;
+        for _ in 0..STEPS {
+            let (moved, n) = self.remake(&own, near, &x);
+            (x, support) = (moved, n);
+        }
+        if !x.iter().all(|c| c.is_finite()) {
+            return *old;
+        }
+        Estimate {
+            position: x,
+            status: Status::Ok,
+            support: stored_support(support),
+            axis: first.piece as u8,
+            evidence: (first.score - first.prior).max(0.0),
+        }
+    }
+
+    /// Where the other slot of a paired line lies, with the gain and scale of the law there.
+    #[inline(always)]
+    fn partner(&self, slot: usize) -> Option<([f32; D], f32, f32)> {
+        let other = slot ^ 1;
+        if self.pieces.slots_per_record() != 2 || !self.places.is_known(other) {
+            return None;
+        }
+        let x = self.places.of(other);
+        let (gain, inverse_a2, _) = self.law_at(&x);
+        Some((x, gain, inverse_a2))
+    }
+
+    /// The law at `x`: the gain of an estimate on the spot, `1 / a^2`, and the density.
+    #[inline(always)]
+    fn law_at(&self, x: &[f32; D]) -> (f32, f32, f32) {
+        let density = self.density.at(x);
+        let width = self.density.width(density);
+        let mut volume = 1.0;
+        for _ in 0..D {
+            volume *= width;
+        }
+        (self.law.center / (volume * density), self.law.inverse_a2 / (width * width), density)
+    }
+
+    /// Estimates of the slots at the other ends that lie near `own`.
+    #[inline(always)]
+    fn gather(
+        &self,
+        slot: usize,
+        own: &Piece<D>,
+        partner: &Option<([f32; D], f32, f32)>,
+        near: &mut Near<D>,
+    ) {
+        near.clear();
+        let slots_per_record = self.pieces.slots_per_record();
+        let reach = TUBE * self.law.radius;
+        let (ends, class) = self.graph.of(slot);
+        for (edge, (&end, &class)) in ends.iter().zip(class).enumerate() {
+            let either = either(class, slots_per_record);
+            let odds = self.law.odds[usize::from(class)];
+            for of_record in 0..if either { 2 } else { 1 } {
+                let at = end as usize + of_record;
+                let e = self.places.of(at);
+                if distance2(&own.project(&e), &e) < reach * reach {
+                    let odds = match partner {
+                        // An edge that belongs to the other slot as well as to this one is shared.
+                        Some((x, gain, inverse_a2)) if is_reverse(class) => {
+                            let q = 1.0 / (1.0 + distance2(x, &e) * inverse_a2);
+                            odds / (1.0 + odds * gain * q * q * q)
+                        }
+                        // Either of two slots is twice as likely to lie anywhere.
+                        _ if either => 0.5 * odds,
+                        _ => odds,
+                    };
+                    near.push(&e, odds, (edge as u32, at as u32));
+                }
+            }
+        }
+        near.pad();
+    }
+
+    #[inline(always)]
+    fn consider(&self, near: &Near<D>, x: [f32; D], piece: usize, best: &mut Vec<Candidate<D>>) {
+        let (gain, inverse_a2, density) = self.law_at(&x);
+        let prior = PRIOR * ln(density);
+        let score = prior + near.log_likelihood(&x, gain, inverse_a2);
+        best.push(Candidate { x, piece, score, prior });
+    }
+
+    /// The likeliest candidate. Where others come close, records decide whose estimates are astray.
+    #[inline(always)]
+    fn winner(&self, slot: usize, candidates: &[Candidate<D>]) -> Option<Candidate<D>> {
+        let mut best = *candidates.first()?;
+        for candidate in &candidates[1..] {
+            if candidate.score > best.score {
+                best = *candidate;
+            }
+        }
+        let apart = 4.0 * self.law.radius * self.law.radius;
+        let rival =
+            |c: &&Candidate<D>| c.score > best.score - DOUBT && distance2(&c.x, &best.x) > apart;
+        let mut second: Option<Candidate<D>> = None;
+        for candidate in candidates.iter().filter(rival) {
+            if second.is_none_or(|s| candidate.score > s.score) {
+                second = Some(*candidate);
+            }
+        }
+        if let Some(second) = second
+            && second.score + self.from_records(slot, &second.x)
+                > best.score + self.from_records(slot, &best.x)
+        {
+            return Some(second);
+        }
+        Some(best)
+    }
+
+    /// What records near `x` add where their estimates are elsewhere.
+    #[inline(always)]
+    fn from_records(&self, slot: usize, x: &[f32; D]) -> f32 {
+        let slots_per_record = self.pieces.slots_per_record();
+        let (gain, inverse_a2, _) = self.law_at(x);
+        let chance = self.pieces.record_chance(slot, x);
+        let (ends, class) = self.graph.of(slot);
+        let mut sum = 0.0;
+        for (&end, &class) in ends.iter().zip(class) {
+            let record = end as usize / slots_per_record;
+            if self.pieces.may_vote(slot, record)
+                && self.pieces.record_distance2(record, x) <= self.delta2
+            {
+                let odds = self.law.odds[usize::from(class)];
+                let either = either(class, slots_per_record);
+                let q = 1.0 / (1.0 + self.places.nearest(end, either, x).0 * inverse_a2);
+                let by_estimate = 1.0 + odds * gain * q * q * q;
+                sum += ln(1.0 + ASTRAY * odds / chance / by_estimate);
+            }
+        }
+        sum
+    }
+
+    /// `x` moved along `own` to the least squares of the records of near neighbors, weighted by how near
+    /// their estimates are. Estimates hold fully across their own pieces, and a little along them.
+    #[inline(always)]
+    fn remake(&self, own: &Piece<D>, near: &Near<D>, x: &[f32; D]) -> ([f32; D], u32) {
+        let width = self.density.width(self.density.at(x));
+        let inverse_kernel2 = 1.0 / (self.kernel * self.kernel * width * width);
+        // The sum of weighted matrices splits: the identity, and the neighbors' own pieces.
+        let (mut weight, mut pull) = (0.0f32, [0.0f32; D]);
+        let (mut free, mut free_pull) = ([[0.0f32; D]; D], [0.0f32; D]);
+        let mut n = 0;
+        for i in 0..near.from.len() {
+            let e = near.at(i);
+            let closeness = 1.0 - distance2(&e, x) * inverse_kernel2;
+            if closeness <= 0.0 {
+                continue;
+            }
+            let at = near.from[i].1 as usize;
+            let along = self.pieces.piece(at, self.places.piece(at)).along;
+            n += 1;
+            weight += closeness;
+            for r in 0..D {
+                pull[r] += closeness * (e[r] - x[r]);
+                let mut moved = 0.0;
+                for c in 0..D {
+                    free[r][c] += closeness * along[r][c];
+                    moved += along[r][c] * (e[c] - x[c]);
+                }
+                free_pull[r] += closeness * moved;
+            }
+        }
+        let free_share = 1.0 - P::MOST_ALONG.min(P::ALONG / n.max(1) as f32);
+        let mut hold = [[0.0f32; D]; D];
+        for r in 0..D {
+            for c in 0..D {
+                hold[r][c] = -free_share * free[r][c];
+            }
+            hold[r][r] += weight;
+            pull[r] -= free_share * free_pull[r];
+        }
+        (own.project(&solve_within(own, x, &hold, &pull, weight)), n)
+    }
+}
+
+/// `x` plus the step along `own` that solves `hold step = pull` within it.
+#[inline(always)]
+fn solve_within<const D: usize>(
+    own: &Piece<D>,
+    x: &[f32; D],
+    hold: &[[f32; D]; D],
+    pull: &[f32; D],
+    weight: f32,
+) -> [f32; D] {
+    // P hold P + weight (1 - P): the part across the piece is decoupled and stays 0.
+    let p = &own.along;
+    let (mut half, mut full, mut right) = ([[0.0f32; D]; D], [[0.0f32; D]; D], [0.0f32; D]);
+    for r in 0..D {
+        for c in 0..D {
+            for k in 0..D {
+                half[r][c] += p[r][k] * hold[k][c];
+            }
+            right[r] += p[r][c] * pull[c];
+        }
+    }
+    for r in 0..D {
+        for c in 0..D {
+            for k in 0..D {
+                full[r][c] += half[r][k] * p[k][c];
+            }
+            full[r][c] -= weight * p[r][c];
+        }
+        full[r][r] += weight;
+    }
+    if !solve_symmetric(&mut full, &mut right) {
+        return *x;
+    }
+    std::array::from_fn(|c| x[c] + right[c])
+}
