@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 use unlift::audit::Threshold;
+use unlift::neighbors::oracle::Noise;
 use unlift::obfuscate::Entry;
 use unlift::recover::{Delta, Solver};
 
@@ -49,6 +50,9 @@ pub enum Command {
     Recover(RecoverArgs),
     /// Compare recovered points with the truth
     Evaluate(EvaluateArgs),
+    /// Measure speed and memory
+    #[command(subcommand)]
+    Bench(BenchCommand),
     /// List the schemes: rule, what stays hidden, source, stated patents
     Schemes,
 }
@@ -118,8 +122,9 @@ Examples:
   unlift audit map PROJECT --share-safe --json
 
 Gates: SCHEME[@RATIO]:THRESHOLD[:gain]<=PERCENT. SCHEME may be all; without @RATIO every ratio
-counts; every solver counts; the largest figure decides. :gain bounds what recovery adds to a
-blind attacker, in percentage points. A gate that is about no row of the audit is a usage error.
+counts; every solver and noise model counts; the largest figure decides. :gain bounds what
+recovery adds to a blind attacker, in percentage points. A gate that is about no row of the audit
+is a usage error.
 
 Exit codes: 0 done, 1 a gate failed, 2 usage, 3 bad input.")]
 pub struct AuditMapArgs {
@@ -136,6 +141,11 @@ pub struct AuditMapArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::ratio,
           default_value = "1,0.75,0.5,0.3,0.2,0.1", help_heading = "Attack")]
     pub inlier_ratios: Vec<f64>,
+    /// How the oracle errs, by commas or repeated: uniform (any record), near (the 2K-th to 10K-th
+    /// nearest), clustered (wrong places that neighbors share, as of look-alike descriptors)
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::noise,
+          default_value = "uniform", help_heading = "Attack")]
+    pub oracle_noise: Vec<Noise>,
     /// Recovery methods, by commas or repeated: consensus, ransac
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
           default_value = "consensus", help_heading = "Attack")]
@@ -221,9 +231,13 @@ pub struct OracleArgs {
     /// The released map of the same obfuscation [default: released.parquet beside TRUTH]
     #[arg(long, value_name = "FILE")]
     pub released: Option<PathBuf>,
-    /// Share of true neighbors: round(RATIO x K) are kept, the others are random
+    /// Share of true neighbors: round(RATIO x K) are kept, the others are wrong
     #[arg(long, value_name = "RATIO", value_parser = values::ratio)]
     pub inlier_ratio: f64,
+    /// The wrong ones: uniform (any record), near (the 2K-th to 10K-th nearest), clustered (wrong
+    /// places that neighbors share, as of look-alike descriptors)
+    #[arg(long, value_name = "MODEL", value_parser = values::noise, default_value = "uniform")]
+    pub oracle_noise: Noise,
     /// Neighbors per hidden point
     #[arg(long, value_name = "K", default_value = "50",
           value_parser = clap::value_parser!(u16).range(1..))]
@@ -287,6 +301,58 @@ pub struct EvaluateArgs {
     pub json: bool,
 }
 
+/// What can be measured.
+#[derive(Debug, Subcommand)]
+pub enum BenchCommand {
+    /// Seconds of recovery per inlier ratio, beside those of the paper
+    Recover(BenchRecoverArgs),
+}
+
+/// Options of `bench recover`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  unlift bench recover --points 700000 --scheme ppl
+  unlift bench recover --points 100000 --scheme plane --map PROJECT --solver consensus,ransac --json
+
+The paper's seconds (64 cores) are shown where it measured the same scheme, K, inlier ratio and
+number of points: ppl, 50, and 100000, 300000 or 700000.")]
+pub struct BenchRecoverArgs {
+    /// Points of the map
+    #[arg(long, value_name = "N", default_value = "700000")]
+    pub points: NonZeroUsize,
+    /// Map to thin out, or to repeat side by side with a jitter [default: the room of the demo]
+    #[arg(long, value_name = "PATH")]
+    pub map: Option<PathBuf>,
+    /// The scheme, see unlift schemes
+    #[arg(long, value_name = "SCHEME", value_parser = values::scheme, default_value = "ppl")]
+    pub scheme: &'static Entry,
+    /// Neighbors per hidden point
+    #[arg(long, value_name = "K", default_value = "50",
+          value_parser = clap::value_parser!(u16).range(1..))]
+    pub k: u16,
+    /// Shares of true neighbors to try, by commas
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::ratio,
+          default_value = "1,0.5,0.3,0.2,0.1")]
+    pub inlier_ratios: Vec<f64>,
+    /// Recovery methods, by commas or repeated: consensus, ransac
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
+          default_value = "consensus")]
+    pub solver: Vec<Solver>,
+    /// Distance up to which a neighbor supports a position, in the unit of the map
+    #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto")]
+    pub delta: Delta,
+    /// The integer that all randomness comes from
+    #[arg(long, value_name = "INTEGER", default_value_t = 0)]
+    pub seed: u64,
+    /// Threads to use [default: one per core]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+    /// Print JSON in place of the table
+    #[arg(long)]
+    pub json: bool,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -311,6 +377,7 @@ mod tests {
         assert_eq!(args.inlier_ratios, [1.0, 0.75, 0.5, 0.3, 0.2, 0.1]);
         assert_eq!((args.map.k, args.map.seed, args.repeats), (50, None, 1));
         assert_eq!(args.solver, [Solver::Consensus]);
+        assert_eq!(args.oracle_noise, [Noise::Uniform]);
         assert_eq!((args.delta, args.map.outlier_filter), (Delta::Auto, None));
         assert_eq!(args.neighbors, NeighborSource::Oracle);
         assert!(args.schemes.is_empty() && args.thresholds.is_empty());

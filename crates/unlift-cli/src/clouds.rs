@@ -37,7 +37,12 @@ impl Clouds {
             self.schemes.push(scheme);
             self.write_obfuscated(scheme, cell.released, cell.original.reveal().positions())?;
         }
-        let name = format!("{scheme}-recovered-{}-{}.ply", cell.row.inlier_ratio, cell.row.solver);
+        let noise = match cell.row.oracle_noise {
+            None | Some("uniform") => String::new(),
+            Some(noise) => format!("-{noise}"),
+        };
+        let name =
+            format!("{scheme}-recovered-{}{noise}-{}.ply", cell.row.inlier_ratio, cell.row.solver);
         let points: Vec<Option<[f64; 3]>> = (0..cell.recovered.n_slots())
             .map(|slot| cell.recovered.position(slot).map(|p| in_map(&p)))
             .collect();

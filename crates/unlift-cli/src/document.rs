@@ -33,6 +33,10 @@ pub fn options(plan: &Plan, more: Map<String, Value>) -> Map<String, Value> {
         Source::Given(given) => &given.name,
     };
     options.insert("neighbors".into(), json!(neighbors));
+    if plan.source == Source::Oracle {
+        let names: Vec<&str> = plan.oracle_noise.iter().map(|noise| noise.name()).collect();
+        options.insert("oracle_noise".into(), json!(names));
+    }
     options.insert("inlier_ratios".into(), json!(plan.inlier_ratios));
     options.insert("k".into(), json!(plan.k));
     options
@@ -137,6 +141,7 @@ fn break_even(row: &audit::BreakEven) -> report::BreakEven {
     report::BreakEven {
         scheme: row.scheme.to_owned(),
         solver: row.solver.to_owned(),
+        oracle_noise: Some(row.oracle_noise.to_owned()),
         threshold: row.threshold.clone(),
         inlier_ratio: Some(row.inlier_ratio),
         bound: match row.bound {

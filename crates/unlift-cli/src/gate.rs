@@ -5,7 +5,7 @@
 //! ```
 //!
 //! `ppl@0.5:0.10<=20` fails when more than 20 % of the points come back within 0.10 under `ppl` at
-//! inlier ratio 0.5. `SCHEME` may be `all`; without `@RATIO` every ratio counts; every solver and K
+//! inlier ratio 0.5. `SCHEME` may be `all`; without `@RATIO` every ratio counts; every solver, noise model and K
 //! always counts: the largest figure decides. `:gain` bounds what recovery adds to a blind attacker,
 //! in percentage points. Numbers are compared as numbers, so `0.1` finds the threshold `0.10`.
 

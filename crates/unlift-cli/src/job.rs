@@ -86,7 +86,9 @@ pub fn open_out(out: &Path) -> anyhow::Result<OutputDir> {
 /// Runs the job and writes its folder, whole or not at all.
 pub fn perform(job: Job<'_>, out: OutputDir) -> anyhow::Result<Finished> {
     check_gates(&job.gates, &job.plan)?;
-    let n_cells = job.plan.schemes.len() * job.plan.ratios().len() * job.plan.solvers.len();
+    let plan = &job.plan;
+    let per_scheme = plan.noises().len() * plan.ratios().len() * plan.solvers.len();
+    let n_cells = plan.schemes.len() * per_scheme;
     let mut watcher = Watcher {
         progress: Progress::new(job.quiet),
         pictures: (!job.share_safe).then(|| Pictures::new(job.original, &job.plan, n_cells)),

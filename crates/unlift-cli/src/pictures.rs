@@ -57,7 +57,7 @@ impl Pictures {
         });
         self.scene.views.push(View {
             scheme: cell.row.scheme.to_owned(),
-            solver: cell.row.solver.to_owned(),
+            solver: unlift_report::method(cell.row.solver, cell.row.oracle_noise),
             inlier_ratio: cell.row.inlier_ratio,
             recovered: recovered.collect(),
         });

@@ -93,13 +93,9 @@ fn without_outliers(points: &[[f64; 3]], filter: OutlierFilter) -> Result<Vec<u3
         return Err(Error::new("points", expected, points.len().to_string()));
     }
     let knn = Knn::new(points)?;
-    let mut found = Vec::new();
-    let means: Vec<f64> = (0..points.len())
-        .map(|row| {
-            knn.nearest(row, n, &mut found);
-            found.iter().map(|(squared, _)| squared.sqrt()).sum::<f64>() / n as f64
-        })
-        .collect();
+    let means = knn.per_row(n, |_, found| {
+        found.iter().map(|(squared, _)| squared.sqrt()).sum::<f64>() / n as f64
+    });
     let mean = means.iter().sum::<f64>() / means.len() as f64;
     let variance = means.iter().map(|m| (m - mean) * (m - mean)).sum::<f64>() / means.len() as f64;
     let limit = mean + filter.std_ratio * variance.sqrt();

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use unlift::audit::Threshold;
+use unlift::neighbors::oracle::Noise;
 use unlift::obfuscate::{Entry, SCHEMES};
 use unlift::recover::{Delta, Solver};
 
@@ -41,6 +42,11 @@ pub fn all_schemes() -> Vec<&'static Entry> {
 /// A solver by its name.
 pub fn solver(text: &str) -> Result<Solver, String> {
     Solver::from_name(text).map_err(|error| expected(&error))
+}
+
+/// A noise model by its name.
+pub fn noise(text: &str) -> Result<Noise, String> {
+    Noise::from_name(text).map_err(|error| expected(&error))
 }
 
 fn expected(error: &unlift::Error) -> String {
@@ -130,6 +136,7 @@ mod tests {
             outlier_filter("20").unwrap_err(),
             scheme("pppl").unwrap_err(),
             solver("magic").unwrap_err(),
+            noise("white").unwrap_err(),
         ];
         assert_eq!(
             texts.join("\n"),
@@ -138,7 +145,8 @@ mod tests {
              expected auto or a number above 0, found wide\n\
              expected NEIGHBORS,RATIO with both above 0 (for example 20,2.0), found 20\n\
              expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, found pppl\n\
-             expected one of consensus, ransac, found magic"
+             expected one of consensus, ransac, found magic\n\
+             expected one of uniform, near, clustered, found white"
         );
     }
 

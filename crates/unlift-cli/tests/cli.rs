@@ -177,12 +177,84 @@ fn bad_input_is_one_line_and_loses_nothing() {
 }
 
 #[test]
+fn every_noise_model_has_rows_and_break_even_ratios_of_its_own() {
+    let place = Place::new();
+    let quick = "--k 10 --schemes olc,ppl --inlier-ratios 1,0.3 --quiet --out audit";
+    let noise = "--oracle-noise uniform,near --oracle-noise clustered,near";
+    place.stdout(&format!("audit map room.csv --scale 1 {quick} {noise}"), 0);
+    let audit = place.json("audit/audit.json");
+    let results = audit["results"].as_array().expect("rows");
+    assert_eq!(results.len(), 2 * 3 * 2);
+    for rows in results.chunks(6) {
+        let names: Vec<&str> = rows.iter().filter_map(|row| row["oracle_noise"].as_str()).collect();
+        assert_eq!(names, ["uniform", "uniform", "near", "near", "clustered", "clustered"]);
+        // Without outliers there is nothing to differ in.
+        for other in [2, 4] {
+            assert_eq!(rows[0]["recovered_percent"], rows[other]["recovered_percent"]);
+            assert_ne!(rows[1]["recovered_percent"], rows[other + 1]["recovered_percent"]);
+        }
+    }
+    let points = audit["break_even"].as_array().expect("ratios");
+    let noises: Vec<&str> = points.iter().filter_map(|p| p["oracle_noise"].as_str()).collect();
+    assert_eq!(noises, ["uniform", "near", "clustered", "uniform", "near", "clustered"]);
+    let page = std::fs::read_to_string(place.path().join("audit/report.html")).expect("a report");
+    assert!(page.contains("consensus, clustered") && page.contains("30 % (near)"));
+
+    // The uniform rows are those of an audit that names no model.
+    place.stdout(&format!("audit map room.csv --scale 1 {quick}"), 0);
+    let usual = place.json("audit/audit.json");
+    assert_eq!(usual["results"][0], results[0]);
+    assert_eq!(usual["results"][1], results[1]);
+}
+
+#[test]
+fn lists_of_a_noise_model_are_written() {
+    let place = Place::new();
+    place.stdout("obfuscate room.csv --scheme olc --scale 1 --seed 1 --out hidden", 0);
+    let mut files = std::collections::BTreeSet::new();
+    for noise in ["uniform", "near", "clustered"] {
+        let line = "neighbors oracle hidden/truth.parquet --k 10 --inlier-ratio 0.5 --out lists";
+        place.stdout(&format!("{line} --oracle-noise {noise}"), 0);
+        files.insert(std::fs::read(place.path().join("lists")).expect("lists"));
+    }
+    assert_eq!(files.len(), 3);
+}
+
+#[test]
+fn a_bench_tells_seconds_of_every_ratio_and_solver() {
+    let place = Place::new();
+    let line = "bench recover --points 900 --map room.csv --k 10 --inlier-ratios 1,0.5 \
+                --solver consensus,ransac";
+    let text = place.stdout(line, 0);
+    assert_eq!(
+        text.lines().next(),
+        text.lines().find(|l| l.starts_with("ppl: 900 points, K = 10"))
+    );
+    assert_eq!(text.matches("consensus").count() + text.matches("ransac").count(), 4, "{text}");
+    let json: Value =
+        serde_json::from_str(&place.stdout(&format!("{line} --json"), 0)).expect("JSON");
+    assert_eq!((json["n_points"].as_u64(), json["k"].as_u64()), (Some(900), Some(10)));
+    let rows = json["rows"].as_array().expect("rows");
+    assert_eq!(rows.len(), 4);
+    assert!(rows.iter().all(|row| row["seconds"].as_f64() > Some(0.0)));
+    assert!(rows.iter().all(|row| row["published_seconds"].is_null()));
+}
+
+#[test]
 fn help_is_part_of_the_interface() {
     let place = Place::new();
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/snapshots");
-    for command in
-        ["", "demo", "audit map", "obfuscate", "neighbors oracle", "recover", "evaluate", "schemes"]
-    {
+    for command in [
+        "",
+        "demo",
+        "audit map",
+        "obfuscate",
+        "neighbors oracle",
+        "recover",
+        "evaluate",
+        "bench recover",
+        "schemes",
+    ] {
         let text = place.stdout(&format!("{command} --help"), 0);
         let name = if command.is_empty() { "unlift" } else { command }.replace(' ', "-");
         let file = folder.join(format!("{name}.txt"));

@@ -36,7 +36,7 @@ pub struct Document {
     pub seed: u64,
     /// The figures, one row per combination that was tried.
     pub results: Vec<Row>,
-    /// The smallest inlier ratio at which half of the points come back, per scheme and solver.
+    /// The smallest inlier ratio at which half of the points come back, per scheme, noise and solver.
     pub break_even: Vec<BreakEven>,
     /// The user's gates and how they ended; empty when none was given.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -85,7 +85,8 @@ pub struct Row {
     pub scheme: String,
     /// Where the neighborhoods came from: `oracle` or `file`.
     pub neighbors: String,
-    /// How the oracle chose the false neighbors (`uniform`); `None` without an oracle.
+    /// How the oracle chose the false neighbors: `uniform`, `near` or `clustered`; `None` without
+    /// an oracle.
     pub oracle_noise: Option<String>,
     /// Share of true neighbors: as requested for the oracle, measured for other sources.
     pub inlier_ratio: f64,
@@ -149,6 +150,9 @@ pub struct BreakEven {
     pub scheme: String,
     /// The solver's name.
     pub solver: String,
+    /// How the oracle chose the false neighbors, as [`Row::oracle_noise`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub oracle_noise: Option<String>,
     /// The threshold as typed.
     pub threshold: String,
     /// The ratio: interpolated, or the smallest / largest tested one as [`BreakEven::bound`] says.

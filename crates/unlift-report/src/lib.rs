@@ -22,3 +22,4 @@ pub use error::Error;
 pub use html::{ErrorCdf, RenderOptions, render};
 pub use scene::Scene3d;
 pub use text::text_table;
+pub use words::method;

@@ -48,7 +48,8 @@ struct ThresholdData {
 #[derive(Debug, Serialize)]
 struct RowData<'a> {
     scheme: &'a str,
-    solver: &'a str,
+    /// The solver, with the noise model where that is not the usual one.
+    solver: String,
     ratio: f64,
     oracle: bool,
     recovered: Vec<Option<f64>>,
@@ -94,7 +95,7 @@ pub(crate) fn page_data<'a>(
         let cdf = options.error_cdf.iter().find(|cdf| cdf.row == index);
         RowData {
             scheme: &row.scheme,
-            solver: &row.solver,
+            solver: words::method(&row.solver, row.oracle_noise.as_deref()),
             ratio: row.inlier_ratio,
             oracle: row.neighbors == "oracle",
             recovered: by_threshold(&row.recovered_percent),
@@ -112,8 +113,9 @@ pub(crate) fn page_data<'a>(
                 slot: slot(document, &row.scheme),
             });
         }
-        if !solvers.contains(&row.solver) {
-            solvers.push(row.solver.clone());
+        let method = words::method(&row.solver, row.oracle_noise.as_deref());
+        if !solvers.contains(&method) {
+            solvers.push(method);
         }
     }
     PageData {

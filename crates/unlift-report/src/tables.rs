@@ -99,7 +99,8 @@ pub(crate) fn break_even(document: &Document) -> Table {
             (_, None) => "not reached".to_owned(),
         };
         let within = threshold_text(document, &point.threshold);
-        vec![point.scheme.clone(), point.solver.clone(), within, ratio]
+        let method = words::method(&point.solver, point.oracle_noise.as_deref());
+        vec![point.scheme.clone(), method, within, ratio]
     });
     Table {
         id: "break-even",

@@ -1,6 +1,6 @@
 //! The short table for a terminal.
 
-use crate::document::Document;
+use crate::document::{Document, Row};
 use crate::{tables, verdict, words};
 
 /// One line per scheme, worst first: percent recovered within each threshold at the headline
@@ -18,13 +18,13 @@ pub fn text_table(document: &Document) -> String {
             continue;
         };
         let ratio = format!("{} %", words::ratio_percent(row.inlier_ratio));
-        let mut cells = vec![row.scheme.clone(), row.solver.clone(), ratio];
+        let mut cells = vec![row.scheme.clone(), card.solver.clone(), ratio];
         for typed in &thresholds {
             let value = row.recovered_percent.get(typed);
             cells.push(value.map_or("-".into(), |v| format!("{} %", words::percent(*v))));
         }
         cells.push(format!("{} %", words::percent(card.blind)));
-        cells.push(break_even(document, row.scheme.as_str(), &row.solver, thresholds.first()));
+        cells.push(break_even(document, row, thresholds.first()));
         lines.push(cells);
     }
     align(&lines)
@@ -37,12 +37,9 @@ fn unit(document: &Document) -> &'static str {
     }
 }
 
-fn break_even(document: &Document, scheme: &str, solver: &str, typed: Option<&String>) -> String {
+fn break_even(document: &Document, row: &Row, typed: Option<&String>) -> String {
     use crate::document::Bound;
-    let point = document
-        .break_even
-        .iter()
-        .find(|b| b.scheme == scheme && b.solver == solver && Some(&b.threshold) == typed);
+    let point = document.break_even.iter().find(|b| b.is_of(row) && Some(&b.threshold) == typed);
     match point.map(|p| (p.bound, p.inlier_ratio.map(words::ratio_percent))) {
         Some((Bound::Interpolated, Some(ratio))) => format!("{ratio} %"),
         Some((Bound::BelowTested, Some(ratio))) => format!("<= {ratio} %"),

@@ -11,6 +11,16 @@ const HEADLINE_RATIO: f64 = 0.5;
 /// A gain over the blind attacker below this many percentage points says that nothing was gained.
 const GAIN_THAT_COUNTS: f64 = 2.0;
 
+impl BreakEven {
+    /// Whether this is the ratio of the curve on which `row` lies.
+    pub(crate) fn is_of(&self, row: &Row) -> bool {
+        let noise = self.oracle_noise.as_ref();
+        self.scheme == row.scheme
+            && self.solver == row.solver
+            && noise.is_none_or(|noise| row.oracle_noise.as_ref() == Some(noise))
+    }
+}
+
 /// The verdict on one scheme.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Card {
@@ -67,10 +77,7 @@ fn card(document: &Document, row: &Row) -> Option<Card> {
     let blind = row.blind_percent.get(typed).copied().unwrap_or(0.0);
     let within = words::threshold(typed, row.unit);
     let when = condition(row);
-    let break_even = document
-        .break_even
-        .iter()
-        .find(|b| b.scheme == row.scheme && b.solver == row.solver && b.threshold == *typed);
+    let break_even = document.break_even.iter().find(|b| b.is_of(row) && b.threshold == *typed);
     Some(Card {
         scheme: row.scheme.clone(),
         title: words::scheme_title(&row.scheme).to_owned(),
@@ -82,13 +89,17 @@ fn card(document: &Document, row: &Row) -> Option<Card> {
         amount: amount(recovered, blind),
         gain: gain(recovered, blind),
         break_even: break_even.map(break_even_sentence),
-        solver: row.solver.clone(),
+        solver: words::method(&row.solver, row.oracle_noise.as_deref()),
     })
 }
 
 fn condition(row: &Row) -> String {
     if row.neighbors == "oracle" {
-        words::when_right(row.inlier_ratio)
+        let when = words::when_right(row.inlier_ratio);
+        match row.oracle_noise.as_deref() {
+            None | Some("uniform") => when,
+            Some(noise) => format!("{when} and the others {noise}"),
+        }
     } else {
         let right = words::ratio_percent(row.inlier_ratio);
         format!("with the given neighborhoods, of which {right} % is right")

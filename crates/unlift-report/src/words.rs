@@ -94,6 +94,15 @@ pub(crate) fn when_right(ratio: f64) -> String {
     }
 }
 
+/// A solver, and the neighborhoods it had unless they were the usual ones: what tells apart rows
+/// of one scheme and inlier ratio. A row without a noise model had uniform ones.
+pub fn method(solver: &str, oracle_noise: Option<&str>) -> String {
+    match oracle_noise {
+        None | Some("uniform") => solver.to_owned(),
+        Some(noise) => format!("{solver}, {noise}"),
+    }
+}
+
 /// An inlier ratio as a percentage without the sign, to two digits.
 pub(crate) fn ratio_percent(ratio: f64) -> String {
     significant(ratio * 100.0, 2)

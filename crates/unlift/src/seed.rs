@@ -33,6 +33,10 @@ pub enum Stage {
     KMeans = 11,
     /// Subsets of the input (`--max-points`).
     Subset = 12,
+    /// The wrong places that look like a patch of a map.
+    OracleLookAlikes = 20,
+    /// Copies of a map side by side, to measure on.
+    Tiling = 21,
 }
 
 const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;

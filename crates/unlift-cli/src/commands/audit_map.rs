@@ -73,6 +73,7 @@ fn plan(args: &AuditMapArgs, prepared: &Prepared, n_read: usize) -> anyhow::Resu
     Ok(Plan {
         schemes: distinct(schemes, |a, b| a.name == b.name),
         source,
+        oracle_noise: distinct(args.oracle_noise.clone(), |a, b| a == b),
         inlier_ratios: distinct(args.inlier_ratios.clone(), |a, b| a == b),
         k: usize::from(args.map.k),
         solvers: distinct(args.solver.clone(), |a, b| a == b),

@@ -1,6 +1,7 @@
 //! One file per command: parse, call the library, print.
 
 mod audit_map;
+mod bench;
 mod demo;
 mod evaluate;
 mod neighbors;
@@ -11,7 +12,7 @@ mod schemes;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-use crate::args::{AuditCommand, Command, MapArgs, NeighborsCommand};
+use crate::args::{AuditCommand, BenchCommand, Command, MapArgs, NeighborsCommand};
 use crate::exit::{Outcome, advise};
 use crate::prepare::{self, Preparation, Prepared};
 use crate::progress::Spinner;
@@ -29,6 +30,7 @@ pub fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Neighbors(NeighborsCommand::Oracle(args)) => neighbors::oracle(&args),
         Command::Recover(args) => recover::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
+        Command::Bench(BenchCommand::Recover(args)) => bench::recovery(&args),
         Command::Schemes => schemes::run(),
     }
 }

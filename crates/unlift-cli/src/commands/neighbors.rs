@@ -1,6 +1,6 @@
 //! `unlift neighbors oracle`: the truth in, neighborhoods of a chosen quality out.
 
-use unlift::neighbors::oracle::{TrueNeighbors, search};
+use unlift::neighbors::oracle::{Outliers, TrueNeighbors, search};
 use unlift_io::stage::{read_released, read_truth, write_neighborhoods};
 
 use super::obfuscate::RELEASED;
@@ -29,7 +29,8 @@ pub fn oracle(args: &OracleArgs) -> anyhow::Result<Outcome> {
     let knn = search(&original).map_err(core)?;
     let k = usize::from(args.k);
     let near = TrueNeighbors::new(&knn, &secret, released.slots_per_record(), k).map_err(core)?;
-    let lists = near.at_inlier_ratio(args.inlier_ratio, args.seed).map_err(core)?;
+    let outliers = Outliers::new(args.oracle_noise, &near, &knn, &secret, args.seed);
+    let lists = near.lists(args.inlier_ratio, &outliers.map_err(core)?, args.seed).map_err(core)?;
     write_neighborhoods(&args.out, &lists)?;
     drop(alive);
     print(&format!(

@@ -37,6 +37,7 @@ pub fn document(metric: bool) -> Document {
             break_even.extend(thresholds.map(|threshold| BreakEven {
                 scheme: (*scheme).into(),
                 solver: solver.into(),
+                oracle_noise: Some("uniform".into()),
                 threshold: threshold.into(),
                 inlier_ratio: Some(if last { 0.1 } else { 0.17 + 0.01 * s as f64 }),
                 bound: if last { Bound::BelowTested } else { Bound::Interpolated },

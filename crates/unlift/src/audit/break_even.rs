@@ -33,6 +33,8 @@ pub struct BreakEven {
     pub scheme: &'static str,
     /// Solver name.
     pub solver: &'static str,
+    /// How the oracle erred.
+    pub oracle_noise: &'static str,
     /// Threshold label.
     pub threshold: String,
     /// The ratio, linearly interpolated, or the tested ratio that bounds it.
@@ -41,22 +43,27 @@ pub struct BreakEven {
     pub bound: Bound,
 }
 
-/// Break-even ratios within the first threshold, for every scheme and solver with oracle rows.
+/// Break-even ratios within the first threshold, for every scheme, noise model and solver with
+/// oracle rows.
 pub fn break_even(plan: &Plan, rows: &[Row]) -> Vec<BreakEven> {
     let mut result = Vec::new();
     for scheme in &plan.schemes {
-        for solver in &plan.solvers {
-            let mut curve: Vec<(f64, f64)> = rows
-                .iter()
-                .filter(|r| r.scheme == scheme.name && r.solver == solver.name())
-                .filter(|r| r.oracle_noise.is_some())
-                .map(|r| (r.inlier_ratio, r.recovered_percent[0]))
-                .collect();
-            curve.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
-            if let Some((inlier_ratio, bound)) = crossing(&curve) {
-                let threshold = plan.thresholds[0].label.clone();
-                let (scheme, solver) = (scheme.name, solver.name());
-                result.push(BreakEven { scheme, solver, threshold, inlier_ratio, bound });
+        for noise in plan.noises().into_iter().flatten() {
+            for solver in &plan.solvers {
+                let (scheme, solver, oracle_noise) = (scheme.name, solver.name(), noise.name());
+                let mut curve: Vec<(f64, f64)> = rows
+                    .iter()
+                    .filter(|r| r.scheme == scheme && r.solver == solver)
+                    .filter(|r| r.oracle_noise == Some(oracle_noise))
+                    .map(|r| (r.inlier_ratio, r.recovered_percent[0]))
+                    .collect();
+                curve.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
+                if let Some((inlier_ratio, bound)) = crossing(&curve) {
+                    let threshold = plan.thresholds[0].label.clone();
+                    let found =
+                        BreakEven { scheme, solver, oracle_noise, threshold, inlier_ratio, bound };
+                    result.push(found);
+                }
             }
         }
     }

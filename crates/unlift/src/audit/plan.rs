@@ -1,5 +1,6 @@
 //! What is to be audited.
 
+use crate::neighbors::oracle::Noise;
 use crate::obfuscate::{Entry, SchemeOptions};
 use crate::recover::{Delta, Solver};
 use crate::{Error, Unit};
@@ -50,7 +51,7 @@ pub enum Source {
     Given(PointNeighbors),
 }
 
-/// A plan: every combination of scheme, source, inlier ratio and solver becomes a row.
+/// A plan: every combination of scheme, source, noise model, inlier ratio and solver becomes a row.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// Schemes to audit.
@@ -59,6 +60,8 @@ pub struct Plan {
     pub scheme_options: SchemeOptions,
     /// Where neighborhoods come from.
     pub source: Source,
+    /// How the oracle errs; a row each.
+    pub oracle_noise: Vec<Noise>,
     /// Shares of true neighbors (oracle).
     pub inlier_ratios: Vec<f64>,
     /// Neighbors per slot (oracle). For given lists, the longest list decides.
@@ -91,6 +94,7 @@ impl Plan {
             schemes: crate::obfuscate::SCHEMES.iter().filter(|s| s.in_3d.is_some()).collect(),
             scheme_options: SchemeOptions { voxel },
             source: Source::Oracle,
+            oracle_noise: vec![Noise::Uniform],
             inlier_ratios: vec![1.0, 0.75, 0.5, 0.3, 0.2, 0.1],
             k: 50,
             solvers: vec![Solver::Consensus],
@@ -101,7 +105,16 @@ impl Plan {
         }
     }
 
-    /// The inlier ratios of the rows of one scheme and solver; `None` where it will be measured.
+    /// The noise models of the rows of one scheme; `None` where neighborhoods are given.
+    pub fn noises(&self) -> Vec<Option<Noise>> {
+        match self.source {
+            Source::Oracle => self.oracle_noise.iter().map(|&noise| Some(noise)).collect(),
+            Source::Given(_) => vec![None],
+        }
+    }
+
+    /// The inlier ratios of the rows of one scheme, noise model and solver; `None` where it will be
+    /// measured.
     pub fn ratios(&self) -> Vec<Option<f64>> {
         match self.source {
             Source::Oracle => self.inlier_ratios.iter().map(|&ratio| Some(ratio)).collect(),
@@ -127,6 +140,7 @@ impl Plan {
         }
         for (what, empty) in [
             ("schemes", self.schemes.is_empty()),
+            ("oracle noise models", self.oracle_noise.is_empty()),
             ("inlier ratios", self.inlier_ratios.is_empty()),
             ("solvers", self.solvers.is_empty()),
             ("thresholds", self.thresholds.is_empty()),

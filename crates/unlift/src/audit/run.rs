@@ -7,7 +7,7 @@ use super::plan::{Plan, PointNeighbors, Source};
 use super::row::Row;
 use crate::evaluate::{Accuracy, blind, evaluate};
 use crate::neighbors::Neighborhoods;
-use crate::neighbors::oracle::{self, TrueNeighbors};
+use crate::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
 use crate::obfuscate::{Entry, obfuscate};
 use crate::recover::{RecoverOptions, Recovered, Solver, recover};
 use crate::released::Released;
@@ -71,9 +71,9 @@ pub struct Seconds {
 /// What an audit found.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// One row per scheme, inlier ratio and solver, in this order.
+    /// One row per scheme, noise model, inlier ratio and solver, in this order.
     pub rows: Vec<Row>,
-    /// The ratio at which half of the points come back, per scheme and solver.
+    /// The ratio at which half of the points come back, per scheme, noise model and solver.
     pub break_even: Vec<BreakEven>,
     /// Where the time went.
     pub seconds: Seconds,
@@ -95,7 +95,7 @@ pub fn run(
     plan.check(original.len())?;
     let mut clock = Clock::default();
     let search = clock.time(|s| &mut s.search, || oracle::search(original))?;
-    let per_scheme = plan.ratios().len() * plan.solvers.len();
+    let per_scheme = plan.noises().len() * plan.ratios().len() * plan.solvers.len();
     let total = per_scheme * plan.schemes.len() * plan.repeats as usize;
     let mut done = 0;
     let mut rows = Vec::new();
@@ -122,42 +122,56 @@ pub fn run(
             };
             let near = || TrueNeighbors::new(&search, &hidden.1, slots, k);
             let near = clock.time(|s| &mut s.neighbors, near).map_err(of_scheme)?;
-            for ratio in plan.ratios() {
-                let lists = clock.time(
+            for noise in plan.noises() {
+                let outliers = clock.time(
                     |s| &mut s.neighbors,
-                    || match (&given, ratio) {
-                        (Some(lists), _) => Ok(lists.clone()),
-                        (None, ratio) => near.at_inlier_ratio(ratio.unwrap_or(1.0), seed),
+                    || {
+                        let noise = noise.unwrap_or(Noise::Uniform);
+                        Outliers::new(noise, &near, &search, &hidden.1, seed)
                     },
-                );
-                let lists = lists.map_err(of_scheme)?;
-                let measured = ratio.unwrap_or_else(|| near.measured_inlier_ratio(&lists));
-                for &solver in &plan.solvers {
-                    let what = format!("{} at {measured:.2}, {}", entry.name, solver.name());
-                    observer.progress(done, total, &what);
-                    // The attacker's own seed: that of the obfuscation is the owner's secret.
-                    let attacker = u64::from(repeat);
-                    let options = RecoverOptions { solver, delta: plan.delta, seed: attacker };
-                    let started = Instant::now();
-                    let recovered = recover(&hidden.0, &lists, &options)?;
-                    let took = started.elapsed().as_secs_f64();
-                    seconds[repeat_rows.len()] += took;
-                    clock.seconds.recover += took;
-                    let accuracy = clock
-                        .time(|s| &mut s.evaluate, || evaluate(&recovered, original, &hidden.1))?;
-                    let mut row = blank(entry, plan, (k, solver), measured, &recovered, &hidden.1);
-                    row.fill(&accuracy, &baseline, &plan.thresholds);
-                    observer.cell(&Cell {
-                        row: &row,
-                        repeat,
-                        original,
-                        secret: &hidden.1,
-                        released: &hidden.0,
-                        recovered: &recovered,
-                        accuracy: &accuracy,
-                    });
-                    repeat_rows.push(row);
-                    done += 1;
+                )?;
+                for ratio in plan.ratios() {
+                    let lists = clock.time(
+                        |s| &mut s.neighbors,
+                        || match (&given, ratio) {
+                            (Some(lists), _) => Ok(lists.clone()),
+                            (None, ratio) => near.lists(ratio.unwrap_or(1.0), &outliers, seed),
+                        },
+                    );
+                    let lists = lists.map_err(of_scheme)?;
+                    let measured = ratio.unwrap_or_else(|| near.measured_inlier_ratio(&lists));
+                    for &solver in &plan.solvers {
+                        let source = noise.map_or("given", Noise::name);
+                        let what =
+                            format!("{} at {measured:.2} {source}, {}", entry.name, solver.name());
+                        observer.progress(done, total, &what);
+                        // The attacker's own seed: that of the obfuscation is the owner's secret.
+                        let attacker = u64::from(repeat);
+                        let options = RecoverOptions { solver, delta: plan.delta, seed: attacker };
+                        let started = Instant::now();
+                        let recovered = recover(&hidden.0, &lists, &options)?;
+                        let took = started.elapsed().as_secs_f64();
+                        seconds[repeat_rows.len()] += took;
+                        clock.seconds.recover += took;
+                        let accuracy = clock.time(
+                            |s| &mut s.evaluate,
+                            || evaluate(&recovered, original, &hidden.1),
+                        )?;
+                        let mut row =
+                            blank(entry, plan, (k, solver, noise), measured, &recovered, &hidden.1);
+                        row.fill(&accuracy, &baseline, &plan.thresholds);
+                        observer.cell(&Cell {
+                            row: &row,
+                            repeat,
+                            original,
+                            secret: &hidden.1,
+                            released: &hidden.0,
+                            recovered: &recovered,
+                            accuracy: &accuracy,
+                        });
+                        repeat_rows.push(row);
+                        done += 1;
+                    }
                 }
             }
             by_repeat.push(repeat_rows);
@@ -203,14 +217,14 @@ fn translate(
 fn blank(
     entry: &Entry,
     plan: &Plan,
-    (k, solver): (usize, Solver),
+    (k, solver, noise): (usize, Solver, Option<Noise>),
     inlier_ratio: f64,
     recovered: &Recovered<3>,
     secret: &Secret,
 ) -> Row {
-    let (neighbors, oracle_noise) = match &plan.source {
-        Source::Oracle => ("oracle".to_owned(), Some("uniform")),
-        Source::Given(given) => (given.name.clone(), None),
+    let neighbors = match &plan.source {
+        Source::Oracle => "oracle".to_owned(),
+        Source::Given(given) => given.name.clone(),
     };
     let mut dropped = std::collections::BTreeMap::new();
     for reason in DropReason::ALL {
@@ -222,7 +236,7 @@ fn blank(
     Row {
         scheme: entry.name,
         neighbors,
-        oracle_noise,
+        oracle_noise: noise.map(Noise::name),
         inlier_ratio,
         k,
         solver: solver.name(),

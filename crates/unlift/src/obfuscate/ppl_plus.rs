@@ -4,8 +4,6 @@
 //! wrong matrix and depends on the orientation of the map; here it is the direction in which the
 //! neighbors spread least, which is the rule the authors describe.
 
-use rayon::prelude::*;
-
 use super::pairs::{drop_pairs, pair_again, random_pairs, refused_last};
 use super::ppl::{apart, lines_through};
 use super::{Entry, Lifted, Scheme, SchemeOptions};
@@ -85,11 +83,7 @@ fn normals(points: &[[f64; 3]]) -> Result<Vec<Option<[f64; 3]>>, Error> {
     }
     let k = (points.len() / 100).clamp(4, 100) & !1;
     let knn = Knn::new(points)?;
-    Ok((0..points.len())
-        .into_par_iter()
-        .map_init(Vec::new, |found, row| {
-            knn.nearest(row, k, found);
-            local_normal(&points[row], found.iter().map(|&(_, at)| points[at as usize]))
-        })
-        .collect())
+    Ok(knn.per_row(k, |row, found| {
+        local_normal(&points[row], found.iter().map(|&(_, at)| points[at as usize]))
+    }))
 }

@@ -10,10 +10,13 @@ mod objects;
 mod room;
 mod sampling;
 mod surfaces;
+mod tiled;
 mod views;
 
 use crate::seed::{Draws, Stage};
 use surfaces::rotate;
+
+pub use tiled::tiled;
 
 /// The number of points of the demo's room.
 pub const DEFAULT_N_POINTS: usize = 20_000;

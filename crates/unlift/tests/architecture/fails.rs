@@ -28,13 +28,13 @@ fn arrows_against_the_stream_are_found_however_they_are_written() {
         ("recover/mod.rs", "use crate::*;"),
         ("recover/mod.rs", "use crate::evaluate::Accuracy;"),
         ("recover/mod.rs", "use crate::obfuscate::SCHEMES;"),
-        ("geometry/knn.rs", "use crate::released::Lines;"),
+        ("geometry/knn/mod.rs", "use crate::released::Lines;"),
         ("points.rs", "use crate::truth::Original;"),
         ("truth/secret.rs", "use crate::released::Released;"),
         ("released/mod.rs", "use crate::truth::Secret;"),
         ("neighbors/neighborhoods.rs", "use crate::truth::Secret;"),
         ("neighbors/line_distance.rs", "use crate::truth::Secret;"),
-        ("neighbors/oracle.rs", "use crate::recover::Recovered;"),
+        ("neighbors/oracle/mod.rs", "use crate::recover::Recovered;"),
         ("obfuscate/olc.rs", "use crate::neighbors::Neighborhoods;"),
         ("evaluate/mod.rs", "use crate::obfuscate::SCHEMES;"),
         ("evaluate/mod.rs", "use crate::audit::Row;"),
@@ -52,7 +52,7 @@ fn arrows_with_the_stream_pass() {
         ("recover/ransac/loops.rs", "use crate::recover::sections::{NO_VOTE, Sections};"),
         ("recover/mod.rs", "//! Never imports `crate::truth`.\nconst A: &str = \"crate::truth\";"),
         ("geometry/kmeans.rs", "use super::vector::dot;\nuse crate::seed::{Draws, Stage};"),
-        ("neighbors/oracle.rs", "use crate::truth::{Original, Secret};"),
+        ("neighbors/oracle/mod.rs", "use crate::truth::{Original, Secret};"),
         ("audit/run.rs", "use crate::recover::{RecoverOptions as Options, recover};"),
         ("seed.rs", "mod tests {\n    use super::*;\n}"),
     ];
@@ -67,7 +67,7 @@ fn reveals_are_found() {
     assert_eq!(forbidden_reveals(&source("audit/run.rs", reveal)), ["audit/run.rs: `reveal`"]);
     assert_eq!(forbidden_reveals(&source("recover/mod.rs", "map(Original::reveal)")).len(), 1);
     assert_eq!(forbidden_reveals(&source("neighbors/neighborhoods.rs", reveal)).len(), 1);
-    assert!(forbidden_reveals(&source("neighbors/oracle.rs", reveal)).is_empty());
+    assert!(forbidden_reveals(&source("neighbors/oracle/mod.rs", reveal)).is_empty());
     assert!(forbidden_reveals(&source("audit/run.rs", "// reveal()")).is_empty());
 }
 

@@ -23,6 +23,7 @@ macro_rules! over_schemes {
 mod degenerate;
 mod gauge;
 mod maps;
+mod noise;
 mod pins;
 mod records;
 mod recovery;

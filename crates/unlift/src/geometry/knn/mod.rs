@@ -1,0 +1,456 @@
+//! Exact K nearest neighbors with canonical ties: by distance, then by row.
+//!
+//! A balanced k-d tree over whole leaves. Points are stored leaf by leaf, a column per coordinate,
+//! so that a leaf is a few vector instructions and rows asked for one after the other in
+//! [`spatial_order`](Knn::spatial_order) find their neighbors in cache. Where a node lies in the
+//! columns follows from its number: only boxes are stored.
+//!
+//! A query looks first at the smallest node around its point that holds enough others. The K-th
+//! distance found there bounds the true one, and every point within that bound is taken: ties
+//! cannot be missed. Who asks for every row is served leaf by leaf ([`leaf`]).
+
+mod leaf;
+
+use rayon::prelude::*;
+
+use crate::Error;
+use crate::simd::{Kernel, dispatch};
+
+/// Points per leaf at most: small enough to skip most, large enough to be worth a jump.
+const LEAF: usize = 16;
+/// Points of a node that rayon is not worth asking for.
+const ALONE: usize = 1 << 14;
+
+/// A search tree over points that are looked up by row.
+pub struct Knn<'a, const D: usize> {
+    points: &'a [[f64; D]],
+    /// Number of levels below the root: there are `2^depth` leaves.
+    depth: u32,
+    /// Boxes of the nodes: the root is 1, node `i` has the halves `2 i` and `2 i + 1`.
+    boxes: Vec<Bounds<D>>,
+    /// Coordinates in leaf order.
+    columns: [Vec<f64>; D],
+    /// The row at each place of the leaf order.
+    rows: Vec<u32>,
+    /// The place of each row.
+    places: Vec<u32>,
+}
+
+#[derive(Clone, Copy)]
+struct Bounds<const D: usize> {
+    low: [f64; D],
+    high: [f64; D],
+}
+
+impl<const D: usize> Bounds<D> {
+    const EMPTY: Self = Self { low: [f64::INFINITY; D], high: [f64::NEG_INFINITY; D] };
+
+    fn and(mut self, other: &Self) -> Self {
+        for c in 0..D {
+            self.low[c] = self.low[c].min(other.low[c]);
+            self.high[c] = self.high[c].max(other.high[c]);
+        }
+        self
+    }
+
+    fn of(points: impl Iterator<Item = [f64; D]>) -> Self {
+        points.fold(Self::EMPTY, |all, p| all.and(&Self { low: p, high: p }))
+    }
+
+    /// At most the squared distance from `query` to any point inside, rounding included: every
+    /// operation is that of the distance itself, and each rounds monotonically.
+    #[inline(always)]
+    fn squared_distance(&self, query: &[f64; D]) -> f64 {
+        let mut sum = 0.0;
+        for (c, x) in query.iter().enumerate() {
+            let gap = (self.low[c] - x).max(x - self.high[c]).max(0.0);
+            sum += gap * gap;
+        }
+        sum
+    }
+}
+
+impl<'a, const D: usize> Knn<'a, D> {
+    /// A tree over `points`.
+    ///
+    /// # Errors
+    /// When there are no points, more than 2^32 of them, or one is not finite.
+    pub fn new(points: &'a [[f64; D]]) -> Result<Self, Error> {
+        let n = points.len();
+        if n == 0 || u32::try_from(n).is_err() {
+            return Err(Error::new("points", "1 to 4294967295 of them", n.to_string()));
+        }
+        if let Some(at) = points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+            let what = format!("point {at}");
+            return Err(Error::new(what, "finite coordinates", format!("{:?}", points[at])));
+        }
+        let depth = n.div_ceil(LEAF).next_power_of_two().trailing_zeros();
+        let mut items: Vec<([f64; D], u32)> = points.iter().copied().zip(0..).collect();
+        split(&mut items, depth, &|leaf| (leaf * n) >> depth, 0);
+        let columns = std::array::from_fn(|c| items.iter().map(|item| item.0[c]).collect());
+        let rows: Vec<u32> = items.iter().map(|item| item.1).collect();
+        let mut places = vec![0; n];
+        for (place, &row) in rows.iter().enumerate() {
+            places[row as usize] = place as u32;
+        }
+        let n_leaves = 1usize << depth;
+        let mut boxes = vec![Bounds::EMPTY; 2 * n_leaves];
+        for leaf in 0..n_leaves {
+            let places = (leaf * n) >> depth..((leaf + 1) * n) >> depth;
+            boxes[n_leaves + leaf] = Bounds::of(items[places].iter().map(|item| item.0));
+        }
+        for node in (1..n_leaves).rev() {
+            boxes[node] = boxes[2 * node].and(&boxes[2 * node + 1]);
+        }
+        Ok(Self { points, depth, boxes, columns, rows, places })
+    }
+
+    /// All rows, in an order in which near rows are near: queries in this order are fastest.
+    pub fn spatial_order(&self) -> &[u32] {
+        &self.rows
+    }
+
+    /// All rows in patches of near ones: halved along the longest side of their box until a patch
+    /// holds at most `most` (or as few as a leaf of the tree).
+    pub fn patches(&self, most: usize) -> Vec<&[u32]> {
+        let n = self.rows.len();
+        let fits = |level: &u32| n.div_ceil(1 << level) <= most.max(1);
+        let level = (0..self.depth).find(fits).unwrap_or(self.depth);
+        (1usize << level..2 << level).map(|node| &self.rows[self.range(node)]).collect()
+    }
+
+    /// The `k` nearest other rows of row `row` (fewer when there are fewer), as (squared distance,
+    /// row) in canonical order, into `found`.
+    pub fn nearest(&self, row: usize, k: usize, found: &mut Vec<(f64, u32)>) {
+        let place = self.places[row] as usize;
+        self.search(self.points[row], Some(place), k, found);
+    }
+
+    /// The `k` nearest rows of any position, in the same form.
+    pub fn nearest_to(&self, position: [f64; D], k: usize, found: &mut Vec<(f64, u32)>) {
+        self.search(position, None, k, found);
+    }
+
+    /// Calls `of(row, its k nearest, entry)` for every row, with `entries` in spatial order: several
+    /// times faster than one query after the other.
+    ///
+    /// # Panics
+    /// When there is not one entry per row.
+    pub fn each<T: Send>(
+        &self,
+        k: usize,
+        entries: &mut [T],
+        of: impl Fn(usize, &[(f64, u32)], &mut T) + Sync,
+    ) {
+        assert_eq!(entries.len(), self.rows.len(), "one entry per row");
+        let mut rest = entries;
+        let mut leaves = Vec::with_capacity(1 << self.depth);
+        for leaf in 0..1 << self.depth {
+            let (entries, others) = rest.split_at_mut(self.range((1 << self.depth) + leaf).len());
+            leaves.push((leaf, entries));
+            rest = others;
+        }
+        leaves.into_par_iter().for_each_init(leaf::Scratch::new, |scratch, (leaf, entries)| {
+            leaf::solve(self, leaf, k, scratch, |at, row, found| of(row, found, &mut entries[at]));
+        });
+    }
+
+    /// `of(row, its k nearest)` for every row, in the order of rows.
+    pub fn per_row<T: Clone + Send>(
+        &self,
+        k: usize,
+        of: impl Fn(usize, &[(f64, u32)]) -> T + Sync,
+    ) -> Vec<T> {
+        let mut by_place: Vec<Option<T>> = vec![None; self.rows.len()];
+        self.each(k, &mut by_place, |row, found, entry| *entry = Some(of(row, found)));
+        self.places.iter().filter_map(|&place| by_place[place as usize].take()).collect()
+    }
+
+    /// The distance of every row to its `k`-th nearest other row (to its last one in small sets).
+    pub fn kth_distances(&self, k: usize) -> Vec<f64> {
+        self.per_row(k, |_, found| found.last().map_or(0.0, |last| last.0.sqrt()))
+    }
+
+    fn search(&self, query: [f64; D], own: Option<usize>, k: usize, found: &mut Vec<(f64, u32)>) {
+        found.clear();
+        if k == 0 {
+            return;
+        }
+        // Any place will do to start from; a position of its own has none, so it walks down.
+        let leaf = match own {
+            Some(place) => (((place + 1) << self.depth) - 1) / self.rows.len(),
+            None => self.leaf_towards(&query),
+        };
+        let own = own.map_or(u32::MAX, |place| place as u32);
+        dispatch(Search { tree: self, query, own, leaf, k, found: &mut *found });
+        if found.len() > k {
+            found.select_nth_unstable_by_key(k - 1, canonical);
+            found.truncate(k);
+        }
+        found.sort_unstable_by_key(canonical);
+    }
+
+    fn leaf_towards(&self, query: &[f64; D]) -> usize {
+        let mut node = 1;
+        for _ in 0..self.depth {
+            let [a, b] = [2 * node, 2 * node + 1].map(|n| self.boxes[n].squared_distance(query));
+            node = 2 * node + usize::from(b < a);
+        }
+        node - (1 << self.depth)
+    }
+
+    /// Calls `take` with the places of every leaf within the squared distance `bound`, those below
+    /// node `but` left out.
+    #[inline(always)]
+    fn leaves_within(
+        &self,
+        query: &[f64; D],
+        bound: f64,
+        but: usize,
+        mut take: impl FnMut(std::ops::Range<usize>),
+    ) {
+        let mut stack = [0usize; usize::BITS as usize];
+        let mut height = 1;
+        stack[0] = 1;
+        while height > 0 {
+            height -= 1;
+            let node = stack[height];
+            if node == but {
+                continue;
+            }
+            if node >> self.depth != 0 {
+                take(self.range(node));
+                continue;
+            }
+            for half in [2 * node, 2 * node + 1] {
+                if self.boxes[half].squared_distance(query) <= bound {
+                    stack[height] = half;
+                    height += 1;
+                }
+            }
+        }
+    }
+
+    /// The places of a node.
+    #[inline(always)]
+    fn range(&self, node: usize) -> std::ops::Range<usize> {
+        let level = usize::BITS - 1 - node.leading_zeros();
+        let below = self.depth - level;
+        let first = (node << below) - (1 << self.depth);
+        let n = self.rows.len();
+        (first * n) >> self.depth..((first + (1 << below)) * n) >> self.depth
+    }
+}
+
+/// Distance and row as one integer: the bits of numbers from 0 up are ordered as the numbers are.
+#[inline(always)]
+fn canonical(&(squared, row): &(f64, u32)) -> u128 {
+    (u128::from(squared.to_bits()) << 32) | u128::from(row)
+}
+
+/// Puts `items`, the leaves from `first` on, in leaf order: halves along the longest side, `depth`
+/// times. `starts` is the place at which a leaf begins.
+fn split<const D: usize>(
+    items: &mut [([f64; D], u32)],
+    depth: u32,
+    starts: &(impl Fn(usize) -> usize + Sync),
+    first: usize,
+) {
+    if depth == 0 {
+        return;
+    }
+    let bounds = Bounds::of(items.iter().map(|item| item.0));
+    let side = |c: usize| bounds.high[c] - bounds.low[c];
+    let longest = (1..D).fold(0, |best, c| if side(c) > side(best) { c } else { best });
+    let middle = first + (1 << (depth - 1));
+    let at = starts(middle) - starts(first);
+    if at < items.len() {
+        items.select_nth_unstable_by(at, |a, b| {
+            a.0[longest].total_cmp(&b.0[longest]).then(a.1.cmp(&b.1))
+        });
+    }
+    let alone = items.len() < ALONE;
+    let (left, right) = items.split_at_mut(at);
+    if alone {
+        split(left, depth - 1, starts, first);
+        split(right, depth - 1, starts, middle);
+    } else {
+        rayon::join(
+            || split(left, depth - 1, starts, first),
+            || split(right, depth - 1, starts, middle),
+        );
+    }
+}
+
+/// Everything within the K-th distance, and a little more, in no order.
+struct Search<'a, 'b, const D: usize> {
+    tree: &'a Knn<'b, D>,
+    query: [f64; D],
+    /// The place that is no neighbor.
+    own: u32,
+    leaf: usize,
+    k: usize,
+    found: &'a mut Vec<(f64, u32)>,
+}
+
+impl<const D: usize> Kernel for Search<'_, '_, D> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { tree, query, own, leaf, k, found } = self;
+        let n_leaves = 1usize << tree.depth;
+        // The smallest node with so many others that its K-th is not far beyond the true one.
+        let mut near = n_leaves + leaf;
+        while near > 1 && tree.range(near).len() < 2 * k + 1 {
+            near /= 2;
+        }
+        take(tree, &query, own, tree.range(near), f64::INFINITY, found);
+        if near == 1 {
+            return;
+        }
+        let bound = found.select_nth_unstable_by_key(k - 1, canonical).1.0;
+        found.retain(|item| item.0 <= bound);
+        tree.leaves_within(&query, bound, near, |places| {
+            take(tree, &query, own, places, bound, found);
+        });
+    }
+}
+
+/// Appends the points at `places` that lie within the squared distance `bound` of `query`.
+#[inline(always)]
+fn take<const D: usize>(
+    tree: &Knn<'_, D>,
+    query: &[f64; D],
+    own: u32,
+    places: std::ops::Range<usize>,
+    bound: f64,
+    found: &mut Vec<(f64, u32)>,
+) {
+    let mut at = places.start;
+    while at < places.end {
+        let end = places.end.min(at + LEAF);
+        let mut squared = [0.0; LEAF];
+        // The order of operations is that of `vector::squared_distance`: the same bits.
+        for (column, center) in tree.columns.iter().zip(query) {
+            for (sum, x) in squared.iter_mut().zip(&column[at..end]) {
+                let d = center - x;
+                *sum += d * d;
+            }
+        }
+        for (place, &distance) in (at..end).zip(&squared) {
+            if distance <= bound && place as u32 != own {
+                found.push((distance, tree.rows[place]));
+            }
+        }
+        at = end;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::vector::squared_distance;
+    use crate::seed::{Draws, Stage};
+
+    fn brute_force<const D: usize>(
+        points: &[[f64; D]],
+        query: &[f64; D],
+        skip: Option<usize>,
+        k: usize,
+    ) -> Vec<(f64, u32)> {
+        let mut all: Vec<(f64, u32)> = (0..points.len())
+            .filter(|&other| Some(other) != skip)
+            .map(|other| (squared_distance(query, &points[other]), other as u32))
+            .collect();
+        all.sort_unstable_by_key(canonical);
+        all.truncate(k);
+        all
+    }
+
+    fn compare<const D: usize>(points: &[[f64; D]]) {
+        let knn = Knn::new(points).unwrap();
+        let mut found = Vec::new();
+        for row in 0..points.len() {
+            for k in [1, 7, 50] {
+                knn.nearest(row, k, &mut found);
+                assert_eq!(found, brute_force(points, &points[row], Some(row), k), "{row}, k {k}");
+            }
+        }
+        for k in [1, 7, 50] {
+            let all = knn.per_row(k, |_, found| found.to_vec());
+            for (row, found) in all.iter().enumerate() {
+                assert_eq!(found, &brute_force(points, &points[row], Some(row), k), "{row}, k {k}");
+            }
+        }
+    }
+
+    #[test]
+    fn equals_brute_force_with_many_ties() {
+        let mut draws = Draws::new(5, Stage::Synthetic, 0);
+        // A coarse lattice: most distances tie, many points coincide.
+        let lattice: Vec<[f64; 3]> =
+            (0..800).map(|_| std::array::from_fn(|_| draws.below(6) as f64)).collect();
+        compare(&lattice);
+    }
+
+    #[test]
+    fn equals_brute_force_at_every_size_and_density() {
+        for n in [2, 23, 24, 25, 48, 49, 97, 300, 1000] {
+            let mut draws = Draws::new(n, Stage::Synthetic, 0);
+            // Cubing makes the middle a million times denser than the rim.
+            let mut points = |_| std::array::from_fn(|_| draws.between(-1.0, 1.0).powi(3) * 1e3);
+            compare(&(0..n).map(&mut points).collect::<Vec<[f64; 3]>>());
+            let flat: Vec<[f64; 2]> =
+                (0..n).map(&mut points).map(|p: [f64; 3]| [p[0], p[1]]).collect();
+            compare(&flat);
+        }
+    }
+
+    #[test]
+    fn coincident_points_are_found_by_row() {
+        let points = [[1.0, 2.0, 3.0]; 200];
+        let mut found = Vec::new();
+        Knn::new(&points).unwrap().nearest(100, 3, &mut found);
+        assert_eq!(found, [(0.0, 0), (0.0, 1), (0.0, 2)]);
+    }
+
+    #[test]
+    fn any_position_can_ask() {
+        let mut draws = Draws::new(9, Stage::Synthetic, 0);
+        let points: Vec<[f64; 3]> =
+            (0..700).map(|_| std::array::from_fn(|_| draws.normal())).collect();
+        let knn = Knn::new(&points).unwrap();
+        let mut found = Vec::new();
+        for _ in 0..200 {
+            let query = std::array::from_fn(|_| 3.0 * draws.normal());
+            knn.nearest_to(query, 20, &mut found);
+            assert_eq!(found, brute_force(&points, &query, None, 20));
+        }
+    }
+
+    #[test]
+    fn values_per_row_come_in_the_order_of_rows() {
+        let points = [[0.0, 0.0], [5.0, 0.0], [1.0, 0.0]];
+        let knn = Knn::new(&points).unwrap();
+        assert_eq!(knn.kth_distances(1), [1.0, 4.0, 1.0]);
+        let mut order = knn.spatial_order().to_vec();
+        order.sort_unstable();
+        assert_eq!(order, [0, 1, 2]);
+    }
+
+    #[test]
+    fn fewer_points_than_asked_for() {
+        let points = [[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]];
+        let knn = Knn::new(&points).unwrap();
+        let mut found = Vec::new();
+        knn.nearest(0, 50, &mut found);
+        assert_eq!(found, vec![(1.0, 1), (9.0, 2)]);
+    }
+
+    #[test]
+    fn no_points_and_no_numbers_are_refused() {
+        assert!(Knn::<3>::new(&[]).is_err());
+        assert!(Knn::new(&[[0.0, f64::NAN]]).is_err());
+    }
+}

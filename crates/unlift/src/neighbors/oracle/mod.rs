@@ -1,0 +1,140 @@
+//! Neighborhoods from the originals, at a chosen inlier ratio (paper, section 6).
+//!
+//! The one module of this stage that reveals: it stands for an attacker of stated quality.
+
+mod from_points;
+mod outliers;
+mod walk;
+
+use rayon::prelude::*;
+
+pub use from_points::from_points;
+pub use outliers::{Noise, Outliers};
+
+use walk::Walk;
+
+use super::Neighborhoods;
+use crate::geometry::knn::Knn;
+use crate::seed::{Draws, Stage};
+use crate::truth::{Original, Secret};
+use crate::{Error, RecordId};
+
+/// The true neighborhoods of every slot: the first K records met by walking outward from its
+/// original in order of (distance, original id). Never the slot's own, each once (a paired line may
+/// hide two near points), dropped points skipped.
+#[derive(Clone, Debug)]
+pub struct TrueNeighbors {
+    k: usize,
+    n_records: usize,
+    slots_per_record: usize,
+    /// K records per slot, in order of nearness: never released in this order.
+    records: Vec<RecordId>,
+}
+
+impl TrueNeighbors {
+    /// The true neighborhoods of size `k` under the obfuscation that `secret` belongs to. `knn` must
+    /// be a search over the original positions.
+    ///
+    /// # Errors
+    /// When `k` is 0 or fewer than `k` other records exist.
+    pub fn new<const D: usize>(
+        knn: &Knn<'_, D>,
+        secret: &Secret,
+        slots_per_record: usize,
+        k: usize,
+    ) -> Result<Self, Error> {
+        let n_slots = secret.n_slots();
+        let n_records = n_slots / slots_per_record;
+        if k == 0 || n_records < k + 1 {
+            let expected = format!("between 1 and {} (other records)", n_records.saturating_sub(1));
+            return Err(Error::new("k", expected, k.to_string()));
+        }
+        let mut records = vec![RecordId(0); n_slots * k];
+        Walk::new(knn, secret, slots_per_record).each(k, &mut records, |_, near, row| {
+            row.copy_from_slice(near);
+        });
+        Ok(Self { k, n_records, slots_per_record, records })
+    }
+
+    /// Neighborhoods of which `round(inlier_ratio * K)` entries are true neighbors, uniformly
+    /// chosen, and the others are `outliers`. Both are nested: a lower ratio keeps a subset of
+    /// the true neighbors and a superset of the others.
+    ///
+    /// # Errors
+    /// When the ratio is not in `[0, 1]`, or there are too few outliers.
+    pub fn lists(
+        &self,
+        inlier_ratio: f64,
+        outliers: &Outliers,
+        seed: u64,
+    ) -> Result<Neighborhoods, Error> {
+        if !(0.0..=1.0).contains(&inlier_ratio) {
+            return Err(Error::new("inlier ratio", "0 to 1", inlier_ratio.to_string()));
+        }
+        let keep = (inlier_ratio * self.k as f64).round() as usize;
+        let wanted = self.k - keep;
+        let most = outliers.most(self);
+        if wanted > most {
+            let what = format!("inlier ratio {inlier_ratio} at K = {}", self.k);
+            let expected = format!("at least {wanted} records that are {}", outliers.meaning());
+            return Err(Error::new(what, expected, most.to_string()));
+        }
+        let mut records = vec![RecordId(0); self.records.len()];
+        records.par_chunks_mut(self.k).enumerate().for_each_init(Vec::new, |order, (slot, row)| {
+            order.clear();
+            order.extend_from_slice(self.of(slot));
+            Draws::new(seed, Stage::OracleKeep, slot as u64).shuffle(order);
+            row[..keep].copy_from_slice(&order[..keep]);
+            outliers.fill(self, slot, seed, order, &mut row[keep..]);
+            row.sort_unstable();
+        });
+        let n_slots = self.n_records * self.slots_per_record;
+        let offsets = (0..=n_slots as u64).map(|slot| slot * self.k as u64).collect();
+        Neighborhoods::try_new(offsets, records, None, self.n_records, self.slots_per_record)
+    }
+
+    /// [`lists`](Self::lists) with uniformly random outliers.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn at_inlier_ratio(&self, inlier_ratio: f64, seed: u64) -> Result<Neighborhoods, Error> {
+        self.lists(inlier_ratio, &Outliers::uniform(), seed)
+    }
+
+    /// The true neighbors of `slot`, the nearest first.
+    fn of(&self, slot: usize) -> &[RecordId] {
+        &self.records[slot * self.k..(slot + 1) * self.k]
+    }
+
+    /// The record that slot `slot` sits on.
+    fn own(&self, slot: usize) -> RecordId {
+        RecordId::from_index(slot / self.slots_per_record)
+    }
+
+    /// The share of listed entries that are true neighbors, over all slots with a list.
+    pub fn measured_inlier_ratio(&self, lists: &Neighborhoods) -> f64 {
+        let (hits, listed) = (0..lists.n_slots())
+            .into_par_iter()
+            .map(|slot| {
+                let near = self.of(slot);
+                let listed = lists.of(slot);
+                (listed.iter().filter(|record| near.contains(record)).count(), listed.len())
+            })
+            .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+        if listed == 0 { 0.0 } else { hits as f64 / listed as f64 }
+    }
+}
+
+/// Whether `records` holds `record`: looks at all of them, which is faster than to stop at a hit.
+#[inline(always)]
+fn listed(records: &[RecordId], record: RecordId) -> bool {
+    records.iter().fold(false, |hit, &other| hit | (other == record))
+}
+
+/// A search over the originals, for [`TrueNeighbors::new`]; built once per map.
+///
+/// # Errors
+/// When there are no points.
+pub fn search<const D: usize>(original: &Original<D>) -> Result<Knn<'_, D>, Error> {
+    Knn::new(original.reveal().positions())
+}
