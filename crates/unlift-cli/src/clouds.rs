@@ -37,7 +37,13 @@ impl Clouds {
             self.schemes.push(scheme);
             self.write_obfuscated(scheme, cell.released, cell.original.reveal().positions())?;
         }
-        let name = format!("{scheme}-recovered-{}-{}.ply", cell.row.inlier_ratio, cell.row.solver);
+        let row = cell.row;
+        // A measured ratio is no name: two sources may share it.
+        let given = match row.oracle_noise {
+            Some(_) => row.inlier_ratio.to_string(),
+            None => row.neighbors.clone(),
+        };
+        let name = format!("{scheme}-recovered-{given}-{}.ply", row.solver);
         let points: Vec<Option<[f64; 3]>> = (0..cell.recovered.n_slots())
             .map(|slot| cell.recovered.position(slot).map(|p| in_map(&p)))
             .collect();

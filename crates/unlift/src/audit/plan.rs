@@ -1,5 +1,6 @@
 //! What is to be audited.
 
+use crate::neighbors::sources::Joined;
 use crate::obfuscate::{Entry, SchemeOptions};
 use crate::recover::{Delta, Solver};
 use crate::{Error, Unit};
@@ -48,6 +49,28 @@ pub enum Source {
     Oracle,
     /// Given; the inlier ratio is measured.
     Given(PointNeighbors),
+    /// From the released map alone, as an attacker would; the inlier ratio is measured.
+    Own(Joined),
+}
+
+impl Source {
+    /// The name in reports.
+    pub fn name(&self) -> String {
+        match self {
+            Self::Oracle => "oracle".to_owned(),
+            Self::Given(given) => given.name.clone(),
+            Self::Own(joined) => joined.name(),
+        }
+    }
+}
+
+/// What tells the rows of one scheme and solver apart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Variant<'a> {
+    /// Where neighborhoods come from.
+    pub source: &'a Source,
+    /// The inlier ratio; `None` where it will be measured.
+    pub inlier_ratio: Option<f64>,
 }
 
 /// A plan: every combination of scheme, source, inlier ratio and solver becomes a row.
@@ -57,11 +80,12 @@ pub struct Plan {
     pub schemes: Vec<&'static Entry>,
     /// Parameters of schemes.
     pub scheme_options: SchemeOptions,
-    /// Where neighborhoods come from.
-    pub source: Source,
+    /// Where neighborhoods come from; each has its own rows.
+    pub sources: Vec<Source>,
     /// Shares of true neighbors (oracle).
     pub inlier_ratios: Vec<f64>,
-    /// Neighbors per slot (oracle). For given lists, the longest list decides.
+    /// True neighbors per slot: of the oracle, and where the inlier ratio of an attacker's own lists
+    /// is measured. For given lists, the longest list decides.
     pub k: usize,
     /// Recovery methods.
     pub solvers: Vec<Solver>,
@@ -90,7 +114,7 @@ impl Plan {
         Self {
             schemes: crate::obfuscate::SCHEMES.iter().filter(|s| s.in_3d.is_some()).collect(),
             scheme_options: SchemeOptions { voxel },
-            source: Source::Oracle,
+            sources: vec![Source::Oracle],
             inlier_ratios: vec![1.0, 0.75, 0.5, 0.3, 0.2, 0.1],
             k: 50,
             solvers: vec![Solver::Consensus],
@@ -101,19 +125,29 @@ impl Plan {
         }
     }
 
-    /// The inlier ratios of the rows of one scheme and solver; `None` where it will be measured.
-    pub fn ratios(&self) -> Vec<Option<f64>> {
-        match self.source {
-            Source::Oracle => self.inlier_ratios.iter().map(|&ratio| Some(ratio)).collect(),
-            Source::Given(_) => vec![None],
+    /// The rows of one scheme and solver, source by source.
+    pub fn variants(&self) -> Vec<Variant<'_>> {
+        let mut variants = Vec::new();
+        for source in &self.sources {
+            match source {
+                Source::Oracle => {
+                    let ratios = self.inlier_ratios.iter();
+                    let of = |&ratio| Variant { source, inlier_ratio: Some(ratio) };
+                    variants.extend(ratios.map(of));
+                }
+                Source::Given(_) | Source::Own(_) => {
+                    variants.push(Variant { source, inlier_ratio: None });
+                }
+            }
         }
+        variants
     }
 
     /// Checks every field against the map it is meant for.
     ///
     /// # Errors
     /// Names the first field out of range.
-    pub fn check(&self, n_points: usize) -> Result<(), Error> {
+    pub fn check(&self, n_points: usize, has_descriptors: bool) -> Result<(), Error> {
         self.scheme_options.check()?;
         if n_points < self.k + 1 {
             let expected = format!("at least K + 1 = {}", self.k + 1);
@@ -122,11 +156,20 @@ impl Plan {
         if let Some(ratio) = self.inlier_ratios.iter().find(|r| !(0.0..=1.0).contains(*r)) {
             return Err(Error::new("inlier ratio", "0 to 1", ratio.to_string()));
         }
+        let blind = |source: &&Source| match source {
+            Source::Own(joined) => joined.needs_descriptors() && !has_descriptors,
+            Source::Oracle | Source::Given(_) => false,
+        };
+        if let Some(source) = self.sources.iter().find(blind) {
+            let expected = format!("some, as neighbors by {} need them", source.name());
+            return Err(Error::new("descriptors", expected, "none"));
+        }
         if self.repeats == 0 {
             return Err(Error::new("repeats", "at least 1", "0"));
         }
         for (what, empty) in [
             ("schemes", self.schemes.is_empty()),
+            ("sources", self.sources.is_empty()),
             ("inlier ratios", self.inlier_ratios.is_empty()),
             ("solvers", self.solvers.is_empty()),
             ("thresholds", self.thresholds.is_empty()),
