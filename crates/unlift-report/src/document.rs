@@ -83,7 +83,7 @@ pub enum LengthUnit {
 pub struct Row {
     /// The scheme's user-facing name, for example `ppl+`.
     pub scheme: String,
-    /// Where the neighborhoods came from: `oracle` or `file`.
+    /// Where the neighborhoods came from: `oracle`, `file`, or names of sources joined by `+`.
     pub neighbors: String,
     /// How the oracle chose the false neighbors: `uniform`, `near` or `clustered`; `None` without
     /// an oracle.

@@ -66,15 +66,19 @@ fn plan(args: &AuditMapArgs, prepared: &Prepared, n_read: usize) -> anyhow::Resu
             )));
         }
     }
-    let source = match &args.neighbors {
-        NeighborSource::Oracle => Source::Oracle,
-        NeighborSource::File(path) => Source::Given(by_point(path, prepared, n_read)?),
+    let inlier_ratios = match args.inlier_ratios.as_slice() {
+        [] => usual.inlier_ratios.clone(),
+        given => given.to_vec(),
+    };
+    let oracle_noise = match args.oracle_noise.as_slice() {
+        [] => usual.oracle_noise.clone(),
+        given => given.to_vec(),
     };
     Ok(Plan {
         schemes: distinct(schemes, |a, b| a.name == b.name),
-        source,
-        oracle_noise: distinct(args.oracle_noise.clone(), |a, b| a == b),
-        inlier_ratios: distinct(args.inlier_ratios.clone(), |a, b| a == b),
+        sources: sources(args, prepared, n_read)?,
+        oracle_noise: distinct(oracle_noise, |a, b| a == b),
+        inlier_ratios: distinct(inlier_ratios, |a, b| a == b),
         k: usize::from(args.map.k),
         solvers: distinct(args.solver.clone(), |a, b| a == b),
         delta: args.delta,
@@ -83,6 +87,54 @@ fn plan(args: &AuditMapArgs, prepared: &Prepared, n_read: usize) -> anyhow::Resu
         repeats: args.repeats,
         ..usual
     })
+}
+
+/// Every source once, and no option that would be about none of them.
+fn sources(args: &AuditMapArgs, prepared: &Prepared, n_read: usize) -> anyhow::Result<Vec<Source>> {
+    let mut sources = Vec::new();
+    for source in distinct(args.neighbors.clone(), |a, b| a == b) {
+        sources.push(match source {
+            NeighborSource::Oracle => Source::Oracle,
+            NeighborSource::Own(joined) if joined.needs_descriptors() && !has(prepared) => {
+                return Err(usage(format!(
+                    "--neighbors {}: expected descriptors (--descriptors FILE), found none",
+                    joined.name()
+                )));
+            }
+            NeighborSource::Own(joined) => Source::Own(match args.source_k {
+                Some(k) => joined.with_k(usize::from(k)),
+                None => joined,
+            }),
+            NeighborSource::File(path) => Source::Given(by_point(&path, prepared, n_read)?),
+        });
+    }
+    let files = sources.iter().filter(|s| matches!(s, Source::Given(_))).count();
+    if files > 1 {
+        return Err(usage(format!("--neighbors: expected at most one file, found {files}")));
+    }
+    let names = || sources.iter().map(Source::name).collect::<Vec<_>>().join(", ");
+    for (option, given) in [
+        ("--inlier-ratios", !args.inlier_ratios.is_empty()),
+        ("--oracle-noise", !args.oracle_noise.is_empty()),
+    ] {
+        if given && !sources.contains(&Source::Oracle) {
+            let found = names();
+            return Err(usage(format!(
+                "{option}: expected with --neighbors oracle, found only {found}"
+            )));
+        }
+    }
+    if args.source_k.is_some() && !sources.iter().any(|s| matches!(s, Source::Own(_))) {
+        let found = names();
+        return Err(usage(format!(
+            "--source-k: expected with a source that makes its own lists, found only {found}"
+        )));
+    }
+    Ok(sources)
+}
+
+fn has(prepared: &Prepared) -> bool {
+    prepared.descriptors.is_some()
 }
 
 /// Lists by row of the file, for the rows that were kept.
@@ -120,8 +172,10 @@ fn provenance(
     if let Some(path) = &args.map.descriptors {
         others.push(("descriptors".to_owned(), hash_file(path)?));
     }
-    if let NeighborSource::File(path) = &args.neighbors {
-        others.push(("neighbors".to_owned(), hash_file(path)?));
+    for source in &args.neighbors {
+        if let NeighborSource::File(path) = source {
+            others.push(("neighbors".to_owned(), hash_file(path)?));
+        }
     }
     Ok(Input {
         path: Some(args.path.display().to_string()),

@@ -14,14 +14,15 @@ pub const PERCENTILES: [f64; 5] = [50.0, 75.0, 90.0, 95.0, 99.0];
 pub struct Row {
     /// Scheme name.
     pub scheme: &'static str,
-    /// Source of the neighborhoods: `oracle` or a name.
+    /// Source of the neighborhoods: `oracle`, `file`, or names joined by `+`.
     pub neighbors: String,
     /// Noise model of the oracle; `None` for other sources.
     pub oracle_noise: Option<&'static str>,
     /// As requested (oracle) or measured.
     pub inlier_ratio: f64,
-    /// Neighbors per slot: of the oracle, or the longest of given lists. It is also how many nearest
-    /// records count as true neighbors when a ratio is measured.
+    /// Records per list: of the oracle, the longest of given lists, or the attacker's choice. The
+    /// ratio of given lists is measured against as many true neighbors; that of an attacker's own
+    /// lists against those of the plan, so that a short list is not judged by a stricter rule.
     pub k: usize,
     /// Solver name.
     pub solver: &'static str,
