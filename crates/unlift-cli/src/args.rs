@@ -136,7 +136,7 @@ pub struct AuditMapArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::ratio,
           default_value = "1,0.75,0.5,0.3,0.2,0.1", help_heading = "Attack")]
     pub inlier_ratios: Vec<f64>,
-    /// Recovery methods, by commas or repeated: consensus, ransac
+    /// Recovery methods, by commas or repeated: consensus, ransac, density, tomography
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
           default_value = "consensus", help_heading = "Attack")]
     pub solver: Vec<Solver>,
@@ -248,7 +248,7 @@ pub struct RecoverArgs {
     /// Lists of records, one per hidden point
     #[arg(long, value_name = "FILE")]
     pub neighbors: PathBuf,
-    /// Recovery method: consensus or ransac
+    /// Recovery method: consensus, ransac, density or tomography
     #[arg(long, value_name = "SOLVER", value_parser = values::solver, default_value = "consensus")]
     pub solver: Solver,
     /// Distance up to which a neighbor supports a position, in the unit of the map

@@ -138,7 +138,7 @@ mod tests {
              expected auto or a number above 0, found wide\n\
              expected NEIGHBORS,RATIO with both above 0 (for example 20,2.0), found 20\n\
              expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, found pppl\n\
-             expected one of consensus, ransac, found magic"
+             expected one of consensus, ransac, density, tomography, found magic"
         );
     }
 

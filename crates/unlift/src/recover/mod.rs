@@ -6,6 +6,7 @@ mod chance;
 mod chunks;
 mod consensus;
 mod delta;
+mod density;
 mod family;
 mod line_rows;
 mod lists;
@@ -22,6 +23,7 @@ pub(crate) use recovered::stored_support;
 pub use recovered::{Estimate, Recovered, Status};
 
 use crate::Error;
+use crate::density::{published, tomography};
 use crate::neighbors::Neighborhoods;
 use crate::released::{Obfuscation, Released};
 use chunks::Chunks;
@@ -44,24 +46,31 @@ pub fn recover<const D: usize>(
         let expected = format!("{} rows, one per slot", released.n_slots());
         return Err(Error::new("neighborhoods", expected, lists.n_slots().to_string()));
     }
+    let descriptor_row = assign::descriptor_rows(released, lists);
     let family = Family::new(released);
-    let delta = match options.delta {
+    let delta = || match options.delta {
         Delta::Fixed(delta) => delta,
         Delta::Auto => delta::choose(&family, lists, options.seed).unwrap_or(1.0),
     };
-    let (estimates, trials) = match options.solver {
+    let (estimates, trials, delta) = match options.solver {
         Solver::Consensus => {
-            let given = Lists::given(lists);
-            let solved = consensus::solve(&family, given, delta as f32, options.seed, Chunks::All);
-            (solved, None)
+            let (given, delta) = (Lists::given(lists), delta());
+            let all = Chunks::All;
+            (consensus::solve(&family, given, delta as f32, options.seed, all), None, delta)
         }
         Solver::Ransac => {
+            let delta = delta();
             let (solved, trials) = ransac::solve(&family, lists, delta as f32, options.seed);
-            (solved, Some(trials))
+            (solved, Some(trials), delta)
+        }
+        Solver::Density => {
+            return density::place(released, lists, &published(released), descriptor_row);
+        }
+        Solver::Tomography => {
+            return density::place(released, lists, &tomography(released), descriptor_row);
         }
     };
     let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
-    let descriptor_row = assign::descriptor_rows(released, lists);
     let (origin, unit) = (released.origin(), released.unit());
     Recovered::try_new(&estimates, with_axis, descriptor_row, origin, unit, delta)
         .map(|recovered| recovered.with_trials(trials))

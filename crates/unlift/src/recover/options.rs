@@ -10,17 +10,29 @@ pub enum Solver {
     Consensus,
     /// The paper's sampling loop (section 4), for comparison.
     Ransac,
+    /// The published density attacks on the records alone (Chelani et al. 2021, Lee et al. 2023, Moon et
+    /// al. 2024), for comparison; recovers nothing from planes and axis candidates.
+    Density,
+    /// The density of points that makes the records likeliest, and the points where they meet it: our
+    /// strongest attack without neighborhoods. Recovers nothing from planes.
+    Tomography,
 }
 
 impl Solver {
     /// Every solver.
-    pub const ALL: [Solver; 2] = [Self::Consensus, Self::Ransac];
+    pub const ALL: [Solver; 4] = [Self::Consensus, Self::Ransac, Self::Density, Self::Tomography];
+
+    /// The solvers that place points by their listed records. The others read the lists only to tell the
+    /// two slots of a paired line apart, and take no delta.
+    pub const FROM_LISTS: [Solver; 2] = [Self::Consensus, Self::Ransac];
 
     /// The name users know it by.
     pub fn name(self) -> &'static str {
         match self {
             Self::Consensus => "consensus",
             Self::Ransac => "ransac",
+            Self::Density => "density",
+            Self::Tomography => "tomography",
         }
     }
 
