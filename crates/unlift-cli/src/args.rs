@@ -146,9 +146,9 @@ pub struct AuditMapArgs {
     /// How the oracle errs, by commas or repeated: uniform (any record), near (the 2K-th to 10K-th
     /// nearest), clustered (wrong places that neighbors share, as of look-alike descriptors)
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::noise,
-          default_value = "uniform", help_heading = "Attack")]
+          help_heading = "Attack")]
     pub oracle_noise: Vec<Noise>,
-    /// Recovery methods, by commas or repeated: consensus, ransac
+    /// Recovery methods, by commas or repeated: joint, consensus, ransac, density, tomography
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
           default_value = "consensus", help_heading = "Attack")]
     pub solver: Vec<Solver>,
@@ -299,7 +299,7 @@ pub struct RecoverArgs {
     /// Lists of records, one per hidden point
     #[arg(long, value_name = "FILE")]
     pub neighbors: PathBuf,
-    /// Recovery method: consensus or ransac
+    /// Recovery method: consensus, ransac, density or tomography
     #[arg(long, value_name = "SOLVER", value_parser = values::solver, default_value = "consensus")]
     pub solver: Solver,
     /// Distance up to which a neighbor supports a position, in the unit of the map

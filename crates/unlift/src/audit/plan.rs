@@ -123,7 +123,7 @@ impl Plan {
             oracle_noise: vec![Noise::Uniform],
             inlier_ratios: vec![1.0, 0.75, 0.5, 0.3, 0.2, 0.1],
             k: 50,
-            solvers: vec![Solver::Consensus],
+            solvers: vec![Solver::Joint],
             delta: Delta::Auto,
             thresholds: thresholds.map(threshold).to_vec(),
             seed: 0,
@@ -176,6 +176,16 @@ impl Plan {
         if let Some(source) = self.sources.iter().find(blind) {
             let expected = format!("some, as neighbors by {} need them", source.name());
             return Err(Error::new("descriptors", expected, "none"));
+        }
+        for source in &self.sources {
+            let Source::Own(joined) = source else { continue };
+            let failing = |scheme: &&&Entry| joined.fails_on(scheme.name).is_some();
+            if let Some(scheme) = self.schemes.iter().find(failing) {
+                let part = joined.fails_on(scheme.name).map_or("", |part| part.name);
+                let what = format!("scheme with neighbors by {}", source.name());
+                let expected = format!("one whose records alone tell {part} where points are");
+                return Err(Error::new(what, expected, scheme.name));
+            }
         }
         if self.repeats == 0 {
             return Err(Error::new("repeats", "at least 1", "0"));

@@ -5,6 +5,7 @@
 
 mod all_pairs;
 mod best;
+mod geometric;
 mod join;
 mod neighborhoods;
 pub mod oracle;
@@ -14,6 +15,7 @@ mod similarity;
 pub mod sources;
 mod walk;
 
+pub use geometric::geometric;
 pub use join::join;
 pub use neighborhoods::Neighborhoods;
 pub use overlap::overlap;

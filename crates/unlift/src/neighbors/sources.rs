@@ -1,6 +1,6 @@
 //! Where an attacker gets neighborhoods from a released map alone: one entry per source.
 
-use super::{Neighborhoods, join, overlap, similarity};
+use super::{Neighborhoods, geometric, join, overlap, similarity};
 use crate::Error;
 use crate::released::Released;
 
@@ -19,6 +19,8 @@ pub struct SourceEntry {
     /// Records per list unless asked otherwise: the attack's own choice, few where the first of a
     /// ranking are much better than the rest.
     pub usual_k: usize,
+    /// Schemes (by name) whose records tell it nothing.
+    pub not_for: &'static [&'static str],
     /// For images, where it is defined on them.
     pub in_2d: Option<Make<2>>,
     /// For maps, where it is defined on them.
@@ -38,6 +40,7 @@ pub const SOURCES: &[SourceEntry] = &[
         summary: "records with the most similar descriptors, of any kind",
         needs_descriptors: true,
         usual_k: 50,
+        not_for: &[],
         in_2d: Some(|released, k, _| similarity(released, k)),
         in_3d: Some(|released, k, _| similarity(released, k)),
     },
@@ -46,8 +49,18 @@ pub const SOURCES: &[SourceEntry] = &[
         summary: "records whose SIFT patches overlap, and a short walk from these; no training",
         needs_descriptors: true,
         usual_k: 20,
+        not_for: &[],
         in_2d: Some(|released, k, _| overlap(released, k)),
         in_3d: Some(|released, k, _| overlap(released, k)),
+    },
+    SourceEntry {
+        name: "geometric",
+        summary: "records that meet where records alone say that points are; no descriptors",
+        needs_descriptors: false,
+        usual_k: 50,
+        not_for: &["plane"],
+        in_2d: None,
+        in_3d: Some(|released, k, _| geometric(released, k)),
     },
 ];
 
@@ -107,6 +120,11 @@ impl Joined {
     /// Whether a map without descriptors is of no use.
     pub fn needs_descriptors(&self) -> bool {
         self.parts.iter().any(|entry| entry.needs_descriptors)
+    }
+
+    /// The first of the sources that has nothing to say about maps of `scheme`.
+    pub fn fails_on(&self, scheme: &str) -> Option<&'static SourceEntry> {
+        self.parts.iter().copied().find(|entry| entry.not_for.contains(&scheme))
     }
 
     /// Lists for every slot of a released map, from it alone.
