@@ -29,8 +29,8 @@ impl<const D: usize> Columns<D> {
 
     #[inline(always)]
     pub(crate) fn push(&mut self, x: &[f32; D], odds: f32, slot: u32) {
-        for c in 0..D {
-            self.x[c].push(x[c]);
+        for (column, x) in self.x.iter_mut().zip(x) {
+            column.push(*x);
         }
         self.odds.push(odds);
         self.slot.push(slot);

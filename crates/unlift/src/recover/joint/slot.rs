@@ -187,8 +187,8 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
             }
         }
         if let Some(second) = second
-            && second.score + self.from_records(slot, &second.x)
-                > best.score + self.from_records(slot, &best.x)
+            && second.score + self.by_records(slot, &second.x)
+                > best.score + self.by_records(slot, &best.x)
         {
             return Some(second);
         }
@@ -197,7 +197,7 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
 
     /// What records near `x` add where their estimates are elsewhere.
     #[inline(always)]
-    fn from_records(&self, slot: usize, x: &[f32; D]) -> f32 {
+    fn by_records(&self, slot: usize, x: &[f32; D]) -> f32 {
         let slots_per_record = self.pieces.slots_per_record();
         let (gain, inverse_a2, _) = self.law_at(x);
         let chance = self.pieces.record_chance(slot, x);
