@@ -119,7 +119,7 @@ Examples:
   unlift audit map PROJECT --scale 1
   unlift audit map cloud.ply --schemes ppl,ppl+ --inlier-ratios 1,0.5 --out ppl-audit
   unlift audit map PROJECT --scale 1 --gate 'ppl@0.5:0.10<=20' --gate 'all:0.25:gain<=30'
-  unlift audit map PROJECT --neighbors neighbors.parquet --solver consensus,ransac
+  unlift audit map PROJECT --neighbors neighbors.parquet --solver joint,ransac
   unlift audit map PROJECT --descriptors database.db --neighbors oracle --neighbors overlap
   unlift audit map PROJECT --share-safe --json
 
@@ -144,16 +144,16 @@ pub struct AuditMapArgs {
           help_heading = "Attack")]
     pub inlier_ratios: Vec<f64>,
     /// How the oracle errs, by commas or repeated: uniform (any record), near (the 2K-th to 10K-th
-    /// nearest), clustered (wrong places that neighbors share, as of look-alike descriptors)
+    /// nearest), clustered (wrong places that neighbors share, as of look-alike descriptors) [default: uniform]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::noise,
           help_heading = "Attack")]
     pub oracle_noise: Vec<Noise>,
     /// Recovery methods, by commas or repeated: joint, consensus, ransac, density, tomography
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
-          default_value = "consensus", help_heading = "Attack")]
+          default_value = "joint", help_heading = "Attack")]
     pub solver: Vec<Solver>,
     /// Where neighborhoods come from, repeatable: oracle (made from the map itself); what an attacker
-    /// makes from the released map (similarity, overlap, or several joined by +); or a file
+    /// makes from the released map (similarity, overlap, geometric, or several joined by +); or a file
     #[arg(long, value_name = "oracle|SOURCE|FILE", value_parser = values::neighbor_source,
           default_value = "oracle", help_heading = "Attack")]
     pub neighbors: Vec<NeighborSource>,
@@ -231,7 +231,7 @@ pub enum NeighborsCommand {
 /// Options of `neighbors find`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Sources: similarity (any descriptors), overlap (SIFT), or several joined by +.
+Sources: similarity (any descriptors), overlap (SIFT), geometric (no descriptors), or several joined by +.
 
 Example:
   unlift neighbors find hidden/released.parquet --source overlap --out hidden/neighbors.parquet")]
@@ -299,8 +299,8 @@ pub struct RecoverArgs {
     /// Lists of records, one per hidden point
     #[arg(long, value_name = "FILE")]
     pub neighbors: PathBuf,
-    /// Recovery method: consensus, ransac, density or tomography
-    #[arg(long, value_name = "SOLVER", value_parser = values::solver, default_value = "consensus")]
+    /// Recovery method: joint, consensus, ransac, density or tomography
+    #[arg(long, value_name = "SOLVER", value_parser = values::solver, default_value = "joint")]
     pub solver: Solver,
     /// Distance up to which a neighbor supports a position, in the unit of the map
     #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto")]
@@ -350,7 +350,7 @@ pub enum BenchCommand {
 #[command(after_help = "\
 Examples:
   unlift bench recover --points 700000 --scheme ppl
-  unlift bench recover --points 100000 --scheme plane --map PROJECT --solver consensus,ransac --json
+  unlift bench recover --points 100000 --scheme plane --map PROJECT --solver joint,ransac --json
 
 The paper's seconds (64 cores) are shown where it measured the same scheme, K, inlier ratio and
 number of points: ppl, 50, and 100000, 300000 or 700000.")]
@@ -372,9 +372,9 @@ pub struct BenchRecoverArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::ratio,
           default_value = "1,0.5,0.3,0.2,0.1")]
     pub inlier_ratios: Vec<f64>,
-    /// Recovery methods, by commas or repeated: consensus, ransac
+    /// Recovery methods, by commas or repeated: joint, consensus, ransac, density, tomography
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
-          default_value = "consensus")]
+          default_value = "joint")]
     pub solver: Vec<Solver>,
     /// Distance up to which a neighbor supports a position, in the unit of the map
     #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto")]
@@ -412,7 +412,7 @@ mod tests {
     fn defaults_are_those_of_the_documentation() {
         let args = audit(&[]).unwrap();
         assert_eq!((args.map.k, args.map.seed, args.repeats), (50, None, 1));
-        assert_eq!(args.solver, [Solver::Consensus]);
+        assert_eq!(args.solver, [Solver::Joint]);
         assert_eq!((args.delta, args.map.outlier_filter), (Delta::Auto, None));
         assert_eq!(args.neighbors, [NeighborSource::Oracle]);
         assert!(

@@ -163,7 +163,8 @@ fn sources_without_an_oracle_have_rows_of_their_own() {
     let place = Place::new();
     write_descriptors(&place);
     let line = "audit map room.csv --k 10 --schemes olc,ppl --inlier-ratios 0.5 --descriptors d.bin \
-                --neighbors oracle --neighbors overlap --neighbors overlap+similarity --out a";
+                --neighbors oracle --neighbors overlap --neighbors overlap+similarity \
+                --neighbors geometric --neighbors overlap+geometric --out a";
     place.stdout(line, 0);
     let document = place.json("a/audit.json");
     let rows: Vec<(String, Value, u64)> = document["results"]
@@ -179,6 +180,8 @@ fn sources_without_an_oracle_have_rows_of_their_own() {
         ("oracle".to_owned(), Value::from("uniform"), 10),
         ("overlap".to_owned(), Value::Null, 20),
         ("overlap+similarity".to_owned(), Value::Null, 50),
+        ("geometric".to_owned(), Value::Null, 50),
+        ("overlap+geometric".to_owned(), Value::Null, 50),
     ];
     assert_eq!(rows, [expected.clone(), expected].concat());
     assert_eq!(document["break_even"].as_array().map(Vec::len), Some(2));
@@ -221,6 +224,15 @@ fn options_that_are_about_no_source_are_told() {
         "unlift: --inlier-ratios: expected with --neighbors oracle, found only overlap"
     );
     assert_eq!(
+        complaint("--neighbors oracle --neighbors overlap+geometric --descriptors d.bin"),
+        "unlift: --neighbors overlap+geometric: expected --schemes whose records alone tell where \
+         points are, found plane"
+    );
+    assert_eq!(
+        complaint("--neighbors overlap --descriptors d.bin --oracle-noise near"),
+        "unlift: --oracle-noise: expected with --neighbors oracle, found only overlap"
+    );
+    assert_eq!(
         complaint("--source-k 7"),
         "unlift: --source-k: expected with a source that makes its own lists, found only oracle"
     );
@@ -230,7 +242,7 @@ fn options_that_are_about_no_source_are_told() {
 fn clouds_are_written_on_request() {
     let place = Place::new();
     place.stdout(&format!("audit map room.csv {QUICK} --write-clouds --out a"), 0);
-    for file in ["original.ply", "olc-obfuscated.obj", "ppl-recovered-0.5-consensus.ply"] {
+    for file in ["original.ply", "olc-obfuscated.obj", "ppl-recovered-0.5-joint.ply"] {
         assert!(place.path().join("a/clouds").join(file).is_file(), "{file}");
     }
 }
@@ -280,7 +292,7 @@ fn every_noise_model_has_rows_and_break_even_ratios_of_its_own() {
     let noises: Vec<&str> = points.iter().filter_map(|p| p["oracle_noise"].as_str()).collect();
     assert_eq!(noises, ["uniform", "near", "clustered", "uniform", "near", "clustered"]);
     let page = std::fs::read_to_string(place.path().join("audit/report.html")).expect("a report");
-    assert!(page.contains("consensus, clustered") && page.contains("30 % (near)"));
+    assert!(page.contains("joint, clustered") && page.contains("30 % (near)"));
 
     // The uniform rows are those of an audit that names no model.
     place.stdout(&format!("audit map room.csv --scale 1 {quick}"), 0);

@@ -92,7 +92,7 @@ pub struct Row {
     pub inlier_ratio: f64,
     /// Neighbors per hidden point.
     pub k: u32,
-    /// `consensus`, `ransac`, `density` or `tomography`.
+    /// `joint`, `consensus`, `ransac`, `density` or `tomography`.
     pub solver: String,
     /// The distance that decided support, in `unit`; `None` when it was chosen per point.
     pub delta: Option<f64>,

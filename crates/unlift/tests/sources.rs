@@ -1,5 +1,6 @@
 //! Laws of every source that makes neighborhoods from a released map, and what each is for.
 
+use unlift::audit::{Plan, Source};
 use unlift::descriptors::Values;
 use unlift::neighbors::sources::{Joined, SOURCES};
 use unlift::neighbors::{Neighborhoods, overlap, similarity};
@@ -117,9 +118,11 @@ fn similarity_is_the_cosine() {
     }
 }
 
-/// Every source, and two joined.
+/// Every source that compares descriptors, and two joined; the laws of lists by records alone are with
+/// those of the density.
 fn sources() -> Vec<Joined> {
-    let names = SOURCES.iter().map(|entry| entry.name).chain(["overlap+similarity"]);
+    let described = SOURCES.iter().filter(|entry| entry.needs_descriptors);
+    let names = described.map(|entry| entry.name).chain(["overlap+similarity"]);
     names.map(|name| Joined::parse(name).unwrap().with_k(6)).collect()
 }
 
@@ -215,4 +218,22 @@ fn blank_and_equal_descriptors_are_no_trouble() {
         assert!(lists.scores().unwrap().iter().all(|score| score.is_finite()));
         assert!(lists.of(7).contains(&RecordId(8)), "{}", source.name());
     }
+}
+
+#[test]
+fn schemes_that_a_source_cannot_have_exist_and_are_refused_before_anything_runs() {
+    for entry in SOURCES {
+        for name in entry.not_for {
+            unlift::obfuscate::scheme(name).unwrap();
+        }
+    }
+    let mut plan = Plan::new(unlift::Unit::Meter);
+    plan.sources = vec![Source::Own(Joined::parse("geometric").unwrap())];
+    assert_eq!(
+        plan.check(1000, false).unwrap_err().to_string(),
+        "scheme with neighbors by geometric: expected one whose records alone tell geometric where \
+         points are, found plane"
+    );
+    plan.schemes.retain(|scheme| scheme.name != "plane");
+    plan.check(1000, false).unwrap();
 }

@@ -5,6 +5,8 @@ use std::time::Instant;
 
 use serde_json::{Map, Value, json};
 use unlift::audit::{Plan, PointNeighbors, Source};
+use unlift::neighbors::sources::Joined;
+use unlift::obfuscate::Entry;
 use unlift_io::hash::{hash_file, hash_files};
 use unlift_io::read;
 use unlift_io::stage::read_point_neighborhoods;
@@ -75,8 +77,8 @@ fn plan(args: &AuditMapArgs, prepared: &Prepared, n_read: usize) -> anyhow::Resu
         given => given.to_vec(),
     };
     Ok(Plan {
+        sources: sources(args, &schemes, prepared, n_read)?,
         schemes: distinct(schemes, |a, b| a.name == b.name),
-        sources: sources(args, prepared, n_read)?,
         oracle_noise: distinct(oracle_noise, |a, b| a == b),
         inlier_ratios: distinct(inlier_ratios, |a, b| a == b),
         k: usize::from(args.map.k),
@@ -90,7 +92,12 @@ fn plan(args: &AuditMapArgs, prepared: &Prepared, n_read: usize) -> anyhow::Resu
 }
 
 /// Every source once, and no option that would be about none of them.
-fn sources(args: &AuditMapArgs, prepared: &Prepared, n_read: usize) -> anyhow::Result<Vec<Source>> {
+fn sources(
+    args: &AuditMapArgs,
+    schemes: &[&'static Entry],
+    prepared: &Prepared,
+    n_read: usize,
+) -> anyhow::Result<Vec<Source>> {
     let mut sources = Vec::new();
     for source in distinct(args.neighbors.clone(), |a, b| a == b) {
         sources.push(match source {
@@ -98,6 +105,14 @@ fn sources(args: &AuditMapArgs, prepared: &Prepared, n_read: usize) -> anyhow::R
             NeighborSource::Own(joined) if joined.needs_descriptors() && !has(prepared) => {
                 return Err(usage(format!(
                     "--neighbors {}: expected descriptors (--descriptors FILE), found none",
+                    joined.name()
+                )));
+            }
+            NeighborSource::Own(joined) if blind_on(&joined, schemes).is_some() => {
+                let scheme = blind_on(&joined, schemes).unwrap_or_default();
+                return Err(usage(format!(
+                    "--neighbors {}: expected --schemes whose records alone tell where points are, \
+                     found {scheme}",
                     joined.name()
                 )));
             }
@@ -131,6 +146,11 @@ fn sources(args: &AuditMapArgs, prepared: &Prepared, n_read: usize) -> anyhow::R
         )));
     }
     Ok(sources)
+}
+
+/// The first scheme that a source has nothing to say about.
+fn blind_on(joined: &Joined, schemes: &[&'static Entry]) -> Option<&'static str> {
+    schemes.iter().map(|scheme| scheme.name).find(|name| joined.fails_on(name).is_some())
 }
 
 fn has(prepared: &Prepared) -> bool {
