@@ -152,6 +152,10 @@ pub struct AuditMapArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
           default_value = "joint", help_heading = "Attack")]
     pub solver: Vec<Solver>,
+    /// Add a row per scheme for an attacker who is told where three true neighbors of every point are: what
+    /// is missing there lies in the map
+    #[arg(long, help_heading = "Attack")]
+    pub reference: bool,
     /// Where neighborhoods come from, repeatable: oracle (made from the map itself); what an attacker
     /// makes from the released map (similarity, overlap, geometric, or several joined by +); or a file
     #[arg(long, value_name = "oracle|SOURCE|FILE", value_parser = values::neighbor_source,

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use unlift::Descriptors;
-use unlift::audit::{Cell, Observer, Outcome, Plan, run};
+use unlift::audit::{Cell, Observer, Outcome, Plan, REFERENCE, run};
 use unlift::truth::Original;
 use unlift_io::atomic::{OutputDir, write_file};
 use unlift_report::document::{Document, GateResult, Input};
@@ -125,7 +125,8 @@ pub fn perform(job: Job<'_>, out: OutputDir) -> anyhow::Result<Finished> {
 fn candidates<'a>(plan: &'a Plan, outcome: Option<&'a Outcome>) -> Vec<Candidate<'a>> {
     let mut candidates = Vec::new();
     if let Some(outcome) = outcome {
-        for row in &outcome.rows {
+        // The reference is no attack.
+        for row in outcome.rows.iter().filter(|row| row.solver != REFERENCE) {
             for (at, threshold) in plan.thresholds.iter().enumerate() {
                 candidates.push(Candidate {
                     scheme: row.scheme,

@@ -83,6 +83,7 @@ fn plan(args: &AuditMapArgs, prepared: &Prepared, n_read: usize) -> anyhow::Resu
         inlier_ratios: distinct(inlier_ratios, |a, b| a == b),
         k: usize::from(args.map.k),
         solvers: distinct(args.solver.clone(), |a, b| a == b),
+        reference: args.reference,
         delta: args.delta,
         thresholds,
         seed: args.map.seed.unwrap_or(0),

@@ -9,4 +9,4 @@ mod run;
 pub use break_even::{Bound, BreakEven, break_even};
 pub use plan::{Plan, PointNeighbors, Source, Threshold, Variant};
 pub use row::{PERCENTILES, Repeats, Row};
-pub use run::{Cell, Observer, Outcome, RowSeconds, Seconds, Silent, run};
+pub use run::{Cell, Observer, Outcome, REFERENCE, RowSeconds, Seconds, Silent, run};

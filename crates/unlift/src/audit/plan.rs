@@ -94,6 +94,8 @@ pub struct Plan {
     pub k: usize,
     /// Recovery methods.
     pub solvers: Vec<Solver>,
+    /// Whether each scheme also gets a row for an attacker who is told the true neighbors' places.
+    pub reference: bool,
     /// The distance that decides support.
     pub delta: Delta,
     /// When a point counts as recovered.
@@ -124,6 +126,7 @@ impl Plan {
             inlier_ratios: vec![1.0, 0.75, 0.5, 0.3, 0.2, 0.1],
             k: 50,
             solvers: vec![Solver::Joint],
+            reference: false,
             delta: Delta::Auto,
             thresholds: thresholds.map(threshold).to_vec(),
             seed: 0,

@@ -1,12 +1,14 @@
 //! The pipeline, chained in memory.
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 use super::break_even::{BreakEven, break_even};
 use super::lists::Lists;
 use super::plan::{Plan, Source, Variant};
 use super::row::Row;
-use crate::evaluate::{Accuracy, blind, evaluate};
+use crate::evaluate::{Accuracy, blind, evaluate, reference};
+use crate::geometry::knn::Knn;
 use crate::neighbors::oracle::{self, Noise};
 use crate::obfuscate::{Entry, obfuscate};
 use crate::recover::{RecoverOptions, Recovered, Solver, recover};
@@ -105,7 +107,7 @@ pub fn run(
     let mut clock = Clock::default();
     let search = clock.time(|s| &mut s.search, || oracle::search(original))?;
     let variants = plan.variants();
-    let per_scheme = variants.len() * plan.solvers.len();
+    let per_scheme = variants.len() * plan.solvers.len() + usize::from(plan.reference);
     let total = per_scheme * plan.schemes.len() * plan.repeats as usize;
     let mut done = 0;
     let mut rows = Vec::new();
@@ -171,6 +173,11 @@ pub fn run(
                     done += 1;
                 }
             }
+            if plan.reference {
+                let row = reference_row(entry, &hidden, original, &search, &baseline, plan);
+                repeat_rows.push(row);
+                done += 1;
+            }
             by_repeat.push(repeat_rows);
         }
         for at in 0..per_scheme {
@@ -200,6 +207,53 @@ fn hide(
     )
 }
 
+/// The row of an attacker who is told where three true neighbors of every point are.
+fn reference_row(
+    entry: &Entry,
+    (released, secret): &(Released<3>, Secret),
+    original: &Original<3>,
+    search: &Knn<'_, 3>,
+    baseline: &Accuracy,
+    plan: &Plan,
+) -> Row {
+    let mut row = Row {
+        scheme: entry.name,
+        neighbors: REFERENCE.to_owned(),
+        oracle_noise: None,
+        inlier_ratio: 1.0,
+        k: 3,
+        solver: REFERENCE,
+        delta: 0.0,
+        unit: released.unit(),
+        n_points: released.n_slots(),
+        lost: Default::default(),
+        dropped: dropped(secret),
+        recovered_percent: Vec::new(),
+        blind_percent: Vec::new(),
+        axis_accuracy_percent: None,
+        assignment_accuracy_percent: None,
+        error_percentiles: Vec::new(),
+        ransac_trials: None,
+        repeats: None,
+    };
+    row.fill(&reference(released, original, secret, search), baseline, &plan.thresholds);
+    row
+}
+
+/// The name of that attacker: as a source and as a solver, though it is neither.
+pub const REFERENCE: &str = "reference";
+
+fn dropped(secret: &Secret) -> BTreeMap<&'static str, usize> {
+    let mut dropped = BTreeMap::new();
+    for reason in DropReason::ALL {
+        let n = secret.dropped().iter().filter(|d| d.reason == reason).count();
+        if n > 0 {
+            dropped.insert(reason.name(), n);
+        }
+    }
+    dropped
+}
+
 /// A row with everything but the measurements.
 fn blank(
     entry: &Entry,
@@ -208,13 +262,6 @@ fn blank(
     recovered: &Recovered<3>,
     secret: &Secret,
 ) -> Row {
-    let mut dropped = std::collections::BTreeMap::new();
-    for reason in DropReason::ALL {
-        let n = secret.dropped().iter().filter(|d| d.reason == reason).count();
-        if n > 0 {
-            dropped.insert(reason.name(), n);
-        }
-    }
     Row {
         scheme: entry.name,
         neighbors: variant.source.name(),
@@ -226,7 +273,7 @@ fn blank(
         unit: recovered.unit(),
         n_points: recovered.n_slots(),
         lost: Default::default(),
-        dropped,
+        dropped: dropped(secret),
         recovered_percent: Vec::new(),
         blind_percent: Vec::new(),
         axis_accuracy_percent: None,

@@ -11,10 +11,14 @@ use crate::{Error, RecordId};
 /// evidence, and a record that a source does not list gets 0 from it. Without scores every entry of
 /// a source counts alike.
 ///
+/// Lists that `only_ranks` add to the scores of what others list, and name nothing themselves (unless
+/// all do).
+///
 /// # Errors
 /// When there are no lists, or they are of different maps.
 pub fn join(
     lists: &[Neighborhoods],
+    only_ranks: &[bool],
     k: usize,
     n_records: usize,
     slots_per_record: usize,
@@ -29,19 +33,23 @@ pub fn join(
     }
     let surprises: Vec<Vec<f32>> = lists.iter().map(surprises).collect();
     let (mut offsets, mut records, mut scores) = (vec![0u64], Vec::new(), Vec::new());
-    let mut union: Vec<(u32, f32)> = Vec::new();
+    let names = only_ranks.iter().any(|ranks| !ranks);
+    let mut union: Vec<(u32, f32, bool)> = Vec::new();
     for slot in 0..n_slots {
         union.clear();
-        for (lists, surprises) in lists.iter().zip(&surprises) {
+        for (source, (lists, surprises)) in lists.iter().zip(&surprises).enumerate() {
+            let ranks = names && only_ranks.get(source).copied().unwrap_or(false);
             let start = lists.offsets()[slot] as usize;
             let entries = lists.of(slot).iter().enumerate();
-            union.extend(entries.map(|(at, record)| (record.0, surprises[start + at])));
+            union.extend(entries.map(|(at, record)| (record.0, surprises[start + at], ranks)));
         }
         // Stable: scores of one record are added in the order of the sources.
-        union.sort_by_key(|&(record, _)| record);
+        union.sort_by_key(|&(record, ..)| record);
         let mut best = Best::new(k);
         for same in union.chunk_by(|a, b| a.0 == b.0) {
-            best.push(same.iter().map(|&(_, score)| score).sum(), same[0].0);
+            if same.iter().any(|&(_, _, ranks)| !ranks) {
+                best.push(same.iter().map(|&(_, score, _)| score).sum(), same[0].0);
+            }
         }
         for (score, record) in best.into_sorted() {
             records.push(RecordId(record));
@@ -89,20 +97,34 @@ mod tests {
     fn what_two_sources_name_comes_first() {
         let a = lists(&[&[(1, 5.0), (2, 4.0)], &[(3, 1.0)], &[], &[]]);
         let b = lists(&[&[(2, 0.9), (3, 0.1)], &[(0, 0.2)], &[], &[]]);
-        let joined = join(&[a, b], 1, 4, 1).unwrap();
+        let joined = join(&[a, b], &[false; 2], 1, 4, 1).unwrap();
         assert_eq!(joined.of(0), &[RecordId(2)]);
         assert_eq!((joined.n_slots(), joined.of(2).len()), (4, 0));
     }
 
     #[test]
+    fn a_source_that_only_ranks_names_nothing() {
+        let names = lists(&[&[(1, 5.0), (2, 5.0)], &[], &[], &[]]);
+        let ranks = lists(&[&[(2, 1.0), (3, 9.0)], &[(0, 1.0)], &[], &[]]);
+        let joined = join(&[names.clone(), ranks.clone()], &[false, true], 9, 4, 1).unwrap();
+        assert_eq!(joined.of(0), &[RecordId(1), RecordId(2)]);
+        let scores = joined.scores_of(0).unwrap();
+        assert!(scores[1] > scores[0] && joined.of(1).is_empty());
+        // Alone it must name.
+        assert_eq!(join(&[ranks], &[true], 9, 4, 1).unwrap().of(1), &[RecordId(0)]);
+    }
+
+    #[test]
     fn one_source_keeps_its_order() {
         let a = lists(&[&[(1, -5.0), (2, -4.0), (3, -9.0)], &[], &[], &[]]);
-        assert_eq!(join(&[a], 2, 4, 1).unwrap().of(0), &[RecordId(1), RecordId(2)]);
+        assert_eq!(join(&[a], &[false], 2, 4, 1).unwrap().of(0), &[RecordId(1), RecordId(2)]);
     }
 
     #[test]
     fn lists_of_different_maps_are_refused() {
-        let message = join(&[lists(&[&[], &[]]), lists(&[&[]])], 1, 2, 1).unwrap_err().to_string();
+        let message = join(&[lists(&[&[], &[]]), lists(&[&[]])], &[false; 2], 1, 2, 1)
+            .unwrap_err()
+            .to_string();
         assert_eq!(message, "joined neighborhoods: expected lists of 2 slots, found 1");
     }
 }

@@ -19,6 +19,9 @@ pub struct SourceEntry {
     /// Records per list unless asked otherwise: the attack's own choice, few where the first of a
     /// ranking are much better than the rest.
     pub usual_k: usize,
+    /// Whether in company it only ranks what the others list: recovery errs as it does, so that its own
+    /// entries would confirm wrong places.
+    pub only_ranks: bool,
     /// Schemes (by name) whose records tell it nothing.
     pub not_for: &'static [&'static str],
     /// For images, where it is defined on them.
@@ -39,7 +42,8 @@ pub const SOURCES: &[SourceEntry] = &[
         name: "similarity",
         summary: "records with the most similar descriptors, of any kind",
         needs_descriptors: true,
-        usual_k: 50,
+        usual_k: 20,
+        only_ranks: false,
         not_for: &[],
         in_2d: Some(|released, k, _| similarity(released, k)),
         in_3d: Some(|released, k, _| similarity(released, k)),
@@ -48,7 +52,8 @@ pub const SOURCES: &[SourceEntry] = &[
         name: "overlap",
         summary: "records whose SIFT patches overlap, and a short walk from these; no training",
         needs_descriptors: true,
-        usual_k: 20,
+        usual_k: 40,
+        only_ranks: false,
         not_for: &[],
         in_2d: Some(|released, k, _| overlap(released, k)),
         in_3d: Some(|released, k, _| overlap(released, k)),
@@ -58,6 +63,7 @@ pub const SOURCES: &[SourceEntry] = &[
         summary: "records that meet where records alone say that points are; no descriptors",
         needs_descriptors: false,
         usual_k: 50,
+        only_ranks: true,
         not_for: &["plane"],
         in_2d: None,
         in_3d: Some(|released, k, _| geometric(released, k)),
@@ -84,7 +90,7 @@ pub struct Joined {
 
 impl Joined {
     /// The sources named in `text`, joined by `+`, each once. A list has as many records as the
-    /// source that chooses most.
+    /// source that chooses most; those that only rank choose none in company.
     ///
     /// # Errors
     /// When a name is unknown or stands twice.
@@ -97,7 +103,9 @@ impl Joined {
             }
             parts.push(entry);
         }
-        let k = parts.iter().map(|entry| entry.usual_k).max().unwrap_or(1);
+        let names = parts.iter().any(|entry| !entry.only_ranks);
+        let chosen = parts.iter().filter(|entry| !(names && entry.only_ranks));
+        let k = chosen.map(|entry| entry.usual_k).max().unwrap_or(1);
         Ok(Self { parts, k })
     }
 
@@ -141,7 +149,11 @@ impl Joined {
         let mut lists = lists.collect::<Result<Vec<_>, _>>()?;
         match lists.len() {
             1 => Ok(lists.remove(0)),
-            _ => join(&lists, self.k, released.n_records(), released.slots_per_record()),
+            _ => {
+                let ranks: Vec<bool> = self.parts.iter().map(|entry| entry.only_ranks).collect();
+                let (n_records, slots) = (released.n_records(), released.slots_per_record());
+                join(&lists, &ranks, self.k, n_records, slots)
+            }
         }
     }
 }
@@ -153,8 +165,8 @@ mod tests {
     #[test]
     fn names_are_joined_and_the_largest_usual_k_counts() {
         let joined = Joined::parse("overlap+similarity").unwrap();
-        assert_eq!((joined.name().as_str(), joined.k()), ("overlap+similarity", 50));
-        assert_eq!(Joined::parse("overlap").unwrap().k(), 20);
+        assert_eq!((joined.name().as_str(), joined.k()), ("overlap+similarity", 40));
+        assert_eq!(Joined::parse("overlap").unwrap().k(), 40);
         assert_eq!(Joined::parse("overlap").unwrap().with_k(7).k(), 7);
     }
 
