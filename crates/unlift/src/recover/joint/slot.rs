@@ -90,6 +90,9 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         };
         let own = self.pieces.piece(slot, first.piece);
         let near = &scratch.near[first.piece];
+        if near.len() == 0 {
+            return *old;
+        }
         let mut x = first.x;
         let mut support = 0;
         for _ in 0..STEPS {
@@ -139,24 +142,30 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         let slots_per_record = self.pieces.slots_per_record();
         let partner = self.partner(slot);
         let (ends, class) = self.graph.of(slot);
+        // Lost slots are far away, but an absurd delta reaches everywhere.
+        let mut push = |slot: u32, odds: f32| {
+            if self.places.is_known(slot as usize) {
+                all.push(&self.places.of(slot as usize), odds, slot);
+            }
+        };
         for (&end, &class) in ends.iter().zip(class) {
             let odds = self.law.odds[usize::from(class)];
-            let e = self.places.of(end as usize);
             if either(class, slots_per_record) {
                 // Either of two slots is twice as likely to lie anywhere.
-                all.push(&e, 0.5 * odds, end);
-                all.push(&self.places.of(end as usize + 1), 0.5 * odds, end + 1);
+                push(end, 0.5 * odds);
+                push(end + 1, 0.5 * odds);
                 continue;
             }
             let odds = match &partner {
                 // An edge that belongs to the other slot as well as to this one is shared.
                 Some((x, gain, inverse_a2)) if is_reverse(class) => {
-                    let q = 1.0 / (1.0 + distance2(x, &e) * inverse_a2);
+                    let apart2 = distance2(x, &self.places.of(end as usize));
+                    let q = 1.0 / (1.0 + apart2 * inverse_a2);
                     odds / (1.0 + odds * gain * q * q * q)
                 }
                 _ => odds,
             };
-            all.push(&e, odds, end);
+            push(end, odds);
         }
     }
 
@@ -220,6 +229,7 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
 
     /// `x` moved along `own` to the least squares of the records of near neighbors, weighted by how near
     /// their estimates are. Estimates hold fully across their own pieces, and a little along them.
+    /// With it the number of these records.
     #[inline(always)]
     fn remake(&self, own: &Piece<D>, near: &Columns<D>, x: &[f32; D]) -> ([f32; D], u32) {
         let width = self.density.width(self.density.at(x));
@@ -227,7 +237,8 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         // The sum of weighted matrices splits: the identity, and the neighbors' own pieces.
         let (mut weight, mut pull) = (0.0f32, [0.0f32; D]);
         let (mut free, mut free_pull) = ([[0.0f32; D]; D], [0.0f32; D]);
-        let mut n = 0;
+        let (mut n, mut records, mut last) = (0, 0, usize::MAX);
+        let slots_per_record = self.pieces.slots_per_record();
         for i in 0..near.len() {
             let e = near.at(i);
             let closeness = 1.0 - distance2(&e, x) * inverse_kernel2;
@@ -237,6 +248,10 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
             let at = near.slot(i);
             let along = self.pieces.piece(at, self.places.piece(at)).along;
             n += 1;
+            // Both slots of a paired line are one record; they stand side by side.
+            let record = at / slots_per_record;
+            records += u32::from(record != last);
+            last = record;
             weight += closeness;
             for r in 0..D {
                 pull[r] += closeness * (e[r] - x[r]);
@@ -257,7 +272,7 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
             hold[r][r] += weight;
             pull[r] -= free_share * free_pull[r];
         }
-        (own.project(&solve_within(own, x, &hold, &pull, weight)), n)
+        (own.project(&solve_within(own, x, &hold, &pull, weight)), records)
     }
 }
 
