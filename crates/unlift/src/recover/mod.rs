@@ -7,6 +7,7 @@ mod chance_field;
 mod chunks;
 mod consensus;
 mod delta;
+mod exact;
 mod family;
 mod grid;
 mod joint;
@@ -71,6 +72,11 @@ pub fn recover<const D: usize>(
             (solved, Some(trials))
         }
         _ => (consensus(), None),
+    };
+    let estimates = if options.exact_constraints {
+        exact::settle(released, estimates, delta as f32)
+    } else {
+        estimates
     };
     let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
     let descriptor_row = assign::descriptor_rows(released, lists);
