@@ -54,10 +54,10 @@ impl<const D: usize> Grid<D> {
     #[inline(always)]
     pub(crate) fn index(&self, place: &[f32; D]) -> usize {
         let mut index = 0;
-        for c in 0..D {
-            let at = (place[c] - self.low[c]) / self.cell;
+        for ((x, low), n) in place.iter().zip(&self.low).zip(&self.dims) {
+            let at = (x - low) / self.cell;
             // The cast saturates: far places, infinite ones included, land in border cells.
-            index = index * self.dims[c] + (at as usize).min(self.dims[c] - 1);
+            index = index * n + (at as usize).min(n - 1);
         }
         index
     }

@@ -7,6 +7,7 @@ mod chance_field;
 mod chunks;
 mod consensus;
 mod delta;
+mod density;
 mod exact;
 mod family;
 mod grid;
@@ -25,6 +26,7 @@ pub(crate) use recovered::stored_support;
 pub use recovered::{Estimate, Recovered, Status};
 
 use crate::Error;
+use crate::density::{published, tomography};
 use crate::neighbors::Neighborhoods;
 use crate::released::{Obfuscation, Released};
 use chunks::Chunks;
@@ -47,6 +49,15 @@ pub fn recover<const D: usize>(
     if lists.n_slots() != released.n_slots() {
         let expected = format!("{} rows, one per slot", released.n_slots());
         return Err(Error::new("neighborhoods", expected, lists.n_slots().to_string()));
+    }
+    let descriptor_row = assign::descriptor_rows(released, lists);
+    let peaks = match options.solver {
+        Solver::Density => Some(published(released)),
+        Solver::Tomography => Some(tomography(released)),
+        Solver::Consensus | Solver::Joint | Solver::Ransac => None,
+    };
+    if let Some(peaks) = peaks {
+        return density::place(released, lists, &peaks, descriptor_row);
     }
     let family = Family::new(released, lists);
     // Joint recovery also asks who lists whom, from the first pass on.
@@ -79,7 +90,6 @@ pub fn recover<const D: usize>(
         estimates
     };
     let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
-    let descriptor_row = assign::descriptor_rows(released, lists);
     let (origin, unit) = (released.origin(), released.unit());
     Recovered::try_new(&estimates, with_axis, descriptor_row, origin, unit, delta)
         .map(|recovered| recovered.with_trials(trials))

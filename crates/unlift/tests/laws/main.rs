@@ -21,6 +21,7 @@ macro_rules! over_schemes {
 }
 
 mod degenerate;
+mod density;
 mod gauge;
 mod maps;
 mod noise;

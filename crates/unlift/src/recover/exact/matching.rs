@@ -75,8 +75,7 @@ pub(super) fn by_part<'a, T>(
     let mut parts = Vec::with_capacity(n.div_ceil(PART));
     for part in 0..n.div_ceil(PART) {
         let (first, last) = (part * PART, n.min((part + 1) * PART));
-        let (head, tail) =
-            column.split_at_mut(partners.offsets[last] - partners.offsets[first]);
+        let (head, tail) = column.split_at_mut(partners.offsets[last] - partners.offsets[first]);
         parts.push((part, head));
         column = tail;
     }

@@ -21,9 +21,7 @@ pub(crate) fn settle<const D: usize>(
     delta: f32,
 ) -> Vec<Estimate<D>> {
     match released.obfuscation() {
-        Obfuscation::AxisCandidates(records) => {
-            swaps::settle(records.position(), estimates, delta)
-        }
+        Obfuscation::AxisCandidates(records) => swaps::settle(records.position(), estimates, delta),
         Obfuscation::Rays(rays) => parity::settle(rays, estimates),
         Obfuscation::Lines(_) | Obfuscation::AxisPlanes(_) => estimates,
     }

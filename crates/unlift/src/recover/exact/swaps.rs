@@ -62,9 +62,7 @@ pub(super) fn pairs<const D: usize>(
     let side = |(record, estimate): (&[f32; D], &Estimate<D>)| {
         let axis = usize::from(estimate.axis);
         match estimate.status {
-            Status::Ok => {
-                Side { axis, published: record[axis], estimate: estimate.position[axis] }
-            }
+            Status::Ok => Side { axis, published: record[axis], estimate: estimate.position[axis] },
             _ => Side { axis: LOST, published: 0.0, estimate: 0.0 },
         }
     };
@@ -170,8 +168,5 @@ fn classes<const D: usize>(estimates: &[Estimate<D>]) -> Vec<u8> {
     sorted.par_sort_unstable_by(f32::total_cmp);
     let bounds: Vec<f32> =
         (1..CLASSES).filter_map(|c| sorted.get(c * sorted.len() / CLASSES).copied()).collect();
-    estimates
-        .iter()
-        .map(|e| bounds.partition_point(|&bound| bound <= e.evidence) as u8)
-        .collect()
+    estimates.iter().map(|e| bounds.partition_point(|&bound| bound <= e.evidence) as u8).collect()
 }

@@ -11,6 +11,7 @@ mod agreement;
 mod density;
 mod graph;
 mod law;
+mod near;
 mod pieces;
 mod places;
 mod slot;
