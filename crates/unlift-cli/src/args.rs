@@ -152,6 +152,10 @@ pub struct AuditMapArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
           default_value = "joint", help_heading = "Attack")]
     pub solver: Vec<Solver>,
+    /// Do not use rules that tie records together: exchanged coordinates of cp that other records
+    /// publish, voxels that the centers of ray-voxel leave out
+    #[arg(long, help_heading = "Attack")]
+    pub no_exact_constraints: bool,
     /// Add a row per scheme for an attacker who is told where three true neighbors of every point are: what
     /// is missing there lies in the map
     #[arg(long, help_heading = "Attack")]
@@ -306,6 +310,10 @@ pub struct RecoverArgs {
     /// Recovery method: joint, consensus, ransac, density or tomography
     #[arg(long, value_name = "SOLVER", value_parser = values::solver, default_value = "joint")]
     pub solver: Solver,
+    /// Do not use rules that tie records together: exchanged coordinates of cp that other records
+    /// publish, voxels that the centers of ray-voxel leave out
+    #[arg(long)]
+    pub no_exact_constraints: bool,
     /// Distance up to which a neighbor supports a position, in the unit of the map
     #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto")]
     pub delta: Delta,

@@ -51,6 +51,7 @@ pub fn options(plan: &Plan, more: Map<String, Value>) -> Map<String, Value> {
         Delta::Fixed(delta) => json!(delta),
     };
     options.insert("delta".into(), delta);
+    options.insert("exact_constraints".into(), json!(plan.exact_constraints));
     options.insert("thresholds".into(), json!(labels));
     options.insert("repeats".into(), json!(plan.repeats));
     options.extend(more);
@@ -128,6 +129,7 @@ fn row(row: &Row, thresholds: &[Threshold]) -> report::Row {
         recovered_percent: by_threshold(&row.recovered_percent),
         blind_percent: by_threshold(&row.blind_percent),
         axis_accuracy_percent: row.axis_accuracy_percent,
+        exact_percent: row.exact_percent,
         assignment_accuracy_percent: row.assignment_accuracy_percent,
         median_error: row.error_percentiles[0],
         error_percentiles: ordered(

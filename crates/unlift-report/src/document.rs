@@ -112,6 +112,9 @@ pub struct Row {
     pub blind_percent: ByThreshold,
     /// Percent of points whose swapped axis was told correctly (`cp` only).
     pub axis_accuracy_percent: Option<f64>,
+    /// Percent of points recovered within a hundredth of the smallest threshold (`cp` only).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exact_percent: Option<f64>,
     /// Percent of descriptors assigned to the right point of their line (`ppl`, `ppl+` only).
     pub assignment_accuracy_percent: Option<f64>,
     /// Median error over the released points, in `unit`; lost points count as infinitely far, so

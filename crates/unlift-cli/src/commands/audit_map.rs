@@ -85,6 +85,7 @@ fn plan(args: &AuditMapArgs, prepared: &Prepared, n_read: usize) -> anyhow::Resu
         solvers: distinct(args.solver.clone(), |a, b| a == b),
         reference: args.reference,
         delta: args.delta,
+        exact_constraints: !args.no_exact_constraints,
         thresholds,
         seed: args.map.seed.unwrap_or(0),
         repeats: args.repeats,

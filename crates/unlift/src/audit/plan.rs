@@ -98,6 +98,8 @@ pub struct Plan {
     pub reference: bool,
     /// The distance that decides support.
     pub delta: Delta,
+    /// Whether rules that tie records together fix coordinates.
+    pub exact_constraints: bool,
     /// When a point counts as recovered.
     pub thresholds: Vec<Threshold>,
     /// The seed of the first repeat; the others count up.
@@ -128,6 +130,7 @@ impl Plan {
             solvers: vec![Solver::Joint],
             reference: false,
             delta: Delta::Auto,
+            exact_constraints: true,
             thresholds: thresholds.map(threshold).to_vec(),
             seed: 0,
             repeats: 1,

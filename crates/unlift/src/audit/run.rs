@@ -146,7 +146,12 @@ pub fn run(
                     let what =
                         format!("{} at {:.2} {source}, {}", entry.name, made.ratio, solver.name());
                     observer.progress(done, total, &what);
-                    let options = RecoverOptions { solver, delta: plan.delta, seed: attacker };
+                    let options = RecoverOptions {
+                        solver,
+                        delta: plan.delta,
+                        seed: attacker,
+                        exact_constraints: plan.exact_constraints,
+                    };
                     let started = Instant::now();
                     let recovered = recover(&hidden.0, &made.lists, &options)?;
                     let took = started.elapsed().as_secs_f64();
@@ -231,6 +236,7 @@ fn reference_row(
         recovered_percent: Vec::new(),
         blind_percent: Vec::new(),
         axis_accuracy_percent: None,
+        exact_percent: None,
         assignment_accuracy_percent: None,
         error_percentiles: Vec::new(),
         ransac_trials: None,
@@ -277,6 +283,7 @@ fn blank(
         recovered_percent: Vec::new(),
         blind_percent: Vec::new(),
         axis_accuracy_percent: None,
+        exact_percent: None,
         assignment_accuracy_percent: None,
         error_percentiles: Vec::new(),
         ransac_trials: recovered.trials().map(|trials| trials.bins().collect()),

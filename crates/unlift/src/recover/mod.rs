@@ -8,6 +8,7 @@ mod chunks;
 mod consensus;
 mod delta;
 mod density;
+mod exact;
 mod family;
 mod grid;
 mod joint;
@@ -82,6 +83,11 @@ pub fn recover<const D: usize>(
             (solved, Some(trials))
         }
         _ => (consensus(), None),
+    };
+    let estimates = if options.exact_constraints {
+        exact::settle(released, estimates, delta as f32)
+    } else {
+        estimates
     };
     let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
     let (origin, unit) = (released.origin(), released.unit());

@@ -70,11 +70,14 @@ pub struct RecoverOptions {
     pub delta: Delta,
     /// The attacker's own seed: null samples and random trials.
     pub seed: u64,
+    /// Whether rules that tie records together are used where they fix coordinates: `cp` exchanges
+    /// values that are still in the map, `ray-voxel` leaves every other voxel along a ray.
+    pub exact_constraints: bool,
 }
 
 impl Default for RecoverOptions {
     fn default() -> Self {
-        Self { solver: Solver::Joint, delta: Delta::Auto, seed: 0 }
+        Self { solver: Solver::Joint, delta: Delta::Auto, seed: 0, exact_constraints: true }
     }
 }
 

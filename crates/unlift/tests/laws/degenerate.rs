@@ -17,7 +17,12 @@ fn harsh_options() -> Vec<RecoverOptions> {
     let mut options = all_options();
     for solver in Solver::FROM_LISTS {
         for delta in [1e-18, 1e-9, 1e9, 1e18] {
-            options.push(RecoverOptions { solver, delta: Delta::Fixed(delta), seed: 0 });
+            options.push(RecoverOptions {
+                solver,
+                delta: Delta::Fixed(delta),
+                seed: 0,
+                ..RecoverOptions::default()
+            });
         }
     }
     options

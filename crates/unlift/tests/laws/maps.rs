@@ -110,7 +110,7 @@ pub fn all_options() -> Vec<RecoverOptions> {
     let mut options = Vec::new();
     for solver in Solver::FROM_LISTS {
         for delta in [Delta::Fixed(0.1), Delta::Auto] {
-            options.push(RecoverOptions { solver, delta, seed: 3 });
+            options.push(RecoverOptions { solver, delta, seed: 3, ..RecoverOptions::default() });
         }
     }
     options

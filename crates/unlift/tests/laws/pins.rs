@@ -33,8 +33,12 @@ fn bytes_are_pinned() {
         let Some(scheme) = entry.in_3d else { continue };
         let hidden = hide(scheme, &points, 0);
         let lists = hidden.lists(20, 0.5, 0);
-        let options =
-            RecoverOptions { solver: Solver::Consensus, delta: Delta::Fixed(0.1), seed: 0 };
+        let options = RecoverOptions {
+            solver: Solver::Consensus,
+            delta: Delta::Fixed(0.1),
+            seed: 0,
+            ..RecoverOptions::default()
+        };
         let recovered = solve(&hidden.released, &lists, options);
         let hashes = (hash(&released_bytes(&hidden.released)), hash(&recovered_bytes(&recovered)));
         found.push((entry.name, hashes.0, hashes.1));
