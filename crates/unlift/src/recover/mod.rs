@@ -84,7 +84,8 @@ pub fn recover<const D: usize>(
         }
         _ => (consensus(), None),
     };
-    let estimates = if options.exact_constraints {
+    // The paper's loop stays as published.
+    let estimates = if options.exact_constraints && options.solver != Solver::Ransac {
         exact::settle(released, estimates, delta as f32)
     } else {
         estimates
