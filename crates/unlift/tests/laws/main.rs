@@ -22,6 +22,7 @@ macro_rules! over_schemes {
 
 mod degenerate;
 mod density;
+mod exact;
 mod gauge;
 mod maps;
 mod noise;

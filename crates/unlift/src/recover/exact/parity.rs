@@ -16,8 +16,10 @@ const FINER: usize = 4;
 const SWEEPS: usize = 2;
 /// Estimates looked at for the first start, and for finer ones.
 const SAMPLE: (usize, usize) = (1 << 12, 1 << 15);
-/// The grid is believed when as many more of these estimates agree than do not, as a share.
-const LEAST: f64 = 0.3;
+/// The grid is believed when so many more of these estimates agree than do not: as a share, and in
+/// standard deviations of what a wrong grid yields (the best of all starts reaches 4 or 5).
+const LEAST: f64 = 0.1;
+const SIGMAS: f64 = 8.0;
 /// An estimate is moved this far past the wall, in voxels.
 const INSIDE: f32 = 1e-3;
 
@@ -71,10 +73,10 @@ fn move_to_wall<const D: usize>(
 ) {
     let t: f32 = (0..D).map(|c| (estimate.position[c] - center[c]) * direction[c]).sum();
     let mut steps: Vec<f32> = Vec::with_capacity(2 * D);
-    for c in 0..D {
+    for (c, &along) in direction.iter().enumerate() {
         let cell = (f64::from(estimate.position[c]) - board.start[c]) / board.edge;
         for wall in [cell.floor(), cell.floor() + 1.0] {
-            let step = ((wall - cell) * board.edge) as f32 / direction[c];
+            let step = ((wall - cell) * board.edge) as f32 / along;
             if step.is_finite() {
                 steps.push(step + (INSIDE * board.edge as f32).copysign(step));
             }
@@ -138,7 +140,8 @@ pub(super) fn find<const D: usize>(
         width *= 2.0 / STARTS as f64;
     }
     let agree = score(&many, &start, edge);
-    let believed = agree.unsigned_abs() as f64 >= LEAST * many.len() as f64;
+    let n = many.len() as f64;
+    let believed = agree.unsigned_abs() as f64 >= (LEAST * n).max(SIGMAS * n.sqrt());
     (believed && !many.is_empty()).then_some(Checkerboard {
         start,
         edge,
