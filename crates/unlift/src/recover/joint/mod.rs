@@ -71,6 +71,9 @@ const SMOOTH: f32 = 4.5;
 const SETTLED: f64 = 0.03;
 /// Rounds end when as many as this share of those that moved before move again.
 const SLOW: f64 = 0.9;
+/// A slot that did not jump is looked at again if its place is ahead by at most this many nats per
+/// neighbor that did: jumps of others cannot overturn it.
+const PER_MOVE: f32 = 2.0;
 /// Rounds end when records agree by this share less than they did at best.
 const WORSE: f64 = 0.08;
 
@@ -89,6 +92,8 @@ fn rounds<const D: usize, P: Pieces<D>>(
     let mut radius = most_radius;
     let mut most = f64::NEG_INFINITY;
     let mut before = n;
+    let mut moves = vec![true; n];
+    let mut ahead = vec![0.0; n];
     for _ in 0..ROUNDS {
         let places = Places::new(&now);
         let density = Density::new(&places, &listed, SMOOTH * radius);
@@ -106,17 +111,18 @@ fn rounds<const D: usize, P: Pieces<D>>(
         let round_of =
             Round { pieces, graph, places: &places, density: &density, law: &law, kernel, delta2 };
         let mut next = now.clone();
-        next.par_chunks_mut(CHUNK).zip(now.par_chunks(CHUNK)).enumerate().for_each_init(
+        next.par_chunks_mut(CHUNK).zip(ahead.par_chunks_mut(CHUNK)).enumerate().for_each_init(
             Scratch::default,
-            |scratch, (chunk, (next, now))| {
-                dispatch(Chunk { round: &round_of, first: chunk * CHUNK, now, next, scratch });
+            |scratch, (chunk, (next, ahead))| {
+                let (round, moves, first) = (&round_of, &moves, chunk * CHUNK);
+                dispatch(Chunk { round, moves, first, next, ahead, scratch });
             },
         );
         let still = law.radius * law.radius;
-        let has_moved = |(a, b): &(&Estimate<D>, &Estimate<D>)| {
-            a.status != b.status || places::distance2(&a.position, &b.position) > still
-        };
-        let moved = now.iter().zip(&next).filter(has_moved).count();
+        moves.par_iter_mut().zip(now.par_iter().zip(&next)).for_each(|(moves, (a, b))| {
+            *moves = a.status != b.status || places::distance2(&a.position, &b.position) > still;
+        });
+        let moved = moves.iter().filter(|&&moves| moves).count();
         let agreement = agreement::of(pieces, graph, &next, delta2);
         if agreement < (1.0 - WORSE) * most {
             break;
@@ -135,9 +141,12 @@ fn rounds<const D: usize, P: Pieces<D>>(
 
 struct Chunk<'a, 'b, const D: usize, P> {
     round: &'a Round<'b, D, P>,
+    /// Which slots jumped in the round before.
+    moves: &'a [bool],
     first: usize,
-    now: &'a [Estimate<D>],
     next: &'a mut [Estimate<D>],
+    /// How many nats each place is ahead of the best one elsewhere.
+    ahead: &'a mut [f32],
     scratch: &'a mut Scratch<D>,
 }
 
@@ -146,8 +155,11 @@ impl<const D: usize, P: Pieces<D>> Kernel for Chunk<'_, '_, D, P> {
 
     #[inline(always)]
     fn run(self) {
-        for (at, (next, now)) in self.next.iter_mut().zip(self.now).enumerate() {
-            *next = self.round.solve(self.first + at, now, self.scratch);
+        for (at, (next, ahead)) in self.next.iter_mut().zip(self.ahead).enumerate() {
+            let slot = self.first + at;
+            if self.moves[slot] || *ahead <= PER_MOVE * self.round.moved_ends(slot, self.moves) {
+                (*next, *ahead) = self.round.solve(slot, next, self.scratch);
+            }
         }
     }
 }

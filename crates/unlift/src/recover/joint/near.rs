@@ -21,19 +21,22 @@ impl<const D: usize> Default for Columns<D> {
 }
 
 impl<const D: usize> Columns<D> {
-    pub(crate) fn clear(&mut self) {
-        self.x.iter_mut().for_each(Vec::clear);
-        self.odds.clear();
-        self.slot.clear();
+    /// `n` rows, to be [`set`](Self::set).
+    #[inline(always)]
+    pub(crate) fn resize(&mut self, n: usize) {
+        self.x.iter_mut().for_each(|column| column.resize(n, 0.0));
+        self.odds.resize(n, 0.0);
+        self.slot.resize(n, 0);
     }
 
+    /// Writes row `i`.
     #[inline(always)]
-    pub(crate) fn push(&mut self, x: &[f32; D], odds: f32, slot: u32) {
+    pub(crate) fn set(&mut self, i: usize, x: &[f32; D], odds: f32, slot: u32) {
         for (column, x) in self.x.iter_mut().zip(x) {
-            column.push(*x);
+            column[i] = *x;
         }
-        self.odds.push(odds);
-        self.slot.push(slot);
+        self.odds[i] = odds;
+        self.slot[i] = slot;
     }
 
     /// Number of estimates.
@@ -70,12 +73,14 @@ impl<const D: usize> Columns<D> {
             }
             apart2[i] = sum;
         }
-        near.clear();
+        // Every row is written, and stays if it is near: no branch to guess.
+        near.resize(n);
+        let mut kept = 0;
         for i in 0..n {
-            if self.apart2[i] < reach * reach {
-                near.push(&self.at(i), self.odds[i], self.slot[i]);
-            }
+            near.set(kept, &self.at(i), self.odds[i], self.slot[i]);
+            kept += usize::from(self.apart2[i] < reach * reach);
         }
+        near.resize(kept);
         near.pad();
     }
 

@@ -60,14 +60,15 @@ impl<const D: usize> Default for Scratch<D> {
 }
 
 impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
-    /// The new estimate of `slot`; the old one when no neighbor says anything.
+    /// The new estimate of `slot`, and how many nats its place is ahead of the best one elsewhere; the
+    /// old estimate when no neighbor says anything.
     #[inline(always)]
     pub(crate) fn solve(
         &self,
         slot: usize,
         old: &Estimate<D>,
         scratch: &mut Scratch<D>,
-    ) -> Estimate<D> {
+    ) -> (Estimate<D>, f32) {
         scratch.best.clear();
         self.gather(slot, &mut scratch.all);
         let reach = TUBE * self.law.radius;
@@ -85,13 +86,13 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
                 self.consider(near, old.position, piece, &mut scratch.best);
             }
         }
-        let Some(first) = self.winner(slot, &scratch.best) else {
-            return *old;
+        let Some((first, ahead)) = self.winner(slot, &scratch.best) else {
+            return (*old, 0.0);
         };
         let own = self.pieces.piece(slot, first.piece);
         let near = &scratch.near[first.piece];
         if near.len() == 0 {
-            return *old;
+            return (*old, 0.0);
         }
         let mut x = first.x;
         let mut support = 0;
@@ -100,15 +101,31 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
             (x, support) = (moved, n);
         }
         if !x.iter().all(|c| c.is_finite()) {
-            return *old;
+            return (*old, 0.0);
         }
-        Estimate {
+        let estimate = Estimate {
             position: x,
             status: Status::Ok,
             support: stored_support(support),
             axis: first.piece as u8,
             evidence: (first.score - first.prior).max(0.0),
+        };
+        (estimate, ahead)
+    }
+
+    /// How many of the slots at the other ends of the edges of `slot` are marked in `moves`.
+    #[inline(always)]
+    pub(crate) fn moved_ends(&self, slot: usize, moves: &[bool]) -> f32 {
+        let slots_per_record = self.pieces.slots_per_record();
+        let (ends, class) = self.graph.of(slot);
+        let mut n = 0u32;
+        for (&end, &class) in ends.iter().zip(class) {
+            n += u32::from(moves[end as usize]);
+            if either(class, slots_per_record) {
+                n += u32::from(moves[end as usize + 1]);
+            }
         }
+        n as f32
     }
 
     /// Where the other slot of a paired line lies, with the gain and scale of the law there.
@@ -138,22 +155,18 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
     /// The estimates of all slots at the other ends of the edges of `slot`.
     #[inline(always)]
     fn gather(&self, slot: usize, all: &mut Columns<D>) {
-        all.clear();
         let slots_per_record = self.pieces.slots_per_record();
         let partner = self.partner(slot);
         let (ends, class) = self.graph.of(slot);
-        // Lost slots are far away, but an absurd delta reaches everywhere.
-        let mut push = |slot: u32, odds: f32| {
-            if self.places.is_known(slot as usize) {
-                all.push(&self.places.of(slot as usize), odds, slot);
-            }
-        };
+        all.resize(slots_per_record * ends.len());
+        let mut n = 0;
         for (&end, &class) in ends.iter().zip(class) {
             let odds = self.law.odds[usize::from(class)];
             if either(class, slots_per_record) {
                 // Either of two slots is twice as likely to lie anywhere.
-                push(end, 0.5 * odds);
-                push(end + 1, 0.5 * odds);
+                for slot in [end, end + 1] {
+                    n += usize::from(self.set(all, n, slot, 0.5 * odds));
+                }
                 continue;
             }
             let odds = match &partner {
@@ -165,8 +178,18 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
                 }
                 _ => odds,
             };
-            push(end, odds);
+            n += usize::from(self.set(all, n, end, odds));
         }
+        all.resize(n);
+    }
+
+    /// Writes row `at` of `all`: the estimate of `slot`. Whether it is known: lost slots are far away, but
+    /// an absurd delta reaches everywhere.
+    #[inline(always)]
+    fn set(&self, all: &mut Columns<D>, at: usize, slot: u32, odds: f32) -> bool {
+        let x = self.places.of(slot as usize);
+        all.set(at, &x, odds, slot);
+        self.places.is_known(slot as usize)
     }
 
     #[inline(always)]
@@ -177,9 +200,10 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         best.push(Candidate { x, piece, score, prior });
     }
 
-    /// The likeliest candidate. Where others come close, records decide whose estimates are astray.
+    /// The likeliest candidate, and how far it is ahead of the best one elsewhere. Where others come
+    /// close, records decide whose estimates are astray.
     #[inline(always)]
-    fn winner(&self, slot: usize, candidates: &[Candidate<D>]) -> Option<Candidate<D>> {
+    fn winner(&self, slot: usize, candidates: &[Candidate<D>]) -> Option<(Candidate<D>, f32)> {
         let mut best = *candidates.first()?;
         for candidate in &candidates[1..] {
             if candidate.score > best.score {
@@ -187,21 +211,24 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
             }
         }
         let apart = 4.0 * self.law.radius * self.law.radius;
-        let rival =
-            |c: &&Candidate<D>| c.score > best.score - DOUBT && distance2(&c.x, &best.x) > apart;
+        let elsewhere = |c: &&Candidate<D>| distance2(&c.x, &best.x) > apart;
         let mut second: Option<Candidate<D>> = None;
-        for candidate in candidates.iter().filter(rival) {
+        for candidate in candidates.iter().filter(elsewhere) {
             if second.is_none_or(|s| candidate.score > s.score) {
                 second = Some(*candidate);
             }
         }
-        if let Some(second) = second
+        let Some(second) = second else {
+            return Some((best, best.score - best.prior));
+        };
+        let ahead = best.score - second.score;
+        if ahead < DOUBT
             && second.score + self.by_records(slot, &second.x)
                 > best.score + self.by_records(slot, &best.x)
         {
-            return Some(second);
+            return Some((second, 0.0));
         }
-        Some(best)
+        Some((best, ahead))
     }
 
     /// What records near `x` add where their estimates are elsewhere.
