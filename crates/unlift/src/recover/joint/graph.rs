@@ -96,11 +96,19 @@ impl Graph {
 
     /// How often each record is at the other end of an edge.
     pub(crate) fn times_listed(&self, n_records: usize, slots_per_record: usize) -> Vec<u32> {
-        let mut counts = vec![0; n_records];
-        for &end in &self.ends {
-            counts[end as usize / slots_per_record] += 1;
-        }
-        counts
+        // Sums of integers: the same however threads share the work.
+        self.ends
+            .par_chunks(self.ends.len().div_ceil(rayon::current_num_threads()).max(1))
+            .map(|ends| {
+                let mut counts = vec![0; n_records];
+                ends.iter().for_each(|&end| counts[end as usize / slots_per_record] += 1);
+                counts
+            })
+            .reduce_with(|mut a, b| {
+                a.iter_mut().zip(&b).for_each(|(a, b)| *a += b);
+                a
+            })
+            .unwrap_or_else(|| vec![0; n_records])
     }
 
     /// The edges as neighborhoods (records with one slot each).
@@ -115,36 +123,81 @@ const PART: usize = 1 << 12;
 
 /// Per record the entries that name it, in order of slot.
 struct NamedBy {
-    offsets: Vec<u64>,
+    blocks: Vec<Block>,
+}
+
+/// The same for [`BLOCK`] records.
+struct Block {
+    offsets: Vec<u32>,
     /// The slot that names it, and the place of the entry.
     by: Vec<(u32, u32)>,
 }
 
+/// Records whose entries are sorted at a time: they stay in the cache.
+const BLOCK: usize = 1 << 13;
+
+/// An entry on its way: the record it names, its slot and its place.
+type Entry = (u32, u32, u32);
+
 impl NamedBy {
     fn new(lists: &Neighborhoods, slots_per_record: usize) -> Self {
-        let n_records = lists.n_slots() / slots_per_record;
-        let mut offsets = vec![0u64; n_records + 1];
-        for record in lists.records() {
-            offsets[record.index() + 1] += 1;
+        let (n_slots, n_records) = (lists.n_slots(), lists.n_slots() / slots_per_record);
+        let n_blocks = n_records.div_ceil(BLOCK);
+        // Entries go to the blocks of the records they name first, part by part.
+        let parts: Vec<Vec<Vec<Entry>>> = (0..n_slots.div_ceil(PART))
+            .into_par_iter()
+            .map(|part| {
+                let mut to = vec![Vec::new(); n_blocks];
+                for slot in part * PART..((part + 1) * PART).min(n_slots) {
+                    let first = lists.offsets()[slot];
+                    for (at, record) in lists.of(slot).iter().enumerate() {
+                        let entry = (record.0, slot as u32, (first + at as u64) as u32);
+                        to[record.index() / BLOCK].push(entry);
+                    }
+                }
+                to
+            })
+            .collect();
+        let blocks = (0..n_blocks)
+            .into_par_iter()
+            .map(|block| {
+                let first = block * BLOCK;
+                Block::new(first, BLOCK.min(n_records - first), || {
+                    parts.iter().flat_map(|to| &to[block])
+                })
+            })
+            .collect();
+        Self { blocks }
+    }
+
+    fn of(&self, record: usize) -> &[(u32, u32)] {
+        let Block { offsets, by } = &self.blocks[record / BLOCK];
+        let at = record % BLOCK;
+        &by[offsets[at] as usize..offsets[at + 1] as usize]
+    }
+}
+
+impl Block {
+    fn new<'a, I: Iterator<Item = &'a Entry>>(
+        first: usize,
+        n_records: usize,
+        entries: impl Fn() -> I,
+    ) -> Self {
+        let mut offsets = vec![0u32; n_records + 1];
+        for &(record, ..) in entries() {
+            offsets[record as usize - first + 1] += 1;
         }
         for r in 0..n_records {
             offsets[r + 1] += offsets[r];
         }
         let mut next = offsets.clone();
-        let mut by = vec![(0, 0); lists.records().len()];
-        for slot in 0..lists.n_slots() {
-            let first = lists.offsets()[slot];
-            for (at, record) in lists.of(slot).iter().enumerate() {
-                let to = &mut next[record.index()];
-                by[*to as usize] = (slot as u32, (first + at as u64) as u32);
-                *to += 1;
-            }
+        let mut by = vec![(0, 0); offsets[n_records] as usize];
+        for &(record, slot, place) in entries() {
+            let to = &mut next[record as usize - first];
+            by[*to as usize] = (slot, place);
+            *to += 1;
         }
         Self { offsets, by }
-    }
-
-    fn of(&self, record: usize) -> &[(u32, u32)] {
-        &self.by[self.offsets[record] as usize..self.offsets[record + 1] as usize]
     }
 }
 

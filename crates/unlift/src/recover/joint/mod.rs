@@ -12,6 +12,7 @@ mod density;
 mod graph;
 mod law;
 mod near;
+mod order;
 mod pieces;
 mod places;
 mod slot;
@@ -24,11 +25,11 @@ use rayon::prelude::*;
 use self::density::Density;
 use self::law::{Law, Look};
 use self::pieces::{CandidatePieces, LinePieces, Pieces, PlanePieces};
-use self::places::Places;
+use self::places::{Places, distance2};
 use self::slot::{Round, Scratch};
-use super::Estimate;
 use super::chunks::CHUNK;
 use super::family::Family;
+use super::{Estimate, Status};
 use crate::simd::{Kernel, dispatch};
 
 /// Estimates made better than `start` along `graph`.
@@ -73,7 +74,7 @@ const SETTLED: f64 = 0.03;
 const SLOW: f64 = 0.9;
 /// A slot that did not jump is looked at again if its place is ahead by at most this many nats per
 /// neighbor that did: jumps of others cannot overturn it.
-const PER_MOVE: f32 = 2.0;
+const PER_MOVE: f32 = 3.0;
 /// Rounds end when records agree by this share less than they did at best.
 const WORSE: f64 = 0.08;
 
@@ -87,15 +88,16 @@ fn rounds<const D: usize, P: Pieces<D>>(
     let n = start.len();
     let slots_per_record = pieces.slots_per_record();
     let listed = graph.times_listed(n / slots_per_record, slots_per_record);
+    let (most_radius, delta2) = (MOST_RADIUS * delta, delta * delta);
     let mut now = start;
-    let most_radius = MOST_RADIUS * delta;
-    let mut radius = most_radius;
-    let mut most = f64::NEG_INFINITY;
-    let mut before = n;
-    let mut moves = vec![true; n];
-    let mut ahead = vec![0.0; n];
+    let mut places = Places::new(&now);
+    let order = order::of(&places);
+    // Nothing is settled yet.
+    let (mut moves, mut n_moves, mut ahead) = (vec![true; n], n, vec![0.0; n]);
+    let mut before = places.clone();
+    let mut fresh = vec![(Estimate::lost(Status::NoSupport), 0.0); n];
+    let (mut radius, mut most) = (most_radius, f64::NEG_INFINITY);
     for _ in 0..ROUNDS {
-        let places = Places::new(&now);
         let density = Density::new(&places, &listed, SMOOTH * radius);
         let law = Law::learn(&Look {
             places: &places,
@@ -106,47 +108,58 @@ fn rounds<const D: usize, P: Pieces<D>>(
             most_radius,
             seed,
         });
-        let kernel = KERNEL * law.radius;
-        let delta2 = delta * delta;
-        let round_of =
-            Round { pieces, graph, places: &places, density: &density, law: &law, kernel, delta2 };
-        let mut next = now.clone();
-        next.par_chunks_mut(CHUNK).zip(ahead.par_chunks_mut(CHUNK)).enumerate().for_each_init(
+        let round = Round {
+            pieces,
+            graph,
+            places: &places,
+            before: &before,
+            moves: &moves,
+            density: &density,
+            law: &law,
+            kernel: KERNEL * law.radius,
+            delta2,
+        };
+        fresh.par_chunks_mut(CHUNK).zip(order.par_chunks(CHUNK)).for_each_init(
             Scratch::default,
-            |scratch, (chunk, (next, ahead))| {
-                let (round, moves, first) = (&round_of, &moves, chunk * CHUNK);
-                dispatch(Chunk { round, moves, first, next, ahead, scratch });
+            |scratch, (fresh, slots)| {
+                dispatch(Chunk { round: &round, slots, now: &now, ahead: &ahead, fresh, scratch });
             },
         );
-        let still = law.radius * law.radius;
-        moves.par_iter_mut().zip(now.par_iter().zip(&next)).for_each(|(moves, (a, b))| {
-            *moves = a.status != b.status || places::distance2(&a.position, &b.position) > still;
-        });
-        let moved = moves.iter().filter(|&&moves| moves).count();
+        let mut next = now.clone();
+        for (&slot, fresh) in order.iter().zip(&fresh) {
+            (next[slot as usize], ahead[slot as usize]) = *fresh;
+        }
         let agreement = agreement::of(pieces, graph, &next, delta2);
         if agreement < (1.0 - WORSE) * most {
             break;
         }
         most = most.max(agreement);
-        now = next;
         radius = law.radius;
-        let slow = 2 * moved < n && moved as f64 > SLOW * before as f64;
-        if slow || (moved as f64) < SETTLED * n as f64 {
+        let has_moved = |(a, b): (&Estimate<D>, &Estimate<D>)| {
+            a.status != b.status || distance2(&a.position, &b.position) > radius * radius
+        };
+        moves = now.iter().zip(&next).map(has_moved).collect();
+        let earlier = n_moves;
+        n_moves = moves.iter().filter(|&&moves| moves).count();
+        now = next;
+        let slow = 2 * n_moves < n && n_moves as f64 > SLOW * earlier as f64;
+        if slow || (n_moves as f64) < SETTLED * n as f64 {
             break;
         }
-        before = moved;
+        before = places;
+        places = Places::new(&now);
     }
     now
 }
 
 struct Chunk<'a, 'b, const D: usize, P> {
     round: &'a Round<'b, D, P>,
-    /// Which slots jumped in the round before.
-    moves: &'a [bool],
-    first: usize,
-    next: &'a mut [Estimate<D>],
+    slots: &'a [u32],
+    now: &'a [Estimate<D>],
     /// How many nats each place is ahead of the best one elsewhere.
-    ahead: &'a mut [f32],
+    ahead: &'a [f32],
+    /// Estimates of `slots` after the round, and how far they are ahead.
+    fresh: &'a mut [(Estimate<D>, f32)],
     scratch: &'a mut Scratch<D>,
 }
 
@@ -155,11 +168,13 @@ impl<const D: usize, P: Pieces<D>> Kernel for Chunk<'_, '_, D, P> {
 
     #[inline(always)]
     fn run(self) {
-        for (at, (next, ahead)) in self.next.iter_mut().zip(self.ahead).enumerate() {
-            let slot = self.first + at;
-            if self.moves[slot] || *ahead <= PER_MOVE * self.round.moved_ends(slot, self.moves) {
-                (*next, *ahead) = self.round.solve(slot, next, self.scratch);
-            }
+        for (fresh, &slot) in self.fresh.iter_mut().zip(self.slots) {
+            let slot = slot as usize;
+            let (now, ahead) = (&self.now[slot], self.ahead[slot]);
+            let is_settled =
+                !self.round.moves[slot] && ahead > PER_MOVE * self.round.moves_near(slot) as f32;
+            *fresh =
+                if is_settled { (*now, ahead) } else { self.round.solve(slot, now, self.scratch) };
         }
     }
 }

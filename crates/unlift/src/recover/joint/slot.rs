@@ -14,6 +14,9 @@ pub(crate) struct Round<'a, const D: usize, P> {
     pub(crate) pieces: &'a P,
     pub(crate) graph: &'a Graph,
     pub(crate) places: &'a Places<D>,
+    /// Where slots were believed to be a round earlier, and which of them jumped since.
+    pub(crate) before: &'a Places<D>,
+    pub(crate) moves: &'a [bool],
     pub(crate) density: &'a Density<D>,
     pub(crate) law: &'a Law,
     /// Within this many local widths estimates enter the re-made position.
@@ -113,19 +116,27 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         (estimate, ahead)
     }
 
-    /// How many of the slots at the other ends of the edges of `slot` are marked in `moves`.
+    /// How many of the slots at the other ends of the edges of `slot` have moved to or from where `slot`
+    /// may lie.
     #[inline(always)]
-    pub(crate) fn moved_ends(&self, slot: usize, moves: &[bool]) -> f32 {
+    pub(crate) fn moves_near(&self, slot: usize) -> u32 {
         let slots_per_record = self.pieces.slots_per_record();
         let (ends, class) = self.graph.of(slot);
-        let mut n = 0u32;
+        let reach2 = (TUBE * self.law.radius) * (TUBE * self.law.radius);
+        let near = |x: &[f32; D]| {
+            (0..P::PER_SLOT)
+                .any(|piece| distance2(&self.pieces.piece(slot, piece).project(x), x) < reach2)
+        };
+        let mut n = 0;
         for (&end, &class) in ends.iter().zip(class) {
-            n += u32::from(moves[end as usize]);
-            if either(class, slots_per_record) {
-                n += u32::from(moves[end as usize + 1]);
+            let last = end as usize + usize::from(either(class, slots_per_record));
+            for end in end as usize..=last {
+                if self.moves[end] {
+                    n += u32::from(near(&self.places.of(end)) || near(&self.before.of(end)));
+                }
             }
         }
-        n as f32
+        n
     }
 
     /// Where the other slot of a paired line lies, with the gain and scale of the law there.
