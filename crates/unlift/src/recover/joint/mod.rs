@@ -65,7 +65,7 @@ const MOST_RADIUS: f32 = 0.95;
 /// True neighbors are looked for within this many radii of the law.
 const REACH: f32 = 4.0;
 /// Estimates enter the re-made position within this many radii of the law.
-const KERNEL: f32 = 4.0;
+const KERNEL: f32 = 3.5;
 /// The density of estimates is smooth over this many radii of the law.
 const SMOOTH: f32 = 4.5;
 /// Rounds end when fewer than this share of the slots jump farther than a radius of the law.
