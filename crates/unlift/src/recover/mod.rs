@@ -5,6 +5,7 @@ mod candidate_rows;
 mod chance;
 mod chance_field;
 mod chunks;
+mod confidence;
 mod consensus;
 mod delta;
 mod family;
@@ -18,6 +19,9 @@ mod ransac;
 mod recovered;
 mod sections;
 
+pub use confidence::Confidence;
+#[doc(hidden)]
+pub use confidence::{Cues, N_CUES, N_TERMS, Seen, centered, terms};
 pub use options::{Delta, RecoverOptions, Solver};
 pub use ransac::TrialHistogram;
 pub(crate) use recovered::stored_support;
@@ -42,6 +46,19 @@ pub fn recover<const D: usize>(
     lists: &Neighborhoods,
     options: &RecoverOptions,
 ) -> Result<Recovered<D>, Error> {
+    recover_and_look(released, lists, options).map(|found| found.0)
+}
+
+/// [`recover`], with what confidence is made of. For fitting it alone.
+///
+/// # Errors
+/// As there.
+#[doc(hidden)]
+pub fn recover_and_look<const D: usize>(
+    released: &Released<D>,
+    lists: &Neighborhoods,
+    options: &RecoverOptions,
+) -> Result<(Recovered<D>, Seen), Error> {
     options.check()?;
     if lists.n_slots() != released.n_slots() {
         let expected = format!("{} rows, one per slot", released.n_slots());
@@ -73,8 +90,12 @@ pub fn recover<const D: usize>(
         _ => (consensus(), None),
     };
     let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
+    let slots_per_record = released.slots_per_record();
+    let edges = (graph.as_ref(), lists);
+    let seen = confidence::look(&family, edges, slots_per_record, &estimates, delta as f32);
+    let confidence = confidence::of(&family, options.solver, &estimates, &seen);
     let descriptor_row = assign::descriptor_rows(released, lists);
     let (origin, unit) = (released.origin(), released.unit());
-    Recovered::try_new(&estimates, with_axis, descriptor_row, origin, unit, delta)
-        .map(|recovered| recovered.with_trials(trials))
+    let recovered = Recovered::try_new(&estimates, with_axis, descriptor_row, origin, unit, delta)?;
+    Ok((recovered.with_trials(trials).with_confidence(confidence)?, seen))
 }

@@ -16,14 +16,14 @@ mod places;
 mod slot;
 mod small;
 
-pub(crate) use graph::Graph;
+pub(crate) use density::Density;
+pub(crate) use graph::{Graph, either};
+pub(crate) use pieces::{CandidatePieces, LinePieces, Pieces, PlanePieces};
+pub(crate) use places::Places;
 
 use rayon::prelude::*;
 
-use self::density::Density;
 use self::law::{Law, Look};
-use self::pieces::{CandidatePieces, LinePieces, Pieces, PlanePieces};
-use self::places::Places;
 use self::slot::{Round, Scratch};
 use super::Estimate;
 use super::chunks::CHUNK;
