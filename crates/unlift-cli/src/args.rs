@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 use unlift::audit::Threshold;
 use unlift::neighbors::oracle::Noise;
+use unlift::neighbors::sources::Joined;
 use unlift::obfuscate::Entry;
 use unlift::recover::{Delta, Solver};
 
@@ -118,7 +119,8 @@ Examples:
   unlift audit map PROJECT --scale 1
   unlift audit map cloud.ply --schemes ppl,ppl+ --inlier-ratios 1,0.5 --out ppl-audit
   unlift audit map PROJECT --scale 1 --gate 'ppl@0.5:0.10<=20' --gate 'all:0.25:gain<=30'
-  unlift audit map PROJECT --neighbors neighbors.parquet --solver consensus,ransac
+  unlift audit map PROJECT --neighbors neighbors.parquet --solver joint,ransac
+  unlift audit map PROJECT --descriptors database.db --neighbors oracle --neighbors overlap
   unlift audit map PROJECT --share-safe --json
 
 Gates: SCHEME[@RATIO]:THRESHOLD[:gain]<=PERCENT. SCHEME may be all; without @RATIO every ratio
@@ -137,23 +139,36 @@ pub struct AuditMapArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::scheme,
           help_heading = "Attack")]
     pub schemes: Vec<&'static Entry>,
-    /// Shares of true neighbors to try, by commas (oracle)
+    /// Shares of true neighbors to try, by commas (oracle) [default: 1,0.75,0.5,0.3,0.2,0.1]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::ratio,
-          default_value = "1,0.75,0.5,0.3,0.2,0.1", help_heading = "Attack")]
+          help_heading = "Attack")]
     pub inlier_ratios: Vec<f64>,
     /// How the oracle errs, by commas or repeated: uniform (any record), near (the 2K-th to 10K-th
-    /// nearest), clustered (wrong places that neighbors share, as of look-alike descriptors)
+    /// nearest), clustered (wrong places that neighbors share, as of look-alike descriptors) [default: uniform]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::noise,
-          default_value = "uniform", help_heading = "Attack")]
+          help_heading = "Attack")]
     pub oracle_noise: Vec<Noise>,
-    /// Recovery methods, by commas or repeated: consensus, ransac
+    /// Recovery methods, by commas or repeated: joint, consensus, ransac, density, tomography
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
-          default_value = "consensus", help_heading = "Attack")]
+          default_value = "joint", help_heading = "Attack")]
     pub solver: Vec<Solver>,
-    /// Where neighborhoods come from: oracle (made from the map itself), or a file
-    #[arg(long, value_name = "oracle|FILE", value_parser = values::neighbor_source,
+    /// Do not use rules that tie records together: exchanged coordinates of cp that other records
+    /// publish, voxels that the centers of ray-voxel leave out
+    #[arg(long, help_heading = "Attack")]
+    pub no_exact_constraints: bool,
+    /// Add a row per scheme for an attacker who is told where three true neighbors of every point are: what
+    /// is missing there lies in the map
+    #[arg(long, help_heading = "Attack")]
+    pub reference: bool,
+    /// Where neighborhoods come from, repeatable: oracle (made from the map itself); what an attacker
+    /// makes from the released map (similarity, overlap, geometric, or several joined by +); or a file
+    #[arg(long, value_name = "oracle|SOURCE|FILE", value_parser = values::neighbor_source,
           default_value = "oracle", help_heading = "Attack")]
-    pub neighbors: NeighborSource,
+    pub neighbors: Vec<NeighborSource>,
+    /// Records per list of an attacker's own sources [default: each source's own choice]
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..),
+          help_heading = "Attack")]
+    pub source_k: Option<u16>,
     /// Distance up to which a neighbor supports a position, in the unit of the audit
     #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto",
           help_heading = "Attack")]
@@ -217,6 +232,36 @@ pub struct ObfuscateArgs {
 pub enum NeighborsCommand {
     /// From the truth, at a chosen inlier ratio: an attacker of stated quality
     Oracle(OracleArgs),
+    /// From a released map alone, as an attacker would
+    Find(FindArgs),
+}
+
+/// Options of `neighbors find`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Sources: similarity (any descriptors), overlap (SIFT), geometric (no descriptors), or several joined by +.
+
+Example:
+  unlift neighbors find hidden/released.parquet --source overlap --out hidden/neighbors.parquet")]
+pub struct FindArgs {
+    /// A released map
+    #[arg(value_name = "OBFUSCATED")]
+    pub released: PathBuf,
+    /// How: a source, or several joined by +
+    #[arg(long, value_name = "SOURCE", value_parser = values::joined)]
+    pub source: Joined,
+    /// Records per list [default: the source's own choice]
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
+    pub k: Option<u16>,
+    /// The integer that all randomness comes from
+    #[arg(long, value_name = "INTEGER", default_value_t = 0)]
+    pub seed: u64,
+    /// Threads to use; never changes a result [default: one per core]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+    /// File to write
+    #[arg(long, value_name = "FILE", default_value = "neighborhoods.parquet")]
+    pub out: PathBuf,
 }
 
 /// Options of `neighbors oracle`.
@@ -262,9 +307,13 @@ pub struct RecoverArgs {
     /// Lists of records, one per hidden point
     #[arg(long, value_name = "FILE")]
     pub neighbors: PathBuf,
-    /// Recovery method: consensus or ransac
-    #[arg(long, value_name = "SOLVER", value_parser = values::solver, default_value = "consensus")]
+    /// Recovery method: joint, consensus, ransac, density or tomography
+    #[arg(long, value_name = "SOLVER", value_parser = values::solver, default_value = "joint")]
     pub solver: Solver,
+    /// Do not use rules that tie records together: exchanged coordinates of cp that other records
+    /// publish, voxels that the centers of ray-voxel leave out
+    #[arg(long)]
+    pub no_exact_constraints: bool,
     /// Distance up to which a neighbor supports a position, in the unit of the map
     #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto")]
     pub delta: Delta,
@@ -313,7 +362,7 @@ pub enum BenchCommand {
 #[command(after_help = "\
 Examples:
   unlift bench recover --points 700000 --scheme ppl
-  unlift bench recover --points 100000 --scheme plane --map PROJECT --solver consensus,ransac --json
+  unlift bench recover --points 100000 --scheme plane --map PROJECT --solver joint,ransac --json
 
 The paper's seconds (64 cores) are shown where it measured the same scheme, K, inlier ratio and
 number of points: ppl, 50, and 100000, 300000 or 700000.")]
@@ -335,9 +384,9 @@ pub struct BenchRecoverArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::ratio,
           default_value = "1,0.5,0.3,0.2,0.1")]
     pub inlier_ratios: Vec<f64>,
-    /// Recovery methods, by commas or repeated: consensus, ransac
+    /// Recovery methods, by commas or repeated: joint, consensus, ransac, density, tomography
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
-          default_value = "consensus")]
+          default_value = "joint")]
     pub solver: Vec<Solver>,
     /// Distance up to which a neighbor supports a position, in the unit of the map
     #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto")]
@@ -374,12 +423,15 @@ mod tests {
     #[test]
     fn defaults_are_those_of_the_documentation() {
         let args = audit(&[]).unwrap();
-        assert_eq!(args.inlier_ratios, [1.0, 0.75, 0.5, 0.3, 0.2, 0.1]);
         assert_eq!((args.map.k, args.map.seed, args.repeats), (50, None, 1));
-        assert_eq!(args.solver, [Solver::Consensus]);
-        assert_eq!(args.oracle_noise, [Noise::Uniform]);
+        assert_eq!(args.solver, [Solver::Joint]);
         assert_eq!((args.delta, args.map.outlier_filter), (Delta::Auto, None));
-        assert_eq!(args.neighbors, NeighborSource::Oracle);
+        assert_eq!(args.neighbors, [NeighborSource::Oracle]);
+        assert!(
+            args.inlier_ratios.is_empty()
+                && args.oracle_noise.is_empty()
+                && args.source_k.is_none()
+        );
         assert!(args.schemes.is_empty() && args.thresholds.is_empty());
     }
 

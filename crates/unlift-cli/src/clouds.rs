@@ -37,12 +37,14 @@ impl Clouds {
             self.schemes.push(scheme);
             self.write_obfuscated(scheme, cell.released, cell.original.reveal().positions())?;
         }
-        let noise = match cell.row.oracle_noise {
-            None | Some("uniform") => String::new(),
-            Some(noise) => format!("-{noise}"),
+        let row = cell.row;
+        // A measured ratio is no name: two sources may share it.
+        let given = match row.oracle_noise {
+            None => row.neighbors.clone(),
+            Some("uniform") => row.inlier_ratio.to_string(),
+            Some(noise) => format!("{}-{noise}", row.inlier_ratio),
         };
-        let name =
-            format!("{scheme}-recovered-{}{noise}-{}.ply", cell.row.inlier_ratio, cell.row.solver);
+        let name = format!("{scheme}-recovered-{given}-{}.ply", row.solver);
         let points: Vec<Option<[f64; 3]>> = (0..cell.recovered.n_slots())
             .map(|slot| cell.recovered.position(slot).map(|p| in_map(&p)))
             .collect();

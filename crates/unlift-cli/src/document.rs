@@ -28,17 +28,22 @@ pub fn options(plan: &Plan, more: Map<String, Value>) -> Map<String, Value> {
     let mut options = Map::new();
     options.insert("schemes".into(), json!(names));
     options.insert("voxel".into(), json!(plan.scheme_options.voxel));
-    let neighbors = match &plan.source {
-        Source::Oracle => "oracle",
-        Source::Given(given) => &given.name,
-    };
+    let neighbors: Vec<String> = plan.sources.iter().map(Source::name).collect();
     options.insert("neighbors".into(), json!(neighbors));
-    if plan.source == Source::Oracle {
+    if plan.sources.contains(&Source::Oracle) {
         let names: Vec<&str> = plan.oracle_noise.iter().map(|noise| noise.name()).collect();
         options.insert("oracle_noise".into(), json!(names));
     }
     options.insert("inlier_ratios".into(), json!(plan.inlier_ratios));
     options.insert("k".into(), json!(plan.k));
+    let own = |source: &Source| match source {
+        Source::Own(joined) => Some((joined.name(), json!(joined.k()))),
+        Source::Oracle | Source::Given(_) => None,
+    };
+    let own: Map<String, Value> = plan.sources.iter().filter_map(own).collect();
+    if !own.is_empty() {
+        options.insert("source_k".into(), Value::Object(own));
+    }
     options
         .insert("solver".into(), json!(plan.solvers.iter().map(|s| s.name()).collect::<Vec<_>>()));
     let delta = match plan.delta {
@@ -46,6 +51,7 @@ pub fn options(plan: &Plan, more: Map<String, Value>) -> Map<String, Value> {
         Delta::Fixed(delta) => json!(delta),
     };
     options.insert("delta".into(), delta);
+    options.insert("exact_constraints".into(), json!(plan.exact_constraints));
     options.insert("thresholds".into(), json!(labels));
     options.insert("repeats".into(), json!(plan.repeats));
     options.extend(more);
@@ -62,6 +68,10 @@ pub fn document(plan: &Plan, outcome: &Outcome, provenance: Provenance) -> repor
         ("recover", seconds.recover),
         ("evaluate", seconds.evaluate),
     ];
+    let rows = seconds.rows.iter().map(|row| {
+        let made = (row.neighbors > 0.0).then(|| ("neighbors".to_owned(), row.neighbors));
+        ordered(made.into_iter().chain([("recover".to_owned(), row.recover)]))
+    });
     let line: Vec<String> =
         std::env::args_os().map(|word| quoted(&word.to_string_lossy())).collect();
     report::Document {
@@ -85,7 +95,7 @@ pub fn document(plan: &Plan, outcome: &Outcome, provenance: Provenance) -> repor
             peak_memory_bytes: crate::memory::peak_bytes(),
             seconds: report::Seconds {
                 total: provenance.started.elapsed().as_secs_f64(),
-                rows: seconds.rows.iter().map(|&s| ordered([("recover".to_owned(), s)])).collect(),
+                rows: rows.collect(),
                 stages: ordered(stages.map(|(name, s)| (name.to_owned(), s))),
             },
         },
@@ -119,6 +129,7 @@ fn row(row: &Row, thresholds: &[Threshold]) -> report::Row {
         recovered_percent: by_threshold(&row.recovered_percent),
         blind_percent: by_threshold(&row.blind_percent),
         axis_accuracy_percent: row.axis_accuracy_percent,
+        exact_percent: row.exact_percent,
         assignment_accuracy_percent: row.assignment_accuracy_percent,
         median_error: row.error_percentiles[0],
         error_percentiles: ordered(

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use unlift::Descriptors;
-use unlift::audit::{Cell, Observer, Outcome, Plan, run};
+use unlift::audit::{Cell, Observer, Outcome, Plan, REFERENCE, run};
 use unlift::truth::Original;
 use unlift_io::atomic::{OutputDir, write_file};
 use unlift_report::document::{Document, GateResult, Input};
@@ -86,9 +86,7 @@ pub fn open_out(out: &Path) -> anyhow::Result<OutputDir> {
 /// Runs the job and writes its folder, whole or not at all.
 pub fn perform(job: Job<'_>, out: OutputDir) -> anyhow::Result<Finished> {
     check_gates(&job.gates, &job.plan)?;
-    let plan = &job.plan;
-    let per_scheme = plan.noises().len() * plan.ratios().len() * plan.solvers.len();
-    let n_cells = plan.schemes.len() * per_scheme;
+    let n_cells = job.plan.schemes.len() * job.plan.variants().len() * job.plan.solvers.len();
     let mut watcher = Watcher {
         progress: Progress::new(job.quiet),
         pictures: (!job.share_safe).then(|| Pictures::new(job.original, &job.plan, n_cells)),
@@ -127,7 +125,8 @@ pub fn perform(job: Job<'_>, out: OutputDir) -> anyhow::Result<Finished> {
 fn candidates<'a>(plan: &'a Plan, outcome: Option<&'a Outcome>) -> Vec<Candidate<'a>> {
     let mut candidates = Vec::new();
     if let Some(outcome) = outcome {
-        for row in &outcome.rows {
+        // The reference is no attack.
+        for row in outcome.rows.iter().filter(|row| row.solver != REFERENCE) {
             for (at, threshold) in plan.thresholds.iter().enumerate() {
                 candidates.push(Candidate {
                     scheme: row.scheme,
@@ -141,11 +140,11 @@ fn candidates<'a>(plan: &'a Plan, outcome: Option<&'a Outcome>) -> Vec<Candidate
         return candidates;
     }
     for scheme in &plan.schemes {
-        for inlier_ratio in plan.ratios() {
+        for variant in plan.variants() {
             for threshold in &plan.thresholds {
                 candidates.push(Candidate {
                     scheme: scheme.name,
-                    inlier_ratio,
+                    inlier_ratio: variant.inlier_ratio,
                     threshold: threshold.value,
                     recovered_percent: 0.0,
                     blind_percent: 0.0,

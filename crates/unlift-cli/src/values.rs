@@ -4,14 +4,17 @@ use std::path::PathBuf;
 
 use unlift::audit::Threshold;
 use unlift::neighbors::oracle::Noise;
+use unlift::neighbors::sources::{Joined, source};
 use unlift::obfuscate::{Entry, SCHEMES};
 use unlift::recover::{Delta, Solver};
 
 /// Where neighborhoods come from.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum NeighborSource {
     /// Made from the originals at chosen inlier ratios.
     Oracle,
+    /// Made from the released map alone, by one source or several: names joined by `+`.
+    Own(Joined),
     /// Lists by point, in a file.
     File(PathBuf),
 }
@@ -84,13 +87,22 @@ pub fn delta(text: &str) -> Result<Delta, String> {
     value.map(Delta::Fixed)
 }
 
-/// `oracle`, or a file.
+/// `oracle`, names of sources joined by `+`, or a file.
 pub fn neighbor_source(text: &str) -> Result<NeighborSource, String> {
     match text {
-        "" => Err("expected oracle or a file".to_owned()),
+        "" => Err("expected oracle, a source or a file".to_owned()),
         "oracle" => Ok(NeighborSource::Oracle),
+        // One name that is known makes the others names as well: a slip is no missing file.
+        names if names.split('+').any(|name| source(name).is_ok()) => {
+            joined(names).map(NeighborSource::Own)
+        }
         path => Ok(NeighborSource::File(path.into())),
     }
+}
+
+/// Names of sources joined by `+`.
+pub fn joined(text: &str) -> Result<Joined, String> {
+    Joined::parse(text).map_err(|error| expected(&error))
 }
 
 /// `NEIGHBORS,RATIO`, for example `20,2.0`.
@@ -137,6 +149,7 @@ mod tests {
             scheme("pppl").unwrap_err(),
             solver("magic").unwrap_err(),
             noise("white").unwrap_err(),
+            neighbor_source("overlap+magic").unwrap_err(),
         ];
         assert_eq!(
             texts.join("\n"),
@@ -145,9 +158,19 @@ mod tests {
              expected auto or a number above 0, found wide\n\
              expected NEIGHBORS,RATIO with both above 0 (for example 20,2.0), found 20\n\
              expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, found pppl\n\
-             expected one of consensus, ransac, found magic\n\
-             expected one of uniform, near, clustered, found white"
+             expected one of joint, consensus, ransac, density, tomography, found magic\n\
+             expected one of uniform, near, clustered, found white\n\
+             expected one of similarity, overlap, geometric, found magic"
         );
+    }
+
+    #[test]
+    fn names_of_sources_are_names_and_the_rest_are_files() {
+        let own = |name: &str| NeighborSource::Own(Joined::parse(name).unwrap());
+        assert_eq!(neighbor_source("overlap"), Ok(own("overlap")));
+        assert_eq!(neighbor_source("overlap+similarity"), Ok(own("overlap+similarity")));
+        assert_eq!(neighbor_source("./overlap"), Ok(NeighborSource::File("./overlap".into())));
+        assert_eq!(neighbor_source("oracle"), Ok(NeighborSource::Oracle));
     }
 
     #[test]

@@ -144,11 +144,105 @@ fn neighbors_must_be_a_parquet_file() {
     assert!(refused.starts_with("unlift: room.csv: expected a Parquet file"), "{refused}");
 }
 
+/// 700 made-up descriptors for `room.csv`: points in a row of the file look alike.
+fn write_descriptors(place: &Place) {
+    let mut bytes = b"P3DESC01".to_vec();
+    bytes.extend(700u64.to_le_bytes());
+    bytes.extend(128u32.to_le_bytes());
+    bytes.extend(1u32.to_le_bytes());
+    (0..700u64).for_each(|id| bytes.extend(id.to_le_bytes()));
+    for row in 0..700u32 {
+        let wave = |c: u32| 40.0 + 39.0 * (f64::from(row) / 20.0 + f64::from(c * c)).sin();
+        bytes.extend((0..128).map(|c| wave(c) as u8));
+    }
+    std::fs::write(place.path().join("d.bin"), bytes).expect("a writable folder");
+}
+
+#[test]
+fn sources_without_an_oracle_have_rows_of_their_own() {
+    let place = Place::new();
+    write_descriptors(&place);
+    let line = "audit map room.csv --k 10 --schemes olc,ppl --inlier-ratios 0.5 --descriptors d.bin \
+                --neighbors oracle --neighbors overlap --neighbors overlap+similarity \
+                --neighbors geometric --neighbors overlap+geometric --out a";
+    place.stdout(line, 0);
+    let document = place.json("a/audit.json");
+    let rows: Vec<(String, Value, u64)> = document["results"]
+        .as_array()
+        .expect("rows")
+        .iter()
+        .map(|row| {
+            let neighbors = row["neighbors"].as_str().expect("a name").to_owned();
+            (neighbors, row["oracle_noise"].clone(), row["k"].as_u64().expect("K"))
+        })
+        .collect();
+    let expected = [
+        ("oracle".to_owned(), Value::from("uniform"), 10),
+        ("overlap".to_owned(), Value::Null, 20),
+        ("overlap+similarity".to_owned(), Value::Null, 50),
+        ("geometric".to_owned(), Value::Null, 50),
+        ("overlap+geometric".to_owned(), Value::Null, 50),
+    ];
+    assert_eq!(rows, [expected.clone(), expected].concat());
+    assert_eq!(document["break_even"].as_array().map(Vec::len), Some(2));
+    assert_eq!(document["options"]["source_k"]["overlap"], 20);
+    assert!(document["run"]["seconds"]["rows"][1]["neighbors"].as_f64() > Some(0.0));
+}
+
+#[test]
+fn a_released_map_alone_gives_the_lists_that_the_audit_uses() {
+    let place = Place::new();
+    write_descriptors(&place);
+    let map = "room.csv --scale 1 --k 10 --descriptors d.bin --seed 0";
+    place.stdout(&format!("obfuscate {map} --scheme olc --out hidden"), 0);
+    let find = "neighbors find hidden/released.parquet --source overlap --k 8 --out lists.parquet";
+    assert_eq!(
+        place.stdout(find, 0),
+        "700 neighborhoods of up to 8 by overlap, in lists.parquet\n"
+    );
+    place.stdout("recover hidden/released.parquet --neighbors lists.parquet --out b.parquet", 0);
+    let text = place.stdout("evaluate b.parquet --truth hidden/truth.parquet --json", 0);
+    let staged: Value = serde_json::from_str(&text).unwrap();
+    let audit =
+        format!("audit map {map} --schemes olc --neighbors overlap --source-k 8 --out a --json");
+    let chained: Value = serde_json::from_str(&place.stdout(&audit, 0)).unwrap();
+    let share = |value: &Value| value["recovered_percent"]["0.25"].as_f64().unwrap();
+    assert!((share(&staged) - share(&chained["results"][0])).abs() < 1e-3);
+}
+
+#[test]
+fn options_that_are_about_no_source_are_told() {
+    let place = Place::new();
+    write_descriptors(&place);
+    let complaint = |options: &str| place.complaint(&format!("audit map room.csv {options}"), 2);
+    assert_eq!(
+        complaint("--neighbors overlap"),
+        "unlift: --neighbors overlap: expected descriptors (--descriptors FILE), found none"
+    );
+    assert_eq!(
+        complaint("--neighbors overlap --descriptors d.bin --inlier-ratios 0.5"),
+        "unlift: --inlier-ratios: expected with --neighbors oracle, found only overlap"
+    );
+    assert_eq!(
+        complaint("--neighbors oracle --neighbors overlap+geometric --descriptors d.bin"),
+        "unlift: --neighbors overlap+geometric: expected --schemes whose records alone tell where \
+         points are, found plane"
+    );
+    assert_eq!(
+        complaint("--neighbors overlap --descriptors d.bin --oracle-noise near"),
+        "unlift: --oracle-noise: expected with --neighbors oracle, found only overlap"
+    );
+    assert_eq!(
+        complaint("--source-k 7"),
+        "unlift: --source-k: expected with a source that makes its own lists, found only oracle"
+    );
+}
+
 #[test]
 fn clouds_are_written_on_request() {
     let place = Place::new();
     place.stdout(&format!("audit map room.csv {QUICK} --write-clouds --out a"), 0);
-    for file in ["original.ply", "olc-obfuscated.obj", "ppl-recovered-0.5-consensus.ply"] {
+    for file in ["original.ply", "olc-obfuscated.obj", "ppl-recovered-0.5-joint.ply"] {
         assert!(place.path().join("a/clouds").join(file).is_file(), "{file}");
     }
 }
@@ -198,7 +292,7 @@ fn every_noise_model_has_rows_and_break_even_ratios_of_its_own() {
     let noises: Vec<&str> = points.iter().filter_map(|p| p["oracle_noise"].as_str()).collect();
     assert_eq!(noises, ["uniform", "near", "clustered", "uniform", "near", "clustered"]);
     let page = std::fs::read_to_string(place.path().join("audit/report.html")).expect("a report");
-    assert!(page.contains("consensus, clustered") && page.contains("30 % (near)"));
+    assert!(page.contains("joint, clustered") && page.contains("30 % (near)"));
 
     // The uniform rows are those of an audit that names no model.
     place.stdout(&format!("audit map room.csv --scale 1 {quick}"), 0);
@@ -250,6 +344,7 @@ fn help_is_part_of_the_interface() {
         "audit map",
         "obfuscate",
         "neighbors oracle",
+        "neighbors find",
         "recover",
         "evaluate",
         "bench recover",

@@ -85,6 +85,7 @@ fn check_row(place: &str, row: &Row) -> Result<(), Error> {
         ("delta", row.delta),
         ("median_error", row.median_error),
         ("axis_accuracy_percent", row.axis_accuracy_percent),
+        ("exact_percent", row.exact_percent),
         ("assignment_accuracy_percent", row.assignment_accuracy_percent),
     ];
     for (field, value) in optional {

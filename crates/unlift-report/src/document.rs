@@ -83,7 +83,7 @@ pub enum LengthUnit {
 pub struct Row {
     /// The scheme's user-facing name, for example `ppl+`.
     pub scheme: String,
-    /// Where the neighborhoods came from: `oracle` or `file`.
+    /// Where the neighborhoods came from: `oracle`, `file`, or names of sources joined by `+`.
     pub neighbors: String,
     /// How the oracle chose the false neighbors: `uniform`, `near` or `clustered`; `None` without
     /// an oracle.
@@ -92,7 +92,7 @@ pub struct Row {
     pub inlier_ratio: f64,
     /// Neighbors per hidden point.
     pub k: u32,
-    /// `consensus` or `ransac`.
+    /// `joint`, `consensus`, `ransac`, `density` or `tomography`.
     pub solver: String,
     /// The distance that decided support, in `unit`; `None` when it was chosen per point.
     pub delta: Option<f64>,
@@ -112,6 +112,9 @@ pub struct Row {
     pub blind_percent: ByThreshold,
     /// Percent of points whose swapped axis was told correctly (`cp` only).
     pub axis_accuracy_percent: Option<f64>,
+    /// Percent of points recovered within a hundredth of the smallest threshold (`cp` only).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exact_percent: Option<f64>,
     /// Percent of descriptors assigned to the right point of their line (`ppl`, `ppl+` only).
     pub assignment_accuracy_percent: Option<f64>,
     /// Median error over the released points, in `unit`; lost points count as infinitely far, so

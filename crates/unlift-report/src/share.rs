@@ -26,9 +26,10 @@ impl Document {
 fn withhold(option: &str, value: &mut Value) {
     match value {
         Value::String(text) => {
-            // `--neighbors oracle` is a choice, `--neighbors lists.parquet` a name.
+            // `--neighbors oracle+x` is a choice, `--neighbors lists.parquet` a name of the owner's.
+            let is_choice = |c: char| c.is_ascii_lowercase() || c == '+';
             let names = NAMING_OPTIONS.contains(&option)
-                || (option == "neighbors" && text != "oracle")
+                || (option == "neighbors" && !text.chars().all(is_choice))
                 || text.contains(['/', '\\']);
             if names {
                 *text = WITHHELD.to_owned();

@@ -123,6 +123,7 @@ pub(crate) fn losses(document: &Document) -> Table {
             words::thousands(row.n_lost),
             reasons(&row.lost),
             percent(row.axis_accuracy_percent),
+            percent(row.exact_percent),
             percent(row.assignment_accuracy_percent),
         ]);
         cells
@@ -133,6 +134,7 @@ pub(crate) fn losses(document: &Document) -> Table {
         "lost",
         "lost by reason",
         "axis right, %",
+        "exact, %",
         "descriptor right, %",
     ];
     let mut head = texts(&["scheme", "solver", "neighbors right"]);

@@ -102,7 +102,10 @@ fn condition(row: &Row) -> String {
         }
     } else {
         let right = words::ratio_percent(row.inlier_ratio);
-        format!("with the given neighborhoods, of which {right} % is right")
+        match row.neighbors.as_str() {
+            "file" => format!("with the given neighborhoods, of which {right} % is right"),
+            own => format!("with neighborhoods found by {own}, of which {right} % is right"),
+        }
     }
 }
 

@@ -139,7 +139,12 @@ fn table(sizes: &Sizes, pools: &[ThreadPool], original: &Original<3>, entry: &En
             if solver == Solver::Ransac && original.len() > MOST_SAMPLED {
                 continue;
             }
-            let options = RecoverOptions { solver, delta: Delta::Fixed(DELTA), seed: 0 };
+            let options = RecoverOptions {
+                solver,
+                delta: Delta::Fixed(DELTA),
+                seed: 0,
+                ..RecoverOptions::default()
+            };
             let work = || recover(&released, &lists, &options).expect("valid input");
             let took = seconds(sizes, pools, &work);
             row(sizes, &lists, (entry.name, ratio, solver.name()), &took, gather[0]);

@@ -7,6 +7,7 @@
 //! ```
 
 pub mod audit;
+mod density;
 pub mod descriptors;
 mod error;
 pub mod evaluate;

@@ -5,6 +5,8 @@ use std::time::Instant;
 
 use serde_json::{Map, Value, json};
 use unlift::audit::{Plan, PointNeighbors, Source};
+use unlift::neighbors::sources::Joined;
+use unlift::obfuscate::Entry;
 use unlift_io::hash::{hash_file, hash_files};
 use unlift_io::read;
 use unlift_io::stage::read_point_neighborhoods;
@@ -66,23 +68,95 @@ fn plan(args: &AuditMapArgs, prepared: &Prepared, n_read: usize) -> anyhow::Resu
             )));
         }
     }
-    let source = match &args.neighbors {
-        NeighborSource::Oracle => Source::Oracle,
-        NeighborSource::File(path) => Source::Given(by_point(path, prepared, n_read)?),
+    let inlier_ratios = match args.inlier_ratios.as_slice() {
+        [] => usual.inlier_ratios.clone(),
+        given => given.to_vec(),
+    };
+    let oracle_noise = match args.oracle_noise.as_slice() {
+        [] => usual.oracle_noise.clone(),
+        given => given.to_vec(),
     };
     Ok(Plan {
+        sources: sources(args, &schemes, prepared, n_read)?,
         schemes: distinct(schemes, |a, b| a.name == b.name),
-        source,
-        oracle_noise: distinct(args.oracle_noise.clone(), |a, b| a == b),
-        inlier_ratios: distinct(args.inlier_ratios.clone(), |a, b| a == b),
+        oracle_noise: distinct(oracle_noise, |a, b| a == b),
+        inlier_ratios: distinct(inlier_ratios, |a, b| a == b),
         k: usize::from(args.map.k),
         solvers: distinct(args.solver.clone(), |a, b| a == b),
+        reference: args.reference,
         delta: args.delta,
+        exact_constraints: !args.no_exact_constraints,
         thresholds,
         seed: args.map.seed.unwrap_or(0),
         repeats: args.repeats,
         ..usual
     })
+}
+
+/// Every source once, and no option that would be about none of them.
+fn sources(
+    args: &AuditMapArgs,
+    schemes: &[&'static Entry],
+    prepared: &Prepared,
+    n_read: usize,
+) -> anyhow::Result<Vec<Source>> {
+    let mut sources = Vec::new();
+    for source in distinct(args.neighbors.clone(), |a, b| a == b) {
+        sources.push(match source {
+            NeighborSource::Oracle => Source::Oracle,
+            NeighborSource::Own(joined) if joined.needs_descriptors() && !has(prepared) => {
+                return Err(usage(format!(
+                    "--neighbors {}: expected descriptors (--descriptors FILE), found none",
+                    joined.name()
+                )));
+            }
+            NeighborSource::Own(joined) if blind_on(&joined, schemes).is_some() => {
+                let scheme = blind_on(&joined, schemes).unwrap_or_default();
+                return Err(usage(format!(
+                    "--neighbors {}: expected --schemes whose records alone tell where points are, \
+                     found {scheme}",
+                    joined.name()
+                )));
+            }
+            NeighborSource::Own(joined) => Source::Own(match args.source_k {
+                Some(k) => joined.with_k(usize::from(k)),
+                None => joined,
+            }),
+            NeighborSource::File(path) => Source::Given(by_point(&path, prepared, n_read)?),
+        });
+    }
+    let files = sources.iter().filter(|s| matches!(s, Source::Given(_))).count();
+    if files > 1 {
+        return Err(usage(format!("--neighbors: expected at most one file, found {files}")));
+    }
+    let names = || sources.iter().map(Source::name).collect::<Vec<_>>().join(", ");
+    for (option, given) in [
+        ("--inlier-ratios", !args.inlier_ratios.is_empty()),
+        ("--oracle-noise", !args.oracle_noise.is_empty()),
+    ] {
+        if given && !sources.contains(&Source::Oracle) {
+            let found = names();
+            return Err(usage(format!(
+                "{option}: expected with --neighbors oracle, found only {found}"
+            )));
+        }
+    }
+    if args.source_k.is_some() && !sources.iter().any(|s| matches!(s, Source::Own(_))) {
+        let found = names();
+        return Err(usage(format!(
+            "--source-k: expected with a source that makes its own lists, found only {found}"
+        )));
+    }
+    Ok(sources)
+}
+
+/// The first scheme that a source has nothing to say about.
+fn blind_on(joined: &Joined, schemes: &[&'static Entry]) -> Option<&'static str> {
+    schemes.iter().map(|scheme| scheme.name).find(|name| joined.fails_on(name).is_some())
+}
+
+fn has(prepared: &Prepared) -> bool {
+    prepared.descriptors.is_some()
 }
 
 /// Lists by row of the file, for the rows that were kept.
@@ -120,8 +194,10 @@ fn provenance(
     if let Some(path) = &args.map.descriptors {
         others.push(("descriptors".to_owned(), hash_file(path)?));
     }
-    if let NeighborSource::File(path) = &args.neighbors {
-        others.push(("neighbors".to_owned(), hash_file(path)?));
+    for source in &args.neighbors {
+        if let NeighborSource::File(path) = source {
+            others.push(("neighbors".to_owned(), hash_file(path)?));
+        }
     }
     Ok(Input {
         path: Some(args.path.display().to_string()),

@@ -28,6 +28,7 @@ pub fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Audit(AuditCommand::Map(args)) => audit_map::run(*args),
         Command::Obfuscate(args) => obfuscate::run(&args),
         Command::Neighbors(NeighborsCommand::Oracle(args)) => neighbors::oracle(&args),
+        Command::Neighbors(NeighborsCommand::Find(args)) => neighbors::find(&args),
         Command::Recover(args) => recover::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Bench(BenchCommand::Recover(args)) => bench::recovery(&args),

@@ -1,10 +1,11 @@
-//! `unlift neighbors oracle`: the truth in, neighborhoods of a chosen quality out.
+//! `unlift neighbors`: from the truth at a chosen quality, or from a released map alone.
 
 use unlift::neighbors::oracle::{Outliers, TrueNeighbors, search};
 use unlift_io::stage::{read_released, read_truth, write_neighborhoods};
 
 use super::obfuscate::RELEASED;
-use crate::args::OracleArgs;
+use super::with_threads;
+use crate::args::{FindArgs, OracleArgs};
 use crate::exit::{Outcome, advise};
 use crate::output::print;
 use crate::progress::Spinner;
@@ -37,6 +38,30 @@ pub fn oracle(args: &OracleArgs) -> anyhow::Result<Outcome> {
         "{} neighborhoods of {k} at inlier ratio {}, in {}\n",
         lists.n_slots(),
         args.inlier_ratio,
+        args.out.display()
+    ))?;
+    Ok(Outcome::Done)
+}
+
+/// Makes neighborhoods as an attacker would.
+pub fn find(args: &FindArgs) -> anyhow::Result<Outcome> {
+    let released = read_released::<3>(&args.released)?;
+    let source = match args.k {
+        Some(k) => args.source.clone().with_k(usize::from(k)),
+        None => args.source.clone(),
+    };
+    let alive = Spinner::new("finding neighbors");
+    let lists = with_threads(args.threads, || {
+        let lists = source.make(&released, args.seed);
+        Ok(lists.map_err(|error| unlift_io::Error::core(&args.released, error))?)
+    })?;
+    write_neighborhoods(&args.out, &lists)?;
+    drop(alive);
+    print(&format!(
+        "{} neighborhoods of up to {} by {}, in {}\n",
+        lists.n_slots(),
+        source.k(),
+        source.name(),
         args.out.display()
     ))?;
     Ok(Outcome::Done)

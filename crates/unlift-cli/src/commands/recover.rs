@@ -14,7 +14,12 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
     let released = read_released::<3>(&args.released)?;
     let (records, slots) = (released.n_records(), released.slots_per_record());
     let lists = read_neighborhoods(&args.neighbors, records, slots)?;
-    let options = RecoverOptions { solver: args.solver, delta: args.delta, seed: args.seed };
+    let options = RecoverOptions {
+        solver: args.solver,
+        delta: args.delta,
+        seed: args.seed,
+        exact_constraints: !args.no_exact_constraints,
+    };
     let alive = Spinner::new("recovering");
     let recovered = with_threads(args.threads, || {
         let result = recover(&released, &lists, &options);

@@ -196,6 +196,17 @@ impl<'a> Meta<'a> {
         }
     }
 
+    /// A number, if it is given.
+    pub(super) fn number(&self, key: &str) -> Result<Option<f64>, Error> {
+        match self.object.get(key) {
+            None => Ok(None),
+            Some(value) => match value.as_f64() {
+                Some(x) => Ok(Some(x)),
+                None => Err(self.wrong(key, "a number")),
+            },
+        }
+    }
+
     /// A number of at least 0; 0 when it is not given.
     pub(super) fn number_or_0(&self, key: &str) -> Result<f64, Error> {
         match self.object.get(key) {

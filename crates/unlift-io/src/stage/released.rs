@@ -48,6 +48,9 @@ pub fn write_released<const D: usize>(path: &Path, released: &Released<D>) -> Re
             let centers = rays.centers().iter();
             let centers: Vec<Vec<f64>> = centers.map(|c| c.map(f64::from).to_vec()).collect();
             meta.insert("centers".into(), json!(centers));
+            if let Some(edge) = rays.voxel() {
+                meta.insert("voxel".into(), json!(edge));
+            }
             vector("direction_");
             fields.insert(0, field("center", UInt8));
         }
@@ -187,6 +190,10 @@ fn read_rays<const D: usize>(path: &Path, table: &Table) -> Result<Obfuscation<D
     })?;
     let [direction] = read_vectors(table, ["direction_"])?;
     let rays = Rays::try_new(&centers, center, &direction);
+    let rays = match table.meta().number("voxel")? {
+        Some(edge) => rays.and_then(|rays| rays.with_voxel(edge)),
+        None => rays,
+    };
     rays.map(Obfuscation::Rays).map_err(|source| Error::core(path, source))
 }
 

@@ -127,6 +127,7 @@ fn row(s: usize, r: usize, solver: &str, thresholds: [&str; 2], unit: LengthUnit
         recovered_percent: by_threshold([share(0), share(1)]),
         blind_percent: by_threshold(BLIND[s]),
         axis_accuracy_percent: has(&["cp"], 97.3 - 6.0 * r as f64),
+        exact_percent: has(&["cp"], 26.1 - 3.0 * r as f64),
         assignment_accuracy_percent: has(&["ppl", "ppl+"], 98.0 - 3.0 * r as f64),
         median_error: percentiles[0].1,
         error_percentiles: percentiles.into_iter().collect(),

@@ -48,7 +48,7 @@ pub struct BreakEven {
 pub fn break_even(plan: &Plan, rows: &[Row]) -> Vec<BreakEven> {
     let mut result = Vec::new();
     for scheme in &plan.schemes {
-        for noise in plan.noises().into_iter().flatten() {
+        for noise in &plan.oracle_noise {
             for solver in &plan.solvers {
                 let (scheme, solver, oracle_noise) = (scheme.name, solver.name(), noise.name());
                 let mut curve: Vec<(f64, f64)> = rows

@@ -1,6 +1,7 @@
 //! What is to be audited.
 
 use crate::neighbors::oracle::Noise;
+use crate::neighbors::sources::Joined;
 use crate::obfuscate::{Entry, SchemeOptions};
 use crate::recover::{Delta, Solver};
 use crate::{Error, Unit};
@@ -49,6 +50,30 @@ pub enum Source {
     Oracle,
     /// Given; the inlier ratio is measured.
     Given(PointNeighbors),
+    /// From the released map alone, as an attacker would; the inlier ratio is measured.
+    Own(Joined),
+}
+
+impl Source {
+    /// The name in reports.
+    pub fn name(&self) -> String {
+        match self {
+            Self::Oracle => "oracle".to_owned(),
+            Self::Given(given) => given.name.clone(),
+            Self::Own(joined) => joined.name(),
+        }
+    }
+}
+
+/// What tells the rows of one scheme and solver apart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Variant<'a> {
+    /// Where neighborhoods come from.
+    pub source: &'a Source,
+    /// How the oracle errs; `None` for other sources.
+    pub noise: Option<Noise>,
+    /// The inlier ratio; `None` where it will be measured.
+    pub inlier_ratio: Option<f64>,
 }
 
 /// A plan: every combination of scheme, source, noise model, inlier ratio and solver becomes a row.
@@ -58,18 +83,23 @@ pub struct Plan {
     pub schemes: Vec<&'static Entry>,
     /// Parameters of schemes.
     pub scheme_options: SchemeOptions,
-    /// Where neighborhoods come from.
-    pub source: Source,
+    /// Where neighborhoods come from; each has its own rows.
+    pub sources: Vec<Source>,
     /// How the oracle errs; a row each.
     pub oracle_noise: Vec<Noise>,
     /// Shares of true neighbors (oracle).
     pub inlier_ratios: Vec<f64>,
-    /// Neighbors per slot (oracle). For given lists, the longest list decides.
+    /// True neighbors per slot: of the oracle, and where the inlier ratio of an attacker's own lists
+    /// is measured. For given lists, the longest list decides.
     pub k: usize,
     /// Recovery methods.
     pub solvers: Vec<Solver>,
+    /// Whether each scheme also gets a row for an attacker who is told the true neighbors' places.
+    pub reference: bool,
     /// The distance that decides support.
     pub delta: Delta,
+    /// Whether rules that tie records together fix coordinates.
+    pub exact_constraints: bool,
     /// When a point counts as recovered.
     pub thresholds: Vec<Threshold>,
     /// The seed of the first repeat; the others count up.
@@ -93,40 +123,50 @@ impl Plan {
         Self {
             schemes: crate::obfuscate::SCHEMES.iter().filter(|s| s.in_3d.is_some()).collect(),
             scheme_options: SchemeOptions { voxel },
-            source: Source::Oracle,
+            sources: vec![Source::Oracle],
             oracle_noise: vec![Noise::Uniform],
             inlier_ratios: vec![1.0, 0.75, 0.5, 0.3, 0.2, 0.1],
             k: 50,
-            solvers: vec![Solver::Consensus],
+            solvers: vec![Solver::Joint],
+            reference: false,
             delta: Delta::Auto,
+            exact_constraints: true,
             thresholds: thresholds.map(threshold).to_vec(),
             seed: 0,
             repeats: 1,
         }
     }
 
-    /// The noise models of the rows of one scheme; `None` where neighborhoods are given.
-    pub fn noises(&self) -> Vec<Option<Noise>> {
-        match self.source {
-            Source::Oracle => self.oracle_noise.iter().map(|&noise| Some(noise)).collect(),
-            Source::Given(_) => vec![None],
+    /// The rows of one scheme and solver, source by source; those of the oracle noise model by
+    /// noise model.
+    pub fn variants(&self) -> Vec<Variant<'_>> {
+        let mut variants = Vec::new();
+        for source in &self.sources {
+            match source {
+                Source::Oracle => {
+                    for &noise in &self.oracle_noise {
+                        let ratios = self.inlier_ratios.iter().map(|&ratio| Some(ratio));
+                        let noise = Some(noise);
+                        variants.extend(ratios.map(|inlier_ratio| Variant {
+                            source,
+                            noise,
+                            inlier_ratio,
+                        }));
+                    }
+                }
+                Source::Given(_) | Source::Own(_) => {
+                    variants.push(Variant { source, noise: None, inlier_ratio: None });
+                }
+            }
         }
-    }
-
-    /// The inlier ratios of the rows of one scheme, noise model and solver; `None` where it will be
-    /// measured.
-    pub fn ratios(&self) -> Vec<Option<f64>> {
-        match self.source {
-            Source::Oracle => self.inlier_ratios.iter().map(|&ratio| Some(ratio)).collect(),
-            Source::Given(_) => vec![None],
-        }
+        variants
     }
 
     /// Checks every field against the map it is meant for.
     ///
     /// # Errors
     /// Names the first field out of range.
-    pub fn check(&self, n_points: usize) -> Result<(), Error> {
+    pub fn check(&self, n_points: usize, has_descriptors: bool) -> Result<(), Error> {
         self.scheme_options.check()?;
         if n_points < self.k + 1 {
             let expected = format!("at least K + 1 = {}", self.k + 1);
@@ -135,11 +175,30 @@ impl Plan {
         if let Some(ratio) = self.inlier_ratios.iter().find(|r| !(0.0..=1.0).contains(*r)) {
             return Err(Error::new("inlier ratio", "0 to 1", ratio.to_string()));
         }
+        let blind = |source: &&Source| match source {
+            Source::Own(joined) => joined.needs_descriptors() && !has_descriptors,
+            Source::Oracle | Source::Given(_) => false,
+        };
+        if let Some(source) = self.sources.iter().find(blind) {
+            let expected = format!("some, as neighbors by {} need them", source.name());
+            return Err(Error::new("descriptors", expected, "none"));
+        }
+        for source in &self.sources {
+            let Source::Own(joined) = source else { continue };
+            let failing = |scheme: &&&Entry| joined.fails_on(scheme.name).is_some();
+            if let Some(scheme) = self.schemes.iter().find(failing) {
+                let part = joined.fails_on(scheme.name).map_or("", |part| part.name);
+                let what = format!("scheme with neighbors by {}", source.name());
+                let expected = format!("one whose records alone tell {part} where points are");
+                return Err(Error::new(what, expected, scheme.name));
+            }
+        }
         if self.repeats == 0 {
             return Err(Error::new("repeats", "at least 1", "0"));
         }
         for (what, empty) in [
             ("schemes", self.schemes.is_empty()),
+            ("sources", self.sources.is_empty()),
             ("oracle noise models", self.oracle_noise.is_empty()),
             ("inlier ratios", self.inlier_ratios.is_empty()),
             ("solvers", self.solvers.is_empty()),

@@ -9,19 +9,23 @@ use crate::evaluate::Accuracy;
 /// Percentiles of the error that a row keeps.
 pub const PERCENTILES: [f64; 5] = [50.0, 75.0, 90.0, 95.0, 99.0];
 
+/// A point recovered within this share of the smallest threshold counts as exact.
+const EXACT: f64 = 0.01;
+
 /// A row of an audit. Means over repeats, where there are several; counts are of the first repeat.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     /// Scheme name.
     pub scheme: &'static str,
-    /// Source of the neighborhoods: `oracle` or a name.
+    /// Source of the neighborhoods: `oracle`, `file`, or names joined by `+`.
     pub neighbors: String,
     /// Noise model of the oracle; `None` for other sources.
     pub oracle_noise: Option<&'static str>,
     /// As requested (oracle) or measured.
     pub inlier_ratio: f64,
-    /// Neighbors per slot: of the oracle, or the longest of given lists. It is also how many nearest
-    /// records count as true neighbors when a ratio is measured.
+    /// Records per list: of the oracle, the longest of given lists, or the attacker's choice. The
+    /// ratio of given lists is measured against as many true neighbors; that of an attacker's own
+    /// lists against those of the plan, so that a short list is not judged by a stricter rule.
     pub k: usize,
     /// Solver name.
     pub solver: &'static str,
@@ -41,6 +45,8 @@ pub struct Row {
     pub blind_percent: Vec<f64>,
     /// Share of exchanged axes named (`cp`).
     pub axis_accuracy_percent: Option<f64>,
+    /// Percentage recovered within a hundredth of the smallest threshold (`cp`).
+    pub exact_percent: Option<f64>,
     /// Share of descriptors given to their own point (paired lines with descriptors).
     pub assignment_accuracy_percent: Option<f64>,
     /// Errors at [`PERCENTILES`]; `None` where that many points were lost.
@@ -79,6 +85,9 @@ impl Row {
         self.recovered_percent = within(accuracy);
         self.blind_percent = within(blind);
         self.axis_accuracy_percent = accuracy.axis_percent;
+        let smallest = thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min);
+        let exact = accuracy.percent_within(EXACT * smallest);
+        self.exact_percent = accuracy.axis_percent.map(|_| exact);
         self.assignment_accuracy_percent = accuracy.assignment_percent;
         self.error_percentiles = PERCENTILES.map(|p| accuracy.percentile(p)).to_vec();
     }
@@ -125,6 +134,7 @@ impl Row {
         if mean.oracle_noise.is_none() {
             mean.inlier_ratio = known(average(&|r| Some(r.inlier_ratio)));
         }
+        mean.exact_percent = average(&|r| r.exact_percent);
         mean.axis_accuracy_percent = average(&|r| r.axis_accuracy_percent);
         mean.assignment_accuracy_percent = average(&|r| r.assignment_accuracy_percent);
         mean.repeats = Some(repeats);

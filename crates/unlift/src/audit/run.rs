@@ -1,13 +1,15 @@
 //! The pipeline, chained in memory.
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 use super::break_even::{BreakEven, break_even};
-use super::plan::{Plan, PointNeighbors, Source};
+use super::lists::Lists;
+use super::plan::{Plan, Source, Variant};
 use super::row::Row;
-use crate::evaluate::{Accuracy, blind, evaluate};
-use crate::neighbors::Neighborhoods;
-use crate::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
+use crate::evaluate::{Accuracy, blind, evaluate, reference};
+use crate::geometry::knn::Knn;
+use crate::neighbors::oracle::{self, Noise};
 use crate::obfuscate::{Entry, obfuscate};
 use crate::recover::{RecoverOptions, Recovered, Solver, recover};
 use crate::released::Released;
@@ -64,14 +66,23 @@ pub struct Seconds {
     pub recover: f64,
     /// Evaluating, the blind attacker included.
     pub evaluate: f64,
-    /// Recovery per row, summed over repeats.
-    pub rows: Vec<f64>,
+    /// Per row, summed over repeats.
+    pub rows: Vec<RowSeconds>,
+}
+
+/// Where the time of one row went.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RowSeconds {
+    /// Making its neighborhoods; 0 where another solver's row already has the time.
+    pub neighbors: f64,
+    /// Recovering.
+    pub recover: f64,
 }
 
 /// What an audit found.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// One row per scheme, noise model, inlier ratio and solver, in this order.
+    /// One row per scheme, source, noise model, inlier ratio and solver, in this order.
     pub rows: Vec<Row>,
     /// The ratio at which half of the points come back, per scheme, noise model and solver.
     pub break_even: Vec<BreakEven>,
@@ -92,87 +103,85 @@ pub fn run(
     plan: &Plan,
     observer: &mut dyn Observer,
 ) -> Result<Outcome, Error> {
-    plan.check(original.len())?;
+    plan.check(original.len(), descriptors.is_some())?;
     let mut clock = Clock::default();
     let search = clock.time(|s| &mut s.search, || oracle::search(original))?;
-    let per_scheme = plan.noises().len() * plan.ratios().len() * plan.solvers.len();
+    let variants = plan.variants();
+    let per_scheme = variants.len() * plan.solvers.len() + usize::from(plan.reference);
     let total = per_scheme * plan.schemes.len() * plan.repeats as usize;
     let mut done = 0;
     let mut rows = Vec::new();
     for entry in &plan.schemes {
         let mut by_repeat: Vec<Vec<Row>> = Vec::new();
-        let mut seconds = vec![0.0; per_scheme];
+        let mut seconds = vec![RowSeconds::default(); per_scheme];
         for repeat in 0..plan.repeats {
             let seed = plan.seed.wrapping_add(u64::from(repeat));
+            // The attacker's own seed: that of the obfuscation is the owner's secret.
+            let attacker = u64::from(repeat);
             let of_scheme = |error: Error| error.within(entry.name);
             let hidden = hide(entry, original, descriptors, plan, seed, &mut clock);
             let hidden = hidden.map_err(of_scheme)?;
             let baseline =
                 clock.time(|s| &mut s.evaluate, || Ok(blind(&hidden.0, original, &hidden.1)))?;
             let mut repeat_rows = Vec::new();
-            let slots = hidden.0.slots_per_record();
-            let (given, k) = match &plan.source {
-                Source::Oracle => (None, plan.k),
-                Source::Given(points) => {
-                    let lists = translate(points, &hidden.1, &hidden.0).map_err(of_scheme)?;
-                    let others = hidden.0.n_records().saturating_sub(1);
-                    let k = lists.longest().min(others).max(1);
-                    (Some(lists), k)
+            let by_row = hidden.1.by_descriptor_row();
+            let mut sources = Lists::new(plan, &search, &hidden, &by_row, (seed, attacker));
+            for variant in &variants {
+                let source = match variant.noise {
+                    Some(noise) => noise.name().to_owned(),
+                    None => variant.source.name(),
+                };
+                let what = format!("{}, neighbors by {}", entry.name, variant.source.name());
+                observer.progress(done, total, &what);
+                let started = Instant::now();
+                let made = clock
+                    .time(|s| &mut s.neighbors, || sources.make(variant))
+                    .map_err(of_scheme)?;
+                let making = started.elapsed().as_secs_f64();
+                let secret = match variant.source {
+                    Source::Own(_) => &by_row,
+                    Source::Oracle | Source::Given(_) => &hidden.1,
+                };
+                for (at, &solver) in plan.solvers.iter().enumerate() {
+                    let what =
+                        format!("{} at {:.2} {source}, {}", entry.name, made.ratio, solver.name());
+                    observer.progress(done, total, &what);
+                    let options = RecoverOptions {
+                        solver,
+                        delta: plan.delta,
+                        seed: attacker,
+                        exact_constraints: plan.exact_constraints,
+                    };
+                    let started = Instant::now();
+                    let recovered = recover(&hidden.0, &made.lists, &options)?;
+                    let took = started.elapsed().as_secs_f64();
+                    let row_seconds = &mut seconds[repeat_rows.len()];
+                    row_seconds.recover += took;
+                    // Lists are made once for all solvers: the first one's row has the time.
+                    row_seconds.neighbors += if at == 0 { making } else { 0.0 };
+                    clock.seconds.recover += took;
+                    let accuracy = clock
+                        .time(|s| &mut s.evaluate, || evaluate(&recovered, original, secret))?;
+                    let mut row = blank(entry, variant, (made.k, solver), &recovered, secret);
+                    row.inlier_ratio = made.ratio;
+                    row.fill(&accuracy, &baseline, &plan.thresholds);
+                    observer.cell(&Cell {
+                        row: &row,
+                        repeat,
+                        original,
+                        secret,
+                        released: &hidden.0,
+                        recovered: &recovered,
+                        accuracy: &accuracy,
+                    });
+                    repeat_rows.push(row);
+                    done += 1;
                 }
-            };
-            let near = || TrueNeighbors::new(&search, &hidden.1, slots, k);
-            let near = clock.time(|s| &mut s.neighbors, near).map_err(of_scheme)?;
-            for noise in plan.noises() {
-                let outliers = clock.time(
-                    |s| &mut s.neighbors,
-                    || {
-                        let noise = noise.unwrap_or(Noise::Uniform);
-                        Outliers::new(noise, &near, &search, &hidden.1, seed)
-                    },
-                )?;
-                for ratio in plan.ratios() {
-                    let lists = clock.time(
-                        |s| &mut s.neighbors,
-                        || match (&given, ratio) {
-                            (Some(lists), _) => Ok(lists.clone()),
-                            (None, ratio) => near.lists(ratio.unwrap_or(1.0), &outliers, seed),
-                        },
-                    );
-                    let lists = lists.map_err(of_scheme)?;
-                    let measured = ratio.unwrap_or_else(|| near.measured_inlier_ratio(&lists));
-                    for &solver in &plan.solvers {
-                        let source = noise.map_or("given", Noise::name);
-                        let what =
-                            format!("{} at {measured:.2} {source}, {}", entry.name, solver.name());
-                        observer.progress(done, total, &what);
-                        // The attacker's own seed: that of the obfuscation is the owner's secret.
-                        let attacker = u64::from(repeat);
-                        let options = RecoverOptions { solver, delta: plan.delta, seed: attacker };
-                        let started = Instant::now();
-                        let recovered = recover(&hidden.0, &lists, &options)?;
-                        let took = started.elapsed().as_secs_f64();
-                        seconds[repeat_rows.len()] += took;
-                        clock.seconds.recover += took;
-                        let accuracy = clock.time(
-                            |s| &mut s.evaluate,
-                            || evaluate(&recovered, original, &hidden.1),
-                        )?;
-                        let mut row =
-                            blank(entry, plan, (k, solver, noise), measured, &recovered, &hidden.1);
-                        row.fill(&accuracy, &baseline, &plan.thresholds);
-                        observer.cell(&Cell {
-                            row: &row,
-                            repeat,
-                            original,
-                            secret: &hidden.1,
-                            released: &hidden.0,
-                            recovered: &recovered,
-                            accuracy: &accuracy,
-                        });
-                        repeat_rows.push(row);
-                        done += 1;
-                    }
-                }
+            }
+            if plan.reference {
+                let row = reference_row(entry, &hidden, original, &search, &baseline, plan);
+                repeat_rows.push(row);
+                done += 1;
             }
             by_repeat.push(repeat_rows);
         }
@@ -203,51 +212,78 @@ fn hide(
     )
 }
 
-fn translate(
-    given: &PointNeighbors,
-    secret: &Secret,
-    released: &Released<3>,
-) -> Result<Neighborhoods, Error> {
-    let scores = given.scores.as_deref();
-    let slots = released.slots_per_record();
-    oracle::from_points(&given.offsets, &given.neighbors, scores, secret, slots)
+/// The row of an attacker who is told where three true neighbors of every point are.
+fn reference_row(
+    entry: &Entry,
+    (released, secret): &(Released<3>, Secret),
+    original: &Original<3>,
+    search: &Knn<'_, 3>,
+    baseline: &Accuracy,
+    plan: &Plan,
+) -> Row {
+    let mut row = Row {
+        scheme: entry.name,
+        neighbors: REFERENCE.to_owned(),
+        oracle_noise: None,
+        inlier_ratio: 1.0,
+        k: 3,
+        solver: REFERENCE,
+        delta: 0.0,
+        unit: released.unit(),
+        n_points: released.n_slots(),
+        lost: Default::default(),
+        dropped: dropped(secret),
+        recovered_percent: Vec::new(),
+        blind_percent: Vec::new(),
+        axis_accuracy_percent: None,
+        exact_percent: None,
+        assignment_accuracy_percent: None,
+        error_percentiles: Vec::new(),
+        ransac_trials: None,
+        repeats: None,
+    };
+    row.fill(&reference(released, original, secret, search), baseline, &plan.thresholds);
+    row
 }
 
-/// A row with everything but the measurements.
-fn blank(
-    entry: &Entry,
-    plan: &Plan,
-    (k, solver, noise): (usize, Solver, Option<Noise>),
-    inlier_ratio: f64,
-    recovered: &Recovered<3>,
-    secret: &Secret,
-) -> Row {
-    let neighbors = match &plan.source {
-        Source::Oracle => "oracle".to_owned(),
-        Source::Given(given) => given.name.clone(),
-    };
-    let mut dropped = std::collections::BTreeMap::new();
+/// The name of that attacker: as a source and as a solver, though it is neither.
+pub const REFERENCE: &str = "reference";
+
+fn dropped(secret: &Secret) -> BTreeMap<&'static str, usize> {
+    let mut dropped = BTreeMap::new();
     for reason in DropReason::ALL {
         let n = secret.dropped().iter().filter(|d| d.reason == reason).count();
         if n > 0 {
             dropped.insert(reason.name(), n);
         }
     }
+    dropped
+}
+
+/// A row with everything but the measurements.
+fn blank(
+    entry: &Entry,
+    variant: &Variant<'_>,
+    (k, solver): (usize, Solver),
+    recovered: &Recovered<3>,
+    secret: &Secret,
+) -> Row {
     Row {
         scheme: entry.name,
-        neighbors,
-        oracle_noise: noise.map(Noise::name),
-        inlier_ratio,
+        neighbors: variant.source.name(),
+        oracle_noise: variant.noise.map(Noise::name),
+        inlier_ratio: 0.0,
         k,
         solver: solver.name(),
         delta: recovered.delta(),
         unit: recovered.unit(),
         n_points: recovered.n_slots(),
         lost: Default::default(),
-        dropped,
+        dropped: dropped(secret),
         recovered_percent: Vec::new(),
         blind_percent: Vec::new(),
         axis_accuracy_percent: None,
+        exact_percent: None,
         assignment_accuracy_percent: None,
         error_percentiles: Vec::new(),
         ransac_trials: recovered.trials().map(|trials| trials.bins().collect()),

@@ -2,6 +2,8 @@
 
 mod accuracy;
 mod blind;
+mod reference;
 
 pub use accuracy::{Accuracy, evaluate};
 pub use blind::blind;
+pub use reference::reference;

@@ -3,6 +3,7 @@
 use super::ray::from_centers;
 use super::{Entry, Lifted, Scheme, SchemeOptions};
 use crate::Error;
+use crate::released::Obfuscation;
 
 /// Ray clouds, voxel variant.
 #[derive(Clone, Copy, Debug)]
@@ -32,9 +33,13 @@ impl Scheme<3> for RayVoxel {
             low = std::array::from_fn(|c| low[c].min(point[c]));
         }
         let start = low.map(|x| x - 0.5 * options.voxel);
-        from_centers(points, seed, |_, point| {
+        let mut lifted = from_centers(points, seed, |_, point| {
             let cell = |c: usize| ((point[c] - start[c]) / options.voxel).floor();
             (0..3).map(|c| cell(c).rem_euclid(2.0) as usize).sum::<usize>() % 2
-        })
+        })?;
+        if let Obfuscation::Rays(rays) = lifted.obfuscation {
+            lifted.obfuscation = Obfuscation::Rays(rays.with_voxel(options.voxel)?);
+        }
+        Ok(lifted)
     }
 }

@@ -1,7 +1,7 @@
 //! How improbable an agreement is by chance (the evidence that decides between positions).
 //!
-//! Of `k` listed records `n` support a position, while of `m` null records `c` do. A wrong position
-//! gets Bin(k, p) votes with p about `(c + 1/2) / (m + 1)`, never 0. The evidence is the Chernoff
+//! Of `k` listed records `n` support a position, while a random one does with chance `p`. A wrong
+//! position gets Bin(k, p) votes. The evidence is the Chernoff
 //! bound on the tail, `k KL(n/k || p)` nats: it orders as the tail does, and splits into logarithms
 //! of integers, so four small tables replace one table per `k`.
 
@@ -67,6 +67,10 @@ pub(crate) fn evidence(n: usize, k: usize, p: f32) -> f32 {
 mod tests {
     use super::*;
 
+    fn chance(p: f64) -> Chance {
+        Chance { p: p as f32, ln_p: p.ln() as f32 }
+    }
+
     /// ln P(X >= n) for X ~ Bin(k, p), by summation.
     fn ln_tail(n: usize, k: usize, p: f64) -> f64 {
         let mut term = (1.0 - p).powi(k as i32);
@@ -82,22 +86,25 @@ mod tests {
 
     #[test]
     fn evidence_bounds_the_binomial_tail_and_orders_like_it() {
-        let chance = Chance::new(50, 100);
-        for (n, c) in [(26, 40), (4, 0), (10, 3), (50, 20), (1, 0)] {
-            let p = (c as f64 + 0.5) / 101.0;
-            let evidence = f64::from(chance.evidence(n, 50, c));
+        let improbability = Improbability::new(50);
+        for (n, p) in [(26, 0.4), (4, 0.005), (10, 0.035), (50, 0.2), (1, 0.005), (49, 0.5)] {
+            let of_tables = f64::from(improbability.evidence(n, 50, chance(p)));
+            let evidence = f64::from(evidence(n, 50, p as f32));
+            assert!((evidence - of_tables).abs() < 2e-3, "n {n} p {p}: {evidence} {of_tables}");
             // Chernoff: P(X >= n) <= exp(-k KL); tight up to a polynomial factor.
-            assert!(evidence <= -ln_tail(n, 50, p) + 1e-3, "n {n} c {c}");
-            assert!(evidence >= -ln_tail(n, 50, p) - 4.0, "n {n} c {c}");
+            assert!(evidence <= -ln_tail(n, 50, p) + 1e-3, "n {n} p {p}");
+            assert!(evidence >= -ln_tail(n, 50, p) - 4.0, "n {n} p {p}");
         }
         // 26 votes where 20 are expected are far likelier than 4 where 0.25 are.
-        assert!(chance.evidence(26, 50, 40) < chance.evidence(4, 50, 0));
+        let of = |n, p| improbability.evidence(n, 50, chance(p));
+        assert!(of(26, 0.4) < of(4, 0.005));
     }
 
     #[test]
     fn no_evidence_at_or_below_chance() {
-        let chance = Chance::new(50, 100);
-        assert_eq!(chance.evidence(0, 50, 0), 0.0);
-        assert_eq!(chance.evidence(10, 50, 20), 0.0);
+        let improbability = Improbability::new(50);
+        assert_eq!(improbability.evidence(0, 50, chance(0.005)), 0.0);
+        assert_eq!(improbability.evidence(10, 50, chance(0.2)), 0.0);
+        assert_eq!(evidence(10, 50, 0.2), 0.0);
     }
 }

@@ -5,7 +5,11 @@
 pub(crate) struct Grid<const D: usize> {
     low: [f32; D],
     cell: f32,
+    /// Cells per length.
+    per_length: f32,
     dims: [usize; D],
+    /// The last cell along each axis, as places are compared with it.
+    last: [f32; D],
     pub(crate) values: Vec<f32>,
 }
 
@@ -38,11 +42,12 @@ impl<const D: usize> Grid<D> {
     }
 
     fn of_cells(low: [f32; D], high: [f32; D], cell: f32) -> Self {
-        let dims = std::array::from_fn(|c| {
+        let dims: [usize; D] = std::array::from_fn(|c| {
             (((high[c] - low[c]) / cell).ceil() as usize).clamp(1, 1 << 20)
         });
         let values = vec![0.0; dims.iter().product()];
-        Self { low, cell, dims, values }
+        let last = dims.map(|n| (n - 1) as f32);
+        Self { low, cell, per_length: 1.0 / cell, dims, last, values }
     }
 
     /// The edge of a cell.
@@ -50,14 +55,13 @@ impl<const D: usize> Grid<D> {
         self.cell
     }
 
-    /// The cell of `place`.
+    /// The cell of `place`; far places, infinite ones included, land in border cells.
     #[inline(always)]
     pub(crate) fn index(&self, place: &[f32; D]) -> usize {
         let mut index = 0;
-        for c in 0..D {
-            let at = (place[c] - self.low[c]) / self.cell;
-            // The cast saturates: far places, infinite ones included, land in border cells.
-            index = index * self.dims[c] + (at as usize).min(self.dims[c] - 1);
+        for (c, &x) in place.iter().enumerate() {
+            let at = ((x - self.low[c]) * self.per_length).max(0.0).min(self.last[c]);
+            index = index * self.dims[c] + at as u32 as usize;
         }
         index
     }

@@ -8,6 +8,8 @@ mod chunks;
 mod confidence;
 mod consensus;
 mod delta;
+mod density;
+mod exact;
 mod family;
 mod grid;
 mod joint;
@@ -28,9 +30,11 @@ pub(crate) use recovered::stored_support;
 pub use recovered::{Estimate, Recovered, Status};
 
 use crate::Error;
+use crate::density::{published, tomography};
 use crate::neighbors::Neighborhoods;
 use crate::released::{Obfuscation, Released};
 use chunks::Chunks;
+use confidence::Solved;
 use delta::Prefer;
 use family::Family;
 use lists::Lists;
@@ -64,6 +68,17 @@ pub fn recover_and_look<const D: usize>(
         let expected = format!("{} rows, one per slot", released.n_slots());
         return Err(Error::new("neighborhoods", expected, lists.n_slots().to_string()));
     }
+    let descriptor_row = assign::descriptor_rows(released, lists);
+    let peaks = match options.solver {
+        Solver::Density => Some(published(released)),
+        Solver::Tomography => Some(tomography(released)),
+        Solver::Consensus | Solver::Joint | Solver::Ransac => None,
+    };
+    if let Some(peaks) = peaks {
+        // Nothing is known yet about how sure these are.
+        let placed = density::place(released, lists, &peaks, descriptor_row)?;
+        return Ok((placed, Seen { cues: Vec::new(), radius: 1.0 }));
+    }
     let family = Family::new(released, lists);
     // Joint recovery also asks who lists whom, from the first pass on.
     let graph = (options.solver == Solver::Joint)
@@ -89,12 +104,19 @@ pub fn recover_and_look<const D: usize>(
         }
         _ => (consensus(), None),
     };
-    let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
+    // The paper's loop stays as published.
+    let unsettled = estimates;
+    let estimates = if options.exact_constraints && options.solver != Solver::Ransac {
+        exact::settle(released, unsettled.clone(), delta as f32)
+    } else {
+        unsettled.clone()
+    };
     let slots_per_record = released.slots_per_record();
     let edges = (graph.as_ref(), lists);
-    let seen = confidence::look(&family, edges, slots_per_record, &estimates, delta as f32);
+    let solved = Solved { estimates: &estimates, unsettled: &unsettled, delta: delta as f32 };
+    let seen = confidence::look(&family, edges, slots_per_record, &solved);
     let confidence = confidence::of(&family, options.solver, &estimates, &seen);
-    let descriptor_row = assign::descriptor_rows(released, lists);
+    let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
     let (origin, unit) = (released.origin(), released.unit());
     let recovered = Recovered::try_new(&estimates, with_axis, descriptor_row, origin, unit, delta)?;
     Ok((recovered.with_trials(trials).with_confidence(confidence)?, seen))

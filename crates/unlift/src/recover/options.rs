@@ -12,11 +12,22 @@ pub enum Solver {
     Joint,
     /// The paper's sampling loop (section 4), for comparison.
     Ransac,
+    /// The published density attacks on the records alone (Chelani et al. 2021, Lee et al. 2023, Moon et
+    /// al. 2024), for comparison; recovers nothing from planes and axis candidates.
+    Density,
+    /// The density of points that makes the records likeliest, and the points where they meet it: our
+    /// strongest attack without neighborhoods. Recovers nothing from planes.
+    Tomography,
 }
 
 impl Solver {
     /// Every solver.
-    pub const ALL: [Solver; 3] = [Self::Consensus, Self::Joint, Self::Ransac];
+    pub const ALL: [Solver; 5] =
+        [Self::Joint, Self::Consensus, Self::Ransac, Self::Density, Self::Tomography];
+
+    /// The solvers that place points by their listed records. The others read the lists only to tell the
+    /// two slots of a paired line apart, and take no delta.
+    pub const FROM_LISTS: [Solver; 3] = [Self::Joint, Self::Consensus, Self::Ransac];
 
     /// The name users know it by.
     pub fn name(self) -> &'static str {
@@ -24,6 +35,8 @@ impl Solver {
             Self::Consensus => "consensus",
             Self::Joint => "joint",
             Self::Ransac => "ransac",
+            Self::Density => "density",
+            Self::Tomography => "tomography",
         }
     }
 
@@ -57,11 +70,14 @@ pub struct RecoverOptions {
     pub delta: Delta,
     /// The attacker's own seed: null samples and random trials.
     pub seed: u64,
+    /// Whether rules that tie records together are used where they fix coordinates: `cp` exchanges
+    /// values that are still in the map, `ray-voxel` leaves every other voxel along a ray.
+    pub exact_constraints: bool,
 }
 
 impl Default for RecoverOptions {
     fn default() -> Self {
-        Self { solver: Solver::Consensus, delta: Delta::Auto, seed: 0 }
+        Self { solver: Solver::Joint, delta: Delta::Auto, seed: 0, exact_constraints: true }
     }
 }
 

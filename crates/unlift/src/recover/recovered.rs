@@ -46,7 +46,8 @@ pub struct Estimate<const D: usize> {
     /// What became of the slot.
     pub status: Status,
     /// Listed records that the position was made of: within delta of it before the last refit (planes:
-    /// within 1.5 delta, summed over the free axes). Counts beyond 65,535 stay there.
+    /// within 1.5 delta, summed over the free axes). Joint recovery: records listed by the slot or by
+    /// whose slots its own is, with an estimate near. Counts beyond 65,535 stay there.
     pub support: u16,
     /// The axis on which the hidden coordinate lies (axis candidates only, else 0).
     pub axis: u8,

@@ -9,6 +9,7 @@ pub struct Rays<const D: usize> {
     centers: Vec<[f32; D]>,
     center: Vec<u8>,
     direction: Vec<[f32; D]>,
+    voxel: Option<f64>,
 }
 
 impl<const D: usize> Rays<D> {
@@ -47,7 +48,7 @@ impl<const D: usize> Rays<D> {
                 Ok(finite_f32(unit_direction(d, row)?, "direction", row)?.map(|x| x + 0.0))
             })
             .collect::<Result<_, Error>>()?;
-        Ok(Self { centers, center, direction })
+        Ok(Self { centers, center, direction, voxel: None })
     }
 
     /// The rows `order[0], order[1], ...`.
@@ -56,7 +57,25 @@ impl<const D: usize> Rays<D> {
             centers: self.centers.clone(),
             center: super::rows(&self.center, order),
             direction: super::rows(&self.direction, order),
+            voxel: self.voxel,
         }
+    }
+
+    /// The same rays, their centers given by the parity of a grid of voxels of this edge: a public
+    /// parameter of the scheme. Where the grid starts is not published.
+    ///
+    /// # Errors
+    /// When `edge` is not a positive length.
+    pub fn with_voxel(self, edge: f64) -> Result<Self, Error> {
+        if !(edge.is_finite() && edge > 0.0) {
+            return Err(Error::new("voxel", "a positive length", edge.to_string()));
+        }
+        Ok(Self { voxel: Some(edge), ..self })
+    }
+
+    /// The edge of the voxels whose parity gives the centers, in the unit of the map, if it is so.
+    pub fn voxel(&self) -> Option<f64> {
+        self.voxel
     }
 
     /// Number of rays.

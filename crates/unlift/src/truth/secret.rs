@@ -132,6 +132,23 @@ impl Secret {
         &self.descriptor_row
     }
 
+    /// The same secret with slots counted as descriptor rows are: slot `s` hides the point of
+    /// descriptor row `s`. Which slot of a record comes first is arbitrary; who makes lists from
+    /// descriptors counts this way, having no other.
+    #[must_use]
+    pub fn by_descriptor_row(&self) -> Self {
+        let mut by_row = self.clone();
+        for (slot, &row) in self.descriptor_row.iter().enumerate() {
+            let row = row as usize;
+            by_row.hidden[row] = self.hidden[slot];
+            if let (Some(to), Some(from)) = (&mut by_row.swapped_axis, &self.swapped_axis) {
+                to[row] = from[slot];
+            }
+            by_row.descriptor_row[row] = row as u32;
+        }
+        by_row
+    }
+
     /// Points that are in no record.
     pub fn dropped(&self) -> &[Dropped] {
         &self.dropped

@@ -35,6 +35,8 @@ fn arrows_against_the_stream_are_found_however_they_are_written() {
         ("neighbors/neighborhoods.rs", "use crate::truth::Secret;"),
         ("neighbors/line_distance.rs", "use crate::truth::Secret;"),
         ("neighbors/oracle/mod.rs", "use crate::recover::Recovered;"),
+        ("density/mod.rs", "use crate::neighbors::Neighborhoods;"),
+        ("density/mod.rs", "use crate::truth::Original;"),
         ("obfuscate/olc.rs", "use crate::neighbors::Neighborhoods;"),
         ("evaluate/mod.rs", "use crate::obfuscate::SCHEMES;"),
         ("evaluate/mod.rs", "use crate::audit::Row;"),

@@ -22,10 +22,12 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("synthetic", &[]),
     ("truth", &[]),
     ("released", &[]),
+    // Used by `neighbors` (lists) and `recover` (positions), which may not know each other's making.
+    ("density", &["released"]),
     ("obfuscate", &["truth", "released"]),
-    ("neighbors", &["released"]),
+    ("neighbors", &["released", "density"]),
     ("neighbors/oracle/", &["truth", "released"]),
-    ("recover", &["released", "neighbors"]),
+    ("recover", &["released", "neighbors", "density"]),
     ("evaluate", &["truth", "released", "recover"]),
     ("audit", &["truth", "released", "obfuscate", "neighbors", "recover", "evaluate"]),
 ];

@@ -21,6 +21,8 @@ macro_rules! over_schemes {
 }
 
 mod degenerate;
+mod density;
+mod exact;
 mod gauge;
 mod maps;
 mod noise;

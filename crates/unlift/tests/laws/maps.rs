@@ -105,12 +105,12 @@ pub fn random_lists<const D: usize>(hidden: &Hidden<D>, k: usize, seed: u64) -> 
     hidden.lists_of(&(0..hidden.released.n_slots()).map(row).collect::<Vec<_>>())
 }
 
-/// Both solvers, both ways to choose delta.
+/// The solvers that read lists, both ways to choose delta.
 pub fn all_options() -> Vec<RecoverOptions> {
     let mut options = Vec::new();
-    for solver in Solver::ALL {
+    for solver in Solver::FROM_LISTS {
         for delta in [Delta::Fixed(0.1), Delta::Auto] {
-            options.push(RecoverOptions { solver, delta, seed: 3 });
+            options.push(RecoverOptions { solver, delta, seed: 3, ..RecoverOptions::default() });
         }
     }
     options

@@ -137,7 +137,12 @@ fn bounded_influence<const D: usize>(name: &str, scheme: &dyn Scheme<D>, seed: u
         .collect();
     let without: Vec<Vec<u32>> =
         agreeing.iter().map(|row| row.iter().skip(1).copied().collect()).collect();
-    let options = RecoverOptions { solver: Solver::Consensus, delta: Delta::Fixed(DELTA), seed: 3 };
+    let options = RecoverOptions {
+        solver: Solver::Consensus,
+        delta: Delta::Fixed(DELTA),
+        seed: 3,
+        ..RecoverOptions::default()
+    };
     let lists = hidden.lists_of(&without);
     let alone = solve(&hidden.released, &lists, options);
     let mut with = without.clone();

@@ -7,14 +7,14 @@
 
 use rayon::prelude::*;
 
-use super::Seen;
 use super::edges::Edges;
+use super::{Seen, Solved};
 use crate::recover::chance;
-use crate::recover::joint::{Density, Pieces, Places};
+use crate::recover::joint::{Density, Pieces, Places, distance2};
 use crate::recover::{Estimate, Status};
 
 /// Number of cues.
-pub const N_CUES: usize = 16;
+pub const N_CUES: usize = 18;
 
 /// The cues of one slot.
 pub type Cues = [f32; N_CUES];
@@ -46,6 +46,8 @@ struct Crowd {
     listed: f32,
     /// The share of members whose records may vote.
     voting_share: f32,
+    /// How far exact constraints moved the estimate, if they did.
+    settled: Option<f32>,
     /// The mean of the logarithm of the members' own evidence; of the second pass.
     of_members: f32,
     sparsity: f32,
@@ -64,9 +66,9 @@ struct Look<'a, const D: usize, P, E> {
 pub(super) fn of<const D: usize, P: Pieces<D>, E: Edges>(
     pieces: &P,
     edges: &E,
-    estimates: &[Estimate<D>],
-    delta: f32,
+    solved: &Solved<'_, D>,
 ) -> Seen {
+    let Solved { estimates, unsettled, delta } = *solved;
     let slots_per_record = pieces.slots_per_record();
     let places = Places::new(estimates);
     let listed = edges.times_listed(estimates.len() / slots_per_record);
@@ -78,6 +80,11 @@ pub(super) fn of<const D: usize, P: Pieces<D>, E: Edges>(
             let slot = part * PART + at;
             if estimates[slot].status == Status::Ok {
                 *crowd = look.crowd(slot, &estimates[slot], near);
+                let before = &unsettled[slot];
+                if before.status == Status::Ok {
+                    let moved2 = distance2(&before.position, &estimates[slot].position);
+                    crowd.settled = (moved2 > 0.0).then(|| moved2.sqrt());
+                }
             }
         }
     });
@@ -238,6 +245,8 @@ impl Map {
             ln(crowd.listed.max(0.1)),
             crowd.voting_share,
             self.voting_share,
+            if crowd.settled.is_some() { 1.0 } else { 0.0 },
+            libm::log1pf(crowd.settled.unwrap_or(0.0) / self.radius),
         ]
     }
 }

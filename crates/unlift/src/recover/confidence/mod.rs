@@ -30,36 +30,44 @@ pub struct Seen {
     pub radius: f64,
 }
 
-/// Looks around `estimates`, along `graph` where there is one, else along `lists`.
+/// What recovery found.
+pub(super) struct Solved<'a, const D: usize> {
+    /// Per slot.
+    pub(super) estimates: &'a [Estimate<D>],
+    /// The same before exact constraints moved them.
+    pub(super) unsettled: &'a [Estimate<D>],
+    /// The distance that decided support.
+    pub(super) delta: f32,
+}
+
+/// Looks around estimates, along `graph` where there is one, else along `lists`.
 pub(super) fn look<const D: usize>(
     family: &Family<'_, D>,
     (graph, lists): (Option<&Graph>, &Neighborhoods),
     slots_per_record: usize,
-    estimates: &[Estimate<D>],
-    delta: f32,
+    solved: &Solved<'_, D>,
 ) -> Seen {
     match graph {
-        Some(graph) => look_along(family, &BothWays { graph, slots_per_record }, estimates, delta),
-        None => look_along(family, &Listed { lists, slots_per_record }, estimates, delta),
+        Some(graph) => look_along(family, &BothWays { graph, slots_per_record }, solved),
+        None => look_along(family, &Listed { lists, slots_per_record }, solved),
     }
 }
 
 fn look_along<const D: usize, E: Edges>(
     family: &Family<'_, D>,
     edges: &E,
-    estimates: &[Estimate<D>],
-    delta: f32,
+    solved: &Solved<'_, D>,
 ) -> Seen {
     match family {
         Family::Lines { rows, slots_per_record, chance } => {
-            let pieces = LinePieces::new(rows, *slots_per_record, chance, delta);
-            cues::of(&pieces, edges, estimates, delta)
+            let pieces = LinePieces::new(rows, *slots_per_record, chance, solved.delta);
+            cues::of(&pieces, edges, solved)
         }
         Family::Planes { planes, sorted } => {
-            cues::of(&PlanePieces::new(planes, sorted, delta), edges, estimates, delta)
+            cues::of(&PlanePieces::new(planes, sorted, solved.delta), edges, solved)
         }
         Family::Candidates { rows, chance } => {
-            cues::of(&CandidatePieces::new(rows, chance, delta), edges, estimates, delta)
+            cues::of(&CandidatePieces::new(rows, chance, solved.delta), edges, solved)
         }
     }
 }

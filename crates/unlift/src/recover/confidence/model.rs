@@ -9,7 +9,7 @@ use crate::recover::family::Family;
 pub const N_KINDS: usize = 5;
 
 /// Pairs of cues whose products count too.
-const PRODUCTS: [(usize, usize); 19] = [
+const PRODUCTS: [(usize, usize); 21] = [
     (0, 0),
     (2, 2),
     (3, 3),
@@ -29,6 +29,8 @@ const PRODUCTS: [(usize, usize); 19] = [
     (0, 14),
     (0, 15),
     (14, 15),
+    (0, 16),
+    (9, 16),
 ];
 
 /// Number of terms: the constant, the cues, and the products.
@@ -95,7 +97,8 @@ pub fn centered(terms: [f32; N_TERMS], center: &[f32], spread: &[f32]) -> [f32; 
 /// What `cues` say about slots solved by `solver`; lengths are multiples of `radius`.
 pub(super) fn confidence(solver: Solver, kind: usize, cues: &Cues, radius: f32) -> Confidence {
     let of_solver = match solver {
-        Solver::Consensus => 0,
+        // The attacks on records alone have no cues and never come here.
+        Solver::Consensus | Solver::Density | Solver::Tomography => 0,
         Solver::Joint => 1,
         Solver::Ransac => 2,
     };

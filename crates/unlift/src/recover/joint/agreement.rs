@@ -11,7 +11,7 @@ use super::pieces::Pieces;
 use crate::recover::{Estimate, Status};
 
 /// Slots looked at.
-const SLOTS: usize = 1 << 13;
+const SLOTS: usize = 1 << 12;
 
 /// The mean number of records at the other ends of a slot's edges that pass near its estimate, less
 /// that expected by chance.

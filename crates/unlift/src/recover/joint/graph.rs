@@ -19,6 +19,8 @@ const REVERSE: usize = 1;
 const MUTUAL: usize = 2;
 /// Classes of scores per direction.
 const SCORE_CLASSES: usize = 8;
+/// Where score classes begin, as shares of all entries: finer at the top, where most neighbors are.
+const SCORE_RANKS: [f64; SCORE_CLASSES - 1] = [0.3, 0.55, 0.72, 0.84, 0.91, 0.955, 0.98];
 /// Classes of edges at most.
 pub(crate) const CLASSES: usize = 3 * SCORE_CLASSES;
 
@@ -203,8 +205,9 @@ fn score_classes(lists: &Neighborhoods) -> impl Fn(usize) -> u8 + Sync + '_ {
         let every = scores.len().div_ceil(1 << 16).max(1);
         let mut sample: Vec<f32> = scores.iter().step_by(every).copied().collect();
         sample.sort_unstable_by(f32::total_cmp);
-        (1..SCORE_CLASSES)
-            .filter_map(|c| sample.get(c * sample.len() / SCORE_CLASSES).copied())
+        SCORE_RANKS
+            .iter()
+            .filter_map(|share| sample.get((share * sample.len() as f64) as usize).copied())
             .collect()
     });
     move |at| match lists.scores() {

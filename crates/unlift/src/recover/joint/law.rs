@@ -15,9 +15,9 @@ use crate::seed::{Draws, Stage};
 /// Bins of the radius.
 const BINS: usize = 48;
 /// Random edges per slot.
-const RANDOM: usize = 32;
+const RANDOM: usize = 24;
 /// Slots looked at.
-const SLOTS: usize = 1 << 13;
+const SLOTS: usize = 1 << 12;
 /// The share of neighbors in a class is at most and at least this.
 const SHARE: (f64, f64) = (5e-4, 0.95);
 

@@ -11,6 +11,7 @@ mod agreement;
 mod density;
 mod graph;
 mod law;
+mod near;
 mod pieces;
 mod places;
 mod slot;
@@ -19,7 +20,7 @@ mod small;
 pub(crate) use density::Density;
 pub(crate) use graph::{Graph, either};
 pub(crate) use pieces::{CandidatePieces, LinePieces, Pieces, PlanePieces};
-pub(crate) use places::Places;
+pub(crate) use places::{Places, distance2};
 
 use rayon::prelude::*;
 

@@ -26,16 +26,11 @@ impl<const D: usize> Piece<D> {
     /// The place of the piece nearest to `x`.
     #[inline(always)]
     pub(crate) fn project(&self, x: &[f32; D]) -> [f32; D] {
-        let mut ahead = 0.0;
-        for c in 0..D {
-            ahead += self.sense[c] * (x[c] - self.through[c]);
-        }
+        let away: [f32; D] = std::array::from_fn(|c| x[c] - self.through[c]);
+        let ahead: f32 = away.iter().zip(&self.sense).map(|(a, s)| s * a).sum();
         let keep = if ahead < 0.0 { 0.0 } else { 1.0 };
         std::array::from_fn(|r| {
-            let mut moved = 0.0;
-            for c in 0..D {
-                moved += self.along[r][c] * (x[c] - self.through[c]);
-            }
+            let moved: f32 = away.iter().zip(&self.along[r]).map(|(a, along)| along * a).sum();
             self.through[r] + keep * moved
         })
     }
@@ -111,16 +106,10 @@ impl<const D: usize> Pieces<D> for LinePieces<'_, D> {
     #[inline(always)]
     fn record_distance2(&self, record: usize, x: &[f32; D]) -> f32 {
         let row = &self.rows[record];
-        let (mut t, mut square) = (0.0, 0.0);
-        for c in 0..D {
-            t += (x[c] - row.through[c]) * row.direction[c];
-        }
+        let away: [f32; D] = std::array::from_fn(|c| x[c] - row.through[c]);
+        let t: f32 = away.iter().zip(&row.direction).map(|(a, d)| a * d).sum();
         let t = t.max(row.floor());
-        for c in 0..D {
-            let d = x[c] - row.through[c] - t * row.direction[c];
-            square += d * d;
-        }
-        square
+        away.iter().zip(&row.direction).map(|(a, d)| (a - t * d) * (a - t * d)).sum()
     }
 
     #[inline(always)]
@@ -211,8 +200,8 @@ impl<const D: usize> Pieces<D> for CandidatePieces<'_, D> {
     #[inline(always)]
     fn record_distance2(&self, record: usize, x: &[f32; D]) -> f32 {
         let (mut sum, mut largest) = (0.0f32, 0.0f32);
-        for c in 0..D {
-            let d = x[c] - self.rows[record][c];
+        for (x, published) in x.iter().zip(&self.rows[record]) {
+            let d = x - published;
             sum += d * d;
             largest = largest.max(d * d);
         }

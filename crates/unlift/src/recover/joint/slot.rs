@@ -3,10 +3,10 @@
 use super::density::Density;
 use super::graph::{Graph, either, is_reverse};
 use super::law::Law;
+use super::near::{Columns, ln};
 use super::pieces::{Piece, Pieces};
 use super::places::{Places, distance2};
 use super::small::solve_symmetric;
-use crate::recover::sections::LANES;
 use crate::recover::{Estimate, Status, stored_support};
 
 /// Everything a round reads.
@@ -35,84 +35,6 @@ const PRIOR: f32 = 0.5;
 /// Least squares steps.
 const STEPS: usize = 2;
 
-/// Columns of estimates near a piece.
-#[derive(Debug)]
-struct Near<const D: usize> {
-    x: [Vec<f32>; D],
-    odds: Vec<f32>,
-    /// The edge and the slot of each estimate.
-    from: Vec<(u32, u32)>,
-}
-
-impl<const D: usize> Default for Near<D> {
-    fn default() -> Self {
-        Self { x: std::array::from_fn(|_| Vec::new()), odds: Vec::new(), from: Vec::new() }
-    }
-}
-
-impl<const D: usize> Near<D> {
-    fn clear(&mut self) {
-        self.x.iter_mut().for_each(Vec::clear);
-        self.odds.clear();
-        self.from.clear();
-    }
-
-    #[inline(always)]
-    fn push(&mut self, x: &[f32; D], odds: f32, from: (u32, u32)) {
-        for c in 0..D {
-            self.x[c].push(x[c]);
-        }
-        self.odds.push(odds);
-        self.from.push(from);
-    }
-
-    #[inline(always)]
-    fn at(&self, i: usize) -> [f32; D] {
-        std::array::from_fn(|c| self.x[c][i])
-    }
-
-    /// Fills up the last vector with estimates that say nothing.
-    fn pad(&mut self) {
-        let n = self.odds.len().next_multiple_of(LANES);
-        self.x.iter_mut().for_each(|column| column.resize(n, 0.0));
-        self.odds.resize(n, 0.0);
-    }
-
-    /// The logarithm of how much likelier these estimates are about a point at `x` than by chance:
-    /// the sum of `ln(1 + odds * gain * (1 + r^2 / a^2)^-3)`.
-    #[inline(always)]
-    fn log_likelihood(&self, x: &[f32; D], gain: f32, inverse_a2: f32) -> f32 {
-        let mut sums = [0.0f32; LANES];
-        let (odds, _) = self.odds.as_chunks::<LANES>();
-        let columns: [&[[f32; LANES]]; D] =
-            std::array::from_fn(|c| &self.x[c].as_chunks::<LANES>().0[..odds.len()]);
-        for (i, odds) in odds.iter().enumerate() {
-            for lane in 0..LANES {
-                let mut r2 = 0.0;
-                for c in 0..D {
-                    let d = columns[c][i][lane] - x[c];
-                    r2 += d * d;
-                }
-                let q = 1.0 / (1.0 + r2 * inverse_a2);
-                sums[lane] += ln(1.0 + odds[lane] * gain * (q * q * q));
-            }
-        }
-        sums.iter().sum()
-    }
-}
-
-/// The logarithm of a positive number, to 2e-6: exponent plus a polynomial of the mantissa, without
-/// branches.
-#[inline(always)]
-fn ln(y: f32) -> f32 {
-    let bits = y.to_bits();
-    let exponent = (bits >> 23) as i32 - 127;
-    let m = f32::from_bits(bits & 0x007f_ffff | 0x3f80_0000) - 1.0;
-    // ln(1 + m) on [0, 1), zero at 0, fitted for the smallest largest error.
-    let p = m * (0.317_648_7 + m * (-0.193_760_2 + m * (0.085_569_24 - m * 0.018_338_63)));
-    exponent as f32 * std::f32::consts::LN_2 + m * (0.999_901_65 + m * (-0.497_875 + p))
-}
-
 /// A position that could win.
 #[derive(Clone, Copy, Debug)]
 struct Candidate<const D: usize> {
@@ -125,13 +47,15 @@ struct Candidate<const D: usize> {
 /// Buffers of one thread.
 #[derive(Debug)]
 pub(crate) struct Scratch<const D: usize> {
-    near: [Near<D>; D],
+    all: Columns<D>,
+    near: [Columns<D>; D],
     best: Vec<Candidate<D>>,
 }
 
 impl<const D: usize> Default for Scratch<D> {
     fn default() -> Self {
-        Self { near: std::array::from_fn(|_| Near::default()), best: Vec::new() }
+        let near = std::array::from_fn(|_| Columns::default());
+        Self { all: Columns::default(), near, best: Vec::new() }
     }
 }
 
@@ -144,13 +68,14 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         old: &Estimate<D>,
         scratch: &mut Scratch<D>,
     ) -> Estimate<D> {
-        let partner = self.partner(slot);
         scratch.best.clear();
+        self.gather(slot, &mut scratch.all);
+        let reach = TUBE * self.law.radius;
         for piece in 0..P::PER_SLOT {
             let own = self.pieces.piece(slot, piece);
-            self.gather(slot, &own, &partner, &mut scratch.near[piece]);
+            scratch.all.near(&own, reach, &mut scratch.near[piece]);
             let near = &scratch.near[piece];
-            let n = near.from.len();
+            let n = near.len();
             let step = n.div_ceil(CANDIDATES).max(1);
             for i in (0..n).step_by(step) {
                 let x = own.project(&near.at(i));
@@ -165,6 +90,9 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         };
         let own = self.pieces.piece(slot, first.piece);
         let near = &scratch.near[first.piece];
+        if near.len() == 0 {
+            return *old;
+        }
         let mut x = first.x;
         let mut support = 0;
         for _ in 0..STEPS {
@@ -207,45 +135,42 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         (self.law.center / (volume * density), self.law.inverse_a2 / (width * width), density)
     }
 
-    /// Estimates of the slots at the other ends that lie near `own`.
+    /// The estimates of all slots at the other ends of the edges of `slot`.
     #[inline(always)]
-    fn gather(
-        &self,
-        slot: usize,
-        own: &Piece<D>,
-        partner: &Option<([f32; D], f32, f32)>,
-        near: &mut Near<D>,
-    ) {
-        near.clear();
+    fn gather(&self, slot: usize, all: &mut Columns<D>) {
+        all.clear();
         let slots_per_record = self.pieces.slots_per_record();
-        let reach = TUBE * self.law.radius;
+        let partner = self.partner(slot);
         let (ends, class) = self.graph.of(slot);
-        for (edge, (&end, &class)) in ends.iter().zip(class).enumerate() {
-            let either = either(class, slots_per_record);
-            let odds = self.law.odds[usize::from(class)];
-            for of_record in 0..if either { 2 } else { 1 } {
-                let at = end as usize + of_record;
-                let e = self.places.of(at);
-                if distance2(&own.project(&e), &e) < reach * reach {
-                    let odds = match partner {
-                        // An edge that belongs to the other slot as well as to this one is shared.
-                        Some((x, gain, inverse_a2)) if is_reverse(class) => {
-                            let q = 1.0 / (1.0 + distance2(x, &e) * inverse_a2);
-                            odds / (1.0 + odds * gain * q * q * q)
-                        }
-                        // Either of two slots is twice as likely to lie anywhere.
-                        _ if either => 0.5 * odds,
-                        _ => odds,
-                    };
-                    near.push(&e, odds, (edge as u32, at as u32));
-                }
+        // Lost slots are far away, but an absurd delta reaches everywhere.
+        let mut push = |slot: u32, odds: f32| {
+            if self.places.is_known(slot as usize) {
+                all.push(&self.places.of(slot as usize), odds, slot);
             }
+        };
+        for (&end, &class) in ends.iter().zip(class) {
+            let odds = self.law.odds[usize::from(class)];
+            if either(class, slots_per_record) {
+                // Either of two slots is twice as likely to lie anywhere.
+                push(end, 0.5 * odds);
+                push(end + 1, 0.5 * odds);
+                continue;
+            }
+            let odds = match &partner {
+                // An edge that belongs to the other slot as well as to this one is shared.
+                Some((x, gain, inverse_a2)) if is_reverse(class) => {
+                    let apart2 = distance2(x, &self.places.of(end as usize));
+                    let q = 1.0 / (1.0 + apart2 * inverse_a2);
+                    odds / (1.0 + odds * gain * q * q * q)
+                }
+                _ => odds,
+            };
+            push(end, odds);
         }
-        near.pad();
     }
 
     #[inline(always)]
-    fn consider(&self, near: &Near<D>, x: [f32; D], piece: usize, best: &mut Vec<Candidate<D>>) {
+    fn consider(&self, near: &Columns<D>, x: [f32; D], piece: usize, best: &mut Vec<Candidate<D>>) {
         let (gain, inverse_a2, density) = self.law_at(&x);
         let prior = PRIOR * ln(density);
         let score = prior + near.log_likelihood(&x, gain, inverse_a2);
@@ -271,8 +196,8 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
             }
         }
         if let Some(second) = second
-            && second.score + self.from_records(slot, &second.x)
-                > best.score + self.from_records(slot, &best.x)
+            && second.score + self.by_records(slot, &second.x)
+                > best.score + self.by_records(slot, &best.x)
         {
             return Some(second);
         }
@@ -281,7 +206,7 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
 
     /// What records near `x` add where their estimates are elsewhere.
     #[inline(always)]
-    fn from_records(&self, slot: usize, x: &[f32; D]) -> f32 {
+    fn by_records(&self, slot: usize, x: &[f32; D]) -> f32 {
         let slots_per_record = self.pieces.slots_per_record();
         let (gain, inverse_a2, _) = self.law_at(x);
         let chance = self.pieces.record_chance(slot, x);
@@ -304,23 +229,29 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
 
     /// `x` moved along `own` to the least squares of the records of near neighbors, weighted by how near
     /// their estimates are. Estimates hold fully across their own pieces, and a little along them.
+    /// With it the number of these records.
     #[inline(always)]
-    fn remake(&self, own: &Piece<D>, near: &Near<D>, x: &[f32; D]) -> ([f32; D], u32) {
+    fn remake(&self, own: &Piece<D>, near: &Columns<D>, x: &[f32; D]) -> ([f32; D], u32) {
         let width = self.density.width(self.density.at(x));
         let inverse_kernel2 = 1.0 / (self.kernel * self.kernel * width * width);
         // The sum of weighted matrices splits: the identity, and the neighbors' own pieces.
         let (mut weight, mut pull) = (0.0f32, [0.0f32; D]);
         let (mut free, mut free_pull) = ([[0.0f32; D]; D], [0.0f32; D]);
-        let mut n = 0;
-        for i in 0..near.from.len() {
+        let (mut n, mut records, mut last) = (0, 0, usize::MAX);
+        let slots_per_record = self.pieces.slots_per_record();
+        for i in 0..near.len() {
             let e = near.at(i);
             let closeness = 1.0 - distance2(&e, x) * inverse_kernel2;
             if closeness <= 0.0 {
                 continue;
             }
-            let at = near.from[i].1 as usize;
+            let at = near.slot(i);
             let along = self.pieces.piece(at, self.places.piece(at)).along;
             n += 1;
+            // Both slots of a paired line are one record; they stand side by side.
+            let record = at / slots_per_record;
+            records += u32::from(record != last);
+            last = record;
             weight += closeness;
             for r in 0..D {
                 pull[r] += closeness * (e[r] - x[r]);
@@ -341,7 +272,7 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
             hold[r][r] += weight;
             pull[r] -= free_share * free_pull[r];
         }
-        (own.project(&solve_within(own, x, &hold, &pull, weight)), n)
+        (own.project(&solve_within(own, x, &hold, &pull, weight)), records)
     }
 }
 

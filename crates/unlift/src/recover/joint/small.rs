@@ -9,8 +9,9 @@ pub(crate) fn solve_symmetric<const D: usize>(a: &mut [[f32; D]; D], b: &mut [f3
         }
         for r in i + 1..D {
             let f = a[r][i] / a[i][i];
-            for c in i..D {
-                a[r][c] -= f * a[i][c];
+            let pivot = a[i];
+            for (value, p) in a[r].iter_mut().zip(&pivot).skip(i) {
+                *value -= f * p;
             }
             b[r] -= f * b[i];
         }

@@ -1,7 +1,5 @@
 //! The twin itself: all choices a slot has, with what decides between them.
 
-use crate::recover::null_sample::NULL_RECORDS;
-
 /// A position that could win, and what decides.
 #[derive(Debug)]
 pub(super) struct Choice {
@@ -60,11 +58,11 @@ impl Vote {
 /// Every start of an interval with its score and the position least squares makes of it.
 pub(super) fn options_along(
     listed: &[Vote],
-    null: &[Vote],
     k: usize,
     delta: f64,
     floor: f64,
-    at: impl Fn(f64) -> Vec<f64>,
+    at: impl Fn(f64) -> [f64; 3],
+    chance: impl Fn(&[f64; 3]) -> f64,
 ) -> Vec<Choice> {
     // A start counts for itself: rounding of a square root must not decide that.
     let slack = delta * delta * (1.0 + 1e-9);
@@ -81,7 +79,7 @@ pub(super) fn options_along(
         .filter_map(|vote| vote.start(delta))
         .map(|start| {
             let mut t = start.max(floor);
-            let p = (count(null, t) + 0.5) / (NULL_RECORDS as f64 + 1.0);
+            let p = chance(&at(t));
             let evidence = evidence(count(listed, t), k as f64, p);
             let score = evidence + p.ln();
             for _ in 0..2 {
@@ -95,7 +93,7 @@ pub(super) fn options_along(
                     t = near.iter().map(|&(at, bend)| bend * at).sum::<f64>() / weight;
                 }
             }
-            Choice { position: at(t.max(floor)), score, evidence }
+            Choice { position: at(t.max(floor)).to_vec(), score, evidence }
         })
         .collect()
 }
@@ -131,27 +129,25 @@ pub(super) fn section(own: &Line, other: &Line) -> Option<Vote> {
     Some(Vote { terms: vec![(miss.iter().map(|x| x * x).sum(), t, bend)] })
 }
 
-/// The options of a slot on `own`, given the lines listed for it and the null sample.
+/// The options of a slot on `own`, given the lines listed for it and the chance of a place.
 pub(super) fn line_options(
     rows: &[Line],
     own: usize,
     listed: &[usize],
-    null: &[usize],
     delta: f64,
+    chance: impl Fn(&[f64; 3]) -> f64,
 ) -> Vec<Choice> {
     let own = &rows[own];
-    let votes = |of: &[usize]| -> Vec<Vote> {
-        of.iter().filter_map(|&other| section(own, &rows[other])).collect()
-    };
     let may_vote = |&&other: &&usize| own.2.is_none() || rows[other].2 != own.2;
     let k = listed.iter().filter(may_vote).count();
     let floor = if own.2.is_some() { 0.0 } else { f64::NEG_INFINITY };
-    let votes_of_listed = votes(listed);
+    let votes_of_listed: Vec<Vote> =
+        listed.iter().filter_map(|&other| section(own, &rows[other])).collect();
     if votes_of_listed.len() < 2 {
         return Vec::new();
     }
-    let at = |t: f64| (0..3).map(|c| own.0[c] + t * own.1[c]).collect();
-    options_along(&votes_of_listed, &votes(null), k, delta, floor, at)
+    let at = |t: f64| std::array::from_fn(|c| own.0[c] + t * own.1[c]);
+    options_along(&votes_of_listed, k, delta, floor, at, chance)
 }
 
 /// The options of an axis candidate: each own axis against all lines of every record.
@@ -159,8 +155,8 @@ pub(super) fn candidate_options(
     rows: &[[f64; 3]],
     own: usize,
     listed: &[usize],
-    null: &[usize],
     delta: f64,
+    chance: impl Fn(&[f64; 3]) -> f64,
 ) -> Vec<Choice> {
     let p = rows[own];
     let mut options = Vec::new();
@@ -174,10 +170,10 @@ pub(super) fn candidate_options(
             };
             Vote { terms: (0..3).map(line).collect() }
         };
-        let votes = |of: &[usize]| of.iter().map(vote).collect::<Vec<_>>();
-        let at = |t: f64| (0..3).map(|c| if c == axis { t } else { p[c] }).collect();
+        let votes: Vec<Vote> = listed.iter().map(vote).collect();
+        let at = |t: f64| std::array::from_fn(|c| if c == axis { t } else { p[c] });
         let none = f64::NEG_INFINITY;
-        options.extend(options_along(&votes(listed), &votes(null), listed.len(), delta, none, at));
+        options.extend(options_along(&votes, listed.len(), delta, none, at, &chance));
     }
     options
 }

@@ -1,15 +1,15 @@
 //! A brute-force twin of the solvers: `f64` throughout, every interval start and every window tried,
-//! nothing reused, nothing pruned. Only the null sample is shared, since it is drawn.
+//! nothing reused, nothing pruned. Only the field of chance is shared: it is data to both.
 
 mod brute;
 
 use super::solve;
 use crate::RecordId;
 use crate::neighbors::Neighborhoods;
+use crate::recover::chance_field::tube;
 use crate::recover::chunks::Chunks;
 use crate::recover::family::Family;
 use crate::recover::lists::Lists;
-use crate::recover::null_sample::draw;
 use crate::recover::{Estimate, Status};
 use crate::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
 use crate::seed::{Draws, Stage};
@@ -71,18 +71,17 @@ fn check(
     what: &str,
     obfuscation: Result<Obfuscation<3>, Error>,
     delta: f64,
-    judge: impl Fn(usize, &[usize], &Estimate<3>, Lists<'_>) -> Result<f64, String>,
+    judge: impl Fn(usize, &[usize], &Estimate<3>, &Family<'_, 3>) -> Result<f64, String>,
 ) {
     let mut draws = Draws::new(SEED, Stage::Synthetic, 2);
     let neighborhoods = lists(N, &mut draws);
     let released = released(obfuscation.unwrap());
-    let family = Family::new(&released);
-    let given = Lists::given(&neighborhoods);
-    let solved = solve(&family, given, delta as f32, SEED, Chunks::All);
+    let family = Family::new(&released, &neighborhoods);
+    let solved = solve(&family, Lists::given(&neighborhoods), delta as f32, Chunks::All);
     let mut wrong = Vec::new();
     for (slot, estimate) in solved.iter().enumerate() {
         let listed: Vec<usize> = neighborhoods.of(slot).iter().map(|r| r.index()).collect();
-        match judge(slot, &listed, estimate, given) {
+        match judge(slot, &listed, estimate, &family) {
             Ok(evidence) if estimate.status == Status::Ok => {
                 let off = (evidence - f64::from(estimate.evidence)).abs();
                 assert!(off <= 1e-3 * (1.0 + evidence), "{what}: evidence is {off} off");
@@ -100,11 +99,12 @@ fn widen(position: &[f32; 3]) -> Vec<f64> {
 }
 
 fn lines_equal_their_twin(rows: &[Line], obfuscation: Obfuscation<3>, what: &str, delta: f64) {
-    check(what, Ok(obfuscation), delta, |slot, listed, estimate, lists| {
-        let may_vote = |r: RecordId| rows[slot].2.is_none() || rows[r.index()].2 != rows[slot].2;
-        let null: Vec<usize> =
-            draw(lists, slot, SEED, may_vote).iter().map(|r| r.index()).collect();
-        let options = line_options(rows, slot, listed, &null, delta);
+    check(what, Ok(obfuscation), delta, |slot, listed, estimate, family| {
+        let Family::Lines { chance, .. } = family else { panic!("lines") };
+        let field = &chance[usize::from(rows[slot].2.unwrap_or(0))];
+        let tube = tube(3, delta as f32);
+        let chance = |x: &[f64; 3]| f64::from(field.at(&x.map(|x| x as f32), tube, 0.0).p);
+        let options = line_options(rows, slot, listed, delta, chance);
         if estimate.status != Status::Ok {
             return none_left(&options);
         }
@@ -157,10 +157,11 @@ fn candidates_equal_their_twin() {
     let rows: Vec<[f64; 3]> = candidates.position().iter().map(|p| p.map(f64::from)).collect();
     for delta in [0.02, 0.1, 0.4] {
         let obfuscation = Obfuscation::AxisCandidates(candidates.clone());
-        check("candidates", Ok(obfuscation), delta, |slot, listed, estimate, lists| {
-            let null: Vec<usize> =
-                draw(lists, slot, SEED, |_| true).iter().map(|r| r.index()).collect();
-            let options = candidate_options(&rows, slot, listed, &null, delta);
+        check("candidates", Ok(obfuscation), delta, |slot, listed, estimate, family| {
+            let Family::Candidates { chance, .. } = family else { panic!("candidates") };
+            let tube = tube(3, delta as f32);
+            let chance = |x: &[f64; 3]| f64::from(chance.at(&x.map(|x| x as f32), tube).p);
+            let options = candidate_options(&rows, slot, listed, delta, chance);
             if estimate.status != Status::Ok {
                 return none_left(&options);
             }

@@ -1,0 +1,106 @@
+//! The neighborhoods of one obfuscation, from every source of a plan.
+
+use super::plan::{Plan, Source, Variant};
+use crate::Error;
+use crate::geometry::knn::Knn;
+use crate::neighbors::Neighborhoods;
+use crate::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
+use crate::released::Released;
+use crate::truth::Secret;
+
+/// Lists, and how good they are.
+pub struct Made {
+    /// The lists.
+    pub lists: Neighborhoods,
+    /// The inlier ratio, as requested or measured.
+    pub ratio: f64,
+    /// Records per list.
+    pub k: usize,
+}
+
+/// Makes lists for one obfuscation. True neighborhoods are searched when first needed, and kept.
+pub struct Lists<'a> {
+    plan: &'a Plan,
+    search: &'a Knn<'a, 3>,
+    released: &'a Released<3>,
+    secret: &'a Secret,
+    by_row: &'a Secret,
+    /// Of the oracle, and of the attacker.
+    seeds: (u64, u64),
+    near: Vec<((usize, bool), TrueNeighbors)>,
+    /// Those of the last variant: variants of one noise model follow each other.
+    outliers: Option<Outliers>,
+}
+
+impl<'a> Lists<'a> {
+    /// Lists for `hidden`, whose secret by descriptor row is `by_row`; `seeds` are the owner's and
+    /// the attacker's.
+    pub fn new(
+        plan: &'a Plan,
+        search: &'a Knn<'a, 3>,
+        hidden: &'a (Released<3>, Secret),
+        by_row: &'a Secret,
+        seeds: (u64, u64),
+    ) -> Self {
+        let (released, secret) = (&hidden.0, &hidden.1);
+        Self { plan, search, released, secret, by_row, seeds, near: Vec::new(), outliers: None }
+    }
+
+    /// The lists of one variant of the plan.
+    ///
+    /// # Errors
+    /// When the source cannot make them for this obfuscation.
+    pub fn make(&mut self, variant: &Variant<'_>) -> Result<Made, Error> {
+        let slots = self.released.slots_per_record();
+        match variant.source {
+            Source::Oracle => {
+                let ratio = variant.inlier_ratio.unwrap_or(1.0);
+                let lists = self.oracle(variant.noise.unwrap_or(Noise::Uniform), ratio)?;
+                Ok(Made { lists, ratio, k: self.plan.k })
+            }
+            Source::Given(points) => {
+                let scores = points.scores.as_deref();
+                let (offsets, neighbors) = (&points.offsets, &points.neighbors);
+                let lists = oracle::from_points(offsets, neighbors, scores, self.secret, slots)?;
+                let others = self.released.n_records().saturating_sub(1);
+                let k = lists.longest().min(others).max(1);
+                let ratio = self.near(k, false)?.measured_inlier_ratio(&lists);
+                Ok(Made { lists, ratio, k })
+            }
+            Source::Own(joined) => {
+                // The list of slot s is that of descriptor row s.
+                let lists = joined.make(self.released, self.seeds.1)?;
+                let ratio = self.near(self.plan.k, true)?.measured_inlier_ratio(&lists);
+                Ok(Made { lists, ratio, k: joined.k() })
+            }
+        }
+    }
+
+    /// Of the oracle that errs as `noise` says.
+    fn oracle(&mut self, noise: Noise, ratio: f64) -> Result<Neighborhoods, Error> {
+        let seed = self.seeds.0;
+        let (search, secret, kept) = (self.search, self.secret, self.outliers.take());
+        let near = self.near(self.plan.k, false)?;
+        let outliers = match kept {
+            Some(outliers) if outliers.noise() == noise => outliers,
+            _ => Outliers::new(noise, near, search, secret, seed)?,
+        };
+        let lists = near.lists(ratio, &outliers, seed);
+        self.outliers = Some(outliers);
+        lists
+    }
+
+    /// The `k` true neighbors of every slot, as slots or as descriptor rows are counted.
+    fn near(&mut self, k: usize, by_row: bool) -> Result<&TrueNeighbors, Error> {
+        let slots = self.released.slots_per_record();
+        // With one point a record both count alike: one search serves both.
+        let by_row = by_row && slots > 1;
+        if let Some(at) = self.near.iter().position(|(of, _)| *of == (k, by_row)) {
+            return Ok(&self.near[at].1);
+        }
+        let secret = if by_row { self.by_row } else { self.secret };
+        let near = TrueNeighbors::new(self.search, secret, slots, k)?;
+        self.near.push(((k, by_row), near));
+        Ok(&self.near[self.near.len() - 1].1)
+    }
+}

@@ -1,0 +1,222 @@
+//! Records as the lines on which their points can be.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::geometry::vector::{along, distance, dot, median, sub, widen};
+use crate::released::{AxisCandidates, Obfuscation, Released};
+
+/// A line, or the part of it beyond `from`, that may hold a hidden point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FeasibleLine {
+    pub(super) through: [f32; 3],
+    /// Of unit length.
+    pub(super) direction: [f32; 3],
+    /// Where it begins.
+    pub(super) from: f32,
+    /// How likely the point is on this line rather than on the record's others; any common factor.
+    pub(super) prior: f32,
+    /// Lines of one group meet trivially and say nothing about each other: the center of a ray.
+    pub(super) group: Option<u8>,
+}
+
+/// What a record hides, and so how likely a place on it is at a given density of points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Hides {
+    /// One point, of which the record is a projection along a random direction.
+    One,
+    /// Two points. Few pairs are close together: a pair `d` apart is as likely as `d` squared.
+    Two,
+    /// One point seen from a center: a ray meets the more points the farther it is.
+    OnRay,
+    /// One point, on one of three axis lines.
+    OnAxis,
+}
+
+/// All records of a map.
+#[derive(Debug)]
+pub(super) struct Feasible {
+    pub(super) hides: Hides,
+    /// `per_record` rows per record.
+    pub(super) lines: Vec<FeasibleLine>,
+    pub(super) per_record: usize,
+    pub(super) n_groups: usize,
+}
+
+impl Feasible {
+    /// The records of `released`; `None` for planes, whose points may be anywhere on a plane: three
+    /// sets of offsets are three histograms, and tell nothing about which offsets belong together.
+    pub(super) fn new<const D: usize>(released: &Released<D>) -> Option<Self> {
+        // The only dimension these attacks know, in a function generic over it.
+        let solid = |v: &[f32; D]| -> [f32; 3] { std::array::from_fn(|c| v[c % D]) };
+        if D != 3 {
+            return None;
+        }
+        let line = |through: [f32; 3], direction: [f32; 3]| FeasibleLine {
+            through,
+            direction,
+            from: f32::NEG_INFINITY,
+            prior: 1.0,
+            group: None,
+        };
+        match released.obfuscation() {
+            Obfuscation::Lines(lines) => {
+                let rows = lines.foot().iter().zip(lines.direction());
+                let hides = if released.slots_per_record() == 2 { Hides::Two } else { Hides::One };
+                let lines = rows.map(|(foot, d)| line(solid(foot), solid(d))).collect();
+                Some(Self { hides, lines, per_record: 1, n_groups: 0 })
+            }
+            Obfuscation::Rays(rays) => {
+                let rows = rays.center().iter().zip(rays.direction());
+                let lines = rows
+                    .map(|(&center, direction)| FeasibleLine {
+                        from: 0.0,
+                        group: Some(center),
+                        ..line(solid(&rays.centers()[usize::from(center)]), solid(direction))
+                    })
+                    .collect();
+                let n_groups = rays.centers().len();
+                Some(Self { hides: Hides::OnRay, lines, per_record: 1, n_groups })
+            }
+            Obfuscation::AxisPlanes(_) => None,
+            Obfuscation::AxisCandidates(candidates) => {
+                let common = value_densities(candidates);
+                let mut lines = Vec::with_capacity(3 * candidates.len());
+                for (row, position) in candidates.position().iter().enumerate() {
+                    for axis in 0..3 {
+                        let (mut through, mut direction) = (solid(position), [0.0; 3]);
+                        through[axis] = 0.0;
+                        direction[axis] = 1.0;
+                        // The value on an exchanged axis is anybody's: likelier where values abound.
+                        lines.push(FeasibleLine {
+                            prior: common[axis][row],
+                            ..line(through, direction)
+                        });
+                    }
+                }
+                Some(Self { hides: Hides::OnAxis, lines, per_record: 3, n_groups: 0 })
+            }
+        }
+    }
+
+    /// Number of records.
+    pub(super) fn n_records(&self) -> usize {
+        self.lines.len() / self.per_record
+    }
+
+    /// The same lines, counted from where they pass `middle`: the origin of a map is rounded, so that a
+    /// shifted or scaled map has its feet elsewhere. Rays keep their center.
+    pub(super) fn counted_from(mut self, middle: &[f64; 3]) -> Self {
+        for line in self.lines.iter_mut().filter(|line| line.group.is_none()) {
+            line.through = nearest(line, middle).map(|x| x as f32);
+        }
+        self
+    }
+
+    /// Where the map lies and a length of the order of its size, from the records alone; `None` when
+    /// they have no extent.
+    pub(super) fn middle(&self) -> Option<([f64; 3], f64)> {
+        let (middle, extent) = match self.hides {
+            Hides::OnRay => between_centers(&self.lines),
+            _ => crossing(&self.lines),
+        }?;
+        // Grids square voxel sides in f32.
+        let usable = (extent as f32 * extent as f32).is_normal() && extent > 0.0;
+        usable.then_some((middle, extent))
+    }
+}
+
+/// The middle of the centers of rays, and the largest distance between two of them.
+fn between_centers(lines: &[FeasibleLine]) -> Option<([f64; 3], f64)> {
+    let mut centers: Vec<[f64; 3]> = Vec::new();
+    for line in lines {
+        let center = widen(&line.through);
+        if !centers.contains(&center) {
+            centers.push(center);
+        }
+    }
+    if centers.is_empty() {
+        return None;
+    }
+    // In an order of their own, not of the records.
+    centers.sort_unstable_by(|a, b| {
+        let axes = a.iter().zip(b).map(|(x, y)| x.total_cmp(y));
+        axes.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
+    });
+    let n = centers.len() as f64;
+    let middle = std::array::from_fn(|c| centers.iter().map(|x| x[c]).sum::<f64>() / n);
+    let apart = |a: &[f64; 3]| centers.iter().map(|b| distance(a, b)).fold(0.0, f64::max);
+    let extent = centers.iter().map(apart).fold(0.0, f64::max);
+    Some((middle, extent))
+}
+
+/// Lines whose normal equations are this much flatter than those of random lines count as parallel.
+const PARALLEL: f64 = 1e-5;
+
+/// The place that lines pass nearest in the mean square, and the median distance of the lines from it;
+/// `None` for parallel lines.
+fn crossing(lines: &[FeasibleLine]) -> Option<([f64; 3], f64)> {
+    // The squared distance from a line is |(I - d d') (x - p)|^2: normal equations in x. All sums are
+    // of sorted terms, so that the order of records changes no bit.
+    let across = |line: &FeasibleLine, row: usize, column: usize| {
+        f64::from(u8::from(row == column))
+            - f64::from(line.direction[row]) * f64::from(line.direction[column])
+    };
+    let sum = |term: &dyn Fn(&FeasibleLine) -> f64| {
+        let mut terms: Vec<f64> = lines.iter().map(term).collect();
+        terms.sort_unstable_by(f64::total_cmp);
+        terms.iter().sum::<f64>()
+    };
+    let matrix = Matrix3::from_fn(|row, column| sum(&|line| across(line, row, column)));
+    let right = Vector3::from_fn(|row, _| {
+        sum(&|line| (0..3).map(|c| across(line, row, c) * f64::from(line.through[c])).sum())
+    });
+    // Directions are rounded, so that parallel lines are only nearly singular.
+    let even = matrix.trace() / 3.0;
+    if matrix.determinant() <= PARALLEL * even * even * even {
+        return None;
+    }
+    let middle: [f64; 3] = (matrix.try_inverse()? * right).into();
+    let mut distances: Vec<f64> = lines
+        .iter()
+        .map(|line| {
+            let away = sub(&nearest(line, &middle), &middle);
+            dot(&away, &away).sqrt()
+        })
+        .collect();
+    let sound = !distances.is_empty() && distances.iter().all(|x| x.is_finite());
+    sound.then(|| (middle, median(&mut distances)))
+}
+
+/// The point of a line nearest `x`.
+fn nearest(line: &FeasibleLine, x: &[f64; 3]) -> [f64; 3] {
+    let (through, direction) = (widen(&line.through), widen(&line.direction));
+    along(&through, dot(&sub(x, &through), &direction), &direction)
+}
+
+/// Values to either side over which the density of the published values of an axis is measured.
+const REACH: usize = 50;
+
+/// Per axis and record, how dense the published values of that axis are around the record's.
+fn value_densities<const D: usize>(candidates: &AxisCandidates<D>) -> [Vec<f32>; 3] {
+    let n = candidates.len();
+    std::array::from_fn(|axis| {
+        let value = |row: u32| candidates.position()[row as usize][axis % D];
+        let mut order: Vec<u32> = (0..n as u32).collect();
+        order.sort_by(|&a, &b| value(a).total_cmp(&value(b)));
+        let reach = REACH.min(n / 4);
+        // Coincident values would have no width: the mean spacing is added.
+        let spacing = match n {
+            0 | 1 => 1.0,
+            _ => (value(order[n - 1]) - value(order[0])) / n as f32,
+        };
+        let mut densities = vec![1.0; n];
+        for rank in 0..n {
+            let (low, high) = (rank.saturating_sub(reach), (rank + reach).min(n - 1));
+            let width = value(order[high]) - value(order[low]) + spacing;
+            if width > 0.0 {
+                densities[order[rank] as usize] = (high - low + 1) as f32 / width;
+            }
+        }
+        densities
+    })
+}

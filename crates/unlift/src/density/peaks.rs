@@ -1,0 +1,125 @@
+//! From spread points to positions: where a record's point most probably is.
+
+use rayon::prelude::*;
+
+use super::feasible::{FeasibleLine, Hides};
+use super::grid::Span;
+use super::tomography::Spread;
+use super::{Peak, Peaks};
+
+/// Samples to either side that count as the same place: about what smoothing spreads.
+const REACH: usize = 2;
+
+/// The most probable place of every slot's point.
+pub(super) fn find(spread: &Spread<'_>) -> Peaks {
+    let feasible = spread.feasible;
+    let slots = if feasible.hides == Hides::Two { 2 } else { 1 };
+    let mut of: Vec<Option<Peak>> = vec![None; slots * feasible.n_records()];
+    of.par_chunks_mut(slots).enumerate().for_each_init(
+        || (Vec::new(), Vec::new()),
+        |(view, windows), (record, out)| {
+            spread.view(record, spread.weights_of(record), view);
+            let lines = record * feasible.per_record..(record + 1) * feasible.per_record;
+            if let [first, second] = out {
+                let (line, span) = (&feasible.lines[record], spread.spans[record]);
+                Window::all(view, span, spread.grid.side, windows);
+                let total = view.iter().sum();
+                if let Some(pair) = best_pair(windows) {
+                    [*first, *second] = pair.map(|w| peak(&w, line, 0, total, view.len()));
+                }
+            } else {
+                out[0] = best(spread, lines, view, windows);
+            }
+        },
+    );
+    Peaks { of, resolution: f64::from(spread.grid.side) }
+}
+
+/// The place with the most likelihood around it, on any of a record's lines.
+fn best(
+    spread: &Spread<'_>,
+    lines: std::ops::Range<usize>,
+    view: &[f32],
+    windows: &mut Vec<Window>,
+) -> Option<Peak> {
+    let total = view.iter().sum();
+    let mut found: Option<(Window, usize)> = None;
+    let mut begin = 0;
+    for at in lines.clone() {
+        let span = spread.spans[at];
+        Window::all(&view[begin..begin + span.len()], span, spread.grid.side, windows);
+        begin += span.len();
+        for window in windows.iter() {
+            if window.likelihood > found.map_or(0.0, |(best, _)| best.likelihood) {
+                found = Some((*window, at));
+            }
+        }
+    }
+    let (window, at) = found?;
+    peak(&window, &spread.feasible.lines[at], at - lines.start, total, view.len())
+}
+
+/// The two places that are likeliest together: both likely, and apart, as pairs are.
+fn best_pair(windows: &[Window]) -> Option<[Window; 2]> {
+    let maxima: Vec<&Window> = (0..windows.len())
+        .filter(|&at| {
+            let likelihood = |at: Option<usize>| {
+                at.and_then(|at| windows.get(at)).map_or(0.0, |window| window.likelihood)
+            };
+            let here = windows[at].likelihood;
+            here > likelihood(at.checked_sub(1)) && here >= likelihood(Some(at + 1))
+        })
+        .map(|at| &windows[at])
+        .collect();
+    let (mut found, mut most) = (None, 0.0);
+    for (at, second) in maxima.iter().enumerate() {
+        for first in &maxima[..at] {
+            let apart = second.t - first.t;
+            let likelihood = first.likelihood * second.likelihood * apart * apart;
+            if likelihood > most {
+                (found, most) = (Some([**first, **second]), likelihood);
+            }
+        }
+    }
+    // A line that meets one crowd only: both points are there.
+    found.or_else(|| maxima.first().map(|&&only| [only; 2]))
+}
+
+/// Likelihood around one sample.
+#[derive(Clone, Copy, Debug)]
+struct Window {
+    likelihood: f32,
+    /// The mean parameter.
+    t: f32,
+}
+
+impl Window {
+    /// One per sample of a line.
+    fn all(view: &[f32], span: Span, side: f32, out: &mut Vec<Self>) {
+        out.clear();
+        for at in 0..view.len() {
+            let from = at.saturating_sub(REACH);
+            let near = &view[from..view.len().min(at + REACH + 1)];
+            let likelihood: f32 = near.iter().sum();
+            let moment: f32 = near.iter().enumerate().map(|(i, x)| i as f32 * x).sum();
+            let first = (span.first + from as i32) as f32 + 0.5;
+            let shift = if likelihood > 0.0 { moment / likelihood } else { 0.0 };
+            out.push(Self { likelihood, t: (first + shift) * side });
+        }
+    }
+}
+
+fn peak(
+    window: &Window,
+    line: &FeasibleLine,
+    axis: usize,
+    total: f32,
+    n_samples: usize,
+) -> Option<Peak> {
+    let position: [f32; 3] =
+        std::array::from_fn(|c| line.through[c] + window.t * line.direction[c]);
+    let blind = (2 * REACH + 1) as f32 / n_samples as f32;
+    let evidence = libm::logf(window.likelihood / total / blind).max(0.0);
+    let sound = evidence.is_finite() && position.iter().all(|x| x.is_finite());
+    sound.then_some(Peak { position, axis: axis as u8, evidence })
+}

@@ -1,0 +1,75 @@
+//! The best few of a stream, whatever its order.
+
+/// Keeps the entries with the highest scores; among equal scores those with the lowest ids. What is
+/// kept depends on the set of entries alone.
+#[derive(Clone, Debug)]
+pub struct Best {
+    most: usize,
+    floor: f32,
+    entries: Vec<(f32, u32)>,
+}
+
+impl Best {
+    /// Keeps at most `most` entries.
+    pub fn new(most: usize) -> Self {
+        Self { most, floor: f32::NEG_INFINITY, entries: Vec::new() }
+    }
+
+    /// No entry below this score can be kept any more.
+    #[inline(always)]
+    pub fn floor(&self) -> f32 {
+        self.floor
+    }
+
+    /// Offers an entry; each id once.
+    #[inline]
+    pub fn push(&mut self, score: f32, id: u32) {
+        self.entries.push((score, id));
+        if self.entries.len() >= 2 * self.most.max(8) {
+            self.shrink();
+        }
+    }
+
+    fn shrink(&mut self) {
+        if self.most == 0 {
+            self.entries.clear();
+            self.floor = f32::INFINITY;
+        } else if self.entries.len() > self.most {
+            self.entries.select_nth_unstable_by(self.most - 1, higher_first);
+            self.entries.truncate(self.most);
+            self.floor = self.entries[self.most - 1].0;
+        }
+    }
+
+    /// What was kept, highest score first, equal scores by id.
+    pub fn into_sorted(mut self) -> Vec<(f32, u32)> {
+        self.shrink();
+        self.entries.sort_unstable_by(higher_first);
+        self.entries
+    }
+}
+
+/// The order of results: by score, high to low, then by id.
+pub fn higher_first(a: &(f32, u32), b: &(f32, u32)) -> std::cmp::Ordering {
+    b.0.total_cmp(&a.0).then(a.1.cmp(&b.1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_order_of_the_stream_does_not_matter() {
+        let entries: Vec<(f32, u32)> = (0..200).map(|id| ((id * 37 % 23) as f32, id)).collect();
+        let keep = |entries: &mut dyn Iterator<Item = &(f32, u32)>| {
+            let mut best = Best::new(10);
+            entries.for_each(|&(score, id)| best.push(score, id));
+            best.into_sorted()
+        };
+        let forth = keep(&mut entries.iter());
+        assert_eq!(forth, keep(&mut entries.iter().rev()));
+        let mut all = entries.clone();
+        all.sort_unstable_by(higher_first);
+        assert_eq!(forth, all[..10]);
+    }
+}

@@ -1,0 +1,117 @@
+//! Neighborhoods from where the records alone say that points are: no descriptors, no oracle.
+//!
+//! The attacker's counterpart of the neighbors by line-line distance of Chelani et al. (CVPR 2021), with
+//! the estimates of tomography in place of distances between lines: two lines pass each other closely
+//! for many reasons, two estimates end up close for one.
+
+use rayon::prelude::*;
+
+use super::Neighborhoods;
+use crate::density::{Peak, tomography};
+use crate::geometry::knn::Knn;
+use crate::geometry::vector::{distance, dot, sub, widen};
+use crate::released::{Obfuscation, Released};
+use crate::{Error, RecordId};
+
+/// Estimates looked at per record listed: some share a record, some records pass too far away.
+const LOOK: usize = 3;
+
+/// Per slot the `k` records most likely to hide points near its own, with scores that are higher for
+/// likelier ones: the distance between estimates, plus the distance from the estimate to the record
+/// where that is known, in units of the resolution, negated. Slots whose record meets no density have an
+/// empty list.
+///
+/// The slots of a paired line get the lists of its two estimates in the order of these along the line: which
+/// of its descriptors belongs to which is not known here. Rays list rays of other centers only; rays of
+/// one center are no evidence for each other.
+///
+/// Cost: tomography (linear in the records), then nearest neighbors of points.
+///
+/// # Errors
+/// When `k` is 0, the map is not in three dimensions, or records of its family tell nothing by
+/// themselves (planes, rays of one center).
+pub fn geometric<const D: usize>(released: &Released<D>, k: usize) -> Result<Neighborhoods, Error> {
+    if k == 0 {
+        return Err(Error::new("k", "at least 1", "0"));
+    }
+    let what = "geometric neighborhoods";
+    if D != 3 {
+        return Err(Error::new(what, "a map in three dimensions", D.to_string()));
+    }
+    let centers = match released.obfuscation() {
+        Obfuscation::AxisPlanes(_) => {
+            return Err(Error::new(what, "lines, rays or axis candidates", "planes"));
+        }
+        Obfuscation::Rays(rays) if rays.centers().len() < 2 => {
+            return Err(Error::new(what, "rays of two or more centers", "one center"));
+        }
+        Obfuscation::Rays(rays) => Some(rays.center()),
+        Obfuscation::Lines(_) | Obfuscation::AxisCandidates(_) => None,
+    };
+    let peaks = tomography(released);
+    let slots: Vec<usize> = (0..peaks.of.len()).filter(|&slot| peaks.of[slot].is_some()).collect();
+    let found: Vec<Peak> = peaks.of.iter().flatten().copied().collect();
+    let positions: Vec<[f64; 3]> = found.iter().map(|peak| widen(&peak.position)).collect();
+    let mut rows: Vec<Vec<(f32, RecordId)>> = vec![Vec::new(); peaks.of.len()];
+    if !positions.is_empty() {
+        let knn = Knn::new(&positions)?;
+        let per_record = released.slots_per_record();
+        let near = |scratch: &mut Vec<(f64, u32)>, at: usize| {
+            let own = RecordId::from_index(slots[at] / per_record);
+            let may_list = |record: RecordId| {
+                record != own && centers.is_none_or(|c| c[record.index()] != c[own.index()])
+            };
+            let mut look = LOOK * k;
+            loop {
+                knn.nearest(at, look, scratch);
+                let mut row: Vec<(f32, RecordId)> = Vec::new();
+                for &(squared, other) in scratch.iter() {
+                    let record = RecordId::from_index(slots[other as usize] / per_record);
+                    if may_list(record) && row.iter().all(|&(_, listed)| listed != record) {
+                        let miss = distance_to(released, record, &positions[at]);
+                        let far = (squared.sqrt() + miss) / peaks.resolution;
+                        row.push((-(far as f32), record));
+                    }
+                }
+                // Own partners, shared records and rays of the own center cost places.
+                if row.len() >= k || scratch.len() < look {
+                    row.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+                    row.truncate(k);
+                    return row;
+                }
+                look *= 2;
+            }
+        };
+        let listed: Vec<Vec<(f32, RecordId)>> =
+            (0..positions.len()).into_par_iter().map_init(Vec::new, near).collect();
+        for (row, slot) in listed.into_iter().zip(&slots) {
+            rows[*slot] = row;
+        }
+    }
+    let mut offsets = vec![0u64];
+    offsets.extend(rows.iter().scan(0u64, |end, row| {
+        *end += row.len() as u64;
+        Some(*end)
+    }));
+    let (scores, records) = rows.into_iter().flatten().unzip();
+    let n_records = released.n_records();
+    Neighborhoods::try_new(offsets, records, Some(scores), n_records, released.slots_per_record())
+}
+
+/// The distance from `x` to the line of a record; 0 for axis candidates, of whose three lines any may be
+/// meant.
+fn distance_to<const D: usize>(released: &Released<D>, record: RecordId, x: &[f64; 3]) -> f64 {
+    let solid = |v: &[f32; D]| -> [f64; 3] { std::array::from_fn(|c| f64::from(v[c % D])) };
+    let at = record.index();
+    let (through, direction) = match released.obfuscation() {
+        Obfuscation::Lines(lines) => (solid(&lines.foot()[at]), solid(&lines.direction()[at])),
+        Obfuscation::Rays(rays) => {
+            (solid(&rays.centers()[usize::from(rays.center()[at])]), solid(&rays.direction()[at]))
+        }
+        Obfuscation::AxisPlanes(_) | Obfuscation::AxisCandidates(_) => return 0.0,
+    };
+    let away = sub(x, &through);
+    let t = dot(&away, &direction);
+    let nearest: [f64; 3] = std::array::from_fn(|c| through[c] + t * direction[c]);
+    distance(x, &nearest)
+}

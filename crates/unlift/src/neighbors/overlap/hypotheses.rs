@@ -1,0 +1,181 @@
+//! How one patch may lie over another: a turn by a multiple of 45 degrees, then a shift by cells.
+
+/// Cells along one side of a SIFT patch.
+pub const SIDE: usize = 4;
+/// Cells of a patch.
+pub const CELLS: usize = SIDE * SIDE;
+/// Orientation bins of a cell, 45 degrees each.
+pub const BINS: usize = 8;
+/// Values of a SIFT descriptor: cell by cell, row by row, the bins of a cell side by side.
+pub const DIM: usize = CELLS * BINS;
+
+/// Shifts with `|dx| + |dy|` below 4 that keep at least six cells: 21 of them.
+const FARTHEST: i32 = 4;
+/// The longest shift along one axis.
+const LONGEST: i32 = 2;
+
+/// What stands in one cell of a version of a patch: up to four cells of the patch, by share.
+pub type Cell = [(u8, f32); 4];
+
+/// One version of a patch: cells of it, turned and shifted, in the order in which they are compared.
+#[derive(Clone, Debug)]
+pub struct Version {
+    /// The cells, by what they are made of.
+    pub cells: Vec<Cell>,
+    /// Bins by which orientations turn.
+    pub turn: usize,
+    /// Square root of the weight of a hypothesis with so many cells: either side carries it.
+    pub root_weight: f32,
+}
+
+/// A pair of versions that are compared: one of each patch, of equally many cells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pair {
+    /// Index into [`Hypotheses::turned`].
+    pub turned: usize,
+    /// Index into [`Hypotheses::still`].
+    pub still: usize,
+    /// Whether exchanging the patches gives other hypotheses: turns by odd multiples resample the
+    /// cells of the turned patch. Turns by even multiples come in pairs of a map and its inverse.
+    pub both_ways: bool,
+}
+
+/// All hypotheses that are tried.
+#[derive(Clone, Debug)]
+pub struct Hypotheses {
+    /// Versions of the patch that is turned and shifted.
+    pub turned: Vec<Version>,
+    /// Versions of the patch that stays: without the cells outside the other.
+    pub still: Vec<Version>,
+    /// Which version is compared with which.
+    pub pairs: Vec<Pair>,
+}
+
+impl Hypotheses {
+    /// Eight turns by 21 shifts.
+    pub fn new() -> Self {
+        let mut all = Self { turned: Vec::new(), still: Vec::new(), pairs: Vec::new() };
+        for dy in -LONGEST..=LONGEST {
+            for dx in -LONGEST..=LONGEST {
+                if dx.abs() + dy.abs() < FARTHEST {
+                    all.add_shift([dx, dy], &[0, 2, 4, 6], false);
+                    // Turns by 5 and 7 are those by 1 and 3 the other way.
+                    all.add_shift([dx, dy], &[1, 3], true);
+                }
+            }
+        }
+        all
+    }
+
+    fn add_shift(&mut self, shift: [i32; 2], turns: &[usize], both_ways: bool) {
+        let still = self.still.len();
+        for (at, &turn) in turns.iter().enumerate() {
+            let mut version = Version { cells: Vec::new(), turn, root_weight: 0.0 };
+            let mut kept = version.clone();
+            kept.turn = 0;
+            for cell in 0..CELLS {
+                if let Some(sources) = sources(cell, turn, shift) {
+                    version.cells.push(sources);
+                    kept.cells.push([(cell as u8, 1.0), (0, 0.0), (0, 0.0), (0, 0.0)]);
+                }
+            }
+            // Few shared cells agree more easily by chance; the exponent is from learning.md 3.1.
+            let share = version.cells.len() as f64 / CELLS as f64;
+            version.root_weight = libm::pow(share, 0.5 * WEIGHT_EXPONENT) as f32;
+            kept.root_weight = version.root_weight;
+            // Turns by the same parity cover the same cells: one still version serves them all.
+            if at == 0 {
+                self.still.push(kept);
+            }
+            self.pairs.push(Pair { turned: self.turned.len(), still, both_ways });
+            self.turned.push(version);
+        }
+    }
+}
+
+/// Exponent of the share of cells that are compared.
+const WEIGHT_EXPONENT: f64 = 0.06;
+
+/// What of a patch comes to lie in `cell` when it is turned by `turn` times 45 degrees about its
+/// middle and then shifted; `None` where that is outside the patch.
+fn sources(cell: usize, turn: usize, shift: [i32; 2]) -> Option<Cell> {
+    let middle = (SIDE - 1) as f64 / 2.0;
+    let x = (cell % SIDE) as f64 - middle - f64::from(shift[0]);
+    let y = (cell / SIDE) as f64 - middle - f64::from(shift[1]);
+    // Exact for even turns; the same bits on every machine for odd ones.
+    const HALF: f64 = std::f64::consts::FRAC_1_SQRT_2;
+    let (cos, sin) = [
+        (1.0, 0.0),
+        (HALF, HALF),
+        (0.0, 1.0),
+        (-HALF, HALF),
+        (-1.0, 0.0),
+        (-HALF, -HALF),
+        (0.0, -1.0),
+        (HALF, -HALF),
+    ][turn % 8];
+    let from = [cos * x + sin * y + middle, cos * y - sin * x + middle];
+    let last = (SIDE - 1) as f64;
+    // Rounding of a half turn may leave the edge by a hair.
+    if from.iter().any(|&c| c < -1e-9 || c > last + 1e-9) {
+        return None;
+    }
+    let low = from.map(|c| c.clamp(0.0, last).floor().min(last - 1.0));
+    let part = [from[0].clamp(0.0, last) - low[0], from[1].clamp(0.0, last) - low[1]];
+    let mut result = [(0, 0.0); 4];
+    for (at, slot) in result.iter_mut().enumerate() {
+        let (right, down) = (at % 2, at / 2);
+        let share = |high: usize, part: f64| if high == 1 { part } else { 1.0 - part };
+        let column = low[0] as usize + right;
+        let row = low[1] as usize + down;
+        *slot =
+            ((row * SIDE + column) as u8, (share(right, part[0]) * share(down, part[1])) as f32);
+    }
+    Some(result)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eight_turns_of_21_shifts_without_inverse_copies() {
+        let all = Hypotheses::new();
+        assert_eq!(all.still.len(), 2 * 21);
+        assert_eq!(all.pairs.iter().filter(|p| !p.both_ways).count(), 4 * 21);
+        assert_eq!(all.pairs.iter().filter(|p| p.both_ways).count(), 2 * 21);
+        for pair in &all.pairs {
+            let (turned, still) = (&all.turned[pair.turned], &all.still[pair.still]);
+            assert_eq!(turned.cells.len(), still.cells.len());
+        }
+    }
+
+    #[test]
+    fn shifts_keep_the_cells_that_both_patches_have() {
+        let all = Hypotheses::new();
+        let cells: Vec<usize> = all
+            .pairs
+            .iter()
+            .filter(|p| all.turned[p.turned].turn == 0)
+            .map(|p| all.turned[p.turned].cells.len())
+            .collect();
+        assert_eq!(cells.iter().filter(|&&n| n == 16).count(), 1);
+        assert_eq!(cells.iter().filter(|&&n| n == 12).count(), 4);
+        assert_eq!(cells.iter().min(), Some(&6));
+    }
+
+    #[test]
+    fn a_quarter_turn_moves_whole_cells() {
+        // Turned by 90 degrees from x towards y, the first row becomes the last column.
+        let made_of = sources(3, 2, [0, 0]).unwrap();
+        let (cell, _) = made_of.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+        assert_eq!(cell, 0);
+    }
+
+    #[test]
+    fn an_eighth_of_a_turn_loses_the_corners() {
+        let kept = |cell| sources(cell, 1, [0, 0]).is_some();
+        let lost: Vec<usize> = (0..CELLS).filter(|&cell| !kept(cell)).collect();
+        assert_eq!(lost, [0, 3, 12, 15]);
+    }
+}

@@ -1,0 +1,176 @@
+//! Every version of every patch, as bytes of equal length, ready to be multiplied.
+
+use rayon::prelude::*;
+
+use super::hypotheses::{BINS, CELLS, Cell, DIM, Hypotheses, Version};
+use crate::descriptors::Values;
+use crate::neighbors::all_pairs::Blocks;
+use crate::simd::{self, BLOCK};
+use crate::{Descriptors, Error};
+
+/// Length of a version in bytes' units. Rounding adds less than half of the square root of [`DIM`],
+/// so that no product of two exceeds 133 x 133.
+const LENGTH: f32 = 127.0;
+
+/// The norm below which shared cells count as blank: blank parts (the edge of an image) would match
+/// each other.
+const NORM_FLOOR: f32 = 0.05;
+
+/// The patches of a map. Memory: about 10 KB a patch.
+pub struct Patches {
+    hypotheses: Hypotheses,
+    n: usize,
+    blocks: Vec<Block>,
+}
+
+/// The versions of [`BLOCK`] patches, one after the other; rows beyond the last patch are zero.
+struct Block {
+    turned: Vec<u8>,
+    still: Vec<i8>,
+}
+
+impl Patches {
+    /// The patches of `descriptors`, taken in `order`.
+    ///
+    /// # Errors
+    /// When they are not SIFT: 128 columns, none negative.
+    pub fn new(descriptors: &Descriptors, order: &[u32]) -> Result<Self, Error> {
+        let expected = "SIFT (128 values, none negative)";
+        if descriptors.dim() != DIM {
+            let found = format!("{} values", descriptors.dim());
+            return Err(Error::new("descriptors for overlap", expected, found));
+        }
+        if let Values::F32(values) = descriptors.values()
+            && let Some(value) = values.iter().find(|&&x| x < 0.0)
+        {
+            return Err(Error::new("descriptors for overlap", expected, value.to_string()));
+        }
+        let hypotheses = Hypotheses::new();
+        let blocks = order
+            .par_chunks(BLOCK)
+            .map(|slots| Block::new(&hypotheses, descriptors, slots))
+            .collect();
+        Ok(Self { hypotheses, n: order.len(), blocks })
+    }
+}
+
+impl Blocks for Patches {
+    const EXACT: bool = true;
+
+    fn len(&self) -> usize {
+        self.n
+    }
+
+    /// The best cosine of shared cells over all hypotheses, as a product of bytes.
+    fn scores(&self, a: usize, b: usize, scores: &mut [f32]) {
+        let (a, b) = (&self.blocks[a], &self.blocks[b]);
+        let mut forth = vec![0i16; BLOCK * BLOCK];
+        let mut back = forth.clone();
+        let turned = starts(&self.hypotheses.turned);
+        let still = starts(&self.hypotheses.still);
+        for pair in &self.hypotheses.pairs {
+            let depth = self.hypotheses.turned[pair.turned].cells.len() * BINS;
+            let left = turned[pair.turned]..turned[pair.turned] + BLOCK * depth;
+            let right = still[pair.still]..still[pair.still] + BLOCK * depth;
+            let product = |left: &[u8], right: &[i8], best: &mut [i16]| {
+                simd::raise_to_products(left, right, depth, best);
+            };
+            product(&a.turned[left.clone()], &b.still[right.clone()], &mut forth);
+            if pair.both_ways {
+                product(&b.turned[left], &a.still[right], &mut back);
+            }
+        }
+        for i in 0..BLOCK {
+            for j in 0..BLOCK {
+                scores[i * BLOCK + j] = f32::from(forth[i * BLOCK + j].max(back[j * BLOCK + i]));
+            }
+        }
+    }
+}
+
+/// Where each version starts within a block.
+fn starts(versions: &[Version]) -> Vec<usize> {
+    let step = |at: &mut usize, version: &Version| {
+        let start = *at;
+        *at += version.cells.len() * BINS * BLOCK;
+        Some(start)
+    };
+    versions.iter().scan(0, step).collect()
+}
+
+impl Block {
+    fn new(hypotheses: &Hypotheses, descriptors: &Descriptors, slots: &[u32]) -> Self {
+        let length = |versions: &[Version]| -> usize {
+            versions.iter().map(|version| version.cells.len() * BINS * BLOCK).sum()
+        };
+        let mut block = Self {
+            turned: vec![0; length(&hypotheses.turned)],
+            still: vec![0; length(&hypotheses.still)],
+        };
+        let mut bytes = [0u8; DIM];
+        for (row, &slot) in slots.iter().enumerate() {
+            let squares = squares(descriptors, slot as usize);
+            let mut start = 0;
+            for version in &hypotheses.turned {
+                let depth = version.cells.len() * BINS;
+                quantize(&squares, version, &mut bytes);
+                let at = start + row * depth;
+                block.turned[at..at + depth].copy_from_slice(&bytes[..depth]);
+                start += BLOCK * depth;
+            }
+            let mut start = 0;
+            for version in &hypotheses.still {
+                let depth = version.cells.len() * BINS;
+                quantize(&squares, version, &mut bytes);
+                for (at, &byte) in bytes[..depth].iter().enumerate() {
+                    block.still[start + simd::packed(row, at, depth)] = byte as i8;
+                }
+                start += BLOCK * depth;
+            }
+        }
+        block
+    }
+}
+
+/// The gradient histogram behind a RootSIFT descriptor: its squares, of sum 1.
+fn squares(descriptors: &Descriptors, slot: usize) -> [[f32; BINS]; CELLS] {
+    let range = slot * DIM..(slot + 1) * DIM;
+    let mut squares = [0.0f32; DIM];
+    match descriptors.values() {
+        Values::U8(v) => {
+            for (square, &x) in squares.iter_mut().zip(&v[range]) {
+                *square = f32::from(x) * f32::from(x);
+            }
+        }
+        Values::F32(v) => {
+            let largest = v[range.clone()].iter().copied().fold(f32::MIN_POSITIVE, f32::max);
+            for (square, &x) in squares.iter_mut().zip(&v[range]) {
+                *square = (x / largest) * (x / largest);
+            }
+        }
+    }
+    let sum: f32 = squares.iter().sum::<f32>().max(f32::MIN_POSITIVE);
+    std::array::from_fn(|cell| std::array::from_fn(|bin| squares[cell * BINS + bin] / sum))
+}
+
+/// One version of a patch in bytes; histograms are mixed as histograms, and rooted after.
+fn quantize(squares: &[[f32; BINS]; CELLS], version: &Version, bytes: &mut [u8; DIM]) {
+    let mut mixed = [0.0f32; DIM];
+    for (cell, mixed) in version.cells.iter().zip(mixed.chunks_exact_mut(BINS)) {
+        for bin in 0..BINS {
+            // Orientations of a descriptor run against the grid.
+            mixed[(bin + BINS - version.turn) % BINS] = mix(squares, cell, bin);
+        }
+    }
+    let depth = version.cells.len() * BINS;
+    let norm = mixed[..depth].iter().sum::<f32>().sqrt().max(NORM_FLOOR);
+    let scale = LENGTH * version.root_weight / norm;
+    for (byte, &value) in bytes[..depth].iter_mut().zip(&mixed) {
+        *byte = (value.sqrt() * scale).round() as u8;
+    }
+}
+
+#[inline(always)]
+fn mix(squares: &[[f32; BINS]; CELLS], cell: &Cell, bin: usize) -> f32 {
+    cell.iter().map(|&(from, share)| squares[usize::from(from)][bin] * share).sum()
+}

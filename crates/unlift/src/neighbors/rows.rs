@@ -1,0 +1,95 @@
+//! Descriptor rows in an order of their own, and the way back from ranked rows to lists of records.
+
+use rayon::prelude::*;
+
+use super::Neighborhoods;
+use crate::descriptors::Values;
+use crate::released::Released;
+use crate::{Descriptors, Error, RecordId};
+
+/// Descriptor rows sorted by content. Sums and ties then do not depend on the order in which a map
+/// was released: permuting its records permutes its lists (up to rows that are equal altogether).
+#[derive(Debug)]
+pub struct Rows<'a> {
+    /// All rows, by slot.
+    pub descriptors: &'a Descriptors,
+    /// The slot of each row.
+    pub slots: Vec<u32>,
+    /// The record of each row.
+    pub records: Vec<u32>,
+    n_records: usize,
+    slots_per_record: usize,
+}
+
+impl<'a> Rows<'a> {
+    /// The rows of a released map, for lists of `k` records.
+    ///
+    /// # Errors
+    /// When the map has no descriptors, `k` is 0, or there are fewer than `k` other records.
+    pub fn new<const D: usize>(released: &'a Released<D>, k: usize) -> Result<Self, Error> {
+        let descriptors = released.descriptors().ok_or_else(|| {
+            Error::new("released map", "descriptors, which this source compares", "none")
+        })?;
+        let n_records = released.n_records();
+        if k == 0 || n_records < k + 1 {
+            let expected = format!("between 1 and {} (other records)", n_records.saturating_sub(1));
+            return Err(Error::new("k", expected, k.to_string()));
+        }
+        let mut slots: Vec<u32> = (0..released.n_slots() as u32).collect();
+        let dim = descriptors.dim();
+        let row = |slot: u32| slot as usize * dim..(slot as usize + 1) * dim;
+        match descriptors.values() {
+            Values::U8(v) => {
+                slots.par_sort_unstable_by(|&a, &b| v[row(a)].cmp(&v[row(b)]).then(a.cmp(&b)));
+            }
+            Values::F32(v) => slots.par_sort_unstable_by(|&a, &b| {
+                let unequal = v[row(a)].iter().zip(&v[row(b)]).map(|(x, y)| x.total_cmp(y));
+                unequal.into_iter().find(|order| order.is_ne()).unwrap_or_else(|| a.cmp(&b))
+            }),
+        }
+        let slots_per_record = released.slots_per_record();
+        let records = slots.iter().map(|&slot| slot / slots_per_record as u32).collect();
+        Ok(Self { descriptors, slots, records, n_records, slots_per_record })
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.slots.len()
+    }
+
+    /// How many rows must be kept so that `k` records are among them: a record may take two places.
+    pub fn enough_for(&self, k: usize) -> usize {
+        k * self.slots_per_record
+    }
+
+    /// Lists of the first `k` records of each row's ranking; `ranked[row]` is best first.
+    ///
+    /// # Errors
+    /// None that a ranking of other records' rows with finite scores can cause.
+    pub fn lists(&self, ranked: &[Vec<(f32, u32)>], k: usize) -> Result<Neighborhoods, Error> {
+        let mut row_of = vec![0; self.len()];
+        for (row, &slot) in self.slots.iter().enumerate() {
+            row_of[slot as usize] = row;
+        }
+        let (mut offsets, mut records) = (vec![0u64], Vec::new());
+        let mut scores = Vec::new();
+        for row in row_of {
+            let start = records.len();
+            for &(score, other) in &ranked[row] {
+                let record = RecordId(self.records[other as usize]);
+                if records.len() - start < k && !records[start..].contains(&record) {
+                    records.push(record);
+                    scores.push(score);
+                }
+            }
+            offsets.push(records.len() as u64);
+        }
+        Neighborhoods::try_new(
+            offsets,
+            records,
+            Some(scores),
+            self.n_records,
+            self.slots_per_record,
+        )
+    }
+}

@@ -1,0 +1,190 @@
+//! Where an attacker gets neighborhoods from a released map alone: one entry per source.
+
+use super::{Neighborhoods, geometric, join, overlap, similarity};
+use crate::Error;
+use crate::released::Released;
+
+/// Makes lists of a number of records per slot; the last argument is the attacker's seed.
+pub type Make<const D: usize> = fn(&Released<D>, usize, u64) -> Result<Neighborhoods, Error>;
+
+/// A source as users choose it.
+#[derive(Clone, Copy, Debug)]
+pub struct SourceEntry {
+    /// Its name.
+    pub name: &'static str,
+    /// What it does, in one line.
+    pub summary: &'static str,
+    /// Whether the released map must have descriptors.
+    pub needs_descriptors: bool,
+    /// Records per list unless asked otherwise: the attack's own choice, few where the first of a
+    /// ranking are much better than the rest.
+    pub usual_k: usize,
+    /// Whether in company it only ranks what the others list: recovery errs as it does, so that its own
+    /// entries would confirm wrong places.
+    pub only_ranks: bool,
+    /// Schemes (by name) whose records tell it nothing.
+    pub not_for: &'static [&'static str],
+    /// For images, where it is defined on them.
+    pub in_2d: Option<Make<2>>,
+    /// For maps, where it is defined on them.
+    pub in_3d: Option<Make<3>>,
+}
+
+impl PartialEq for SourceEntry {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+/// All sources.
+pub const SOURCES: &[SourceEntry] = &[
+    SourceEntry {
+        name: "similarity",
+        summary: "records with the most similar descriptors, of any kind",
+        needs_descriptors: true,
+        usual_k: 20,
+        only_ranks: false,
+        not_for: &[],
+        in_2d: Some(|released, k, _| similarity(released, k)),
+        in_3d: Some(|released, k, _| similarity(released, k)),
+    },
+    SourceEntry {
+        name: "overlap",
+        summary: "records whose SIFT patches overlap, and a short walk from these; no training",
+        needs_descriptors: true,
+        usual_k: 40,
+        only_ranks: false,
+        not_for: &[],
+        in_2d: Some(|released, k, _| overlap(released, k)),
+        in_3d: Some(|released, k, _| overlap(released, k)),
+    },
+    SourceEntry {
+        name: "geometric",
+        summary: "records that meet where records alone say that points are; no descriptors",
+        needs_descriptors: false,
+        usual_k: 50,
+        only_ranks: true,
+        not_for: &["plane"],
+        in_2d: None,
+        in_3d: Some(|released, k, _| geometric(released, k)),
+    },
+];
+
+/// The source called `name`.
+///
+/// # Errors
+/// When there is none; the error lists the names.
+pub fn source(name: &str) -> Result<&'static SourceEntry, Error> {
+    SOURCES.iter().find(|entry| entry.name == name).ok_or_else(|| {
+        let names: Vec<&str> = SOURCES.iter().map(|entry| entry.name).collect();
+        Error::new("source", format!("one of {}", names.join(", ")), name)
+    })
+}
+
+/// One source or several joined ones, and how many records a list has.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joined {
+    parts: Vec<&'static SourceEntry>,
+    k: usize,
+}
+
+impl Joined {
+    /// The sources named in `text`, joined by `+`, each once. A list has as many records as the
+    /// source that chooses most; those that only rank choose none in company.
+    ///
+    /// # Errors
+    /// When a name is unknown or stands twice.
+    pub fn parse(text: &str) -> Result<Self, Error> {
+        let mut parts: Vec<&'static SourceEntry> = Vec::new();
+        for name in text.split('+') {
+            let entry = source(name.trim())?;
+            if parts.contains(&entry) {
+                return Err(Error::new("joined sources", "each once", format!("{name} twice")));
+            }
+            parts.push(entry);
+        }
+        let names = parts.iter().any(|entry| !entry.only_ranks);
+        let chosen = parts.iter().filter(|entry| !(names && entry.only_ranks));
+        let k = chosen.map(|entry| entry.usual_k).max().unwrap_or(1);
+        Ok(Self { parts, k })
+    }
+
+    /// The same sources with `k` records per list.
+    #[must_use]
+    pub fn with_k(self, k: usize) -> Self {
+        Self { k, ..self }
+    }
+
+    /// The names, joined by `+`.
+    pub fn name(&self) -> String {
+        self.parts.iter().map(|entry| entry.name).collect::<Vec<_>>().join("+")
+    }
+
+    /// Records per list.
+    pub fn k(&self) -> usize {
+        self.k
+    }
+
+    /// Whether a map without descriptors is of no use.
+    pub fn needs_descriptors(&self) -> bool {
+        self.parts.iter().any(|entry| entry.needs_descriptors)
+    }
+
+    /// The first of the sources that has nothing to say about maps of `scheme`.
+    pub fn fails_on(&self, scheme: &str) -> Option<&'static SourceEntry> {
+        self.parts.iter().copied().find(|entry| entry.not_for.contains(&scheme))
+    }
+
+    /// Lists for every slot of a released map, from it alone.
+    ///
+    /// # Errors
+    /// When a source is not defined on maps, or cannot work on this one.
+    pub fn make(&self, released: &Released<3>, seed: u64) -> Result<Neighborhoods, Error> {
+        let lists = self.parts.iter().map(|entry| {
+            let make = entry
+                .in_3d
+                .ok_or_else(|| Error::new("source", "one that is defined on maps", entry.name))?;
+            make(released, self.k, seed).map_err(|error| error.within(entry.name))
+        });
+        let mut lists = lists.collect::<Result<Vec<_>, _>>()?;
+        match lists.len() {
+            1 => Ok(lists.remove(0)),
+            _ => {
+                let ranks: Vec<bool> = self.parts.iter().map(|entry| entry.only_ranks).collect();
+                let (n_records, slots) = (released.n_records(), released.slots_per_record());
+                join(&lists, &ranks, self.k, n_records, slots)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_joined_and_the_largest_usual_k_counts() {
+        let joined = Joined::parse("overlap+similarity").unwrap();
+        assert_eq!((joined.name().as_str(), joined.k()), ("overlap+similarity", 40));
+        assert_eq!(Joined::parse("overlap").unwrap().k(), 40);
+        assert_eq!(Joined::parse("overlap").unwrap().with_k(7).k(), 7);
+    }
+
+    #[test]
+    fn unknown_and_repeated_names_are_told() {
+        let message = |text: &str| Joined::parse(text).unwrap_err().to_string();
+        assert!(message("overlop").starts_with("source: expected one of similarity, overlap"));
+        assert_eq!(
+            message("overlap+overlap"),
+            "joined sources: expected each once, found overlap twice"
+        );
+    }
+
+    #[test]
+    fn every_name_is_one_word_of_its_own() {
+        for (at, entry) in SOURCES.iter().enumerate() {
+            assert!(entry.name.chars().all(|c| c.is_ascii_lowercase()), "{}", entry.name);
+            assert!(SOURCES[..at].iter().all(|other| other.name != entry.name));
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! A short walk over the graph of best matches: neighbors of neighbors are neighbors.
+//!
+//! Two points near each other need not have patches that overlap, but a few steps over sure matches
+//! lead from one to the other (`learning.md` 3.2).
+
+use rayon::prelude::*;
+
+use super::all_pairs::Found;
+use super::best::{Best, higher_first};
+
+/// Edges that a row keeps.
+const EDGES: usize = 6;
+/// Edge weight is `exp(SHARPNESS * (z - USUAL))`.
+const SHARPNESS: f64 = 2.0;
+const USUAL: f64 = 3.0;
+/// Weight of each further step.
+const DECAY: f64 = 0.7;
+/// Steps.
+const STEPS: usize = 5;
+/// Rows that a walk visits at most after each step; the rest is pruned.
+const WIDEST: usize = 128;
+
+/// Scores of pairs in standard deviations above what their rows score otherwise, mean of both.
+pub fn standardized(found: &[Found]) -> Vec<Vec<(f32, u32)>> {
+    let z = |row: usize, score: f32| {
+        (f64::from(score) - found[row].mean) / found[row].deviation.max(1e-9)
+    };
+    let row = |row: usize| {
+        let both = |&(score, other): &(f32, u32)| {
+            (((z(row, score) + z(other as usize, score)) / 2.0) as f32, other)
+        };
+        let mut ranked: Vec<(f32, u32)> = found[row].best.iter().map(both).collect();
+        ranked.sort_unstable_by(higher_first);
+        ranked
+    };
+    (0..found.len()).into_par_iter().map(row).collect()
+}
+
+/// Ranks the rows that a walk from each row reaches, at most `most`, and after them those that stand
+/// in `ranked` (standardized scores, best first) but were not reached. Scores are natural logarithms.
+pub fn walk(ranked: &[Vec<(f32, u32)>], record_of: &[u32], most: usize) -> Vec<Vec<(f32, u32)>> {
+    let steps = graph(ranked);
+    let scratch = || Scratch { at: vec![0.0; ranked.len()], sum: vec![0.0; ranked.len()] };
+    (0..ranked.len())
+        .into_par_iter()
+        .map_init(scratch, |scratch, row| {
+            let reached = scratch.reached(&steps, row);
+            let mut best = Best::new(most);
+            for &(other, sum) in &reached {
+                if record_of[other as usize] != record_of[row] {
+                    best.push(libm::log(sum) as f32, other);
+                }
+            }
+            let mut list = best.into_sorted();
+            let missing = most - list.len();
+            // Not reached is worse than reached, by a little for the best of them.
+            let lowest = list.last().map_or(0.0, |&(score, _)| score);
+            let top = ranked[row].first().map_or(0.0, |&(z, _)| z);
+            let rest = ranked[row]
+                .iter()
+                .filter(|(_, other)| reached.binary_search_by_key(other, |&(row, _)| row).is_err());
+            list.extend(rest.take(missing).map(|&(z, other)| (lowest + z.min(top) - top, other)));
+            list
+        })
+        .collect()
+}
+
+/// Probabilities of one step, per row in ascending order of the other row.
+fn graph(ranked: &[Vec<(f32, u32)>]) -> Vec<Vec<(u32, f64)>> {
+    let mut steps: Vec<Vec<(u32, f64)>> = vec![Vec::new(); ranked.len()];
+    for (row, list) in ranked.iter().enumerate() {
+        for &(z, other) in list.iter().take(EDGES) {
+            let weight = libm::exp(SHARPNESS * (f64::from(z) - USUAL));
+            steps[row].push((other, weight));
+            steps[other as usize].push((row as u32, weight));
+        }
+    }
+    steps.par_iter_mut().for_each(|row| {
+        // An edge that both ends keep is one edge: z is the same from either.
+        row.sort_unstable_by_key(|&(other, _)| other);
+        row.dedup_by_key(|&mut (other, _)| other);
+        let sum: f64 = row.iter().map(|&(_, weight)| weight).sum();
+        for (_, weight) in row.iter_mut() {
+            *weight /= sum;
+        }
+    });
+    steps
+}
+
+struct Scratch {
+    at: Vec<f64>,
+    sum: Vec<f64>,
+}
+
+impl Scratch {
+    /// The rows that a walk from `start` reaches, ascending, with the discounted sum of the
+    /// probabilities to be there after 1, 2, ... steps.
+    fn reached(&mut self, steps: &[Vec<(u32, f64)>], start: usize) -> Vec<(u32, f64)> {
+        let mut here = vec![(start as u32, 1.0)];
+        let (mut touched, mut ever) = (Vec::new(), Vec::new());
+        let mut discount = 1.0;
+        for _ in 0..STEPS {
+            for &(row, probability) in &here {
+                for &(other, step) in &steps[row as usize] {
+                    if self.at[other as usize] == 0.0 {
+                        touched.push(other);
+                    }
+                    self.at[other as usize] += probability * step;
+                }
+            }
+            here.clear();
+            for other in touched.drain(..) {
+                let probability = std::mem::take(&mut self.at[other as usize]);
+                if self.sum[other as usize] == 0.0 {
+                    ever.push(other);
+                }
+                self.sum[other as usize] += discount * probability;
+                here.push((other, probability));
+            }
+            if here.len() > WIDEST {
+                let by_probability =
+                    |a: &(u32, f64), b: &(u32, f64)| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0));
+                here.select_nth_unstable_by(WIDEST - 1, by_probability);
+                here.truncate(WIDEST);
+            }
+            // Sums in row order, whatever was pruned.
+            here.sort_unstable_by_key(|&(row, _)| row);
+            discount *= DECAY;
+        }
+        ever.sort_unstable();
+        ever.into_iter()
+            .map(|row| (row, std::mem::take(&mut self.sum[row as usize])))
+            .filter(|&(_, sum)| sum > 0.0)
+            .collect()
+    }
+}

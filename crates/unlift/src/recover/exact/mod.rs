@@ -1,0 +1,28 @@
+//! Exact constraints: what a scheme's rule says about hidden coordinates beyond one record.
+//!
+//! A feasible set is what one record says. The rule that made the records says more: coordinates that
+//! were exchanged are still in the map, one in each of two records ([`swaps`]), and a center that follows
+//! from a voxel grid leaves only every other voxel along a ray ([`parity`]).
+
+mod candidates;
+mod law;
+mod matching;
+mod parity;
+mod swaps;
+
+use super::Estimate;
+use crate::released::{Obfuscation, Released};
+
+/// Estimates of `released` moved to where the rule of their family allows them to be. `delta` is the
+/// distance that decided support.
+pub(crate) fn settle<const D: usize>(
+    released: &Released<D>,
+    estimates: Vec<Estimate<D>>,
+    delta: f32,
+) -> Vec<Estimate<D>> {
+    match released.obfuscation() {
+        Obfuscation::AxisCandidates(records) => swaps::settle(records.position(), estimates, delta),
+        Obfuscation::Rays(rays) => parity::settle(rays, estimates),
+        Obfuscation::Lines(_) | Obfuscation::AxisPlanes(_) => estimates,
+    }
+}

@@ -1,0 +1,155 @@
+//! Voxel parity: where the center of a ray follows from a checkerboard, every other voxel along it is out.
+//!
+//! The edge of a voxel is published, where the grid starts is not. But estimates tell: there is one
+//! start (up to whole voxels) for which nearly all of them lie in voxels of their own center.
+
+use rayon::prelude::*;
+
+use crate::recover::{Estimate, Status};
+use crate::released::Rays;
+
+/// Starts tried per axis, at first and in each finer step.
+const STARTS: usize = 16;
+/// Finer steps, each over the two intervals around the best start so far.
+const FINER: usize = 4;
+/// Sweeps over the axes in each finer step.
+const SWEEPS: usize = 2;
+/// Estimates looked at for the first start, and for finer ones.
+const SAMPLE: (usize, usize) = (1 << 12, 1 << 15);
+/// The grid is believed when so many more of these estimates agree than do not: as a share, and in
+/// standard deviations of what a wrong grid yields (the best of all starts reaches 4 or 5).
+const LEAST: f64 = 0.1;
+const SIGMAS: f64 = 8.0;
+/// An estimate is moved this far past the wall, in voxels.
+const INSIDE: f32 = 1e-3;
+
+/// A checkerboard: its start, and the center of the voxel there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Checkerboard<const D: usize> {
+    start: [f64; D],
+    edge: f64,
+    first: u8,
+}
+
+impl<const D: usize> Checkerboard<D> {
+    /// The center that belongs to a point at `x`.
+    pub(super) fn center(&self, x: &[f32; D]) -> u8 {
+        self.first ^ u8::from(odd(x, &self.start, self.edge))
+    }
+}
+
+/// Whether the voxel of `x` has odd parity.
+#[inline(always)]
+fn odd<const D: usize>(x: &[f32; D], start: &[f64; D], edge: f64) -> bool {
+    let cell = |c: usize| ((f64::from(x[c]) - start[c]) / edge).floor();
+    // The remainder by 2 of any float is exact.
+    (0..D).map(cell).sum::<f64>().rem_euclid(2.0) != 0.0
+}
+
+/// `estimates` in voxels of another center moved along their rays to the nearest one of their own.
+pub(super) fn settle<const D: usize>(
+    rays: &Rays<D>,
+    mut estimates: Vec<Estimate<D>>,
+) -> Vec<Estimate<D>> {
+    let Some(board) = find(rays, &estimates) else {
+        return estimates;
+    };
+    estimates.par_iter_mut().enumerate().for_each(|(i, estimate)| {
+        if estimate.status == Status::Ok && board.center(&estimate.position) != rays.center()[i] {
+            let center = &rays.centers()[usize::from(rays.center()[i])];
+            move_to_wall(&board, rays.center()[i], center, &rays.direction()[i], estimate);
+        }
+    });
+    estimates
+}
+
+/// Every wall along a ray changes the parity: the nearest one, before or behind, ends the wrong voxel.
+fn move_to_wall<const D: usize>(
+    board: &Checkerboard<D>,
+    own: u8,
+    center: &[f32; D],
+    direction: &[f32; D],
+    estimate: &mut Estimate<D>,
+) {
+    let t: f32 = (0..D).map(|c| (estimate.position[c] - center[c]) * direction[c]).sum();
+    let mut steps: Vec<f32> = Vec::with_capacity(2 * D);
+    for (c, &along) in direction.iter().enumerate() {
+        let cell = (f64::from(estimate.position[c]) - board.start[c]) / board.edge;
+        for wall in [cell.floor(), cell.floor() + 1.0] {
+            let step = ((wall - cell) * board.edge) as f32 / along;
+            if step.is_finite() {
+                steps.push(step + (INSIDE * board.edge as f32).copysign(step));
+            }
+        }
+    }
+    steps.sort_unstable_by(|a, b| a.abs().total_cmp(&b.abs()));
+    for step in steps.into_iter().filter(|step| t + step > 0.0) {
+        let x = std::array::from_fn(|c| center[c] + (t + step) * direction[c]);
+        if board.center(&x) == own {
+            estimate.position = x;
+            return;
+        }
+    }
+}
+
+/// The checkerboard that the estimates show, if there are two centers and the edge is known.
+pub(super) fn find<const D: usize>(
+    rays: &Rays<D>,
+    estimates: &[Estimate<D>],
+) -> Option<Checkerboard<D>> {
+    let edge = rays.voxel()?;
+    if rays.centers().len() != 2 {
+        return None;
+    }
+    let known: Vec<([f32; D], u8)> = estimates
+        .iter()
+        .zip(rays.center())
+        .filter(|(e, _)| e.status == Status::Ok)
+        .map(|(e, &center)| (e.position, center))
+        .collect();
+    let sample = |most: usize| -> Vec<([f32; D], u8)> {
+        known.iter().step_by(known.len().div_ceil(most).max(1)).copied().collect()
+    };
+    let (few, many) = (sample(SAMPLE.0), sample(SAMPLE.1));
+    // Starts a whole voxel apart differ in which center is first alone.
+    let step = edge / STARTS as f64;
+    let starts: Vec<[f64; D]> = (0..STARTS.pow(D as u32))
+        .map(|at| std::array::from_fn(|c| (at / STARTS.pow(c as u32) % STARTS) as f64 * step))
+        .collect();
+    let scores: Vec<i64> = starts.par_iter().map(|start| score(&few, start, edge).abs()).collect();
+    let best = (0..starts.len()).max_by_key(|&at| (scores[at], std::cmp::Reverse(at)))?;
+    let mut start = starts[best];
+    let mut width = step;
+    for _ in 0..FINER {
+        for axis in (0..SWEEPS).flat_map(|_| 0..D) {
+            let tried = |at: usize| {
+                let mut tried = start;
+                tried[axis] += width * (2.0 * at as f64 / STARTS as f64 - 1.0);
+                tried
+            };
+            let scores: Vec<i64> = (0..=STARTS)
+                .into_par_iter()
+                .map(|at| score(&many, &tried(at), edge).abs())
+                .collect();
+            let most = scores.iter().copied().max().unwrap_or(0);
+            let first = scores.iter().position(|&s| s == most).unwrap_or(STARTS / 2);
+            let last = scores.iter().rposition(|&s| s == most).unwrap_or(STARTS / 2);
+            // The middle of starts that are as good.
+            start = tried((first + last) / 2);
+        }
+        width *= 2.0 / STARTS as f64;
+    }
+    let agree = score(&many, &start, edge);
+    let n = many.len() as f64;
+    let believed = agree.unsigned_abs() as f64 >= (LEAST * n).max(SIGMAS * n.sqrt());
+    (believed && !many.is_empty()).then_some(Checkerboard {
+        start,
+        edge,
+        first: u8::from(agree < 0),
+    })
+}
+
+/// How many more of the estimates have the parity of their center than have not.
+fn score<const D: usize>(of: &[([f32; D], u8)], start: &[f64; D], edge: f64) -> i64 {
+    of.iter().map(|(x, center)| if odd(x, start, edge) == (*center == 1) { 1 } else { -1 }).sum()
+}

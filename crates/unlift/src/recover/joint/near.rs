@@ -1,0 +1,122 @@
+//! Columns of neighbors' estimates, and how likely they are about a place.
+
+use super::pieces::Piece;
+use crate::recover::sections::LANES;
+
+/// Estimates with the odds that they are a true neighbor's, in columns.
+#[derive(Debug)]
+pub(crate) struct Columns<const D: usize> {
+    x: [Vec<f32>; D],
+    odds: Vec<f32>,
+    slot: Vec<u32>,
+    /// Squared distance to the piece last looked at.
+    apart2: Vec<f32>,
+}
+
+impl<const D: usize> Default for Columns<D> {
+    fn default() -> Self {
+        let x = std::array::from_fn(|_| Vec::new());
+        Self { x, odds: Vec::new(), slot: Vec::new(), apart2: Vec::new() }
+    }
+}
+
+impl<const D: usize> Columns<D> {
+    pub(crate) fn clear(&mut self) {
+        self.x.iter_mut().for_each(Vec::clear);
+        self.odds.clear();
+        self.slot.clear();
+    }
+
+    #[inline(always)]
+    pub(crate) fn push(&mut self, x: &[f32; D], odds: f32, slot: u32) {
+        for (column, x) in self.x.iter_mut().zip(x) {
+            column.push(*x);
+        }
+        self.odds.push(odds);
+        self.slot.push(slot);
+    }
+
+    /// Number of estimates.
+    #[inline(always)]
+    pub(crate) fn len(&self) -> usize {
+        self.slot.len()
+    }
+
+    /// The estimate in row `i`.
+    #[inline(always)]
+    pub(crate) fn at(&self, i: usize) -> [f32; D] {
+        std::array::from_fn(|c| self.x[c][i])
+    }
+
+    /// The slot whose estimate is in row `i`.
+    #[inline(always)]
+    pub(crate) fn slot(&self, i: usize) -> usize {
+        self.slot[i] as usize
+    }
+
+    /// Puts the estimates within `reach` of `piece` into `near`.
+    #[inline(always)]
+    pub(crate) fn near(&mut self, piece: &Piece<D>, reach: f32, near: &mut Self) {
+        let n = self.len();
+        self.apart2.resize(n, 0.0);
+        let columns: [&[f32]; D] = std::array::from_fn(|c| &self.x[c][..n]);
+        let apart2 = &mut self.apart2[..n];
+        for i in 0..n {
+            let x: [f32; D] = std::array::from_fn(|c| columns[c][i]);
+            let y = piece.project(&x);
+            let mut sum = 0.0;
+            for c in 0..D {
+                sum += (x[c] - y[c]) * (x[c] - y[c]);
+            }
+            apart2[i] = sum;
+        }
+        near.clear();
+        for i in 0..n {
+            if self.apart2[i] < reach * reach {
+                near.push(&self.at(i), self.odds[i], self.slot[i]);
+            }
+        }
+        near.pad();
+    }
+
+    /// Fills up the last vector with estimates that say nothing.
+    fn pad(&mut self) {
+        let n = self.odds.len().next_multiple_of(LANES);
+        self.x.iter_mut().for_each(|column| column.resize(n, 0.0));
+        self.odds.resize(n, 0.0);
+    }
+
+    /// The logarithm of how much likelier these estimates are about a point at `x` than by chance:
+    /// the sum of `ln(1 + odds * gain * (1 + r^2 / a^2)^-3)`.
+    #[inline(always)]
+    pub(crate) fn log_likelihood(&self, x: &[f32; D], gain: f32, inverse_a2: f32) -> f32 {
+        let mut sums = [0.0f32; LANES];
+        let (odds, _) = self.odds.as_chunks::<LANES>();
+        let columns: [&[[f32; LANES]]; D] =
+            std::array::from_fn(|c| &self.x[c].as_chunks::<LANES>().0[..odds.len()]);
+        for (i, odds) in odds.iter().enumerate() {
+            for lane in 0..LANES {
+                let mut r2 = 0.0;
+                for c in 0..D {
+                    let d = columns[c][i][lane] - x[c];
+                    r2 += d * d;
+                }
+                let q = 1.0 / (1.0 + r2 * inverse_a2);
+                sums[lane] += ln(1.0 + odds[lane] * gain * (q * q * q));
+            }
+        }
+        sums.iter().sum()
+    }
+}
+
+/// The logarithm of a positive number, to 2e-6: exponent plus a polynomial of the mantissa, without
+/// branches.
+#[inline(always)]
+pub(crate) fn ln(y: f32) -> f32 {
+    let bits = y.to_bits();
+    let exponent = (bits >> 23) as i32 - 127;
+    let m = f32::from_bits(bits & 0x007f_ffff | 0x3f80_0000) - 1.0;
+    // ln(1 + m) on [0, 1), zero at 0, fitted for the smallest largest error.
+    let p = m * (0.317_648_7 + m * (-0.193_760_2 + m * (0.085_569_24 - m * 0.018_338_63)));
+    exponent as f32 * std::f32::consts::LN_2 + m * (0.999_901_65 + m * (-0.497_875 + p))
+}

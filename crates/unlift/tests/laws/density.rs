@@ -1,0 +1,213 @@
+//! Attacks on the records alone: what must hold for them besides the laws of degenerate maps.
+
+use unlift::neighbors::{Neighborhoods, geometric};
+use unlift::obfuscate::{Scheme, olc::Olc, scheme};
+use unlift::recover::{RecoverOptions, Recovered, Solver, Status};
+use unlift::released::{Lines, Obfuscation, Released};
+use unlift::seed::{Draws, Stage};
+
+use crate::maps::*;
+
+const ALONE: [Solver; 2] = [Solver::Density, Solver::Tomography];
+
+fn empty_lists<const D: usize>(released: &Released<D>) -> Neighborhoods {
+    let rows = vec![Vec::new(); released.n_slots()];
+    lists_of(&rows, released.n_records(), released.slots_per_record())
+}
+
+fn alone<const D: usize>(released: &Released<D>, solver: Solver) -> Recovered<D> {
+    solve(released, &empty_lists(released), RecoverOptions { solver, ..Default::default() })
+}
+
+/// The furnished room, denser than the one other laws use: crowds are what these attacks see.
+fn furnished(n: usize) -> Vec<[f64; 3]> {
+    unlift::synthetic::room(1, n).points
+}
+
+/// The share of points within `reach`, in percent; a paired line's two positions are one set.
+fn percent_within(hidden: &Hidden<3>, recovered: &Recovered<3>, reach: f64) -> f64 {
+    let off = |at: usize, slot: usize| {
+        let point = hidden.original.reveal().positions()[hidden.secret.hidden()[slot].index()];
+        recovered
+            .position(at)
+            .map_or(f64::INFINITY, |x| norm(&std::array::from_fn::<f64, 3, _>(|c| x[c] - point[c])))
+    };
+    let per = hidden.released.slots_per_record();
+    let mut within = 0;
+    for record in 0..hidden.released.n_records() {
+        let hits = |order: &[usize]| {
+            let slots = (0..per).map(|slot| off(record * per + order[slot], record * per + slot));
+            slots.filter(|&off| off <= reach).count()
+        };
+        within += if per == 2 { hits(&[0, 1]).max(hits(&[1, 0])) } else { hits(&[0]) };
+    }
+    100.0 * within as f64 / hidden.released.n_slots() as f64
+}
+
+fn threads_change_no_byte<const D: usize>(name: &str, scheme: &dyn Scheme<D>) {
+    let released = hide(scheme, &room(5, 500), 5).released;
+    let run = || {
+        let mut bytes: Vec<u8> =
+            ALONE.iter().flat_map(|&solver| recovered_bytes(&alone(&released, solver))).collect();
+        if let Ok(lists) = geometric(&released, 10) {
+            bytes.extend(lists.records().iter().flat_map(|r| r.0.to_le_bytes()));
+            let scores = lists.scores().unwrap_or_default();
+            bytes.extend(scores.iter().flat_map(|x| x.to_bits().to_le_bytes()));
+        }
+        bytes
+    };
+    let on = |threads| {
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(run)
+    };
+    let one = on(1);
+    assert!(one == on(2) && one == on(8), "{name}: threads changed a byte");
+}
+
+#[test]
+fn density_determinism() {
+    over_schemes!(threads_change_no_byte);
+}
+
+/// Points on a wall, lines in all directions: the wall comes back.
+#[test]
+fn a_wall_comes_back_from_random_lines() {
+    let mut draws = Draws::new(2, Stage::Synthetic, 0);
+    let wall: Vec<[f64; 3]> =
+        (0..2000).map(|_| [draws.between(0.0, 2.0), 0.5, draws.between(0.0, 2.0)]).collect();
+    let hidden = hide(&Olc, &wall, 1);
+    for (solver, least) in [(Solver::Density, 60.0), (Solver::Tomography, 70.0)] {
+        let percent = percent_within(&hidden, &alone(&hidden.released, solver), 0.1);
+        assert!(percent >= least, "{solver:?}: {percent}");
+    }
+}
+
+/// Floors: measured shares within 25 cm, less three or four points.
+#[test]
+fn a_room_comes_back_from_its_records() {
+    let floors = [("olc", 57.0, 69.0), ("ppl", 53.0, 63.0), ("ray", 32.0, 40.0), ("cp", 0.0, 27.0)];
+    let points = furnished(4000);
+    for (name, published, ours) in floors {
+        let hidden = hide(scheme(name).unwrap().in_3d.unwrap(), &points, 1);
+        for (solver, least) in [(Solver::Density, published), (Solver::Tomography, ours)] {
+            let percent = percent_within(&hidden, &alone(&hidden.released, solver), 0.25);
+            assert!(percent >= least, "{name}, {solver:?}: {percent}");
+        }
+    }
+}
+
+/// A map in other units has the same shares.
+#[test]
+fn a_scaled_map_has_the_same_shares() {
+    let points = furnished(1500);
+    let scaled: Vec<[f64; 3]> = points.iter().map(|p| p.map(|x| 7.3 * x)).collect();
+    for name in ["olc", "ppl", "ray", "cp"] {
+        let scheme = scheme(name).unwrap().in_3d.unwrap();
+        let (one, other) = (hide(scheme, &points, 1), hide(scheme, &scaled, 1));
+        for solver in ALONE {
+            let one = percent_within(&one, &alone(&one.released, solver), 0.25);
+            let other = percent_within(&other, &alone(&other.released, solver), 7.3 * 0.25);
+            // Records are rounded to f32 after scaling: a sample on the border of two voxels may change sides.
+            assert!((one - other).abs() <= 0.5, "{name}, {solver:?}: {one} and {other}");
+        }
+    }
+}
+
+/// Records in another order give the same positions in that order.
+#[test]
+fn permuted_records_give_permuted_positions() {
+    let released = hide(&Olc, &furnished(1000), 1).released;
+    let Obfuscation::Lines(lines) = released.obfuscation() else { panic!("lines") };
+    let order = Draws::new(1, Stage::Shuffle, 9).permutation(lines.len());
+    let rows = |of: &[[f32; 3]]| -> Vec<[f64; 3]> {
+        order.iter().map(|&row| of[row as usize].map(f64::from)).collect()
+    };
+    let permuted = Lines::through(&rows(lines.foot()), &rows(lines.direction())).unwrap();
+    let (origin, unit) = (released.origin(), released.unit());
+    let permuted = Released::try_new(Obfuscation::Lines(permuted), 1, origin, unit, None).unwrap();
+    for solver in ALONE {
+        let (one, other) = (alone(&released, solver), alone(&permuted, solver));
+        let bits = |x: [f32; 3]| x.map(f32::to_bits);
+        let same = |(at, &row): (usize, &u32)| {
+            bits(one.positions()[row as usize]) == bits(other.positions()[at])
+        };
+        assert!(order.iter().enumerate().all(same), "{solver:?}");
+    }
+}
+
+/// Lists hold far more neighbors than chance would, are full and leave out rays of the own center.
+#[test]
+fn geometric_lists_hold_neighbors() {
+    let points = furnished(3000);
+    for (name, least) in [("olc", 0.40), ("ppl", 0.17), ("ray", 0.13), ("cp", 0.11)] {
+        let hidden = hide(scheme(name).unwrap().in_3d.unwrap(), &points, 1);
+        let lists = geometric(&hidden.released, 20).unwrap();
+        let ratio = hidden.near(20).measured_inlier_ratio(&lists);
+        assert!(ratio >= least, "{name}: {ratio}, {} by chance", 20.0 / 3000.0);
+        let full = (0..lists.n_slots()).filter(|&slot| lists.of(slot).len() == 20).count();
+        assert!(full as f64 >= 0.95 * lists.n_slots() as f64, "{name}: {full} full lists");
+        if let Obfuscation::Rays(rays) = hidden.released.obfuscation() {
+            for slot in 0..lists.n_slots() {
+                let own = rays.center()[slot];
+                assert!(lists.of(slot).iter().all(|r| rays.center()[r.index()] != own));
+            }
+        }
+    }
+}
+
+/// Maps that fix little or nothing: a status, never a NaN, never a panic.
+fn odd_maps_are_answered<const D: usize>(name: &str, scheme: &dyn Scheme<D>) {
+    let far = [vec![[1e6; D]; 3], uniform(1, 60)].concat();
+    let maps = [piles(3, 1, 40, 0.0), piles(3, 2, 40, 1e-7), uniform(3, 2), uniform(3, 9), far];
+    for points in maps {
+        let Ok(hidden) = try_hide(scheme, &points, 0.5, 1) else { continue };
+        for solver in ALONE {
+            let recovered = alone(&hidden.released, solver);
+            for slot in 0..recovered.n_slots() {
+                let ok = recovered.status()[slot] == Status::Ok;
+                let position = recovered.positions()[slot];
+                assert_eq!(ok, position.iter().all(|x| x.is_finite()), "{name}: {position:?}");
+                let evidence = recovered.evidence()[slot];
+                assert!(evidence >= 0.0 && evidence.is_finite(), "{name}: {evidence}");
+            }
+            assert!(recovered.delta().is_finite() && recovered.delta() > 0.0, "{name}");
+        }
+        if let Ok(lists) = geometric(&hidden.released, 5) {
+            assert_eq!(lists.n_slots(), hidden.released.n_slots(), "{name}");
+        }
+    }
+}
+
+#[test]
+fn density_of_odd_maps() {
+    over_schemes!(odd_maps_are_answered);
+    let parallel = Lines::through(&uniform::<3>(1, 50), &[[0.0, 0.6, 0.8]; 50]).unwrap();
+    for lines in [parallel, Lines::through(&[], &[]).unwrap()] {
+        let family = Obfuscation::Lines(lines);
+        let released = Released::try_new(family, 1, [0.0; 3], unlift::Unit::Meter, None).unwrap();
+        for solver in ALONE {
+            alone(&released, solver);
+        }
+        assert!(geometric(&released, 5).unwrap().records().is_empty());
+    }
+}
+
+#[test]
+fn where_records_alone_tell_nothing_the_error_says_so() {
+    let message = |name: &str| {
+        let released = hide(scheme(name).unwrap().in_3d.unwrap(), &furnished(200), 1).released;
+        geometric(&released, 5).unwrap_err().to_string()
+    };
+    assert_eq!(
+        message("plane"),
+        "geometric neighborhoods: expected lines, rays or axis candidates, found planes"
+    );
+    let flat = hide::<2>(&Olc, &room(1, 100), 1).released;
+    assert_eq!(
+        geometric(&flat, 5).unwrap_err().to_string(),
+        "geometric neighborhoods: expected a map in three dimensions, found 2"
+    );
+    let planes = hide(scheme("plane").unwrap().in_3d.unwrap(), &furnished(200), 1).released;
+    for solver in ALONE {
+        assert!(alone(&planes, solver).status().iter().all(|&s| s == Status::NoSupport));
+    }
+}

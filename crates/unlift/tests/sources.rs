@@ -1,0 +1,239 @@
+//! Laws of every source that makes neighborhoods from a released map, and what each is for.
+
+use unlift::audit::{Plan, Source};
+use unlift::descriptors::Values;
+use unlift::neighbors::sources::{Joined, SOURCES};
+use unlift::neighbors::{Neighborhoods, overlap, similarity};
+use unlift::released::{Lines, Obfuscation, Released};
+use unlift::seed::{Draws, Stage};
+use unlift::{Descriptors, RecordId, Unit};
+
+/// A picture around a keypoint: blobs of gradients, each at a place, in a direction.
+struct Picture(Vec<([f64; 2], f64)>);
+
+impl Picture {
+    fn random(item: u64) -> Self {
+        let mut draws = Draws::new(3, Stage::Synthetic, item);
+        let mut blob = || {
+            let place = [draws.between(-5.0, 5.0), draws.between(-5.0, 5.0)];
+            (place, draws.between(0.0, std::f64::consts::TAU))
+        };
+        Self((0..24).map(|_| blob()).collect())
+    }
+
+    /// Its SIFT-like descriptor after the picture is turned (from x towards y) and shifted: 4 x 4
+    /// cells of 8 bins, orientations counted against the grid.
+    fn descriptor(&self, degrees: f64, shift: [f64; 2]) -> Vec<u8> {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let mut squares = Vec::new();
+        for cell in 0..16 {
+            let place = [f64::from(cell % 4) - 1.5, f64::from(cell / 4) - 1.5];
+            for bin in 0..8 {
+                let mut sum = 1e-4;
+                for (at, angle) in &self.0 {
+                    let x = cos * at[0] - sin * at[1] + shift[0] - place[0];
+                    let y = sin * at[0] + cos * at[1] + shift[1] - place[1];
+                    let turned =
+                        angle + degrees.to_radians() + f64::from(bin) * std::f64::consts::FRAC_PI_4;
+                    sum += (-(x * x + y * y)).exp() * (2.0 * turned.cos()).exp();
+                }
+                squares.push(sum);
+            }
+        }
+        let total: f64 = squares.iter().sum();
+        squares.iter().map(|s| (512.0 * (s / total).sqrt()).round().min(255.0) as u8).collect()
+    }
+}
+
+/// Lines that tell nothing, with the given descriptors.
+fn released(rows: &[Vec<u8>], slots_per_record: usize) -> Released<3> {
+    let n = rows.len() / slots_per_record;
+    let points: Vec<[f64; 3]> = (0..n).map(|i| [i as f64, 0.0, (i % 7) as f64]).collect();
+    let lines = Lines::through(&points, &vec![[0.0, 1.0, 0.5]; n]).unwrap();
+    let descriptors = Descriptors::try_new(Values::U8(rows.concat()), rows[0].len()).unwrap();
+    let obfuscation = Obfuscation::Lines(lines);
+    Released::try_new(obfuscation, slots_per_record, [0.0; 3], Unit::Meter, Some(descriptors))
+        .unwrap()
+}
+
+fn random_map(n: usize) -> Vec<Vec<u8>> {
+    (0..n as u64).map(|item| Picture::random(item).descriptor(0.0, [0.0; 2])).collect()
+}
+
+fn best(lists: &Neighborhoods, slot: usize) -> RecordId {
+    let scores = lists.scores_of(slot).expect("scores");
+    let at = (0..scores.len()).max_by(|&a, &b| scores[a].total_cmp(&scores[b])).expect("a list");
+    lists.of(slot)[at]
+}
+
+#[test]
+fn a_patch_that_is_turned_or_shifted_is_found_again() {
+    let mut rows = random_map(300);
+    let changes = [
+        (45.0, [0.0, 0.0]),
+        (135.0, [0.0, 0.0]),
+        (90.0, [1.0, 0.0]),
+        (180.0, [-1.0, 1.0]),
+        (0.0, [0.0, 2.0]),
+    ];
+    for (item, (degrees, shift)) in changes.into_iter().enumerate() {
+        rows.push(Picture::random(item as u64).descriptor(degrees, shift));
+    }
+    let map = released(&rows, 1);
+    let lists = overlap(&map, 5).unwrap();
+    for (item, change) in changes.iter().enumerate() {
+        assert_eq!(best(&lists, item), RecordId(300 + item as u32), "{change:?}");
+        assert_eq!(best(&lists, 300 + item), RecordId(item as u32), "{change:?}");
+    }
+    // The test can fail: similarity sees none of this but the smallest turn or shift.
+    let plain = similarity(&map, 5).unwrap();
+    let found = (0..changes.len()).filter(|&i| best(&plain, i) == RecordId(300 + i as u32)).count();
+    assert!(found < changes.len(), "{found}");
+}
+
+#[test]
+fn similarity_is_the_cosine() {
+    let rows = random_map(150);
+    let lists = similarity(&released(&rows, 1), 10).unwrap();
+    let cosine = |a: &[u8], b: &[u8]| {
+        let dot = |a: &[u8], b: &[u8]| -> f64 {
+            a.iter().zip(b).map(|(&x, &y)| f64::from(x) * f64::from(y)).sum()
+        };
+        dot(a, b) / (dot(a, a) * dot(b, b)).sqrt()
+    };
+    for slot in [0, 77, 149] {
+        let mut all: Vec<(f64, u32)> = (0..150)
+            .filter(|&other| other != slot)
+            .map(|other| (cosine(&rows[slot], &rows[other]), other as u32))
+            .collect();
+        all.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut nearest: Vec<RecordId> = all[..10].iter().map(|&(_, id)| RecordId(id)).collect();
+        nearest.sort_unstable();
+        assert_eq!(lists.of(slot), nearest);
+        for (record, score) in lists.of(slot).iter().zip(lists.scores_of(slot).unwrap()) {
+            // Sums of 128 products in f32.
+            let exact = cosine(&rows[slot], &rows[record.index()]);
+            assert!((f64::from(*score) - exact).abs() < 1e-5);
+        }
+    }
+}
+
+/// Every source that compares descriptors, and two joined; the laws of lists by records alone are with
+/// those of the density.
+fn sources() -> Vec<Joined> {
+    let described = SOURCES.iter().filter(|entry| entry.needs_descriptors);
+    let names = described.map(|entry| entry.name).chain(["overlap+similarity"]);
+    names.map(|name| Joined::parse(name).unwrap().with_k(6)).collect()
+}
+
+#[test]
+fn lists_have_k_other_records_each_once_also_for_paired_lines() {
+    for slots_per_record in [1, 2] {
+        let map = released(&random_map(200), slots_per_record);
+        for source in sources() {
+            // `try_new` refuses the own record and repeats.
+            let lists = source.make(&map, 0).unwrap();
+            assert_eq!(lists.n_slots(), 200);
+            for slot in 0..200 {
+                assert_eq!(lists.of(slot).len(), 6, "{} {slot}", source.name());
+            }
+            assert!(lists.scores().is_some(), "{}", source.name());
+        }
+    }
+}
+
+#[test]
+fn the_same_bytes_for_any_number_of_threads() {
+    let map = released(&random_map(420), 2);
+    for source in sources() {
+        let on = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| source.make(&map, 0).unwrap())
+        };
+        let one = on(1);
+        assert_eq!(one, on(2), "{}", source.name());
+        assert_eq!(one, on(8), "{}", source.name());
+    }
+}
+
+#[test]
+fn permuting_records_permutes_lists() {
+    let rows = random_map(260);
+    let mut order: Vec<u32> = (0..260).collect();
+    Draws::new(5, Stage::Synthetic, 0).shuffle(&mut order);
+    let permuted: Vec<Vec<u8>> = order.iter().map(|&at| rows[at as usize].clone()).collect();
+    for source in sources() {
+        let plain = source.make(&released(&rows, 1), 0).unwrap();
+        let other = source.make(&released(&permuted, 1), 0).unwrap();
+        for (slot, &was) in order.iter().enumerate() {
+            let mut entries: Vec<(u32, f32)> = other
+                .of(slot)
+                .iter()
+                .zip(other.scores_of(slot).unwrap())
+                .map(|(record, &score)| (order[record.index()], score))
+                .collect();
+            entries.sort_unstable_by_key(|&(record, _)| record);
+            let expected: Vec<(u32, f32)> = plain
+                .of(was as usize)
+                .iter()
+                .map(|record| record.0)
+                .zip(plain.scores_of(was as usize).unwrap().iter().copied())
+                .collect();
+            assert_eq!(entries, expected, "{} {slot}", source.name());
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_compared_is_told_in_one_line() {
+    let map = released(&random_map(9), 1);
+    let message = |map: &Released<3>, name: &str, k: usize| {
+        let source = Joined::parse(name).unwrap().with_k(k);
+        source.make(map, 0).unwrap_err().to_string()
+    };
+    assert_eq!(
+        message(&map, "overlap", 9),
+        "overlap: k: expected between 1 and 8 (other records), found 9"
+    );
+    let short = released(&[vec![1, 2, 3], vec![3, 2, 1], vec![0, 1, 0]], 1);
+    assert_eq!(
+        message(&short, "overlap", 1),
+        "overlap: descriptors for overlap: expected SIFT (128 values, none negative), found 3 values"
+    );
+    let (obfuscation, unit) = (short.obfuscation().clone(), short.unit());
+    let bare = Released::try_new(obfuscation, 1, [0.0; 3], unit, None).unwrap();
+    assert_eq!(
+        message(&bare, "similarity", 1),
+        "similarity: released map: expected descriptors, which this source compares, found none"
+    );
+}
+
+#[test]
+fn blank_and_equal_descriptors_are_no_trouble() {
+    let mut rows = random_map(40);
+    rows[3] = vec![0; 128];
+    rows[7] = rows[8].clone();
+    for source in sources() {
+        let lists = source.make(&released(&rows, 1), 0).unwrap();
+        assert!(lists.scores().unwrap().iter().all(|score| score.is_finite()));
+        assert!(lists.of(7).contains(&RecordId(8)), "{}", source.name());
+    }
+}
+
+#[test]
+fn schemes_that_a_source_cannot_have_exist_and_are_refused_before_anything_runs() {
+    for entry in SOURCES {
+        for name in entry.not_for {
+            unlift::obfuscate::scheme(name).unwrap();
+        }
+    }
+    let mut plan = Plan::new(unlift::Unit::Meter);
+    plan.sources = vec![Source::Own(Joined::parse("geometric").unwrap())];
+    assert_eq!(
+        plan.check(1000, false).unwrap_err().to_string(),
+        "scheme with neighbors by geometric: expected one whose records alone tell geometric where \
+         points are, found plane"
+    );
+    plan.schemes.retain(|scheme| scheme.name != "plane");
+    plan.check(1000, false).unwrap();
+}
