@@ -140,7 +140,7 @@ fn constants(rows: &[Vec<Row>]) -> String {
          use super::model::{Model, N_KINDS, N_TERMS};\n\n",
     );
     let list =
-        |values: &[f32]| values.iter().map(|x| format!("{x:.4e}")).collect::<Vec<_>>().join(", ");
+        |values: &[f32]| values.iter().map(|x| format!("{x:.3e}")).collect::<Vec<_>>().join(", ");
     let _ = writeln!(
         text,
         "/// Means of terms.\npub(super) const CENTER: [f32; N_TERMS] = [{}];\n",
