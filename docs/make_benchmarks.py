@@ -139,7 +139,7 @@ def noise_figure(rows):
 
 def own_sources(scene, *options):
     """What an attacker gets without an oracle: sources by scheme, joint recovery."""
-    sources = ["similarity", "overlap", "geometric", "overlap+similarity", "overlap+geometric"]
+    sources = ["similarity", "overlap", "geometric", "overlap+geometric"]
     schemes = ["olc", "ppl", "ray", "plane", "cp"]
     found, seconds = {}, {}
     for named, of in ((sources, [s for s in schemes if s != "plane"]),

@@ -152,12 +152,10 @@ pub struct AuditMapArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
           default_value = "joint", help_heading = "Attack")]
     pub solver: Vec<Solver>,
-    /// Do not use rules that tie records together: exchanged coordinates of cp that other records
-    /// publish, voxels that the centers of ray-voxel leave out
+    /// Do not use rules that tie records together (cp: swaps are mutual; ray-voxel: parity)
     #[arg(long, help_heading = "Attack")]
     pub no_exact_constraints: bool,
-    /// Add a row per scheme for an attacker who is told where three true neighbors of every point are: what
-    /// is missing there lies in the map
+    /// Add a row per scheme for an attacker who is told where three true neighbors of every point are
     #[arg(long, help_heading = "Attack")]
     pub reference: bool,
     /// Where neighborhoods come from, repeatable: oracle (made from the map itself); what an attacker
@@ -310,8 +308,7 @@ pub struct RecoverArgs {
     /// Recovery method: joint, consensus, ransac, density or tomography
     #[arg(long, value_name = "SOLVER", value_parser = values::solver, default_value = "joint")]
     pub solver: Solver,
-    /// Do not use rules that tie records together: exchanged coordinates of cp that other records
-    /// publish, voxels that the centers of ray-voxel leave out
+    /// Do not use rules that tie records together (cp: swaps are mutual; ray-voxel: parity)
     #[arg(long)]
     pub no_exact_constraints: bool,
     /// Distance up to which a neighbor supports a position, in the unit of the map
@@ -341,8 +338,7 @@ pub struct EvaluateArgs {
     /// The truth.parquet of the obfuscation
     #[arg(long, value_name = "TRUTH")]
     pub truth: PathBuf,
-    /// Errors up to which a point counts as recovered, by commas; kept as typed
-    /// [default: 0.10,0.25 in meters, else 1.0,2.5]
+    /// Errors that count as recovered, by commas [default: 0.10,0.25 in meters, else 1.0,2.5]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold)]
     pub thresholds: Vec<Threshold>,
     /// Print JSON in place of the table

@@ -28,7 +28,7 @@ const FINE: i32 = 3;
 pub(crate) enum Prefer {
     /// The widest: a wider support is the steadier one.
     Wide,
-    /// The narrowest: joint recovery looks for neighbors' estimates, which are sharper than records.
+    /// A narrow one: joint recovery looks for neighbors' estimates, which are sharper than records.
     Narrow,
 }
 
@@ -83,7 +83,11 @@ pub(crate) fn choose<const D: usize>(
     let near = |&&(_, value): &&(f64, f64)| value >= prefer.near_most() * most || value == most;
     match prefer {
         Prefer::Wide => fine.iter().rev().find(near).map(|x| x.0),
-        Prefer::Narrow => fine.iter().find(near).map(|x| x.0),
+        Prefer::Narrow => {
+            // A third of the way across the plateau, in logarithm: its very edge is a matter of luck.
+            let (low, high) = (fine.iter().find(near)?.0, fine.iter().rev().find(near)?.0);
+            Some(libm::cbrt(low * low * high))
+        }
     }
 }
 

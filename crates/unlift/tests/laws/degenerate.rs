@@ -56,7 +56,8 @@ fn statuses<const D: usize>(
     for options in options {
         let recovered = recover(released, lists, options)
             .unwrap_or_else(|error| panic!("{what}, {options:?}: {error}"));
-        for slot in 0..recovered.n_slots() {
+        assert_eq!(recovered.n_slots(), both_ways.len(), "{what}");
+        for (slot, both_ways) in both_ways.iter().enumerate() {
             let ok = recovered.status()[slot] == Status::Ok;
             let position = recovered.positions()[slot];
             assert_eq!(ok, position.iter().all(|x| x.is_finite()), "{what}: {position:?}");
@@ -64,7 +65,7 @@ fn statuses<const D: usize>(
             let evidence = recovered.evidence()[slot];
             assert!(evidence >= 0.0 && evidence.is_finite(), "{what}: evidence {evidence}");
             let asked = match options.solver {
-                Solver::Joint => both_ways[slot].len(),
+                Solver::Joint => both_ways.len(),
                 _ => lists.of(slot).len(),
             };
             let support = usize::from(recovered.support()[slot]);

@@ -70,7 +70,10 @@ fn exact_limit<const D: usize>(name: &str, scheme: &dyn Scheme<D>, seed: u64) {
         row
     };
     let lists = hidden.lists_of(&(0..n).map(row).collect::<Vec<_>>());
-    for options in all_options() {
+    // About votes: piles of equal points share all values, which an assignment may exchange.
+    for options in
+        all_options().into_iter().map(|o| RecoverOptions { exact_constraints: false, ..o })
+    {
         let recovered = solve(&hidden.released, &lists, options);
         let mut fixed = 0;
         for slot in 0..n {
@@ -90,6 +93,10 @@ fn exact_limit<const D: usize>(name: &str, scheme: &dyn Scheme<D>, seed: u64) {
                     continue;
                 }
                 tolerance = delta;
+            }
+            // Joint recovery is re-made from all estimates within reach, so a pile close by pulls a little.
+            if options.solver == Solver::Joint {
+                tolerance = 0.05 * delta;
             }
             // Else: a few units in the last place at 6 m, over the sine of the best crossing.
             assert_eq!(status, Status::Ok, "{name}, {options:?}: slot {slot}");
@@ -141,7 +148,8 @@ fn bounded_influence<const D: usize>(name: &str, scheme: &dyn Scheme<D>, seed: u
         solver: Solver::Consensus,
         delta: Delta::Fixed(DELTA),
         seed: 3,
-        ..RecoverOptions::default()
+        // About votes: an assignment looks at the whole map.
+        exact_constraints: false,
     };
     let lists = hidden.lists_of(&without);
     let alone = solve(&hidden.released, &lists, options);

@@ -7,7 +7,7 @@
 //!
 //! A query looks first at the smallest node around its point that holds enough others. The K-th
 //! distance found there bounds the true one, and every point within that bound is taken: ties
-//! cannot be missed. Who asks for every row is served leaf by leaf ([`leaf`]).
+//! cannot be missed. Who asks for every row is served leaf by leaf (`leaf`).
 
 mod leaf;
 
