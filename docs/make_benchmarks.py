@@ -3,8 +3,8 @@
 
     cargo build --release && python3 docs/make_benchmarks.py ../shared
 
-Needs the scenes (SHARED/data) and the paper's tables (SHARED/paper/tables); standard library only.
-Everything between the begin and end markers of the two files is replaced.
+or parts of them (`accuracy`, `low`, `noise`, `own`, `alone`), named after the folder. Needs the scenes
+(SHARED/data) and the paper's tables (SHARED/paper/tables); standard library only. Everything between the begin and end markers of the two files is replaced.
 """
 import csv, json, pathlib, subprocess, sys, tempfile
 
@@ -139,7 +139,7 @@ def noise_figure(rows):
 
 def own_sources(scene, *options):
     """What an attacker gets without an oracle: sources by scheme, joint recovery."""
-    sources = ["similarity", "overlap", "geometric", "overlap+geometric"]
+    sources = ["similarity", "overlap", "geometric", "overlap+geometric", "overlap+similarity"]
     schemes = ["olc", "ppl", "ray", "plane", "cp"]
     found, seconds = {}, {}
     for named, of in ((sources, [s for s in schemes if s != "plane"]),
@@ -175,13 +175,61 @@ def exact_line(rows):
     return f"Recovered exactly (`cp`, `joint`), percent, In {' / '.join(map(str, RATIOS))}: {' / '.join(shares)}."
 
 
-def main():
-    kitchen_options = ["--scale", "1"]
-    if "--records-alone" in sys.argv:
-        put(ROOT / "docs/benchmarks.md", "records alone", [*records_alone(), ""])
-        return
+def confidence_table(rows, solver):
+    """Percent of the points that the attacker is 90 % sure of, and percent of those within the threshold."""
+    by_key = {(r["scheme"], r["inlier_ratio"]): r for r in rows if r["solver"] == solver}
+    yield "| In | " + " | ".join(SCHEMES) + " |"
+    yield "| --- |" + " --- |" * len(SCHEMES)
+    for ratio in RATIOS:
+        cells = []
+        for scheme in SCHEMES:
+            row = by_key[scheme, ratio]
+            correct = row.get("sure_correct_percent")
+            cells.append(f"{row['sure_percent']:.0f} / " + ("-" if correct is None else f"{correct:.1f}"))
+        yield f"| {ratio} | " + " | ".join(cells) + " |"
+
+
+def reliability(documents):
+    """The curve over all schemes and ratios of a map, recovered by `joint`."""
+    curves = []
+    for name, rows in documents:
+        pooled = [[0, 0.0, 0.0] for _ in range(10)]
+        for row in rows:
+            if row["solver"] == "joint":
+                for bin, more in zip(pooled, row["reliability"]):
+                    if more["n"]:
+                        bin[0] += more["n"]
+                        bin[1] += more["n"] * more["predicted"]
+                        bin[2] += more["n"] * more["observed"]
+        curves.append((name, pooled))
+    yield "| map | " + " | ".join(f"{10 * b}-{10 * b + 10} %" for b in range(10)) + " |"
+    yield "| --- |" + " --- |" * 10
+    for name, pooled in curves:
+        cells = [f"{100 * a / n:.0f}: {100 * b / n:.0f}" if n else "-" for n, a, b in pooled]
+        yield f"| {name} | " + " | ".join(cells) + " |"
+        total = sum(n for n, _, _ in pooled)
+        yield f"| share of points | " + " | ".join(f"{100 * n / total:.0f} %" for n, _, _ in pooled) + " |"
+
+
+def low(scene, *options):
+    """Below a tenth: joint and consensus."""
+    schemes = [s for s in SCHEMES if s != "ray-voxel"]
+    rows = audit(scene, "--schemes", ",".join(schemes), "--inlier-ratios", "0.06,0.04", "--repeats", "3", *options,
+                 solvers="joint,consensus")["results"]
+    yield "| In, solver | " + " | ".join(schemes) + " |"
+    yield "| --- |" + " --- |" * len(schemes)
+    for ratio in (0.06, 0.04):
+        for solver in ("joint", "consensus"):
+            found = {r["scheme"]: cell(r) for r in rows if (r["inlier_ratio"], r["solver"]) == (ratio, solver)}
+            yield f"| {ratio}, `{solver}` | " + " | ".join(found[s] for s in schemes) + " |"
+
+
+KITCHEN = ["--scale", "1"]
+
+
+def accuracy():
     descriptors = ["--descriptors", str(SHARED / "data/redkitchen/descriptors.bin")]
-    kitchen = audit("redkitchen", *kitchen_options, *descriptors, "--reference", "--repeats", "3", solvers=",".join(SOLVERS))
+    kitchen = audit("redkitchen", *KITCHEN, *descriptors, "--reference", "--repeats", "3", solvers=",".join(SOLVERS))
     castle = audit("castle", "--reference", "--repeats", "3", solvers=",".join(SOLVERS))
     rows, published = kitchen["results"], paper()
     out = ["## RedKitchen (7-Scenes, 21,149 points, meters)", "",
@@ -203,13 +251,40 @@ def main():
             f"Cost of this audit (three solvers, three seeds): {cost(castle)}.", ""]
     put(ROOT / "docs/benchmarks.md", "accuracy", out)
     put(ROOT / "README.md", "results", [*table(rows, "joint", published), ""])
-    noisy = audit("redkitchen", *kitchen_options, "--oracle-noise", ",".join(NOISES), solvers=",".join(SOLVERS))["results"]
+    put(ROOT / "docs/benchmarks.md", "confidence", [
+        "Percent of all points that the attacker is 90 % sure to have within the smallest threshold / percent of those that",
+        "are, `joint`, RedKitchen:", "", *confidence_table(rows, "joint"), "", "Castle:", "",
+        *confidence_table(castle["results"], "joint"), "",
+        "Stated probability: share that came true, over all schemes, ratios and seeds:", "",
+        *reliability([("RedKitchen", rows), ("Castle", castle["results"])]), ""])
+
+
+def below_a_tenth():
+    put(ROOT / "docs/benchmarks.md", "low", [
+        "RedKitchen, within 10 / 25 cm, mean of seeds 0, 1, 2:", "", *low("redkitchen", *KITCHEN), "",
+        "Castle, within 1.0 / 2.5:", "", *low("castle"), ""])
+
+
+def noise():
+    noisy = audit("redkitchen", *KITCHEN, "--oracle-noise", ",".join(NOISES), solvers=",".join(SOLVERS))["results"]
     (ROOT / "docs/noise.svg").write_text(noise_figure(noisy))
     put(ROOT / "docs/benchmarks.md", "noise", [*noise_table(noisy), "", "![Noise models](noise.svg)", ""])
+
+
+def own():
     put(ROOT / "docs/benchmarks.md", "own sources", [
         "RedKitchen, within 10 / 25 cm (in parentheses the share of listed records among the true 50 nearest):", "",
-        *own_sources("redkitchen", *kitchen_options), "", "Castle, within 1.0 / 2.5:", "", *own_sources("castle"), ""])
+        *own_sources("redkitchen", *KITCHEN), "", "Castle, within 1.0 / 2.5:", "", *own_sources("castle"), ""])
+
+
+def alone():
     put(ROOT / "docs/benchmarks.md", "records alone", [*records_alone(), ""])
+
+
+def main():
+    sections = {"accuracy": accuracy, "low": below_a_tenth, "noise": noise, "own": own, "alone": alone}
+    for name in sys.argv[2:] or sections:
+        sections[name]()
 
 
 def put(path, name, lines):

@@ -135,6 +135,9 @@ fn row(row: &Row, thresholds: &[Threshold]) -> report::Row {
         error_percentiles: ordered(
             audit::PERCENTILES.iter().map(|&p| label(p)).zip(row.error_percentiles.iter().copied()),
         ),
+        sure_percent: row.reliability.as_ref().map(|r| r.sure_percent()),
+        sure_correct_percent: row.reliability.as_ref().and_then(|r| r.sure_correct_percent()),
+        reliability: row.reliability.as_ref().map(|r| r.bins.iter().map(bin).collect()),
         ransac_trials: row
             .ransac_trials
             .as_ref()
@@ -146,6 +149,10 @@ fn row(row: &Row, thresholds: &[Threshold]) -> report::Row {
             median_error: r.median_error_std,
         }),
     }
+}
+
+fn bin(bin: &unlift::evaluate::Bin) -> report::ReliabilityBin {
+    report::ReliabilityBin { predicted: bin.predicted(), observed: bin.observed(), n: bin.n as u64 }
 }
 
 fn break_even(row: &audit::BreakEven) -> report::BreakEven {

@@ -4,9 +4,12 @@
 use std::path::{Path, PathBuf};
 
 use unlift::descriptors::Values;
+use unlift::evaluate::{Reliability, evaluate, reliability};
+use unlift::geometry::vector::median;
 use unlift::neighbors::oracle;
 use unlift::neighbors::sources::Joined;
-use unlift::obfuscate::{SchemeOptions, obfuscate, scheme};
+use unlift::obfuscate::{SCHEMES, SchemeOptions, obfuscate, scheme};
+use unlift::recover::{RecoverOptions, Solver, recover};
 use unlift::truth::Original;
 use unlift::{PointSet, Unit};
 use unlift_io::read;
@@ -107,5 +110,48 @@ fn patches_of_a_real_map_name_neighbors() {
         let lists = Joined::parse(source).unwrap().with_k(20).make(&released, 0).unwrap();
         let ratio = near.measured_inlier_ratio(&lists);
         assert!(ratio >= at_least, "{source} on {name}: {ratio}");
+    }
+}
+
+#[test]
+fn what_is_said_about_a_real_map_comes_true() {
+    if cfg!(debug_assertions) {
+        eprintln!("skipped: too slow without optimization");
+        return;
+    }
+    for (name, meters) in [("redkitchen", Some(0.10)), ("castle", None)] {
+        let Some(path) = dataset(name) else { continue };
+        let points = PointSet::try_new(read::open(&path).unwrap().positions, Unit::Meter).unwrap();
+        let original = Original::new(points);
+        let search = oracle::search(&original).unwrap();
+        let typical = median(&mut search.kth_distances(50));
+        let threshold = meters.unwrap_or(typical);
+        let mut found: Option<Reliability> = None;
+        for entry in SCHEMES {
+            let options = SchemeOptions { voxel: 5.0 * typical };
+            let (released, secret) =
+                obfuscate(entry.in_3d.unwrap(), &original, None, &options, 0).unwrap();
+            let slots = released.slots_per_record();
+            let near = oracle::TrueNeighbors::new(&search, &secret, slots, 50).unwrap();
+            for ratio in [0.5, 0.1] {
+                let lists = near.at_inlier_ratio(ratio, 0).unwrap();
+                let options = RecoverOptions { solver: Solver::Joint, ..RecoverOptions::default() };
+                let recovered = recover(&released, &lists, &options).unwrap();
+                let accuracy = evaluate(&recovered, &original, &secret).unwrap();
+                let one = reliability(&recovered, &accuracy, threshold).unwrap();
+                match &mut found {
+                    Some(all) => all.merge(&one),
+                    None => found = Some(one),
+                }
+            }
+        }
+        let found = found.unwrap();
+        for bin in found.bins.iter().filter(|bin| bin.n * 100 > found.n_points) {
+            let (said, true_share) = (bin.predicted().unwrap(), bin.observed().unwrap());
+            assert!(
+                (said - true_share).abs() <= 0.05,
+                "{name}: said {said:.3}, was {true_share:.3}"
+            );
+        }
     }
 }

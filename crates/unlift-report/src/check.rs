@@ -87,6 +87,8 @@ fn check_row(place: &str, row: &Row) -> Result<(), Error> {
         ("axis_accuracy_percent", row.axis_accuracy_percent),
         ("exact_percent", row.exact_percent),
         ("assignment_accuracy_percent", row.assignment_accuracy_percent),
+        ("sure_percent", row.sure_percent),
+        ("sure_correct_percent", row.sure_correct_percent),
     ];
     for (field, value) in optional {
         if let Some(value) = value {
@@ -96,6 +98,13 @@ fn check_row(place: &str, row: &Row) -> Result<(), Error> {
     for (percentile, value) in &row.error_percentiles {
         if let Some(value) = value {
             finite(&format!("{place}.error_percentiles[{percentile:?}]"), *value)?;
+        }
+    }
+    for (at, bin) in row.reliability.iter().flatten().enumerate() {
+        for (field, value) in [("predicted", bin.predicted), ("observed", bin.observed)] {
+            if let Some(value) = value {
+                between(&format!("{place}.reliability[{at}].{field}"), value, 0.0, 1.0)?;
+            }
         }
     }
     if let Some(spread) = &row.std {

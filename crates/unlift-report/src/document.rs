@@ -122,6 +122,16 @@ pub struct Row {
     pub median_error: Option<f64>,
     /// Percentiles of the error by their number (`50`, `75`, `90`, `95`, `99`), as `median_error`.
     pub error_percentiles: IndexMap<String, Option<f64>>,
+    /// Percent of the released points that the attacker is 90 % sure to have within the smallest
+    /// threshold, from its own data alone; absent for solvers that do not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sure_percent: Option<f64>,
+    /// Percent of those that are within it; absent without any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sure_correct_percent: Option<f64>,
+    /// Ten bins of the probability that the attacker states, from 0 to 1, over recovered points.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reliability: Option<Vec<ReliabilityBin>>,
     /// RANSAC's trials per point: (largest number of trials in the bin, points in it).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ransac_trials: Option<Vec<(u64, u64)>>,
@@ -131,6 +141,17 @@ pub struct Row {
     /// Standard deviation over the repeats; `None` for a single run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub std: Option<Spread>,
+}
+
+/// Points of similar stated probability, over all repeats.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct ReliabilityBin {
+    /// The mean stated probability, 0 to 1; `None` without points.
+    pub predicted: Option<f64>,
+    /// The share that was within the smallest threshold; `None` without points.
+    pub observed: Option<f64>,
+    /// Points in the bin.
+    pub n: u64,
 }
 
 /// Standard deviations of a row's figures over its repeats.

@@ -94,6 +94,7 @@ pub fn render(
         verdict,
         gates: document.gates.iter().map(gate_words).collect(),
         published: page_data.has_published(),
+        judged: document.results.iter().any(|row| row.reliability.is_some()),
         tables: table_list.into_iter().flatten().collect(),
         losses: loss_list.into_iter().flatten().collect(),
         times: tables::times(&document),
@@ -131,6 +132,8 @@ struct Page<'a> {
     slots: Vec<usize>,
     gates: Vec<GateWords>,
     published: bool,
+    /// Whether any attacker said how sure it is.
+    judged: bool,
     tables: Vec<Table>,
     losses: Vec<Table>,
     times: Option<Table>,

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::document::{Document, LengthUnit};
+use crate::document::{Document, LengthUnit, Row};
 use crate::html::RenderOptions;
 use crate::paper::{PublishedCurve, published_3d};
 use crate::scene::Encoded;
@@ -56,6 +56,8 @@ struct RowData<'a> {
     blind: Vec<Option<f64>>,
     /// (error, percent of the points within it), rising.
     errors: Vec<(f64, f64)>,
+    /// (stated probability, share that came true), in percent, rising; bins of few points left out.
+    reliability: Vec<(f64, f64)>,
 }
 
 #[derive(Debug, Serialize)]
@@ -82,6 +84,19 @@ pub(crate) fn slot(document: &Document, scheme: &str) -> usize {
     (KNOWN_SCHEMES.len() + turn) % SLOTS
 }
 
+/// Bins with at least this share of the released points are drawn: fewer scatter.
+const LEAST_DRAWN: f64 = 0.005;
+
+fn judged(row: &Row) -> Vec<(f64, f64)> {
+    let least = LEAST_DRAWN * row.n_points as f64;
+    row.reliability
+        .iter()
+        .flatten()
+        .filter(|bin| bin.n as f64 >= least)
+        .filter_map(|bin| Some((100.0 * bin.predicted?, 100.0 * bin.observed?)))
+        .collect()
+}
+
 pub(crate) fn page_data<'a>(
     document: &'a Document,
     scene: Option<&'a Encoded>,
@@ -100,6 +115,7 @@ pub(crate) fn page_data<'a>(
             oracle: row.neighbors == "oracle",
             recovered: by_threshold(&row.recovered_percent),
             blind: by_threshold(&row.blind_percent),
+            reliability: judged(row),
             errors: cdf.map_or_else(|| percentile_points(row), |cdf| cdf.points.clone()),
         }
     });

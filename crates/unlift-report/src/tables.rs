@@ -125,6 +125,8 @@ pub(crate) fn losses(document: &Document) -> Table {
             percent(row.axis_accuracy_percent),
             percent(row.exact_percent),
             percent(row.assignment_accuracy_percent),
+            percent(row.sure_percent),
+            percent(row.sure_correct_percent),
         ]);
         cells
     });
@@ -136,12 +138,14 @@ pub(crate) fn losses(document: &Document) -> Table {
         "axis right, %",
         "exact, %",
         "descriptor right, %",
+        "sure, %",
+        "sure and right, %",
     ];
     let mut head = texts(&["scheme", "solver", "neighbors right"]);
     head.extend(texts(&columns));
     Table {
         id: "losses",
-        caption: "Points not released by the scheme, points the recovery gave up, and choices it got right."
+        caption: "Points not released by the scheme, points the recovery gave up, choices it got right, and points it is sure of."
             .to_owned(),
         head,
         rows: rows.collect(),

@@ -52,7 +52,7 @@ fn curves_tables_and_canvas_are_there_without_errors_or_network() {
         browser.emulate(width, height, "light");
         browser.open(&file.0);
         // One overview, one chart per scheme, one of errors; each with drawn curves.
-        assert_eq!(browser.evaluate("document.documentElement.dataset.charts"), json!("9"));
+        assert_eq!(browser.evaluate("document.documentElement.dataset.charts"), json!("10"));
         let empty = "[...document.querySelectorAll('.chart')].filter(c => c.querySelectorAll('svg path').length < 10).length";
         assert_eq!(browser.evaluate(empty), json!(0));
         assert_eq!(browser.evaluate("document.querySelectorAll('table').length >= 5"), json!(true));
@@ -115,7 +115,7 @@ fn a_page_of_figures_only_has_curves_and_no_canvas() {
         PageFile::new("figures", &render(&document, Some(&scene), &options).expect("a page"));
     browser.emulate(1280, 900, "light");
     browser.open(&file.0);
-    assert_eq!(browser.evaluate("document.documentElement.dataset.charts"), json!("9"));
+    assert_eq!(browser.evaluate("document.documentElement.dataset.charts"), json!("10"));
     assert_eq!(browser.evaluate("document.querySelector('canvas')"), json!(null));
     assert_eq!(browser.complaints, Vec::<String>::new());
 }

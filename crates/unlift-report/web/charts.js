@@ -222,5 +222,24 @@ window.Unlift = window.Unlift || {};
     legend("errors-legend", schemeEntries(data));
   }
 
-  Object.assign(window.Unlift, { element, length, css, color, overview, multiples, errors, chartCount: () => drawn.size });
+  /** What came true over what the attacker said, one curve per scheme; the diagonal is a perfect judge. */
+  function reliability(node, data, { ratio, solver }) {
+    const series = [];
+    for (const scheme of data.schemes) {
+      const row = data.rows.find((r) => r.scheme === scheme.name && r.solver === solver && r.ratio === ratio);
+      series.push(line(scheme.name, row?.reliability ?? [], scheme.slot));
+    }
+    const diagonal = line("perfect", [[0, 0], [100, 100]], 4, { dash: "dotted", width: 1, mark: "none" });
+    draw(node, {
+      ...baseOption({ right: 26, top: 22 }),
+      tooltip: { ...tooltip(() => ""), trigger: "item", formatter: (item) =>
+        element("span", {}, `${item.seriesName}: ${item.value[1].toFixed(1)} % right where ${item.value[0].toFixed(1)} % was said`) },
+      xAxis: axis({ type: "value", min: 0, max: 100, name: "said, %", nameGap: 28 }),
+      yAxis: percentAxis({}),
+      series: [...series.filter((one) => one.data.length), { ...diagonal, silent: true }],
+    });
+    legend("reliability-legend", schemeEntries(data));
+  }
+
+  Object.assign(window.Unlift, { element, length, css, color, overview, multiples, errors, reliability, chartCount: () => drawn.size });
 })();

@@ -2,7 +2,7 @@
 "use strict";
 
 (() => {
-  const { element, overview, multiples, errors, chartCount, SceneView, ramp } = window.Unlift;
+  const { element, overview, multiples, errors, reliability, chartCount, SceneView, ramp } = window.Unlift;
   const root = document.documentElement;
   const data = JSON.parse(document.getElementById("data").textContent);
   const percent = (ratio) => `${+(ratio * 100).toPrecision(2)} %`;
@@ -71,6 +71,21 @@
     redraws.push(redraw);
   }
 
+  function judged() {
+    const rows = data.rows.filter((row) => row.reliability.length);
+    const form = document.getElementById("reliability-controls");
+    if (!form || !rows.length) return;
+    const ratios = distinct(rows.map((row) => row.ratio)).sort((a, b) => b - a);
+    const solvers = distinct(rows.map((row) => row.solver));
+    const state = { ratio: nearestHalf(ratios), solver: solvers[0] };
+    const redraw = () => reliability(document.getElementById("chart-reliability"), data, state);
+    const options = ratios.map((ratio) => [ratio, percent(ratio)]);
+    (ratios.length > 8 ? list : choice)(form, state, "ratio", "Neighbors right", options, redraw);
+    choice(form, state, "solver", "Solver", solvers.map((solver) => [solver, solver]), redraw);
+    redraw();
+    redraws.push(redraw);
+  }
+
   function scene() {
     const status = document.getElementById("scene-status");
     const form = document.getElementById("scene-controls");
@@ -128,6 +143,7 @@
   if (data.rows.length) {
     curves();
     distribution();
+    judged();
   }
   if (data.scene) scene();
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => redraws.forEach((redraw) => redraw()));

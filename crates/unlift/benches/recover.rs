@@ -142,7 +142,7 @@ fn table(sizes: &Sizes, pools: &[ThreadPool], original: &Original<3>, entry: &En
             let options = RecoverOptions {
                 solver,
                 delta: Delta::Fixed(DELTA),
-                seed: 0,
+                confidence: false,
                 ..RecoverOptions::default()
             };
             let work = || recover(&released, &lists, &options).expect("valid input");

@@ -57,8 +57,12 @@ fn measure(args: &BenchRecoverArgs) -> anyhow::Result<Bench> {
     for &ratio in &args.inlier_ratios {
         let lists = near.at_inlier_ratio(ratio, args.seed)?;
         for &solver in &args.solver {
-            let options =
-                RecoverOptions { solver, delta: args.delta, seed: 0, ..RecoverOptions::default() };
+            let options = RecoverOptions {
+                solver,
+                delta: args.delta,
+                confidence: false,
+                ..RecoverOptions::default()
+            };
             let started = Instant::now();
             recover(&released, &lists, &options)?;
             rows.push((ratio, solver.name(), started.elapsed().as_secs_f64()));

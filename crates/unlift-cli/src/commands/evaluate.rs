@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 use unlift::audit::{Plan, Threshold};
-use unlift::evaluate::{Accuracy, evaluate};
+use unlift::evaluate::{Accuracy, Reliability, evaluate, reliability};
 use unlift_io::stage::{read_recovered, read_truth};
 
 use crate::args::EvaluateArgs;
@@ -25,16 +25,23 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
         [] => Plan::new(unit).thresholds,
         given => given.to_vec(),
     };
+    let smallest = thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min);
+    let sure = reliability(&recovered, &accuracy, smallest);
     print(&if args.json {
-        format!("{:#}\n", as_json(&accuracy, &thresholds, unit.name()))
+        format!("{:#}\n", as_json(&accuracy, sure.as_ref(), &thresholds, unit.name()))
     } else {
-        as_table(&accuracy, &thresholds, unit.name())
+        as_table(&accuracy, sure.as_ref(), &thresholds, unit.name())
     })?;
     Ok(Outcome::Done)
 }
 
 /// The figures under the names of `audit.json`.
-fn as_json(accuracy: &Accuracy, thresholds: &[Threshold], unit: &str) -> Value {
+fn as_json(
+    accuracy: &Accuracy,
+    sure: Option<&Reliability>,
+    thresholds: &[Threshold],
+    unit: &str,
+) -> Value {
     let within: Map<String, Value> = thresholds
         .iter()
         .map(|t| (t.label.clone(), json!(accuracy.percent_within(t.value))))
@@ -49,11 +56,18 @@ fn as_json(accuracy: &Accuracy, thresholds: &[Threshold], unit: &str) -> Value {
         "recovered_percent": within,
         "axis_accuracy_percent": accuracy.axis_percent,
         "assignment_accuracy_percent": accuracy.assignment_percent,
+        "sure_percent": sure.map(Reliability::sure_percent),
+        "sure_correct_percent": sure.and_then(Reliability::sure_correct_percent),
         "median_error": accuracy.percentile(50.0),
     })
 }
 
-fn as_table(accuracy: &Accuracy, thresholds: &[Threshold], unit: &str) -> String {
+fn as_table(
+    accuracy: &Accuracy,
+    sure: Option<&Reliability>,
+    thresholds: &[Threshold],
+    unit: &str,
+) -> String {
     let row = |what: String, figure: String| vec![what, figure];
     let mut rows = vec![row("points".to_owned(), accuracy.n_points().to_string())];
     for threshold in thresholds {
@@ -68,6 +82,8 @@ fn as_table(accuracy: &Accuracy, thresholds: &[Threshold], unit: &str) -> String
     for (what, percent) in [
         ("axes named", accuracy.axis_percent),
         ("descriptors assigned", accuracy.assignment_percent),
+        ("attacker 90 % sure", sure.map(Reliability::sure_percent)),
+        ("of these within", sure.and_then(Reliability::sure_correct_percent)),
     ] {
         if let Some(percent) = percent {
             rows.push(row(what.to_owned(), format!("{percent:.1} %")));

@@ -19,6 +19,7 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
         delta: args.delta,
         seed: args.seed,
         exact_constraints: !args.no_exact_constraints,
+        ..RecoverOptions::default()
     };
     let alive = Spinner::new("recovering");
     let recovered = with_threads(args.threads, || {

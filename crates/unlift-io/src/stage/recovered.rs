@@ -13,7 +13,7 @@ use arrow_schema::Field;
 use serde_json::json;
 use std::path::Path;
 use std::sync::Arc;
-use unlift::recover::{Estimate, Recovered, Status};
+use unlift::recover::{Confidence, Estimate, Recovered, Status};
 
 /// Writes recovered points, one row per slot; positions in the map's frame (the origin is added).
 ///
@@ -43,6 +43,10 @@ pub fn write_recovered<const D: usize>(path: &Path, recovered: &Recovered<D>) ->
     fields.push(field("status", Utf8));
     fields.push(field("support", UInt16));
     fields.push(field("evidence", Float32));
+    if recovered.confidence().is_some() {
+        fields.push(field("found", Float32));
+        fields.push(Field::new("error_scale", Float32, true));
+    }
     fields.extend(recovered.axis().map(|_| field("axis", UInt8)));
     fields.extend(recovered.descriptor_row().map(|_| field("descriptor_row", UInt32)));
     write_table(path, to_text(meta), fields, recovered.n_slots(), |slots| {
@@ -57,6 +61,13 @@ pub fn write_recovered<const D: usize>(path: &Path, recovered: &Recovered<D>) ->
         columns.push(numbers::<UInt16Type>(support.iter().copied()));
         let evidence = &recovered.evidence()[slots.clone()];
         columns.push(numbers::<Float32Type>(evidence.iter().copied()));
+        if let Some(confidence) = recovered.confidence() {
+            let confidence = &confidence[slots.clone()];
+            columns.push(numbers::<Float32Type>(confidence.iter().map(|c| c.found)));
+            // A lost slot has no error.
+            let scale = |c: &Confidence| c.scale.is_finite().then_some(c.scale);
+            columns.push(optional_numbers::<Float32Type>(confidence.iter().map(scale)));
+        }
         if let Some(axis) = recovered.axis() {
             columns.push(numbers::<UInt8Type>(axis[slots.clone()].iter().copied()));
         }
@@ -70,7 +81,8 @@ pub fn write_recovered<const D: usize>(path: &Path, recovered: &Recovered<D>) ->
 /// Reads recovered points of dimension `D` (see [`peek`](super::peek)).
 ///
 /// Only the coordinates are needed: without `status`, a point is `ok` or, where they are null,
-/// `no_support`; `support` and `evidence` default to 0. Rows are in slot order or, when there is a
+/// `no_support`; `support` and `evidence` default to 0. Confidence is known where both of its
+/// columns are there. Rows are in slot order or, when there is a
 /// column `slot`, in any.
 ///
 /// # Errors
@@ -88,12 +100,16 @@ pub fn read_recovered<const D: usize>(path: &Path) -> Result<Recovered<D>, Error
         ("status", Type::Text),
         ("support", Type::Integer),
         ("evidence", Type::Float),
+        ("found", Type::Float),
+        ("error_scale", Type::Float),
         ("axis", Type::Integer),
         ("descriptor_row", Type::Integer),
     ];
     columns.extend(optional.into_iter().filter(|(name, _)| table.has(name)));
     let mut estimates: Vec<Estimate<D>> = Vec::new();
     let (mut slots, mut rows): (Vec<u32>, Vec<u32>) = (Vec::new(), Vec::new());
+    let mut confidence: Vec<Confidence> = Vec::new();
+    let with_confidence = table.has("found") && table.has("error_scale");
     let n_slots = table.n_rows();
     table.read(&columns, |batch| {
         if table.has("slot") {
@@ -102,11 +118,17 @@ pub fn read_recovered<const D: usize>(path: &Path) -> Result<Recovered<D>, Error
         if table.has("descriptor_row") {
             rows.extend(batch.integers("descriptor_row", n_slots)?);
         }
+        if with_confidence {
+            read_confidence(batch, &mut confidence)?;
+        }
         read_estimates(&table, batch, &coordinates, &origin, &mut estimates)
     })?;
     if table.has("slot") {
         let order = permutation(path, "slot", &slots)?;
         estimates = order.iter().map(|&row| estimates[row as usize]).collect();
+        if with_confidence {
+            confidence = order.iter().map(|&row| confidence[row as usize]).collect();
+        }
         if !rows.is_empty() {
             rows = order.iter().map(|&row| rows[row as usize]).collect();
         }
@@ -114,7 +136,27 @@ pub fn read_recovered<const D: usize>(path: &Path) -> Result<Recovered<D>, Error
     let rows = table.has("descriptor_row").then_some(rows);
     let with_axis = table.has("axis");
     Recovered::try_new(&estimates, with_axis, rows, origin, unit, delta)
+        .and_then(|recovered| match with_confidence {
+            true => recovered.with_confidence(confidence),
+            false => Ok(recovered),
+        })
         .map_err(|source| Error::core(path, source))
+}
+
+/// The confidence of one batch, appended to `to`.
+fn read_confidence(batch: &Batch<'_>, to: &mut Vec<Confidence>) -> Result<(), Error> {
+    let (found, scale) = (batch.floats("found")?, batch.optional_floats("error_scale")?);
+    for (row, (found, scale)) in found.into_iter().zip(scale).enumerate() {
+        if !(0.0..=1.0).contains(&found) {
+            return Err(batch.wrong("found", row, "a probability", found.to_string()));
+        }
+        if let Some(negative) = scale.filter(|&scale| scale < 0.0) {
+            return Err(batch.wrong("error_scale", row, "a length", negative.to_string()));
+        }
+        let scale = scale.map_or(f32::INFINITY, |scale| scale as f32);
+        to.push(Confidence { found: found as f32, scale });
+    }
+    Ok(())
 }
 
 /// The estimates of one batch, appended to `to`.

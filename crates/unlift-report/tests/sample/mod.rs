@@ -4,7 +4,8 @@
 
 use indexmap::IndexMap;
 use unlift_report::document::{
-    Bound, BreakEven, Document, GateResult, Input, LengthUnit, Row, Run, SCHEMA, Seconds,
+    Bound, BreakEven, Document, GateResult, Input, LengthUnit, ReliabilityBin, Row, Run, SCHEMA,
+    Seconds,
 };
 use unlift_report::scene::{ObfuscationView, Scene3d, SceneBox, Shapes, View};
 
@@ -131,6 +132,20 @@ fn row(s: usize, r: usize, solver: &str, thresholds: [&str; 2], unit: LengthUnit
         assignment_accuracy_percent: has(&["ppl", "ppl+"], 98.0 - 3.0 * r as f64),
         median_error: percentiles[0].1,
         error_percentiles: percentiles.into_iter().collect(),
+        sure_percent: Some((0.8 * share(0) * 10.0).round() / 10.0),
+        sure_correct_percent: Some(97.0),
+        reliability: Some(
+            (0..10u64)
+                .map(|bin| {
+                    let middle = (10 * bin + 5) as f64 / 100.0;
+                    ReliabilityBin {
+                        predicted: Some(middle),
+                        observed: Some(middle + 0.002 * (bin as f64 - 5.0)),
+                        n: 500 + 400 * bin,
+                    }
+                })
+                .collect(),
+        ),
         ransac_trials: (solver == "ransac")
             .then(|| vec![(10, 9_000), (100, 10_000), (10_000, 2_148)]),
         repeats: 1,

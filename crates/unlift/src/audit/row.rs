@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::plan::Threshold;
 use crate::Unit;
-use crate::evaluate::Accuracy;
+use crate::evaluate::{Accuracy, Reliability};
 
 /// Percentiles of the error that a row keeps.
 pub const PERCENTILES: [f64; 5] = [50.0, 75.0, 90.0, 95.0, 99.0];
@@ -51,6 +51,9 @@ pub struct Row {
     pub assignment_accuracy_percent: Option<f64>,
     /// Errors at [`PERCENTILES`]; `None` where that many points were lost.
     pub error_percentiles: Vec<Option<f64>>,
+    /// Whether the attacker's probabilities to lie within the smallest threshold came true, over all
+    /// repeats; `None` for solvers that give none.
+    pub reliability: Option<Reliability>,
     /// (trials at most, slots) of the sampling loop (`ransac`).
     pub ransac_trials: Option<Vec<(u32, u64)>>,
     /// Spread over repeats, if there are several.
@@ -76,6 +79,11 @@ impl Row {
         self.lost.values().sum()
     }
 
+    /// The smallest of `thresholds`.
+    pub(super) fn smallest(thresholds: &[Threshold]) -> f64 {
+        thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min)
+    }
+
     pub(super) fn fill(&mut self, accuracy: &Accuracy, blind: &Accuracy, thresholds: &[Threshold]) {
         let within = |accuracy: &Accuracy| {
             thresholds.iter().map(|t| accuracy.percent_within(t.value)).collect()
@@ -85,8 +93,7 @@ impl Row {
         self.recovered_percent = within(accuracy);
         self.blind_percent = within(blind);
         self.axis_accuracy_percent = accuracy.axis_percent;
-        let smallest = thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min);
-        let exact = accuracy.percent_within(EXACT * smallest);
+        let exact = accuracy.percent_within(EXACT * Self::smallest(thresholds));
         self.exact_percent = accuracy.axis_percent.map(|_| exact);
         self.assignment_accuracy_percent = accuracy.assignment_percent;
         self.error_percentiles = PERCENTILES.map(|p| accuracy.percentile(p)).to_vec();
@@ -137,6 +144,11 @@ impl Row {
         mean.exact_percent = average(&|r| r.exact_percent);
         mean.axis_accuracy_percent = average(&|r| r.axis_accuracy_percent);
         mean.assignment_accuracy_percent = average(&|r| r.assignment_accuracy_percent);
+        for row in &rows[1..] {
+            if let (Some(all), Some(more)) = (&mut mean.reliability, &row.reliability) {
+                all.merge(more);
+            }
+        }
         mean.repeats = Some(repeats);
         mean
     }

@@ -7,7 +7,7 @@ use super::break_even::{BreakEven, break_even};
 use super::lists::Lists;
 use super::plan::{Plan, Source, Variant};
 use super::row::Row;
-use crate::evaluate::{Accuracy, blind, evaluate, reference};
+use crate::evaluate::{Accuracy, blind, evaluate, reference, reliability};
 use crate::geometry::knn::Knn;
 use crate::neighbors::oracle::{self, Noise};
 use crate::obfuscate::{Entry, obfuscate};
@@ -151,6 +151,7 @@ pub fn run(
                         delta: plan.delta,
                         seed: attacker,
                         exact_constraints: plan.exact_constraints,
+                        ..RecoverOptions::default()
                     };
                     let started = Instant::now();
                     let recovered = recover(&hidden.0, &made.lists, &options)?;
@@ -165,6 +166,8 @@ pub fn run(
                     let mut row = blank(entry, variant, (made.k, solver), &recovered, secret);
                     row.inlier_ratio = made.ratio;
                     row.fill(&accuracy, &baseline, &plan.thresholds);
+                    let smallest = Row::smallest(&plan.thresholds);
+                    row.reliability = reliability(&recovered, &accuracy, smallest);
                     observer.cell(&Cell {
                         row: &row,
                         repeat,
@@ -239,6 +242,7 @@ fn reference_row(
         exact_percent: None,
         assignment_accuracy_percent: None,
         error_percentiles: Vec::new(),
+        reliability: None,
         ransac_trials: None,
         repeats: None,
     };
@@ -286,6 +290,7 @@ fn blank(
         exact_percent: None,
         assignment_accuracy_percent: None,
         error_percentiles: Vec::new(),
+        reliability: None,
         ransac_trials: recovered.trials().map(|trials| trials.bins().collect()),
         repeats: None,
     }

@@ -3,7 +3,9 @@
 mod accuracy;
 mod blind;
 mod reference;
+mod reliability;
 
 pub use accuracy::{Accuracy, evaluate};
 pub use blind::blind;
 pub use reference::reference;
+pub use reliability::{Bin, Reliability, reliability};

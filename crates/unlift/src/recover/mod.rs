@@ -5,6 +5,7 @@ mod candidate_rows;
 mod chance;
 mod chance_field;
 mod chunks;
+mod confidence;
 mod consensus;
 mod delta;
 mod density;
@@ -20,6 +21,9 @@ mod ransac;
 mod recovered;
 mod sections;
 
+pub use confidence::Confidence;
+#[doc(hidden)]
+pub use confidence::{Cues, N_CUES, N_TERMS, Seen, centered, terms};
 pub use options::{Delta, RecoverOptions, Solver};
 pub use ransac::TrialHistogram;
 pub(crate) use recovered::stored_support;
@@ -30,6 +34,7 @@ use crate::density::{published, tomography};
 use crate::neighbors::Neighborhoods;
 use crate::released::{Obfuscation, Released};
 use chunks::Chunks;
+use confidence::Solved;
 use delta::Prefer;
 use family::Family;
 use lists::Lists;
@@ -45,6 +50,19 @@ pub fn recover<const D: usize>(
     lists: &Neighborhoods,
     options: &RecoverOptions,
 ) -> Result<Recovered<D>, Error> {
+    recover_and_look(released, lists, options).map(|found| found.0)
+}
+
+/// [`recover`], with what confidence is made of. For fitting it alone.
+///
+/// # Errors
+/// As there.
+#[doc(hidden)]
+pub fn recover_and_look<const D: usize>(
+    released: &Released<D>,
+    lists: &Neighborhoods,
+    options: &RecoverOptions,
+) -> Result<(Recovered<D>, Seen), Error> {
     options.check()?;
     if lists.n_slots() != released.n_slots() {
         let expected = format!("{} rows, one per slot", released.n_slots());
@@ -57,7 +75,9 @@ pub fn recover<const D: usize>(
         Solver::Consensus | Solver::Joint | Solver::Ransac => None,
     };
     if let Some(peaks) = peaks {
-        return density::place(released, lists, &peaks, descriptor_row);
+        // Nothing is known yet about how sure these are.
+        let placed = density::place(released, lists, &peaks, descriptor_row)?;
+        return Ok((placed, Seen::NOTHING));
     }
     let family = Family::new(released, lists);
     // Joint recovery also asks who lists whom, from the first pass on.
@@ -85,13 +105,21 @@ pub fn recover<const D: usize>(
         _ => (consensus(), None),
     };
     // The paper's loop stays as published.
-    let estimates = if options.exact_constraints && options.solver != Solver::Ransac {
-        exact::settle(released, estimates, delta as f32)
-    } else {
-        estimates
-    };
+    let exact = options.exact_constraints && options.solver != Solver::Ransac;
+    let settled = (exact && exact::can_settle(released))
+        .then(|| exact::settle(released, estimates.clone(), delta as f32));
+    let unsettled = &estimates;
+    let estimates = settled.as_ref().unwrap_or(unsettled);
     let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
     let (origin, unit) = (released.origin(), released.unit());
-    Recovered::try_new(&estimates, with_axis, descriptor_row, origin, unit, delta)
-        .map(|recovered| recovered.with_trials(trials))
+    let recovered = Recovered::try_new(estimates, with_axis, descriptor_row, origin, unit, delta)?
+        .with_trials(trials);
+    if !options.confidence {
+        return Ok((recovered, Seen::NOTHING));
+    }
+    let edges = (graph.as_ref(), lists);
+    let solved = Solved { estimates, unsettled, delta: delta as f32 };
+    let seen = confidence::look(&family, edges, released.slots_per_record(), &solved);
+    let confidence = confidence::of(&family, options.solver, estimates, &seen);
+    Ok((recovered.with_confidence(confidence)?, seen))
 }

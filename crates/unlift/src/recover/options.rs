@@ -73,11 +73,19 @@ pub struct RecoverOptions {
     /// Whether rules that tie records together are used where they fix coordinates: `cp` exchanges
     /// values that are still in the map, `ray-voxel` leaves every other voxel along a ray.
     pub exact_constraints: bool,
+    /// Whether every recovered point gets the probability that it is right; a few microseconds each.
+    pub confidence: bool,
 }
 
 impl Default for RecoverOptions {
     fn default() -> Self {
-        Self { solver: Solver::Joint, delta: Delta::Auto, seed: 0, exact_constraints: true }
+        Self {
+            solver: Solver::Joint,
+            delta: Delta::Auto,
+            seed: 0,
+            exact_constraints: true,
+            confidence: true,
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! The result of recovery: a position or a reason, per slot.
 
-use super::TrialHistogram;
+use super::{Confidence, TrialHistogram};
 use crate::{Error, Unit};
 
 /// What became of a slot.
@@ -79,6 +79,7 @@ pub struct Recovered<const D: usize> {
     evidence: Vec<f32>,
     axis: Option<Vec<u8>>,
     descriptor_row: Option<Vec<u32>>,
+    confidence: Option<Vec<Confidence>>,
     trials: Option<TrialHistogram>,
 }
 
@@ -121,6 +122,7 @@ impl<const D: usize> Recovered<D> {
             evidence: estimates.iter().map(|e| e.evidence).collect(),
             axis: with_axis.then(|| estimates.iter().map(|e| e.axis).collect()),
             descriptor_row,
+            confidence: None,
             trials: None,
         })
     }
@@ -180,6 +182,29 @@ impl<const D: usize> Recovered<D> {
     /// Per slot the released descriptor row said to belong to it (paired lines with descriptors).
     pub fn descriptor_row(&self) -> Option<&[u32]> {
         self.descriptor_row.as_deref()
+    }
+
+    /// Per slot how sure the attacker is; `None` for a map read from a file without it.
+    pub fn confidence(&self) -> Option<&[Confidence]> {
+        self.confidence.as_deref()
+    }
+
+    /// The probability that the true place of `slot` is within `threshold` (in the unit of the map) of
+    /// the recovered one, as the attacker can tell; 0 for a lost slot, `None` where it is not known.
+    pub fn probability_within(&self, slot: usize, threshold: f64) -> Option<f64> {
+        self.confidence.as_ref().map(|rows| rows[slot].probability_within(threshold))
+    }
+
+    /// Adds how sure the attacker is of every slot.
+    ///
+    /// # Errors
+    /// When there is not one row per slot.
+    pub fn with_confidence(self, confidence: Vec<Confidence>) -> Result<Self, Error> {
+        if confidence.len() != self.n_slots() {
+            let expected = format!("{} rows", self.n_slots());
+            return Err(Error::new("confidence", expected, confidence.len().to_string()));
+        }
+        Ok(Self { confidence: Some(confidence), ..self })
     }
 
     /// How many trials the slots took (`ransac` only; not stored in files).

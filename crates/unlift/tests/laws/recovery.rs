@@ -150,6 +150,7 @@ fn bounded_influence<const D: usize>(name: &str, scheme: &dyn Scheme<D>, seed: u
         seed: 3,
         // About votes: an assignment looks at the whole map.
         exact_constraints: false,
+        ..RecoverOptions::default()
     };
     let lists = hidden.lists_of(&without);
     let alone = solve(&hidden.released, &lists, options);

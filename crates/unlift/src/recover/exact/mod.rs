@@ -13,6 +13,11 @@ mod swaps;
 use super::Estimate;
 use crate::released::{Obfuscation, Released};
 
+/// Whether the rule of the family of `released` says more than its records.
+pub(crate) fn can_settle<const D: usize>(released: &Released<D>) -> bool {
+    matches!(released.obfuscation(), Obfuscation::AxisCandidates(_) | Obfuscation::Rays(_))
+}
+
 /// Estimates of `released` moved to where the rule of their family allows them to be. `delta` is the
 /// distance that decided support.
 pub(crate) fn settle<const D: usize>(

@@ -64,6 +64,12 @@ impl<const D: usize> Density<D> {
         self.grid.values[self.grid.index(x)]
     }
 
+    /// The logarithm of how much sparser estimates are where the density is `density` than at a
+    /// typical place.
+    pub(crate) fn sparsity(&self, density: f32) -> f32 {
+        libm::logf(self.typical / density)
+    }
+
     /// How much wider neighbors lie where the density is `density` than at a typical place: lists have
     /// one length, so neighbors lie farther apart where points are sparse. Dense places count as
     /// typical: how narrow they are is beyond what the grid resolves.

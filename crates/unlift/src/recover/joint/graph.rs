@@ -38,6 +38,12 @@ pub(crate) fn is_reverse(class: u8) -> bool {
     usize::from(class) / SCORE_CLASSES == REVERSE
 }
 
+/// Whether each end of an edge of this class names the other.
+#[inline(always)]
+pub(crate) fn is_mutual(class: u8) -> bool {
+    usize::from(class) / SCORE_CLASSES == MUTUAL
+}
+
 /// Rows of edges in order of their other ends, a class beside each.
 pub(crate) struct Graph {
     offsets: Vec<u64>,

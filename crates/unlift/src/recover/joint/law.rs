@@ -8,7 +8,7 @@
 use rayon::prelude::*;
 
 use super::density::Density;
-use super::graph::{CLASSES, Graph, either};
+use super::graph::{CLASSES, Graph, either, is_mutual};
 use super::places::Places;
 use crate::seed::{Draws, Stage};
 
@@ -18,6 +18,10 @@ const BINS: usize = 48;
 const RANDOM: usize = 24;
 /// Slots looked at.
 const SLOTS: usize = 1 << 12;
+/// Mutual edges tell the radius if so many of them are close,
+const ENOUGH: f64 = 500.0;
+/// and within this share of the radius of all.
+const TIGHTER: f64 = 0.65;
 /// The share of neighbors in a class is at most and at least this.
 const SHARE: (f64, f64) = (5e-4, 0.95);
 
@@ -68,8 +72,10 @@ impl Law {
 }
 
 struct Tally {
-    /// Close edges per bin, and close random ones.
-    bins: [(f64, f64); BINS],
+    /// Close edges per bin, and close random ones; of all edges, and of mutual ones.
+    bins: [[(f64, f64); BINS]; 2],
+    /// Edges, and mutual ones.
+    edges: [f64; 2],
     /// Edges and close ones, per class.
     classes: [[f64; 2]; CLASSES],
     /// Random edges that lead to one slot or to either of two, and close ones.
@@ -79,7 +85,7 @@ struct Tally {
 impl Default for Tally {
     fn default() -> Self {
         let classes = [[0.0; 2]; CLASSES];
-        Self { bins: [(0.0, 0.0); BINS], classes, random: [[0.0; 2]; 2] }
+        Self { bins: [[(0.0, 0.0); BINS]; 2], edges: [0.0; 2], classes, random: [[0.0; 2]; 2] }
     }
 }
 
@@ -94,31 +100,41 @@ impl Tally {
             (bin < BINS as f32).then_some(bin as usize)
         };
         let (ends, class) = look.graph.of(slot);
+        let mut n_mutual = 0;
         for (&end, &class) in ends.iter().zip(class) {
+            n_mutual += usize::from(is_mutual(class));
             let of_class = &mut self.classes[usize::from(class)];
             of_class[0] += 1.0;
             if let Some(bin) = close(end, class) {
-                self.bins[bin].0 += 1.0;
+                self.bins[0][bin].0 += 1.0;
+                self.bins[1][bin].0 += f64::from(u8::from(is_mutual(class)));
                 of_class[1] += 1.0;
             }
         }
         let mut draws = Draws::new(look.seed, Stage::NullSample, slot as u64);
+        self.edges[0] += ends.len() as f64;
+        self.edges[1] += n_mutual as f64;
         // Random edges stand for as many as the slot has.
         let share = ends.len() as f64 / RANDOM as f64;
+        let share_mutual = n_mutual as f64 / RANDOM as f64;
         for _ in 0..RANDOM {
             let (end, class) = look.graph.edge(draws.below(look.graph.len() as u64) as usize);
             let of_kind = &mut self.random[usize::from(either(class, look.slots_per_record))];
             of_kind[0] += 1.0;
             if let Some(bin) = close(end, class) {
-                self.bins[bin].1 += share;
+                self.bins[0][bin].1 += share;
+                self.bins[1][bin].1 += share_mutual;
                 of_kind[1] += 1.0;
             }
         }
     }
 
     fn merge(&mut self, other: &Self) {
-        for (a, b) in self.bins.iter_mut().zip(&other.bins) {
-            *a = (a.0 + b.0, a.1 + b.1);
+        for kind in 0..2 {
+            self.edges[kind] += other.edges[kind];
+            for (a, b) in self.bins[kind].iter_mut().zip(&other.bins[kind]) {
+                *a = (a.0 + b.0, a.1 + b.1);
+            }
         }
         for (a, b) in self.classes.iter_mut().zip(&other.classes) {
             (0..2).for_each(|i| a[i] += b[i]);
@@ -128,22 +144,22 @@ impl Tally {
         }
     }
 
-    fn law<const D: usize>(&self, look: &Look<'_, D>) -> Law {
-        let edges: f64 = self.classes.iter().map(|c| c[0]).sum::<f64>().max(1.0);
-        let found: f64 = self.bins.iter().map(|b| b.0).sum();
-        let by_chance: f64 = self.bins.iter().map(|b| b.1).sum();
+    /// Close edges beyond those expected by chance, per bin; of all edges or of mutual ones.
+    fn excess(&self, kind: usize) -> [f64; BINS] {
+        let (bins, edges) = (&self.bins[kind], self.edges[kind].max(1.0));
+        let found: f64 = bins.iter().map(|b| b.0).sum();
+        let by_chance: f64 = bins.iter().map(|b| b.1).sum();
         let share = share_of(found / edges, by_chance / edges);
+        bins.map(|(found, by_chance)| (found - (1.0 - share) * by_chance).max(0.0))
+    }
+
+    fn law<const D: usize>(&self, look: &Look<'_, D>) -> Law {
         let chance = self.random.map(|[edges, found]| found / edges.max(1.0));
-        let excess =
-            self.bins.map(|(found, by_chance)| (found - (1.0 - share) * by_chance).max(0.0));
-        let half = 0.5 * excess.iter().sum::<f64>();
-        let (mut sum, mut radius) = (0.0, 0.5);
-        for (bin, e) in excess.iter().enumerate() {
-            if sum + e >= half && *e > 0.0 {
-                radius = (bin as f64 + (half - sum) / e) / BINS as f64;
-                break;
-            }
-            sum += e;
+        let [all, mutual] = [0, 1].map(|kind| self.excess(kind));
+        let mut radius = middle(&all);
+        // Wrong entries that are near all the same are rarely mutual.
+        if mutual.iter().sum::<f64>() >= ENOUGH && middle(&mutual) < TIGHTER * radius {
+            radius = middle(&mutual);
         }
         let radius = (radius as f32 * look.reach).min(look.most_radius).max(f32::MIN_POSITIVE);
         let (median, mass) = profile(D);
@@ -160,6 +176,19 @@ impl Tally {
             center: 1.0 / (mass * a.powi(D as i32)),
         }
     }
+}
+
+/// Where half of `excess` lies, as a share of the bins.
+fn middle(excess: &[f64; BINS]) -> f64 {
+    let half = 0.5 * excess.iter().sum::<f64>();
+    let mut sum = 0.0;
+    for (bin, e) in excess.iter().enumerate() {
+        if sum + e >= half && *e > 0.0 {
+            return (bin as f64 + (half - sum) / e) / BINS as f64;
+        }
+        sum += e;
+    }
+    0.5
 }
 
 /// The share of neighbors `p`, where `found` of the edges are close and random ones with `chance`: all

@@ -18,14 +18,14 @@ mod places;
 mod slot;
 mod small;
 
-pub(crate) use graph::Graph;
+pub(crate) use density::Density;
+pub(crate) use graph::{Graph, either};
+pub(crate) use pieces::{CandidatePieces, LinePieces, Pieces, PlanePieces};
+pub(crate) use places::{Places, distance2};
 
 use rayon::prelude::*;
 
-use self::density::Density;
 use self::law::{Law, Look};
-use self::pieces::{CandidatePieces, LinePieces, Pieces, PlanePieces};
-use self::places::{Places, distance2};
 use self::slot::{Round, Scratch};
 use super::chunks::CHUNK;
 use super::family::Family;
@@ -65,7 +65,7 @@ const MOST_RADIUS: f32 = 0.95;
 /// True neighbors are looked for within this many radii of the law.
 const REACH: f32 = 4.0;
 /// Estimates enter the re-made position within this many radii of the law.
-const KERNEL: f32 = 3.5;
+const KERNEL: f32 = 3.75;
 /// The density of estimates is smooth over this many radii of the law.
 const SMOOTH: f32 = 4.5;
 /// Rounds end when fewer than this share of the slots jump farther than a radius of the law.

@@ -1,0 +1,169 @@
+//! Fits the constants of confidence on synthetic rooms, and prints them as Rust.
+//!
+//! ```text
+//! cargo run --release -p unlift --example fit_confidence > constants.rs
+//! mv constants.rs crates/unlift/src/recover/confidence/ && cargo fmt
+//! ```
+//!
+//! Every scheme, solver, noise model and ratio is recovered in rooms of several sizes, some of them
+//! stretched so that points thin out with distance, as outdoors. The likelihood of "the error is within
+//! t", for thresholds t around the typical distance of the K-th neighbor, is maximized by damped Newton
+//! steps. The same constants come out on every machine and for any number of threads.
+
+use std::fmt::Write;
+
+use rayon::prelude::*;
+use unlift::geometry::knn::Knn;
+use unlift::geometry::vector::{distance, median};
+use unlift::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
+use unlift::obfuscate::{Entry, SCHEMES, SchemeOptions, obfuscate};
+use unlift::recover::{Cues, N_TERMS, RecoverOptions, Solver, centered, recover_and_look, terms};
+use unlift::synthetic::room;
+use unlift::truth::Original;
+use unlift::{Error, PointSet, Unit};
+
+#[path = "fit_confidence/likelihood.rs"]
+mod likelihood;
+
+use likelihood::{Row, fit};
+
+/// Seed, points, stretch, neighbors per slot.
+const ROOMS: [(u64, usize, f64, usize); 8] = [
+    (101, 6_000, 0.0, 50),
+    (102, 5_000, 0.1, 50),
+    (103, 5_000, 0.3, 50),
+    (104, 5_000, 1.0, 30),
+    (105, 10_000, 0.0, 50),
+    (106, 4_000, 0.05, 20),
+    (107, 5_000, 3.0, 50),
+    (108, 12_000, 0.3, 50),
+];
+/// Every noise model with its inlier ratios.
+const RATIOS: [(Noise, &[f64]); 3] = [
+    (Noise::Uniform, &[1.0, 0.75, 0.5, 0.3, 0.2, 0.1, 0.06]),
+    (Noise::Near, &[0.5, 0.2]),
+    (Noise::Clustered, &[0.5, 0.2, 0.1]),
+];
+/// Slots used of each recovered map.
+const SLOTS: usize = 400;
+/// Kinds of records, by scheme in the order of `SCHEMES`: lines, pairs, rays, planes, candidates.
+const KIND: [usize; 7] = [0, 1, 1, 2, 2, 3, 4];
+const N_KINDS: usize = 5;
+
+fn main() -> Result<(), Error> {
+    let mut rows: Vec<Vec<Row>> = (0..3 * N_KINDS).map(|_| Vec::new()).collect();
+    for of_room in ROOMS {
+        let original = Original::new(scene(of_room)?);
+        let typical = {
+            let mut kth = Knn::new(original.reveal().positions())?.kth_distances(50);
+            median(&mut kth)
+        };
+        for (scheme, entry) in SCHEMES.iter().enumerate() {
+            eprintln!("room {}, {}", of_room.0, entry.name);
+            for (solver, row) in of_scheme(&original, entry, of_room.3, typical)? {
+                rows[solver * N_KINDS + KIND[scheme]].push(row);
+            }
+        }
+    }
+    print!("{}", constants(&rows));
+    Ok(())
+}
+
+/// A room whose points are pushed outward by `1 + stretch r^2`.
+fn scene((seed, n, stretch, _): (u64, usize, f64, usize)) -> Result<PointSet<3>, Error> {
+    let mut points = room(seed, n).points;
+    for point in &mut points {
+        let r2: f64 = point.iter().map(|x| x * x).sum();
+        *point = point.map(|x| x * (1.0 + stretch * r2));
+    }
+    PointSet::try_new(points, Unit::Meter)
+}
+
+/// Rows of one scheme in one room, each with the number of its solver.
+fn of_scheme(
+    original: &Original<3>,
+    entry: &Entry,
+    k: usize,
+    typical: f64,
+) -> Result<Vec<(usize, Row)>, Error> {
+    let Some(scheme) = entry.in_3d else { return Ok(Vec::new()) };
+    let knn = oracle::search(original)?;
+    let options = SchemeOptions { voxel: 5.0 * typical };
+    let (released, secret) = obfuscate(scheme, original, None, &options, 0)?;
+    let near = TrueNeighbors::new(&knn, &secret, released.slots_per_record(), k)?;
+    let points = original.reveal().positions();
+    let mut rows = Vec::new();
+    for (noise, ratios) in RATIOS {
+        let outliers = Outliers::new(noise, &near, &knn, &secret, 0)?;
+        for &ratio in ratios {
+            let lists = near.lists(ratio, &outliers, 0)?;
+            for (at, solver) in
+                [Solver::Consensus, Solver::Joint, Solver::Ransac].into_iter().enumerate()
+            {
+                let options = RecoverOptions { solver, seed: 1, ..RecoverOptions::default() };
+                let (recovered, seen) = recover_and_look(&released, &lists, &options)?;
+                let every = recovered.n_slots().div_ceil(SLOTS).max(1);
+                for slot in (0..recovered.n_slots()).step_by(every) {
+                    if let Some(position) = recovered.position(slot) {
+                        let error = distance(&position, &points[secret.hidden()[slot].index()]);
+                        let cues = seen.cues[slot];
+                        let (error, typical) = (error / seen.radius, typical / seen.radius);
+                        rows.push((at, Row { cues, error, typical }));
+                    }
+                }
+            }
+        }
+    }
+    Ok(rows)
+}
+
+/// The constants as a Rust file.
+fn constants(rows: &[Vec<Row>]) -> String {
+    let all: Vec<[f32; N_TERMS]> = rows.iter().flatten().map(|row| terms(&row.cues)).collect();
+    let n = all.len() as f64;
+    let mean: Vec<f64> =
+        (0..N_TERMS).map(|t| all.iter().map(|x| f64::from(x[t])).sum::<f64>() / n).collect();
+    let spread: Vec<f32> = (0..N_TERMS)
+        .map(|t| {
+            let square = |x: &[f32; N_TERMS]| (f64::from(x[t]) - mean[t]).powi(2);
+            ((all.iter().map(square).sum::<f64>() / n).sqrt() as f32).max(1e-3)
+        })
+        .collect();
+    let center: Vec<f32> = mean.iter().map(|&x| x as f32).collect();
+    let models: Vec<_> = rows
+        .par_iter()
+        .map(|rows| {
+            let terms = |cues: &Cues| centered(terms(cues), &center, &spread);
+            fit(rows, terms)
+        })
+        .collect();
+    let mut text = String::from(
+        "//! Constants of confidence, printed by `cargo run --release -p unlift --example fit_confidence`.\n\n\
+         use super::model::{Model, N_KINDS, N_TERMS};\n\n",
+    );
+    let list =
+        |values: &[f32]| values.iter().map(|x| format!("{x:.3e}")).collect::<Vec<_>>().join(", ");
+    let _ = writeln!(
+        text,
+        "/// Means of terms.\npub(super) const CENTER: [f32; N_TERMS] = [{}];\n",
+        list(&center)
+    );
+    let _ = writeln!(
+        text,
+        "/// Standard deviations of terms.\npub(super) const SPREAD: [f32; N_TERMS] = [{}];\n",
+        list(&spread)
+    );
+    let _ = writeln!(text, "/// Per solver (consensus, joint, ransac) and kind of records.");
+    let _ = writeln!(text, "pub(super) const MODELS: [[Model; N_KINDS]; 3] = [");
+    for of_solver in models.chunks(N_KINDS) {
+        let _ = writeln!(text, "[");
+        for fitted in of_solver {
+            eprintln!("{} rows, mean negative log-likelihood {:.4}", fitted.n, fitted.loss);
+            let (found, scale) = (list(&fitted.found), list(&fitted.scale));
+            let _ = writeln!(text, "Model {{ found: [{found}], scale: [{scale}] }},");
+        }
+        let _ = writeln!(text, "],");
+    }
+    let _ = writeln!(text, "];");
+    text
+}

@@ -1,0 +1,97 @@
+//! Whether an attacker who says "I am 90 % sure" is right nine times out of ten.
+
+use super::Accuracy;
+use crate::recover::{Recovered, Status};
+
+/// Bins of the predicted probability.
+pub const BINS: usize = 10;
+
+/// A point with at least this probability is one the attacker is sure of.
+pub const SURE: f64 = 0.9;
+
+/// Predicted probabilities against what came true, over the recovered points.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reliability {
+    /// Released points, lost ones included.
+    pub n_points: usize,
+    /// Bins of equal width from 0 to 1.
+    pub bins: [Bin; BINS],
+    /// Points with a probability of at least [`SURE`].
+    pub sure: Bin,
+}
+
+/// Points of similar probability.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bin {
+    /// How many.
+    pub n: usize,
+    /// The sum of their probabilities.
+    pub expected: f64,
+    /// How many are within the threshold.
+    pub within: usize,
+}
+
+impl Bin {
+    fn add(&mut self, probability: f64, within: bool) {
+        self.n += 1;
+        self.expected += probability;
+        self.within += usize::from(within);
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.n += other.n;
+        self.expected += other.expected;
+        self.within += other.within;
+    }
+
+    /// The mean probability; `None` without points.
+    pub fn predicted(&self) -> Option<f64> {
+        (self.n > 0).then(|| self.expected / self.n as f64)
+    }
+
+    /// The share that is within the threshold; `None` without points.
+    pub fn observed(&self) -> Option<f64> {
+        (self.n > 0).then(|| self.within as f64 / self.n as f64)
+    }
+}
+
+impl Reliability {
+    /// The percentage of the released points that the attacker is sure of.
+    pub fn sure_percent(&self) -> f64 {
+        if self.n_points == 0 { 0.0 } else { 100.0 * self.sure.n as f64 / self.n_points as f64 }
+    }
+
+    /// The percentage of those that are within the threshold; `None` without any.
+    pub fn sure_correct_percent(&self) -> Option<f64> {
+        self.sure.observed().map(|share| 100.0 * share)
+    }
+
+    /// Adds the points of another run.
+    pub fn merge(&mut self, other: &Self) {
+        self.n_points += other.n_points;
+        self.bins.iter_mut().zip(&other.bins).for_each(|(a, b)| a.merge(b));
+        self.sure.merge(&other.sure);
+    }
+}
+
+/// How well the probabilities of `recovered` to lie within `threshold` (unit of the map) came true;
+/// `None` where it has none. `accuracy` must be of the same points.
+pub fn reliability<const D: usize>(
+    recovered: &Recovered<D>,
+    accuracy: &Accuracy,
+    threshold: f64,
+) -> Option<Reliability> {
+    let confidence = recovered.confidence()?;
+    let mut bins = [Bin::default(); BINS];
+    let mut sure = Bin::default();
+    let slots = confidence.iter().zip(recovered.status()).zip(accuracy.errors());
+    for ((confidence, _), &error) in slots.filter(|((_, status), _)| **status == Status::Ok) {
+        let probability = confidence.probability_within(threshold);
+        let within = error <= threshold;
+        bins[((probability * BINS as f64) as usize).min(BINS - 1)].add(probability, within);
+        if probability >= SURE {
+            sure.add(probability, within);
+        }
+    }
+    Some(Reliability { n_points: recovered.n_slots(), bins, sure })
+}

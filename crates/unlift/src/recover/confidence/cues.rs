@@ -1,0 +1,285 @@
+//! What an attacker sees that tells right estimates from wrong ones: pure numbers, no lengths.
+//!
+//! Around a right estimate the estimates of listed records crowd, and listed records pass, more than
+//! chance has it. How crowded, within which radius, and how well the crowd centers on the estimate are
+//! the cues of a slot; the same over the whole map tell how well recovery went at all, which no slot can
+//! know alone: estimates that drifted together agree with each other.
+
+use rayon::prelude::*;
+
+use super::edges::Edges;
+use super::{Seen, Solved};
+use crate::recover::chance;
+use crate::recover::joint::{Density, Pieces, Places, distance2};
+use crate::recover::{Estimate, Status};
+
+/// Number of cues.
+pub const N_CUES: usize = 18;
+
+/// The cues of one slot.
+pub type Cues = [f32; N_CUES];
+
+/// Crowds are looked for where chance expects at most this share of the listed estimates.
+const MOST_CHANCE: f32 = 0.3;
+/// The density of estimates is smooth over this many deltas.
+const SMOOTH: f32 = 4.0;
+/// Ratios of lengths are told apart down to this.
+const LEAST_RATIO: f32 = 1e-3;
+/// Slots whose cues are taken together.
+const PART: usize = 1 << 10;
+
+/// The listed estimates that crowd around one estimate.
+#[derive(Clone, Copy, Debug, Default)]
+struct Crowd {
+    /// How improbable it is by chance, in nats.
+    evidence: f32,
+    /// The radius that makes it least probable.
+    radius: f32,
+    /// Members beyond those expected by chance.
+    excess: f32,
+    /// How far its middle is off the estimate, along and across the piece, per radius.
+    off: [f32; 2],
+    /// The same measures of listed records that pass within delta.
+    record_evidence: f32,
+    record_excess: f32,
+    /// Records that could have voted.
+    listed: f32,
+    /// The share of members whose records may vote.
+    voting_share: f32,
+    /// How far exact constraints moved the estimate, if they did.
+    settled: Option<f32>,
+    /// The mean of the logarithm of the members' own evidence; of the second pass.
+    of_members: f32,
+    sparsity: f32,
+}
+
+/// What all slots are looked at with.
+struct Look<'a, const D: usize, P, E> {
+    pieces: &'a P,
+    edges: &'a E,
+    places: &'a Places<D>,
+    density: &'a Density<D>,
+    delta2: f32,
+}
+
+/// The cues of every slot, and the length (typical radius of crowds) that scales predicted errors.
+pub(super) fn of<const D: usize, P: Pieces<D>, E: Edges>(
+    pieces: &P,
+    edges: &E,
+    solved: &Solved<'_, D>,
+) -> Seen {
+    let Solved { estimates, unsettled, delta } = *solved;
+    let slots_per_record = pieces.slots_per_record();
+    let places = Places::new(estimates);
+    let listed = edges.times_listed(estimates.len() / slots_per_record);
+    let density = Density::new(&places, &listed, SMOOTH * delta);
+    let look = Look { pieces, edges, places: &places, density: &density, delta2: delta * delta };
+    let mut crowds = vec![Crowd::default(); estimates.len()];
+    crowds.par_chunks_mut(PART).enumerate().for_each_init(Vec::new, |near, (part, crowds)| {
+        for (at, crowd) in crowds.iter_mut().enumerate() {
+            let slot = part * PART + at;
+            if estimates[slot].status == Status::Ok {
+                *crowd = look.crowd(slot, &estimates[slot], near);
+                let before = &unsettled[slot];
+                if before.status == Status::Ok {
+                    let moved2 = distance2(&before.position, &estimates[slot].position);
+                    crowd.settled = (moved2 > 0.0).then(|| moved2.sqrt());
+                }
+            }
+        }
+    });
+    let evidence: Vec<f32> = crowds.iter().map(|crowd| libm::log1pf(crowd.evidence)).collect();
+    crowds.par_chunks_mut(PART).enumerate().for_each(|(part, crowds)| {
+        for (at, crowd) in crowds.iter_mut().enumerate() {
+            look.ask_members(part * PART + at, crowd, &evidence);
+        }
+    });
+    let map = Map::new(&crowds, delta);
+    let cues = crowds.par_iter().map(|crowd| map.cues(crowd)).collect();
+    Seen { cues, radius: f64::from(map.radius) }
+}
+
+impl<const D: usize, P: Pieces<D>, E: Edges> Look<'_, D, P, E> {
+    fn crowd(&self, slot: usize, own: &Estimate<D>, near: &mut Vec<(f32, usize)>) -> Crowd {
+        let x = own.position;
+        let density = self.density.at(&x);
+        // Chance expects `rate * r^D` of the listed estimates within r, for one or either slot of a record.
+        let rate = density * ball::<D>();
+        let reach2 = libm::powf(MOST_CHANCE / rate, 2.0 / D as f32);
+        near.clear();
+        let (mut all, mut rates) = (0usize, 0.0f32);
+        let (mut voting, mut votes) = (0usize, 0usize);
+        let slots_per_record = self.pieces.slots_per_record();
+        self.edges.each(slot, |end, either| {
+            let (d2, at) = self.places.nearest(end, either, &x);
+            all += 1;
+            rates += if either { 2.0 * rate } else { rate };
+            if d2 < reach2 {
+                near.push((d2, at));
+            }
+            let record = end as usize / slots_per_record;
+            if self.pieces.may_vote(slot, record) {
+                voting += 1;
+                votes += usize::from(self.pieces.record_distance2(record, &x) <= self.delta2);
+            }
+        });
+        // Ends are sorted by slot within equal distances: the same order everywhere.
+        near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let mean_rate = rates / all.max(1) as f32;
+        let mut crowd = Crowd {
+            listed: voting as f32,
+            sparsity: self.density.sparsity(density),
+            ..Crowd::default()
+        };
+        let mut members = 0;
+        for (at, &(d2, _)) in near.iter().enumerate() {
+            let last = near.get(at + 1).is_none_or(|next| next.0 > d2);
+            let p = (mean_rate * power::<D>(d2)).clamp(1e-9, MOST_CHANCE);
+            if last && at > 0 {
+                let evidence = chance::evidence(at + 1, all, p);
+                if evidence > crowd.evidence {
+                    members = at + 1;
+                    crowd.evidence = evidence;
+                    crowd.radius = d2.sqrt();
+                    crowd.excess = (members as f32 - p * all as f32).max(0.0);
+                }
+            }
+        }
+        let mut sum = [0.0f32; D];
+        let mut voting_members = 0u32;
+        for &(_, at) in &near[..members] {
+            let e = self.places.of(at);
+            (0..D).for_each(|c| sum[c] += e[c] - x[c]);
+            voting_members += u32::from(self.pieces.may_vote(slot, at / slots_per_record));
+        }
+        crowd.voting_share = voting_members as f32 / members.max(1) as f32;
+        if members > 0 && crowd.radius > 0.0 {
+            let piece = self.pieces.piece(slot, usize::from(own.axis));
+            let scale = 1.0 / (members as f32 * crowd.radius);
+            let mut along2 = 0.0;
+            let mut all2 = 0.0;
+            for r in 0..D {
+                let along: f32 = (0..D).map(|c| piece.along[r][c] * sum[c]).sum();
+                along2 += along * along;
+                all2 += sum[r] * sum[r];
+            }
+            crowd.off = [along2.sqrt() * scale, (all2 - along2).max(0.0).sqrt() * scale];
+        }
+        let p = self.pieces.record_chance(slot, &x).clamp(1e-9, 0.5);
+        crowd.record_evidence = if voting > 0 { chance::evidence(votes, voting, p) } else { 0.0 };
+        crowd.record_excess = votes as f32 - p * voting as f32;
+        crowd
+    }
+
+    /// How well founded the members of a crowd are themselves.
+    fn ask_members(&self, slot: usize, crowd: &mut Crowd, evidence: &[f32]) {
+        if crowd.evidence <= 0.0 {
+            return;
+        }
+        let x = self.places.of(slot);
+        let reach2 = crowd.radius * crowd.radius * (1.0 + 1e-6);
+        let (mut n, mut sum) = (0u32, 0.0);
+        self.edges.each(slot, |end, either| {
+            let (d2, at) = self.places.nearest(end, either, &x);
+            if d2 <= reach2 {
+                n += 1;
+                sum += evidence[at];
+            }
+        });
+        crowd.of_members = sum / n.max(1) as f32;
+    }
+}
+
+/// What is the same for all slots.
+struct Map {
+    /// The typical radius of crowds.
+    radius: f32,
+    evidence: f32,
+    voting_share: f32,
+    share: f32,
+    record_share: f32,
+    ln_radius_per_delta: f32,
+}
+
+impl Map {
+    fn new(crowds: &[Crowd], delta: f32) -> Self {
+        let n = crowds.len().max(1) as f64;
+        let mean = |of: &dyn Fn(&Crowd) -> f32| {
+            (crowds.iter().map(|c| f64::from(of(c))).sum::<f64>() / n) as f32
+        };
+        let share = |excess: &dyn Fn(&Crowd) -> f32| {
+            let listed: f64 = crowds.iter().map(|c| f64::from(c.listed)).sum();
+            let found: f64 = crowds.iter().map(|c| f64::from(excess(c))).sum();
+            (found / listed.max(1.0)) as f32
+        };
+        let radius = weighted_median(crowds).unwrap_or(delta);
+        Self {
+            radius,
+            evidence: mean(&|c| libm::log1pf(c.evidence)),
+            voting_share: mean(&|c| c.voting_share),
+            share: libm::logf(share(&|c| c.excess).max(LEAST_RATIO)),
+            record_share: libm::logf(share(&|c| c.record_excess).max(LEAST_RATIO)),
+            ln_radius_per_delta: libm::logf((radius / delta).max(LEAST_RATIO)),
+        }
+    }
+
+    fn cues(&self, crowd: &Crowd) -> Cues {
+        let ln = |x: f32| libm::logf(x.max(LEAST_RATIO));
+        let evidence = libm::log1pf(crowd.evidence);
+        let record_evidence = libm::log1pf(crowd.record_evidence);
+        let radius = ln(crowd.radius / self.radius);
+        [
+            evidence,
+            ln(crowd.excess.max(0.1)),
+            radius,
+            record_evidence,
+            ln(crowd.record_excess.max(0.1)),
+            crowd.off[0],
+            crowd.off[1],
+            crowd.of_members,
+            crowd.sparsity,
+            self.evidence,
+            self.share,
+            self.record_share,
+            self.ln_radius_per_delta,
+            ln(crowd.listed.max(0.1)),
+            crowd.voting_share,
+            self.voting_share,
+            if crowd.settled.is_some() { 1.0 } else { 0.0 },
+            libm::log1pf(crowd.settled.unwrap_or(0.0) / self.radius),
+        ]
+    }
+}
+
+/// The median radius of crowds, each counted as its evidence.
+fn weighted_median(crowds: &[Crowd]) -> Option<f32> {
+    let every = crowds.len().div_ceil(1 << 14).max(1);
+    let mut sample: Vec<(f32, f32)> = crowds
+        .iter()
+        .step_by(every)
+        .filter(|c| c.evidence > 0.0 && c.radius > 0.0)
+        .map(|c| (c.radius, c.evidence))
+        .collect();
+    sample.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let half = 0.5 * sample.iter().map(|s| f64::from(s.1)).sum::<f64>();
+    let mut sum = 0.0;
+    for (radius, weight) in sample {
+        sum += f64::from(weight);
+        if sum >= half {
+            return Some(radius);
+        }
+    }
+    None
+}
+
+/// The volume of the unit ball.
+fn ball<const D: usize>() -> f32 {
+    use std::f32::consts::PI;
+    if D == 2 { PI } else { 4.0 / 3.0 * PI }
+}
+
+/// `r^D` from a squared radius.
+#[inline(always)]
+fn power<const D: usize>(d2: f32) -> f32 {
+    if D == 2 { d2 } else { d2 * d2.sqrt() }
+}

@@ -1,0 +1,97 @@
+//! How sure the attacker can be of each recovered point, from attacker-side data alone.
+//!
+//! After recovery every slot is looked at once more: `cues.rs` measures how much better than by chance
+//! estimates and records agree around it, and `model.rs` turns that into the probability that the right
+//! place was found and a scale of its error. Its constants come from synthetic rooms
+//! (`examples/fit_confidence.rs`), never from a real map. Cues are ratios: a scaled map has the same.
+
+mod constants;
+mod cues;
+mod edges;
+mod model;
+
+use rayon::prelude::*;
+
+pub use cues::{Cues, N_CUES};
+use edges::{BothWays, Edges, Listed};
+pub use model::{Confidence, N_TERMS, centered, terms};
+
+use super::family::Family;
+use super::joint::{CandidatePieces, Graph, LinePieces, PlanePieces};
+use super::{Estimate, Solver, Status};
+use crate::neighbors::Neighborhoods;
+
+/// What the attacker sees around every slot.
+#[derive(Clone, Debug)]
+pub struct Seen {
+    /// Per slot.
+    pub cues: Vec<Cues>,
+    /// The typical radius of crowds, in the unit of the map: errors scale with it.
+    pub radius: f64,
+}
+
+impl Seen {
+    /// Nobody looked.
+    pub(super) const NOTHING: Self = Self { cues: Vec::new(), radius: 1.0 };
+}
+
+/// What recovery found.
+pub(super) struct Solved<'a, const D: usize> {
+    /// Per slot.
+    pub(super) estimates: &'a [Estimate<D>],
+    /// The same before exact constraints moved them.
+    pub(super) unsettled: &'a [Estimate<D>],
+    /// The distance that decided support.
+    pub(super) delta: f32,
+}
+
+/// Looks around estimates, along `graph` where there is one, else along `lists`.
+pub(super) fn look<const D: usize>(
+    family: &Family<'_, D>,
+    (graph, lists): (Option<&Graph>, &Neighborhoods),
+    slots_per_record: usize,
+    solved: &Solved<'_, D>,
+) -> Seen {
+    match graph {
+        Some(graph) => look_along(family, &BothWays { graph, slots_per_record }, solved),
+        None => look_along(family, &Listed { lists, slots_per_record }, solved),
+    }
+}
+
+fn look_along<const D: usize, E: Edges>(
+    family: &Family<'_, D>,
+    edges: &E,
+    solved: &Solved<'_, D>,
+) -> Seen {
+    match family {
+        Family::Lines { rows, slots_per_record, chance } => {
+            let pieces = LinePieces::new(rows, *slots_per_record, chance, solved.delta);
+            cues::of(&pieces, edges, solved)
+        }
+        Family::Planes { planes, sorted } => {
+            cues::of(&PlanePieces::new(planes, sorted, solved.delta), edges, solved)
+        }
+        Family::Candidates { rows, chance } => {
+            cues::of(&CandidatePieces::new(rows, chance, solved.delta), edges, solved)
+        }
+    }
+}
+
+/// How sure the attacker is of every slot.
+pub(super) fn of<const D: usize>(
+    family: &Family<'_, D>,
+    solver: Solver,
+    estimates: &[Estimate<D>],
+    seen: &Seen,
+) -> Vec<Confidence> {
+    let kind = model::kind(family);
+    let radius = seen.radius as f32;
+    estimates
+        .par_iter()
+        .zip(&seen.cues)
+        .map(|(estimate, cues)| match estimate.status {
+            Status::Ok => model::confidence(solver, kind, cues, radius),
+            _ => Confidence::LOST,
+        })
+        .collect()
+}

@@ -1,0 +1,127 @@
+//! What the attacker says about its own success, on rooms that no constant was fitted on.
+
+use unlift::evaluate::{Reliability, evaluate, reliability};
+use unlift::geometry::knn::Knn;
+use unlift::geometry::vector::median;
+use unlift::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
+use unlift::obfuscate::{SchemeOptions, obfuscate, scheme};
+use unlift::recover::{RecoverOptions, Recovered, Solver, recover};
+use unlift::synthetic::room;
+use unlift::truth::{Original, Secret};
+use unlift::{PointSet, Unit};
+
+/// A room and its typical distance of the 50th neighbor.
+fn scene(seed: u64, n: usize, scale: f64) -> (Original<3>, f64) {
+    let points: Vec<[f64; 3]> = room(seed, n).points.iter().map(|p| p.map(|x| scale * x)).collect();
+    let typical = median(&mut Knn::new(&points).unwrap().kth_distances(50));
+    (Original::new(PointSet::try_new(points, Unit::Meter).unwrap()), typical)
+}
+
+fn recovered(
+    (original, typical): &(Original<3>, f64),
+    name: &str,
+    solver: Solver,
+    (noise, ratio): (Noise, f64),
+) -> (Recovered<3>, Secret) {
+    let knn = oracle::search(original).unwrap();
+    let options = SchemeOptions { voxel: 5.0 * typical };
+    let scheme = scheme(name).unwrap().in_3d.unwrap();
+    let (released, secret) = obfuscate(scheme, original, None, &options, 7).unwrap();
+    let near = TrueNeighbors::new(&knn, &secret, released.slots_per_record(), 50).unwrap();
+    let outliers = Outliers::new(noise, &near, &knn, &secret, 7).unwrap();
+    let lists = near.lists(ratio, &outliers, 7).unwrap();
+    let options = RecoverOptions { solver, ..RecoverOptions::default() };
+    (recover(&released, &lists, &options).unwrap(), secret)
+}
+
+/// The largest distance from the diagonal over bins with at least `least` points, in percent.
+fn off_diagonal(reliability: &Reliability, least: usize) -> f64 {
+    let bins = reliability.bins.iter().filter(|bin| bin.n >= least);
+    let off =
+        |bin: &unlift::evaluate::Bin| Some(100.0 * (bin.predicted()? - bin.observed()?).abs());
+    bins.filter_map(off).fold(0.0, f64::max)
+}
+
+fn judge(solver: Solver, schemes: &[&str], cases: &[(Noise, f64)]) -> Reliability {
+    let scene = scene(207, 4_000, 1.0);
+    let mut all: Option<Reliability> = None;
+    for name in schemes {
+        for &case in cases {
+            let (recovered, secret) = recovered(&scene, name, solver, case);
+            let accuracy = evaluate(&recovered, &scene.0, &secret).unwrap();
+            let one = reliability(&recovered, &accuracy, scene.1).unwrap();
+            match &mut all {
+                Some(all) => all.merge(&one),
+                None => all = Some(one),
+            }
+        }
+    }
+    all.unwrap()
+}
+
+const CASES: [(Noise, f64); 5] = [
+    (Noise::Uniform, 1.0),
+    (Noise::Uniform, 0.2),
+    (Noise::Uniform, 0.06),
+    (Noise::Near, 0.3),
+    (Noise::Clustered, 0.2),
+];
+
+#[test]
+fn what_is_said_comes_true_as_often_as_said() {
+    // Without optimization a part must do.
+    let (schemes, cases): (&[&str], &[_]) = if cfg!(debug_assertions) {
+        (&["olc"], &CASES[1..3])
+    } else {
+        (&["olc", "ppl", "ppl+", "ray", "ray-voxel", "plane", "cp"], &CASES)
+    };
+    for solver in [Solver::Joint, Solver::Consensus] {
+        let found = judge(solver, schemes, cases);
+        let off = off_diagonal(&found, found.n_points / 50);
+        assert!(off <= 5.0, "{solver:?}: {off:.1} points off the diagonal, {:?}", found.bins);
+        let correct = found.sure_correct_percent().unwrap();
+        assert!(found.sure_percent() > 15.0 && correct > 90.0, "{solver:?}: {correct}");
+    }
+}
+
+#[test]
+fn the_unit_of_the_map_changes_nothing() {
+    let (small, large) = (scene(208, 1_200, 1.0), scene(208, 1_200, 7.3));
+    for name in ["olc", "cp"] {
+        let case = (Noise::Uniform, 0.3);
+        let (a, _) = recovered(&small, name, Solver::Joint, case);
+        let (b, _) = recovered(&large, name, Solver::Joint, case);
+        let off = (0..a.n_slots()).filter(|&slot| {
+            let p = a.probability_within(slot, small.1).unwrap();
+            let q = b.probability_within(slot, large.1).unwrap();
+            (p - q).abs() > 0.01
+        });
+        // Rounding tips a few slots to another place.
+        let off = off.count();
+        assert!(off * 50 < a.n_slots(), "{name}: {off} of {}", a.n_slots());
+    }
+}
+
+#[test]
+fn threads_change_no_bit() {
+    let scene = scene(209, 1_000, 1.0);
+    for solver in [Solver::Consensus, Solver::Joint, Solver::Ransac] {
+        let on = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let run = || recovered(&scene, "ppl", solver, (Noise::Uniform, 0.3)).0;
+            let confidence = pool.install(run);
+            let bits = confidence.confidence().unwrap().iter();
+            bits.map(|c| (c.found.to_bits(), c.scale.to_bits())).collect::<Vec<_>>()
+        };
+        assert_eq!(on(1), on(3), "{solver:?}");
+    }
+}
+
+#[test]
+fn lost_points_are_given_no_chance() {
+    let lost = unlift::recover::Confidence::LOST;
+    assert_eq!(lost.probability_within(1e9), 0.0);
+    let half = unlift::recover::Confidence { found: 0.8, scale: 0.1 };
+    assert!((half.probability_within(0.1) - 0.4).abs() < 1e-6);
+    assert!(half.probability_within(0.2) > half.probability_within(0.1));
+}
