@@ -139,6 +139,8 @@ fn constants(rows: &[Vec<Row>]) -> String {
         .collect();
     let mut text = String::from(
         "//! Constants of confidence, printed by `cargo run --release -p unlift --example fit_confidence`.\n\n\
+         // A fitted weight may look like a constant of mathematics.\n\
+         #![allow(clippy::approx_constant)]\n\n\
          use super::model::{Model, N_KINDS, N_TERMS};\n\n",
     );
     let list =

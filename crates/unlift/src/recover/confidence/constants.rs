@@ -1,5 +1,8 @@
 //! Constants of confidence, printed by `cargo run --release -p unlift --example fit_confidence`.
 
+// A fitted weight may look like a constant of mathematics.
+#![allow(clippy::approx_constant)]
+
 use super::model::{Model, N_KINDS, N_TERMS};
 
 /// Means of terms.
