@@ -39,6 +39,7 @@ pub const DEPENDENCIES: &[&str] = &["libm", "rayon", "nalgebra"];
 pub const CRATES: &[(&str, &[&str])] = &[
     ("unlift", &[]),
     ("unlift-io", &["unlift"]),
+    ("unlift-features", &["unlift"]),
     ("unlift-report", &[]),
     ("unlift-cli", &["unlift", "unlift-io", "unlift-report"]),
 ];
