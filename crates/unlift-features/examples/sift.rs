@@ -34,10 +34,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let start = Instant::now();
     let mut all: Vec<Features> = Vec::new();
-    in_order(&images, |image: &GrayImage| sift.extract(image), |_, features| {
-        all.push(features);
-        Ok::<(), std::convert::Infallible>(())
-    })?;
+    in_order(
+        &images,
+        |image: &GrayImage| sift.extract(image),
+        |_, features| {
+            all.push(features);
+            Ok::<(), std::convert::Infallible>(())
+        },
+    )?;
     let seconds = start.elapsed().as_secs_f64();
     let total: usize = all.iter().map(|features| features.keypoints.len()).sum();
     println!("{} images, {total} features, {seconds:.4} s", images.len());

@@ -48,11 +48,15 @@ mod tests {
     fn results_come_in_order_and_a_failing_sink_ends_it() {
         let items: Vec<usize> = (0..1000).collect();
         let mut seen = Vec::new();
-        let result = in_order(&items, |item| item * 2, |at, value| {
-            assert_eq!(value, 2 * at);
-            seen.push(at);
-            if at == 500 { Err("full") } else { Ok(()) }
-        });
+        let result = in_order(
+            &items,
+            |item| item * 2,
+            |at, value| {
+                assert_eq!(value, 2 * at);
+                seen.push(at);
+                if at == 500 { Err("full") } else { Ok(()) }
+            },
+        );
         assert_eq!(result, Err("full"));
         assert_eq!(seen, items[..501]);
     }

@@ -65,11 +65,21 @@ impl Kernel for Smooth<'_> {
 
 type Chunks<'a> = &'a [[f32; LANES]];
 
+/// A loop, as `map` over an array is not inlined and would leave the vector registers.
+#[inline(always)]
+fn scaled(values: &[f32; LANES], by: f32) -> [f32; LANES] {
+    let mut scaled = [0.0; LANES];
+    for (scaled, value) in scaled.iter_mut().zip(values) {
+        *scaled = by * value;
+    }
+    scaled
+}
+
 /// One row of sums over columns.
 #[inline(always)]
 fn columns(middle: Chunks, sides: &[(Chunks, Chunks)], taps: &[f32], line: &mut [f32]) {
     for (at, (out, middle)) in line.as_chunks_mut::<LANES>().0.iter_mut().zip(middle).enumerate() {
-        let mut sums = middle.map(|value| taps[0] * value);
+        let mut sums = scaled(middle, taps[0]);
         for ((above, below), &tap) in sides.iter().zip(&taps[1..]) {
             let (above, below) = (&above[at], &below[at]);
             for ((sum, &a), &b) in sums.iter_mut().zip(above).zip(below) {
@@ -86,7 +96,7 @@ fn rows(line: &[f32], taps: &[f32], out: &mut [f32]) {
     let radius = taps.len() - 1;
     for (chunk, out) in out.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
         let at = chunk * LANES + radius;
-        let mut sums = lanes::<LANES>(line, at).map(|value| taps[0] * value);
+        let mut sums = scaled(&lanes(line, at), taps[0]);
         for (i, &tap) in taps.iter().enumerate().skip(1) {
             let (left, right) = (lanes::<LANES>(line, at - i), lanes::<LANES>(line, at + i));
             for ((sum, &a), &b) in sums.iter_mut().zip(&left).zip(&right) {
@@ -127,7 +137,8 @@ mod tests {
                         let at = |i: usize, d: isize, n: usize| {
                             (i as isize + d).clamp(0, n as isize - 1) as usize
                         };
-                        let tap = gaussian.taps[dx.unsigned_abs()] * gaussian.taps[dy.unsigned_abs()];
+                        let tap =
+                            gaussian.taps[dx.unsigned_abs()] * gaussian.taps[dy.unsigned_abs()];
                         sum += tap * from.at(at(x, dx, width), at(y, dy, height));
                     }
                 }

@@ -27,10 +27,11 @@ impl Differences<'_> {
         dispatch(Scan { differences: self, least: (SAMPLED * peak) as f32, found });
     }
 
-    /// Whether the middle difference at `(x, y)` exceeds all neighbors (`sign` 1) or stays below
-    /// them (-1).
+    /// Whether the middle difference at `(x, y)`, not zero, is farther from it than all neighbors, or
+    /// they lie on the other side.
     #[inline(always)]
-    fn extreme(self, x: usize, y: usize, sign: f32) -> bool {
+    fn extreme(self, x: usize, y: usize) -> bool {
+        let sign = self.at(1, x, y).signum();
         let here = sign * self.at(1, x, y);
         (0..3).all(|level| {
             (y - 1..=y + 1).all(|row| {
@@ -57,15 +58,22 @@ impl Kernel for Scan<'_> {
         let levels = differences.0;
         let (width, height) = (levels[0].width, levels[0].height);
         for y in 1..height.saturating_sub(1) {
-            let rows = [levels[1].row(y), levels[2].row(y)];
-            let across = [levels[1].row(y - 1), levels[2].row(y - 1), levels[1].row(y + 1), levels[2].row(y + 1)];
+            let rows = [levels[0].row(y), levels[1].row(y), levels[2].row(y), levels[3].row(y)];
+            let across = [
+                levels[1].row(y - 1),
+                levels[2].row(y - 1),
+                levels[1].row(y + 1),
+                levels[2].row(y + 1),
+            ];
             for start in (1..width.saturating_sub(1)).step_by(BLOCK) {
-                if !strong(rows, start, least) || !peaked(rows, across, start, least) {
+                if !strong(rows[1], rows[2], start, least) {
                     continue;
                 }
-                for x in start..(start + BLOCK).min(width - 1) {
-                    let here = differences.at(1, x, y);
-                    if here.abs() >= least && differences.extreme(x, y, here.signum()) {
+                let mut peaks = peaks(&rows, &across, start, least);
+                while peaks != 0 {
+                    let x = start + peaks.trailing_zeros() as usize;
+                    peaks &= peaks - 1;
+                    if x < width - 1 && differences.extreme(x, y) {
                         found.push((x as u32, y as u32));
                     }
                 }
@@ -86,32 +94,35 @@ fn difference(below: &[f32], above: &[f32], at: usize) -> [f32; BLOCK] {
 
 /// Whether any pixel of a block has the contrast.
 #[inline(always)]
-fn strong(rows: [&[f32]; 2], at: usize, least: f32) -> bool {
+fn strong(below: &[f32], above: &[f32], at: usize, least: f32) -> bool {
     let mut any = 0;
-    for value in difference(rows[0], rows[1], at) {
+    for value in difference(below, above, at) {
         any |= u32::from(value.abs() >= least);
     }
     any != 0
 }
 
-/// Whether any pixel of a block exceeds its four neighbors in its own level: one in ten blocks, where
-/// the full test would be made for every pixel.
+/// The pixels of a block, as bits, that have the contrast and exceed the four neighbors of their own
+/// level and the two of the others. One in hundreds does, and is worth the full test.
 #[inline(always)]
-fn peaked(rows: [&[f32]; 2], across: [&[f32]; 4], at: usize, least: f32) -> bool {
-    let here = difference(rows[0], rows[1], at);
-    let left = difference(rows[0], rows[1], at - 1);
-    let right = difference(rows[0], rows[1], at + 1);
+fn peaks(levels: &[&[f32]; 4], across: &[&[f32]; 4], at: usize, least: f32) -> u32 {
+    let here = difference(levels[1], levels[2], at);
+    let left = difference(levels[1], levels[2], at - 1);
+    let right = difference(levels[1], levels[2], at + 1);
     let up = difference(across[0], across[1], at);
     let down = difference(across[2], across[3], at);
-    let mut any = 0;
+    let finer = difference(levels[0], levels[1], at);
+    let coarser = difference(levels[2], levels[3], at);
+    let mut peaks = 0;
     for i in 0..BLOCK {
-        let most = left[i].max(right[i]).max(up[i]).max(down[i]);
-        let fewest = left[i].min(right[i]).min(up[i]).min(down[i]);
+        let most = left[i].max(right[i]).max(up[i]).max(down[i]).max(finer[i]).max(coarser[i]);
+        let fewest = left[i].min(right[i]).min(up[i]).min(down[i]).min(finer[i]).min(coarser[i]);
         let value = here[i];
-        any |= u32::from((value >= least) & (value > most));
-        any |= u32::from((value <= -least) & (value < fewest));
+        let high = (value >= least) & (value > most);
+        let low = (value <= -least) & (value < fewest);
+        peaks |= u32::from(high | low) << i;
     }
-    any != 0
+    peaks
 }
 
 #[cfg(test)]
@@ -132,10 +143,10 @@ mod tests {
 
     #[test]
     fn extrema_of_both_signs_are_found_inside_only() {
-        let spots = [(1, 1, 1.0), (17, 5, -1.0), (38, 8, 0.5), (0, 4, 1.0), (39, 6, 1.0), (20, 9, 1.0)];
-        let value = |x, y| {
-            spots.iter().find(|spot| (spot.0, spot.1) == (x, y)).map_or(0.0, |spot| spot.2)
-        };
+        let spots =
+            [(1, 1, 1.0), (17, 5, -1.0), (38, 8, 0.5), (0, 4, 1.0), (39, 6, 1.0), (20, 9, 1.0)];
+        let value =
+            |x, y| spots.iter().find(|spot| (spot.0, spot.1) == (x, y)).map_or(0.0, |spot| spot.2);
         let levels = levels(40, 10, value);
         let mut found = vec![(9, 9)];
         Differences(&levels).extrema(0.1, &mut found);

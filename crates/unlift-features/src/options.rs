@@ -65,7 +65,8 @@ impl SiftOptions {
                 return Err(Error::new(name, expected, value.to_string()));
             }
         }
-        let real = [("peak_threshold", self.peak_threshold), ("edge_threshold", self.edge_threshold)];
+        let real =
+            [("peak_threshold", self.peak_threshold), ("edge_threshold", self.edge_threshold)];
         for (name, value) in real {
             if !(value.is_finite() && value > 0.0) {
                 return Err(Error::new(name, "a positive number", value.to_string()));

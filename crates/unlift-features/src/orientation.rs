@@ -70,7 +70,8 @@ pub(crate) fn orientations(
     let mut histogram = dispatch(Votes { gradients, place, radius, shift, weights });
     for _ in 0..SMOOTHED {
         histogram = std::array::from_fn(|bin| {
-            (histogram[(bin + BINS - 1) % BINS] + histogram[bin] + histogram[(bin + 1) % BINS]) / 3.0
+            (histogram[(bin + BINS - 1) % BINS] + histogram[bin] + histogram[(bin + 1) % BINS])
+                / 3.0
         });
     }
     peaks(&histogram)
@@ -100,7 +101,8 @@ impl Kernel for Votes<'_> {
             let half = libm::sqrt((reach - dy * dy).max(0.0));
             // Whole pixels within the circle, by their distance from the middle one.
             let middle = column as f64 - shift.0;
-            let low = libm::ceil(middle - half).max(column as f64 - radius as f64).max(0.0) as usize;
+            let low =
+                libm::ceil(middle - half).max(column as f64 - radius as f64).max(0.0) as usize;
             let high = libm::floor(middle + half).min((column + radius) as f64) as usize;
             let end = (high + 1).min(width);
             if low >= end {

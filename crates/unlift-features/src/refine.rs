@@ -123,7 +123,8 @@ const SINGULAR: f64 = 1e-10;
 /// Gauss elimination with row pivots.
 fn solve(mut a: [[f64; 3]; 3], mut b: [f64; 3]) -> Option<[f64; 3]> {
     for j in 0..3 {
-        let pivot = (j..3).fold(j, |best, i| if a[i][j].abs() > a[best][j].abs() { i } else { best });
+        let pivot =
+            (j..3).fold(j, |best, i| if a[i][j].abs() > a[best][j].abs() { i } else { best });
         if !(a[pivot][j].abs() >= SINGULAR) {
             return None;
         }
