@@ -98,8 +98,8 @@ fn polar(x: f32, y: f32) -> (f32, f32) {
     let (ax, ay) = (x.abs(), y.abs());
     // Tiny, so that no gradient at all has a direction, too.
     let r = (ax - ay) / (ax + ay + 1e-12);
-    // Of the quadrant with both positive: 1 eighth at 45 degrees.
-    let angle = 1.0 + (CUBIC * r * r - LINEAR) * r;
+    // Of the quadrant with both positive: 1 eighth at 45 degrees. The cubic ends a little below zero.
+    let angle = (1.0 + (CUBIC * r * r - LINEAR) * r).max(0.0);
     let angle = if x < 0.0 { 4.0 - angle } else { angle };
     let angle = if y < 0.0 { TURN - angle } else { angle };
     (length, angle)

@@ -164,7 +164,8 @@ mod tests {
 
     #[test]
     fn a_ramp_points_uphill_whichever_way() {
-        for degrees in (0..360).step_by(7) {
+        // Not on a border of two bins, where both are equally high and neither is a peak.
+        for degrees in (2..360).step_by(7).filter(|degrees| degrees % 10 != 0) {
             let (sin, cos) = f64::from(degrees).to_radians().sin_cos();
             let value = |i: usize| (cos * (i % 41) as f64 + sin * (i / 41) as f64) as f32;
             let image = GrayImage::try_new(41, 41, (0..41 * 41).map(value).collect()).unwrap();
