@@ -125,15 +125,16 @@ fn solve(mut a: [[f64; 3]; 3], mut b: [f64; 3]) -> Option<[f64; 3]> {
     for j in 0..3 {
         let pivot =
             (j..3).fold(j, |best, i| if a[i][j].abs() > a[best][j].abs() { i } else { best });
-        if !(a[pivot][j].abs() >= SINGULAR) {
+        if a[pivot][j].abs() < SINGULAR {
             return None;
         }
         a.swap(j, pivot);
         b.swap(j, pivot);
+        let row = a[j];
         for i in j + 1..3 {
-            let factor = a[i][j] / a[j][j];
-            for k in j..3 {
-                a[i][k] -= factor * a[j][k];
+            let factor = a[i][j] / row[j];
+            for (value, from) in a[i].iter_mut().zip(row) {
+                *value -= factor * from;
             }
             b[i] -= factor * b[j];
         }
