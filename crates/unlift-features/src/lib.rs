@@ -5,7 +5,7 @@
 //! ```
 //!
 //! [`read`](load::read) decodes a photo, [`Sift`] extracts, [`in_order`](batch::in_order) does many in
-//! constant memory. The same photo gives the same bytes for any number of threads and on any machine.
+//! constant memory. The same image gives the same bytes for any number of threads.
 //!
 //! ```
 //! use unlift_features::{GrayImage, Sift};

@@ -38,12 +38,12 @@ pub struct Features {
     pub descriptors: Vec<[u8; descriptor::LENGTH]>,
 }
 
-/// Scale-invariant features as COLMAP extracts them on a CPU: the same keypoints within a
-/// hundredth of a pixel, the same bytes within one or two.
+/// Scale-invariant features as COLMAP extracts them on a CPU: of the same pixels the same keypoints
+/// within a thousandth of a pixel, and bytes that differ by one here and there.
 ///
 /// Shared by any number of threads: each call borrows a set of buffers, and buffers are kept for the
-/// next. They take 24 times the pixels of the doubled image, about 8 MB for 640 x 480 and 740 MB for the
-/// largest image that is not shrunk (`max_image_size`).
+/// next. A set takes 24 bytes per pixel of the doubled image: 30 MB for 640 x 480, 740 MB for 3200 x
+/// 2400 (larger images are shrunk). The same pixels give the same bytes on any machine, unless they are shrunk.
 ///
 /// Source: D. Lowe, Distinctive image features from scale-invariant keypoints, IJCV 2004; where that
 /// leaves a choice, the documentation of VLFeat (vlfeat.org) and COLMAP (colmap.github.io).

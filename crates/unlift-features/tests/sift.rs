@@ -218,6 +218,30 @@ fn the_same_bytes_for_any_number_of_threads_and_in_used_buffers() {
 }
 
 #[test]
+fn features_are_the_same_bits_everywhere() {
+    // Values that are exact on every machine: discs on a checked ground.
+    let value = |i: usize| {
+        let (x, y) = (i % 150, i / 150);
+        let (dx, dy) = ((x % 29).abs_diff(14), (y % 23).abs_diff(11));
+        let disc = dx * dx + dy * dy < 20 + (x / 29) * 9 + (y / 23) * 5;
+        u8::from(disc) * 90 + 60 + ((x * x / 70 + y * 3) % 64) as u8
+    };
+    let bytes: Vec<u8> = (0..150 * 110).map(value).collect();
+    let image = GrayImage::from_bytes(150, 110, &bytes).unwrap();
+    let features = Sift::default().extract(&image);
+    // FNV-1a over all bytes.
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    let mut mix = |byte: u8| hash = (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
+    for keypoint in &features.keypoints {
+        for value in [keypoint.x, keypoint.y, keypoint.scale, keypoint.orientation] {
+            value.to_le_bytes().into_iter().for_each(&mut mix);
+        }
+    }
+    features.descriptors.iter().flatten().for_each(|&byte| mix(byte));
+    assert_eq!((features.keypoints.len(), hash), (117, 15_136_636_572_972_869_078));
+}
+
+#[test]
 fn options_out_of_range_are_refused() {
     let options = SiftOptions { levels: 0, ..SiftOptions::default() };
     let error = Sift::try_new(options).err().unwrap().to_string();
