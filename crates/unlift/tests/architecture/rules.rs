@@ -41,7 +41,7 @@ pub const CRATES: &[(&str, &[&str])] = &[
     ("unlift-io", &["unlift"]),
     ("unlift-features", &["unlift"]),
     ("unlift-report", &[]),
-    ("unlift-cli", &["unlift", "unlift-io", "unlift-report"]),
+    ("unlift-cli", &["unlift", "unlift-io", "unlift-features", "unlift-report"]),
 ];
 
 /// Lines of a file at most, its unit tests not counted.
