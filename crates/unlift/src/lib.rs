@@ -19,7 +19,9 @@ pub mod points;
 pub mod recover;
 pub mod released;
 pub mod seed;
-mod simd;
+// Not part of the interface: the loops of `unlift-features` are compiled through it, so that `unsafe` stays here.
+#[doc(hidden)]
+pub mod simd;
 pub mod synthetic;
 pub mod truth;
 

@@ -8,7 +8,7 @@
 
 /// A loop worth compiling for several instruction sets. Implementations, and everything they call
 /// in the hot path, are `#[inline(always)]`: only inlined code inherits the instruction set.
-pub(crate) trait Kernel {
+pub trait Kernel {
     /// What the loop returns.
     type Output;
 
@@ -18,7 +18,7 @@ pub(crate) trait Kernel {
 
 /// Runs `kernel` with the best instructions of this machine.
 #[inline]
-pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
+pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
     {
         if std::arch::is_x86_feature_detected!("avx2") {

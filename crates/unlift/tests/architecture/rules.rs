@@ -39,8 +39,9 @@ pub const DEPENDENCIES: &[&str] = &["libm", "rayon", "nalgebra"];
 pub const CRATES: &[(&str, &[&str])] = &[
     ("unlift", &[]),
     ("unlift-io", &["unlift"]),
+    ("unlift-features", &["unlift"]),
     ("unlift-report", &[]),
-    ("unlift-cli", &["unlift", "unlift-io", "unlift-report"]),
+    ("unlift-cli", &["unlift", "unlift-io", "unlift-features", "unlift-report"]),
 ];
 
 /// Lines of a file at most, its unit tests not counted.

@@ -1,0 +1,113 @@
+//! What an extractor reads: gray values, row by row.
+
+use unlift::Error;
+
+/// A gray image.
+///
+/// `pixels` is `(height, width)`, row-major; 0 is black, 1 is white. Thresholds of the extractor are
+/// stated on that scale.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GrayImage {
+    width: usize,
+    height: usize,
+    pixels: Vec<f32>,
+}
+
+impl GrayImage {
+    /// An image of `width` x `height` pixels from its rows.
+    ///
+    /// # Errors
+    /// When a side is zero, `pixels` has another length than `width * height`, or a value is not finite.
+    pub fn try_new(width: usize, height: usize, pixels: Vec<f32>) -> Result<Self, Error> {
+        if width == 0 || height == 0 {
+            let found = format!("{width} x {height}");
+            return Err(Error::new("image", "at least one pixel", found));
+        }
+        if width.checked_mul(height) != Some(pixels.len()) {
+            let expected = format!("{width} x {height} pixels");
+            return Err(Error::new("image", expected, format!("{} pixels", pixels.len())));
+        }
+        if let Some(at) = pixels.iter().position(|value| !value.is_finite()) {
+            let what = format!("image: pixel ({}, {})", at % width, at / width);
+            return Err(Error::new(what, "a finite value", pixels[at].to_string()));
+        }
+        Ok(Self { width, height, pixels })
+    }
+
+    /// The same from bytes: 0 is black, 255 is white.
+    ///
+    /// # Errors
+    /// As [`try_new`](Self::try_new).
+    pub fn from_bytes(width: usize, height: usize, bytes: &[u8]) -> Result<Self, Error> {
+        let pixels = bytes.iter().map(|&byte| f32::from(byte) / 255.0).collect();
+        Self::try_new(width, height, pixels)
+    }
+
+    /// Pixels in a row.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Rows.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Row `y`, of `width` pixels.
+    ///
+    /// # Panics
+    /// When there is no such row.
+    pub fn row(&self, y: usize) -> &[f32] {
+        &self.pixels[y * self.width..(y + 1) * self.width]
+    }
+
+    /// The image shrunk so that no side exceeds `most` pixels, or `None` if it is small enough.
+    ///
+    /// Sides are rounded down, as COLMAP does; the filter is Lanczos of three lobes.
+    pub(crate) fn fitted(&self, most: usize) -> Option<Self> {
+        let longer = self.width.max(self.height);
+        if longer <= most {
+            return None;
+        }
+        let scale = most as f64 / longer as f64;
+        let side = |length: usize| ((length as f64 * scale) as usize).max(1);
+        let (width, height) = (side(self.width), side(self.height));
+        let buffer: image::ImageBuffer<image::Luma<f32>, &[f32]> =
+            image::ImageBuffer::from_raw(self.width as u32, self.height as u32, &self.pixels[..])?;
+        let filter = image::imageops::FilterType::Lanczos3;
+        let small = image::imageops::resize(&buffer, width as u32, height as u32, filter);
+        Some(Self { width, height, pixels: small.into_raw() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_image_states_what_is_wrong_with_it() {
+        let text = |result: Result<GrayImage, Error>| result.map_err(|error| error.to_string());
+        assert_eq!(
+            text(GrayImage::try_new(0, 4, vec![])).unwrap_err(),
+            "image: expected at least one pixel, found 0 x 4"
+        );
+        assert_eq!(
+            text(GrayImage::from_bytes(2, 2, &[1, 2, 3])).unwrap_err(),
+            "image: expected 2 x 2 pixels, found 3 pixels"
+        );
+        assert_eq!(
+            text(GrayImage::try_new(2, 1, vec![0.0, f32::NAN])).unwrap_err(),
+            "image: pixel (1, 0): expected a finite value, found NaN"
+        );
+    }
+
+    #[test]
+    fn fitting_rounds_sides_down_and_keeps_gray_levels() {
+        let image = GrayImage::try_new(100, 33, vec![0.25; 3300]).unwrap();
+        assert!(image.fitted(100).is_none());
+        let small = image.fitted(50).unwrap();
+        assert_eq!((small.width(), small.height()), (50, 16));
+        assert!(small.row(7).iter().all(|value| (value - 0.25).abs() < 1e-5));
+        assert_eq!(image.fitted(1).unwrap().height(), 1);
+    }
+}

@@ -1,0 +1,42 @@
+//! Photos in, keypoints and descriptors out: SIFT as COLMAP extracts it by default.
+//!
+//! ```text
+//! photo ──> GrayImage ──> octaves ──> extrema ──> orientations ──> descriptors ──> Features
+//! ```
+//!
+//! [`read`](load::read) decodes a photo, [`Sift`] extracts, [`in_order`](batch::in_order) does many in
+//! constant memory. The same image gives the same bytes for any number of threads.
+//!
+//! ```
+//! use unlift_features::{GrayImage, Sift};
+//!
+//! // A Gaussian blob gives one keypoint at its center.
+//! let pixels = (0..64 * 64).map(|i| {
+//!     let (dx, dy) = ((i % 64) as f32 - 30.0, (i / 64) as f32 - 34.0);
+//!     (-(dx * dx + dy * dy) / 50.0).exp()
+//! });
+//! let image = GrayImage::try_new(64, 64, pixels.collect())?;
+//! let features = Sift::default().extract(&image);
+//! let keypoint = features.keypoints[0];
+//! assert!((keypoint.x - 30.5).abs() < 0.1 && (keypoint.y - 34.5).abs() < 0.1);
+//! # Ok::<(), unlift::Error>(())
+//! ```
+
+pub mod batch;
+mod blur;
+mod descriptor;
+mod extrema;
+mod gradient;
+mod image;
+pub mod load;
+mod octave;
+mod options;
+mod orientation;
+mod plane;
+mod quantize;
+mod refine;
+mod sift;
+
+pub use image::GrayImage;
+pub use options::SiftOptions;
+pub use sift::{Features, Keypoint, Sift};

@@ -1,0 +1,119 @@
+//! From a photo in a file to gray values.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use ::image::metadata::Orientation;
+use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+use unlift::Error;
+
+use crate::image::GrayImage;
+
+/// What is read, as told to people.
+const KINDS: &str = "a JPEG, PNG or WebP image";
+/// Pixels of a photo at most: 16384 x 16384. A header can claim any size in a few bytes.
+const MOST_PIXELS: u64 = 1 << 28;
+
+/// Reads the photo at `path`, turned upright as its EXIF orientation says, as gray values.
+///
+/// What a file is, its bytes decide, not its name. COLMAP does not turn photos; keypoints of a turned
+/// photo are in pixels of the upright one.
+///
+/// # Errors
+/// One line with the path: no such file, neither JPEG nor PNG nor WebP, cut off, or larger than
+/// 2^28 pixels.
+pub fn read(path: &Path) -> Result<GrayImage, Error> {
+    let name = path.display().to_string();
+    let bytes = std::fs::read(path)
+        .map_err(|error| Error::new(name.escape_debug().to_string(), KINDS, error.to_string()))?;
+    decode(&bytes, &name)
+}
+
+/// The same from the bytes of a file called `name`.
+///
+/// # Errors
+/// As [`read`].
+pub fn decode(bytes: &[u8], name: &str) -> Result<GrayImage, Error> {
+    // One line, whatever the name holds.
+    let wrong = |expected: &str, found: String| {
+        Error::new(name.escape_debug().to_string(), expected, found.escape_debug().to_string())
+    };
+    let format = match ::image::guess_format(bytes) {
+        Ok(format @ (ImageFormat::Jpeg | ImageFormat::Png | ImageFormat::WebP)) => format,
+        _ => return Err(wrong(KINDS, kind(bytes))),
+    };
+    let kind = label(format);
+    if format == ImageFormat::Jpeg && !has_end(bytes) {
+        return Err(wrong("a whole JPEG image", "one that is cut off".to_owned()));
+    }
+    let whole = format!("a whole {kind} image");
+    let broken = |error: ::image::ImageError| wrong(&whole, error.to_string());
+    let mut decoder =
+        ImageReader::with_format(Cursor::new(bytes), format).into_decoder().map_err(broken)?;
+    let (width, height) = decoder.dimensions();
+    if u64::from(width) * u64::from(height) > MOST_PIXELS {
+        let found = format!("{width} x {height}");
+        return Err(wrong("at most 268435456 pixels", found));
+    }
+    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
+    let mut photo = DynamicImage::from_decoder(decoder).map_err(broken)?;
+    photo.apply_orientation(orientation);
+    gray(&photo)
+}
+
+/// Gray values as COLMAP makes them: rounded to bytes, weights of Rec. 709, transparency ignored.
+fn gray(photo: &DynamicImage) -> Result<GrayImage, Error> {
+    let (width, height) = (photo.width() as usize, photo.height() as usize);
+    if !photo.color().has_color() {
+        return GrayImage::from_bytes(width, height, photo.to_luma8().as_raw());
+    }
+    let mut bytes = Vec::with_capacity(width * height);
+    let colors = photo.to_rgb8();
+    bytes.extend(colors.pixels().map(|pixel| {
+        let [red, green, blue] = pixel.0.map(f32::from);
+        (0.2126 * red + 0.7152 * green + 0.0722 * blue).round() as u8
+    }));
+    GrayImage::from_bytes(width, height, &bytes)
+}
+
+/// A name for bytes that are no photo.
+fn kind(bytes: &[u8]) -> String {
+    if bytes.is_empty() {
+        return "an empty file".to_owned();
+    }
+    if let Ok(format) = ::image::guess_format(bytes) {
+        return format!("a {} image", label(format));
+    }
+    let start = &bytes[..bytes.len().min(512)];
+    let printable = |byte: &u8| !byte.is_ascii_control() || byte.is_ascii_whitespace();
+    if start.iter().all(printable) && start.utf8_chunks().count() == 1 {
+        return "text".to_owned();
+    }
+    let first: Vec<String> = bytes.iter().take(4).map(|byte| format!("{byte:02x}")).collect();
+    format!("a file that starts with {}", first.join(" "))
+}
+
+fn label(format: ImageFormat) -> String {
+    match format {
+        ImageFormat::WebP => "WebP".to_owned(),
+        format => format!("{format:?}").to_uppercase(),
+    }
+}
+
+/// Whether a JPEG has an end after its first scan. Decoders fill what is missing with gray, which would
+/// be taken for a photo; the end of a thumbnail in the header does not count.
+fn has_end(bytes: &[u8]) -> bool {
+    const SCAN: u8 = 0xda;
+    let mut at = 2;
+    while let Some(&[0xff, marker, high, low]) = bytes.get(at..at + 4) {
+        match marker {
+            // Fill bytes may stand before a marker.
+            0xff => at += 1,
+            _ => at += 2 + usize::from(u16::from_be_bytes([high, low])),
+        }
+        if marker == SCAN {
+            break;
+        }
+    }
+    bytes.get(at..).is_some_and(|rest| rest.windows(2).any(|pair| pair == [0xff, 0xd9]))
+}
