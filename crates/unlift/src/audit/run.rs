@@ -7,7 +7,7 @@ use super::break_even::{BreakEven, break_even};
 use super::lists::Lists;
 use super::plan::{Plan, Source, Variant};
 use super::row::Row;
-use crate::evaluate::{Accuracy, blind, evaluate, reference, reliability};
+use crate::evaluate::{Accuracy, blind, evaluate, in_better_order, reference, reliability};
 use crate::geometry::knn::Knn;
 use crate::neighbors::oracle::{self, Noise};
 use crate::obfuscate::{Entry, obfuscate};
@@ -142,6 +142,9 @@ pub fn run(
                     Source::Own(_) => &by_row,
                     Source::Oracle | Source::Given(_) => &hidden.1,
                 };
+                // Lists from the records alone follow the order along a paired line.
+                let in_some_order = hidden.0.slots_per_record() == 2
+                    && matches!(&variant.source, Source::Own(joined) if !joined.tells_slots());
                 for (at, &solver) in plan.solvers.iter().enumerate() {
                     let what =
                         format!("{} at {:.2} {source}, {}", entry.name, made.ratio, solver.name());
@@ -161,6 +164,9 @@ pub fn run(
                     // Lists are made once for all solvers: the first one's row has the time.
                     row_seconds.neighbors += if at == 0 { making } else { 0.0 };
                     clock.seconds.recover += took;
+                    let ordered =
+                        in_some_order.then(|| in_better_order(&recovered, original, secret));
+                    let secret = ordered.as_ref().unwrap_or(secret);
                     let accuracy = clock
                         .time(|s| &mut s.evaluate, || evaluate(&recovered, original, secret))?;
                     let mut row = blank(entry, variant, (made.k, solver), &recovered, secret);

@@ -2,10 +2,12 @@
 
 mod accuracy;
 mod blind;
+mod pairs;
 mod reference;
 mod reliability;
 
 pub use accuracy::{Accuracy, evaluate};
 pub use blind::blind;
+pub use pairs::in_better_order;
 pub use reference::reference;
 pub use reliability::{Bin, Reliability, reliability};

@@ -149,6 +149,18 @@ impl Secret {
         by_row
     }
 
+    /// The same secret with the points of two slots exchanged wherever `exchange` says so of the first
+    /// slot of a pair.
+    #[must_use]
+    pub fn exchanged(&self, exchange: impl Fn(usize) -> bool) -> Self {
+        let mut exchanged = self.clone();
+        for first in (0..self.n_slots() / 2).map(|pair| 2 * pair).filter(|&slot| exchange(slot)) {
+            exchanged.hidden.swap(first, first + 1);
+            exchanged.descriptor_row.swap(first, first + 1);
+        }
+        exchanged
+    }
+
     /// Points that are in no record.
     pub fn dropped(&self) -> &[Dropped] {
         &self.dropped

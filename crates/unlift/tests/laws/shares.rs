@@ -1,6 +1,6 @@
 //! Laws about shares of a whole map: equivariance, and random lists against the blind attacker.
 
-use unlift::evaluate::{blind, evaluate};
+use unlift::evaluate::{blind, evaluate, in_better_order};
 use unlift::obfuscate::Scheme;
 use unlift::recover::{RecoverOptions, Solver};
 
@@ -72,4 +72,22 @@ fn equivariance() {
 #[test]
 fn random_lists_yield_no_more_than_none() {
     over_schemes!(random_lists_tell_nothing);
+}
+
+/// Which slot of a paired line comes first must not matter to an attack that cannot know.
+#[test]
+fn pairs_in_better_order_do_not_depend_on_the_order() {
+    let points: Vec<[f64; 3]> = room(33, 1000);
+    let ppl = unlift::obfuscate::scheme("ppl").unwrap().in_3d.unwrap();
+    let hidden = try_hide(ppl, &points, 0.5, 7).unwrap();
+    let lists = hidden.lists(20, 0.6, 7);
+    let recovered = solve(&hidden.released, &lists, RecoverOptions::default());
+    let percent = |secret: &unlift::truth::Secret| {
+        evaluate(&recovered, &hidden.original, secret).unwrap().percent_within(0.25)
+    };
+    let turned = hidden.secret.exchanged(|first| first % 6 == 0);
+    assert!(percent(&turned) < percent(&hidden.secret) - 10.0);
+    let better = |secret| percent(&in_better_order(&recovered, &hidden.original, secret));
+    assert_eq!(better(&turned), better(&hidden.secret));
+    assert!(better(&turned) >= percent(&hidden.secret));
 }
