@@ -48,7 +48,7 @@ struct ThresholdData {
 #[derive(Debug, Serialize)]
 struct RowData<'a> {
     scheme: &'a str,
-    /// The solver, with the noise model where that is not the usual one.
+    /// The solver, with the neighborhoods it had where these are not the usual ones.
     solver: String,
     ratio: f64,
     oracle: bool,
@@ -84,6 +84,14 @@ pub(crate) fn slot(document: &Document, scheme: &str) -> usize {
     (KNOWN_SCHEMES.len() + turn) % SLOTS
 }
 
+/// What tells apart the rows of one scheme: its curve on the page.
+fn series(row: &Row) -> String {
+    match row.neighbors.as_str() {
+        "oracle" => words::method(&row.solver, row.oracle_noise.as_deref()),
+        source => format!("{}, {source}", row.solver),
+    }
+}
+
 /// Bins with at least this share of the released points are drawn: fewer scatter.
 const LEAST_DRAWN: f64 = 0.005;
 
@@ -110,7 +118,7 @@ pub(crate) fn page_data<'a>(
         let cdf = options.error_cdf.iter().find(|cdf| cdf.row == index);
         RowData {
             scheme: &row.scheme,
-            solver: words::method(&row.solver, row.oracle_noise.as_deref()),
+            solver: series(row),
             ratio: row.inlier_ratio,
             oracle: row.neighbors == "oracle",
             recovered: by_threshold(&row.recovered_percent),
@@ -129,7 +137,7 @@ pub(crate) fn page_data<'a>(
                 slot: slot(document, &row.scheme),
             });
         }
-        let method = words::method(&row.solver, row.oracle_noise.as_deref());
+        let method = series(row);
         if !solvers.contains(&method) {
             solvers.push(method);
         }
