@@ -10,4 +10,4 @@ pub use accuracy::{Accuracy, evaluate};
 pub use blind::blind;
 pub use pairs::in_better_order;
 pub use reference::reference;
-pub use reliability::{Bin, Reliability, reliability};
+pub use reliability::{BINS, Bin, Reliability, SURE, reliability};
