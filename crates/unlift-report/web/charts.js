@@ -197,11 +197,15 @@ window.Unlift = window.Unlift || {};
   }
 
   /** Percent of the points over error, one curve per scheme, thresholds as upright lines. */
+  // A source that is no oracle has one row, at the ratio that was measured.
+  const rowOf = (data, scheme, { ratio, solver }) =>
+    data.rows.find((r) => r.scheme === scheme.name && r.solver === solver && (r.ratio === ratio || !r.oracle));
+
   function errors(node, data, { ratio, solver }) {
     const smallest = Math.min(...data.rows.flatMap((row) => row.errors.map(([e]) => e)).filter((e) => e > 0));
     const series = [];
     for (const scheme of data.schemes) {
-      const row = data.rows.find((r) => r.scheme === scheme.name && r.solver === solver && r.ratio === ratio);
+      const row = rowOf(data, scheme, { ratio, solver });
       const points = (row?.errors ?? []).map(([e, percent]) => [Math.max(e, smallest), percent]);
       series.push(line(scheme.name, points, scheme.slot, { mark: points.length > 20 ? "none" : MARKS[scheme.slot] }));
     }
@@ -226,7 +230,7 @@ window.Unlift = window.Unlift || {};
   function reliability(node, data, { ratio, solver }) {
     const series = [];
     for (const scheme of data.schemes) {
-      const row = data.rows.find((r) => r.scheme === scheme.name && r.solver === solver && r.ratio === ratio);
+      const row = rowOf(data, scheme, { ratio, solver });
       series.push(line(scheme.name, row?.reliability ?? [], scheme.slot));
     }
     const diagonal = line("perfect", [[0, 0], [100, 100]], 4, { dash: "dotted", width: 1, mark: "none" });

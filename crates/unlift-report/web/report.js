@@ -7,6 +7,11 @@
   const data = JSON.parse(document.getElementById("data").textContent);
   const percent = (ratio) => `${+(ratio * 100).toPrecision(2)} %`;
   const distinct = (items) => [...new Set(items)];
+  // Of the oracle, where there is one: other sources have one ratio each, the measured one.
+  const ratiosOf = (rows) => {
+    const asked = rows.filter((row) => row.oracle);
+    return distinct((asked.length ? asked : rows).map((row) => row.ratio)).sort((a, b) => b - a);
+  };
   const nearestHalf = (ratios) => ratios.reduce((a, b) => (Math.abs(b - 0.5) < Math.abs(a - 0.5) ? b : a), ratios[0]);
 
   /** A row of buttons of which one is chosen; not drawn when there is nothing to choose. */
@@ -61,7 +66,7 @@
 
   function distribution() {
     const form = document.getElementById("error-controls");
-    const ratios = distinct(data.rows.map((row) => row.ratio)).sort((a, b) => b - a);
+    const ratios = ratiosOf(data.rows);
     const state = { ratio: nearestHalf(ratios), solver: data.solvers[0] };
     const redraw = () => errors(document.getElementById("chart-errors"), data, state);
     const options = ratios.map((ratio) => [ratio, percent(ratio)]);
@@ -75,7 +80,7 @@
     const rows = data.rows.filter((row) => row.reliability.length);
     const form = document.getElementById("reliability-controls");
     if (!form || !rows.length) return;
-    const ratios = distinct(rows.map((row) => row.ratio)).sort((a, b) => b - a);
+    const ratios = ratiosOf(rows);
     const solvers = distinct(rows.map((row) => row.solver));
     const state = { ratio: nearestHalf(ratios), solver: solvers[0] };
     const redraw = () => reliability(document.getElementById("chart-reliability"), data, state);
