@@ -36,10 +36,15 @@ def cell(row):
     return " / ".join(f"{x:.1f}" for x in row["recovered_percent"].values())
 
 
+def head(names, columns):
+    """The first two lines of a table."""
+    yield "| " + " | ".join([*names, *columns]) + " |"
+    yield "|" + " --- |" * (len(names) + len(columns))
+
+
 def table(rows, solver, published=None):
     by_key = {(r["scheme"], r["inlier_ratio"]): r for r in rows if r["solver"] == solver}
-    yield "| In | " + " | ".join(SCHEMES) + " |"
-    yield "| --- |" + " --- |" * len(SCHEMES)
+    yield from head(["In"], SCHEMES)
     for ratio in RATIOS:
         cells = []
         for scheme in SCHEMES:
@@ -60,8 +65,7 @@ def column(rows, solver, scheme, field):
 
 def break_even(document):
     signs = {"interpolated": "", "below_tested": "below ", "above_tested": "above "}
-    yield "| solver | " + " | ".join(SCHEMES) + " |"
-    yield "| --- |" + " --- |" * len(SCHEMES)
+    yield from head(["solver"], SCHEMES)
     for solver in SOLVERS:
         by_scheme = {b["scheme"]: b for b in document["break_even"] if b["solver"] == solver}
         cells = [f"{signs[by_scheme[s]['bound']]}{by_scheme[s]['inlier_ratio']:.2f}" for s in SCHEMES]
@@ -83,8 +87,7 @@ def records_alone():
             if row["method"].startswith("density"):
                 published.setdefault(row["scheme"], []).append(row["recovered_percent"])
     schemes = ["olc", "ppl", "ppl+", "ray", "cp"]
-    yield "| attack | " + " | ".join(schemes) + " |"
-    yield "| --- |" + " --- |" * len(schemes)
+    yield from head(["attack"], schemes)
     yield "| published, paper (12-scenes) | " + " | ".join(" / ".join(published.get(s, [])) or "-" for s in schemes) + " |"
     for scene, name, thresholds, more in (("redkitchen", "RedKitchen", "0.05,0.1,0.25", ["--scale", "1"]),
                                           ("castle", "Castle", "0.5,1,2.5", [])):
@@ -103,8 +106,7 @@ def noise_table(rows):
     """All noise models, schemes, ratios and solvers: percent within the smallest threshold."""
     shares = {(r["oracle_noise"], r["scheme"], r["inlier_ratio"], r["solver"]): [*r["recovered_percent"].values()][0]
               for r in rows}
-    yield "| noise | In | " + " | ".join(SCHEMES) + " |"
-    yield "| --- | --- |" + " --- |" * len(SCHEMES)
+    yield from head(["noise", "In"], SCHEMES)
     for noise in NOISES:
         for ratio in RATIOS:
             cells = [" / ".join(f"{shares[noise, s, ratio, solver]:.0f}" for solver in SOLVERS) for s in SCHEMES]
@@ -150,8 +152,7 @@ def own_sources(scene, *options):
         for row, spent in zip(document["results"], document["run"]["seconds"]["rows"]):
             found[row["neighbors"], row["scheme"]] = row
             seconds.setdefault(row["neighbors"], []).append(spent["neighbors"])
-    yield "| neighbors by | seconds of lists, per scheme | " + " | ".join(schemes) + " |"
-    yield "| --- | --- |" + " --- |" * len(schemes)
+    yield from head(["neighbors by", "seconds of lists, per scheme"], schemes)
     for source in sources:
         cells = [f"{cell(found[source, s])} ({100 * found[source, s]['inlier_ratio']:.1f} %)" if (source, s) in found
                  else "-" for s in schemes]
@@ -178,8 +179,7 @@ def exact_line(rows):
 def confidence_table(rows, solver):
     """Percent of the points that the attacker is 90 % sure of, and percent of those within the threshold."""
     by_key = {(r["scheme"], r["inlier_ratio"]): r for r in rows if r["solver"] == solver}
-    yield "| In | " + " | ".join(SCHEMES) + " |"
-    yield "| --- |" + " --- |" * len(SCHEMES)
+    yield from head(["In"], SCHEMES)
     for ratio in RATIOS:
         cells = []
         for scheme in SCHEMES:
@@ -202,8 +202,7 @@ def reliability(documents):
                         bin[1] += more["n"] * more["predicted"]
                         bin[2] += more["n"] * more["observed"]
         curves.append((name, pooled))
-    yield "| map | " + " | ".join(f"{10 * b}-{10 * b + 10} %" for b in range(10)) + " |"
-    yield "| --- |" + " --- |" * 10
+    yield from head(["map"], [f"{10 * b}-{10 * b + 10} %" for b in range(10)])
     for name, pooled in curves:
         cells = [f"{100 * a / n:.0f}: {100 * b / n:.0f}" if n else "-" for n, a, b in pooled]
         yield f"| {name} | " + " | ".join(cells) + " |"
@@ -216,8 +215,7 @@ def low(scene, *options):
     schemes = [s for s in SCHEMES if s != "ray-voxel"]
     rows = audit(scene, "--schemes", ",".join(schemes), "--inlier-ratios", "0.06,0.04", "--repeats", "3", *options,
                  solvers="joint,consensus")["results"]
-    yield "| In, solver | " + " | ".join(schemes) + " |"
-    yield "| --- |" + " --- |" * len(schemes)
+    yield from head(["In, solver"], schemes)
     for ratio in (0.06, 0.04):
         for solver in ("joint", "consensus"):
             found = {r["scheme"]: cell(r) for r in rows if (r["inlier_ratio"], r["solver"]) == (ratio, solver)}

@@ -14,7 +14,7 @@ use crate::obfuscate::{Entry, obfuscate};
 use crate::recover::{RecoverOptions, Recovered, Solver, recover};
 use crate::released::Released;
 use crate::truth::{DropReason, Original, Secret};
-use crate::{Descriptors, Error};
+use crate::{Descriptors, Error, Unit};
 
 /// Everything known about one row of one repeat, for whoever writes clouds or draws pictures.
 pub struct Cell<'a> {
@@ -142,9 +142,10 @@ pub fn run(
                     Source::Own(_) => &by_row,
                     Source::Oracle | Source::Given(_) => &hidden.1,
                 };
-                // Lists from the records alone follow the order along a paired line.
+                // Lists from the records alone follow the order along a paired line: no descriptor
+                // tells its two slots apart.
                 let in_some_order = hidden.0.slots_per_record() == 2
-                    && matches!(&variant.source, Source::Own(joined) if !joined.tells_slots());
+                    && matches!(&variant.source, Source::Own(from) if !from.needs_descriptors());
                 for (at, &solver) in plan.solvers.iter().enumerate() {
                     let what =
                         format!("{} at {:.2} {source}, {}", entry.name, made.ratio, solver.name());
@@ -230,18 +231,42 @@ fn reference_row(
     baseline: &Accuracy,
     plan: &Plan,
 ) -> Row {
-    let mut row = Row {
+    let mut row = unmeasured(entry, REFERENCE.to_owned(), (3, REFERENCE), released.unit(), secret);
+    row.inlier_ratio = 1.0;
+    row.fill(&reference(released, original, secret, search), baseline, &plan.thresholds);
+    row
+}
+
+/// The name of that attacker: as a source and as a solver, though it is neither.
+pub const REFERENCE: &str = "reference";
+
+/// A row of which only the cell is known.
+fn unmeasured(
+    entry: &Entry,
+    neighbors: String,
+    (k, solver): (usize, &'static str),
+    unit: Unit,
+    secret: &Secret,
+) -> Row {
+    let mut dropped = BTreeMap::new();
+    for reason in DropReason::ALL {
+        let n = secret.dropped().iter().filter(|d| d.reason == reason).count();
+        if n > 0 {
+            dropped.insert(reason.name(), n);
+        }
+    }
+    Row {
         scheme: entry.name,
-        neighbors: REFERENCE.to_owned(),
+        neighbors,
         oracle_noise: None,
-        inlier_ratio: 1.0,
-        k: 3,
-        solver: REFERENCE,
+        inlier_ratio: 0.0,
+        k,
+        solver,
         delta: 0.0,
-        unit: released.unit(),
-        n_points: released.n_slots(),
-        lost: Default::default(),
-        dropped: dropped(secret),
+        unit,
+        n_points: secret.n_slots(),
+        lost: BTreeMap::new(),
+        dropped,
         recovered_percent: Vec::new(),
         blind_percent: Vec::new(),
         axis_accuracy_percent: None,
@@ -251,23 +276,7 @@ fn reference_row(
         reliability: None,
         ransac_trials: None,
         repeats: None,
-    };
-    row.fill(&reference(released, original, secret, search), baseline, &plan.thresholds);
-    row
-}
-
-/// The name of that attacker: as a source and as a solver, though it is neither.
-pub const REFERENCE: &str = "reference";
-
-fn dropped(secret: &Secret) -> BTreeMap<&'static str, usize> {
-    let mut dropped = BTreeMap::new();
-    for reason in DropReason::ALL {
-        let n = secret.dropped().iter().filter(|d| d.reason == reason).count();
-        if n > 0 {
-            dropped.insert(reason.name(), n);
-        }
     }
-    dropped
 }
 
 /// A row with everything but the measurements.
@@ -278,27 +287,13 @@ fn blank(
     recovered: &Recovered<3>,
     secret: &Secret,
 ) -> Row {
+    let cell = (k, solver.name());
+    let row = unmeasured(entry, variant.source.name(), cell, recovered.unit(), secret);
     Row {
-        scheme: entry.name,
-        neighbors: variant.source.name(),
         oracle_noise: variant.noise.map(Noise::name),
-        inlier_ratio: 0.0,
-        k,
-        solver: solver.name(),
         delta: recovered.delta(),
-        unit: recovered.unit(),
-        n_points: recovered.n_slots(),
-        lost: Default::default(),
-        dropped: dropped(secret),
-        recovered_percent: Vec::new(),
-        blind_percent: Vec::new(),
-        axis_accuracy_percent: None,
-        exact_percent: None,
-        assignment_accuracy_percent: None,
-        error_percentiles: Vec::new(),
-        reliability: None,
         ransac_trials: recovered.trials().map(|trials| trials.bins().collect()),
-        repeats: None,
+        ..row
     }
 }
 

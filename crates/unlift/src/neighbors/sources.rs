@@ -125,11 +125,6 @@ impl Joined {
         self.k
     }
 
-    /// Whether a list belongs to a descriptor, so that the two slots of a paired line are told apart.
-    pub fn tells_slots(&self) -> bool {
-        self.needs_descriptors()
-    }
-
     /// Whether a map without descriptors is of no use.
     pub fn needs_descriptors(&self) -> bool {
         self.parts.iter().any(|entry| entry.needs_descriptors)

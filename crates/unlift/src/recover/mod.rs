@@ -23,7 +23,7 @@ mod sections;
 
 pub use confidence::Confidence;
 #[doc(hidden)]
-pub use confidence::{Cues, N_CUES, N_TERMS, Seen, centered, terms};
+pub use confidence::{Cues, N_TERMS, Seen, centered, terms};
 pub use options::{Delta, RecoverOptions, Solver};
 pub use ransac::TrialHistogram;
 pub(crate) use recovered::stored_support;

@@ -12,7 +12,7 @@ mod model;
 
 use rayon::prelude::*;
 
-pub use cues::{Cues, N_CUES};
+pub use cues::Cues;
 use edges::{BothWays, Edges, Listed};
 pub use model::{Confidence, N_TERMS, centered, terms};
 

@@ -1,7 +1,6 @@
 //! How dense estimates of listed records lie: the votes a place gets by chance.
 
 use super::places::Places;
-use crate::recover::chance_field::trimmed;
 use crate::recover::grid::Grid;
 
 /// Estimates per volume, as a share of all, each counted as often as its record is listed.
@@ -12,8 +11,6 @@ pub(crate) struct Density<const D: usize> {
 
 /// A cell has at least the density of this part of one estimate.
 const LEAST: f32 = 0.5;
-/// Places looked at for the box of the grid and the typical density.
-const SAMPLE: usize = 1 << 14;
 /// Sparse places are taken as so much wider at most.
 const WIDEST: f32 = 2.5;
 
@@ -22,12 +19,7 @@ impl<const D: usize> Density<D> {
     /// about `radius`.
     pub(crate) fn new(places: &Places<D>, listed: &[u32], radius: f32) -> Self {
         let n = places.len();
-        let every = n.div_ceil(SAMPLE).max(1);
-        let ends: [(f32, f32); D] = std::array::from_fn(|c| {
-            let found = (0..n).step_by(every).filter(|&slot| places.is_known(slot));
-            trimmed(&mut found.map(|slot| places.of(slot)[c]).collect::<Vec<f32>>())
-        });
-        let (low, high) = (ends.map(|e| e.0), ends.map(|e| e.1));
+        let (low, high) = places.trimmed_box();
         let most = (4 * n).max(1 << 16);
         let mut grid = Grid::with_cell(low, high, radius * CELL, most);
         let slots_per_record = n / listed.len().max(1);
@@ -48,11 +40,7 @@ impl<const D: usize> Density<D> {
         for value in &mut grid.values {
             *value = value.max(least) * scale;
         }
-        let mut sample: Vec<f32> = (0..n)
-            .step_by(every)
-            .filter(|&slot| places.is_known(slot))
-            .map(|slot| grid.values[grid.index(&places.of(slot))])
-            .collect();
+        let mut sample: Vec<f32> = places.sample().map(|x| grid.values[grid.index(&x)]).collect();
         sample.sort_unstable_by(f32::total_cmp);
         let typical = sample.get(sample.len() / 2).copied().unwrap_or(scale);
         Self { grid, typical }

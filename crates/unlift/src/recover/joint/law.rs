@@ -74,8 +74,6 @@ impl Law {
 struct Tally {
     /// Close edges per bin, and close random ones; of all edges, and of mutual ones.
     bins: [[(f64, f64); BINS]; 2],
-    /// Edges, and mutual ones.
-    edges: [f64; 2],
     /// Edges and close ones, per class.
     classes: [[f64; 2]; CLASSES],
     /// Random edges that lead to one slot or to either of two, and close ones.
@@ -85,7 +83,7 @@ struct Tally {
 impl Default for Tally {
     fn default() -> Self {
         let classes = [[0.0; 2]; CLASSES];
-        Self { bins: [[(0.0, 0.0); BINS]; 2], edges: [0.0; 2], classes, random: [[0.0; 2]; 2] }
+        Self { bins: [[(0.0, 0.0); BINS]; 2], classes, random: [[0.0; 2]; 2] }
     }
 }
 
@@ -112,8 +110,6 @@ impl Tally {
             }
         }
         let mut draws = Draws::new(look.seed, Stage::NullSample, slot as u64);
-        self.edges[0] += ends.len() as f64;
-        self.edges[1] += n_mutual as f64;
         // Random edges stand for as many as the slot has.
         let share = ends.len() as f64 / RANDOM as f64;
         let share_mutual = n_mutual as f64 / RANDOM as f64;
@@ -131,7 +127,6 @@ impl Tally {
 
     fn merge(&mut self, other: &Self) {
         for kind in 0..2 {
-            self.edges[kind] += other.edges[kind];
             for (a, b) in self.bins[kind].iter_mut().zip(&other.bins[kind]) {
                 *a = (a.0 + b.0, a.1 + b.1);
             }
@@ -146,7 +141,10 @@ impl Tally {
 
     /// Close edges beyond those expected by chance, per bin; of all edges or of mutual ones.
     fn excess(&self, kind: usize) -> [f64; BINS] {
-        let (bins, edges) = (&self.bins[kind], self.edges[kind].max(1.0));
+        let bins = &self.bins[kind];
+        let of_kind = |class: &u8| kind == 0 || is_mutual(*class);
+        let classes = (0..CLASSES as u8).filter(of_kind);
+        let edges = classes.map(|class| self.classes[usize::from(class)][0]).sum::<f64>().max(1.0);
         let found: f64 = bins.iter().map(|b| b.0).sum();
         let by_chance: f64 = bins.iter().map(|b| b.1).sum();
         let share = share_of(found / edges, by_chance / edges);

@@ -7,21 +7,14 @@
 use rayon::prelude::*;
 
 use super::places::Places;
-use crate::recover::chance_field::trimmed;
 
 /// Cells per axis, as a power of two.
 const BITS: u32 = 10;
-/// Places looked at for the box of the cells.
-const SAMPLE: usize = 1 << 14;
 
 /// All slots, along a curve that fills space (Morton's); lost ones last.
 pub(crate) fn of<const D: usize>(places: &Places<D>) -> Vec<u32> {
     let n = places.len();
-    let every = n.div_ceil(SAMPLE).max(1);
-    let ends: [(f32, f32); D] = std::array::from_fn(|c| {
-        let known = (0..n).step_by(every).filter(|&slot| places.is_known(slot));
-        trimmed(&mut known.map(|slot| places.of(slot)[c]).collect::<Vec<f32>>())
-    });
+    let (low, high) = places.trimmed_box();
     let cells = (1u32 << BITS) as f32;
     let code = |slot: usize| {
         if !places.is_known(slot) {
@@ -29,8 +22,7 @@ pub(crate) fn of<const D: usize>(places: &Places<D>) -> Vec<u32> {
         }
         let x = places.of(slot);
         let cell: [u32; D] = std::array::from_fn(|c| {
-            let (low, high) = ends[c];
-            (((x[c] - low) / (high - low) * cells) as u32).min((1 << BITS) - 1)
+            (((x[c] - low[c]) / (high[c] - low[c]) * cells) as u32).min((1 << BITS) - 1)
         });
         let mut code = 0;
         for bit in (0..BITS).rev() {

@@ -1,5 +1,6 @@
 //! Where slots are believed to be, in the form the rounds read.
 
+use crate::recover::chance_field::trimmed;
 use crate::recover::{Estimate, Status};
 
 /// A slot's estimate: one memory access.
@@ -12,6 +13,9 @@ struct Place<const D: usize> {
 
 /// Lost slots lie this far away: near nothing, and still a number when squared.
 const FAR: f32 = 1e18;
+
+/// Places that stand for all.
+const SAMPLE: usize = 1 << 14;
 
 /// One place per slot.
 #[derive(Clone, Debug)]
@@ -44,6 +48,20 @@ impl<const D: usize> Places<D> {
     #[inline(always)]
     pub(crate) fn of(&self, slot: usize) -> [f32; D] {
         self.rows[slot].x
+    }
+
+    /// Some of the known places, evenly over the slots.
+    pub(crate) fn sample(&self) -> impl Iterator<Item = [f32; D]> + '_ {
+        let every = self.len().div_ceil(SAMPLE).max(1);
+        (0..self.len()).step_by(every).filter(|&slot| self.is_known(slot)).map(|slot| self.of(slot))
+    }
+
+    /// The corners of a box around the known places, without the farthest.
+    pub(crate) fn trimmed_box(&self) -> ([f32; D], [f32; D]) {
+        let ends: [(f32, f32); D] = std::array::from_fn(|c| {
+            trimmed(&mut self.sample().map(|x| x[c]).collect::<Vec<f32>>())
+        });
+        (ends.map(|e| e.0), ends.map(|e| e.1))
     }
 
     /// The piece of its feasible set that `slot` lies on.
