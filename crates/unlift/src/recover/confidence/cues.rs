@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::edges::Edges;
 use super::{Seen, Solved};
 use crate::recover::chance;
-use crate::recover::joint::{Density, Pieces, Places, distance2};
+use crate::recover::joint::{Density, Pieces, Places, along_curve, distance2};
 use crate::recover::{Estimate, Status};
 
 /// Number of cues.
@@ -74,10 +74,13 @@ pub(super) fn of<const D: usize, P: Pieces<D>, E: Edges>(
     let listed = edges.times_listed(estimates.len() / slots_per_record);
     let density = Density::new(&places, &listed, SMOOTH * delta);
     let look = Look { pieces, edges, places: &places, density: &density, delta2: delta * delta };
-    let mut crowds = vec![Crowd::default(); estimates.len()];
-    crowds.par_chunks_mut(PART).enumerate().for_each_init(Vec::new, |near, (part, crowds)| {
-        for (at, crowd) in crowds.iter_mut().enumerate() {
-            let slot = part * PART + at;
+    // Crowds in the order in which they are looked at, then by slot: neighbors are found in the cache.
+    let order = along_curve(&places);
+    let mut along = vec![Crowd::default(); estimates.len()];
+    let by_part = || order.par_chunks(PART);
+    along.par_chunks_mut(PART).zip(by_part()).for_each_init(Vec::new, |near, (crowds, slots)| {
+        for (crowd, &slot) in crowds.iter_mut().zip(slots) {
+            let slot = slot as usize;
             if estimates[slot].status == Status::Ok {
                 *crowd = look.crowd(slot, &estimates[slot], near);
                 let before = &unsettled[slot];
@@ -88,12 +91,19 @@ pub(super) fn of<const D: usize, P: Pieces<D>, E: Edges>(
             }
         }
     });
-    let evidence: Vec<f32> = crowds.iter().map(|crowd| libm::log1pf(crowd.evidence)).collect();
-    crowds.par_chunks_mut(PART).enumerate().for_each(|(part, crowds)| {
-        for (at, crowd) in crowds.iter_mut().enumerate() {
-            look.ask_members(part * PART + at, crowd, &evidence);
+    let mut evidence = vec![0.0; estimates.len()];
+    for (crowd, &slot) in along.iter().zip(&order) {
+        evidence[slot as usize] = libm::log1pf(crowd.evidence);
+    }
+    along.par_chunks_mut(PART).zip(by_part()).for_each(|(crowds, slots)| {
+        for (crowd, &slot) in crowds.iter_mut().zip(slots) {
+            look.ask_members(slot as usize, crowd, &evidence);
         }
     });
+    let mut crowds = vec![Crowd::default(); estimates.len()];
+    for (crowd, &slot) in along.into_iter().zip(&order) {
+        crowds[slot as usize] = crowd;
+    }
     let map = Map::new(&crowds, delta);
     let cues = crowds.par_iter().map(|crowd| map.cues(crowd)).collect();
     Seen { cues, radius: f64::from(map.radius) }

@@ -10,8 +10,6 @@ use super::candidates::{PART, Partners};
 
 /// Passes at most.
 const PASSES: usize = 30;
-/// Passes end when no message moves by more than this share.
-const SETTLED: f32 = 1e-3;
 
 /// Messages along pairs: `at[e]` is what the record of entry `e` tells the partner: how free it is.
 pub(super) struct Messages {
@@ -25,9 +23,15 @@ impl Messages {
         Self { at: vec![0.5; n], next: vec![0.0; n] }
     }
 
-    /// Sends messages until they settle. `weight` is that of each pair (the same from both sides),
+    /// Sends messages until none moves by more than a share `settled`. `weight` is that of each pair (the same from both sides),
     /// `alone` that of each record without one.
-    pub(super) fn settle(&mut self, partners: &Partners, weight: &[f32], alone: &[f32]) {
+    pub(super) fn settle(
+        &mut self,
+        partners: &Partners,
+        weight: &[f32],
+        alone: &[f32],
+        settled: f32,
+    ) {
         for _ in 0..PASSES {
             let at = &self.at;
             let moved: Vec<f32> = by_part(partners, &mut self.next)
@@ -51,7 +55,7 @@ impl Messages {
                 })
                 .collect();
             std::mem::swap(&mut self.at, &mut self.next);
-            if moved.into_iter().fold(0.0, f32::max) < SETTLED {
+            if moved.into_iter().fold(0.0, f32::max) < settled {
                 break;
             }
         }

@@ -7,6 +7,7 @@
 mod candidates;
 mod law;
 mod matching;
+mod order;
 mod parity;
 mod swaps;
 

@@ -9,10 +9,14 @@ use rayon::prelude::*;
 use super::candidates::{PART, Partners};
 use super::law::{CLASSES, Law, Tally};
 use super::matching::{Messages, by_part};
+use super::order::side_by_side;
 use crate::recover::{Estimate, Status};
 
 /// Rounds of learning.
 const ROUNDS: usize = 6;
+/// Messages have settled when none moves by more than this share: while the law is learned, and at last.
+const LEARNING: f32 = 0.02;
+const SETTLED: f32 = 1e-3;
 /// Pairs less probable than this teach nothing.
 const NOTHING: f32 = 1e-3;
 /// Pairs at least this probable are taken.
@@ -67,16 +71,19 @@ pub(super) fn pairs<const D: usize>(
         }
     };
     let sides: Vec<Side> = published.iter().zip(estimates).map(side).collect();
+    let order = side_by_side(&sides, delta);
+    let sides: Vec<Side> = order.iter().map(|&record| sides[record as usize]).collect();
     let Some(partners) = Partners::find(&sides, D, delta) else {
         return vec![None; n];
     };
     let rarity = rarity(published, &sides, partners.reach);
     let prior = prior::<D>(&sides);
     let class = classes(estimates);
+    let class: Vec<u8> = order.iter().map(|&record| class[record as usize]).collect();
     let mut law = Law::new(partners.reach);
     let mut messages = Messages::new(&partners);
     let mut weight = vec![0.0f32; partners.of.len()];
-    for _ in 0..ROUNDS {
+    for round in 0..ROUNDS {
         let likelier = |i: usize, j: usize| {
             let away = (sides[j].published - sides[i].estimate).abs();
             law.density(usize::from(class[i]), away) * rarity[i]
@@ -95,7 +102,8 @@ pub(super) fn pairs<const D: usize>(
         let others = law.mean_good();
         let alone: Vec<f32> =
             class.iter().map(|&c| law.alone(usize::from(c), others) as f32).collect();
-        messages.settle(&partners, &weight, &alone);
+        let settled = if round + 1 < ROUNDS { LEARNING } else { SETTLED };
+        messages.settle(&partners, &weight, &alone, settled);
         let tallies: Vec<Tally> = (0..n.div_ceil(PART))
             .into_par_iter()
             .map(|part| {
@@ -131,7 +139,11 @@ pub(super) fn pairs<const D: usize>(
     };
     let best: Vec<Option<u32>> = (0..n).into_par_iter().map(best).collect();
     let mutual = |i: usize| best[i].filter(|&j| best[j as usize] == Some(i as u32));
-    (0..n).map(mutual).collect()
+    let mut found = vec![None; n];
+    for (i, &record) in order.iter().enumerate() {
+        found[record as usize] = mutual(i).map(|j| order[j as usize]);
+    }
+    found
 }
 
 /// Per axis the probability that some other record on it is the partner, before anything is known.

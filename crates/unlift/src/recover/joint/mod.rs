@@ -20,6 +20,7 @@ mod small;
 
 pub(crate) use density::Density;
 pub(crate) use graph::{Graph, either};
+pub(crate) use order::along_curve;
 pub(crate) use pieces::{CandidatePieces, LinePieces, Pieces, PlanePieces};
 pub(crate) use places::{Places, distance2};
 
@@ -91,7 +92,7 @@ fn rounds<const D: usize, P: Pieces<D>>(
     let (most_radius, delta2) = (MOST_RADIUS * delta, delta * delta);
     let mut now = start;
     let mut places = Places::new(&now);
-    let order = order::of(&places);
+    let order = along_curve(&places);
     // Nothing is settled yet.
     let (mut moves, mut n_moves, mut ahead) = (vec![true; n], n, vec![0.0; n]);
     let mut before = places.clone();

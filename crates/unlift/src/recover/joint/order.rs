@@ -7,32 +7,27 @@
 use rayon::prelude::*;
 
 use super::places::Places;
+use crate::geometry::curve;
 
 /// Cells per axis, as a power of two.
 const BITS: u32 = 10;
 
-/// All slots, along a curve that fills space (Morton's); lost ones last.
-pub(crate) fn of<const D: usize>(places: &Places<D>) -> Vec<u32> {
+/// All slots, along a curve that fills space; lost ones last.
+pub(crate) fn along_curve<const D: usize>(places: &Places<D>) -> Vec<u32> {
     let n = places.len();
     let (low, high) = places.trimmed_box();
     let cells = (1u32 << BITS) as f32;
     let code = |slot: usize| {
         if !places.is_known(slot) {
-            return u32::MAX;
+            return u64::MAX;
         }
         let x = places.of(slot);
         let cell: [u32; D] = std::array::from_fn(|c| {
             (((x[c] - low[c]) / (high[c] - low[c]) * cells) as u32).min((1 << BITS) - 1)
         });
-        let mut code = 0;
-        for bit in (0..BITS).rev() {
-            for of_axis in &cell {
-                code = code << 1 | of_axis >> bit & 1;
-            }
-        }
-        code
+        curve::along(&cell, BITS)
     };
-    let mut keys: Vec<(u32, u32)> =
+    let mut keys: Vec<(u64, u32)> =
         (0..n).into_par_iter().map(|slot| (code(slot), slot as u32)).collect();
     keys.par_sort_unstable();
     keys.into_iter().map(|(_, slot)| slot).collect()
