@@ -32,14 +32,22 @@ impl FeatureWriter {
         Ok(Self { output, writer })
     }
 
+    /// Whether an image can be written, as far as it decides that.
+    ///
+    /// # Errors
+    /// When the name has an empty part, `.` or `..`, is taken, or leads into another image, or when a
+    /// column has not one row per keypoint.
+    pub fn check(&self, image: &ImageFeatures) -> Result<(), Error> {
+        check(&self.writer, image, self.output.path())
+    }
+
     /// Writes one image.
     ///
     /// # Errors
-    /// When the name is empty, taken, or that of a folder of other images, when a column has not
-    /// one row per keypoint, or when the disk fails.
+    /// As [`check`](Self::check), or when the disk fails.
     pub fn append(&mut self, image: &ImageFeatures) -> Result<(), Error> {
         let path = self.output.path().to_owned();
-        check(&self.writer, image, &path)?;
+        self.check(image)?;
         write(&mut self.writer, self.output.writer(), image).map_err(|e| Error::write(&path, e))
     }
 
