@@ -18,8 +18,8 @@ COLMAP extracts it, descriptors bytes: RootSIFT times 512. Features of a file ar
 extracted.
 
 A run that is interrupted goes on where it was when the same command is given again: finished images
-wait in FILE.parts, which is gone when FILE is there. An image that cannot be used gets one line, the
-others are written, and the exit code is 3.
+wait in FILE.parts, which is gone when FILE is there. An image that cannot be used gets one line;
+the others are written, and the exit code is 3.
 
 Exit codes: 0 done, 2 usage, 3 bad input, be it a single image.")]
 pub struct FeaturesArgs {
