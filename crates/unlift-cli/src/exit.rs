@@ -14,7 +14,7 @@ pub enum Outcome {
 
 /// Exit code of a wrong command line; clap uses the same.
 const USAGE: u8 = 2;
-/// Exit code of files that cannot be read, written or used.
+/// Exit code of files that cannot be read, written or used; of many images, a single one.
 const BAD_INPUT: u8 = 3;
 
 /// The command line asks for something that cannot be done (exit code 2).
@@ -68,12 +68,16 @@ pub fn finish(result: anyhow::Result<Outcome>) -> ExitCode {
 
 /// The lines on stderr.
 fn text(error: &anyhow::Error) -> String {
-    // One line per error: a newline in a file name must not fake a second one.
-    let line = format!("{error:#}").replace(['\n', '\r'], " ");
+    let line = line(error);
     match error.downcast_ref::<Advised>() {
-        Some(advised) => format!("unlift: {line}\n  try: {}\n", advised.advice),
-        None => format!("unlift: {line}\n"),
+        Some(advised) => format!("{line}\n  try: {}\n", advised.advice),
+        None => format!("{line}\n"),
     }
+}
+
+/// One line per error: a newline in a file name must not fake a second one.
+pub fn line(error: &anyhow::Error) -> String {
+    format!("unlift: {}", format!("{error:#}").replace(['\n', '\r'], " "))
 }
 
 fn code(error: &anyhow::Error) -> u8 {

@@ -1,11 +1,14 @@
 //! The command line of unlift: parse, call the library, print.
 
 mod args;
+mod args_bench;
+mod args_features;
 mod clouds;
 mod commands;
 mod document;
 mod exit;
 mod gate;
+mod images;
 mod job;
 mod memory;
 mod output;

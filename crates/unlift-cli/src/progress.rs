@@ -36,6 +36,11 @@ impl Progress {
         self.bar.set_position(done as u64);
         self.bar.set_message(what.to_owned());
     }
+
+    /// Prints a line on stderr without tearing the bar.
+    pub fn say(&self, line: &str) {
+        self.bar.suspend(|| eprintln!("{line}"));
+    }
 }
 
 /// A sign of life for work whose steps cannot be counted; gone when dropped. Hidden where stderr is no

@@ -348,6 +348,7 @@ fn help_is_part_of_the_interface() {
         "recover",
         "evaluate",
         "bench recover",
+        "features",
         "schemes",
     ] {
         let text = place.stdout(&format!("{command} --help"), 0);

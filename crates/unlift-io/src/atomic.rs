@@ -8,8 +8,7 @@ use tempfile::TempDir;
 
 /// Writes the file `path` through `fill`; whatever stood there stays until the new file is whole.
 ///
-/// The bytes go to a temporary file in the same folder, which is flushed to disk and renamed. A
-/// symbolic link is followed: the file it names is replaced, not the link.
+/// As [`OutputFile`], for what is written in one go.
 ///
 /// # Errors
 /// When the folder does not exist, `path` is a folder or a device, `fill` fails, or the disk does.
@@ -18,36 +17,89 @@ pub fn write_file(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> Result<(), Error> {
-    let failed = |source| Error::write(path, source);
-    let target = resolved(path).map_err(failed)?;
-    match fs::metadata(&target) {
-        Ok(found) if found.is_dir() => return Err(Error::new(path, "", "a file", "a folder")),
-        // Renaming over a device or a pipe would replace it in the system.
-        Ok(found) if !found.is_file() => {
-            return Err(Error::new(path, "", "a regular file", "a device or a pipe"));
+    let mut output = OutputFile::create(path)?;
+    fill(output.writer()).map_err(|source| Error::write(path, source))?;
+    output.commit()
+}
+
+/// A file that is built in a temporary sibling and takes its place on [`commit`](Self::commit).
+///
+/// The bytes go to a temporary file in the same folder, which is flushed to disk and renamed. A
+/// symbolic link is followed: the file it names is replaced, not the link. Dropped without a commit,
+/// it leaves no trace.
+#[derive(Debug)]
+pub struct OutputFile {
+    path: PathBuf,
+    target: PathBuf,
+    writer: BufWriter<File>,
+    temporary: tempfile::TempPath,
+}
+
+impl OutputFile {
+    /// Starts a file that will become `path`; what stands there stays as it is until the commit.
+    ///
+    /// # Errors
+    /// When the folder does not exist, `path` is a folder or a device, or the disk fails.
+    pub fn create(path: &Path) -> Result<Self, Error> {
+        let failed = |source| Error::write(path, source);
+        let target = Self::check(path)?;
+        let mut builder = tempfile::Builder::new();
+        let prefix = hidden_prefix(&target);
+        builder.prefix(&prefix).suffix(".partial");
+        // A temporary file is private by default; an output has the permissions of any new file.
+        #[cfg(unix)]
+        let permissions = std::os::unix::fs::PermissionsExt::from_mode(0o666);
+        #[cfg(unix)]
+        builder.permissions(permissions);
+        let (file, temporary) =
+            builder.tempfile_in(parent_of(&target)).map_err(failed)?.into_parts();
+        let writer = BufWriter::with_capacity(1 << 17, file);
+        Ok(Self { path: path.to_owned(), target, writer, temporary })
+    }
+
+    /// Whether a file can be put at `path`, before hours of work go into it; where it will stand,
+    /// links followed.
+    ///
+    /// # Errors
+    /// As [`create`](Self::create).
+    pub fn check(path: &Path) -> Result<PathBuf, Error> {
+        let target = resolved(path).map_err(|source| Error::write(path, source))?;
+        match fs::metadata(&target) {
+            Ok(found) if found.is_dir() => return Err(Error::new(path, "", "a file", "a folder")),
+            // Renaming over a device or a pipe would replace it in the system.
+            Ok(found) if !found.is_file() => {
+                return Err(Error::new(path, "", "a regular file", "a device or a pipe"));
+            }
+            _ => {}
         }
-        _ => {}
+        let folder = parent_of(&target);
+        if !folder.is_dir() {
+            return Err(Error::new(folder, "", "a folder to write in", "none"));
+        }
+        Ok(target)
     }
-    let folder = parent_of(&target);
-    if !folder.is_dir() {
-        return Err(Error::new(folder, "", "a folder to write in", "none"));
+
+    /// The path as it was given, for errors.
+    pub fn path(&self) -> &Path {
+        &self.path
     }
-    let mut builder = tempfile::Builder::new();
-    let prefix = hidden_prefix(&target);
-    builder.prefix(&prefix).suffix(".partial");
-    // A temporary file is private by default; an output has the permissions of any new file.
-    #[cfg(unix)]
-    let permissions = std::os::unix::fs::PermissionsExt::from_mode(0o666);
-    #[cfg(unix)]
-    builder.permissions(permissions);
-    let temporary = builder.tempfile_in(folder).map_err(failed)?;
-    let (file, temporary_path) = temporary.into_parts();
-    let mut writer = BufWriter::with_capacity(1 << 17, file);
-    fill(&mut writer).map_err(failed)?;
-    writer.flush().map_err(failed)?;
-    writer.get_ref().sync_all().map_err(failed)?;
-    drop(writer);
-    temporary_path.persist(&target).map_err(|refused| failed(refused.error))
+
+    /// Where the bytes go.
+    pub fn writer(&mut self) -> &mut BufWriter<File> {
+        &mut self.writer
+    }
+
+    /// Puts the file in its place.
+    ///
+    /// # Errors
+    /// When the disk fails; what stood there is still there then.
+    pub fn commit(mut self) -> Result<(), Error> {
+        let failed = |source| Error::write(&self.path, source);
+        self.writer.flush().map_err(failed)?;
+        self.writer.get_ref().sync_all().map_err(failed)?;
+        drop(self.writer);
+        self.temporary.persist(&self.target).map_err(|refused| failed(refused.error))
+    }
 }
 
 /// A folder that is built in a temporary sibling and takes its place on [`commit`](Self::commit).

@@ -61,6 +61,11 @@ pub fn hash_positions(positions: &[[f64; 3]]) -> String {
     hex(hasher)
 }
 
+/// The SHA-256 of `bytes`, as 64 hexadecimal digits.
+pub fn hash_bytes(bytes: &[u8]) -> String {
+    hex(Sha256::new_with_prefix(bytes))
+}
+
 fn hex(hasher: Sha256) -> String {
     hasher.finalize().iter().map(|b| format!("{b:02x}")).collect()
 }

@@ -13,7 +13,7 @@ use unlift_io::read;
 use unlift_report::paper::published_seconds;
 
 use super::with_threads;
-use crate::args::BenchRecoverArgs;
+use crate::args_bench::BenchRecoverArgs;
 use crate::exit::{Outcome, usage};
 use crate::memory::peak_bytes;
 use crate::output::{print, table};

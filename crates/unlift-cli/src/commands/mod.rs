@@ -4,6 +4,7 @@ mod audit_map;
 mod bench;
 mod demo;
 mod evaluate;
+mod features;
 mod neighbors;
 mod obfuscate;
 mod recover;
@@ -32,6 +33,7 @@ pub fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Recover(args) => recover::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Bench(BenchCommand::Recover(args)) => bench::recovery(&args),
+        Command::Features(args) => features::run(&args),
         Command::Schemes => schemes::run(),
     }
 }

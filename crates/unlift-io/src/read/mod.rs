@@ -1,10 +1,10 @@
 //! The first stage: a map in somebody else's format becomes positions, ids and camera centers.
 
-mod bytes;
+pub(crate) mod bytes;
 pub mod colmap;
 mod database;
 mod descriptors;
-mod lines;
+pub(crate) mod lines;
 mod npy;
 mod ply;
 mod table;

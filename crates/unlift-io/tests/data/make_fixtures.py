@@ -1,9 +1,10 @@
-"""Writes the fixtures of this folder. Needs pycolmap 4.2 and NumPy; see README.md."""
+"""Writes the fixtures of this folder. Needs pycolmap 4.2, h5py 3.16 and NumPy; see README.md."""
 
 import shutil
 import sqlite3
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pycolmap
 
@@ -143,6 +144,27 @@ def write_descriptors(model, path, descriptors):
         f.write(np.array(rows).astype(np.uint8).tobytes())
 
 
+def features(path, libver):
+    """hloc's layout as h5py writes it: one type and one form of storage per image."""
+    with h5py.File(path, "w", libver=libver) as file:
+        half = file.create_group("db/half.jpg")
+        keypoints = np.array([[1.5, 2.25], [3, 4], [100, 50]], np.float16)
+        half.create_dataset("keypoints", data=keypoints).attrs["uncertainty"] = 1.5
+        half["descriptors"] = np.arange(12, dtype=np.float16).reshape(4, 3) / 8
+        half["scores"] = np.array([0.5, 0.25, 0.125], np.float16)
+        half["image_size"] = np.array([640, 480])
+        double = file.create_group("db/seq/double.jpg")
+        double["keypoints"] = np.array([[0.1, 0.2, 7, 8], [0.3, 0.4, 9, 10]])
+        rows = np.arange(8, dtype=np.float32).reshape(4, 2)
+        # The newest form of chunks is newer than the reader; hloc does not compress.
+        packed = {} if libver == "latest" else {"chunks": (2, 1), "compression": "gzip", "shuffle": True}
+        double.create_dataset("descriptors", data=rows, **packed)
+        single = file.create_group("big \u00fc.png")
+        single["keypoints"] = np.array([[1, 2], [3, 4]], ">f4")
+        single["descriptors"] = np.array([[1, 2], [3, 4], [5, 6]], np.uint8)
+        single["image_size"] = np.array([10, 20], np.int32)
+
+
 def main():
     for folder in ("rig-bin", "rig-txt", "project"):
         shutil.rmtree(HERE / folder, ignore_errors=True)
@@ -171,6 +193,8 @@ def main():
     np.save(HERE / "f8.npy", points)
     np.save(HERE / "f4-big-endian.npy", points.astype(">f4"))
     np.save(HERE / "f8-fortran.npy", np.asfortranarray(points))
+    features(HERE / "features-latest.h5", "latest")
+    features(HERE / "features-earliest.h5", "earliest")
 
 
 main()

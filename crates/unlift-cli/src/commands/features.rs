@@ -1,0 +1,192 @@
+//! `unlift features`: keypoints and descriptors of images into one file.
+
+use std::path::{Path, PathBuf};
+
+use unlift_features::SiftOptions;
+use unlift_features::batch::in_order;
+use unlift_io::Error;
+use unlift_io::atomic::OutputFile;
+use unlift_io::features::{FeatureWriter, ImageFeatures};
+
+use super::with_threads;
+use crate::args_features::FeaturesArgs;
+use crate::exit::{Outcome, line, usage};
+use crate::images::FeatureSource;
+use crate::images::parts::{Parts, write_part};
+use crate::output::print;
+use crate::progress::Progress;
+
+/// What was done, and what could not be.
+#[derive(Default)]
+struct Tally {
+    images: usize,
+    features: usize,
+    resumed: usize,
+    failed: usize,
+}
+
+/// Extracts or copies the features of all images.
+pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
+    let target = OutputFile::check(&args.out).map_err(|error| usage(format!("--out: {error}")))?;
+    let options = options(args)?;
+    let tally = with_threads(args.threads, || {
+        let source = FeatureSource::open(&args.images, &options)?;
+        let mut progress = Progress::new(args.quiet);
+        let mut tally = Tally::default();
+        for error in source.refused() {
+            tally.failed += 1;
+            progress.say(&line(&anyhow::anyhow!("{error}")));
+        }
+        match &source {
+            FeatureSource::Folder(_) => {
+                extract(&source, &target, &options, &mut tally, &mut progress)?;
+            }
+            FeatureSource::File(_) => copy(&source, args, &mut tally, &mut progress)?,
+        }
+        Ok(tally)
+    })?;
+    let total = tally.images + tally.failed;
+    if tally.images > 0 {
+        let resumed = match tally.resumed {
+            0 => String::new(),
+            n => format!(" ({n} images of an earlier run)"),
+        };
+        let (images, features) = (tally.images, tally.features);
+        let out = args.out.display();
+        print(&format!("{images} images, {features} features{resumed}, in {out}\n"))?;
+    }
+    if tally.failed > 0 {
+        let expected = format!("{total} images that can be used");
+        return Err(Error::new(&args.images, "", expected, tally.images.to_string()).into());
+    }
+    Ok(Outcome::Done)
+}
+
+/// The options of the extractor; none of them fits a file.
+fn options(args: &FeaturesArgs) -> anyhow::Result<SiftOptions> {
+    let given = [
+        ("--max-features", args.max_features.is_some()),
+        ("--max-image-size", args.max_image_size.is_some()),
+        ("--first-octave", args.first_octave.is_some()),
+    ];
+    if args.images.is_file()
+        && let Some((name, _)) = given.iter().find(|(_, given)| *given)
+    {
+        return Err(usage(format!("{name}: expected with a folder of photos, found a file")));
+    }
+    let defaults = SiftOptions::default();
+    Ok(SiftOptions {
+        max_features: args.max_features.map_or(defaults.max_features, |n| n.get()),
+        max_image_size: args.max_image_size.map_or(defaults.max_image_size, |n| n as usize),
+        doubled: args.first_octave.map_or(defaults.doubled, |octave| octave < 0),
+        ..defaults
+    })
+}
+
+/// What became of one photo.
+enum Done {
+    Now(PathBuf),
+    Earlier(PathBuf),
+}
+
+/// Features of photos: each into a part, then all parts into the file.
+fn extract(
+    source: &FeatureSource,
+    target: &Path,
+    options: &SiftOptions,
+    tally: &mut Tally,
+    progress: &mut Progress,
+) -> anyhow::Result<()> {
+    let FeatureSource::Folder(folder) = source else { return Ok(()) };
+    let parts = Parts::open(target, options)?;
+    let names = folder.names();
+    let all: Vec<usize> = (0..names.len()).collect();
+    let one = |&at: &usize| -> anyhow::Result<Done> {
+        let part = parts.path(&names[at], folder.path(at))?;
+        if part.is_file() {
+            return Ok(Done::Earlier(part));
+        }
+        write_part(&part, &folder.get(at)?).map_err(Fatal)?;
+        Ok(Done::Now(part))
+    };
+    let mut finished = Vec::with_capacity(names.len());
+    in_order(&all, one, |at, result| {
+        progress.show(at, names.len(), &names[at]);
+        match result {
+            Ok(Done::Now(part)) => finished.push((&names[at][..], part)),
+            Ok(Done::Earlier(part)) => {
+                tally.resumed += 1;
+                finished.push((&names[at][..], part));
+            }
+            // A full disk is not the photo's fault, and the next one will not fit either.
+            Err(error) if error.is::<Fatal>() => return Err(error),
+            Err(error) => {
+                tally.failed += 1;
+                progress.say(&line(&error));
+            }
+        }
+        Ok(())
+    })?;
+    if finished.is_empty() {
+        parts.remove();
+        return Ok(());
+    }
+    tally.images = finished.len();
+    parts.join(&finished, target, |at, image| {
+        tally.features += image.keypoints.len();
+        progress.show(at, finished.len(), "joining");
+    })?;
+    Ok(())
+}
+
+/// An error that ends the run.
+#[derive(Debug)]
+struct Fatal(Error);
+
+impl std::fmt::Display for Fatal {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl std::error::Error for Fatal {}
+
+/// Features of a file, written anew.
+fn copy(
+    source: &FeatureSource,
+    args: &FeaturesArgs,
+    tally: &mut Tally,
+    progress: &mut Progress,
+) -> anyhow::Result<()> {
+    let names = source.names();
+    let all: Vec<usize> = (0..names.len()).collect();
+    let mut writer = FeatureWriter::create(&args.out)?;
+    let one = |&at: &usize| -> anyhow::Result<ImageFeatures> {
+        let image = source.get(at)?;
+        image.described(&args.images)?;
+        Ok(image)
+    };
+    in_order(&all, one, |at, result| -> anyhow::Result<()> {
+        progress.show(at, names.len(), &names[at]);
+        let usable = result.and_then(|image| {
+            writer.check(&image)?;
+            Ok(image)
+        });
+        match usable {
+            Ok(image) => {
+                writer.append(&image)?;
+                tally.images += 1;
+                tally.features += image.keypoints.len();
+            }
+            Err(error) => {
+                tally.failed += 1;
+                progress.say(&line(&error));
+            }
+        }
+        Ok(())
+    })?;
+    if tally.images > 0 {
+        writer.finish()?;
+    }
+    Ok(())
+}

@@ -1,0 +1,157 @@
+//! A folder of photos: which there are, and the features of one.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use unlift::Descriptors;
+use unlift::descriptors::Values;
+use unlift_features::{Features, Sift, SiftOptions, load};
+use unlift_io::Error;
+use unlift_io::features::ImageFeatures;
+
+/// What is taken for a photo; what a file is, its bytes decide when it is read.
+const ENDINGS: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
+/// Pixels a side below which nothing can be an extremum.
+const LEAST_SIDE: usize = 3;
+/// Standard deviation of a SIFT keypoint in pixels of the image it was found in, as hloc states it.
+const DETECTION_NOISE: f64 = 1.0;
+
+/// The photos of a folder, sorted by name.
+pub struct Folder {
+    sift: Sift,
+    max_image_size: usize,
+    names: Vec<String>,
+    paths: Vec<PathBuf>,
+    refused: Vec<Error>,
+}
+
+impl Folder {
+    /// Lists the photos in `root` and in folders inside it. Names that begin with a dot are passed over.
+    ///
+    /// # Errors
+    /// When the folder cannot be read or holds no photo, or an option is out of range.
+    pub fn open(root: &Path, options: &SiftOptions) -> anyhow::Result<Self> {
+        let sift = Sift::try_new(options.clone())?;
+        let mut found = Found::default();
+        found.visit(root, "", &mut Vec::new());
+        if found.photos.is_empty() {
+            return Err(match found.refused.pop() {
+                Some(refused) => refused,
+                None => Error::new(root, "", "JPEG, PNG or WebP photos", "none"),
+            }
+            .into());
+        }
+        found.photos.sort_unstable();
+        let (names, paths) = found.photos.into_iter().unzip();
+        let max_image_size = options.max_image_size;
+        Ok(Self { sift, max_image_size, names, paths, refused: found.refused })
+    }
+
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    pub fn refused(&self) -> &[Error] {
+        &self.refused
+    }
+
+    /// Where photo `at` is.
+    pub fn path(&self, at: usize) -> &Path {
+        &self.paths[at]
+    }
+
+    pub fn get(&self, at: usize) -> anyhow::Result<ImageFeatures> {
+        let path = &self.paths[at];
+        let photo = load::read(path)?;
+        let size = [photo.width(), photo.height()];
+        if size.iter().any(|&side| side < LEAST_SIDE) {
+            let found = format!("{} x {}", size[0], size[1]);
+            let expected = format!("at least {LEAST_SIDE} pixels a side");
+            return Err(Error::new(path, "", expected, found).into());
+        }
+        let shrunk = size[0].max(size[1]) as f64 / self.max_image_size as f64;
+        let features = self.sift.extract(&photo);
+        let image = ImageFeatures {
+            name: self.names[at].clone(),
+            size: Some(size.map(|side| side as u32)),
+            uncertainty_px: Some(DETECTION_NOISE * shrunk.max(1.0)),
+            photo: Some(path.clone()),
+            ..convert(features)
+        };
+        Ok(image)
+    }
+}
+
+/// Features in hloc's convention: here, and nowhere else, the middle of the first pixel goes from
+/// (0.5, 0.5) to (0, 0).
+fn convert(features: Features) -> ImageFeatures {
+    let keypoints = &features.keypoints;
+    let scales: Vec<f32> = keypoints.iter().map(|keypoint| keypoint.scale).collect();
+    let bytes = features.descriptors.into_flattened();
+    // Real images do not give dummies; an image whose features are all alike has nothing to tell.
+    let descriptors = Descriptors::try_new(Values::U8(bytes), 128).ok();
+    ImageFeatures {
+        keypoints: keypoints
+            .iter()
+            .map(|keypoint| [f64::from(keypoint.x - 0.5), f64::from(keypoint.y - 0.5)])
+            .collect(),
+        orientations_deg: Some(keypoints.iter().map(|k| k.orientation.to_degrees()).collect()),
+        // The contrast is not kept; large features are found again more often than small ones.
+        scores: Some(scales.clone()),
+        scales: Some(scales),
+        descriptors,
+        ..ImageFeatures::default()
+    }
+}
+
+#[derive(Default)]
+struct Found {
+    photos: Vec<(String, PathBuf)>,
+    refused: Vec<Error>,
+}
+
+impl Found {
+    /// Adds what is in `folder`, whose name is `prefix`; `above` are the folders it is in.
+    fn visit(&mut self, folder: &Path, prefix: &str, above: &mut Vec<PathBuf>) {
+        // A link to a folder further up would never end.
+        let Ok(real) = fs::canonicalize(folder) else { return };
+        if above.contains(&real) {
+            return;
+        }
+        let entries = match fs::read_dir(folder) {
+            Ok(entries) => entries,
+            Err(source) => return self.refused.push(Error::read(folder, source)),
+        };
+        above.push(real);
+        for entry in entries {
+            let path = match entry {
+                Ok(entry) => entry.path(),
+                Err(source) => {
+                    self.refused.push(Error::read(folder, source));
+                    continue;
+                }
+            };
+            let file_name = path.file_name().unwrap_or_default();
+            if file_name.as_encoded_bytes().starts_with(b".") {
+                continue;
+            }
+            let name = file_name.to_str().map(|name| match prefix {
+                "" => name.to_owned(),
+                _ => format!("{prefix}/{name}"),
+            });
+            let is_folder = path.is_dir();
+            let ending = path.extension().unwrap_or_default().to_string_lossy();
+            let is_photo = ENDINGS.contains(&&*ending.to_ascii_lowercase());
+            match name {
+                Some(name) if is_folder => self.visit(&path, &name, above),
+                Some(name) if is_photo => self.photos.push((name, path)),
+                None if is_folder || is_photo => {
+                    let found = "bytes that are no text";
+                    self.refused.push(Error::new(&path, "", "a name in UTF-8", found));
+                }
+                _ => {}
+            }
+        }
+        above.pop();
+    }
+}

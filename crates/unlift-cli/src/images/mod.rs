@@ -1,0 +1,63 @@
+//! Features of images from wherever they are: a folder of photos, hloc's HDF5, a COLMAP database.
+
+mod folder;
+pub mod parts;
+
+use std::path::Path;
+
+use unlift_features::SiftOptions;
+use unlift_io::features::{self, ImageFeatures};
+
+pub use folder::Folder;
+
+/// Images by name, one at a time. Shared by threads; memory grows by names only.
+///
+/// All images in parallel, in order and in constant memory is `in_order` of `unlift-features` over the
+/// numbers of [`names`](Self::names), with `get` in its work.
+pub enum FeatureSource {
+    /// Photos, whose features are extracted when they are asked for.
+    Folder(Folder),
+    /// A file.
+    File(features::FeatureSource),
+}
+
+impl FeatureSource {
+    /// Opens a folder of photos, or a file of features.
+    ///
+    /// # Errors
+    /// When there is no such thing, or no image in it.
+    pub fn open(path: &Path, options: &SiftOptions) -> anyhow::Result<Self> {
+        let metadata = std::fs::metadata(path).map_err(|e| unlift_io::Error::read(path, e))?;
+        Ok(match metadata.is_dir() {
+            true => Self::Folder(Folder::open(path, options)?),
+            false => Self::File(features::FeatureSource::open(path)?),
+        })
+    }
+
+    /// Names of all images, sorted by their bytes.
+    pub fn names(&self) -> &[String] {
+        match self {
+            Self::Folder(folder) => folder.names(),
+            Self::File(file) => file.names(),
+        }
+    }
+
+    /// What was found beside images and cannot be used, one error each.
+    pub fn refused(&self) -> &[unlift_io::Error] {
+        match self {
+            Self::Folder(folder) => folder.refused(),
+            Self::File(_) => &[],
+        }
+    }
+
+    /// The features of image `at` of [`names`](Self::names).
+    ///
+    /// # Errors
+    /// One line when this image cannot be used; others may be.
+    pub fn get(&self, at: usize) -> anyhow::Result<ImageFeatures> {
+        match self {
+            Self::Folder(folder) => folder.get(at),
+            Self::File(file) => Ok(file.get(at)?),
+        }
+    }
+}

@@ -1,0 +1,234 @@
+//! `unlift features` as a user runs it: photos and files in, one whole file out, bad ones named.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use image::{GrayImage, ImageFormat, Luma, RgbImage};
+use unlift_io::features::{FeatureSource, ImageFeatures};
+
+/// A folder of its own per test.
+struct Place(tempfile::TempDir);
+
+impl Place {
+    /// With three photos: `photos/a.png`, `photos/b/c.jpg`, `photos/b/ü d.webp`.
+    fn new() -> Self {
+        let place = Self(tempfile::tempdir().expect("a temporary folder"));
+        fs::create_dir_all(place.path("photos/b")).unwrap();
+        for (at, name) in ["a.png", "b/c.jpg", "b/ü d.webp"].into_iter().enumerate() {
+            photo(at as u32).save(place.path("photos").join(name)).unwrap();
+        }
+        place
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn run(&self, line: &str) -> Output {
+        let program = Command::new(env!("CARGO_BIN_EXE_unlift"))
+            .args(line.split_whitespace())
+            .current_dir(self.0.path())
+            .output();
+        program.expect("the program starts")
+    }
+
+    /// What a run that must end with `code` printed: on stdout, and the lines on stderr.
+    fn ends(&self, line: &str, code: i32) -> (String, Vec<String>) {
+        let output = self.run(line);
+        let text = |bytes| String::from_utf8(bytes).expect("UTF-8");
+        let (stdout, stderr) = (text(output.stdout), text(output.stderr));
+        assert_eq!(output.status.code(), Some(code), "{line}\n{stderr}");
+        (stdout, stderr.lines().map(str::to_owned).collect())
+    }
+
+    fn left(&self) -> Vec<String> {
+        let entries = fs::read_dir(self.0.path()).unwrap();
+        let mut names: Vec<String> =
+            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+}
+
+/// Blobs of several sizes; `which` moves them.
+fn photo(which: u32) -> RgbImage {
+    RgbImage::from_fn(96, 64, |x, y| {
+        let (x, y) = (f64::from(x + 5 * which), f64::from(y));
+        let wave = (x / 5.0).sin() * (y / 7.0).cos() + (x * y / 90.0).sin();
+        let value = (127.0 + 60.0 * wave) as u8;
+        image::Rgb([value, value, 255 - value])
+    })
+}
+
+fn all(path: &Path) -> Vec<ImageFeatures> {
+    let source = FeatureSource::open(path).unwrap();
+    (0..source.names().len()).map(|at| source.get(at).unwrap()).collect()
+}
+
+#[test]
+fn photos_become_one_file_that_is_the_same_for_any_number_of_threads() {
+    let place = Place::new();
+    let (stdout, stderr) = place.ends("features photos --out one.h5 --threads 1", 0);
+    assert!(stdout.starts_with("3 images, ") && stdout.ends_with(" features, in one.h5\n"));
+    assert!(stderr.is_empty(), "{stderr:?}");
+    place.ends("features photos --out four.h5 --threads 4 --quiet", 0);
+    assert_eq!(fs::read(place.path("one.h5")).unwrap(), fs::read(place.path("four.h5")).unwrap());
+    assert_eq!(place.left(), ["four.h5", "one.h5", "photos"]);
+
+    let images = all(&place.path("one.h5"));
+    let names: Vec<&str> = images.iter().map(|image| &*image.name).collect();
+    assert_eq!(names, ["a.png", "b/c.jpg", "b/ü d.webp"]);
+    for image in &images {
+        let n = image.keypoints.len();
+        assert!(n > 10, "{n}");
+        assert_eq!((image.size, image.uncertainty_px), (Some([96, 64]), Some(1.0)));
+        assert_eq!(image.descriptors.as_ref().map(|d| (d.len(), d.dim())), Some((n, 128)));
+        assert!(image.scores.is_some() && image.scales == image.scores);
+    }
+}
+
+#[test]
+fn keypoints_are_in_the_convention_of_hloc() {
+    let place = Place::new();
+    // A blob whose middle is the pixel in column 30 and row 34.
+    let blob = GrayImage::from_fn(64, 64, |x, y| {
+        let (dx, dy) = (f64::from(x) - 30.0, f64::from(y) - 34.0);
+        Luma([(255.0 * (-(dx * dx + dy * dy) / 50.0).exp()) as u8])
+    });
+    fs::create_dir(place.path("blob")).unwrap();
+    blob.save(place.path("blob/a.png")).unwrap();
+    place.ends("features blob", 0);
+    let [x, y] = all(&place.path("features.h5"))[0].keypoints[0];
+    assert!((x - 30.0).abs() < 0.1 && (y - 34.0).abs() < 0.1, "({x}, {y})");
+}
+
+#[test]
+fn options_are_those_of_the_extractor() {
+    let place = Place::new();
+    let count = |options: &str| {
+        let (stdout, _) = place.ends(&format!("features photos {options}"), 0);
+        stdout.split(' ').nth(2).and_then(|n| n.parse::<usize>().ok()).expect("a number")
+    };
+    let usual = count("");
+    assert!(count("--first-octave 0") < usual && count("--max-features 5") < usual);
+    assert!(count("--first-octave -1 --max-image-size 48") < usual);
+    assert_eq!(all(&place.path("features.h5"))[0].uncertainty_px, Some(2.0));
+    place.ends("features photos --first-octave 1", 2);
+    place.ends("features photos --max-features 0", 2);
+    let (_, stderr) = place.ends("features features.h5 --max-features 9 --out copy.h5", 2);
+    assert_eq!(stderr, ["unlift: --max-features: expected with a folder of photos, found a file"]);
+}
+
+#[test]
+fn a_broken_photo_is_one_line_and_the_rest_is_written() {
+    let place = Place::new();
+    let jpeg = fs::read(place.path("photos/b/c.jpg")).unwrap();
+    fs::write(place.path("photos/cut.jpg"), &jpeg[..jpeg.len() / 2]).unwrap();
+    fs::write(place.path("photos/note.jpg"), "not a photo").unwrap();
+    fs::write(place.path("photos/empty.PNG"), "").unwrap();
+    fs::write(place.path("photos/notes.txt"), "passed over").unwrap();
+    fs::write(place.path("photos/.hidden.jpg"), "passed over").unwrap();
+    GrayImage::new(1, 1).save_with_format(place.path("photos/one.webp"), ImageFormat::Png).unwrap();
+    GrayImage::new(40, 40).save(place.path("photos/flat.png")).unwrap();
+    let (stdout, stderr) = place.ends("features photos", 3);
+    assert!(stdout.starts_with("4 images, "), "{stdout}");
+    assert_eq!(
+        stderr,
+        [
+            "unlift: photos/cut.jpg: expected a whole JPEG image, found one that is cut off",
+            "unlift: photos/empty.PNG: expected a JPEG, PNG or WebP image, found an empty file",
+            "unlift: photos/note.jpg: expected a JPEG, PNG or WebP image, found text",
+            "unlift: photos/one.webp: expected at least 3 pixels a side, found 1 x 1",
+            "unlift: photos: expected 8 images that can be used, found 4",
+        ]
+    );
+    let images = all(&place.path("features.h5"));
+    assert_eq!((images.len(), images[3].keypoints.len()), (4, 0), "flat.png has no features");
+}
+
+#[test]
+fn what_cannot_be_used_at_all_leaves_no_file() {
+    let place = Place::new();
+    fs::create_dir(place.path("empty")).unwrap();
+    fs::create_dir(place.path("bad")).unwrap();
+    fs::write(place.path("bad/a.jpg"), "text").unwrap();
+    let last = |line: &str, code| place.ends(line, code).1.pop().expect("a line");
+    assert_eq!(
+        last("features empty", 3),
+        "unlift: empty: expected JPEG, PNG or WebP photos, found none"
+    );
+    assert_eq!(last("features bad", 3), "unlift: bad: expected 1 images that can be used, found 0");
+    assert_eq!(
+        last("features bad/a.jpg", 3),
+        "unlift: bad/a.jpg: expected features in HDF5, or a COLMAP database (SQLite), found a file \
+         that begins with \"text\""
+    );
+    assert_eq!(
+        last("features nothing", 3),
+        "unlift: nothing: expected a file or folder, found nothing"
+    );
+    assert_eq!(
+        last("features photos --out photos", 2),
+        "unlift: --out: photos: expected a file, found a folder"
+    );
+    assert_eq!(place.left(), ["bad", "empty", "photos"]);
+}
+
+#[test]
+fn a_run_that_was_interrupted_goes_on_and_gives_the_same_bytes() {
+    let place = Place::new();
+    place.ends("features photos --out whole.h5", 0);
+    // What earlier runs may have left.
+    let parts = place.path("again.h5.parts");
+    fs::create_dir(&parts).unwrap();
+    fs::write(parts.join(".joined.h5.x.partial"), "half").unwrap();
+    fs::write(parts.join("0123.part.h5"), "of other options").unwrap();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_unlift"))
+        .args(["features", "photos", "--out", "again.h5", "--threads", "1"])
+        .current_dir(place.path(""))
+        .spawn()
+        .expect("the program starts");
+    // Killed at any moment: before, between or after the images.
+    while fs::read_dir(&parts).is_ok_and(|entries| entries.count() < 4)
+        && child.try_wait().expect("a state").is_none()
+    {
+        std::thread::yield_now();
+    }
+    child.kill().expect("it can be killed");
+    child.wait().expect("it ends");
+    let (stdout, _) = place.ends("features photos --out again.h5", 0);
+    assert!(stdout.starts_with("3 images, "), "{stdout}");
+    let [again, whole] = ["again.h5", "whole.h5"].map(|name| fs::read(place.path(name)).unwrap());
+    assert_eq!(again, whole);
+    assert_eq!(place.left(), ["again.h5", "photos", "whole.h5"]);
+}
+
+#[test]
+fn features_of_a_file_are_copied() {
+    let place = Place::new();
+    place.ends("features photos --out a.h5", 0);
+    place.ends("features a.h5 --out b.h5", 0);
+    assert_eq!(fs::read(place.path("a.h5")).unwrap(), fs::read(place.path("b.h5")).unwrap());
+
+    let fixture = "../unlift-io/tests/data/project/database.db";
+    let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join(fixture);
+    fs::copy(fixture, place.path("d.db")).unwrap();
+    let database = rusqlite::Connection::open(place.path("d.db")).unwrap();
+    let fill = "INSERT INTO keypoints SELECT image_id, 8, 2, zeroblob(64) FROM images; \
+                DELETE FROM descriptors WHERE image_id = 1; \
+                UPDATE images SET name = '../x.jpg' WHERE image_id = 2";
+    database.execute_batch(fill).unwrap();
+    database.close().unwrap();
+    let (stdout, stderr) = place.ends("features d.db --out d.h5", 3);
+    assert_eq!(stdout, "1 images, 8 features, in d.h5\n");
+    assert_eq!(
+        stderr,
+        [
+            "unlift: d.h5: image \"../x.jpg\": expected a name of parts that are not empty, . or .., \
+             found \"../x.jpg\"",
+            "unlift: d.db: image \"i3.jpg\": expected descriptors, found none",
+            "unlift: d.db: expected 3 images that can be used, found 1",
+        ]
+    );
+}

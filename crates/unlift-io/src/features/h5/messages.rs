@@ -1,0 +1,111 @@
+//! Object headers of HDF5: what says that some bytes are an array of floats of this shape.
+//!
+//! Source: HDF5 File Format Specification 3.0, IV.A, headers of version 1, which every reader knows.
+
+use super::{Array, Numbers};
+
+/// No address, or no length.
+pub(super) const UNDEFINED: u64 = u64::MAX;
+
+/// Appends zeros up to a multiple of eight.
+pub(super) fn pad(bytes: &mut Vec<u8>) {
+    bytes.resize(bytes.len().next_multiple_of(8), 0);
+}
+
+fn message(header: &mut Vec<u8>, kind: u16, mut body: Vec<u8>) {
+    pad(&mut body);
+    header.extend(kind.to_le_bytes());
+    header.extend((body.len() as u16).to_le_bytes());
+    header.extend([0; 4]);
+    header.extend(body);
+}
+
+/// A header of version 1 around its messages.
+fn header(messages: u16, body: &[u8]) -> Vec<u8> {
+    let mut bytes = vec![1, 0];
+    bytes.extend(messages.to_le_bytes());
+    bytes.extend(1u32.to_le_bytes());
+    bytes.extend((body.len() as u32).to_le_bytes());
+    bytes.extend([0; 4]);
+    bytes.extend(body);
+    bytes
+}
+
+/// The header of a group whose names are in the tree and heap at these addresses.
+pub(super) fn group(tree: u64, heap: u64) -> Vec<u8> {
+    let mut body = Vec::new();
+    let addresses = [tree.to_le_bytes(), heap.to_le_bytes()].concat();
+    message(&mut body, 0x11, addresses);
+    header(1, &body)
+}
+
+/// The header of a dataset whose `len` bytes stand at `address`, with attributes that are doubles.
+pub(super) fn dataset(
+    array: &Array,
+    address: u64,
+    len: u64,
+    attributes: &[(&str, f64)],
+) -> Vec<u8> {
+    let mut body = Vec::new();
+    message(&mut body, 0x01, dataspace(&array.shape));
+    message(&mut body, 0x03, datatype(&array.values));
+    // Space is allocated late, a fill value is written if one is set, and none is.
+    message(&mut body, 0x05, vec![2, 2, 2, 1, 0, 0, 0, 0]);
+    let mut layout = vec![3, 1];
+    layout.extend(if len == 0 { UNDEFINED } else { address }.to_le_bytes());
+    layout.extend(len.to_le_bytes());
+    message(&mut body, 0x08, layout);
+    for (name, value) in attributes {
+        message(&mut body, 0x0c, attribute(name, *value));
+    }
+    header(4 + attributes.len() as u16, &body)
+}
+
+fn dataspace(shape: &[u64]) -> Vec<u8> {
+    let mut bytes = vec![1, shape.len() as u8, 0, 0, 0, 0, 0, 0];
+    bytes.extend(shape.iter().flat_map(|side| side.to_le_bytes()));
+    bytes
+}
+
+fn datatype(values: &Numbers) -> Vec<u8> {
+    match values {
+        Numbers::U8(_) => integer(1, false),
+        Numbers::I64(_) => integer(8, true),
+        Numbers::F32(_) => float(4, 23, 8, 127),
+        Numbers::F64(_) => float(8, 52, 11, 1023),
+    }
+}
+
+fn integer(size: u32, signed: bool) -> Vec<u8> {
+    let mut bytes = vec![0x10, if signed { 8 } else { 0 }, 0, 0];
+    bytes.extend(size.to_le_bytes());
+    bytes.extend([0, 0]);
+    bytes.extend((8 * size as u16).to_le_bytes());
+    bytes
+}
+
+fn float(size: u32, mantissa: u8, exponent: u8, bias: u32) -> Vec<u8> {
+    let bits = 8 * size as u16;
+    // Little-endian, the leading one of the mantissa is implied, the sign is the last bit.
+    let mut bytes = vec![0x11, 0x20, bits as u8 - 1, 0];
+    bytes.extend(size.to_le_bytes());
+    bytes.extend([0, 0]);
+    bytes.extend(bits.to_le_bytes());
+    bytes.extend([mantissa, exponent, 0, mantissa]);
+    bytes.extend(bias.to_le_bytes());
+    bytes
+}
+
+/// A scalar attribute of version 1.
+fn attribute(name: &str, value: f64) -> Vec<u8> {
+    let mut parts =
+        [[name.as_bytes(), &[0]].concat(), datatype(&Numbers::F64(Vec::new())), dataspace(&[])];
+    let mut bytes = vec![1, 0];
+    bytes.extend(parts.iter().flat_map(|part| (part.len() as u16).to_le_bytes()));
+    for part in &mut parts {
+        pad(part);
+        bytes.append(part);
+    }
+    bytes.extend(value.to_le_bytes());
+    bytes
+}

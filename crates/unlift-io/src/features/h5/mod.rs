@@ -1,0 +1,72 @@
+//! Arrays by path in an HDF5 file: all that the rest of the crate knows of HDF5.
+//!
+//! Reading is a library's work ([`FeatureStore`], the only file that names it). Writing is our own
+//! ([`Writer`]): a feature file is larger than memory, and the library's writer either holds it whole or
+//! rewrites a folder's list of names at every addition, which is quadratic in images.
+
+mod messages;
+mod read;
+mod tree;
+mod write;
+
+pub(crate) use read::FeatureStore;
+pub(crate) use write::Writer;
+
+/// Values of an array, row-major.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Numbers {
+    U8(Vec<u8>),
+    F32(Vec<f32>),
+    F64(Vec<f64>),
+    I64(Vec<i64>),
+}
+
+/// An array and its shape.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Array {
+    pub shape: Vec<u64>,
+    pub values: Numbers,
+}
+
+impl Numbers {
+    /// How many.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::U8(v) => v.len(),
+            Self::F32(v) => v.len(),
+            Self::F64(v) => v.len(),
+            Self::I64(v) => v.len(),
+        }
+    }
+
+    /// The same, little-endian.
+    fn bytes(&self) -> Vec<u8> {
+        match self {
+            Self::U8(v) => v.clone(),
+            Self::F32(v) => v.iter().flat_map(|x| x.to_le_bytes()).collect(),
+            Self::F64(v) => v.iter().flat_map(|x| x.to_le_bytes()).collect(),
+            Self::I64(v) => v.iter().flat_map(|x| x.to_le_bytes()).collect(),
+        }
+    }
+
+    /// The same as doubles.
+    pub fn to_f64(&self) -> Vec<f64> {
+        match self {
+            Self::U8(v) => v.iter().map(|&x| f64::from(x)).collect(),
+            Self::F32(v) => v.iter().map(|&x| f64::from(x)).collect(),
+            Self::F64(v) => v.clone(),
+            Self::I64(v) => v.iter().map(|&x| x as f64).collect(),
+        }
+    }
+}
+
+/// A shape as people write it: `(128, 40)`.
+pub(crate) fn shape_text(shape: &[u64]) -> String {
+    match shape {
+        [n] => format!("({n},)"),
+        _ => {
+            let sides: Vec<String> = shape.iter().map(u64::to_string).collect();
+            format!("({})", sides.join(", "))
+        }
+    }
+}

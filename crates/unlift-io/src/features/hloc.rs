@@ -1,0 +1,170 @@
+//! hloc's layout: a group per image, an array per kind of feature.
+
+use std::path::Path;
+
+use unlift::Descriptors;
+use unlift::descriptors::Values;
+
+use super::ImageFeatures;
+use super::h5::{Array, FeatureStore, Numbers, shape_text};
+use crate::error::Error;
+
+/// An open file of features.
+pub(super) struct Hloc {
+    store: FeatureStore,
+    names: Vec<String>,
+}
+
+impl Hloc {
+    /// Opens `path` and lists its images.
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        let store = FeatureStore::open(path)?;
+        let names = store.groups()?;
+        Ok(Self { store, names })
+    }
+
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    pub fn get(&self, at: usize) -> Result<ImageFeatures, Error> {
+        image(&self.store, &self.names[at])
+    }
+}
+
+/// The one image of a file that [`encode`](super::encode) made.
+///
+/// # Errors
+/// When `path` cannot be read, is cut off, or does not hold exactly the image `name`.
+pub fn decode(path: &Path, name: &str) -> Result<ImageFeatures, Error> {
+    let store = FeatureStore::open(path)?;
+    match &store.groups()?[..] {
+        [only] if only == name => image(&store, name),
+        other => {
+            let found = format!("{} images", other.len());
+            Err(Error::new(path, "", format!("the image {name} alone"), found))
+        }
+    }
+}
+
+fn image(store: &FeatureStore, name: &str) -> Result<ImageFeatures, Error> {
+    let present = store.names(name)?;
+    let has = |array: &str| present.iter().any(|name| name == array);
+    let optional = |array: &str| has(array).then(|| store.array(name, array)).transpose();
+    let Some(places) = optional("keypoints")? else {
+        let found = format!("only {}", present.join(", "));
+        return Err(store.error(name, "", "an array keypoints", found));
+    };
+    let keypoints = keypoints(&places)
+        .map_err(|(expected, found)| store.error(name, "keypoints", expected, found))?;
+    let n = keypoints.len();
+    let per_keypoint = |array: &str| -> Result<Option<Vec<f32>>, Error> {
+        let Some(values) = optional(array)? else { return Ok(None) };
+        if values.shape != [n as u64] && values.shape != [n as u64, 1] {
+            let expected = format!("one value per keypoint, ({n},)");
+            return Err(store.error(name, array, expected, shape_text(&values.shape)));
+        }
+        Ok(Some(values.values.to_f64().into_iter().map(|value| value as f32).collect()))
+    };
+    let descriptors = optional("descriptors")?.map(|array| descriptors(array, n)).transpose();
+    Ok(ImageFeatures {
+        name: name.to_owned(),
+        size: optional("image_size")?
+            .map(|array| size(&array))
+            .transpose()
+            .map_err(|(expected, found)| store.error(name, "image_size", expected, found))?,
+        descriptors: descriptors
+            .map_err(|(expected, found)| store.error(name, "descriptors", expected, found))?,
+        scores: per_keypoint("scores")?,
+        scales: per_keypoint("scales")?,
+        orientations_deg: per_keypoint("oris")?,
+        uncertainty_px: store.number(name, "keypoints", "uncertainty")?,
+        keypoints,
+        photo: None,
+    })
+}
+
+/// What was expected and what was found.
+type Wrong = (String, String);
+
+/// Rows of at least two columns; what follows x and y is not read.
+fn keypoints(array: &Array) -> Result<Vec<[f64; 2]>, Wrong> {
+    let columns = match array.shape[..] {
+        [_, columns] if columns >= 2 => columns as usize,
+        // An image without keypoints, as some exporters write it.
+        [0] => return Ok(Vec::new()),
+        _ => return Err(("shape (N, 2)".to_owned(), shape_text(&array.shape))),
+    };
+    let values = array.values.to_f64();
+    let rows = values.chunks_exact(columns).map(|row| [row[0], row[1]]);
+    let rows: Vec<[f64; 2]> = rows.collect();
+    match rows.iter().position(|row| !row.iter().all(|value| value.is_finite())) {
+        None => Ok(rows),
+        Some(at) => Err((
+            format!("a finite place in row {at}"),
+            format!("({}, {})", rows[at][0], rows[at][1]),
+        )),
+    }
+}
+
+/// `(D, N)` as rows of `D`.
+fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
+    let expected = || format!("shape (D, N) with N = {n}, one column per keypoint");
+    let dim = match array.shape[..] {
+        [dim, count] if count == n as u64 && (dim > 0 || n == 0) => (dim as usize).max(1),
+        [count, _] if count == n as u64 => {
+            let found = format!("{}, rows and columns exchanged", shape_text(&array.shape));
+            return Err((expected(), found));
+        }
+        _ => return Err((expected(), shape_text(&array.shape))),
+    };
+    let values = match array.values {
+        Numbers::U8(bytes) => Values::U8(rows(&bytes, dim, n)),
+        Numbers::F32(floats) => Values::F32(rows(&floats, dim, n)),
+        Numbers::F64(doubles) => {
+            let floats: Vec<f32> = doubles.iter().map(|&value| value as f32).collect();
+            Values::F32(rows(&floats, dim, n))
+        }
+        Numbers::I64(_) => {
+            return Err(("floats, or bytes without sign".to_owned(), "other integers".to_owned()));
+        }
+    };
+    Descriptors::try_new(values, dim)
+        .map_err(|error| (error.expected().to_owned(), describe(&error)))
+}
+
+/// What was found, with the row and value it stands in.
+fn describe(error: &unlift::Error) -> String {
+    match error.what() {
+        "descriptors" => error.found().to_owned(),
+        place => format!("{} ({place})", error.found()),
+    }
+}
+
+/// The transpose of `(dim, n)`.
+fn rows<T: Copy>(columns: &[T], dim: usize, n: usize) -> Vec<T> {
+    let mut rows = Vec::with_capacity(columns.len());
+    for at in 0..n {
+        rows.extend((0..dim).map(|row| columns[row * n + at]));
+    }
+    rows
+}
+
+fn size(array: &Array) -> Result<[u32; 2], Wrong> {
+    let sides = array.values.to_f64();
+    let side = |value: f64| {
+        let whole = (1.0..=f64::from(u32::MAX)).contains(&value) && value.fract() == 0.0;
+        whole.then_some(value as u32)
+    };
+    match sides[..] {
+        [width, height] => side(width).zip(side(height)).map(|(width, height)| [width, height]),
+        _ => None,
+    }
+    .ok_or_else(|| {
+        let found = match sides.len() {
+            2 => format!("{} and {}", sides[0], sides[1]),
+            _ => shape_text(&array.shape),
+        };
+        ("width and height in pixels".to_owned(), found)
+    })
+}

@@ -1,0 +1,142 @@
+//! Features of images in and out: hloc's HDF5 files and COLMAP databases.
+//!
+//! One convention holds everywhere behind this module: **hloc's**. Keypoints are in pixels, `(x, y)`,
+//! and the middle of the first pixel is `(0, 0)`; COLMAP's, whose middle is `(0.5, 0.5)`, are brought
+//! to it where they are read. Names of images are relative to their folder, with slashes.
+//!
+//! ```no_run
+//! use unlift_io::features::FeatureSource;
+//!
+//! let source = FeatureSource::open("features.h5".as_ref())?;
+//! for at in 0..source.names().len() {
+//!     match source.get(at) {
+//!         Ok(image) => println!("{}: {} keypoints", image.name, image.keypoints.len()),
+//!         Err(error) => eprintln!("{error}"),
+//!     }
+//! }
+//! # Ok::<(), unlift_io::Error>(())
+//! ```
+
+mod colmap;
+mod h5;
+mod hloc;
+#[cfg(test)]
+mod malformed;
+mod writer;
+
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use unlift::Descriptors;
+
+use crate::error::Error;
+use crate::read::bytes::open_file;
+use crate::read::lines::quoted;
+
+pub use hloc::decode;
+pub use writer::{FeatureWriter, encode};
+
+/// What is known of one image, whatever it came from.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ImageFeatures {
+    /// Path relative to the folder of photos, with slashes.
+    pub name: String,
+    /// Width and height in pixels.
+    pub size: Option<[u32; 2]>,
+    /// `n` places `(x, y)` in pixels, all finite; the middle of the first pixel is `(0, 0)`.
+    pub keypoints: Vec<[f64; 2]>,
+    /// `(n, dim)`: bytes are RootSIFT times 512, floats what a network made; never dummies. `None` when
+    /// the source has none; see [`described`](Self::described).
+    pub descriptors: Option<Descriptors>,
+    /// `n` confidences of the detector.
+    pub scores: Option<Vec<f32>>,
+    /// `n` scales in pixels.
+    pub scales: Option<Vec<f32>>,
+    /// `n` orientations in degrees, from x to y.
+    pub orientations_deg: Option<Vec<f32>>,
+    /// Standard deviation of a keypoint's place in pixels, as the detector states it.
+    pub uncertainty_px: Option<f64>,
+    /// The photo itself, where the source is a folder of them.
+    pub photo: Option<PathBuf>,
+}
+
+impl ImageFeatures {
+    /// The descriptors, for those who cannot do without.
+    ///
+    /// # Errors
+    /// A line that names `source` (the file) and the image when there are none.
+    pub fn described(&self, source: &Path) -> Result<&Descriptors, Error> {
+        let place = || format!("image {}", quoted(self.name.as_bytes()));
+        let missing = || Error::new(source, place(), "descriptors", "none");
+        self.descriptors.as_ref().ok_or_else(missing)
+    }
+}
+
+/// Features in a file, one image at a time: memory does not grow with the number of images.
+///
+/// Shared by threads: [`get`](Self::get) may be called from many at once.
+pub struct FeatureSource(Kind);
+
+enum Kind {
+    Hloc(hloc::Hloc),
+    Colmap(colmap::Colmap),
+}
+
+const SQLITE: &[u8; 8] = b"SQLite f";
+const HDF5: &[u8; 8] = b"\x89HDF\r\n\x1a\n";
+
+impl FeatureSource {
+    /// Opens hloc's HDF5 features or a COLMAP `database.db`; its first bytes decide which.
+    ///
+    /// # Errors
+    /// When the file cannot be read, is neither, is cut off, or lists no image.
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        let (file, len) = open_file(path)?;
+        let mut start = Vec::new();
+        file_start(&file, &mut start).map_err(|e| Error::read(path, e))?;
+        let kind = match start.first_chunk() {
+            Some(HDF5) => Kind::Hloc(hloc::Hloc::open(path)?),
+            Some(SQLITE) => Kind::Colmap(colmap::Colmap::open(path)?),
+            _ => {
+                let expected = "features in HDF5, or a COLMAP database (SQLite)";
+                let found = match len {
+                    0 => "an empty file".to_owned(),
+                    _ => format!("a file that begins with {}", quoted(&start)),
+                };
+                return Err(Error::new(path, "", expected, found));
+            }
+        };
+        let source = Self(kind);
+        if source.names().is_empty() {
+            return Err(Error::new(path, "", "at least one image", "none"));
+        }
+        Ok(source)
+    }
+
+    /// The images, sorted by the bytes of their names.
+    pub fn names(&self) -> &[String] {
+        match &self.0 {
+            Kind::Hloc(file) => file.names(),
+            Kind::Colmap(database) => database.names(),
+        }
+    }
+
+    /// The features of image `at` of [`names`](Self::names).
+    ///
+    /// # Errors
+    /// One line when this image is not as it should be; others may be.
+    ///
+    /// # Panics
+    /// When there is no such image.
+    pub fn get(&self, at: usize) -> Result<ImageFeatures, Error> {
+        match &self.0 {
+            Kind::Hloc(file) => file.get(at),
+            Kind::Colmap(database) => database.get(at),
+        }
+    }
+}
+
+fn file_start(file: &File, start: &mut Vec<u8>) -> std::io::Result<usize> {
+    file.take(8).read_to_end(start)
+}

@@ -1,0 +1,149 @@
+//! Features out: one image after the other, in hloc's layout.
+
+use std::io::{self, Cursor, Seek, Write};
+use std::path::Path;
+
+use unlift::descriptors::Values;
+
+use super::ImageFeatures;
+use super::h5::{Array, Numbers, Writer};
+use crate::atomic::OutputFile;
+use crate::error::Error;
+use crate::read::lines::quoted;
+
+/// A file of features that is written image by image and appears whole.
+///
+/// Per image a group under its name with `keypoints` `(N, 2)` and, where they are known, `descriptors`
+/// `(D, N)`, `scores`, `scales` and `oris` `(N,)` and `image_size` `(2,)`; see `docs/formats.md`.
+/// Memory grows by names only. The same images in the same order give the same bytes.
+pub struct FeatureWriter {
+    output: OutputFile,
+    writer: Writer,
+}
+
+impl FeatureWriter {
+    /// Starts a file that will become `path`.
+    ///
+    /// # Errors
+    /// When no file can be written there.
+    pub fn create(path: &Path) -> Result<Self, Error> {
+        let mut output = OutputFile::create(path)?;
+        let writer = Writer::start(output.writer()).map_err(|e| Error::write(path, e))?;
+        Ok(Self { output, writer })
+    }
+
+    /// Whether an image can be written, as far as it decides that.
+    ///
+    /// # Errors
+    /// When the name has an empty part, `.` or `..`, is taken, or leads into another image, or when a
+    /// column has not one row per keypoint.
+    pub fn check(&self, image: &ImageFeatures) -> Result<(), Error> {
+        check(&self.writer, image, self.output.path())
+    }
+
+    /// Writes one image.
+    ///
+    /// # Errors
+    /// As [`check`](Self::check), or when the disk fails.
+    pub fn append(&mut self, image: &ImageFeatures) -> Result<(), Error> {
+        let path = self.output.path().to_owned();
+        self.check(image)?;
+        write(&mut self.writer, self.output.writer(), image).map_err(|e| Error::write(&path, e))
+    }
+
+    /// Puts the file in its place.
+    ///
+    /// # Errors
+    /// When the disk fails; nothing is left behind then.
+    pub fn finish(mut self) -> Result<(), Error> {
+        let path = self.output.path().to_owned();
+        let finished = self.writer.finish(self.output.writer());
+        finished.map_err(|e| Error::write(path, e))?;
+        self.output.commit()
+    }
+}
+
+/// The bytes of a file with one image.
+///
+/// # Errors
+/// As [`FeatureWriter::append`], naming `path` as the place they are for.
+pub fn encode(image: &ImageFeatures, path: &Path) -> Result<Vec<u8>, Error> {
+    let failed = |e| Error::write(path, e);
+    let mut out = Cursor::new(Vec::new());
+    let mut writer = Writer::start(&mut out).map_err(failed)?;
+    check(&writer, image, path)?;
+    write(&mut writer, &mut out, image).map_err(failed)?;
+    writer.finish(&mut out).map_err(failed)?;
+    Ok(out.into_inner())
+}
+
+fn check(writer: &Writer, image: &ImageFeatures, path: &Path) -> Result<(), Error> {
+    let place = || format!("image {}", quoted(image.name.as_bytes()));
+    let parts = || image.name.split('/');
+    if parts().any(|part| part.is_empty() || part == "." || part == ".." || part.contains('\0')) {
+        let expected = "a name of parts that are not empty, . or ..";
+        return Err(Error::new(path, place(), expected, quoted(image.name.as_bytes())));
+    }
+    if !writer.is_free(&image.name) {
+        let found = "one that is there already, or within another image";
+        return Err(Error::new(path, place(), "a new name", found));
+    }
+    let n = image.keypoints.len();
+    let columns = [
+        ("descriptors", image.descriptors.as_ref().map(|rows| rows.len())),
+        ("scores", image.scores.as_ref().map(Vec::len)),
+        ("scales", image.scales.as_ref().map(Vec::len)),
+        ("oris", image.orientations_deg.as_ref().map(Vec::len)),
+    ];
+    for (name, len) in columns {
+        if let Some(len) = len.filter(|&len| len != n) {
+            let place = format!("{}, {name}", place());
+            return Err(Error::new(path, place, format!("{n}, one per keypoint"), len.to_string()));
+        }
+    }
+    Ok(())
+}
+
+fn write(
+    writer: &mut Writer,
+    out: &mut (impl Write + Seek),
+    image: &ImageFeatures,
+) -> io::Result<()> {
+    let n = image.keypoints.len() as u64;
+    let mut put = |name: &str, shape: Vec<u64>, values: Numbers, attributes: &[(&str, f64)]| {
+        writer.array(out, &image.name, name, &Array { shape, values }, attributes)
+    };
+    let places = image.keypoints.iter().flatten().map(|&value| value as f32).collect();
+    let uncertainty: Vec<_> =
+        image.uncertainty_px.iter().map(|&value| ("uncertainty", value)).collect();
+    put("keypoints", vec![n, 2], Numbers::F32(places), &uncertainty)?;
+    if let Some(rows) = &image.descriptors {
+        let dim = rows.dim();
+        let values = match rows.values() {
+            Values::U8(values) => Numbers::U8(columns(values, dim)),
+            Values::F32(values) => Numbers::F32(columns(values, dim)),
+        };
+        put("descriptors", vec![dim as u64, n], values, &[])?;
+    }
+    let per_keypoint =
+        [("scores", &image.scores), ("scales", &image.scales), ("oris", &image.orientations_deg)];
+    for (name, values) in per_keypoint {
+        if let Some(values) = values {
+            put(name, vec![n], Numbers::F32(values.clone()), &[])?;
+        }
+    }
+    if let Some(size) = image.size {
+        put("image_size", vec![2], Numbers::I64(size.map(i64::from).to_vec()), &[])?;
+    }
+    Ok(())
+}
+
+/// The transpose of `(n, dim)`.
+fn columns<T: Copy>(rows: &[T], dim: usize) -> Vec<T> {
+    let n = rows.len() / dim;
+    let mut columns = Vec::with_capacity(rows.len());
+    for column in 0..dim {
+        columns.extend((0..n).map(|row| rows[row * dim + column]));
+    }
+    columns
+}
