@@ -123,7 +123,7 @@ fn sum<const D: usize>(mut total: Grid<D>, parts: &[Grid<D>]) -> Grid<D> {
 }
 
 fn add_line<const D: usize>(grid: &mut Grid<D>, row: &LineRow<D>, weight: f32) {
-    let Some((from, to)) = grid.clip(&row.through, &row.direction, row.floor(), f32::INFINITY)
+    let Some((from, to)) = grid.clip(&row.through, &row.direction, row.floor(), row.to)
     else {
         return;
     };

@@ -26,9 +26,10 @@ impl<'a, const D: usize> Family<'a, D> {
             let chance = chance_field::of_lines(&rows, lists, slots_per_record);
             Self::Lines { rows, slots_per_record, chance }
         };
+        let bounds = released.bounds().map(|bounds| bounds.about(&released.origin()));
         match released.obfuscation() {
-            Obfuscation::Lines(records) => lines(from_lines(records)),
-            Obfuscation::Rays(records) => lines(from_rays(records)),
+            Obfuscation::Lines(records) => lines(from_lines(records, bounds.as_ref())),
+            Obfuscation::Rays(records) => lines(from_rays(records, bounds.as_ref())),
             Obfuscation::AxisPlanes(planes) => {
                 Self::Planes { planes, sorted: SortedPlanes::new(planes) }
             }

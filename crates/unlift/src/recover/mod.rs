@@ -114,7 +114,8 @@ pub fn recover_and_look<const D: usize>(
     let (origin, unit) = (released.origin(), released.unit());
     let recovered = Recovered::try_new(estimates, with_axis, descriptor_row, origin, unit, delta)?
         .with_trials(trials);
-    if !options.confidence {
+    // Its constants come from maps: in images nobody has compared them with what comes true.
+    if !options.confidence || D == 2 {
         return Ok((recovered, Seen::NOTHING));
     }
     let edges = (graph.as_ref(), lists);
