@@ -40,6 +40,15 @@ impl<'a, const D: usize> Family<'a, D> {
         }
     }
 
+    /// Whether these are rays of which it is known where each center's points lie: one ray says nothing
+    /// about another of its center, and rays of two centers do not meet.
+    pub(crate) fn has_regions(&self) -> bool {
+        match self {
+            Self::Lines { rows, .. } => rows.iter().any(|row| row.is_ray() && row.to.is_finite()),
+            Self::Planes { .. } | Self::Candidates { .. } => false,
+        }
+    }
+
     /// How likely a random record agrees with a place where records are, at `delta`.
     pub(crate) fn typical_chance(&self, delta: f32) -> f32 {
         match self {

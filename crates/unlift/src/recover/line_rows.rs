@@ -35,9 +35,10 @@ pub(crate) fn from_lines<const D: usize>(
     let row = |(&foot, &direction): (&[f32; D], &[f32; D])| {
         let clip = |bounds: &Bounds<D>| bounds.clip(&widen(&foot), &widen(&direction));
         let (through, to) = match bounds.and_then(clip) {
-            Some((from, to)) => {
-                (along(&widen(&foot), from, &widen(&direction)).map(|x| x as f32), (to - from) as f32)
-            }
+            Some((from, to)) => (
+                along(&widen(&foot), from, &widen(&direction)).map(|x| x as f32),
+                (to - from) as f32,
+            ),
             None => (foot, f32::INFINITY),
         };
         LineRow { through, direction, group: NO_GROUP, to }

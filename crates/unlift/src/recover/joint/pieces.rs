@@ -48,6 +48,9 @@ pub(crate) trait Pieces<const D: usize>: Sync {
     const MOST_ALONG: f32;
     /// How fast that falls with the number of votes.
     const ALONG: f32;
+    /// The radius of the law is at most this many deltas: where most estimates are wrong, those that are
+    /// near by accident would widen it without end.
+    const MOST_RADIUS: f32 = 0.95;
 
     /// Slots per record.
     fn slots_per_record(&self) -> usize {
@@ -188,6 +191,8 @@ impl<'a, const D: usize> CandidatePieces<'a, D> {
 
 impl<const D: usize> Pieces<D> for CandidatePieces<'_, D> {
     const PER_SLOT: usize = D;
+    // In an image records agree by chance at a delta as wide as neighbors are apart: it is narrower.
+    const MOST_RADIUS: f32 = if D == 2 { 3.0 } else { 0.95 };
     const MOST_ALONG: f32 = 0.25;
     const ALONG: f32 = 2.0;
 
