@@ -157,7 +157,8 @@ mod tests {
              expected a number from 0 to 1, found 1.5\n\
              expected auto or a number above 0, found wide\n\
              expected NEIGHBORS,RATIO with both above 0 (for example 20,2.0), found 20\n\
-             expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, found pppl\n\
+             expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, lines2d, cp2d, \
+             dcl2d, found pppl\n\
              expected one of joint, consensus, ransac, density, tomography, found magic\n\
              expected one of uniform, near, clustered, found white\n\
              expected one of similarity, overlap, geometric, found magic"

@@ -46,7 +46,7 @@ const RATIOS: [(Noise, &[f64]); 3] = [
 ];
 /// Slots used of each recovered map.
 const SLOTS: usize = 400;
-/// Kinds of records, by scheme in the order of `SCHEMES`: lines, pairs, rays, planes, candidates.
+/// Kinds of records, by scheme for maps in the order of `SCHEMES`: lines, pairs, rays, planes, candidates.
 const KIND: [usize; 7] = [0, 1, 1, 2, 2, 3, 4];
 const N_KINDS: usize = 5;
 
@@ -58,7 +58,8 @@ fn main() -> Result<(), Error> {
             let mut kth = Knn::new(original.reveal().positions())?.kth_distances(50);
             median(&mut kth)
         };
-        for (scheme, entry) in SCHEMES.iter().enumerate() {
+        let for_maps = SCHEMES.iter().filter(|entry| entry.in_3d.is_some());
+        for (scheme, entry) in for_maps.enumerate() {
             eprintln!("room {}, {}", of_room.0, entry.name);
             for (solver, row) in of_scheme(&original, entry, of_room.3, typical)? {
                 rows[solver * N_KINDS + KIND[scheme]].push(row);

@@ -33,6 +33,8 @@ pub enum Stage {
     KMeans = 11,
     /// Subsets of the input (`--max-points`).
     Subset = 12,
+    /// The seed of one image among many.
+    Image = 13,
     /// The wrong places that look like a patch of a map.
     OracleLookAlikes = 20,
     /// Copies of a map side by side, to measure on.

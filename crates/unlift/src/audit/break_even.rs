@@ -43,7 +43,7 @@ pub struct BreakEven {
     pub bound: Bound,
 }
 
-/// Break-even ratios within the first threshold, for every scheme, noise model and solver with
+/// Break-even ratios within the headline threshold, for every scheme, noise model and solver with
 /// oracle rows.
 pub fn break_even(plan: &Plan, rows: &[Row]) -> Vec<BreakEven> {
     let mut result = Vec::new();
@@ -55,11 +55,11 @@ pub fn break_even(plan: &Plan, rows: &[Row]) -> Vec<BreakEven> {
                     .iter()
                     .filter(|r| r.scheme == scheme && r.solver == solver)
                     .filter(|r| r.oracle_noise == Some(oracle_noise))
-                    .map(|r| (r.inlier_ratio, r.recovered_percent[0]))
+                    .map(|r| (r.inlier_ratio, r.recovered_percent[plan.headline]))
                     .collect();
                 curve.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
                 if let Some((inlier_ratio, bound)) = crossing(&curve) {
-                    let threshold = plan.thresholds[0].label.clone();
+                    let threshold = plan.thresholds[plan.headline].label.clone();
                     let found =
                         BreakEven { scheme, solver, oracle_noise, threshold, inlier_ratio, bound };
                     result.push(found);

@@ -9,6 +9,7 @@ use crate::released::Released;
 use crate::truth::Secret;
 
 /// Lists, and how good they are.
+#[derive(Debug)]
 pub struct Made {
     /// The lists.
     pub lists: Neighborhoods,
@@ -19,10 +20,10 @@ pub struct Made {
 }
 
 /// Makes lists for one obfuscation. True neighborhoods are searched when first needed, and kept.
-pub struct Lists<'a> {
+pub struct Lists<'a, const D: usize> {
     plan: &'a Plan,
-    search: &'a Knn<'a, 3>,
-    released: &'a Released<3>,
+    search: &'a Knn<'a, D>,
+    released: &'a Released<D>,
     secret: &'a Secret,
     by_row: &'a Secret,
     /// Of the oracle, and of the attacker.
@@ -32,13 +33,13 @@ pub struct Lists<'a> {
     outliers: Option<Outliers>,
 }
 
-impl<'a> Lists<'a> {
+impl<'a, const D: usize> Lists<'a, D> {
     /// Lists for `hidden`, whose secret by descriptor row is `by_row`; `seeds` are the owner's and
     /// the attacker's.
     pub fn new(
         plan: &'a Plan,
-        search: &'a Knn<'a, 3>,
-        hidden: &'a (Released<3>, Secret),
+        search: &'a Knn<'a, D>,
+        hidden: &'a (Released<D>, Secret),
         by_row: &'a Secret,
         seeds: (u64, u64),
     ) -> Self {
@@ -74,6 +75,32 @@ impl<'a> Lists<'a> {
                 Ok(Made { lists, ratio, k: joined.k() })
             }
         }
+    }
+
+    /// The same where there may be too few records: lists without entries, of which nothing is recovered,
+    /// where K true neighbors and the wrong entries asked for do not exist.
+    ///
+    /// # Errors
+    /// As [`make`](Self::make), on maps that are large enough.
+    pub fn make_if_enough(&mut self, variant: &Variant<'_>) -> Result<Made, Error> {
+        let enough = self.released.n_records() > self.plan.k;
+        match (enough, variant.source) {
+            (true, Source::Oracle) => self.make(variant).or_else(|_| self.none(variant)),
+            (true, Source::Given(_) | Source::Own(_)) => self.make(variant),
+            (false, _) => self.none(variant),
+        }
+    }
+
+    fn none(&self, variant: &Variant<'_>) -> Result<Made, Error> {
+        let (n_slots, n_records) = (self.released.n_slots(), self.released.n_records());
+        let slots = self.released.slots_per_record();
+        let lists =
+            Neighborhoods::try_new(vec![0; n_slots + 1], Vec::new(), None, n_records, slots)?;
+        let k = match variant.source {
+            Source::Own(joined) => joined.k(),
+            Source::Oracle | Source::Given(_) => self.plan.k,
+        };
+        Ok(Made { lists, ratio: variant.inlier_ratio.unwrap_or(0.0), k })
     }
 
     /// Of the oracle that errs as `noise` says.

@@ -1,12 +1,19 @@
 //! One whole audit as a value: a plan in, rows out. The only module that sees the whole pipeline.
+//!
+//! [`run`](fn@run) audits a map, [`images::run`] many images; both go through the same cells.
 
 mod break_even;
+mod cells;
+mod clock;
+pub mod images;
 mod lists;
 mod plan;
+mod pool;
 mod row;
 mod run;
 
 pub use break_even::{Bound, BreakEven, break_even};
+pub use cells::{Cell, REFERENCE};
 pub use plan::{Plan, PointNeighbors, Source, Threshold, Variant};
-pub use row::{PERCENTILES, Repeats, Row};
-pub use run::{Cell, Observer, Outcome, REFERENCE, RowSeconds, Seconds, Silent, run};
+pub use row::{Distinct, PERCENTILES, Repeats, Row};
+pub use run::{Observer, Outcome, RowSeconds, Seconds, Silent, run};

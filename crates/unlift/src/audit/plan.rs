@@ -102,6 +102,8 @@ pub struct Plan {
     pub exact_constraints: bool,
     /// When a point counts as recovered.
     pub thresholds: Vec<Threshold>,
+    /// Which of the thresholds break-even ratios are about.
+    pub headline: usize,
     /// The seed of the first repeat; the others count up.
     pub seed: u64,
     /// How many seeds are averaged.
@@ -109,29 +111,34 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The plan of a default audit of points in `unit`: all 3D schemes, six inlier ratios, K = 50.
+    /// The plan of a default audit of points in `unit`: six inlier ratios; of maps all 3D schemes at
+    /// K = 50, of images (pixels) all 2D schemes at K = 20.
     pub fn new(unit: Unit) -> Self {
-        let (voxel, thresholds) = match unit {
-            Unit::Meter => (0.5, ["0.10", "0.25"]),
-            Unit::KthNeighbor => (5.0, ["1.0", "2.5"]),
-            Unit::Pixel => (50.0, ["10", "25"]),
+        let (voxel, thresholds): (f64, &[&str]) = match unit {
+            Unit::Meter => (0.5, &["0.10", "0.25"]),
+            Unit::KthNeighbor => (5.0, &["1.0", "2.5"]),
+            // No 2D scheme has voxels.
+            Unit::Pixel => (1.0, &["1", "5", "10", "25"]),
         };
+        let of_images = unit == Unit::Pixel;
+        let is_meant = |s: &&Entry| if of_images { s.in_2d.is_some() } else { s.in_3d.is_some() };
         let threshold = |label: &str| Threshold {
             label: label.to_owned(),
             value: label.parse().unwrap_or(1.0),
         };
         Self {
-            schemes: crate::obfuscate::SCHEMES.iter().filter(|s| s.in_3d.is_some()).collect(),
+            schemes: crate::obfuscate::SCHEMES.iter().filter(is_meant).collect(),
             scheme_options: SchemeOptions { voxel },
             sources: vec![Source::Oracle],
             oracle_noise: vec![Noise::Uniform],
             inlier_ratios: vec![1.0, 0.75, 0.5, 0.3, 0.2, 0.1],
-            k: 50,
+            k: if of_images { 20 } else { 50 },
             solvers: vec![Solver::Joint],
             reference: false,
             delta: Delta::Auto,
             exact_constraints: true,
-            thresholds: thresholds.map(threshold).to_vec(),
+            thresholds: thresholds.iter().copied().map(threshold).collect(),
+            headline: if of_images { 2 } else { 0 },
             seed: 0,
             repeats: 1,
         }
@@ -172,14 +179,62 @@ impl Plan {
             let expected = format!("at least K + 1 = {}", self.k + 1);
             return Err(Error::new("points", expected, n_points.to_string()));
         }
+        self.check_fields::<3>(has_descriptors)
+    }
+
+    /// Checks every field, before any image is looked at.
+    ///
+    /// # Errors
+    /// Names the first field out of range, or that is for maps alone.
+    pub fn check_for_images(&self) -> Result<(), Error> {
+        self.check_fields::<2>(true)?;
+        let lone = |solver: &&Solver| !Solver::FROM_LISTS.contains(solver);
+        if let Some(solver) = self.solvers.iter().find(lone) {
+            // In the plane all lines meet: records alone tell nothing.
+            return Err(Error::new("solver", "one that recovers from lists", solver.name()));
+        }
+        if self.k == 0 {
+            return Err(Error::new("k", "at least 1", "0"));
+        }
+        for source in &self.sources {
+            match source {
+                Source::Oracle => {}
+                Source::Given(given) => {
+                    let expected = "the oracle or one that works on images alone";
+                    return Err(Error::new("neighbors", expected, given.name.as_str()));
+                }
+                Source::Own(joined) => {
+                    if let Some(part) = joined.not_in_dimension::<2>() {
+                        return Err(Error::new("neighbors", "a source for images", part.name));
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The first source that needs descriptors.
+    pub(super) fn needs_descriptors(&self) -> Option<&Source> {
+        let needs = |source: &&Source| match source {
+            Source::Own(joined) => joined.needs_descriptors(),
+            Source::Oracle | Source::Given(_) => false,
+        };
+        self.sources.iter().find(needs)
+    }
+
+    fn check_fields<const D: usize>(&self, has_descriptors: bool) -> Result<(), Error> {
+        let other = |scheme: &&&Entry| scheme.of_dimension::<D>().is_none();
+        if let Some(scheme) = self.schemes.iter().find(other) {
+            return Err(Error::new("scheme", format!("one for {D}D points"), scheme.name));
+        }
+        if self.headline >= self.thresholds.len().max(1) {
+            let expected = format!("below {}", self.thresholds.len());
+            return Err(Error::new("headline threshold", expected, self.headline.to_string()));
+        }
         if let Some(ratio) = self.inlier_ratios.iter().find(|r| !(0.0..=1.0).contains(*r)) {
             return Err(Error::new("inlier ratio", "0 to 1", ratio.to_string()));
         }
-        let blind = |source: &&Source| match source {
-            Source::Own(joined) => joined.needs_descriptors() && !has_descriptors,
-            Source::Oracle | Source::Given(_) => false,
-        };
-        if let Some(source) = self.sources.iter().find(blind) {
+        if !has_descriptors && let Some(source) = self.needs_descriptors() {
             let expected = format!("some, as neighbors by {} need them", source.name());
             return Err(Error::new("descriptors", expected, "none"));
         }

@@ -9,8 +9,10 @@ use crate::evaluate::{Accuracy, Reliability};
 /// Percentiles of the error that a row keeps.
 pub const PERCENTILES: [f64; 5] = [50.0, 75.0, 90.0, 95.0, 99.0];
 
-/// A point recovered within this share of the smallest threshold counts as exact.
+/// A point of a map recovered within this share of the smallest threshold counts as exact.
 const EXACT: f64 = 0.01;
+/// A keypoint recovered within this many pixels counts as exact.
+const EXACT_PX: f64 = 1.0;
 
 /// A row of an audit. Means over repeats, where there are several; counts are of the first repeat.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,7 +47,7 @@ pub struct Row {
     pub blind_percent: Vec<f64>,
     /// Share of exchanged axes named (`cp`).
     pub axis_accuracy_percent: Option<f64>,
-    /// Percentage recovered within a hundredth of the smallest threshold (`cp`).
+    /// Percentage recovered within a hundredth of the smallest threshold (`cp`), or within 1 px (`cp2d`).
     pub exact_percent: Option<f64>,
     /// Share of descriptors given to their own point (paired lines with descriptors).
     pub assignment_accuracy_percent: Option<f64>,
@@ -58,6 +60,20 @@ pub struct Row {
     pub ransac_trials: Option<Vec<(u32, u64)>>,
     /// Spread over repeats, if there are several.
     pub repeats: Option<Repeats>,
+    /// The shares over distinct places (images only).
+    pub distinct: Option<Distinct>,
+}
+
+/// Shares over distinct places: a fifth of the keypoints of an image have a twin at the same place, and
+/// every place counts once here. Of twins with different fates each counts half.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Distinct {
+    /// Places.
+    pub n_places: usize,
+    /// Percentage recovered within each threshold, in the plan's order.
+    pub recovered_percent: Vec<f64>,
+    /// The same for an attacker without neighborhoods.
+    pub blind_percent: Vec<f64>,
 }
 
 /// Spread over seeds.
@@ -84,6 +100,14 @@ impl Row {
         thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min)
     }
 
+    /// The error below which a point counts as exact.
+    pub(super) fn exact_within(unit: Unit, thresholds: &[Threshold]) -> f64 {
+        match unit {
+            Unit::Pixel => EXACT_PX,
+            Unit::Meter | Unit::KthNeighbor => EXACT * Self::smallest(thresholds),
+        }
+    }
+
     pub(super) fn fill(&mut self, accuracy: &Accuracy, blind: &Accuracy, thresholds: &[Threshold]) {
         let within = |accuracy: &Accuracy| {
             thresholds.iter().map(|t| accuracy.percent_within(t.value)).collect()
@@ -93,10 +117,33 @@ impl Row {
         self.recovered_percent = within(accuracy);
         self.blind_percent = within(blind);
         self.axis_accuracy_percent = accuracy.axis_percent;
-        let exact = accuracy.percent_within(EXACT * Self::smallest(thresholds));
+        let exact = accuracy.percent_within(Self::exact_within(self.unit, thresholds));
         self.exact_percent = accuracy.axis_percent.map(|_| exact);
         self.assignment_accuracy_percent = accuracy.assignment_percent;
         self.error_percentiles = PERCENTILES.map(|p| accuracy.percentile(p)).to_vec();
+    }
+
+    /// Adds the shares over distinct places; `weights` are those of the slots.
+    pub(super) fn fill_distinct(
+        &mut self,
+        accuracy: &Accuracy,
+        blind: &Accuracy,
+        weights: &[f64],
+        thresholds: &[Threshold],
+    ) {
+        let all: f64 = weights.iter().sum();
+        let within = |accuracy: &Accuracy| {
+            let percent = |t: &Threshold| match all {
+                0.0 => 0.0,
+                _ => 100.0 * accuracy.weight_within(t.value, weights) / all,
+            };
+            thresholds.iter().map(percent).collect()
+        };
+        self.distinct = Some(Distinct {
+            n_places: all.round() as usize,
+            recovered_percent: within(accuracy),
+            blind_percent: within(blind),
+        });
     }
 
     /// The mean of the same row over several seeds.
@@ -132,6 +179,14 @@ impl Row {
         for c in columns {
             mean.recovered_percent[c] = known(average(&|r| Some(r.recovered_percent[c])));
             mean.blind_percent[c] = known(average(&|r| Some(r.blind_percent[c])));
+        }
+        if let Some(distinct) = &mut mean.distinct {
+            let of = |r: &Row| r.distinct.clone();
+            for c in 0..distinct.recovered_percent.len() {
+                distinct.recovered_percent[c] =
+                    known(average(&|r| of(r).map(|d| d.recovered_percent[c])));
+                distinct.blind_percent[c] = known(average(&|r| of(r).map(|d| d.blind_percent[c])));
+            }
         }
         for p in 0..mean.error_percentiles.len() {
             mean.error_percentiles[p] = average(&|r| r.error_percentiles[p]);

@@ -94,10 +94,21 @@ impl Accuracy {
         &self.errors
     }
 
+    /// Number of points with an error of at most `threshold`.
+    pub fn n_within(&self, threshold: f64) -> usize {
+        self.sorted.partition_point(|&error| error <= threshold)
+    }
+
     /// Percentage of points with an error of at most `threshold`; 0 without points.
     pub fn percent_within(&self, threshold: f64) -> f64 {
-        let within = self.sorted.partition_point(|&error| error <= threshold);
-        if self.sorted.is_empty() { 0.0 } else { 100.0 * within as f64 / self.sorted.len() as f64 }
+        let (within, n) = (self.n_within(threshold), self.sorted.len());
+        if n == 0 { 0.0 } else { 100.0 * within as f64 / n as f64 }
+    }
+
+    /// The sum of `weights` (one per slot) over the points with an error of at most `threshold`.
+    pub fn weight_within(&self, threshold: f64, weights: &[f64]) -> f64 {
+        let within = self.errors.iter().zip(weights).filter(|(error, _)| **error <= threshold);
+        within.map(|(_, weight)| weight).sum()
     }
 
     /// The error that `percent` of the points do not exceed; `None` when that many were not

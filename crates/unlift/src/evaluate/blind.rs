@@ -8,13 +8,14 @@ use crate::geometry::vector::{along, distance, dot, sub, widen};
 use crate::released::{Obfuscation, Released};
 use crate::truth::{Original, Secret};
 
-/// The errors of a blind attacker, who knows the records and the 1-99 % box of the originals (more
-/// than an attacker would: the baseline is generous).
+/// The errors of a blind attacker, who knows the records and the box in which points lie: that of an
+/// image, else the 1-99 % box of the originals (more than an attacker would: the baseline is generous).
 ///
 /// One rule per family:
 /// - lines: the middle of the line's segment in the box; the point of the line nearest the box's
 ///   center when it misses the box;
-/// - rays: the same on the half-line;
+/// - rays: the same on the half-line; where every center has a region of its own, the range that half of
+///   an even density lies within, r_max / sqrt 2 in an image;
 /// - axis planes: the box's center, moved onto the plane;
 /// - axis candidates: the published point itself.
 pub fn blind<const D: usize>(
@@ -25,7 +26,11 @@ pub fn blind<const D: usize>(
     let points = original.reveal().positions();
     let origin = released.origin();
     let local: Vec<[f64; D]> = points.iter().map(|p| sub(p, &origin)).collect();
-    let guess = guesses(released, &local);
+    let known = released.bounds().map(|bounds| bounds.about(&origin));
+    let guess = match known.or_else(|| Bounds::quantiles(&local, 0.01)) {
+        Some(bounds) => guesses(released, &bounds),
+        None => Vec::new(),
+    };
     let errors = secret
         .hidden()
         .iter()
@@ -38,21 +43,27 @@ pub fn blind<const D: usize>(
 }
 
 /// One guess per record, about the released origin.
-fn guesses<const D: usize>(released: &Released<D>, local: &[[f64; D]]) -> Vec<[f64; D]> {
-    let Some(bounds) = Bounds::quantiles(local, 0.01) else { return Vec::new() };
+fn guesses<const D: usize>(released: &Released<D>, bounds: &Bounds<D>) -> Vec<[f64; D]> {
     let center = bounds.center();
     match released.obfuscation() {
         Obfuscation::Lines(lines) => lines
             .foot()
             .iter()
             .zip(lines.direction())
-            .map(|(p, d)| middle(&bounds, &widen(p), &widen(d), f64::NEG_INFINITY))
+            .map(|(p, d)| middle(bounds, &widen(p), &widen(d), f64::NEG_INFINITY))
             .collect(),
         Obfuscation::Rays(rays) => rays
             .center()
             .iter()
             .zip(rays.direction())
-            .map(|(&c, d)| middle(&bounds, &widen(&rays.centers()[usize::from(c)]), &widen(d), 0.0))
+            .map(|(&c, d)| {
+                let (center, d) = (widen(&rays.centers()[usize::from(c)]), widen(d));
+                match rays.regions().and_then(|of| of[usize::from(c)].clip(&center, &d)) {
+                    // Of an even density the share within r grows as r^D.
+                    Some((_, to)) => along(&center, to * libm::pow(0.5, 1.0 / D as f64), &d),
+                    None => middle(bounds, &center, &d, 0.0),
+                }
+            })
             .collect(),
         Obfuscation::AxisPlanes(planes) => planes
             .axis()

@@ -1,6 +1,7 @@
 //! Where a map lies and how far it reaches, robust to far outliers.
 
-use super::vector::{median, quantile};
+use super::vector::{median, quantile, sub};
+use crate::Error;
 
 /// An axis-aligned box.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,6 +27,30 @@ impl<const D: usize> Bounds<D> {
             high[c] = quantile(&column, 1.0 - q);
         }
         Some(Self { low, high })
+    }
+
+    /// The box from `low` to `high`.
+    ///
+    /// # Errors
+    /// When a corner is not finite, or the box has no extent along an axis.
+    pub fn try_new(low: [f64; D], high: [f64; D]) -> Result<Self, Error> {
+        let sound = |c: usize| low[c].is_finite() && high[c].is_finite() && low[c] < high[c];
+        if !(0..D).all(sound) {
+            let found = format!("{low:?} to {high:?}");
+            return Err(Error::new("bounds", "finite corners, the low one first", found));
+        }
+        Ok(Self { low, high })
+    }
+
+    /// Whether `point` lies in the box, its border included.
+    pub fn contains(&self, point: &[f64; D]) -> bool {
+        (0..D).all(|c| (self.low[c]..=self.high[c]).contains(&point[c]))
+    }
+
+    /// The same box about `origin`.
+    #[must_use]
+    pub fn about(&self, origin: &[f64; D]) -> Self {
+        Self { low: sub(&self.low, origin), high: sub(&self.high, origin) }
     }
 
     /// The middle of the box.

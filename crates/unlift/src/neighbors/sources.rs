@@ -1,5 +1,7 @@
 //! Where an attacker gets neighborhoods from a released map alone: one entry per source.
 
+use std::any::Any;
+
 use super::{Neighborhoods, geometric, join, overlap, similarity};
 use crate::Error;
 use crate::released::Released;
@@ -24,10 +26,21 @@ pub struct SourceEntry {
     pub only_ranks: bool,
     /// Schemes (by name) whose records tell it nothing.
     pub not_for: &'static [&'static str],
+    /// The same for images: of their fewer keypoints, only the first of a ranking are near.
+    pub usual_k_2d: usize,
     /// For images, where it is defined on them.
     pub in_2d: Option<Make<2>>,
     /// For maps, where it is defined on them.
     pub in_3d: Option<Make<3>>,
+}
+
+impl SourceEntry {
+    /// How it makes lists in `D` dimensions, if it does.
+    pub fn of_dimension<const D: usize>(&self) -> Option<Make<D>> {
+        // A constant cannot choose between two types; `Any` asks whether they are the same.
+        let of: &dyn Any = if D == 2 { &self.in_2d } else { &self.in_3d };
+        of.downcast_ref::<Option<Make<D>>>().copied().flatten()
+    }
 }
 
 impl PartialEq for SourceEntry {
@@ -43,6 +56,7 @@ pub const SOURCES: &[SourceEntry] = &[
         summary: "records with the most similar descriptors, of any kind",
         needs_descriptors: true,
         usual_k: 20,
+        usual_k_2d: 10,
         only_ranks: false,
         not_for: &[],
         in_2d: Some(|released, k, _| similarity(released, k)),
@@ -53,6 +67,7 @@ pub const SOURCES: &[SourceEntry] = &[
         summary: "records whose SIFT patches overlap, and a short walk from these; no training",
         needs_descriptors: true,
         usual_k: 40,
+        usual_k_2d: 10,
         only_ranks: false,
         not_for: &[],
         in_2d: Some(|released, k, _| overlap(released, k)),
@@ -63,6 +78,7 @@ pub const SOURCES: &[SourceEntry] = &[
         summary: "records that meet where records alone say that points are; no descriptors",
         needs_descriptors: false,
         usual_k: 50,
+        usual_k_2d: 10,
         only_ranks: true,
         not_for: &["plane"],
         in_2d: None,
@@ -109,6 +125,18 @@ impl Joined {
         Ok(Self { parts, k })
     }
 
+    /// The same sources with as many records per list as they choose in images.
+    #[must_use]
+    pub fn for_images(self) -> Self {
+        let k = self.parts.iter().map(|entry| entry.usual_k_2d).max().unwrap_or(1);
+        self.with_k(k)
+    }
+
+    /// The first of the sources that is not defined in `D` dimensions.
+    pub fn not_in_dimension<const D: usize>(&self) -> Option<&'static SourceEntry> {
+        self.parts.iter().copied().find(|entry| entry.of_dimension::<D>().is_none())
+    }
+
     /// The same sources with `k` records per list.
     #[must_use]
     pub fn with_k(self, k: usize) -> Self {
@@ -135,15 +163,20 @@ impl Joined {
         self.parts.iter().copied().find(|entry| entry.not_for.contains(&scheme))
     }
 
-    /// Lists for every slot of a released map, from it alone.
+    /// Lists for every slot of a released map or image, from it alone.
     ///
     /// # Errors
-    /// When a source is not defined on maps, or cannot work on this one.
-    pub fn make(&self, released: &Released<3>, seed: u64) -> Result<Neighborhoods, Error> {
+    /// When a source is not defined in `D` dimensions, or cannot work on this one.
+    pub fn make<const D: usize>(
+        &self,
+        released: &Released<D>,
+        seed: u64,
+    ) -> Result<Neighborhoods, Error> {
         let lists = self.parts.iter().map(|entry| {
-            let make = entry
-                .in_3d
-                .ok_or_else(|| Error::new("source", "one that is defined on maps", entry.name))?;
+            let make = entry.of_dimension::<D>().ok_or_else(|| {
+                let expected = format!("one that is defined in {D} dimensions");
+                Error::new("source", expected, entry.name)
+            })?;
             make(released, self.k, seed).map_err(|error| error.within(entry.name))
         });
         let mut lists = lists.collect::<Result<Vec<_>, _>>()?;

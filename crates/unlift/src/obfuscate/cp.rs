@@ -3,6 +3,7 @@
 use super::pairs::random_pairs;
 use super::{Entry, Lifted, Scheme, SchemeOptions};
 use crate::Error;
+use crate::geometry::frame::Bounds;
 use crate::released::{AxisCandidates, Obfuscation};
 use crate::seed::{Draws, Stage};
 
@@ -22,7 +23,13 @@ pub const ENTRY: Entry = Entry {
 };
 
 impl<const D: usize> Scheme<D> for Cp {
-    fn lift(&self, points: &[[f64; D]], _: &SchemeOptions, seed: u64) -> Result<Lifted<D>, Error> {
+    fn lift(
+        &self,
+        points: &[[f64; D]],
+        _: Option<&Bounds<D>>,
+        _: &SchemeOptions,
+        seed: u64,
+    ) -> Result<Lifted<D>, Error> {
         let (pairs, dropped) = random_pairs(points.len(), &mut Draws::new(seed, Stage::Scheme, 0));
         let (mut positions, mut hidden) = (Vec::new(), Vec::new());
         let mut swapped_axis = Vec::new();

@@ -3,9 +3,14 @@
 //! A scheme only states its rule ([`Scheme::lift`]); what every scheme needs to be free of truth
 //! (the origin, the normal form, the order of records, slots and descriptors) happens here, once.
 
+use std::any::Any;
+
 mod pairs;
 
 pub mod cp;
+pub mod cp2d;
+pub mod dcl2d;
+pub mod lines2d;
 pub mod olc;
 pub mod plane;
 pub mod ppl;
@@ -13,7 +18,8 @@ pub mod ppl_plus;
 pub mod ray;
 pub mod ray_voxel;
 
-use crate::geometry::{frame::rounded_origin, vector::sub};
+use crate::geometry::frame::{Bounds, rounded_origin};
+use crate::geometry::vector::sub;
 use crate::released::{Obfuscation, Released};
 use crate::seed::{Draws, Stage};
 use crate::truth::{Dropped, Original, Secret};
@@ -29,6 +35,9 @@ pub const SCHEMES: &[Entry] = &[
     ray_voxel::ENTRY,
     plane::ENTRY,
     cp::ENTRY,
+    lines2d::ENTRY,
+    cp2d::ENTRY,
+    dcl2d::ENTRY,
 ];
 
 /// The scheme users call `name`.
@@ -60,6 +69,15 @@ pub struct Entry {
     pub in_3d: Option<&'static dyn Scheme<3>>,
 }
 
+impl Entry {
+    /// The scheme on points of `D` dimensions, if it is defined there.
+    pub fn of_dimension<const D: usize>(&self) -> Option<&'static dyn Scheme<D>> {
+        // A constant cannot choose between two types; `Any` asks whether they are the same.
+        let of: &dyn Any = if D == 2 { &self.in_2d } else { &self.in_3d };
+        of.downcast_ref::<Option<&'static dyn Scheme<D>>>().copied().flatten()
+    }
+}
+
 impl std::fmt::Debug for Entry {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Entry").field("name", &self.name).finish_non_exhaustive()
@@ -88,7 +106,8 @@ impl SchemeOptions {
 
 /// A rule for hiding points: the only public seam of the library.
 pub trait Scheme<const D: usize>: Sync {
-    /// Hides `points` (given about the released origin). Every original ends up in exactly one slot
+    /// Hides `points`, given about the released origin, as are the `bounds` in which all of them are
+    /// publicly known to lie (an image's). Every original ends up in exactly one slot
     /// or among the dropped ones, with a reason; no record is empty.
     ///
     /// # Errors
@@ -96,6 +115,7 @@ pub trait Scheme<const D: usize>: Sync {
     fn lift(
         &self,
         points: &[[f64; D]],
+        bounds: Option<&Bounds<D>>,
         options: &SchemeOptions,
         seed: u64,
     ) -> Result<Lifted<D>, Error>;
@@ -136,9 +156,14 @@ pub fn obfuscate<const D: usize>(
         let expected = format!("{} rows, one per point", points.len());
         return Err(Error::new("descriptors", expected, descriptors.len().to_string()));
     }
-    let origin = rounded_origin(points.positions());
+    // The middle of known bounds tells nothing about the points.
+    let bounds = original.bounds();
+    let origin = match &bounds {
+        Some(bounds) => bounds.center(),
+        None => rounded_origin(points.positions()),
+    };
     let local: Vec<[f64; D]> = points.positions().iter().map(|p| sub(p, &origin)).collect();
-    let lifted = scheme.lift(&local, options, seed)?;
+    let lifted = scheme.lift(&local, bounds.map(|b| b.about(&origin)).as_ref(), options, seed)?;
 
     let slots = lifted.slots_per_record;
     let n_records = lifted.obfuscation.len();
@@ -173,7 +198,8 @@ pub fn obfuscate<const D: usize>(
         origin,
         points.unit(),
         released_descriptors,
-    )?;
+    )?
+    .with_bounds(bounds);
     let secret =
         Secret::try_new(hidden, swapped_axis, descriptor_row, lifted.dropped, points.len())?;
     Ok((released, secret))

@@ -1,6 +1,7 @@
 //! `olc`: a uniformly random line through every point.
 
 use super::{Entry, Lifted, Scheme, SchemeOptions};
+use crate::geometry::frame::Bounds;
 use crate::released::{Lines, Obfuscation};
 use crate::seed::{Draws, Stage};
 use crate::{Error, OriginalId};
@@ -21,7 +22,13 @@ pub const ENTRY: Entry = Entry {
 };
 
 impl<const D: usize> Scheme<D> for Olc {
-    fn lift(&self, points: &[[f64; D]], _: &SchemeOptions, seed: u64) -> Result<Lifted<D>, Error> {
+    fn lift(
+        &self,
+        points: &[[f64; D]],
+        _: Option<&Bounds<D>>,
+        _: &SchemeOptions,
+        seed: u64,
+    ) -> Result<Lifted<D>, Error> {
         let directions: Vec<[f64; D]> = (0..points.len())
             .map(|i| Draws::new(seed, Stage::Scheme, i as u64).direction())
             .collect();

@@ -1,6 +1,7 @@
 //! `plane`: of every point one coordinate is kept, on one of three servers.
 
 use super::{Entry, Lifted, Scheme, SchemeOptions};
+use crate::geometry::frame::Bounds;
 use crate::released::{AxisPlanes, Obfuscation};
 use crate::seed::{Draws, Stage};
 use crate::{Error, OriginalId};
@@ -21,7 +22,13 @@ pub const ENTRY: Entry = Entry {
 };
 
 impl Scheme<3> for Plane {
-    fn lift(&self, points: &[[f64; 3]], _: &SchemeOptions, seed: u64) -> Result<Lifted<3>, Error> {
+    fn lift(
+        &self,
+        points: &[[f64; 3]],
+        _: Option<&Bounds<3>>,
+        _: &SchemeOptions,
+        seed: u64,
+    ) -> Result<Lifted<3>, Error> {
         let mut axis: Vec<u8> = (0..points.len()).map(|i| (i % 3) as u8).collect();
         Draws::new(seed, Stage::Scheme, 0).shuffle(&mut axis);
         let offset: Vec<f64> =

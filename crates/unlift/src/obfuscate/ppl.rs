@@ -2,6 +2,7 @@
 
 use super::pairs::{drop_pairs, pair_again, random_pairs, refused_last};
 use super::{Entry, Lifted, Scheme, SchemeOptions};
+use crate::geometry::frame::Bounds;
 use crate::geometry::vector::{squared_distance, sub};
 use crate::released::{Lines, Obfuscation};
 use crate::seed::{Draws, Stage};
@@ -27,7 +28,13 @@ pub const ENTRY: Entry = Entry {
 const RE_DRAWS: usize = 100;
 
 impl Scheme<3> for Ppl {
-    fn lift(&self, points: &[[f64; 3]], _: &SchemeOptions, seed: u64) -> Result<Lifted<3>, Error> {
+    fn lift(
+        &self,
+        points: &[[f64; 3]],
+        _: Option<&Bounds<3>>,
+        _: &SchemeOptions,
+        seed: u64,
+    ) -> Result<Lifted<3>, Error> {
         let mut draws = Draws::new(seed, Stage::Scheme, 0);
         let (mut pairs, mut dropped) = random_pairs(points.len(), &mut draws);
         let coincident = separate(points, &mut pairs, &mut draws);

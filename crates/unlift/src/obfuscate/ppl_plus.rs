@@ -7,6 +7,7 @@
 use super::pairs::{drop_pairs, pair_again, random_pairs, refused_last};
 use super::ppl::{apart, lines_through};
 use super::{Entry, Lifted, Scheme, SchemeOptions};
+use crate::geometry::frame::Bounds;
 use crate::geometry::knn::Knn;
 use crate::geometry::normal::local_normal;
 use crate::geometry::vector::{dot, sub};
@@ -39,7 +40,13 @@ const STALL: (usize, usize) = (100, 50);
 const SIN_20_DEGREES: f64 = 0.342_020_143_325_668_7;
 
 impl Scheme<3> for PplPlus {
-    fn lift(&self, points: &[[f64; 3]], _: &SchemeOptions, seed: u64) -> Result<Lifted<3>, Error> {
+    fn lift(
+        &self,
+        points: &[[f64; 3]],
+        _: Option<&Bounds<3>>,
+        _: &SchemeOptions,
+        seed: u64,
+    ) -> Result<Lifted<3>, Error> {
         let normals = normals(points)?;
         let on_surface = |pair: &[OriginalId; 2]| {
             let [a, b] = pair.map(|id| points[id.index()]);

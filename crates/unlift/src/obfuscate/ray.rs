@@ -1,6 +1,7 @@
 //! `ray`: a half-line from one of two centers, chosen at random for every point.
 
 use super::{Entry, Lifted, Scheme, SchemeOptions};
+use crate::geometry::frame::Bounds;
 use crate::geometry::kmeans::kmeans;
 use crate::geometry::vector::{dot, sub};
 use crate::released::{Obfuscation, Rays};
@@ -27,7 +28,13 @@ pub const ENTRY: Entry = Entry {
 const RESTARTS: u64 = 10;
 
 impl Scheme<3> for Ray {
-    fn lift(&self, points: &[[f64; 3]], _: &SchemeOptions, seed: u64) -> Result<Lifted<3>, Error> {
+    fn lift(
+        &self,
+        points: &[[f64; 3]],
+        _: Option<&Bounds<3>>,
+        _: &SchemeOptions,
+        seed: u64,
+    ) -> Result<Lifted<3>, Error> {
         from_centers(points, seed, |row, _| {
             Draws::new(seed, Stage::Scheme, row as u64).below(2) as usize
         })
@@ -43,9 +50,17 @@ pub(super) fn from_centers(
     if points.len() < 2 {
         return Err(Error::new("points", "at least 2 for two centers", points.len().to_string()));
     }
-    let centers = kmeans(points, 2, RESTARTS, seed);
+    rays_from(&kmeans(points, 2, RESTARTS, seed), points, choose)
+}
+
+/// The rays from `centers` to every point; `choose` gives the center of a row.
+pub(super) fn rays_from<const D: usize>(
+    centers: &[[f64; D]],
+    points: &[[f64; D]],
+    choose: impl Fn(usize, &[f64; D]) -> usize,
+) -> Result<Lifted<D>, Error> {
     // What is stored is the center in f32; the ray starts there.
-    let centers: Vec<[f64; 3]> = centers.iter().map(|c| c.map(|x| f64::from(x as f32))).collect();
+    let centers: Vec<[f64; D]> = centers.iter().map(|c| c.map(|x| f64::from(x as f32))).collect();
     let (mut hidden, mut dropped) = (Vec::new(), Vec::new());
     let (mut center, mut direction) = (Vec::new(), Vec::new());
     for (row, point) in points.iter().enumerate() {

@@ -3,6 +3,7 @@
 use super::ray::from_centers;
 use super::{Entry, Lifted, Scheme, SchemeOptions};
 use crate::Error;
+use crate::geometry::frame::Bounds;
 use crate::released::Obfuscation;
 
 /// Ray clouds, voxel variant.
@@ -24,6 +25,7 @@ impl Scheme<3> for RayVoxel {
     fn lift(
         &self,
         points: &[[f64; 3]],
+        _: Option<&Bounds<3>>,
         options: &SchemeOptions,
         seed: u64,
     ) -> Result<Lifted<3>, Error> {

@@ -123,8 +123,7 @@ fn sum<const D: usize>(mut total: Grid<D>, parts: &[Grid<D>]) -> Grid<D> {
 }
 
 fn add_line<const D: usize>(grid: &mut Grid<D>, row: &LineRow<D>, weight: f32) {
-    let Some((from, to)) = grid.clip(&row.through, &row.direction, row.floor(), f32::INFINITY)
-    else {
+    let Some((from, to)) = grid.clip(&row.through, &row.direction, row.floor(), row.to) else {
         return;
     };
     let steps = ((to - from) / grid.cell()).ceil().max(1.0);

@@ -20,6 +20,9 @@ const HALVINGS: u32 = 14;
 /// Where a random record agrees with a typical place this often, its agreement tells nothing, and the
 /// density of records within delta is no longer that of the place.
 const TOO_WIDE: f32 = 0.04;
+/// The same for axis candidates of an image: both of a record's lines cross all of a small plane, so that
+/// at a delta as wide as neighbors are apart a random record agrees this often.
+const TOO_WIDE_IN_IMAGE: f32 = 0.12;
 /// Steps per octave of the fine ladder.
 const FINE: i32 = 3;
 
@@ -30,6 +33,8 @@ pub(crate) enum Prefer {
     Wide,
     /// A narrow one: joint recovery looks for neighbors' estimates, which are sharper than records.
     Narrow,
+    /// The narrowest: where records cross each other all over a small plane.
+    Narrowest,
 }
 
 impl Prefer {
@@ -37,18 +42,30 @@ impl Prefer {
     fn near_most(self) -> f64 {
         match self {
             Self::Wide => 0.94,
-            Self::Narrow => 0.95,
+            Self::Narrow | Self::Narrowest => 0.95,
         }
     }
 }
 
-/// The delta with the best mean evidence; `None` for an empty map or one without extent.
+/// The delta with the best mean evidence, not below `least`; `None` for an empty map or one without extent.
 pub(crate) fn choose<const D: usize>(
     family: &Family<'_, D>,
     lists: &Neighborhoods,
     prefer: Prefer,
+    least: f64,
     seed: u64,
 ) -> Option<f64> {
+    let too_wide = match family {
+        Family::Candidates { .. } if D == 2 => TOO_WIDE_IN_IMAGE,
+        Family::Candidates { .. } | Family::Lines { .. } | Family::Planes { .. } => TOO_WIDE,
+    };
+    // Few points are far apart: at least one halving lies between the two limits.
+    let too_wide = too_wide.max(family.typical_chance((2.0 * least) as f32));
+    // The fine ladder reaches beyond the coarse one, but not where its limit is one of an image.
+    let most_chance = match family {
+        Family::Candidates { .. } if D == 2 => too_wide,
+        Family::Candidates { .. } | Family::Lines { .. } | Family::Planes { .. } => f32::INFINITY,
+    };
     let extent = family.extent();
     if lists.n_slots() == 0 || !(extent.is_finite() && extent > 0.0) {
         return None;
@@ -65,7 +82,10 @@ pub(crate) fn choose<const D: usize>(
     let (mut coarse, mut most) = (extent, f64::NEG_INFINITY);
     for step in 1..=HALVINGS {
         let delta = extent / f64::from(1u32 << step);
-        if family.typical_chance(delta as f32) > TOO_WIDE {
+        if delta < least {
+            break;
+        }
+        if family.typical_chance(delta as f32) > too_wide {
             continue;
         }
         let value = value(delta);
@@ -77,12 +97,14 @@ pub(crate) fn choose<const D: usize>(
     }
     let fine: Vec<(f64, f64)> = (1 - FINE..2 * FINE)
         .map(|step| coarse * libm::exp2(f64::from(step) / f64::from(FINE)))
+        .filter(|&delta| delta >= least && family.typical_chance(delta as f32) <= most_chance)
         .map(|delta| (delta, value(delta)))
         .collect();
     let most = fine.iter().map(|&(_, value)| value).fold(f64::NEG_INFINITY, f64::max);
     let near = |&&(_, value): &&(f64, f64)| value >= prefer.near_most() * most || value == most;
     match prefer {
         Prefer::Wide => fine.iter().rev().find(near).map(|x| x.0),
+        Prefer::Narrowest => fine.iter().find(near).map(|x| x.0),
         Prefer::Narrow => {
             // A third of the way across the plateau, in logarithm: its very edge is a matter of luck.
             let (low, high) = (fine.iter().find(near)?.0, fine.iter().rev().find(near)?.0);

@@ -21,8 +21,8 @@ pub(super) fn place<const D: usize>(
     descriptor_row: Option<Vec<u32>>,
 ) -> Result<Recovered<D>, Error> {
     let rows = match released.obfuscation() {
-        Obfuscation::Lines(lines) => from_lines(lines),
-        Obfuscation::Rays(rays) => from_rays(rays),
+        Obfuscation::Lines(lines) => from_lines(lines, None),
+        Obfuscation::Rays(rays) => from_rays(rays, None),
         Obfuscation::AxisPlanes(_) | Obfuscation::AxisCandidates(_) => Vec::new(),
     };
     let delta = if peaks.resolution > 0.0 { peaks.resolution } else { 1.0 };

@@ -26,9 +26,10 @@ impl<'a, const D: usize> Family<'a, D> {
             let chance = chance_field::of_lines(&rows, lists, slots_per_record);
             Self::Lines { rows, slots_per_record, chance }
         };
+        let bounds = released.bounds().map(|bounds| bounds.about(&released.origin()));
         match released.obfuscation() {
-            Obfuscation::Lines(records) => lines(from_lines(records)),
-            Obfuscation::Rays(records) => lines(from_rays(records)),
+            Obfuscation::Lines(records) => lines(from_lines(records, bounds.as_ref())),
+            Obfuscation::Rays(records) => lines(from_rays(records, bounds.as_ref())),
             Obfuscation::AxisPlanes(planes) => {
                 Self::Planes { planes, sorted: SortedPlanes::new(planes) }
             }
@@ -36,6 +37,15 @@ impl<'a, const D: usize> Family<'a, D> {
                 let rows = candidates.position();
                 Self::Candidates { rows, chance: chance_field::of_candidates(rows, lists) }
             }
+        }
+    }
+
+    /// Whether these are rays of which it is known where each center's points lie: one ray says nothing
+    /// about another of its center, and rays of two centers do not meet.
+    pub(crate) fn has_regions(&self) -> bool {
+        match self {
+            Self::Lines { rows, .. } => rows.iter().any(|row| row.is_ray() && row.to.is_finite()),
+            Self::Planes { .. } | Self::Candidates { .. } => false,
         }
     }
 

@@ -2,6 +2,8 @@
 
 use super::sections::{NO_VOTE, Sections};
 use crate::RecordId;
+use crate::geometry::frame::Bounds;
+use crate::geometry::vector::{along, widen};
 use crate::released::{Lines, Rays};
 
 /// One line or ray: half a cache line, so that a neighbor costs one memory access.
@@ -14,6 +16,8 @@ pub(crate) struct LineRow<const D: usize> {
     pub(crate) direction: [f32; D],
     /// The center of a ray, or [`NO_GROUP`].
     pub(crate) group: u32,
+    /// Where it ends: infinite, except within known bounds.
+    pub(crate) to: f32,
 }
 
 /// The group of lines, which all may vote for each other.
@@ -22,27 +26,41 @@ pub(crate) const NO_GROUP: u32 = u32::MAX;
 /// Squared sines below this count as parallel: such a record does not tell where along the line.
 const PARALLEL: f32 = 1e-6;
 
-/// All records as rows.
-pub(crate) fn from_lines<const D: usize>(lines: &Lines<D>) -> Vec<LineRow<D>> {
-    lines
-        .foot()
-        .iter()
-        .zip(lines.direction())
-        .map(|(&through, &direction)| LineRow { through, direction, group: NO_GROUP })
-        .collect()
+/// All records as rows; within `bounds` about the released origin, where these are known: a chord starts
+/// where the line enters.
+pub(crate) fn from_lines<const D: usize>(
+    lines: &Lines<D>,
+    bounds: Option<&Bounds<D>>,
+) -> Vec<LineRow<D>> {
+    let row = |(&foot, &direction): (&[f32; D], &[f32; D])| {
+        let clip = |bounds: &Bounds<D>| bounds.clip(&widen(&foot), &widen(&direction));
+        let (through, to) = match bounds.and_then(clip) {
+            Some((from, to)) => (
+                along(&widen(&foot), from, &widen(&direction)).map(|x| x as f32),
+                (to - from) as f32,
+            ),
+            None => (foot, f32::INFINITY),
+        };
+        LineRow { through, direction, group: NO_GROUP, to }
+    };
+    lines.foot().iter().zip(lines.direction()).map(row).collect()
 }
 
-/// All records as rows.
-pub(crate) fn from_rays<const D: usize>(rays: &Rays<D>) -> Vec<LineRow<D>> {
-    rays.center()
-        .iter()
-        .zip(rays.direction())
-        .map(|(&center, &direction)| LineRow {
-            through: rays.centers()[usize::from(center)],
-            direction,
-            group: u32::from(center),
-        })
-        .collect()
+/// All records as rows; within the region of their center or else within `bounds`, where these are known.
+pub(crate) fn from_rays<const D: usize>(
+    rays: &Rays<D>,
+    bounds: Option<&Bounds<D>>,
+) -> Vec<LineRow<D>> {
+    let row = |(&center, &direction): (&u8, &[f32; D])| {
+        let through = rays.centers()[usize::from(center)];
+        let region = rays.regions().map(|regions| &regions[usize::from(center)]).or(bounds);
+        let clip = |region: &Bounds<D>| region.clip(&widen(&through), &widen(&direction));
+        // A ray that leaves its region at once is a file's fault: nothing is known about it.
+        let to = region.and_then(clip).map(|(_, to)| to as f32).filter(|&to| to > 0.0);
+        let to = to.unwrap_or(f32::INFINITY);
+        LineRow { through, direction, group: u32::from(center), to }
+    };
+    rays.center().iter().zip(rays.direction()).map(row).collect()
 }
 
 impl<const D: usize> LineRow<D> {
@@ -58,10 +76,16 @@ impl<const D: usize> LineRow<D> {
         !own.is_ray() || self.group != own.group
     }
 
-    /// Where half-lines begin to count.
+    /// Where half-lines and chords begin to count.
     #[inline(always)]
     pub(crate) fn floor(&self) -> f32 {
-        if self.group == NO_GROUP { f32::NEG_INFINITY } else { 0.0 }
+        if self.group == NO_GROUP && self.to == f32::INFINITY { f32::NEG_INFINITY } else { 0.0 }
+    }
+
+    /// `t` moved to where the record is.
+    #[inline(always)]
+    pub(crate) fn clamp(&self, t: f32) -> f32 {
+        t.max(self.floor()).min(self.to)
     }
 
     /// The point of this line nearest to `other`; `None` when they are parallel or it lies behind a
@@ -72,7 +96,7 @@ impl<const D: usize> LineRow<D> {
         columns.gather(&[*other], &[RecordId(0)]);
         columns.sections(self, &mut sections);
         let (t, miss2) = (sections.at[0], sections.miss2[0]);
-        (miss2 < NO_VOTE && t >= self.floor()).then(|| self.at(t))
+        (miss2 < NO_VOTE && t >= self.floor() && t <= self.to).then(|| self.at(t))
     }
 
     /// The point at parameter `t`.

@@ -25,6 +25,11 @@ impl<'a> Lists<'a> {
         Self { neighborhoods, mixed: true }
     }
 
+    /// The same lists, mixed.
+    pub(crate) fn turned_to_mixed(&self) -> Self {
+        Self::mixed(self.neighborhoods)
+    }
+
     /// The list of `slot`; `buffer` is where a mixed one is put together.
     #[inline(always)]
     pub(crate) fn of<'b>(&'b self, slot: usize, buffer: &'b mut Vec<RecordId>) -> &'b [RecordId] {

@@ -53,6 +53,23 @@ pub fn recover<const D: usize>(
     recover_and_look(released, lists, options).map(|found| found.0)
 }
 
+/// The least delta tried in an image, as a share of the spacing of points. A fifth of the keypoints have a
+/// twin at the same place, and coordinates may be whole numbers: such records agree exactly, so that
+/// the evidence of a few slots grows without end as delta shrinks. But the neighbors that a list names
+/// are farther apart than that.
+const LEAST_DELTA: f64 = 0.25;
+/// Delta for rays from anchors, as a share of the spacing of points.
+const ANCHOR_DELTA: f64 = 1.75;
+/// Partners in an image are looked for within this many deltas.
+const EXACT_REACH: f64 = 4.0;
+
+/// How far apart points would be if they were spread evenly over known bounds; 0 without bounds.
+fn spacing<const D: usize>(released: &Released<D>) -> f64 {
+    let Some(bounds) = released.bounds() else { return 0.0 };
+    let volume: f64 = (0..D).map(|c| bounds.high[c] - bounds.low[c]).product();
+    libm::pow(volume / released.n_slots().max(1) as f64, 1.0 / D as f64)
+}
+
 /// [`recover`], with what confidence is made of. For fitting it alone.
 ///
 /// # Errors
@@ -88,10 +105,20 @@ pub fn recover_and_look<const D: usize>(
         _ => None,
     };
     let used = both_ways.as_ref().unwrap_or(lists);
-    let prefer = if graph.is_some() { Prefer::Narrow } else { Prefer::Wide };
+    let prefer = match &family {
+        _ if graph.is_none() => Prefer::Wide,
+        Family::Candidates { .. } if D == 2 => Prefer::Narrowest,
+        _ => Prefer::Narrow,
+    };
+    let spacing = spacing(released);
     let delta = match options.delta {
         Delta::Fixed(delta) => delta,
-        Delta::Auto => delta::choose(&family, used, prefer, options.seed).unwrap_or(1.0),
+        // Anchors say nothing at one delta rather than at another.
+        Delta::Auto if family.has_regions() => ANCHOR_DELTA * spacing,
+        Delta::Auto => {
+            let least = LEAST_DELTA * spacing;
+            delta::choose(&family, used, prefer, least, options.seed).unwrap_or(1.0)
+        }
     };
     let consensus = || consensus::solve(&family, Lists::given(used), delta as f32, Chunks::All);
     let (estimates, trials) = match (options.solver, &graph) {
@@ -104,17 +131,20 @@ pub fn recover_and_look<const D: usize>(
         }
         _ => (consensus(), None),
     };
+    // In an image delta is narrow and values are few: partners are looked for farther away.
+    let exact_reach = if D == 2 { EXACT_REACH * delta } else { delta };
     // The paper's loop stays as published.
     let exact = options.exact_constraints && options.solver != Solver::Ransac;
     let settled = (exact && exact::can_settle(released))
-        .then(|| exact::settle(released, estimates.clone(), delta as f32));
+        .then(|| exact::settle(released, estimates.clone(), exact_reach as f32));
     let unsettled = &estimates;
     let estimates = settled.as_ref().unwrap_or(unsettled);
     let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
     let (origin, unit) = (released.origin(), released.unit());
     let recovered = Recovered::try_new(estimates, with_axis, descriptor_row, origin, unit, delta)?
         .with_trials(trials);
-    if !options.confidence {
+    // Its constants come from maps: in images nobody has compared them with what comes true.
+    if !options.confidence || D == 2 {
         return Ok((recovered, Seen::NOTHING));
     }
     let edges = (graph.as_ref(), lists);

@@ -86,9 +86,9 @@ pub(crate) struct Intervals {
 }
 
 impl Intervals {
-    /// The intervals of `sections` at `delta`, as far as they lie above `floor`.
+    /// The intervals of `sections` at `delta`, as far as they lie between `floor` and `top`.
     #[inline(always)]
-    pub(crate) fn fill(&mut self, sections: &Sections, delta2: f32, floor: f32) {
+    pub(crate) fn fill(&mut self, sections: &Sections, delta2: f32, floor: f32, top: f32) {
         let n = sections.len();
         self.low.resize(n, f32::INFINITY);
         self.high.resize(n, f32::NEG_INFINITY);
@@ -97,9 +97,9 @@ impl Intervals {
         for j in 0..n {
             let room = delta2 - miss2[j];
             let half = (room.max(0.0) / bend[j]).sqrt();
-            let end = at[j] + half;
-            let empty = (room < 0.0) | (end < floor);
-            low[j] = if empty { f32::INFINITY } else { (at[j] - half).max(floor) };
+            let (start, end) = (at[j] - half, at[j] + half);
+            let empty = (room < 0.0) | (end < floor) | (start > top);
+            low[j] = if empty { f32::INFINITY } else { start.max(floor) };
             high[j] = if empty { f32::NEG_INFINITY } else { end };
         }
     }

@@ -13,6 +13,7 @@ pub use axis_planes::AxisPlanes;
 pub use lines::Lines;
 pub use rays::Rays;
 
+use crate::geometry::frame::Bounds;
 use crate::{Descriptors, Error, Unit};
 
 /// The records of a map: what the set `O(x)` of Eq. (1) is for each hidden point.
@@ -73,6 +74,7 @@ pub struct Released<const D: usize> {
     origin: [f64; D],
     unit: Unit,
     descriptors: Option<Descriptors>,
+    bounds: Option<Bounds<D>>,
 }
 
 impl<const D: usize> Released<D> {
@@ -105,7 +107,20 @@ impl<const D: usize> Released<D> {
             let expected = format!("{n_slots} rows, one per slot");
             return Err(Error::new("descriptors", expected, descriptors.len().to_string()));
         }
-        Ok(Self { obfuscation, slots_per_record, origin, unit, descriptors })
+        Ok(Self { obfuscation, slots_per_record, origin, unit, descriptors, bounds: None })
+    }
+
+    /// The same map, every hidden point of which is known to lie within `bounds` (in the map's frame):
+    /// the size of an image is public.
+    #[must_use]
+    pub fn with_bounds(self, bounds: Option<Bounds<D>>) -> Self {
+        Self { bounds, ..self }
+    }
+
+    /// The box in which every hidden point is known to lie, in the map's frame; `None` where nothing is
+    /// known.
+    pub fn bounds(&self) -> Option<Bounds<D>> {
+        self.bounds
     }
 
     /// The records, about [`origin`](Self::origin).

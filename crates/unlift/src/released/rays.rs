@@ -2,6 +2,7 @@
 
 use super::{finite_f32, unit_direction};
 use crate::Error;
+use crate::geometry::frame::Bounds;
 
 /// Half-lines `center + t direction`, `t > 0`; `center` is an index into a table.
 #[derive(Clone, Debug, PartialEq)]
@@ -10,6 +11,7 @@ pub struct Rays<const D: usize> {
     center: Vec<u8>,
     direction: Vec<[f32; D]>,
     voxel: Option<f64>,
+    regions: Option<Vec<Bounds<D>>>,
 }
 
 impl<const D: usize> Rays<D> {
@@ -48,7 +50,7 @@ impl<const D: usize> Rays<D> {
                 Ok(finite_f32(unit_direction(d, row)?, "direction", row)?.map(|x| x + 0.0))
             })
             .collect::<Result<_, Error>>()?;
-        Ok(Self { centers, center, direction, voxel: None })
+        Ok(Self { centers, center, direction, voxel: None, regions: None })
     }
 
     /// The rows `order[0], order[1], ...`.
@@ -58,6 +60,7 @@ impl<const D: usize> Rays<D> {
             center: super::rows(&self.center, order),
             direction: super::rows(&self.direction, order),
             voxel: self.voxel,
+            regions: self.regions.clone(),
         }
     }
 
@@ -76,6 +79,24 @@ impl<const D: usize> Rays<D> {
     /// The edge of the voxels whose parity gives the centers, in the unit of the map, if it is so.
     pub fn voxel(&self) -> Option<f64> {
         self.voxel
+    }
+
+    /// The same rays, where the center of a point follows from the region it lies in: per center the
+    /// box of its points, about the released origin. A public rule of the scheme.
+    ///
+    /// # Errors
+    /// When there is not one region per center.
+    pub fn with_regions(self, regions: Vec<Bounds<D>>) -> Result<Self, Error> {
+        if regions.len() != self.centers.len() {
+            let expected = format!("{}, one per center", self.centers.len());
+            return Err(Error::new("regions", expected, regions.len().to_string()));
+        }
+        Ok(Self { regions: Some(regions), ..self })
+    }
+
+    /// Per center the box in which all of its points lie, about the released origin, if it is known.
+    pub fn regions(&self) -> Option<&[Bounds<D>]> {
+        self.regions.as_deref()
     }
 
     /// Number of rays.

@@ -11,7 +11,7 @@ pub enum DropReason {
     CoincidentPair,
     /// Its line stayed within the local surface after all re-pairings (`ppl+`).
     RejectedPair,
-    /// It lies on a center of a ray cloud, so its ray has no direction.
+    /// It lies on a center of a ray cloud or an anchor of an image, so its ray has no direction.
     OnCenter,
 }
 

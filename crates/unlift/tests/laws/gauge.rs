@@ -156,6 +156,12 @@ fn moving_along_the_record_changes_no_byte<const D: usize>(
                 let partner = points[original_of(slot ^ 1)];
                 moved[id] = along(&partner, by, &sub(&points[id], &partner));
             }
+            Obfuscation::Rays(rays) if rays.regions().is_some() => {
+                // Anchors do not follow the points.
+                let center = rays.centers()[usize::from(rays.center()[slot])].map(f64::from);
+                let center = std::array::from_fn(|c| center[c] + origin[c]);
+                moved[id] = along(&center, by, &sub(&points[id], &center));
+            }
             Obfuscation::Rays(rays) => {
                 let Some(other) = slot_of(id ^ 1) else { continue };
                 let center_of = |slot: usize| rays.center()[slot];

@@ -1,18 +1,15 @@
 //! Maps, lists and bytes that the laws share.
 
 use proptest::prelude::ProptestConfig;
+use unlift::geometry::frame::Bounds;
 use unlift::neighbors::Neighborhoods;
 use unlift::neighbors::oracle::{self, TrueNeighbors};
-use unlift::obfuscate::{Scheme, SchemeOptions, cp::Cp, obfuscate, olc::Olc};
+use unlift::obfuscate::{Scheme, SchemeOptions, obfuscate};
 use unlift::recover::{Delta, RecoverOptions, Recovered, Solver, recover};
 use unlift::released::{Obfuscation, Released};
 use unlift::seed::{Draws, Stage};
 use unlift::truth::{Original, Secret};
 use unlift::{Error, PointSet, RecordId, Unit};
-
-/// Implementations for keypoints that are not (yet) rows of the registry.
-pub const OUTSIDERS_2D: &[(&str, &dyn Scheme<2>)] =
-    &[("olc, as an outsider", &Olc), ("cp, as an outsider", &Cp)];
 
 /// Few cases, really random ones; a failure prints its arguments.
 pub fn cases(n: u32) -> ProptestConfig {
@@ -31,14 +28,32 @@ pub struct Hidden<const D: usize> {
     pub secret: Secret,
 }
 
-/// Hides `points` with voxels of `voxel`.
+/// The image that `points` are keypoints of: whole voxels around them.
+fn image<const D: usize>(points: &[[f64; D]], voxel: f64) -> Bounds<D> {
+    let column = |c: usize| points.iter().map(move |p| p[c]);
+    let low = |c: usize| column(c).fold(f64::INFINITY, f64::min).min(f64::MAX);
+    let high = |c: usize| column(c).fold(f64::NEG_INFINITY, f64::max).max(f64::MIN);
+    if points.is_empty() {
+        return Bounds { low: [0.0; D], high: [voxel; D] };
+    }
+    Bounds {
+        low: std::array::from_fn(|c| ((low(c) / voxel).floor() - 1.0) * voxel),
+        high: std::array::from_fn(|c| ((high(c) / voxel).ceil() + 1.0) * voxel),
+    }
+}
+
+/// Hides `points` with voxels of `voxel`; in the plane they are keypoints of an image.
 pub fn try_hide<const D: usize>(
     scheme: &dyn Scheme<D>,
     points: &[[f64; D]],
     voxel: f64,
     seed: u64,
 ) -> Result<Hidden<D>, Error> {
-    let original = Original::new(PointSet::try_new(points.to_vec(), Unit::Meter)?);
+    let set = PointSet::try_new(points.to_vec(), Unit::Meter)?;
+    let original = match D {
+        2 => Original::within(set, image(points, voxel))?,
+        _ => Original::new(set),
+    };
     let (released, secret) = obfuscate(scheme, &original, None, &SchemeOptions { voxel }, seed)?;
     Ok(Hidden { original, released, secret })
 }

@@ -128,6 +128,12 @@ fn bounded_influence<const D: usize>(name: &str, scheme: &dyn Scheme<D>, seed: u
     }
     // Voxels smaller than a pile, so that its points have rays from both centers.
     let hidden = try_hide(scheme, &points, 0.004, seed).unwrap();
+    if let Obfuscation::Rays(rays) = hidden.released.obfuscation()
+        && rays.regions().is_some()
+    {
+        // Rays that meet nowhere fix no point: a range comes from all bearings together.
+        return;
+    }
     let per = hidden.released.slots_per_record();
     let n = hidden.released.n_slots();
     let near_pile = |slot: usize| hidden.secret.hidden()[slot].index() / COPIES;
@@ -219,7 +225,8 @@ fn no_hidden_input<const D: usize>(name: &str, scheme: &dyn Scheme<D>, seed: u64
             hidden.released.unit(),
             None,
         )
-        .unwrap();
+        .unwrap()
+        .with_bounds(hidden.released.bounds());
         let copied = Neighborhoods::try_new(
             lists.offsets().to_vec(),
             lists.records().to_vec(),

@@ -27,7 +27,8 @@ fn shifted_and_scaled_maps_leak_the_same<const D: usize>(name: &str, scheme: &dy
     let points: Vec<[f64; D]> = room(31, 4000);
     let solver = Solver::Consensus;
     let here = shares(scheme, &points, 1.0, solver);
-    assert!(here[0] > 10.0, "{name}: a map that does not come back shows nothing: {here:?}");
+    // Of rays from anchors little comes back, but more than by chance.
+    assert!(here[1] > 5.0, "{name}: a map that does not come back shows nothing: {here:?}");
     let scaled: Vec<[f64; D]> = points.iter().map(|p| p.map(|x| 7.3 * x)).collect();
     let far: Vec<[f64; D]> = points.iter().map(|p| p.map(|x| x + 1e6)).collect();
     for (how, there) in [

@@ -82,7 +82,7 @@ fn solve_slot<const D: usize>(
     let mut best_score = f32::NEG_INFINITY;
     for axis in 0..D {
         scratch.listed.sections(own, axis, *delta2, &mut scratch.sections);
-        scratch.intervals.fill(&scratch.sections, *delta2, f32::NEG_INFINITY);
+        scratch.intervals.fill(&scratch.sections, *delta2, f32::NEG_INFINITY, f32::INFINITY);
         let at =
             |t: f32| chance.at(&std::array::from_fn(|c| if c == axis { t } else { own[c] }), *tube);
         let Some(peak) = best_start(&scratch.intervals, listed.len(), improbability, at) else {

@@ -89,7 +89,7 @@ fn solve_slot<const D: usize>(
         let few = may_vote < 2;
         return Estimate::lost(if few { Status::TooFewNeighbors } else { Status::Degenerate });
     }
-    scratch.intervals.fill(&scratch.sections, *delta2, own.floor());
+    scratch.intervals.fill(&scratch.sections, *delta2, own.floor(), own.to);
     let field = &problem.chance[if own.is_ray() { own.group as usize } else { 0 }];
     let chance = |t: f32| field.at(&own.at(t), problem.tube, problem.ln_tube);
     let Some(peak) = best_start(&scratch.intervals, may_vote, improbability, chance) else {
@@ -97,7 +97,7 @@ fn solve_slot<const D: usize>(
     };
     let (t, support) = refit(&scratch.sections, peak.t, *delta2);
     Estimate {
-        position: own.at(t.max(own.floor())),
+        position: own.at(own.clamp(t)),
         status: Status::Ok,
         support: stored_support(support),
         axis: 0,

@@ -1,6 +1,7 @@
 //! Exact consensus: on each slot's own record, the position whose agreement with the listed records
 //! is least probable by chance. One file per record family.
 
+mod anchors;
 mod candidates;
 mod lines;
 mod planes;
@@ -19,6 +20,7 @@ pub(crate) fn solve<const D: usize>(
     chunks: Chunks<'_>,
 ) -> Vec<Estimate<D>> {
     match family {
+        Family::Lines { rows, .. } if family.has_regions() => anchors::solve(rows, lists, chunks),
         Family::Lines { rows, slots_per_record, chance } => {
             lines::solve(rows, *slots_per_record, chance, lists, delta, chunks)
         }

@@ -21,6 +21,8 @@ const SETTLED: f32 = 1e-3;
 const NOTHING: f32 = 1e-3;
 /// Pairs at least this probable are taken.
 const LEAST: f32 = 0.2;
+/// The same in an image, where a wrong partner is near all the same.
+const LEAST_IN_IMAGE: f32 = 0.1;
 
 /// A record on the axis it is believed to have exchanged.
 #[derive(Clone, Copy, Debug)]
@@ -127,11 +129,12 @@ pub(super) fn pairs<const D: usize>(
         tallies.iter().for_each(|part| tally.merge(part));
         law = law.learned(&tally);
     }
+    let least = if D == 2 { LEAST_IN_IMAGE } else { LEAST };
     let best = |i: usize| {
         let mut best: Option<(f32, u32)> = None;
         for e in partners.entries(i) {
             let p = messages.probability(&partners, &weight, e);
-            if p >= LEAST && best.is_none_or(|(most, _)| p > most) {
+            if p >= least && best.is_none_or(|(most, _)| p > most) {
                 best = Some((p, partners.of[e]));
             }
         }

@@ -42,6 +42,8 @@ pub(crate) fn solve<const D: usize>(
     seed: u64,
 ) -> Vec<Estimate<D>> {
     match family {
+        // Where bearings say hardly more than chance does, estimates would drift to their anchors.
+        _ if family.has_regions() && mean_evidence(&start) < LEAST_EVIDENCE => start,
         Family::Lines { rows, slots_per_record, chance } => rounds(
             &LinePieces::new(rows, *slots_per_record, chance, delta),
             graph,
@@ -58,11 +60,16 @@ pub(crate) fn solve<const D: usize>(
     }
 }
 
+/// Rays from anchors are left where they are if their evidence is less than this in the mean, in nats.
+const LEAST_EVIDENCE: f64 = 1.0;
+
+fn mean_evidence<const D: usize>(estimates: &[Estimate<D>]) -> f64 {
+    let sum: f64 = estimates.iter().map(|e| f64::from(e.evidence)).sum();
+    sum / estimates.len().max(1) as f64
+}
+
 /// Rounds at most.
 const ROUNDS: usize = 16;
-/// The radius of the law is at most this many deltas: where most estimates are wrong, those that are
-/// near by accident would widen it without end.
-const MOST_RADIUS: f32 = 0.95;
 /// True neighbors are looked for within this many radii of the law.
 const REACH: f32 = 4.0;
 /// Estimates enter the re-made position within this many radii of the law.
@@ -89,7 +96,7 @@ fn rounds<const D: usize, P: Pieces<D>>(
     let n = start.len();
     let slots_per_record = pieces.slots_per_record();
     let listed = graph.times_listed(n / slots_per_record, slots_per_record);
-    let (most_radius, delta2) = (MOST_RADIUS * delta, delta * delta);
+    let (most_radius, delta2) = (P::MOST_RADIUS * delta, delta * delta);
     let mut now = start;
     let mut places = Places::new(&now);
     let order = along_curve(&places);

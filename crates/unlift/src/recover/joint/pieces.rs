@@ -12,15 +12,18 @@ pub(crate) struct Piece<const D: usize> {
     pub(crate) through: [f32; D],
     /// The projector onto its directions.
     pub(crate) along: [[f32; D]; D],
-    /// The sense of a half-line; zero for others.
+    /// The sense of a half-line or a chord; zero for others.
     pub(crate) sense: [f32; D],
+    /// How far it reaches in that sense.
+    pub(crate) to: f32,
 }
 
 impl<const D: usize> Piece<D> {
-    fn line(through: [f32; D], direction: [f32; D], is_ray: bool) -> Self {
+    /// A line, or what is left of it beyond `through`, up to `to`.
+    fn line(through: [f32; D], direction: [f32; D], begins: bool, to: f32) -> Self {
         let along = std::array::from_fn(|r| std::array::from_fn(|c| direction[r] * direction[c]));
-        let sense = if is_ray { direction } else { [0.0; D] };
-        Self { through, along, sense }
+        let sense = if begins { direction } else { [0.0; D] };
+        Self { through, along, sense, to }
     }
 
     /// The place of the piece nearest to `x`.
@@ -29,6 +32,7 @@ impl<const D: usize> Piece<D> {
         let away: [f32; D] = std::array::from_fn(|c| x[c] - self.through[c]);
         let ahead: f32 = away.iter().zip(&self.sense).map(|(a, s)| s * a).sum();
         let keep = if ahead < 0.0 { 0.0 } else { 1.0 };
+        let keep = if ahead > self.to { self.to / ahead } else { keep };
         std::array::from_fn(|r| {
             let moved: f32 = away.iter().zip(&self.along[r]).map(|(a, along)| along * a).sum();
             self.through[r] + keep * moved
@@ -44,6 +48,9 @@ pub(crate) trait Pieces<const D: usize>: Sync {
     const MOST_ALONG: f32;
     /// How fast that falls with the number of votes.
     const ALONG: f32;
+    /// The radius of the law is at most this many deltas: where most estimates are wrong, those that are
+    /// near by accident would widen it without end.
+    const MOST_RADIUS: f32 = 0.95;
 
     /// Slots per record.
     fn slots_per_record(&self) -> usize {
@@ -95,7 +102,7 @@ impl<const D: usize> Pieces<D> for LinePieces<'_, D> {
     #[inline(always)]
     fn piece(&self, slot: usize, _: usize) -> Piece<D> {
         let own = self.own(slot);
-        Piece::line(own.through, own.direction, own.is_ray())
+        Piece::line(own.through, own.direction, own.floor() == 0.0, own.to)
     }
 
     #[inline(always)]
@@ -108,7 +115,7 @@ impl<const D: usize> Pieces<D> for LinePieces<'_, D> {
         let row = &self.rows[record];
         let away: [f32; D] = std::array::from_fn(|c| x[c] - row.through[c]);
         let t: f32 = away.iter().zip(&row.direction).map(|(a, d)| a * d).sum();
-        let t = t.max(row.floor());
+        let t = row.clamp(t);
         away.iter().zip(&row.direction).map(|(a, d)| (a - t * d) * (a - t * d)).sum()
     }
 
@@ -147,6 +154,7 @@ impl<const D: usize> Pieces<D> for PlanePieces<'_, D> {
             through: std::array::from_fn(at),
             along: std::array::from_fn(|r| std::array::from_fn(|c| along(r, c))),
             sense: [0.0; D],
+            to: f32::INFINITY,
         }
     }
 
@@ -183,13 +191,15 @@ impl<'a, const D: usize> CandidatePieces<'a, D> {
 
 impl<const D: usize> Pieces<D> for CandidatePieces<'_, D> {
     const PER_SLOT: usize = D;
+    // In an image records agree by chance at a delta as wide as neighbors are apart: it is narrower.
+    const MOST_RADIUS: f32 = if D == 2 { 3.0 } else { 0.95 };
     const MOST_ALONG: f32 = 0.25;
     const ALONG: f32 = 2.0;
 
     #[inline(always)]
     fn piece(&self, slot: usize, piece: usize) -> Piece<D> {
         let direction = std::array::from_fn(|c| if c == piece { 1.0 } else { 0.0 });
-        Piece::line(self.rows[slot], direction, false)
+        Piece::line(self.rows[slot], direction, false, f32::INFINITY)
     }
 
     #[inline(always)]

@@ -109,7 +109,7 @@ impl<const D: usize> Kernel for Trial<'_, D> {
                 self.scratch.lines.sections(own, &mut self.scratch.sections);
                 let may_vote = listed.iter().filter(|r| rows[r.index()].may_vote_for(own)).count();
                 let (found, trials) = self.on_line(may_vote);
-                (found.at(|t| own.at(t.max(own.floor())), 0), trials)
+                (found.at(|t| own.at(own.clamp(t)), 0), trials)
             }
             Family::Candidates { rows, .. } => {
                 let axis = self.axes[self.slot];

@@ -223,7 +223,7 @@ fn instruction_sets_change_no_bit() {
     let points = points(N + 3, &mut draws);
     let directions: Vec<[f64; 3]> = points.iter().map(|_| draws.direction()).collect();
     let rows =
-        crate::recover::line_rows::from_lines(&Lines::through(&points, &directions).unwrap());
+        crate::recover::line_rows::from_lines(&Lines::through(&points, &directions).unwrap(), None);
     for own in 0..50 {
         let portable = crate::simd::portable(SectionBits { rows: &rows, own });
         assert!(portable == crate::simd::dispatch(SectionBits { rows: &rows, own }));

@@ -1,0 +1,283 @@
+//! The pipeline on one map or image, chained in memory: every row of one scheme and one repeat.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use super::clock::Clock;
+use super::lists::Lists;
+use super::plan::{Plan, Source, Variant};
+use super::row::Row;
+use super::run::{Observer, RowSeconds};
+use crate::evaluate::{
+    Accuracy, blind, distinct_weights, evaluate, in_better_order, reference, reliability,
+};
+use crate::geometry::knn::Knn;
+use crate::neighbors::oracle::Noise;
+use crate::obfuscate::{Entry, obfuscate};
+use crate::recover::{RecoverOptions, Recovered, Solver, recover};
+use crate::released::Released;
+use crate::truth::{DropReason, Original, Secret};
+use crate::{Descriptors, Error, Unit};
+
+/// Everything known about one row of one repeat, for whoever writes clouds or draws pictures.
+pub struct Cell<'a, const D: usize = 3> {
+    /// The row of this repeat.
+    pub row: &'a Row,
+    /// Which repeat, from 0.
+    pub repeat: u32,
+    /// The truth.
+    pub original: &'a Original<D>,
+    /// The secret of this obfuscation.
+    pub secret: &'a Secret,
+    /// What the attacker saw.
+    pub released: &'a Released<D>,
+    /// What the attacker got.
+    pub recovered: &'a Recovered<D>,
+    /// Error per slot.
+    pub accuracy: &'a Accuracy,
+}
+
+/// A map or an image as its owner holds it.
+#[derive(Clone, Copy)]
+pub(super) struct Owned<'a, const D: usize> {
+    pub(super) original: &'a Original<D>,
+    /// One row per original.
+    pub(super) descriptors: Option<&'a Descriptors>,
+    /// A search over the originals.
+    pub(super) search: &'a Knn<'a, D>,
+    /// Whether it is one of many, of which some may have too few points to be attacked: their points
+    /// count as lost.
+    pub(super) one_of_many: bool,
+}
+
+/// Which rows are wanted, and how chance falls.
+#[derive(Clone, Copy)]
+pub(super) struct Run<'a> {
+    pub(super) plan: &'a Plan,
+    pub(super) entry: &'static Entry,
+    pub(super) repeat: u32,
+    /// The owner's seed.
+    pub(super) seed: u64,
+}
+
+/// One finished row, with what a pool of many needs.
+pub(super) struct Finished<'a> {
+    pub(super) row: Row,
+    pub(super) accuracy: &'a Accuracy,
+    pub(super) baseline: &'a Accuracy,
+    /// Per slot the weight that makes distinct places count once.
+    pub(super) weights: &'a [f64],
+    /// Entries of all lists.
+    pub(super) n_listed: usize,
+    pub(super) seconds: RowSeconds,
+}
+
+/// Rows per scheme and repeat.
+pub(super) fn per_scheme(plan: &Plan) -> usize {
+    plan.variants().len() * plan.solvers.len() + usize::from(plan.reference)
+}
+
+/// Runs every cell of one scheme and repeat; `progress` hears what comes next, `each` gets every row.
+///
+/// # Errors
+/// When the scheme cannot hide the points, or a source cannot make lists for them.
+pub(super) fn cells<const D: usize>(
+    owned: &Owned<'_, D>,
+    run: &Run<'_>,
+    clock: &mut Clock,
+    observer: &mut dyn Observer<D>,
+    mut each: impl FnMut(&mut dyn Observer<D>, Option<String>, Option<Finished<'_>>),
+) -> Result<(), Error> {
+    let Run { plan, entry, repeat, seed } = *run;
+    let original = owned.original;
+    // The attacker's own seed: that of the obfuscation is the owner's secret.
+    let attacker = u64::from(repeat);
+    let of_scheme = |error: Error| error.within(entry.name);
+    let hidden = hide(entry, original, owned.descriptors, plan, seed, clock).map_err(of_scheme)?;
+    let baseline = clock.time(|s| &mut s.evaluate, || Ok(blind(&hidden.0, original, &hidden.1)))?;
+    let by_row = hidden.1.by_descriptor_row();
+    let mut sources = Lists::new(plan, owned.search, &hidden, &by_row, (seed, attacker));
+    for variant in &plan.variants() {
+        let source = match variant.noise {
+            Some(noise) => noise.name().to_owned(),
+            None => variant.source.name(),
+        };
+        let what = format!("{}, neighbors by {}", entry.name, variant.source.name());
+        each(observer, Some(what), None);
+        let started = Instant::now();
+        let make = || match owned.one_of_many {
+            true => sources.make_if_enough(variant),
+            false => sources.make(variant),
+        };
+        let made = clock.time(|s| &mut s.neighbors, make).map_err(of_scheme)?;
+        let making = started.elapsed().as_secs_f64();
+        let secret = match variant.source {
+            Source::Own(_) => &by_row,
+            Source::Oracle | Source::Given(_) => &hidden.1,
+        };
+        // Lists from the records alone follow the order along a paired line: no descriptor
+        // tells its two slots apart.
+        let in_some_order = hidden.0.slots_per_record() == 2
+            && matches!(&variant.source, Source::Own(from) if !from.needs_descriptors());
+        for (at, &solver) in plan.solvers.iter().enumerate() {
+            let what = format!("{} at {:.2} {source}, {}", entry.name, made.ratio, solver.name());
+            each(observer, Some(what), None);
+            let options = RecoverOptions {
+                solver,
+                delta: plan.delta,
+                seed: attacker,
+                exact_constraints: plan.exact_constraints,
+                ..RecoverOptions::default()
+            };
+            let started = Instant::now();
+            let recovered = recover(&hidden.0, &made.lists, &options)?;
+            let took = started.elapsed().as_secs_f64();
+            // Lists are made once for all solvers: the first one's row has the time.
+            let making = if at == 0 { making } else { 0.0 };
+            clock.seconds.recover += took;
+            let ordered = in_some_order.then(|| in_better_order(&recovered, original, secret));
+            let secret = ordered.as_ref().unwrap_or(secret);
+            let accuracy =
+                clock.time(|s| &mut s.evaluate, || evaluate(&recovered, original, secret))?;
+            let mut row = blank(entry, variant, (made.k, solver), &recovered, secret);
+            row.inlier_ratio = made.ratio;
+            row.fill(&accuracy, &baseline, &plan.thresholds);
+            let weights = places(owned, secret);
+            if owned.one_of_many {
+                row.fill_distinct(&accuracy, &baseline, &weights, &plan.thresholds);
+            }
+            row.reliability = reliability(&recovered, &accuracy, Row::smallest(&plan.thresholds));
+            observer.cell(&Cell {
+                row: &row,
+                repeat,
+                original,
+                secret,
+                released: &hidden.0,
+                recovered: &recovered,
+                accuracy: &accuracy,
+            });
+            let finished = Finished {
+                row,
+                accuracy: &accuracy,
+                baseline: &baseline,
+                weights: &weights,
+                n_listed: made.lists.records().len(),
+                seconds: RowSeconds { neighbors: making, recover: took },
+            };
+            each(observer, None, Some(finished));
+        }
+    }
+    if plan.reference {
+        let (row, accuracy) = reference_row(entry, &hidden, owned, &baseline, plan);
+        let weights = places(owned, &hidden.1);
+        let seconds = RowSeconds::default();
+        let (accuracy, baseline, weights) = (&accuracy, &baseline, &weights[..]);
+        each(
+            observer,
+            None,
+            Some(Finished { row, accuracy, baseline, weights, n_listed: 0, seconds }),
+        );
+    }
+    Ok(())
+}
+
+/// What makes distinct places count once; asked of images alone.
+fn places<const D: usize>(owned: &Owned<'_, D>, secret: &Secret) -> Vec<f64> {
+    if owned.one_of_many { distinct_weights(owned.original, secret) } else { Vec::new() }
+}
+
+fn hide<const D: usize>(
+    entry: &Entry,
+    original: &Original<D>,
+    descriptors: Option<&Descriptors>,
+    plan: &Plan,
+    seed: u64,
+    clock: &mut Clock,
+) -> Result<(Released<D>, Secret), Error> {
+    let scheme = entry
+        .of_dimension::<D>()
+        .ok_or_else(|| Error::new("scheme", format!("one for {D}D points"), entry.name))?;
+    clock.time(
+        |s| &mut s.obfuscate,
+        || obfuscate(scheme, original, descriptors, &plan.scheme_options, seed),
+    )
+}
+
+/// The row of an attacker who is told where three true neighbors of every point are.
+fn reference_row<const D: usize>(
+    entry: &Entry,
+    (released, secret): &(Released<D>, Secret),
+    owned: &Owned<'_, D>,
+    baseline: &Accuracy,
+    plan: &Plan,
+) -> (Row, Accuracy) {
+    let mut row = unmeasured(entry, REFERENCE.to_owned(), (3, REFERENCE), released.unit(), secret);
+    row.inlier_ratio = 1.0;
+    let accuracy = reference(released, owned.original, secret, owned.search);
+    row.fill(&accuracy, baseline, &plan.thresholds);
+    if owned.one_of_many {
+        row.fill_distinct(&accuracy, baseline, &places(owned, secret), &plan.thresholds);
+    }
+    (row, accuracy)
+}
+
+/// The name of that attacker: as a source and as a solver, though it is neither.
+pub const REFERENCE: &str = "reference";
+
+/// A row of which only the cell is known.
+fn unmeasured(
+    entry: &Entry,
+    neighbors: String,
+    (k, solver): (usize, &'static str),
+    unit: Unit,
+    secret: &Secret,
+) -> Row {
+    let mut dropped = BTreeMap::new();
+    for reason in DropReason::ALL {
+        let n = secret.dropped().iter().filter(|d| d.reason == reason).count();
+        if n > 0 {
+            dropped.insert(reason.name(), n);
+        }
+    }
+    Row {
+        scheme: entry.name,
+        neighbors,
+        oracle_noise: None,
+        inlier_ratio: 0.0,
+        k,
+        solver,
+        delta: 0.0,
+        unit,
+        n_points: secret.n_slots(),
+        lost: BTreeMap::new(),
+        dropped,
+        recovered_percent: Vec::new(),
+        blind_percent: Vec::new(),
+        axis_accuracy_percent: None,
+        exact_percent: None,
+        assignment_accuracy_percent: None,
+        error_percentiles: Vec::new(),
+        reliability: None,
+        ransac_trials: None,
+        repeats: None,
+        distinct: None,
+    }
+}
+
+/// A row with everything but the measurements.
+fn blank<const D: usize>(
+    entry: &Entry,
+    variant: &Variant<'_>,
+    (k, solver): (usize, Solver),
+    recovered: &Recovered<D>,
+    secret: &Secret,
+) -> Row {
+    let cell = (k, solver.name());
+    let row = unmeasured(entry, variant.source.name(), cell, recovered.unit(), secret);
+    Row {
+        oracle_noise: variant.noise.map(Noise::name),
+        delta: recovered.delta(),
+        ransac_trials: recovered.trials().map(|trials| trials.bins().collect()),
+        ..row
+    }
+}

@@ -1,0 +1,146 @@
+//! One row over the keypoints of many images: sums, and a histogram of errors of bounded size.
+
+use std::collections::BTreeMap;
+
+use super::cells::Finished;
+use super::plan::Threshold;
+use super::row::{Distinct, PERCENTILES, Row};
+
+/// Bits of the mantissa of an `f32` that are left out of an error's bin: bins are 0.05 % wide.
+const DROPPED_BITS: u32 = 12;
+
+/// Sums over images; no share is rounded before the end.
+#[derive(Debug)]
+pub(super) struct Pool {
+    /// The first image's row, which names the cell.
+    cell: Row,
+    n_points: usize,
+    within: Vec<usize>,
+    blind_within: Vec<usize>,
+    exact: usize,
+    /// Slots whose axis was named.
+    axis: Option<f64>,
+    n_places: f64,
+    places_within: Vec<f64>,
+    blind_places_within: Vec<f64>,
+    /// Deltas times slots.
+    delta: f64,
+    /// True entries of lists, and all.
+    hits: f64,
+    n_listed: usize,
+    lost: BTreeMap<&'static str, usize>,
+    dropped: BTreeMap<&'static str, usize>,
+    trials: Option<BTreeMap<u32, u64>>,
+    /// Finite errors, by their leading bits.
+    errors: BTreeMap<u32, usize>,
+}
+
+impl Pool {
+    /// A pool for rows like `row`.
+    pub(super) fn new(row: &Row, thresholds: &[Threshold]) -> Self {
+        let n = thresholds.len();
+        Self {
+            cell: row.clone(),
+            n_points: 0,
+            within: vec![0; n],
+            blind_within: vec![0; n],
+            exact: 0,
+            axis: row.axis_accuracy_percent.map(|_| 0.0),
+            n_places: 0.0,
+            places_within: vec![0.0; n],
+            blind_places_within: vec![0.0; n],
+            delta: 0.0,
+            hits: 0.0,
+            n_listed: 0,
+            lost: BTreeMap::new(),
+            dropped: BTreeMap::new(),
+            trials: row.ransac_trials.as_ref().map(|_| BTreeMap::new()),
+            errors: BTreeMap::new(),
+        }
+    }
+
+    /// Adds the row of one image.
+    pub(super) fn add(&mut self, finished: &Finished<'_>, thresholds: &[Threshold]) {
+        let Finished { row, accuracy, baseline, weights, n_listed, .. } = finished;
+        let n = accuracy.n_points();
+        self.n_points += n;
+        for (at, threshold) in thresholds.iter().enumerate() {
+            self.within[at] += accuracy.n_within(threshold.value);
+            self.blind_within[at] += baseline.n_within(threshold.value);
+            self.places_within[at] += accuracy.weight_within(threshold.value, weights);
+            self.blind_places_within[at] += baseline.weight_within(threshold.value, weights);
+        }
+        self.exact += accuracy.n_within(Row::exact_within(row.unit, thresholds));
+        if let Some(percent) = row.axis_accuracy_percent {
+            *self.axis.get_or_insert(0.0) += percent * n as f64;
+        }
+        self.n_places += weights.iter().sum::<f64>();
+        self.delta += row.delta * n as f64;
+        self.hits += row.inlier_ratio * *n_listed as f64;
+        self.n_listed += n_listed;
+        for (&reason, count) in &row.lost {
+            *self.lost.entry(reason).or_insert(0) += count;
+        }
+        for (&reason, count) in &row.dropped {
+            *self.dropped.entry(reason).or_insert(0) += count;
+        }
+        for &(up_to, slots) in row.ransac_trials.iter().flatten() {
+            let trials = self.trials.get_or_insert_with(BTreeMap::new);
+            *trials.entry(up_to).or_insert(0) += slots;
+        }
+        for &error in accuracy.errors().iter().filter(|error| error.is_finite()) {
+            *self.errors.entry((error as f32).to_bits() >> DROPPED_BITS).or_insert(0) += 1;
+        }
+    }
+
+    /// The row over everything added.
+    pub(super) fn row(&self, thresholds: &[Threshold]) -> Row {
+        let n = self.n_points.max(1) as f64;
+        let percent = |counts: &[usize]| counts.iter().map(|&c| 100.0 * c as f64 / n).collect();
+        let places = self.n_places.max(f64::MIN_POSITIVE);
+        let of_places = |sums: &[f64]| sums.iter().map(|sum| 100.0 * sum / places).collect();
+        debug_assert_eq!(self.within.len(), thresholds.len());
+        Row {
+            // A requested ratio is a name; a measured one is that of all entries.
+            inlier_ratio: match self.cell.oracle_noise {
+                None if self.n_listed > 0 => self.hits / self.n_listed as f64,
+                _ => self.cell.inlier_ratio,
+            },
+            delta: self.delta / n,
+            n_points: self.n_points,
+            lost: self.lost.clone(),
+            dropped: self.dropped.clone(),
+            recovered_percent: percent(&self.within),
+            blind_percent: percent(&self.blind_within),
+            axis_accuracy_percent: self.axis.map(|sum| sum / n),
+            exact_percent: self.axis.map(|_| 100.0 * self.exact as f64 / n),
+            error_percentiles: PERCENTILES.map(|p| self.percentile(p)).to_vec(),
+            ransac_trials: self
+                .trials
+                .as_ref()
+                .map(|trials| trials.iter().map(|(&up_to, &slots)| (up_to, slots)).collect()),
+            distinct: Some(Distinct {
+                n_places: self.n_places.round() as usize,
+                recovered_percent: of_places(&self.places_within),
+                blind_percent: of_places(&self.blind_places_within),
+            }),
+            ..self.cell.clone()
+        }
+    }
+
+    /// The error that `percent` of the keypoints do not exceed, to the width of a bin; `None` when that
+    /// many were not recovered.
+    fn percentile(&self, percent: f64) -> Option<f64> {
+        let rank = ((percent / 100.0 * self.n_points as f64).ceil() as usize).max(1);
+        let mut below = 0;
+        for (&bin, &count) in &self.errors {
+            below += count;
+            if below >= rank {
+                // The middle of the bin; errors of 0 are exact.
+                let half = if bin == 0 { 0 } else { 1 << (DROPPED_BITS - 1) };
+                return Some(f64::from(f32::from_bits(bin << DROPPED_BITS | half)));
+            }
+        }
+        None
+    }
+}

@@ -1,0 +1,55 @@
+//! `dcl2d`: lines through one of two anchors, by the half of the image a keypoint lies in.
+//!
+//! The authors have published no code. What follows is the rule as described, with these assumptions:
+//!
+//! - the split is vertical, at half of the width; the anchors are the two ends of the split: the left
+//!   half belongs to the upper one, the right half to the lower one (their distance, the height of the
+//!   image, is the one recommended);
+//! - a keypoint on the split belongs to the right half;
+//! - a keypoint on its anchor has no line and is dropped;
+//! - which anchor a line belongs to, and so in which half its keypoint lies, can be seen from the line:
+//!   it is released as a ray from the anchor.
+
+use super::ray::rays_from;
+use super::{Entry, Lifted, Scheme, SchemeOptions};
+use crate::Error;
+use crate::geometry::frame::Bounds;
+use crate::released::Obfuscation;
+
+/// Dual convergent lines.
+#[derive(Clone, Copy, Debug)]
+pub struct Dcl2d;
+
+/// The registry row.
+pub const ENTRY: Entry = Entry {
+    name: "dcl2d",
+    summary: "a line from every keypoint to the anchor of its half of the image",
+    source: "Kim et al., Dual Convergent Lines, CVPR 2026",
+    hidden: "the range from the anchor (1 of 2 coordinates)",
+    patents: "none found",
+    in_2d: Some(&Dcl2d),
+    in_3d: None,
+};
+
+impl Scheme<2> for Dcl2d {
+    fn lift(
+        &self,
+        points: &[[f64; 2]],
+        bounds: Option<&Bounds<2>>,
+        _: &SchemeOptions,
+        _: u64,
+    ) -> Result<Lifted<2>, Error> {
+        let Some(image) = bounds else {
+            return Err(Error::new("image size", "known, as anchors lie on its border", "none"));
+        };
+        let split = image.center()[0];
+        let anchors = [[split, image.low[1]], [split, image.high[1]]];
+        let mut lifted = rays_from(&anchors, points, |_, point| usize::from(point[0] >= split))?;
+        if let Obfuscation::Rays(rays) = lifted.obfuscation {
+            let left = Bounds { low: image.low, high: [split, image.high[1]] };
+            let right = Bounds { low: [split, image.low[1]], high: image.high };
+            lifted.obfuscation = Obfuscation::Rays(rays.with_regions(vec![left, right])?);
+        }
+        Ok(lifted)
+    }
+}

@@ -1,0 +1,195 @@
+//! Audits of images: pooled rows, twins, images with hardly any keypoints.
+
+use unlift::audit::images::{self, Image, Outcome};
+use unlift::audit::{Observer, Plan, Row, Silent, Source};
+use unlift::descriptors::Values;
+use unlift::geometry::frame::Bounds;
+use unlift::neighbors::sources::Joined;
+use unlift::obfuscate::scheme;
+use unlift::recover::Solver;
+use unlift::seed::{Draws, Stage};
+use unlift::truth::Original;
+use unlift::{Descriptors, Error, PointSet, Unit};
+
+const SIZE: [f64; 2] = [320.0, 240.0];
+
+fn image_of(name: &str, points: Vec<[f64; 2]>) -> Image {
+    let bounds = Bounds::try_new([0.0; 2], SIZE).unwrap();
+    let mut draws = Draws::new(points.len() as u64, Stage::Synthetic, 1);
+    let values: Vec<u8> = (0..128 * points.len()).map(|_| draws.below(200) as u8).collect();
+    let descriptors = Descriptors::try_new(Values::U8(values), 128).unwrap();
+    let points = PointSet::try_new(points, Unit::Pixel).unwrap();
+    let original = Original::within(points, bounds).unwrap();
+    Image { name: name.to_owned(), original, descriptors: Some(descriptors) }
+}
+
+/// Keypoints in clusters; of `twins` percent there is a second one at the same place.
+fn keypoints(seed: u64, n: usize, twins: u64) -> Vec<[f64; 2]> {
+    let mut draws = Draws::new(seed, Stage::Synthetic, 0);
+    let mut points: Vec<[f64; 2]> = Vec::new();
+    while points.len() < n {
+        let center: [f64; 2] = std::array::from_fn(|c| draws.between(0.1, 0.9) * SIZE[c]);
+        for _ in 0..12 {
+            let at = |c: usize, x: f64| (center[c] + 12.0 * x).clamp(0.0, SIZE[c]);
+            let point = [at(0, draws.normal()), at(1, draws.normal())];
+            points.push(point);
+            if draws.below(100) < twins {
+                points.push(point);
+            }
+        }
+    }
+    points.truncate(n);
+    points
+}
+
+fn plan() -> Plan {
+    let mut plan = Plan::new(Unit::Pixel);
+    plan.inlier_ratios = vec![1.0, 0.5];
+    plan
+}
+
+fn run(images: &[Image], plan: &Plan) -> Outcome {
+    let images = images.iter().cloned().map(Ok::<_, Error>);
+    images::run(images, plan, &mut Silent).unwrap()
+}
+
+#[test]
+fn the_default_plan_takes_all_2d_schemes() {
+    let names: Vec<&str> = Plan::new(Unit::Pixel).schemes.iter().map(|s| s.name).collect();
+    assert_eq!(names, ["lines2d", "cp2d", "dcl2d"]);
+    let in_3d = Plan::new(Unit::Meter).schemes;
+    assert!(in_3d.iter().all(|s| s.in_3d.is_some()) && in_3d.len() == 7);
+}
+
+#[test]
+fn keypoints_come_back() {
+    let outcome = run(&[image_of("a", keypoints(1, 900, 20))], &plan());
+    let row = |name: &str| outcome.rows.iter().find(|row| row.scheme == name).unwrap();
+    for name in ["lines2d", "cp2d"] {
+        let row = row(name);
+        assert!(row.recovered_percent[3] > 85.0, "{name}: {:?}", row.recovered_percent);
+        assert!(row.blind_percent[3] < 30.0, "{name}: {:?}", row.blind_percent);
+        assert!(row.reliability.is_none());
+    }
+    assert!(row("cp2d").exact_percent.unwrap() > 20.0);
+    assert!(row("lines2d").exact_percent.is_none());
+}
+
+/// The pooled row of one image is its own row; that of two lies between theirs.
+#[test]
+fn rows_are_pooled_over_keypoints() {
+    #[derive(Default)]
+    struct Each(Vec<Vec<Row>>);
+    impl Observer<2> for Each {
+        fn image(&mut self, _: &str, rows: &[Row]) {
+            self.0.push(rows.to_vec());
+        }
+    }
+    let mut plan = plan();
+    plan.repeats = 2;
+    let images = [image_of("a", keypoints(1, 300, 20)), image_of("b", keypoints(2, 150, 0))];
+    let mut each = Each::default();
+    let all = images.iter().cloned().map(Ok::<_, Error>);
+    let pooled = images::run(all, &plan, &mut each).unwrap().rows;
+    for (at, row) in pooled.iter().enumerate() {
+        let [a, b] = [0, 1].map(|image: usize| &each.0[image][at]);
+        assert_eq!(row.n_points, a.n_points + b.n_points);
+        let (n, m) = (a.n_points as f64, b.n_points as f64);
+        for c in 0..4 {
+            let of = |r: &Row| r.recovered_percent[c];
+            let mean = (n * of(a) + m * of(b)) / (n + m);
+            assert!((of(row) - mean).abs() < 1e-9, "{}: {} {mean}", row.scheme, of(row));
+        }
+        let places = |r: &Row| r.distinct.as_ref().unwrap().n_places;
+        assert_eq!(places(row), places(a) + places(b));
+        assert!(places(b) == b.n_points && places(a) < a.n_points);
+        let median = |r: &Row| r.error_percentiles[0].unwrap();
+        let (low, high) = (median(a).min(median(b)), median(a).max(median(b)));
+        let slack = 1.0 + 1e-3;
+        assert!(median(row) >= low / slack && median(row) <= high * slack, "{}", row.scheme);
+    }
+    // Neither the order of images nor threads matter, nor do the other images.
+    let turned = run(&[images[1].clone(), images[0].clone()], &plan).rows;
+    let shares = |rows: &[Row]| -> Vec<Vec<f64>> {
+        rows.iter().map(|row| row.recovered_percent.clone()).collect()
+    };
+    assert_eq!(shares(&pooled), shares(&turned));
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| run(&images, &plan).rows)
+    };
+    assert_eq!(on(1), on(3));
+}
+
+/// Images without, with one, two or few keypoints, all at one place or on one line: every keypoint is
+/// counted, as lost where need be.
+#[test]
+fn images_with_hardly_any_keypoints_are_counted() {
+    let line = |n: usize| (0..n).map(|i| [10.0 + 3.0 * i as f64, 50.0]).collect();
+    let images = [
+        image_of("none", Vec::new()),
+        image_of("one", vec![[5.0, 6.0]]),
+        image_of("two", vec![[5.0, 6.0], [7.0, 6.0]]),
+        image_of("twenty", keypoints(3, 20, 0)),
+        image_of("a few more", keypoints(4, 23, 30)),
+        image_of("one place", vec![[33.0, 44.0]; 50]),
+        image_of("upright", (0..60).map(|i| [160.0, 2.0 + 3.0 * f64::from(i)]).collect()),
+        image_of("one line", line(60)),
+        image_of("enough", keypoints(5, 200, 20)),
+    ];
+    let mut plan = plan();
+    plan.inlier_ratios = vec![1.0, 0.1];
+    plan.solvers = Solver::FROM_LISTS.to_vec();
+    plan.sources.push(Source::Own(Joined::parse("similarity").unwrap().for_images()));
+    plan.sources.push(Source::Own(Joined::parse("overlap").unwrap().for_images()));
+    let outcome = run(&images, &plan);
+    assert_eq!((outcome.n_images, outcome.n_too_small), (9, 4));
+    let n: usize = images.iter().map(|image| image.original.len()).sum();
+    assert_eq!(outcome.rows.len(), 3 * 4 * 3);
+    for row in &outcome.rows {
+        let what = format!("{} by {} with {}", row.scheme, row.neighbors, row.solver);
+        assert_eq!(row.n_points + row.dropped.values().sum::<usize>(), n, "{what}");
+        assert!(row.n_lost() >= 22, "{what}: {:?}", row.lost);
+        assert!(row.recovered_percent.iter().all(|p| (0.0..=100.0).contains(p)), "{what}");
+        assert!(row.delta.is_finite(), "{what}");
+    }
+    for image in &images {
+        run(std::slice::from_ref(image), &plan);
+    }
+}
+
+/// Twins agree exactly; that must not make delta shrink to nothing.
+#[test]
+fn twins_do_not_shrink_delta() {
+    for (name, twins) in [("lines2d", 0), ("lines2d", 35), ("cp2d", 0), ("cp2d", 35)] {
+        let mut plan = plan();
+        plan.schemes = vec![scheme(name).unwrap()];
+        let row = &run(&[image_of("twins", keypoints(6, 900, twins))], &plan).rows[1];
+        assert!((1.0..40.0).contains(&row.delta), "{name}, {twins} %: {}", row.delta);
+        assert!(row.recovered_percent[3] > 75.0, "{name}, {twins} %: {:?}", row.recovered_percent);
+    }
+}
+
+#[test]
+fn what_is_not_for_images_is_refused() {
+    let message = |plan: &Plan| {
+        let images = [image_of("a", keypoints(1, 100, 0))];
+        let images = images.into_iter().map(Ok::<_, Error>);
+        images::run(images, plan, &mut Silent).unwrap_err().to_string()
+    };
+    let mut of_maps = plan();
+    of_maps.schemes = vec![scheme("olc").unwrap()];
+    assert_eq!(message(&of_maps), "scheme: expected one for 2D points, found olc");
+    let mut alone = plan();
+    alone.solvers = vec![Solver::Density];
+    assert_eq!(message(&alone), "solver: expected one that recovers from lists, found density");
+    let mut geometric = plan();
+    geometric.sources = vec![Source::Own(Joined::parse("geometric").unwrap())];
+    assert_eq!(message(&geometric), "neighbors: expected a source for images, found geometric");
+    let outside = PointSet::try_new(vec![[1.0, 2.0], [400.0, 2.0]], Unit::Pixel).unwrap();
+    let error = Original::within(outside, Bounds::try_new([0.0; 2], SIZE).unwrap()).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "point 1: expected between [0.0, 0.0] and [320.0, 240.0], found [400.0, 2.0]"
+    );
+}
