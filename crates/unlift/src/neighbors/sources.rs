@@ -66,7 +66,7 @@ pub const SOURCES: &[SourceEntry] = &[
         name: "overlap",
         summary: "records whose SIFT patches overlap, and a short walk from these; no training",
         needs_descriptors: true,
-        usual_k: 40,
+        usual_k: 30,
         usual_k_2d: 10,
         only_ranks: false,
         not_for: &[],

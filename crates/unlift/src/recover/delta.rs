@@ -25,6 +25,18 @@ const TOO_WIDE: f32 = 0.04;
 const TOO_WIDE_IN_IMAGE: f32 = 0.12;
 /// Steps per octave of the fine ladder.
 const FINE: i32 = 3;
+/// How far across the plateau a narrow delta lies, as a share in logarithm. Planes leave two coordinates
+/// open: estimates gain from a wider support.
+const ACROSS: f64 = 1.0 / 3.0;
+const ACROSS_OF_PLANES: f64 = 5.0 / 6.0;
+/// Below the lower edge of the plateau evidence grows by more than this per octave, or is less than this
+/// share of the best of the coarse ladder.
+const GROWTH: f64 = 1.2;
+const FAR_BELOW: f64 = 0.8;
+/// Steps below the best delta in which the edge is looked for.
+const LOWEST: i32 = 15;
+/// A narrow delta is at most this many times the edge.
+const BEYOND_EDGE: f64 = 2.5;
 
 /// The maximum is flat: which of the deltas near it to take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,11 +118,36 @@ pub(crate) fn choose<const D: usize>(
         Prefer::Wide => fine.iter().rev().find(near).map(|x| x.0),
         Prefer::Narrowest => fine.iter().find(near).map(|x| x.0),
         Prefer::Narrow => {
-            // A third of the way across the plateau, in logarithm: its very edge is a matter of luck.
+            // Some way across the plateau, in logarithm: its very edge is a matter of luck.
             let (low, high) = (fine.iter().find(near)?.0, fine.iter().rev().find(near)?.0);
-            Some(libm::cbrt(low * low * high))
+            let (across, most) = match family {
+                Family::Planes { .. } => (ACROSS_OF_PLANES, f64::INFINITY),
+                Family::Lines { .. } | Family::Candidates { .. } => {
+                    (ACROSS, BEYOND_EDGE * edge(coarse, &value).max(least))
+                }
+            };
+            Some((low * libm::pow(high / low, across)).min(most))
         }
     }
+}
+
+/// Where evidence begins to fall when delta shrinks below `coarse`, the best of the coarse ladder.
+///
+/// Entries that are wrong but not far away keep evidence high up to deltas many times as wide as
+/// neighbors are apart: the plateau is not theirs alone, its lower edge is.
+fn edge(coarse: f64, value: &impl Fn(f64) -> f64) -> f64 {
+    let at = |step: i32| coarse * libm::exp2(f64::from(-step) / f64::from(FINE));
+    let mut values: Vec<f64> = (-FINE..=0).map(|step| value(at(step))).collect();
+    let least = FAR_BELOW * values[FINE as usize];
+    for step in 1..=LOWEST {
+        let below = value(at(step));
+        let octave_above = values[step as usize];
+        if !(below > least && GROWTH * below >= octave_above) {
+            return at(step);
+        }
+        values.push(below);
+    }
+    at(LOWEST)
 }
 
 fn sample_chunks(n_slots: usize, seed: u64) -> Vec<usize> {

@@ -14,6 +14,8 @@ use crate::seed::{Draws, Stage};
 
 /// Bins of the radius.
 const BINS: usize = 48;
+/// From this bin on an edge is too long for one of a neighbor.
+const OUTSIDE: usize = BINS / 4 * 3;
 /// Random edges per slot.
 const RANDOM: usize = 24;
 /// Slots looked at.
@@ -139,8 +141,8 @@ impl Tally {
         }
     }
 
-    /// Close edges beyond those expected by chance, per bin; of all edges or of mutual ones.
-    fn excess(&self, kind: usize) -> [f64; BINS] {
+    /// Close edges beyond those expected by chance or merely in the same region, per bin; of all edges or of mutual ones.
+    fn excess(&self, kind: usize, dimensions: i32) -> [f64; BINS] {
         let bins = &self.bins[kind];
         let of_kind = |class: &u8| kind == 0 || is_mutual(*class);
         let classes = (0..CLASSES as u8).filter(of_kind);
@@ -148,12 +150,18 @@ impl Tally {
         let found: f64 = bins.iter().map(|b| b.0).sum();
         let by_chance: f64 = bins.iter().map(|b| b.1).sum();
         let share = share_of(found / edges, by_chance / edges);
-        bins.map(|(found, by_chance)| (found - (1.0 - share) * by_chance).max(0.0))
+        let excess = bins.map(|(found, by_chance)| found - (1.0 - share) * by_chance);
+        // Wrong entries that are near all the same lie as dense everywhere as they do far out.
+        let volume =
+            |bin: usize| ((bin + 1) as f64).powi(dimensions) - (bin as f64).powi(dimensions);
+        let outside = excess[OUTSIDE..].iter().sum::<f64>().max(0.0);
+        let density = outside / (OUTSIDE..BINS).map(volume).sum::<f64>();
+        std::array::from_fn(|bin| (excess[bin] - density * volume(bin)).max(0.0))
     }
 
     fn law<const D: usize>(&self, look: &Look<'_, D>) -> Law {
         let chance = self.random.map(|[edges, found]| found / edges.max(1.0));
-        let [all, mutual] = [0, 1].map(|kind| self.excess(kind));
+        let [all, mutual] = [0, 1].map(|kind| self.excess(kind, D as i32));
         let mut radius = middle(&all);
         // Wrong entries that are near all the same are rarely mutual.
         if mutual.iter().sum::<f64>() >= ENOUGH && middle(&mutual) < TIGHTER * radius {
