@@ -3,10 +3,12 @@
 
     cargo build --release && python3 docs/make_benchmarks.py ../shared
 
-or parts of them (`accuracy`, `low`, `noise`, `own`, `alone`, `large`), named after the folder. Needs the scenes
+or parts of them (`accuracy`, `low`, `noise`, `own`, `alone`, `large`, `images`), named after the folder. Needs the scenes
 (SHARED/data) and the paper's tables (SHARED/paper/tables); standard library only. Everything between the begin and end markers of the two files is replaced.
 """
 import array, csv, json, math, pathlib, random, struct, subprocess, sys, tempfile
+
+import image_tables
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 SHARED = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else ROOT.parent / "shared").resolve()
@@ -315,8 +317,13 @@ def large():
         + "; ".join(f"{scheme} {' / '.join(spent)}" for scheme, spent in by_scheme.items()) + ".", ""])
 
 
+def images():
+    put(ROOT / "docs/benchmarks.md", "images", image_tables.tables(ROOT / "target/release/unlift", SHARED))
+
+
 def main():
-    sections = {"accuracy": accuracy, "low": below_a_tenth, "noise": noise, "own": own, "alone": alone, "large": large}
+    sections = {"accuracy": accuracy, "low": below_a_tenth, "noise": noise, "own": own, "alone": alone, "large": large,
+                "images": images}
     for name in sys.argv[2:] or sections:
         sections[name]()
 
