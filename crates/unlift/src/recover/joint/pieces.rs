@@ -1,9 +1,9 @@
 //! Where a slot may lie, as flat pieces: all that joint recovery knows of a record family.
 
+use super::near::ln;
 use crate::recover::chance_field::{CandidateField, ChanceField, tube};
 use crate::recover::line_rows::LineRow;
 use crate::recover::plane_windows::SortedPlanes;
-use super::near::ln;
 use crate::released::AxisPlanes;
 
 /// A flat piece of a feasible set: a line, a half-line or a plane.
