@@ -6,6 +6,7 @@ use serde_json::{Map, Value, json};
 use std::fmt;
 use std::path::Path;
 use unlift::Unit;
+use unlift::geometry::frame::Bounds;
 
 /// The Parquet key-value metadata key that holds the JSON object.
 pub(super) const KEY: &str = "unlift";
@@ -180,6 +181,20 @@ impl<'a> Meta<'a> {
         rows.ok_or_else(|| self.wrong("centers", format!("a list of lists of {D} numbers")))
     }
 
+    /// The box that holds all hidden points, in the frame of the map, if it is given.
+    pub(super) fn bounds<const D: usize>(&self) -> Result<Option<Bounds<D>>, Error> {
+        let Some(value) = self.object.get("bounds") else { return Ok(None) };
+        corners(value).map(Some).ok_or_else(|| self.wrong("bounds", rule_of_corners::<D>()))
+    }
+
+    /// Per center the box that holds its points, about the origin, if they are given.
+    pub(super) fn regions<const D: usize>(&self) -> Result<Option<Vec<Bounds<D>>>, Error> {
+        let Some(value) = self.object.get("regions") else { return Ok(None) };
+        let regions = value.as_array().and_then(|rows| rows.iter().map(corners).collect());
+        let expected = || format!("per center {}", rule_of_corners::<D>());
+        regions.map(Some).ok_or_else(|| self.wrong("regions", expected()))
+    }
+
     /// A text, if the key is there and is one.
     pub(super) fn text(&self, key: &str) -> Option<&str> {
         self.object.get(key).and_then(Value::as_str)
@@ -228,6 +243,15 @@ impl<'a> Meta<'a> {
 fn vector<const D: usize>(value: &Value) -> Option<[f64; D]> {
     let row: Option<Vec<f64>> = value.as_array()?.iter().map(Value::as_f64).collect();
     row?.try_into().ok()
+}
+
+fn corners<const D: usize>(value: &Value) -> Option<Bounds<D>> {
+    let [low, high] = value.as_array()?.as_slice() else { return None };
+    Bounds::try_new(vector(low)?, vector(high)?).ok()
+}
+
+fn rule_of_corners<const D: usize>() -> String {
+    format!("a low and a high corner of {D} numbers")
 }
 
 /// The first characters of a JSON value: enough to recognize it.

@@ -9,11 +9,12 @@ use arrow_array::ArrayRef;
 use arrow_array::types::{Float32Type, UInt8Type};
 use arrow_schema::DataType::{Float32, UInt8};
 use arrow_schema::Field;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::ops::Range;
 use std::path::Path;
 use unlift::Descriptors;
 use unlift::descriptors::Values;
+use unlift::geometry::frame::Bounds;
 use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
 
 /// The longest descriptor that is read: known ones have up to 4,096 values.
@@ -34,6 +35,9 @@ pub fn write_released<const D: usize>(path: &Path, released: &Released<D>) -> Re
     meta.insert("slots_per_record".into(), json!(per_record));
     meta.insert("origin".into(), json!(released.origin().to_vec()));
     meta.insert("unit".into(), json!(released.unit().name()));
+    if let Some(bounds) = released.bounds() {
+        meta.insert("bounds".into(), corners(&bounds));
+    }
     let mut fields: Vec<Field> = Vec::new();
     let mut vector = |prefix| {
         let names = coordinate_names::<D>(prefix);
@@ -50,6 +54,10 @@ pub fn write_released<const D: usize>(path: &Path, released: &Released<D>) -> Re
             meta.insert("centers".into(), json!(centers));
             if let Some(edge) = rays.voxel() {
                 meta.insert("voxel".into(), json!(edge));
+            }
+            if let Some(regions) = rays.regions() {
+                let regions: Vec<Value> = regions.iter().map(corners).collect();
+                meta.insert("regions".into(), json!(regions));
             }
             vector("direction_");
             fields.insert(0, field("center", UInt8));
@@ -108,7 +116,14 @@ pub fn read_released<const D: usize>(path: &Path) -> Result<Released<D>, Error> 
         }
     };
     let descriptors = read_descriptors(path, &table, per_record)?;
-    Released::try_new(obfuscation, per_record, origin, unit, descriptors).map_err(core)
+    let bounds = meta.bounds::<D>()?;
+    let released = Released::try_new(obfuscation, per_record, origin, unit, descriptors);
+    Ok(released.map_err(core)?.with_bounds(bounds))
+}
+
+/// A box in the metadata: its low and its high corner.
+fn corners<const D: usize>(bounds: &Bounds<D>) -> Value {
+    json!([bounds.low.to_vec(), bounds.high.to_vec()])
 }
 
 fn record_columns<const D: usize>(
@@ -192,6 +207,10 @@ fn read_rays<const D: usize>(path: &Path, table: &Table) -> Result<Obfuscation<D
     let rays = Rays::try_new(&centers, center, &direction);
     let rays = match table.meta().number("voxel")? {
         Some(edge) => rays.and_then(|rays| rays.with_voxel(edge)),
+        None => rays,
+    };
+    let rays = match table.meta().regions::<D>()? {
+        Some(regions) => rays.and_then(|rays| rays.with_regions(regions)),
         None => rays,
     };
     rays.map(Obfuscation::Rays).map_err(|source| Error::core(path, source))

@@ -3,8 +3,11 @@
 use crate::maps;
 use std::fs;
 use std::path::Path;
+use unlift::geometry::frame::Bounds;
 use unlift::neighbors::Neighborhoods;
+use unlift::obfuscate::{SCHEMES, SchemeOptions, obfuscate};
 use unlift::released::{AxisCandidates, Obfuscation, Released};
+use unlift::truth::Original;
 use unlift::{PointSet, RecordId, Unit};
 use unlift_io::stage::{self, Kind};
 
@@ -43,6 +46,26 @@ fn released_law<const D: usize>() {
 fn released_maps() {
     released_law::<2>();
     released_law::<3>();
+}
+
+/// What is public about an image is released with it: without its size recovery would know less.
+#[test]
+fn released_images() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.parquet");
+    let bounds = Bounds::try_new([0.0, 0.0], [640.0, 480.1]).unwrap();
+    let keypoints: Vec<[f64; 2]> =
+        (0..90).map(|i| [7.1 * f64::from(i), 5.0 + 0.3 * f64::from(i * i % 1500)]).collect();
+    let points = PointSet::try_new(keypoints, Unit::Pixel).unwrap();
+    let original = Original::within(points, bounds).unwrap();
+    for entry in SCHEMES {
+        let Some(scheme) = entry.in_2d else { continue };
+        let (released, _) =
+            obfuscate(scheme, &original, None, &SchemeOptions::default(), 3).unwrap();
+        assert!(released.bounds().is_some());
+        written_twice(folder.path(), |path| stage::write_released(path, &released).unwrap());
+        assert!(stage::read_released::<2>(&path).unwrap() == released, "{}", entry.name);
+    }
 }
 
 fn truth_law<const D: usize>() {

@@ -122,6 +122,10 @@ pub(crate) fn choose<const D: usize>(
             let (low, high) = (fine.iter().find(near)?.0, fine.iter().rev().find(near)?.0);
             let (across, most) = match family {
                 Family::Planes { .. } => (ACROSS_OF_PLANES, f64::INFINITY),
+                // In an image lines cross everywhere: the lower edge is that of chance.
+                Family::Lines { .. } | Family::Candidates { .. } if D == 2 => {
+                    (ACROSS, f64::INFINITY)
+                }
                 Family::Lines { .. } | Family::Candidates { .. } => {
                     (ACROSS, BEYOND_EDGE * edge(coarse, &value).max(least))
                 }

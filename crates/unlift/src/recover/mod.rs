@@ -62,6 +62,9 @@ const LEAST_DELTA: f64 = 0.25;
 const ANCHOR_DELTA: f64 = 1.75;
 /// Partners in an image are looked for within this many deltas.
 const EXACT_REACH: f64 = 4.0;
+/// How often joint recovery of an image starts again from what was settled. Exact coordinates place their
+/// neighbors better, whose partners are then found; rays from anchors move a little in every round.
+const FEEDS: usize = 16;
 
 /// How far apart points would be if they were spread evenly over known bounds; 0 without bounds.
 fn spacing<const D: usize>(released: &Released<D>) -> f64 {
@@ -135,8 +138,16 @@ pub fn recover_and_look<const D: usize>(
     let exact_reach = if D == 2 { EXACT_REACH * delta } else { delta };
     // The paper's loop stays as published.
     let exact = options.exact_constraints && options.solver != Solver::Ransac;
-    let settled = (exact && exact::can_settle(released))
-        .then(|| exact::settle(released, estimates.clone(), exact_reach as f32));
+    let settled = (exact && exact::can_settle(released)).then(|| {
+        let settle = |estimates| exact::settle(released, estimates, exact_reach as f32);
+        let mut settled = settle(estimates.clone());
+        if let (Some(graph), 2) = (&graph, D) {
+            for _ in 0..FEEDS {
+                settled = settle(joint::solve(&family, graph, settled, delta as f32, options.seed));
+            }
+        }
+        settled
+    });
     let unsettled = &estimates;
     let estimates = settled.as_ref().unwrap_or(unsettled);
     let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));

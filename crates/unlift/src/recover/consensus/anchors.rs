@@ -4,12 +4,11 @@
 //! Rays of one anchor meet in it, and those of two anchors meet nowhere that both may lie. What is left is
 //! perspective: neighbors within a distance `s` of a point at range `r` are seen from the anchor within
 //! an angle of `s / r`. The window of bearings that holds the listed rays least probably by chance
-//! gives that angle. What `s` is follows from the map itself: of an even density half of the points
-//! lie beyond `1 / sqrt 2` of where their rays end.
+//! gives that angle. What `s` is nobody knows, but of two rays of about the same bearing the one with the
+//! narrower window is likely the longer one: ranks give shares of the region, over which points are spread.
 
 use rayon::prelude::*;
 
-use crate::geometry::vector::median;
 use crate::recover::chance::evidence;
 use crate::recover::chunks::{Chunks, solve_chunks};
 use crate::recover::line_rows::LineRow;
@@ -20,6 +19,11 @@ use crate::recover::{Estimate, Status, stored_support};
 const SAMPLE: usize = 1 << 9;
 /// Evidence counts in excess of this many times what chance alone yields in the mean.
 const CHANCE: f32 = 2.0;
+/// How often scores are averaged with those of neighbors.
+const SMOOTHINGS: usize = 3;
+/// Ranges are compared on each side among this part of an anchor's rays, and at least so many.
+const SECTORS: usize = 12;
+const LEAST_SECTOR: usize = 20;
 
 /// What the listed rays of a slot's own anchor say.
 #[derive(Clone, Copy, Debug)]
@@ -49,19 +53,7 @@ pub(super) fn solve<const D: usize>(
         .filter_map(|slot| Some(window(rows, &bearings, slot, &mixed)?.evidence))
         .collect();
     let by_chance = CHANCE * by_chance.iter().sum::<f32>() / by_chance.len().max(1) as f32;
-    // Without evidence the range is the one that half of an even density lies within.
-    let half = libm::pow(0.5, 1.0 / D as f64);
-    // What a range would be of a neighborhood of size 1, as a share of the ray.
-    let mut shares: Vec<f64> = rows
-        .iter()
-        .zip(&windows)
-        .filter_map(|(row, window)| Some(1.0 / f64::from(row.to * (*window)?.sine)))
-        .filter(|share| share.is_finite())
-        .collect();
-    let size = match shares.is_empty() {
-        true => 1.0,
-        false => half / median(&mut shares),
-    };
+    let shares = shares(rows, lists, &bearings, &windows);
     solve_chunks(
         lists.n_slots(),
         chunks,
@@ -71,12 +63,14 @@ pub(super) fn solve<const D: usize>(
                 let own = &rows[first + at];
                 *estimate = match windows[first + at] {
                     None => Estimate::lost(Status::TooFewNeighbors),
-                    Some(Window { sine, count, evidence }) => {
+                    Some(Window { count, evidence, .. }) => {
                         let excess = (evidence - by_chance).max(0.0);
                         let trust = excess / evidence.max(f32::MIN_POSITIVE);
-                        let (seen, blind) = (own.clamp(size as f32 / sine), half as f32 * own.to);
+                        // Without evidence half of the points lie before it.
+                        let share = 0.5 + trust * (shares[first + at] - 0.5);
+                        let range = libm::powf(share, 1.0 / D as f32) * own.to;
                         Estimate {
-                            position: own.at(blind + trust * (seen - blind)),
+                            position: own.at(range),
                             status: Status::Ok,
                             support: stored_support(count),
                             axis: 0,
@@ -87,6 +81,59 @@ pub(super) fn solve<const D: usize>(
             }
         },
     )
+}
+
+/// Per slot the share of its ray's region that lies before its point: by how narrow its window is
+/// among rays of about the same bearing, as points are spread evenly over a region.
+fn shares<const D: usize>(
+    rows: &[LineRow<D>],
+    lists: Lists<'_>,
+    bearings: &Bearings,
+    windows: &[Option<Window>],
+) -> Vec<f32> {
+    let known = |slot: usize| windows[slot].map(|window| -libm::logf(window.sine));
+    let mut score: Vec<f32> = (0..rows.len()).map(|slot| known(slot).unwrap_or(f32::NAN)).collect();
+    // Neighbors lie at about the same range.
+    for _ in 0..SMOOTHINGS {
+        let smooth = |slot: usize| {
+            let Some(window) = windows[slot] else { return score[slot] };
+            let own = &rows[slot];
+            let mut buffer = Vec::new();
+            let (mut sum, mut n) = (0.0f32, 0.0f32);
+            for record in lists.of(slot, &mut buffer) {
+                let (row, score) = (&rows[record.index()], score[record.index()]);
+                if row.group == own.group && score.is_finite() && sine(own, row) <= window.sine {
+                    (sum, n) = (sum + score, n + 1.0);
+                }
+            }
+            if n > 0.0 { 0.5 * (score[slot] + sum / n) } else { score[slot] }
+        };
+        score = (0..rows.len()).into_par_iter().map(smooth).collect();
+    }
+    let place = |at: usize| {
+        let (group, slot) = (bearings.sorted[at].0, bearings.slot[at] as usize);
+        if score[slot].is_nan() {
+            return 0.5;
+        }
+        let of_group = bearings.sorted.partition_point(|row| row.0 < group)
+            ..bearings.sorted.partition_point(|row| row.0 <= group);
+        let half = (of_group.len() / SECTORS).max(LEAST_SECTOR);
+        let from = at.saturating_sub(half).max(of_group.start);
+        let (mut below, mut all) = (0.0f32, 0.0f32);
+        for &other in &bearings.slot[from..(at + half + 1).min(of_group.end)] {
+            let other = score[other as usize];
+            all += f32::from(u8::from(!other.is_nan()));
+            below += f32::from(u8::from(other < score[slot]));
+            below += 0.5 * f32::from(u8::from(other == score[slot]));
+        }
+        below / all
+    };
+    let in_order: Vec<f32> = (0..rows.len()).into_par_iter().map(place).collect();
+    let mut shares = vec![0.5; rows.len()];
+    for (&slot, share) in bearings.slot.iter().zip(in_order) {
+        shares[slot as usize] = share;
+    }
+    shares
 }
 
 /// The window around `slot` that is least probable by chance; `None` with fewer than two listed rays of
@@ -130,17 +177,24 @@ fn sine<const D: usize>(a: &LineRow<D>, b: &LineRow<D>) -> f32 {
 struct Bearings {
     /// (group, angle).
     sorted: Vec<(u32, f64)>,
+    /// The slot of each.
+    slot: Vec<u32>,
     /// Windows narrower than this tell nothing.
     finest: f32,
 }
 
 impl Bearings {
     fn new<const D: usize>(rows: &[LineRow<D>]) -> Self {
-        let mut sorted: Vec<(u32, f64)> = rows.iter().map(|row| (row.group, angle(row))).collect();
-        sorted.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        let mut slot: Vec<u32> = (0..rows.len() as u32).collect();
+        let key = |slot: &u32| (rows[*slot as usize].group, angle(&rows[*slot as usize]));
+        slot.sort_by(|a, b| {
+            let (a, b) = (key(a), key(b));
+            a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+        });
+        let sorted = slot.iter().map(key).collect();
         // A window holds a few bearings of the map at least.
         let finest = 4.0 / rows.len().max(4) as f32;
-        Self { sorted, finest }
+        Self { sorted, slot, finest }
     }
 
     /// The share of all records that are rays of the anchor of `own` within `sine` of it.

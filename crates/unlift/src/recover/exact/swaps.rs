@@ -22,7 +22,7 @@ const NOTHING: f32 = 1e-3;
 /// Pairs at least this probable are taken.
 const LEAST: f32 = 0.2;
 /// The same in an image, where a wrong partner is near all the same.
-const LEAST_IN_IMAGE: f32 = 0.1;
+const LEAST_IN_IMAGE: f32 = 0.05;
 
 /// A record on the axis it is believed to have exchanged.
 #[derive(Clone, Copy, Debug)]

@@ -154,7 +154,11 @@ impl Tally {
         // Wrong entries that are near all the same lie as dense everywhere as they do far out.
         let volume =
             |bin: usize| ((bin + 1) as f64).powi(dimensions) - (bin as f64).powi(dimensions);
-        let outside = excess[OUTSIDE..].iter().sum::<f64>().max(0.0);
+        // The neighbors of a keypoint, in units of a small plane, reach as far out as these do.
+        let outside = match dimensions {
+            2 => 0.0,
+            _ => excess[OUTSIDE..].iter().sum::<f64>().max(0.0),
+        };
         let density = outside / (OUTSIDE..BINS).map(volume).sum::<f64>();
         std::array::from_fn(|bin| (excess[bin] - density * volume(bin)).max(0.0))
     }

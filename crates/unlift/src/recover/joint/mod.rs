@@ -30,6 +30,7 @@ use self::law::{Law, Look};
 use self::slot::{Round, Scratch};
 use super::chunks::CHUNK;
 use super::family::Family;
+use super::line_rows::LineRow;
 use super::{Estimate, Status};
 use crate::simd::{Kernel, dispatch};
 
@@ -44,6 +45,12 @@ pub(crate) fn solve<const D: usize>(
     match family {
         // Where bearings say hardly more than chance does, estimates would drift to their anchors.
         _ if family.has_regions() && mean_evidence(&start) < LEAST_EVIDENCE => start,
+        Family::Lines { rows, slots_per_record, chance } if family.has_regions() => {
+            let pieces = LinePieces::new(rows, *slots_per_record, chance, delta);
+            let joint = rounds(&pieces, graph, start.clone(), delta, seed);
+            // Points are spread over a region; estimates that are not have drifted.
+            if unevenness(rows, &joint) > MOST_UNEVEN { start } else { joint }
+        }
         Family::Lines { rows, slots_per_record, chance } => rounds(
             &LinePieces::new(rows, *slots_per_record, chance, delta),
             graph,
@@ -58,6 +65,24 @@ pub(crate) fn solve<const D: usize>(
             rounds(&CandidatePieces::new(rows, chance, delta), graph, start, delta, seed)
         }
     }
+}
+
+/// Estimates on rays from anchors may lie that unevenly.
+const MOST_UNEVEN: f64 = 0.16;
+
+/// How far the shares of their regions that lie before estimates are from evenly spread: the largest
+/// difference of the two distributions.
+fn unevenness<const D: usize>(rows: &[LineRow<D>], estimates: &[Estimate<D>]) -> f64 {
+    let share = |(row, estimate): (&LineRow<D>, &Estimate<D>)| {
+        let along = |c: usize| (estimate.position[c] - row.through[c]) * row.direction[c];
+        let t = (0..D).map(along).sum::<f32>() / row.to;
+        (estimate.status == Status::Ok).then(|| t.clamp(0.0, 1.0).powi(D as i32))
+    };
+    let mut shares: Vec<f32> = rows.iter().zip(estimates).filter_map(share).collect();
+    shares.sort_unstable_by(f32::total_cmp);
+    let n = shares.len().max(1) as f64;
+    let off = |(at, share): (usize, &f32)| ((at as f64 + 0.5) / n - f64::from(*share)).abs();
+    shares.iter().enumerate().map(off).fold(0.0, f64::max)
 }
 
 /// Rays from anchors are left where they are if their evidence is less than this in the mean, in nats.

@@ -1,5 +1,6 @@
 //! Where a slot may lie, as flat pieces: all that joint recovery knows of a record family.
 
+use super::near::ln;
 use crate::recover::chance_field::{CandidateField, ChanceField, tube};
 use crate::recover::line_rows::LineRow;
 use crate::recover::plane_windows::SortedPlanes;
@@ -64,6 +65,11 @@ pub(crate) trait Pieces<const D: usize>: Sync {
     fn record_distance2(&self, record: usize, x: &[f32; D]) -> f32;
     /// The chance that a random record that may vote for `slot` passes within delta of `x`.
     fn record_chance(&self, slot: usize, x: &[f32; D]) -> f32;
+    /// The logarithm of how much of its feasible set `slot` has per length at `x`, where that differs.
+    #[inline(always)]
+    fn ln_spread(&self, _: usize, _: &[f32; D]) -> f32 {
+        0.0
+    }
 }
 
 /// Lines and rays.
@@ -72,7 +78,12 @@ pub(crate) struct LinePieces<'a, const D: usize> {
     slots_per_record: usize,
     chance: &'a [ChanceField<D>],
     tube: f32,
+    /// Whether these are rays from anchors, each with a region of its own.
+    anchored: bool,
 }
+
+/// Ranges below this share of a ray are as unlikely as this one.
+const LEAST_RANGE: f32 = 1e-3;
 
 impl<'a, const D: usize> LinePieces<'a, D> {
     pub(crate) fn new(
@@ -81,7 +92,8 @@ impl<'a, const D: usize> LinePieces<'a, D> {
         chance: &'a [ChanceField<D>],
         delta: f32,
     ) -> Self {
-        Self { rows, slots_per_record, chance, tube: tube(D, delta) }
+        let anchored = rows.iter().any(|row| row.is_ray() && row.to.is_finite());
+        Self { rows, slots_per_record, chance, tube: tube(D, delta), anchored }
     }
 
     #[inline(always)]
@@ -124,6 +136,18 @@ impl<const D: usize> Pieces<D> for LinePieces<'_, D> {
         let own = self.own(slot);
         let field = &self.chance[if own.is_ray() { own.group as usize } else { 0 }];
         field.at(x, self.tube, 0.0).p
+    }
+
+    // Points are spread over the region of an anchor, and its rays diverge: without this term estimates
+    // drift to where all bearings meet.
+    #[inline(always)]
+    fn ln_spread(&self, slot: usize, x: &[f32; D]) -> f32 {
+        if !self.anchored {
+            return 0.0;
+        }
+        let own = self.own(slot);
+        let t: f32 = (0..D).map(|c| (x[c] - own.through[c]) * own.direction[c]).sum();
+        (D - 1) as f32 * ln((t / own.to).max(LEAST_RANGE))
     }
 }
 

@@ -83,10 +83,10 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
             let step = n.div_ceil(CANDIDATES).max(1);
             for i in (0..n).step_by(step) {
                 let x = own.project(&near.at(i));
-                self.consider(near, x, piece, &mut scratch.best);
+                self.consider(near, x, (slot, piece), &mut scratch.best);
             }
             if old.status == Status::Ok && usize::from(old.axis) == piece {
-                self.consider(near, old.position, piece, &mut scratch.best);
+                self.consider(near, old.position, (slot, piece), &mut scratch.best);
             }
         }
         let Some((first, ahead)) = self.winner(slot, &scratch.best) else {
@@ -204,9 +204,15 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
     }
 
     #[inline(always)]
-    fn consider(&self, near: &Columns<D>, x: [f32; D], piece: usize, best: &mut Vec<Candidate<D>>) {
+    fn consider(
+        &self,
+        near: &Columns<D>,
+        x: [f32; D],
+        (slot, piece): (usize, usize),
+        best: &mut Vec<Candidate<D>>,
+    ) {
         let (gain, inverse_a2, density) = self.law_at(&x);
-        let prior = PRIOR * ln(density);
+        let prior = PRIOR * ln(density) + self.pieces.ln_spread(slot, &x);
         let score = prior + near.log_likelihood(&x, gain, inverse_a2);
         best.push(Candidate { x, piece, score, prior });
     }

@@ -1,0 +1,87 @@
+//! The figures of synthetic images, where no data set is at hand: keypoints as SIFT spreads them,
+//! K = 20, everything automatic, joint recovery. Floors are a little below what was measured.
+
+use unlift::audit::images::{self, Image};
+use unlift::audit::{Plan, Row, Silent};
+use unlift::geometry::frame::Bounds;
+use unlift::obfuscate::scheme;
+use unlift::recover::Solver;
+use unlift::seed::{Draws, Stage};
+use unlift::truth::Original;
+use unlift::{Error, PointSet, Unit};
+
+const SIZE: [f64; 2] = [640.0, 480.0];
+const KEYPOINTS: usize = 1200;
+
+/// Keypoints along edges of objects, some strewn over the image; a fifth have a twin at the same place.
+fn image(seed: u64) -> Image {
+    let mut draws = Draws::new(seed, Stage::Synthetic, 0);
+    let mut points: Vec<[f64; 2]> = Vec::new();
+    while points.len() < KEYPOINTS {
+        let from: [f64; 2] = std::array::from_fn(|c| draws.between(0.02, 0.98) * SIZE[c]);
+        let to: [f64; 2] = std::array::from_fn(|c| from[c] + 60.0 * draws.normal());
+        for _ in 0..12 {
+            let (t, jitter) = (draws.between(0.0, 1.0), [draws.normal(), draws.normal()]);
+            let at = |c: usize| from[c] + t * (to[c] - from[c]) + 4.0 * jitter[c];
+            let point = std::array::from_fn(|c| at(c).clamp(0.0, SIZE[c]));
+            points.push(point);
+            if draws.below(5) == 0 {
+                points.push(point);
+            }
+        }
+        points.push(std::array::from_fn(|c| draws.between(0.0, 1.0) * SIZE[c]));
+    }
+    points.truncate(KEYPOINTS);
+    let points = PointSet::try_new(points, Unit::Pixel).unwrap();
+    let bounds = Bounds::try_new([0.0; 2], SIZE).unwrap();
+    let original = Original::within(points, bounds).unwrap();
+    Image { name: format!("image {seed}"), original, descriptors: None }
+}
+
+/// (inlier ratio, scheme, percent within 5, 10 and 25 px) at least; `dcl2d` against blind instead.
+const FLOORS: &[(f64, &str, [f64; 3])] = &[
+    (1.0, "lines2d", [60.0, 80.0, 95.0]),
+    (0.3, "lines2d", [45.0, 70.0, 92.0]),
+    (1.0, "cp2d", [60.0, 78.0, 93.0]),
+    (0.3, "cp2d", [48.0, 68.0, 88.0]),
+];
+
+fn rows(schemes: &[&str], ratios: &[f64]) -> Vec<Row> {
+    let mut plan = Plan::new(Unit::Pixel);
+    plan.schemes = schemes.iter().map(|name| scheme(name).unwrap()).collect();
+    plan.inlier_ratios = ratios.to_vec();
+    plan.solvers = vec![Solver::Joint];
+    let images = (1..=3).map(|seed| Ok::<_, Error>(image(seed)));
+    let rows = images::run(images, &plan, &mut Silent).unwrap().rows;
+    for row in &rows {
+        let (found, blind) = (&row.recovered_percent, &row.blind_percent);
+        let error = row.error_percentiles[0];
+        eprintln!("{} {} {found:.1?} blind {blind:.1?} {error:.1?}", row.scheme, row.inlier_ratio);
+    }
+    rows
+}
+
+#[test]
+fn lines_and_permutations_come_back() {
+    let rows = rows(&["lines2d", "cp2d"], &[1.0, 0.3]);
+    let mut missed = Vec::new();
+    for (ratio, name, floors) in FLOORS {
+        let row = rows.iter().find(|row| row.scheme == *name && row.inlier_ratio == *ratio);
+        for (percent, least) in row.unwrap().recovered_percent[1..].iter().zip(floors) {
+            if percent < least {
+                missed.push(format!("{name} at {ratio}: {percent:.1} < {least}"));
+            }
+        }
+    }
+    assert!(missed.is_empty(), "{missed:#?}");
+}
+
+/// Convergent lines hide much, but lists must never make an attacker worse than blind.
+#[test]
+fn convergent_lines_are_never_worse_than_blind() {
+    for row in rows(&["dcl2d"], &[1.0, 0.5, 0.3, 0.1]) {
+        for (found, blind) in row.recovered_percent.iter().zip(&row.blind_percent).skip(1) {
+            assert!(found >= &(0.9 * blind), "{}: {found:.2} < {blind:.2}", row.inlier_ratio);
+        }
+    }
+}
