@@ -10,12 +10,13 @@ use unlift::neighbors::sources::Joined;
 use unlift::obfuscate::Entry;
 use unlift::recover::{Delta, Solver};
 
+use crate::args_audit::{AttackArgs, ResultArgs, RunArgs};
 use crate::args_bench::BenchRecoverArgs;
 use crate::args_features::FeaturesArgs;
-use crate::gate::Gate;
+use crate::args_images::AuditImagesArgs;
 use crate::values::{self, NeighborSource, OutlierFilter};
 
-/// How much of a privacy-preserving ("obfuscated") SfM map comes back?
+/// How much of a privacy-preserving ("obfuscated") SfM map or image comes back?
 #[derive(Debug, Parser)]
 #[command(
     name = "unlift",
@@ -25,6 +26,7 @@ use crate::values::{self, NeighborSource, OutlierFilter};
 Examples:
   unlift demo                                  audit a made-up room, no data needed
   unlift audit map PROJECT/sparse/0 --scale 1  audit a COLMAP map that is in meters
+  unlift audit images photos                   audit the keypoints of photos
   unlift schemes                               what can be audited
 
 Exit codes: 0 done, 1 a gate failed, 2 usage, 3 bad input.
@@ -68,6 +70,8 @@ pub enum AuditCommand {
     /// Audit a 3D map: COLMAP, PLY, CSV, XYZ or NPY
     // Boxed: ten times the size of the other commands.
     Map(Box<AuditMapArgs>),
+    /// Audit images: a folder of photos, hloc's features.h5, or a COLMAP database.db
+    Images(Box<AuditImagesArgs>),
 }
 
 /// Options of `demo`.
@@ -143,68 +147,29 @@ pub struct AuditMapArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::scheme,
           help_heading = "Attack")]
     pub schemes: Vec<&'static Entry>,
-    /// Shares of true neighbors to try, by commas (oracle) [default: 1,0.75,0.5,0.3,0.2,0.1]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::ratio,
-          help_heading = "Attack")]
-    pub inlier_ratios: Vec<f64>,
-    /// How the oracle errs, by commas or repeated: uniform (any record), near (the 2K-th to 10K-th
-    /// nearest), clustered (wrong places that neighbors share, as of look-alike descriptors) [default: uniform]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::noise,
-          help_heading = "Attack")]
-    pub oracle_noise: Vec<Noise>,
     /// Recovery methods, by commas or repeated: joint, consensus, ransac, density, tomography
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
           default_value = "joint", help_heading = "Attack")]
     pub solver: Vec<Solver>,
-    /// Do not use rules that tie records together (cp: swaps are mutual; ray-voxel: parity)
-    #[arg(long, help_heading = "Attack")]
-    pub no_exact_constraints: bool,
-    /// Add a row per scheme for an attacker who is told where three true neighbors of every point are
-    #[arg(long, help_heading = "Attack")]
-    pub reference: bool,
     /// Where neighborhoods come from, repeatable: oracle (made from the map itself); what an attacker
     /// makes from the released map (similarity, overlap, geometric, or several joined by +); or a file
     #[arg(long, value_name = "oracle|SOURCE|FILE", value_parser = values::neighbor_source,
           default_value = "oracle", help_heading = "Attack")]
     pub neighbors: Vec<NeighborSource>,
-    /// Records per list of an attacker's own sources [default: each source's own choice]
-    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..),
-          help_heading = "Attack")]
-    pub source_k: Option<u16>,
-    /// Distance up to which a neighbor supports a position, in the unit of the audit
-    #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto",
-          help_heading = "Attack")]
-    pub delta: Delta,
-    /// Average over this many seeds
-    #[arg(long, value_name = "N", default_value = "1",
-          value_parser = clap::value_parser!(u32).range(1..), help_heading = "Attack")]
-    pub repeats: u32,
+    #[command(flatten)]
+    pub attack: AttackArgs,
     /// Errors up to which a point counts as recovered, by commas; kept as typed
     /// [default: 0.10,0.25 with --scale, else 1.0,2.5]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold,
           help_heading = "Result")]
     pub thresholds: Vec<Threshold>,
-    /// Fail (exit code 1) when more than this comes back; repeatable, see below
-    #[arg(long, value_name = "GATE", value_parser = Gate::parse, help_heading = "Result")]
-    pub gate: Vec<Gate>,
-    /// Folder to write: empty, missing, or an earlier audit (replaced whole)
-    #[arg(long, value_name = "DIR", default_value = "unlift-audit", help_heading = "Result")]
-    pub out: PathBuf,
     /// Also write original, obfuscated and recovered clouds (PLY, OBJ)
     #[arg(long, help_heading = "Result", conflicts_with = "share_safe")]
     pub write_clouds: bool,
-    /// A report that can be shown: figures only, no points, paths or names
-    #[arg(long, help_heading = "Result")]
-    pub share_safe: bool,
-    /// Print a summary as JSON on stdout in place of the table
-    #[arg(long, help_heading = "Result")]
-    pub json: bool,
-    /// Threads to use; never changes a figure [default: one per core]
-    #[arg(long, value_name = "N", help_heading = "Run")]
-    pub threads: Option<NonZeroUsize>,
-    /// No progress bars
-    #[arg(long, help_heading = "Run")]
-    pub quiet: bool,
+    #[command(flatten)]
+    pub result: ResultArgs,
+    #[command(flatten)]
+    pub run: RunArgs,
 }
 
 /// Options of `obfuscate`.
@@ -378,14 +343,14 @@ mod tests {
     #[test]
     fn defaults_are_those_of_the_documentation() {
         let args = audit(&[]).unwrap();
-        assert_eq!((args.map.k, args.map.seed, args.repeats), (50, None, 1));
+        assert_eq!((args.map.k, args.map.seed, args.attack.repeats), (50, None, 1));
         assert_eq!(args.solver, [Solver::Joint]);
-        assert_eq!((args.delta, args.map.outlier_filter), (Delta::Auto, None));
+        assert_eq!((args.attack.delta, args.map.outlier_filter), (Delta::Auto, None));
         assert_eq!(args.neighbors, [NeighborSource::Oracle]);
         assert!(
-            args.inlier_ratios.is_empty()
-                && args.oracle_noise.is_empty()
-                && args.source_k.is_none()
+            args.attack.inlier_ratios.is_empty()
+                && args.attack.oracle_noise.is_empty()
+                && args.attack.source_k.is_none()
         );
         assert!(args.schemes.is_empty() && args.thresholds.is_empty());
     }

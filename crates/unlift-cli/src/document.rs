@@ -5,7 +5,7 @@ use std::time::Instant;
 use indexmap::IndexMap;
 use serde_json::{Map, Value, json};
 use unlift::Unit;
-use unlift::audit::{self, Outcome, Plan, Row, Source, Threshold};
+use unlift::audit::{self, Plan, Row, Source, Threshold};
 use unlift::recover::Delta;
 use unlift_report::document as report;
 
@@ -58,9 +58,19 @@ pub fn options(plan: &Plan, more: Map<String, Value>) -> Map<String, Value> {
     options
 }
 
-/// The document of an audit.
-pub fn document(plan: &Plan, outcome: &Outcome, provenance: Provenance) -> report::Document {
-    let seconds = &outcome.seconds;
+/// What an audit of a map or of images found.
+pub struct Found<'a> {
+    /// One row per combination.
+    pub rows: &'a [Row],
+    /// The ratios at which half comes back.
+    pub break_even: &'a [audit::BreakEven],
+    /// Where the time went.
+    pub seconds: &'a audit::Seconds,
+}
+
+/// The document of an audit; of images it lacks the figures of each.
+pub fn document(plan: &Plan, outcome: &Found<'_>, provenance: Provenance) -> report::Document {
+    let seconds = outcome.seconds;
     let stages = [
         ("search", seconds.search),
         ("obfuscate", seconds.obfuscate),
@@ -83,6 +93,7 @@ pub fn document(plan: &Plan, outcome: &Outcome, provenance: Provenance) -> repor
         results: outcome.rows.iter().map(|r| row(r, &plan.thresholds)).collect(),
         break_even: outcome.break_even.iter().map(break_even).collect(),
         gates: provenance.gates,
+        images: Vec::new(),
         run: report::Run {
             command: Some(
                 ["unlift".to_owned()]
@@ -102,10 +113,37 @@ pub fn document(plan: &Plan, outcome: &Outcome, provenance: Provenance) -> repor
     }
 }
 
-fn row(row: &Row, thresholds: &[Threshold]) -> report::Row {
-    let by_threshold = |percents: &[f64]| {
-        ordered(thresholds.iter().map(|t| t.label.clone()).zip(percents.iter().copied()))
+/// Percentages by threshold as typed.
+fn by_threshold(thresholds: &[Threshold], percents: &[f64]) -> report::ByThreshold {
+    ordered(thresholds.iter().map(|t| t.label.clone()).zip(percents.iter().copied()))
+}
+
+/// The figures of one image of an audit.
+pub fn image(
+    name: &str,
+    n_points: usize,
+    rows: &[Row],
+    thresholds: &[Threshold],
+) -> report::ImageFigures {
+    let figures = |row: &Row| report::ImageRow {
+        recovered_percent: by_threshold(thresholds, &row.recovered_percent),
+        distinct_percent: row
+            .distinct
+            .as_ref()
+            .map(|d| by_threshold(thresholds, &d.recovered_percent))
+            .unwrap_or_default(),
+        inlier_ratio: row.inlier_ratio,
+        median_error: row.error_percentiles.first().copied().flatten(),
     };
+    report::ImageFigures {
+        name: Some(name.to_owned()),
+        n_points: n_points as u64,
+        rows: rows.iter().map(figures).collect(),
+    }
+}
+
+fn row(row: &Row, thresholds: &[Threshold]) -> report::Row {
+    let by_threshold = |percents: &[f64]| by_threshold(thresholds, percents);
     let by_reason = |counts: &std::collections::BTreeMap<&'static str, usize>| {
         ordered(counts.iter().map(|(reason, &n)| ((*reason).to_owned(), n as u64)))
     };
@@ -120,7 +158,8 @@ fn row(row: &Row, thresholds: &[Threshold]) -> report::Row {
         delta: Some(row.delta),
         unit: match row.unit {
             Unit::Meter => report::LengthUnit::Meter,
-            Unit::KthNeighbor | Unit::Pixel => report::LengthUnit::KthNeighbor,
+            Unit::KthNeighbor => report::LengthUnit::KthNeighbor,
+            Unit::Pixel => report::LengthUnit::Pixel,
         },
         n_points: row.n_points as u64,
         n_lost: row.n_lost() as u64,
@@ -147,6 +186,11 @@ fn row(row: &Row, thresholds: &[Threshold]) -> report::Row {
             recovered_percent: by_threshold(&r.recovered_percent_std),
             blind_percent: by_threshold(&r.blind_percent_std),
             median_error: r.median_error_std,
+        }),
+        distinct: row.distinct.as_ref().map(|d| report::Distinct {
+            n_places: d.n_places as u64,
+            recovered_percent: by_threshold(&d.recovered_percent),
+            blind_percent: by_threshold(&d.blind_percent),
         }),
     }
 }

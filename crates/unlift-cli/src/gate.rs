@@ -78,7 +78,7 @@ impl Gate {
         };
         let scheme = match scheme.trim() {
             "all" => None,
-            name => Some(crate::values::scheme(name)?.name.to_owned()),
+            name => Some(crate::values::any_scheme(name)?.name.to_owned()),
         };
         let threshold = positive(threshold).map_err(|error| format!("threshold: {error}"))?;
         let bound_percent = match bound.trim().trim_end_matches('%').trim_end().parse::<f64>() {

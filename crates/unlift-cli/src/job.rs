@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use unlift::Descriptors;
-use unlift::audit::{Cell, Observer, Outcome, Plan, REFERENCE, run};
+use unlift::audit::{Cell, Observer, Plan, REFERENCE, Row, run};
 use unlift::truth::Original;
 use unlift_io::atomic::{OutputDir, write_file};
 use unlift_report::document::{Document, GateResult, Input};
@@ -76,7 +76,7 @@ impl Finished {
 }
 
 /// The file that marks a folder as an audit.
-const MARKER: &str = "audit.json";
+pub const MARKER: &str = "audit.json";
 
 /// Opens the folder an audit goes to: refused early, before anything is computed.
 pub fn open_out(out: &Path) -> anyhow::Result<OutputDir> {
@@ -106,13 +106,22 @@ pub fn perform(job: Job<'_>, out: OutputDir) -> anyhow::Result<Finished> {
         return Err(error.into());
     }
     drop(watcher.progress);
-    let gates = gate_results(&job.gates, &job.plan, &outcome)?;
+    let gates = gate_results(&job.gates, &job.plan, &outcome.rows)?;
     let options = document::options(&job.plan, job.options);
     let provenance = Provenance { input: job.input, options, gates, started: job.started };
-    let document = document::document(&job.plan, &outcome, provenance);
+    let found = document::Found {
+        rows: &outcome.rows,
+        break_even: &outcome.break_even,
+        seconds: &outcome.seconds,
+    };
+    let document = document::document(&job.plan, &found, provenance);
     let shown = if job.share_safe { document.share_safe() } else { document };
     let scene = watcher.pictures.map(|p| p.into_scene(&job.cameras, job.up));
-    let options = RenderOptions { share_safe: job.share_safe, error_cdf: watcher.curves };
+    let options = RenderOptions {
+        share_safe: job.share_safe,
+        error_cdf: watcher.curves,
+        ..RenderOptions::default()
+    };
     let page = render(&shown, scene.as_ref(), &options)?;
     let json = shown.to_json()?;
     write_file(&out.path().join("report.html"), |w| std::io::Write::write_all(w, page.as_bytes()))?;
@@ -122,11 +131,11 @@ pub fn perform(job: Job<'_>, out: OutputDir) -> anyhow::Result<Finished> {
 }
 
 /// Rows that the plan will have, as gates see them.
-fn candidates<'a>(plan: &'a Plan, outcome: Option<&'a Outcome>) -> Vec<Candidate<'a>> {
+fn candidates<'a>(plan: &'a Plan, rows: Option<&'a [Row]>) -> Vec<Candidate<'a>> {
     let mut candidates = Vec::new();
-    if let Some(outcome) = outcome {
+    if let Some(rows) = rows {
         // The reference is no attack.
-        for row in outcome.rows.iter().filter(|row| row.solver != REFERENCE) {
+        for row in rows.iter().filter(|row| row.solver != REFERENCE) {
             for (at, threshold) in plan.thresholds.iter().enumerate() {
                 candidates.push(Candidate {
                     scheme: row.scheme,
@@ -156,7 +165,7 @@ fn candidates<'a>(plan: &'a Plan, outcome: Option<&'a Outcome>) -> Vec<Candidate
 }
 
 /// A gate about no row is told before the audit runs, not after.
-fn check_gates(gates: &[Gate], plan: &Plan) -> anyhow::Result<()> {
+pub fn check_gates(gates: &[Gate], plan: &Plan) -> anyhow::Result<()> {
     let rows = candidates(plan, None);
     match gates.iter().find(|gate| gate.worst(rows.iter().copied()).is_none()) {
         None => Ok(()),
@@ -168,8 +177,9 @@ fn check_gates(gates: &[Gate], plan: &Plan) -> anyhow::Result<()> {
     }
 }
 
-fn gate_results(gates: &[Gate], plan: &Plan, outcome: &Outcome) -> anyhow::Result<Vec<GateResult>> {
-    let rows = candidates(plan, Some(outcome));
+/// How every gate ended.
+pub fn gate_results(gates: &[Gate], plan: &Plan, rows: &[Row]) -> anyhow::Result<Vec<GateResult>> {
+    let rows = candidates(plan, Some(rows));
     let result = |gate: &Gate| {
         // A gate that is about no row must never count as held.
         let found = gate.worst(rows.iter().copied());
@@ -198,6 +208,13 @@ struct Watcher {
 /// Points of an error curve.
 const CURVE_POINTS: i32 = 80;
 
+/// The errors of an error curve: from a hundredth of the largest threshold to ten times it, evenly on a
+/// logarithmic axis.
+pub fn curve_errors(largest_threshold: f64) -> impl Iterator<Item = f64> {
+    let exponent = |step: i32| -2.0 + 3.0 * f64::from(step) / f64::from(CURVE_POINTS);
+    (0..=CURVE_POINTS).map(move |step| largest_threshold * 10f64.powf(exponent(step)))
+}
+
 impl Observer for Watcher {
     fn progress(&mut self, done: usize, total: usize, what: &str) {
         self.progress.show(done, total, what);
@@ -208,11 +225,7 @@ impl Observer for Watcher {
             return;
         }
         let most = self.thresholds.iter().copied().fold(0.0, f64::max);
-        // From a hundredth of the largest threshold to ten times it, evenly on a logarithmic axis.
-        let at =
-            |step: i32| most * 10f64.powf(-2.0 + 3.0 * f64::from(step) / f64::from(CURVE_POINTS));
-        let points =
-            (0..=CURVE_POINTS).map(|s| (at(s), cell.accuracy.percent_within(at(s)))).collect();
+        let points = curve_errors(most).map(|at| (at, cell.accuracy.percent_within(at))).collect();
         self.curves.push(unlift_report::ErrorCdf { row: self.curves.len(), points });
         if let Some(pictures) = &mut self.pictures {
             pictures.add(cell);

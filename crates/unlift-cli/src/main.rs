@@ -1,8 +1,10 @@
 //! The command line of unlift: parse, call the library, print.
 
 mod args;
+mod args_audit;
 mod args_bench;
 mod args_features;
+mod args_images;
 mod clouds;
 mod commands;
 mod document;

@@ -39,7 +39,23 @@ impl Progress {
 
     /// Prints a line on stderr without tearing the bar.
     pub fn say(&self, line: &str) {
-        self.bar.suspend(|| eprintln!("{line}"));
+        self.voice().say(line);
+    }
+
+    /// The same for whoever has something to say while another one shows progress.
+    pub fn voice(&self) -> Voice {
+        Voice(self.bar.clone())
+    }
+}
+
+/// Prints lines on stderr beside a progress bar.
+#[derive(Clone)]
+pub struct Voice(ProgressBar);
+
+impl Voice {
+    /// Prints a line on stderr without tearing the bar.
+    pub fn say(&self, line: &str) {
+        self.0.suspend(|| eprintln!("{line}"));
     }
 }
 

@@ -28,12 +28,51 @@ pub struct OutlierFilter {
     pub std_ratio: f64,
 }
 
-/// A scheme by its name.
+/// A scheme by its name, be it for maps or for images.
+pub fn any_scheme(text: &str) -> Result<&'static Entry, String> {
+    unlift::obfuscate::scheme(text).map_err(|error| expected(&error))
+}
+
+/// A scheme for maps by its name.
 pub fn scheme(text: &str) -> Result<&'static Entry, String> {
-    let entry = unlift::obfuscate::scheme(text).map_err(|error| expected(&error))?;
+    let entry = any_scheme(text)?;
     match entry.in_3d {
         Some(_) => Ok(entry),
         None => Err(format!("expected a scheme for maps, found {text} (for images only)")),
+    }
+}
+
+/// A scheme for images by its name.
+pub fn image_scheme(text: &str) -> Result<&'static Entry, String> {
+    let of_images = |entry: &&Entry| entry.in_2d.is_some();
+    match SCHEMES.iter().filter(of_images).find(|entry| entry.name == text) {
+        Some(entry) => Ok(entry),
+        None => {
+            let names: Vec<&str> = SCHEMES.iter().filter(of_images).map(|e| e.name).collect();
+            Err(format!("expected one of {}, found {text}", names.join(", ")))
+        }
+    }
+}
+
+/// A solver for images by its name: one that recovers from lists. In the plane all lines meet, so
+/// records alone tell nothing.
+pub fn image_solver(text: &str) -> Result<Solver, String> {
+    let names = || Solver::FROM_LISTS.map(|solver| solver.name()).join(", ");
+    let found = Solver::FROM_LISTS.into_iter().find(|solver| solver.name() == text);
+    found.ok_or_else(|| format!("expected one of {}, found {text}", names()))
+}
+
+/// `oracle`, or names of sources for images joined by `+`, with the lengths of lists usual there.
+pub fn image_source(text: &str) -> Result<NeighborSource, String> {
+    if text == "oracle" {
+        return Ok(NeighborSource::Oracle);
+    }
+    let wrong =
+        || format!("expected oracle, similarity, overlap or both joined by +, found {text}");
+    let joined = joined(text).map_err(|_| wrong())?;
+    match joined.not_in_dimension::<2>() {
+        None => Ok(NeighborSource::Own(joined.for_images())),
+        Some(_) => Err(wrong()),
     }
 }
 

@@ -33,6 +33,7 @@ mod octave;
 mod options;
 mod orientation;
 mod plane;
+pub mod preview;
 mod quantize;
 mod refine;
 mod sift;

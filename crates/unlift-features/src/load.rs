@@ -23,10 +23,16 @@ const MOST_PIXELS: u64 = 1 << 28;
 /// One line with the path: no such file, neither JPEG nor PNG nor WebP, cut off, or larger than
 /// 2^28 pixels.
 pub fn read(path: &Path) -> Result<GrayImage, Error> {
+    let (bytes, name) = bytes_of(path)?;
+    decode(&bytes, &name)
+}
+
+/// The bytes of a file, and how it is called in errors.
+pub(crate) fn bytes_of(path: &Path) -> Result<(Vec<u8>, String), Error> {
     let name = path.display().to_string();
     let bytes = std::fs::read(path)
         .map_err(|error| Error::new(name.escape_debug().to_string(), KINDS, error.to_string()))?;
-    decode(&bytes, &name)
+    Ok((bytes, name))
 }
 
 /// The same from the bytes of a file called `name`.
@@ -34,6 +40,14 @@ pub fn read(path: &Path) -> Result<GrayImage, Error> {
 /// # Errors
 /// As [`read`].
 pub fn decode(bytes: &[u8], name: &str) -> Result<GrayImage, Error> {
+    gray(&upright(bytes, name)?)
+}
+
+/// The photo itself, turned upright.
+///
+/// # Errors
+/// As [`read`].
+pub(crate) fn upright(bytes: &[u8], name: &str) -> Result<DynamicImage, Error> {
     // One line, whatever the name holds.
     let wrong = |expected: &str, found: String| {
         Error::new(name.escape_debug().to_string(), expected, found.escape_debug().to_string())
@@ -58,7 +72,7 @@ pub fn decode(bytes: &[u8], name: &str) -> Result<GrayImage, Error> {
     let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
     let mut photo = DynamicImage::from_decoder(decoder).map_err(broken)?;
     photo.apply_orientation(orientation);
-    gray(&photo)
+    Ok(photo)
 }
 
 /// Gray values as COLMAP makes them: rounded to bytes, weights of Rec. 709, transparency ignored.

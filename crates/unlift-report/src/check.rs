@@ -1,7 +1,7 @@
 //! The rules of `audit.json` that its types cannot say.
 
 use crate::Error;
-use crate::document::{ByThreshold, Document, Row, SCHEMA};
+use crate::document::{ByThreshold, Document, ImageFigures, Row, SCHEMA};
 
 impl Document {
     /// Checks the rules of the format: the schema, one row per combination, finite numbers,
@@ -36,6 +36,9 @@ impl Document {
         for (i, gate) in self.gates.iter().enumerate() {
             finite(&format!("gates[{i}].found_percent"), gate.found_percent)?;
             finite(&format!("gates[{i}].bound_percent"), gate.bound_percent)?;
+        }
+        for (i, image) in self.images.iter().enumerate() {
+            check_image(&format!("images[{i}]"), image, self.results.len())?;
         }
         self.check_run()
     }
@@ -107,6 +110,10 @@ fn check_row(place: &str, row: &Row) -> Result<(), Error> {
             }
         }
     }
+    if let Some(distinct) = &row.distinct {
+        percentages(&format!("{place}.distinct.recovered_percent"), &distinct.recovered_percent)?;
+        percentages(&format!("{place}.distinct.blind_percent"), &distinct.blind_percent)?;
+    }
     if let Some(spread) = &row.std {
         let maps = [
             ("recovered_percent", &spread.recovered_percent),
@@ -114,6 +121,23 @@ fn check_row(place: &str, row: &Row) -> Result<(), Error> {
         ];
         for (field, map) in maps {
             percentages(&format!("{place}.std.{field}"), map)?;
+        }
+    }
+    Ok(())
+}
+
+fn check_image(place: &str, image: &ImageFigures, n_results: usize) -> Result<(), Error> {
+    if !image.rows.is_empty() && image.rows.len() != n_results {
+        let expected = format!("{n_results} rows, as in results");
+        return Err(invalid(format!("{place}.rows"), expected, image.rows.len().to_string()));
+    }
+    for (at, row) in image.rows.iter().enumerate() {
+        let place = format!("{place}.rows[{at}]");
+        between(&format!("{place}.inlier_ratio"), row.inlier_ratio, 0.0, 1.0)?;
+        percentages(&format!("{place}.recovered_percent"), &row.recovered_percent)?;
+        percentages(&format!("{place}.distinct_percent"), &row.distinct_percent)?;
+        if let Some(error) = row.median_error {
+            finite(&format!("{place}.median_error"), error)?;
         }
     }
     Ok(())

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::Error;
 use crate::round::round_floats;
 
+pub use crate::images::{Distinct, ImageCounts, ImageFigures, ImageRow};
 pub use crate::round::SIGNIFICANT_DIGITS;
 
 /// The schema this build writes and reads.
@@ -41,6 +42,9 @@ pub struct Document {
     /// The user's gates and how they ended; empty when none was given.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub gates: Vec<GateResult>,
+    /// Audits of images: every image that was used, in the order of names; empty for maps.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub images: Vec<ImageFigures>,
     /// What varies from run to run.
     pub run: Run,
 }
@@ -63,6 +67,9 @@ pub struct Input {
     /// SHA-256 of further files that were read, by role (`descriptors`, `neighbors`).
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub other_sha256: IndexMap<String, String>,
+    /// How many images there were; `None` for maps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub images: Option<ImageCounts>,
 }
 
 /// The unit of every length in a row: thresholds, delta, errors.
@@ -74,6 +81,9 @@ pub enum LengthUnit {
     /// The median distance of an original to its K-th nearest neighbor; used without a scale.
     #[serde(rename = "kth_neighbor")]
     KthNeighbor,
+    /// Pixels of the image: audits of images.
+    #[serde(rename = "px")]
+    Pixel,
 }
 
 /// The figures of one (scheme, neighbors, oracle noise, inlier ratio, K, solver).
@@ -141,6 +151,9 @@ pub struct Row {
     /// Standard deviation over the repeats; `None` for a single run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub std: Option<Spread>,
+    /// The shares over distinct places; images only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distinct: Option<Distinct>,
 }
 
 /// Points of similar stated probability, over all repeats.
@@ -255,7 +268,7 @@ impl Document {
     pub fn to_json(&self) -> Result<String, Error> {
         self.check()?;
         let mut value = serde_json::to_value(self)?;
-        for field in ["results", "break_even", "gates", "run"] {
+        for field in ["results", "break_even", "gates", "images", "run"] {
             if let Some(part) = value.get_mut(field) {
                 round_floats(part);
             }

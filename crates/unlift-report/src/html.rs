@@ -4,26 +4,29 @@ use minijinja::value::Serde;
 use minijinja::{AutoEscape, Environment, UndefinedBehavior};
 use serde::Serialize;
 
-use crate::document::{Document, GateResult, LengthUnit};
+use crate::document::{Document, GateResult, ImageCounts, LengthUnit};
 use crate::page_data::{page_data, slot};
+use crate::pictures::Picture;
 use crate::scene::{Scene3d, encode};
 use crate::tables::Table;
 use crate::verdict::Verdict;
-use crate::{Error, paper, tables, verdict, words};
+use crate::{Error, paper, pictures, tables, verdict, words};
 
 /// The template and its parts, by the names they include each other with.
-const TEMPLATES: [(&str, &str); 5] = [
+const TEMPLATES: [(&str, &str); 6] = [
     ("report.html", include_str!("../template/report.html")),
     ("verdict.html", include_str!("../template/verdict.html")),
     ("figures.html", include_str!("../template/figures.html")),
+    ("pictures.html", include_str!("../template/pictures.html")),
     ("tables.html", include_str!("../template/tables.html")),
     ("notes.html", include_str!("../template/notes.html")),
 ];
 const STYLE: &str = include_str!("../template/style.css");
 const BUNDLE: &str = include_str!("../web/vendor/bundle.min.js");
-const SCRIPTS: [&str; 3] = [
+const SCRIPTS: [&str; 4] = [
     include_str!("../web/charts.js"),
     include_str!("../web/scene.js"),
+    include_str!("../web/pictures.js"),
     include_str!("../web/report.js"),
 ];
 
@@ -34,6 +37,8 @@ pub struct RenderOptions {
     pub share_safe: bool,
     /// Finer error curves than the percentiles of the document; may be empty.
     pub error_cdf: Vec<ErrorCdf>,
+    /// Audits of images: those to be drawn, at most [`MOST_PICTURES`](crate::pictures::MOST_PICTURES).
+    pub pictures: Vec<Picture>,
 }
 
 /// The error curve of one row of the results.
@@ -48,7 +53,7 @@ pub struct ErrorCdf {
 
 /// Draws `document` as one self-contained HTML page below 10 MB.
 ///
-/// With [`RenderOptions::share_safe`] the scene is ignored and names are withheld, whatever the
+/// With [`RenderOptions::share_safe`] the scene and pictures are ignored and names are withheld, whatever the
 /// document holds.
 ///
 /// # Errors
@@ -65,13 +70,17 @@ pub fn render(
     let scene = scene.filter(|scene| !options.share_safe && !scene.originals.is_empty());
     let error_unit = tables::thresholds(&document).first().and_then(|typed| typed.parse().ok());
     let encoded = scene.map(|scene| encode(scene, error_unit.unwrap_or(1.0)));
-    let page_data = page_data(&document, encoded.as_ref(), options);
+    let mut blocks = encoded.as_ref().map(|scene| scene.blocks.clone()).unwrap_or_default();
+    let shown = if options.share_safe { &[] } else { options.pictures.as_slice() };
+    let pictures = pictures::encode(shown, &mut blocks);
+    let page_data = page_data(&document, encoded.as_ref(), &pictures, options);
     let data = serde_json::to_string(&page_data)?;
     let verdict = verdict::verdict(&document);
     let options_text: Vec<(String, String)> =
         document.options.iter().map(|(name, value)| (name.clone(), plain(value))).collect();
     let table_list = [
         Some(tables::recovered(&document)),
+        tables::distinct(&document),
         Some(tables::errors(&document)),
         Some(tables::break_even(&document)).filter(|table| !table.rows.is_empty()),
     ];
@@ -82,7 +91,8 @@ pub fn render(
         bundle: BUNDLE,
         scripts: SCRIPTS,
         data: script_text(&data),
-        blocks: encoded.as_ref().map(|scene| scene.blocks.as_slice()).unwrap_or_default(),
+        blocks: &blocks,
+        pictures: pictures.len(),
         scene: encoded.as_ref().map(|scene| SceneWords {
             n_points: words::thousands(scene.n_points),
             n_drawn: words::thousands(scene.n_drawn as u64),
@@ -120,11 +130,13 @@ pub fn render(
 struct Page<'a> {
     style: &'static str,
     bundle: &'static str,
-    scripts: [&'static str; 3],
+    scripts: [&'static str; 4],
     /// JSON for the script; free of `<`.
     data: String,
     blocks: &'a [String],
     scene: Option<SceneWords>,
+    /// Images that are drawn.
+    pictures: usize,
     share_safe: bool,
     subject: Subject,
     verdict: Verdict,
@@ -168,6 +180,10 @@ struct Subject {
     name: Option<String>,
     n_points: String,
     metric: bool,
+    /// "map" or "images", and what these consist of: "points" or "keypoints".
+    kind: &'static str,
+    points: &'static str,
+    images: Option<String>,
     /// What one unit of this page is.
     unit: String,
     /// "50th", of the neighbor whose distance is the unit.
@@ -177,8 +193,10 @@ struct Subject {
 fn subject(document: &Document) -> Subject {
     let input = &document.input;
     let k = document.results.first().map_or(50, |row| row.k);
-    let metric = document.results.first().is_none_or(|row| row.unit == LengthUnit::Meter);
+    let of = document.results.first().map_or(LengthUnit::Meter, |row| row.unit);
+    let metric = of != LengthUnit::KthNeighbor;
     let unit = match (metric, input.scale_m_per_unit, input.unit_in_map_units) {
+        (true, ..) if of == LengthUnit::Pixel => "Lengths are in pixels.".to_owned(),
         (true, Some(scale), _) => {
             format!("Meters, by the declared scale of {scale} m per map unit.")
         }
@@ -193,9 +211,29 @@ fn subject(document: &Document) -> Subject {
         name,
         n_points: words::thousands(input.n_points),
         metric,
+        kind: if of == LengthUnit::Pixel { "images" } else { "map" },
+        points: words::points(of),
+        images: input.images.as_ref().map(images_text),
         unit,
         kth: words::ordinal(k),
     }
+}
+
+/// How many images there were, in a sentence or two.
+fn images_text(counts: &ImageCounts) -> String {
+    let count = words::thousands;
+    let mut text = match counts.found == counts.used {
+        true => format!("{} images.", count(counts.used)),
+        false => format!("{} of {} images.", count(counts.used), count(counts.found)),
+    };
+    if counts.unusable > 0 {
+        text.push_str(&format!(" {} could not be used.", count(counts.unusable)));
+    }
+    if counts.too_small > 0 {
+        let (n, few) = (count(counts.too_small), "had too few keypoints to be attacked");
+        text.push_str(&format!(" {n} {few}; these keypoints count as lost."));
+    }
+    text
 }
 
 /// The part of a path that names the map: `room` of `maps/room/sparse/0`.

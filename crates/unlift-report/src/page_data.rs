@@ -4,7 +4,8 @@ use serde::Serialize;
 
 use crate::document::{Document, LengthUnit, Row};
 use crate::html::RenderOptions;
-use crate::paper::{PublishedCurve, published_3d};
+use crate::paper::{PublishedCurve, published_2d, published_3d};
+use crate::pictures::EncodedPicture;
 use crate::scene::Encoded;
 use crate::{tables, words};
 
@@ -20,9 +21,12 @@ pub(crate) struct PageData<'a> {
     thresholds: Vec<ThresholdData>,
     rows: Vec<RowData<'a>>,
     published: Vec<PublishedData>,
-    /// `m`, or `nd` for multiples of the neighbor distance.
+    /// The threshold that is shown first.
+    headline: usize,
+    /// `m`, `px`, or `nd` for multiples of the neighbor distance.
     unit: &'static str,
     scene: Option<&'a Encoded>,
+    pictures: &'a [EncodedPicture],
 }
 
 impl PageData<'_> {
@@ -70,7 +74,14 @@ struct PublishedData {
 
 /// The color and mark of `scheme`; unknown ones take turns in the order they appear.
 pub(crate) fn slot(document: &Document, scheme: &str) -> usize {
-    if let Some(slot) = KNOWN_SCHEMES.iter().position(|known| *known == scheme) {
+    // Schemes for images have the color of the scheme for maps that they are most like.
+    let known = match scheme {
+        "lines2d" => "olc",
+        "cp2d" => "cp",
+        "dcl2d" => "ray",
+        other => other,
+    };
+    if let Some(slot) = KNOWN_SCHEMES.iter().position(|name| *name == known) {
         return slot;
     }
     let mut unknown: Vec<&str> = Vec::new();
@@ -108,6 +119,7 @@ fn judged(row: &Row) -> Vec<(f64, f64)> {
 pub(crate) fn page_data<'a>(
     document: &'a Document,
     scene: Option<&'a Encoded>,
+    pictures: &'a [EncodedPicture],
     options: &RenderOptions,
 ) -> PageData<'a> {
     let thresholds = tables::thresholds(document);
@@ -154,26 +166,33 @@ pub(crate) fn page_data<'a>(
             .collect(),
         unit: match document.results.first().map(|row| row.unit) {
             Some(LengthUnit::KthNeighbor) => "nd",
+            Some(LengthUnit::Pixel) => "px",
             _ => "m",
         },
+        headline: tables::headline_threshold(document)
+            .and_then(|typed| thresholds.iter().position(|other| *other == typed))
+            .unwrap_or(0),
         schemes,
         solvers,
         scene,
+        pictures,
     }
 }
 
-/// Published curves whose scheme was tested and whose threshold is one of ours; none without a
-/// declared scale.
+/// Published curves whose scheme was tested and whose threshold is one of ours; none for a map
+/// without a declared scale.
 fn published(document: &Document, thresholds: &[String]) -> Vec<PublishedData> {
-    let metric = document.results.iter().all(|row| row.unit == LengthUnit::Meter);
-    if !metric {
-        return Vec::new();
-    }
+    let all = |unit| document.results.iter().all(|row| row.unit == unit);
+    let published = match () {
+        () if all(LengthUnit::Meter) => published_3d(),
+        () if all(LengthUnit::Pixel) => published_2d(),
+        () => return Vec::new(),
+    };
     let same = |typed: &String, curve: &PublishedCurve| {
-        typed.parse::<f64>().is_ok_and(|value| (value - curve.threshold_m).abs() < 1e-9)
+        typed.parse::<f64>().is_ok_and(|value| (value - curve.threshold).abs() < 1e-9)
     };
     let tested = |scheme: &str| document.results.iter().any(|row| row.scheme == scheme);
-    let curves = published_3d().into_iter().filter(|curve| tested(curve.scheme));
+    let curves = published.into_iter().filter(|curve| tested(curve.scheme));
     let matched = curves.filter_map(|curve| {
         let threshold = thresholds.iter().position(|typed| same(typed, &curve))?;
         let PublishedCurve { dataset, scheme, points, .. } = curve;

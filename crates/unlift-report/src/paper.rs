@@ -1,7 +1,7 @@
 //! The figures of the paper this tool follows, to draw beside one's own.
 //!
-//! Source: supplementary tables "geometric accuracy" (SIFT) for 7-scenes, 12-scenes and Cambridge
-//! Landmarks. Those are other maps than the reader's, so only the trend compares.
+//! Source: tables "geometric accuracy" of the paper and its supplement for 7-scenes, 12-scenes and
+//! Cambridge Landmarks. Those are other places than the reader's, so only the trend compares.
 
 /// Who published the dashed curves.
 pub const ATTRIBUTION: &str = "Chelani et al., Obfuscation Based Privacy Preserving \
@@ -13,15 +13,18 @@ const TABLE: &str = include_str!("../published_3d.csv");
 /// Recovered share over inlier ratio, as printed for one dataset, scheme and threshold.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PublishedCurve {
-    /// `7-scenes`, `12-scenes` or `cambridge`.
+    /// `7-scenes`, `12-scenes` or `cambridge`; for images with the features if these are not SIFT.
     pub dataset: &'static str,
     /// The scheme's user-facing name.
     pub scheme: &'static str,
-    /// Error below which a point counts as recovered.
-    pub threshold_m: f64,
+    /// Error below which a point counts as recovered: meters in three dimensions, else pixels.
+    pub threshold: f64,
     /// (inlier ratio, percent of the points recovered), by falling ratio.
     pub points: Vec<(f64, f64)>,
 }
+
+/// `published_2d.csv`: the same of keypoints of images, threshold in pixels.
+const TABLE_2D: &str = include_str!("../published_2d.csv");
 
 /// `published_seconds.csv`: scheme, points, K, inlier ratio, seconds. Source: supplementary table
 /// "runtime" of the same paper; 64 cores.
@@ -47,23 +50,30 @@ pub fn published_seconds(
 
 /// All published curves in three dimensions, in the order of the table.
 pub fn published_3d() -> Vec<PublishedCurve> {
+    curves(TABLE)
+}
+
+/// All published curves of keypoints of images, in the order of the table.
+pub fn published_2d() -> Vec<PublishedCurve> {
+    curves(TABLE_2D)
+}
+
+fn curves(table: &'static str) -> Vec<PublishedCurve> {
     let mut curves: Vec<PublishedCurve> = Vec::new();
-    for line in TABLE.lines().skip(1) {
+    for line in table.lines().skip(1) {
         let cells: Vec<&'static str> = line.split(',').collect();
         let [dataset, scheme, ratio, threshold, percent] = cells[..] else {
-            unreachable!("published_3d.csv: expected 5 cells in {line:?}");
+            unreachable!("published table: expected 5 cells in {line:?}");
         };
-        let number = |cell: &str| cell.parse::<f64>().expect("published_3d.csv holds numbers");
-        let threshold_m = number(threshold);
+        let number = |cell: &str| cell.parse::<f64>().expect("published tables hold numbers");
+        let threshold = number(threshold);
         let point = (number(ratio), number(percent));
         let same = |c: &PublishedCurve| {
-            c.dataset == dataset && c.scheme == scheme && c.threshold_m == threshold_m
+            c.dataset == dataset && c.scheme == scheme && c.threshold == threshold
         };
         match curves.iter_mut().find(|curve| same(curve)) {
             Some(curve) => curve.points.push(point),
-            None => {
-                curves.push(PublishedCurve { dataset, scheme, threshold_m, points: vec![point] })
-            }
+            None => curves.push(PublishedCurve { dataset, scheme, threshold, points: vec![point] }),
         }
     }
     curves
@@ -77,7 +87,9 @@ mod tests {
     fn every_curve_has_the_six_ratios() {
         let curves = published_3d();
         assert_eq!(curves.len(), 3 * 6 * 2);
-        for curve in &curves {
+        let images = published_2d();
+        assert_eq!(images.len(), 4 * 2 * 3);
+        for curve in curves.iter().chain(&images) {
             let ratios: Vec<f64> = curve.points.iter().map(|point| point.0).collect();
             assert_eq!(ratios, [1.0, 0.75, 0.5, 0.3, 0.2, 0.1], "{curve:?}");
         }
@@ -97,8 +109,14 @@ mod tests {
         let curves = published_3d();
         let cp = curves
             .iter()
-            .find(|c| c.dataset == "7-scenes" && c.scheme == "cp" && c.threshold_m == 0.10)
+            .find(|c| c.dataset == "7-scenes" && c.scheme == "cp" && c.threshold == 0.10)
             .unwrap();
         assert_eq!(cp.points[2], (0.5, 67.7));
+        let curves = published_2d();
+        let lines = curves
+            .iter()
+            .find(|c| c.dataset == "7-scenes" && c.scheme == "lines2d" && c.threshold == 10.0)
+            .unwrap();
+        assert_eq!(lines.points[2], (0.5, 78.8));
     }
 }

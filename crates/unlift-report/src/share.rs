@@ -8,7 +8,8 @@ use crate::document::Document;
 const WITHHELD: &str = "(withheld)";
 
 /// Options whose value is a name of the owner's.
-const NAMING_OPTIONS: [&str; 6] = ["descriptors", "input", "map", "model", "out", "path"];
+const NAMING_OPTIONS: [&str; 8] =
+    ["descriptors", "input", "map", "model", "out", "path", "photos", "show"];
 
 impl Document {
     /// A copy without paths, names and the command line: figures, hashes and plain options only.
@@ -16,6 +17,9 @@ impl Document {
         let mut safe = self.clone();
         safe.input.path = None;
         safe.run.command = None;
+        for image in &mut safe.images {
+            image.name = None;
+        }
         for (name, value) in &mut safe.options {
             withhold(name, value);
         }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::document::{Bound, ByReason, Document, Row};
+use crate::document::{Bound, ByReason, Document, LengthUnit, Row};
 use crate::words;
 
 /// A table of text.
@@ -28,7 +28,8 @@ pub(crate) fn recovered(document: &Document) -> Table {
     for typed in &thresholds {
         head.push(format!("blind, within {}, %", threshold_text(document, typed)));
     }
-    head.push("points".to_owned());
+    let points = document.results.first().map_or("points", |row| words::points(row.unit));
+    head.push(points.to_owned());
     let rows = document.results.iter().map(|row| {
         let mut cells = key_cells(row);
         cells.push(row.k.to_string());
@@ -52,11 +53,42 @@ pub(crate) fn recovered(document: &Document) -> Table {
     };
     Table {
         id: "recovered",
-        caption: format!("Points recovered, in percent of the points released.{spread}"),
+        caption: format!("Recovered {points}, in percent of the {points} released.{spread}"),
         rows: rows.collect(),
         head,
         labels: 2,
     }
+}
+
+/// The shares over distinct places; `None` when no row has them.
+pub(crate) fn distinct(document: &Document) -> Option<Table> {
+    document.results.iter().find(|row| row.distinct.is_some())?;
+    let thresholds = thresholds(document);
+    let mut head = texts(&["scheme", "solver", "neighbors right"]);
+    for typed in &thresholds {
+        head.push(format!("within {}, %", threshold_text(document, typed)));
+    }
+    for typed in &thresholds {
+        head.push(format!("blind, within {}, %", threshold_text(document, typed)));
+    }
+    head.push("places".to_owned());
+    let rows = document.results.iter().filter_map(|row| {
+        let distinct = row.distinct.as_ref()?;
+        let mut cells = key_cells(row);
+        for shares in [&distinct.recovered_percent, &distinct.blind_percent] {
+            cells.extend(thresholds.iter().map(|typed| percent_cell(shares.get(typed), None)));
+        }
+        cells.push(words::thousands(distinct.n_places));
+        Some(cells)
+    });
+    Some(Table {
+        id: "distinct",
+        caption: "The same over distinct places: keypoints that lie on each other count once."
+            .to_owned(),
+        rows: rows.collect(),
+        head,
+        labels: 2,
+    })
 }
 
 /// Percentiles of the error.
@@ -213,6 +245,21 @@ pub(crate) fn thresholds(document: &Document) -> Vec<String> {
         }
     }
     all
+}
+
+/// In pixels, the threshold that speaks for an image: half way between exact and roughly right.
+const HEADLINE_PX: f64 = 10.0;
+
+/// The threshold that verdicts are about: the first; for images the one nearest to 10 px.
+pub(crate) fn headline_threshold(document: &Document) -> Option<String> {
+    let all = thresholds(document);
+    if document.results.first().is_none_or(|row| row.unit != LengthUnit::Pixel) {
+        return all.into_iter().next();
+    }
+    let away = |typed: &String| {
+        typed.parse::<f64>().map_or(f64::INFINITY, |value| (value / HEADLINE_PX).ln().abs())
+    };
+    all.into_iter().min_by(|a, b| away(a).total_cmp(&away(b)))
 }
 
 /// A threshold in words of the document's unit.

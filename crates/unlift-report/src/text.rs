@@ -12,6 +12,7 @@ pub fn text_table(document: &Document) -> String {
     let mut head = vec!["scheme".to_owned(), "solver".to_owned(), "right".to_owned()];
     head.extend(thresholds.iter().map(|typed| format!("{typed} {}", unit(document))));
     head.extend(["blind".to_owned(), "break-even".to_owned()]);
+    let headline = tables::headline_threshold(document);
     let mut lines = vec![head];
     for card in verdict::verdict(document).cards {
         let Some(row) = verdict::headline(document, &card.scheme) else {
@@ -24,7 +25,7 @@ pub fn text_table(document: &Document) -> String {
             cells.push(value.map_or("-".into(), |v| format!("{} %", words::percent(*v))));
         }
         cells.push(format!("{} %", words::percent(card.blind)));
-        cells.push(break_even(document, row, thresholds.first()));
+        cells.push(break_even(document, row, headline.as_ref()));
         lines.push(cells);
     }
     align(&lines)
@@ -33,6 +34,7 @@ pub fn text_table(document: &Document) -> String {
 fn unit(document: &Document) -> &'static str {
     match document.results.first().map(|row| row.unit) {
         Some(crate::document::LengthUnit::KthNeighbor) => "nd",
+        Some(crate::document::LengthUnit::Pixel) => "px",
         _ => "m",
     }
 }

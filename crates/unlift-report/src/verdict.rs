@@ -4,7 +4,7 @@
 use serde::Serialize;
 
 use crate::document::{Bound, BreakEven, Document, Row};
-use crate::words;
+use crate::{tables, words};
 
 /// The inlier ratio of the headline, if it was tested; else the tested one nearest to it.
 const HEADLINE_RATIO: f64 = 0.5;
@@ -47,7 +47,7 @@ pub(crate) struct Verdict {
     pub cards: Vec<Card>,
 }
 
-/// Judges every scheme by the strongest solver at the headline ratio, for the first threshold.
+/// Judges every scheme by the strongest solver at the headline ratio, for the headline threshold.
 pub(crate) fn verdict(document: &Document) -> Verdict {
     let mut cards: Vec<Card> = Vec::new();
     for row in &document.results {
@@ -64,7 +64,8 @@ pub(crate) fn verdict(document: &Document) -> Verdict {
 /// The row that speaks for `scheme`: nearest to the headline ratio, then the largest share.
 pub(crate) fn headline<'a>(document: &'a Document, scheme: &str) -> Option<&'a Row> {
     let away = |row: &Row| (row.inlier_ratio - HEADLINE_RATIO).abs();
-    let share = |row: &Row| row.recovered_percent.values().next().copied().unwrap_or(0.0);
+    let typed = tables::headline_threshold(document).unwrap_or_default();
+    let share = |row: &Row| row.recovered_percent.get(&typed).copied().unwrap_or(0.0);
     document
         .results
         .iter()
@@ -73,7 +74,9 @@ pub(crate) fn headline<'a>(document: &'a Document, scheme: &str) -> Option<&'a R
 }
 
 fn card(document: &Document, row: &Row) -> Option<Card> {
-    let (typed, &recovered) = row.recovered_percent.first()?;
+    let typed = &tables::headline_threshold(document)?;
+    let recovered = *row.recovered_percent.get(typed)?;
+    let points = words::points(row.unit);
     let blind = row.blind_percent.get(typed).copied().unwrap_or(0.0);
     let within = words::threshold(typed, row.unit);
     let when = condition(row);
@@ -85,10 +88,10 @@ fn card(document: &Document, row: &Row) -> Option<Card> {
         at_least: words::at_least(recovered),
         recovered,
         blind,
-        sentence: format!("of the points come back within {within} {when}"),
+        sentence: format!("of the {points} come back within {within} {when}"),
         amount: amount(recovered, blind),
         gain: gain(recovered, blind),
-        break_even: break_even.map(break_even_sentence),
+        break_even: break_even.map(|point| break_even_sentence(point, points)),
         solver: words::method(&row.solver, row.oracle_noise.as_deref()),
     })
 }
@@ -131,10 +134,10 @@ fn gain(recovered: f64, blind: f64) -> String {
     format!("A blind guess gets {guess} %; the neighbors add {points} percentage points.")
 }
 
-fn break_even_sentence(point: &BreakEven) -> String {
+fn break_even_sentence(point: &BreakEven, points: &str) -> String {
     match (point.bound, point.inlier_ratio.map(words::ratio_percent)) {
         (Bound::Interpolated, Some(ratio)) => {
-            format!("Half of the points come back when only {ratio} % of neighbors are right.")
+            format!("Half of the {points} come back when only {ratio} % of neighbors are right.")
         }
         (Bound::BelowTested, Some(ratio)) => {
             format!("Half come back even when {ratio} % are right, the fewest tested.")
@@ -153,18 +156,20 @@ fn summary(document: &Document, cards: &[Card]) -> String {
     let Some(row) = headline(document, &worst.scheme) else {
         return String::new();
     };
-    let within = row.recovered_percent.first().map(|(typed, _)| words::threshold(typed, row.unit));
+    let typed = tables::headline_threshold(document);
+    let within = typed.map(|typed| words::threshold(&typed, row.unit));
     let within = within.unwrap_or_default();
     let when = condition(row);
     if cards.len() == 1 {
         return format!("At least {} % {}.", worst.at_least, worst.sentence);
     }
     let most = cards.iter().filter(|card| card.recovered >= 50.0).count();
+    let points = words::points(row.unit);
     let who = match (most, cards.len()) {
-        (0, n) => format!("None of the {n} schemes gives back half of its points"),
-        (m, n) if m == n => format!("All {n} schemes give back most of their points"),
-        (1, n) => format!("One of {n} schemes gives back most of its points"),
-        (m, n) => format!("{m} of {n} schemes give back most of their points"),
+        (0, n) => format!("None of the {n} schemes gives back half of its {points}"),
+        (m, n) if m == n => format!("All {n} schemes give back most of their {points}"),
+        (1, n) => format!("One of {n} schemes gives back most of its {points}"),
+        (m, n) => format!("{m} of {n} schemes give back most of their {points}"),
     };
     let (low, high) = (&best.at_least, &worst.at_least);
     format!("{who}; the shares run from {low} to {high} % within {within} {when}.")

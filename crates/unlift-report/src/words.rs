@@ -12,6 +12,9 @@ pub(crate) fn scheme_title(scheme: &str) -> &str {
         "ray-voxel" => "Ray cloud, voxel parity",
         "plane" => "Axis-aligned planes",
         "cp" => "Coordinate permutation",
+        "lines2d" => "Random lines in the image",
+        "cp2d" => "Coordinate permutation in the image",
+        "dcl2d" => "Dual convergent lines",
         other => other,
     }
 }
@@ -26,6 +29,9 @@ pub(crate) fn scheme_rule(scheme: &str) -> &'static str {
         "ray-voxel" => "As the ray cloud; the center follows the parity of the point's voxel.",
         "plane" => "Each point keeps one coordinate of three.",
         "cp" => "Two points swap one coordinate.",
+        "lines2d" => "Each keypoint becomes a line of random direction through it.",
+        "cp2d" => "Two keypoints swap one of their two coordinates.",
+        "dcl2d" => "Each keypoint becomes a ray from the anchor of its half of the image.",
         _ => "",
     }
 }
@@ -35,16 +41,26 @@ pub(crate) fn threshold(typed: &str, unit: LengthUnit) -> String {
     match (unit, typed.parse::<f64>()) {
         (LengthUnit::Meter, Ok(meters)) => meters_text(meters),
         (LengthUnit::Meter, Err(_)) => format!("{typed} m"),
+        (LengthUnit::Pixel, _) => format!("{typed} px"),
         (LengthUnit::KthNeighbor, Ok(1.0)) => "1 neighbor distance".to_owned(),
         (LengthUnit::KthNeighbor, _) => format!("{typed} neighbor distances"),
     }
 }
 
-/// A length of the document's unit: centimeters below a meter, or multiples of the unit.
+/// What is hidden: points of a map, or keypoints of images.
+pub(crate) fn points(unit: LengthUnit) -> &'static str {
+    match unit {
+        LengthUnit::Meter | LengthUnit::KthNeighbor => "points",
+        LengthUnit::Pixel => "keypoints",
+    }
+}
+
+/// A length of the document's unit: centimeters below a meter, pixels, or multiples of the unit.
 pub(crate) fn length(value: f64, unit: LengthUnit) -> String {
     match unit {
         LengthUnit::Meter => meters_text(value),
         LengthUnit::KthNeighbor => format!("{} nd", significant(value, 3)),
+        LengthUnit::Pixel => format!("{} px", significant(value, 3)),
     }
 }
 
@@ -168,6 +184,8 @@ mod tests {
         assert_eq!(threshold("2.5", LengthUnit::Meter), "2.5 m");
         assert_eq!(threshold("1.0", LengthUnit::KthNeighbor), "1 neighbor distance");
         assert_eq!(threshold("2.5", LengthUnit::KthNeighbor), "2.5 neighbor distances");
+        assert_eq!(threshold("10", LengthUnit::Pixel), "10 px");
+        assert_eq!(length(3.14159, LengthUnit::Pixel), "3.14 px");
     }
 
     #[test]

@@ -121,6 +121,29 @@ fn a_page_of_figures_only_has_curves_and_no_canvas() {
 }
 
 #[test]
+fn pictures_of_images_are_drawn_for_every_choice() {
+    let Some(mut browser) = browser() else { return };
+    let options = RenderOptions { pictures: vec![sample::picture()], ..RenderOptions::default() };
+    let page = render(&sample::images(), None, &options).expect("a page");
+    let file = PageFile::new("images", &page);
+    for (width, height) in [(1280, 900), (390, 844)] {
+        browser.emulate(width, height, "light");
+        browser.open(&file.0);
+        browser.evaluate("document.querySelectorAll('.controls input').forEach(i => i.click())");
+        assert_eq!(browser.evaluate("document.documentElement.dataset.pictures"), json!("drawn"));
+        let lit = "[...document.querySelectorAll('.pictures canvas')].map(canvas => {
+            const [w, h] = [canvas.width, canvas.height];
+            const pixels = canvas.getContext('2d').getImageData(0, 0, w, h).data;
+            return new Set(new Uint32Array(pixels.buffer)).size > 2;
+        }).join()";
+        assert_eq!(browser.evaluate(lit), json!("true,true,true,true"));
+        let wider = "document.documentElement.scrollWidth > document.documentElement.clientWidth";
+        assert_eq!(browser.evaluate(wider), json!(false), "sideways at {width} px");
+        assert_eq!(browser.complaints, Vec::<String>::new());
+    }
+}
+
+#[test]
 fn pictures_are_taken_when_asked_for() {
     let Some(folder) = std::env::var_os("UNLIFT_SCREENSHOTS") else {
         return;

@@ -143,3 +143,35 @@ fn the_vendored_bundle_is_the_one_described() {
         "bundle.min.js has sha256 {sum}"
     );
 }
+
+#[test]
+fn a_page_of_images_speaks_of_keypoints_and_pixels() {
+    let document = sample::images();
+    let options = RenderOptions { pictures: vec![sample::picture()], ..RenderOptions::default() };
+    let page = render(&document, None, &options).expect("a page");
+    let text = without_script(&page);
+    assert!(text.contains("How much of these images comes back?"));
+    assert!(text.contains("2 of 4 images. 1 could not be used. 1 had too few keypoints"));
+    assert!(text.contains("of the keypoints come back within 10 px when half"));
+    assert!(text.contains("<td>94.2</td>") && text.contains("id=\"table-distinct\""));
+    assert!(text.contains("3DV 2025") && page.contains("\"unit\":\"px\""));
+    assert!(page.contains("kitchen/secret.jpg"));
+    assert!(text_table(&document).contains("10 px"));
+
+    let safe =
+        render(&document, None, &RenderOptions { share_safe: true, ..options }).expect("a page");
+    assert!(!safe.contains("secret") && !safe.contains("id=\"picture-graph\""));
+    let json = document.share_safe().to_json().expect("a document");
+    assert!(!json.contains("secret") && json.contains("\"name\": null"));
+}
+
+#[test]
+fn rows_of_an_image_are_those_of_the_results() {
+    let mut document = sample::images();
+    document.images[1].rows.pop();
+    let error = document.to_json().unwrap_err().to_string();
+    assert_eq!(error, "audit.json: images[1].rows: expected 12 rows, as in results, found 11");
+    document.images[1].rows.clear();
+    let text = document.to_json().expect("an image without keypoints has no rows");
+    assert_eq!(Document::from_json(&text).expect("the same").images, document.images);
+}

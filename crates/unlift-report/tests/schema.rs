@@ -105,6 +105,8 @@ fn check(document: &Document) -> Vec<String> {
 fn documents_keep_the_schema() {
     assert_eq!(check(&sample::document(true)), Vec::<String>::new());
     assert_eq!(check(&sample::document(false).share_safe()), Vec::<String>::new());
+    assert_eq!(check(&sample::images()), Vec::<String>::new());
+    assert_eq!(check(&sample::images().share_safe()), Vec::<String>::new());
     let mut full = sample::document(true);
     full.results[0].repeats = 3;
     full.results[0].std = Some(Spread { median_error: Some(0.1), ..Spread::default() });

@@ -21,7 +21,7 @@ window.Unlift = window.Unlift || {};
   /** A length of the document's unit, as the tables say it. */
   function length(value, unit) {
     const short = (x) => String(Number(x.toPrecision(2)));
-    if (unit !== "m") return `${short(value)} nd`;
+    if (unit !== "m") return `${short(value)} ${unit}`;
     if (value >= 1) return `${short(value)} m`;
     return value >= 0.01 ? `${short(value * 100)} cm` : `${short(value * 1000)} mm`;
   }
@@ -154,7 +154,10 @@ window.Unlift = window.Unlift || {};
   }
 
   /** One small chart per scheme: every threshold and solver, the paper's curves, the blind line. */
-  function multiples(node, data, { dataset }) {
+  function multiples(node, data, { dataset, threshold: chosen }) {
+    // More than two thresholds would be a thicket: then the chosen one alone.
+    const few = data.thresholds.length <= 2;
+    const first = few ? 0 : chosen;
     data.schemes.forEach((scheme, index) => {
       let figure = node.children[index];
       if (!figure) {
@@ -165,7 +168,8 @@ window.Unlift = window.Unlift || {};
       }
       const series = [];
       data.thresholds.forEach((threshold, t) => {
-        const opacity = t === 0 ? 1 : 0.55;
+        if (!few && t !== chosen) return;
+        const opacity = t === first ? 1 : 0.55;
         data.solvers.forEach((solver, s) => {
           const style = { opacity, width: s === 0 ? 2.2 : 1.4, size: 6, mark: s === 0 ? "circle" : "emptyRect" };
           const name = data.solvers.length > 1 ? `${threshold.label}, ${solver}` : threshold.label;
@@ -188,7 +192,8 @@ window.Unlift = window.Unlift || {};
       });
     });
     const ink = css("--ink");
-    const entries = data.thresholds.map((t, i) => [
+    const shown = data.thresholds.filter((_, t) => few || t === chosen);
+    const entries = shown.map((t, i) => [
       `within ${t.label}`, i === 0 ? ink : css("--soft"), "solid", "circle"]);
     data.solvers.slice(1).forEach((solver) => entries.push([solver, ink, "solid", "emptyRect"]));
     if (data.published.length) entries.push([`the paper's, on ${dataset}`, ink, "dashed", "none"]);

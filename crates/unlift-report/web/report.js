@@ -2,7 +2,7 @@
 "use strict";
 
 (() => {
-  const { element, overview, multiples, errors, reliability, chartCount, SceneView, ramp } = window.Unlift;
+  const { element, overview, multiples, errors, reliability, chartCount, SceneView, ramp, drawPicture } = window.Unlift;
   const root = document.documentElement;
   const data = JSON.parse(document.getElementById("data").textContent);
   const percent = (ratio) => `${+(ratio * 100).toPrecision(2)} %`;
@@ -52,7 +52,7 @@
   function curves() {
     const form = document.getElementById("curve-controls");
     const datasets = distinct(data.published.map((curve) => curve.dataset));
-    const state = { threshold: 0, solver: data.solvers[0], dataset: datasets[0] };
+    const state = { threshold: data.headline, solver: data.solvers[0], dataset: datasets[0] };
     const redraw = () => {
       overview(document.getElementById("chart-overview"), data, state);
       multiples(document.getElementById("chart-multiples"), data, state);
@@ -144,6 +144,38 @@
     root.dataset.scene = "drawn";
   }
 
+  function pictures() {
+    const form = document.getElementById("picture-controls");
+    const views = data.pictures.flatMap((picture) => picture.views);
+    const schemes = distinct(views.map((view) => view.scheme));
+    const state = { picture: 0, scheme: schemes[0], given: null };
+    // What an attacker's own lists are worth differs from image to image, and so does their name.
+    const given = () => distinct(data.pictures[state.picture].views.map((view) => view.given));
+    const usual = (names) => names.find((name) => name === "50 %") ?? names[0];
+    let at = given().indexOf(usual(given()));
+    const redraw = () => {
+      at = Math.max(0, given().indexOf(state.given));
+      drawPicture(data, state);
+    };
+    const controls = () => {
+      form.replaceChildren();
+      state.given = given()[at];
+      const names = data.pictures.map((picture, i) => [i, picture.note ? `${picture.name} (${picture.note})` : picture.name]);
+      list(form, state, "picture", "Image", names, () => { controls(); redraw(); });
+      choice(form, state, "scheme", "Scheme", schemes.map((scheme) => [scheme, scheme]), redraw);
+      const options = given().map((name) => [name, name]);
+      (options.length > 8 ? list : choice)(form, state, "given", "Neighbors right", options, redraw);
+    };
+    controls();
+    redraw();
+    let width = window.innerWidth;
+    window.addEventListener("resize", () => {
+      if (window.innerWidth === width) return;
+      width = window.innerWidth;
+      drawPicture(data, state);
+    });
+  }
+
   root.dataset.script = "1";
   if (data.rows.length) {
     curves();
@@ -151,6 +183,7 @@
     judged();
   }
   if (data.scene) scene();
+  if (data.pictures.length) pictures();
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => redraws.forEach((redraw) => redraw()));
   root.dataset.charts = chartCount();
   root.dataset.tables = document.querySelectorAll("table").length;

@@ -12,11 +12,12 @@ use unlift_io::read;
 use unlift_io::stage::read_point_neighborhoods;
 use unlift_report::document::Input;
 
+use super::plan::{attack, check_about, own, summary, thresholds};
 use super::{open_map, with_threads};
 use crate::args::AuditMapArgs;
 use crate::document::ordered;
 use crate::exit::{Outcome, usage};
-use crate::job::{Finished, Job, open_out, perform};
+use crate::job::{Job, open_out, perform};
 use crate::output::print;
 use crate::prepare::Prepared;
 use crate::values::{NeighborSource, all_schemes, distinct};
@@ -24,8 +25,8 @@ use crate::values::{NeighborSource, all_schemes, distinct};
 /// Audits a map.
 pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
     let started = Instant::now();
-    let out = open_out(&args.out)?;
-    let finished = with_threads(args.threads, || {
+    let out = open_out(&args.result.out)?;
+    let finished = with_threads(args.run.threads, || {
         let (input, prepared) = open_map(&args.path, &args.map)?;
         for note in &input.skipped {
             eprintln!("unlift: note: {note}");
@@ -39,57 +40,32 @@ pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
             plan: plan(&args, &prepared, input.positions.len())?,
             input: provenance(&args, &input, &prepared)?,
             options: more_options(&args),
-            gates: args.gate.clone(),
-            out: args.out.clone(),
+            gates: args.result.gate.clone(),
+            out: args.result.out.clone(),
             unit_in_map_units: prepared.unit_in_map_units,
             write_clouds: args.write_clouds,
-            share_safe: args.share_safe,
-            quiet: args.quiet,
+            share_safe: args.result.share_safe,
+            quiet: args.run.quiet,
             started,
         };
         perform(job, out)
     })?;
-    print(&if args.json { summary(&finished)? } else { finished.text() })?;
+    print(&if args.result.json { summary(&finished)? } else { finished.text() })?;
     Ok(if finished.passed() { Outcome::Done } else { Outcome::GateFailed })
 }
 
 fn plan(args: &AuditMapArgs, prepared: &Prepared, n_read: usize) -> anyhow::Result<Plan> {
     let usual = Plan::new(prepared.original.reveal().unit());
     let schemes = if args.schemes.is_empty() { all_schemes() } else { args.schemes.clone() };
-    let thresholds = match args.thresholds.as_slice() {
-        [] => usual.thresholds.clone(),
-        given => given.to_vec(),
-    };
-    for (at, threshold) in thresholds.iter().enumerate() {
-        if thresholds[..at].iter().any(|other| other.value == threshold.value) {
-            return Err(usage(format!(
-                "--thresholds: expected each once, found {} again",
-                threshold.label
-            )));
-        }
-    }
-    let inlier_ratios = match args.inlier_ratios.as_slice() {
-        [] => usual.inlier_ratios.clone(),
-        given => given.to_vec(),
-    };
-    let oracle_noise = match args.oracle_noise.as_slice() {
-        [] => usual.oracle_noise.clone(),
-        given => given.to_vec(),
-    };
+    let thresholds = thresholds(&args.thresholds, &usual)?;
     Ok(Plan {
         sources: sources(args, &schemes, prepared, n_read)?,
         schemes: distinct(schemes, |a, b| a.name == b.name),
-        oracle_noise: distinct(oracle_noise, |a, b| a == b),
-        inlier_ratios: distinct(inlier_ratios, |a, b| a == b),
         k: usize::from(args.map.k),
         solvers: distinct(args.solver.clone(), |a, b| a == b),
-        reference: args.reference,
-        delta: args.delta,
-        exact_constraints: !args.no_exact_constraints,
         thresholds,
         seed: args.map.seed.unwrap_or(0),
-        repeats: args.repeats,
-        ..usual
+        ..attack(&args.attack, usual)
     })
 }
 
@@ -118,10 +94,7 @@ fn sources(
                     joined.name()
                 )));
             }
-            NeighborSource::Own(joined) => Source::Own(match args.source_k {
-                Some(k) => joined.with_k(usize::from(k)),
-                None => joined,
-            }),
+            NeighborSource::Own(joined) => own(joined, &args.attack),
             NeighborSource::File(path) => Source::Given(by_point(&path, prepared, n_read)?),
         });
     }
@@ -129,24 +102,7 @@ fn sources(
     if files > 1 {
         return Err(usage(format!("--neighbors: expected at most one file, found {files}")));
     }
-    let names = || sources.iter().map(Source::name).collect::<Vec<_>>().join(", ");
-    for (option, given) in [
-        ("--inlier-ratios", !args.inlier_ratios.is_empty()),
-        ("--oracle-noise", !args.oracle_noise.is_empty()),
-    ] {
-        if given && !sources.contains(&Source::Oracle) {
-            let found = names();
-            return Err(usage(format!(
-                "{option}: expected with --neighbors oracle, found only {found}"
-            )));
-        }
-    }
-    if args.source_k.is_some() && !sources.iter().any(|s| matches!(s, Source::Own(_))) {
-        let found = names();
-        return Err(usage(format!(
-            "--source-k: expected with a source that makes its own lists, found only {found}"
-        )));
-    }
+    check_about(&args.attack, &sources)?;
     Ok(sources)
 }
 
@@ -206,6 +162,7 @@ fn provenance(
         scale_m_per_unit: args.map.scale,
         unit_in_map_units: Some(prepared.unit_in_map_units),
         other_sha256: ordered(others),
+        images: None,
     })
 }
 
@@ -220,15 +177,4 @@ fn more_options(args: &AuditMapArgs) -> Map<String, Value> {
         options.insert("outlier_filter".into(), value);
     }
     options
-}
-
-/// What a script wants to know: the results and where the rest is.
-fn summary(finished: &Finished) -> anyhow::Result<String> {
-    let mut document: Value = serde_json::from_str(&finished.document.to_json()?)?;
-    let keep = ["unlift", "schema", "results", "break_even", "gates"];
-    if let Some(fields) = document.as_object_mut() {
-        fields.retain(|name, _| keep.contains(&name.as_str()));
-        fields.insert("report".into(), json!(finished.report.display().to_string()));
-    }
-    Ok(format!("{document:#}\n"))
 }

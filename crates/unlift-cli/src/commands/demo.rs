@@ -41,6 +41,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
                 scale_m_per_unit: Some(1.0),
                 unit_in_map_units: Some(1.0),
                 other_sha256: Default::default(),
+                images: None,
             },
             options,
             gates: Vec::new(),

@@ -1,5 +1,6 @@
 //! One file per command: parse, call the library, print.
 
+mod audit_images;
 mod audit_map;
 mod bench;
 mod demo;
@@ -7,6 +8,7 @@ mod evaluate;
 mod features;
 mod neighbors;
 mod obfuscate;
+mod plan;
 mod recover;
 mod schemes;
 
@@ -27,6 +29,7 @@ pub fn run(command: Command) -> anyhow::Result<Outcome> {
     match command {
         Command::Demo(args) => demo::run(&args),
         Command::Audit(AuditCommand::Map(args)) => audit_map::run(*args),
+        Command::Audit(AuditCommand::Images(args)) => audit_images::run(&args),
         Command::Obfuscate(args) => obfuscate::run(&args),
         Command::Neighbors(NeighborsCommand::Oracle(args)) => neighbors::oracle(&args),
         Command::Neighbors(NeighborsCommand::Find(args)) => neighbors::find(&args),

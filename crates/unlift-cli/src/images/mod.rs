@@ -1,7 +1,10 @@
 //! Features of images from wherever they are: a folder of photos, hloc's HDF5, a COLMAP database.
 
+pub mod audit;
 mod folder;
 pub mod parts;
+mod pictures;
+pub mod stream;
 
 use std::path::Path;
 

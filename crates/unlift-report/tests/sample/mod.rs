@@ -4,9 +4,10 @@
 
 use indexmap::IndexMap;
 use unlift_report::document::{
-    Bound, BreakEven, Document, GateResult, Input, LengthUnit, ReliabilityBin, Row, Run, SCHEMA,
-    Seconds,
+    Bound, BreakEven, Distinct, Document, GateResult, ImageCounts, ImageFigures, ImageRow, Input,
+    LengthUnit, ReliabilityBin, Row, Run, SCHEMA, Seconds,
 };
+use unlift_report::pictures::{Given, Graph, Marks, Picture, RecoveredView, ReleasedView};
 use unlift_report::scene::{ObfuscationView, Scene3d, SceneBox, Shapes, View};
 
 pub const SCHEMES: [&str; 7] = ["olc", "ppl", "ppl+", "ray", "ray-voxel", "plane", "cp"];
@@ -65,6 +66,7 @@ pub fn document(metric: bool) -> Document {
             scale_m_per_unit: metric.then_some(1.0),
             unit_in_map_units: Some(if metric { 1.0 } else { 0.0834 }),
             other_sha256: IndexMap::new(),
+            images: None,
         },
         options: serde_json::json!({
             "schemes": SCHEMES, "inlier-ratios": RATIOS, "k": 50, "solver": ["consensus", "ransac"],
@@ -77,6 +79,7 @@ pub fn document(metric: bool) -> Document {
         results,
         break_even,
         gates: vec![gate("ppl@0.5:0.10<=20", 89.1, 20.0), gate("plane@0.1:0.10<=20", 11.8, 20.0)],
+        images: Vec::new(),
         run: Run {
             command: Some(
                 "unlift audit map maps/furnished-room --scale 1 --solver consensus".into(),
@@ -150,6 +153,88 @@ fn row(s: usize, r: usize, solver: &str, thresholds: [&str; 2], unit: LengthUnit
             .then(|| vec![(10, 9_000), (100, 10_000), (10_000, 2_148)]),
         repeats: 1,
         std: None,
+        distinct: None,
+    }
+}
+
+/// An audit of two images under two schemes.
+pub fn images() -> Document {
+    let mut document = document(true);
+    let by_threshold = |values: [f64; 4]| -> IndexMap<String, f64> {
+        ["1", "5", "10", "25"].map(str::to_owned).into_iter().zip(values).collect()
+    };
+    document
+        .results
+        .retain(|row| row.solver == "consensus" && ["olc", "cp"].contains(&&*row.scheme));
+    for (at, row) in document.results.iter_mut().enumerate() {
+        row.scheme = if row.scheme == "olc" { "lines2d" } else { "cp2d" }.into();
+        let less = at as f64;
+        row.recovered_percent = by_threshold([21.5 - less, 61.5 - less, 81.5 - less, 95.5 - less]);
+        row.blind_percent = by_threshold([0.5, 2.25, 4.5, 11.0]);
+        (row.unit, row.reliability) = (LengthUnit::Pixel, None);
+        (row.sure_percent, row.sure_correct_percent) = (None, None);
+        row.distinct = Some(Distinct {
+            n_places: 17_000,
+            recovered_percent: by_threshold([20.25, 60.25, 80.25, 94.25]),
+            blind_percent: row.blind_percent.clone(),
+        });
+    }
+    document.break_even.clear();
+    document.gates.clear();
+    document.run.seconds.rows.clear();
+    document.input.images = Some(ImageCounts { found: 4, used: 2, unusable: 1, too_small: 1 });
+    document.images = ["kitchen/secret.jpg", "b.jpg"]
+        .map(|name| ImageFigures {
+            name: Some(name.into()),
+            n_points: 10_574,
+            rows: document
+                .results
+                .iter()
+                .map(|row| ImageRow {
+                    recovered_percent: row.recovered_percent.clone(),
+                    distinct_percent: row.recovered_percent.clone(),
+                    inlier_ratio: row.inlier_ratio,
+                    median_error: Some(3.25),
+                })
+                .collect(),
+        })
+        .into();
+    document
+}
+
+/// A picture of the first image of [`images`].
+pub fn picture() -> Picture {
+    let place = |i: u64| [0, 1].map(|c| unit_random(2 * i + c) * [640.0, 480.0][c as usize]);
+    let keypoints: Vec<[f32; 2]> = (0..300).map(place).collect();
+    let given = Given { neighbors: "oracle".into(), oracle_noise: None, inlier_ratio: 0.5 };
+    let views = ["lines2d", "cp2d"].map(|scheme| RecoveredView {
+        scheme: scheme.into(),
+        given: given.clone(),
+        recovered: keypoints.iter().map(|p| Some(p.map(|x| x + 4.0))).collect(),
+    });
+    let lines = keypoints.iter().map(|p| Some([[p[0], 0.0], [p[0], 479.0]])).collect();
+    let released = vec![
+        ReleasedView { scheme: "lines2d".into(), marks: Marks::Lines(lines) },
+        ReleasedView {
+            scheme: "cp2d".into(),
+            marks: Marks::Points(keypoints.iter().map(|p| Some([p[0], 7.0])).collect()),
+        },
+    ];
+    let graphs = vec![Graph {
+        given,
+        neighbors: (0..300).map(|i| (1..6).map(|j| place((i + j) % 300)).collect()).collect(),
+    }];
+    let name = "kitchen/secret.jpg".into();
+    let note = "median".into();
+    Picture {
+        name,
+        note,
+        size: [640, 480],
+        photo: None,
+        keypoints,
+        released,
+        views: views.into(),
+        graphs,
     }
 }
 

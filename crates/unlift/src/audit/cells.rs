@@ -12,6 +12,7 @@ use crate::evaluate::{
     Accuracy, blind, distinct_weights, evaluate, in_better_order, reference, reliability,
 };
 use crate::geometry::knn::Knn;
+use crate::neighbors::Neighborhoods;
 use crate::neighbors::oracle::Noise;
 use crate::obfuscate::{Entry, obfuscate};
 use crate::recover::{RecoverOptions, Recovered, Solver, recover};
@@ -31,6 +32,8 @@ pub struct Cell<'a, const D: usize = 3> {
     pub secret: &'a Secret,
     /// What the attacker saw.
     pub released: &'a Released<D>,
+    /// The lists it was recovered from: one per slot, by descriptor row for an attacker's own sources.
+    pub lists: &'a Neighborhoods,
     /// What the attacker got.
     pub recovered: &'a Recovered<D>,
     /// Error per slot.
@@ -153,6 +156,7 @@ pub(super) fn cells<const D: usize>(
                 original,
                 secret,
                 released: &hidden.0,
+                lists: &made.lists,
                 recovered: &recovered,
                 accuracy: &accuracy,
             });

@@ -83,7 +83,11 @@ impl<'a, const D: usize> Lists<'a, D> {
     /// # Errors
     /// As [`make`](Self::make), on maps that are large enough.
     pub fn make_if_enough(&mut self, variant: &Variant<'_>) -> Result<Made, Error> {
-        let enough = self.released.n_records() > self.plan.k;
+        let wanted = match variant.source {
+            Source::Own(joined) => joined.k().max(self.plan.k),
+            Source::Oracle | Source::Given(_) => self.plan.k,
+        };
+        let enough = self.released.n_records() > wanted;
         match (enough, variant.source) {
             (true, Source::Oracle) => self.make(variant).or_else(|_| self.none(variant)),
             (true, Source::Given(_) | Source::Own(_)) => self.make(variant),

@@ -1,0 +1,79 @@
+//! Arguments of `unlift audit images`.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use clap::Args;
+use unlift::audit::Threshold;
+use unlift::obfuscate::Entry;
+use unlift::recover::Solver;
+
+use crate::args_audit::{AttackArgs, ResultArgs, RunArgs};
+use crate::values::{self, NeighborSource};
+
+/// Options of `audit images`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  unlift audit images photos
+  unlift audit images features.h5 --photos photos --solver joint,ransac --out audit
+  unlift audit images PROJECT/database.db --max-images 100 --schemes lines2d --inlier-ratios 1,0.5
+  unlift audit images photos --neighbors oracle --neighbors similarity --neighbors overlap
+  unlift audit images photos --gate 'cp2d@0.5:10<=20' --share-safe --json
+
+Photos are JPEG, PNG or WebP files at any depth; features are those of unlift features (SIFT).
+Figures are over the keypoints of all images; lengths are in pixels.
+
+Gates are those of unlift audit map. An image that cannot be used gets one line on stderr and is
+counted in audit.json; the others are audited, and the exit code is 3.
+
+Exit codes: 0 done, 1 a gate failed, 2 usage, 3 bad input, be it a single image.")]
+pub struct AuditImagesArgs {
+    /// A folder of photos, hloc's features.h5, or a COLMAP database.db
+    #[arg(value_name = "PATH")]
+    pub path: PathBuf,
+    /// Features wanted per photo; coarse ones first, and the last scale is kept whole [default: 8192]
+    #[arg(long, value_name = "N", help_heading = "Input")]
+    pub max_features: Option<NonZeroUsize>,
+    /// Use at most this many images, evenly spaced over their sorted names
+    #[arg(long, value_name = "N", help_heading = "Input")]
+    pub max_images: Option<NonZeroUsize>,
+    /// True neighbors per keypoint
+    #[arg(long, value_name = "K", default_value = "20", help_heading = "Input",
+          value_parser = clap::value_parser!(u16).range(1..))]
+    pub k: u16,
+    /// The integer that all randomness comes from
+    #[arg(long, value_name = "INTEGER", default_value_t = 0, help_heading = "Input")]
+    pub seed: u64,
+    /// Schemes to audit, by commas [default: lines2d,cp2d,dcl2d]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_scheme,
+          help_heading = "Attack")]
+    pub schemes: Vec<&'static Entry>,
+    /// Recovery methods, by commas or repeated: joint, consensus, ransac
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_solver,
+          default_value = "joint", help_heading = "Attack")]
+    pub solver: Vec<Solver>,
+    /// Where neighborhoods come from, repeatable: oracle (made from the keypoints themselves), or what
+    /// an attacker makes from the released descriptors (similarity, overlap, or both joined by +);
+    /// overlap needs the bytes of SIFT
+    #[arg(long, value_name = "oracle|SOURCE", value_parser = values::image_source,
+          default_value = "oracle", help_heading = "Attack")]
+    pub neighbors: Vec<NeighborSource>,
+    #[command(flatten)]
+    pub attack: AttackArgs,
+    /// Errors in pixels up to which a keypoint counts as recovered, by commas; kept as typed
+    /// [default: 1,5,10,25]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold,
+          help_heading = "Result")]
+    pub thresholds: Vec<Threshold>,
+    /// Draw this image in the report; repeatable [default: the least, the median and the most recovered]
+    #[arg(long, value_name = "NAME", help_heading = "Result", conflicts_with = "share_safe")]
+    pub show: Vec<String>,
+    /// Folder of the photos to draw, when PATH is a file
+    #[arg(long, value_name = "DIR", help_heading = "Result", conflicts_with = "share_safe")]
+    pub photos: Option<PathBuf>,
+    #[command(flatten)]
+    pub result: ResultArgs,
+    #[command(flatten)]
+    pub run: RunArgs,
+}

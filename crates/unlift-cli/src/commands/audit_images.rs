@@ -1,0 +1,215 @@
+//! `unlift audit images`: keypoints of images in, one honest answer out.
+
+use std::path::Path;
+use std::time::Instant;
+
+use serde_json::{Map, json};
+use unlift::audit::{Plan, Source};
+use unlift::{Unit, neighbors::sources::Joined};
+use unlift_features::SiftOptions;
+use unlift_io::Error;
+use unlift_report::pictures::MOST_PICTURES;
+
+use super::plan::{attack, check_about, own, summary, thresholds};
+use super::with_threads;
+use crate::args_images::AuditImagesArgs;
+use crate::exit::{Outcome, usage};
+use crate::images::FeatureSource;
+use crate::images::audit::{ImagesJob, perform};
+use crate::images::stream::{Needs, lacking};
+use crate::job::open_out;
+use crate::output::print;
+use crate::values::{NeighborSource, distinct};
+
+/// The threshold that speaks for an audit, in pixels, or the nearest one asked for.
+const HEADLINE_PX: f64 = 10.0;
+
+/// Audits images.
+pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
+    let started = Instant::now();
+    let plan = plan(args)?;
+    let out = open_out(&args.result.out)?;
+    let (finished, used) = with_threads(args.run.threads, || {
+        let source = FeatureSource::open(&args.path, &extraction(args)?)?;
+        let chosen = chosen(source.names().len(), args.max_images.map(|n| n.get()));
+        let needs = needs(&plan);
+        check_descriptors(&source, &chosen, &plan)?;
+        let job = ImagesJob {
+            source: &source,
+            path: &args.path,
+            show: show(args, &source, &chosen)?,
+            chosen,
+            needs,
+            plan,
+            options: more_options(args),
+            gates: args.result.gate.clone(),
+            photos: args.photos.clone(),
+            out: args.result.out.clone(),
+            share_safe: args.result.share_safe,
+            quiet: args.run.quiet,
+            started,
+        };
+        perform(job, out)
+    })?;
+    if let Some(finished) = &finished {
+        print(&if args.result.json { summary(finished)? } else { finished.text() })?;
+    }
+    if used.unusable > 0 {
+        // The figures are of fewer images than asked for: no gate decides then.
+        let expected = format!("{} images that can be used", used.used + used.unusable);
+        return Err(Error::new(&args.path, "", expected, used.used.to_string()).into());
+    }
+    let passed = finished.is_none_or(|finished| finished.passed());
+    Ok(if passed { Outcome::Done } else { Outcome::GateFailed })
+}
+
+fn plan(args: &AuditImagesArgs) -> anyhow::Result<Plan> {
+    let usual = Plan::new(Unit::Pixel);
+    let mut sources = Vec::new();
+    for source in distinct(args.neighbors.clone(), |a, b| a == b) {
+        match source {
+            NeighborSource::Own(joined) => sources.push(own(joined, &args.attack)),
+            NeighborSource::Oracle | NeighborSource::File(_) => sources.push(Source::Oracle),
+        }
+    }
+    check_about(&args.attack, &sources)?;
+    let schemes = match args.schemes.as_slice() {
+        [] => usual.schemes.clone(),
+        given => distinct(given.to_vec(), |a, b| a.name == b.name),
+    };
+    let thresholds = thresholds(&args.thresholds, &usual)?;
+    let away = |at: &usize| (thresholds[*at].value / HEADLINE_PX).ln().abs();
+    let headline = (0..thresholds.len()).min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0);
+    let plan = Plan {
+        sources,
+        schemes,
+        k: usize::from(args.k),
+        solvers: distinct(args.solver.clone(), |a, b| a == b),
+        thresholds,
+        headline,
+        seed: args.seed,
+        ..attack(&args.attack, usual)
+    };
+    plan.check_for_images().map_err(|error| usage(error.to_string()))?;
+    Ok(plan)
+}
+
+/// The options of the extractor; none of them fits a file.
+fn extraction(args: &AuditImagesArgs) -> anyhow::Result<SiftOptions> {
+    let folder = args.path.is_dir();
+    if args.max_features.is_some() && args.path.is_file() {
+        return Err(usage("--max-features: expected with a folder of photos, found a file"));
+    }
+    if args.photos.is_some() && folder {
+        return Err(usage("--photos: expected with a file of features, found a folder of photos"));
+    }
+    let defaults = SiftOptions::default();
+    let max_features = args.max_features.map_or(defaults.max_features, |n| n.get());
+    Ok(SiftOptions { max_features, ..defaults })
+}
+
+/// Numbers of at most `most` images, evenly spaced over all `n`: the middles of as many equal parts.
+fn chosen(n: usize, most: Option<usize>) -> Vec<usize> {
+    let most = most.unwrap_or(n).min(n);
+    (0..most).map(|at| ((2 * at + 1) * n) / (2 * most)).collect()
+}
+
+/// What a source needs of an image.
+fn needs_of(joined: &Joined) -> Needs {
+    let sift = joined.name().split('+').any(|name| name == "overlap");
+    Needs { descriptors: joined.needs_descriptors(), sift }
+}
+
+fn needs(plan: &Plan) -> Needs {
+    let mut all = Needs::default();
+    for source in &plan.sources {
+        if let Source::Own(joined) = source {
+            let of = needs_of(joined);
+            all.descriptors |= of.descriptors;
+            all.sift |= of.sift;
+        }
+    }
+    all
+}
+
+/// Asks the first image with keypoints whether it has what the sources need: one line in place of one per
+/// image. What is wrong with single images is told when they are read.
+fn check_descriptors(source: &FeatureSource, chosen: &[usize], plan: &Plan) -> anyhow::Result<()> {
+    // Extracted features always have them.
+    if matches!(source, FeatureSource::Folder(_)) || !needs(plan).descriptors {
+        return Ok(());
+    }
+    let found = chosen.iter().filter_map(|&at| source.get(at).ok());
+    let Some(first) = found.into_iter().find(|image| !image.keypoints.is_empty()) else {
+        return Ok(());
+    };
+    for wanted in &plan.sources {
+        if let Source::Own(joined) = wanted
+            && let Some((expected, found)) = lacking(&first, needs_of(joined))
+        {
+            let name = joined.name();
+            return Err(usage(format!("--neighbors {name}: expected {expected}, found {found}")));
+        }
+    }
+    Ok(())
+}
+
+/// Numbers of the images to draw, if they were named.
+fn show(
+    args: &AuditImagesArgs,
+    source: &FeatureSource,
+    chosen: &[usize],
+) -> anyhow::Result<Option<Vec<usize>>> {
+    if args.show.is_empty() {
+        return Ok(None);
+    }
+    let names = distinct(args.show.clone(), |a, b| a == b);
+    if names.len() > MOST_PICTURES {
+        let n = names.len();
+        return Err(usage(format!("--show: expected at most {MOST_PICTURES} images, found {n}")));
+    }
+    let mut numbers = Vec::with_capacity(names.len());
+    for name in &names {
+        let at = source.names().binary_search_by(|other| other.as_bytes().cmp(name.as_bytes()));
+        match at {
+            Ok(at) if chosen.contains(&at) => numbers.push(at),
+            Ok(_) => {
+                let expected = "an image that --max-images leaves in";
+                return Err(usage(format!("--show: expected {expected}, found {name}")));
+            }
+            Err(_) => {
+                let place = Path::new(&args.path).display();
+                return Err(usage(format!("--show: expected an image of {place}, found {name}")));
+            }
+        }
+    }
+    Ok(Some(numbers))
+}
+
+/// Options that change the images, not the plan.
+fn more_options(args: &AuditImagesArgs) -> Map<String, serde_json::Value> {
+    let mut options = Map::new();
+    if let Some(most) = args.max_features {
+        options.insert("max_features".into(), json!(most.get()));
+    }
+    if let Some(most) = args.max_images {
+        options.insert("max_images".into(), json!(most.get()));
+    }
+    if !args.show.is_empty() {
+        options.insert("show".into(), json!(args.show));
+    }
+    options
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn images_are_evenly_spaced_and_all_without_a_limit() {
+        assert_eq!(chosen(4, None), [0, 1, 2, 3]);
+        assert_eq!(chosen(10, Some(3)), [1, 5, 8]);
+        assert_eq!(chosen(3, Some(9)), [0, 1, 2]);
+        assert_eq!(chosen(0, Some(2)), [0; 0]);
+    }
+}

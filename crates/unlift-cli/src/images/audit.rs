@@ -1,0 +1,290 @@
+//! One audit of images from a source of features to the files in its folder.
+
+use std::cell::RefCell;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use serde_json::{Map, Value};
+use unlift::audit::images::{Outcome, run};
+use unlift::audit::{Cell, Observer, Plan, Row};
+use unlift_io::atomic::{OutputDir, write_file};
+use unlift_io::hash::{hash_file, hash_files};
+use unlift_report::document::{ImageCounts, ImageFigures, Input};
+use unlift_report::pictures::Picture;
+use unlift_report::{ErrorCdf, RenderOptions, render};
+
+use super::FeatureSource;
+use super::pictures::Album;
+use super::stream::{Needs, Stream, Tally};
+use crate::document::{self, Found, Provenance};
+use crate::exit::line;
+use crate::gate::Gate;
+use crate::job::{Finished, MARKER, check_gates, curve_errors, gate_results};
+use crate::progress::{Progress, Voice};
+
+/// Longest side of an embedded photo in pixels.
+const PREVIEW: u32 = 640;
+/// The inlier ratio by which images are compared, or the nearest one tested.
+const USUAL_RATIO: f64 = 0.5;
+
+/// Everything an audit of images needs.
+pub struct ImagesJob<'a> {
+    /// Where images are.
+    pub source: &'a FeatureSource,
+    /// The same as the user named it.
+    pub path: &'a Path,
+    /// Numbers of the images to be used, rising.
+    pub chosen: Vec<usize>,
+    /// What is to be done.
+    pub plan: Plan,
+    /// What the plan needs of an image.
+    pub needs: Needs,
+    /// Options for the record, beside those in the plan.
+    pub options: Map<String, Value>,
+    /// Bounds to hold.
+    pub gates: Vec<Gate>,
+    /// Numbers of the images to draw; `None` chooses.
+    pub show: Option<Vec<usize>>,
+    /// Folder of photos, where the source is a file.
+    pub photos: Option<PathBuf>,
+    /// Folder to write.
+    pub out: PathBuf,
+    /// Figures only.
+    pub share_safe: bool,
+    /// No progress bars.
+    pub quiet: bool,
+    /// When the command began.
+    pub started: Instant,
+}
+
+/// What became of the images.
+#[derive(Clone, Copy, Debug)]
+pub struct Used {
+    /// Images that were used.
+    pub used: usize,
+    /// Images that were not, as they could not be read.
+    pub unusable: usize,
+}
+
+/// Runs the job and writes its folder, whole or not at all; without a single usable image none.
+pub fn perform(job: ImagesJob<'_>, out: OutputDir) -> anyhow::Result<(Option<Finished>, Used)> {
+    check_gates(&job.gates, &job.plan)?;
+    let tally = RefCell::new(Tally::default());
+    let mut watcher = Watcher::new(&job, &tally);
+    let voice = watcher.progress.voice();
+    for error in job.source.refused() {
+        tally.borrow_mut().unusable += 1;
+        voice.say(&line(&anyhow::anyhow!("{error}")));
+    }
+    let of = (job.source, job.path);
+    let images = Stream::new(of, &job.chosen, job.needs, &tally, voice.clone());
+    let outcome = run(images, &job.plan, &mut watcher)?;
+    let Watcher { figures, curves, .. } = watcher;
+    let tally = tally.into_inner();
+    let used = Used { used: tally.used.len(), unusable: tally.unusable };
+    if used.used == 0 {
+        return Ok((None, used));
+    }
+    let pictures = if job.share_safe { Vec::new() } else { draw(&job, &tally, &figures, &voice)? };
+    let gates = gate_results(&job.gates, &job.plan, &outcome.rows)?;
+    let provenance = Provenance {
+        input: input(&job, &tally, &outcome)?,
+        options: document::options(&job.plan, job.options),
+        gates,
+        started: job.started,
+    };
+    let Outcome { rows, break_even, seconds, .. } = &outcome;
+    let found = Found { rows, break_even, seconds };
+    let mut document = document::document(&job.plan, &found, provenance);
+    document.images = figures;
+    let document = if job.share_safe { document.share_safe() } else { document };
+    let options = RenderOptions {
+        share_safe: job.share_safe,
+        error_cdf: curves.into_iter().map(Curve::shares).collect(),
+        pictures,
+    };
+    let page = render(&document, None, &options)?;
+    let json = document.to_json()?;
+    write_file(&out.path().join("report.html"), |w| std::io::Write::write_all(w, page.as_bytes()))?;
+    write_file(&out.path().join(MARKER), |w| std::io::Write::write_all(w, json.as_bytes()))?;
+    out.commit()?;
+    Ok((Some(Finished { document, report: job.out.join("report.html") }), used))
+}
+
+/// What was read: of photos, those that were used.
+fn input(job: &ImagesJob<'_>, tally: &Tally, outcome: &Outcome) -> anyhow::Result<Input> {
+    let sha256 = match job.source {
+        FeatureSource::File(_) => hash_file(job.path)?,
+        FeatureSource::Folder(folder) => {
+            let photos: Vec<&Path> = tally.used.iter().map(|&at| folder.path(at)).collect();
+            hash_files(&photos)?
+        }
+    };
+    Ok(Input {
+        path: Some(job.path.display().to_string()),
+        sha256,
+        n_points: tally.n_points as u64,
+        scale_m_per_unit: None,
+        unit_in_map_units: None,
+        other_sha256: Default::default(),
+        images: Some(ImageCounts {
+            found: (job.source.names().len() + job.source.refused().len()) as u64,
+            used: tally.used.len() as u64,
+            unusable: tally.unusable as u64,
+            too_small: outcome.n_too_small as u64,
+        }),
+    })
+}
+
+/// Audits the images to be drawn once more, by the first solver and seed: an image's randomness comes from
+/// its name, so what is drawn is what was counted, and no picture had to be kept in between.
+fn draw(
+    job: &ImagesJob<'_>,
+    tally: &Tally,
+    figures: &[ImageFigures],
+    voice: &Voice,
+) -> anyhow::Result<Vec<Picture>> {
+    let wanted: Vec<(usize, &str)> = match &job.show {
+        Some(show) => {
+            let usable = show.iter().filter(|at| tally.used.contains(at));
+            usable.map(|&at| (at, "")).collect()
+        }
+        None => telling(&job.plan, figures)
+            .into_iter()
+            .map(|(at, note)| (tally.used[at], note))
+            .collect(),
+    };
+    let numbers: Vec<usize> = wanted.iter().map(|(at, _)| *at).collect();
+    let mut plan = job.plan.clone();
+    plan.solvers.truncate(1);
+    (plan.repeats, plan.reference) = (1, false);
+    let mut album = Album::default();
+    let again = RefCell::new(Tally::default());
+    let images = Stream::new((job.source, job.path), &numbers, job.needs, &again, voice.clone());
+    run(images, &plan, &mut album)?;
+    let mut pictures = album.pictures;
+    for picture in &mut pictures {
+        let at = numbers.iter().position(|&at| job.source.names()[at] == picture.name);
+        let Some(at) = at else { continue };
+        picture.note = wanted[at].1.to_owned();
+        let photo = match (job.source, &job.photos) {
+            (FeatureSource::Folder(folder), _) => folder.path(numbers[at]).to_owned(),
+            (FeatureSource::File(_), Some(photos)) => photos.join(&picture.name),
+            (FeatureSource::File(_), None) => continue,
+        };
+        match unlift_features::preview::jpeg(&photo, PREVIEW) {
+            Ok(jpeg) => picture.photo = Some(jpeg),
+            Err(error) => voice.say(&format!("unlift: note: {error}")),
+        }
+    }
+    Ok(pictures)
+}
+
+/// Positions in `figures` of the images of which least, about half and most came back, by the mean over
+/// schemes within the headline threshold; fewer when there are fewer.
+fn telling(plan: &Plan, figures: &[ImageFigures]) -> Vec<(usize, &'static str)> {
+    let label = &plan.thresholds[plan.headline].label;
+    let away = |ratio: &f64| (ratio - USUAL_RATIO).abs();
+    let per_scheme = plan.variants().len() * plan.solvers.len() + usize::from(plan.reference);
+    let variants = plan.variants();
+    // The first solver's row of the variant nearest to the usual ratio; an own source has no ratio yet.
+    let at = (0..variants.len())
+        .min_by(|&a, &b| {
+            let of = |at: usize| variants[at].inlier_ratio.as_ref().map_or(f64::INFINITY, away);
+            of(a).total_cmp(&of(b))
+        })
+        .unwrap_or(0);
+    let score = |image: &ImageFigures| -> Option<f64> {
+        let enough = image.n_points as usize > plan.k;
+        let rows = image.rows.iter().skip(at * plan.solvers.len()).step_by(per_scheme);
+        let shares = rows.map(|row| row.recovered_percent.get(label).copied().unwrap_or(0.0));
+        (enough && !image.rows.is_empty()).then(|| shares.sum())
+    };
+    let mut scored: Vec<(f64, usize)> =
+        figures.iter().enumerate().filter_map(|(at, image)| Some((score(image)?, at))).collect();
+    scored.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let n = scored.len();
+    let at = |place: usize| scored[place].1;
+    match n {
+        0 => Vec::new(),
+        1 => vec![(at(0), "")],
+        2 => vec![(at(1), "most recovered"), (at(0), "least recovered")],
+        _ => vec![(at(n / 2), "median"), (at(n - 1), "most recovered"), (at(0), "least recovered")],
+    }
+}
+
+/// An error curve over all images: counts, so that its size does not depend on their number.
+struct Curve {
+    row: usize,
+    errors: Vec<f64>,
+    within: Vec<usize>,
+    n: usize,
+}
+
+impl Curve {
+    fn shares(self) -> ErrorCdf {
+        let percent = |count: usize| 100.0 * count as f64 / self.n.max(1) as f64;
+        let points = self.errors.iter().zip(&self.within);
+        ErrorCdf { row: self.row, points: points.map(|(&e, &n)| (e, percent(n))).collect() }
+    }
+}
+
+/// Shows progress and keeps the figures of every image.
+struct Watcher<'a> {
+    progress: Progress,
+    tally: &'a RefCell<Tally>,
+    total: usize,
+    plan: &'a Plan,
+    figures: Vec<ImageFigures>,
+    curves: Vec<Curve>,
+    /// Cells of this image so far, of the first repeat.
+    cells: usize,
+}
+
+impl<'a> Watcher<'a> {
+    fn new(job: &'a ImagesJob<'_>, tally: &'a RefCell<Tally>) -> Self {
+        Self {
+            progress: Progress::new(job.quiet),
+            tally,
+            total: job.chosen.len(),
+            plan: &job.plan,
+            figures: Vec::new(),
+            curves: Vec::new(),
+            cells: 0,
+        }
+    }
+}
+
+impl Observer<2> for Watcher<'_> {
+    fn progress(&mut self, done: usize, _: usize, what: &str) {
+        let unusable = self.tally.borrow().unusable;
+        self.progress.show((done + unusable).min(self.total), self.total, what);
+    }
+
+    fn cell(&mut self, cell: &Cell<'_, 2>) {
+        if cell.repeat > 0 {
+            return;
+        }
+        if self.curves.len() <= self.cells {
+            let most = self.plan.thresholds.iter().map(|t| t.value).fold(0.0, f64::max);
+            let errors: Vec<f64> = curve_errors(most).collect();
+            let per_scheme = self.plan.variants().len() * self.plan.solvers.len();
+            // The reference has a row, and no cell.
+            let references = usize::from(self.plan.reference) * (self.cells / per_scheme.max(1));
+            let within = vec![0; errors.len()];
+            self.curves.push(Curve { row: self.cells + references, errors, within, n: 0 });
+        }
+        let curve = &mut self.curves[self.cells];
+        curve.n += cell.accuracy.n_points();
+        for (within, &error) in curve.within.iter_mut().zip(&curve.errors) {
+            *within += cell.accuracy.n_within(error);
+        }
+        self.cells += 1;
+    }
+
+    fn image(&mut self, name: &str, rows: &[Row]) {
+        self.cells = 0;
+        let n = self.tally.borrow_mut().take();
+        self.figures.push(document::image(name, n, rows, &self.plan.thresholds));
+    }
+}

@@ -1,0 +1,144 @@
+//! What the report draws of chosen images, collected while these are audited once more.
+
+use unlift::audit::{Cell, Observer};
+use unlift::released::{Obfuscation, Released};
+use unlift_report::pictures::{
+    GRAPH_NEIGHBORS, Given, Graph, Marks, Picture, RecoveredView, ReleasedView,
+};
+
+/// Collects pictures of all images that pass by, in their order.
+#[derive(Default)]
+pub struct Album {
+    /// Finished pictures.
+    pub pictures: Vec<Picture>,
+    /// That of the image at hand.
+    current: Picture,
+}
+
+impl Observer<2> for Album {
+    fn cell(&mut self, cell: &Cell<'_, 2>) {
+        let picture = &mut self.current;
+        let truth = cell.original.reveal().positions();
+        if picture.keypoints.is_empty() {
+            picture.keypoints = truth.iter().map(narrow).collect();
+            // Bounds reach half a pixel beyond the middles of the outermost ones.
+            let sides = cell.original.bounds().map(|b| [0, 1].map(|c| b.high[c] - b.low[c]));
+            picture.size = sides.unwrap_or([1.0; 2]).map(|side| side.round() as u32);
+        }
+        let mut slot_of = vec![None; truth.len()];
+        for (slot, original) in cell.secret.hidden().iter().enumerate() {
+            slot_of[original.index()] = Some(slot);
+        }
+        let scheme = cell.row.scheme;
+        if picture.released.iter().all(|view| view.scheme != scheme)
+            && let Some(marks) = marks(cell.released, &slot_of)
+        {
+            picture.released.push(ReleasedView { scheme: scheme.to_owned(), marks });
+        }
+        let given = Given {
+            neighbors: cell.row.neighbors.clone(),
+            oracle_noise: cell.row.oracle_noise.map(str::to_owned),
+            inlier_ratio: cell.row.inlier_ratio,
+        };
+        let first = picture.released.first().is_some_and(|view| view.scheme == scheme);
+        if first && picture.graphs.iter().all(|graph| graph.given != given) {
+            let neighbors = slot_of.iter().map(|slot| slot.map_or(Vec::new(), |s| best(cell, s)));
+            picture.graphs.push(Graph { given: given.clone(), neighbors: neighbors.collect() });
+        }
+        let recovered = slot_of.iter().map(|slot| {
+            slot.and_then(|slot| cell.recovered.position(slot)).map(|place| narrow(&place))
+        });
+        picture.views.push(RecoveredView {
+            scheme: scheme.to_owned(),
+            given,
+            recovered: recovered.collect(),
+        });
+    }
+
+    fn image(&mut self, name: &str, _: &[unlift::audit::Row]) {
+        let picture = std::mem::take(&mut self.current);
+        if !picture.keypoints.is_empty() {
+            self.pictures.push(Picture { name: name.to_owned(), ..picture });
+        }
+    }
+}
+
+/// True places of the neighbors of `slot` that a graph shows: those with the best scores; without scores
+/// (oracle) those with the lowest record numbers, which are random.
+fn best(cell: &Cell<'_, 2>, slot: usize) -> Vec<[f32; 2]> {
+    let listed = cell.lists.of(slot);
+    let mut order: Vec<usize> = (0..listed.len()).collect();
+    if let Some(scores) = cell.lists.scores_of(slot) {
+        order.sort_by(|&a, &b| scores[b].total_cmp(&scores[a]).then(a.cmp(&b)));
+    }
+    let truth = cell.original.reveal().positions();
+    // Images have one slot per record.
+    let place = |at: &usize| {
+        let original = cell.secret.hidden().get(listed[*at].index())?;
+        truth.get(original.index()).map(narrow)
+    };
+    order.iter().take(GRAPH_NEIGHBORS).filter_map(place).collect()
+}
+
+/// What is released, by original.
+fn marks(released: &Released<2>, slot_of: &[Option<usize>]) -> Option<Marks> {
+    let origin = released.origin();
+    let bounds = released.bounds()?;
+    let at = |p: &[f64; 2], t: f64, d: &[f64; 2]| -> [f32; 2] {
+        [0, 1].map(|c| (p[c] + t * d[c]) as f32)
+    };
+    let place = |p: &[f32; 2]| [0, 1].map(|c| f64::from(p[c]) + origin[c]);
+    let records = slot_of.iter();
+    Some(match released.obfuscation() {
+        Obfuscation::Lines(lines) => Marks::Lines(
+            records
+                .map(|slot| {
+                    let foot = place(lines.foot().get((*slot)?)?);
+                    let along = lines.direction().get((*slot)?)?.map(f64::from);
+                    let (from, to) = bounds.clip(&foot, &along)?;
+                    Some([at(&foot, from, &along), at(&foot, to, &along)])
+                })
+                .collect(),
+        ),
+        Obfuscation::Rays(rays) => Marks::Rays(
+            records
+                .map(|slot| {
+                    let center = usize::from(*rays.center().get((*slot)?)?);
+                    let anchor = place(rays.centers().get(center)?);
+                    let along = rays.direction().get((*slot)?)?.map(f64::from);
+                    let to = ray_end(released, center, &anchor, &along)?;
+                    Some([at(&anchor, 0.0, &along), at(&anchor, to, &along)])
+                })
+                .collect(),
+        ),
+        Obfuscation::AxisCandidates(points) => Marks::Points(
+            records
+                .map(|slot| Some(place(points.position().get((*slot)?)?).map(|x| x as f32)))
+                .collect(),
+        ),
+        // No scheme for images makes planes: in an image they would be lines.
+        Obfuscation::AxisPlanes(_) => return None,
+    })
+}
+
+/// Where a ray leaves the part of the image in which its point lies.
+fn ray_end(
+    released: &Released<2>,
+    center: usize,
+    anchor: &[f64; 2],
+    along: &[f64; 2],
+) -> Option<f64> {
+    let Obfuscation::Rays(rays) = released.obfuscation() else { return None };
+    let bounds = released.bounds()?;
+    let origin = released.origin();
+    let region = rays.regions().and_then(|regions| regions.get(center));
+    // Regions are about the origin.
+    let region = region.map(|region| region.about(&origin.map(|x| -x))).unwrap_or(bounds);
+    // Rounded directions of rays along a border may miss the part by a hair.
+    let (_, to) = region.clip(anchor, along).or_else(|| bounds.clip(anchor, along))?;
+    Some(to.max(0.0))
+}
+
+fn narrow(place: &[f64; 2]) -> [f32; 2] {
+    place.map(|x| x as f32)
+}

@@ -1,0 +1,150 @@
+//! Images for an audit: one after the other, the next ones read in parallel, broken ones told and left out.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::path::Path;
+
+use rayon::prelude::*;
+use unlift::audit::images::Image;
+use unlift::geometry::frame::Bounds;
+use unlift::truth::Original;
+use unlift::{PointSet, Unit};
+use unlift_io::Error;
+use unlift_io::features::ImageFeatures;
+
+use super::FeatureSource;
+use crate::exit::line;
+use crate::progress::Voice;
+
+/// Images per thread that are read ahead.
+const PER_THREAD: usize = 2;
+
+/// What became of the images so far.
+#[derive(Debug, Default)]
+pub struct Tally {
+    /// Keypoints of each image that was handed out and not yet [taken](Self::take).
+    sizes: VecDeque<usize>,
+    /// Numbers of the images that were handed out.
+    pub used: Vec<usize>,
+    /// Keypoints of all of them.
+    pub n_points: usize,
+    /// Images that could not be used.
+    pub unusable: usize,
+}
+
+impl Tally {
+    /// The keypoints of the image that was handed out first and not taken yet.
+    pub fn take(&mut self) -> usize {
+        self.sizes.pop_front().unwrap_or(0)
+    }
+}
+
+/// What an image must have, beside keypoints and a size.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Needs {
+    /// Descriptors of any kind.
+    pub descriptors: bool,
+    /// Those of SIFT, in bytes.
+    pub sift: bool,
+}
+
+/// The images `chosen` of a source. Memory depends on the number of threads, not on that of images.
+pub struct Stream<'a> {
+    source: &'a FeatureSource,
+    path: &'a Path,
+    chosen: &'a [usize],
+    needs: Needs,
+    next: usize,
+    ready: VecDeque<(usize, Image)>,
+    tally: &'a RefCell<Tally>,
+    voice: Voice,
+}
+
+impl<'a> Stream<'a> {
+    /// `path` names the source in errors, which `voice` tells and `tally` counts.
+    pub fn new(
+        (source, path): (&'a FeatureSource, &'a Path),
+        chosen: &'a [usize],
+        needs: Needs,
+        tally: &'a RefCell<Tally>,
+        voice: Voice,
+    ) -> Self {
+        let ready = VecDeque::new();
+        Self { source, path, chosen, needs, next: 0, ready, tally, voice }
+    }
+
+    fn read_ahead(&mut self) {
+        let n = PER_THREAD * rayon::current_num_threads();
+        let numbers = &self.chosen[self.next..self.chosen.len().min(self.next + n)];
+        self.next += numbers.len();
+        let (source, path, needs) = (self.source, self.path, self.needs);
+        let read = |&at: &usize| (at, image(source, path, at, needs));
+        let read: Vec<_> = numbers.par_iter().with_max_len(1).map(read).collect();
+        for (at, image) in read {
+            match image {
+                Ok(image) => self.ready.push_back((at, image)),
+                Err(error) => {
+                    self.tally.borrow_mut().unusable += 1;
+                    self.voice.say(&line(&error));
+                }
+            }
+        }
+    }
+}
+
+impl Iterator for Stream<'_> {
+    type Item = anyhow::Result<Image>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        while self.ready.is_empty() && self.next < self.chosen.len() {
+            self.read_ahead();
+        }
+        let (at, image) = self.ready.pop_front()?;
+        let mut tally = self.tally.borrow_mut();
+        tally.used.push(at);
+        tally.n_points += image.original.len();
+        tally.sizes.push_back(image.original.len());
+        Some(Ok(image))
+    }
+}
+
+fn image(source: &FeatureSource, path: &Path, at: usize, needs: Needs) -> anyhow::Result<Image> {
+    let features = source.get(at)?;
+    let wrong = |expected: &str, found: &str| {
+        Error::new(path, format!("image {}", features.name.escape_debug()), expected, found)
+    };
+    if let Some(missing) = lacking(&features, needs) {
+        return Err(wrong(missing.0, missing.1).into());
+    }
+    let [width, height] = features.size.ok_or_else(|| wrong("a size in pixels", "none"))?;
+    // The middle of the first pixel is (0, 0).
+    let high = [f64::from(width) - 0.5, f64::from(height) - 0.5];
+    let of_image = |error: unlift::Error| {
+        Error::core(path, error.within(&format!("image {}", features.name.escape_debug())))
+    };
+    let bounds = Bounds::try_new([-0.5; 2], high).map_err(of_image)?;
+    let points = PointSet::try_new(features.keypoints.clone(), Unit::Pixel).map_err(of_image)?;
+    let original = Original::within(points, bounds).map_err(of_image)?;
+    // Nobody asks for them otherwise, and they are most of an image.
+    let descriptors = features.descriptors.filter(|_| needs.descriptors);
+    Ok(Image { name: features.name, original, descriptors })
+}
+
+/// What was expected of these features, and found; `None` where they have what is needed. An image
+/// without keypoints needs nothing.
+pub fn lacking(features: &ImageFeatures, needs: Needs) -> Option<(&'static str, &'static str)> {
+    if features.keypoints.is_empty() || !needs.descriptors {
+        return None;
+    }
+    match &features.descriptors {
+        None => Some(("descriptors", "none")),
+        Some(found) if needs.sift => match found.values() {
+            unlift::descriptors::Values::F32(_) => Some(("SIFT descriptors in bytes", "floats")),
+            unlift::descriptors::Values::U8(_) if found.dim() != 128 => {
+                Some(("SIFT descriptors of 128 bytes", "others"))
+            }
+            unlift::descriptors::Values::U8(_) => None,
+        },
+        Some(_) => None,
+    }
+}

@@ -1,0 +1,216 @@
+// Chosen images: keypoints, what a scheme releases, what comes back, who is listed as whose neighbor.
+"use strict";
+
+(() => {
+  const NOT_DRAWN = 65535;
+  const DARK = "#10141a";
+  const GRAY = "#4a505a";
+  const HIT = "#53b4f5";
+  const MISS = "#ffa238";
+  const SHORT = "#35c46f";
+  const LONG = "#ff5a4d";
+  /** An edge is short below this share of the smaller side, as in the paper's figures. */
+  const SHORT_SHARE = 0.1;
+
+  const text = (block) => document.getElementById(`block-${block}`).textContent.trim();
+  const cache = new Map();
+
+  /** Places as x, y, x, y, ... in pixels; those not drawn are NaN. */
+  function places(picture, block) {
+    if (!cache.has(block)) {
+      const bytes = Uint8Array.from(atob(text(block)), (c) => c.charCodeAt(0));
+      const view = new DataView(bytes.buffer);
+      const points = new Float32Array(bytes.length / 2);
+      for (let i = 0; i < points.length; i++) {
+        const q = view.getUint16(2 * i, true);
+        points[i] = q === NOT_DRAWN ? NaN : (q / (NOT_DRAWN - 1)) * picture.size[i % 2] - 0.5;
+      }
+      cache.set(block, points);
+    }
+    return cache.get(block);
+  }
+
+  const photos = new Map();
+
+  /** Calls `ready` when the photo is there; at once, with null, when there is none. */
+  function photo(picture, ready) {
+    if (picture.photo === null) return ready(null);
+    const known = photos.get(picture.photo);
+    if (known) return known.complete ? ready(known) : known.addEventListener("load", () => ready(known));
+    const image = new Image();
+    photos.set(picture.photo, image);
+    image.addEventListener("load", () => ready(image));
+    image.src = `data:image/jpeg;base64,${text(picture.photo)}`;
+  }
+
+  /** A canvas as wide as its place, ready to be drawn on in pixels of the image. */
+  function open(id, picture, background) {
+    const canvas = document.getElementById(id);
+    const [w, h] = picture.size;
+    // Upright photos would be taller than a screen.
+    const width = Math.max(1, Math.min(canvas.parentElement.clientWidth, (0.8 * window.innerHeight * w) / h));
+    const height = (width * h) / w;
+    const ratio = Math.min(window.devicePixelRatio || 1, 2);
+    canvas.style.width = `${width}px`;
+    canvas.style.height = `${height}px`;
+    canvas.width = Math.round(width * ratio);
+    canvas.height = Math.round(height * ratio);
+    const context = canvas.getContext("2d");
+    context.fillStyle = background;
+    context.fillRect(0, 0, canvas.width, canvas.height);
+    const scale = canvas.width / w;
+    context.setTransform(scale, 0, 0, scale, 0.5 * scale, 0.5 * scale);
+    /** `pixel` is the size of a pixel of the screen. */
+    return { context, pixel: ratio / scale, w, h };
+  }
+
+  /** The photo under a veil, so that marks stand out; a gray frame without one. */
+  function ground({ context, w, h }, image, veil) {
+    if (!image) return;
+    context.drawImage(image, -0.5, -0.5, w, h);
+    context.fillStyle = `rgba(16,20,26,${veil})`;
+    context.fillRect(-0.5, -0.5, w, h);
+  }
+
+  function dots({ context, pixel }, points, radius, style) {
+    context.fillStyle = style;
+    context.beginPath();
+    for (let i = 0; i < points.length; i += 2) {
+      if (Number.isNaN(points[i])) continue;
+      context.moveTo(points[i], points[i + 1]);
+      context.arc(points[i], points[i + 1], radius * pixel, 0, 7);
+    }
+    context.fill();
+  }
+
+  /** Segments as x, y, x, y each; one path, one stroke. */
+  function segments({ context, pixel }, ends, width, style) {
+    context.strokeStyle = style;
+    context.lineWidth = width * pixel;
+    context.beginPath();
+    for (let i = 0; i + 3 < ends.length; i += 4) {
+      if (Number.isNaN(ends[i]) || Number.isNaN(ends[i + 2])) continue;
+      context.moveTo(ends[i], ends[i + 1]);
+      context.lineTo(ends[i + 2], ends[i + 3]);
+    }
+    context.stroke();
+  }
+
+  /** How opaque `n` lines may be so that they are no fog. */
+  const opacity = (n, most) => Math.max(0.06, Math.min(most, (most * 260) / Math.max(n, 1)));
+
+  function original(picture, image) {
+    const pane = open("picture-original", picture, GRAY);
+    ground(pane, image, 0.25);
+    dots(pane, places(picture, picture.keypoints), 2.6, "rgba(16,20,26,0.75)");
+    dots(pane, places(picture, picture.keypoints), 1.7, "#ffe08a");
+  }
+
+  function released(picture, scheme) {
+    const pane = open("picture-released", picture, DARK);
+    const marks = picture.released.find((one) => one.scheme === scheme);
+    if (!marks) return "nothing to draw for this choice";
+    const ends = places(picture, marks.block);
+    if (marks.kind === "points") {
+      const { w, h } = pane;
+      const axes = [];
+      for (let i = 0; i < ends.length; i += 2) {
+        axes.push(ends[i], -0.5, ends[i], h - 0.5, -0.5, ends[i + 1], w - 0.5, ends[i + 1]);
+      }
+      segments(pane, axes, 1, `rgba(201,179,255,${opacity(axes.length / 4, 0.3)})`);
+      dots(pane, ends, 1.8, "#e2d6ff");
+      return "a point each, moved along one of its two axis lines";
+    }
+    segments(pane, ends, 1, `rgba(201,179,255,${opacity(ends.length / 4, 0.55)})`);
+    if (marks.kind === "lines") return "a line each";
+    const anchors = ends.filter((_, i) => i % 4 < 2);
+    dots(pane, anchors, 5, "#ffffff");
+    return "a half-line each, from the anchor of its half";
+  }
+
+  /** Lines from true to recovered places, with a head where there is room for one. */
+  function arrows(pane, ends, style) {
+    const { context, pixel } = pane;
+    segments(pane, ends, 1.1, style);
+    context.fillStyle = style;
+    context.beginPath();
+    for (let i = 0; i + 3 < ends.length; i += 4) {
+      const [dx, dy] = [ends[i + 2] - ends[i], ends[i + 3] - ends[i + 1]];
+      const length = Math.hypot(dx, dy) / pixel;
+      if (!(length > 9)) continue;
+      const [ux, uy] = [(dx / length) * 6, (dy / length) * 6];
+      context.moveTo(ends[i + 2], ends[i + 3]);
+      context.lineTo(ends[i + 2] - ux - 0.45 * uy, ends[i + 3] - uy + 0.45 * ux);
+      context.lineTo(ends[i + 2] - ux + 0.45 * uy, ends[i + 3] - uy - 0.45 * ux);
+    }
+    context.fill();
+  }
+
+  function recovered(picture, image, state, within) {
+    const pane = open("picture-recovered", picture, GRAY);
+    ground(pane, image, 0.62);
+    const view = picture.views.find((one) => one.scheme === state.scheme && one.given === state.given);
+    if (!view) return "nothing to draw for this choice";
+    const [truth, found] = [places(picture, picture.keypoints), places(picture, view.block)];
+    const groups = { hit: [], miss: [] };
+    let lost = 0;
+    for (let i = 0; i < truth.length; i += 2) {
+      if (Number.isNaN(found[i])) { lost++; continue; }
+      const error = Math.hypot(found[i] - truth[i], found[i + 1] - truth[i + 1]);
+      groups[error <= within ? "hit" : "miss"].push(truth[i], truth[i + 1], found[i], found[i + 1]);
+    }
+    const heads = (ends) => ends.filter((_, i) => i % 4 > 1);
+    const faint = opacity(groups.miss.length / 4, 0.75);
+    arrows(pane, groups.miss, `rgba(255,162,56,${Math.max(0.3, faint)})`);
+    dots(pane, heads(groups.miss), 1.6, MISS);
+    arrows(pane, groups.hit, HIT);
+    dots(pane, heads(groups.hit), 1.9, HIT);
+    const n = truth.length / 2;
+    const share = n ? ((100 * groups.hit.length) / 4 / n).toFixed(1) : "0.0";
+    return `${share} % within ${+within.toPrecision(3)} px (blue), the others orange${lost ? `, ${lost} lost` : ""}`;
+  }
+
+  function graph(picture, state) {
+    const pane = open("picture-graph", picture, DARK);
+    const drawn = picture.graphs.find((one) => one.given === state.given);
+    if (!drawn) return "nothing to draw for this choice";
+    const [from, to] = [places(picture, picture.keypoints), places(picture, drawn.block)];
+    const reach = SHORT_SHARE * Math.min(...picture.size);
+    const edges = { short: [], long: [] };
+    for (let i = 0; i < from.length / 2; i++) {
+      for (let j = drawn.k * i; j < drawn.k * (i + 1); j++) {
+        if (Number.isNaN(to[2 * j])) continue;
+        const edge = [from[2 * i], from[2 * i + 1], to[2 * j], to[2 * j + 1]];
+        const length = Math.hypot(edge[2] - edge[0], edge[3] - edge[1]);
+        edges[length < reach ? "short" : "long"].push(...edge);
+      }
+    }
+    const n = (edges.short.length + edges.long.length) / 4;
+    segments(pane, edges.long, 0.8, `rgba(255,90,77,${opacity(edges.long.length / 4, 0.5)})`);
+    segments(pane, edges.short, 1, SHORT);
+    dots(pane, from, 1.5, "#f1efe9");
+    const share = n ? ((25 * edges.short.length) / n).toFixed(1) : "0.0";
+    return `five of each list; ${share} % of the edges are shorter than ${+reach.toPrecision(3)} px (green), the others red`;
+  }
+
+  /** Draws one picture as `state` asks for. */
+  function drawPicture(data, state) {
+    const picture = data.pictures[state.picture];
+    const within = data.thresholds[data.headline]?.value ?? 10;
+    const say = (id, words) => { document.getElementById(id).textContent = words; };
+    say("said-original", picture.photo === null ? "no photo was given" : "");
+    say("said-released", released(picture, state.scheme));
+    say("said-graph", graph(picture, state));
+    photo(picture, (image) => {
+      // Another picture may have been chosen while this photo was read.
+      if (data.pictures[state.picture] !== picture) return;
+      original(picture, image);
+      say("said-recovered", recovered(picture, image, state, within));
+      document.documentElement.dataset.pictures = "drawn";
+    });
+    const some = picture.n_drawn < picture.n_keypoints ? `, ${picture.n_drawn} of them drawn` : "";
+    say("picture-status", `${picture.name}, ${picture.size.join(" x ")} px, ${picture.n_keypoints} keypoints${some}`);
+  }
+
+  Object.assign(window.Unlift, { drawPicture });
+})();
