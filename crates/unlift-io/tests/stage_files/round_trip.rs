@@ -61,7 +61,7 @@ fn released_images() {
     for entry in SCHEMES {
         let Some(scheme) = entry.in_2d else { continue };
         let (released, _) =
-            obfuscate(scheme, &original, None, &SchemeOptions::default(), 3).unwrap();
+            obfuscate(scheme, &original, None, &SchemeOptions { voxel: 50.0 }, 3).unwrap();
         assert!(released.bounds().is_some());
         written_twice(folder.path(), |path| stage::write_released(path, &released).unwrap());
         assert!(stage::read_released::<2>(&path).unwrap() == released, "{}", entry.name);

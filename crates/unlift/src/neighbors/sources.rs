@@ -198,8 +198,8 @@ mod tests {
     #[test]
     fn names_are_joined_and_the_largest_usual_k_counts() {
         let joined = Joined::parse("overlap+similarity").unwrap();
-        assert_eq!((joined.name().as_str(), joined.k()), ("overlap+similarity", 40));
-        assert_eq!(Joined::parse("overlap").unwrap().k(), 40);
+        assert_eq!((joined.name().as_str(), joined.k()), ("overlap+similarity", 30));
+        assert_eq!(Joined::parse("overlap").unwrap().k(), 30);
         assert_eq!(Joined::parse("overlap").unwrap().with_k(7).k(), 7);
     }
 

@@ -54,7 +54,7 @@ fn least_shares<const D: usize>(
     }
     let hidden = try_hide(scheme, points, 0.5, 7).unwrap();
     let blind = blind(&hidden.released, &hidden.original, &hidden.secret).percent_within(0.25);
-    assert!(blind < 20.0, "{name}: {blind} % within reach of a blind attacker");
+    assert!(blind < 30.0, "{name}: {blind} % within reach of a blind attacker");
     [0.0, 1.1 * blind]
 }
 
