@@ -185,7 +185,7 @@ mod tests {
         assert_eq!(threshold("1.0", LengthUnit::KthNeighbor), "1 neighbor distance");
         assert_eq!(threshold("2.5", LengthUnit::KthNeighbor), "2.5 neighbor distances");
         assert_eq!(threshold("10", LengthUnit::Pixel), "10 px");
-        assert_eq!(length(3.14159, LengthUnit::Pixel), "3.14 px");
+        assert_eq!(length(3.4567, LengthUnit::Pixel), "3.46 px");
     }
 
     #[test]
