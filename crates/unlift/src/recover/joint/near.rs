@@ -57,9 +57,9 @@ impl<const D: usize> Columns<D> {
         self.slot[i] as usize
     }
 
-    /// Puts the estimates within `reach` of `piece` into `near`.
+    /// Puts the estimates within `reach` of `piece` into `near`, but not those within `blind` of a center.
     #[inline(always)]
-    pub(crate) fn near(&mut self, piece: &Piece<D>, reach: f32, near: &mut Self) {
+    pub(crate) fn near(&mut self, piece: &Piece<D>, reach: f32, blind: f32, near: &mut Self) {
         let n = self.len();
         self.apart2.resize(n, 0.0);
         let columns: [&[f32]; D] = std::array::from_fn(|c| &self.x[c][..n]);
@@ -72,6 +72,15 @@ impl<const D: usize> Columns<D> {
                 sum += (x[c] - y[c]) * (x[c] - y[c]);
             }
             apart2[i] = sum;
+        }
+        if piece.from_center {
+            for i in 0..n {
+                let mut sum = 0.0;
+                for c in 0..D {
+                    sum += (columns[c][i] - piece.through[c]) * (columns[c][i] - piece.through[c]);
+                }
+                apart2[i] = if sum < blind * blind { f32::INFINITY } else { apart2[i] };
+            }
         }
         // Every row is written, and stays if it is near: no branch to guess.
         near.resize(n);

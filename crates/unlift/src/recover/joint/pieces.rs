@@ -17,14 +17,15 @@ pub(crate) struct Piece<const D: usize> {
     pub(crate) sense: [f32; D],
     /// How far it reaches in that sense.
     pub(crate) to: f32,
+    /// Whether those of other slots end in `through`, too: what is near it is near all of them.
+    pub(crate) from_center: bool,
 }
 
 impl<const D: usize> Piece<D> {
-    /// A line, or what is left of it beyond `through`, up to `to`.
-    fn line(through: [f32; D], direction: [f32; D], begins: bool, to: f32) -> Self {
+    /// A whole line.
+    fn line(through: [f32; D], direction: [f32; D]) -> Self {
         let along = std::array::from_fn(|r| std::array::from_fn(|c| direction[r] * direction[c]));
-        let sense = if begins { direction } else { [0.0; D] };
-        Self { through, along, sense, to }
+        Self { through, along, sense: [0.0; D], to: f32::INFINITY, from_center: false }
     }
 
     /// The place of the piece nearest to `x`.
@@ -114,7 +115,9 @@ impl<const D: usize> Pieces<D> for LinePieces<'_, D> {
     #[inline(always)]
     fn piece(&self, slot: usize, _: usize) -> Piece<D> {
         let own = self.own(slot);
-        Piece::line(own.through, own.direction, own.floor() == 0.0, own.to)
+        let sense = if own.floor() == 0.0 { own.direction } else { [0.0; D] };
+        let line = Piece::line(own.through, own.direction);
+        Piece { sense, to: own.to, from_center: own.is_ray(), ..line }
     }
 
     #[inline(always)]
@@ -179,6 +182,7 @@ impl<const D: usize> Pieces<D> for PlanePieces<'_, D> {
             along: std::array::from_fn(|r| std::array::from_fn(|c| along(r, c))),
             sense: [0.0; D],
             to: f32::INFINITY,
+            from_center: false,
         }
     }
 
@@ -223,7 +227,7 @@ impl<const D: usize> Pieces<D> for CandidatePieces<'_, D> {
     #[inline(always)]
     fn piece(&self, slot: usize, piece: usize) -> Piece<D> {
         let direction = std::array::from_fn(|c| if c == piece { 1.0 } else { 0.0 });
-        Piece::line(self.rows[slot], direction, false, f32::INFINITY)
+        Piece::line(self.rows[slot], direction)
     }
 
     #[inline(always)]

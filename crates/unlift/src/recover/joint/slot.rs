@@ -14,9 +14,12 @@ pub(crate) struct Round<'a, const D: usize, P> {
     pub(crate) pieces: &'a P,
     pub(crate) graph: &'a Graph,
     pub(crate) places: &'a Places<D>,
-    /// Where slots were believed to be a round earlier, and which of them jumped since.
+    /// Where slots were believed to be when those whose turn it is moved last, and which of them jumped
+    /// since.
     pub(crate) before: &'a Places<D>,
     pub(crate) moves: &'a [bool],
+    /// Whose turn it is: slots whose number leaves this remainder when divided by that.
+    pub(crate) turn: (usize, usize),
     pub(crate) density: &'a Density<D>,
     pub(crate) law: &'a Law,
     /// Within this many local widths estimates enter the re-made position.
@@ -26,6 +29,9 @@ pub(crate) struct Round<'a, const D: usize, P> {
 
 /// Estimates farther from a piece than this many radii of the law say nothing about it.
 const TUBE: f32 = 6.0;
+/// Estimates within this many radii of the law of the center of a ray are near all of its rays. They would
+/// draw others there, as nothing tells them apart.
+const BLIND: f32 = 3.0;
 /// Candidates looked at per piece.
 const CANDIDATES: usize = 16;
 /// Records decide between the best candidates that lie within this many nats of each other.
@@ -63,6 +69,13 @@ impl<const D: usize> Default for Scratch<D> {
 }
 
 impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
+    /// Tells the slots that move from those that hold still.
+    #[inline(always)]
+    pub(crate) fn is_turn_of(&self) -> impl Fn(usize) -> bool + use<D, P> {
+        let (turn, turns) = self.turn;
+        move |slot| slot % turns == turn
+    }
+
     /// The new estimate of `slot`, and how many nats its place is ahead of the best one elsewhere; the
     /// old estimate when no neighbor says anything.
     #[inline(always)]
@@ -74,10 +87,10 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
     ) -> (Estimate<D>, f32) {
         scratch.best.clear();
         self.gather(slot, &mut scratch.all);
-        let reach = TUBE * self.law.radius;
+        let (reach, blind) = (TUBE * self.law.radius, BLIND * self.law.radius);
         for piece in 0..P::PER_SLOT {
             let own = self.pieces.piece(slot, piece);
-            scratch.all.near(&own, reach, &mut scratch.near[piece]);
+            scratch.all.near(&own, reach, blind, &mut scratch.near[piece]);
             let near = &scratch.near[piece];
             let n = near.len();
             let step = n.div_ceil(CANDIDATES).max(1);
