@@ -13,8 +13,9 @@ use super::lists::Lists;
 use crate::neighbors::Neighborhoods;
 use crate::seed::{Draws, Stage};
 
-/// Chunks solved per delta.
+/// Chunks solved per delta; fewer of an image, where they are most of the time and few of all.
 const SAMPLE: usize = 12;
+const SAMPLE_IN_IMAGE: usize = 6;
 /// Halvings of the extent that the coarse ladder spans.
 const HALVINGS: u32 = 14;
 /// Where a random record agrees with a typical place this often, its agreement tells nothing, and the
@@ -82,7 +83,8 @@ pub(crate) fn choose<const D: usize>(
     if lists.n_slots() == 0 || !(extent.is_finite() && extent > 0.0) {
         return None;
     }
-    let chunks = sample_chunks(lists.n_slots(), seed);
+    let chunks =
+        sample_chunks(lists.n_slots(), if D == 2 { SAMPLE_IN_IMAGE } else { SAMPLE }, seed);
     let mean_evidence = |lists: Lists<'_>, delta: f64| {
         let solved = consensus::solve(family, lists, delta as f32, Chunks::Some(&chunks));
         solved.iter().map(|e| f64::from(e.evidence)).sum::<f64>() / solved.len() as f64
@@ -154,13 +156,13 @@ fn edge(coarse: f64, value: &impl Fn(f64) -> f64) -> f64 {
     at(LOWEST)
 }
 
-fn sample_chunks(n_slots: usize, seed: u64) -> Vec<usize> {
+fn sample_chunks(n_slots: usize, sample: usize, seed: u64) -> Vec<usize> {
     let n_chunks = n_slots.div_ceil(CHUNK);
-    let mut chunks: Vec<usize> = if n_chunks <= SAMPLE {
+    let mut chunks: Vec<usize> = if n_chunks <= sample {
         (0..n_chunks).collect()
     } else {
         let mut draws = Draws::new(seed, Stage::DeltaSlots, 0);
-        (0..SAMPLE).map(|_| draws.below(n_chunks as u64) as usize).collect()
+        (0..sample).map(|_| draws.below(n_chunks as u64) as usize).collect()
     };
     chunks.sort_unstable();
     chunks.dedup();

@@ -62,10 +62,6 @@ const LEAST_DELTA: f64 = 0.25;
 const ANCHOR_DELTA: f64 = 1.75;
 /// Partners in an image are looked for within this many deltas.
 const EXACT_REACH: f64 = 4.0;
-/// How often joint recovery of an image starts again from what was settled. Exact coordinates place their
-/// neighbors better, whose partners are then found; rays from anchors move a little in every round.
-const FEEDS: usize = 16;
-
 /// How far apart points would be if they were spread evenly over known bounds; 0 without bounds.
 fn spacing<const D: usize>(released: &Released<D>) -> f64 {
     let Some(bounds) = released.bounds() else { return 0.0 };
@@ -141,8 +137,8 @@ pub fn recover_and_look<const D: usize>(
     let settled = (exact && exact::can_settle(released)).then(|| {
         let settle = |estimates| exact::settle(released, estimates, exact_reach as f32);
         let mut settled = settle(estimates.clone());
-        if let (Some(graph), 2) = (&graph, D) {
-            for _ in 0..FEEDS {
+        if let Some(graph) = &graph {
+            for _ in 0..exact::feeds(released) {
                 settled = settle(joint::solve(&family, graph, settled, delta as f32, options.seed));
             }
         }

@@ -15,6 +15,8 @@ const STEPS: usize = 1 << 9;
 pub(super) struct Law {
     good: [f64; CLASSES],
     weight: [[f64; SCALES]; CLASSES],
+    /// The density of each scale in the middle of each step.
+    shapes: Vec<[f64; SCALES]>,
     reach: f32,
     /// Density times share, per class and step.
     table: Vec<[f64; STEPS]>,
@@ -24,20 +26,23 @@ impl Law {
     /// Before anything is known; partners are looked for within `reach`.
     pub(super) fn new(reach: f32) -> Self {
         let weight = [[1.0 / SCALES as f64; SCALES]; CLASSES];
+        let shape = |step: usize, scale: usize| {
+            let away = (step as f64 + 0.5) / STEPS as f64;
+            // In units of the reach; 1 / sqrt(2 pi).
+            let inverse = f64::from(2u32 << scale);
+            let z = away * inverse;
+            0.398_942_280_4 * inverse / f64::from(reach) * libm::exp(-0.5 * z * z)
+        };
+        let shapes =
+            (0..STEPS).map(|step| std::array::from_fn(|scale| shape(step, scale))).collect();
         let table = vec![[0.0; STEPS]; CLASSES];
-        Self { good: [0.8; CLASSES], weight, reach, table }.tabulated()
+        Self { good: [0.8; CLASSES], weight, shapes, reach, table }.tabulated()
     }
 
     /// The weighted density of each scale of `class` in the middle of a step.
     fn parts(&self, class: usize, step: usize) -> [f64; SCALES] {
-        let away = (step as f64 + 0.5) / STEPS as f64;
-        let reach = f64::from(self.reach);
-        std::array::from_fn(|s| {
-            // In units of the reach; 1 / sqrt(2 pi).
-            let inverse = f64::from(2u32 << s);
-            let z = away * inverse;
-            0.398_942_280_4 * inverse / reach * self.weight[class][s] * libm::exp(-0.5 * z * z)
-        })
+        let shape = &self.shapes[step];
+        std::array::from_fn(|s| shape[s] * self.weight[class][s])
     }
 
     fn tabulated(mut self) -> Self {

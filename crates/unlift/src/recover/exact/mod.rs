@@ -19,6 +19,18 @@ pub(crate) fn can_settle<const D: usize>(released: &Released<D>) -> bool {
     matches!(released.obfuscation(), Obfuscation::AxisCandidates(_) | Obfuscation::Rays(_))
 }
 
+/// How often joint recovery of `released` goes on from what was settled. In an image exact coordinates place
+/// their neighbors better, whose partners are then found. In a map they hardly do, and it costs as
+/// much time again.
+pub(crate) fn feeds<const D: usize>(released: &Released<D>) -> usize {
+    match released.obfuscation() {
+        Obfuscation::AxisCandidates(_) if D == 2 => FEEDS,
+        _ => 0,
+    }
+}
+
+const FEEDS: usize = 2;
+
 /// Estimates of `released` moved to where the rule of their family allows them to be. `delta` is the
 /// distance that decided support.
 pub(crate) fn settle<const D: usize>(
