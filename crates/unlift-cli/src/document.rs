@@ -27,7 +27,10 @@ pub fn options(plan: &Plan, more: Map<String, Value>) -> Map<String, Value> {
     let labels: Vec<&str> = plan.thresholds.iter().map(|t| t.label.as_str()).collect();
     let mut options = Map::new();
     options.insert("schemes".into(), json!(names));
-    options.insert("voxel".into(), json!(plan.scheme_options.voxel));
+    // No scheme for images has voxels.
+    if plan.schemes.iter().any(|scheme| scheme.in_3d.is_some()) {
+        options.insert("voxel".into(), json!(plan.scheme_options.voxel));
+    }
     let neighbors: Vec<String> = plan.sources.iter().map(Source::name).collect();
     options.insert("neighbors".into(), json!(neighbors));
     if plan.sources.contains(&Source::Oracle) {

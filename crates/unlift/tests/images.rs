@@ -1,7 +1,7 @@
 //! Audits of images: pooled rows, twins, images with hardly any keypoints.
 
 use unlift::audit::images::{self, Image, Outcome};
-use unlift::audit::{Observer, Plan, Row, Silent, Source};
+use unlift::audit::{Plan, Row, Silent, Source};
 use unlift::descriptors::Values;
 use unlift::geometry::frame::Bounds;
 use unlift::neighbors::sources::Joined;
@@ -80,8 +80,14 @@ fn keypoints_come_back() {
 fn rows_are_pooled_over_keypoints() {
     #[derive(Default)]
     struct Each(Vec<Vec<Row>>);
-    impl Observer<2> for Each {
-        fn image(&mut self, _: &str, rows: &[Row]) {
+    impl images::Watcher for Each {
+        type OfImage = Silent;
+
+        fn begin(&mut self) -> Silent {
+            Silent
+        }
+
+        fn image(&mut self, _: &str, rows: &[Row], _: Silent) {
             self.0.push(rows.to_vec());
         }
     }

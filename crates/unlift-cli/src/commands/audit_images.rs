@@ -4,8 +4,8 @@ use std::path::Path;
 use std::time::Instant;
 
 use serde_json::{Map, json};
+use unlift::Unit;
 use unlift::audit::{Plan, Source};
-use unlift::{Unit, neighbors::sources::Joined};
 use unlift_features::SiftOptions;
 use unlift_io::Error;
 use unlift_report::pictures::MOST_PICTURES;
@@ -32,14 +32,12 @@ pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
     let (finished, used) = with_threads(args.run.threads, || {
         let source = FeatureSource::open(&args.path, &extraction(args)?)?;
         let chosen = chosen(source.names().len(), args.max_images.map(|n| n.get()));
-        let needs = needs(&plan);
         check_descriptors(&source, &chosen, &plan)?;
         let job = ImagesJob {
             source: &source,
             path: &args.path,
             show: show(args, &source, &chosen)?,
             chosen,
-            needs,
             plan,
             options: more_options(args),
             gates: args.result.gate.clone(),
@@ -114,29 +112,11 @@ fn chosen(n: usize, most: Option<usize>) -> Vec<usize> {
     (0..most).map(|at| ((2 * at + 1) * n) / (2 * most)).collect()
 }
 
-/// What a source needs of an image.
-fn needs_of(joined: &Joined) -> Needs {
-    let sift = joined.name().split('+').any(|name| name == "overlap");
-    Needs { descriptors: joined.needs_descriptors(), sift }
-}
-
-fn needs(plan: &Plan) -> Needs {
-    let mut all = Needs::default();
-    for source in &plan.sources {
-        if let Source::Own(joined) = source {
-            let of = needs_of(joined);
-            all.descriptors |= of.descriptors;
-            all.sift |= of.sift;
-        }
-    }
-    all
-}
-
 /// Asks the first image with keypoints whether it has what the sources need: one line in place of one per
 /// image. What is wrong with single images is told when they are read.
 fn check_descriptors(source: &FeatureSource, chosen: &[usize], plan: &Plan) -> anyhow::Result<()> {
     // Extracted features always have them.
-    if matches!(source, FeatureSource::Folder(_)) || !needs(plan).descriptors {
+    if matches!(source, FeatureSource::Folder(_)) || !Needs::of_plan(plan).descriptors {
         return Ok(());
     }
     let found = chosen.iter().filter_map(|&at| source.get(at).ok());
@@ -145,7 +125,7 @@ fn check_descriptors(source: &FeatureSource, chosen: &[usize], plan: &Plan) -> a
     };
     for wanted in &plan.sources {
         if let Source::Own(joined) = wanted
-            && let Some((expected, found)) = lacking(&first, needs_of(joined))
+            && let Some((expected, found)) = lacking(&first, Needs::of(joined))
         {
             let name = joined.name();
             return Err(usage(format!("--neighbors {name}: expected {expected}, found {found}")));

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use serde_json::{Map, Value};
-use unlift::audit::images::{Outcome, run};
-use unlift::audit::{Cell, Observer, Plan, Row};
+use unlift::audit::images::{self, Outcome, run};
+use unlift::audit::{Cell, Observer, Plan, Row, Source};
+use unlift::neighbors::sources::Joined;
 use unlift_io::atomic::{OutputDir, write_file};
 use unlift_io::hash::{hash_file, hash_files};
 use unlift_report::document::{ImageCounts, ImageFigures, Input};
@@ -15,7 +16,7 @@ use unlift_report::{ErrorCdf, RenderOptions, render};
 
 use super::FeatureSource;
 use super::pictures::Album;
-use super::stream::{Needs, Stream, Tally};
+use super::stream::{Needs, Stream, Tally, lacking};
 use crate::document::{self, Found, Provenance};
 use crate::exit::line;
 use crate::gate::Gate;
@@ -37,8 +38,6 @@ pub struct ImagesJob<'a> {
     pub chosen: Vec<usize>,
     /// What is to be done.
     pub plan: Plan,
-    /// What the plan needs of an image.
-    pub needs: Needs,
     /// Options for the record, beside those in the plan.
     pub options: Map<String, Value>,
     /// Bounds to hold.
@@ -77,9 +76,10 @@ pub fn perform(job: ImagesJob<'_>, out: OutputDir) -> anyhow::Result<(Option<Fin
         voice.say(&line(&anyhow::anyhow!("{error}")));
     }
     let of = (job.source, job.path);
-    let images = Stream::new(of, &job.chosen, job.needs, &tally, voice.clone());
+    let needs = Needs::of_plan(&job.plan);
+    let images = Stream::new(of, &job.chosen, needs, &tally, voice.clone());
     let outcome = run(images, &job.plan, &mut watcher)?;
-    let Watcher { figures, curves, .. } = watcher;
+    let Watcher { figures, errors, curves, .. } = watcher;
     let tally = tally.into_inner();
     let used = Used { used: tally.used.len(), unusable: tally.unusable };
     if used.used == 0 {
@@ -100,7 +100,7 @@ pub fn perform(job: ImagesJob<'_>, out: OutputDir) -> anyhow::Result<(Option<Fin
     let document = if job.share_safe { document.share_safe() } else { document };
     let options = RenderOptions {
         share_safe: job.share_safe,
-        error_cdf: curves.into_iter().map(Curve::shares).collect(),
+        error_cdf: curves.iter().map(|curve| curve.shares(&errors)).collect(),
         pictures,
     };
     let page = render(&document, None, &options)?;
@@ -137,7 +137,8 @@ fn input(job: &ImagesJob<'_>, tally: &Tally, outcome: &Outcome) -> anyhow::Resul
 }
 
 /// Audits the images to be drawn once more, by the first solver and seed: an image's randomness comes from
-/// its name, so what is drawn is what was counted, and no picture had to be kept in between.
+/// its name, so what is drawn is what was counted, and no picture had to be kept in between. What a server
+/// sees that has no oracle is drawn as well, whether or not it was asked for.
 fn draw(
     job: &ImagesJob<'_>,
     tally: &Tally,
@@ -158,9 +159,11 @@ fn draw(
     let mut plan = job.plan.clone();
     plan.solvers.truncate(1);
     (plan.repeats, plan.reference) = (1, false);
+    plan.sources.extend(without_oracle(job, &numbers));
+    let needs = Needs::of_plan(&plan);
     let mut album = Album::default();
     let again = RefCell::new(Tally::default());
-    let images = Stream::new((job.source, job.path), &numbers, job.needs, &again, voice.clone());
+    let images = Stream::new((job.source, job.path), &numbers, needs, &again, voice.clone());
     run(images, &plan, &mut album)?;
     let mut pictures = album.pictures;
     for picture in &mut pictures {
@@ -178,6 +181,24 @@ fn draw(
         }
     }
     Ok(pictures)
+}
+
+/// Sources by descriptors that the plan lacks and all images `numbers` have what it takes for.
+fn without_oracle(job: &ImagesJob<'_>, numbers: &[usize]) -> Vec<Source> {
+    let missing = ["similarity", "overlap"].into_iter().filter_map(|name| Joined::parse(name).ok());
+    let missing = missing.filter(|joined| {
+        let same =
+            |source: &Source| matches!(source, Source::Own(own) if own.name() == joined.name());
+        let fits = |&at: &usize| match job.source {
+            FeatureSource::Folder(_) => true,
+            FeatureSource::File(_) => {
+                let read = job.source.get(at);
+                read.is_ok_and(|image| lacking(&image, Needs::of(joined)).is_none())
+            }
+        };
+        !job.plan.sources.iter().any(same) && numbers.iter().all(fits)
+    });
+    missing.map(Source::Own).collect()
 }
 
 /// Positions in `figures` of the images of which least, about half and most came back, by the mean over
@@ -216,15 +237,14 @@ fn telling(plan: &Plan, figures: &[ImageFigures]) -> Vec<(usize, &'static str)> 
 /// An error curve over all images: counts, so that its size does not depend on their number.
 struct Curve {
     row: usize,
-    errors: Vec<f64>,
     within: Vec<usize>,
     n: usize,
 }
 
 impl Curve {
-    fn shares(self) -> ErrorCdf {
+    fn shares(&self, errors: &[f64]) -> ErrorCdf {
         let percent = |count: usize| 100.0 * count as f64 / self.n.max(1) as f64;
-        let points = self.errors.iter().zip(&self.within);
+        let points = errors.iter().zip(&self.within);
         ErrorCdf { row: self.row, points: points.map(|(&e, &n)| (e, percent(n))).collect() }
     }
 }
@@ -236,55 +256,72 @@ struct Watcher<'a> {
     total: usize,
     plan: &'a Plan,
     figures: Vec<ImageFigures>,
+    /// Where curves are looked at.
+    errors: Vec<f64>,
     curves: Vec<Curve>,
-    /// Cells of this image so far, of the first repeat.
-    cells: usize,
 }
 
 impl<'a> Watcher<'a> {
     fn new(job: &'a ImagesJob<'_>, tally: &'a RefCell<Tally>) -> Self {
+        let most = job.plan.thresholds.iter().map(|t| t.value).fold(0.0, f64::max);
         Self {
             progress: Progress::new(job.quiet),
             tally,
             total: job.chosen.len(),
             plan: &job.plan,
             figures: Vec::new(),
+            errors: curve_errors(most).collect(),
             curves: Vec::new(),
-            cells: 0,
         }
     }
 }
 
-impl Observer<2> for Watcher<'_> {
+impl images::Watcher for Watcher<'_> {
+    type OfImage = Curves;
+
+    fn begin(&mut self) -> Curves {
+        let per_scheme = self.plan.variants().len() * self.plan.solvers.len();
+        let (errors, reference) = (self.errors.clone(), self.plan.reference);
+        Curves { errors, per_scheme, reference, curves: Vec::new() }
+    }
+
     fn progress(&mut self, done: usize, _: usize, what: &str) {
         let unusable = self.tally.borrow().unusable;
         self.progress.show((done + unusable).min(self.total), self.total, what);
     }
 
+    fn image(&mut self, name: &str, rows: &[Row], Curves { curves, .. }: Curves) {
+        if self.curves.is_empty() {
+            self.curves = curves;
+        } else {
+            for (to, more) in self.curves.iter_mut().zip(&curves) {
+                to.n += more.n;
+                to.within.iter_mut().zip(&more.within).for_each(|(to, more)| *to += more);
+            }
+        }
+        let n = self.tally.borrow_mut().take();
+        self.figures.push(document::image(name, n, rows, &self.plan.thresholds));
+    }
+}
+
+/// The error curves of one image, of the first repeat.
+struct Curves {
+    errors: Vec<f64>,
+    per_scheme: usize,
+    reference: bool,
+    curves: Vec<Curve>,
+}
+
+impl Observer<2> for Curves {
     fn cell(&mut self, cell: &Cell<'_, 2>) {
         if cell.repeat > 0 {
             return;
         }
-        if self.curves.len() <= self.cells {
-            let most = self.plan.thresholds.iter().map(|t| t.value).fold(0.0, f64::max);
-            let errors: Vec<f64> = curve_errors(most).collect();
-            let per_scheme = self.plan.variants().len() * self.plan.solvers.len();
-            // The reference has a row, and no cell.
-            let references = usize::from(self.plan.reference) * (self.cells / per_scheme.max(1));
-            let within = vec![0; errors.len()];
-            self.curves.push(Curve { row: self.cells + references, errors, within, n: 0 });
-        }
-        let curve = &mut self.curves[self.cells];
-        curve.n += cell.accuracy.n_points();
-        for (within, &error) in curve.within.iter_mut().zip(&curve.errors) {
-            *within += cell.accuracy.n_within(error);
-        }
-        self.cells += 1;
-    }
-
-    fn image(&mut self, name: &str, rows: &[Row]) {
-        self.cells = 0;
-        let n = self.tally.borrow_mut().take();
-        self.figures.push(document::image(name, n, rows, &self.plan.thresholds));
+        let cells = self.curves.len();
+        // The reference has a row, and no cell.
+        let references = usize::from(self.reference) * (cells / self.per_scheme.max(1));
+        let within = self.errors.iter().map(|&error| cell.accuracy.n_within(error)).collect();
+        let n = cell.accuracy.n_points();
+        self.curves.push(Curve { row: cells + references, within, n });
     }
 }

@@ -1,6 +1,7 @@
 //! What the report draws of chosen images, collected while these are audited once more.
 
-use unlift::audit::{Cell, Observer};
+use unlift::audit::images::Watcher;
+use unlift::audit::{Cell, Observer, Row};
 use unlift::released::{Obfuscation, Released};
 use unlift_report::pictures::{
     GRAPH_NEIGHBORS, Given, Graph, Marks, Picture, RecoveredView, ReleasedView,
@@ -11,13 +12,29 @@ use unlift_report::pictures::{
 pub struct Album {
     /// Finished pictures.
     pub pictures: Vec<Picture>,
-    /// That of the image at hand.
-    current: Picture,
 }
 
-impl Observer<2> for Album {
+impl Watcher for Album {
+    type OfImage = Page;
+
+    fn begin(&mut self) -> Page {
+        Page::default()
+    }
+
+    fn image(&mut self, name: &str, _: &[Row], Page(picture): Page) {
+        if !picture.keypoints.is_empty() {
+            self.pictures.push(Picture { name: name.to_owned(), ..picture });
+        }
+    }
+}
+
+/// The picture of an image at work.
+#[derive(Default)]
+pub struct Page(Picture);
+
+impl Observer<2> for Page {
     fn cell(&mut self, cell: &Cell<'_, 2>) {
-        let picture = &mut self.current;
+        let picture = &mut self.0;
         let truth = cell.original.reveal().positions();
         if picture.keypoints.is_empty() {
             picture.keypoints = truth.iter().map(narrow).collect();
@@ -53,13 +70,6 @@ impl Observer<2> for Album {
             given,
             recovered: recovered.collect(),
         });
-    }
-
-    fn image(&mut self, name: &str, _: &[unlift::audit::Row]) {
-        let picture = std::mem::take(&mut self.current);
-        if !picture.keypoints.is_empty() {
-            self.pictures.push(Picture { name: name.to_owned(), ..picture });
-        }
     }
 }
 

@@ -6,7 +6,9 @@ use std::path::Path;
 
 use rayon::prelude::*;
 use unlift::audit::images::Image;
+use unlift::audit::{Plan, Source};
 use unlift::geometry::frame::Bounds;
+use unlift::neighbors::sources::Joined;
 use unlift::truth::Original;
 use unlift::{PointSet, Unit};
 use unlift_io::Error;
@@ -46,6 +48,27 @@ pub struct Needs {
     pub descriptors: bool,
     /// Those of SIFT, in bytes.
     pub sift: bool,
+}
+
+impl Needs {
+    /// What a source needs.
+    pub fn of(joined: &Joined) -> Self {
+        let sift = joined.name().split('+').any(|name| name == "overlap");
+        Self { descriptors: joined.needs_descriptors(), sift }
+    }
+
+    /// What a plan needs.
+    pub fn of_plan(plan: &Plan) -> Self {
+        let mut all = Self::default();
+        for source in &plan.sources {
+            if let Source::Own(joined) = source {
+                let of = Self::of(joined);
+                all.descriptors |= of.descriptors;
+                all.sift |= of.sift;
+            }
+        }
+        all
+    }
 }
 
 /// The images `chosen` of a source. Memory depends on the number of threads, not on that of images.

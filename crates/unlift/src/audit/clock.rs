@@ -22,4 +22,14 @@ impl Clock {
         *stage(&mut self.seconds) += started.elapsed().as_secs_f64();
         result
     }
+
+    /// Adds the time of another clock, but not that of its rows.
+    pub(super) fn merge(&mut self, more: &Self) {
+        let (to, more) = (&mut self.seconds, &more.seconds);
+        to.search += more.search;
+        to.obfuscate += more.obfuscate;
+        to.neighbors += more.neighbors;
+        to.recover += more.recover;
+        to.evaluate += more.evaluate;
+    }
 }

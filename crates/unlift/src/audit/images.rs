@@ -1,4 +1,6 @@
-//! An audit of many images: their keypoints pooled, one image in memory at a time.
+//! An audit of many images: their keypoints pooled, a few images in memory at a time.
+
+use rayon::prelude::*;
 
 use super::break_even::{BreakEven, break_even};
 use super::cells::{Owned, Run, cells};
@@ -6,7 +8,7 @@ use super::clock::Clock;
 use super::plan::Plan;
 use super::pool::Pool;
 use super::row::Row;
-use super::run::{Observer, RowSeconds, Seconds};
+use super::run::{Observer, RowSeconds, Seconds, Silent};
 use crate::neighbors::oracle;
 use crate::seed::{Draws, Stage};
 use crate::truth::Original;
@@ -40,11 +42,45 @@ pub struct Outcome {
     pub seconds: Seconds,
 }
 
-/// Runs `plan` on all `images`, one after the other.
+/// Hears how an audit of images goes.
+///
+/// Several images are at work at the same time: what is seen of one is collected on its own, and handed
+/// over when its turn comes.
+pub trait Watcher {
+    /// What is collected of one image; its progress is not told.
+    type OfImage: Observer<2> + Send;
+
+    /// Before an image is begun.
+    fn begin(&mut self) -> Self::OfImage;
+
+    /// `done` of `total` images are finished, as far as their number is known; `what` comes next.
+    fn progress(&mut self, done: usize, total: usize, what: &str) {
+        let _ = (done, total, what);
+    }
+
+    /// One image is finished, in the order of the images. `rows` has one per scheme, source, noise model,
+    /// inlier ratio and solver, in this order; none for an image without keypoints.
+    fn image(&mut self, name: &str, rows: &[Row], seen: Self::OfImage) {
+        let _ = (name, rows, seen);
+    }
+}
+
+impl Watcher for Silent {
+    type OfImage = Self;
+
+    fn begin(&mut self) -> Self {
+        Self
+    }
+}
+
+/// Images at work per thread: while a large one is finished the others' threads are not idle.
+const AT_WORK: usize = 2;
+
+/// Runs `plan` on all `images`, a few at a time.
 ///
 /// Rows depend on the images, their names and the plan alone: the same bytes for any number of threads.
-/// Memory does not grow with the number of images. `observer` hears the rows of every image; progress is
-/// counted in images.
+/// Memory does not grow with the number of images. Seconds are summed over images that are at work
+/// at the same time.
 ///
 /// # Errors
 /// When the plan is not for images, an image cannot be read or has no bounds or descriptors that are
@@ -52,49 +88,76 @@ pub struct Outcome {
 pub fn run<E: From<Error>>(
     images: impl IntoIterator<Item = Result<Image, E>>,
     plan: &Plan,
-    observer: &mut dyn Observer<2>,
+    watcher: &mut impl Watcher,
 ) -> Result<Outcome, E> {
     plan.check_for_images()?;
-    let mut clock = Clock::default();
-    let images = images.into_iter();
+    let mut images = images.into_iter();
     let expected = images.size_hint().0;
-    let mut pools: Vec<Vec<Pool>> = Vec::new();
-    let mut seconds: Vec<RowSeconds> = Vec::new();
+    let at_work = AT_WORK * rayon::current_num_threads();
+    let mut all = Sums::default();
     let (mut n_images, mut n_too_small) = (0, 0);
-    for image in images {
-        let image = image?;
-        observer.progress(n_images, expected.max(n_images), &image.name);
-        n_images += 1;
-        n_too_small += usize::from(image.original.len() <= plan.k);
-        if image.original.is_empty() {
-            observer.image(&image.name, &[]);
-            continue;
+    loop {
+        let batch = images.by_ref().take(at_work).collect::<Result<Vec<Image>, E>>()?;
+        let Some(first) = batch.first() else { break };
+        watcher.progress(n_images, expected.max(n_images), &first.name);
+        let begun: Vec<_> = batch.into_iter().map(|image| (image, watcher.begin())).collect();
+        let one = |(image, mut seen)| {
+            let done = one(&image, plan, &mut seen);
+            (image, seen, done)
+        };
+        let done: Vec<_> = begun.into_par_iter().with_max_len(1).map(one).collect();
+        for (image, seen, done) in done {
+            let (rows, sums) = done.map_err(|error| error.within(&image.name))?;
+            all.merge(sums);
+            n_images += 1;
+            n_too_small += usize::from(image.original.len() <= plan.k);
+            watcher.image(&image.name, &rows, seen);
         }
-        let rows = one(&image, plan, &mut clock, observer, &mut pools, &mut seconds)
-            .map_err(|error| error.within(&image.name))?;
-        observer.image(&image.name, &rows);
     }
-    observer.progress(n_images, n_images, "done");
+    watcher.progress(n_images, n_images, "done");
+    let Sums { pools, rows: seconds, clock } = all;
     let pooled = |pools: &Vec<Pool>| {
         let repeats: Vec<Row> = pools.iter().map(|pool| pool.row(&plan.thresholds)).collect();
         Row::mean(&repeats)
     };
     let rows: Vec<Row> = pools.iter().map(pooled).collect();
-    clock.seconds.rows = seconds;
     let break_even = break_even(plan, &rows);
-    Ok(Outcome { rows, break_even, n_images, n_too_small, seconds: clock.seconds })
+    let seconds = Seconds { rows: seconds, ..clock.seconds };
+    Ok(Outcome { rows, break_even, n_images, n_too_small, seconds })
 }
 
-/// The rows of one image, added to the pools of its row and repeat.
-fn one(
-    image: &Image,
-    plan: &Plan,
-    clock: &mut Clock,
-    observer: &mut dyn Observer<2>,
-    pools: &mut Vec<Vec<Pool>>,
-    seconds: &mut Vec<RowSeconds>,
-) -> Result<Vec<Row>, Error> {
+/// What is summed over images.
+#[derive(Default)]
+struct Sums {
+    /// Per row and repeat.
+    pools: Vec<Vec<Pool>>,
+    /// Per row.
+    rows: Vec<RowSeconds>,
+    clock: Clock,
+}
+
+impl Sums {
+    /// Adds the sums of the next image.
+    fn merge(&mut self, more: Self) {
+        self.clock.merge(&more.clock);
+        if self.pools.is_empty() {
+            (self.pools, self.rows) = (more.pools, more.rows);
+            return;
+        }
+        let pools = self.pools.iter_mut().flatten();
+        pools.zip(more.pools.iter().flatten()).for_each(|(to, more)| to.merge(more));
+        self.rows.iter_mut().zip(&more.rows).for_each(|(to, more)| to.add(more));
+    }
+}
+
+/// The rows of one image, and its sums; nothing without keypoints.
+fn one(image: &Image, plan: &Plan, seen: &mut impl Observer<2>) -> Result<(Vec<Row>, Sums), Error> {
+    let mut sums = Sums::default();
+    if image.original.is_empty() {
+        return Ok((Vec::new(), sums));
+    }
     check(image, plan)?;
+    let Sums { pools, rows: seconds, clock } = &mut sums;
     let search = clock.time(|s| &mut s.search, || oracle::search(&image.original))?;
     let descriptors = image.descriptors.as_ref();
     let owned =
@@ -108,19 +171,16 @@ fn one(
             let seed = Draws::new(seed, Stage::Image, hash(&image.name)).bits();
             next = first;
             let run = Run { plan, entry, repeat, seed };
-            cells(&owned, &run, clock, observer, |_, _, finished| {
+            cells(&owned, &run, clock, seen, |_, _, finished| {
                 let Some(finished) = finished else { return };
                 if by_repeat.len() <= next {
                     by_repeat.push(Vec::new());
-                }
-                if pools.len() <= next {
                     pools.push(Vec::new());
                     seconds.push(RowSeconds::default());
                 }
-                if pools[next].len() <= repeat as usize {
-                    pools[next].push(Pool::new(&finished.row, &plan.thresholds));
-                }
-                pools[next][repeat as usize].add(&finished, &plan.thresholds);
+                let mut pool = Pool::new(&finished.row, &plan.thresholds);
+                pool.add(&finished, &plan.thresholds);
+                pools[next].push(pool);
                 seconds[next].add(&finished.seconds);
                 by_repeat[next].push(finished.row);
                 next += 1;
@@ -128,7 +188,7 @@ fn one(
         }
         first = next;
     }
-    Ok(by_repeat.iter().map(|repeats| Row::mean(repeats)).collect())
+    Ok((by_repeat.iter().map(|repeats| Row::mean(repeats)).collect(), sums))
 }
 
 /// What [`Plan::check_for_images`] cannot know.

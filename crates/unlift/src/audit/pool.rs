@@ -93,6 +93,35 @@ impl Pool {
         }
     }
 
+    /// Adds everything added to `more`, a pool of the same row.
+    pub(super) fn merge(&mut self, more: &Self) {
+        self.n_points += more.n_points;
+        let counts = |to: &mut [usize], more: &[usize]| {
+            to.iter_mut().zip(more).for_each(|(to, more)| *to += more);
+        };
+        let sums = |to: &mut [f64], more: &[f64]| {
+            to.iter_mut().zip(more).for_each(|(to, more)| *to += more);
+        };
+        counts(&mut self.within, &more.within);
+        counts(&mut self.blind_within, &more.blind_within);
+        sums(&mut self.places_within, &more.places_within);
+        sums(&mut self.blind_places_within, &more.blind_places_within);
+        self.exact += more.exact;
+        if let Some(more) = more.axis {
+            *self.axis.get_or_insert(0.0) += more;
+        }
+        self.n_places += more.n_places;
+        self.delta += more.delta;
+        self.hits += more.hits;
+        self.n_listed += more.n_listed;
+        merge_counts(&mut self.lost, &more.lost);
+        merge_counts(&mut self.dropped, &more.dropped);
+        merge_counts(&mut self.errors, &more.errors);
+        for (&up_to, slots) in more.trials.iter().flatten() {
+            *self.trials.get_or_insert_with(BTreeMap::new).entry(up_to).or_insert(0) += slots;
+        }
+    }
+
     /// The row over everything added.
     pub(super) fn row(&self, thresholds: &[Threshold]) -> Row {
         let n = self.n_points.max(1) as f64;
@@ -142,5 +171,11 @@ impl Pool {
             }
         }
         None
+    }
+}
+
+fn merge_counts<K: Copy + Ord>(to: &mut BTreeMap<K, usize>, more: &BTreeMap<K, usize>) {
+    for (&key, count) in more {
+        *to.entry(key).or_insert(0) += count;
     }
 }

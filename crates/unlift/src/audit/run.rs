@@ -20,12 +20,6 @@ pub trait Observer<const D: usize = 3> {
     fn cell(&mut self, cell: &Cell<'_, D>) {
         let _ = cell;
     }
-
-    /// One image of an audit of images is finished: its rows, one per scheme, source, noise model, inlier
-    /// ratio and solver, in this order.
-    fn image(&mut self, name: &str, rows: &[Row]) {
-        let _ = (name, rows);
-    }
 }
 
 /// An observer that does nothing.
