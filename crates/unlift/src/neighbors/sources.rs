@@ -66,7 +66,7 @@ pub const SOURCES: &[SourceEntry] = &[
         name: "overlap",
         summary: "records whose SIFT patches overlap, and a short walk from these; no training",
         needs_descriptors: true,
-        usual_k: 30,
+        usual_k: 35,
         usual_k_2d: 10,
         only_ranks: false,
         not_for: &[],
@@ -198,8 +198,8 @@ mod tests {
     #[test]
     fn names_are_joined_and_the_largest_usual_k_counts() {
         let joined = Joined::parse("overlap+similarity").unwrap();
-        assert_eq!((joined.name().as_str(), joined.k()), ("overlap+similarity", 30));
-        assert_eq!(Joined::parse("overlap").unwrap().k(), 30);
+        assert_eq!((joined.name().as_str(), joined.k()), ("overlap+similarity", 35));
+        assert_eq!(Joined::parse("overlap").unwrap().k(), 35);
         assert_eq!(Joined::parse("overlap").unwrap().with_k(7).k(), 7);
     }
 
