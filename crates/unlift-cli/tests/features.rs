@@ -1,64 +1,21 @@
 //! `unlift features` as a user runs it: photos and files in, one whole file out, bad ones named.
 
-use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+mod common;
 
-use image::{GrayImage, ImageFormat, Luma, RgbImage};
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use common::Place;
+use image::{GrayImage, ImageFormat, Luma};
 use unlift_io::features::{FeatureSource, ImageFeatures};
 
-/// A folder of its own per test.
-struct Place(tempfile::TempDir);
-
-impl Place {
-    /// With three photos: `photos/a.png`, `photos/b/c.jpg`, `photos/b/ü d.webp`.
-    fn new() -> Self {
-        let place = Self(tempfile::tempdir().expect("a temporary folder"));
-        fs::create_dir_all(place.path("photos/b")).unwrap();
-        for (at, name) in ["a.png", "b/c.jpg", "b/ü d.webp"].into_iter().enumerate() {
-            photo(at as u32).save(place.path("photos").join(name)).unwrap();
-        }
-        place
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn run(&self, line: &str) -> Output {
-        let program = Command::new(env!("CARGO_BIN_EXE_unlift"))
-            .args(line.split_whitespace())
-            .current_dir(self.0.path())
-            .output();
-        program.expect("the program starts")
-    }
-
-    /// What a run that must end with `code` printed: on stdout, and the lines on stderr.
-    fn ends(&self, line: &str, code: i32) -> (String, Vec<String>) {
-        let output = self.run(line);
-        let text = |bytes| String::from_utf8(bytes).expect("UTF-8");
-        let (stdout, stderr) = (text(output.stdout), text(output.stderr));
-        assert_eq!(output.status.code(), Some(code), "{line}\n{stderr}");
-        (stdout, stderr.lines().map(str::to_owned).collect())
-    }
-
-    fn left(&self) -> Vec<String> {
-        let entries = fs::read_dir(self.0.path()).unwrap();
-        let mut names: Vec<String> =
-            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
-        names.sort();
-        names
-    }
+fn photos() -> Place {
+    Place::with_photos(&["a.png", "b/c.jpg", "b/ü d.webp"])
 }
 
-/// Blobs of several sizes; `which` moves them.
-fn photo(which: u32) -> RgbImage {
-    RgbImage::from_fn(96, 64, |x, y| {
-        let (x, y) = (f64::from(x + 5 * which), f64::from(y));
-        let wave = (x / 5.0).sin() * (y / 7.0).cos() + (x * y / 90.0).sin();
-        let value = (127.0 + 60.0 * wave) as u8;
-        image::Rgb([value, value, 255 - value])
-    })
+fn lines(text: &str) -> Vec<&str> {
+    text.lines().collect()
 }
 
 fn all(path: &Path) -> Vec<ImageFeatures> {
@@ -68,10 +25,10 @@ fn all(path: &Path) -> Vec<ImageFeatures> {
 
 #[test]
 fn photos_become_one_file_that_is_the_same_for_any_number_of_threads() {
-    let place = Place::new();
+    let place = photos();
     let (stdout, stderr) = place.ends("features photos --out one.h5 --threads 1", 0);
     assert!(stdout.starts_with("3 images, ") && stdout.ends_with(" features, in one.h5\n"));
-    assert!(stderr.is_empty(), "{stderr:?}");
+    assert!(stderr.is_empty(), "{stderr}");
     place.ends("features photos --out four.h5 --threads 4 --quiet", 0);
     assert_eq!(fs::read(place.path("one.h5")).unwrap(), fs::read(place.path("four.h5")).unwrap());
     assert_eq!(place.left(), ["four.h5", "one.h5", "photos"]);
@@ -82,7 +39,7 @@ fn photos_become_one_file_that_is_the_same_for_any_number_of_threads() {
     for image in &images {
         let n = image.keypoints.len();
         assert!(n > 10, "{n}");
-        assert_eq!((image.size, image.uncertainty_px), (Some([96, 64]), Some(1.0)));
+        assert_eq!((image.size, image.uncertainty_px), (Some([128, 96]), Some(1.0)));
         assert_eq!(image.descriptors.as_ref().map(|d| (d.len(), d.dim())), Some((n, 128)));
         assert!(image.scores.is_some() && image.scales == image.scores);
     }
@@ -90,7 +47,7 @@ fn photos_become_one_file_that_is_the_same_for_any_number_of_threads() {
 
 #[test]
 fn keypoints_are_in_the_convention_of_hloc() {
-    let place = Place::new();
+    let place = photos();
     // A blob whose middle is the pixel in column 30 and row 34.
     let blob = GrayImage::from_fn(64, 64, |x, y| {
         let (dx, dy) = (f64::from(x) - 30.0, f64::from(y) - 34.0);
@@ -105,24 +62,27 @@ fn keypoints_are_in_the_convention_of_hloc() {
 
 #[test]
 fn options_are_those_of_the_extractor() {
-    let place = Place::new();
+    let place = photos();
     let count = |options: &str| {
         let (stdout, _) = place.ends(&format!("features photos {options}"), 0);
         stdout.split(' ').nth(2).and_then(|n| n.parse::<usize>().ok()).expect("a number")
     };
     let usual = count("");
     assert!(count("--first-octave 0") < usual && count("--max-features 5") < usual);
-    assert!(count("--first-octave -1 --max-image-size 48") < usual);
+    assert!(count("--first-octave -1 --max-image-size 64") < usual);
     assert_eq!(all(&place.path("features.h5"))[0].uncertainty_px, Some(2.0));
     place.ends("features photos --first-octave 1", 2);
     place.ends("features photos --max-features 0", 2);
     let (_, stderr) = place.ends("features features.h5 --max-features 9 --out copy.h5", 2);
-    assert_eq!(stderr, ["unlift: --max-features: expected with a folder of photos, found a file"]);
+    assert_eq!(
+        lines(&stderr),
+        ["unlift: --max-features: expected with a folder of photos, found a file"]
+    );
 }
 
 #[test]
 fn a_broken_photo_is_one_line_and_the_rest_is_written() {
-    let place = Place::new();
+    let place = photos();
     let jpeg = fs::read(place.path("photos/b/c.jpg")).unwrap();
     fs::write(place.path("photos/cut.jpg"), &jpeg[..jpeg.len() / 2]).unwrap();
     fs::write(place.path("photos/note.jpg"), "not a photo").unwrap();
@@ -134,7 +94,7 @@ fn a_broken_photo_is_one_line_and_the_rest_is_written() {
     let (stdout, stderr) = place.ends("features photos", 3);
     assert!(stdout.starts_with("4 images, "), "{stdout}");
     assert_eq!(
-        stderr,
+        lines(&stderr),
         [
             "unlift: photos/cut.jpg: expected a whole JPEG image, found one that is cut off",
             "unlift: photos/empty.PNG: expected a JPEG, PNG or WebP image, found an empty file",
@@ -149,11 +109,12 @@ fn a_broken_photo_is_one_line_and_the_rest_is_written() {
 
 #[test]
 fn what_cannot_be_used_at_all_leaves_no_file() {
-    let place = Place::new();
+    let place = photos();
     fs::create_dir(place.path("empty")).unwrap();
     fs::create_dir(place.path("bad")).unwrap();
     fs::write(place.path("bad/a.jpg"), "text").unwrap();
-    let last = |line: &str, code| place.ends(line, code).1.pop().expect("a line");
+    let last =
+        |line: &str, code| place.ends(line, code).1.lines().last().expect("a line").to_owned();
     assert_eq!(
         last("features empty", 3),
         "unlift: empty: expected JPEG, PNG or WebP photos, found none"
@@ -177,7 +138,7 @@ fn what_cannot_be_used_at_all_leaves_no_file() {
 
 #[test]
 fn a_run_that_was_interrupted_goes_on_and_gives_the_same_bytes() {
-    let place = Place::new();
+    let place = photos();
     place.ends("features photos --out whole.h5", 0);
     // What earlier runs may have left.
     let parts = place.path("again.h5.parts");
@@ -206,7 +167,7 @@ fn a_run_that_was_interrupted_goes_on_and_gives_the_same_bytes() {
 
 #[test]
 fn features_of_a_file_are_copied() {
-    let place = Place::new();
+    let place = photos();
     place.ends("features photos --out a.h5", 0);
     place.ends("features a.h5 --out b.h5", 0);
     assert_eq!(fs::read(place.path("a.h5")).unwrap(), fs::read(place.path("b.h5")).unwrap());
@@ -223,7 +184,7 @@ fn features_of_a_file_are_copied() {
     let (stdout, stderr) = place.ends("features d.db --out d.h5", 3);
     assert_eq!(stdout, "1 images, 8 features, in d.h5\n");
     assert_eq!(
-        stderr,
+        lines(&stderr),
         [
             "unlift: d.h5: image \"../x.jpg\": expected a name of parts that are not empty, . or .., \
              found \"../x.jpg\"",

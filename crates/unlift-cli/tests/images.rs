@@ -1,61 +1,23 @@
 //! `unlift audit images` as a user runs it: photos and files in, one audit out, bad images named.
 
-use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+mod common;
 
+use std::fs;
+use std::path::Path;
+
+use common::{Place, photo};
 use image::RgbImage;
 use serde_json::Value;
 use unlift_io::features::{FeatureSource, FeatureWriter};
 
-/// A folder of its own per test, with `photos/a.png`, `photos/b.png` and `photos/c/d.png` in it.
-struct Place(tempfile::TempDir);
-
 const QUICK: &str = "--k 10 --inlier-ratios 1,0.5";
 
-impl Place {
-    fn new() -> Self {
-        let place = Self(tempfile::tempdir().expect("a temporary folder"));
-        fs::create_dir_all(place.path("photos/c")).unwrap();
-        for (at, name) in ["a.png", "b.png", "c/d.png"].into_iter().enumerate() {
-            photo(at as u32).save(place.path("photos").join(name)).unwrap();
-        }
-        place
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn run(&self, line: &str) -> Output {
-        let program = Command::new(env!("CARGO_BIN_EXE_unlift"))
-            .args(line.split_whitespace())
-            .current_dir(self.0.path())
-            .output();
-        program.expect("the program starts")
-    }
-
-    /// What a run that must end with `code` printed: on stdout, and on stderr.
-    fn ends(&self, line: &str, code: i32) -> (String, String) {
-        let output = self.run(line);
-        let text = |bytes| String::from_utf8(bytes).expect("UTF-8");
-        let (stdout, stderr) = (text(output.stdout), text(output.stderr));
-        assert_eq!(output.status.code(), Some(code), "{line}\n{stderr}");
-        (stdout, stderr)
-    }
-
-    fn json(&self, file: &str) -> Value {
-        serde_json::from_str(&fs::read_to_string(self.path(file)).expect("a file")).expect("JSON")
-    }
+fn photos() -> Place {
+    Place::with_photos(&["a.png", "b.png", "c/d.png"])
 }
 
-fn photo(which: u32) -> RgbImage {
-    RgbImage::from_fn(128, 96, |x, y| {
-        let (x, y) = (f64::from(x + 9 * which), f64::from(y));
-        let wave = (x / 5.0).sin() * (y / 7.0).cos() + (x * y / 90.0).sin();
-        let value = (127.0 + 60.0 * wave) as u8;
-        image::Rgb([value, value, 255 - value])
-    })
+fn json(place: &Place, file: &str) -> Value {
+    serde_json::from_str(&fs::read_to_string(place.path(file)).expect("a file")).expect("JSON")
 }
 
 /// The features of `from` once more, without their descriptors.
@@ -72,11 +34,11 @@ fn without_descriptors(from: &Path, to: &Path) {
 
 #[test]
 fn photos_become_pooled_rows_rows_per_image_and_pictures() {
-    let place = Place::new();
+    let place = photos();
     let sources = "--neighbors oracle --neighbors similarity --neighbors overlap";
     let (stdout, stderr) = place.ends(&format!("audit images photos {QUICK} {sources} --out a"), 0);
     assert!(stdout.ends_with("report: a/report.html\n") && stderr.is_empty(), "{stdout}{stderr}");
-    let document = place.json("a/audit.json");
+    let document = json(&place, "a/audit.json");
     let counts = &document["input"]["images"];
     assert_eq!((counts["found"].as_u64(), counts["used"].as_u64()), (Some(3), Some(3)));
     let rows = document["results"].as_array().expect("rows");
@@ -108,11 +70,11 @@ fn photos_become_pooled_rows_rows_per_image_and_pictures() {
 
 #[test]
 fn neither_threads_nor_where_features_come_from_change_a_byte() {
-    let place = Place::new();
+    let place = photos();
     place.ends("features photos --out f.h5", 0);
     let figures = |line: &str| {
         place.ends(&format!("audit images {line} {QUICK} --solver joint,ransac --out t"), 0);
-        let mut document = place.json("t/audit.json");
+        let mut document = json(&place, "t/audit.json");
         let page = fs::read_to_string(place.path("t/report.html")).unwrap();
         let data = page.split("id=\"block-").skip(1).map(str::to_owned).next().unwrap();
         let fields = document.as_object_mut().unwrap();
@@ -128,12 +90,20 @@ fn neither_threads_nor_where_features_come_from_change_a_byte() {
 
 #[test]
 fn a_file_without_photos_has_frames_and_chosen_images_are_shown() {
-    let place = Place::new();
+    let place = photos();
     place.ends("features photos --out f.h5", 0);
     place.ends(&format!("audit images f.h5 {QUICK} --show b.png --out a"), 0);
     let page = fs::read_to_string(place.path("a/report.html")).unwrap();
     assert!(page.contains("\"name\":\"b.png\"") && !page.contains("\"name\":\"a.png\""));
     assert!(!page.contains("/9j/"));
+    // What a server sees is drawn unasked, where there are descriptors; it is in no table.
+    assert!(page.contains("\"given\":\"overlap, ") && page.contains("\"given\":\"similarity, "));
+    let rows = json(&place, "a/audit.json")["results"].clone();
+    assert!(rows.as_array().unwrap().iter().all(|row| row["neighbors"] == "oracle"));
+    without_descriptors(&place.path("f.h5"), &place.path("bare.h5"));
+    place.ends(&format!("audit images bare.h5 {QUICK} --show b.png --out b"), 0);
+    let page = fs::read_to_string(place.path("b/report.html")).unwrap();
+    assert!(page.contains("\"given\":\"50 %\"") && !page.contains("\"given\":\"overlap, "));
     let (_, stderr) = place.ends("audit images f.h5 --show x.png", 2);
     assert_eq!(stderr, "unlift: --show: expected an image of f.h5, found x.png\n");
     let (_, stderr) = place.ends("audit images f.h5 --max-features 9", 2);
@@ -142,7 +112,7 @@ fn a_file_without_photos_has_frames_and_chosen_images_are_shown() {
 
 #[test]
 fn what_can_be_shared_has_neither_names_nor_pictures() {
-    let place = Place::new();
+    let place = photos();
     let line = format!("audit images photos {QUICK} --share-safe --max-images 2 --out a");
     place.ends(&line, 0);
     for file in ["a/audit.json", "a/report.html"] {
@@ -151,14 +121,14 @@ fn what_can_be_shared_has_neither_names_nor_pictures() {
             assert!(!text.contains(secret), "{file}: {secret}");
         }
     }
-    let document = place.json("a/audit.json");
+    let document = json(&place, "a/audit.json");
     assert_eq!(document["images"].as_array().map(Vec::len), Some(2));
     assert_eq!(document["images"][0]["name"], Value::Null);
 }
 
 #[test]
 fn gates_hold_or_fail() {
-    let place = Place::new();
+    let place = photos();
     let line = format!("audit images photos {QUICK} --schemes lines2d --out a");
     let (stdout, _) = place.ends(&format!("{line} --gate lines2d@1:25<=1"), 1);
     assert!(stdout.contains("gate lines2d@1:25<=1: FAILED"), "{stdout}");
@@ -169,7 +139,7 @@ fn gates_hold_or_fail() {
 
 #[test]
 fn broken_images_are_named_counted_and_left_out() {
-    let place = Place::new();
+    let place = photos();
     fs::write(place.path("photos/text.jpg"), "no photo").unwrap();
     let mut whole = std::io::Cursor::new(Vec::new());
     photo(0).write_to(&mut whole, image::ImageFormat::Jpeg).unwrap();
@@ -186,14 +156,14 @@ fn broken_images_are_named_counted_and_left_out() {
          unlift: photos/text.jpg: expected a JPEG, PNG or WebP image, found text\n\
          unlift: photos: expected 7 images that can be used, found 4\n"
     );
-    let counts = place.json("a/audit.json")["input"]["images"].clone();
+    let counts = json(&place, "a/audit.json")["input"]["images"].clone();
     let counts = ["found", "used", "unusable", "too_small"].map(|name| counts[name].as_u64());
     assert_eq!(counts, [7, 4, 3, 1].map(Some));
 }
 
 #[test]
 fn what_cannot_be_audited_is_one_line() {
-    let place = Place::new();
+    let place = photos();
     fs::create_dir(place.path("empty")).unwrap();
     place.ends("features photos --out f.h5", 0);
     without_descriptors(&place.path("f.h5"), &place.path("bare.h5"));
@@ -228,7 +198,7 @@ fn what_cannot_be_audited_is_one_line() {
 
 #[test]
 fn learned_descriptors_are_no_sift() {
-    let place = Place::new();
+    let place = photos();
     place.ends("features photos --out f.h5", 0);
     let source = FeatureSource::open(&place.path("f.h5")).unwrap();
     let mut writer = FeatureWriter::create(&place.path("floats.h5")).unwrap();
