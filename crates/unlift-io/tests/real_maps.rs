@@ -141,10 +141,16 @@ fn what_is_said_about_a_real_map_comes_true() {
             }
         }
         let found = found.unwrap();
-        // Below are few points, most of them of maps that came back badly.
-        for bin in &found.bins[4..] {
+        let (mut off, mut points) = (0.0, 0.0);
+        for bin in &found.bins {
             let (said, was) = (bin.predicted().unwrap(), bin.observed().unwrap());
-            assert!((said - was).abs() <= 0.05, "{name}: said {said:.3}, was {was:.3}");
+            eprintln!("{name}: said {said:.3}, was {was:.3}, {} points", bin.n);
+            off += bin.n as f64 * (said - was).abs();
+            points += bin.n as f64;
+            // Saying too much is worse than too little. Below are few points, of maps that came back badly.
+            let too_much = said > 0.4 && said - was > 0.05;
+            assert!(!too_much, "{name}: said {said:.3}, was {was:.3}");
         }
+        assert!(off / points <= 0.04, "{name}: off by {:.3} in the mean", off / points);
     }
 }
