@@ -15,7 +15,7 @@ use crate::seed::{Draws, Stage};
 
 /// Chunks solved per delta; fewer of an image, where they are most of the time and few of all.
 const SAMPLE: usize = 12;
-const SAMPLE_IN_IMAGE: usize = 6;
+const SAMPLE_IN_IMAGE: usize = 4;
 /// Halvings of the extent that the coarse ladder spans.
 const HALVINGS: u32 = 14;
 /// Where a random record agrees with a typical place this often, its agreement tells nothing, and the

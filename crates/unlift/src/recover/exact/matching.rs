@@ -34,12 +34,12 @@ impl Messages {
     ) {
         for _ in 0..PASSES {
             let at = &self.at;
-            let moved: Vec<f32> = by_part(partners, &mut self.next)
+            let moves: Vec<bool> = by_part(partners, &mut self.next)
                 .into_par_iter()
                 .map(|(part, out)| {
                     let records = part * PART..alone.len().min((part + 1) * PART);
                     let first = partners.offsets[records.start];
-                    let mut moved = 0.0f32;
+                    let mut moves = false;
                     for i in records {
                         let entries = partners.entries(i);
                         let offer = |e: usize| weight[e] * at[partners.back[e] as usize];
@@ -47,15 +47,15 @@ impl Messages {
                         for e in entries {
                             // Never below what is there without any offer.
                             let free = 1.0 / (all - offer(e)).max(alone[i]);
-                            moved = moved.max((free / at[e] - 1.0).abs());
+                            moves |= (free - at[e]).abs() >= settled * at[e];
                             out[e - first] = free;
                         }
                     }
-                    moved
+                    moves
                 })
                 .collect();
             std::mem::swap(&mut self.at, &mut self.next);
-            if moved.into_iter().fold(0.0, f32::max) < settled {
+            if !moves.contains(&true) {
                 break;
             }
         }
