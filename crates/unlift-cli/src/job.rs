@@ -91,6 +91,7 @@ pub fn perform(job: Job<'_>, out: OutputDir) -> anyhow::Result<Finished> {
         progress: Progress::new(job.quiet),
         pictures: (!job.share_safe).then(|| Pictures::new(job.original, &job.plan, n_cells)),
         curves: Vec::new(),
+        row_of_cell: RowOfCell::new(&job.plan),
         clouds: job
             .write_clouds
             .then(|| Clouds::new(out.path(), job.unit_in_map_units))
@@ -200,9 +201,29 @@ struct Watcher {
     progress: Progress,
     pictures: Option<Pictures>,
     curves: Vec<unlift_report::ErrorCdf>,
+    row_of_cell: RowOfCell,
     clouds: Option<Clouds>,
     thresholds: Vec<f64>,
     failed: Option<unlift_io::Error>,
+}
+
+/// Which row of the results a cell becomes: the reference of a scheme has a row, and no cell.
+#[derive(Clone, Copy, Debug)]
+pub struct RowOfCell {
+    cells_per_scheme: usize,
+    reference: bool,
+}
+
+impl RowOfCell {
+    pub fn new(plan: &Plan) -> Self {
+        let cells_per_scheme = plan.variants().len() * plan.solvers.len();
+        Self { cells_per_scheme, reference: plan.reference }
+    }
+
+    /// The row of cell number `cell` of the first repeat.
+    pub fn of(&self, cell: usize) -> usize {
+        cell + usize::from(self.reference) * (cell / self.cells_per_scheme.max(1))
+    }
 }
 
 /// Points of an error curve.
@@ -226,12 +247,28 @@ impl Observer for Watcher {
         }
         let most = self.thresholds.iter().copied().fold(0.0, f64::max);
         let points = curve_errors(most).map(|at| (at, cell.accuracy.percent_within(at))).collect();
-        self.curves.push(unlift_report::ErrorCdf { row: self.curves.len(), points });
+        let row = self.row_of_cell.of(self.curves.len());
+        self.curves.push(unlift_report::ErrorCdf { row, points });
         if let Some(pictures) = &mut self.pictures {
             pictures.add(cell);
         }
         if let (Some(clouds), None) = (&mut self.clouds, &self.failed) {
             self.failed = clouds.write(cell, most).err();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn references_stand_between_the_cells_of_schemes() {
+        let mut plan = Plan::new(unlift::Unit::Meter);
+        plan.inlier_ratios = vec![1.0, 0.5];
+        let rows = |plan: &Plan| [0, 1, 2, 3, 4].map(|cell| RowOfCell::new(plan).of(cell));
+        assert_eq!(rows(&plan), [0, 1, 2, 3, 4]);
+        plan.reference = true;
+        assert_eq!(rows(&plan), [0, 1, 3, 4, 6]);
     }
 }

@@ -20,7 +20,7 @@ use super::stream::{Needs, Stream, Tally, lacking};
 use crate::document::{self, Found, Provenance};
 use crate::exit::line;
 use crate::gate::Gate;
-use crate::job::{Finished, MARKER, check_gates, curve_errors, gate_results};
+use crate::job::{Finished, MARKER, RowOfCell, check_gates, curve_errors, gate_results};
 use crate::progress::{Progress, Voice};
 
 /// Longest side of an embedded photo in pixels.
@@ -280,9 +280,8 @@ impl images::Watcher for Watcher<'_> {
     type OfImage = Curves;
 
     fn begin(&mut self) -> Curves {
-        let per_scheme = self.plan.variants().len() * self.plan.solvers.len();
-        let (errors, reference) = (self.errors.clone(), self.plan.reference);
-        Curves { errors, per_scheme, reference, curves: Vec::new() }
+        let row_of_cell = RowOfCell::new(self.plan);
+        Curves { errors: self.errors.clone(), row_of_cell, curves: Vec::new() }
     }
 
     fn progress(&mut self, done: usize, _: usize, what: &str) {
@@ -307,8 +306,7 @@ impl images::Watcher for Watcher<'_> {
 /// The error curves of one image, of the first repeat.
 struct Curves {
     errors: Vec<f64>,
-    per_scheme: usize,
-    reference: bool,
+    row_of_cell: RowOfCell,
     curves: Vec<Curve>,
 }
 
@@ -317,11 +315,9 @@ impl Observer<2> for Curves {
         if cell.repeat > 0 {
             return;
         }
-        let cells = self.curves.len();
-        // The reference has a row, and no cell.
-        let references = usize::from(self.reference) * (cells / self.per_scheme.max(1));
+        let row = self.row_of_cell.of(self.curves.len());
         let within = self.errors.iter().map(|&error| cell.accuracy.n_within(error)).collect();
         let n = cell.accuracy.n_points();
-        self.curves.push(Curve { row: cells + references, within, n });
+        self.curves.push(Curve { row, within, n });
     }
 }
