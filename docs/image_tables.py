@@ -69,6 +69,12 @@ def scene(name, document, paper, solvers):
     for scheme in SCHEMES:
         yield line(rows, f"`{scheme}` over distinct positions, within 5 / 10 / 25 px", scheme,
                    lambda r: percents(r["distinct"]["recovered_percent"]))
+    yield ""
+    for solver in solvers:
+        errors = [r["median_error"] for ratio in RATIOS for r in rows
+                  if (r["solver"], r["scheme"], r["inlier_ratio"]) == (solver, "dcl2d", ratio)]
+        told = " / ".join("lost" if e is None else f"{e:.0f}" for e in errors)
+        yield f"`dcl2d`, median error of `{solver}`, px, In {ratios}: {told}; blind {rows[-1]['blind_median_error']:.0f}."
     run = document["run"]
     yield ""
     yield (f"Cost: {run['seconds']['total']:.1f} s for {rows[0]['n_points']:,} keypoints, {run['threads']} threads, peak "

@@ -174,6 +174,7 @@ fn row(row: &Row, thresholds: &[Threshold]) -> report::Row {
         exact_percent: row.exact_percent,
         assignment_accuracy_percent: row.assignment_accuracy_percent,
         median_error: row.error_percentiles[0],
+        blind_median_error: row.blind_median_error,
         error_percentiles: ordered(
             audit::PERCENTILES.iter().map(|&p| label(p)).zip(row.error_percentiles.iter().copied()),
         ),

@@ -87,6 +87,7 @@ fn check_row(place: &str, row: &Row) -> Result<(), Error> {
     let optional = [
         ("delta", row.delta),
         ("median_error", row.median_error),
+        ("blind_median_error", row.blind_median_error),
         ("axis_accuracy_percent", row.axis_accuracy_percent),
         ("exact_percent", row.exact_percent),
         ("assignment_accuracy_percent", row.assignment_accuracy_percent),

@@ -130,6 +130,9 @@ pub struct Row {
     /// Median error over the released points, in `unit`; lost points count as infinitely far, so
     /// `None` when half of them or more are lost.
     pub median_error: Option<f64>,
+    /// The same of an attacker without neighborhoods; absent in documents of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blind_median_error: Option<f64>,
     /// Percentiles of the error by their number (`50`, `75`, `90`, `95`, `99`), as `median_error`.
     pub error_percentiles: IndexMap<String, Option<f64>>,
     /// Percent of the released points that the attacker is 90 % sure to have within the smallest

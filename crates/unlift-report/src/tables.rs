@@ -99,12 +99,13 @@ pub(crate) fn errors(document: &Document) -> Table {
             percentiles.push(key);
         }
     }
-    let mut head = texts(&["scheme", "solver", "neighbors right", "median"]);
+    let mut head = texts(&["scheme", "solver", "neighbors right", "median", "blind, median"]);
     head.extend(percentiles.iter().map(|key| format!("{key} % within")));
     let rows = document.results.iter().map(|row| {
         let mut cells = key_cells(row);
         let text = |value: Option<f64>| value.map_or(NONE.into(), |v| words::length(v, row.unit));
         cells.push(text(row.median_error));
+        cells.push(text(row.blind_median_error));
         for key in &percentiles {
             cells.push(text(row.error_percentiles.get(*key).copied().flatten()));
         }

@@ -134,6 +134,7 @@ fn row(s: usize, r: usize, solver: &str, thresholds: [&str; 2], unit: LengthUnit
         exact_percent: has(&["cp"], 26.1 - 3.0 * r as f64),
         assignment_accuracy_percent: has(&["ppl", "ppl+"], 98.0 - 3.0 * r as f64),
         median_error: percentiles[0].1,
+        blind_median_error: Some(1.25 * scale),
         error_percentiles: percentiles.into_iter().collect(),
         sure_percent: Some((0.8 * share(0) * 10.0).round() / 10.0),
         sure_correct_percent: Some(97.0),

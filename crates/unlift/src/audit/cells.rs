@@ -261,6 +261,7 @@ fn unmeasured(
         exact_percent: None,
         assignment_accuracy_percent: None,
         error_percentiles: Vec::new(),
+        blind_median_error: None,
         reliability: None,
         ransac_trials: None,
         repeats: None,

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::cells::Finished;
 use super::plan::Threshold;
 use super::row::{Distinct, PERCENTILES, Row};
+use crate::evaluate::Accuracy;
 
 /// Bits of the mantissa of an `f32` that are left out of an error's bin: bins are 0.05 % wide.
 const DROPPED_BITS: u32 = 12;
@@ -31,8 +32,8 @@ pub(super) struct Pool {
     lost: BTreeMap<&'static str, usize>,
     dropped: BTreeMap<&'static str, usize>,
     trials: Option<BTreeMap<u32, u64>>,
-    /// Finite errors, by their leading bits.
-    errors: BTreeMap<u32, usize>,
+    errors: Errors,
+    blind_errors: Errors,
 }
 
 impl Pool {
@@ -55,7 +56,8 @@ impl Pool {
             lost: BTreeMap::new(),
             dropped: BTreeMap::new(),
             trials: row.ransac_trials.as_ref().map(|_| BTreeMap::new()),
-            errors: BTreeMap::new(),
+            errors: Errors::default(),
+            blind_errors: Errors::default(),
         }
     }
 
@@ -88,9 +90,8 @@ impl Pool {
             let trials = self.trials.get_or_insert_with(BTreeMap::new);
             *trials.entry(up_to).or_insert(0) += slots;
         }
-        for &error in accuracy.errors().iter().filter(|error| error.is_finite()) {
-            *self.errors.entry((error as f32).to_bits() >> DROPPED_BITS).or_insert(0) += 1;
-        }
+        self.errors.add(accuracy);
+        self.blind_errors.add(baseline);
     }
 
     /// Adds everything added to `more`, a pool of the same row.
@@ -116,7 +117,8 @@ impl Pool {
         self.n_listed += more.n_listed;
         merge_counts(&mut self.lost, &more.lost);
         merge_counts(&mut self.dropped, &more.dropped);
-        merge_counts(&mut self.errors, &more.errors);
+        merge_counts(&mut self.errors.0, &more.errors.0);
+        merge_counts(&mut self.blind_errors.0, &more.blind_errors.0);
         for (&up_to, slots) in more.trials.iter().flatten() {
             *self.trials.get_or_insert_with(BTreeMap::new).entry(up_to).or_insert(0) += slots;
         }
@@ -143,7 +145,10 @@ impl Pool {
             blind_percent: percent(&self.blind_within),
             axis_accuracy_percent: self.axis.map(|sum| sum / n),
             exact_percent: self.axis.map(|_| 100.0 * self.exact as f64 / n),
-            error_percentiles: PERCENTILES.map(|p| self.percentile(p)).to_vec(),
+            error_percentiles: PERCENTILES
+                .map(|p| self.errors.percentile(p, self.n_points))
+                .to_vec(),
+            blind_median_error: self.blind_errors.percentile(50.0, self.n_points),
             ransac_trials: self
                 .trials
                 .as_ref()
@@ -156,13 +161,25 @@ impl Pool {
             ..self.cell.clone()
         }
     }
+}
 
-    /// The error that `percent` of the keypoints do not exceed, to the width of a bin; `None` when that
+/// Finite errors, counted by their leading bits.
+#[derive(Debug, Default)]
+struct Errors(BTreeMap<u32, usize>);
+
+impl Errors {
+    fn add(&mut self, accuracy: &Accuracy) {
+        for &error in accuracy.errors().iter().filter(|error| error.is_finite()) {
+            *self.0.entry((error as f32).to_bits() >> DROPPED_BITS).or_insert(0) += 1;
+        }
+    }
+
+    /// The error that `percent` of `of` keypoints do not exceed, to the width of a bin; `None` when that
     /// many were not recovered.
-    fn percentile(&self, percent: f64) -> Option<f64> {
-        let rank = ((percent / 100.0 * self.n_points as f64).ceil() as usize).max(1);
+    fn percentile(&self, percent: f64, of: usize) -> Option<f64> {
+        let rank = ((percent / 100.0 * of as f64).ceil() as usize).max(1);
         let mut below = 0;
-        for (&bin, &count) in &self.errors {
+        for (&bin, &count) in &self.0 {
             below += count;
             if below >= rank {
                 // The middle of the bin; errors of 0 are exact.

@@ -53,6 +53,8 @@ pub struct Row {
     pub assignment_accuracy_percent: Option<f64>,
     /// Errors at [`PERCENTILES`]; `None` where that many points were lost.
     pub error_percentiles: Vec<Option<f64>>,
+    /// Median error of an attacker without neighborhoods.
+    pub blind_median_error: Option<f64>,
     /// Whether the attacker's probabilities to lie within the smallest threshold came true, over all
     /// repeats; `None` for solvers that give none.
     pub reliability: Option<Reliability>,
@@ -121,6 +123,7 @@ impl Row {
         self.exact_percent = accuracy.axis_percent.map(|_| exact);
         self.assignment_accuracy_percent = accuracy.assignment_percent;
         self.error_percentiles = PERCENTILES.map(|p| accuracy.percentile(p)).to_vec();
+        self.blind_median_error = blind.percentile(50.0);
     }
 
     /// Adds the shares over distinct places; `weights` are those of the slots.
@@ -191,6 +194,7 @@ impl Row {
         for p in 0..mean.error_percentiles.len() {
             mean.error_percentiles[p] = average(&|r| r.error_percentiles[p]);
         }
+        mean.blind_median_error = average(&|r| r.blind_median_error);
         mean.delta = average(&|r| Some(r.delta)).unwrap_or(mean.delta);
         // A requested ratio is a name, not a measurement: a mean would change its last bit.
         if mean.oracle_noise.is_none() {
