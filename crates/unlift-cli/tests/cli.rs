@@ -178,14 +178,14 @@ fn sources_without_an_oracle_have_rows_of_their_own() {
         .collect();
     let expected = [
         ("oracle".to_owned(), Value::from("uniform"), 10),
-        ("overlap".to_owned(), Value::Null, 30),
-        ("overlap+similarity".to_owned(), Value::Null, 30),
+        ("overlap".to_owned(), Value::Null, 35),
+        ("overlap+similarity".to_owned(), Value::Null, 35),
         ("geometric".to_owned(), Value::Null, 50),
-        ("overlap+geometric".to_owned(), Value::Null, 30),
+        ("overlap+geometric".to_owned(), Value::Null, 35),
     ];
     assert_eq!(rows, [expected.clone(), expected].concat());
     assert_eq!(document["break_even"].as_array().map(Vec::len), Some(2));
-    assert_eq!(document["options"]["source_k"]["overlap"], 30);
+    assert_eq!(document["options"]["source_k"]["overlap"], 35);
     assert!(document["run"]["seconds"]["rows"][1]["neighbors"].as_f64() > Some(0.0));
 }
 
