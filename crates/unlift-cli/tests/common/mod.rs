@@ -37,15 +37,6 @@ impl Place {
         assert_eq!(status.code(), Some(code), "{line}\n{stderr}");
         (stdout, stderr)
     }
-
-    /// The names of what is in the folder, sorted.
-    pub fn left(&self) -> Vec<String> {
-        let entries = fs::read_dir(self.0.path()).unwrap();
-        let mut names: Vec<String> =
-            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
-        names.sort();
-        names
-    }
 }
 
 /// Blobs of several sizes; `which` moves them.

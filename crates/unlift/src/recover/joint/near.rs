@@ -76,8 +76,8 @@ impl<const D: usize> Columns<D> {
         if piece.from_center {
             for i in 0..n {
                 let mut sum = 0.0;
-                for c in 0..D {
-                    sum += (columns[c][i] - piece.through[c]) * (columns[c][i] - piece.through[c]);
+                for (column, from) in columns.iter().zip(&piece.through) {
+                    sum += (column[i] - from) * (column[i] - from);
                 }
                 apart2[i] = if sum < blind * blind { f32::INFINITY } else { apart2[i] };
             }
