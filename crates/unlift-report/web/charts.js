@@ -5,6 +5,7 @@ window.Unlift = window.Unlift || {};
 (() => {
   const { echarts } = window.UnliftVendor;
   const MARKS = ["circle", "rect", "triangle", "diamond", "emptyCircle", "emptyRect", "emptyTriangle", "emptyDiamond"];
+  const SOLVER_MARKS = ["circle", "emptyRect", "emptyTriangle", "emptyDiamond", "emptyCircle"];
   const drawn = new Map();
 
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -171,7 +172,7 @@ window.Unlift = window.Unlift || {};
         if (!few && t !== chosen) return;
         const opacity = t === first ? 1 : 0.55;
         data.solvers.forEach((solver, s) => {
-          const style = { opacity, width: s === 0 ? 2.2 : 1.4, size: 6, mark: s === 0 ? "circle" : "emptyRect" };
+          const style = { opacity, width: s === 0 ? 2.2 : 1.4, size: 6, mark: SOLVER_MARKS[s] };
           const name = data.solvers.length > 1 ? `${threshold.label}, ${solver}` : threshold.label;
           series.push(line(name, curve(data, scheme.name, solver, "recovered", t), scheme.slot, style));
         });
@@ -195,7 +196,7 @@ window.Unlift = window.Unlift || {};
     const shown = data.thresholds.filter((_, t) => few || t === chosen);
     const entries = shown.map((t, i) => [
       `within ${t.label}`, i === 0 ? ink : css("--soft"), "solid", "circle"]);
-    data.solvers.slice(1).forEach((solver) => entries.push([solver, ink, "solid", "emptyRect"]));
+    data.solvers.slice(1).forEach((solver, s) => entries.push([solver, ink, "solid", SOLVER_MARKS[s + 1]]));
     if (data.published.length) entries.push([`the paper's, on ${dataset}`, ink, "dashed", "none"]);
     entries.push(["blind", ink, "dotted", "none"]);
     legend("multiples-legend", entries);
