@@ -8,10 +8,11 @@
 
 use rayon::prelude::*;
 
-use super::chance::Chance;
 use super::grid::Grid;
 use super::line_rows::LineRow;
+use super::sections::MOST_CHANCE;
 use crate::neighbors::Neighborhoods;
+use crate::simd::{Kernel, dispatch};
 
 /// Cells of a grid at most.
 const CELLS: usize = 1 << 15;
@@ -24,11 +25,10 @@ const TRIM: f64 = 0.03;
 /// Every place has at least this share of the mean density.
 const FLOOR: f32 = 0.05;
 
-/// The density of records and its logarithm, per cell.
+/// The density of records, per cell.
 #[derive(Clone, Debug)]
 pub(crate) struct ChanceField<const D: usize> {
     grid: Grid<D>,
-    ln: Vec<f32>,
 }
 
 impl<const D: usize> ChanceField<D> {
@@ -41,8 +41,7 @@ impl<const D: usize> ChanceField<D> {
         for value in &mut grid.values {
             *value = (value.max(FLOOR * mean) * scale).max(f32::MIN_POSITIVE);
         }
-        let ln = grid.values.iter().map(|&x| libm::logf(x)).collect();
-        Self { grid, ln }
+        Self { grid }
     }
 
     /// The density at a typical place: the mean over places weighted by density.
@@ -58,20 +57,25 @@ impl<const D: usize> ChanceField<D> {
 
     /// The chance that a random record passes through a region of volume-per-length `tube` about `x`.
     #[inline(always)]
-    pub(crate) fn at(&self, x: &[f32; D], tube: f32, ln_tube: f32) -> Chance {
-        let cell = self.grid.index(x);
-        let p = self.grid.values[cell] * tube;
-        if p < MOST {
-            Chance { p, ln_p: self.ln[cell] + ln_tube }
-        } else {
-            Chance { p: MOST, ln_p: LN_MOST }
+    pub(crate) fn at(&self, x: &[f32; D], tube: f32) -> f32 {
+        (self.grid.values[self.grid.index(x)] * tube).min(MOST_CHANCE)
+    }
+
+    /// Adds the same at each `t` of a line to `chance`, with room for a cell each.
+    #[inline(always)]
+    pub(crate) fn add_along(
+        &self,
+        (through, direction): (&[f32; D], &[f32; D]),
+        t: &[f32],
+        tube: f32,
+        (cells, chance): (&mut [u32], &mut [f32]),
+    ) {
+        self.grid.cells_along(through, direction, t, cells);
+        for (chance, &cell) in chance.iter_mut().zip(cells.iter()) {
+            *chance += (self.grid.values[cell as usize] * tube).min(MOST_CHANCE);
         }
     }
 }
-
-/// A chance is at most this.
-const MOST: f32 = 0.5;
-const LN_MOST: f32 = -std::f32::consts::LN_2;
 
 /// Volume per length of the tube of radius `delta` around a line in `D` dimensions.
 pub(crate) fn tube(dimensions: usize, delta: f32) -> f32 {
@@ -102,17 +106,33 @@ pub(crate) fn of_lines<const D: usize>(
             let weight = chosen.iter().map(|&r| counts[r] as f32).sum();
             let parts: Vec<Grid<D>> = chosen
                 .par_chunks(chosen.len().div_ceil(8).max(1))
-                .map(|part| {
-                    let mut grid = empty.clone();
-                    for &record in part {
-                        add_line(&mut grid, &rows[record], counts[record] as f32);
-                    }
-                    grid
-                })
+                .map(|part| dispatch(Lengths { grid: empty.clone(), rows, counts: &counts, part }))
                 .collect();
             ChanceField::new(sum(empty, &parts), weight)
         })
         .collect()
+}
+
+/// Adds the lengths of some records, each as often as it is listed, to a grid.
+struct Lengths<'a, const D: usize> {
+    grid: Grid<D>,
+    rows: &'a [LineRow<D>],
+    counts: &'a [u32],
+    part: &'a [usize],
+}
+
+impl<const D: usize> Kernel for Lengths<'_, D> {
+    type Output = Grid<D>;
+
+    #[inline(always)]
+    fn run(self) -> Grid<D> {
+        let Self { mut grid, rows, counts, part } = self;
+        let mut buffers = (Vec::new(), Vec::new());
+        for &record in part {
+            add_line(&mut grid, &rows[record], counts[record] as f32, &mut buffers);
+        }
+        grid
+    }
 }
 
 fn sum<const D: usize>(mut total: Grid<D>, parts: &[Grid<D>]) -> Grid<D> {
@@ -122,15 +142,25 @@ fn sum<const D: usize>(mut total: Grid<D>, parts: &[Grid<D>]) -> Grid<D> {
     total
 }
 
-fn add_line<const D: usize>(grid: &mut Grid<D>, row: &LineRow<D>, weight: f32) {
+#[inline(always)]
+fn add_line<const D: usize>(
+    grid: &mut Grid<D>,
+    row: &LineRow<D>,
+    weight: f32,
+    buffers: &mut (Vec<f32>, Vec<u32>),
+) {
     let Some((from, to)) = grid.clip(&row.through, &row.direction, row.floor(), row.to) else {
         return;
     };
     let steps = ((to - from) / grid.cell()).ceil().max(1.0);
     let step = (to - from) / steps;
-    for i in 0..steps as usize {
-        let cell = grid.index(&row.at(from + (i as f32 + 0.5) * step));
-        grid.values[cell] += weight * step;
+    let (t, cells) = buffers;
+    t.clear();
+    t.extend((0..steps as i32).map(|i| from + (i as f32 + 0.5) * step));
+    cells.resize(t.len(), 0);
+    grid.cells_along(&row.through, &row.direction, t, cells);
+    for &cell in cells.iter() {
+        grid.values[cell as usize] += weight * step;
     }
 }
 
@@ -172,9 +202,10 @@ pub(crate) fn trimmed(column: &mut [f32]) -> (f32, f32) {
     if column.is_empty() {
         return (0.0, 0.0);
     }
-    column.sort_unstable_by(f32::total_cmp);
-    let cut = ((column.len() - 1) as f64 * TRIM) as usize;
-    let (low, high) = (column[cut], column[column.len() - 1 - cut]);
+    let last = column.len() - 1;
+    let cut = (last as f64 * TRIM) as usize;
+    let mut at = |rank: usize| *column.select_nth_unstable_by(rank, f32::total_cmp).1;
+    let (low, high) = (at(cut), at(last - cut));
     let margin = 0.1 * (high - low);
     (low - margin, high + margin)
 }
@@ -217,9 +248,23 @@ impl<const D: usize> CandidateField<D> {
 
     /// The chance that any of a random record's lines passes through a tube about `x`.
     #[inline(always)]
-    pub(crate) fn at(&self, x: &[f32; D], tube: f32) -> Chance {
-        let p: f32 = self.along.iter().map(|field| field.at(x, tube, 0.0).p).sum();
-        let p = p.min(MOST);
-        Chance { p, ln_p: libm::logf(p) }
+    pub(crate) fn at(&self, x: &[f32; D], tube: f32) -> f32 {
+        self.along.iter().map(|field| field.at(x, tube)).sum::<f32>().min(MOST_CHANCE)
+    }
+
+    /// Adds the same at each `t` of the line through `own` along `axis` to `chance`, with room for a cell each.
+    #[inline(always)]
+    pub(crate) fn add_along(
+        &self,
+        (own, axis): (&[f32; D], usize),
+        t: &[f32],
+        tube: f32,
+        (cells, chance): (&mut [u32], &mut [f32]),
+    ) {
+        let through = std::array::from_fn(|c| if c == axis { 0.0 } else { own[c] });
+        let direction = std::array::from_fn(|c| if c == axis { 1.0 } else { 0.0 });
+        for field in &self.along {
+            field.add_along((&through, &direction), t, tube, (&mut *cells, &mut *chance));
+        }
     }
 }

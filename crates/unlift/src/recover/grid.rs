@@ -13,6 +13,9 @@ pub(crate) struct Grid<const D: usize> {
     pub(crate) values: Vec<f32>,
 }
 
+/// From here on every number is whole.
+const ROUNDING: f32 = 8_388_608.0;
+
 impl<const D: usize> Grid<D> {
     /// About `n_cells` empty cells over the box from `low` to `high`; an axis without extent gets one.
     pub(crate) fn over(low: [f32; D], high: [f32; D], n_cells: usize) -> Self {
@@ -58,12 +61,44 @@ impl<const D: usize> Grid<D> {
     /// The cell of `place`; far places, infinite ones included, land in border cells.
     #[inline(always)]
     pub(crate) fn index(&self, place: &[f32; D]) -> usize {
-        let mut index = 0;
-        for (c, &x) in place.iter().enumerate() {
-            let at = ((x - self.low[c]) * self.per_length).max(0.0).min(self.last[c]);
-            index = index * self.dims[c] + at as u32 as usize;
+        self.number(|c| place[c]) as usize
+    }
+
+    /// The number of the cell of a place with these coordinates.
+    #[inline(always)]
+    fn number(&self, x: impl Fn(usize) -> f32) -> u32 {
+        let mut number = 0;
+        for c in 0..D {
+            let at = ((x(c) - self.low[c]) * self.per_length - 0.5).max(0.0).min(self.last[c]);
+            // Rounded to a whole number by running out of digits: a cast that minds infinities is no vector
+            // instruction. What is exactly between two cells belongs to either.
+            let whole = (at + ROUNDING).to_bits() - ROUNDING.to_bits();
+            number = number * self.dims[c] as u32 + whole;
         }
-        index
+        number
+    }
+
+    /// The cells of the places `through + t direction`.
+    #[inline(always)]
+    pub(crate) fn cells_along(
+        &self,
+        through: &[f32; D],
+        direction: &[f32; D],
+        t: &[f32],
+        cells: &mut [u32],
+    ) {
+        for (cell, t) in cells.iter_mut().zip(t) {
+            *cell = self.number(|c| through[c] + t * direction[c]);
+        }
+    }
+
+    /// The cells of places in columns.
+    #[inline(always)]
+    pub(crate) fn cells_of(&self, columns: &[&[f32]; D], cells: &mut [u32]) {
+        let columns: [&[f32]; D] = columns.map(|column| &column[..cells.len()]);
+        for (i, cell) in cells.iter_mut().enumerate() {
+            *cell = self.number(|c| columns[c][i]);
+        }
     }
 
     /// Adds `weight` at `place`, shared linearly among the cells around it.

@@ -91,12 +91,42 @@ impl<const D: usize> LineRow<D> {
     /// The point of this line nearest to `other`; `None` when they are parallel or it lies behind a
     /// center.
     pub(crate) fn crossing(&self, other: &Self) -> Option<[f32; D]> {
-        let mut columns = LineColumns::default();
-        let mut sections = Sections::default();
-        columns.gather(&[*other], &[RecordId(0)]);
-        columns.sections(self, &mut sections);
-        let (t, miss2) = (sections.at[0], sections.miss2[0]);
+        let of_other = (other.through, other.direction, other.group);
+        let (t, miss2, _) = self.section(of_other);
         (miss2 < NO_VOTE && t >= self.floor() && t <= self.to).then(|| self.at(t))
+    }
+
+    /// Where the record with this point, direction and group passes nearest, how far away (squared) and
+    /// at which angle (squared sine).
+    ///
+    /// With `v` and `u` the parts of `self.through - through` and `self.direction` perpendicular to
+    /// the record, the squared distance is `|v + t u|^2`: no difference of large squares, so that
+    /// `f32` suffices far from the origin.
+    #[inline(always)]
+    fn section(&self, (through, direction, group): ([f32; D], [f32; D], u32)) -> (f32, f32, f32) {
+        let (mut w_e, mut d_e) = (0.0, 0.0);
+        for c in 0..D {
+            w_e += (self.through[c] - through[c]) * direction[c];
+            d_e += self.direction[c] * direction[c];
+        }
+        let v = |c: usize| self.through[c] - through[c] - w_e * direction[c];
+        let u = |c: usize| self.direction[c] - d_e * direction[c];
+        let (mut v_u, mut u_u) = (0.0, 0.0);
+        for c in 0..D {
+            v_u += v(c) * u(c);
+            u_u += u(c) * u(c);
+        }
+        let parallel = u_u < PARALLEL;
+        let t = if parallel { 0.0 } else { -v_u / u_u };
+        let mut miss = 0.0;
+        for c in 0..D {
+            let m = v(c) + t * u(c);
+            miss += m * m;
+        }
+        // Rays of one center meet trivially; a closest approach behind a center is none.
+        let behind = self.is_ray() & ((group == self.group) | (w_e + t * d_e <= 0.0));
+        let miss2 = if parallel | behind { NO_VOTE } else { miss };
+        (t, miss2, if parallel { 1.0 } else { u_u })
     }
 
     /// The point at parameter `t`.
@@ -146,11 +176,14 @@ impl<const D: usize> LineColumns<D> {
         }
     }
 
+    /// How many of the gathered records are evidence for a point on `own`.
+    #[inline(always)]
+    pub(crate) fn n_that_may_vote(&self, own: &LineRow<D>) -> usize {
+        let strange = |&&group: &&u32| !own.is_ray() || group != own.group;
+        self.group.iter().filter(strange).count()
+    }
+
     /// The sections of the gathered records with `own`.
-    ///
-    /// With `v` and `u` the parts of `own.through - through` and `own.direction` perpendicular to
-    /// the record, the squared distance is `|v + t u|^2`: no difference of large squares, so that
-    /// `f32` suffices far from the origin.
     #[inline(always)]
     pub(crate) fn sections(&self, own: &LineRow<D>, out: &mut Sections) {
         let n = self.group.len();
@@ -159,34 +192,10 @@ impl<const D: usize> LineColumns<D> {
         let direction: [&[f32]; D] = std::array::from_fn(|c| &self.direction[c][..n]);
         let group = &self.group[..n];
         let (at, miss2, bend) = (&mut out.at[..n], &mut out.miss2[..n], &mut out.bend[..n]);
-        let rays = own.is_ray();
         for j in 0..n {
-            let (mut w_e, mut d_e) = (0.0, 0.0);
-            for c in 0..D {
-                w_e += (own.through[c] - through[c][j]) * direction[c][j];
-                d_e += own.direction[c] * direction[c][j];
-            }
-            let (mut v_u, mut u_u) = (0.0, 0.0);
-            for c in 0..D {
-                let v = own.through[c] - through[c][j] - w_e * direction[c][j];
-                let u = own.direction[c] - d_e * direction[c][j];
-                v_u += v * u;
-                u_u += u * u;
-            }
-            let parallel = u_u < PARALLEL;
-            let t = if parallel { 0.0 } else { -v_u / u_u };
-            let mut miss = 0.0;
-            for c in 0..D {
-                let v = own.through[c] - through[c][j] - w_e * direction[c][j];
-                let u = own.direction[c] - d_e * direction[c][j];
-                let m = v + t * u;
-                miss += m * m;
-            }
-            // Rays of one center meet trivially; a closest approach behind a center is none.
-            let behind = rays & ((group[j] == own.group) | (w_e + t * d_e <= 0.0));
-            at[j] = t;
-            miss2[j] = if parallel | behind { NO_VOTE } else { miss };
-            bend[j] = if parallel { 1.0 } else { u_u };
+            let through = std::array::from_fn(|c| through[c][j]);
+            let direction = std::array::from_fn(|c| direction[c][j]);
+            (at[j], miss2[j], bend[j]) = own.section((through, direction, group[j]));
         }
     }
 }

@@ -57,9 +57,4 @@ impl<'a> Lists<'a> {
     pub(crate) fn n_slots(&self) -> usize {
         self.neighborhoods.n_slots()
     }
-
-    /// The length of the longest list.
-    pub(crate) fn longest(&self) -> usize {
-        self.neighborhoods.longest()
-    }
 }

@@ -13,6 +13,7 @@ mod exact;
 mod family;
 mod grid;
 mod joint;
+mod lanes;
 mod line_rows;
 mod lists;
 mod options;

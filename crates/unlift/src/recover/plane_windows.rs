@@ -2,6 +2,7 @@
 
 use super::chance::evidence;
 use super::family::interquartile_range;
+use super::lanes::ln;
 use crate::RecordId;
 use crate::released::AxisPlanes;
 
@@ -104,8 +105,8 @@ pub(crate) fn best_window(
             end += 1;
         }
         let p = chance.probability[listed[start].1.index()];
-        let evidence = evidence(end - start, listed.len(), p);
-        let score = evidence + libm::logf(p);
+        let evidence = evidence((end - start) as f32, listed.len() as f32, p);
+        let score = evidence + ln(p);
         if best.is_none_or(|b| score > b.0) {
             best = Some((score, evidence, start, end));
         }

@@ -6,7 +6,8 @@
 //! every `t` alike, as a parallel axis of a candidate does). Within `delta` of a
 //! record is therefore an interval of `t`.
 
-use super::chance::{Chance, Improbability};
+use super::chance::evidence;
+use super::lanes::{LANES, ln};
 
 /// Sections of one list of records with one feasible line, in columns.
 #[derive(Clone, Debug, Default)]
@@ -18,10 +19,6 @@ pub(crate) struct Sections {
 
 /// `miss2` of a record that says nothing here (parallel, same center, behind it).
 pub(crate) const NO_VOTE: f32 = f32::INFINITY;
-
-/// Columns are padded to a multiple of this many entries that do not vote, so that every loop runs
-/// over whole vectors, with the same order of additions whatever the machine.
-pub(crate) const LANES: usize = 8;
 
 impl Sections {
     /// Makes room for `n` sections, of which the first `n` must then be written; the padding is silent.
@@ -78,11 +75,26 @@ impl Sections {
     }
 }
 
-/// Intervals of `t` within delta of each record; empty ones have `low > high`.
+/// Intervals of `t` within delta of the records that pass there, in order of record.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Intervals {
-    pub(crate) low: Vec<f32>,
-    pub(crate) high: Vec<f32>,
+    low: Vec<f32>,
+    high: Vec<f32>,
+    /// Records that are within delta everywhere.
+    everywhere: u32,
+    at_starts: AtStarts,
+}
+
+/// What is looked at where each interval starts, in columns.
+#[derive(Clone, Debug, Default)]
+struct AtStarts {
+    /// How many intervals hold it.
+    count: Vec<u32>,
+    /// The chance that a random record passes there.
+    chance: Vec<f32>,
+    cell: Vec<u32>,
+    evidence: Vec<f32>,
+    score: Vec<f32>,
 }
 
 impl Intervals {
@@ -100,22 +112,22 @@ impl Intervals {
             let (start, end) = (at[j] - half, at[j] + half);
             let empty = (room < 0.0) | (end < floor) | (start > top);
             low[j] = if empty { f32::INFINITY } else { start.max(floor) };
-            high[j] = if empty { f32::NEG_INFINITY } else { end };
+            high[j] = end;
         }
-    }
-
-    /// How many of the intervals `from..to` contain `t`; both are multiples of [`LANES`].
-    #[inline(always)]
-    pub(crate) fn count(&self, from: usize, to: usize, t: f32) -> u32 {
-        let mut lanes = [0u32; LANES];
-        let (low, _) = self.low[from..to].as_chunks::<LANES>();
-        let (high, _) = self.high[from..to].as_chunks::<LANES>();
-        for (low, high) in low.iter().zip(high) {
-            for lane in 0..LANES {
-                lanes[lane] += u32::from((low[lane] <= t) & (t <= high[lane]));
-            }
+        // Every row is written, and stays if it begins somewhere: no branch to guess.
+        let (mut kept, mut everywhere) = (0, 0);
+        for j in 0..n {
+            let start = low[j];
+            (low[kept], high[kept]) = (start, high[j]);
+            kept += usize::from(start.is_finite());
+            everywhere += u32::from(start == f32::NEG_INFINITY);
         }
-        lanes.iter().sum()
+        self.everywhere = everywhere;
+        self.low.truncate(kept);
+        self.high.truncate(kept);
+        let padded = kept.next_multiple_of(LANES);
+        self.low.resize(padded, f32::INFINITY);
+        self.high.resize(padded, f32::NEG_INFINITY);
     }
 }
 
@@ -124,38 +136,70 @@ impl Intervals {
 pub(crate) struct Peak {
     /// The position.
     pub(crate) t: f32,
-    /// Listed records within delta of it.
-    pub(crate) count: u32,
-    /// Improbability of that by chance, in nats.
+    /// Improbability by chance that so many records pass there, in nats.
     pub(crate) evidence: f32,
     /// Evidence and prior: what is maximized.
     pub(crate) score: f32,
 }
 
-/// The start of a listed interval that maximizes evidence plus prior. The number of agreeing records
-/// changes only at interval ends and is largest at some start, so no position has more votes than the
-/// starts looked at.
-///
-/// `k` listed records could vote. The prior is the chance itself: a point is likelier to lie where the
-/// map is dense, and chance measures density (without it the empty parts of a map, where two votes are
-/// already improbable, win too often). Ties are won by the lower record.
-#[inline(always)]
-pub(crate) fn best_start(
-    listed: &Intervals,
-    k: usize,
-    improbability: &Improbability,
-    chance: impl Fn(f32) -> Chance,
-) -> Option<Peak> {
-    let n = listed.low.len();
-    let mut best: Option<Peak> = None;
-    for &t in listed.low.iter().filter(|t| t.is_finite()) {
-        let count = listed.count(0, n, t);
-        let chance = chance(t);
-        let evidence = improbability.evidence(count as usize, k, chance);
-        let score = evidence + chance.ln_p;
-        if best.is_none_or(|b| score > b.score) {
-            best = Some(Peak { t, count, evidence, score });
+impl Intervals {
+    /// The start of a listed interval that maximizes evidence plus prior. The number of agreeing records
+    /// changes only at interval ends and is largest at some start, so no position has more votes than the
+    /// starts looked at.
+    ///
+    /// `k` listed records could vote; `chances` adds to its last argument the chance that a random record
+    /// passes at each start (of the first), with room for cells of a grid (in the second). The prior is the chance
+    /// itself: a point is likelier to lie where the map is dense, and chance measures density (without it the empty
+    /// parts of a map, where two votes are already improbable, win too often). Ties are won by the lower record.
+    #[inline(always)]
+    pub(crate) fn best_start(
+        &mut self,
+        k: usize,
+        chances: impl Fn(&[f32], &mut [u32], &mut [f32]),
+    ) -> Option<Peak> {
+        let n = self.low.len();
+        self.at_starts.resize(n);
+        let AtStarts { count, chance, cell, evidence: nats, score } = &mut self.at_starts;
+        let (count, chance, nats, score) =
+            (&mut count[..n], &mut chance[..n], &mut nats[..n], &mut score[..n]);
+        // A vector of starts at a time is compared with every interval.
+        let (starts, counts) = (self.low.as_chunks::<LANES>().0, count.as_chunks_mut::<LANES>().0);
+        for (starts, counts) in starts.iter().zip(counts) {
+            let mut sums = [self.everywhere; LANES];
+            for (low, high) in self.low.iter().zip(&self.high) {
+                for lane in 0..LANES {
+                    sums[lane] += u32::from((*low <= starts[lane]) & (starts[lane] <= *high));
+                }
+            }
+            *counts = sums;
+        }
+        chance.fill(0.0);
+        chances(&self.low, cell, chance);
+        for i in 0..n {
+            let p = chance[i].min(MOST_CHANCE);
+            nats[i] = evidence(count[i] as i32 as f32, k as f32, p);
+            score[i] = nats[i] + ln(p);
+        }
+        let mut best: Option<usize> = None;
+        for (i, start) in self.low.iter().enumerate() {
+            if *start < f32::INFINITY && best.is_none_or(|best| score[i] > score[best]) {
+                best = Some(i);
+            }
+        }
+        best.map(|i| Peak { t: self.low[i], evidence: nats[i], score: score[i] })
+    }
+}
+
+impl AtStarts {
+    #[inline(always)]
+    fn resize(&mut self, n: usize) {
+        self.count.resize(n, 0);
+        self.cell.resize(n, 0);
+        for column in [&mut self.chance, &mut self.evidence, &mut self.score] {
+            column.resize(n, 0.0);
         }
     }
-    best
 }
+
+/// A chance is at most this.
+pub(crate) const MOST_CHANCE: f32 = 0.5;

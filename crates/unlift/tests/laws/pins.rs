@@ -16,13 +16,13 @@ fn hash(bytes: &[u8]) -> u64 {
 
 /// (scheme, hash of the released map, hash of what consensus makes of it).
 const PINS: &[(&str, u64, u64)] = &[
-    ("olc", 0xbc5917367dfbbb82, 0x1d58d6e7fa8e55b3),
-    ("ppl", 0x853f42e87f4d6ad1, 0x92ec22ba9613d610),
-    ("ppl+", 0xd1a39aa133219c2c, 0x4a9766060a7d5f62),
-    ("ray", 0x8afdc7e564ab7e2f, 0x7a05185b2eb1d8e0),
-    ("ray-voxel", 0x8b43b3092460bcbb, 0x2bdaa6340cd85536),
-    ("plane", 0xed46e9680801a7de, 0x541d66711d3f1ced),
-    ("cp", 0x96a0f41fb6eaf080, 0x6aec24dd82b45e01),
+    ("olc", 0xbc5917367dfbbb82, 0x6917d1e102e4acee),
+    ("ppl", 0x853f42e87f4d6ad1, 0xfeac798182fed30e),
+    ("ppl+", 0xd1a39aa133219c2c, 0xf3e3972ab96d0300),
+    ("ray", 0x8afdc7e564ab7e2f, 0xe831f85588e9368f),
+    ("ray-voxel", 0x8b43b3092460bcbb, 0xa498afb74ba8420f),
+    ("plane", 0xed46e9680801a7de, 0x071e9fc4935629e3),
+    ("cp", 0x96a0f41fb6eaf080, 0x5e7a880602add49d),
 ];
 
 #[test]

@@ -53,6 +53,25 @@ struct Crowd {
     sparsity: f32,
 }
 
+/// A listed estimate near another: the squared distance, then the slot, as a number that sorts by both, so that
+/// the order is the same everywhere.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Near(u64);
+
+impl Near {
+    fn new(distance2: f32, slot: usize) -> Self {
+        Self(u64::from(distance2.to_bits()) << 32 | slot as u64)
+    }
+
+    fn distance2(self) -> f32 {
+        f32::from_bits((self.0 >> 32) as u32)
+    }
+
+    fn slot(self) -> usize {
+        self.0 as u32 as usize
+    }
+}
+
 /// What all slots are looked at with.
 struct Look<'a, const D: usize, P, E> {
     pieces: &'a P,
@@ -110,7 +129,7 @@ pub(super) fn of<const D: usize, P: Pieces<D>, E: Edges>(
 }
 
 impl<const D: usize, P: Pieces<D>, E: Edges> Look<'_, D, P, E> {
-    fn crowd(&self, slot: usize, own: &Estimate<D>, near: &mut Vec<(f32, usize)>) -> Crowd {
+    fn crowd(&self, slot: usize, own: &Estimate<D>, near: &mut Vec<Near>) -> Crowd {
         let x = own.position;
         let density = self.density.at(&x);
         // Chance expects `rate * r^D` of the listed estimates within r, for one or either slot of a record.
@@ -125,7 +144,7 @@ impl<const D: usize, P: Pieces<D>, E: Edges> Look<'_, D, P, E> {
             all += 1;
             rates += if either { 2.0 * rate } else { rate };
             if d2 < reach2 {
-                near.push((d2, at));
+                near.push(Near::new(d2, at));
             }
             let record = end as usize / slots_per_record;
             if self.pieces.may_vote(slot, record) {
@@ -133,8 +152,7 @@ impl<const D: usize, P: Pieces<D>, E: Edges> Look<'_, D, P, E> {
                 votes += usize::from(self.pieces.record_distance2(record, &x) <= self.delta2);
             }
         });
-        // Ends are sorted by slot within equal distances: the same order everywhere.
-        near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        near.sort_unstable();
         let mean_rate = rates / all.max(1) as f32;
         let mut crowd = Crowd {
             listed: voting as f32,
@@ -142,11 +160,12 @@ impl<const D: usize, P: Pieces<D>, E: Edges> Look<'_, D, P, E> {
             ..Crowd::default()
         };
         let mut members = 0;
-        for (at, &(d2, _)) in near.iter().enumerate() {
-            let last = near.get(at + 1).is_none_or(|next| next.0 > d2);
+        for (at, one) in near.iter().enumerate() {
+            let d2 = one.distance2();
+            let last = near.get(at + 1).is_none_or(|next| next.distance2() > d2);
             let p = (mean_rate * power::<D>(d2)).clamp(1e-9, MOST_CHANCE);
             if last && at > 0 {
-                let evidence = chance::evidence(at + 1, all, p);
+                let evidence = chance::evidence((at + 1) as f32, all as f32, p);
                 if evidence > crowd.evidence {
                     members = at + 1;
                     crowd.evidence = evidence;
@@ -157,7 +176,8 @@ impl<const D: usize, P: Pieces<D>, E: Edges> Look<'_, D, P, E> {
         }
         let mut sum = [0.0f32; D];
         let mut voting_members = 0u32;
-        for &(_, at) in &near[..members] {
+        for one in &near[..members] {
+            let at = one.slot();
             let e = self.places.of(at);
             (0..D).for_each(|c| sum[c] += e[c] - x[c]);
             voting_members += u32::from(self.pieces.may_vote(slot, at / slots_per_record));
@@ -176,7 +196,8 @@ impl<const D: usize, P: Pieces<D>, E: Edges> Look<'_, D, P, E> {
             crowd.off = [along2.sqrt() * scale, (all2 - along2).max(0.0).sqrt() * scale];
         }
         let p = self.pieces.record_chance(slot, &x).clamp(1e-9, 0.5);
-        crowd.record_evidence = if voting > 0 { chance::evidence(votes, voting, p) } else { 0.0 };
+        crowd.record_evidence =
+            if voting > 0 { chance::evidence(votes as f32, voting as f32, p) } else { 0.0 };
         crowd.record_excess = votes as f32 - p * voting as f32;
         crowd
     }

@@ -157,7 +157,7 @@ fn window<const D: usize>(
         let sine = sine.max(bearings.finest);
         let count = at + 1;
         let chance = bearings.share_within(own, sine);
-        let evidence = evidence(count, listed.len(), chance);
+        let evidence = evidence(count as f32, listed.len() as f32, chance);
         if best.is_none_or(|b| evidence > b.evidence) {
             best = Some(Window { sine, count: count as u32, evidence });
         }

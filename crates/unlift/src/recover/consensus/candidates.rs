@@ -3,11 +3,10 @@
 use super::refit;
 use crate::RecordId;
 use crate::recover::candidate_rows::CandidateColumns;
-use crate::recover::chance::Improbability;
 use crate::recover::chance_field::{CandidateField, tube};
 use crate::recover::chunks::{Chunks, solve_chunks};
 use crate::recover::lists::Lists;
-use crate::recover::sections::{Intervals, Sections, best_start};
+use crate::recover::sections::{Intervals, Sections};
 use crate::recover::{Estimate, Status, stored_support};
 use crate::simd::{Kernel, dispatch};
 
@@ -19,9 +18,8 @@ pub(super) fn solve<const D: usize>(
     delta: f32,
     chunks: Chunks<'_>,
 ) -> Vec<Estimate<D>> {
-    let improbability = Improbability::new(lists.longest());
     let tube = tube(D, delta);
-    let problem = Problem { rows, chance, lists, delta2: delta * delta, tube, improbability };
+    let problem = Problem { rows, chance, lists, delta2: delta * delta, tube };
     solve_chunks(lists.n_slots(), chunks, Scratch::default, |scratch, first, out| {
         dispatch(Chunk { problem: &problem, first, out, scratch });
     })
@@ -33,7 +31,6 @@ struct Problem<'a, const D: usize> {
     lists: Lists<'a>,
     delta2: f32,
     tube: f32,
-    improbability: Improbability,
 }
 
 #[derive(Default)]
@@ -71,7 +68,7 @@ fn solve_slot<const D: usize>(
     slot: usize,
     scratch: &mut Scratch<D>,
 ) -> Estimate<D> {
-    let Problem { rows, chance, lists, delta2, tube, improbability } = problem;
+    let Problem { rows, chance, lists, delta2, tube } = problem;
     let own = &rows[slot];
     let listed = lists.of(slot, &mut scratch.buffer);
     if listed.len() < 2 {
@@ -83,9 +80,9 @@ fn solve_slot<const D: usize>(
     for axis in 0..D {
         scratch.listed.sections(own, axis, *delta2, &mut scratch.sections);
         scratch.intervals.fill(&scratch.sections, *delta2, f32::NEG_INFINITY, f32::INFINITY);
-        let at =
-            |t: f32| chance.at(&std::array::from_fn(|c| if c == axis { t } else { own[c] }), *tube);
-        let Some(peak) = best_start(&scratch.intervals, listed.len(), improbability, at) else {
+        let Some(peak) = scratch.intervals.best_start(listed.len(), |t, cells, chances| {
+            chance.add_along((own, axis), t, *tube, (cells, chances));
+        }) else {
             continue;
         };
         if peak.score > best_score {

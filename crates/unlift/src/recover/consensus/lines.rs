@@ -2,12 +2,11 @@
 
 use super::refit;
 use crate::RecordId;
-use crate::recover::chance::Improbability;
 use crate::recover::chance_field::{ChanceField, tube};
 use crate::recover::chunks::{Chunks, solve_chunks};
 use crate::recover::line_rows::{LineColumns, LineRow};
 use crate::recover::lists::Lists;
-use crate::recover::sections::{Intervals, Sections, best_start};
+use crate::recover::sections::{Intervals, Sections};
 use crate::recover::{Estimate, Status, stored_support};
 use crate::simd::{Kernel, dispatch};
 
@@ -27,8 +26,6 @@ pub(super) fn solve<const D: usize>(
         lists,
         delta2: delta * delta,
         tube: tube(D, delta),
-        ln_tube: libm::logf(tube(D, delta)),
-        improbability: Improbability::new(lists.longest()),
     };
     solve_chunks(lists.n_slots(), chunks, Scratch::default, |scratch, first, out| {
         dispatch(Chunk { problem: &problem, first, out, scratch });
@@ -42,8 +39,6 @@ struct Problem<'a, const D: usize> {
     lists: Lists<'a>,
     delta2: f32,
     tube: f32,
-    ln_tube: f32,
-    improbability: Improbability,
 }
 
 #[derive(Default)]
@@ -79,20 +74,21 @@ fn solve_slot<const D: usize>(
     slot: usize,
     scratch: &mut Scratch<D>,
 ) -> Estimate<D> {
-    let Problem { rows, lists, delta2, improbability, .. } = problem;
+    let Problem { rows, lists, delta2, .. } = problem;
     let own = &rows[slot / problem.slots_per_record];
     let listed = lists.of(slot, &mut scratch.buffer);
     scratch.listed.gather(rows, listed);
     scratch.listed.sections(own, &mut scratch.sections);
-    let may_vote = listed.iter().filter(|r| rows[r.index()].may_vote_for(own)).count();
+    let may_vote = scratch.listed.n_that_may_vote(own);
     if scratch.sections.n_voting() < 2 {
         let few = may_vote < 2;
         return Estimate::lost(if few { Status::TooFewNeighbors } else { Status::Degenerate });
     }
     scratch.intervals.fill(&scratch.sections, *delta2, own.floor(), own.to);
     let field = &problem.chance[if own.is_ray() { own.group as usize } else { 0 }];
-    let chance = |t: f32| field.at(&own.at(t), problem.tube, problem.ln_tube);
-    let Some(peak) = best_start(&scratch.intervals, may_vote, improbability, chance) else {
+    let Some(peak) = scratch.intervals.best_start(may_vote, |t, cells, chance| {
+        field.add_along((&own.through, &own.direction), t, problem.tube, (cells, chance));
+    }) else {
         return Estimate::lost(Status::NoSupport);
     };
     let (t, support) = refit(&scratch.sections, peak.t, *delta2);

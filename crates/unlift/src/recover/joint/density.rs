@@ -52,6 +52,15 @@ impl<const D: usize> Density<D> {
         self.grid.values[self.grid.index(x)]
     }
 
+    /// The densities at places in columns, with room for a cell each.
+    #[inline(always)]
+    pub(crate) fn at_each(&self, x: &[&[f32]; D], cells: &mut [u32], densities: &mut [f32]) {
+        self.grid.cells_of(x, cells);
+        for (density, &cell) in densities.iter_mut().zip(cells.iter()) {
+            *density = self.grid.values[cell as usize];
+        }
+    }
+
     /// The logarithm of how much sparser estimates are where the density is `density` than at a
     /// typical place.
     pub(crate) fn sparsity(&self, density: f32) -> f32 {

@@ -62,8 +62,10 @@ impl Graph {
         let parts: Vec<Rows> = (0..n_slots.div_ceil(PART))
             .into_par_iter()
             .map(|part| {
+                let slots = part * PART..((part + 1) * PART).min(n_slots);
                 let mut rows = Rows::default();
-                for slot in part * PART..((part + 1) * PART).min(n_slots) {
+                rows.reserve(lists, &named_by, slots.clone(), slots_per_record);
+                for slot in slots {
                     rows.add(lists, &named_by, slot, slots_per_record, most, &score_class);
                 }
                 rows
@@ -93,6 +95,11 @@ impl Graph {
     #[inline(always)]
     pub(crate) fn edge(&self, at: usize) -> (u32, u8) {
         (self.ends[at], self.class[at])
+    }
+
+    /// Number of slots.
+    pub(crate) fn n_slots(&self) -> usize {
+        self.offsets.len() - 1
     }
 
     /// Number of edges, both directions counted.
@@ -215,6 +222,20 @@ struct Rows {
 }
 
 impl Rows {
+    /// Room for the rows of `slots`.
+    fn reserve(
+        &mut self,
+        lists: &Neighborhoods,
+        named_by: &NamedBy,
+        slots: std::ops::Range<usize>,
+        slots_per_record: usize,
+    ) {
+        let most = |slot| lists.of(slot).len() + named_by.of(slot / slots_per_record).len();
+        let n_edges = slots.map(most).sum();
+        self.ends.reserve_exact(n_edges);
+        self.class.reserve_exact(n_edges);
+    }
+
     /// Merges the list of `slot` with the entries that name its record; both are in ascending order.
     fn add(
         &mut self,

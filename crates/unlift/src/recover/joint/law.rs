@@ -11,6 +11,7 @@ use super::density::Density;
 use super::graph::{CLASSES, Graph, either, is_mutual};
 use super::places::Places;
 use crate::seed::{Draws, Stage};
+use crate::simd::{Kernel, dispatch};
 
 /// Bins of the radius.
 const BINS: usize = 48;
@@ -20,6 +21,8 @@ const OUTSIDE: usize = BINS / 4 * 3;
 const RANDOM: usize = 24;
 /// Slots looked at.
 const SLOTS: usize = 1 << 12;
+/// Slots looked at by one thread at a time.
+const PART: usize = 256;
 /// Mutual edges tell the radius if so many of them are close,
 const ENOUGH: f64 = 500.0;
 /// and within this share of the radius of all.
@@ -49,23 +52,40 @@ pub(crate) struct Look<'a, const D: usize> {
     pub(crate) reach: f32,
     /// The radius of the law at most.
     pub(crate) most_radius: f32,
-    pub(crate) seed: u64,
+    pub(crate) sample: &'a Sample,
+}
+
+/// The slots that are looked at, with random edges for each.
+pub(crate) struct Sample {
+    slots: Vec<u32>,
+    random: Vec<[(u32, u8); RANDOM]>,
+}
+
+impl Sample {
+    /// Slots spread evenly over `graph`.
+    pub(crate) fn new(graph: &Graph, seed: u64) -> Self {
+        if graph.len() == 0 {
+            return Self { slots: Vec::new(), random: Vec::new() };
+        }
+        let every = graph.n_slots().div_ceil(SLOTS).max(1);
+        let slots: Vec<u32> = (0..graph.n_slots() as u32).step_by(every).collect();
+        let random = |&slot: &u32| {
+            let mut draws = Draws::new(seed, Stage::NullSample, u64::from(slot));
+            std::array::from_fn(|_| graph.edge(draws.below(graph.len() as u64) as usize))
+        };
+        let random = slots.iter().map(random).collect();
+        Self { slots, random }
+    }
 }
 
 impl Law {
     /// The law of the present places.
     pub(crate) fn learn<const D: usize>(look: &Look<'_, D>) -> Self {
-        let n = look.places.len();
-        let every = n.div_ceil(SLOTS).max(1);
-        let slots: Vec<usize> =
-            (0..n).step_by(every).filter(|&slot| look.places.is_known(slot)).collect();
+        let Sample { slots, random } = look.sample;
         let parts: Vec<Tally> = slots
-            .par_chunks(256)
-            .map(|part| {
-                let mut tally = Tally::default();
-                part.iter().for_each(|&slot| tally.add(slot, look));
-                tally
-            })
+            .par_chunks(PART)
+            .zip(random.par_chunks(PART))
+            .map(|(slots, random)| dispatch(Part { slots, random, look }))
             .collect();
         let mut total = Tally::default();
         parts.iter().for_each(|part| total.merge(part));
@@ -73,56 +93,82 @@ impl Law {
     }
 }
 
+/// Some of the slots of a sample.
+struct Part<'a, 'b, const D: usize> {
+    slots: &'a [u32],
+    random: &'a [[(u32, u8); RANDOM]],
+    look: &'a Look<'b, D>,
+}
+
+impl<const D: usize> Kernel for Part<'_, '_, D> {
+    type Output = Tally;
+
+    #[inline(always)]
+    fn run(self) -> Tally {
+        let mut tally = Tally::default();
+        for (&slot, random) in self.slots.iter().zip(self.random) {
+            if self.look.places.is_known(slot as usize) {
+                tally.add(slot as usize, random, self.look);
+            }
+        }
+        tally
+    }
+}
+
 struct Tally {
     /// Close edges per bin, and close random ones; of all edges, and of mutual ones.
-    bins: [[(f64, f64); BINS]; 2],
+    bins: [[(u32, f64); BINS]; 2],
     /// Edges and close ones, per class.
-    classes: [[f64; 2]; CLASSES],
+    classes: [[u32; 2]; CLASSES],
     /// Random edges that lead to one slot or to either of two, and close ones.
-    random: [[f64; 2]; 2],
+    random: [[u32; 2]; 2],
 }
 
 impl Default for Tally {
     fn default() -> Self {
-        let classes = [[0.0; 2]; CLASSES];
-        Self { bins: [[(0.0, 0.0); BINS]; 2], classes, random: [[0.0; 2]; 2] }
+        let classes = [[0; 2]; CLASSES];
+        Self { bins: [[(0, 0.0); BINS]; 2], classes, random: [[0; 2]; 2] }
     }
 }
 
 impl Tally {
-    fn add<const D: usize>(&mut self, slot: usize, look: &Look<'_, D>) {
+    #[inline(always)]
+    fn add<const D: usize>(
+        &mut self,
+        slot: usize,
+        random: &[(u32, u8); RANDOM],
+        look: &Look<'_, D>,
+    ) {
         let x = look.places.of(slot);
         let width = look.density.width(look.density.at(&x));
-        let scale = BINS as f32 / (width * look.reach);
+        let reach = width * look.reach;
+        let (reach2, scale) = (reach * reach, BINS as f32 / reach);
         let close = |end: u32, class: u8| {
             let (d2, _) = look.places.nearest(end, either(class, look.slots_per_record), &x);
-            let bin = d2.sqrt() * scale;
-            (bin < BINS as f32).then_some(bin as usize)
+            (d2 < reach2).then(|| ((d2.sqrt() * scale) as usize).min(BINS - 1))
         };
         let (ends, class) = look.graph.of(slot);
         let mut n_mutual = 0;
         for (&end, &class) in ends.iter().zip(class) {
             n_mutual += usize::from(is_mutual(class));
             let of_class = &mut self.classes[usize::from(class)];
-            of_class[0] += 1.0;
+            of_class[0] += 1;
             if let Some(bin) = close(end, class) {
-                self.bins[0][bin].0 += 1.0;
-                self.bins[1][bin].0 += f64::from(u8::from(is_mutual(class)));
-                of_class[1] += 1.0;
+                self.bins[0][bin].0 += 1;
+                self.bins[1][bin].0 += u32::from(is_mutual(class));
+                of_class[1] += 1;
             }
         }
-        let mut draws = Draws::new(look.seed, Stage::NullSample, slot as u64);
         // Random edges stand for as many as the slot has.
         let share = ends.len() as f64 / RANDOM as f64;
         let share_mutual = n_mutual as f64 / RANDOM as f64;
-        for _ in 0..RANDOM {
-            let (end, class) = look.graph.edge(draws.below(look.graph.len() as u64) as usize);
+        for &(end, class) in random {
             let of_kind = &mut self.random[usize::from(either(class, look.slots_per_record))];
-            of_kind[0] += 1.0;
+            of_kind[0] += 1;
             if let Some(bin) = close(end, class) {
                 self.bins[0][bin].1 += share;
                 self.bins[1][bin].1 += share_mutual;
-                of_kind[1] += 1.0;
+                of_kind[1] += 1;
             }
         }
     }
@@ -146,11 +192,12 @@ impl Tally {
         let bins = &self.bins[kind];
         let of_kind = |class: &u8| kind == 0 || is_mutual(*class);
         let classes = (0..CLASSES as u8).filter(of_kind);
-        let edges = classes.map(|class| self.classes[usize::from(class)][0]).sum::<f64>().max(1.0);
-        let found: f64 = bins.iter().map(|b| b.0).sum();
+        let edges: u32 = classes.map(|class| self.classes[usize::from(class)][0]).sum();
+        let edges = f64::from(edges.max(1));
+        let found: f64 = bins.iter().map(|b| f64::from(b.0)).sum();
         let by_chance: f64 = bins.iter().map(|b| b.1).sum();
         let share = share_of(found / edges, by_chance / edges);
-        let excess = bins.map(|(found, by_chance)| found - (1.0 - share) * by_chance);
+        let excess = bins.map(|(found, by_chance)| f64::from(found) - (1.0 - share) * by_chance);
         // Wrong entries that are near all the same lie as dense everywhere as they do far out.
         let volume =
             |bin: usize| ((bin + 1) as f64).powi(dimensions) - (bin as f64).powi(dimensions);
@@ -164,7 +211,7 @@ impl Tally {
     }
 
     fn law<const D: usize>(&self, look: &Look<'_, D>) -> Law {
-        let chance = self.random.map(|[edges, found]| found / edges.max(1.0));
+        let chance = self.random.map(|counts| share_found(counts));
         let [all, mutual] = [0, 1].map(|kind| self.excess(kind, D as i32));
         let mut radius = middle(&all);
         // Wrong entries that are near all the same are rarely mutual.
@@ -177,15 +224,19 @@ impl Tally {
         Law {
             radius,
             odds: std::array::from_fn(|class| {
-                let [edges, found] = self.classes[class];
                 let chance = chance[usize::from(either(class as u8, look.slots_per_record))];
-                let p = share_of(found / edges.max(1.0), chance);
+                let p = share_of(share_found(self.classes[class]), chance);
                 (p / (1.0 - p)) as f32
             }),
             inverse_a2: 1.0 / (a * a),
             center: 1.0 / (mass * a.powi(D as i32)),
         }
     }
+}
+
+/// Of so many edges, how many were close.
+fn share_found([edges, found]: [u32; 2]) -> f64 {
+    f64::from(found) / f64::from(edges.max(1))
 }
 
 /// Where half of `excess` lies, as a share of the bins.

@@ -18,6 +18,7 @@ mod near;
 mod order;
 mod pieces;
 mod places;
+mod remake;
 mod slot;
 mod small;
 
@@ -31,7 +32,7 @@ use std::collections::VecDeque;
 
 use rayon::prelude::*;
 
-use self::law::{Law, Look};
+use self::law::{Law, Look, Sample};
 use self::slot::{Round, Scratch};
 use super::chunks::CHUNK;
 use super::family::Family;
@@ -108,6 +109,7 @@ fn rounds<const D: usize, P: Pieces<D>>(
     let mut now = start;
     let mut places = Places::new(&now);
     let order = along_curve(&places);
+    let sample = Sample::new(graph, seed);
     // Nothing is settled yet.
     let (mut moves, mut n_moves, mut ahead) = (vec![true; n], n, vec![0.0; n]);
     // Where slots were when those whose turn it is moved last, and in the rounds since.
@@ -126,7 +128,7 @@ fn rounds<const D: usize, P: Pieces<D>>(
                 slots_per_record,
                 reach: REACH * radius,
                 most_radius,
-                seed,
+                sample: &sample,
             });
             radius = law.radius;
             let round = Round {
@@ -207,8 +209,9 @@ impl<const D: usize, P: Pieces<D>> Kernel for Chunk<'_, '_, D, P> {
                 continue;
             }
             let (now, ahead) = (&self.now[slot], self.ahead[slot]);
-            let is_settled =
-                !self.round.moves[slot] && ahead > PER_MOVE * self.round.moves_near(slot) as f32;
+            let is_settled = !self.round.moves[slot]
+                && ahead > 0.0
+                && self.round.is_quiet_near(slot, ahead / PER_MOVE);
             *fresh =
                 if is_settled { (*now, ahead) } else { self.round.solve(slot, now, self.scratch) };
         }

@@ -1,7 +1,11 @@
 //! Columns of neighbors' estimates, and how likely they are about a place.
 
 use super::pieces::Piece;
-use crate::recover::sections::LANES;
+use super::places::distance2;
+use crate::recover::lanes::{LANES, Lanes, ln};
+
+/// Vectors are filled up with estimates this far away: beyond any reach, and still a number when squared.
+const BEYOND: f32 = 1e19;
 
 /// Estimates with the odds that they are a true neighbor's, in columns.
 #[derive(Debug)]
@@ -11,12 +15,13 @@ pub(crate) struct Columns<const D: usize> {
     slot: Vec<u32>,
     /// Squared distance to the piece last looked at.
     apart2: Vec<f32>,
+    kept: Vec<u32>,
 }
 
 impl<const D: usize> Default for Columns<D> {
     fn default() -> Self {
         let x = std::array::from_fn(|_| Vec::new());
-        Self { x, odds: Vec::new(), slot: Vec::new(), apart2: Vec::new() }
+        Self { x, odds: Vec::new(), slot: Vec::new(), apart2: Vec::new(), kept: Vec::new() }
     }
 }
 
@@ -51,6 +56,18 @@ impl<const D: usize> Columns<D> {
         std::array::from_fn(|c| self.x[c][i])
     }
 
+    /// All estimates, a vector at a time; the last one is filled up with estimates far away.
+    #[inline(always)]
+    pub(crate) fn vectors(&self) -> [&[Lanes]; D] {
+        std::array::from_fn(|c| self.x[c].as_chunks().0)
+    }
+
+    /// The squared distance from `x` to the estimate in row `i`.
+    #[inline(always)]
+    pub(crate) fn distance2(&self, i: usize, x: &[f32; D]) -> f32 {
+        distance2(&self.at(i), x)
+    }
+
     /// The slot whose estimate is in row `i`.
     #[inline(always)]
     pub(crate) fn slot(&self, i: usize) -> usize {
@@ -82,21 +99,25 @@ impl<const D: usize> Columns<D> {
                 apart2[i] = if sum < blind * blind { f32::INFINITY } else { apart2[i] };
             }
         }
-        // Every row is written, and stays if it is near: no branch to guess.
-        near.resize(n);
-        let mut kept = 0;
+        // Every number is written, and stays if it is near: no branch to guess.
+        self.kept.resize(n, 0);
+        let mut n_kept = 0;
         for i in 0..n {
-            near.set(kept, &self.at(i), self.odds[i], self.slot[i]);
-            kept += usize::from(self.apart2[i] < reach * reach);
+            self.kept[n_kept] = i as u32;
+            n_kept += usize::from(self.apart2[i] < reach * reach);
         }
-        near.resize(kept);
+        near.resize(n_kept);
+        for (to, &i) in self.kept[..n_kept].iter().enumerate() {
+            let i = i as usize;
+            near.set(to, &self.at(i), self.odds[i], self.slot[i]);
+        }
         near.pad();
     }
 
     /// Fills up the last vector with estimates that say nothing.
     fn pad(&mut self) {
         let n = self.odds.len().next_multiple_of(LANES);
-        self.x.iter_mut().for_each(|column| column.resize(n, 0.0));
+        self.x.iter_mut().for_each(|column| column.resize(n, BEYOND));
         self.odds.resize(n, 0.0);
     }
 
@@ -121,16 +142,4 @@ impl<const D: usize> Columns<D> {
         }
         sums.iter().sum()
     }
-}
-
-/// The logarithm of a positive number, to 2e-6: exponent plus a polynomial of the mantissa, without
-/// branches.
-#[inline(always)]
-pub(crate) fn ln(y: f32) -> f32 {
-    let bits = y.to_bits();
-    let exponent = (bits >> 23) as i32 - 127;
-    let m = f32::from_bits(bits & 0x007f_ffff | 0x3f80_0000) - 1.0;
-    // ln(1 + m) on [0, 1), zero at 0, fitted for the smallest largest error.
-    let p = m * (0.317_648_7 + m * (-0.193_760_2 + m * (0.085_569_24 - m * 0.018_338_63)));
-    exponent as f32 * std::f32::consts::LN_2 + m * (0.999_901_65 + m * (-0.497_875 + p))
 }

@@ -1,7 +1,7 @@
 //! Where a slot may lie, as flat pieces: all that joint recovery knows of a record family.
 
-use super::near::ln;
 use crate::recover::chance_field::{CandidateField, ChanceField, tube};
+use crate::recover::lanes::ln;
 use crate::recover::line_rows::LineRow;
 use crate::recover::plane_windows::SortedPlanes;
 use crate::released::AxisPlanes;
@@ -54,12 +54,17 @@ pub(crate) trait Pieces<const D: usize>: Sync {
     /// near by accident would widen it without end.
     const MOST_RADIUS: f32 = 0.95;
 
+    /// Whether pieces are planes with a normal, not lines with a direction.
+    const NORMAL: bool = false;
+
     /// Slots per record.
     fn slots_per_record(&self) -> usize {
         1
     }
     /// One piece of a slot.
     fn piece(&self, slot: usize, piece: usize) -> Piece<D>;
+    /// The unit direction of a piece, or its normal.
+    fn direction(&self, slot: usize, piece: usize) -> [f32; D];
     /// Whether a record near a place is evidence for a point of `slot`.
     fn may_vote(&self, slot: usize, record: usize) -> bool;
     /// Squared distance from `x` to where `record` may lie.
@@ -121,6 +126,11 @@ impl<const D: usize> Pieces<D> for LinePieces<'_, D> {
     }
 
     #[inline(always)]
+    fn direction(&self, slot: usize, _: usize) -> [f32; D] {
+        self.own(slot).direction
+    }
+
+    #[inline(always)]
     fn may_vote(&self, slot: usize, record: usize) -> bool {
         self.rows[record].may_vote_for(self.own(slot))
     }
@@ -138,7 +148,7 @@ impl<const D: usize> Pieces<D> for LinePieces<'_, D> {
     fn record_chance(&self, slot: usize, x: &[f32; D]) -> f32 {
         let own = self.own(slot);
         let field = &self.chance[if own.is_ray() { own.group as usize } else { 0 }];
-        field.at(x, self.tube, 0.0).p
+        field.at(x, self.tube)
     }
 
     // Points are spread over the region of an anchor, and its rays diverge: without this term estimates
@@ -152,6 +162,12 @@ impl<const D: usize> Pieces<D> for LinePieces<'_, D> {
         let t: f32 = (0..D).map(|c| (x[c] - own.through[c]) * own.direction[c]).sum();
         (D - 1) as f32 * ln((t / own.to).max(LEAST_RANGE))
     }
+}
+
+/// The direction of an axis.
+#[inline(always)]
+fn unit<const D: usize>(axis: usize) -> [f32; D] {
+    std::array::from_fn(|c| if c == axis { 1.0 } else { 0.0 })
 }
 
 /// Axis planes.
@@ -169,6 +185,7 @@ impl<'a, const D: usize> PlanePieces<'a, D> {
 
 impl<const D: usize> Pieces<D> for PlanePieces<'_, D> {
     const PER_SLOT: usize = 1;
+    const NORMAL: bool = true;
     const MOST_ALONG: f32 = 0.25;
     const ALONG: f32 = 2.0;
 
@@ -184,6 +201,11 @@ impl<const D: usize> Pieces<D> for PlanePieces<'_, D> {
             to: f32::INFINITY,
             from_center: false,
         }
+    }
+
+    #[inline(always)]
+    fn direction(&self, slot: usize, _: usize) -> [f32; D] {
+        unit(usize::from(self.planes.axis()[slot]))
     }
 
     #[inline(always)]
@@ -226,8 +248,12 @@ impl<const D: usize> Pieces<D> for CandidatePieces<'_, D> {
 
     #[inline(always)]
     fn piece(&self, slot: usize, piece: usize) -> Piece<D> {
-        let direction = std::array::from_fn(|c| if c == piece { 1.0 } else { 0.0 });
-        Piece::line(self.rows[slot], direction)
+        Piece::line(self.rows[slot], unit(piece))
+    }
+
+    #[inline(always)]
+    fn direction(&self, _: usize, piece: usize) -> [f32; D] {
+        unit(piece)
     }
 
     #[inline(always)]
@@ -248,6 +274,6 @@ impl<const D: usize> Pieces<D> for CandidatePieces<'_, D> {
 
     #[inline(always)]
     fn record_chance(&self, _: usize, x: &[f32; D]) -> f32 {
-        self.chance.at(x, self.tube).p
+        self.chance.at(x, self.tube)
     }
 }

@@ -3,10 +3,11 @@
 use super::density::Density;
 use super::graph::{Graph, either, is_reverse};
 use super::law::Law;
-use super::near::{Columns, ln};
+use super::near::Columns;
 use super::pieces::{Piece, Pieces};
 use super::places::{Places, distance2};
-use super::small::solve_symmetric;
+use super::remake::{Directions, remade};
+use crate::recover::lanes::ln;
 use crate::recover::{Estimate, Status, stored_support};
 
 /// Everything a round reads.
@@ -41,9 +42,6 @@ const ASTRAY: f32 = 0.2;
 /// The weight of the density prior.
 const PRIOR: f32 = 0.5;
 
-/// Least squares steps.
-const STEPS: usize = 2;
-
 /// A position that could win.
 #[derive(Clone, Copy, Debug)]
 struct Candidate<const D: usize> {
@@ -53,18 +51,77 @@ struct Candidate<const D: usize> {
     prior: f32,
 }
 
+/// Places that could win, with the law there, in columns.
+#[derive(Debug)]
+struct Tried<const D: usize> {
+    x: [Vec<f32>; D],
+    cell: Vec<u32>,
+    density: Vec<f32>,
+    gain: Vec<f32>,
+    inverse_a2: Vec<f32>,
+    prior: Vec<f32>,
+}
+
+impl<const D: usize> Default for Tried<D> {
+    fn default() -> Self {
+        let new = Vec::new;
+        let x = std::array::from_fn(|_| new());
+        Self { x, cell: Vec::new(), density: new(), gain: new(), inverse_a2: new(), prior: new() }
+    }
+}
+
+impl<const D: usize> Tried<D> {
+    #[inline(always)]
+    fn clear(&mut self) {
+        self.x.iter_mut().for_each(Vec::clear);
+    }
+
+    #[inline(always)]
+    fn push(&mut self, x: &[f32; D]) {
+        for (column, x) in self.x.iter_mut().zip(x) {
+            column.push(*x);
+        }
+    }
+
+    /// Looks up density and law.
+    #[inline(always)]
+    fn weigh<P: Pieces<D>>(&mut self, round: &Round<'_, D, P>) {
+        let n = self.x[0].len();
+        self.cell.resize(n, 0);
+        let Self { x, cell, density, gain, inverse_a2, prior } = self;
+        for column in [&mut *density, &mut *gain, &mut *inverse_a2, &mut *prior] {
+            column.resize(n, 0.0);
+        }
+        round.density.at_each(&x.each_ref().map(|column| &column[..]), cell, density);
+        let (density, gain, inverse_a2, prior) =
+            (&density[..n], &mut gain[..n], &mut inverse_a2[..n], &mut prior[..n]);
+        for i in 0..n {
+            (gain[i], inverse_a2[i]) = round.law_where(density[i]);
+            prior[i] = PRIOR * ln(density[i]);
+        }
+    }
+}
+
 /// Buffers of one thread.
 #[derive(Debug)]
 pub(crate) struct Scratch<const D: usize> {
     all: Columns<D>,
     near: [Columns<D>; D],
+    directions: Directions<D>,
+    tried: Tried<D>,
     best: Vec<Candidate<D>>,
 }
 
 impl<const D: usize> Default for Scratch<D> {
     fn default() -> Self {
         let near = std::array::from_fn(|_| Columns::default());
-        Self { all: Columns::default(), near, best: Vec::new() }
+        Self {
+            all: Columns::default(),
+            near,
+            directions: Directions::default(),
+            tried: Tried::default(),
+            best: Vec::new(),
+        }
     }
 }
 
@@ -91,16 +148,7 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         for piece in 0..P::PER_SLOT {
             let own = self.pieces.piece(slot, piece);
             scratch.all.near(&own, reach, blind, &mut scratch.near[piece]);
-            let near = &scratch.near[piece];
-            let n = near.len();
-            let step = n.div_ceil(CANDIDATES).max(1);
-            for i in (0..n).step_by(step) {
-                let x = own.project(&near.at(i));
-                self.consider(near, x, (slot, piece), &mut scratch.best);
-            }
-            if old.status == Status::Ok && usize::from(old.axis) == piece {
-                self.consider(near, old.position, (slot, piece), &mut scratch.best);
-            }
+            self.consider(&own, (slot, piece), old, scratch);
         }
         let Some((first, ahead)) = self.winner(slot, &scratch.best) else {
             return (*old, 0.0);
@@ -110,12 +158,12 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         if near.len() == 0 {
             return (*old, 0.0);
         }
-        let mut x = first.x;
-        let mut support = 0;
-        for _ in 0..STEPS {
-            let (moved, n) = self.remake(&own, near, &x);
-            (x, support) = (moved, n);
-        }
+        let inverse_kernel2 = |x: &[f32; D]| {
+            let kernel = self.kernel * self.density.width(self.density.at(x));
+            1.0 / (kernel * kernel)
+        };
+        let near = (near, &mut scratch.directions);
+        let (x, support) = remade(self.pieces, self.places, &own, near, first.x, inverse_kernel2);
         if !x.iter().all(|c| c.is_finite()) {
             return (*old, 0.0);
         }
@@ -129,10 +177,10 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         (estimate, ahead)
     }
 
-    /// How many of the slots at the other ends of the edges of `slot` have moved to or from where `slot`
-    /// may lie.
+    /// Whether at most so many of the slots at the other ends of the edges of `slot` have moved to or from
+    /// where `slot` may lie.
     #[inline(always)]
-    pub(crate) fn moves_near(&self, slot: usize) -> u32 {
+    pub(crate) fn is_quiet_near(&self, slot: usize, most: f32) -> bool {
         let slots_per_record = self.pieces.slots_per_record();
         let (ends, class) = self.graph.of(slot);
         let reach2 = (TUBE * self.law.radius) * (TUBE * self.law.radius);
@@ -140,16 +188,19 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
             (0..P::PER_SLOT)
                 .any(|piece| distance2(&self.pieces.piece(slot, piece).project(x), x) < reach2)
         };
-        let mut n = 0;
+        let mut n = 0.0;
         for (&end, &class) in ends.iter().zip(class) {
             let last = end as usize + usize::from(either(class, slots_per_record));
             for end in end as usize..=last {
-                if self.moves[end] {
-                    n += u32::from(near(&self.places.of(end)) || near(&self.before.of(end)));
+                if self.moves[end] && (near(&self.places.of(end)) || near(&self.before.of(end))) {
+                    n += 1.0;
+                    if n > most {
+                        return false;
+                    }
                 }
             }
         }
-        n
+        true
     }
 
     /// Where the other slot of a paired line lies, with the gain and scale of the law there.
@@ -160,20 +211,24 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
             return None;
         }
         let x = self.places.of(other);
-        let (gain, inverse_a2, _) = self.law_at(&x);
+        let (gain, inverse_a2) = self.law_at(&x);
         Some((x, gain, inverse_a2))
     }
 
-    /// The law at `x`: the gain of an estimate on the spot, `1 / a^2`, and the density.
+    /// The law at `x`: the gain of an estimate on the spot, and `1 / a^2`.
     #[inline(always)]
-    fn law_at(&self, x: &[f32; D]) -> (f32, f32, f32) {
-        let density = self.density.at(x);
+    fn law_at(&self, x: &[f32; D]) -> (f32, f32) {
+        self.law_where(self.density.at(x))
+    }
+
+    #[inline(always)]
+    fn law_where(&self, density: f32) -> (f32, f32) {
         let width = self.density.width(density);
         let mut volume = 1.0;
         for _ in 0..D {
             volume *= width;
         }
-        (self.law.center / (volume * density), self.law.inverse_a2 / (width * width), density)
+        (self.law.center / (volume * density), self.law.inverse_a2 / (width * width))
     }
 
     /// The estimates of all slots at the other ends of the edges of `slot`.
@@ -216,18 +271,32 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         self.places.is_known(slot as usize)
     }
 
+    /// Adds the candidates of one piece to the best: neighbors' estimates, and the old one.
     #[inline(always)]
     fn consider(
         &self,
-        near: &Columns<D>,
-        x: [f32; D],
+        own: &Piece<D>,
         (slot, piece): (usize, usize),
-        best: &mut Vec<Candidate<D>>,
+        old: &Estimate<D>,
+        scratch: &mut Scratch<D>,
     ) {
-        let (gain, inverse_a2, density) = self.law_at(&x);
-        let prior = PRIOR * ln(density) + self.pieces.ln_spread(slot, &x);
-        let score = prior + near.log_likelihood(&x, gain, inverse_a2);
-        best.push(Candidate { x, piece, score, prior });
+        let Scratch { near, tried, best, .. } = scratch;
+        let near = &near[piece];
+        tried.clear();
+        let step = near.len().div_ceil(CANDIDATES).max(1);
+        for i in (0..near.len()).step_by(step) {
+            tried.push(&own.project(&near.at(i)));
+        }
+        if old.status == Status::Ok && usize::from(old.axis) == piece {
+            tried.push(&old.position);
+        }
+        tried.weigh(self);
+        for i in 0..tried.density.len() {
+            let x = std::array::from_fn(|c| tried.x[c][i]);
+            let prior = tried.prior[i] + self.pieces.ln_spread(slot, &x);
+            let score = prior + near.log_likelihood(&x, tried.gain[i], tried.inverse_a2[i]);
+            best.push(Candidate { x, piece, score, prior });
+        }
     }
 
     /// The likeliest candidate, and how far it is ahead of the best one elsewhere. Where others come
@@ -265,7 +334,7 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
     #[inline(always)]
     fn by_records(&self, slot: usize, x: &[f32; D]) -> f32 {
         let slots_per_record = self.pieces.slots_per_record();
-        let (gain, inverse_a2, _) = self.law_at(x);
+        let (gain, inverse_a2) = self.law_at(x);
         let chance = self.pieces.record_chance(slot, x);
         let (ends, class) = self.graph.of(slot);
         let mut sum = 0.0;
@@ -283,87 +352,4 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         }
         sum
     }
-
-    /// `x` moved along `own` to the least squares of the records of near neighbors, weighted by how near
-    /// their estimates are. Estimates hold fully across their own pieces, and a little along them.
-    /// With it the number of these records.
-    #[inline(always)]
-    fn remake(&self, own: &Piece<D>, near: &Columns<D>, x: &[f32; D]) -> ([f32; D], u32) {
-        let width = self.density.width(self.density.at(x));
-        let inverse_kernel2 = 1.0 / (self.kernel * self.kernel * width * width);
-        // The sum of weighted matrices splits: the identity, and the neighbors' own pieces.
-        let (mut weight, mut pull) = (0.0f32, [0.0f32; D]);
-        let (mut free, mut free_pull) = ([[0.0f32; D]; D], [0.0f32; D]);
-        let (mut n, mut records, mut last) = (0, 0, usize::MAX);
-        let slots_per_record = self.pieces.slots_per_record();
-        for i in 0..near.len() {
-            let e = near.at(i);
-            let closeness = 1.0 - distance2(&e, x) * inverse_kernel2;
-            if closeness <= 0.0 {
-                continue;
-            }
-            let at = near.slot(i);
-            let along = self.pieces.piece(at, self.places.piece(at)).along;
-            n += 1;
-            // Both slots of a paired line are one record; they stand side by side.
-            let record = at / slots_per_record;
-            records += u32::from(record != last);
-            last = record;
-            weight += closeness;
-            for r in 0..D {
-                pull[r] += closeness * (e[r] - x[r]);
-                let mut moved = 0.0;
-                for c in 0..D {
-                    free[r][c] += closeness * along[r][c];
-                    moved += along[r][c] * (e[c] - x[c]);
-                }
-                free_pull[r] += closeness * moved;
-            }
-        }
-        let free_share = 1.0 - P::MOST_ALONG.min(P::ALONG / n.max(1) as f32);
-        let mut hold = [[0.0f32; D]; D];
-        for r in 0..D {
-            for c in 0..D {
-                hold[r][c] = -free_share * free[r][c];
-            }
-            hold[r][r] += weight;
-            pull[r] -= free_share * free_pull[r];
-        }
-        (own.project(&solve_within(own, x, &hold, &pull, weight)), records)
-    }
-}
-
-/// `x` plus the step along `own` that solves `hold step = pull` within it.
-#[inline(always)]
-fn solve_within<const D: usize>(
-    own: &Piece<D>,
-    x: &[f32; D],
-    hold: &[[f32; D]; D],
-    pull: &[f32; D],
-    weight: f32,
-) -> [f32; D] {
-    // P hold P + weight (1 - P): the part across the piece is decoupled and stays 0.
-    let p = &own.along;
-    let (mut half, mut full, mut right) = ([[0.0f32; D]; D], [[0.0f32; D]; D], [0.0f32; D]);
-    for r in 0..D {
-        for c in 0..D {
-            for k in 0..D {
-                half[r][c] += p[r][k] * hold[k][c];
-            }
-            right[r] += p[r][c] * pull[c];
-        }
-    }
-    for r in 0..D {
-        for c in 0..D {
-            for k in 0..D {
-                full[r][c] += half[r][k] * p[k][c];
-            }
-            full[r][c] -= weight * p[r][c];
-        }
-        full[r][r] += weight;
-    }
-    if !solve_symmetric(&mut full, &mut right) {
-        return *x;
-    }
-    std::array::from_fn(|c| x[c] + right[c])
 }

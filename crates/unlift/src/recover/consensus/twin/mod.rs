@@ -103,7 +103,7 @@ fn lines_equal_their_twin(rows: &[Line], obfuscation: Obfuscation<3>, what: &str
         let Family::Lines { chance, .. } = family else { panic!("lines") };
         let field = &chance[usize::from(rows[slot].2.unwrap_or(0))];
         let tube = tube(3, delta as f32);
-        let chance = |x: &[f64; 3]| f64::from(field.at(&x.map(|x| x as f32), tube, 0.0).p);
+        let chance = |x: &[f64; 3]| f64::from(field.at(&x.map(|x| x as f32), tube));
         let options = line_options(rows, slot, listed, delta, chance);
         if estimate.status != Status::Ok {
             return none_left(&options);
@@ -160,7 +160,7 @@ fn candidates_equal_their_twin() {
         check("candidates", Ok(obfuscation), delta, |slot, listed, estimate, family| {
             let Family::Candidates { chance, .. } = family else { panic!("candidates") };
             let tube = tube(3, delta as f32);
-            let chance = |x: &[f64; 3]| f64::from(chance.at(&x.map(|x| x as f32), tube).p);
+            let chance = |x: &[f64; 3]| f64::from(chance.at(&x.map(|x| x as f32), tube));
             let options = candidate_options(&rows, slot, listed, delta, chance);
             if estimate.status != Status::Ok {
                 return none_left(&options);

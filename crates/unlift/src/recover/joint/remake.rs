@@ -1,0 +1,217 @@
+//! A place made anew: least squares to the records of the neighbors found near it.
+
+use super::near::Columns;
+use super::pieces::{Piece, Pieces};
+use super::places::Places;
+use super::small::solve_symmetric;
+use crate::recover::lanes::{LANES, Lanes};
+
+/// Least squares steps.
+const STEPS: usize = 2;
+
+/// The directions of the pieces that neighbors lie on, in columns.
+#[derive(Debug)]
+pub(crate) struct Directions<const D: usize> {
+    columns: [Vec<f32>; D],
+}
+
+impl<const D: usize> Default for Directions<D> {
+    fn default() -> Self {
+        Self { columns: std::array::from_fn(|_| Vec::new()) }
+    }
+}
+
+impl<const D: usize> Directions<D> {
+    /// Those of the slots of `near`, padded as it is.
+    #[inline(always)]
+    fn gather<P: Pieces<D>>(&mut self, pieces: &P, places: &Places<D>, near: &Columns<D>) {
+        let n = near.len();
+        for column in &mut self.columns {
+            column.resize(n.next_multiple_of(LANES), 0.0);
+        }
+        let mut columns = self.columns.each_mut().map(|column| &mut column[..]);
+        for i in 0..n {
+            let slot = near.slot(i);
+            let direction = pieces.direction(slot, places.piece(slot));
+            for c in 0..D {
+                columns[c][i] = direction[c];
+            }
+        }
+        for column in &mut columns {
+            column[n..].fill(0.0);
+        }
+    }
+}
+
+/// Sums over neighbors near a place, each weighted by how near it is; one per lane.
+#[derive(Clone, Copy)]
+struct Sums<const D: usize> {
+    n: [u32; LANES],
+    weight: Lanes,
+    /// Differences to the place, and their parts along the directions of the neighbors' pieces.
+    pull: [Lanes; D],
+    free_pull: [Lanes; D],
+    /// Products of the coordinates of these directions; the upper half of a symmetric matrix.
+    free: [[Lanes; D]; D],
+}
+
+impl<const D: usize> Sums<D> {
+    const ZERO: Self = Self {
+        n: [0; LANES],
+        weight: [0.0; LANES],
+        pull: [[0.0; LANES]; D],
+        free_pull: [[0.0; LANES]; D],
+        free: [[[0.0; LANES]; D]; D],
+    };
+
+    /// Over the neighbors of `near` within `1 / sqrt(inverse_kernel2)` of `x`.
+    #[inline(always)]
+    fn new(
+        near: &Columns<D>,
+        directions: &Directions<D>,
+        x: &[f32; D],
+        inverse_kernel2: f32,
+    ) -> Self {
+        let mut sums = Self::ZERO;
+        let places = near.vectors();
+        let directions: [&[Lanes]; D] =
+            std::array::from_fn(|c| &directions.columns[c].as_chunks().0[..places[0].len()]);
+        for i in 0..places[0].len() {
+            for lane in 0..LANES {
+                let away: [f32; D] = std::array::from_fn(|c| places[c][i][lane] - x[c]);
+                let toward: [f32; D] = std::array::from_fn(|c| directions[c][i][lane]);
+                let (mut r2, mut along) = (0.0, 0.0);
+                for c in 0..D {
+                    r2 += away[c] * away[c];
+                    along += toward[c] * away[c];
+                }
+                let closeness = (1.0 - r2 * inverse_kernel2).max(0.0);
+                sums.n[lane] += u32::from(closeness > 0.0);
+                sums.weight[lane] += closeness;
+                for r in 0..D {
+                    let held = closeness * toward[r];
+                    sums.pull[r][lane] += closeness * away[r];
+                    sums.free_pull[r][lane] += held * along;
+                    for c in r..D {
+                        sums.free[r][c][lane] += held * toward[c];
+                    }
+                }
+            }
+        }
+        sums
+    }
+}
+
+#[inline(always)]
+fn total(lanes: &Lanes) -> f32 {
+    lanes.iter().sum()
+}
+
+/// `x` moved along `own` to the least squares of the records of near neighbors, weighted by how near their
+/// estimates are: within `1 / sqrt(inverse_kernel2)`. Estimates hold fully across their own pieces, and
+/// a little along them. With it the number of these records.
+#[inline(always)]
+pub(crate) fn remade<const D: usize, P: Pieces<D>>(
+    pieces: &P,
+    places: &Places<D>,
+    own: &Piece<D>,
+    (near, directions): (&Columns<D>, &mut Directions<D>),
+    mut x: [f32; D],
+    inverse_kernel2: impl Fn(&[f32; D]) -> f32,
+) -> ([f32; D], u32) {
+    directions.gather(pieces, places, near);
+    let mut records = 0;
+    for step in 1..=STEPS {
+        let inverse_kernel2 = inverse_kernel2(&x);
+        let sums = Sums::new(near, directions, &x, inverse_kernel2);
+        let n: u32 = sums.n.iter().sum();
+        if step == STEPS {
+            records = n;
+            if pieces.slots_per_record() > 1 {
+                records = n_records(near, pieces.slots_per_record(), &x, inverse_kernel2);
+            }
+        }
+        x = own.project(&moved::<D, P>(own, &x, &sums, n));
+    }
+    (x, records)
+}
+
+/// Records within a kernel of `x`: both slots of a paired line are one, and stand side by side.
+#[inline(always)]
+fn n_records<const D: usize>(
+    near: &Columns<D>,
+    slots_per_record: usize,
+    x: &[f32; D],
+    inverse_kernel2: f32,
+) -> u32 {
+    let (mut records, mut last) = (0, usize::MAX);
+    for i in 0..near.len() {
+        if 1.0 - near.distance2(i, x) * inverse_kernel2 > 0.0 {
+            let record = near.slot(i) / slots_per_record;
+            records += u32::from(record != last);
+            last = record;
+        }
+    }
+    records
+}
+
+/// One step of least squares.
+#[inline(always)]
+fn moved<const D: usize, P: Pieces<D>>(
+    own: &Piece<D>,
+    x: &[f32; D],
+    sums: &Sums<D>,
+    n: u32,
+) -> [f32; D] {
+    let weight = total(&sums.weight);
+    let mut pull = sums.pull.map(|lanes| total(&lanes));
+    // The part of neighbors that is free along their pieces: lines, or all but the normals of planes.
+    let (whole, sign) = if P::NORMAL { (1.0, -1.0) } else { (0.0, 1.0) };
+    let free_share = 1.0 - P::MOST_ALONG.min(P::ALONG / n.max(1) as f32);
+    let mut hold = [[0.0f32; D]; D];
+    for r in 0..D {
+        for c in r..D {
+            let free = sign * total(&sums.free[r][c]) + if r == c { whole * weight } else { 0.0 };
+            hold[r][c] = -free_share * free;
+            hold[c][r] = hold[r][c];
+        }
+        hold[r][r] += weight;
+        pull[r] -= free_share * (whole * pull[r] + sign * total(&sums.free_pull[r]));
+    }
+    solve_within(own, x, &hold, &pull, weight)
+}
+
+/// `x` plus the step along `own` that solves `hold step = pull` within it.
+#[inline(always)]
+fn solve_within<const D: usize>(
+    own: &Piece<D>,
+    x: &[f32; D],
+    hold: &[[f32; D]; D],
+    pull: &[f32; D],
+    weight: f32,
+) -> [f32; D] {
+    // P hold P + weight (1 - P): the part across the piece is decoupled and stays 0.
+    let p = &own.along;
+    let (mut half, mut full, mut right) = ([[0.0f32; D]; D], [[0.0f32; D]; D], [0.0f32; D]);
+    for r in 0..D {
+        for c in 0..D {
+            for k in 0..D {
+                half[r][c] += p[r][k] * hold[k][c];
+            }
+            right[r] += p[r][c] * pull[c];
+        }
+    }
+    for r in 0..D {
+        for c in 0..D {
+            for k in 0..D {
+                full[r][c] += half[r][k] * p[k][c];
+            }
+            full[r][c] -= weight * p[r][c];
+        }
+        full[r][r] += weight;
+    }
+    if !solve_symmetric(&mut full, &mut right) {
+        return *x;
+    }
+    std::array::from_fn(|c| x[c] + right[c])
+}
