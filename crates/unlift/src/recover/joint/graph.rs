@@ -160,8 +160,13 @@ impl NamedBy {
         let parts: Vec<Vec<Vec<Entry>>> = (0..n_slots.div_ceil(PART))
             .into_par_iter()
             .map(|part| {
-                let mut to = vec![Vec::new(); n_blocks];
-                for slot in part * PART..((part + 1) * PART).min(n_slots) {
+                let slots = part * PART..((part + 1) * PART).min(n_slots);
+                let mut counts = vec![0; n_blocks];
+                for record in slots.clone().flat_map(|slot| lists.of(slot)) {
+                    counts[record.index() / BLOCK] += 1;
+                }
+                let mut to: Vec<_> = counts.into_iter().map(Vec::with_capacity).collect();
+                for slot in slots {
                     let first = lists.offsets()[slot];
                     for (at, record) in lists.of(slot).iter().enumerate() {
                         let entry = (record.0, slot as u32, (first + at as u64) as u32);
@@ -247,35 +252,44 @@ impl Rows {
         score_class: &impl Fn(usize) -> u8,
     ) {
         let first = lists.offsets()[slot] as usize;
-        let all = named_by.of(slot / slots_per_record);
+        let (list, all) = (lists.of(slot), named_by.of(slot / slots_per_record));
         // Slots are in random order: every so many of them are as good as any.
-        let mut reverse = all.iter().step_by(all.len().div_ceil(most).max(1)).peekable();
+        let every = all.len().div_ceil(most).max(1);
+        let n_reverse = all.len().div_ceil(every);
         let class =
             |direction: usize, entry: usize| (direction * SCORE_CLASSES) as u8 + score_class(entry);
-        for (at, record) in lists.of(slot).iter().enumerate() {
-            let slots = record.0 * slots_per_record as u32;
-            while let Some(&&(by, entry)) = reverse.peek()
-                && by < slots
-            {
-                self.push(by, class(REVERSE, entry as usize));
-                reverse.next();
-            }
-            let mut direction = FORWARD;
-            while reverse.peek().is_some_and(|(by, _)| *by < slots + slots_per_record as u32) {
-                direction = MUTUAL;
-                reverse.next();
-            }
-            self.push(slots, class(direction, first + at));
+        let (own, mut to) = (slots_per_record as u32, self.ends.len());
+        self.ends.resize(to + list.len() + n_reverse, 0);
+        self.class.resize(to + list.len() + n_reverse, 0);
+        let mut put = |end: u32, class: u8, stays: bool| {
+            (self.ends[to], self.class[to]) = (end, class);
+            to += usize::from(stays);
+        };
+        // Which of two lists goes on is anyone's guess: steps are added, not branched on.
+        let (mut at, mut reverse, mut mutual) = (0, 0, u32::MAX);
+        while at < list.len() && reverse < n_reverse {
+            let (mine, (by, entry)) = (list[at].0, all[reverse * every]);
+            // One or two slots make a record.
+            let theirs = by >> (own - 1);
+            let (is_mine, is_theirs) = (mine <= theirs, theirs <= mine);
+            let of_mine = class(if is_theirs { MUTUAL } else { FORWARD }, first + at);
+            let of_theirs = class(REVERSE, entry as usize);
+            let end = if is_mine { mine * own } else { by };
+            // The other slot of a record that is mutual already says nothing new.
+            put(end, if is_mine { of_mine } else { of_theirs }, is_mine | (theirs != mutual));
+            mutual = if is_mine & is_theirs { theirs } else { mutual };
+            at += usize::from(is_mine);
+            reverse += usize::from(is_theirs);
         }
-        for &(by, entry) in reverse {
-            self.push(by, class(REVERSE, entry as usize));
+        for (at, record) in list.iter().enumerate().skip(at) {
+            put(record.0 * own, class(FORWARD, first + at), true);
         }
+        for &(by, entry) in all.iter().step_by(every).skip(reverse) {
+            put(by, class(REVERSE, entry as usize), by >> (own - 1) != mutual);
+        }
+        self.ends.truncate(to);
+        self.class.truncate(to);
         self.row_ends.push(self.ends.len() as u32);
-    }
-
-    fn push(&mut self, end: u32, class: u8) {
-        self.ends.push(end);
-        self.class.push(class);
     }
 }
 

@@ -62,10 +62,28 @@ impl<const D: usize> Columns<D> {
         std::array::from_fn(|c| self.x[c].as_chunks().0)
     }
 
-    /// The squared distance from `x` to the estimate in row `i`.
+    /// Records of estimates within `1 / sqrt(inverse_kernel2)` of `x`: both slots of a paired line are one, and
+    /// stand side by side.
     #[inline(always)]
-    pub(crate) fn distance2(&self, i: usize, x: &[f32; D]) -> f32 {
-        distance2(&self.at(i), x)
+    pub(crate) fn n_records(
+        &mut self,
+        slots_per_record: usize,
+        x: &[f32; D],
+        inverse_kernel2: f32,
+    ) -> u32 {
+        let n = self.len();
+        self.apart2.resize(n, 0.0);
+        for i in 0..n {
+            self.apart2[i] = distance2(&self.at(i), x);
+        }
+        let within = |&apart2: &f32| 1.0 - apart2 * inverse_kernel2 > 0.0;
+        let all: u32 = self.apart2.iter().map(|apart2| u32::from(within(apart2))).sum();
+        let is_pair = |slots: &[u32]| slots_per_record == 2 && slots[0] / 2 == slots[1] / 2;
+        let pairs = self.apart2.windows(2).zip(self.slot.windows(2));
+        let twice = |(apart2, slots): (&[f32], &[u32])| {
+            u32::from(within(&apart2[0]) & within(&apart2[1]) & is_pair(slots))
+        };
+        all - pairs.map(twice).sum::<u32>()
     }
 
     /// The slot whose estimate is in row `i`.
@@ -127,17 +145,26 @@ impl<const D: usize> Columns<D> {
     pub(crate) fn log_likelihood(&self, x: &[f32; D], gain: f32, inverse_a2: f32) -> f32 {
         let mut sums = [0.0f32; LANES];
         let (odds, _) = self.odds.as_chunks::<LANES>();
-        let columns: [&[[f32; LANES]]; D] =
-            std::array::from_fn(|c| &self.x[c].as_chunks::<LANES>().0[..odds.len()]);
-        for (i, odds) in odds.iter().enumerate() {
+        let columns: [&[Lanes]; D] =
+            std::array::from_fn(|c| &self.x[c].as_chunks().0[..odds.len()]);
+        let likelier = |i: usize, lane: usize| {
+            let mut r2 = 0.0;
+            for c in 0..D {
+                let d = columns[c][i][lane] - x[c];
+                r2 += d * d;
+            }
+            let q = 1.0 / (1.0 + r2 * inverse_a2);
+            1.0 + odds[i][lane] * gain * (q * q * q)
+        };
+        // One logarithm of two at a time: no product comes near the end of `f32`.
+        for i in 0..odds.len() / 2 {
             for lane in 0..LANES {
-                let mut r2 = 0.0;
-                for c in 0..D {
-                    let d = columns[c][i][lane] - x[c];
-                    r2 += d * d;
-                }
-                let q = 1.0 / (1.0 + r2 * inverse_a2);
-                sums[lane] += ln(1.0 + odds[lane] * gain * (q * q * q));
+                sums[lane] += ln(likelier(2 * i, lane) * likelier(2 * i + 1, lane));
+            }
+        }
+        if odds.len() % 2 == 1 {
+            for lane in 0..LANES {
+                sums[lane] += ln(likelier(odds.len() - 1, lane));
             }
         }
         sums.iter().sum()

@@ -115,7 +115,7 @@ pub(crate) fn remade<const D: usize, P: Pieces<D>>(
     pieces: &P,
     places: &Places<D>,
     own: &Piece<D>,
-    (near, directions): (&Columns<D>, &mut Directions<D>),
+    (near, directions): (&mut Columns<D>, &mut Directions<D>),
     mut x: [f32; D],
     inverse_kernel2: impl Fn(&[f32; D]) -> f32,
 ) -> ([f32; D], u32) {
@@ -128,31 +128,12 @@ pub(crate) fn remade<const D: usize, P: Pieces<D>>(
         if step == STEPS {
             records = n;
             if pieces.slots_per_record() > 1 {
-                records = n_records(near, pieces.slots_per_record(), &x, inverse_kernel2);
+                records = near.n_records(pieces.slots_per_record(), &x, inverse_kernel2);
             }
         }
         x = own.project(&moved::<D, P>(own, &x, &sums, n));
     }
     (x, records)
-}
-
-/// Records within a kernel of `x`: both slots of a paired line are one, and stand side by side.
-#[inline(always)]
-fn n_records<const D: usize>(
-    near: &Columns<D>,
-    slots_per_record: usize,
-    x: &[f32; D],
-    inverse_kernel2: f32,
-) -> u32 {
-    let (mut records, mut last) = (0, usize::MAX);
-    for i in 0..near.len() {
-        if 1.0 - near.distance2(i, x) * inverse_kernel2 > 0.0 {
-            let record = near.slot(i) / slots_per_record;
-            records += u32::from(record != last);
-            last = record;
-        }
-    }
-    records
 }
 
 /// One step of least squares.

@@ -154,7 +154,7 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
             return (*old, 0.0);
         };
         let own = self.pieces.piece(slot, first.piece);
-        let near = &scratch.near[first.piece];
+        let near = &mut scratch.near[first.piece];
         if near.len() == 0 {
             return (*old, 0.0);
         }
