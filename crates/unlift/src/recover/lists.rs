@@ -2,6 +2,7 @@
 
 use crate::RecordId;
 use crate::neighbors::Neighborhoods;
+use crate::simd::prefetch;
 
 /// Neighborhoods as given, or with every entry replaced by one from another slot's list.
 #[derive(Clone, Copy, Debug)]
@@ -46,6 +47,17 @@ impl<'a> Lists<'a> {
             buffer.push(entries[at]);
         }
         buffer
+    }
+
+    /// Brings the rows near that `slot` lists, if there is such a slot.
+    #[inline(always)]
+    pub(crate) fn prefetch<T>(&self, slot: usize, rows: &[T]) {
+        // Mixed lists are of small samples.
+        if slot < self.n_slots() && !self.mixed {
+            for record in self.neighborhoods.of(slot) {
+                prefetch(rows, record.index());
+            }
+        }
     }
 
     /// All entries of all lists.

@@ -98,8 +98,11 @@ pub(super) fn of<const D: usize, P: Pieces<D>, E: Edges>(
     let mut along = vec![Crowd::default(); estimates.len()];
     let by_part = || order.par_chunks(PART);
     along.par_chunks_mut(PART).zip(by_part()).for_each_init(Vec::new, |near, (crowds, slots)| {
-        for (crowd, &slot) in crowds.iter_mut().zip(slots) {
+        for (at, (crowd, &slot)) in crowds.iter_mut().zip(slots).enumerate() {
             let slot = slot as usize;
+            if let Some(&next) = slots.get(at + 1) {
+                look.prefetch(next as usize);
+            }
             if estimates[slot].status == Status::Ok {
                 *crowd = look.crowd(slot, &estimates[slot], near);
                 let before = &unsettled[slot];
@@ -129,6 +132,15 @@ pub(super) fn of<const D: usize, P: Pieces<D>, E: Edges>(
 }
 
 impl<const D: usize, P: Pieces<D>, E: Edges> Look<'_, D, P, E> {
+    /// Brings near what [`crowd`](Self::crowd) looks at.
+    fn prefetch(&self, slot: usize) {
+        let slots_per_record = self.pieces.slots_per_record();
+        self.edges.each(slot, |end, _| {
+            self.places.prefetch(end as usize);
+            self.pieces.prefetch(end as usize / slots_per_record);
+        });
+    }
+
     fn crowd(&self, slot: usize, own: &Estimate<D>, near: &mut Vec<Near>) -> Crowd {
         let x = own.position;
         let density = self.density.at(&x);

@@ -55,6 +55,7 @@ impl<const D: usize> Kernel for Chunk<'_, D> {
     fn run(self) {
         let Self { problem, first, out, scratch } = self;
         for (at, estimate) in out.iter_mut().enumerate() {
+            problem.lists.prefetch(first + at + 1, problem.rows);
             *estimate = solve_slot(problem, first + at, scratch);
         }
     }

@@ -74,6 +74,8 @@ fn mean_evidence<const D: usize>(estimates: &[Estimate<D>]) -> f64 {
     sum / estimates.len().max(1) as f64
 }
 
+/// The next slot whose turn it is is looked for among so many.
+const MOST_AHEAD: usize = 8;
 /// Sweeps over all slots at most.
 const SWEEPS: usize = 16;
 /// Rounds of a sweep: in each, every so many-th slot moves. In the first sweep all move at once: its
@@ -203,10 +205,14 @@ impl<const D: usize, P: Pieces<D>> Kernel for Chunk<'_, '_, D, P> {
     #[inline(always)]
     fn run(self) {
         let is_turn_of = self.round.is_turn_of();
-        for (fresh, &slot) in self.fresh.iter_mut().zip(self.slots) {
+        for (at, (fresh, &slot)) in self.fresh.iter_mut().zip(self.slots).enumerate() {
             let slot = slot as usize;
             if !is_turn_of(slot) {
                 continue;
+            }
+            let next = self.slots[at + 1..].iter().map(|&slot| slot as usize);
+            if let Some(next) = next.take(MOST_AHEAD).find(|&slot| is_turn_of(slot)) {
+                self.round.prefetch(next);
             }
             let (now, ahead) = (&self.now[slot], self.ahead[slot]);
             let is_settled = !self.round.moves[slot]

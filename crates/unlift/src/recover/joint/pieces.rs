@@ -5,6 +5,7 @@ use crate::recover::lanes::ln;
 use crate::recover::line_rows::LineRow;
 use crate::recover::plane_windows::SortedPlanes;
 use crate::released::AxisPlanes;
+use crate::simd::prefetch;
 
 /// A flat piece of a feasible set: a line, a half-line or a plane.
 #[derive(Clone, Copy, Debug)]
@@ -67,6 +68,8 @@ pub(crate) trait Pieces<const D: usize>: Sync {
     fn direction(&self, slot: usize, piece: usize) -> [f32; D];
     /// Whether a record near a place is evidence for a point of `slot`.
     fn may_vote(&self, slot: usize, record: usize) -> bool;
+    /// Brings the row of `record` near.
+    fn prefetch(&self, record: usize);
     /// Squared distance from `x` to where `record` may lie.
     fn record_distance2(&self, record: usize, x: &[f32; D]) -> f32;
     /// The chance that a random record that may vote for `slot` passes within delta of `x`.
@@ -133,6 +136,11 @@ impl<const D: usize> Pieces<D> for LinePieces<'_, D> {
     #[inline(always)]
     fn may_vote(&self, slot: usize, record: usize) -> bool {
         self.rows[record].may_vote_for(self.own(slot))
+    }
+
+    #[inline(always)]
+    fn prefetch(&self, record: usize) {
+        prefetch(self.rows, record);
     }
 
     #[inline(always)]
@@ -214,6 +222,11 @@ impl<const D: usize> Pieces<D> for PlanePieces<'_, D> {
     }
 
     #[inline(always)]
+    fn prefetch(&self, record: usize) {
+        prefetch(self.planes.offset(), record);
+    }
+
+    #[inline(always)]
     fn record_distance2(&self, record: usize, x: &[f32; D]) -> f32 {
         let axis = usize::from(self.planes.axis()[record]);
         let d = x[axis] - self.planes.offset()[record];
@@ -259,6 +272,11 @@ impl<const D: usize> Pieces<D> for CandidatePieces<'_, D> {
     #[inline(always)]
     fn may_vote(&self, _: usize, _: usize) -> bool {
         true
+    }
+
+    #[inline(always)]
+    fn prefetch(&self, record: usize) {
+        prefetch(self.rows, record);
     }
 
     #[inline(always)]

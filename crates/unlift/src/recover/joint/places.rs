@@ -2,6 +2,7 @@
 
 use crate::recover::chance_field::trimmed;
 use crate::recover::{Estimate, Status};
+use crate::simd::prefetch;
 
 /// A slot's estimate: one memory access.
 #[derive(Clone, Copy, Debug)]
@@ -48,6 +49,12 @@ impl<const D: usize> Places<D> {
     #[inline(always)]
     pub(crate) fn of(&self, slot: usize) -> [f32; D] {
         self.rows[slot].x
+    }
+
+    /// Brings the place of `slot` near.
+    #[inline(always)]
+    pub(crate) fn prefetch(&self, slot: usize) {
+        prefetch(&self.rows, slot);
     }
 
     /// Some of the known places, evenly over the slots.

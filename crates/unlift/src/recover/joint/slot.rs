@@ -133,6 +133,13 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         move |slot| slot % turns == turn
     }
 
+    /// Brings the places near that [`solve`](Self::solve) looks at.
+    #[inline(always)]
+    pub(crate) fn prefetch(&self, slot: usize) {
+        // The other slot of a record lies beside the one that is named.
+        self.graph.of(slot).0.iter().for_each(|&end| self.places.prefetch(end as usize));
+    }
+
     /// The new estimate of `slot`, and how many nats its place is ahead of the best one elsewhere; the
     /// old estimate when no neighbor says anything.
     #[inline(always)]
