@@ -211,7 +211,7 @@ impl Tally {
     }
 
     fn law<const D: usize>(&self, look: &Look<'_, D>) -> Law {
-        let chance = self.random.map(|counts| share_found(counts));
+        let chance = self.random.map(share_found);
         let [all, mutual] = [0, 1].map(|kind| self.excess(kind, D as i32));
         let mut radius = middle(&all);
         // Wrong entries that are near all the same are rarely mutual.

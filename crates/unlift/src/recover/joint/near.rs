@@ -158,13 +158,13 @@ impl<const D: usize> Columns<D> {
         };
         // One logarithm of two at a time: no product comes near the end of `f32`.
         for i in 0..odds.len() / 2 {
-            for lane in 0..LANES {
-                sums[lane] += ln(likelier(2 * i, lane) * likelier(2 * i + 1, lane));
+            for (lane, sum) in sums.iter_mut().enumerate() {
+                *sum += ln(likelier(2 * i, lane) * likelier(2 * i + 1, lane));
             }
         }
         if odds.len() % 2 == 1 {
-            for lane in 0..LANES {
-                sums[lane] += ln(likelier(odds.len() - 1, lane));
+            for (lane, sum) in sums.iter_mut().enumerate() {
+                *sum += ln(likelier(odds.len() - 1, lane));
             }
         }
         sums.iter().sum()

@@ -33,8 +33,8 @@ impl<const D: usize> Directions<D> {
         for i in 0..n {
             let slot = near.slot(i);
             let direction = pieces.direction(slot, places.piece(slot));
-            for c in 0..D {
-                columns[c][i] = direction[c];
+            for (column, along) in columns.iter_mut().zip(direction) {
+                column[i] = along;
             }
         }
         for column in &mut columns {
@@ -92,8 +92,8 @@ impl<const D: usize> Sums<D> {
                     let held = closeness * toward[r];
                     sums.pull[r][lane] += closeness * away[r];
                     sums.free_pull[r][lane] += held * along;
-                    for c in r..D {
-                        sums.free[r][c][lane] += held * toward[c];
+                    for (c, toward) in toward.iter().enumerate().skip(r) {
+                        sums.free[r][c][lane] += held * toward;
                     }
                 }
             }
@@ -150,13 +150,12 @@ fn moved<const D: usize, P: Pieces<D>>(
     let (whole, sign) = if P::NORMAL { (1.0, -1.0) } else { (0.0, 1.0) };
     let free_share = 1.0 - P::MOST_ALONG.min(P::ALONG / n.max(1) as f32);
     let mut hold = [[0.0f32; D]; D];
-    for r in 0..D {
-        for c in r..D {
-            let free = sign * total(&sums.free[r][c]) + if r == c { whole * weight } else { 0.0 };
-            hold[r][c] = -free_share * free;
-            hold[c][r] = hold[r][c];
+    for (r, row) in hold.iter_mut().enumerate() {
+        for (c, value) in row.iter_mut().enumerate() {
+            let free = sign * total(&sums.free[r.min(c)][r.max(c)]);
+            *value = -free_share * if r == c { free + whole * weight } else { free };
         }
-        hold[r][r] += weight;
+        row[r] += weight;
         pull[r] -= free_share * (whole * pull[r] + sign * total(&sums.free_pull[r]));
     }
     solve_within(own, x, &hold, &pull, weight)
