@@ -1,10 +1,13 @@
 //! How improbable an agreement is by chance (the evidence that decides between positions).
 //!
 //! Of `k` listed records `n` support a position, while a random one does with chance `p`. A wrong
-//! position gets Bin(k, p) votes. The evidence is the Chernoff
-//! bound on the tail, `k KL(n/k || p)` nats: it orders as the tail does, and has no branches.
+//! position gets Bin(k, p) votes. The evidence is the Chernoff bound on the tail, `k KL(n/k || p)` nats:
+//! it orders as the tail does, and has no branches.
 
 use super::lanes::ln;
+
+/// The chance that a random record agrees is taken for at most this.
+pub(crate) const MOST_CHANCE: f32 = 0.5;
 
 /// Evidence in nats that `n` of `k` listed records agree where a random one does with probability
 /// `p`, above 0 and below 1; 0 when chance alone would give as many.
@@ -44,6 +47,22 @@ mod tests {
         }
         // 26 votes where 20 are expected are far likelier than 4 where 0.25 are.
         assert!(evidence(26.0, 50.0, 0.4) < evidence(4.0, 50.0, 0.005));
+    }
+
+    #[test]
+    fn evidence_is_near_the_exact_bound() {
+        for k in [1, 2, 7, 20, 50, 100, 400] {
+            for n in 0..=k {
+                for p in [1e-6, 1e-4, 0.005, 0.03, 0.2, f64::from(MOST_CHANCE)] {
+                    let share = n as f64 / k as f64;
+                    let term = |x: f64, y: f64| if x > 0.0 { x * (x / y).ln() } else { 0.0 };
+                    let exact = k as f64 * (term(share, p) + term(1.0 - share, 1.0 - p));
+                    let exact = if share <= p { 0.0 } else { exact };
+                    let found = f64::from(evidence(n as f32, k as f32, p as f32));
+                    assert!((found - exact).abs() <= 2e-3, "{n} of {k} at {p}: {found}, {exact}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -8,9 +8,9 @@
 
 use rayon::prelude::*;
 
+use super::chance::MOST_CHANCE;
 use super::grid::Grid;
 use super::line_rows::LineRow;
-use super::sections::MOST_CHANCE;
 use crate::neighbors::Neighborhoods;
 use crate::simd::{Kernel, dispatch};
 
@@ -61,7 +61,7 @@ impl<const D: usize> ChanceField<D> {
         (self.grid.values[self.grid.index(x)] * tube).min(MOST_CHANCE)
     }
 
-    /// Adds the same at each `t` of a line to `chance`, with room for a cell each.
+    /// Adds the same, however large, at each `t` of a line to `chance`, with room for a cell each.
     #[inline(always)]
     pub(crate) fn add_along(
         &self,
@@ -72,7 +72,7 @@ impl<const D: usize> ChanceField<D> {
     ) {
         self.grid.cells_along(through, direction, t, cells);
         for (chance, &cell) in chance.iter_mut().zip(cells.iter()) {
-            *chance += (self.grid.values[cell as usize] * tube).min(MOST_CHANCE);
+            *chance += self.grid.values[cell as usize] * tube;
         }
     }
 }
@@ -252,7 +252,8 @@ impl<const D: usize> CandidateField<D> {
         self.along.iter().map(|field| field.at(x, tube)).sum::<f32>().min(MOST_CHANCE)
     }
 
-    /// Adds the same at each `t` of the line through `own` along `axis` to `chance`, with room for a cell each.
+    /// Adds the same, however large, at each `t` of the line through `own` along `axis` to `chance`, with room for
+    /// a cell each.
     #[inline(always)]
     pub(crate) fn add_along(
         &self,

@@ -167,3 +167,47 @@ impl<const D: usize> Grid<D> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::seed::{Draws, Stage};
+
+    /// The cell of a place, counted in another way.
+    fn counted(grid: &Grid<3>, place: &[f32; 3]) -> usize {
+        (0..3).fold(0, |number, c| {
+            let at = f64::from(place[c] - grid.low[c]) / f64::from(grid.cell);
+            // Not a number is nowhere, and nowhere is the first cell.
+            let whole = if at.is_nan() { 0.0 } else { at.floor() };
+            number * grid.dims[c] + whole.clamp(0.0, (grid.dims[c] - 1) as f64) as usize
+        })
+    }
+
+    #[test]
+    fn places_fall_into_their_cells_however_they_are_asked_for() {
+        let grid = Grid::over([-3.0, 0.0, 2.0], [4.0, 5.0, 2.0], 4096);
+        assert_eq!(grid.dims[2], 1);
+        let mut draws = Draws::new(3, Stage::Synthetic, 0);
+        let mut places: Vec<[f32; 3]> = (0..5000)
+            .map(|_| std::array::from_fn(|_| draws.between(-6.0, 8.0) as f32))
+            .collect();
+        places.extend([
+            [f32::INFINITY, 1.0, f32::NEG_INFINITY],
+            [1e30, -1e30, 2.0],
+            [f32::NAN, 1.0, 2.0],
+            [f32::MAX, f32::MIN, 0.0],
+        ]);
+        let columns: [Vec<f32>; 3] =
+            std::array::from_fn(|c| places.iter().map(|place| place[c]).collect());
+        let mut cells = vec![0; places.len()];
+        grid.cells_of(&columns.each_ref().map(|column| &column[..]), &mut cells);
+        for (place, &cell) in places.iter().zip(&cells) {
+            let number = grid.index(place);
+            assert_eq!(number, cell as usize, "{place:?}");
+            assert_eq!(number, counted(&grid, place), "{place:?}");
+            let mut along = [0; 1];
+            grid.cells_along(place, &[0.0; 3], &[0.0], &mut along);
+            assert_eq!(along[0], cell, "{place:?}");
+        }
+    }
+}

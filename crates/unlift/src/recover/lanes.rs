@@ -18,3 +18,22 @@ pub(crate) fn ln(y: f32) -> f32 {
     let p = m * (0.317_648_7 + m * (-0.193_760_2 + m * (0.085_569_24 - m * 0.018_338_63)));
     exponent as f32 * std::f32::consts::LN_2 + m * (0.999_901_65 + m * (-0.497_875 + p))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn logarithm_is_near_the_exact_one() {
+        // Every exponent, and mantissas all over.
+        for exponent in -126..127 {
+            for step in 0..1000 {
+                let y = (exponent as f32).exp2() * (1.0 + step as f32 / 1000.0);
+                let exact = f64::from(y).ln();
+                let off = (f64::from(ln(y)) - exact).abs();
+                assert!(off <= 2.5e-6 + 1e-7 * exact.abs(), "ln {y}: off by {off}");
+            }
+        }
+        assert_eq!(ln(1.0), 0.0);
+    }
+}

@@ -6,7 +6,7 @@
 //! every `t` alike, as a parallel axis of a candidate does). Within `delta` of a
 //! record is therefore an interval of `t`.
 
-use super::chance::evidence;
+use super::chance::{MOST_CHANCE, evidence};
 use super::lanes::{LANES, ln};
 
 /// Sections of one list of records with one feasible line, in columns.
@@ -200,6 +200,3 @@ impl AtStarts {
         }
     }
 }
-
-/// A chance is at most this.
-pub(crate) const MOST_CHANCE: f32 = 0.5;

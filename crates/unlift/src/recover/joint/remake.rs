@@ -10,36 +10,29 @@ use crate::recover::lanes::{LANES, Lanes};
 const STEPS: usize = 2;
 
 /// The directions of the pieces that neighbors lie on, in columns.
-#[derive(Debug)]
-pub(crate) struct Directions<const D: usize> {
-    columns: [Vec<f32>; D],
-}
+pub(crate) type Directions<const D: usize> = [Vec<f32>; D];
 
-impl<const D: usize> Default for Directions<D> {
-    fn default() -> Self {
-        Self { columns: std::array::from_fn(|_| Vec::new()) }
+/// Makes `directions` those of the slots of `near`, padded as it is.
+#[inline(always)]
+fn gather<const D: usize, P: Pieces<D>>(
+    directions: &mut Directions<D>,
+    (pieces, places): (&P, &Places<D>),
+    near: &Columns<D>,
+) {
+    let n = near.len();
+    for column in &mut *directions {
+        column.resize(n.next_multiple_of(LANES), 0.0);
     }
-}
-
-impl<const D: usize> Directions<D> {
-    /// Those of the slots of `near`, padded as it is.
-    #[inline(always)]
-    fn gather<P: Pieces<D>>(&mut self, pieces: &P, places: &Places<D>, near: &Columns<D>) {
-        let n = near.len();
-        for column in &mut self.columns {
-            column.resize(n.next_multiple_of(LANES), 0.0);
+    let mut columns = directions.each_mut().map(|column| &mut column[..]);
+    for i in 0..n {
+        let slot = near.slot(i);
+        let direction = pieces.direction(slot, places.piece(slot));
+        for (column, along) in columns.iter_mut().zip(direction) {
+            column[i] = along;
         }
-        let mut columns = self.columns.each_mut().map(|column| &mut column[..]);
-        for i in 0..n {
-            let slot = near.slot(i);
-            let direction = pieces.direction(slot, places.piece(slot));
-            for (column, along) in columns.iter_mut().zip(direction) {
-                column[i] = along;
-            }
-        }
-        for column in &mut columns {
-            column[n..].fill(0.0);
-        }
+    }
+    for column in &mut columns {
+        column[n..].fill(0.0);
     }
 }
 
@@ -75,7 +68,7 @@ impl<const D: usize> Sums<D> {
         let mut sums = Self::ZERO;
         let places = near.vectors();
         let directions: [&[Lanes]; D] =
-            std::array::from_fn(|c| &directions.columns[c].as_chunks().0[..places[0].len()]);
+            std::array::from_fn(|c| &directions[c].as_chunks().0[..places[0].len()]);
         for i in 0..places[0].len() {
             for lane in 0..LANES {
                 let away: [f32; D] = std::array::from_fn(|c| places[c][i][lane] - x[c]);
@@ -119,7 +112,7 @@ pub(crate) fn remade<const D: usize, P: Pieces<D>>(
     mut x: [f32; D],
     inverse_kernel2: impl Fn(&[f32; D]) -> f32,
 ) -> ([f32; D], u32) {
-    directions.gather(pieces, places, near);
+    gather(directions, (pieces, places), near);
     let mut records = 0;
     for step in 1..=STEPS {
         let inverse_kernel2 = inverse_kernel2(&x);

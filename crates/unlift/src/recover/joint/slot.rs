@@ -118,7 +118,7 @@ impl<const D: usize> Default for Scratch<D> {
         Self {
             all: Columns::default(),
             near,
-            directions: Directions::default(),
+            directions: std::array::from_fn(|_| Vec::new()),
             tried: Tried::default(),
             best: Vec::new(),
         }
