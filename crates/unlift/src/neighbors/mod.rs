@@ -3,13 +3,15 @@
 //! `oracle` makes them from the originals, for experiments. All others take what an attacker has, a
 //! released map, and stand in [`sources::SOURCES`].
 
-mod all_pairs;
+mod alike;
 mod best;
+mod compare;
 mod geometric;
 mod join;
 mod neighborhoods;
 pub mod oracle;
 mod overlap;
+mod pairs;
 mod rows;
 mod similarity;
 pub mod sources;

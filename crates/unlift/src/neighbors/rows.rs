@@ -7,6 +7,10 @@ use crate::descriptors::Values;
 use crate::released::Released;
 use crate::{Descriptors, Error, RecordId};
 
+fn records_of(slots: &[u32], slots_per_record: usize) -> Vec<u32> {
+    slots.iter().map(|&slot| slot / slots_per_record as u32).collect()
+}
+
 /// Descriptor rows sorted by content. Sums and ties then do not depend on the order in which a map
 /// was released: permuting its records permutes its lists (up to rows that are equal altogether).
 #[derive(Debug)]
@@ -48,8 +52,26 @@ impl<'a> Rows<'a> {
             }),
         }
         let slots_per_record = released.slots_per_record();
-        let records = slots.iter().map(|&slot| slot / slots_per_record as u32).collect();
+        let records = records_of(&slots, slots_per_record);
         Ok(Self { descriptors, slots, records, n_records, slots_per_record })
+    }
+
+    /// All rows of `descriptors` as they stand, each a record of its own.
+    pub fn of_all(descriptors: &'a Descriptors) -> Self {
+        let slots: Vec<u32> = (0..descriptors.len() as u32).collect();
+        Self {
+            descriptors,
+            records: slots.clone(),
+            n_records: slots.len(),
+            slots_per_record: 1,
+            slots,
+        }
+    }
+
+    /// Puts the rows in another order of slots.
+    pub fn reorder(&mut self, slots: Vec<u32>) {
+        self.records = records_of(&slots, self.slots_per_record);
+        self.slots = slots;
     }
 
     /// Number of rows.

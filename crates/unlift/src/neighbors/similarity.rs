@@ -1,9 +1,7 @@
 //! Neighborhoods from any descriptors: near points look alike more often than far ones.
 
-use rayon::prelude::*;
-
 use super::Neighborhoods;
-use super::all_pairs::{self, Blocks};
+use super::compare::{Likeness, MOST_ROWS, search};
 use super::rows::Rows;
 use crate::descriptors::Values;
 use crate::released::Released;
@@ -13,65 +11,60 @@ use crate::{Descriptors, Error};
 /// The `k` records with the most similar descriptors. Scores: cosine similarity; of a record with two
 /// descriptors the larger.
 ///
-/// Exact, and therefore quadratic in slots.
+/// Exact up to [`MOST_ROWS`] slots. Of more, each is compared with those that look
+/// alike on the whole.
 ///
 /// # Errors
-/// When the map has no descriptors, fewer than `k` other records, or too many slots to compare all
-/// pairs.
+/// When the map has no descriptors, or fewer than `k` other records.
 pub fn similarity<const D: usize>(
     released: &Released<D>,
     k: usize,
 ) -> Result<Neighborhoods, Error> {
-    let rows = Rows::new(released, k)?;
-    all_pairs::check(rows.len())?;
-    let units = Units::new(rows.descriptors, &rows.slots);
-    let found = all_pairs::compare(&units, &rows.records, rows.enough_for(k));
+    let mut rows = Rows::new(released, k)?;
+    let enough = rows.enough_for(k);
+    let found = search(&Cosine, &mut rows, enough, MOST_ROWS)?;
     let ranked: Vec<_> = found.into_iter().map(|found| found.best).collect();
     rows.lists(&ranked, k)
 }
 
-/// Descriptors of unit length, in blocks of rows and, transposed, of columns.
-struct Units {
+/// The cosine of two descriptors.
+pub struct Cosine;
+
+/// Descriptors of unit length, as rows and, transposed, as columns.
+pub struct Units {
     dim: usize,
-    n: usize,
-    blocks: Vec<(Vec<f32>, Vec<f32>)>,
+    rows: Vec<f32>,
+    columns: Vec<f32>,
 }
 
-impl Units {
-    fn new(descriptors: &Descriptors, order: &[u32]) -> Self {
-        let dim = descriptors.dim();
-        let block = |slots: &[u32]| {
-            let (mut rows, mut columns) = (vec![0.0; BLOCK * dim], vec![0.0; BLOCK * dim]);
-            for (at, &slot) in slots.iter().enumerate() {
-                let range = slot as usize * dim..(slot as usize + 1) * dim;
-                let row: Vec<f64> = match descriptors.values() {
-                    Values::U8(v) => v[range].iter().map(|&x| f64::from(x)).collect(),
-                    Values::F32(v) => v[range].iter().map(|&x| f64::from(x)).collect(),
-                };
-                // A blank descriptor is like none other: its similarities are 0.
-                let norm = row.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
-                for (c, x) in row.iter().enumerate() {
-                    let value = (x / norm) as f32;
-                    rows[at * dim + c] = value;
-                    columns[c * BLOCK + at] = value;
-                }
-            }
-            (rows, columns)
-        };
-        Self { dim, n: order.len(), blocks: order.par_chunks(BLOCK).map(block).collect() }
-    }
-}
-
-impl Blocks for Units {
+impl Likeness for Cosine {
     const EXACT: bool = false;
+    const PARTNERS: usize = 64;
+    type Block = Units;
 
-    fn len(&self) -> usize {
-        self.n
+    fn block(&self, descriptors: &Descriptors, slots: &[u32]) -> Units {
+        let dim = descriptors.dim();
+        let (mut rows, mut columns) = (vec![0.0; BLOCK * dim], vec![0.0; BLOCK * dim]);
+        for (at, &slot) in slots.iter().enumerate() {
+            let range = slot as usize * dim..(slot as usize + 1) * dim;
+            let row: Vec<f64> = match descriptors.values() {
+                Values::U8(v) => v[range].iter().map(|&x| f64::from(x)).collect(),
+                Values::F32(v) => v[range].iter().map(|&x| f64::from(x)).collect(),
+            };
+            // A blank descriptor is like none other: its similarities are 0.
+            let norm = row.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+            for (c, x) in row.iter().enumerate() {
+                let value = (x / norm) as f32;
+                rows[at * dim + c] = value;
+                columns[c * BLOCK + at] = value;
+            }
+        }
+        Units { dim, rows, columns }
     }
 
-    fn scores(&self, a: usize, b: usize, scores: &mut [f32]) {
-        let (rows, columns) = (&self.blocks[a].0, &self.blocks[b].1);
-        simd::dispatch(Product { rows, columns, dim: self.dim, products: scores });
+    fn scores(&self, a: &Units, b: &Units, scores: &mut [f32]) {
+        let (rows, columns) = (&a.rows, &b.columns);
+        simd::dispatch(Product { rows, columns, dim: a.dim, products: scores });
     }
 }
 

@@ -188,9 +188,8 @@ mod tests {
         let grid = Grid::over([-3.0, 0.0, 2.0], [4.0, 5.0, 2.0], 4096);
         assert_eq!(grid.dims[2], 1);
         let mut draws = Draws::new(3, Stage::Synthetic, 0);
-        let mut places: Vec<[f32; 3]> = (0..5000)
-            .map(|_| std::array::from_fn(|_| draws.between(-6.0, 8.0) as f32))
-            .collect();
+        let mut places: Vec<[f32; 3]> =
+            (0..5000).map(|_| std::array::from_fn(|_| draws.between(-6.0, 8.0) as f32)).collect();
         places.extend([
             [f32::INFINITY, 1.0, f32::NEG_INFINITY],
             [1e30, -1e30, 2.0],

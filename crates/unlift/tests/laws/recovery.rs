@@ -287,3 +287,11 @@ fn lists_belong_to_a_map() {
     over_schemes!(foreign_lists_are_refused);
     assert!(PointSet::try_new(vec![[0.0, f64::NAN]], Unit::Meter).is_err());
 }
+
+/// Where neighbors coincide, estimates differ by rounding alone: a law narrower than that once tore a pile apart.
+#[test]
+fn rounding_is_no_distance() {
+    const SEED: u64 = 7_442_521_786_000_528_742;
+    let scheme = unlift::obfuscate::scheme("ppl+").unwrap().in_3d.unwrap();
+    exact_limit("ppl+", scheme, SEED);
+}

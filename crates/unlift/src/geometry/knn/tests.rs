@@ -52,8 +52,7 @@ fn equals_brute_force_at_every_size_and_density() {
         // Cubing makes the middle a million times denser than the rim.
         let mut points = |_| std::array::from_fn(|_| draws.between(-1.0, 1.0).powi(3) * 1e3);
         compare(&(0..n).map(&mut points).collect::<Vec<[f64; 3]>>());
-        let flat: Vec<[f64; 2]> =
-            (0..n).map(&mut points).map(|p: [f64; 3]| [p[0], p[1]]).collect();
+        let flat: Vec<[f64; 2]> = (0..n).map(&mut points).map(|p: [f64; 3]| [p[0], p[1]]).collect();
         compare(&flat);
     }
 }
@@ -69,8 +68,7 @@ fn coincident_points_are_found_by_row() {
 #[test]
 fn any_position_can_ask() {
     let mut draws = Draws::new(9, Stage::Synthetic, 0);
-    let points: Vec<[f64; 3]> =
-        (0..700).map(|_| std::array::from_fn(|_| draws.normal())).collect();
+    let points: Vec<[f64; 3]> = (0..700).map(|_| std::array::from_fn(|_| draws.normal())).collect();
     let knn = Knn::new(&points).unwrap();
     let mut found = Vec::new();
     for _ in 0..200 {

@@ -7,10 +7,11 @@
 mod hypotheses;
 mod patches;
 
-use patches::Patches;
+pub use patches::Patches;
 
+use super::compare::{MOST_ROWS, search};
 use super::rows::Rows;
-use super::{Neighborhoods, all_pairs, walk};
+use super::{Neighborhoods, walk};
 use crate::Error;
 use crate::released::Released;
 
@@ -20,15 +21,16 @@ const CANDIDATES: usize = 64;
 /// The `k` records whose patches overlap each slot's patch most, or that a short walk over such
 /// records reaches. Scores: log of the (discounted) probability to be reached.
 ///
+/// Exact up to [`MOST_ROWS`] slots. Of more, each is compared with those that look alike on the whole, which finds
+/// fewer of its partners.
+///
 /// # Errors
 /// When the map has no SIFT descriptors, or fewer than `k` other records.
 pub fn overlap<const D: usize>(released: &Released<D>, k: usize) -> Result<Neighborhoods, Error> {
-    let rows = Rows::new(released, k)?;
-    all_pairs::check(rows.len())?;
+    let mut rows = Rows::new(released, k)?;
     let enough = rows.enough_for(k);
-    let patches = Patches::new(rows.descriptors, &rows.slots)?;
-    let found = all_pairs::compare(&patches, &rows.records, enough.max(CANDIDATES));
-    drop(patches);
+    let patches = Patches::of(rows.descriptors)?;
+    let found = search(&patches, &mut rows, enough.max(CANDIDATES), MOST_ROWS)?;
     let ranked = walk::standardized(&found);
     rows.lists(&walk::walk(&ranked, &rows.records, enough), k)
 }

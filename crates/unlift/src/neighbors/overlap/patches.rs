@@ -1,10 +1,8 @@
 //! Every version of every patch, as bytes of equal length, ready to be multiplied.
 
-use rayon::prelude::*;
-
 use super::hypotheses::{BINS, CELLS, Cell, DIM, Hypotheses, Version};
 use crate::descriptors::Values;
-use crate::neighbors::all_pairs::Blocks;
+use crate::neighbors::compare::Likeness;
 use crate::simd::{self, BLOCK};
 use crate::{Descriptors, Error};
 
@@ -16,25 +14,23 @@ const LENGTH: f32 = 127.0;
 /// each other.
 const NORM_FLOOR: f32 = 0.05;
 
-/// The patches of a map. Memory: about 10 KB a patch.
+/// How patches are compared.
 pub struct Patches {
     hypotheses: Hypotheses,
-    n: usize,
-    blocks: Vec<Block>,
 }
 
-/// The versions of [`BLOCK`] patches, one after the other; rows beyond the last patch are zero.
-struct Block {
+/// The versions of [`BLOCK`] patches, one after the other; rows beyond the last patch are zero. About 10 KB a patch.
+pub struct Block {
     turned: Vec<u8>,
     still: Vec<i8>,
 }
 
 impl Patches {
-    /// The patches of `descriptors`, taken in `order`.
+    /// For the patches of `descriptors`.
     ///
     /// # Errors
     /// When they are not SIFT: 128 columns, none negative.
-    pub fn new(descriptors: &Descriptors, order: &[u32]) -> Result<Self, Error> {
+    pub fn of(descriptors: &Descriptors) -> Result<Self, Error> {
         let expected = "SIFT (128 values, none negative)";
         if descriptors.dim() != DIM {
             let found = format!("{} values", descriptors.dim());
@@ -45,25 +41,21 @@ impl Patches {
         {
             return Err(Error::new("descriptors for overlap", expected, value.to_string()));
         }
-        let hypotheses = Hypotheses::new();
-        let blocks = order
-            .par_chunks(BLOCK)
-            .map(|slots| Block::new(&hypotheses, descriptors, slots))
-            .collect();
-        Ok(Self { hypotheses, n: order.len(), blocks })
+        Ok(Self { hypotheses: Hypotheses::new() })
     }
 }
 
-impl Blocks for Patches {
+impl Likeness for Patches {
     const EXACT: bool = true;
+    const PARTNERS: usize = 64;
+    type Block = Block;
 
-    fn len(&self) -> usize {
-        self.n
+    fn block(&self, descriptors: &Descriptors, slots: &[u32]) -> Block {
+        Block::new(&self.hypotheses, descriptors, slots)
     }
 
     /// The best cosine of shared cells over all hypotheses, as a product of bytes.
-    fn scores(&self, a: usize, b: usize, scores: &mut [f32]) {
-        let (a, b) = (&self.blocks[a], &self.blocks[b]);
+    fn scores(&self, a: &Block, b: &Block, scores: &mut [f32]) {
         let mut forth = vec![0i16; BLOCK * BLOCK];
         let mut back = forth.clone();
         let turned = starts(&self.hypotheses.turned);

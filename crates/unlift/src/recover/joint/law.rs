@@ -50,7 +50,8 @@ pub(crate) struct Look<'a, const D: usize> {
     pub(crate) slots_per_record: usize,
     /// True neighbors are looked for within this many local widths.
     pub(crate) reach: f32,
-    /// The radius of the law at most.
+    /// The radius of the law at least and at most.
+    pub(crate) least_radius: f32,
     pub(crate) most_radius: f32,
     pub(crate) sample: &'a Sample,
 }
@@ -218,7 +219,7 @@ impl Tally {
         if mutual.iter().sum::<f64>() >= ENOUGH && middle(&mutual) < TIGHTER * radius {
             radius = middle(&mutual);
         }
-        let radius = (radius as f32 * look.reach).min(look.most_radius).max(f32::MIN_POSITIVE);
+        let radius = (radius as f32 * look.reach).min(look.most_radius).max(look.least_radius);
         let (median, mass) = profile(D);
         let a = radius / median;
         Law {

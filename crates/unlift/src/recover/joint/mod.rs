@@ -85,6 +85,8 @@ const TURNS: usize = 2;
 const REACH: f32 = 4.0;
 /// Estimates enter the re-made position within this many radii of the law.
 const KERNEL: f32 = 3.75;
+/// The radius of the law is at least this share of the largest coordinate: estimates of one place differ by rounding.
+const ROUNDING: f32 = 8.0 * f32::EPSILON;
 /// The density of estimates is smooth over this many radii of the law.
 const SMOOTH: f32 = 4.5;
 /// Sweeps end when fewer than this share of the slots jump farther than a radius of the law.
@@ -110,6 +112,7 @@ fn rounds<const D: usize, P: Pieces<D>>(
     let (most_radius, delta2) = (P::MOST_RADIUS * delta, delta * delta);
     let mut now = start;
     let mut places = Places::new(&now);
+    let least_radius = (ROUNDING * places.farthest()).max(f32::MIN_POSITIVE);
     let order = along_curve(&places);
     let sample = Sample::new(graph, seed);
     // Nothing is settled yet.
@@ -129,6 +132,7 @@ fn rounds<const D: usize, P: Pieces<D>>(
                 density: &density,
                 slots_per_record,
                 reach: REACH * radius,
+                least_radius,
                 most_radius,
                 sample: &sample,
             });

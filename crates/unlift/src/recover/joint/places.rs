@@ -57,6 +57,12 @@ impl<const D: usize> Places<D> {
         prefetch(&self.rows, slot);
     }
 
+    /// The largest coordinate of a known place, without its sign.
+    pub(crate) fn farthest(&self) -> f32 {
+        let known = (0..self.len()).filter(|&slot| self.is_known(slot));
+        known.flat_map(|slot| self.of(slot)).fold(0.0, |most, x| most.max(x.abs()))
+    }
+
     /// Some of the known places, evenly over the slots.
     pub(crate) fn sample(&self) -> impl Iterator<Item = [f32; D]> + '_ {
         let every = self.len().div_ceil(SAMPLE).max(1);

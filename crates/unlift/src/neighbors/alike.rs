@@ -1,0 +1,148 @@
+//! An order of rows in which those that look alike stand together.
+//!
+//! Rows are halved at the median along the direction in which they differ most, and the halves again, until a
+//! part is one block. All parts but the last are full.
+
+use rayon::prelude::*;
+
+use crate::descriptors::Values;
+use crate::simd::BLOCK;
+use crate::{Descriptors, Error};
+
+/// Rows that tell the direction of a cut.
+const SAMPLE: usize = 256;
+/// Power iterations: any direction near the first is as good.
+const ITERATIONS: usize = 8;
+
+/// `slots` in that order.
+pub fn order(descriptors: &Descriptors, slots: &[u32]) -> Vec<u32> {
+    let mut slots = slots.to_vec();
+    halve(descriptors, &mut slots);
+    slots
+}
+
+fn halve(descriptors: &Descriptors, slots: &mut [u32]) {
+    if slots.len() <= BLOCK {
+        return;
+    }
+    let direction = widest(descriptors, slots);
+    let mut along: Vec<(f32, u32)> =
+        slots.par_iter().map(|&slot| (product(descriptors, slot, &direction), slot)).collect();
+    // Whole blocks on the left. Rows that are equal keep to the order of slots.
+    let left = (slots.len() / 2).next_multiple_of(BLOCK);
+    let by_place = |a: &(f32, u32), b: &(f32, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+    along.par_sort_unstable_by(by_place);
+    slots.iter_mut().zip(&along).for_each(|(slot, &(_, moved))| *slot = moved);
+    drop(along);
+    let (low, high) = slots.split_at_mut(left);
+    rayon::join(|| halve(descriptors, low), || halve(descriptors, high));
+}
+
+/// The direction in which rows differ most, from some of them.
+fn widest(descriptors: &Descriptors, slots: &[u32]) -> Vec<f32> {
+    let every = slots.len().div_ceil(SAMPLE).max(1);
+    let mut rows: Vec<Vec<f32>> =
+        slots.iter().step_by(every).map(|&slot| row(descriptors, slot)).collect();
+    let n = rows.len() as f32;
+    let mean: Vec<f32> =
+        (0..descriptors.dim()).map(|c| rows.iter().map(|row| row[c]).sum::<f32>() / n).collect();
+    for row in &mut rows {
+        row.iter_mut().zip(&mean).for_each(|(x, mean)| *x -= mean);
+    }
+    // From the row that is farthest from the middle.
+    let length2 = |row: &Vec<f32>| row.iter().map(|x| x * x).sum::<f32>();
+    let farthest = rows.iter().max_by(|a, b| length2(a).total_cmp(&length2(b)));
+    let mut direction = farthest.cloned().unwrap_or_default();
+    for _ in 0..ITERATIONS {
+        let mut next = vec![0.0f32; direction.len()];
+        for row in &rows {
+            let along: f32 = row.iter().zip(&direction).map(|(x, d)| x * d).sum();
+            next.iter_mut().zip(row).for_each(|(next, x)| *next += along * x);
+        }
+        let length = length2(&next).sqrt();
+        if length == 0.0 {
+            break;
+        }
+        direction = next.into_iter().map(|x| x / length).collect();
+    }
+    direction
+}
+
+fn row(descriptors: &Descriptors, slot: u32) -> Vec<f32> {
+    let dim = descriptors.dim();
+    let range = slot as usize * dim..(slot as usize + 1) * dim;
+    match descriptors.values() {
+        Values::U8(v) => v[range].iter().map(|&x| f32::from(x)).collect(),
+        Values::F32(v) => v[range].to_vec(),
+    }
+}
+
+fn product(descriptors: &Descriptors, slot: u32, direction: &[f32]) -> f32 {
+    let dim = descriptors.dim();
+    let range = slot as usize * dim..(slot as usize + 1) * dim;
+    match descriptors.values() {
+        Values::U8(v) => v[range].iter().zip(direction).map(|(&x, d)| f32::from(x) * d).sum(),
+        Values::F32(v) => v[range].iter().zip(direction).map(|(x, d)| x * d).sum(),
+    }
+}
+
+/// The mean row of each block of `slots`.
+///
+/// # Errors
+/// When all of them are the same.
+pub fn means(descriptors: &Descriptors, slots: &[u32]) -> Result<Descriptors, Error> {
+    let mean = |slots: &[u32]| {
+        let mut sum = vec![0.0f32; descriptors.dim()];
+        for &slot in slots {
+            sum.iter_mut().zip(row(descriptors, slot)).for_each(|(sum, x)| *sum += x);
+        }
+        sum.into_iter().map(move |x| x / slots.len() as f32).collect::<Vec<f32>>()
+    };
+    let values: Vec<f32> = slots.par_chunks(BLOCK).flat_map_iter(mean).collect();
+    Descriptors::try_new(Values::F32(values), descriptors.dim())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::seed::{Draws, Stage};
+
+    #[test]
+    fn blocks_hold_rows_that_look_alike() {
+        // Eight kinds of rows, in random order.
+        let mut draws = Draws::new(1, Stage::Synthetic, 0);
+        let kinds: Vec<usize> = (0..8 * BLOCK).map(|_| draws.below(8) as usize).collect();
+        let values = kinds.iter().flat_map(|&kind| {
+            let noise: [u8; 8] = std::array::from_fn(|_| draws.below(20) as u8);
+            std::array::from_fn::<u8, 8, _>(|c| if c == kind { 200 } else { noise[c] })
+        });
+        let descriptors = Descriptors::try_new(Values::U8(values.collect()), 8).unwrap();
+        let slots: Vec<u32> = (0..kinds.len() as u32).collect();
+        let order = order(&descriptors, &slots);
+        let mut sorted = order.clone();
+        sorted.sort_unstable();
+        assert_eq!(sorted, slots);
+        // Halves need not cut between kinds: a block holds few of them nevertheless.
+        let n_kinds = |block: &[u32]| {
+            let mut kinds: Vec<usize> = block.iter().map(|&slot| kinds[slot as usize]).collect();
+            kinds.sort_unstable();
+            kinds.dedup();
+            kinds.len()
+        };
+        let mean = order.chunks(BLOCK).map(n_kinds).sum::<usize>() as f64 / 8.0;
+        assert!(mean <= 3.0, "{mean} kinds per block");
+        let means = means(&descriptors, &order).unwrap();
+        assert_eq!((means.len(), means.dim()), (8, 8));
+    }
+
+    #[test]
+    fn rows_that_are_all_the_same_keep_their_order() {
+        let mut values = vec![7u8; 4 * 300];
+        values[0] = 8;
+        let descriptors = Descriptors::try_new(Values::U8(values), 4).unwrap();
+        let slots: Vec<u32> = (0..300).collect();
+        let order = order(&descriptors, &slots);
+        assert_eq!(order.len(), 300);
+        assert!(order.iter().filter(|&&slot| slot > 0).is_sorted());
+    }
+}

@@ -1,0 +1,247 @@
+//! Descriptors compared block by block: memory grows with rows, never with pairs.
+
+use std::sync::Mutex;
+
+use rayon::prelude::*;
+
+use super::best::Best;
+use super::pairs::{Pairs, Tile};
+use super::rows::Rows;
+use super::{alike, pairs};
+use crate::simd::BLOCK;
+use crate::{Descriptors, Error};
+
+/// Rows of which all pairs are compared at most: minutes on two cores. Of more, the blocks that look most alike.
+pub const MOST_ROWS: usize = 1 << 17;
+
+/// Rows that tell what scores are usual, where not all pairs are compared.
+const USUAL: usize = 16 * BLOCK;
+
+/// How alike two descriptors are. The score of a pair does not depend on its order.
+pub trait Likeness: Sync {
+    /// Whether scores are integers: then their sums are exact in any order, and are kept.
+    const EXACT: bool;
+    /// Blocks that every block of a large map is compared with.
+    const PARTNERS: usize;
+    /// [`BLOCK`] rows, ready to be compared.
+    type Block: Send + Sync;
+
+    /// The rows of `slots`, at most [`BLOCK`].
+    fn block(&self, descriptors: &Descriptors, slots: &[u32]) -> Self::Block;
+
+    /// Scores of all rows of `a` with all of `b`, `(BLOCK, BLOCK)`; what stands for rows beyond the last
+    /// has no meaning.
+    fn scores(&self, a: &Self::Block, b: &Self::Block, scores: &mut [f32]);
+}
+
+/// What a row found.
+#[derive(Clone, Debug, Default)]
+pub struct Found {
+    /// The best rows of other records, best first; equal scores in row order.
+    pub best: Vec<(f32, u32)>,
+    /// Mean of the scores with rows of other records, wherever they are; 0 unless scores are exact.
+    pub mean: f64,
+    /// Their standard deviation; 0 unless scores are exact.
+    pub deviation: f64,
+}
+
+/// The `most` best partners of every row among the rows of other records: exact up to `exact` rows. Beyond, rows
+/// are ordered anew so that those that look alike stand together, and every block meets the blocks whose mean rows
+/// are most like its own.
+///
+/// # Errors
+/// None that descriptors of a map can cause.
+pub fn search<L: Likeness>(
+    likeness: &L,
+    rows: &mut Rows<'_>,
+    most: usize,
+    exact: usize,
+) -> Result<Vec<Found>, Error> {
+    let n_blocks = rows.len().div_ceil(BLOCK);
+    if rows.len() <= exact {
+        return Ok(compare(likeness, rows, most, (&Pairs::all(n_blocks), None)));
+    }
+    rows.reorder(alike::order(rows.descriptors, &rows.slots));
+    let means = alike::means(rows.descriptors, &rows.slots)?;
+    let of_blocks = Rows::of_all(&means);
+    let all = Pairs::all(n_blocks.div_ceil(BLOCK));
+    let alike = compare(likeness, &of_blocks, L::PARTNERS, (&all, None));
+    let every = rows.len().div_ceil(USUAL);
+    Ok(compare(likeness, rows, most, (&pairs::chosen(&alike), Some(every))))
+}
+
+/// Compares rows as far as `pairs` says; each keeps its `most` best partners of other records. What scores are usual
+/// is learned from all pairs, or from those with every `every`-th row.
+///
+/// The same bytes for any number of threads: what a row keeps depends on the set of its scores alone.
+fn compare<L: Likeness>(
+    likeness: &L,
+    rows: &Rows<'_>,
+    most: usize,
+    (pairs, every): (&Pairs, Option<usize>),
+) -> Vec<Found> {
+    let kept: Vec<Mutex<Vec<Row>>> = rows
+        .slots
+        .chunks(BLOCK)
+        .map(|slots| Mutex::new(slots.iter().map(|_| Row::new(most)).collect()))
+        .collect();
+    let block = |at: usize| {
+        let end = rows.len().min((at + 1) * BLOCK);
+        likeness.block(rows.descriptors, &rows.slots[at * BLOCK..end])
+    };
+    let counts = L::EXACT && every.is_none();
+    let usual = every.filter(|_| L::EXACT).map(|every| Usual::new(likeness, rows, every));
+    let scratch = || (vec![0.0f32; BLOCK * BLOCK], vec![0.0f32; BLOCK * BLOCK]);
+    for Tile { held, meetings } in pairs.tiles() {
+        let first = held.start;
+        let held: Vec<L::Block> = held.clone().into_par_iter().map(block).collect();
+        if let Some(usual) = &usual {
+            held.par_iter().enumerate().for_each_init(scratch, |(scores, _), (at, block)| {
+                let a = first + at;
+                usual.count(
+                    likeness,
+                    block,
+                    scores,
+                    &mut lock(&kept[a]),
+                    &rows.records[a * BLOCK..],
+                );
+            });
+        }
+        meetings.par_iter().with_max_len(1).for_each_init(scratch, |(scores, turned), of_one| {
+            let b = of_one.block as usize;
+            let made = (b < first || b - first >= held.len()).then(|| block(b));
+            let own = made.as_ref().unwrap_or_else(|| &held[b - first]);
+            let of_b = Met::of(rows, b, counts);
+            for &a in &of_one.with {
+                let a = a as usize;
+                likeness.scores(&held[a - first], own, scores);
+                of_b.offer(&mut lock(&kept[a]), scores, &rows.records[a * BLOCK..]);
+                if a == b {
+                    continue;
+                }
+                for i in 0..BLOCK {
+                    for j in 0..BLOCK {
+                        turned[j * BLOCK + i] = scores[i * BLOCK + j];
+                    }
+                }
+                let of_a = Met::of(rows, a, counts);
+                of_a.offer(&mut lock(&kept[b]), turned, &rows.records[b * BLOCK..]);
+            }
+        });
+    }
+    let rows = kept.into_iter().flat_map(|rows| match rows.into_inner() {
+        Ok(rows) => rows,
+        Err(poisoned) => poisoned.into_inner(),
+    });
+    rows.map(Row::found).collect()
+}
+
+/// Rows from all over the map, which tell what scores are usual.
+struct Usual<B> {
+    blocks: Vec<(B, Vec<u32>)>,
+}
+
+impl<B> Usual<B> {
+    /// Every `every`-th row.
+    fn new<L: Likeness<Block = B>>(likeness: &L, rows: &Rows<'_>, every: usize) -> Self {
+        let slots: Vec<u32> = rows.slots.iter().step_by(every).copied().collect();
+        let records: Vec<u32> = rows.records.iter().step_by(every).copied().collect();
+        let block = |(slots, records): (&[u32], &[u32])| {
+            (likeness.block(rows.descriptors, slots), records.to_vec())
+        };
+        Self { blocks: slots.chunks(BLOCK).zip(records.chunks(BLOCK)).map(block).collect() }
+    }
+
+    /// Counts the scores of the rows of `block`.
+    fn count<L: Likeness<Block = B>>(
+        &self,
+        likeness: &L,
+        block: &B,
+        scores: &mut [f32],
+        rows: &mut [Row],
+        record_of: &[u32],
+    ) {
+        for (usual, records) in &self.blocks {
+            likeness.scores(block, usual, scores);
+            for (i, row) in rows.iter_mut().enumerate() {
+                row.count(&scores[i * BLOCK..], records, record_of[i]);
+            }
+        }
+    }
+}
+
+/// A panic in another thread is passed on by rayon: the data behind a poisoned lock is not used.
+fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    match mutex.lock() {
+        Ok(guard) => guard,
+        Err(poisoned) => poisoned.into_inner(),
+    }
+}
+
+struct Row {
+    best: Best,
+    n: u64,
+    sum: f64,
+    squares: f64,
+}
+
+impl Row {
+    fn new(most: usize) -> Self {
+        Self { best: Best::new(most), n: 0, sum: 0.0, squares: 0.0 }
+    }
+
+    /// Counts the scores with rows of other records than `own`.
+    fn count(&mut self, scores: &[f32], records: &[u32], own: u32) {
+        let (mut n, mut sum, mut squares) = (0u64, 0.0f64, 0.0f64);
+        for (&score, &record) in scores.iter().zip(records) {
+            // Whole numbers far below 2^53 in total: exact.
+            let score = if record == own { 0.0 } else { f64::from(score) };
+            n += u64::from(record != own);
+            sum += score;
+            squares += score * score;
+        }
+        self.n += n;
+        self.sum += sum;
+        self.squares += squares;
+    }
+
+    fn found(self) -> Found {
+        let n = self.n.max(1) as f64;
+        let mean = self.sum / n;
+        let deviation = (self.squares / n - mean * mean).max(0.0).sqrt();
+        Found { best: self.best.into_sorted(), mean, deviation }
+    }
+}
+
+/// A block that others meet.
+struct Met<'a> {
+    first: usize,
+    records: &'a [u32],
+    counts: bool,
+}
+
+impl<'a> Met<'a> {
+    fn of(rows: &'a Rows<'_>, block: usize, counts: bool) -> Self {
+        let first = block * BLOCK;
+        Self { first, records: &rows.records[first..rows.len().min(first + BLOCK)], counts }
+    }
+
+    /// Offers its rows to `rows` with these scores; `record_of` tells the record of each of `rows`.
+    fn offer(&self, rows: &mut [Row], scores: &[f32], record_of: &[u32]) {
+        for (i, row) in rows.iter_mut().enumerate() {
+            let scores = &scores[i * BLOCK..];
+            let own = record_of[i];
+            if self.counts {
+                row.count(scores, self.records, own);
+            }
+            for (j, (&score, &record)) in scores.iter().zip(self.records).enumerate() {
+                if score >= row.best.floor() && record != own {
+                    row.best.push(score, (self.first + j) as u32);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
