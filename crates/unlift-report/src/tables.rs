@@ -271,14 +271,18 @@ pub(crate) fn threshold_text(document: &Document, typed: &str) -> String {
     }
 }
 
-fn key_cells(row: &Row) -> Vec<String> {
+pub(crate) fn key_cells(row: &Row) -> Vec<String> {
+    vec![row.scheme.clone(), row.solver.clone(), ratio_cell(row)]
+}
+
+/// How many neighbors are right, and who says who they are unless that is a uniform oracle.
+fn ratio_cell(row: &Row) -> String {
     let source = match (row.neighbors.as_str(), row.oracle_noise.as_deref()) {
         ("oracle", None | Some("uniform")) => String::new(),
         ("oracle", Some(noise)) => format!(" ({noise})"),
         (source, _) => format!(" ({source})"),
     };
-    let ratio = format!("{} %{source}", words::ratio_percent(row.inlier_ratio));
-    vec![row.scheme.clone(), row.solver.clone(), ratio]
+    format!("{} %{source}", words::ratio_percent(row.inlier_ratio))
 }
 
 fn percent_cell(value: Option<&f64>, spread: Option<&f64>) -> String {

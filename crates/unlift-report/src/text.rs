@@ -18,17 +18,22 @@ pub fn text_table(document: &Document) -> String {
         let Some(row) = verdict::headline(document, &card.scheme) else {
             continue;
         };
-        let ratio = format!("{} %", words::ratio_percent(row.inlier_ratio));
-        let mut cells = vec![row.scheme.clone(), card.solver.clone(), ratio];
-        for typed in &thresholds {
-            let value = row.recovered_percent.get(typed);
-            cells.push(value.map_or("-".into(), |v| format!("{} %", words::percent(*v))));
+        for row in [row].into_iter().chain(verdict::other_sources(document, row)) {
+            let mut cells = tables::key_cells(row);
+            for typed in &thresholds {
+                cells.push(percent(row.recovered_percent.get(typed)));
+            }
+            let blind = headline.as_ref().and_then(|typed| row.blind_percent.get(typed));
+            cells.push(percent(blind));
+            cells.push(break_even(document, row, headline.as_ref()));
+            lines.push(cells);
         }
-        cells.push(format!("{} %", words::percent(card.blind)));
-        cells.push(break_even(document, row, headline.as_ref()));
-        lines.push(cells);
     }
     align(&lines)
+}
+
+fn percent(value: Option<&f64>) -> String {
+    value.map_or("-".into(), |value| format!("{} %", words::percent(*value)))
 }
 
 fn unit(document: &Document) -> &'static str {

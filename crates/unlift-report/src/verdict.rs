@@ -1,6 +1,8 @@
 //! One plain sentence per scheme, worst first. The word "safe" never appears: an audit shows what
 //! one attack took, not what no attack can take.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use crate::document::{Bound, BreakEven, Document, Row};
@@ -71,6 +73,22 @@ pub(crate) fn headline<'a>(document: &'a Document, scheme: &str) -> Option<&'a R
         .iter()
         .filter(|row| row.scheme == scheme)
         .min_by(|a, b| away(a).total_cmp(&away(b)).then(share(b).total_cmp(&share(a))))
+}
+
+/// Of every source but the oracle and that of `speaks`, the row that recovers most of its scheme; in order of name.
+pub(crate) fn other_sources<'a>(document: &'a Document, speaks: &Row) -> Vec<&'a Row> {
+    let typed = tables::headline_threshold(document).unwrap_or_default();
+    let share = |row: &Row| row.recovered_percent.get(&typed).copied().unwrap_or(0.0);
+    let mut best: BTreeMap<&str, &Row> = BTreeMap::new();
+    for row in document.results.iter().filter(|row| row.scheme == speaks.scheme) {
+        if row.neighbors != "oracle" && row.neighbors != speaks.neighbors {
+            let so_far = best.entry(&row.neighbors).or_insert(row);
+            if share(row) > share(so_far) {
+                *so_far = row;
+            }
+        }
+    }
+    best.into_values().collect()
 }
 
 fn card(document: &Document, row: &Row) -> Option<Card> {

@@ -135,6 +135,25 @@ fn the_terminal_table_is_short_and_worst_first() {
 }
 
 #[test]
+fn the_terminal_table_has_a_line_per_source() {
+    let mut document = sample::document(true);
+    let oracle = document.results.iter().find(|row| row.scheme == "olc").unwrap().clone();
+    let typed = oracle.recovered_percent.keys().next().unwrap().clone();
+    for (solver, percent) in [("consensus", 41.5), ("joint", 63.5)] {
+        let mut row = oracle.clone();
+        (row.neighbors, row.oracle_noise, row.inlier_ratio) = ("overlap".into(), None, 0.13);
+        row.solver = solver.into();
+        row.recovered_percent.insert(typed.clone(), percent);
+        document.results.push(row);
+    }
+    let table = text_table(&document);
+    let lines: Vec<&str> = table.lines().collect();
+    assert_eq!(lines.len(), 9);
+    assert!(lines[2].starts_with("olc") && lines[2].contains("13 % (overlap)"), "{table}");
+    assert!(lines[2].contains("63.5 %") && !table.contains("41.5 %"), "{table}");
+}
+
+#[test]
 fn the_vendored_bundle_is_the_one_described() {
     let bundle = include_bytes!("../web/vendor/bundle.min.js");
     let sum: String = Sha256::digest(bundle).iter().map(|byte| format!("{byte:02x}")).collect();

@@ -28,7 +28,7 @@ mod likelihood;
 use likelihood::{Row, fit};
 
 /// Seed, points, stretch, neighbors per slot.
-const ROOMS: [(u64, usize, f64, usize); 10] = [
+const ROOMS: [(u64, usize, f64, usize); 12] = [
     (101, 6_000, 0.0, 50),
     (102, 5_000, 0.1, 50),
     (103, 5_000, 0.3, 50),
@@ -40,6 +40,8 @@ const ROOMS: [(u64, usize, f64, usize); 10] = [
     // On large maps planes come back even at 0.1.
     (109, 20_000, 0.0, 50),
     (110, 20_000, 0.3, 50),
+    (111, 9_000, 1.0, 50),
+    (112, 16_000, 3.0, 50),
 ];
 /// Every noise model with its inlier ratios.
 const RATIOS: [(Noise, &[f64]); 3] = [

@@ -94,7 +94,12 @@ fn sources(
                     joined.name()
                 )));
             }
-            NeighborSource::Own(joined) => own(joined, &args.attack),
+            NeighborSource::Own(joined) => {
+                if let Some(note) = joined.note(prepared.original.len()) {
+                    eprintln!("unlift: note: {note}");
+                }
+                own(joined, &args.attack)
+            }
             NeighborSource::File(path) => Source::Given(by_point(&path, prepared, n_read)?),
         });
     }

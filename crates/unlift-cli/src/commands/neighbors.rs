@@ -50,6 +50,9 @@ pub fn find(args: &FindArgs) -> anyhow::Result<Outcome> {
         Some(k) => args.source.clone().with_k(usize::from(k)),
         None => args.source.clone(),
     };
+    if let Some(note) = source.note(released.n_slots()) {
+        eprintln!("unlift: note: {note}");
+    }
     let alive = Spinner::new("finding neighbors");
     let lists = with_threads(args.threads, || {
         let lists = source.make(&released, args.seed);

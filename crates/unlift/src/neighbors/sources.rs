@@ -2,6 +2,7 @@
 
 use std::any::Any;
 
+use super::compare::MOST_ROWS;
 use super::{Neighborhoods, geometric, join, overlap, similarity};
 use crate::Error;
 use crate::released::Released;
@@ -158,6 +159,17 @@ impl Joined {
         self.parts.iter().any(|entry| entry.needs_descriptors)
     }
 
+    /// What a user should know about lists for `n_slots` hidden points, if anything.
+    pub fn note(&self, n_slots: usize) -> Option<String> {
+        (self.needs_descriptors() && n_slots > MOST_ROWS).then(|| {
+            format!(
+                "{}: of more than {MOST_ROWS} points each is compared with those whose descriptors look alike on the \
+                 whole: some neighbors that all pairs would tell are missed",
+                self.name()
+            )
+        })
+    }
+
     /// The first of the sources that has nothing to say about maps of `scheme`.
     pub fn fails_on(&self, scheme: &str) -> Option<&'static SourceEntry> {
         self.parts.iter().copied().find(|entry| entry.not_for.contains(&scheme))
@@ -211,6 +223,18 @@ mod tests {
             message("overlap+overlap"),
             "joined sources: expected each once, found overlap twice"
         );
+    }
+
+    #[test]
+    fn only_large_maps_with_descriptors_call_for_a_note() {
+        let note = |name: &str, n| Joined::parse(name).unwrap().note(n);
+        assert!(
+            note("overlap+geometric", MOST_ROWS + 1)
+                .unwrap()
+                .starts_with("overlap+geometric: of more")
+        );
+        assert_eq!(note("overlap", MOST_ROWS), None);
+        assert_eq!(note("geometric", MOST_ROWS + 1), None);
     }
 
     #[test]

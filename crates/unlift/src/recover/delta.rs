@@ -13,8 +13,10 @@ use super::lists::Lists;
 use crate::neighbors::Neighborhoods;
 use crate::seed::{Draws, Stage};
 
-/// Chunks solved per delta; fewer of an image, where they are most of the time and few of all.
+/// Chunks solved per delta; more of planes, whose evidence hardly depends on delta, so that luck widens the plateau;
+/// fewer of an image, where they are most of the time and few of all.
 const SAMPLE: usize = 12;
+const SAMPLE_OF_PLANES: usize = 24;
 const SAMPLE_IN_IMAGE: usize = 4;
 /// Halvings of the extent that the coarse ladder spans.
 const HALVINGS: u32 = 14;
@@ -29,7 +31,7 @@ const FINE: i32 = 3;
 /// How far across the plateau a narrow delta lies, as a share in logarithm. Planes leave two coordinates
 /// open: estimates gain from a wider support.
 const ACROSS: f64 = 1.0 / 3.0;
-const ACROSS_OF_PLANES: f64 = 5.0 / 6.0;
+const ACROSS_OF_PLANES: f64 = 3.0 / 4.0;
 /// Below the lower edge of the plateau evidence grows by more than this per octave, or is less than this
 /// share of the best of the coarse ladder.
 const GROWTH: f64 = 1.2;
@@ -83,8 +85,12 @@ pub(crate) fn choose<const D: usize>(
     if lists.n_slots() == 0 || !(extent.is_finite() && extent > 0.0) {
         return None;
     }
-    let chunks =
-        sample_chunks(lists.n_slots(), if D == 2 { SAMPLE_IN_IMAGE } else { SAMPLE }, seed);
+    let sample = match family {
+        _ if D == 2 => SAMPLE_IN_IMAGE,
+        Family::Planes { .. } => SAMPLE_OF_PLANES,
+        Family::Lines { .. } | Family::Candidates { .. } => SAMPLE,
+    };
+    let chunks = sample_chunks(lists.n_slots(), sample, seed);
     let mean_evidence = |lists: Lists<'_>, delta: f64| {
         let solved = consensus::solve(family, lists, delta as f32, Chunks::Some(&chunks));
         solved.iter().map(|e| f64::from(e.evidence)).sum::<f64>() / solved.len() as f64

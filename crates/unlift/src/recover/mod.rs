@@ -158,6 +158,6 @@ pub fn recover_and_look<const D: usize>(
     let edges = (graph.as_ref(), lists);
     let solved = Solved { estimates, unsettled, delta: delta as f32 };
     let seen = confidence::look(&family, edges, released.slots_per_record(), &solved);
-    let confidence = confidence::of(&family, options.solver, estimates, &seen);
+    let confidence = confidence::of(released, options.solver, estimates, &seen);
     Ok((recovered.with_confidence(confidence)?, seen))
 }

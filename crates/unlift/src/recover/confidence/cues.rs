@@ -7,14 +7,14 @@
 
 use rayon::prelude::*;
 
-use super::edges::Edges;
+use super::edges::{Edge, Edges};
 use super::{Seen, Solved};
 use crate::recover::chance;
 use crate::recover::joint::{Density, Pieces, Places, along_curve, distance2};
 use crate::recover::{Estimate, Status};
 
 /// Number of cues.
-pub const N_CUES: usize = 18;
+pub const N_CUES: usize = 20;
 
 /// The cues of one slot.
 pub type Cues = [f32; N_CUES];
@@ -50,6 +50,9 @@ struct Crowd {
     settled: Option<f32>,
     /// The mean of the logarithm of the members' own evidence; of the second pass.
     of_members: f32,
+    /// The logarithm of how many more members the slot lists than list it. Look-alikes agree on a wrong place, but
+    /// those who are there do not name who is not. Of the second pass; 0 where nobody knows who lists a slot.
+    one_sided: f32,
     sparsity: f32,
 }
 
@@ -135,9 +138,9 @@ impl<const D: usize, P: Pieces<D>, E: Edges> Look<'_, D, P, E> {
     /// Brings near what [`crowd`](Self::crowd) looks at.
     fn prefetch(&self, slot: usize) {
         let slots_per_record = self.pieces.slots_per_record();
-        self.edges.each(slot, |end, _| {
-            self.places.prefetch(end as usize);
-            self.pieces.prefetch(end as usize / slots_per_record);
+        self.edges.each(slot, |edge| {
+            self.places.prefetch(edge.end as usize);
+            self.pieces.prefetch(edge.end as usize / slots_per_record);
         });
     }
 
@@ -151,7 +154,7 @@ impl<const D: usize, P: Pieces<D>, E: Edges> Look<'_, D, P, E> {
         let (mut all, mut rates) = (0usize, 0.0f32);
         let (mut voting, mut votes) = (0usize, 0usize);
         let slots_per_record = self.pieces.slots_per_record();
-        self.edges.each(slot, |end, either| {
+        self.edges.each(slot, |Edge { end, either, .. }| {
             let (d2, at) = self.places.nearest(end, either, &x);
             all += 1;
             rates += if either { 2.0 * rate } else { rate };
@@ -222,14 +225,20 @@ impl<const D: usize, P: Pieces<D>, E: Edges> Look<'_, D, P, E> {
         let x = self.places.of(slot);
         let reach2 = crowd.radius * crowd.radius * (1.0 + 1e-6);
         let (mut n, mut sum) = (0u32, 0.0);
-        self.edges.each(slot, |end, either| {
-            let (d2, at) = self.places.nearest(end, either, &x);
+        let (mut listed, mut listing) = (0u32, 0u32);
+        self.edges.each(slot, |edge| {
+            let (d2, at) = self.places.nearest(edge.end, edge.either, &x);
             if d2 <= reach2 {
                 n += 1;
                 sum += evidence[at];
+                listed += u32::from(edge.lists);
+                listing += u32::from(edge.is_listed);
             }
         });
         crowd.of_members = sum / n.max(1) as f32;
+        if E::BOTH_WAYS {
+            crowd.one_sided = libm::logf((listed + 1) as f32 / (listing + 1) as f32);
+        }
     }
 }
 
@@ -239,6 +248,7 @@ struct Map {
     radius: f32,
     evidence: f32,
     voting_share: f32,
+    one_sided: f32,
     share: f32,
     record_share: f32,
     ln_radius_per_delta: f32,
@@ -260,6 +270,7 @@ impl Map {
             radius,
             evidence: mean(&|c| libm::log1pf(c.evidence)),
             voting_share: mean(&|c| c.voting_share),
+            one_sided: mean(&|c| c.one_sided.abs()),
             share: libm::logf(share(&|c| c.excess).max(LEAST_RATIO)),
             record_share: libm::logf(share(&|c| c.record_excess).max(LEAST_RATIO)),
             ln_radius_per_delta: libm::logf((radius / delta).max(LEAST_RATIO)),
@@ -290,6 +301,8 @@ impl Map {
             self.voting_share,
             if crowd.settled.is_some() { 1.0 } else { 0.0 },
             libm::log1pf(crowd.settled.unwrap_or(0.0) / self.radius),
+            crowd.one_sided,
+            self.one_sided,
         ]
     }
 }

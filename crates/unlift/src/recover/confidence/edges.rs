@@ -2,12 +2,27 @@
 
 use crate::neighbors::Neighborhoods;
 use crate::recover::chance_field;
-use crate::recover::joint::{Graph, either};
+use crate::recover::joint::{Graph, either, is_mutual, is_reverse};
+
+/// One edge of a slot.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Edge {
+    /// The slot at the other end.
+    pub(crate) end: u32,
+    /// Whether it may be the next slot instead.
+    pub(crate) either: bool,
+    /// Whether the slot lists the other end, and the other way round.
+    pub(crate) lists: bool,
+    pub(crate) is_listed: bool,
+}
 
 /// Edges of slots.
 pub(crate) trait Edges: Sync {
-    /// Calls `f(end, either)` for every edge: a slot, and whether it may be that one or the next.
-    fn each(&self, slot: usize, f: impl FnMut(u32, bool));
+    /// Whether it is known who lists a slot.
+    const BOTH_WAYS: bool;
+
+    /// Calls `f` for every edge.
+    fn each(&self, slot: usize, f: impl FnMut(Edge));
     /// How often each record is at the other end of an edge.
     fn times_listed(&self, n_records: usize) -> Vec<u32>;
 }
@@ -19,11 +34,14 @@ pub(crate) struct Listed<'a> {
 }
 
 impl Edges for Listed<'_> {
+    const BOTH_WAYS: bool = false;
+
     #[inline(always)]
-    fn each(&self, slot: usize, mut f: impl FnMut(u32, bool)) {
+    fn each(&self, slot: usize, mut f: impl FnMut(Edge)) {
         let either = self.slots_per_record == 2;
         for record in self.lists.of(slot) {
-            f(record.0 * self.slots_per_record as u32, either);
+            let end = record.0 * self.slots_per_record as u32;
+            f(Edge { end, either, lists: true, is_listed: false });
         }
     }
 
@@ -39,11 +57,14 @@ pub(crate) struct BothWays<'a> {
 }
 
 impl Edges for BothWays<'_> {
+    const BOTH_WAYS: bool = true;
+
     #[inline(always)]
-    fn each(&self, slot: usize, mut f: impl FnMut(u32, bool)) {
+    fn each(&self, slot: usize, mut f: impl FnMut(Edge)) {
         let (ends, class) = self.graph.of(slot);
         for (&end, &class) in ends.iter().zip(class) {
-            f(end, either(class, self.slots_per_record));
+            let (lists, is_listed) = (!is_reverse(class), is_reverse(class) || is_mutual(class));
+            f(Edge { end, either: either(class, self.slots_per_record), lists, is_listed });
         }
     }
 

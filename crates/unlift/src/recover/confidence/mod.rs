@@ -20,6 +20,7 @@ use super::family::Family;
 use super::joint::{CandidatePieces, Graph, LinePieces, PlanePieces};
 use super::{Estimate, Solver, Status};
 use crate::neighbors::Neighborhoods;
+use crate::released::Released;
 
 /// What the attacker sees around every slot.
 #[derive(Clone, Debug)]
@@ -79,12 +80,12 @@ fn look_along<const D: usize, E: Edges>(
 
 /// How sure the attacker is of every slot.
 pub(super) fn of<const D: usize>(
-    family: &Family<'_, D>,
+    released: &Released<D>,
     solver: Solver,
     estimates: &[Estimate<D>],
     seen: &Seen,
 ) -> Vec<Confidence> {
-    let kind = model::kind(family);
+    let kind = model::kind(released);
     let radius = seen.radius as f32;
     estimates
         .par_iter()

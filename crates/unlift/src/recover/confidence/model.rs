@@ -3,13 +3,13 @@
 use super::constants::{CENTER, MODELS, SPREAD};
 use super::cues::{Cues, N_CUES};
 use crate::recover::Solver;
-use crate::recover::family::Family;
+use crate::released::{Obfuscation, Released};
 
 /// Kinds of records that are calibrated apart: lines, paired lines, rays, axis planes, axis candidates.
 pub const N_KINDS: usize = 5;
 
 /// Pairs of cues whose products count too.
-const PRODUCTS: [(usize, usize); 21] = [
+const PRODUCTS: [(usize, usize); 27] = [
     (0, 0),
     (2, 2),
     (3, 3),
@@ -31,6 +31,12 @@ const PRODUCTS: [(usize, usize); 21] = [
     (14, 15),
     (0, 16),
     (9, 16),
+    (18, 18),
+    (0, 18),
+    (18, 19),
+    (19, 19),
+    (9, 19),
+    (10, 19),
 ];
 
 /// Number of terms: the constant, the cues, and the products.
@@ -68,13 +74,13 @@ impl Confidence {
     }
 }
 
-/// Which kind of records a family holds, below [`N_KINDS`].
-pub(super) fn kind<const D: usize>(family: &Family<'_, D>) -> usize {
-    match family {
-        Family::Lines { rows, .. } if rows.first().is_some_and(|row| row.is_ray()) => 2,
-        Family::Lines { slots_per_record, .. } => slots_per_record - 1,
-        Family::Planes { .. } => 3,
-        Family::Candidates { .. } => 4,
+/// Which kind of records a map holds, below [`N_KINDS`].
+pub(super) fn kind<const D: usize>(released: &Released<D>) -> usize {
+    match released.obfuscation() {
+        Obfuscation::Lines(_) => released.slots_per_record() - 1,
+        Obfuscation::Rays(_) => 2,
+        Obfuscation::AxisPlanes(_) => 3,
+        Obfuscation::AxisCandidates(_) => 4,
     }
 }
 

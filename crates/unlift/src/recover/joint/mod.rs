@@ -23,7 +23,7 @@ mod slot;
 mod small;
 
 pub(crate) use density::Density;
-pub(crate) use graph::{Graph, either};
+pub(crate) use graph::{Graph, either, is_mutual, is_reverse};
 pub(crate) use order::along_curve;
 pub(crate) use pieces::{CandidatePieces, LinePieces, Pieces, PlanePieces};
 pub(crate) use places::{Places, distance2};
