@@ -11,7 +11,7 @@ use crate::{Descriptors, Error};
 /// The `k` records with the most similar descriptors. Scores: cosine similarity; of a record with two
 /// descriptors the larger.
 ///
-/// Exact up to [`MOST_ROWS`] slots. Of more, each is compared with those that look
+/// Exact up to 131,072 slots (`MOST_ROWS`). Of more, each is compared with those that look
 /// alike on the whole.
 ///
 /// # Errors

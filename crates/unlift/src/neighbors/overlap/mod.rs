@@ -21,7 +21,7 @@ const CANDIDATES: usize = 64;
 /// The `k` records whose patches overlap each slot's patch most, or that a short walk over such
 /// records reaches. Scores: log of the (discounted) probability to be reached.
 ///
-/// Exact up to [`MOST_ROWS`] slots. Of more, each is compared with those that look alike on the whole, which finds
+/// Exact up to 131,072 slots (`MOST_ROWS`). Of more, each is compared with those that look alike on the whole, which finds
 /// fewer of its partners.
 ///
 /// # Errors
