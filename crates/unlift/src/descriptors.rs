@@ -101,6 +101,16 @@ impl Descriptors {
         Self { values, dim: self.dim }
     }
 
+    /// Writes row `at` to `row`, which has one value per column.
+    #[inline]
+    pub fn read_row(&self, at: usize, row: &mut [f32]) {
+        let range = at * self.dim..(at + 1) * self.dim;
+        match &self.values {
+            Values::U8(v) => row.iter_mut().zip(&v[range]).for_each(|(x, &v)| *x = f32::from(v)),
+            Values::F32(v) => row.copy_from_slice(&v[range]),
+        }
+    }
+
     /// Squared Euclidean distance between rows `a` and `b`.
     #[inline]
     pub fn squared_distance(&self, a: usize, b: usize) -> f32 {

@@ -26,8 +26,12 @@ fn halve(descriptors: &Descriptors, slots: &mut [u32]) {
         return;
     }
     let direction = widest(descriptors, slots);
-    let mut along: Vec<(f32, u32)> =
-        slots.par_iter().map(|&slot| (product(descriptors, slot, &direction), slot)).collect();
+    let scratch = || vec![0.0; descriptors.dim()];
+    let product = |row: &mut Vec<f32>, &slot: &u32| {
+        descriptors.read_row(slot as usize, row);
+        (row.iter().zip(&direction).map(|(x, d)| x * d).sum(), slot)
+    };
+    let mut along: Vec<(f32, u32)> = slots.par_iter().map_init(scratch, product).collect();
     // Whole blocks on the left. Rows that are equal keep to the order of slots.
     let left = (slots.len() / 2).next_multiple_of(BLOCK);
     let by_place = |a: &(f32, u32), b: &(f32, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
@@ -69,21 +73,9 @@ fn widest(descriptors: &Descriptors, slots: &[u32]) -> Vec<f32> {
 }
 
 fn row(descriptors: &Descriptors, slot: u32) -> Vec<f32> {
-    let dim = descriptors.dim();
-    let range = slot as usize * dim..(slot as usize + 1) * dim;
-    match descriptors.values() {
-        Values::U8(v) => v[range].iter().map(|&x| f32::from(x)).collect(),
-        Values::F32(v) => v[range].to_vec(),
-    }
-}
-
-fn product(descriptors: &Descriptors, slot: u32, direction: &[f32]) -> f32 {
-    let dim = descriptors.dim();
-    let range = slot as usize * dim..(slot as usize + 1) * dim;
-    match descriptors.values() {
-        Values::U8(v) => v[range].iter().zip(direction).map(|(&x, d)| f32::from(x) * d).sum(),
-        Values::F32(v) => v[range].iter().zip(direction).map(|(x, d)| x * d).sum(),
-    }
+    let mut row = vec![0.0; descriptors.dim()];
+    descriptors.read_row(slot as usize, &mut row);
+    row
 }
 
 /// The mean row of each block of `slots`.

@@ -17,12 +17,13 @@ pub const MOST_ROWS: usize = 1 << 17;
 /// Rows that tell what scores are usual, where not all pairs are compared.
 const USUAL: usize = 16 * BLOCK;
 
+/// Blocks that every block of a large map is compared with.
+const PARTNERS: usize = 64;
+
 /// How alike two descriptors are. The score of a pair does not depend on its order.
 pub trait Likeness: Sync {
     /// Whether scores are integers: then their sums are exact in any order, and are kept.
     const EXACT: bool;
-    /// Blocks that every block of a large map is compared with.
-    const PARTNERS: usize;
     /// [`BLOCK`] rows, ready to be compared.
     type Block: Send + Sync;
 
@@ -50,7 +51,7 @@ pub struct Found {
 /// are most like its own.
 ///
 /// # Errors
-/// None that descriptors of a map can cause.
+/// When there are more rows than that, and the mean rows of all blocks are the same.
 pub fn search<L: Likeness>(
     likeness: &L,
     rows: &mut Rows<'_>,
@@ -65,7 +66,7 @@ pub fn search<L: Likeness>(
     let means = alike::means(rows.descriptors, &rows.slots)?;
     let of_blocks = Rows::of_all(&means);
     let all = Pairs::all(n_blocks.div_ceil(BLOCK));
-    let alike = compare(likeness, &of_blocks, L::PARTNERS, (&all, None));
+    let alike = compare(likeness, &of_blocks, PARTNERS, (&all, None));
     let every = rows.len().div_ceil(USUAL);
     Ok(compare(likeness, rows, most, (&pairs::chosen(&alike), Some(every))))
 }

@@ -3,7 +3,6 @@
 use super::Neighborhoods;
 use super::compare::{Likeness, MOST_ROWS, search};
 use super::rows::Rows;
-use crate::descriptors::Values;
 use crate::released::Released;
 use crate::simd::{self, BLOCK, Kernel};
 use crate::{Descriptors, Error};
@@ -39,22 +38,19 @@ pub struct Units {
 
 impl Likeness for Cosine {
     const EXACT: bool = false;
-    const PARTNERS: usize = 64;
     type Block = Units;
 
     fn block(&self, descriptors: &Descriptors, slots: &[u32]) -> Units {
         let dim = descriptors.dim();
         let (mut rows, mut columns) = (vec![0.0; BLOCK * dim], vec![0.0; BLOCK * dim]);
+        let mut row = vec![0.0; dim];
         for (at, &slot) in slots.iter().enumerate() {
-            let range = slot as usize * dim..(slot as usize + 1) * dim;
-            let row: Vec<f64> = match descriptors.values() {
-                Values::U8(v) => v[range].iter().map(|&x| f64::from(x)).collect(),
-                Values::F32(v) => v[range].iter().map(|&x| f64::from(x)).collect(),
-            };
+            descriptors.read_row(slot as usize, &mut row);
+            let square = |&x: &f32| f64::from(x) * f64::from(x);
             // A blank descriptor is like none other: its similarities are 0.
-            let norm = row.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
-            for (c, x) in row.iter().enumerate() {
-                let value = (x / norm) as f32;
+            let norm = row.iter().map(square).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+            for (c, &x) in row.iter().enumerate() {
+                let value = (f64::from(x) / norm) as f32;
                 rows[at * dim + c] = value;
                 columns[c * BLOCK + at] = value;
             }

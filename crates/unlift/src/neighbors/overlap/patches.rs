@@ -47,7 +47,6 @@ impl Patches {
 
 impl Likeness for Patches {
     const EXACT: bool = true;
-    const PARTNERS: usize = 64;
     type Block = Block;
 
     fn block(&self, descriptors: &Descriptors, slots: &[u32]) -> Block {
