@@ -147,10 +147,10 @@ fn what_is_said_about_a_real_map_comes_true() {
             eprintln!("{name}: said {said:.3}, was {was:.3}, {} points", bin.n);
             off += bin.n as f64 * (said - was).abs();
             points += bin.n as f64;
-            // Saying too much is worse than too little. Below are few points, of maps that came back badly.
-            let too_much = said > 0.4 && said - was > 0.05;
-            assert!(!too_much, "{name}: said {said:.3}, was {was:.3}");
+            // Below are few points, of maps that came back badly.
+            let most = if said > 0.4 { 0.05 } else { 0.08 };
+            assert!((said - was).abs() <= most, "{name}: said {said:.3}, was {was:.3}");
         }
-        assert!(off / points <= 0.04, "{name}: off by {:.3} in the mean", off / points);
+        assert!(off / points <= 0.03, "{name}: off by {:.3} in the mean", off / points);
     }
 }
