@@ -119,3 +119,12 @@ fn lost_points_are_given_no_chance() {
     assert!((half.probability_within(0.1) - 0.4).abs() < 1e-6);
     assert!(half.probability_within(0.2) > half.probability_within(0.1));
 }
+
+#[test]
+fn crowds_that_do_not_list_back_are_not_believed() {
+    let sure_percent = |case| judge(Solver::Joint, &["plane"], &[case]).sure_percent();
+    let of_good = sure_percent((Noise::Uniform, 0.3));
+    let of_shared = sure_percent((Noise::Clustered, 0.2));
+    assert!(of_good > 60.0, "sure of {of_good} % where lists are good");
+    assert!(of_shared < 5.0, "sure of {of_shared} % where wrong entries share a place");
+}
