@@ -128,3 +128,15 @@ fn crowds_that_do_not_list_back_are_not_believed() {
     assert!(of_good > 60.0, "sure of {of_good} % where lists are good");
     assert!(of_shared < 5.0, "sure of {of_shared} % where wrong entries share a place");
 }
+
+#[test]
+fn crowds_that_do_not_list_back_are_not_followed() {
+    let scene = scene(207, 4_000, 1.0);
+    // Between what comes back when they are followed (89, 75, 72) and when not (93, 78, 78).
+    for (name, least) in [("olc", 91.0), ("ppl", 76.5), ("ray", 75.0)] {
+        let (recovered, secret) = recovered(&scene, name, Solver::Joint, (Noise::Clustered, 0.15));
+        let accuracy = evaluate(&recovered, &scene.0, &secret).unwrap();
+        let percent = accuracy.percent_within(scene.1);
+        assert!(percent > least, "{name}: {percent} %");
+    }
+}

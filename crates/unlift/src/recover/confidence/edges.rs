@@ -2,7 +2,7 @@
 
 use crate::neighbors::Neighborhoods;
 use crate::recover::chance_field;
-use crate::recover::joint::{Graph, either, is_mutual, is_reverse};
+use crate::recover::joint::{Graph, Side, either, side};
 
 /// One edge of a slot.
 #[derive(Clone, Copy, Debug)]
@@ -63,7 +63,8 @@ impl Edges for BothWays<'_> {
     fn each(&self, slot: usize, mut f: impl FnMut(Edge)) {
         let (ends, class) = self.graph.of(slot);
         for (&end, &class) in ends.iter().zip(class) {
-            let (lists, is_listed) = (!is_reverse(class), is_reverse(class) || is_mutual(class));
+            let side = side(class);
+            let (lists, is_listed) = (side != Side::Reverse, side != Side::Forward);
             f(Edge { end, either: either(class, self.slots_per_record), lists, is_listed });
         }
     }

@@ -13,10 +13,18 @@ use crate::{Error, RecordId};
 /// named by mistake.
 const MOST_REVERSE: usize = 3;
 
-/// Named by the slot, by the other end, by both.
-const FORWARD: usize = 0;
-const REVERSE: usize = 1;
-const MUTUAL: usize = 2;
+/// Which end of an edge names the other.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) enum Side {
+    /// The slot names the neighbor.
+    Forward,
+    /// The neighbor names the slot. On a paired line it may mean the other slot, nobody knows.
+    Reverse,
+    /// Each names the other.
+    #[default]
+    Mutual,
+}
+
 /// Classes of scores per direction.
 const SCORE_CLASSES: usize = 8;
 /// Where score classes begin, as shares of all entries: finer at the top, where most neighbors are.
@@ -28,20 +36,17 @@ pub(crate) const CLASSES: usize = 3 * SCORE_CLASSES;
 /// names records, while the slot that a list belongs to is known.
 #[inline(always)]
 pub(crate) fn either(class: u8, slots_per_record: usize) -> bool {
-    slots_per_record == 2 && usize::from(class) / SCORE_CLASSES != REVERSE
+    slots_per_record == 2 && side(class) != Side::Reverse
 }
 
-/// Whether an edge of this class was named by its other end alone. On a paired line it belongs to one of
-/// the two slots, nobody knows which.
+/// Who names whom in an edge of this class.
 #[inline(always)]
-pub(crate) fn is_reverse(class: u8) -> bool {
-    usize::from(class) / SCORE_CLASSES == REVERSE
-}
-
-/// Whether each end of an edge of this class names the other.
-#[inline(always)]
-pub(crate) fn is_mutual(class: u8) -> bool {
-    usize::from(class) / SCORE_CLASSES == MUTUAL
+pub(crate) fn side(class: u8) -> Side {
+    match usize::from(class) / SCORE_CLASSES {
+        0 => Side::Forward,
+        1 => Side::Reverse,
+        _ => Side::Mutual,
+    }
 }
 
 /// Rows of edges in order of their other ends, a class beside each.
@@ -257,7 +262,7 @@ impl Rows {
         let every = all.len().div_ceil(most).max(1);
         let n_reverse = all.len().div_ceil(every);
         let class =
-            |direction: usize, entry: usize| (direction * SCORE_CLASSES) as u8 + score_class(entry);
+            |side: Side, entry: usize| (side as usize * SCORE_CLASSES) as u8 + score_class(entry);
         let (own, mut to) = (slots_per_record as u32, self.ends.len());
         self.ends.resize(to + list.len() + n_reverse, 0);
         self.class.resize(to + list.len() + n_reverse, 0);
@@ -272,8 +277,8 @@ impl Rows {
             // One or two slots make a record.
             let theirs = by >> (own - 1);
             let (is_mine, is_theirs) = (mine <= theirs, theirs <= mine);
-            let of_mine = class(if is_theirs { MUTUAL } else { FORWARD }, first + at);
-            let of_theirs = class(REVERSE, entry as usize);
+            let of_mine = class(if is_theirs { Side::Mutual } else { Side::Forward }, first + at);
+            let of_theirs = class(Side::Reverse, entry as usize);
             let end = if is_mine { mine * own } else { by };
             // The other slot of a record that is mutual already says nothing new.
             put(end, if is_mine { of_mine } else { of_theirs }, is_mine | (theirs != mutual));
@@ -282,10 +287,10 @@ impl Rows {
             reverse += usize::from(is_theirs);
         }
         for (at, record) in list.iter().enumerate().skip(at) {
-            put(record.0 * own, class(FORWARD, first + at), true);
+            put(record.0 * own, class(Side::Forward, first + at), true);
         }
         for &(by, entry) in all.iter().step_by(every).skip(reverse) {
-            put(by, class(REVERSE, entry as usize), by >> (own - 1) != mutual);
+            put(by, class(Side::Reverse, entry as usize), by >> (own - 1) != mutual);
         }
         self.ends.truncate(to);
         self.class.truncate(to);

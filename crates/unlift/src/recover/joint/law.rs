@@ -7,8 +7,9 @@
 
 use rayon::prelude::*;
 
+use super::crowds;
 use super::density::Density;
-use super::graph::{CLASSES, Graph, either, is_mutual};
+use super::graph::{CLASSES, Graph, Side, either, side};
 use super::places::Places;
 use crate::seed::{Draws, Stage};
 use crate::simd::{Kernel, dispatch};
@@ -40,6 +41,8 @@ pub(crate) struct Law {
     /// `(1 + r^2 / a^2)^-3`: 1 / a^2, and the density at the center.
     pub(crate) inverse_a2: f32,
     pub(crate) center: f32,
+    /// Nats by which those who list a slot, or those it lists, may be ahead of the others.
+    pub(crate) surplus: f32,
 }
 
 /// What the law is learned from.
@@ -76,6 +79,11 @@ impl Sample {
         };
         let random = slots.iter().map(random).collect();
         Self { slots, random }
+    }
+
+    /// Slots, each with its random edges.
+    pub(super) fn rows(&self) -> impl Iterator<Item = (&u32, &[(u32, u8); RANDOM])> {
+        self.slots.iter().zip(&self.random)
     }
 }
 
@@ -151,12 +159,12 @@ impl Tally {
         let (ends, class) = look.graph.of(slot);
         let mut n_mutual = 0;
         for (&end, &class) in ends.iter().zip(class) {
-            n_mutual += usize::from(is_mutual(class));
+            n_mutual += usize::from(side(class) == Side::Mutual);
             let of_class = &mut self.classes[usize::from(class)];
             of_class[0] += 1;
             if let Some(bin) = close(end, class) {
                 self.bins[0][bin].0 += 1;
-                self.bins[1][bin].0 += u32::from(is_mutual(class));
+                self.bins[1][bin].0 += u32::from(side(class) == Side::Mutual);
                 of_class[1] += 1;
             }
         }
@@ -191,7 +199,7 @@ impl Tally {
     /// Close edges beyond those expected by chance or merely in the same region, per bin; of all edges or of mutual ones.
     fn excess(&self, kind: usize, dimensions: i32) -> [f64; BINS] {
         let bins = &self.bins[kind];
-        let of_kind = |class: &u8| kind == 0 || is_mutual(*class);
+        let of_kind = |class: &u8| kind == 0 || side(*class) == Side::Mutual;
         let classes = (0..CLASSES as u8).filter(of_kind);
         let edges: u32 = classes.map(|class| self.classes[usize::from(class)][0]).sum();
         let edges = f64::from(edges.max(1));
@@ -231,6 +239,7 @@ impl Tally {
             }),
             inverse_a2: 1.0 / (a * a),
             center: 1.0 / (mass * a.powi(D as i32)),
+            surplus: crowds::surplus(look),
         }
     }
 }

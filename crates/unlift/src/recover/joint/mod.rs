@@ -11,6 +11,7 @@
 //! other was. So every other slot holds still while the rest moves.
 
 mod agreement;
+mod crowds;
 mod density;
 mod graph;
 mod law;
@@ -23,7 +24,7 @@ mod slot;
 mod small;
 
 pub(crate) use density::Density;
-pub(crate) use graph::{Graph, either, is_mutual, is_reverse};
+pub(crate) use graph::{Graph, Side, either, side};
 pub(crate) use order::along_curve;
 pub(crate) use pieces::{CandidatePieces, LinePieces, Pieces, PlanePieces};
 pub(crate) use places::{Places, distance2};

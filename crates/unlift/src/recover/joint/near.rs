@@ -1,5 +1,6 @@
 //! Columns of neighbors' estimates, and how likely they are about a place.
 
+use super::graph::Side;
 use super::pieces::Piece;
 use super::places::distance2;
 use crate::recover::lanes::{LANES, Lanes, ln};
@@ -12,6 +13,7 @@ const BEYOND: f32 = 1e19;
 pub(crate) struct Columns<const D: usize> {
     x: [Vec<f32>; D],
     odds: Vec<f32>,
+    side: Vec<Side>,
     slot: Vec<u32>,
     /// Squared distance to the piece last looked at.
     apart2: Vec<f32>,
@@ -21,7 +23,8 @@ pub(crate) struct Columns<const D: usize> {
 impl<const D: usize> Default for Columns<D> {
     fn default() -> Self {
         let x = std::array::from_fn(|_| Vec::new());
-        Self { x, odds: Vec::new(), slot: Vec::new(), apart2: Vec::new(), kept: Vec::new() }
+        let (odds, apart2) = (Vec::new(), Vec::new());
+        Self { x, odds, side: Vec::new(), slot: Vec::new(), apart2, kept: Vec::new() }
     }
 }
 
@@ -31,16 +34,17 @@ impl<const D: usize> Columns<D> {
     pub(crate) fn resize(&mut self, n: usize) {
         self.x.iter_mut().for_each(|column| column.resize(n, 0.0));
         self.odds.resize(n, 0.0);
+        self.side.resize(n, Side::Mutual);
         self.slot.resize(n, 0);
     }
 
     /// Writes row `i`.
     #[inline(always)]
-    pub(crate) fn set(&mut self, i: usize, x: &[f32; D], odds: f32, slot: u32) {
+    pub(crate) fn set(&mut self, i: usize, x: &[f32; D], (odds, side): (f32, Side), slot: u32) {
         for (column, x) in self.x.iter_mut().zip(x) {
             column[i] = *x;
         }
-        self.odds[i] = odds;
+        (self.odds[i], self.side[i]) = (odds, side);
         self.slot[i] = slot;
     }
 
@@ -127,7 +131,7 @@ impl<const D: usize> Columns<D> {
         near.resize(n_kept);
         for (to, &i) in self.kept[..n_kept].iter().enumerate() {
             let i = i as usize;
-            near.set(to, &self.at(i), self.odds[i], self.slot[i]);
+            near.set(to, &self.at(i), (self.odds[i], self.side[i]), self.slot[i]);
         }
         near.pad();
     }
@@ -137,17 +141,63 @@ impl<const D: usize> Columns<D> {
         let n = self.odds.len().next_multiple_of(LANES);
         self.x.iter_mut().for_each(|column| column.resize(n, BEYOND));
         self.odds.resize(n, 0.0);
+        self.side.resize(n, Side::Mutual);
     }
 
-    /// The logarithm of how much likelier these estimates are about a point at `x` than by chance:
-    /// the sum of `ln(1 + odds * gain * (1 + r^2 / a^2)^-3)`.
+    /// The logarithm of how much likelier these estimates are about a point at `x` than by chance, where the law has
+    /// this gain and `1 / a^2`: the sum of `ln(1 + odds * gain * (1 + r^2 / a^2)^-3)`.
     #[inline(always)]
-    pub(crate) fn log_likelihood(&self, x: &[f32; D], gain: f32, inverse_a2: f32) -> f32 {
+    pub(crate) fn log_likelihood(&self, x: &[f32; D], law: (f32, f32)) -> f32 {
         let mut sums = [0.0f32; LANES];
+        let likelier = self.likelier(x, law);
+        let n = self.odds.len() / LANES;
+        // One logarithm of two at a time: no product comes near the end of `f32`.
+        for i in 0..n / 2 {
+            for (lane, sum) in sums.iter_mut().enumerate() {
+                *sum += ln(likelier(2 * i, lane) * likelier(2 * i + 1, lane));
+            }
+        }
+        if n % 2 == 1 {
+            for (lane, sum) in sums.iter_mut().enumerate() {
+                *sum += ln(likelier(n - 1, lane));
+            }
+        }
+        sums.iter().sum()
+    }
+
+    /// The same, but those whom a slot names and those who name it may be ahead of each other by no more
+    /// than `surplus` beyond what both name.
+    #[inline(always)]
+    pub(crate) fn two_sided(&self, x: &[f32; D], law: (f32, f32), surplus: f32) -> f32 {
+        let (mut all, mut forward, mut reverse) =
+            ([0.0f32; LANES], [0.0f32; LANES], [0.0f32; LANES]);
+        let likelier = self.likelier(x, law);
+        for (i, side) in self.side.as_chunks::<LANES>().0.iter().enumerate() {
+            for lane in 0..LANES {
+                let one = ln(likelier(i, lane));
+                all[lane] += one;
+                forward[lane] += if side[lane] == Side::Forward { one } else { 0.0 };
+                reverse[lane] += if side[lane] == Side::Reverse { one } else { 0.0 };
+            }
+        }
+        let [all, forward, reverse]: [f32; 3] =
+            [all, forward, reverse].map(|sums| sums.iter().sum());
+        let of_both = all - forward - reverse;
+        all - ((forward - reverse).abs() - of_both - surplus).max(0.0)
+    }
+
+    /// How much likelier the estimate in a lane of a vector is about a point at `x` than by chance.
+    #[inline(always)]
+    fn likelier(
+        &self,
+        x: &[f32; D],
+        (gain, inverse_a2): (f32, f32),
+    ) -> impl Fn(usize, usize) -> f32 + '_ {
         let (odds, _) = self.odds.as_chunks::<LANES>();
         let columns: [&[Lanes]; D] =
             std::array::from_fn(|c| &self.x[c].as_chunks().0[..odds.len()]);
-        let likelier = |i: usize, lane: usize| {
+        let x = *x;
+        move |i: usize, lane: usize| {
             let mut r2 = 0.0;
             for c in 0..D {
                 let d = columns[c][i][lane] - x[c];
@@ -155,18 +205,49 @@ impl<const D: usize> Columns<D> {
             }
             let q = 1.0 / (1.0 + r2 * inverse_a2);
             1.0 + odds[i][lane] * gain * (q * q * q)
-        };
-        // One logarithm of two at a time: no product comes near the end of `f32`.
-        for i in 0..odds.len() / 2 {
-            for (lane, sum) in sums.iter_mut().enumerate() {
-                *sum += ln(likelier(2 * i, lane) * likelier(2 * i + 1, lane));
-            }
         }
-        if odds.len() % 2 == 1 {
-            for (lane, sum) in sums.iter_mut().enumerate() {
-                *sum += ln(likelier(odds.len() - 1, lane));
-            }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LAW: (f32, f32) = (100.0, 4.0);
+
+    /// Estimates at the origin: so many of each side, with odds of 1.
+    fn columns(of_each: [(Side, usize); 3]) -> Columns<3> {
+        let mut columns = Columns::default();
+        let sides = of_each.iter().flat_map(|&(side, n)| std::iter::repeat_n(side, n));
+        columns.resize(of_each.iter().map(|of_side| of_side.1).sum());
+        for (i, side) in sides.enumerate() {
+            columns.set(i, &[0.0; 3], (1.0, side), i as u32);
         }
-        sums.iter().sum()
+        columns.pad();
+        columns
+    }
+
+    #[test]
+    fn one_side_is_ahead_by_no_more_than_the_surplus() {
+        let one = 101f32.ln();
+        for (forward, reverse, mutual) in [(9, 0, 0), (0, 9, 0), (7, 3, 1), (5, 5, 0), (20, 1, 30)]
+        {
+            let sides =
+                [(Side::Forward, forward), (Side::Reverse, reverse), (Side::Mutual, mutual)];
+            let found = columns(sides).two_sided(&[0.0; 3], LAW, 10.0);
+            let (less, more) =
+                (forward.min(reverse) as f32 * one, forward.max(reverse) as f32 * one);
+            let of_both = mutual as f32 * one;
+            let expected = of_both + less + more.min(less + of_both + 10.0);
+            assert!((found - expected).abs() < 1e-3 * expected, "{found}, expected {expected}");
+        }
+    }
+
+    #[test]
+    fn no_estimate_counts_twice() {
+        let columns = columns([(Side::Forward, 6), (Side::Reverse, 7), (Side::Mutual, 4)]);
+        let x = [0.3, -0.1, 0.2];
+        let (sided, all) = (columns.two_sided(&x, LAW, 1e9), columns.log_likelihood(&x, LAW));
+        assert!((sided - all).abs() < 1e-4 * all, "{sided} {all}");
     }
 }

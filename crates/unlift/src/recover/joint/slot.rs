@@ -1,7 +1,7 @@
 //! One slot in one round: candidates from neighbors' estimates, the likeliest of them, re-made.
 
 use super::density::Density;
-use super::graph::{Graph, either, is_reverse};
+use super::graph::{Graph, Side, either, side};
 use super::law::Law;
 use super::near::Columns;
 use super::pieces::{Piece, Pieces};
@@ -247,24 +247,24 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         all.resize(slots_per_record * ends.len());
         let mut n = 0;
         for (&end, &class) in ends.iter().zip(class) {
-            let odds = self.law.odds[usize::from(class)];
+            let (odds, side) = (self.law.odds[usize::from(class)], side(class));
             if either(class, slots_per_record) {
                 // Either of two slots is twice as likely to lie anywhere.
                 for slot in [end, end + 1] {
-                    n += usize::from(self.set(all, n, slot, 0.5 * odds));
+                    n += usize::from(self.set(all, n, slot, (0.5 * odds, side)));
                 }
                 continue;
             }
             let odds = match &partner {
                 // An edge that belongs to the other slot as well as to this one is shared.
-                Some((x, gain, inverse_a2)) if is_reverse(class) => {
+                Some((x, gain, inverse_a2)) if side == Side::Reverse => {
                     let apart2 = distance2(x, &self.places.of(end as usize));
                     let q = 1.0 / (1.0 + apart2 * inverse_a2);
                     odds / (1.0 + odds * gain * q * q * q)
                 }
                 _ => odds,
             };
-            n += usize::from(self.set(all, n, end, odds));
+            n += usize::from(self.set(all, n, end, (odds, side)));
         }
         all.resize(n);
     }
@@ -272,9 +272,9 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
     /// Writes row `at` of `all`: the estimate of `slot`. Whether it is known: lost slots are far away, but
     /// an absurd delta reaches everywhere.
     #[inline(always)]
-    fn set(&self, all: &mut Columns<D>, at: usize, slot: u32, odds: f32) -> bool {
+    fn set(&self, all: &mut Columns<D>, at: usize, slot: u32, vote: (f32, Side)) -> bool {
         let x = self.places.of(slot as usize);
-        all.set(at, &x, odds, slot);
+        all.set(at, &x, vote, slot);
         self.places.is_known(slot as usize)
     }
 
@@ -301,7 +301,12 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         for i in 0..tried.density.len() {
             let x = std::array::from_fn(|c| tried.x[c][i]);
             let prior = tried.prior[i] + self.pieces.ln_spread(slot, &x);
-            let score = prior + near.log_likelihood(&x, tried.gain[i], tried.inverse_a2[i]);
+            let (law, surplus) = ((tried.gain[i], tried.inverse_a2[i]), self.law.surplus);
+            let likelihood = match surplus < f32::INFINITY {
+                true => near.two_sided(&x, law, surplus),
+                false => near.log_likelihood(&x, law),
+            };
+            let score = prior + likelihood;
             best.push(Candidate { x, piece, score, prior });
         }
     }

@@ -1,0 +1,54 @@
+//! Whether wrong entries of a list share places, as look-alike descriptors do.
+//!
+//! Where lists are wrong at random, a wrong entry stands alone. Where they are wrong together, whoever lists it
+//! also lists others beside it, and a place that is merely named by look-alikes gathers as much
+//! evidence as the right one. But those there do not list back, while at the right place as many list as are
+//! listed. So where crowds are found, one side may be ahead of the other only so far.
+
+use super::graph::{Side, side};
+use super::law::Look;
+use super::places::distance2;
+
+/// Every so many slots of the sample are looked at,
+const EVERY: usize = 4;
+/// and so many entries of each.
+const ENTRIES: usize = 2;
+/// An entry is elsewhere when it is farther from the estimate than this many times as far as true neighbors are looked for.
+const ELSEWHERE: f32 = 2.0;
+/// Lists are wrong together if an entry elsewhere has so many others of its list beside it, beyond chance.
+const CROWD: f64 = 0.25;
+/// Evidence of one side counts at most so many nats beyond that of the other and of both.
+const SURPLUS: f32 = 10.0;
+
+/// How many nats one side may be ahead of the other.
+pub(super) fn surplus<const D: usize>(look: &Look<'_, D>) -> f32 {
+    let mut entries = 0.0;
+    let mut beside = 0.0;
+    let mut own = Vec::new();
+    for (&slot, random) in look.sample.rows().step_by(EVERY) {
+        let slot = slot as usize;
+        if !look.places.is_known(slot) {
+            continue;
+        }
+        let (ends, class) = look.graph.of(slot);
+        own.clear();
+        let edges = ends.iter().zip(class);
+        own.extend(edges.filter(|(_, class)| side(**class) == Side::Forward).map(|(end, _)| *end));
+        let x = look.places.of(slot);
+        for &entry in own.iter().step_by(own.len().div_ceil(ENTRIES).max(1)) {
+            let y = look.places.of(entry as usize);
+            let reach = look.reach * look.density.width(look.density.at(&y));
+            let far = ELSEWHERE * ELSEWHERE * reach * reach;
+            if !look.places.is_known(entry as usize) || distance2(&x, &y) <= far {
+                continue;
+            }
+            let is_beside = |end: u32| distance2(&look.places.of(end as usize), &y) < reach * reach;
+            let found = own.iter().filter(|&&end| end != entry && is_beside(end)).count();
+            let by_chance = random.iter().filter(|(end, _)| is_beside(*end)).count();
+            entries += 1.0;
+            beside +=
+                found as f64 - (own.len() - 1) as f64 / random.len() as f64 * by_chance as f64;
+        }
+    }
+    if beside > CROWD * entries { SURPLUS } else { f32::INFINITY }
+}
