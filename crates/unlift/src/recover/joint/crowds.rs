@@ -15,7 +15,7 @@ const EVERY: usize = 4;
 const ENTRIES: usize = 2;
 /// An entry is elsewhere when it is farther from the estimate than this many times as far as true neighbors are looked for.
 const ELSEWHERE: f32 = 2.0;
-/// Lists are wrong together if an entry elsewhere has so many others of its list beside it, beyond chance.
+/// Lists are wrong together if an entry has so many others of its list beside it elsewhere, beyond chance.
 const CROWD: f64 = 0.25;
 /// Evidence of one side counts at most so many nats beyond that of the other and of both.
 const SURPLUS: f32 = 10.0;
@@ -39,13 +39,13 @@ pub(super) fn surplus<const D: usize>(look: &Look<'_, D>) -> f32 {
             let y = look.places.of(entry as usize);
             let reach = look.reach * look.density.width(look.density.at(&y));
             let far = ELSEWHERE * ELSEWHERE * reach * reach;
+            entries += 1.0;
             if !look.places.is_known(entry as usize) || distance2(&x, &y) <= far {
                 continue;
             }
             let is_beside = |end: u32| distance2(&look.places.of(end as usize), &y) < reach * reach;
             let found = own.iter().filter(|&&end| end != entry && is_beside(end)).count();
             let by_chance = random.iter().filter(|(end, _)| is_beside(*end)).count();
-            entries += 1.0;
             beside +=
                 found as f64 - (own.len() - 1) as f64 / random.len() as f64 * by_chance as f64;
         }

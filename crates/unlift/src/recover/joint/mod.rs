@@ -14,6 +14,7 @@ mod agreement;
 mod crowds;
 mod density;
 mod graph;
+mod jumps;
 mod law;
 mod near;
 mod order;
@@ -29,12 +30,11 @@ pub(crate) use order::along_curve;
 pub(crate) use pieces::{CandidatePieces, LinePieces, Pieces, PlanePieces};
 pub(crate) use places::{Places, distance2};
 
-use std::collections::VecDeque;
-
 use rayon::prelude::*;
 
+use self::jumps::Jumps;
 use self::law::{Law, Look, Sample};
-use self::slot::{Round, Scratch};
+use self::slot::{Round, Scratch, TUBE};
 use super::chunks::CHUNK;
 use super::family::Family;
 use super::{Estimate, Status};
@@ -118,8 +118,8 @@ fn rounds<const D: usize, P: Pieces<D>>(
     let sample = Sample::new(graph, seed);
     // Nothing is settled yet.
     let (mut moves, mut n_moves, mut ahead) = (vec![true; n], n, vec![0.0; n]);
-    // Where slots were when those whose turn it is moved last, and in the rounds since.
-    let mut before = VecDeque::from([places.clone()]);
+    let concerned = Jumps::new(n);
+    let mut jumped = Vec::new();
     let mut fresh = vec![(Estimate::lost(Status::NoSupport), 0.0); n];
     let (mut radius, mut most) = (most_radius, f64::NEG_INFINITY);
     for sweep in 0..SWEEPS {
@@ -142,8 +142,6 @@ fn rounds<const D: usize, P: Pieces<D>>(
                 pieces,
                 graph,
                 places: &places,
-                before: &before[0],
-                moves: &moves,
                 turn: (turn, turns),
                 density: &density,
                 law: &law,
@@ -153,24 +151,26 @@ fn rounds<const D: usize, P: Pieces<D>>(
             fresh.par_chunks_mut(CHUNK).zip(order.par_chunks(CHUNK)).for_each_init(
                 Scratch::default,
                 |scratch, (fresh, slots)| {
-                    let (round, now, ahead) = (&round, &next, &ahead);
-                    dispatch(Chunk { round, slots, now, ahead, fresh, scratch });
+                    let old = Old { now: &next, moves: &moves, ahead: &ahead, jumps: &concerned };
+                    dispatch(Chunk { round: &round, slots, old, fresh, scratch });
                 },
             );
             let is_turn_of = round.is_turn_of();
+            jumped.clear();
             for (&slot, &(estimate, by)) in order.iter().zip(&fresh) {
                 let slot = slot as usize;
                 if !is_turn_of(slot) {
                     continue;
                 }
                 moves[slot] = jumps(&next[slot], &estimate, radius);
+                if moves[slot] {
+                    jumped.push(slot as u32);
+                }
                 (next[slot], ahead[slot]) = (estimate, by);
             }
-            before.push_back(places);
-            if before.len() > TURNS {
-                before.pop_front();
-            }
-            places = Places::new(&next);
+            let after = Places::new(&next);
+            concerned.tell(&jumped, (pieces, graph), (&places, &after), TUBE * radius);
+            places = after;
         }
         let agreement = agreement::of(pieces, graph, &next, delta2);
         if agreement < (1.0 - WORSE) * most {
@@ -193,12 +193,20 @@ fn jumps<const D: usize>(a: &Estimate<D>, b: &Estimate<D>, radius: f32) -> bool 
     a.status != b.status || distance2(&a.position, &b.position) > radius * radius
 }
 
+/// What the rounds before found.
+struct Old<'a, const D: usize> {
+    now: &'a [Estimate<D>],
+    /// Which slots jumped when it was their turn.
+    moves: &'a [bool],
+    /// How many nats each place is ahead of the best one elsewhere.
+    ahead: &'a [f32],
+    jumps: &'a Jumps,
+}
+
 struct Chunk<'a, 'b, const D: usize, P> {
     round: &'a Round<'b, D, P>,
     slots: &'a [u32],
-    now: &'a [Estimate<D>],
-    /// How many nats each place is ahead of the best one elsewhere.
-    ahead: &'a [f32],
+    old: Old<'a, D>,
     /// Estimates of `slots` after the round, and how far they are ahead.
     fresh: &'a mut [(Estimate<D>, f32)],
     scratch: &'a mut Scratch<D>,
@@ -219,10 +227,9 @@ impl<const D: usize, P: Pieces<D>> Kernel for Chunk<'_, '_, D, P> {
             if let Some(next) = next.take(MOST_AHEAD).find(|&slot| is_turn_of(slot)) {
                 self.round.prefetch(next);
             }
-            let (now, ahead) = (&self.now[slot], self.ahead[slot]);
-            let is_settled = !self.round.moves[slot]
-                && ahead > 0.0
-                && self.round.is_quiet_near(slot, ahead / PER_MOVE);
+            let (now, ahead) = (&self.old.now[slot], self.old.ahead[slot]);
+            let n_jumps = self.old.jumps.take(slot) as f32;
+            let is_settled = !self.old.moves[slot] && ahead > 0.0 && n_jumps <= ahead / PER_MOVE;
             *fresh =
                 if is_settled { (*now, ahead) } else { self.round.solve(slot, now, self.scratch) };
         }

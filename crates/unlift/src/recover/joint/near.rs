@@ -1,37 +1,147 @@
 //! Columns of neighbors' estimates, and how likely they are about a place.
 
-use super::graph::Side;
+use super::graph::{Side, either, side};
 use super::pieces::Piece;
-use super::places::distance2;
+use super::places::{FAR, Places, distance2};
 use crate::recover::lanes::{LANES, Lanes, ln};
 
 /// Vectors are filled up with estimates this far away: beyond any reach, and still a number when squared.
 const BEYOND: f32 = 1e19;
 
-/// Estimates with the odds that they are a true neighbor's, in columns.
+/// The estimates at the other ends of a slot's edges, in columns.
+#[derive(Debug)]
+pub(crate) struct Ends<const D: usize> {
+    x: [Vec<f32>; D],
+    slot: Vec<u32>,
+    class: Vec<u8>,
+    /// Squared distance to the piece last looked at.
+    apart2: Vec<f32>,
+    kept: Vec<u32>,
+}
+
+impl<const D: usize> Default for Ends<D> {
+    fn default() -> Self {
+        let x = std::array::from_fn(|_| Vec::new());
+        Self { x, slot: Vec::new(), class: Vec::new(), apart2: Vec::new(), kept: Vec::new() }
+    }
+}
+
+impl<const D: usize> Ends<D> {
+    /// The places of the slots at the other ends of edges, each of a class: of both slots of a record
+    /// where it is not known which.
+    #[inline(always)]
+    pub(crate) fn gather(
+        &mut self,
+        (ends, class): (&[u32], &[u8]),
+        places: &Places<D>,
+        slots_per_record: usize,
+    ) {
+        let most = slots_per_record * ends.len();
+        self.resize(most);
+        let columns = self.x.each_mut().map(|column| &mut column[..most]);
+        let (slots, classes) = (&mut self.slot[..most], &mut self.class[..most]);
+        let mut n = 0;
+        for (&end, &class) in ends.iter().zip(class) {
+            let mut set = |i: usize, slot: u32| {
+                let x = places.of(slot as usize);
+                for c in 0..D {
+                    columns[c][i] = x[c];
+                }
+                (slots[i], classes[i]) = (slot, class);
+            };
+            set(n, end);
+            if slots_per_record == 2 {
+                // Written in any case: the next row covers it unless it stays.
+                set(n + 1, end | 1);
+                n += usize::from(either(class, slots_per_record));
+            }
+            n += 1;
+        }
+        self.resize(n);
+    }
+
+    #[inline(always)]
+    fn resize(&mut self, n: usize) {
+        self.x.iter_mut().for_each(|column| column.resize(n, 0.0));
+        self.slot.resize(n, 0);
+        self.class.resize(n, 0);
+    }
+
+    /// Puts the estimates within `reach` of `piece` into `near`, with the odds of each, but not those within
+    /// `blind` of a center.
+    #[inline(always)]
+    pub(crate) fn near(
+        &mut self,
+        piece: &Piece<D>,
+        reach: f32,
+        blind: f32,
+        odds: impl Fn(&[f32; D], u8) -> f32,
+        near: &mut Columns<D>,
+    ) {
+        let n = self.slot.len();
+        self.apart2.resize(n, 0.0);
+        let columns: [&[f32]; D] = std::array::from_fn(|c| &self.x[c][..n]);
+        let apart2 = &mut self.apart2[..n];
+        for i in 0..n {
+            let x: [f32; D] = std::array::from_fn(|c| columns[c][i]);
+            let y = piece.project(&x);
+            let mut sum = 0.0;
+            for c in 0..D {
+                sum += (x[c] - y[c]) * (x[c] - y[c]);
+            }
+            // An absurd delta reaches even those.
+            apart2[i] = if x[0] == FAR { f32::INFINITY } else { sum };
+        }
+        if piece.from_center {
+            for i in 0..n {
+                let mut sum = 0.0;
+                for (column, from) in columns.iter().zip(&piece.through) {
+                    sum += (column[i] - from) * (column[i] - from);
+                }
+                apart2[i] = if sum < blind * blind { f32::INFINITY } else { apart2[i] };
+            }
+        }
+        // Every number is written, and stays if it is near: no branch to guess.
+        self.kept.resize(n, 0);
+        let (kept, mut n_kept) = (&mut self.kept[..n], 0);
+        for (i, apart2) in apart2.iter().enumerate() {
+            kept[n_kept] = i as u32;
+            n_kept += usize::from(*apart2 < reach * reach);
+        }
+        near.resize(n_kept);
+        for (to, &i) in kept[..n_kept].iter().enumerate() {
+            let i = i as usize;
+            let x = std::array::from_fn(|c| columns[c][i]);
+            let class = self.class[i];
+            near.set(to, &x, (odds(&x, class), side(class)), self.slot[i]);
+        }
+        near.pad();
+    }
+}
+
+/// Estimates near a piece with the odds that they are a true neighbor's, in columns.
 #[derive(Debug)]
 pub(crate) struct Columns<const D: usize> {
     x: [Vec<f32>; D],
     odds: Vec<f32>,
     side: Vec<Side>,
     slot: Vec<u32>,
-    /// Squared distance to the piece last looked at.
+    /// Squared distance to the place last looked at.
     apart2: Vec<f32>,
-    kept: Vec<u32>,
 }
 
 impl<const D: usize> Default for Columns<D> {
     fn default() -> Self {
         let x = std::array::from_fn(|_| Vec::new());
         let (odds, apart2) = (Vec::new(), Vec::new());
-        Self { x, odds, side: Vec::new(), slot: Vec::new(), apart2, kept: Vec::new() }
+        Self { x, odds, side: Vec::new(), slot: Vec::new(), apart2 }
     }
 }
 
 impl<const D: usize> Columns<D> {
     /// `n` rows, to be [`set`](Self::set).
     #[inline(always)]
-    pub(crate) fn resize(&mut self, n: usize) {
+    fn resize(&mut self, n: usize) {
         self.x.iter_mut().for_each(|column| column.resize(n, 0.0));
         self.odds.resize(n, 0.0);
         self.side.resize(n, Side::Mutual);
@@ -40,7 +150,7 @@ impl<const D: usize> Columns<D> {
 
     /// Writes row `i`.
     #[inline(always)]
-    pub(crate) fn set(&mut self, i: usize, x: &[f32; D], (odds, side): (f32, Side), slot: u32) {
+    fn set(&mut self, i: usize, x: &[f32; D], (odds, side): (f32, Side), slot: u32) {
         for (column, x) in self.x.iter_mut().zip(x) {
             column[i] = *x;
         }
@@ -94,46 +204,6 @@ impl<const D: usize> Columns<D> {
     #[inline(always)]
     pub(crate) fn slot(&self, i: usize) -> usize {
         self.slot[i] as usize
-    }
-
-    /// Puts the estimates within `reach` of `piece` into `near`, but not those within `blind` of a center.
-    #[inline(always)]
-    pub(crate) fn near(&mut self, piece: &Piece<D>, reach: f32, blind: f32, near: &mut Self) {
-        let n = self.len();
-        self.apart2.resize(n, 0.0);
-        let columns: [&[f32]; D] = std::array::from_fn(|c| &self.x[c][..n]);
-        let apart2 = &mut self.apart2[..n];
-        for i in 0..n {
-            let x: [f32; D] = std::array::from_fn(|c| columns[c][i]);
-            let y = piece.project(&x);
-            let mut sum = 0.0;
-            for c in 0..D {
-                sum += (x[c] - y[c]) * (x[c] - y[c]);
-            }
-            apart2[i] = sum;
-        }
-        if piece.from_center {
-            for i in 0..n {
-                let mut sum = 0.0;
-                for (column, from) in columns.iter().zip(&piece.through) {
-                    sum += (column[i] - from) * (column[i] - from);
-                }
-                apart2[i] = if sum < blind * blind { f32::INFINITY } else { apart2[i] };
-            }
-        }
-        // Every number is written, and stays if it is near: no branch to guess.
-        self.kept.resize(n, 0);
-        let mut n_kept = 0;
-        for i in 0..n {
-            self.kept[n_kept] = i as u32;
-            n_kept += usize::from(self.apart2[i] < reach * reach);
-        }
-        near.resize(n_kept);
-        for (to, &i) in self.kept[..n_kept].iter().enumerate() {
-            let i = i as usize;
-            near.set(to, &self.at(i), (self.odds[i], self.side[i]), self.slot[i]);
-        }
-        near.pad();
     }
 
     /// Fills up the last vector with estimates that say nothing.

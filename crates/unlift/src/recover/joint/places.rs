@@ -13,7 +13,7 @@ struct Place<const D: usize> {
 }
 
 /// Lost slots lie this far away: near nothing, and still a number when squared.
-const FAR: f32 = 1e18;
+pub(super) const FAR: f32 = 1e18;
 
 /// Places that stand for all.
 const SAMPLE: usize = 1 << 14;

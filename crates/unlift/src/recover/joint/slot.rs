@@ -3,7 +3,7 @@
 use super::density::Density;
 use super::graph::{Graph, Side, either, side};
 use super::law::Law;
-use super::near::Columns;
+use super::near::{Columns, Ends};
 use super::pieces::{Piece, Pieces};
 use super::places::{Places, distance2};
 use super::remake::{Directions, remade};
@@ -15,10 +15,6 @@ pub(crate) struct Round<'a, const D: usize, P> {
     pub(crate) pieces: &'a P,
     pub(crate) graph: &'a Graph,
     pub(crate) places: &'a Places<D>,
-    /// Where slots were believed to be when those whose turn it is moved last, and which of them jumped
-    /// since.
-    pub(crate) before: &'a Places<D>,
-    pub(crate) moves: &'a [bool],
     /// Whose turn it is: slots whose number leaves this remainder when divided by that.
     pub(crate) turn: (usize, usize),
     pub(crate) density: &'a Density<D>,
@@ -29,7 +25,7 @@ pub(crate) struct Round<'a, const D: usize, P> {
 }
 
 /// Estimates farther from a piece than this many radii of the law say nothing about it.
-const TUBE: f32 = 6.0;
+pub(super) const TUBE: f32 = 6.0;
 /// Estimates within this many radii of the law of the center of a ray are near all of its rays. They would
 /// draw others there, as nothing tells them apart.
 const BLIND: f32 = 3.0;
@@ -41,6 +37,9 @@ const DOUBT: f32 = 8.0;
 const ASTRAY: f32 = 0.2;
 /// The weight of the density prior.
 const PRIOR: f32 = 0.5;
+
+/// So many places stay in the cache.
+const CACHED: usize = 1 << 16;
 
 /// A position that could win.
 #[derive(Clone, Copy, Debug)]
@@ -105,7 +104,7 @@ impl<const D: usize> Tried<D> {
 /// Buffers of one thread.
 #[derive(Debug)]
 pub(crate) struct Scratch<const D: usize> {
-    all: Columns<D>,
+    all: Ends<D>,
     near: [Columns<D>; D],
     directions: Directions<D>,
     tried: Tried<D>,
@@ -116,7 +115,7 @@ impl<const D: usize> Default for Scratch<D> {
     fn default() -> Self {
         let near = std::array::from_fn(|_| Columns::default());
         Self {
-            all: Columns::default(),
+            all: Ends::default(),
             near,
             directions: std::array::from_fn(|_| Vec::new()),
             tried: Tried::default(),
@@ -136,6 +135,9 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
     /// Brings the places near that [`solve`](Self::solve) looks at.
     #[inline(always)]
     pub(crate) fn prefetch(&self, slot: usize) {
+        if self.places.len() <= CACHED {
+            return;
+        }
         // The other slot of a record lies beside the one that is named.
         self.graph.of(slot).0.iter().for_each(|&end| self.places.prefetch(end as usize));
     }
@@ -150,11 +152,12 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         scratch: &mut Scratch<D>,
     ) -> (Estimate<D>, f32) {
         scratch.best.clear();
-        self.gather(slot, &mut scratch.all);
+        scratch.all.gather(self.graph.of(slot), self.places, self.pieces.slots_per_record());
         let (reach, blind) = (TUBE * self.law.radius, BLIND * self.law.radius);
+        let odds = self.odds(slot);
         for piece in 0..P::PER_SLOT {
             let own = self.pieces.piece(slot, piece);
-            scratch.all.near(&own, reach, blind, &mut scratch.near[piece]);
+            scratch.all.near(&own, reach, blind, &odds, &mut scratch.near[piece]);
             self.consider(&own, (slot, piece), old, scratch);
         }
         let Some((first, ahead)) = self.winner(slot, &scratch.best) else {
@@ -182,32 +185,6 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
             evidence: (first.score - first.prior).max(0.0),
         };
         (estimate, ahead)
-    }
-
-    /// Whether at most so many of the slots at the other ends of the edges of `slot` have moved to or from
-    /// where `slot` may lie.
-    #[inline(always)]
-    pub(crate) fn is_quiet_near(&self, slot: usize, most: f32) -> bool {
-        let slots_per_record = self.pieces.slots_per_record();
-        let (ends, class) = self.graph.of(slot);
-        let reach2 = (TUBE * self.law.radius) * (TUBE * self.law.radius);
-        let near = |x: &[f32; D]| {
-            (0..P::PER_SLOT)
-                .any(|piece| distance2(&self.pieces.piece(slot, piece).project(x), x) < reach2)
-        };
-        let mut n = 0.0;
-        for (&end, &class) in ends.iter().zip(class) {
-            let last = end as usize + usize::from(either(class, slots_per_record));
-            for end in end as usize..=last {
-                if self.moves[end] && (near(&self.places.of(end)) || near(&self.before.of(end))) {
-                    n += 1.0;
-                    if n > most {
-                        return false;
-                    }
-                }
-            }
-        }
-        true
     }
 
     /// Where the other slot of a paired line lies, with the gain and scale of the law there.
@@ -238,44 +215,26 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         (self.law.center / (volume * density), self.law.inverse_a2 / (width * width))
     }
 
-    /// The estimates of all slots at the other ends of the edges of `slot`.
+    /// The odds that an edge of a class leads to a true neighbor of `slot`, whose estimate is at a place.
     #[inline(always)]
-    fn gather(&self, slot: usize, all: &mut Columns<D>) {
+    fn odds(&self, slot: usize) -> impl Fn(&[f32; D], u8) -> f32 + '_ {
         let slots_per_record = self.pieces.slots_per_record();
         let partner = self.partner(slot);
-        let (ends, class) = self.graph.of(slot);
-        all.resize(slots_per_record * ends.len());
-        let mut n = 0;
-        for (&end, &class) in ends.iter().zip(class) {
-            let (odds, side) = (self.law.odds[usize::from(class)], side(class));
+        move |x, class| {
+            let odds = self.law.odds[usize::from(class)];
             if either(class, slots_per_record) {
                 // Either of two slots is twice as likely to lie anywhere.
-                for slot in [end, end + 1] {
-                    n += usize::from(self.set(all, n, slot, (0.5 * odds, side)));
-                }
-                continue;
+                return 0.5 * odds;
             }
-            let odds = match &partner {
+            match &partner {
                 // An edge that belongs to the other slot as well as to this one is shared.
-                Some((x, gain, inverse_a2)) if side == Side::Reverse => {
-                    let apart2 = distance2(x, &self.places.of(end as usize));
-                    let q = 1.0 / (1.0 + apart2 * inverse_a2);
+                Some((other, gain, inverse_a2)) if side(class) == Side::Reverse => {
+                    let q = 1.0 / (1.0 + distance2(other, x) * inverse_a2);
                     odds / (1.0 + odds * gain * q * q * q)
                 }
                 _ => odds,
-            };
-            n += usize::from(self.set(all, n, end, (odds, side)));
+            }
         }
-        all.resize(n);
-    }
-
-    /// Writes row `at` of `all`: the estimate of `slot`. Whether it is known: lost slots are far away, but
-    /// an absurd delta reaches everywhere.
-    #[inline(always)]
-    fn set(&self, all: &mut Columns<D>, at: usize, slot: u32, vote: (f32, Side)) -> bool {
-        let x = self.places.of(slot as usize);
-        all.set(at, &x, vote, slot);
-        self.places.is_known(slot as usize)
     }
 
     /// Adds the candidates of one piece to the best: neighbors' estimates, and the old one.
@@ -333,35 +292,39 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
             return Some((best, best.score - best.prior));
         };
         let ahead = best.score - second.score;
-        if ahead < DOUBT
-            && second.score + self.by_records(slot, &second.x)
-                > best.score + self.by_records(slot, &best.x)
-        {
-            return Some((second, 0.0));
+        if ahead < DOUBT {
+            let [of_best, of_second] = self.by_records(slot, [best.x, second.x]);
+            if second.score + of_second > best.score + of_best {
+                return Some((second, 0.0));
+            }
         }
         Some((best, ahead))
     }
 
-    /// What records near `x` add where their estimates are elsewhere.
+    /// What records near two places add where their estimates are elsewhere.
     #[inline(always)]
-    fn by_records(&self, slot: usize, x: &[f32; D]) -> f32 {
+    fn by_records(&self, slot: usize, x: [[f32; D]; 2]) -> [f32; 2] {
         let slots_per_record = self.pieces.slots_per_record();
-        let (gain, inverse_a2) = self.law_at(x);
-        let chance = self.pieces.record_chance(slot, x);
+        let at = x.map(|x| (self.law_at(&x), self.pieces.record_chance(slot, &x)));
         let (ends, class) = self.graph.of(slot);
-        let mut sum = 0.0;
+        let mut sums = [0.0; 2];
         for (&end, &class) in ends.iter().zip(class) {
             let record = end as usize / slots_per_record;
-            if self.pieces.may_vote(slot, record)
-                && self.pieces.record_distance2(record, x) <= self.delta2
-            {
+            if !self.pieces.may_vote(slot, record) {
+                continue;
+            }
+            for (i, x) in x.iter().enumerate() {
+                if self.pieces.record_distance2(record, x) > self.delta2 {
+                    continue;
+                }
+                let ((gain, inverse_a2), chance) = at[i];
                 let odds = self.law.odds[usize::from(class)];
                 let either = either(class, slots_per_record);
                 let q = 1.0 / (1.0 + self.places.nearest(end, either, x).0 * inverse_a2);
                 let by_estimate = 1.0 + odds * gain * q * q * q;
-                sum += ln(1.0 + ASTRAY * odds / chance / by_estimate);
+                sums[i] += ln(1.0 + ASTRAY * odds / chance / by_estimate);
             }
         }
-        sum
+        sums
     }
 }

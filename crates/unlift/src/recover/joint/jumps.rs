@@ -1,0 +1,65 @@
+//! Whom a jump concerns: the slots that must be looked at again.
+//!
+//! A slot that jumps tells those at the other ends of its edges, if it jumped to or from where they may lie. Few
+//! slots jump after the first sweep, so telling is cheaper than asking.
+
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use rayon::prelude::*;
+
+use super::graph::{Graph, either};
+use super::pieces::Pieces;
+use super::places::{Places, distance2};
+
+/// Per slot, how many jumps concern it since it was looked at. Sums of integers: the same however threads
+/// share the work.
+pub(super) struct Jumps {
+    near: Vec<AtomicU32>,
+}
+
+impl Jumps {
+    /// No jumps yet.
+    pub(super) fn new(n_slots: usize) -> Self {
+        Self { near: (0..n_slots).map(|_| AtomicU32::new(0)).collect() }
+    }
+
+    /// How many jumps concern `slot` since this was asked last.
+    #[inline(always)]
+    pub(super) fn take(&self, slot: usize) -> u32 {
+        self.near[slot].swap(0, Ordering::Relaxed)
+    }
+
+    /// Tells whom it concerns that `slots` jumped from one place to another: whoever may lie within
+    /// `reach` of either.
+    pub(super) fn tell<const D: usize, P: Pieces<D>>(
+        &self,
+        slots: &[u32],
+        (pieces, graph): (&P, &Graph),
+        (from, to): (&Places<D>, &Places<D>),
+        reach: f32,
+    ) {
+        let slots_per_record = pieces.slots_per_record();
+        let concerns = |slot: usize, x: &[f32; D]| {
+            let near = |piece| distance2(&pieces.piece(slot, piece).project(x), x) < reach * reach;
+            (0..P::PER_SLOT).any(near)
+        };
+        slots.par_chunks(CHUNK).for_each(|slots| {
+            for slot in slots.iter().map(|&slot| slot as usize) {
+                let (from, to) = (from.of(slot), to.of(slot));
+                let (ends, class) = graph.of(slot);
+                for (&end, &class) in ends.iter().zip(class) {
+                    let last = end as usize + usize::from(either(class, slots_per_record));
+                    // Both slots of a record lie on one piece.
+                    if concerns(end as usize, &from) || concerns(end as usize, &to) {
+                        for end in end as usize..=last {
+                            self.near[end].fetch_add(1, Ordering::Relaxed);
+                        }
+                    }
+                }
+            }
+        });
+    }
+}
+
+/// Slots whose jumps one thread tells at a time.
+const CHUNK: usize = 64;
