@@ -135,6 +135,11 @@ pub fn neighbor_source(text: &str) -> Result<NeighborSource, String> {
         names if names.split('+').any(|name| source(name).is_ok()) => {
             joined(names).map(NeighborSource::Own)
         }
+        names if names.split(',').any(|name| name == "oracle" || source(name).is_ok()) => {
+            Err(format!(
+                "expected one source (repeat the option for rows of each, + joins sources), found {names}"
+            ))
+        }
         path => Ok(NeighborSource::File(path.into())),
     }
 }
@@ -211,6 +216,10 @@ mod tests {
         assert_eq!(neighbor_source("overlap+similarity"), Ok(own("overlap+similarity")));
         assert_eq!(neighbor_source("./overlap"), Ok(NeighborSource::File("./overlap".into())));
         assert_eq!(neighbor_source("oracle"), Ok(NeighborSource::Oracle));
+        let several = neighbor_source("overlap,similarity").unwrap_err();
+        assert!(several.starts_with("expected one source (repeat the option"), "{several}");
+        let file = NeighborSource::File("lists,overlapping.parquet".into());
+        assert_eq!(neighbor_source("lists,overlapping.parquet"), Ok(file));
     }
 
     #[test]

@@ -56,7 +56,7 @@ pub const SOURCES: &[SourceEntry] = &[
         name: "similarity",
         summary: "records with the most similar descriptors, of any kind",
         needs_descriptors: true,
-        usual_k: 20,
+        usual_k: 30,
         usual_k_2d: 10,
         only_ranks: false,
         not_for: &[],

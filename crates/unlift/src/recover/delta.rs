@@ -39,7 +39,7 @@ const FAR_BELOW: f64 = 0.8;
 /// Steps below the best delta in which the edge is looked for.
 const LOWEST: i32 = 15;
 /// A narrow delta is at most this many times the edge.
-const BEYOND_EDGE: f64 = 2.5;
+const BEYOND_EDGE: f64 = 2.0;
 
 /// The maximum is flat: which of the deltas near it to take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
