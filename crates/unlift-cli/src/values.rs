@@ -135,7 +135,10 @@ pub fn neighbor_source(text: &str) -> Result<NeighborSource, String> {
         names if names.split('+').any(|name| source(name).is_ok()) => {
             joined(names).map(NeighborSource::Own)
         }
-        names if names.split(',').any(|name| name == "oracle" || source(name).is_ok()) => {
+        names
+            if !names.contains(std::path::is_separator)
+                && names.split(',').any(|name| name == "oracle" || source(name).is_ok()) =>
+        {
             Err(format!(
                 "expected one source (repeat the option for rows of each, + joins sources), found {names}"
             ))
@@ -220,6 +223,8 @@ mod tests {
         assert!(several.starts_with("expected one source (repeat the option"), "{several}");
         let file = NeighborSource::File("lists,overlapping.parquet".into());
         assert_eq!(neighbor_source("lists,overlapping.parquet"), Ok(file));
+        let file = NeighborSource::File("./lists,overlap".into());
+        assert_eq!(neighbor_source("./lists,overlap"), Ok(file));
     }
 
     #[test]

@@ -102,10 +102,12 @@ fn threads_change_no_bit() {
     for solver in [Solver::Consensus, Solver::Joint, Solver::Ransac] {
         let on = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let run = || recovered(&scene, "ppl", solver, (Noise::Uniform, 0.3)).0;
-            let confidence = pool.install(run);
-            let bits = confidence.confidence().unwrap().iter();
-            bits.map(|c| (c.found.to_bits(), c.scale.to_bits())).collect::<Vec<_>>()
+            let run = |case| pool.install(|| recovered(&scene, "ppl", solver, case).0);
+            [(Noise::Uniform, 0.3), (Noise::Clustered, 0.3)].map(|case| {
+                let found = run(case);
+                let bits = found.confidence().unwrap().iter();
+                bits.map(|c| (c.found.to_bits(), c.scale.to_bits())).collect::<Vec<_>>()
+            })
         };
         assert_eq!(on(1), on(3), "{solver:?}");
     }

@@ -13,14 +13,17 @@ use super::places::distance2;
 const EVERY: usize = 4;
 /// and so many entries of each.
 const ENTRIES: usize = 2;
-/// An entry is elsewhere when it is farther from the estimate than this many times as far as true neighbors are looked for.
+/// An entry is elsewhere when it is farther from the estimate than this many times as far as true neighbors are looked for
+/// about the entry.
 const ELSEWHERE: f32 = 2.0;
-/// Lists are wrong together if an entry has so many others of its list beside it elsewhere, beyond chance.
+/// Lists are wrong together if an entry that does not list back has so many others of its list beside it elsewhere, beyond
+/// chance, in the mean; entries that are not elsewhere count with none. Of a pair one slot is looked at, so
+/// pairs need more.
 const CROWD: f64 = 0.25;
 /// Evidence of one side counts at most so many nats beyond that of the other and of both.
 const SURPLUS: f32 = 10.0;
 
-/// How many nats one side may be ahead of the other.
+/// How many nats one side may be ahead of the other beyond what both say; without bound where lists are not wrong together.
 pub(super) fn surplus<const D: usize>(look: &Look<'_, D>) -> f32 {
     let mut entries = 0.0;
     let mut beside = 0.0;
@@ -36,11 +39,13 @@ pub(super) fn surplus<const D: usize>(look: &Look<'_, D>) -> f32 {
         own.extend(edges.filter(|(_, class)| side(**class) == Side::Forward).map(|(end, _)| *end));
         let x = look.places.of(slot);
         for &entry in own.iter().step_by(own.len().div_ceil(ENTRIES).max(1)) {
+            entries += 1.0;
+            if !look.places.is_known(entry as usize) {
+                continue;
+            }
             let y = look.places.of(entry as usize);
             let reach = look.reach * look.density.width(look.density.at(&y));
-            let far = ELSEWHERE * ELSEWHERE * reach * reach;
-            entries += 1.0;
-            if !look.places.is_known(entry as usize) || distance2(&x, &y) <= far {
+            if distance2(&x, &y) <= ELSEWHERE * ELSEWHERE * reach * reach {
                 continue;
             }
             let is_beside = |end: u32| distance2(&look.places.of(end as usize), &y) < reach * reach;

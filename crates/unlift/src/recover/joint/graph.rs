@@ -14,14 +14,13 @@ use crate::{Error, RecordId};
 const MOST_REVERSE: usize = 3;
 
 /// Which end of an edge names the other.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Side {
     /// The slot names the neighbor.
     Forward,
     /// The neighbor names the slot. On a paired line it may mean the other slot, nobody knows.
     Reverse,
     /// Each names the other.
-    #[default]
     Mutual,
 }
 

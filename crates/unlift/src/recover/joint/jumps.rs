@@ -1,7 +1,8 @@
 //! Whom a jump concerns: the slots that must be looked at again.
 //!
 //! A slot that jumps tells those at the other ends of its edges, if it jumped to or from where they may lie. Few
-//! slots jump after the first sweep, so telling is cheaper than asking.
+//! slots jump after the first sweep, so telling is cheaper than asking. A slot whom many list knows only some of
+//! them: the others are not told, and stay until something else jumps.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -11,22 +12,22 @@ use super::graph::{Graph, either};
 use super::pieces::Pieces;
 use super::places::{Places, distance2};
 
-/// Per slot, how many jumps concern it since it was looked at. Sums of integers: the same however threads
+/// Per slot, how many jumps concern it since it was last its turn. Sums of integers: the same however threads
 /// share the work.
 pub(super) struct Jumps {
-    near: Vec<AtomicU32>,
+    concerning: Vec<AtomicU32>,
 }
 
 impl Jumps {
     /// No jumps yet.
     pub(super) fn new(n_slots: usize) -> Self {
-        Self { near: (0..n_slots).map(|_| AtomicU32::new(0)).collect() }
+        Self { concerning: (0..n_slots).map(|_| AtomicU32::new(0)).collect() }
     }
 
-    /// How many jumps concern `slot` since this was asked last.
+    /// How many jumps concern `slot` since this was asked last, whether it was then looked at or passed over.
     #[inline(always)]
     pub(super) fn take(&self, slot: usize) -> u32 {
-        self.near[slot].swap(0, Ordering::Relaxed)
+        self.concerning[slot].swap(0, Ordering::Relaxed)
     }
 
     /// Tells whom it concerns that `slots` jumped from one place to another: whoever may lie within
@@ -52,7 +53,7 @@ impl Jumps {
                     // Both slots of a record lie on one piece.
                     if concerns(end as usize, &from) || concerns(end as usize, &to) {
                         for end in end as usize..=last {
-                            self.near[end].fetch_add(1, Ordering::Relaxed);
+                            self.concerning[end].fetch_add(1, Ordering::Relaxed);
                         }
                     }
                 }

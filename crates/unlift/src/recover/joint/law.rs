@@ -41,7 +41,8 @@ pub(crate) struct Law {
     /// `(1 + r^2 / a^2)^-3`: 1 / a^2, and the density at the center.
     pub(crate) inverse_a2: f32,
     pub(crate) center: f32,
-    /// Nats by which those who list a slot, or those it lists, may be ahead of the others.
+    /// Nats by which those who list a slot, or those it lists, may be ahead of the others beyond what both
+    /// say; infinite where nothing bounds them.
     pub(crate) surplus: f32,
 }
 

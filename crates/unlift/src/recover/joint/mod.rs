@@ -95,8 +95,8 @@ const SETTLED: f64 = 0.03;
 /// Sweeps end when as many as this share of those that moved before move again.
 const SLOW: f64 = 0.9;
 /// A slot that did not jump is looked at again if its place is ahead by at most this many nats per
-/// neighbor that did: jumps of others cannot overturn it.
-const PER_MOVE: f32 = 3.0;
+/// neighbor that did in one sweep: jumps of others cannot overturn it.
+const PER_JUMP: f32 = 3.0;
 /// Sweeps end when records agree by this share less than they did at best.
 const WORSE: f64 = 0.08;
 
@@ -117,11 +117,12 @@ fn rounds<const D: usize, P: Pieces<D>>(
     let order = along_curve(&places);
     let sample = Sample::new(graph, seed);
     // Nothing is settled yet.
-    let (mut moves, mut n_moves, mut ahead) = (vec![true; n], n, vec![0.0; n]);
-    let concerned = Jumps::new(n);
-    let mut jumped = Vec::new();
+    let (mut has_jumped, mut n_jumped, mut ahead) = (vec![true; n], n, vec![0.0; n]);
+    let jumps = Jumps::new(n);
+    let mut jumpers = Vec::new();
     let mut fresh = vec![(Estimate::lost(Status::NoSupport), 0.0); n];
-    let (mut radius, mut most) = (most_radius, f64::NEG_INFINITY);
+    let (mut radius, mut surplus) = (most_radius, f32::INFINITY);
+    let mut most = f64::NEG_INFINITY;
     for sweep in 0..SWEEPS {
         let turns = if sweep == 0 { 1 } else { TURNS };
         let mut next = now.clone();
@@ -138,6 +139,11 @@ fn rounds<const D: usize, P: Pieces<D>>(
                 sample: &sample,
             });
             radius = law.radius;
+            if law.surplus != surplus {
+                // Leads found under another rule say nothing.
+                ahead.fill(0.0);
+                surplus = law.surplus;
+            }
             let round = Round {
                 pieces,
                 graph,
@@ -151,25 +157,30 @@ fn rounds<const D: usize, P: Pieces<D>>(
             fresh.par_chunks_mut(CHUNK).zip(order.par_chunks(CHUNK)).for_each_init(
                 Scratch::default,
                 |scratch, (fresh, slots)| {
-                    let old = Old { now: &next, moves: &moves, ahead: &ahead, jumps: &concerned };
+                    let old = Old {
+                        estimates: &next,
+                        has_jumped: &has_jumped,
+                        ahead: &ahead,
+                        jumps: &jumps,
+                    };
                     dispatch(Chunk { round: &round, slots, old, fresh, scratch });
                 },
             );
             let is_turn_of = round.is_turn_of();
-            jumped.clear();
+            jumpers.clear();
             for (&slot, &(estimate, by)) in order.iter().zip(&fresh) {
                 let slot = slot as usize;
                 if !is_turn_of(slot) {
                     continue;
                 }
-                moves[slot] = jumps(&next[slot], &estimate, radius);
-                if moves[slot] {
-                    jumped.push(slot as u32);
+                has_jumped[slot] = is_jump(&next[slot], &estimate, radius);
+                if has_jumped[slot] {
+                    jumpers.push(slot as u32);
                 }
                 (next[slot], ahead[slot]) = (estimate, by);
             }
             let after = Places::new(&next);
-            concerned.tell(&jumped, (pieces, graph), (&places, &after), TUBE * radius);
+            jumps.tell(&jumpers, (pieces, graph), (&places, &after), TUBE * radius);
             places = after;
         }
         let agreement = agreement::of(pieces, graph, &next, delta2);
@@ -178,10 +189,10 @@ fn rounds<const D: usize, P: Pieces<D>>(
         }
         most = most.max(agreement);
         now = next;
-        let earlier = n_moves;
-        n_moves = moves.iter().filter(|&&moves| moves).count();
-        let slow = 2 * n_moves < n && n_moves as f64 > SLOW * earlier as f64;
-        if slow || (n_moves as f64) < SETTLED * n as f64 {
+        let earlier = n_jumped;
+        n_jumped = has_jumped.iter().filter(|&&jumped| jumped).count();
+        let slow = 2 * n_jumped < n && n_jumped as f64 > SLOW * earlier as f64;
+        if slow || (n_jumped as f64) < SETTLED * n as f64 {
             break;
         }
     }
@@ -189,15 +200,15 @@ fn rounds<const D: usize, P: Pieces<D>>(
 }
 
 /// Whether a slot is elsewhere, farther than the law looks.
-fn jumps<const D: usize>(a: &Estimate<D>, b: &Estimate<D>, radius: f32) -> bool {
+fn is_jump<const D: usize>(a: &Estimate<D>, b: &Estimate<D>, radius: f32) -> bool {
     a.status != b.status || distance2(&a.position, &b.position) > radius * radius
 }
 
 /// What the rounds before found.
 struct Old<'a, const D: usize> {
-    now: &'a [Estimate<D>],
+    estimates: &'a [Estimate<D>],
     /// Which slots jumped when it was their turn.
-    moves: &'a [bool],
+    has_jumped: &'a [bool],
     /// How many nats each place is ahead of the best one elsewhere.
     ahead: &'a [f32],
     jumps: &'a Jumps,
@@ -227,9 +238,10 @@ impl<const D: usize, P: Pieces<D>> Kernel for Chunk<'_, '_, D, P> {
             if let Some(next) = next.take(MOST_AHEAD).find(|&slot| is_turn_of(slot)) {
                 self.round.prefetch(next);
             }
-            let (now, ahead) = (&self.old.now[slot], self.old.ahead[slot]);
+            let (now, ahead) = (&self.old.estimates[slot], self.old.ahead[slot]);
             let n_jumps = self.old.jumps.take(slot) as f32;
-            let is_settled = !self.old.moves[slot] && ahead > 0.0 && n_jumps <= ahead / PER_MOVE;
+            let is_settled =
+                !self.old.has_jumped[slot] && ahead > 0.0 && n_jumps <= ahead / PER_JUMP;
             *fresh =
                 if is_settled { (*now, ahead) } else { self.round.solve(slot, now, self.scratch) };
         }

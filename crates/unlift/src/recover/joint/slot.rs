@@ -38,7 +38,7 @@ const ASTRAY: f32 = 0.2;
 /// The weight of the density prior.
 const PRIOR: f32 = 0.5;
 
-/// So many places stay in the cache.
+/// So many places stay in the cache: no memory is asked for ahead.
 const CACHED: usize = 1 << 16;
 
 /// A position that could win.
