@@ -38,8 +38,10 @@ const GROWTH: f64 = 1.2;
 const FAR_BELOW: f64 = 0.8;
 /// Steps below the best delta in which the edge is looked for.
 const LOWEST: i32 = 15;
-/// A narrow delta is at most this many times the edge.
-const BEYOND_EDGE: f64 = 2.0;
+/// A narrow delta is at most this many times the edge;
+const BEYOND_EDGE: f64 = 2.25;
+/// where likeness ranked the lists, at most so many times.
+const BEYOND_EDGE_OF_RANKED: f64 = 2.0;
 
 /// The maximum is flat: which of the deltas near it to take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,6 +50,8 @@ pub(crate) enum Prefer {
     Wide,
     /// A narrow one: joint recovery looks for neighbors' estimates, which are sharper than records.
     Narrow,
+    /// A narrower one: lists that likeness ranked, where wrong entries look alike and so keep a wide delta evident.
+    NarrowOfRanked,
     /// The narrowest: where records cross each other all over a small plane.
     Narrowest,
 }
@@ -57,7 +61,7 @@ impl Prefer {
     fn near_most(self) -> f64 {
         match self {
             Self::Wide => 0.94,
-            Self::Narrow | Self::Narrowest => 0.95,
+            Self::Narrow | Self::NarrowOfRanked | Self::Narrowest => 0.95,
         }
     }
 }
@@ -125,7 +129,11 @@ pub(crate) fn choose<const D: usize>(
     match prefer {
         Prefer::Wide => fine.iter().rev().find(near).map(|x| x.0),
         Prefer::Narrowest => fine.iter().find(near).map(|x| x.0),
-        Prefer::Narrow => {
+        Prefer::Narrow | Prefer::NarrowOfRanked => {
+            let beyond_edge = match prefer {
+                Prefer::NarrowOfRanked => BEYOND_EDGE_OF_RANKED,
+                _ => BEYOND_EDGE,
+            };
             // Some way across the plateau, in logarithm: its very edge is a matter of luck.
             let (low, high) = (fine.iter().find(near)?.0, fine.iter().rev().find(near)?.0);
             let (across, most) = match family {
@@ -135,7 +143,7 @@ pub(crate) fn choose<const D: usize>(
                     (ACROSS, f64::INFINITY)
                 }
                 Family::Lines { .. } | Family::Candidates { .. } => {
-                    (ACROSS, BEYOND_EDGE * edge(coarse, &value).max(least))
+                    (ACROSS, beyond_edge * edge(coarse, &value).max(least))
                 }
             };
             Some((low * libm::pow(high / low, across)).min(most))
