@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::edges::{Edge, Edges};
 use super::{Seen, Solved};
 use crate::recover::chance;
-use crate::recover::joint::{Density, Pieces, Places, along_curve, distance2};
+use crate::recover::joint::{Density, Pieces, Places, along_curve, distance2, record_of};
 use crate::recover::{Estimate, Status};
 
 /// Number of cues.
@@ -140,7 +140,7 @@ impl<const D: usize, P: Pieces<D>, E: Edges> Look<'_, D, P, E> {
         let slots_per_record = self.pieces.slots_per_record();
         self.edges.each(slot, |edge| {
             self.places.prefetch(edge.end as usize);
-            self.pieces.prefetch(edge.end as usize / slots_per_record);
+            self.pieces.prefetch(record_of(edge.end as usize, slots_per_record));
         });
     }
 
@@ -161,7 +161,7 @@ impl<const D: usize, P: Pieces<D>, E: Edges> Look<'_, D, P, E> {
             if d2 < reach2 {
                 near.push(Near::new(d2, at));
             }
-            let record = end as usize / slots_per_record;
+            let record = record_of(end as usize, slots_per_record);
             if self.pieces.may_vote(slot, record) {
                 voting += 1;
                 votes += usize::from(self.pieces.record_distance2(record, &x) <= self.delta2);
@@ -195,7 +195,8 @@ impl<const D: usize, P: Pieces<D>, E: Edges> Look<'_, D, P, E> {
             let at = one.slot();
             let e = self.places.of(at);
             (0..D).for_each(|c| sum[c] += e[c] - x[c]);
-            voting_members += u32::from(self.pieces.may_vote(slot, at / slots_per_record));
+            voting_members +=
+                u32::from(self.pieces.may_vote(slot, record_of(at, slots_per_record)));
         }
         crowd.voting_share = voting_members as f32 / members.max(1) as f32;
         if members > 0 && crowd.radius > 0.0 {

@@ -6,7 +6,7 @@
 
 use rayon::prelude::*;
 
-use super::graph::Graph;
+use super::graph::{Graph, record_of};
 use super::pieces::Pieces;
 use crate::recover::{Estimate, Status};
 
@@ -44,7 +44,7 @@ fn of_slot<const D: usize, P: Pieces<D>>(
     }
     let (mut near, mut all) = (0u32, 0u32);
     for &end in graph.of(slot).0 {
-        let record = end as usize / pieces.slots_per_record();
+        let record = record_of(end as usize, pieces.slots_per_record());
         if pieces.may_vote(slot, record) {
             all += 1;
             near += u32::from(pieces.record_distance2(record, &estimate.position) <= delta2);

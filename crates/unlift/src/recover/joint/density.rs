@@ -1,5 +1,6 @@
 //! How dense estimates of listed records lie: the votes a place gets by chance.
 
+use super::graph::record_of;
 use super::places::Places;
 use crate::recover::grid::Grid;
 
@@ -25,7 +26,7 @@ impl<const D: usize> Density<D> {
         let slots_per_record = n / listed.len().max(1);
         let mut weight = 0.0f64;
         for slot in 0..n {
-            let times = listed[slot / slots_per_record] as f32;
+            let times = listed[record_of(slot, slots_per_record)] as f32;
             weight += f64::from(times);
             if places.is_known(slot) {
                 grid.spread(&places.of(slot), times);
@@ -41,8 +42,11 @@ impl<const D: usize> Density<D> {
             *value = value.max(least) * scale;
         }
         let mut sample: Vec<f32> = places.sample().map(|x| grid.values[grid.index(&x)]).collect();
-        sample.sort_unstable_by(f32::total_cmp);
-        let typical = sample.get(sample.len() / 2).copied().unwrap_or(scale);
+        let middle = sample.len() / 2;
+        let typical = match sample.is_empty() {
+            true => scale,
+            false => *sample.select_nth_unstable_by(middle, f32::total_cmp).1,
+        };
         Self { grid, typical }
     }
 

@@ -4,8 +4,11 @@
 //! neighbors. Whether an edge is named by one end, by the other or by both tells how likely it is true,
 //! and so do the scores of a source: edges of one class share an inlier ratio, which recovery learns.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
+use super::named_by::{Block, MOST_CLASSES, NamedBy};
 use crate::neighbors::Neighborhoods;
 use crate::{Error, RecordId};
 
@@ -25,11 +28,17 @@ pub(crate) enum Side {
 }
 
 /// Classes of scores per direction.
-const SCORE_CLASSES: usize = 8;
+const SCORE_CLASSES: usize = MOST_CLASSES;
 /// Where score classes begin, as shares of all entries: finer at the top, where most neighbors are.
 const SCORE_RANKS: [f64; SCORE_CLASSES - 1] = [0.3, 0.55, 0.72, 0.84, 0.91, 0.955, 0.98];
 /// Classes of edges at most.
 pub(crate) const CLASSES: usize = 3 * SCORE_CLASSES;
+
+/// The record of a slot: one or two make a record, so a shift is as good as a division and much faster.
+#[inline(always)]
+pub(crate) fn record_of(slot: usize, slots_per_record: usize) -> usize {
+    slot >> (slots_per_record - 1)
+}
 
 /// Whether an edge of this class says which record it leads to, but not which of its two slots: a list
 /// names records, while the slot that a list belongs to is known.
@@ -61,30 +70,40 @@ impl Graph {
     pub(crate) fn new(lists: &Neighborhoods, slots_per_record: usize) -> Self {
         let n_slots = lists.n_slots();
         let score_class = score_classes(lists);
-        let named_by = NamedBy::new(lists, slots_per_record);
+        let named_by = NamedBy::new(lists, slots_per_record, &score_class);
         let most = MOST_REVERSE * lists.records().len().div_ceil(n_slots.max(1)).max(1);
-        let parts: Vec<Rows> = (0..n_slots.div_ceil(PART))
+        let rooms = rooms(lists, &named_by, slots_per_record);
+        let total = rooms.iter().map(|room| room.len).sum();
+        let (mut ends, mut class) = (vec![0; total], vec![0; total]);
+        let row_ends: Vec<Vec<u32>> = split(&rooms, &mut ends, &mut class)
             .into_par_iter()
-            .map(|part| {
-                let slots = part * PART..((part + 1) * PART).min(n_slots);
-                let mut rows = Rows::default();
-                rows.reserve(lists, &named_by, slots.clone(), slots_per_record);
-                for slot in slots {
-                    rows.add(lists, &named_by, slot, slots_per_record, most, &score_class);
-                }
-                rows
+            .zip(&rooms)
+            .enumerate()
+            .map_init(Block::default, |reverse, (block, (mut rows, room))| {
+                reverse.fill(&named_by, block);
+                let add = |slot: usize| {
+                    let all = reverse.of(record_of(slot - room.slots.start, slots_per_record));
+                    rows.add(lists, all, slot, slots_per_record, most, &score_class);
+                    rows.n as u32
+                };
+                room.slots.clone().map(add).collect()
             })
             .collect();
-        let total: usize = parts.iter().map(|rows| rows.ends.len()).sum();
-        let (mut offsets, mut ends, mut class) =
-            (Vec::with_capacity(n_slots + 1), Vec::with_capacity(total), Vec::with_capacity(total));
+        // Blocks move together.
+        let (mut from, mut to) = (0, 0);
+        let mut offsets = Vec::with_capacity(n_slots + 1);
         offsets.push(0);
-        for rows in parts {
-            let before = ends.len() as u64;
-            offsets.extend(rows.row_ends.iter().map(|&end| before + u64::from(end)));
-            ends.extend(rows.ends);
-            class.extend(rows.class);
+        for (row_ends, room) in row_ends.iter().zip(&rooms) {
+            let n = row_ends.last().map_or(0, |&end| end as usize);
+            ends.copy_within(from..from + n, to);
+            class.copy_within(from..from + n, to);
+            offsets.extend(row_ends.iter().map(|&end| (to + end as usize) as u64));
+            (from, to) = (from + room.len, to + n);
         }
+        ends.truncate(to);
+        class.truncate(to);
+        ends.shrink_to_fit();
+        class.shrink_to_fit();
         Self { offsets, ends, class }
     }
 
@@ -118,7 +137,7 @@ impl Graph {
             .par_chunks(self.ends.len().div_ceil(rayon::current_num_threads()).max(1))
             .map(|ends| {
                 let mut counts = vec![0; n_records];
-                ends.iter().for_each(|&end| counts[end as usize / slots_per_record] += 1);
+                ends.iter().for_each(|&end| counts[record_of(end as usize, slots_per_record)] += 1);
                 counts
             })
             .reduce_with(|mut a, b| {
@@ -135,149 +154,77 @@ impl Graph {
     }
 }
 
-/// Slots whose rows are put together by one thread at a time.
-const PART: usize = 1 << 12;
-
-/// Per record the entries that name it, in order of slot.
-struct NamedBy {
-    blocks: Vec<Block>,
+/// Where the rows of a block of slots go.
+struct Room {
+    slots: Range<usize>,
+    /// Edges that there could be. Memory of those that there are not is never touched.
+    len: usize,
 }
 
-/// The same for [`BLOCK`] records.
-struct Block {
-    offsets: Vec<u32>,
-    /// The slot that names it, and the place of the entry.
-    by: Vec<(u32, u32)>,
+/// A room for each block.
+fn rooms(lists: &Neighborhoods, named_by: &NamedBy, slots_per_record: usize) -> Vec<Room> {
+    let room = |(block, records): (usize, Range<usize>)| {
+        let slots = records.start * slots_per_record..records.end * slots_per_record;
+        let n_listed = lists.offsets()[slots.end] - lists.offsets()[slots.start];
+        let len = n_listed as usize + slots_per_record * named_by.n_entries(block);
+        Room { slots, len }
+    };
+    named_by.blocks().enumerate().map(room).collect()
 }
 
-/// Records whose entries are sorted at a time: they stay in the cache.
-const BLOCK: usize = 1 << 13;
-
-/// An entry on its way: the record it names, its slot and its place.
-type Entry = (u32, u32, u32);
-
-impl NamedBy {
-    fn new(lists: &Neighborhoods, slots_per_record: usize) -> Self {
-        let (n_slots, n_records) = (lists.n_slots(), lists.n_slots() / slots_per_record);
-        let n_blocks = n_records.div_ceil(BLOCK);
-        // Entries go to the blocks of the records they name first, part by part.
-        let parts: Vec<Vec<Vec<Entry>>> = (0..n_slots.div_ceil(PART))
-            .into_par_iter()
-            .map(|part| {
-                let slots = part * PART..((part + 1) * PART).min(n_slots);
-                let mut counts = vec![0; n_blocks];
-                for record in slots.clone().flat_map(|slot| lists.of(slot)) {
-                    counts[record.index() / BLOCK] += 1;
-                }
-                let mut to: Vec<_> = counts.into_iter().map(Vec::with_capacity).collect();
-                for slot in slots {
-                    let first = lists.offsets()[slot];
-                    for (at, record) in lists.of(slot).iter().enumerate() {
-                        let entry = (record.0, slot as u32, (first + at as u64) as u32);
-                        to[record.index() / BLOCK].push(entry);
-                    }
-                }
-                to
-            })
-            .collect();
-        let blocks = (0..n_blocks)
-            .into_par_iter()
-            .map(|block| {
-                let first = block * BLOCK;
-                Block::new(first, BLOCK.min(n_records - first), || {
-                    parts.iter().flat_map(|to| &to[block])
-                })
-            })
-            .collect();
-        Self { blocks }
-    }
-
-    fn of(&self, record: usize) -> &[(u32, u32)] {
-        let Block { offsets, by } = &self.blocks[record / BLOCK];
-        let at = record % BLOCK;
-        &by[offsets[at] as usize..offsets[at + 1] as usize]
-    }
+/// Empty rows in the place of each room.
+fn split<'a>(rooms: &[Room], mut ends: &'a mut [u32], mut class: &'a mut [u8]) -> Vec<Rows<'a>> {
+    let rows = |room: &Room| {
+        let (own, rest) = std::mem::take(&mut ends).split_at_mut(room.len);
+        let (own_class, rest_of_class) = std::mem::take(&mut class).split_at_mut(room.len);
+        (ends, class) = (rest, rest_of_class);
+        Rows { ends: own, class: own_class, n: 0 }
+    };
+    rooms.iter().map(rows).collect()
 }
 
-impl Block {
-    fn new<'a, I: Iterator<Item = &'a Entry>>(
-        first: usize,
-        n_records: usize,
-        entries: impl Fn() -> I,
-    ) -> Self {
-        let mut offsets = vec![0u32; n_records + 1];
-        for &(record, ..) in entries() {
-            offsets[record as usize - first + 1] += 1;
-        }
-        for r in 0..n_records {
-            offsets[r + 1] += offsets[r];
-        }
-        let mut next = offsets.clone();
-        let mut by = vec![(0, 0); offsets[n_records] as usize];
-        for &(record, slot, place) in entries() {
-            let to = &mut next[record as usize - first];
-            by[*to as usize] = (slot, place);
-            *to += 1;
-        }
-        Self { offsets, by }
-    }
+/// The rows of one block, in a place that has room for all of them.
+struct Rows<'a> {
+    ends: &'a mut [u32],
+    class: &'a mut [u8],
+    n: usize,
 }
 
-#[derive(Default)]
-struct Rows {
-    ends: Vec<u32>,
-    class: Vec<u8>,
-    row_ends: Vec<u32>,
-}
-
-impl Rows {
-    /// Room for the rows of `slots`.
-    fn reserve(
-        &mut self,
-        lists: &Neighborhoods,
-        named_by: &NamedBy,
-        slots: std::ops::Range<usize>,
-        slots_per_record: usize,
-    ) {
-        let most = |slot| lists.of(slot).len() + named_by.of(slot / slots_per_record).len();
-        let n_edges = slots.map(most).sum();
-        self.ends.reserve_exact(n_edges);
-        self.class.reserve_exact(n_edges);
-    }
-
-    /// Merges the list of `slot` with the entries that name its record; both are in ascending order.
+impl Rows<'_> {
+    /// Merges the list of `slot` with `all` who name its record; both are in ascending order.
     fn add(
         &mut self,
         lists: &Neighborhoods,
-        named_by: &NamedBy,
+        all: &[(u32, u8)],
         slot: usize,
         slots_per_record: usize,
         most: usize,
         score_class: &impl Fn(usize) -> u8,
     ) {
         let first = lists.offsets()[slot] as usize;
-        let (list, all) = (lists.of(slot), named_by.of(slot / slots_per_record));
+        let list = lists.of(slot);
         // Slots are in random order: every so many of them are as good as any.
         let every = all.len().div_ceil(most).max(1);
         let n_reverse = all.len().div_ceil(every);
-        let class =
-            |side: Side, entry: usize| (side as usize * SCORE_CLASSES) as u8 + score_class(entry);
-        let (own, mut to) = (slots_per_record as u32, self.ends.len());
-        self.ends.resize(to + list.len() + n_reverse, 0);
-        self.class.resize(to + list.len() + n_reverse, 0);
+        let class = |side: Side, of_score: u8| (side as usize * SCORE_CLASSES) as u8 + of_score;
+        let own = slots_per_record as u32;
+        let room = self.n..self.n + list.len() + n_reverse;
+        let (ends, classes) = (&mut self.ends[room.clone()], &mut self.class[room]);
+        let mut to = 0;
         let mut put = |end: u32, class: u8, stays: bool| {
-            (self.ends[to], self.class[to]) = (end, class);
+            (ends[to], classes[to]) = (end, class);
             to += usize::from(stays);
         };
         // Which of two lists goes on is anyone's guess: steps are added, not branched on.
         let (mut at, mut reverse, mut mutual) = (0, 0, u32::MAX);
         while at < list.len() && reverse < n_reverse {
-            let (mine, (by, entry)) = (list[at].0, all[reverse * every]);
+            let (mine, (by, of_score)) = (list[at].0, all[reverse * every]);
             // One or two slots make a record.
             let theirs = by >> (own - 1);
             let (is_mine, is_theirs) = (mine <= theirs, theirs <= mine);
-            let of_mine = class(if is_theirs { Side::Mutual } else { Side::Forward }, first + at);
-            let of_theirs = class(Side::Reverse, entry as usize);
+            let side = if is_theirs { Side::Mutual } else { Side::Forward };
+            let of_mine = class(side, score_class(first + at));
+            let of_theirs = class(Side::Reverse, of_score);
             let end = if is_mine { mine * own } else { by };
             // The other slot of a record that is mutual already says nothing new.
             put(end, if is_mine { of_mine } else { of_theirs }, is_mine | (theirs != mutual));
@@ -286,14 +233,12 @@ impl Rows {
             reverse += usize::from(is_theirs);
         }
         for (at, record) in list.iter().enumerate().skip(at) {
-            put(record.0 * own, class(Side::Forward, first + at), true);
+            put(record.0 * own, class(Side::Forward, score_class(first + at)), true);
         }
-        for &(by, entry) in all.iter().step_by(every).skip(reverse) {
-            put(by, class(Side::Reverse, entry as usize), by >> (own - 1) != mutual);
+        for &(by, of_score) in all.iter().step_by(every).skip(reverse) {
+            put(by, class(Side::Reverse, of_score), by >> (own - 1) != mutual);
         }
-        self.ends.truncate(to);
-        self.class.truncate(to);
-        self.row_ends.push(self.ends.len() as u32);
+        self.n += to;
     }
 }
 

@@ -31,13 +31,14 @@ impl Jumps {
     }
 
     /// Tells whom it concerns that `slots` jumped from one place to another: whoever may lie within
-    /// `reach` of either.
+    /// `reach` of either. Where nothing is `ahead` a slot is looked at in any case and need not know.
     pub(super) fn tell<const D: usize, P: Pieces<D>>(
         &self,
         slots: &[u32],
         (pieces, graph): (&P, &Graph),
         (from, to): (&Places<D>, &Places<D>),
         reach: f32,
+        ahead: &[f32],
     ) {
         let slots_per_record = pieces.slots_per_record();
         let concerns = |slot: usize, x: &[f32; D]| {
@@ -50,9 +51,13 @@ impl Jumps {
                 let (ends, class) = graph.of(slot);
                 for (&end, &class) in ends.iter().zip(class) {
                     let last = end as usize + usize::from(either(class, slots_per_record));
+                    let ends = end as usize..=last;
+                    if !ahead[ends.clone()].iter().any(|&ahead| ahead > 0.0) {
+                        continue;
+                    }
                     // Both slots of a record lie on one piece.
                     if concerns(end as usize, &from) || concerns(end as usize, &to) {
-                        for end in end as usize..=last {
+                        for end in ends {
                             self.concerning[end].fetch_add(1, Ordering::Relaxed);
                         }
                     }

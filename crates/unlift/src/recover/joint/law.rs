@@ -21,7 +21,7 @@ const OUTSIDE: usize = BINS / 4 * 3;
 /// Random edges per slot.
 const RANDOM: usize = 24;
 /// Slots looked at.
-const SLOTS: usize = 1 << 12;
+const SLOTS: usize = 1 << 11;
 /// Slots looked at by one thread at a time.
 const PART: usize = 256;
 /// Mutual edges tell the radius if so many of them are close,
@@ -38,6 +38,8 @@ pub(crate) struct Law {
     pub(crate) radius: f32,
     /// Per class: the odds of a true neighbor.
     pub(crate) odds: [f32; CLASSES],
+    /// The share of true neighbors among the estimates at the other ends of edges.
+    pub(crate) share: f32,
     /// `(1 + r^2 / a^2)^-3`: 1 / a^2, and the density at the center.
     pub(crate) inverse_a2: f32,
     pub(crate) center: f32,
@@ -89,6 +91,20 @@ impl Sample {
 }
 
 impl Law {
+    /// Per class: the odds that an edge leads to a true neighbor of this very slot, and 1 where it may as well be
+    /// one of the other slot of its record, 0 elsewhere.
+    pub(crate) fn odds_of_slot(&self, slots_per_record: usize) -> [(f32, f32); CLASSES] {
+        std::array::from_fn(|class| {
+            let odds = self.odds[class];
+            match class as u8 {
+                // Either of two slots is twice as likely to lie anywhere.
+                class if either(class, slots_per_record) => (0.5 * odds, 0.0),
+                class if slots_per_record == 2 && side(class) == Side::Reverse => (odds, 1.0),
+                _ => (odds, 0.0),
+            }
+        })
+    }
+
     /// The law of the present places.
     pub(crate) fn learn<const D: usize>(look: &Look<'_, D>) -> Self {
         let Sample { slots, random } = look.sample;
@@ -197,6 +213,20 @@ impl Tally {
         }
     }
 
+    /// The share of true neighbors among the estimates at the other ends of edges: of two where it is not known which, one
+    /// may be.
+    fn share(&self, slots_per_record: usize) -> f64 {
+        let chance = self.random.map(share_found);
+        let (mut all, mut neighbors) = (0.0, 0.0);
+        for (class, of_class) in self.classes.iter().enumerate() {
+            let either = either(class as u8, slots_per_record);
+            let edges = f64::from(of_class[0]);
+            all += if either { 2.0 * edges } else { edges };
+            neighbors += edges * share_of(share_found(*of_class), chance[usize::from(either)]);
+        }
+        neighbors / all.max(1.0)
+    }
+
     /// Close edges beyond those expected by chance or merely in the same region, per bin; of all edges or of mutual ones.
     fn excess(&self, kind: usize, dimensions: i32) -> [f64; BINS] {
         let bins = &self.bins[kind];
@@ -233,6 +263,7 @@ impl Tally {
         let a = radius / median;
         Law {
             radius,
+            share: self.share(look.slots_per_record) as f32,
             odds: std::array::from_fn(|class| {
                 let chance = chance[usize::from(either(class as u8, look.slots_per_record))];
                 let p = share_of(share_found(self.classes[class]), chance);

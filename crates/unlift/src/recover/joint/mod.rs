@@ -16,6 +16,7 @@ mod density;
 mod graph;
 mod jumps;
 mod law;
+mod named_by;
 mod near;
 mod order;
 mod pieces;
@@ -25,7 +26,7 @@ mod slot;
 mod small;
 
 pub(crate) use density::Density;
-pub(crate) use graph::{Graph, Side, either, side};
+pub(crate) use graph::{Graph, Side, either, record_of, side};
 pub(crate) use order::along_curve;
 pub(crate) use pieces::{CandidatePieces, LinePieces, Pieces, PlanePieces};
 pub(crate) use places::{Places, distance2};
@@ -92,11 +93,13 @@ const ROUNDING: f32 = 8.0 * f32::EPSILON;
 const SMOOTH: f32 = 4.5;
 /// Sweeps end when fewer than this share of the slots jump farther than a radius of the law.
 const SETTLED: f64 = 0.03;
+/// Law and density are learned again when more than this share of the slots jumped since.
+const STALE: f64 = 0.02;
 /// Sweeps end when as many as this share of those that moved before move again.
 const SLOW: f64 = 0.9;
 /// A slot that did not jump is looked at again if its place is ahead by at most this many nats per
-/// neighbor that did in one sweep: jumps of others cannot overturn it.
-const PER_JUMP: f32 = 3.0;
+/// neighbor that did in one sweep. One jump can weigh more than that, but some speak for the place, too.
+const PER_JUMP: f32 = 2.0;
 /// Sweeps end when records agree by this share less than they did at best.
 const WORSE: f64 = 0.08;
 
@@ -116,34 +119,48 @@ fn rounds<const D: usize, P: Pieces<D>>(
     let least_radius = (ROUNDING * places.farthest()).max(f32::MIN_POSITIVE);
     let order = along_curve(&places);
     let sample = Sample::new(graph, seed);
+    let learn = |places: &Places<D>, radius: f32| {
+        let density = Density::new(places, &listed, SMOOTH * radius);
+        let law = Law::learn(&Look {
+            places,
+            graph,
+            density: &density,
+            slots_per_record,
+            reach: REACH * radius,
+            least_radius,
+            most_radius,
+            sample: &sample,
+        });
+        (density, law)
+    };
     // Nothing is settled yet.
-    let (mut has_jumped, mut n_jumped, mut ahead) = (vec![true; n], n, vec![0.0; n]);
+    let (mut n_jumped, mut ahead) = (n, vec![0.0; n]);
     let jumps = Jumps::new(n);
     let mut jumpers = Vec::new();
     let mut fresh = vec![(Estimate::lost(Status::NoSupport), 0.0); n];
-    let (mut radius, mut surplus) = (most_radius, f32::INFINITY);
+    let mut learned: Option<(Density<D>, Law)> = None;
+    let mut n_jumped_since = 0;
     let mut most = f64::NEG_INFINITY;
     for sweep in 0..SWEEPS {
         let turns = if sweep == 0 { 1 } else { TURNS };
+        let earlier = std::mem::take(&mut n_jumped);
         let mut next = now.clone();
         for turn in 0..turns {
-            let density = Density::new(&places, &listed, SMOOTH * radius);
-            let law = Law::learn(&Look {
-                places: &places,
-                graph,
-                density: &density,
-                slots_per_record,
-                reach: REACH * radius,
-                least_radius,
-                most_radius,
-                sample: &sample,
-            });
-            radius = law.radius;
-            if law.surplus != surplus {
-                // Leads found under another rule say nothing.
-                ahead.fill(0.0);
-                surplus = law.surplus;
-            }
+            let (density, law) = match learned.take() {
+                Some(still) if n_jumped_since as f64 <= STALE * n as f64 => still,
+                before => {
+                    n_jumped_since = 0;
+                    let radius = before.as_ref().map_or(most_radius, |(_, law)| law.radius);
+                    let again = learn(&places, radius);
+                    if before.is_some_and(|(_, law)| law.surplus != again.1.surplus) {
+                        // Leads found under another rule say nothing.
+                        ahead.fill(0.0);
+                    }
+                    again
+                }
+            };
+            let radius = law.radius;
+            let odds = law.odds_of_slot(slots_per_record);
             let round = Round {
                 pieces,
                 graph,
@@ -151,18 +168,14 @@ fn rounds<const D: usize, P: Pieces<D>>(
                 turn: (turn, turns),
                 density: &density,
                 law: &law,
+                odds: &odds,
                 kernel: KERNEL * radius,
                 delta2,
             };
             fresh.par_chunks_mut(CHUNK).zip(order.par_chunks(CHUNK)).for_each_init(
                 Scratch::default,
                 |scratch, (fresh, slots)| {
-                    let old = Old {
-                        estimates: &next,
-                        has_jumped: &has_jumped,
-                        ahead: &ahead,
-                        jumps: &jumps,
-                    };
+                    let old = Old { estimates: &next, ahead: &ahead, jumps: &jumps };
                     dispatch(Chunk { round: &round, slots, old, fresh, scratch });
                 },
             );
@@ -173,15 +186,23 @@ fn rounds<const D: usize, P: Pieces<D>>(
                 if !is_turn_of(slot) {
                     continue;
                 }
-                has_jumped[slot] = is_jump(&next[slot], &estimate, radius);
-                if has_jumped[slot] {
+                let has_jumped = is_jump(&next[slot], &estimate, radius);
+                if has_jumped {
                     jumpers.push(slot as u32);
                 }
-                (next[slot], ahead[slot]) = (estimate, by);
+                // Whoever jumped is looked at again in any case.
+                (next[slot], ahead[slot]) = (estimate, if has_jumped { 0.0 } else { by });
             }
+            n_jumped += jumpers.len();
+            n_jumped_since += jumpers.len();
             let after = Places::new(&next);
-            jumps.tell(&jumpers, (pieces, graph), (&places, &after), TUBE * radius);
+            jumps.tell(&jumpers, (pieces, graph), (&places, &after), TUBE * radius, &ahead);
             places = after;
+            learned = Some((density, law));
+        }
+        if (n_jumped as f64) < SETTLED * n as f64 {
+            // So few cannot have made it worse.
+            return next;
         }
         let agreement = agreement::of(pieces, graph, &next, delta2);
         if agreement < (1.0 - WORSE) * most {
@@ -189,10 +210,7 @@ fn rounds<const D: usize, P: Pieces<D>>(
         }
         most = most.max(agreement);
         now = next;
-        let earlier = n_jumped;
-        n_jumped = has_jumped.iter().filter(|&&jumped| jumped).count();
-        let slow = 2 * n_jumped < n && n_jumped as f64 > SLOW * earlier as f64;
-        if slow || (n_jumped as f64) < SETTLED * n as f64 {
+        if 2 * n_jumped < n && n_jumped as f64 > SLOW * earlier as f64 {
             break;
         }
     }
@@ -207,9 +225,7 @@ fn is_jump<const D: usize>(a: &Estimate<D>, b: &Estimate<D>, radius: f32) -> boo
 /// What the rounds before found.
 struct Old<'a, const D: usize> {
     estimates: &'a [Estimate<D>],
-    /// Which slots jumped when it was their turn.
-    has_jumped: &'a [bool],
-    /// How many nats each place is ahead of the best one elsewhere.
+    /// How many nats each place is ahead of the best one elsewhere; 0 where a slot is to be looked at in any case.
     ahead: &'a [f32],
     jumps: &'a Jumps,
 }
@@ -240,8 +256,7 @@ impl<const D: usize, P: Pieces<D>> Kernel for Chunk<'_, '_, D, P> {
             }
             let (now, ahead) = (&self.old.estimates[slot], self.old.ahead[slot]);
             let n_jumps = self.old.jumps.take(slot) as f32;
-            let is_settled =
-                !self.old.has_jumped[slot] && ahead > 0.0 && n_jumps <= ahead / PER_JUMP;
+            let is_settled = ahead > 0.0 && n_jumps <= ahead / PER_JUMP;
             *fresh =
                 if is_settled { (*now, ahead) } else { self.round.solve(slot, now, self.scratch) };
         }

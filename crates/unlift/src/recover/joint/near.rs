@@ -1,12 +1,23 @@
 //! Columns of neighbors' estimates, and how likely they are about a place.
 
-use super::graph::{Side, either, side};
+use super::graph::{CLASSES, Side, either, side};
 use super::pieces::Piece;
 use super::places::{FAR, Places, distance2};
 use crate::recover::lanes::{LANES, Lanes, ln};
 
 /// Vectors are filled up with estimates this far away: beyond any reach, and still a number when squared.
 const BEYOND: f32 = 1e19;
+
+/// The odds that edges of a slot lead to true neighbors.
+pub(crate) struct Odds<'a, const D: usize> {
+    /// Per class: the odds, and 1 where the edge may as well be the partner's, 0 elsewhere.
+    pub(crate) of_class: &'a [(f32, f32); CLASSES],
+    /// Where the other slot of a paired line lies.
+    pub(crate) partner: [f32; D],
+    /// The law there; a gain of 0 without a partner.
+    pub(crate) gain: f32,
+    pub(crate) inverse_a2: f32,
+}
 
 /// The estimates at the other ends of a slot's edges, in columns.
 #[derive(Debug)]
@@ -67,6 +78,11 @@ impl<const D: usize> Ends<D> {
         self.class.resize(n, 0);
     }
 
+    /// Number of estimates.
+    pub(crate) fn len(&self) -> usize {
+        self.slot.len()
+    }
+
     /// Puts the estimates within `reach` of `piece` into `near`, with the odds of each, but not those within
     /// `blind` of a center.
     #[inline(always)]
@@ -75,7 +91,7 @@ impl<const D: usize> Ends<D> {
         piece: &Piece<D>,
         reach: f32,
         blind: f32,
-        odds: impl Fn(&[f32; D], u8) -> f32,
+        odds: &Odds<'_, D>,
         near: &mut Columns<D>,
     ) {
         let n = self.slot.len();
@@ -113,8 +129,9 @@ impl<const D: usize> Ends<D> {
             let i = i as usize;
             let x = std::array::from_fn(|c| columns[c][i]);
             let class = self.class[i];
-            near.set(to, &x, (odds(&x, class), side(class)), self.slot[i]);
+            near.set(to, &x, (odds.of_class[usize::from(class)], side(class)), self.slot[i]);
         }
+        near.share(odds);
         near.pad();
     }
 }
@@ -124,6 +141,8 @@ impl<const D: usize> Ends<D> {
 pub(crate) struct Columns<const D: usize> {
     x: [Vec<f32>; D],
     odds: Vec<f32>,
+    /// 1 where the edge may as well be the partner's.
+    shared: Vec<f32>,
     side: Vec<Side>,
     slot: Vec<u32>,
     /// Squared distance to the place last looked at.
@@ -133,8 +152,8 @@ pub(crate) struct Columns<const D: usize> {
 impl<const D: usize> Default for Columns<D> {
     fn default() -> Self {
         let x = std::array::from_fn(|_| Vec::new());
-        let (odds, apart2) = (Vec::new(), Vec::new());
-        Self { x, odds, side: Vec::new(), slot: Vec::new(), apart2 }
+        let (odds, shared, apart2) = (Vec::new(), Vec::new(), Vec::new());
+        Self { x, odds, shared, side: Vec::new(), slot: Vec::new(), apart2 }
     }
 }
 
@@ -144,18 +163,39 @@ impl<const D: usize> Columns<D> {
     fn resize(&mut self, n: usize) {
         self.x.iter_mut().for_each(|column| column.resize(n, 0.0));
         self.odds.resize(n, 0.0);
+        self.shared.resize(n, 0.0);
         self.side.resize(n, Side::Mutual);
         self.slot.resize(n, 0);
     }
 
     /// Writes row `i`.
     #[inline(always)]
-    fn set(&mut self, i: usize, x: &[f32; D], (odds, side): (f32, Side), slot: u32) {
+    fn set(&mut self, i: usize, x: &[f32; D], (odds, side): ((f32, f32), Side), slot: u32) {
         for (column, x) in self.x.iter_mut().zip(x) {
             column[i] = *x;
         }
-        (self.odds[i], self.side[i]) = (odds, side);
-        self.slot[i] = slot;
+        (self.odds[i], self.shared[i]) = odds;
+        (self.side[i], self.slot[i]) = (side, slot);
+    }
+
+    /// An edge that belongs to the partner as well as to this slot is shared: less of it is left the better the
+    /// partner's place explains it.
+    #[inline(always)]
+    fn share(&mut self, of: &Odds<'_, D>) {
+        if of.gain == 0.0 {
+            return;
+        }
+        let n = self.odds.len();
+        let columns: [&[f32]; D] = std::array::from_fn(|c| &self.x[c][..n]);
+        let (odds, shared) = (&mut self.odds[..n], &self.shared[..n]);
+        for i in 0..n {
+            let mut r2 = 0.0;
+            for (column, partner) in columns.iter().zip(&of.partner) {
+                r2 += (partner - column[i]) * (partner - column[i]);
+            }
+            let q = 1.0 / (1.0 + r2 * of.inverse_a2);
+            odds[i] /= 1.0 + shared[i] * odds[i] * of.gain * q * q * q;
+        }
     }
 
     /// Number of estimates.
@@ -291,7 +331,7 @@ mod tests {
         let sides = of_each.iter().flat_map(|&(side, n)| std::iter::repeat_n(side, n));
         columns.resize(of_each.iter().map(|of_side| of_side.1).sum());
         for (i, side) in sides.enumerate() {
-            columns.set(i, &[0.0; 3], (1.0, side), i as u32);
+            columns.set(i, &[0.0; 3], ((1.0, 0.0), side), i as u32);
         }
         columns.pad();
         columns

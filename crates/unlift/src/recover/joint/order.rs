@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::places::Places;
 use crate::geometry::curve;
 
-/// Cells per axis, as a power of two.
+/// Cells per axis, as a power of two: place on the curve and slot share 64 bits.
 const BITS: u32 = 10;
 
 /// All slots, along a curve that fills space; lost ones last.
@@ -17,18 +17,17 @@ pub(crate) fn along_curve<const D: usize>(places: &Places<D>) -> Vec<u32> {
     let n = places.len();
     let (low, high) = places.trimmed_box();
     let cells = (1u32 << BITS) as f32;
-    let code = |slot: usize| {
+    let key = |slot: usize| {
         if !places.is_known(slot) {
-            return u64::MAX;
+            return u64::MAX << u32::BITS | slot as u64;
         }
         let x = places.of(slot);
         let cell: [u32; D] = std::array::from_fn(|c| {
             (((x[c] - low[c]) / (high[c] - low[c]) * cells) as u32).min((1 << BITS) - 1)
         });
-        curve::along(&cell, BITS)
+        curve::along(&cell, BITS) << u32::BITS | slot as u64
     };
-    let mut keys: Vec<(u64, u32)> =
-        (0..n).into_par_iter().map(|slot| (code(slot), slot as u32)).collect();
+    let mut keys: Vec<u64> = (0..n).into_par_iter().map(key).collect();
     keys.par_sort_unstable();
-    keys.into_iter().map(|(_, slot)| slot).collect()
+    keys.into_iter().map(|key| key as u32).collect()
 }

@@ -1,5 +1,6 @@
 //! Where a slot may lie, as flat pieces: all that joint recovery knows of a record family.
 
+use super::graph::record_of;
 use crate::recover::chance_field::{CandidateField, ChanceField, tube};
 use crate::recover::lanes::ln;
 use crate::recover::line_rows::LineRow;
@@ -107,7 +108,7 @@ impl<'a, const D: usize> LinePieces<'a, D> {
 
     #[inline(always)]
     fn own(&self, slot: usize) -> &LineRow<D> {
-        &self.rows[slot / self.slots_per_record]
+        &self.rows[record_of(slot, self.slots_per_record)]
     }
 }
 

@@ -1,9 +1,9 @@
 //! One slot in one round: candidates from neighbors' estimates, the likeliest of them, re-made.
 
 use super::density::Density;
-use super::graph::{Graph, Side, either, side};
+use super::graph::{CLASSES, Graph, either, record_of};
 use super::law::Law;
-use super::near::{Columns, Ends};
+use super::near::{Columns, Ends, Odds};
 use super::pieces::{Piece, Pieces};
 use super::places::{Places, distance2};
 use super::remake::{Directions, remade};
@@ -19,6 +19,8 @@ pub(crate) struct Round<'a, const D: usize, P> {
     pub(crate) turn: (usize, usize),
     pub(crate) density: &'a Density<D>,
     pub(crate) law: &'a Law,
+    /// Per class, as in [`Odds`].
+    pub(crate) odds: &'a [(f32, f32); CLASSES],
     /// Within this many local widths estimates enter the re-made position.
     pub(crate) kernel: f32,
     pub(crate) delta2: f32,
@@ -29,8 +31,10 @@ pub(super) const TUBE: f32 = 6.0;
 /// Estimates within this many radii of the law of the center of a ray are near all of its rays. They would
 /// draw others there, as nothing tells them apart.
 const BLIND: f32 = 3.0;
-/// Candidates looked at per piece.
-const CANDIDATES: usize = 16;
+/// Candidates looked at per piece: as many as hold so many true neighbors' estimates,
+const TRUE_CANDIDATES: f32 = 5.0;
+/// but so many at least and at most.
+const CANDIDATES: (f32, f32) = (8.0, 16.0);
 /// Records decide between the best candidates that lie within this many nats of each other.
 const DOUBT: f32 = 8.0;
 /// The share of neighbors whose estimate is wrong, though their record is near.
@@ -187,16 +191,14 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         (estimate, ahead)
     }
 
-    /// Where the other slot of a paired line lies, with the gain and scale of the law there.
+    /// The odds of the edges of `slot`.
     #[inline(always)]
-    fn partner(&self, slot: usize) -> Option<([f32; D], f32, f32)> {
+    fn odds(&self, slot: usize) -> Odds<'_, D> {
         let other = slot ^ 1;
-        if self.pieces.slots_per_record() != 2 || !self.places.is_known(other) {
-            return None;
-        }
-        let x = self.places.of(other);
-        let (gain, inverse_a2) = self.law_at(&x);
-        Some((x, gain, inverse_a2))
+        let has_partner = self.pieces.slots_per_record() == 2 && self.places.is_known(other);
+        let partner = if has_partner { self.places.of(other) } else { [0.0; D] };
+        let (gain, inverse_a2) = if has_partner { self.law_at(&partner) } else { (0.0, 0.0) };
+        Odds { of_class: self.odds, partner, gain, inverse_a2 }
     }
 
     /// The law at `x`: the gain of an estimate on the spot, and `1 / a^2`.
@@ -215,28 +217,6 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         (self.law.center / (volume * density), self.law.inverse_a2 / (width * width))
     }
 
-    /// The odds that an edge of a class leads to a true neighbor of `slot`, whose estimate is at a place.
-    #[inline(always)]
-    fn odds(&self, slot: usize) -> impl Fn(&[f32; D], u8) -> f32 + '_ {
-        let slots_per_record = self.pieces.slots_per_record();
-        let partner = self.partner(slot);
-        move |x, class| {
-            let odds = self.law.odds[usize::from(class)];
-            if either(class, slots_per_record) {
-                // Either of two slots is twice as likely to lie anywhere.
-                return 0.5 * odds;
-            }
-            match &partner {
-                // An edge that belongs to the other slot as well as to this one is shared.
-                Some((other, gain, inverse_a2)) if side(class) == Side::Reverse => {
-                    let q = 1.0 / (1.0 + distance2(other, x) * inverse_a2);
-                    odds / (1.0 + odds * gain * q * q * q)
-                }
-                _ => odds,
-            }
-        }
-    }
-
     /// Adds the candidates of one piece to the best: neighbors' estimates, and the old one.
     #[inline(always)]
     fn consider(
@@ -246,10 +226,12 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         old: &Estimate<D>,
         scratch: &mut Scratch<D>,
     ) {
-        let Scratch { near, tried, best, .. } = scratch;
+        let Scratch { all, near, tried, best, .. } = scratch;
         let near = &near[piece];
         tried.clear();
-        let step = near.len().div_ceil(CANDIDATES).max(1);
+        let n_true = (self.law.share * all.len() as f32).max(1.0);
+        let most = TRUE_CANDIDATES / n_true * near.len() as f32;
+        let step = near.len().div_ceil(most.clamp(CANDIDATES.0, CANDIDATES.1) as usize).max(1);
         for i in (0..near.len()).step_by(step) {
             tried.push(&own.project(&near.at(i)));
         }
@@ -309,7 +291,7 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         let (ends, class) = self.graph.of(slot);
         let mut sums = [0.0; 2];
         for (&end, &class) in ends.iter().zip(class) {
-            let record = end as usize / slots_per_record;
+            let record = record_of(end as usize, slots_per_record);
             if !self.pieces.may_vote(slot, record) {
                 continue;
             }
