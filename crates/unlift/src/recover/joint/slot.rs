@@ -42,8 +42,8 @@ const ASTRAY: f32 = 0.2;
 /// The weight of the density prior.
 const PRIOR: f32 = 0.5;
 
-/// So many places stay in the cache: no memory is asked for ahead.
-const CACHED: usize = 1 << 16;
+/// So many places (8 MB) stay in the cache: no memory is asked for ahead.
+const CACHED: usize = 1 << 19;
 
 /// A position that could win.
 #[derive(Clone, Copy, Debug)]
