@@ -134,7 +134,7 @@ fn crowds_that_do_not_list_back_are_not_believed() {
 #[test]
 fn crowds_that_do_not_list_back_are_not_followed() {
     let scene = scene(207, 4_000, 1.0);
-    // Between what comes back when they are followed (89, 75, 72) and when not (93, 78, 78).
+    // Between what came back when they were followed (89, 75, 72) and when not (93, 78, 78), when the rule was made.
     for (name, least) in [("olc", 91.0), ("ppl", 76.5), ("ray", 75.0)] {
         let (recovered, secret) = recovered(&scene, name, Solver::Joint, (Noise::Clustered, 0.15));
         let accuracy = evaluate(&recovered, &scene.0, &secret).unwrap();

@@ -40,8 +40,8 @@ const FAR_BELOW: f64 = 0.8;
 const LOWEST: i32 = 15;
 /// A narrow delta is at most this many times the edge;
 const BEYOND_EDGE: f64 = 2.25;
-/// where likeness ranked the lists, at most so many times.
-const BEYOND_EDGE_OF_RANKED: f64 = 2.0;
+/// where a source gives scores, at most so many times.
+const BEYOND_EDGE_OF_SCORED: f64 = 2.0;
 
 /// The maximum is flat: which of the deltas near it to take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,8 +50,9 @@ pub(crate) enum Prefer {
     Wide,
     /// A narrow one: joint recovery looks for neighbors' estimates, which are sharper than records.
     Narrow,
-    /// A narrower one: lists that likeness ranked, where wrong entries look alike and so keep a wide delta evident.
-    NarrowOfRanked,
+    /// A narrower one: lists with scores, as an attacker's own sources give them. Their wrong entries look alike
+    /// and so keep a wide delta evident.
+    NarrowOfScored,
     /// The narrowest: where records cross each other all over a small plane.
     Narrowest,
 }
@@ -61,7 +62,7 @@ impl Prefer {
     fn near_most(self) -> f64 {
         match self {
             Self::Wide => 0.94,
-            Self::Narrow | Self::NarrowOfRanked | Self::Narrowest => 0.95,
+            Self::Narrow | Self::NarrowOfScored | Self::Narrowest => 0.95,
         }
     }
 }
@@ -129,9 +130,9 @@ pub(crate) fn choose<const D: usize>(
     match prefer {
         Prefer::Wide => fine.iter().rev().find(near).map(|x| x.0),
         Prefer::Narrowest => fine.iter().find(near).map(|x| x.0),
-        Prefer::Narrow | Prefer::NarrowOfRanked => {
+        Prefer::Narrow | Prefer::NarrowOfScored => {
             let beyond_edge = match prefer {
-                Prefer::NarrowOfRanked => BEYOND_EDGE_OF_RANKED,
+                Prefer::NarrowOfScored => BEYOND_EDGE_OF_SCORED,
                 _ => BEYOND_EDGE,
             };
             // Some way across the plateau, in logarithm: its very edge is a matter of luck.

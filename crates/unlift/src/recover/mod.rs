@@ -108,7 +108,7 @@ pub fn recover_and_look<const D: usize>(
     let prefer = match &family {
         _ if graph.is_none() => Prefer::Wide,
         Family::Candidates { .. } if D == 2 => Prefer::Narrowest,
-        _ if lists.scores().is_some() => Prefer::NarrowOfRanked,
+        _ if lists.scores().is_some() => Prefer::NarrowOfScored,
         _ => Prefer::Narrow,
     };
     let spacing = spacing(released);

@@ -10,7 +10,7 @@ use super::law::Look;
 use super::places::distance2;
 
 /// Every so many slots of the sample are looked at,
-const EVERY: usize = 4;
+const EVERY: usize = 2;
 /// and so many entries of each.
 const ENTRIES: usize = 2;
 /// An entry is elsewhere when it is farther from the estimate than this many times as far as true neighbors are looked for

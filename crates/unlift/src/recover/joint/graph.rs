@@ -157,7 +157,7 @@ impl Graph {
 /// Where the rows of a block of slots go.
 struct Room {
     slots: Range<usize>,
-    /// Edges that there could be. Memory of those that there are not is never touched.
+    /// Edges that there could be. Memory of those that there are not is hardly touched.
     len: usize,
 }
 
@@ -256,5 +256,91 @@ fn score_classes(lists: &Neighborhoods) -> impl Fn(usize) -> u8 + Sync + '_ {
     move |at| match lists.scores() {
         Some(scores) => bounds.partition_point(|&bound| bound <= scores[at]) as u8,
         None => 0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::named_by::BLOCK;
+    use super::*;
+    use crate::seed::{Draws, Stage};
+
+    /// Everyone names record 7, nobody the last one, many each other, and every fifth slot nobody.
+    fn lists(n_records: usize, slots_per_record: usize) -> Neighborhoods {
+        let mut draws = Draws::new(5, Stage::NullSample, 0);
+        let (mut offsets, mut records, mut scores) = (vec![0], Vec::new(), Vec::new());
+        for slot in 0..n_records * slots_per_record {
+            let own = slot / slots_per_record;
+            let mut row = vec![7, own ^ 1, draws.below(n_records as u64) as usize];
+            row.retain(|&record| record != own && record < n_records - 1 && slot % 5 > 0);
+            row.sort_unstable();
+            row.dedup();
+            scores.extend(row.iter().map(|_| draws.below(100) as f32));
+            records.extend(row.into_iter().map(RecordId::from_index));
+            offsets.push(records.len() as u64);
+        }
+        Neighborhoods::try_new(offsets, records, Some(scores), n_records, slots_per_record).unwrap()
+    }
+
+    /// The edges of each slot, found one by one.
+    fn expected(lists: &Neighborhoods, slots_per_record: usize) -> Vec<Vec<(u32, u8)>> {
+        let class = score_classes(lists);
+        let n_slots = lists.n_slots();
+        let mut named_by = vec![Vec::new(); n_slots / slots_per_record];
+        for slot in 0..n_slots {
+            for (at, record) in lists.of(slot).iter().enumerate() {
+                let entry = lists.offsets()[slot] as usize + at;
+                named_by[record.index()].push((slot, class(entry)));
+            }
+        }
+        let most = MOST_REVERSE * lists.records().len().div_ceil(n_slots);
+        let edges = |slot: usize| {
+            let all = &named_by[slot / slots_per_record];
+            let reverse: Vec<_> = all.iter().step_by(all.len().div_ceil(most).max(1)).collect();
+            let list = lists.of(slot);
+            let mut edges = Vec::new();
+            for (at, record) in list.iter().enumerate() {
+                let is_mutual = reverse.iter().any(|by| by.0 / slots_per_record == record.index());
+                let side = if is_mutual { Side::Mutual } else { Side::Forward };
+                let of_score = class(lists.offsets()[slot] as usize + at);
+                edges.push((record.0 * slots_per_record as u32, (side, of_score)));
+            }
+            for &&(by, of_score) in &reverse {
+                if !list.contains(&RecordId::from_index(by / slots_per_record)) {
+                    edges.push((by as u32, (Side::Reverse, of_score)));
+                }
+            }
+            edges.sort_unstable_by_key(|edge| edge.0);
+            let class = |(side, of_score)| (side as usize * SCORE_CLASSES) as u8 + of_score;
+            edges.into_iter().map(|(end, of)| (end, class(of))).collect()
+        };
+        (0..n_slots).map(edges).collect()
+    }
+
+    #[test]
+    fn edges_are_those_found_one_by_one() {
+        for slots_per_record in [1, 2] {
+            let lists = lists(2 * BLOCK + 77, slots_per_record);
+            let expected = expected(&lists, slots_per_record);
+            for threads in [1, 3] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let graph = pool.install(|| Graph::new(&lists, slots_per_record));
+                assert_eq!(graph.len(), expected.iter().map(Vec::len).sum::<usize>());
+                for (slot, expected) in expected.iter().enumerate() {
+                    let (ends, class) = graph.of(slot);
+                    let found: Vec<_> = ends.iter().copied().zip(class.iter().copied()).collect();
+                    assert_eq!(&found, expected, "slot {slot}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn nobody_has_no_edges() {
+        for n in [0, 1] {
+            let none = Neighborhoods::try_new(vec![0; n + 1], Vec::new(), None, n, 1).unwrap();
+            let graph = Graph::new(&none, 1);
+            assert_eq!((graph.n_slots(), graph.len()), (n, 0));
+        }
     }
 }

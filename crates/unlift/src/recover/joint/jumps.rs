@@ -12,7 +12,7 @@ use super::graph::{Graph, either};
 use super::pieces::Pieces;
 use super::places::{Places, distance2};
 
-/// Per slot, how many jumps concern it since it was last its turn. Sums of integers: the same however threads
+/// Per slot that is ahead, how many jumps concern it since it was last its turn. Sums of integers: the same however threads
 /// share the work.
 pub(super) struct Jumps {
     concerning: Vec<AtomicU32>,

@@ -25,7 +25,7 @@ const SLOTS: usize = 1 << 11;
 /// Slots looked at by one thread at a time.
 const PART: usize = 256;
 /// Mutual edges tell the radius if so many of them are close,
-const ENOUGH: f64 = 500.0;
+const ENOUGH: f64 = 250.0;
 /// and within this share of the radius of all.
 const TIGHTER: f64 = 0.65;
 /// The share of neighbors in a class is at most and at least this.

@@ -4,7 +4,7 @@
 //! from there in rounds: every slot looks at where its neighbors are believed to be, moves to the place
 //! where that is likeliest, and is re-made there from the records of the neighbors found near. What
 //! makes a vote count is how much likelier it is about a true neighbor than by chance; both sides of that
-//! ratio, and how far to look, are learned from the map between rounds.
+//! ratio, and how far to look, are learned from the map, again whenever enough slots moved.
 //!
 //! Slots move from the old estimates, so that neither order nor threads matter. But if all of them moved at
 //! once, neighbors that are far from each other could change places for ever, each going where the
@@ -201,7 +201,7 @@ fn rounds<const D: usize, P: Pieces<D>>(
             learned = Some((density, law));
         }
         if (n_jumped as f64) < SETTLED * n as f64 {
-            // So few cannot have made it worse.
+            // So few hardly made it worse.
             return next;
         }
         let agreement = agreement::of(pieces, graph, &next, delta2);

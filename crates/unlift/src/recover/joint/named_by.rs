@@ -1,7 +1,7 @@
 //! Who names a record: lists turned around, a block of records at a time.
 //!
-//! Entries first go to the blocks of the records they name, in four bytes each; a block is then put in order where its rows
-//! are made, and forgotten. So lists are never held turned around as a whole.
+//! Entries first go to the blocks of the records they name, in four bytes each; a block is then put in order only where its
+//! rows are made.
 
 use std::ops::Range;
 

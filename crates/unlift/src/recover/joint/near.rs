@@ -360,4 +360,24 @@ mod tests {
         let (sided, all) = (columns.two_sided(&x, LAW, 1e9), columns.log_likelihood(&x, LAW));
         assert!((sided - all).abs() < 1e-4 * all, "{sided} {all}");
     }
+
+    #[test]
+    fn what_the_partner_explains_is_left_to_it() {
+        let mut columns = Columns::<3>::default();
+        columns.resize(2);
+        columns.set(0, &[1.0, 0.0, 0.0], ((0.5, 1.0), Side::Reverse), 4);
+        columns.set(1, &[1.0, 0.0, 0.0], ((0.5, 0.0), Side::Forward), 6);
+        let mut odds = Odds {
+            of_class: &[(0.0, 0.0); CLASSES],
+            partner: [0.0; 3],
+            gain: 0.0,
+            inverse_a2: 1.0,
+        };
+        columns.share(&odds);
+        assert_eq!(columns.odds, [0.5, 0.5], "nobody to share with");
+        odds.gain = 16.0;
+        columns.share(&odds);
+        // 16 at the center is 2 at a distance of 1: even odds with the partner.
+        assert_eq!(columns.odds, [0.25, 0.5]);
+    }
 }

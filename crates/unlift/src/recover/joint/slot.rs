@@ -31,7 +31,7 @@ pub(super) const TUBE: f32 = 6.0;
 /// Estimates within this many radii of the law of the center of a ray are near all of its rays. They would
 /// draw others there, as nothing tells them apart.
 const BLIND: f32 = 3.0;
-/// Candidates looked at per piece: as many as hold so many true neighbors' estimates,
+/// Candidates looked at per piece: about as many as hold so many true neighbors' estimates,
 const TRUE_CANDIDATES: f32 = 5.0;
 /// but so many at least and at most.
 const CANDIDATES: (f32, f32) = (8.0, 16.0);
