@@ -85,6 +85,12 @@ pub fn recover_and_look<const D: usize>(
         let expected = format!("{} rows, one per slot", released.n_slots());
         return Err(Error::new("neighborhoods", expected, lists.n_slots().to_string()));
     }
+    // Lists of another map may have as many rows.
+    let n_records = released.n_records();
+    if let Some(record) = lists.records().iter().find(|record| record.index() >= n_records) {
+        let expected = format!("records below {n_records}");
+        return Err(Error::new("neighborhoods", expected, record.0.to_string()));
+    }
     let descriptor_row = assign::descriptor_rows(released, lists);
     let peaks = match options.solver {
         Solver::Density => Some(published(released)),

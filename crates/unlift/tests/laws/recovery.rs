@@ -6,7 +6,7 @@ use unlift::obfuscate::Scheme;
 use unlift::recover::{Delta, RecoverOptions, Solver, Status, recover};
 use unlift::released::{Obfuscation, Released};
 use unlift::seed::{Draws, Stage};
-use unlift::{PointSet, Unit};
+use unlift::{PointSet, RecordId, Unit};
 
 use crate::maps::*;
 
@@ -256,6 +256,14 @@ fn foreign_lists_are_refused<const D: usize>(name: &str, scheme: &dyn Scheme<D>)
     let other = hide(scheme, &room(1, 160), 1);
     let error = recover(&one.released, &other.lists(5, 1.0, 1), &RecoverOptions::default());
     assert!(error.unwrap_err().to_string().contains("one per slot"), "{name}");
+    let n = one.released.n_slots();
+    if one.released.n_records() < n {
+        // As many rows, but of a map with one slot per record.
+        let next = (0..n).map(|slot| RecordId::from_index((slot + 1) % n)).collect();
+        let lists = Neighborhoods::try_new((0..=n as u64).collect(), next, None, n, 1).unwrap();
+        let error = recover(&one.released, &lists, &RecoverOptions::default());
+        assert!(error.unwrap_err().to_string().contains("records below"), "{name}");
+    }
 }
 
 proptest! {
