@@ -34,7 +34,7 @@ const SCORE_RANKS: [f64; SCORE_CLASSES - 1] = [0.3, 0.55, 0.72, 0.84, 0.91, 0.95
 /// Classes of edges at most.
 pub(crate) const CLASSES: usize = 3 * SCORE_CLASSES;
 
-/// The record of a slot: one or two make a record, so a shift is as good as a division and much faster.
+/// The record of a slot: one or two make a record, so a shift does for a division.
 #[inline(always)]
 pub(crate) fn record_of(slot: usize, slots_per_record: usize) -> usize {
     slot >> (slots_per_record - 1)

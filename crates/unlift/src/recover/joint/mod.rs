@@ -138,27 +138,22 @@ fn rounds<const D: usize, P: Pieces<D>>(
     let jumps = Jumps::new(n);
     let mut jumpers = Vec::new();
     let mut fresh = vec![(Estimate::lost(Status::NoSupport), 0.0); n];
-    let mut learned: Option<(Density<D>, Law)> = None;
-    let mut n_jumped_since = 0;
+    let (mut learned, mut n_jumped_since) = (learn(&places, most_radius), 0);
     let mut most = f64::NEG_INFINITY;
     for sweep in 0..SWEEPS {
         let turns = if sweep == 0 { 1 } else { TURNS };
         let earlier = std::mem::take(&mut n_jumped);
         let mut next = now.clone();
         for turn in 0..turns {
-            let (density, law) = match learned.take() {
-                Some(still) if n_jumped_since as f64 <= STALE * n as f64 => still,
-                before => {
-                    n_jumped_since = 0;
-                    let radius = before.as_ref().map_or(most_radius, |(_, law)| law.radius);
-                    let again = learn(&places, radius);
-                    if before.is_some_and(|(_, law)| law.surplus != again.1.surplus) {
-                        // Leads found under another rule say nothing.
-                        ahead.fill(0.0);
-                    }
-                    again
+            if n_jumped_since as f64 > STALE * n as f64 {
+                let again = learn(&places, learned.1.radius);
+                if again.1.surplus != learned.1.surplus {
+                    // Leads found under another rule say nothing.
+                    ahead.fill(0.0);
                 }
-            };
+                (learned, n_jumped_since) = (again, 0);
+            }
+            let (density, law) = (&learned.0, &learned.1);
             let radius = law.radius;
             let odds = law.odds_of_slot(slots_per_record);
             let round = Round {
@@ -166,8 +161,8 @@ fn rounds<const D: usize, P: Pieces<D>>(
                 graph,
                 places: &places,
                 turn: (turn, turns),
-                density: &density,
-                law: &law,
+                density,
+                law,
                 odds: &odds,
                 kernel: KERNEL * radius,
                 delta2,
@@ -198,7 +193,6 @@ fn rounds<const D: usize, P: Pieces<D>>(
             let after = Places::new(&next);
             jumps.tell(&jumpers, (pieces, graph), (&places, &after), TUBE * radius, &ahead);
             places = after;
-            learned = Some((density, law));
         }
         if (n_jumped as f64) < SETTLED * n as f64 {
             // So few hardly made it worse.
