@@ -67,8 +67,10 @@ impl Finished {
     pub fn text(&self) -> String {
         let mut text = text_table(&self.document);
         for gate in &self.document.gates {
-            let (word, found) = (if gate.passed { "held" } else { "FAILED" }, gate.found_percent);
-            text.push_str(&format!("gate {}: {word}, found {found:.1} %\n", gate.gate));
+            let word = if gate.passed { "held" } else { "FAILED" };
+            let found = gate.found_percent.map(|found| format!("found {found:.1} %"));
+            let found: Vec<String> = found.into_iter().chain(gate.reason.clone()).collect();
+            text.push_str(&format!("gate {}: {word}, {}\n", gate.gate, found.join("; ")));
         }
         text.push_str(&format!("\nreport: {}\n", self.report.display()));
         text
@@ -188,9 +190,10 @@ pub fn gate_results(gates: &[Gate], plan: &Plan, rows: &[Row]) -> anyhow::Result
             .ok_or_else(|| usage(format!("--gate {}: expected a row, found none", gate.typed)))?;
         Ok(GateResult {
             gate: gate.typed.clone(),
-            found_percent,
+            found_percent: Some(found_percent),
             bound_percent: gate.bound_percent,
             passed: gate.passes(found_percent),
+            reason: None,
         })
     };
     gates.iter().map(result).collect()

@@ -34,13 +34,32 @@ impl Document {
             }
         }
         for (i, gate) in self.gates.iter().enumerate() {
-            finite(&format!("gates[{i}].found_percent"), gate.found_percent)?;
+            if let Some(found) = gate.found_percent {
+                finite(&format!("gates[{i}].found_percent"), found)?;
+            }
             finite(&format!("gates[{i}].bound_percent"), gate.bound_percent)?;
+            if gate.passed && (gate.found_percent.is_none() || gate.reason.is_some()) {
+                let expected = "false where a figure is not known";
+                return Err(invalid(format!("gates[{i}].passed"), expected, "true"));
+            }
         }
+        self.check_not_audited()?;
         for (i, image) in self.images.iter().enumerate() {
             check_image(&format!("images[{i}]"), image, self.results.len())?;
         }
         self.check_run()
+    }
+
+    fn check_not_audited(&self) -> Result<(), Error> {
+        for (i, missing) in self.not_audited.iter().enumerate() {
+            let has_rows = |row: &Row| row.scheme == missing.scheme;
+            if missing.neighbors.is_none() && self.results.iter().any(has_rows) {
+                let place = format!("not_audited[{i}].scheme");
+                let found = format!("{}, which has rows", missing.scheme);
+                return Err(invalid(place, "a scheme without rows in results", found));
+            }
+        }
+        Ok(())
     }
 
     fn check_run(&self) -> Result<(), Error> {
@@ -70,6 +89,11 @@ fn check_row(place: &str, row: &Row) -> Result<(), Error> {
         let keys = |map: &ByThreshold| map.keys().cloned().collect::<Vec<_>>().join(", ");
         let expected = format!("the thresholds {}", keys(&row.recovered_percent));
         return Err(invalid(format!("{place}.blind_percent"), expected, keys(&row.blind_percent)));
+    }
+    check_records_alone(place, row)?;
+    if let (Some(sure), Some(reason)) = (row.sure_percent, &row.sure_unknown) {
+        let expected = format!("null, as sure_unknown says {reason:?}");
+        return Err(invalid(format!("{place}.sure_percent"), expected, sure.to_string()));
     }
     let lost: u64 = row.lost.values().sum();
     // With repeats each count is a rounded mean, and rounded parts need not add up.
@@ -125,6 +149,29 @@ fn check_row(place: &str, row: &Row) -> Result<(), Error> {
         }
     }
     Ok(())
+}
+
+/// Two maps with the same keys as the recovered percentages, or neither.
+fn check_records_alone(place: &str, row: &Row) -> Result<(), Error> {
+    let keys =
+        |keys: &mut dyn Iterator<Item = &String>| keys.cloned().collect::<Vec<_>>().join(", ");
+    let expected = keys(&mut row.recovered_percent.keys());
+    let found = [
+        ("percent", row.records_alone_percent.as_ref().map(|map| keys(&mut map.keys()))),
+        ("by", row.records_alone_by.as_ref().map(|map| keys(&mut map.keys()))),
+    ];
+    if found.iter().all(|(_, keys)| keys.is_none()) {
+        return Ok(());
+    }
+    for (field, keys) in found {
+        if keys.as_ref() != Some(&expected) {
+            let place = format!("{place}.records_alone_{field}");
+            let expected = format!("the thresholds {expected}");
+            return Err(invalid(place, expected, keys.unwrap_or_else(|| "nothing".to_owned())));
+        }
+    }
+    let mut percent = row.records_alone_percent.iter();
+    percent.try_for_each(|map| percentages(&format!("{place}.records_alone_percent"), map))
 }
 
 fn check_image(place: &str, image: &ImageFigures, n_results: usize) -> Result<(), Error> {

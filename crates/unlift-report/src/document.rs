@@ -19,6 +19,9 @@ pub const SCHEMA: u32 = 1;
 /// Threshold, as the user typed it, to a number of percent; in the order typed.
 pub type ByThreshold = IndexMap<String, f64>;
 
+/// Stands for a solver's name in [`BreakEven::solver`]: at every inlier ratio the attack that got most.
+pub const STRONGEST: &str = "strongest";
+
 /// Reason to a number of points.
 pub type ByReason = IndexMap<String, u64>;
 
@@ -37,6 +40,10 @@ pub struct Document {
     pub seed: u64,
     /// The figures, one row per combination that was tried.
     pub results: Vec<Row>,
+    /// What was to be audited and could not be, with the reason; empty when everything was. No figure
+    /// of such a scheme is known: it must never read as a small one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub not_audited: Vec<NotAudited>,
     /// The smallest inlier ratio at which half of the points come back, per scheme, noise and solver.
     pub break_even: Vec<BreakEven>,
     /// The user's gates and how they ended; empty when none was given.
@@ -72,6 +79,19 @@ pub struct Input {
     pub images: Option<ImageCounts>,
 }
 
+/// A scheme, or one source of neighborhoods for a scheme, that could not be audited.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct NotAudited {
+    /// The scheme's user-facing name.
+    pub scheme: String,
+    /// The source without lists, as [`Row::neighbors`]; absent when the scheme itself cannot be applied,
+    /// and so has no row at all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub neighbors: Option<String>,
+    /// Why, in plain words: what was expected and what was found.
+    pub reason: String,
+}
+
 /// The unit of every length in a row: thresholds, delta, errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum LengthUnit {
@@ -102,7 +122,7 @@ pub struct Row {
     pub inlier_ratio: f64,
     /// Neighbors per hidden point.
     pub k: u32,
-    /// `joint`, `consensus`, `ransac`, `density` or `tomography`.
+    /// `joint`, `joint-start`, `consensus`, `ransac`, `density` or `tomography`.
     pub solver: String,
     /// The distance that decided support, in `unit`; `None` when it was chosen per point.
     pub delta: Option<f64>,
@@ -118,8 +138,17 @@ pub struct Row {
     pub dropped: ByReason,
     /// Percent of the released points recovered within each threshold.
     pub recovered_percent: ByThreshold,
-    /// The same for an attacker without neighborhoods.
+    /// The same for a blind guess: no neighborhoods, and no look at more than one record.
     pub blind_percent: ByThreshold,
+    /// The same for the best of our attacks that need the released records alone, neither neighborhoods nor
+    /// descriptors; per threshold the best. The same in all rows of a scheme; absent where there is no
+    /// such attack. What neighborhoods add is what exceeds [`Row::baseline_percent`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub records_alone_percent: Option<ByThreshold>,
+    /// Which attack that was, by threshold: `tomography`, `density` or `geometric, joint`; has the keys of
+    /// `records_alone_percent` and is absent with it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub records_alone_by: Option<IndexMap<String, String>>,
     /// Percent of points whose swapped axis was told correctly (`cp` only).
     pub axis_accuracy_percent: Option<f64>,
     /// Percent of points recovered within a hundredth of the smallest threshold (`cp` only).
@@ -136,9 +165,12 @@ pub struct Row {
     /// Percentiles of the error by their number (`50`, `75`, `90`, `95`, `99`), as `median_error`.
     pub error_percentiles: IndexMap<String, Option<f64>>,
     /// Percent of the released points that the attacker is 90 % sure to have within the smallest
-    /// threshold, from its own data alone; absent for solvers that do not say.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// threshold, from its own data alone; `None` where that is not known.
+    #[serde(default)]
     pub sure_percent: Option<f64>,
+    /// Why `sure_percent` is not known here, in plain words; absent where it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sure_unknown: Option<String>,
     /// Percent of those that are within it; absent without any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sure_correct_percent: Option<f64>,
@@ -188,7 +220,7 @@ pub struct Spread {
 pub struct BreakEven {
     /// The scheme's user-facing name.
     pub scheme: String,
-    /// The solver's name.
+    /// The solver's name, or [`STRONGEST`] where several attacks ran.
     pub solver: String,
     /// How the oracle chose the false neighbors, as [`Row::oracle_noise`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -218,12 +250,16 @@ pub enum Bound {
 pub struct GateResult {
     /// The gate as typed, for example `ppl@0.5:0.10<=20`.
     pub gate: String,
-    /// The figure that was compared, in percent (or percentage points for a gain over blind).
-    pub found_percent: f64,
+    /// The figure that was compared, in percent (or percentage points for a gain over the larger
+    /// baseline); `None` when no row could be audited that the gate is about.
+    pub found_percent: Option<f64>,
     /// The bound it may not exceed.
     pub bound_percent: f64,
-    /// Whether the figure keeps the bound.
+    /// Whether every figure keeps the bound; `false` whenever one that the gate is about is not known.
     pub passed: bool,
+    /// Why the gate did not pass although no figure exceeds the bound: what was not audited.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
 }
 
 /// What varies from run to run.
@@ -250,6 +286,16 @@ pub struct Seconds {
     /// Stage to seconds over the whole run.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub stages: IndexMap<String, f64>,
+}
+
+impl Row {
+    /// What an attacker without neighborhoods gets within `threshold` (as typed): the larger of a blind guess
+    /// and the best attack on the records alone. What neighborhoods add is what exceeds it.
+    pub fn baseline_percent(&self, threshold: &str) -> Option<f64> {
+        let alone = self.records_alone_percent.as_ref().and_then(|map| map.get(threshold));
+        let blind = self.blind_percent.get(threshold);
+        blind.into_iter().chain(alone).copied().reduce(f64::max)
+    }
 }
 
 fn one() -> u32 {

@@ -170,7 +170,9 @@ struct SceneWords {
 struct GateWords {
     gate: String,
     passed: bool,
-    found: String,
+    found: Option<String>,
+    /// Why it did not pass although no figure exceeds the bound.
+    reason: Option<String>,
     bound: String,
 }
 
@@ -251,7 +253,8 @@ fn gate_words(gate: &GateResult) -> GateWords {
     GateWords {
         gate: gate.gate.clone(),
         passed: gate.passed,
-        found: words::percent(gate.found_percent),
+        found: gate.found_percent.map(words::percent),
+        reason: gate.reason.clone(),
         bound: words::significant(gate.bound_percent, 4),
     }
 }

@@ -7,7 +7,7 @@ mod sample;
 
 use serde_json::{Value, json};
 use unlift_report::Document;
-use unlift_report::document::Spread;
+use unlift_report::document::{NotAudited, Spread};
 
 fn schema() -> Value {
     serde_json::from_str(include_str!("../audit.schema.json")).expect("the schema is JSON")
@@ -111,6 +111,12 @@ fn documents_keep_the_schema() {
     full.results[0].repeats = 3;
     full.results[0].std = Some(Spread { median_error: Some(0.1), ..Spread::default() });
     full.results[0].delta = None;
+    (full.results[1].sure_percent, full.results[1].sure_unknown) = (None, Some("few".into()));
+    let missing = NotAudited { scheme: "star".into(), neighbors: None, reason: "flat".into() };
+    full.not_audited =
+        vec![NotAudited { neighbors: Some("geometric".into()), ..missing.clone() }, missing];
+    full.gates[0].passed = false;
+    (full.gates[0].found_percent, full.gates[0].reason) = (None, Some("not audited".into()));
     full.run.seconds.stages.insert("read".into(), 0.5);
     full.input.other_sha256.insert("descriptors".into(), "00".into());
     assert_eq!(check(&full), Vec::<String>::new());
