@@ -3,6 +3,7 @@
 use unlift::audit::{Cell, Plan};
 use unlift::released::{Obfuscation, Released};
 use unlift::truth::Original;
+use unlift_report::Given;
 use unlift_report::scene::{
     ObfuscationView, Scene3d, SceneBox, Shapes, View, points_within_budget, subsample,
 };
@@ -47,9 +48,14 @@ impl Pictures {
             records.dedup();
             records.truncate(MOST_SHAPES);
             let shapes = self.shapes(cell.released, &records);
-            self.scene
-                .obfuscations
-                .push(ObfuscationView { scheme: cell.row.scheme.to_owned(), shapes });
+            let shown = self.sample.iter().enumerate();
+            let withheld = shown.filter(|&(_, &at)| slot_of[at].is_none()).map(|(i, _)| i);
+            self.scene.obfuscations.push(ObfuscationView {
+                scheme: cell.row.scheme.to_owned(),
+                shapes,
+                n_records: cell.released.obfuscation().len() as u64,
+                withheld: withheld.collect(),
+            });
         }
         let recovered = self.sample.iter().map(|&at| {
             let position = slot_of[at].and_then(|slot| cell.recovered.position(slot));
@@ -57,8 +63,12 @@ impl Pictures {
         });
         self.scene.views.push(View {
             scheme: cell.row.scheme.to_owned(),
-            solver: unlift_report::method(cell.row.solver, cell.row.oracle_noise),
-            inlier_ratio: cell.row.inlier_ratio,
+            given: Given {
+                neighbors: cell.row.neighbors.clone(),
+                oracle_noise: cell.row.oracle_noise.map(str::to_owned),
+                inlier_ratio: cell.row.inlier_ratio,
+            },
+            solver: cell.row.solver.to_owned(),
             recovered: recovered.collect(),
         });
     }

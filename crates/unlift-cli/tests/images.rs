@@ -97,13 +97,16 @@ fn a_file_without_photos_has_frames_and_chosen_images_are_shown() {
     assert!(page.contains("\"name\":\"b.png\"") && !page.contains("\"name\":\"a.png\""));
     assert!(!page.contains("/9j/"));
     // What a server sees is drawn unasked, where there are descriptors; it is in no table.
-    assert!(page.contains("\"given\":\"overlap, ") && page.contains("\"given\":\"similarity, "));
+    assert!(page.contains("\"label\":\"overlap, ") && page.contains("\"label\":\"similarity, "));
     let rows = json(&place, "a/audit.json")["results"].clone();
     assert!(rows.as_array().unwrap().iter().all(|row| row["neighbors"] == "oracle"));
     without_descriptors(&place.path("f.h5"), &place.path("bare.h5"));
     place.ends(&format!("audit images bare.h5 {QUICK} --show b.png --out b"), 0);
     let page = fs::read_to_string(place.path("b/report.html")).unwrap();
-    assert!(page.contains("\"given\":\"50 %\"") && !page.contains("\"given\":\"overlap, "));
+    assert!(
+        page.contains("\"label\":\"oracle, 50 % right\"")
+            && !page.contains("\"label\":\"overlap, ")
+    );
     let (_, stderr) = place.ends("audit images f.h5 --show x.png", 2);
     assert_eq!(stderr, "unlift: --show: expected an image of f.h5, found x.png\n");
     let (_, stderr) = place.ends("audit images f.h5 --max-features 9", 2);

@@ -1,7 +1,7 @@
 //! Renders a made-up audit of a made-up room, to look at the page while working on it.
 //!
 //! ```text
-//! cargo run -p unlift-report --example sample_report -- report.html [--no-scale] [--share-safe]
+//! cargo run -p unlift-report --example sample_report -- report.html [--mixed] [--no-scale] [--share-safe]
 //! ```
 //!
 //! No figure in it was measured.
@@ -15,7 +15,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let has = |flag: &str| arguments.iter().any(|argument| argument == flag);
     let path = arguments.iter().find(|argument| !argument.starts_with("--"));
-    let document = sample::document(!has("--no-scale"));
+    let make = if has("--mixed") { sample::mixed } else { sample::document };
+    let document = make(!has("--no-scale"));
     let scene = sample::scene(&document, 12_000);
     let options = RenderOptions { share_safe: has("--share-safe"), ..RenderOptions::default() };
     let page = render(&document, Some(&scene), &options)?;

@@ -4,27 +4,32 @@ use minijinja::value::Serde;
 use minijinja::{AutoEscape, Environment, UndefinedBehavior};
 use serde::Serialize;
 
-use crate::document::{Document, GateResult, ImageCounts, LengthUnit};
+use crate::document::{Document, ImageCounts, LengthUnit};
+use crate::gates::{Gates, gates};
 use crate::page_data::{page_data, slot};
 use crate::pictures::Picture;
 use crate::scene::{Scene3d, encode};
 use crate::tables::Table;
 use crate::verdict::Verdict;
-use crate::{Error, paper, pictures, tables, verdict, words};
+use crate::{Error, attack, paper, pictures, tables, verdict, words};
 
 /// The template and its parts, by the names they include each other with.
-const TEMPLATES: [(&str, &str); 6] = [
+const TEMPLATES: [(&str, &str); 7] = [
     ("report.html", include_str!("../template/report.html")),
+    ("gates.html", include_str!("../template/gates.html")),
     ("verdict.html", include_str!("../template/verdict.html")),
     ("figures.html", include_str!("../template/figures.html")),
     ("pictures.html", include_str!("../template/pictures.html")),
     ("tables.html", include_str!("../template/tables.html")),
     ("notes.html", include_str!("../template/notes.html")),
 ];
-const STYLE: &str = include_str!("../template/style.css");
+const STYLE: [&str; 2] =
+    [include_str!("../template/style.css"), include_str!("../template/figures.css")];
 const BUNDLE: &str = include_str!("../web/vendor/bundle.min.js");
-const SCRIPTS: [&str; 4] = [
+const SCRIPTS: [&str; 6] = [
+    include_str!("../web/choices.js"),
     include_str!("../web/charts.js"),
+    include_str!("../web/figures.js"),
     include_str!("../web/scene.js"),
     include_str!("../web/pictures.js"),
     include_str!("../web/report.js"),
@@ -69,10 +74,13 @@ pub fn render(
     let document = if options.share_safe { document.share_safe() } else { document.clone() };
     let scene = scene.filter(|scene| !options.share_safe && !scene.originals.is_empty());
     let error_unit = tables::thresholds(&document).first().and_then(|typed| typed.parse().ok());
-    let encoded = scene.map(|scene| encode(scene, error_unit.unwrap_or(1.0)));
+    let encoded = scene.map(|scene| encode(scene, &document.results, error_unit.unwrap_or(1.0)));
+    // A view without points, or without anything that came back, would be an empty box.
+    let encoded = encoded.filter(|scene| scene.n_drawn > 0 && !scene.views.is_empty());
     let mut blocks = encoded.as_ref().map(|scene| scene.blocks.clone()).unwrap_or_default();
     let shown = if options.share_safe { &[] } else { options.pictures.as_slice() };
-    let pictures = pictures::encode(shown, &mut blocks);
+    let within = tables::headline_threshold(&document).and_then(|typed| typed.parse().ok());
+    let pictures = pictures::encode(shown, within.unwrap_or(10.0), &mut blocks);
     let page_data = page_data(&document, encoded.as_ref(), &pictures, options);
     let data = serde_json::to_string(&page_data)?;
     let verdict = verdict::verdict(&document);
@@ -80,11 +88,13 @@ pub fn render(
         document.options.iter().map(|(name, value)| (name.clone(), plain(value))).collect();
     let table_list = [
         Some(tables::recovered(&document)),
+        Some(tables::baselines(&document)),
         tables::distinct(&document),
         Some(tables::errors(&document)),
         Some(tables::break_even(&document)).filter(|table| !table.rows.is_empty()),
     ];
-    let loss_list = [Some(tables::losses(&document)), tables::trials(&document)];
+    let loss_list =
+        [Some(tables::losses(&document)), tables::choices(&document), tables::trials(&document)];
 
     let page = Page {
         style: STYLE,
@@ -102,9 +112,12 @@ pub fn render(
         subject: subject(&document),
         slots: verdict.cards.iter().map(|card| slot(&document, &card.scheme)).collect(),
         verdict,
-        gates: document.gates.iter().map(gate_words).collect(),
+        gates: gates(&document),
         published: page_data.has_published(),
-        judged: document.results.iter().any(|row| row.reliability.is_some()),
+        judged: document
+            .results
+            .iter()
+            .any(|row| row.reliability.is_some() || row.sure_unknown.is_some()),
         tables: table_list.into_iter().flatten().collect(),
         losses: loss_list.into_iter().flatten().collect(),
         times: tables::times(&document),
@@ -113,6 +126,14 @@ pub fn render(
         other_sha256: document.input.other_sha256.iter().collect(),
         seconds: words::seconds(document.run.seconds.total),
         memory: document.run.peak_memory_bytes.map(words::bytes),
+        not_audited: document
+            .not_audited
+            .iter()
+            .map(|one| {
+                let source = one.neighbors.as_deref().map(|by| attack::source(by, None));
+                (&one.scheme, source, &one.reason)
+            })
+            .collect(),
         document: &document,
         attribution: paper::ATTRIBUTION,
     };
@@ -128,9 +149,9 @@ pub fn render(
 /// All that the template may print.
 #[derive(Debug, Serialize)]
 struct Page<'a> {
-    style: &'static str,
+    style: [&'static str; 2],
     bundle: &'static str,
-    scripts: [&'static str; 4],
+    scripts: [&'static str; 6],
     /// JSON for the script; free of `<`.
     data: String,
     blocks: &'a [String],
@@ -142,7 +163,7 @@ struct Page<'a> {
     verdict: Verdict,
     /// Color and mark of each card's scheme.
     slots: Vec<usize>,
-    gates: Vec<GateWords>,
+    gates: Option<Gates>,
     published: bool,
     /// Whether any attacker said how sure it is.
     judged: bool,
@@ -155,6 +176,8 @@ struct Page<'a> {
     other_sha256: Vec<(&'a String, &'a String)>,
     seconds: String,
     memory: Option<String>,
+    /// (scheme, source, reason) of what could not be audited.
+    not_audited: Vec<(&'a String, Option<String>, &'a String)>,
     document: &'a Document,
     attribution: &'static str,
 }
@@ -164,16 +187,6 @@ struct SceneWords {
     n_points: String,
     n_drawn: String,
     whole: bool,
-}
-
-#[derive(Debug, Serialize)]
-struct GateWords {
-    gate: String,
-    passed: bool,
-    found: Option<String>,
-    /// Why it did not pass although no figure exceeds the bound.
-    reason: Option<String>,
-    bound: String,
 }
 
 #[derive(Debug, Serialize)]
@@ -190,11 +203,16 @@ struct Subject {
     unit: String,
     /// "50th", of the neighbor whose distance is the unit.
     kth: String,
+    /// What the unit is called where there is no scale.
+    usual_distance: &'static str,
 }
 
 fn subject(document: &Document) -> Subject {
     let input = &document.input;
-    let k = document.results.first().map_or(50, |row| row.k);
+    // The oracle's K is the audit's; sources of an attacker's own choose theirs.
+    let oracle = document.results.iter().find(|row| row.neighbors == "oracle");
+    let typed = document.options.get("k").and_then(serde_json::Value::as_u64);
+    let k = oracle.map(|row| row.k).or(typed.and_then(|k| u32::try_from(k).ok())).unwrap_or(50);
     let of = document.results.first().map_or(LengthUnit::Meter, |row| row.unit);
     let metric = of != LengthUnit::KthNeighbor;
     let unit = match (metric, input.scale_m_per_unit, input.unit_in_map_units) {
@@ -204,7 +222,7 @@ fn subject(document: &Document) -> Subject {
         }
         (true, None, _) => "Meters.".to_owned(),
         (false, _, Some(unit)) => {
-            format!("One neighbor distance is {} map units.", words::significant(unit, 4))
+            format!("Here it is {} map units.", words::significant(unit, 4))
         }
         (false, _, None) => String::new(),
     };
@@ -218,6 +236,7 @@ fn subject(document: &Document) -> Subject {
         images: input.images.as_ref().map(images_text),
         unit,
         kth: words::ordinal(k),
+        usual_distance: words::USUAL_DISTANCE,
     }
 }
 
@@ -247,16 +266,6 @@ fn short_name(path: &str) -> String {
     let mut parts = path.split(['/', '\\']).rev().filter(|part| !part.is_empty());
     let name = parts.clone().find(|part| !says_little(part)).or_else(|| parts.next());
     name.unwrap_or(path).to_owned()
-}
-
-fn gate_words(gate: &GateResult) -> GateWords {
-    GateWords {
-        gate: gate.gate.clone(),
-        passed: gate.passed,
-        found: gate.found_percent.map(words::percent),
-        reason: gate.reason.clone(),
-        bound: words::significant(gate.bound_percent, 4),
-    }
 }
 
 fn plain(value: &serde_json::Value) -> String {

@@ -3,14 +3,19 @@
 //! [`document`] holds the structs of `audit.json`; everything else here only shows them:
 //! nothing is measured in this crate, and a number on the page is a number of the document.
 
+mod attack;
 mod check;
+mod choices;
 pub mod document;
 mod error;
+mod gates;
 mod html;
 mod images;
+mod lead;
 mod page_data;
 pub mod paper;
 pub mod pictures;
+mod quantity;
 mod round;
 pub mod scene;
 mod share;
@@ -19,9 +24,9 @@ mod text;
 mod verdict;
 mod words;
 
+pub use attack::Given;
 pub use document::Document;
 pub use error::Error;
 pub use html::{ErrorCdf, RenderOptions, render};
 pub use scene::Scene3d;
 pub use text::text_table;
-pub use words::method;

@@ -2,12 +2,14 @@
 
 use serde::Serialize;
 
+use crate::attack::{self, Given};
+use crate::choices::{Choices, unit_sign};
 use crate::document::{Document, LengthUnit, Row};
 use crate::html::RenderOptions;
 use crate::paper::{PublishedCurve, published_2d, published_3d};
-use crate::pictures::EncodedPicture;
+use crate::pictures::{EncodedPicture, first_choice};
 use crate::scene::Encoded;
-use crate::{tables, words};
+use crate::tables;
 
 /// Schemes with a color and a mark of their own, the same on every page.
 const KNOWN_SCHEMES: [&str; 7] = ["olc", "ppl", "ppl+", "ray", "ray-voxel", "plane", "cp"];
@@ -16,17 +18,19 @@ const SLOTS: usize = 8;
 
 #[derive(Debug, Serialize)]
 pub(crate) struct PageData<'a> {
-    schemes: Vec<SchemeData>,
-    solvers: Vec<String>,
+    #[serde(flatten)]
+    choices: Choices,
     thresholds: Vec<ThresholdData>,
-    rows: Vec<RowData<'a>>,
+    rows: Vec<RowData>,
     published: Vec<PublishedData>,
     /// The threshold that is shown first.
     headline: usize,
-    /// `m`, `px`, or `nd` for multiples of the neighbor distance.
+    /// `m`, `px`, or `×` for multiples of the usual distance of neighbors.
     unit: &'static str,
     scene: Option<&'a Encoded>,
     pictures: &'a [EncodedPicture],
+    /// The neighborhoods that pictures show first.
+    first_picture: Option<&'a str>,
 }
 
 impl PageData<'_> {
@@ -37,31 +41,31 @@ impl PageData<'_> {
 }
 
 #[derive(Debug, Serialize)]
-struct SchemeData {
-    name: String,
-    title: String,
-    slot: usize,
-}
-
-#[derive(Debug, Serialize)]
 struct ThresholdData {
     label: String,
     value: Option<f64>,
 }
 
 #[derive(Debug, Serialize)]
-struct RowData<'a> {
-    scheme: &'a str,
-    /// The solver, with the neighborhoods it had where these are not the usual ones.
-    solver: String,
+struct RowData {
+    /// Places in the lists of [`Choices`].
+    scheme: usize,
+    given: usize,
+    solver: usize,
+    /// The neighborhoods of this very row: `overlap, 11 % right (measured)`.
+    label: String,
     ratio: f64,
-    oracle: bool,
+    /// Whether it is an attack: a reference row is told what no attacker knows.
+    attack: bool,
+    /// Per threshold, whether no solver got more of this scheme with these neighborhoods.
+    strongest: Vec<bool>,
     recovered: Vec<Option<f64>>,
-    blind: Vec<Option<f64>>,
     /// (error, percent of the points within it), rising.
     errors: Vec<(f64, f64)>,
     /// (stated probability, share that came true), in percent, rising; bins of few points left out.
     reliability: Vec<(f64, f64)>,
+    /// Why the attacker's own probabilities are not known here.
+    unknown: Option<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -95,12 +99,22 @@ pub(crate) fn slot(document: &Document, scheme: &str) -> usize {
     (KNOWN_SCHEMES.len() + turn) % SLOTS
 }
 
-/// What tells apart the rows of one scheme: its curve on the page.
-fn series(row: &Row) -> String {
-    match row.neighbors.as_str() {
-        "oracle" => words::method(&row.solver, row.oracle_noise.as_deref()),
-        source => format!("{}, {source}", row.solver),
+/// Whether `row` is the first of those that recover most of its scheme from its neighborhoods.
+fn is_strongest(document: &Document, row: &Row, typed: &str) -> bool {
+    let share = |row: &Row| row.recovered_percent.get(typed).copied().unwrap_or(-1.0);
+    let given = Given::of(row);
+    let rivals = document.results.iter().filter(|other| {
+        other.scheme == row.scheme
+            && attack::basis(other).is_some()
+            && Given::of(other).same_choice(&given)
+    });
+    let mut best: Option<&Row> = None;
+    for rival in rivals {
+        if best.is_none_or(|best| share(rival) > share(best)) {
+            best = Some(rival);
+        }
     }
+    best.is_some_and(|best| std::ptr::eq(best, row))
 }
 
 /// Bins with at least this share of the released points are drawn: fewer scatter.
@@ -123,37 +137,28 @@ pub(crate) fn page_data<'a>(
     options: &RenderOptions,
 ) -> PageData<'a> {
     let thresholds = tables::thresholds(document);
+    let choices = Choices::of(document);
     let by_threshold = |map: &crate::document::ByThreshold| {
         thresholds.iter().map(|typed| map.get(typed).copied()).collect::<Vec<_>>()
     };
-    let rows = document.results.iter().enumerate().map(|(index, row)| {
+    // Every row is in the lists, as these were made of the rows.
+    let rows = document.results.iter().enumerate().filter_map(|(index, row)| {
         let cdf = options.error_cdf.iter().find(|cdf| cdf.row == index);
-        RowData {
-            scheme: &row.scheme,
-            solver: series(row),
+        let given = Given::of(row);
+        Some(RowData {
+            scheme: choices.scheme(&row.scheme)?,
+            given: choices.given(&given)?,
+            solver: choices.solver(&row.solver)?,
+            label: given.label(),
             ratio: row.inlier_ratio,
-            oracle: row.neighbors == "oracle",
+            attack: attack::basis(row).is_some(),
+            strongest: thresholds.iter().map(|typed| is_strongest(document, row, typed)).collect(),
             recovered: by_threshold(&row.recovered_percent),
-            blind: by_threshold(&row.blind_percent),
-            reliability: judged(row),
             errors: cdf.map_or_else(|| percentile_points(row), |cdf| cdf.points.clone()),
-        }
+            reliability: judged(row),
+            unknown: row.sure_unknown.clone(),
+        })
     });
-    let mut schemes: Vec<SchemeData> = Vec::new();
-    let mut solvers: Vec<String> = Vec::new();
-    for row in &document.results {
-        if !schemes.iter().any(|scheme| scheme.name == row.scheme) {
-            schemes.push(SchemeData {
-                name: row.scheme.clone(),
-                title: words::scheme_title(&row.scheme).to_owned(),
-                slot: slot(document, &row.scheme),
-            });
-        }
-        let method = series(row);
-        if !solvers.contains(&method) {
-            solvers.push(method);
-        }
-    }
     PageData {
         rows: rows.collect(),
         published: published(document, &thresholds),
@@ -164,17 +169,13 @@ pub(crate) fn page_data<'a>(
                 value: typed.parse().ok(),
             })
             .collect(),
-        unit: match document.results.first().map(|row| row.unit) {
-            Some(LengthUnit::KthNeighbor) => "nd",
-            Some(LengthUnit::Pixel) => "px",
-            _ => "m",
-        },
+        unit: unit_sign(document.results.first().map(|row| row.unit)),
         headline: tables::headline_threshold(document)
             .and_then(|typed| thresholds.iter().position(|other| *other == typed))
             .unwrap_or(0),
-        schemes,
-        solvers,
+        choices,
         scene,
+        first_picture: first_choice(pictures),
         pictures,
     }
 }

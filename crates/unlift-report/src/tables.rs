@@ -3,33 +3,90 @@
 use serde::Serialize;
 
 use crate::document::{Bound, ByReason, Document, LengthUnit, Row};
-use crate::words;
+use crate::{attack, words};
 
 /// A table of text.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Table {
     pub id: &'static str,
     pub caption: String,
-    pub head: Vec<String>,
-    /// Cells; the first `labels` of each row are text, the rest are numbers.
+    pub columns: Vec<Column>,
+    /// Cells by row; as many as there are columns.
     pub rows: Vec<Vec<String>>,
-    pub labels: usize,
+    /// What a cell means that a head cannot say.
+    pub notes: Vec<String>,
+}
+
+/// The head of a column.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Column {
+    pub name: String,
+    pub class: Class,
+}
+
+/// How the cells of a column are set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Class {
+    /// Names, flush left, on one line.
+    Label,
+    /// Figures, flush right.
+    Figure,
+    /// Text that may be long: flush left, on several lines.
+    Prose,
 }
 
 const NONE: &str = "–";
 
-/// The main figures: percent recovered and the blind attacker's percent, a column per threshold.
+impl Table {
+    /// Without columns of dashes: what no row has takes no room.
+    fn without_empty_columns(mut self) -> Self {
+        let kept: Vec<bool> = (0..self.columns.len())
+            .map(|at| self.rows.is_empty() || self.rows.iter().any(|row| row[at] != NONE))
+            .collect();
+        let mut keep = kept.iter();
+        self.columns.retain(|_| *keep.next().unwrap_or(&true));
+        for row in &mut self.rows {
+            let mut keep = kept.iter();
+            row.retain(|_| *keep.next().unwrap_or(&true));
+        }
+        self
+    }
+}
+
+fn column(name: impl Into<String>, class: Class) -> Column {
+    Column { name: name.into(), class }
+}
+
+/// The columns that tell rows apart.
+fn key_columns() -> Vec<Column> {
+    let labels = ["scheme", "solver", "neighbors by"].map(|name| column(name, Class::Label));
+    labels.into_iter().chain([column("of them right", Class::Figure)]).collect()
+}
+
+fn key_cells(row: &Row) -> Vec<String> {
+    let source = attack::source(&row.neighbors, row.oracle_noise.as_deref());
+    let right = format!("{} %", words::ratio_percent(row.inlier_ratio));
+    vec![row.scheme.clone(), row.solver.clone(), source, right]
+}
+
+fn within_columns(document: &Document) -> impl Iterator<Item = Column> {
+    let names = thresholds(document).into_iter().map(|typed| threshold_text(document, &typed));
+    names.map(|name| column(format!("within {name}, %"), Class::Figure))
+}
+
+fn points(document: &Document) -> &'static str {
+    document.results.first().map_or("points", |row| words::points(row.unit))
+}
+
+/// The main figures: percent recovered, a column per threshold.
 pub(crate) fn recovered(document: &Document) -> Table {
     let thresholds = thresholds(document);
-    let mut head = texts(&["scheme", "solver", "neighbors right", "K", "delta"]);
-    for typed in &thresholds {
-        head.push(format!("within {}, %", threshold_text(document, typed)));
-    }
-    for typed in &thresholds {
-        head.push(format!("blind, within {}, %", threshold_text(document, typed)));
-    }
-    let points = document.results.first().map_or("points", |row| words::points(row.unit));
-    head.push(points.to_owned());
+    let mut columns = key_columns();
+    columns.extend(["K", "delta"].map(|name| column(name, Class::Figure)));
+    columns.extend(within_columns(document));
+    let points = points(document);
+    columns.push(column(points, Class::Figure));
     let rows = document.results.iter().map(|row| {
         let mut cells = key_cells(row);
         cells.push(row.k.to_string());
@@ -37,10 +94,6 @@ pub(crate) fn recovered(document: &Document) -> Table {
         for typed in &thresholds {
             let spread = row.std.as_ref().and_then(|std| std.recovered_percent.get(typed));
             cells.push(percent_cell(row.recovered_percent.get(typed), spread));
-        }
-        for typed in &thresholds {
-            let spread = row.std.as_ref().and_then(|std| std.blind_percent.get(typed));
-            cells.push(percent_cell(row.blind_percent.get(typed), spread));
         }
         cells.push(words::thousands(row.n_points));
         cells
@@ -51,12 +104,64 @@ pub(crate) fn recovered(document: &Document) -> Table {
     } else {
         String::new()
     };
-    Table {
+    let table = Table {
         id: "recovered",
         caption: format!("Recovered {points}, in percent of the {points} released.{spread}"),
         rows: rows.collect(),
-        head,
-        labels: 2,
+        columns,
+        notes: Vec::new(),
+    };
+    table.without_empty_columns()
+}
+
+/// What an attacker gets without neighborhoods, per scheme: by a guess, and by the records alone.
+pub(crate) fn baselines(document: &Document) -> Table {
+    let thresholds = thresholds(document);
+    let mut columns = ["scheme", "attacker"].map(|name| column(name, Class::Label)).to_vec();
+    columns.extend(within_columns(document));
+    let mut rows: Vec<Vec<String>> = Vec::new();
+    let mut schemes: Vec<&str> = Vec::new();
+    for row in &document.results {
+        if !schemes.contains(&row.scheme.as_str()) {
+            schemes.push(&row.scheme);
+        }
+    }
+    for scheme in schemes {
+        let of = || document.results.iter().filter(|row| row.scheme == scheme);
+        let mut add = |cells: Vec<String>| {
+            // Rows of one scheme share their baselines: each is said once.
+            if !rows.contains(&cells) {
+                rows.push(cells);
+            }
+        };
+        for row in of() {
+            let spread = |typed| row.std.as_ref().and_then(|std| std.blind_percent.get(typed));
+            let shares = thresholds
+                .iter()
+                .map(|typed| percent_cell(row.blind_percent.get(typed), spread(typed)));
+            add([scheme.to_owned(), "blind guess".to_owned()].into_iter().chain(shares).collect());
+        }
+        for row in of() {
+            let Some(alone) = &row.records_alone_percent else { continue };
+            // Another attack may be best at another threshold.
+            let mut by: Vec<&str> = Vec::new();
+            for name in row.records_alone_by.iter().flat_map(|by| by.values()) {
+                if !by.contains(&name.as_str()) {
+                    by.push(name);
+                }
+            }
+            let who = attack::records_alone((!by.is_empty()).then(|| by.join("; ")).as_deref());
+            let shares = thresholds.iter().map(|typed| percent_cell(alone.get(typed), None));
+            add([scheme.to_owned(), who].into_iter().chain(shares).collect());
+        }
+    }
+    Table {
+        id: "baselines",
+        caption: "Without neighborhoods: what neighborhoods give away is what exceeds the larger of both."
+            .to_owned(),
+        columns,
+        rows,
+        notes: Vec::new(),
     }
 }
 
@@ -64,14 +169,13 @@ pub(crate) fn recovered(document: &Document) -> Table {
 pub(crate) fn distinct(document: &Document) -> Option<Table> {
     document.results.iter().find(|row| row.distinct.is_some())?;
     let thresholds = thresholds(document);
-    let mut head = texts(&["scheme", "solver", "neighbors right"]);
+    let mut columns = key_columns();
+    columns.extend(within_columns(document));
     for typed in &thresholds {
-        head.push(format!("within {}, %", threshold_text(document, typed)));
+        let name = format!("blind, within {}, %", threshold_text(document, typed));
+        columns.push(column(name, Class::Figure));
     }
-    for typed in &thresholds {
-        head.push(format!("blind, within {}, %", threshold_text(document, typed)));
-    }
-    head.push("places".to_owned());
+    columns.push(column("places", Class::Figure));
     let rows = document.results.iter().filter_map(|row| {
         let distinct = row.distinct.as_ref()?;
         let mut cells = key_cells(row);
@@ -86,8 +190,8 @@ pub(crate) fn distinct(document: &Document) -> Option<Table> {
         caption: "The same over distinct places: keypoints that lie on each other count once."
             .to_owned(),
         rows: rows.collect(),
-        head,
-        labels: 2,
+        columns,
+        notes: Vec::new(),
     })
 }
 
@@ -95,12 +199,15 @@ pub(crate) fn distinct(document: &Document) -> Option<Table> {
 pub(crate) fn errors(document: &Document) -> Table {
     let mut percentiles: Vec<&String> = Vec::new();
     for key in document.results.iter().flat_map(|row| row.error_percentiles.keys()) {
-        if !percentiles.contains(&key) {
+        // Half within is the median, which has a column.
+        if !percentiles.contains(&key) && key != "50" {
             percentiles.push(key);
         }
     }
-    let mut head = texts(&["scheme", "solver", "neighbors right", "median", "blind, median"]);
-    head.extend(percentiles.iter().map(|key| format!("{key} % within")));
+    let mut columns = key_columns();
+    columns.extend(["median", "blind, median"].map(|name| column(name, Class::Figure)));
+    let names = percentiles.iter().map(|key| format!("{key} % within"));
+    columns.extend(names.map(|name| column(name, Class::Figure)));
     let rows = document.results.iter().map(|row| {
         let mut cells = key_cells(row);
         let text = |value: Option<f64>| value.map_or(NONE.into(), |v| words::length(v, row.unit));
@@ -111,14 +218,15 @@ pub(crate) fn errors(document: &Document) -> Table {
         }
         cells
     });
-    Table {
+    let table = Table {
         id: "errors",
         caption: "Errors. Lost points count as infinitely far; a dash is a percentile among them."
             .to_owned(),
         rows: rows.collect(),
-        head,
-        labels: 2,
-    }
+        columns,
+        notes: Vec::new(),
+    };
+    table.without_empty_columns()
 }
 
 /// Break-even ratios, for every threshold.
@@ -132,58 +240,95 @@ pub(crate) fn break_even(document: &Document) -> Table {
             (_, None) => "not reached".to_owned(),
         };
         let within = threshold_text(document, &point.threshold);
-        let method = words::method(&point.solver, point.oracle_noise.as_deref());
-        vec![point.scheme.clone(), method, within, ratio]
+        let source = attack::source("oracle", point.oracle_noise.as_deref());
+        vec![point.scheme.clone(), point.solver.clone(), source, within, ratio]
     });
+    let labels = ["scheme", "solver", "neighbors by"].map(|name| column(name, Class::Label));
+    let numbers = ["within", "of them right"].map(|name| column(name, Class::Figure));
+    let caption =
+        "Break-even: the smallest share of right neighbors at which half of the points come back.";
     Table {
         id: "break-even",
-        caption: "Break-even: the smallest share of right neighbors at which half of the points come back."
-            .to_owned(),
-        head: texts(&["scheme", "solver", "within", "neighbors right"]),
+        caption: caption.to_owned(),
+        columns: labels.into_iter().chain(numbers).collect(),
         rows: rows.collect(),
-        labels: 2,
+        notes: Vec::new(),
     }
 }
 
-/// Points lost and dropped by reason, axis and descriptor accuracy.
+/// Points lost and not released, by reason.
 pub(crate) fn losses(document: &Document) -> Table {
-    let percent = |value: Option<f64>| value.map_or(NONE.into(), words::percent);
     let rows = document.results.iter().map(|row| {
         let mut cells = key_cells(row);
+        cells.push(words::thousands(row.n_points));
+        cells.push(reasons(&row.dropped));
+        cells.push(words::thousands(row.n_lost));
+        cells.push(reasons(&row.lost));
+        cells
+    });
+    let points = points(document);
+    let mut columns = key_columns();
+    columns.push(column(format!("{points} released"), Class::Figure));
+    columns.push(column("not released", Class::Prose));
+    columns.push(column("lost", Class::Figure));
+    columns.push(column("lost by reason", Class::Prose));
+    let table = Table {
+        id: "losses",
+        caption: format!(
+            "{} not released by the scheme, and {points} that recovery gave up.",
+            words::capital(points)
+        ),
+        columns,
+        rows: rows.collect(),
+        notes: Vec::new(),
+    };
+    table.without_empty_columns()
+}
+
+/// What stands in place of a share of sure points that cannot be had.
+const UNKNOWN: &str = "not known here";
+
+/// Choices that recovery got right, and points it is sure of; `None` when no row has any.
+pub(crate) fn choices(document: &Document) -> Option<Table> {
+    let percent = |value: Option<f64>| value.map_or(NONE.into(), words::percent);
+    let mut notes: Vec<String> = Vec::new();
+    let rows = document.results.iter().map(|row| {
+        let sure = match (&row.sure_unknown, row.sure_percent) {
+            (Some(reason), None) => {
+                let note = format!("{}: {reason}", words::capital(UNKNOWN));
+                if !notes.contains(&note) {
+                    notes.push(note);
+                }
+                UNKNOWN.to_owned()
+            }
+            (_, sure) => percent(sure),
+        };
+        let mut cells = key_cells(row);
         cells.extend([
-            words::thousands(row.n_points),
-            reasons(&row.dropped),
-            words::thousands(row.n_lost),
-            reasons(&row.lost),
             percent(row.axis_accuracy_percent),
             percent(row.exact_percent),
             percent(row.assignment_accuracy_percent),
-            percent(row.sure_percent),
+            sure,
             percent(row.sure_correct_percent),
         ]);
         cells
     });
-    let columns = [
-        "points released",
-        "not released",
-        "lost",
-        "lost by reason",
-        "axis right, %",
-        "exact, %",
-        "descriptor right, %",
-        "sure, %",
-        "sure and right, %",
-    ];
-    let mut head = texts(&["scheme", "solver", "neighbors right"]);
-    head.extend(texts(&columns));
-    Table {
-        id: "losses",
-        caption: "Points not released by the scheme, points the recovery gave up, choices it got right, and points it is sure of."
+    let rows: Vec<Vec<String>> = rows.collect();
+    let names =
+        ["axis right, %", "exact, %", "descriptor right, %", "sure, %", "of the sure right, %"];
+    let keys = key_columns();
+    let n_keys = keys.len();
+    let columns = keys.into_iter().chain(names.map(|name| column(name, Class::Figure)));
+    let table = Table {
+        id: "choices",
+        caption: "Choices that recovery got right, and points that the attacker is sure of."
             .to_owned(),
-        head,
-        rows: rows.collect(),
-        labels: 2,
-    }
+        columns: columns.collect(),
+        rows,
+        notes,
+    };
+    let table = table.without_empty_columns();
+    (table.columns.len() > n_keys).then_some(table)
 }
 
 /// RANSAC's trials per point; `None` when no row has them.
@@ -203,12 +348,14 @@ pub(crate) fn trials(document: &Document) -> Option<Table> {
         cells.push(text.join(" · "));
         rows.push(cells);
     }
+    let mut columns = key_columns();
+    columns.push(column(format!("{} by trials", points(document)), Class::Prose));
     (!rows.is_empty()).then(|| Table {
         id: "trials",
-        caption: "RANSAC: number of points by trials needed.".to_owned(),
-        head: texts(&["scheme", "solver", "neighbors right", "points by trials"]),
+        caption: format!("RANSAC: number of {} by trials needed.", points(document)),
+        columns,
         rows,
-        labels: 2,
+        notes: Vec::new(),
     })
 }
 
@@ -232,9 +379,10 @@ pub(crate) fn times(document: &Document) -> Option<Table> {
         cells
     });
     let rows = rows.collect();
-    let mut head = texts(&["scheme", "solver", "neighbors right"]);
-    head.extend(stages.iter().map(|stage| format!("{stage}, s")));
-    Some(Table { id: "times", caption: "Seconds by stage.".to_owned(), head, rows, labels: 2 })
+    let mut columns = key_columns();
+    columns.extend(stages.iter().map(|stage| column(format!("{stage}, s"), Class::Figure)));
+    let caption = "Seconds by stage.".to_owned();
+    Some(Table { id: "times", caption, columns, rows, notes: Vec::new() })
 }
 
 /// Every threshold of the document, as typed, in order.
@@ -271,20 +419,6 @@ pub(crate) fn threshold_text(document: &Document, typed: &str) -> String {
     }
 }
 
-pub(crate) fn key_cells(row: &Row) -> Vec<String> {
-    vec![row.scheme.clone(), row.solver.clone(), ratio_cell(row)]
-}
-
-/// How many neighbors are right, and who says who they are unless that is a uniform oracle.
-fn ratio_cell(row: &Row) -> String {
-    let source = match (row.neighbors.as_str(), row.oracle_noise.as_deref()) {
-        ("oracle", None | Some("uniform")) => String::new(),
-        ("oracle", Some(noise)) => format!(" ({noise})"),
-        (source, _) => format!(" ({source})"),
-    };
-    format!("{} %{source}", words::ratio_percent(row.inlier_ratio))
-}
-
 fn percent_cell(value: Option<&f64>, spread: Option<&f64>) -> String {
     match (value, spread) {
         (None, _) => NONE.to_owned(),
@@ -303,8 +437,4 @@ fn reasons(map: &ByReason) -> String {
     let parts =
         parts.map(|(name, count)| format!("{} {}", words::thousands(*count), words::reason(name)));
     parts.collect::<Vec<_>>().join(", ")
-}
-
-fn texts(items: &[&str]) -> Vec<String> {
-    items.iter().map(|item| (*item).to_owned()).collect()
 }

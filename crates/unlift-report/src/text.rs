@@ -1,35 +1,57 @@
 //! The short table for a terminal.
 
-use crate::document::{Document, Row};
-use crate::{tables, verdict, words};
+use crate::document::{Bound, Document, LengthUnit, Row, STRONGEST};
+use crate::{attack, tables, verdict, words};
 
-/// One line per scheme, worst first: percent recovered within each threshold at the headline
-/// inlier ratio, the blind attacker's percent, the break-even ratio.
+/// A few lines per scheme, worst first: what comes back today by every source tried, then by the oracle
+/// at the headline inlier ratio. Percent recovered within each threshold, the two baselines, the
+/// break-even ratio.
 ///
 /// Plain text, at most about 100 columns, ends with a line break.
 pub fn text_table(document: &Document) -> String {
     let thresholds = tables::thresholds(document);
-    let mut head = vec!["scheme".to_owned(), "solver".to_owned(), "right".to_owned()];
+    let headline = tables::headline_threshold(document).unwrap_or_default();
+    let alone = |scheme: &str| verdict::records_alone(document, scheme, &headline);
+    let cards = verdict::verdict(document).cards;
+    let any_alone = cards.iter().any(|card| alone(&card.scheme).is_some());
+
+    let mut head = ["scheme", "neighbors by", "right", "solver"].map(str::to_owned).to_vec();
     head.extend(thresholds.iter().map(|typed| format!("{typed} {}", unit(document))));
-    head.extend(["blind".to_owned(), "break-even".to_owned()]);
-    let headline = tables::headline_threshold(document);
+    head.push("blind".to_owned());
+    if any_alone {
+        head.push("records".to_owned());
+    }
+    head.push("break-even".to_owned());
     let mut lines = vec![head];
-    for card in verdict::verdict(document).cards {
-        let Some(row) = verdict::headline(document, &card.scheme) else {
-            continue;
-        };
-        for row in [row].into_iter().chain(verdict::other_sources(document, row)) {
-            let mut cells = tables::key_cells(row);
-            for typed in &thresholds {
-                cells.push(percent(row.recovered_percent.get(typed)));
+    for card in &cards {
+        for row in verdict::by_source(document, &card.scheme) {
+            let right = format!("{} %", words::ratio_percent(row.inlier_ratio));
+            let source = attack::source(&row.neighbors, row.oracle_noise.as_deref());
+            let mut cells = vec![row.scheme.clone(), source, right, row.solver.clone()];
+            cells.extend(thresholds.iter().map(|typed| percent(row.recovered_percent.get(typed))));
+            cells.push(percent(row.blind_percent.get(&headline)));
+            if any_alone {
+                cells.push(percent(alone(&card.scheme).map(|(percent, _)| percent).as_ref()));
             }
-            let blind = headline.as_ref().and_then(|typed| row.blind_percent.get(typed));
-            cells.push(percent(blind));
-            cells.push(break_even(document, row, headline.as_ref()));
+            cells.push(break_even(document, row, &headline));
             lines.push(cells);
         }
     }
-    align(&lines)
+    let mut text = align(&lines);
+    if any_alone {
+        text.push_str(
+            "records: what comes back from the released records alone, without neighborhoods\n",
+        );
+    }
+    if document.results.first().is_some_and(|row| row.unit == LengthUnit::KthNeighbor) {
+        text.push_str(&format!("x: times {}\n", words::USUAL_DISTANCE));
+    }
+    for refused in &document.not_audited {
+        let by = refused.neighbors.as_ref().map(|source| format!(" by {source}"));
+        let (scheme, by) = (&refused.scheme, by.unwrap_or_default());
+        text.push_str(&format!("not audited: {scheme}{by}: {}\n", refused.reason));
+    }
+    text
 }
 
 fn percent(value: Option<&f64>) -> String {
@@ -38,16 +60,23 @@ fn percent(value: Option<&f64>) -> String {
 
 fn unit(document: &Document) -> &'static str {
     match document.results.first().map(|row| row.unit) {
-        Some(crate::document::LengthUnit::KthNeighbor) => "nd",
-        Some(crate::document::LengthUnit::Pixel) => "px",
-        _ => "m",
+        Some(LengthUnit::KthNeighbor) => "x",
+        Some(LengthUnit::Pixel) => "px",
+        Some(LengthUnit::Meter) | None => "m",
     }
 }
 
-fn break_even(document: &Document, row: &Row, typed: Option<&String>) -> String {
-    use crate::document::Bound;
-    let point = document.break_even.iter().find(|b| b.is_of(row) && Some(&b.threshold) == typed);
-    match point.map(|p| (p.bound, p.inlier_ratio.map(words::ratio_percent))) {
+/// Of the curve on which the row lies; rows that are no oracle's lie on none.
+fn break_even(document: &Document, row: &Row, typed: &str) -> String {
+    let noise = |noise: &Option<String>| noise.clone().unwrap_or_else(|| "uniform".to_owned());
+    let mut points = document.break_even.iter().filter(|point| {
+        attack::basis(row) == Some(attack::Basis::Oracle)
+            && point.scheme == row.scheme
+            && (point.solver == row.solver || point.solver == STRONGEST)
+            && noise(&point.oracle_noise) == noise(&row.oracle_noise)
+            && point.threshold == typed
+    });
+    match points.next().map(|p| (p.bound, p.inlier_ratio.map(words::ratio_percent))) {
         Some((Bound::Interpolated, Some(ratio))) => format!("{ratio} %"),
         Some((Bound::BelowTested, Some(ratio))) => format!("<= {ratio} %"),
         Some((Bound::AboveTested, Some(ratio))) => format!("> {ratio} %"),
@@ -55,7 +84,7 @@ fn break_even(document: &Document, row: &Row, typed: Option<&String>) -> String 
     }
 }
 
-/// Columns two spaces apart; the first two flush left, numbers flush right.
+/// Columns two spaces apart; names flush left, numbers flush right.
 fn align(lines: &[Vec<String>]) -> String {
     let columns = lines.iter().map(Vec::len).max().unwrap_or(0);
     let width = |column: usize| {
@@ -68,7 +97,7 @@ fn align(lines: &[Vec<String>]) -> String {
         let mut row = String::new();
         for (column, cell) in line.iter().enumerate() {
             let width = widths[column];
-            if column < 2 {
+            if matches!(column, 0 | 1 | 3) {
                 row.push_str(&format!("{cell:<width$}  "));
             } else {
                 row.push_str(&format!("{cell:>width$}  "));

@@ -1,27 +1,17 @@
-//! One plain sentence per scheme, worst first. The word "safe" never appears: an audit shows what
-//! one attack took, not what no attack can take.
+//! What comes back, per scheme, by the strongest attack tried: first today, from the released data
+//! alone, then if neighbors were known. Worst first. The word "safe" never appears: an audit shows
+//! what one attack took, not what no attack can take.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use crate::attack::{self, Basis};
 use crate::document::{Bound, BreakEven, Document, Row};
-use crate::{tables, words};
+use crate::{lead, quantity, tables, words};
 
-/// The inlier ratio of the headline, if it was tested; else the tested one nearest to it.
+/// The inlier ratio of the oracle's headline, if it was tested; else the tested one nearest to it.
 const HEADLINE_RATIO: f64 = 0.5;
-/// A gain over the blind attacker below this many percentage points says that nothing was gained.
-const GAIN_THAT_COUNTS: f64 = 2.0;
-
-impl BreakEven {
-    /// Whether this is the ratio of the curve on which `row` lies.
-    pub(crate) fn is_of(&self, row: &Row) -> bool {
-        let noise = self.oracle_noise.as_ref();
-        self.scheme == row.scheme
-            && self.solver == row.solver
-            && noise.is_none_or(|noise| row.oracle_noise.as_ref() == Some(noise))
-    }
-}
 
 /// The verdict on one scheme.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -29,166 +19,288 @@ pub(crate) struct Card {
     pub scheme: String,
     pub title: String,
     pub rule: &'static str,
-    /// Whole percent, rounded down.
-    pub at_least: String,
+    /// What came back by kind of attack: today, with given lists, with the oracle's; those that ran.
+    pub findings: Vec<Finding>,
+    /// What an attacker gets without neighborhoods, and what neighborhoods add to that.
+    pub baselines: String,
+    pub break_even: Option<String>,
+    /// Whether other schemes have a share of today and this one has none.
+    pub untried_today: bool,
+    /// Sources that could not be tried on the scheme, with the reason.
+    pub refused: Vec<String>,
+    /// Percent by the records alone, where that was tried.
+    #[serde(skip)]
+    pub alone: Option<f64>,
+}
+
+/// What the strongest attack of one kind got back.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Finding {
+    #[serde(skip)]
+    pub basis: Basis,
+    /// "Today, from the released data alone".
+    pub when: String,
+    /// Percent within the headline threshold.
     pub recovered: f64,
-    pub blind: f64,
-    /// "of the points come back within 10 cm when half of the neighbors are right".
-    pub sentence: String,
+    /// The same as a whole percent, rounded down.
+    pub at_least: String,
     /// How much, in a word or two.
     pub amount: &'static str,
-    pub gain: String,
-    pub break_even: Option<String>,
-    pub solver: String,
+    /// The attack: "overlap, 11 % right (measured), joint".
+    pub by: String,
+    /// Percent of an attacker without neighborhoods: the larger baseline.
+    pub floor: f64,
 }
 
-/// The verdicts of a document and the sentence that sums them up.
+/// A scheme that could not be audited, and why.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Refusal {
+    pub scheme: String,
+    pub title: String,
+    pub reason: String,
+}
+
+/// The verdicts of a document and the sentences that sum them up.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Verdict {
-    pub summary: String,
+    pub lead: Vec<String>,
     pub cards: Vec<Card>,
+    pub refusals: Vec<Refusal>,
+    /// Whether any attack had the released data alone: else the page says that none was tried.
+    pub tested_today: bool,
 }
 
-/// Judges every scheme by the strongest solver at the headline ratio, for the headline threshold.
+impl Card {
+    pub(crate) fn finding(&self, basis: Basis) -> Option<&Finding> {
+        self.findings.iter().find(|finding| finding.basis == basis)
+    }
+
+    /// Today's share decides the order; schemes without one come after those with one.
+    fn badness(&self) -> (f64, f64) {
+        let share = |basis| self.finding(basis).map_or(-1.0, |finding| finding.recovered);
+        (share(Basis::Released), share(Basis::Oracle).max(share(Basis::Given)))
+    }
+}
+
+/// Judges every scheme by its strongest attacks, for the headline threshold.
 pub(crate) fn verdict(document: &Document) -> Verdict {
     let mut cards: Vec<Card> = Vec::new();
     for row in &document.results {
-        if cards.iter().any(|card| card.scheme == row.scheme) {
-            continue;
+        if cards.iter().all(|card| card.scheme != row.scheme) {
+            cards.extend(card(document, &row.scheme));
         }
-        cards.extend(headline(document, &row.scheme).and_then(|row| card(document, row)));
     }
     // Stable: equal shares keep the document's order.
-    cards.sort_by(|a, b| b.recovered.total_cmp(&a.recovered));
-    Verdict { summary: summary(document, &cards), cards }
+    cards.sort_by(|a, b| {
+        let ((a, a_then), (b, b_then)) = (a.badness(), b.badness());
+        b.total_cmp(&a).then(b_then.total_cmp(&a_then))
+    });
+    let whole = document.not_audited.iter().filter(|refused| refused.neighbors.is_none());
+    let refusals = whole.map(|refused| Refusal {
+        scheme: refused.scheme.clone(),
+        title: words::scheme_title(&refused.scheme).to_owned(),
+        reason: refused.reason.clone(),
+    });
+    let refusals: Vec<Refusal> = refusals.collect();
+    let tested_today = cards.iter().any(|card| card.finding(Basis::Released).is_some());
+    for card in &mut cards {
+        card.untried_today = tested_today && card.finding(Basis::Released).is_none();
+    }
+    Verdict { lead: lead::sentences(document, &cards, &refusals), cards, refusals, tested_today }
 }
 
-/// The row that speaks for `scheme`: nearest to the headline ratio, then the largest share.
-pub(crate) fn headline<'a>(document: &'a Document, scheme: &str) -> Option<&'a Row> {
-    let away = |row: &Row| (row.inlier_ratio - HEADLINE_RATIO).abs();
-    let typed = tables::headline_threshold(document).unwrap_or_default();
-    let share = |row: &Row| row.recovered_percent.get(&typed).copied().unwrap_or(0.0);
-    document
-        .results
-        .iter()
-        .filter(|row| row.scheme == scheme)
-        .min_by(|a, b| away(a).total_cmp(&away(b)).then(share(b).total_cmp(&share(a))))
+/// Percent that came back within the threshold `typed`.
+fn share(row: &Row, typed: &str) -> f64 {
+    row.recovered_percent.get(typed).copied().unwrap_or(0.0)
 }
 
-/// Of every source but the oracle and that of `speaks`, the row that recovers most of its scheme; in order of name.
-pub(crate) fn other_sources<'a>(document: &'a Document, speaks: &Row) -> Vec<&'a Row> {
+/// The row of `scheme` that speaks for attacks on this basis: the largest share, of the oracle's rows at
+/// the ratio nearest to the headline's.
+pub(crate) fn strongest<'a>(document: &'a Document, scheme: &str, basis: Basis) -> Option<&'a Row> {
+    let typed = tables::headline_threshold(document)?;
+    let away = |row: &Row| match basis {
+        Basis::Oracle => (row.inlier_ratio - HEADLINE_RATIO).abs(),
+        Basis::Released | Basis::Given => 0.0,
+    };
+    let rows = document.results.iter().filter(|row| row.scheme == scheme);
+    rows.filter(|row| attack::basis(row) == Some(basis)).min_by(|a, b| {
+        away(a).total_cmp(&away(b)).then(share(b, &typed).total_cmp(&share(a, &typed)))
+    })
+}
+
+/// The strongest row of every source of `scheme` but the oracle, most recovered first, then the oracle's.
+pub(crate) fn by_source<'a>(document: &'a Document, scheme: &str) -> Vec<&'a Row> {
     let typed = tables::headline_threshold(document).unwrap_or_default();
-    let share = |row: &Row| row.recovered_percent.get(&typed).copied().unwrap_or(0.0);
     let mut best: BTreeMap<&str, &Row> = BTreeMap::new();
-    for row in document.results.iter().filter(|row| row.scheme == speaks.scheme) {
-        if row.neighbors != "oracle" && row.neighbors != speaks.neighbors {
+    for row in document.results.iter().filter(|row| row.scheme == scheme) {
+        if matches!(attack::basis(row), Some(Basis::Released | Basis::Given)) {
             let so_far = best.entry(&row.neighbors).or_insert(row);
-            if share(row) > share(so_far) {
+            if share(row, &typed) > share(so_far, &typed) {
                 *so_far = row;
             }
         }
     }
-    best.into_values().collect()
+    let mut rows: Vec<&Row> = best.into_values().collect();
+    rows.sort_by(|a, b| share(b, &typed).total_cmp(&share(a, &typed)));
+    rows.extend(strongest(document, scheme, Basis::Oracle));
+    rows
 }
 
-fn card(document: &Document, row: &Row) -> Option<Card> {
+/// Percent by the records alone within `typed`, and the attack that got it: the best of the scheme's rows.
+pub(crate) fn records_alone<'a>(
+    document: &'a Document,
+    scheme: &str,
+    typed: &str,
+) -> Option<(f64, Option<&'a str>)> {
+    let rows = document.results.iter().filter(|row| row.scheme == scheme);
+    let shares = rows.filter_map(|row| {
+        let percent = *row.records_alone_percent.as_ref()?.get(typed)?;
+        let by = row.records_alone_by.as_ref().and_then(|by| by.get(typed));
+        Some((percent, by.map(String::as_str)))
+    });
+    shares.max_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+fn card(document: &Document, scheme: &str) -> Option<Card> {
     let typed = &tables::headline_threshold(document)?;
-    let recovered = *row.recovered_percent.get(typed)?;
-    let points = words::points(row.unit);
-    let blind = row.blind_percent.get(typed).copied().unwrap_or(0.0);
-    let within = words::threshold(typed, row.unit);
-    let when = condition(row);
-    let break_even = document.break_even.iter().find(|b| b.is_of(row) && b.threshold == *typed);
+    let alone = records_alone(document, scheme, typed);
+    let blind = |row: &Row| row.blind_percent.get(typed).copied().unwrap_or(0.0);
+    let floor = |row: &Row| alone.map_or(0.0, |(percent, _)| percent).max(blind(row));
+    let of = |basis| strongest(document, scheme, basis);
+    let found = |basis, row: &Row| Finding {
+        basis,
+        when: when(basis, row),
+        recovered: share(row, typed),
+        at_least: words::at_least(share(row, typed)),
+        amount: quantity::amount(share(row, typed)),
+        by: attack::name(row),
+        floor: floor(row),
+    };
+    let mut findings: Vec<Finding> = [Basis::Released, Basis::Given, Basis::Oracle]
+        .into_iter()
+        .filter_map(|basis| Some(found(basis, of(basis)?)))
+        .collect();
+    let any = document.results.iter().find(|row| row.scheme == scheme)?;
+    if let Some((percent, by)) = alone {
+        // Records alone are released as well: today's attack is the stronger of both.
+        let today = Finding {
+            basis: Basis::Released,
+            when: when(Basis::Released, any),
+            recovered: percent,
+            at_least: words::at_least(percent),
+            amount: quantity::amount(percent),
+            by: attack::records_alone(by),
+            floor: floor(any),
+        };
+        match findings.iter_mut().find(|finding| finding.basis == Basis::Released) {
+            Some(other) if other.recovered >= percent => {}
+            Some(other) => *other = today,
+            None => findings.insert(0, today),
+        }
+    }
+    if findings.is_empty() {
+        return None;
+    }
+    let refused = document.not_audited.iter().filter(|refused| refused.scheme == scheme);
+    let refused = refused.filter_map(|refused| {
+        let source = attack::source(refused.neighbors.as_deref()?, None);
+        Some(format!(
+            "Neighborhoods by {source} were not tried: {}.",
+            refused.reason.trim_end_matches('.')
+        ))
+    });
+    let points = words::points(any.unit);
     Some(Card {
-        scheme: row.scheme.clone(),
-        title: words::scheme_title(&row.scheme).to_owned(),
-        rule: words::scheme_rule(&row.scheme),
-        at_least: words::at_least(recovered),
-        recovered,
-        blind,
-        sentence: format!("of the {points} come back within {within} {when}"),
-        amount: amount(recovered, blind),
-        gain: gain(recovered, blind),
-        break_even: break_even.map(|point| break_even_sentence(point, points)),
-        solver: words::method(&row.solver, row.oracle_noise.as_deref()),
+        scheme: scheme.to_owned(),
+        title: words::scheme_title(scheme).to_owned(),
+        rule: words::scheme_rule(scheme),
+        findings,
+        baselines: baselines(document, scheme, typed, alone),
+        break_even: lowest(document, scheme, typed).map(|point| break_even(point, points)),
+        untried_today: false,
+        refused: refused.collect(),
+        alone: alone.map(|(percent, _)| percent),
     })
 }
 
-fn condition(row: &Row) -> String {
-    if row.neighbors == "oracle" {
-        let when = words::when_right(row.inlier_ratio);
-        match row.oracle_noise.as_deref() {
-            None | Some("uniform") => when,
-            Some(noise) => format!("{when} and the others {noise}"),
-        }
-    } else {
-        let right = words::ratio_percent(row.inlier_ratio);
-        match row.neighbors.as_str() {
-            "file" => format!("with the given neighborhoods, of which {right} % is right"),
-            own => format!("with neighborhoods found by {own}, of which {right} % is right"),
-        }
+/// Under which condition an attack on this basis gets what it got.
+fn when(basis: Basis, row: &Row) -> String {
+    match basis {
+        Basis::Released => "Today, from the released data alone".to_owned(),
+        Basis::Given => "With the given neighborhoods".to_owned(),
+        Basis::Oracle => words::capital(&words::if_known(row.inlier_ratio)),
     }
 }
 
-fn amount(recovered: f64, blind: f64) -> &'static str {
-    if recovered - blind < GAIN_THAT_COUNTS {
-        return "no more than by guessing";
-    }
-    match recovered {
-        80.0.. => "almost all",
-        50.0.. => "most",
-        20.0.. => "a large part",
-        5.0.. => "a small part",
-        _ => "little",
-    }
-}
-
-fn gain(recovered: f64, blind: f64) -> String {
+/// "A blind guess gets 8.1 %, the records alone 65 %. To that, neighborhoods add nothing (overlap), ..."
+fn baselines(
+    document: &Document,
+    scheme: &str,
+    typed: &str,
+    alone: Option<(f64, Option<&str>)>,
+) -> String {
+    let rows = document.results.iter().filter(|row| row.scheme == scheme);
+    let blind = rows.filter_map(|row| row.blind_percent.get(typed).copied());
+    let blind = blind.max_by(f64::total_cmp).unwrap_or(0.0);
     let guess = words::significant(blind, 2);
-    if recovered - blind < GAIN_THAT_COUNTS {
-        return format!("A blind guess gets {guess} %: the neighbors added nothing here.");
+    let (without, floor) = match alone {
+        Some((percent, _)) => {
+            let said = words::significant(percent, 2);
+            (
+                format!("A blind guess gets {guess} %, the records alone {said} %."),
+                percent.max(blind),
+            )
+        }
+        None => (format!("A blind guess gets {guess} %."), blind),
+    };
+    let adds: Vec<String> = by_source(document, scheme)
+        .into_iter()
+        // A solver that needs no neighborhoods tells nothing about what they add.
+        .filter(|row| attack::has_neighborhoods(row))
+        .map(|row| {
+            let source = attack::source(&row.neighbors, row.oracle_noise.as_deref());
+            format!("{} ({source})", quantity::added(share(row, typed) - floor))
+        })
+        .collect();
+    match adds.is_empty() {
+        true => without,
+        false => format!("{without} To that, neighborhoods add {}.", words::list(&adds)),
     }
-    let points = words::at_least(recovered - blind);
-    format!("A blind guess gets {guess} %; the neighbors add {points} percentage points.")
 }
 
-fn break_even_sentence(point: &BreakEven, points: &str) -> String {
+/// The break-even ratio of the scheme's strongest attack: the lowest one.
+fn lowest<'a>(document: &'a Document, scheme: &str, typed: &str) -> Option<&'a BreakEven> {
+    let rank = |point: &BreakEven| match (point.bound, point.inlier_ratio) {
+        (Bound::BelowTested, ratio) => (0, ratio.unwrap_or(0.0)),
+        (Bound::Interpolated, ratio) => (1, ratio.unwrap_or(1.0)),
+        (Bound::AboveTested, ratio) => (2, ratio.unwrap_or(1.0)),
+    };
+    let of = |point: &&BreakEven| point.scheme == scheme && point.threshold == typed;
+    document.break_even.iter().filter(of).min_by(|a, b| {
+        let ((a, a_ratio), (b, b_ratio)) = (rank(a), rank(b));
+        a.cmp(&b).then(a_ratio.total_cmp(&b_ratio))
+    })
+}
+
+fn break_even(point: &BreakEven, points: &str) -> String {
     match (point.bound, point.inlier_ratio.map(words::ratio_percent)) {
         (Bound::Interpolated, Some(ratio)) => {
-            format!("Half of the {points} come back when only {ratio} % of neighbors are right.")
+            format!(
+                "Half of the {points} come back as soon as {ratio} % of the neighbors are right."
+            )
         }
         (Bound::BelowTested, Some(ratio)) => {
-            format!("Half come back even when {ratio} % are right, the fewest tested.")
+            format!(
+                "Half of the {points} come back even when {ratio} % of the neighbors are right, the fewest tested."
+            )
         }
         (Bound::AboveTested, Some(ratio)) => {
-            format!("Less than half came back at every ratio tested, up to {ratio} %.")
+            format!(
+                "Less than half came back at every share of right neighbors tested, up to {ratio} %."
+            )
         }
-        (_, None) => "Less than half came back at every ratio tested.".to_owned(),
+        (_, None) => {
+            "Less than half came back at every share of right neighbors tested.".to_owned()
+        }
     }
-}
-
-fn summary(document: &Document, cards: &[Card]) -> String {
-    let (Some(worst), Some(best)) = (cards.first(), cards.last()) else {
-        return "No scheme was tested.".to_owned();
-    };
-    let Some(row) = headline(document, &worst.scheme) else {
-        return String::new();
-    };
-    let typed = tables::headline_threshold(document);
-    let within = typed.map(|typed| words::threshold(&typed, row.unit));
-    let within = within.unwrap_or_default();
-    let when = condition(row);
-    if cards.len() == 1 {
-        return format!("At least {} % {}.", worst.at_least, worst.sentence);
-    }
-    let most = cards.iter().filter(|card| card.recovered >= 50.0).count();
-    let points = words::points(row.unit);
-    let who = match (most, cards.len()) {
-        (0, n) => format!("None of the {n} schemes gives back half of its {points}"),
-        (m, n) if m == n => format!("All {n} schemes give back most of their {points}"),
-        (1, n) => format!("One of {n} schemes gives back most of its {points}"),
-        (m, n) => format!("{m} of {n} schemes give back most of their {points}"),
-    };
-    let (low, high) = (&best.at_least, &worst.at_least);
-    format!("{who}; the shares run from {low} to {high} % within {within} {when}.")
 }

@@ -36,14 +36,26 @@ pub(crate) fn scheme_rule(scheme: &str) -> &'static str {
     }
 }
 
-/// A threshold as typed, in words of its unit: `10 cm`, `1.0 neighbor distance`.
+/// The unit of a map without a scale, in words; the page says once what it is exactly.
+pub(crate) const USUAL_DISTANCE: &str = "the usual distance between neighboring points";
+
+/// A threshold as typed, short: `10 cm`, `2.5×` (times [`USUAL_DISTANCE`]), `10 px`.
 pub(crate) fn threshold(typed: &str, unit: LengthUnit) -> String {
     match (unit, typed.parse::<f64>()) {
         (LengthUnit::Meter, Ok(meters)) => meters_text(meters),
         (LengthUnit::Meter, Err(_)) => format!("{typed} m"),
         (LengthUnit::Pixel, _) => format!("{typed} px"),
-        (LengthUnit::KthNeighbor, Ok(1.0)) => "1 neighbor distance".to_owned(),
-        (LengthUnit::KthNeighbor, _) => format!("{typed} neighbor distances"),
+        (LengthUnit::KthNeighbor, Ok(times)) => format!("{times}×"),
+        (LengthUnit::KthNeighbor, Err(_)) => format!("{typed}×"),
+    }
+}
+
+/// A threshold as typed, in a sentence: `within 10 cm`, `within 2.5 times the usual distance ...`.
+pub(crate) fn within(typed: &str, unit: LengthUnit) -> String {
+    match (unit, typed.parse::<f64>()) {
+        (LengthUnit::KthNeighbor, Ok(1.0)) => format!("within {USUAL_DISTANCE}"),
+        (LengthUnit::KthNeighbor, Ok(times)) => format!("within {times} times {USUAL_DISTANCE}"),
+        _ => format!("within {}", threshold(typed, unit)),
     }
 }
 
@@ -59,7 +71,7 @@ pub(crate) fn points(unit: LengthUnit) -> &'static str {
 pub(crate) fn length(value: f64, unit: LengthUnit) -> String {
     match unit {
         LengthUnit::Meter => meters_text(value),
-        LengthUnit::KthNeighbor => format!("{} nd", significant(value, 3)),
+        LengthUnit::KthNeighbor => format!("{}×", significant(value, 3)),
         LengthUnit::Pixel => format!("{} px", significant(value, 3)),
     }
 }
@@ -94,28 +106,34 @@ pub(crate) fn at_least(percent: f64) -> String {
     format!("{:.0}", (percent + 1e-9).floor())
 }
 
-/// "when half of the neighbors are right", for any inlier ratio.
-pub(crate) fn when_right(ratio: f64) -> String {
+/// "if half of the neighbors were known", for any inlier ratio.
+pub(crate) fn if_known(ratio: f64) -> String {
     let common = [
-        (1.0, "when all neighbors are right"),
-        (0.75, "when three of four neighbors are right"),
-        (0.5, "when half of the neighbors are right"),
-        (0.25, "when one neighbor in four is right"),
-        (0.2, "when one neighbor in five is right"),
-        (0.1, "when one neighbor in ten is right"),
+        (1.0, "if all neighbors were known"),
+        (0.75, "if three of four neighbors were known"),
+        (0.5, "if half of the neighbors were known"),
+        (0.25, "if one neighbor in four was known"),
+        (0.2, "if one neighbor in five was known"),
+        (0.1, "if one neighbor in ten was known"),
     ];
     match common.iter().find(|(value, _)| (value - ratio).abs() < 1e-9) {
         Some((_, words)) => (*words).to_owned(),
-        None => format!("when {} % of the neighbors are right", ratio_percent(ratio)),
+        None => format!("if {} % of the neighbors were known", ratio_percent(ratio)),
     }
 }
 
-/// A solver, and the neighborhoods it had unless they were the usual ones: what tells apart rows
-/// of one scheme and inlier ratio. A row without a noise model had uniform ones.
-pub fn method(solver: &str, oracle_noise: Option<&str>) -> String {
-    match oracle_noise {
-        None | Some("uniform") => solver.to_owned(),
-        Some(noise) => format!("{solver}, {noise}"),
+/// `text` with a capital first letter.
+pub(crate) fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// "a, b and c".
+pub(crate) fn list(items: &[String]) -> String {
+    match items {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
     }
 }
 
@@ -182,10 +200,20 @@ mod tests {
         assert_eq!(threshold("0.10", LengthUnit::Meter), "10 cm");
         assert_eq!(threshold("0.005", LengthUnit::Meter), "5 mm");
         assert_eq!(threshold("2.5", LengthUnit::Meter), "2.5 m");
-        assert_eq!(threshold("1.0", LengthUnit::KthNeighbor), "1 neighbor distance");
-        assert_eq!(threshold("2.5", LengthUnit::KthNeighbor), "2.5 neighbor distances");
+        assert_eq!(threshold("1.0", LengthUnit::KthNeighbor), "1×");
+        assert_eq!(threshold("2.50", LengthUnit::KthNeighbor), "2.5×");
+        assert_eq!(length(0.34567, LengthUnit::KthNeighbor), "0.346×");
         assert_eq!(threshold("10", LengthUnit::Pixel), "10 px");
         assert_eq!(length(3.4567, LengthUnit::Pixel), "3.46 px");
+    }
+
+    #[test]
+    fn without_a_scale_lengths_are_compared_with_the_distance_of_neighbors() {
+        let said = |typed| within(typed, LengthUnit::KthNeighbor);
+        assert_eq!(said("1.0"), "within the usual distance between neighboring points");
+        assert_eq!(said("2.5"), "within 2.5 times the usual distance between neighboring points");
+        assert_eq!(within("0.10", LengthUnit::Meter), "within 10 cm");
+        assert_eq!(within("10", LengthUnit::Pixel), "within 10 px");
     }
 
     #[test]
@@ -197,10 +225,17 @@ mod tests {
 
     #[test]
     fn ratios_read_as_words_or_percent() {
-        assert_eq!(when_right(0.5), "when half of the neighbors are right");
-        assert_eq!(when_right(0.3), "when 30 % of the neighbors are right");
+        assert_eq!(if_known(0.5), "if half of the neighbors were known");
+        assert_eq!(if_known(0.3), "if 30 % of the neighbors were known");
         assert_eq!(ratio_percent(0.071), "7.1");
         assert_eq!(ratio_percent(1.0), "100");
+    }
+
+    #[test]
+    fn lists_end_with_an_and() {
+        let said =
+            |n| list(&["a", "b", "c"][..n].iter().map(|x| (*x).to_owned()).collect::<Vec<_>>());
+        assert_eq!([0, 1, 2, 3].map(said), ["", "a", "a and b", "a, b and c"]);
     }
 
     #[test]

@@ -9,8 +9,6 @@
   const MISS = "#ffa238";
   const SHORT = "#35c46f";
   const LONG = "#ff5a4d";
-  /** An edge is short below this share of the smaller side, as in the paper's figures. */
-  const SHORT_SHARE = 0.1;
 
   const text = (block) => document.getElementById(`block-${block}`).textContent.trim();
   const cache = new Map();
@@ -146,16 +144,13 @@
     context.fill();
   }
 
-  function recovered(picture, image, state, within) {
+  function recovered(picture, image, view, within) {
     const pane = open("picture-recovered", picture, GRAY);
     ground(pane, image, 0.62);
-    const view = picture.views.find((one) => one.scheme === state.scheme && one.given === state.given);
-    if (!view) return "nothing to draw for this choice";
     const [truth, found] = [places(picture, picture.keypoints), places(picture, view.block)];
     const groups = { hit: [], miss: [] };
-    let lost = 0;
     for (let i = 0; i < truth.length; i += 2) {
-      if (Number.isNaN(found[i])) { lost++; continue; }
+      if (Number.isNaN(found[i])) continue;
       const error = Math.hypot(found[i] - truth[i], found[i + 1] - truth[i + 1]);
       groups[error <= within ? "hit" : "miss"].push(truth[i], truth[i + 1], found[i], found[i + 1]);
     }
@@ -165,51 +160,45 @@
     dots(pane, heads(groups.miss), 1.6, MISS);
     arrows(pane, groups.hit, HIT);
     dots(pane, heads(groups.hit), 1.9, HIT);
-    const n = truth.length / 2;
-    const share = n ? ((100 * groups.hit.length) / 4 / n).toFixed(1) : "0.0";
-    return `${share} % within ${+within.toPrecision(3)} px (blue), the others orange${lost ? `, ${lost} lost` : ""}`;
+    return view.said;
   }
 
-  function graph(picture, state) {
+  function graph(picture, view) {
     const pane = open("picture-graph", picture, DARK);
-    const drawn = picture.graphs.find((one) => one.given === state.given);
+    const drawn = picture.graphs.find((one) => one.given === view.given);
     if (!drawn) return "nothing to draw for this choice";
     const [from, to] = [places(picture, picture.keypoints), places(picture, drawn.block)];
-    const reach = SHORT_SHARE * Math.min(...picture.size);
     const edges = { short: [], long: [] };
     for (let i = 0; i < from.length / 2; i++) {
       for (let j = drawn.k * i; j < drawn.k * (i + 1); j++) {
         if (Number.isNaN(to[2 * j])) continue;
         const edge = [from[2 * i], from[2 * i + 1], to[2 * j], to[2 * j + 1]];
         const length = Math.hypot(edge[2] - edge[0], edge[3] - edge[1]);
-        edges[length < reach ? "short" : "long"].push(...edge);
+        edges[length < picture.short_px ? "short" : "long"].push(...edge);
       }
     }
-    const n = (edges.short.length + edges.long.length) / 4;
     segments(pane, edges.long, 0.8, `rgba(255,90,77,${opacity(edges.long.length / 4, 0.5)})`);
     segments(pane, edges.short, 1, SHORT);
     dots(pane, from, 1.5, "#f1efe9");
-    const share = n ? ((25 * edges.short.length) / n).toFixed(1) : "0.0";
-    return `five of each list; ${share} % of the edges are shorter than ${+reach.toPrecision(3)} px (green), the others red`;
+    return drawn.said;
   }
 
-  /** Draws one picture as `state` asks for. */
-  function drawPicture(data, state) {
-    const picture = data.pictures[state.picture];
+  /** Draws one view of a picture. */
+  function drawPicture(data, picture, view) {
     const within = data.thresholds[data.headline]?.value ?? 10;
     const say = (id, words) => { document.getElementById(id).textContent = words; };
+    drawPicture.latest = picture;
     say("said-original", picture.photo === null ? "no photo was given" : "");
-    say("said-released", released(picture, state.scheme));
-    say("said-graph", graph(picture, state));
+    say("said-released", released(picture, view.scheme));
+    say("said-graph", graph(picture, view));
     photo(picture, (image) => {
       // Another picture may have been chosen while this photo was read.
-      if (data.pictures[state.picture] !== picture) return;
+      if (drawPicture.latest !== picture) return;
       original(picture, image);
-      say("said-recovered", recovered(picture, image, state, within));
+      say("said-recovered", `by ${view.label}, ${view.solver}: ${recovered(picture, image, view, within)}`);
       document.documentElement.dataset.pictures = "drawn";
     });
-    const some = picture.n_drawn < picture.n_keypoints ? `, ${picture.n_drawn} of them drawn` : "";
-    say("picture-status", `${picture.name}, ${picture.size.join(" x ")} px, ${picture.n_keypoints} keypoints${some}`);
+    say("picture-status", picture.said);
   }
 
   Object.assign(window.Unlift, { drawPicture });

@@ -5,7 +5,6 @@
   const THREE = window.UnliftVendor;
   const { element, length } = window.Unlift;
   const NOT_DRAWN = 65535;
-  const LOST = 255;
   const BACKGROUND = "#10141a";
   /** Colors below and above the threshold: blue comes back, orange misses; told apart by the color-blind. */
   const HIT = ["#e3f6ff", "#3d9be0"];
@@ -78,9 +77,7 @@
   function geometryOfPoints(points, errorBytes) {
     const kept = [];
     const errors = [];
-    let lost = 0;
     for (let i = 0; i < points.length / 3; i++) {
-      if (errorBytes && errorBytes[i] === LOST) lost++;
       if (Number.isNaN(points[3 * i])) continue;
       kept.push(points[3 * i], points[3 * i + 1], points[3 * i + 2]);
       errors.push(errorBytes ? ((errorBytes[i] / 254 - 0.5) * 6) / DECADES : 0);
@@ -88,7 +85,7 @@
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(kept), 3));
     geometry.setAttribute("error", new THREE.BufferAttribute(new Float32Array(errors), 1));
-    return { geometry, drawn: errors.length, lost, outside: points.length / 3 - errors.length - lost };
+    return geometry;
   }
 
   /** Line segments from records of `corners` points each. */
@@ -169,8 +166,8 @@
     points(name, block, count, flat, withErrors, size) {
       return this.layer(name, () => {
         const errors = withErrors ? bytesOf(block).subarray(6 * count, 7 * count) : null;
-        const made = geometryOfPoints(decode(this.data, block, count), errors);
-        return { ...made, object: new THREE.Points(made.geometry, this.pointsMaterial(flat, withErrors, size)) };
+        const geometry = geometryOfPoints(decode(this.data, block, count), errors);
+        return { object: new THREE.Points(geometry, this.pointsMaterial(flat, withErrors, size)) };
       });
     }
 
@@ -190,25 +187,29 @@
         const corners = entry.kind === "segments" ? 2 : 4;
         const geometry = geometryOfLines(decode(this.data, entry.block, corners * entry.count), corners);
         const material = new THREE.LineBasicMaterial({ color: "#c9b3ff", transparent: true, opacity: 0.15, depthWrite: false });
-        return { object: new THREE.LineSegments(geometry, material), drawn: entry.count };
+        return { object: new THREE.LineSegments(geometry, material) };
       });
     }
 
-    recovered({ scheme, solver, ratio }) {
-      const view = this.data.views.find((v) => v.scheme === scheme && v.solver === solver && v.inlier_ratio === ratio);
-      return view ? this.points(`view ${view.block}`, view.block, this.data.n_drawn, "#ffffff", true) : null;
+    recovered({ block }) {
+      return this.points(`view ${block}`, block, this.data.n_drawn, "#ffffff", true);
     }
 
-    /** Shows what `state` asks for and returns the layers, for the status line. */
-    show(state) {
-      const layers = {
-        original: () => this.original(),
-        obfuscated: () => this.obfuscated(state.scheme),
-        recovered: () => this.recovered(state),
+    /**
+     * Shows the panes `kinds` of `view` of a scheme, with cameras or without. Returns the panes with what
+     * each of them draws, in words.
+     */
+    show({ kinds, scheme, view, cameras }) {
+      const made = {
+        original: () => ({ layer: this.original(), said: this.data.originals_said, name: "original" }),
+        released: () => {
+          const entry = this.data.obfuscations.find((one) => one.scheme === scheme);
+          return { layer: this.obfuscated(scheme), said: entry?.said ?? "nothing to draw", name: `released, ${scheme}` };
+        },
+        recovered: () => ({ layer: this.recovered(view), said: view.said, name: `recovered, ${view.label}` }),
       };
-      const kinds = state.show === "all" ? Object.keys(layers) : [state.show];
-      this.panes = kinds.map((kind) => ({ kind, layer: layers[kind]() }));
-      this.extra = state.cameras && this.data.n_cameras ? [this.cameras()] : [];
+      this.panes = kinds.map((kind) => ({ kind, ...made[kind]() }));
+      this.extra = cameras && this.data.n_cameras ? [this.cameras()] : [];
       this.resize();
       return this.panes;
     }
@@ -277,7 +278,7 @@
     const reach = 10 ** DECADES;
     const ticks = element("span", { class: "ticks" });
     ticks.append(...[`≤ ${at(1 / reach)}`, at(1), `≥ ${at(reach)}`].map((text) => element("span", {}, text)));
-    node.replaceChildren(element("span", {}, "Error of a recovered point: blue within the first distance, orange beyond"), bar, ticks);
+    node.replaceChildren(element("span", {}, `Error of a recovered point: blue within ${at(1)}, orange beyond`), bar, ticks);
   }
 
   Object.assign(window.Unlift, { SceneView, ramp });

@@ -68,6 +68,7 @@ impl Observer<2> for Page {
         picture.views.push(RecoveredView {
             scheme: scheme.to_owned(),
             given,
+            solver: cell.row.solver.to_owned(),
             recovered: recovered.collect(),
         });
     }

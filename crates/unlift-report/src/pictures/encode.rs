@@ -5,7 +5,7 @@ use base64::engine::general_purpose::STANDARD;
 
 use super::{GRAPH_NEIGHBORS, Given, MOST_PICTURES, Marks, Picture};
 use crate::scene::subsample;
-use crate::words;
+use crate::{attack, words};
 
 /// Bytes of the page that all pictures may take beside their photos, before base64.
 const BUDGET_BYTES: usize = 3_600_000;
@@ -20,9 +20,11 @@ pub(crate) struct EncodedPicture {
     note: String,
     size: [u32; 2],
     photo: Option<usize>,
-    n_keypoints: usize,
-    n_drawn: usize,
+    /// How many keypoints there are and are drawn, in words.
+    said: String,
     keypoints: usize,
+    /// Edges below this many pixels are short.
+    short_px: f32,
     released: Vec<EncodedMarks>,
     views: Vec<EncodedView>,
     graphs: Vec<EncodedGraph>,
@@ -38,33 +40,59 @@ struct EncodedMarks {
 #[derive(Debug, serde::Serialize)]
 struct EncodedView {
     scheme: String,
+    /// What tells the neighborhoods apart in every picture, and what they are called in this one.
     given: String,
+    label: String,
+    solver: String,
     block: usize,
+    /// How much came back, in words.
+    said: String,
+    /// The same as a share, and whether the attacker made the lists.
+    #[serde(skip)]
+    share: f64,
+    #[serde(skip)]
+    own: bool,
 }
 
 #[derive(Debug, serde::Serialize)]
 struct EncodedGraph {
     given: String,
+    /// How many edges are short, in words.
+    said: String,
     /// Neighbors per keypoint; fewer are filled up with places that are not drawn.
     k: usize,
     block: usize,
 }
 
-/// Encodes up to [`MOST_PICTURES`] pictures and appends their blocks to `blocks`. Keypoints are thinned
-/// out where all of them would break the budget.
-pub(crate) fn encode(pictures: &[Picture], blocks: &mut Vec<String>) -> Vec<EncodedPicture> {
-    let pictures = &pictures[..pictures.len().min(MOST_PICTURES)];
-    let each = BUDGET_BYTES / pictures.len().max(1);
-    pictures.iter().map(|picture| one(picture, each, blocks)).collect()
+/// The neighborhoods that are shown first: the attacker's own that give back most of the first picture.
+pub(crate) fn first_choice(pictures: &[EncodedPicture]) -> Option<&str> {
+    let own = pictures.first()?.views.iter().filter(|view| view.own);
+    own.max_by(|a, b| a.share.total_cmp(&b.share)).map(|view| view.given.as_str())
 }
 
-fn one(picture: &Picture, budget: usize, blocks: &mut Vec<String>) -> EncodedPicture {
+/// An edge is short below this share of the smaller side, as in the paper's figures.
+const SHORT_SHARE: f32 = 0.1;
+
+/// Encodes up to [`MOST_PICTURES`] pictures and appends their blocks to `blocks`. Keypoints are thinned
+/// out where all of them would break the budget. Shares are over all of them, within `within` pixels.
+pub(crate) fn encode(
+    pictures: &[Picture],
+    within: f64,
+    blocks: &mut Vec<String>,
+) -> Vec<EncodedPicture> {
+    let pictures = &pictures[..pictures.len().min(MOST_PICTURES)];
+    let each = BUDGET_BYTES / pictures.len().max(1);
+    pictures.iter().map(|picture| one(picture, each, within, blocks)).collect()
+}
+
+fn one(picture: &Picture, budget: usize, within: f64, blocks: &mut Vec<String>) -> EncodedPicture {
     let points = 1
         + 2 * picture.released.len()
         + picture.views.len()
         + GRAPH_NEIGHBORS * picture.graphs.len();
     let most = budget / (BYTES_PER_POINT * points);
     let chosen = subsample(picture.keypoints.len(), most, 0);
+    let short_px = SHORT_SHARE * picture.size[0].min(picture.size[1]) as f32;
     let place = |point: Option<[f32; 2]>| quantize(picture.size, point);
     let mut push = |bytes: Vec<u8>| {
         blocks.push(STANDARD.encode(bytes));
@@ -88,10 +116,18 @@ fn one(picture: &Picture, budget: usize, blocks: &mut Vec<String>) -> EncodedPic
         EncodedMarks { scheme: view.scheme.clone(), kind, block: push(bytes) }
     });
     let released = released.collect();
-    let views = picture.views.iter().map(|view| EncodedView {
-        scheme: view.scheme.clone(),
-        given: label(&view.given),
-        block: push(at(&view.recovered, &chosen, place)),
+    let views = picture.views.iter().map(|view| {
+        let (share, said) = recovered_said(picture, view, within);
+        EncodedView {
+            scheme: view.scheme.clone(),
+            given: key(&view.given),
+            label: view.given.label(),
+            solver: view.solver.clone(),
+            block: push(at(&view.recovered, &chosen, place)),
+            said,
+            share,
+            own: !attack::is_oracle(&view.given.neighbors),
+        }
     });
     let views = views.collect();
     let graphs = picture.graphs.iter().map(|graph| {
@@ -100,7 +136,8 @@ fn one(picture: &Picture, budget: usize, blocks: &mut Vec<String>) -> EncodedPic
             (0..GRAPH_NEIGHBORS).flat_map(|at| place(of.get(at).copied())).collect::<Vec<u8>>()
         };
         let block = push(chosen.iter().flat_map(listed).collect());
-        EncodedGraph { given: label(&graph.given), k: GRAPH_NEIGHBORS, block }
+        let said = graph_said(picture, graph, short_px);
+        EncodedGraph { given: key(&graph.given), said, k: GRAPH_NEIGHBORS, block }
     });
     let graphs = graphs.collect();
     EncodedPicture {
@@ -108,9 +145,9 @@ fn one(picture: &Picture, budget: usize, blocks: &mut Vec<String>) -> EncodedPic
         note: picture.note.clone(),
         size: picture.size,
         photo,
-        n_keypoints: picture.keypoints.len(),
-        n_drawn: chosen.len(),
+        said: picture_said(picture, chosen.len()),
         keypoints,
+        short_px,
         released,
         views,
         graphs,
@@ -138,14 +175,65 @@ fn quantize(size: [u32; 2], point: Option<[f32; 2]>) -> [u8; BYTES_PER_POINT] {
     [x[0], x[1], y[0], y[1]]
 }
 
-/// How neighborhoods are called on the page: `50 %`, `50 %, near`, `overlap, 18 %`.
-fn label(given: &Given) -> String {
-    let right = words::ratio_percent(given.inlier_ratio);
-    match (given.neighbors.as_str(), given.oracle_noise.as_deref()) {
-        ("oracle", None | Some("uniform")) => format!("{right} %"),
-        ("oracle", Some(noise)) => format!("{right} %, {noise}"),
-        (source, _) => format!("{source}, {right} %"),
+/// What tells neighborhoods apart: a measured ratio differs from image to image.
+fn key(given: &Given) -> String {
+    let source = attack::source(&given.neighbors, given.oracle_noise.as_deref());
+    match attack::is_oracle(&given.neighbors) {
+        true => format!("{source} {}", given.inlier_ratio),
+        false => source,
     }
+}
+
+/// "frame-1.jpg, 640 x 480 px, 2,113 keypoints, 900 of them drawn".
+fn picture_said(picture: &Picture, drawn: usize) -> String {
+    let count = |n: usize| words::thousands(n as u64);
+    let [w, h] = picture.size;
+    let n = picture.keypoints.len();
+    let some = if drawn < n { format!(", {} of them drawn", count(drawn)) } else { String::new() };
+    format!("{}, {w} x {h} px, {} keypoints{some}", picture.name, count(n))
+}
+
+/// "81.3 % within 10 px (blue), the others orange; 3 lost": of the released keypoints, drawn or not.
+fn recovered_said(picture: &Picture, view: &super::RecoveredView, within: f64) -> (f64, String) {
+    let released = picture.released.iter().find(|one| one.scheme == view.scheme);
+    let is_released = |i: usize| match released.map(|one| &one.marks) {
+        Some(Marks::Lines(all) | Marks::Rays(all)) => all.get(i).is_some_and(Option::is_some),
+        Some(Marks::Points(all)) => all.get(i).is_some_and(Option::is_some),
+        None => true,
+    };
+    let (mut n, mut hits, mut lost) = (0u64, 0u64, 0u64);
+    for (i, truth) in picture.keypoints.iter().enumerate().filter(|(i, _)| is_released(*i)) {
+        n += 1;
+        match view.recovered.get(i).copied().flatten() {
+            Some(found) if distance(found, *truth) <= within => hits += 1,
+            Some(_) => {}
+            None => lost += 1,
+        }
+    }
+    let share = 100.0 * hits as f64 / n.max(1) as f64;
+    let lost = if lost > 0 { format!("; {} lost", words::thousands(lost)) } else { String::new() };
+    let (percent, within) = (words::percent(share), words::significant(within, 3));
+    (share, format!("{percent} % within {within} px (blue), the others orange{lost}"))
+}
+
+/// "five of each list; 45.1 % of the edges are shorter than 48 px (green), the others red".
+fn graph_said(picture: &Picture, graph: &super::Graph, short_px: f32) -> String {
+    let (mut n, mut short) = (0u64, 0u64);
+    for (from, neighbors) in picture.keypoints.iter().zip(&graph.neighbors) {
+        for to in neighbors.iter().take(GRAPH_NEIGHBORS) {
+            n += 1;
+            short += u64::from(distance(*from, *to) < f64::from(short_px));
+        }
+    }
+    let share = words::percent(100.0 * short as f64 / n.max(1) as f64);
+    let reach = words::significant(f64::from(short_px), 3);
+    format!(
+        "five of each list; {share} % of the edges are shorter than {reach} px (green), the others red"
+    )
+}
+
+fn distance(a: [f32; 2], b: [f32; 2]) -> f64 {
+    f64::from(a[0] - b[0]).hypot(f64::from(a[1] - b[1]))
 }
 
 #[cfg(test)]
@@ -170,20 +258,53 @@ mod tests {
         let keypoints = vec![[1.0, 2.0]; 1000];
         let picture = Picture { size: [9, 9], keypoints, ..Picture::default() };
         let mut blocks = Vec::new();
-        let encoded = one(&picture, 400, &mut blocks);
-        assert_eq!((encoded.n_drawn, encoded.n_keypoints), (100, 1000));
+        let encoded = one(&picture, 400, 10.0, &mut blocks);
+        assert_eq!(encoded.said, ", 9 x 9 px, 1,000 keypoints, 100 of them drawn");
         assert_eq!(STANDARD.decode(&blocks[0]).unwrap().len(), 400);
     }
 
     #[test]
-    fn neighborhoods_are_called_by_share_or_source() {
-        let given = |neighbors: &str, noise: Option<&str>| Given {
-            neighbors: neighbors.into(),
-            oracle_noise: noise.map(str::to_owned),
-            inlier_ratio: 0.183,
+    fn shares_are_of_all_released_keypoints() {
+        let picture = Picture {
+            size: [100, 50],
+            keypoints: vec![[0.0, 0.0]; 5],
+            released: vec![super::super::ReleasedView {
+                scheme: "cp2d".into(),
+                marks: Marks::Points(vec![
+                    Some([1.0, 1.0]),
+                    Some([1.0, 1.0]),
+                    None,
+                    Some([2.0; 2]),
+                    Some([3.0; 2]),
+                ]),
+            }],
+            ..Picture::default()
         };
-        assert_eq!(label(&given("oracle", Some("uniform"))), "18 %");
-        assert_eq!(label(&given("oracle", Some("near"))), "18 %, near");
-        assert_eq!(label(&given("overlap", None)), "overlap, 18 %");
+        let view = super::super::RecoveredView {
+            scheme: "cp2d".into(),
+            given: Given::default(),
+            solver: "joint".into(),
+            recovered: vec![Some([3.0, 4.0]), Some([30.0, 4.0]), None, None, Some([5.0, 0.0])],
+        };
+        let (_, said) = recovered_said(&picture, &view, 5.0);
+        assert_eq!(said, "50.0 % within 5 px (blue), the others orange; 1 lost");
+        let graph = super::super::Graph {
+            given: Given::default(),
+            neighbors: vec![vec![[3.0, 0.0], [5.0, 0.0]]],
+        };
+        let said = graph_said(&picture, &graph, 5.0);
+        assert!(said.contains("50.0 % of the edges are shorter than 5 px"), "{said}");
+    }
+
+    #[test]
+    fn own_lists_of_all_images_are_one_choice() {
+        let given = |neighbors: &str, inlier_ratio| Given {
+            neighbors: neighbors.into(),
+            oracle_noise: None,
+            inlier_ratio,
+        };
+        assert_eq!(key(&given("overlap", 0.18)), key(&given("overlap", 0.2)));
+        assert_ne!(key(&given("oracle", 0.18)), key(&given("oracle", 0.2)));
+        assert_eq!(given("overlap", 0.183).label(), "overlap, 18 % right (measured)");
     }
 }

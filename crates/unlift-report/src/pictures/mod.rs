@@ -5,7 +5,9 @@
 
 mod encode;
 
-pub(crate) use encode::{EncodedPicture, encode};
+pub use crate::attack::Given;
+
+pub(crate) use encode::{EncodedPicture, encode, first_choice};
 
 /// Images on a page at most: a page is for looking at, and stays below 10 MB.
 pub const MOST_PICTURES: usize = 12;
@@ -31,17 +33,6 @@ pub struct Picture {
     pub views: Vec<RecoveredView>,
     /// Who is said to be near whom, one per neighborhoods.
     pub graphs: Vec<Graph>,
-}
-
-/// Neighborhoods by their source and quality.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Given {
-    /// `oracle`, or the name of the attacker's source.
-    pub neighbors: String,
-    /// How the oracle erred.
-    pub oracle_noise: Option<String>,
-    /// Share of true neighbors.
-    pub inlier_ratio: f64,
 }
 
 /// What one scheme publishes.
@@ -71,6 +62,8 @@ pub struct RecoveredView {
     pub scheme: String,
     /// The neighborhoods.
     pub given: Given,
+    /// The solver's name.
+    pub solver: String,
     /// One per keypoint of [`Picture::keypoints`]; `None` where it is lost or was not released.
     pub recovered: Vec<Option<[f32; 2]>>,
 }

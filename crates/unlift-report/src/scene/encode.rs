@@ -3,7 +3,10 @@
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
+use super::said::{self, Fate};
 use super::{ObfuscationView, Scene3d, SceneBox, Shapes, View, subsample};
+use crate::attack::Given;
+use crate::document::Row;
 
 /// Bytes of the page that the 3D view may take. With the libraries (about 1.1 MB), the tables and
 /// the curves the page stays below 10 MB.
@@ -47,7 +50,10 @@ pub(crate) struct Encoded {
     pub high: [f32; 3],
     pub up: [f32; 3],
     pub n_points: u64,
+    /// Points of the map that stand in the page.
     pub n_drawn: usize,
+    /// What is drawn of them, in words.
+    pub originals_said: String,
     pub n_cameras: usize,
     pub error_unit: f32,
     pub obfuscations: Vec<EncodedShapes>,
@@ -63,22 +69,27 @@ pub(crate) struct EncodedShapes {
     pub kind: &'static str,
     pub count: usize,
     pub block: usize,
+    /// What is drawn, in words.
+    pub said: String,
 }
 
 #[derive(Debug, serde::Serialize)]
 pub(crate) struct EncodedView {
-    pub scheme: String,
-    pub solver: String,
-    pub inlier_ratio: f64,
-    pub n_lost: usize,
+    /// The row of the results that this is.
+    pub row: usize,
     pub block: usize,
+    /// Points that are drawn.
+    pub drawn: usize,
+    /// What is drawn and what is not, in words.
+    pub said: String,
 }
 
 /// Encodes `scene`, thinned further if it breaks the budget; errors are told relative to
-/// `error_unit`, the first threshold.
+/// `error_unit`, the first threshold. Views that belong to none of `rows`, or to one that has a view
+/// already, are left out.
 ///
 /// Block 0 holds the originals, block 1 the cameras.
-pub(crate) fn encode(scene: &Scene3d, error_unit: f32) -> Encoded {
+pub(crate) fn encode(scene: &Scene3d, rows: &[Row], error_unit: f32) -> Encoded {
     let bounds = SceneBox::robust(&scene.originals);
     let max = points_within_budget(scene.views.len(), scene.obfuscations.len());
     let chosen = subsample(scene.originals.len(), max, 0);
@@ -88,23 +99,29 @@ pub(crate) fn encode(scene: &Scene3d, error_unit: f32) -> Encoded {
         blocks.len() - 1
     };
 
-    let originals = chosen.iter().map(|&i| scene.originals[i]);
-    push(positions(&bounds, originals));
+    let originals = || chosen.iter().map(|&i| scene.originals[i]);
+    push(positions(&bounds, originals()));
+    let n_outside = originals().filter(|&point| !is_drawn(&bounds, point)).count();
     let cameras = subsample(scene.cameras.len(), MAX_CAMERAS, 0);
     push(positions(&bounds, cameras.iter().map(|&i| scene.cameras[i])));
 
     let mut obfuscations = Vec::new();
-    for ObfuscationView { scheme, shapes } in &scene.obfuscations {
+    for ObfuscationView { scheme, shapes, n_records, .. } in &scene.obfuscations {
         let (kind, bytes, count) = encode_shapes(&bounds, shapes);
+        let said = said::shapes(shapes, count, *n_records);
         let block = push(bytes);
-        obfuscations.push(EncodedShapes { scheme: scheme.clone(), kind, count, block });
+        obfuscations.push(EncodedShapes { scheme: scheme.clone(), kind, count, block, said });
     }
-    let mut views = Vec::new();
+    let mut views: Vec<EncodedView> = Vec::new();
     for view in &scene.views {
-        let (bytes, n_lost) = encode_view(&bounds, &scene.originals, view, &chosen, error_unit);
+        let Some(row) = row_of(rows, view).filter(|&row| views.iter().all(|v| v.row != row)) else {
+            continue;
+        };
+        let withheld = scene.obfuscations.iter().find(|one| one.scheme == view.scheme);
+        let withheld = withheld.map_or(&[][..], |one| &one.withheld);
+        let (bytes, fate) = encode_view(&bounds, scene, view, withheld, &chosen, error_unit);
         let block = push(bytes);
-        let View { scheme, solver, inlier_ratio, .. } = view.clone();
-        views.push(EncodedView { scheme, solver, inlier_ratio, n_lost, block });
+        views.push(EncodedView { row, block, drawn: fate.drawn, said: fate.said() });
     }
     Encoded {
         low: bounds.low,
@@ -112,6 +129,12 @@ pub(crate) fn encode(scene: &Scene3d, error_unit: f32) -> Encoded {
         up: scene.up.unwrap_or([0.0, 0.0, 1.0]),
         n_points: scene.n_points.max(scene.originals.len() as u64),
         n_drawn: chosen.len(),
+        originals_said: Fate {
+            drawn: chosen.len() - n_outside,
+            outside: n_outside,
+            ..Fate::default()
+        }
+        .said(),
         n_cameras: cameras.len(),
         error_unit,
         obfuscations,
@@ -120,25 +143,42 @@ pub(crate) fn encode(scene: &Scene3d, error_unit: f32) -> Encoded {
     }
 }
 
+/// The row of the results that `view` shows.
+fn row_of(rows: &[Row], view: &View) -> Option<usize> {
+    rows.iter().position(|row| {
+        row.scheme == view.scheme
+            && row.solver == view.solver
+            && Given::of(row).same_choice(&view.given)
+    })
+}
+
 /// Positions of all points, then one byte of error each.
 fn encode_view(
     bounds: &SceneBox,
-    originals: &[[f32; 3]],
+    scene: &Scene3d,
     view: &View,
+    withheld: &[usize],
     chosen: &[usize],
     error_unit: f32,
-) -> (Vec<u8>, usize) {
+) -> (Vec<u8>, Fate) {
     let recovered = |i: usize| view.recovered.get(i).copied().unwrap_or([f32::NAN; 3]);
     let mut bytes = positions(bounds, chosen.iter().map(|&i| recovered(i)));
-    let mut n_lost = 0;
+    let mut fate = Fate::default();
     for &i in chosen {
-        let error = distance(recovered(i), originals[i]);
-        if error.is_nan() {
-            n_lost += 1;
+        let error = distance(recovered(i), scene.originals[i]);
+        match () {
+            () if is_drawn(bounds, recovered(i)) => fate.drawn += 1,
+            () if !error.is_nan() => fate.outside += 1,
+            () if withheld.contains(&i) => fate.withheld += 1,
+            () => fate.lost += 1,
         }
         bytes.push(error_byte(error / error_unit));
     }
-    (bytes, n_lost)
+    (bytes, fate)
+}
+
+fn is_drawn(bounds: &SceneBox, point: [f32; 3]) -> bool {
+    quantize(bounds, point) != [NOT_DRAWN; 3]
 }
 
 fn encode_shapes(bounds: &SceneBox, shapes: &Shapes) -> (&'static str, Vec<u8>, usize) {
@@ -198,28 +238,49 @@ mod tests {
     fn scene(n: usize, n_views: usize) -> Scene3d {
         let originals: Vec<[f32; 3]> =
             (0..n).map(|i| [i as f32, (i * 7 % 13) as f32, 0.5]).collect();
-        let view = View {
+        let view = |at: usize| View {
             scheme: "olc".into(),
+            given: given(at),
             solver: "consensus".into(),
-            inlier_ratio: 0.5,
             recovered: originals.clone(),
         };
         let patch = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
         let shapes = Shapes::Patches(vec![patch; n]);
+        let plane = ObfuscationView {
+            scheme: "plane".into(),
+            shapes,
+            n_records: n as u64,
+            withheld: Vec::new(),
+        };
         Scene3d {
             cameras: originals.clone(),
             n_points: n as u64,
-            obfuscations: vec![ObfuscationView { scheme: "plane".into(), shapes }; 7],
-            views: vec![view; n_views],
+            obfuscations: vec![plane; 7],
+            views: (0..n_views).map(view).collect(),
             up: None,
             originals,
         }
     }
 
+    fn given(at: usize) -> Given {
+        Given { neighbors: format!("source-{at}"), oracle_noise: None, inlier_ratio: 0.5 }
+    }
+
+    fn row(at: usize) -> Row {
+        let text = r#"{"scheme": "olc", "neighbors": "", "oracle_noise": null, "inlier_ratio": 0.25, "k": 50,
+            "solver": "consensus", "delta": null, "unit": "m", "n_points": 9, "n_lost": 0, "lost": {},
+            "dropped": {}, "recovered_percent": {}, "blind_percent": {}, "axis_accuracy_percent": null,
+            "assignment_accuracy_percent": null, "median_error": null, "error_percentiles": {}}"#;
+        let row: Row = serde_json::from_str(text).expect("a row");
+        Row { neighbors: given(at).neighbors, ..row }
+    }
+
     #[test]
     fn the_budget_holds_for_any_number_of_points_and_views() {
-        for (n, n_views) in [(0, 0), (10, 1), (60_000, 7), (20_000, 84), (300, 5_000)] {
-            let encoded = encode(&scene(n, n_views), 0.1);
+        for (n, n_views) in [(0, 0), (10, 1), (60_000, 7), (20_000, 84), (300, 3_000)] {
+            let rows: Vec<Row> = (0..n_views).map(row).collect();
+            let encoded = encode(&scene(n, n_views), &rows, 0.1);
+            assert_eq!(encoded.views.len(), n_views);
             let bytes: usize =
                 encoded.blocks.iter().map(|block| block.len() + BYTES_PER_BLOCK).sum();
             assert!(bytes <= SCENE_BUDGET_BYTES, "{n} points, {n_views} views: {bytes} bytes");
@@ -227,6 +288,26 @@ mod tests {
         }
         assert!(points_within_budget(42, 7) > 8_000, "a usual audit shows a real cloud");
         assert_eq!(points_within_budget(usize::MAX / 1_000, 7), 0);
+    }
+
+    #[test]
+    fn views_are_of_rows_whatever_their_measured_ratio() {
+        // The row's ratio is a mean over repeats, that of the view of one run.
+        let encoded = encode(&scene(9, 3), &[row(2), row(0)], 0.1);
+        assert_eq!(encoded.views.iter().map(|view| view.row).collect::<Vec<_>>(), [1, 0]);
+    }
+
+    #[test]
+    fn every_point_is_counted_once() {
+        let mut scene = scene(9, 1);
+        scene.obfuscations[0].scheme = "olc".into();
+        scene.obfuscations[0].withheld = vec![3];
+        scene.views[0].recovered[3] = [f32::NAN; 3];
+        scene.views[0].recovered[4] = [f32::NAN; 3];
+        scene.views[0].recovered[5] = [1e6; 3];
+        let view = &encode(&scene, &[row(0)], 0.1).views[0];
+        assert_eq!(view.drawn, 6);
+        assert_eq!(view.said, "6 of 9 points drawn; 1 not released, 1 lost, 1 outside the box");
     }
 
     #[test]

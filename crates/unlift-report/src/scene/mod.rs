@@ -1,10 +1,13 @@
 //! What the page's 3D view shows: originals, obfuscations and recovered points.
 //!
-//! All positions are in the document's unit (meters, or neighbor distances), about any origin near
+//! All positions are in the document's unit (meters, or usual distances of neighbors), about any origin near
 //! the map: coordinates of 10^6 must be re-centered before they become `f32`.
 
 mod encode;
 mod geometry;
+mod said;
+
+use crate::attack::Given;
 
 pub(crate) use encode::{Encoded, encode};
 pub use encode::{SCENE_BUDGET_BYTES, points_within_budget};
@@ -23,19 +26,19 @@ pub struct Scene3d {
     pub up: Option<[f32; 3]>,
     /// What each scheme publishes, at most one per scheme.
     pub obfuscations: Vec<ObfuscationView>,
-    /// What came back, one per (scheme, solver, inlier ratio).
+    /// What came back, at most one per row of the results.
     pub views: Vec<View>,
 }
 
-/// What came back under one scheme, solver and inlier ratio.
+/// What came back under one scheme, from one kind of neighborhoods, by one solver: of a row of the results.
 #[derive(Debug, Clone, PartialEq)]
 pub struct View {
     /// The scheme's user-facing name.
     pub scheme: String,
+    /// The neighborhoods, as in the row.
+    pub given: Given,
     /// The solver's name.
     pub solver: String,
-    /// The inlier ratio as in the row.
-    pub inlier_ratio: f64,
     /// Recovered positions `(n, 3)`, aligned with [`Scene3d::originals`]; NaN where the point is
     /// lost or was not released.
     pub recovered: Vec<[f32; 3]>,
@@ -48,6 +51,10 @@ pub struct ObfuscationView {
     pub scheme: String,
     /// The records as drawn.
     pub shapes: Shapes,
+    /// Records there are, drawn or not.
+    pub n_records: u64,
+    /// Places in [`Scene3d::originals`] of points that the scheme did not release.
+    pub withheld: Vec<usize>,
 }
 
 /// Records as drawn.

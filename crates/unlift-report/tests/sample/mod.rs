@@ -3,11 +3,12 @@
 #![allow(dead_code, reason = "each user of this file uses a part of it")]
 
 use indexmap::IndexMap;
+use unlift_report::Given;
 use unlift_report::document::{
     Bound, BreakEven, Distinct, Document, GateResult, ImageCounts, ImageFigures, ImageRow, Input,
-    LengthUnit, ReliabilityBin, Row, Run, SCHEMA, Seconds,
+    LengthUnit, NotAudited, ReliabilityBin, Row, Run, SCHEMA, Seconds,
 };
-use unlift_report::pictures::{Given, Graph, Marks, Picture, RecoveredView, ReleasedView};
+use unlift_report::pictures::{Graph, Marks, Picture, RecoveredView, ReleasedView};
 use unlift_report::scene::{ObfuscationView, Scene3d, SceneBox, Shapes, View};
 
 pub const SCHEMES: [&str; 7] = ["olc", "ppl", "ppl+", "ray", "ray-voxel", "plane", "cp"];
@@ -36,7 +37,7 @@ const RECORDS_ALONE: [(&str, [f64; 2]); 6] = [
     ("cp", [16.2, 31.9]),
 ];
 
-/// A whole audit; without a scale lengths are neighbor distances.
+/// A whole audit; without a scale lengths are times the usual distance of neighbors.
 pub fn document(metric: bool) -> Document {
     let thresholds = if metric { ["0.10", "0.25"] } else { ["1.0", "2.5"] };
     let unit = if metric { LengthUnit::Meter } else { LengthUnit::KthNeighbor };
@@ -101,6 +102,45 @@ pub fn document(metric: bool) -> Document {
             seconds: Seconds { total: 41.7, rows, stages: IndexMap::new() },
         },
     }
+}
+
+/// The same with neighborhoods of an attacker's own, at ratios that differ from scheme to scheme: `overlap`
+/// for all schemes, `geometric` where records tell something.
+pub fn mixed(metric: bool) -> Document {
+    let mut document = document(metric);
+    let half: Vec<Row> =
+        document.results.iter().filter(|row| row.inlier_ratio == 0.5).cloned().collect();
+    for row in half {
+        let s = SCHEMES.iter().position(|scheme| *scheme == row.scheme).expect("one of them");
+        let weaker = if row.solver == "ransac" { 3.0 } else { 0.0 };
+        let mut own = |neighbors: &str, inlier_ratio, shares: [f64; 2]| {
+            let mut row = row.clone();
+            (row.neighbors, row.oracle_noise) = (neighbors.into(), None);
+            (row.inlier_ratio, row.k) = (inlier_ratio, 35);
+            // Half or more are too far off for any percentile that is listed.
+            row.median_error = None;
+            row.error_percentiles.values_mut().for_each(|error| *error = None);
+            for (value, share) in row.recovered_percent.values_mut().zip(shares) {
+                *value = share;
+            }
+            document.results.push(row);
+        };
+        let falling = 4.5 * s as f64 + weaker;
+        own("overlap", 0.08 + 0.002 * s as f64, [45.5 - falling, 66.5 - falling]);
+        if row.scheme == "plane" {
+            if row.solver == "consensus" {
+                document.not_audited.push(NotAudited {
+                    scheme: row.scheme,
+                    neighbors: Some("geometric".into()),
+                    reason: "planes say nothing of where points are".into(),
+                });
+            }
+        } else {
+            own("geometric", 0.05, [7.0 - weaker / 10.0, 14.0]);
+        }
+    }
+    document.run.seconds.rows.clear();
+    document
 }
 
 fn row(s: usize, r: usize, solver: &str, thresholds: [&str; 2], unit: LengthUnit) -> Row {
@@ -231,6 +271,7 @@ pub fn picture() -> Picture {
     let views = ["lines2d", "cp2d"].map(|scheme| RecoveredView {
         scheme: scheme.into(),
         given: given.clone(),
+        solver: "joint".into(),
         recovered: keypoints.iter().map(|p| Some(p.map(|x| x + 4.0))).collect(),
     });
     let lines = keypoints.iter().map(|p| Some([[p[0], 0.0], [p[0], 479.0]])).collect();
@@ -333,7 +374,9 @@ pub fn scene(document: &Document, n: usize) -> Scene3d {
                 indices.filter_map(|i| bounds.clip_line(originals[i], direction(i))).collect(),
             ),
         };
-        ObfuscationView { scheme: scheme.into(), shapes }
+        // Every hundredth point is left out by one scheme.
+        let withheld = (0..if scheme == "ppl+" { n } else { 0 }).step_by(100).collect();
+        ObfuscationView { scheme: scheme.into(), shapes, n_records: n as u64, withheld }
     });
     let views = document.results.iter().enumerate().map(|(r, row)| {
         let share = row.recovered_percent[0] as f32 / 100.0;
@@ -348,8 +391,12 @@ pub fn scene(document: &Document, n: usize) -> Scene3d {
         });
         View {
             scheme: row.scheme.clone(),
+            given: Given {
+                neighbors: row.neighbors.clone(),
+                oracle_noise: row.oracle_noise.clone(),
+                inlier_ratio: row.inlier_ratio,
+            },
             solver: row.solver.clone(),
-            inlier_ratio: row.inlier_ratio,
             recovered: recovered.collect(),
         }
     });

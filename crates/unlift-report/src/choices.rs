@@ -1,0 +1,161 @@
+//! What a reader of the page can choose: scheme, neighborhoods, solver. One list of each for every
+//! chart and for the 3D view; a row of the results is a place in each list.
+
+use serde::Serialize;
+
+use crate::attack::{self, Basis, Given};
+use crate::document::{Document, LengthUnit, Row};
+use crate::page_data::slot;
+use crate::{tables, verdict, words};
+
+/// The lists. A row is found by its place in them and by nothing else.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub(crate) struct Choices {
+    pub schemes: Vec<SchemeChoice>,
+    pub givens: Vec<GivenChoice>,
+    pub solvers: Vec<String>,
+    /// The neighborhoods that are shown first: what an attacker has today, else half right.
+    pub first_given: usize,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct SchemeChoice {
+    pub name: String,
+    pub title: String,
+    /// Its color and mark.
+    pub slot: usize,
+    /// Percent of an attacker who guesses, per threshold.
+    pub blind: Vec<Option<f64>>,
+    /// Percent by the records alone, per threshold; nothing where that was not tried.
+    pub alone: Vec<Option<f64>>,
+    /// What that attack is called.
+    pub alone_by: String,
+    /// The larger of both, per threshold: what exceeds it is what neighborhoods give away.
+    pub floor: Vec<Option<f64>>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct GivenChoice {
+    /// `oracle, 50 % right`, `overlap, 9 to 12 % right (measured)`.
+    pub label: String,
+    /// `released`, `given`, `oracle` or `reference` (no attack): the groups of a menu.
+    pub group: &'static str,
+    /// Whose neighborhoods: the curve on which the oracle's ratios lie, the mark of other sources.
+    pub source: String,
+    #[serde(skip)]
+    pub given: Given,
+}
+
+impl Choices {
+    pub(crate) fn of(document: &Document) -> Self {
+        let mut choices = Self::default();
+        let thresholds = tables::thresholds(document);
+        for row in &document.results {
+            if choices.schemes.iter().all(|scheme| scheme.name != row.scheme) {
+                choices.schemes.push(scheme(document, &row.scheme, &thresholds));
+            }
+            if !choices.solvers.contains(&row.solver) {
+                choices.solvers.push(row.solver.clone());
+            }
+            let given = Given::of(row);
+            if choices.givens.iter().all(|known| !known.given.same_choice(&given)) {
+                choices.givens.push(given_choice(document, row));
+            }
+        }
+        // By falling ratio within a source of the oracle; the order of sources stays.
+        let sources: Vec<String> =
+            choices.givens.iter().map(|given| given.source.clone()).collect();
+        let turn = |given: &GivenChoice| sources.iter().position(|source| *source == given.source);
+        choices.givens.sort_by(|a, b| {
+            turn(a).cmp(&turn(b)).then(b.given.inlier_ratio.total_cmp(&a.given.inlier_ratio))
+        });
+        choices.first_given = first_given(document, &choices.givens);
+        choices
+    }
+
+    /// The place of a row's neighborhoods.
+    pub(crate) fn given(&self, given: &Given) -> Option<usize> {
+        self.givens.iter().position(|known| known.given.same_choice(given))
+    }
+
+    pub(crate) fn scheme(&self, name: &str) -> Option<usize> {
+        self.schemes.iter().position(|scheme| scheme.name == name)
+    }
+
+    pub(crate) fn solver(&self, name: &str) -> Option<usize> {
+        self.solvers.iter().position(|solver| solver == name)
+    }
+}
+
+fn scheme(document: &Document, name: &str, thresholds: &[String]) -> SchemeChoice {
+    let rows = || document.results.iter().filter(|row| row.scheme == name);
+    let blind = |typed: &String| {
+        rows().filter_map(|row| row.blind_percent.get(typed).copied()).max_by(f64::total_cmp)
+    };
+    let alone = |typed: &str| verdict::records_alone(document, name, typed);
+    let by = tables::headline_threshold(document).and_then(|typed| alone(&typed)?.1);
+    let floor = |typed: &String| {
+        rows().filter_map(|row| row.baseline_percent(typed)).max_by(f64::total_cmp)
+    };
+    SchemeChoice {
+        name: name.to_owned(),
+        title: words::scheme_title(name).to_owned(),
+        slot: slot(document, name),
+        blind: thresholds.iter().map(blind).collect(),
+        alone: thresholds.iter().map(|typed| Some(alone(typed)?.0)).collect(),
+        alone_by: attack::records_alone(by),
+        floor: thresholds.iter().map(floor).collect(),
+    }
+}
+
+fn group(row: &Row) -> &'static str {
+    match row.neighbors.as_str() {
+        _ if attack::basis(row).is_none() => "reference",
+        "oracle" => "oracle",
+        "file" => "given",
+        _ => "released",
+    }
+}
+
+/// One entry for all rows with these neighborhoods; measured ratios become a range.
+fn given_choice(document: &Document, row: &Row) -> GivenChoice {
+    let given = Given::of(row);
+    let same = document.results.iter().filter(|other| Given::of(other).same_choice(&given));
+    let ratios: Vec<f64> = same.map(|row| row.inlier_ratio).collect();
+    let low = ratios.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = ratios.iter().copied().fold(0.0, f64::max);
+    let source = attack::source(&row.neighbors, row.oracle_noise.as_deref());
+    let said = [low, high].map(words::ratio_percent);
+    let label = match said[0] == said[1] {
+        true => given.label(),
+        false => format!("{source}, {} to {} % right (measured)", said[0], said[1]),
+    };
+    GivenChoice { label, group: group(row), source, given }
+}
+
+/// Today's attack comes first: of the attacker's own sources the one that gets most; without one the
+/// oracle nearest to half.
+fn first_given(document: &Document, givens: &[GivenChoice]) -> usize {
+    let typed = tables::headline_threshold(document).unwrap_or_default();
+    let share = |row: &Row| row.recovered_percent.get(&typed).copied().unwrap_or(0.0);
+    let own = document.results.iter().filter(|row| group(row) == "released");
+    let strongest = own.max_by(|a, b| share(a).total_cmp(&share(b)));
+    let oracle = || {
+        let schemes = document.results.first().map(|row| row.scheme.as_str());
+        verdict::strongest(document, schemes?, Basis::Oracle)
+    };
+    let row = strongest.or_else(oracle);
+    let place = row
+        .map(Given::of)
+        .and_then(|given| givens.iter().position(|known| known.given.same_choice(&given)));
+    place.unwrap_or(0)
+}
+
+/// What stands behind a length in charts: `2.5×` is so many times the usual distance of neighbors.
+pub(crate) fn unit_sign(unit: Option<LengthUnit>) -> &'static str {
+    match unit {
+        Some(LengthUnit::KthNeighbor) => "×",
+        Some(LengthUnit::Pixel) => "px",
+        Some(LengthUnit::Meter) | None => "m",
+    }
+}
