@@ -4,14 +4,17 @@
 use super::plan::Plan;
 use super::row::Row;
 
+/// The share of points, in percent, that the ratio is about.
+const HALF: f64 = 50.0;
+
 /// How sure the ratio is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bound {
     /// Interpolated between two tested ratios.
     Interpolated,
-    /// More than half come back even at the lowest tested ratio, which is given.
+    /// Half or more come back even at the lowest tested ratio, which is given.
     BelowTested,
-    /// Fewer than half come back even at the highest tested ratio, which is given.
+    /// Fewer than half come back at every tested ratio, the highest of which is given.
     AboveTested,
 }
 
@@ -26,7 +29,8 @@ impl Bound {
     }
 }
 
-/// The smallest inlier ratio at which half of the points come back within a threshold.
+/// The smallest inlier ratio, of all tested ones and those between them, at which half of the points come
+/// back within a threshold.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BreakEven {
     /// Scheme name.
@@ -70,20 +74,20 @@ pub fn break_even(plan: &Plan, rows: &[Row]) -> Vec<BreakEven> {
     result
 }
 
-/// Walks from the highest ratio down to where the share first falls below one half.
+/// The lowest ratio at which the curve, linear between tested ratios, still reaches one half. `curve` falls in
+/// ratio. A curve may cross one half several times (chance moves shares by a few points): the lowest crossing
+/// counts, as any other would call a map safer than it was found to be.
 fn crossing(curve: &[(f64, f64)]) -> Option<(f64, Bound)> {
     let (first, last) = (curve.first()?, curve.last()?);
-    if first.1 < 50.0 {
+    let Some(at) = curve.iter().rposition(|(_, share)| *share >= HALF) else {
         return Some((first.0, Bound::AboveTested));
-    }
-    let below = curve.windows(2).find(|w| w[1].1 < 50.0);
-    Some(match below {
-        None => (last.0, Bound::BelowTested),
-        Some(w) => {
-            let share = (w[0].1 - 50.0) / (w[0].1 - w[1].1);
-            (w[0].0 + share * (w[1].0 - w[0].0), Bound::Interpolated)
-        }
-    })
+    };
+    let Some(below) = curve.get(at + 1) else {
+        return Some((last.0, Bound::BelowTested));
+    };
+    let above = curve[at];
+    let share = (above.1 - HALF) / (above.1 - below.1);
+    Some((above.0 + share * (below.0 - above.0), Bound::Interpolated))
 }
 
 #[cfg(test)]
@@ -103,5 +107,29 @@ mod tests {
         assert_eq!(crossing(&[(1.0, 90.0), (0.1, 60.0)]), Some((0.1, Bound::BelowTested)));
         assert_eq!(crossing(&[(1.0, 40.0), (0.1, 10.0)]), Some((1.0, Bound::AboveTested)));
         assert_eq!(crossing(&[]), None);
+    }
+
+    /// `ray-voxel` by `consensus` on a real map: less comes back at the highest ratio than below it.
+    #[test]
+    fn every_tested_ratio_counts_not_only_the_highest() {
+        let curve = [(1.0, 48.1), (0.75, 52.3), (0.5, 50.0)];
+        assert_eq!(crossing(&curve), Some((0.5, Bound::BelowTested)));
+        let (ratio, bound) =
+            crossing(&[(1.0, 48.1), (0.75, 52.3), (0.5, 50.0), (0.3, 40.0)]).unwrap();
+        assert_eq!((ratio, bound), (0.5, Bound::Interpolated));
+    }
+
+    #[test]
+    fn the_lowest_of_several_crossings_counts() {
+        let curve = [(1.0, 90.0), (0.75, 49.0), (0.5, 60.0), (0.3, 40.0)];
+        let (ratio, bound) = crossing(&curve).unwrap();
+        assert!((ratio - 0.4).abs() < 1e-12, "{ratio}");
+        assert_eq!(bound, Bound::Interpolated);
+    }
+
+    #[test]
+    fn a_share_that_is_no_number_hides_no_other() {
+        let curve = [(1.0, f64::NAN), (0.5, 60.0), (0.3, 40.0)];
+        assert!((crossing(&curve).unwrap().0 - 0.4).abs() < 1e-12);
     }
 }
