@@ -175,7 +175,7 @@ def reference_line(rows):
 
 def exact_line(rows):
     shares = column([r for r in rows if r.get("exact_percent") is not None], "joint", "cp", "exact_percent")
-    return f"Recovered exactly (`cp`, `joint`), percent, In {' / '.join(map(str, RATIOS))}: {' / '.join(shares)}."
+    return f"Recovered exactly, with the value that another record publishes (`cp`, `joint`), percent, In {' / '.join(map(str, RATIOS))}: {' / '.join(shares)}."
 
 
 def confidence_table(rows, solver):

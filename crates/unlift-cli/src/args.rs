@@ -307,10 +307,13 @@ pub struct EvaluateArgs {
     /// The truth.parquet of the obfuscation
     #[arg(long, value_name = "TRUTH")]
     pub truth: PathBuf,
+    /// The released map, for the figures of a blind attacker [default: released.parquet beside TRUTH]
+    #[arg(long, value_name = "FILE")]
+    pub released: Option<PathBuf>,
     /// Errors that count as recovered, by commas [default: 0.10,0.25 in meters, else 1.0,2.5]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold)]
     pub thresholds: Vec<Threshold>,
-    /// Print JSON in place of the table
+    /// Print a row of audit.json in place of the table
     #[arg(long)]
     pub json: bool,
 }

@@ -146,7 +146,8 @@ pub fn image(
     }
 }
 
-fn row(row: &Row, thresholds: &[Threshold]) -> report::Row {
+/// A row as it is written.
+pub fn row(row: &Row, thresholds: &[Threshold]) -> report::Row {
     let by_threshold = |percents: &[f64]| by_threshold(thresholds, percents);
     let by_reason = |counts: &std::collections::BTreeMap<&'static str, usize>| {
         ordered(counts.iter().map(|(reason, &n)| ((*reason).to_owned(), n as u64)))

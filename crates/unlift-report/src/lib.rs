@@ -28,5 +28,6 @@ pub use attack::Given;
 pub use document::Document;
 pub use error::Error;
 pub use html::{ErrorCdf, RenderOptions, render};
+pub use round::rounded;
 pub use scene::Scene3d;
 pub use text::text_table;

@@ -1,5 +1,6 @@
 //! Rounding to significant digits, so that a document's text is short and stable.
 
+use serde::Serialize;
 use serde_json::Value;
 
 /// Significant decimal digits of every measured number in `audit.json`.
@@ -14,6 +15,16 @@ pub(crate) fn round(value: f64) -> f64 {
     }
     // Through decimal text: exact where `(value * 10^n).round() / 10^n` leaves a tail of nines.
     format!("{value:.*e}", SIGNIFICANT_DIGITS - 1).parse().unwrap_or(value)
+}
+
+/// `value` as JSON, with numbers as `audit.json` has them.
+///
+/// # Errors
+/// When `value` cannot be JSON.
+pub fn rounded(value: &impl Serialize) -> serde_json::Result<Value> {
+    let mut value = serde_json::to_value(value)?;
+    round_floats(&mut value);
+    Ok(value)
 }
 
 /// Rounds every float inside `value`; integers keep all their digits.

@@ -6,6 +6,7 @@
 //! read ──> obfuscate ──> neighbors ──> recover ──> evaluate ──> report
 //! ```
 
+mod about;
 pub mod audit;
 mod density;
 pub mod descriptors;
@@ -25,6 +26,7 @@ pub mod simd;
 pub mod synthetic;
 pub mod truth;
 
+pub use about::{About, Fingerprint, RowOrder};
 pub use descriptors::Descriptors;
 pub use error::Error;
 pub use ids::{OriginalId, RecordId};

@@ -1,11 +1,21 @@
-//! `unlift evaluate`: recovered points and the truth in, figures out.
+//! `unlift evaluate`: recovered points and the truth in, the figures of an audit's row out.
 
-use serde_json::{Map, Value, json};
-use unlift::audit::{Plan, Threshold};
-use unlift::evaluate::{Accuracy, Reliability, evaluate, reliability};
-use unlift_io::stage::{read_recovered, read_truth};
+use std::path::{Path, PathBuf};
 
+use serde_json::Value;
+use unlift::RowOrder;
+use unlift::audit::{Plan, Row, Threshold, measure};
+use unlift::evaluate::{blind, nearer_to_own};
+use unlift::recover::Recovered;
+use unlift::released::Released;
+use unlift::truth::{Original, Secret};
+use unlift_io::stage::{read_recovered, read_released, read_truth};
+use unlift_report::rounded;
+
+use super::obfuscate::RELEASED;
+use super::same_map;
 use crate::args::EvaluateArgs;
+use crate::document;
 use crate::exit::Outcome;
 use crate::output::{print, table};
 
@@ -13,81 +23,136 @@ use crate::output::{print, table};
 pub fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     let recovered = read_recovered::<3>(&args.recovered)?;
     let (original, secret) = read_truth::<3>(&args.truth)?;
+    same_map(&args.recovered, recovered.about().map, &args.truth, secret.map())?;
+    let released = released(args, &secret)?;
     let unit = original.reveal().unit();
-    if recovered.unit() != unit {
-        let expected = format!("lengths in {}, as in the truth", unit.name());
-        let found = recovered.unit().name();
-        return Err(unlift_io::Error::new(&args.recovered, "unit", expected, found).into());
-    }
-    let accuracy = evaluate(&recovered, &original, &secret)
-        .map_err(|error| unlift_io::Error::core(&args.recovered, error))?;
     let thresholds = match args.thresholds.as_slice() {
         [] => Plan::new(unit).thresholds,
         given => given.to_vec(),
     };
-    let smallest = thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min);
-    let sure = reliability(&recovered, &accuracy, smallest);
+    let baseline = released.map(|released| blind(&released, &original, &secret));
+    let (row, _) = measure(&recovered, &original, &secret, baseline.as_ref(), &thresholds)
+        .map_err(|error| unlift_io::Error::core(&args.recovered, error))?;
+    check_plausible(&args.recovered, &recovered, &original, &secret)?;
+    for note in notes(&recovered, &secret) {
+        eprintln!("unlift: note: {}: {note}", args.recovered.display());
+    }
     print(&if args.json {
-        format!("{:#}\n", as_json(&accuracy, sure.as_ref(), &thresholds, unit.name()))
+        format!("{:#}\n", as_json(&row, &thresholds)?)
     } else {
-        as_table(&accuracy, sure.as_ref(), &thresholds, unit.name())
+        as_table(&row, &thresholds)
     })?;
     Ok(Outcome::Done)
 }
 
-/// The figures under the names of `audit.json`.
-fn as_json(
-    accuracy: &Accuracy,
-    sure: Option<&Reliability>,
-    thresholds: &[Threshold],
-    unit: &str,
-) -> Value {
-    let within: Map<String, Value> = thresholds
-        .iter()
-        .map(|t| (t.label.clone(), json!(accuracy.percent_within(t.value))))
-        .collect();
-    let lost: Map<String, Value> =
-        accuracy.lost.iter().map(|(status, n)| (status.name().to_owned(), json!(n))).collect();
-    json!({
-        "unit": unit,
-        "n_points": accuracy.n_points(),
-        "n_lost": accuracy.n_lost(),
-        "lost": lost,
-        "recovered_percent": within,
-        "axis_accuracy_percent": accuracy.axis_percent,
-        "assignment_accuracy_percent": accuracy.assignment_percent,
-        "sure_percent": sure.map(Reliability::sure_percent),
-        "sure_correct_percent": sure.and_then(Reliability::sure_correct_percent),
-        "median_error": accuracy.percentile(50.0),
-    })
+/// The released map of the truth, for the figures of a blind attacker: the one given, or that beside the truth if
+/// there is one.
+fn released(args: &EvaluateArgs, secret: &Secret) -> anyhow::Result<Option<Released<3>>> {
+    let beside = Some(args.truth.with_file_name(RELEASED)).filter(|path: &PathBuf| path.exists());
+    let Some(path) = args.released.clone().or(beside) else { return Ok(None) };
+    let released = read_released::<3>(&path)?;
+    same_map(&path, Some(released.fingerprint()), &args.truth, secret.map())?;
+    expect_slots(&path, released.n_slots(), secret)?;
+    Ok(Some(released))
 }
 
-fn as_table(
-    accuracy: &Accuracy,
-    sure: Option<&Reliability>,
-    thresholds: &[Threshold],
-    unit: &str,
-) -> String {
-    let row = |what: String, figure: String| vec![what, figure];
-    let mut rows = vec![row("points".to_owned(), accuracy.n_points().to_string())];
-    for threshold in thresholds {
-        let percent = accuracy.percent_within(threshold.value);
-        rows.push(row(format!("within {} {unit}", threshold.label), format!("{percent:.1} %")));
+/// Refuses a released map with another number of hidden points than the truth.
+pub fn expect_slots(path: &Path, found: usize, secret: &Secret) -> anyhow::Result<()> {
+    if found == secret.n_slots() {
+        return Ok(());
     }
-    for (status, n) in &accuracy.lost {
-        rows.push(row(format!("lost: {}", status.name()), n.to_string()));
+    let expected = format!("{} hidden points, as in the truth", secret.n_slots());
+    Err(unlift_io::Error::new(path, "", expected, found.to_string()).into())
+}
+
+/// Positions that fewer than this many slots have are too few to judge.
+const FEW: usize = 30;
+
+/// Refuses positions that do not say which map they are of and, by where they lie, are not of this one: the figures
+/// would be next to nothing and read as "safe".
+fn check_plausible(
+    path: &Path,
+    recovered: &Recovered<3>,
+    original: &Original<3>,
+    secret: &Secret,
+) -> anyhow::Result<()> {
+    if recovered.about().map.is_some() && secret.map().is_some() {
+        return Ok(());
     }
-    let median = accuracy.percentile(50.0).map_or("-".to_owned(), |e| format!("{e:.4}"));
-    rows.push(row(format!("median error, {unit}"), median));
-    for (what, percent) in [
-        ("axes named", accuracy.axis_percent),
-        ("descriptors assigned", accuracy.assignment_percent),
-        ("attacker 90 % sure", sure.map(Reliability::sure_percent)),
-        ("of these within", sure.and_then(Reliability::sure_correct_percent)),
-    ] {
-        if let Some(percent) = percent {
-            rows.push(row(what.to_owned(), format!("{percent:.1} %")));
+    let (nearer, n) = nearer_to_own(recovered, original, secret);
+    // Of strangers half are nearer; two standard deviations on top.
+    let chance = 0.5 * n as f64 + (n as f64).sqrt();
+    if n < FEW || nearer as f64 > chance {
+        return Ok(());
+    }
+    let expected = "positions nearer to their own points than to those of other records";
+    let found = format!("{nearer} of {n} (of another map, or in another order of rows)");
+    Err(unlift_io::Error::new(path, "", expected, found).into())
+}
+
+/// What a user should know about a file that somebody else wrote.
+fn notes(recovered: &Recovered<3>, secret: &Secret) -> Vec<&'static str> {
+    let mut notes = Vec::new();
+    if recovered.about().map.is_none() {
+        notes.push("says not which released map it is of: taken to be of that of the truth");
+    }
+    if recovered.about().order == RowOrder::Unstated && secret.slots_per_record() > 1 {
+        notes.push(
+            "says not what its rows are counted by: every position is compared with the nearer point of its \
+             record, so the figures are upper bounds",
+        );
+    }
+    notes
+}
+
+/// What the files do not say of a row of `audit.json`: its name.
+const UNKNOWN: [&str; 6] = ["scheme", "neighbors", "oracle_noise", "inlier_ratio", "k", "solver"];
+
+/// The row as it stands in `audit.json`, without what the files do not say.
+fn as_json(row: &Row, thresholds: &[Threshold]) -> anyhow::Result<Value> {
+    let mut value = rounded(&document::row(row, thresholds))?;
+    if let Some(fields) = value.as_object_mut() {
+        fields.retain(|name, _| !UNKNOWN.contains(&name.as_str()));
+        if row.blind_percent.is_empty() {
+            fields.retain(|name, _| !name.starts_with("blind_"));
         }
     }
-    table(&rows, &[])
+    Ok(value)
+}
+
+/// A share that is not zero never reads as zero.
+fn percent(share: f64) -> String {
+    if share > 0.0 && share < 0.05 { "under 0.1 %".to_owned() } else { format!("{share:.1} %") }
+}
+
+fn as_table(row: &Row, thresholds: &[Threshold]) -> String {
+    let unit = row.unit.name();
+    let line = |what: String, figure: String| vec![what, figure];
+    let mut lines = vec![line("released points".to_owned(), row.n_points.to_string())];
+    for (reason, n) in &row.dropped {
+        lines.push(line(format!("not released: {reason}"), n.to_string()));
+    }
+    for (threshold, share) in thresholds.iter().zip(&row.recovered_percent) {
+        lines.push(line(format!("within {} {unit}", threshold.label), percent(*share)));
+    }
+    for (threshold, share) in thresholds.iter().zip(&row.blind_percent) {
+        lines.push(line(format!("blind, within {} {unit}", threshold.label), percent(*share)));
+    }
+    for (reason, n) in &row.lost {
+        lines.push(line(format!("lost: {reason}"), n.to_string()));
+    }
+    let median = row.error_percentiles.first().copied().flatten();
+    let median = median.map_or("-".to_owned(), |error| format!("{error:.4}"));
+    lines.push(line(format!("median error, {unit}"), median));
+    let sure = row.reliability.as_ref();
+    for (what, share) in [
+        ("axes named", row.axis_accuracy_percent),
+        ("exact: the published value", row.exact_percent),
+        ("descriptors assigned", row.assignment_accuracy_percent),
+        ("attacker 90 % sure", sure.map(|sure| sure.sure_percent())),
+        ("of these within", sure.and_then(|sure| sure.sure_correct_percent())),
+    ] {
+        lines.extend(share.map(|share| line(what.to_owned(), percent(share))));
+    }
+    table(&lines, &[])
 }

@@ -19,6 +19,7 @@ use crate::args::{AuditCommand, BenchCommand, Command, MapArgs, NeighborsCommand
 use crate::exit::{Outcome, advise};
 use crate::prepare::{self, Preparation, Prepared};
 use crate::progress::Spinner;
+use unlift::Fingerprint;
 use unlift_io::read::{self, Input};
 
 /// Runs one command.
@@ -49,6 +50,22 @@ fn with_threads<T: Send>(
     let n = threads.map_or(0, NonZeroUsize::get);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build()?;
     pool.install(work)
+}
+
+/// Refuses `file` when it is about another released map than `of`; what does not say is taken.
+fn same_map(
+    file: &Path,
+    found: Option<Fingerprint>,
+    of: &Path,
+    expected: Option<Fingerprint>,
+) -> Result<(), unlift_io::Error> {
+    match (found, expected) {
+        (Some(found), Some(expected)) if found != expected => {
+            let expected = format!("{expected}, that of the released map of {}", of.display());
+            Err(unlift_io::Error::new(file, "fingerprint", expected, found.to_string()))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Reads a map and makes it ready: the first step of `audit map` and `obfuscate`.

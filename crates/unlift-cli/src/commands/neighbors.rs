@@ -3,8 +3,9 @@
 use unlift::neighbors::oracle::{Outliers, TrueNeighbors, search};
 use unlift_io::stage::{read_released, read_truth, write_neighborhoods};
 
+use super::evaluate::expect_slots;
 use super::obfuscate::RELEASED;
-use super::with_threads;
+use super::{same_map, with_threads};
 use crate::args::{FindArgs, OracleArgs};
 use crate::exit::{Outcome, advise};
 use crate::output::print;
@@ -20,11 +21,8 @@ pub fn oracle(args: &OracleArgs) -> anyhow::Result<Outcome> {
         None if !released_path.exists() => advise(error, "--released FILE"),
         _ => error.into(),
     })?;
-    if released.n_slots() != secret.n_slots() {
-        let expected = format!("{} hidden points, as in the truth", secret.n_slots());
-        let found = released.n_slots().to_string();
-        return Err(unlift_io::Error::new(released_path, "", expected, found).into());
-    }
+    same_map(&released_path, Some(released.fingerprint()), &args.truth, secret.map())?;
+    expect_slots(&released_path, released.n_slots(), &secret)?;
     let alive = Spinner::new("searching neighbors");
     let core = |error| unlift_io::Error::core(&args.truth, error);
     let knn = search(&original).map_err(core)?;

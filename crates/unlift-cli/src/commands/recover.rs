@@ -1,19 +1,50 @@
 //! `unlift recover`: released files in, positions out; no truth needed.
 
+use unlift::RowOrder;
+use unlift::neighbors::Neighborhoods;
 use unlift::recover::{RecoverOptions, Status, recover};
 use unlift_io::stage::{read_neighborhoods, read_released, write_recovered};
 
-use super::with_threads;
+use super::{same_map, with_threads};
 use crate::args::RecoverArgs;
 use crate::exit::Outcome;
 use crate::output::print;
 use crate::progress::Spinner;
+
+/// What a user should know about lists that somebody else wrote.
+fn notes(lists: &Neighborhoods, slots_per_record: usize) -> Vec<String> {
+    let mut notes = Vec::new();
+    let about = lists.about();
+    let empty = (0..lists.n_slots()).filter(|&slot| lists.of(slot).is_empty()).count();
+    if empty > 0 {
+        let n = lists.n_slots();
+        notes.push(format!(
+            "{empty} of {n} lists are empty: solvers that read lists recover nothing there"
+        ));
+    }
+    if about.map.is_none() {
+        notes.push("says not which released map it is of: taken to be of this one".to_owned());
+    }
+    if about.order == RowOrder::Unstated && slots_per_record > 1 {
+        let names = RowOrder::STATED.map(|order| order.name().unwrap_or_default()).join(", ");
+        notes.push(format!(
+            "says not what its rows are counted by (metadata rows_by: {names}): figures of what is recovered \
+             will be upper bounds"
+        ));
+    }
+    notes
+}
 
 /// Recovers a released map.
 pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
     let released = read_released::<3>(&args.released)?;
     let (records, slots) = (released.n_records(), released.slots_per_record());
     let lists = read_neighborhoods(&args.neighbors, records, slots)?;
+    let of = &args.released;
+    same_map(&args.neighbors, lists.about().map, of, Some(released.fingerprint()))?;
+    for note in notes(&lists, slots) {
+        eprintln!("unlift: note: {}: {note}", args.neighbors.display());
+    }
     let options = RecoverOptions {
         solver: args.solver,
         delta: args.delta,

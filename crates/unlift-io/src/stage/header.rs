@@ -5,8 +5,8 @@ use crate::Error;
 use serde_json::{Map, Value, json};
 use std::fmt;
 use std::path::Path;
-use unlift::Unit;
 use unlift::geometry::frame::Bounds;
+use unlift::{About, Fingerprint, RowOrder, Unit};
 
 /// The Parquet key-value metadata key that holds the JSON object.
 pub(super) const KEY: &str = "unlift";
@@ -195,6 +195,26 @@ impl<'a> Meta<'a> {
         regions.map(Some).ok_or_else(|| self.wrong("regions", expected()))
     }
 
+    /// The released map that the file is about, if it says.
+    pub(super) fn fingerprint(&self) -> Result<Option<Fingerprint>, Error> {
+        let Some(value) = self.object.get("fingerprint") else { return Ok(None) };
+        let found = value.as_str().and_then(Fingerprint::from_hex);
+        let expected = "32 hexadecimal digits, the fingerprint of a released map";
+        found.map(Some).ok_or_else(|| self.wrong("fingerprint", expected))
+    }
+
+    /// The released map, and what rows are counted by, as far as the file says.
+    pub(super) fn about(&self) -> Result<About, Error> {
+        let order = match self.object.get("rows_by") {
+            None => RowOrder::Unstated,
+            Some(value) => value.as_str().and_then(RowOrder::from_name).ok_or_else(|| {
+                let names = RowOrder::STATED.map(|order| order.name().unwrap_or_default());
+                self.wrong("rows_by", format!("one of {}", names.join(", ")))
+            })?,
+        };
+        Ok(About { map: self.fingerprint()?, order })
+    }
+
     /// A text, if the key is there and is one.
     pub(super) fn text(&self, key: &str) -> Option<&str> {
         self.object.get(key).and_then(Value::as_str)
@@ -202,10 +222,15 @@ impl<'a> Meta<'a> {
 
     /// A whole number of at least 1; 1 when it is not given.
     pub(super) fn count_or_1(&self, key: &str) -> Result<usize, Error> {
+        Ok(self.count(key)?.unwrap_or(1))
+    }
+
+    /// A whole number of at least 1, if it is given.
+    pub(super) fn count(&self, key: &str) -> Result<Option<usize>, Error> {
         match self.object.get(key) {
-            None => Ok(1),
+            None => Ok(None),
             Some(value) => match value.as_u64().and_then(|n| usize::try_from(n).ok()) {
-                Some(n) if n >= 1 => Ok(n),
+                Some(n) if n >= 1 => Ok(Some(n)),
                 _ => Err(self.wrong(key, "a whole number of at least 1")),
             },
         }
@@ -269,6 +294,17 @@ pub(super) fn new_meta(kind: Kind) -> Map<String, Value> {
     object.insert("kind".into(), json!(kind.name()));
     object.insert("version".into(), json!(VERSION));
     object
+}
+
+/// Adds the released map that a file is about, where it is known.
+pub(super) fn insert_fingerprint(meta: &mut Map<String, Value>, map: Option<Fingerprint>) {
+    meta.extend(map.map(|map| ("fingerprint".to_owned(), json!(map.to_string()))));
+}
+
+/// Adds the released map, and what rows are counted by, where they are known.
+pub(super) fn insert_about(meta: &mut Map<String, Value>, about: About) {
+    insert_fingerprint(meta, about.map);
+    meta.extend(about.order.name().map(|name| ("rows_by".to_owned(), json!(name))));
 }
 
 /// `meta` as text. Keys are written in alphabetical order whatever map `serde_json` is built with,

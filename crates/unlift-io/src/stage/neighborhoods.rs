@@ -1,7 +1,7 @@
 //! Neighborhoods: lists of records per slot, or of original points per point.
 
 use super::column::Type;
-use super::header::{Kind, new_meta, to_text};
+use super::header::{Kind, insert_about, new_meta, to_text};
 use super::order::rows_by_key;
 use super::table::Table;
 use super::write::{field, list_field, lists, numbers, write_table};
@@ -61,8 +61,9 @@ pub fn write_neighborhoods(path: &Path, neighborhoods: &Neighborhoods) -> Result
     if neighborhoods.scores().is_some() {
         fields.push(list_field("scores", Float32));
     }
-    let meta = to_text(new_meta(Kind::Neighborhoods));
-    write_table(path, meta, fields, neighborhoods.n_slots(), |slots| {
+    let mut meta = new_meta(Kind::Neighborhoods);
+    insert_about(&mut meta, neighborhoods.about());
+    write_table(path, to_text(meta), fields, neighborhoods.n_slots(), |slots| {
         let offsets = &neighborhoods.offsets()[slots.start..=slots.end];
         let lengths = || offsets.windows(2).map(|w| (w[1] - w[0]) as usize);
         let values = offsets[0] as usize..offsets[slots.len()] as usize;
@@ -106,7 +107,9 @@ pub fn read_neighborhoods(
         check_list(path, "records", ("slot", slot), ("record", own), lists.of(slot))?;
     }
     let records = lists.ids.into_iter().map(RecordId).collect();
+    let about = table.meta().about()?;
     Neighborhoods::try_new(lists.offsets, records, lists.scores, n_records, slots_per_record)
+        .map(|lists| lists.with_about(about))
         .map_err(|source| Error::core(path, source))
 }
 

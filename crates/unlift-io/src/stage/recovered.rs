@@ -1,7 +1,7 @@
 //! Recovered points: a position or a reason, per slot.
 
 use super::column::{Batch, Type, coordinate_names};
-use super::header::{Kind, new_meta, to_text};
+use super::header::{Kind, insert_about, new_meta, to_text};
 use super::order::permutation;
 use super::table::Table;
 use super::write::{field, numbers, optional_numbers, write_table};
@@ -38,6 +38,7 @@ pub fn write_recovered<const D: usize>(path: &Path, recovered: &Recovered<D>) ->
     meta.insert("origin".into(), json!(recovered.origin().to_vec()));
     meta.insert("unit".into(), json!(recovered.unit().name()));
     meta.insert("delta".into(), json!(recovered.delta()));
+    insert_about(&mut meta, recovered.about());
     let mut fields = vec![field("slot", UInt32)];
     fields.extend(coordinate_names::<D>("").map(|name| Field::new(name, Float64, true)));
     fields.push(field("status", Utf8));
@@ -92,6 +93,7 @@ pub fn read_recovered<const D: usize>(path: &Path) -> Result<Recovered<D>, Error
     let meta = table.meta();
     meta.expect_dimension::<D>()?;
     let (origin, unit, delta) = (meta.origin::<D>()?, meta.unit()?, meta.number_or_0("delta")?);
+    let about = meta.about()?;
     let coordinates = coordinate_names::<D>("");
     let mut columns: Vec<(&str, Type)> = vec![];
     columns.extend(coordinates.iter().map(|name| (name.as_str(), Type::Float)));
@@ -140,6 +142,7 @@ pub fn read_recovered<const D: usize>(path: &Path) -> Result<Recovered<D>, Error
             true => recovered.with_confidence(confidence),
             false => Ok(recovered),
         })
+        .map(|recovered| recovered.with_about(about))
         .map_err(|source| Error::core(path, source))
 }
 

@@ -1,7 +1,7 @@
 //! Released maps: records by family, and descriptors.
 
 use super::column::{Batch, Type, coordinate_names};
-use super::header::{Kind, new_meta, to_text};
+use super::header::{Kind, insert_fingerprint, new_meta, to_text};
 use super::table::Table;
 use super::write::{field, list_field, lists, numbers, write_table};
 use crate::Error;
@@ -35,6 +35,7 @@ pub fn write_released<const D: usize>(path: &Path, released: &Released<D>) -> Re
     meta.insert("slots_per_record".into(), json!(per_record));
     meta.insert("origin".into(), json!(released.origin().to_vec()));
     meta.insert("unit".into(), json!(released.unit().name()));
+    insert_fingerprint(&mut meta, Some(released.fingerprint()));
     if let Some(bounds) = released.bounds() {
         meta.insert("bounds".into(), corners(&bounds));
     }
@@ -118,7 +119,15 @@ pub fn read_released<const D: usize>(path: &Path) -> Result<Released<D>, Error> 
     let descriptors = read_descriptors(path, &table, per_record)?;
     let bounds = meta.bounds::<D>()?;
     let released = Released::try_new(obfuscation, per_record, origin, unit, descriptors);
-    Ok(released.map_err(core)?.with_bounds(bounds))
+    let released = released.map_err(core)?.with_bounds(bounds);
+    let found = released.fingerprint();
+    match meta.fingerprint()? {
+        Some(said) if said != found => {
+            let expected = format!("that of the content, {found} (or none: the file was changed)");
+            Err(meta.wrong("fingerprint", expected))
+        }
+        _ => Ok(released),
+    }
 }
 
 /// A box in the metadata: its low and its high corner.

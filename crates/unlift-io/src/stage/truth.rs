@@ -1,7 +1,7 @@
 //! The owner's file: originals, and which slot hides which.
 
 use super::column::{Type, coordinate_names};
-use super::header::{Kind, new_meta, to_text};
+use super::header::{Kind, insert_fingerprint, new_meta, to_text};
 use super::order::permutation;
 use super::table::Table;
 use super::write::{field, numbers, optional_numbers, write_table};
@@ -34,6 +34,8 @@ pub fn write_truth<const D: usize>(
     let mut meta = new_meta(Kind::Truth);
     meta.insert("dimension".into(), json!(D));
     meta.insert("unit".into(), json!(points.unit().name()));
+    meta.insert("slots_per_record".into(), json!(secret.slots_per_record()));
+    insert_fingerprint(&mut meta, secret.map());
     let mut fields = vec![Field::new("slot", UInt32, true), field("original", UInt32)];
     fields.extend(coordinate_names::<D>("").map(|name| field(name, Float64)));
     if secret.swapped_axis().is_some() {
@@ -146,5 +148,12 @@ pub fn read_truth<const D: usize>(path: &Path) -> Result<(Original<D>, Secret), 
         dropped,
         n_rows as usize,
     );
-    Ok((Original::new(points), secret.map_err(core)?))
+    let secret = secret.map_err(core)?;
+    // Files of earlier versions do not say: where descriptor rows are crossed, records hide two points.
+    let slots = match table.meta().count("slots_per_record")? {
+        None => secret.slots_per_record(),
+        Some(slots) => slots,
+    };
+    let secret = secret.of_map(table.meta().fingerprint()?, slots).map_err(core)?;
+    Ok((Original::new(points), secret))
 }

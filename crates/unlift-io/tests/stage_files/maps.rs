@@ -6,7 +6,7 @@ use unlift::recover::{Estimate, Recovered, Status};
 use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
 use unlift::seed::{Draws, Stage};
 use unlift::truth::{DropReason, Dropped, Original, Secret};
-use unlift::{Descriptors, OriginalId, PointSet, RecordId, Unit};
+use unlift::{About, Descriptors, Fingerprint, OriginalId, PointSet, RecordId, RowOrder, Unit};
 
 pub fn draws(seed: u64) -> Draws {
     Draws::new(seed, Stage::Synthetic, 0)
@@ -75,7 +75,9 @@ pub fn truth<const D: usize>(seed: u64, n: usize) -> (Original<D>, Secret) {
         dropped.collect(),
         n_all,
     );
-    (Original::new(original), secret.unwrap())
+    let slots = if n.is_multiple_of(2) { 1 + seed as usize % 2 } else { 1 };
+    let secret = secret.unwrap().of_map(about(seed).map, slots).unwrap();
+    (Original::new(original), secret)
 }
 
 /// Lists of up to ten records; scores for every second seed.
@@ -91,7 +93,16 @@ pub fn neighborhoods(seed: u64, n_records: usize, slots_per_record: usize) -> Ne
     }
     scores.extend(records.iter().map(|_| draws.normal() as f32));
     let scores = seed.is_multiple_of(2).then_some(scores);
-    Neighborhoods::try_new(offsets, records, scores, n_records, slots_per_record).unwrap()
+    let lists = Neighborhoods::try_new(offsets, records, scores, n_records, slots_per_record);
+    lists.unwrap().with_about(about(seed))
+}
+
+/// Every order, and a fingerprint for two of three seeds.
+fn about(seed: u64) -> About {
+    let mut orders = RowOrder::STATED.to_vec();
+    orders.push(RowOrder::Unstated);
+    let map = (!seed.is_multiple_of(3)).then_some(Fingerprint([seed as u8; 16]));
+    About { map, order: orders[seed as usize % 4] }
 }
 
 /// Recovered points, a fifth of them lost; axis and descriptor rows for every second seed.
@@ -113,5 +124,6 @@ pub fn recovered<const D: usize>(seed: u64, n: usize) -> Recovered<D> {
     let odd = seed % 2 == 1;
     let rows = odd.then(|| draws.permutation(n));
     let origin = std::array::from_fn(|_| draws.between(-5.0, 5.0));
-    Recovered::try_new(&estimates, odd, rows, origin, Unit::Meter, 0.08).unwrap()
+    let recovered = Recovered::try_new(&estimates, odd, rows, origin, Unit::Meter, 0.08);
+    recovered.unwrap().with_about(about(seed))
 }

@@ -118,6 +118,7 @@ fn recovered_law<const D: usize>() {
         for (a, b) in read.positions().iter().zip(recovered.positions()) {
             assert_eq!(a.map(f32::to_bits), b.map(f32::to_bits));
         }
+        assert_eq!(read.about(), recovered.about());
         assert_eq!((read.delta(), read.unit()), (recovered.delta(), recovered.unit()));
         assert_eq!((read.status(), read.support()), (recovered.status(), recovered.support()));
         assert_eq!((read.axis(), read.evidence()), (recovered.axis(), recovered.evidence()));

@@ -1,24 +1,22 @@
 //! The pipeline on one map or image, chained in memory: every row of one scheme and one repeat.
 
-use std::collections::BTreeMap;
 use std::time::Instant;
 
 use super::clock::Clock;
 use super::lists::Lists;
-use super::plan::{Plan, Source, Variant};
+use super::measure::{measure, unmeasured};
+use super::plan::Plan;
 use super::row::Row;
 use super::run::{Observer, RowSeconds};
-use crate::evaluate::{
-    Accuracy, blind, distinct_weights, evaluate, in_better_order, reference, reliability,
-};
+use crate::evaluate::{Accuracy, blind, distinct_weights, joined, reference};
 use crate::geometry::knn::Knn;
 use crate::neighbors::Neighborhoods;
 use crate::neighbors::oracle::Noise;
 use crate::obfuscate::{Entry, obfuscate};
-use crate::recover::{RecoverOptions, Recovered, Solver, recover};
+use crate::recover::{RecoverOptions, Recovered, recover};
 use crate::released::Released;
-use crate::truth::{DropReason, Original, Secret};
-use crate::{Descriptors, Error, Unit};
+use crate::truth::{Original, Secret};
+use crate::{Descriptors, Error};
 
 /// Everything known about one row of one repeat, for whoever writes clouds or draws pictures.
 pub struct Cell<'a, const D: usize = 3> {
@@ -28,7 +26,7 @@ pub struct Cell<'a, const D: usize = 3> {
     pub repeat: u32,
     /// The truth.
     pub original: &'a Original<D>,
-    /// The secret of this obfuscation.
+    /// The secret of this obfuscation, its slots counted as the rows of `recovered` are.
     pub secret: &'a Secret,
     /// What the attacker saw.
     pub released: &'a Released<D>,
@@ -93,8 +91,8 @@ pub(super) fn cells<const D: usize>(
 ) -> Result<(), Error> {
     let Run { plan, entry, repeat, seed } = *run;
     let original = owned.original;
-    // The attacker's own seed: that of the obfuscation is the owner's secret.
-    let attacker = u64::from(repeat);
+    // The same integer as the owner's, in streams of its own: a released map says nothing of either.
+    let attacker = plan.seed.wrapping_add(u64::from(repeat));
     let of_scheme = |error: Error| error.within(entry.name);
     let hidden = hide(entry, original, owned.descriptors, plan, seed, clock).map_err(of_scheme)?;
     let baseline = clock.time(|s| &mut s.evaluate, || Ok(blind(&hidden.0, original, &hidden.1)))?;
@@ -114,14 +112,6 @@ pub(super) fn cells<const D: usize>(
         };
         let made = clock.time(|s| &mut s.neighbors, make).map_err(of_scheme)?;
         let making = started.elapsed().as_secs_f64();
-        let secret = match variant.source {
-            Source::Own(_) => &by_row,
-            Source::Oracle | Source::Given(_) => &hidden.1,
-        };
-        // Lists from the records alone follow the order along a paired line: no descriptor
-        // tells its two slots apart.
-        let in_some_order = hidden.0.slots_per_record() == 2
-            && matches!(&variant.source, Source::Own(from) if !from.needs_descriptors());
         for (at, &solver) in plan.solvers.iter().enumerate() {
             let what = format!("{} at {:.2} {source}, {}", entry.name, made.ratio, solver.name());
             each(observer, Some(what), None);
@@ -138,18 +128,23 @@ pub(super) fn cells<const D: usize>(
             // Lists are made once for all solvers: the first one's row has the time.
             let making = if at == 0 { making } else { 0.0 };
             clock.seconds.recover += took;
-            let ordered = in_some_order.then(|| in_better_order(&recovered, original, secret));
-            let secret = ordered.as_ref().unwrap_or(secret);
-            let accuracy =
-                clock.time(|s| &mut s.evaluate, || evaluate(&recovered, original, secret))?;
-            let mut row = blank(entry, variant, (made.k, solver), &recovered, secret);
-            row.inlier_ratio = made.ratio;
-            row.fill(&accuracy, &baseline, &plan.thresholds);
+            let blind = Some(&baseline);
+            let measure = || measure(&recovered, original, &hidden.1, blind, &plan.thresholds);
+            let (measured, accuracy) = clock.time(|s| &mut s.evaluate, measure)?;
+            let secret = &*joined(&recovered, original, &hidden.1);
+            let mut row = Row {
+                scheme: entry.name,
+                neighbors: variant.source.name(),
+                oracle_noise: variant.noise.map(Noise::name),
+                inlier_ratio: made.ratio,
+                k: made.k,
+                solver: solver.name(),
+                ..measured
+            };
             let weights = places(owned, secret);
             if owned.one_of_many {
                 row.fill_distinct(&accuracy, &baseline, &weights, &plan.thresholds);
             }
-            row.reliability = reliability(&recovered, &accuracy, Row::smallest(&plan.thresholds));
             observer.cell(&Cell {
                 row: &row,
                 repeat,
@@ -215,10 +210,16 @@ fn reference_row<const D: usize>(
     baseline: &Accuracy,
     plan: &Plan,
 ) -> (Row, Accuracy) {
-    let mut row = unmeasured(entry, REFERENCE.to_owned(), (3, REFERENCE), released.unit(), secret);
-    row.inlier_ratio = 1.0;
+    let mut row = Row {
+        scheme: entry.name,
+        neighbors: REFERENCE.to_owned(),
+        inlier_ratio: 1.0,
+        k: 3,
+        solver: REFERENCE,
+        ..unmeasured(released.unit(), secret)
+    };
     let accuracy = reference(released, owned.original, secret, owned.search);
-    row.fill(&accuracy, baseline, &plan.thresholds);
+    row.fill(&accuracy, Some(baseline), &plan.thresholds);
     if owned.one_of_many {
         row.fill_distinct(&accuracy, baseline, &places(owned, secret), &plan.thresholds);
     }
@@ -227,62 +228,3 @@ fn reference_row<const D: usize>(
 
 /// The name of that attacker: as a source and as a solver, though it is neither.
 pub const REFERENCE: &str = "reference";
-
-/// A row of which only the cell is known.
-fn unmeasured(
-    entry: &Entry,
-    neighbors: String,
-    (k, solver): (usize, &'static str),
-    unit: Unit,
-    secret: &Secret,
-) -> Row {
-    let mut dropped = BTreeMap::new();
-    for reason in DropReason::ALL {
-        let n = secret.dropped().iter().filter(|d| d.reason == reason).count();
-        if n > 0 {
-            dropped.insert(reason.name(), n);
-        }
-    }
-    Row {
-        scheme: entry.name,
-        neighbors,
-        oracle_noise: None,
-        inlier_ratio: 0.0,
-        k,
-        solver,
-        delta: 0.0,
-        unit,
-        n_points: secret.n_slots(),
-        lost: BTreeMap::new(),
-        dropped,
-        recovered_percent: Vec::new(),
-        blind_percent: Vec::new(),
-        axis_accuracy_percent: None,
-        exact_percent: None,
-        assignment_accuracy_percent: None,
-        error_percentiles: Vec::new(),
-        blind_median_error: None,
-        reliability: None,
-        ransac_trials: None,
-        repeats: None,
-        distinct: None,
-    }
-}
-
-/// A row with everything but the measurements.
-fn blank<const D: usize>(
-    entry: &Entry,
-    variant: &Variant<'_>,
-    (k, solver): (usize, Solver),
-    recovered: &Recovered<D>,
-    secret: &Secret,
-) -> Row {
-    let cell = (k, solver.name());
-    let row = unmeasured(entry, variant.source.name(), cell, recovered.unit(), secret);
-    Row {
-        oracle_noise: variant.noise.map(Noise::name),
-        delta: recovered.delta(),
-        ransac_trials: recovered.trials().map(|trials| trials.bins().collect()),
-        ..row
-    }
-}

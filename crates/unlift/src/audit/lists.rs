@@ -1,12 +1,12 @@
 //! The neighborhoods of one obfuscation, from every source of a plan.
 
 use super::plan::{Plan, Source, Variant};
-use crate::Error;
 use crate::geometry::knn::Knn;
 use crate::neighbors::Neighborhoods;
 use crate::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
 use crate::released::Released;
 use crate::truth::Secret;
+use crate::{About, Error, RowOrder};
 
 /// Lists, and how good they are.
 #[derive(Debug)]
@@ -100,6 +100,8 @@ impl<'a, const D: usize> Lists<'a, D> {
         let slots = self.released.slots_per_record();
         let lists =
             Neighborhoods::try_new(vec![0; n_slots + 1], Vec::new(), None, n_records, slots)?;
+        let map = Some(self.released.fingerprint());
+        let lists = lists.with_about(About { map, order: RowOrder::Slots });
         let k = match variant.source {
             Source::Own(joined) => joined.k(),
             Source::Oracle | Source::Given(_) => self.plan.k,

@@ -7,6 +7,7 @@ mod cells;
 mod clock;
 pub mod images;
 mod lists;
+mod measure;
 mod plan;
 mod pool;
 mod row;
@@ -14,6 +15,7 @@ mod run;
 
 pub use break_even::{Bound, BreakEven, break_even};
 pub use cells::{Cell, REFERENCE};
+pub use measure::measure;
 pub use plan::{Plan, PointNeighbors, Source, Threshold, Variant};
 pub use row::{Distinct, PERCENTILES, Repeats, Row};
 pub use run::{Observer, Outcome, RowSeconds, Seconds, Silent, run};

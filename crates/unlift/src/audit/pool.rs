@@ -18,7 +18,8 @@ pub(super) struct Pool {
     n_points: usize,
     within: Vec<usize>,
     blind_within: Vec<usize>,
-    exact: usize,
+    /// Slots recovered exactly.
+    exact: Option<usize>,
     /// Slots whose axis was named.
     axis: Option<f64>,
     n_places: f64,
@@ -45,7 +46,7 @@ impl Pool {
             n_points: 0,
             within: vec![0; n],
             blind_within: vec![0; n],
-            exact: 0,
+            exact: row.exact_percent.map(|_| 0),
             axis: row.axis_accuracy_percent.map(|_| 0.0),
             n_places: 0.0,
             places_within: vec![0.0; n],
@@ -72,7 +73,9 @@ impl Pool {
             self.places_within[at] += accuracy.weight_within(threshold.value, weights);
             self.blind_places_within[at] += baseline.weight_within(threshold.value, weights);
         }
-        self.exact += accuracy.n_within(Row::exact_within(row.unit, thresholds));
+        if let Some(n_exact) = accuracy.n_exact {
+            *self.exact.get_or_insert(0) += n_exact;
+        }
         if let Some(percent) = row.axis_accuracy_percent {
             *self.axis.get_or_insert(0.0) += percent * n as f64;
         }
@@ -107,7 +110,9 @@ impl Pool {
         counts(&mut self.blind_within, &more.blind_within);
         sums(&mut self.places_within, &more.places_within);
         sums(&mut self.blind_places_within, &more.blind_places_within);
-        self.exact += more.exact;
+        if let Some(more) = more.exact {
+            *self.exact.get_or_insert(0) += more;
+        }
         if let Some(more) = more.axis {
             *self.axis.get_or_insert(0.0) += more;
         }
@@ -144,7 +149,7 @@ impl Pool {
             recovered_percent: percent(&self.within),
             blind_percent: percent(&self.blind_within),
             axis_accuracy_percent: self.axis.map(|sum| sum / n),
-            exact_percent: self.axis.map(|_| 100.0 * self.exact as f64 / n),
+            exact_percent: self.exact.map(|exact| 100.0 * exact as f64 / n),
             error_percentiles: PERCENTILES
                 .map(|p| self.errors.percentile(p, self.n_points))
                 .to_vec(),

@@ -9,11 +9,6 @@ use crate::evaluate::{Accuracy, Reliability};
 /// Percentiles of the error that a row keeps.
 pub const PERCENTILES: [f64; 5] = [50.0, 75.0, 90.0, 95.0, 99.0];
 
-/// A point of a map recovered within this share of the smallest threshold counts as exact.
-const EXACT: f64 = 0.01;
-/// A keypoint recovered within this many pixels counts as exact.
-const EXACT_PX: f64 = 1.0;
-
 /// A row of an audit. Means over repeats, where there are several; counts are of the first repeat.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
@@ -47,7 +42,8 @@ pub struct Row {
     pub blind_percent: Vec<f64>,
     /// Share of exchanged axes named (`cp`).
     pub axis_accuracy_percent: Option<f64>,
-    /// Percentage recovered within a hundredth of the smallest threshold (`cp`), or within 1 px (`cp2d`).
+    /// Percentage recovered exactly, that is with the very value that another record publishes (`cp`, `cp2d`):
+    /// all coordinates equal those of the original as `f32` about the released origin.
     pub exact_percent: Option<f64>,
     /// Share of descriptors given to their own point (paired lines with descriptors).
     pub assignment_accuracy_percent: Option<f64>,
@@ -102,28 +98,24 @@ impl Row {
         thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min)
     }
 
-    /// The error below which a point counts as exact.
-    pub(super) fn exact_within(unit: Unit, thresholds: &[Threshold]) -> f64 {
-        match unit {
-            Unit::Pixel => EXACT_PX,
-            Unit::Meter | Unit::KthNeighbor => EXACT * Self::smallest(thresholds),
-        }
-    }
-
-    pub(super) fn fill(&mut self, accuracy: &Accuracy, blind: &Accuracy, thresholds: &[Threshold]) {
+    pub(super) fn fill(
+        &mut self,
+        accuracy: &Accuracy,
+        blind: Option<&Accuracy>,
+        thresholds: &[Threshold],
+    ) {
         let within = |accuracy: &Accuracy| {
             thresholds.iter().map(|t| accuracy.percent_within(t.value)).collect()
         };
         self.n_points = accuracy.n_points();
         self.lost = accuracy.lost.iter().map(|(status, &n)| (status.name(), n)).collect();
         self.recovered_percent = within(accuracy);
-        self.blind_percent = within(blind);
+        self.blind_percent = blind.map(within).unwrap_or_default();
         self.axis_accuracy_percent = accuracy.axis_percent;
-        let exact = accuracy.percent_within(Self::exact_within(self.unit, thresholds));
-        self.exact_percent = accuracy.axis_percent.map(|_| exact);
+        self.exact_percent = accuracy.exact_percent();
         self.assignment_accuracy_percent = accuracy.assignment_percent;
         self.error_percentiles = PERCENTILES.map(|p| accuracy.percentile(p)).to_vec();
-        self.blind_median_error = blind.percentile(50.0);
+        self.blind_median_error = blind.and_then(|blind| blind.percentile(50.0));
     }
 
     /// Adds the shares over distinct places; `weights` are those of the slots.

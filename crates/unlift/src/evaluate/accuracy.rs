@@ -2,10 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use crate::Error;
-use crate::geometry::vector::distance;
+use crate::geometry::vector::{distance, sub};
 use crate::recover::{Recovered, Status};
 use crate::truth::{Original, Secret};
+use crate::{Error, OriginalId, RowOrder};
+
+use super::joined;
 
 /// How much of a map came back. Shares are over *all* released points: lost ones are misses.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,34 +18,71 @@ pub struct Accuracy {
     sorted: Vec<f64>,
     /// Slots that could not be recovered, by reason.
     pub lost: BTreeMap<Status, usize>,
+    /// Slots recovered exactly (schemes that exchange coordinates; else `None`): all coordinates are, as `f32` about
+    /// the released origin, those of the original. The exchanged one is then the very value that another record
+    /// publishes.
+    pub n_exact: Option<usize>,
     /// Share of slots whose exchanged axis was named, in percent (`cp`).
     pub axis_percent: Option<f64>,
     /// Share of slots that were given their own descriptor, in percent (paired lines).
     pub assignment_percent: Option<f64>,
 }
 
-/// Compares `recovered` with the truth, slot by slot.
+/// Compares `recovered` with the truth, row by row, in the order that `recovered` is counted in ([`joined`]). `secret`
+/// is that of the obfuscation, as it was made.
+///
+/// Positions that do not say how they are counted are compared, where records hide two points, with the nearer of
+/// the two: at least as much as any order would show.
 ///
 /// # Errors
-/// When the three do not belong together (numbers of slots or points differ).
+/// When the three do not belong together: another released map, another unit, other numbers of slots or points.
 pub fn evaluate<const D: usize>(
     recovered: &Recovered<D>,
     original: &Original<D>,
     secret: &Secret,
 ) -> Result<Accuracy, Error> {
-    let positions = original.reveal().positions();
+    let points = original.reveal();
+    if let Some(map) = secret.map() {
+        map.expect(recovered.about().map)?;
+    }
+    if recovered.unit() != points.unit() {
+        let expected = format!("lengths in {}, as in the truth", points.unit().name());
+        return Err(Error::new("unit", expected, recovered.unit().name()));
+    }
     if recovered.n_slots() != secret.n_slots() {
         let expected = format!("{} slots, as the truth has", secret.n_slots());
         return Err(Error::new("recovered map", expected, recovered.n_slots().to_string()));
     }
-    if secret.n_originals() != positions.len() {
+    if secret.n_originals() != points.len() {
         let expected = format!("{} originals, as the secret says", secret.n_originals());
-        return Err(Error::new("original points", expected, positions.len().to_string()));
+        return Err(Error::new("original points", expected, points.len().to_string()));
     }
-    let errors: Vec<f64> = secret
-        .hidden()
-        .iter()
-        .enumerate()
+    let accuracy = compare(recovered, original, &joined(recovered, original, secret));
+    let paired = secret.slots_per_record() > 1;
+    if !(paired && recovered.about().order == RowOrder::Unstated) {
+        return Ok(accuracy);
+    }
+    let straight = compare(recovered, original, secret);
+    let crossed = compare(recovered, original, &secret.exchanged(|_| true));
+    let by_row = compare(recovered, original, &secret.by_descriptor_row());
+    let errors = straight.errors.iter().zip(&crossed.errors).map(|(a, b)| a.min(*b)).collect();
+    let assigned = [&accuracy, &straight, &by_row].map(|of| of.assignment_percent.unwrap_or(0.0));
+    let assigned = accuracy.assignment_percent.map(|_| assigned.into_iter().fold(0.0, f64::max));
+    Ok(Accuracy {
+        n_exact: accuracy.n_exact,
+        ..Accuracy::new(errors, accuracy.lost, None, assigned)
+    })
+}
+
+/// The same with every row compared with the original in its slot of `secret`.
+fn compare<const D: usize>(
+    recovered: &Recovered<D>,
+    original: &Original<D>,
+    secret: &Secret,
+) -> Accuracy {
+    let positions = original.reveal().positions();
+    let hidden = || secret.hidden().iter().enumerate();
+    let errors = hidden()
         .map(|(slot, original)| match recovered.position(slot) {
             Some(position) => distance(&position, &positions[original.index()]),
             None => f64::INFINITY,
@@ -53,13 +92,20 @@ pub fn evaluate<const D: usize>(
     for &status in recovered.status().iter().filter(|&&status| status != Status::Ok) {
         *lost.entry(status).or_insert(0) += 1;
     }
+    let origin = recovered.origin();
+    let is_exact = |(slot, original): (usize, &OriginalId)| {
+        let stored = sub(&positions[original.index()], &origin).map(|x| x as f32);
+        // Lost points are NaN, which is equal to nothing.
+        recovered.positions()[slot] == stored
+    };
+    let n_exact = secret.swapped_axis().map(|_| hidden().filter(|slot| is_exact(*slot)).count());
     let axis_percent = match (recovered.axis(), secret.swapped_axis()) {
         (Some(said), Some(true_axis)) => percent_equal(said, true_axis),
         _ => None,
     };
     let assignment_percent =
         recovered.descriptor_row().and_then(|said| percent_equal(said, secret.descriptor_row()));
-    Ok(Accuracy::new(errors, lost, axis_percent, assignment_percent))
+    Accuracy { n_exact, ..Accuracy::new(errors, lost, axis_percent, assignment_percent) }
 }
 
 fn percent_equal<T: PartialEq>(a: &[T], b: &[T]) -> Option<f64> {
@@ -76,7 +122,7 @@ impl Accuracy {
     ) -> Self {
         let mut sorted = errors.clone();
         sorted.sort_unstable_by(f64::total_cmp);
-        Self { errors, sorted, lost, axis_percent, assignment_percent }
+        Self { errors, sorted, lost, n_exact: None, axis_percent, assignment_percent }
     }
 
     /// Number of released points.
@@ -92,6 +138,12 @@ impl Accuracy {
     /// Error per slot in the unit of the points; infinite where nothing was recovered.
     pub fn errors(&self) -> &[f64] {
         &self.errors
+    }
+
+    /// Percentage of points recovered exactly, where that is counted; `None` without points.
+    pub fn exact_percent(&self) -> Option<f64> {
+        let n = self.n_points();
+        self.n_exact.filter(|_| n > 0).map(|exact| 100.0 * exact as f64 / n as f64)
     }
 
     /// Number of points with an error of at most `threshold`.

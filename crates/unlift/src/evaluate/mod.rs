@@ -3,13 +3,15 @@
 mod accuracy;
 mod blind;
 mod distinct;
-mod pairs;
+mod join;
+mod plausible;
 mod reference;
 mod reliability;
 
 pub use accuracy::{Accuracy, evaluate};
 pub use blind::blind;
 pub use distinct::distinct_weights;
-pub use pairs::in_better_order;
+pub use join::joined;
+pub use plausible::nearer_to_own;
 pub use reference::reference;
 pub use reliability::{BINS, Bin, Reliability, SURE, reliability};

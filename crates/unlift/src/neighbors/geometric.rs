@@ -11,7 +11,7 @@ use crate::density::{Peak, tomography};
 use crate::geometry::knn::Knn;
 use crate::geometry::vector::{distance, dot, sub, widen};
 use crate::released::{Obfuscation, Released};
-use crate::{Error, RecordId};
+use crate::{About, Error, RecordId, RowOrder};
 
 /// Estimates looked at per record listed: some share a record, some records pass too far away.
 const LOOK: usize = 3;
@@ -95,7 +95,9 @@ pub fn geometric<const D: usize>(released: &Released<D>, k: usize) -> Result<Nei
     }));
     let (scores, records) = rows.into_iter().flatten().unzip();
     let n_records = released.n_records();
-    Neighborhoods::try_new(offsets, records, Some(scores), n_records, released.slots_per_record())
+    let slots = released.slots_per_record();
+    let lists = Neighborhoods::try_new(offsets, records, Some(scores), n_records, slots)?;
+    Ok(lists.with_about(About { map: Some(released.fingerprint()), order: RowOrder::Either }))
 }
 
 /// The distance from `x` to the line of a record; 0 for axis candidates, of whose three lines any may be

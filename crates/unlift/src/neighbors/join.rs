@@ -2,7 +2,7 @@
 
 use super::Neighborhoods;
 use super::best::Best;
-use crate::{Error, RecordId};
+use crate::{About, Error, RecordId, RowOrder};
 
 /// The union of several sources' lists, cut to the `k` best records of each slot.
 ///
@@ -31,6 +31,7 @@ pub fn join(
     if lists.is_empty() {
         return Err(Error::new("joined neighborhoods", "at least one source", "none"));
     }
+    let about = about(lists)?;
     let surprises: Vec<Vec<f32>> = lists.iter().map(surprises).collect();
     let (mut offsets, mut records, mut scores) = (vec![0u64], Vec::new(), Vec::new());
     let names = only_ranks.iter().any(|ranks| !ranks);
@@ -57,7 +58,27 @@ pub fn join(
         }
         offsets.push(records.len() as u64);
     }
-    Neighborhoods::try_new(offsets, records, Some(scores), n_records, slots_per_record)
+    let joined =
+        Neighborhoods::try_new(offsets, records, Some(scores), n_records, slots_per_record)?;
+    Ok(joined.with_about(about))
+}
+
+/// What the union of `lists` is about. Rows are counted as by those that know how: descriptors tell the two points
+/// of a paired line apart, records alone do not.
+fn about(lists: &[Neighborhoods]) -> Result<About, Error> {
+    let mut union = lists[0].about();
+    for lists in &lists[1..] {
+        let About { map, order } = lists.about();
+        if let Some(of) = union.map {
+            of.expect(map)?;
+        }
+        union.map = union.map.or(map);
+        if order != union.order {
+            let knows = [union.order, order].contains(&RowOrder::DescriptorRows);
+            union.order = if knows { RowOrder::DescriptorRows } else { RowOrder::Unstated };
+        }
+    }
+    Ok(union)
 }
 
 /// Per entry `-ln` of the share of all entries that score as high; equal scores share their ranks.

@@ -1,15 +1,17 @@
 //! The list of records per slot, in compressed rows.
 
-use crate::{Error, RecordId};
+use crate::{About, Error, RecordId};
 
 /// Per slot the records said to hide its neighbors, in ascending order of record id: an order by
 /// nearness would tell more than a set does. Where the lists came from, and how many of them are
-/// right, is not stored here: the attacker does not know it.
+/// right, is not stored here: the attacker does not know it. Which map they are of, and what rows are counted by, is:
+/// positions made from lists mean nothing without it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Neighborhoods {
     offsets: Vec<u64>,
     records: Vec<RecordId>,
     scores: Option<Vec<f32>>,
+    about: About,
 }
 
 impl Neighborhoods {
@@ -79,7 +81,18 @@ impl Neighborhoods {
                 ));
             }
         }
-        Ok(Self { offsets, records, scores })
+        Ok(Self { offsets, records, scores, about: About::default() })
+    }
+
+    /// The same lists, said to be of a released map and counted in an order.
+    #[must_use]
+    pub fn with_about(self, about: About) -> Self {
+        Self { about, ..self }
+    }
+
+    /// Which released map the lists are of, and what their rows are counted by.
+    pub fn about(&self) -> About {
+        self.about
     }
 
     /// Number of slots.

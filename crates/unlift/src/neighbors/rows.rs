@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::Neighborhoods;
 use crate::descriptors::Values;
 use crate::released::Released;
-use crate::{Descriptors, Error, RecordId};
+use crate::{About, Descriptors, Error, RecordId, RowOrder};
 
 fn records_of(slots: &[u32], slots_per_record: usize) -> Vec<u32> {
     slots.iter().map(|&slot| slot / slots_per_record as u32).collect()
@@ -23,6 +23,7 @@ pub struct Rows<'a> {
     pub records: Vec<u32>,
     n_records: usize,
     slots_per_record: usize,
+    about: About,
 }
 
 impl<'a> Rows<'a> {
@@ -53,7 +54,8 @@ impl<'a> Rows<'a> {
         }
         let slots_per_record = released.slots_per_record();
         let records = records_of(&slots, slots_per_record);
-        Ok(Self { descriptors, slots, records, n_records, slots_per_record })
+        let about = About { map: Some(released.fingerprint()), order: RowOrder::DescriptorRows };
+        Ok(Self { descriptors, slots, records, n_records, slots_per_record, about })
     }
 
     /// All rows of `descriptors` as they stand, each a record of its own.
@@ -64,6 +66,7 @@ impl<'a> Rows<'a> {
             records: slots.clone(),
             n_records: slots.len(),
             slots_per_record: 1,
+            about: About::default(),
             slots,
         }
     }
@@ -106,12 +109,8 @@ impl<'a> Rows<'a> {
             }
             offsets.push(records.len() as u64);
         }
-        Neighborhoods::try_new(
-            offsets,
-            records,
-            Some(scores),
-            self.n_records,
-            self.slots_per_record,
-        )
+        let (n_records, slots) = (self.n_records, self.slots_per_record);
+        let lists = Neighborhoods::try_new(offsets, records, Some(scores), n_records, slots)?;
+        Ok(lists.with_about(self.about))
     }
 }

@@ -202,5 +202,6 @@ pub fn obfuscate<const D: usize>(
     .with_bounds(bounds);
     let secret =
         Secret::try_new(hidden, swapped_axis, descriptor_row, lifted.dropped, points.len())?;
+    let secret = secret.of_map(Some(released.fingerprint()), slots)?;
     Ok((released, secret))
 }

@@ -30,10 +30,10 @@ pub use ransac::TrialHistogram;
 pub(crate) use recovered::stored_support;
 pub use recovered::{Estimate, Recovered, Status};
 
-use crate::Error;
 use crate::density::{published, tomography};
 use crate::neighbors::Neighborhoods;
 use crate::released::{Obfuscation, Released};
+use crate::{About, Error};
 use chunks::Chunks;
 use confidence::Solved;
 use delta::Prefer;
@@ -91,6 +91,9 @@ pub fn recover_and_look<const D: usize>(
         let expected = format!("records below {n_records}");
         return Err(Error::new("neighborhoods", expected, record.0.to_string()));
     }
+    let map = released.fingerprint();
+    map.expect(lists.about().map)?;
+    let about = About { map: Some(map), order: lists.about().order };
     let descriptor_row = assign::descriptor_rows(released, lists);
     let peaks = match options.solver {
         Solver::Density => Some(published(released)),
@@ -100,7 +103,7 @@ pub fn recover_and_look<const D: usize>(
     if let Some(peaks) = peaks {
         // Nothing is known yet about how sure these are.
         let placed = density::place(released, lists, &peaks, descriptor_row)?;
-        return Ok((placed, Seen::NOTHING));
+        return Ok((placed.with_about(about), Seen::NOTHING));
     }
     let family = Family::new(released, lists);
     // Joint recovery also asks who lists whom, from the first pass on.
@@ -157,7 +160,8 @@ pub fn recover_and_look<const D: usize>(
     let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
     let (origin, unit) = (released.origin(), released.unit());
     let recovered = Recovered::try_new(estimates, with_axis, descriptor_row, origin, unit, delta)?
-        .with_trials(trials);
+        .with_trials(trials)
+        .with_about(about);
     // Its constants come from maps: in images nobody has compared them with what comes true.
     if !options.confidence || D == 2 {
         return Ok((recovered, Seen::NOTHING));

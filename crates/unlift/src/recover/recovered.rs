@@ -1,7 +1,7 @@
 //! The result of recovery: a position or a reason, per slot.
 
 use super::{Confidence, TrialHistogram};
-use crate::{Error, Unit};
+use crate::{About, Error, Unit};
 
 /// What became of a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -81,6 +81,7 @@ pub struct Recovered<const D: usize> {
     descriptor_row: Option<Vec<u32>>,
     confidence: Option<Vec<Confidence>>,
     trials: Option<TrialHistogram>,
+    about: About,
 }
 
 impl<const D: usize> Recovered<D> {
@@ -124,7 +125,20 @@ impl<const D: usize> Recovered<D> {
             descriptor_row,
             confidence: None,
             trials: None,
+            about: About::default(),
         })
+    }
+
+    /// The same positions, said to be of a released map and counted in an order: that of the lists they were
+    /// made from.
+    #[must_use]
+    pub fn with_about(self, about: About) -> Self {
+        Self { about, ..self }
+    }
+
+    /// Which released map the positions are of, and what their rows are counted by.
+    pub fn about(&self) -> About {
+        self.about
     }
 
     /// Number of slots.

@@ -5,6 +5,7 @@
 
 mod axis_candidates;
 mod axis_planes;
+mod fingerprint;
 mod lines;
 mod rays;
 
@@ -14,7 +15,7 @@ pub use lines::Lines;
 pub use rays::Rays;
 
 use crate::geometry::frame::Bounds;
-use crate::{Descriptors, Error, Unit};
+use crate::{Descriptors, Error, Fingerprint, Unit};
 
 /// The records of a map: what the set `O(x)` of Eq. (1) is for each hidden point.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,6 +76,7 @@ pub struct Released<const D: usize> {
     unit: Unit,
     descriptors: Option<Descriptors>,
     bounds: Option<Bounds<D>>,
+    fingerprint: Fingerprint,
 }
 
 impl<const D: usize> Released<D> {
@@ -107,20 +109,41 @@ impl<const D: usize> Released<D> {
             let expected = format!("{n_slots} rows, one per slot");
             return Err(Error::new("descriptors", expected, descriptors.len().to_string()));
         }
-        Ok(Self { obfuscation, slots_per_record, origin, unit, descriptors, bounds: None })
+        let fingerprint = Fingerprint([0; 16]);
+        let bare = Self {
+            obfuscation,
+            slots_per_record,
+            origin,
+            unit,
+            descriptors,
+            bounds: None,
+            fingerprint,
+        };
+        Ok(Self { fingerprint: fingerprint::of(&bare), ..bare })
     }
 
     /// The same map, every hidden point of which is known to lie within `bounds` (in the map's frame):
     /// the size of an image is public.
     #[must_use]
     pub fn with_bounds(self, bounds: Option<Bounds<D>>) -> Self {
-        Self { bounds, ..self }
+        let known = self.bounds.is_some() || bounds.is_some();
+        let bounded = Self { bounds, ..self };
+        match known {
+            true => Self { fingerprint: fingerprint::of(&bounded), ..bounded },
+            false => bounded,
+        }
     }
 
     /// The box in which every hidden point is known to lie, in the map's frame; `None` where nothing is
     /// known.
     pub fn bounds(&self) -> Option<Bounds<D>> {
         self.bounds
+    }
+
+    /// What tells this map from others: a hash of all that is released. Lists and positions made from the map
+    /// carry it.
+    pub fn fingerprint(&self) -> Fingerprint {
+        self.fingerprint
     }
 
     /// The records, about [`origin`](Self::origin).

@@ -1,6 +1,6 @@
 //! What an obfuscation hides: which original sits in which slot, and by which choice.
 
-use crate::{Error, OriginalId};
+use crate::{Error, Fingerprint, OriginalId};
 
 /// Why a scheme's rule left a point out of the released map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -53,11 +53,14 @@ pub struct Secret {
     descriptor_row: Vec<u32>,
     dropped: Vec<Dropped>,
     n_originals: usize,
+    slots_per_record: usize,
+    map: Option<Fingerprint>,
 }
 
 impl Secret {
     /// Columns over slots: `hidden` (the original in each slot), `swapped_axis` (`cp` only),
-    /// `descriptor_row` (the released descriptor row that belongs to the slot), and the dropped points.
+    /// `descriptor_row` (the released descriptor row that belongs to the slot), and the dropped points. Records are
+    /// taken to hide two points each where a descriptor row is not its slot's own.
     ///
     /// # Errors
     /// When columns differ in length, or an original is neither in exactly one slot nor dropped
@@ -104,7 +107,41 @@ impl Secret {
                 "neither",
             ));
         }
-        Ok(Self { hidden, swapped_axis, descriptor_row, dropped, n_originals })
+        let paired = descriptor_row.iter().enumerate().any(|(slot, &row)| row as usize != slot);
+        let slots_per_record = 1 + usize::from(paired);
+        let map = None;
+        Ok(Self {
+            hidden,
+            swapped_axis,
+            descriptor_row,
+            dropped,
+            n_originals,
+            slots_per_record,
+            map,
+        })
+    }
+
+    /// The same secret, of the released map `map` whose records hide `slots_per_record` points each.
+    ///
+    /// # Errors
+    /// When slots do not fill the records.
+    pub fn of_map(self, map: Option<Fingerprint>, slots_per_record: usize) -> Result<Self, Error> {
+        let whole = slots_per_record > 0 && self.n_slots().is_multiple_of(slots_per_record);
+        if !whole {
+            let expected = format!("a number that divides {} slots", self.n_slots());
+            return Err(Error::new("slots per record", expected, slots_per_record.to_string()));
+        }
+        Ok(Self { map, slots_per_record, ..self })
+    }
+
+    /// The released map that this is the secret of; `None` where it is not known.
+    pub fn map(&self) -> Option<Fingerprint> {
+        self.map
+    }
+
+    /// Hidden points per record.
+    pub fn slots_per_record(&self) -> usize {
+        self.slots_per_record
     }
 
     /// Number of slots.

@@ -5,15 +5,27 @@ use std::collections::BTreeSet;
 use crate::rust::{Source, internal_paths, paths, tokens};
 
 /// What every module may import.
-const VOCABULARY: &[&str] = &["error", "ids", "seed", "points", "descriptors", "geometry", "simd"];
+const VOCABULARY: &[&str] =
+    &["error", "ids", "seed", "points", "descriptors", "geometry", "simd", "about"];
 /// What the root exports: vocabulary under shorter names.
-const ROOT_NAMES: &[&str] = &["Error", "OriginalId", "RecordId", "PointSet", "Unit", "Descriptors"];
+const ROOT_NAMES: &[&str] = &[
+    "Error",
+    "OriginalId",
+    "RecordId",
+    "PointSet",
+    "Unit",
+    "Descriptors",
+    "About",
+    "Fingerprint",
+    "RowOrder",
+];
 
 /// Per module the stages it may import, a row that ends in `/` for a folder within one. A new
 /// module needs a row here, and a reason.
 const ARROWS: &[(&str, &[&str])] = &[
     ("error", &[]),
     ("ids", &[]),
+    ("about", &[]),
     ("seed", &[]),
     ("points", &[]),
     ("descriptors", &[]),
@@ -33,7 +45,7 @@ const ARROWS: &[(&str, &[&str])] = &[
 ];
 
 /// Dependencies of the core: light, and known for long.
-pub const DEPENDENCIES: &[&str] = &["libm", "rayon", "nalgebra"];
+pub const DEPENDENCIES: &[&str] = &["libm", "rayon", "nalgebra", "sha2"];
 
 /// What a crate of this workspace may import of the others.
 pub const CRATES: &[(&str, &[&str])] = &[

@@ -9,7 +9,7 @@ use unlift::recover::{Delta, RecoverOptions, Recovered, Solver, recover};
 use unlift::released::{Obfuscation, Released};
 use unlift::seed::{Draws, Stage};
 use unlift::truth::{Original, Secret};
-use unlift::{Error, PointSet, RecordId, Unit};
+use unlift::{About, Error, PointSet, RecordId, RowOrder, Unit};
 
 /// Few cases, really random ones; a failure prints its arguments.
 pub fn cases(n: u32) -> ProptestConfig {
@@ -100,7 +100,8 @@ pub fn lists_of(rows: &[Vec<u32>], n_records: usize, slots_per_record: usize) ->
         records.extend(row.iter().map(|&record| RecordId(record)));
         offsets.push(records.len() as u64);
     }
-    Neighborhoods::try_new(offsets, records, None, n_records, slots_per_record).unwrap()
+    let lists = Neighborhoods::try_new(offsets, records, None, n_records, slots_per_record);
+    lists.unwrap().with_about(About { map: None, order: RowOrder::Slots })
 }
 
 /// Uniformly random lists of `k` records: neighborhoods that tell nothing.

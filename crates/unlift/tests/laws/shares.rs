@@ -1,8 +1,10 @@
 //! Laws about shares of a whole map: equivariance, and random lists against the blind attacker.
 
-use unlift::evaluate::{blind, evaluate, in_better_order};
+use unlift::evaluate::{blind, evaluate};
 use unlift::obfuscate::Scheme;
 use unlift::recover::{RecoverOptions, Solver};
+
+use unlift::{About, RowOrder};
 
 use crate::maps::*;
 
@@ -100,12 +102,21 @@ fn pairs_in_better_order_do_not_depend_on_the_order() {
     let hidden = try_hide(ppl, &points, 0.5, 7).unwrap();
     let lists = hidden.lists(20, 0.6, 7);
     let recovered = solve(&hidden.released, &lists, RecoverOptions::default());
-    let percent = |secret: &unlift::truth::Secret| {
+    let percent = |order: RowOrder, secret: &unlift::truth::Secret| {
+        let recovered = recovered.clone().with_about(About { order, ..recovered.about() });
         evaluate(&recovered, &hidden.original, secret).unwrap().percent_within(0.25)
     };
     let turned = hidden.secret.exchanged(|first| first % 6 == 0);
-    assert!(percent(&turned) < percent(&hidden.secret) - 10.0);
-    let better = |secret| percent(&in_better_order(&recovered, &hidden.original, secret));
+    let by_slot = |secret| percent(RowOrder::Slots, secret);
+    assert!(by_slot(&turned) < by_slot(&hidden.secret) - 10.0);
+    let better = |secret| percent(RowOrder::Either, secret);
     assert_eq!(better(&turned), better(&hidden.secret));
-    assert!(better(&turned) >= percent(&hidden.secret));
+    assert!(better(&turned) >= by_slot(&hidden.secret));
+    // Who does not say how rows are counted is never credited with less than by any order.
+    let unstated = percent(RowOrder::Unstated, &turned);
+    assert_eq!(unstated, percent(RowOrder::Unstated, &hidden.secret));
+    for order in RowOrder::STATED {
+        assert!(unstated >= percent(order, &hidden.secret), "{order:?}");
+        assert!(unstated >= percent(order, &turned), "{order:?}");
+    }
 }

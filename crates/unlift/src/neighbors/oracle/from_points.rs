@@ -3,7 +3,7 @@
 use super::walk::record_of_originals;
 use crate::neighbors::Neighborhoods;
 use crate::truth::Secret;
-use crate::{Error, RecordId};
+use crate::{About, Error, RecordId, RowOrder};
 
 /// Translates neighbors given by original row (as an owner lists them) to the records of one
 /// obfuscation: dropped points, own records and repeats fall away.
@@ -58,5 +58,6 @@ pub fn from_points(
         rows.push(records.len() as u64);
     }
     let n_records = secret.n_slots() / slots_per_record;
-    Neighborhoods::try_new(rows, records, kept_scores, n_records, slots_per_record)
+    let lists = Neighborhoods::try_new(rows, records, kept_scores, n_records, slots_per_record)?;
+    Ok(lists.with_about(About { map: secret.map(), order: RowOrder::Slots }))
 }

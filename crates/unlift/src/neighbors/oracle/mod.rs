@@ -17,7 +17,7 @@ use super::Neighborhoods;
 use crate::geometry::knn::Knn;
 use crate::seed::{Draws, Stage};
 use crate::truth::{Original, Secret};
-use crate::{Error, RecordId};
+use crate::{About, Error, Fingerprint, RecordId, RowOrder};
 
 /// The true neighborhoods of every slot: the first K records met by walking outward from its
 /// original in order of (distance, original id). Never the slot's own, each once (a paired line may
@@ -27,6 +27,7 @@ pub struct TrueNeighbors {
     k: usize,
     n_records: usize,
     slots_per_record: usize,
+    map: Option<Fingerprint>,
     /// K records per slot, in order of nearness: never released in this order.
     records: Vec<RecordId>,
 }
@@ -53,7 +54,7 @@ impl TrueNeighbors {
         Walk::new(knn, secret, slots_per_record).each(k, &mut records, |_, near, row| {
             row.copy_from_slice(near);
         });
-        Ok(Self { k, n_records, slots_per_record, records })
+        Ok(Self { k, n_records, slots_per_record, map: secret.map(), records })
     }
 
     /// Neighborhoods of which `round(inlier_ratio * K)` entries are true neighbors, uniformly
@@ -90,7 +91,9 @@ impl TrueNeighbors {
         });
         let n_slots = self.n_records * self.slots_per_record;
         let offsets = (0..=n_slots as u64).map(|slot| slot * self.k as u64).collect();
-        Neighborhoods::try_new(offsets, records, None, self.n_records, self.slots_per_record)
+        let (n_records, slots) = (self.n_records, self.slots_per_record);
+        let lists = Neighborhoods::try_new(offsets, records, None, n_records, slots)?;
+        Ok(lists.with_about(About { map: self.map, order: RowOrder::Slots }))
     }
 
     /// [`lists`](Self::lists) with uniformly random outliers.

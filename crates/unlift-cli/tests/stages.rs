@@ -1,0 +1,168 @@
+//! The stages as a user chains them: the audit's figures, and no file of another map.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+use unlift::About;
+use unlift_io::stage::{read_neighborhoods, read_recovered, write_neighborhoods, write_recovered};
+
+/// A folder of its own per test, with a small map and made-up descriptors in it.
+struct Place(tempfile::TempDir);
+
+const POINTS: u32 = 400;
+
+impl Place {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let rows = unlift::synthetic::room(1, POINTS as usize).points;
+        let text: String = rows.iter().map(|[x, y, z]| format!("{x},{y},{z}\n")).collect();
+        std::fs::write(folder.path().join("room.csv"), text).expect("a writable folder");
+        let mut bytes = b"P3DESC01".to_vec();
+        bytes.extend(u64::from(POINTS).to_le_bytes());
+        bytes.extend(128u32.to_le_bytes());
+        bytes.extend(1u32.to_le_bytes());
+        (0..u64::from(POINTS)).for_each(|id| bytes.extend(id.to_le_bytes()));
+        for row in &rows {
+            let wave = |c: u32| {
+                let phase = row[0] + row[1] * f64::from(c % 3) + row[2] * f64::from(c % 5);
+                (60.0 + 55.0 * (phase + f64::from(c * c)).sin()) as u8
+            };
+            bytes.extend((0..128).map(wave));
+        }
+        std::fs::write(folder.path().join("d.bin"), bytes).expect("a writable folder");
+        Self(folder)
+    }
+
+    fn path(&self) -> &Path {
+        self.0.path()
+    }
+
+    fn run(&self, line: &str) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_unlift"))
+            .args(line.split_whitespace())
+            .current_dir(self.path())
+            .output()
+            .expect("the program starts")
+    }
+
+    /// Standard output and standard error of a run that must end with `code`.
+    fn ends(&self, line: &str, code: i32) -> (String, String) {
+        let output = self.run(line);
+        let stderr = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(code), "{line}\n{stderr}");
+        (String::from_utf8(output.stdout).expect("UTF-8"), stderr)
+    }
+
+    fn json(&self, line: &str) -> Value {
+        serde_json::from_str(&self.ends(line, 0).0).expect("JSON")
+    }
+
+    /// An obfuscation, oracle lists and recovered points in the folder `name`.
+    fn chain(&self, name: &str, scheme: &str, seed: u32) {
+        let map = "room.csv --scale 1 --k 10 --descriptors d.bin";
+        self.ends(&format!("obfuscate {map} --scheme {scheme} --seed {seed} --out {name}"), 0);
+        let oracle = format!("neighbors oracle {name}/truth.parquet --k 10 --inlier-ratio 0.5");
+        self.ends(&format!("{oracle} --seed {seed} --out {name}-lists"), 0);
+        let recover = format!("recover {name}/released.parquet --neighbors {name}-lists");
+        self.ends(&format!("{recover} --seed {seed} --out {name}-back"), 0);
+    }
+}
+
+/// The same `--seed` everywhere: `evaluate` prints the row of the audit, figure by figure.
+#[test]
+fn the_stages_print_the_row_of_the_audit() {
+    let place = Place::new();
+    for scheme in ["ppl", "cp"] {
+        place.chain("hidden", scheme, 7);
+        let audit = format!(
+            "audit map room.csv --scale 1 --k 10 --descriptors d.bin --seed 7 --schemes {scheme} \
+             --inlier-ratios 0.5 --neighbors oracle --neighbors overlap --neighbors geometric --json"
+        );
+        let audit = place.json(&audit);
+        for source in ["oracle", "overlap", "geometric"] {
+            if source != "oracle" {
+                let find = format!("neighbors find hidden/released.parquet --source {source}");
+                place.ends(&format!("{find} --seed 7 --out hidden-lists"), 0);
+                let recover = "recover hidden/released.parquet --neighbors hidden-lists --seed 7";
+                place.ends(&format!("{recover} --out hidden-back"), 0);
+            }
+            let staged = place.json("evaluate hidden-back --truth hidden/truth.parquet --json");
+            let rows = audit["results"].as_array().expect("rows");
+            // The strongest attack of a source may have rows of other solvers beside it.
+            let row = rows.iter().find(|r| r["neighbors"] == source && r["solver"] == "joint");
+            let mut row = row.expect("a row").as_object().expect("a row").clone();
+            for name in ["scheme", "neighbors", "oracle_noise", "inlier_ratio", "k", "solver"] {
+                assert!(row.remove(name).is_some(), "{name}");
+            }
+            row.retain(|name, _| staged.get(name).is_some() || !name.starts_with("records_alone"));
+            assert_eq!(Value::Object(row), staged, "{scheme} {source}");
+        }
+    }
+}
+
+#[test]
+fn files_of_another_map_are_refused() {
+    let place = Place::new();
+    place.chain("one", "ppl", 1);
+    // As many points and records; only the released content differs.
+    place.chain("two", "ppl", 2);
+    for (line, file, of) in [
+        ("evaluate one-back --truth two/truth.parquet", "one-back", "two/truth.parquet"),
+        (
+            "evaluate one-back --truth one/truth.parquet --released two/released.parquet",
+            "two/released.parquet",
+            "one/truth.parquet",
+        ),
+        (
+            "recover one/released.parquet --neighbors two-lists --out x",
+            "two-lists",
+            "one/released.parquet",
+        ),
+        (
+            "neighbors oracle one/truth.parquet --released two/released.parquet --inlier-ratio 1 --out x",
+            "two/released.parquet",
+            "one/truth.parquet",
+        ),
+    ] {
+        let (stdout, stderr) = place.ends(line, 3);
+        assert!(stdout.is_empty() && stderr.lines().count() == 1, "{line}\n{stderr}");
+        assert!(stderr.starts_with(&format!("unlift: {file}: fingerprint: expected ")), "{stderr}");
+        assert!(stderr.contains(&format!("that of the released map of {of}, found ")), "{stderr}");
+        assert!(!place.path().join("x").exists(), "{line}");
+    }
+}
+
+/// What somebody else wrote does not say which map it is of: it is taken, and told, unless its positions lie where
+/// only those of another map would.
+#[test]
+fn files_that_do_not_say_are_taken_with_a_note() {
+    let place = Place::new();
+    place.chain("one", "ppl", 1);
+    place.chain("two", "ppl", 2);
+    let at = |name: &str| place.path().join(name);
+    let records = POINTS as usize / 2;
+    let lists = read_neighborhoods(&at("one-lists"), records, 2).unwrap();
+    write_neighborhoods(&at("bare-lists"), &lists.with_about(About::default())).unwrap();
+    let recover = "recover one/released.parquet --neighbors bare-lists --out bare-back --seed 1";
+    let (_, stderr) = place.ends(recover, 0);
+    assert!(stderr.contains("unlift: note: bare-lists: says not which released map"), "{stderr}");
+    assert!(stderr.contains("says not what its rows are counted by"), "{stderr}");
+
+    let back = read_recovered::<3>(&at("one-back")).unwrap();
+    write_recovered(&at("bare-back"), &back.with_about(About::default())).unwrap();
+    let line = "evaluate bare-back --truth one/truth.parquet --json";
+    let (stdout, stderr) = place.ends(line, 0);
+    assert_eq!(stderr.lines().count(), 2, "{stderr}");
+    let bare: Value = serde_json::from_str(&stdout).unwrap();
+    let stated = place.json("evaluate one-back --truth one/truth.parquet --json");
+    for threshold in ["0.10", "0.25"] {
+        let share = |row: &Value| row["recovered_percent"][threshold].as_f64().unwrap();
+        assert!(share(&bare) >= share(&stated), "{threshold}");
+    }
+
+    let (stdout, stderr) = place.ends("evaluate bare-back --truth two/truth.parquet", 3);
+    assert!(stdout.is_empty(), "{stdout}");
+    let start = "unlift: bare-back: expected positions nearer to their own points than to those of other records";
+    assert!(stderr.starts_with(start), "{stderr}");
+}

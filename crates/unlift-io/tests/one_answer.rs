@@ -1,0 +1,221 @@
+//! One answer: the stages through files, and the audit in memory, give the same row, bit for bit.
+//!
+//! Every scheme with every source. What files do not keep (the trials of `ransac`) is left out.
+
+use std::path::Path;
+
+use unlift::audit::{self, Cell, Observer, Plan, PointNeighbors, Row, Source, Variant, measure};
+use unlift::descriptors::Values;
+use unlift::evaluate::blind;
+use unlift::geometry::frame::Bounds;
+use unlift::neighbors::Neighborhoods;
+use unlift::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
+use unlift::neighbors::sources::Joined;
+use unlift::obfuscate::{Entry, obfuscate};
+use unlift::recover::{RecoverOptions, Solver, recover};
+use unlift::seed::{Draws, Stage};
+use unlift::truth::Original;
+use unlift::{Descriptors, PointSet, Unit};
+use unlift_io::stage;
+
+/// A seed that is no default anywhere: all stages are given it.
+const SEED: u64 = 7;
+
+/// SIFT-like bytes that change slowly over the map: waves of several lengths in every direction.
+fn descriptors<const D: usize>(points: &[[f64; D]], extent: f64) -> Descriptors {
+    let value = |point: &[f64; D], bin: usize| {
+        let mut draws = Draws::new(99, Stage::Synthetic, bin as u64);
+        let phase: f64 = point.iter().map(|x| draws.between(-9.0, 9.0) * x / extent).sum();
+        (60.0 + 55.0 * (phase + draws.between(0.0, 6.0)).sin()) as u8
+    };
+    let bytes = points.iter().flat_map(|point| (0..128).map(|bin| value(point, bin)));
+    Descriptors::try_new(Values::U8(bytes.collect()), 128).unwrap()
+}
+
+/// Every source: the oracle at two ratios with three kinds of noise, all that work alone, and lists by point.
+fn sources<const D: usize>(k: usize) -> Vec<Source> {
+    let joined = |name: &str| Joined::parse(name).unwrap().with_k(k);
+    let own = ["similarity", "overlap", "geometric", "overlap+geometric"].map(joined);
+    let own = own.into_iter().filter(|own| own.not_in_dimension::<D>().is_none());
+    let mut sources = vec![Source::Oracle];
+    sources.extend(own.map(Source::Own));
+    sources
+}
+
+/// Lists by point: the next rows of the map, some lists empty.
+fn given(n: usize) -> Source {
+    let row = |point: usize| (1..=(point % 9)).map(move |step| ((point + step) % n) as u32);
+    let mut offsets = vec![0];
+    let mut neighbors: Vec<u32> = Vec::new();
+    for point in 0..n {
+        neighbors.extend(row(point));
+        offsets.push(neighbors.len() as u64);
+    }
+    Source::Given(PointNeighbors { name: "file".into(), offsets, neighbors, scores: None })
+}
+
+/// The rows of the stages, one per variant and solver: every arrow between two stages goes through a file.
+fn staged<const D: usize>(
+    folder: &Path,
+    entry: &Entry,
+    original: &Original<D>,
+    descriptors: &Descriptors,
+    plan: &Plan,
+    owner: u64,
+) -> Vec<Row> {
+    let path = |name: &str| folder.join(name);
+    let scheme = entry.of_dimension::<D>().unwrap();
+    let (released, secret) =
+        obfuscate(scheme, original, Some(descriptors), &plan.scheme_options, owner).unwrap();
+    stage::write_released(&path("released.parquet"), &released).unwrap();
+    stage::write_truth(&path("truth.parquet"), original, &secret).unwrap();
+    drop((released, secret));
+    let mut rows = Vec::new();
+    for variant in &plan.variants() {
+        let lists = lists::<D>(folder, variant, plan, owner);
+        stage::write_neighborhoods(&path("lists.parquet"), &lists).unwrap();
+        for &solver in &plan.solvers {
+            let released = stage::read_released::<D>(&path("released.parquet")).unwrap();
+            let (n, slots) = (released.n_records(), released.slots_per_record());
+            let lists = stage::read_neighborhoods(&path("lists.parquet"), n, slots).unwrap();
+            let options = RecoverOptions { solver, seed: SEED, ..RecoverOptions::default() };
+            let recovered = recover(&released, &lists, &options).unwrap();
+            stage::write_recovered(&path("back.parquet"), &recovered).unwrap();
+            let back = stage::read_recovered::<D>(&path("back.parquet")).unwrap();
+            let (original, secret) = stage::read_truth::<D>(&path("truth.parquet")).unwrap();
+            let baseline = blind(&released, &original, &secret);
+            let measured =
+                measure(&back, &original, &secret, Some(&baseline), &plan.thresholds).unwrap();
+            rows.push(measured.0);
+        }
+    }
+    rows
+}
+
+/// The lists of one variant, made from files alone.
+fn lists<const D: usize>(
+    folder: &Path,
+    variant: &Variant<'_>,
+    plan: &Plan,
+    owner: u64,
+) -> Neighborhoods {
+    let released = stage::read_released::<D>(&folder.join("released.parquet")).unwrap();
+    let (original, secret) = stage::read_truth::<D>(&folder.join("truth.parquet")).unwrap();
+    let slots = secret.slots_per_record();
+    match variant.source {
+        Source::Own(joined) => joined.make(&released, SEED).unwrap(),
+        Source::Given(points) => {
+            oracle::from_points(&points.offsets, &points.neighbors, None, &secret, slots).unwrap()
+        }
+        Source::Oracle => {
+            let knn = oracle::search(&original).unwrap();
+            let near = TrueNeighbors::new(&knn, &secret, slots, plan.k).unwrap();
+            let noise = variant.noise.unwrap();
+            let outliers = Outliers::new(noise, &near, &knn, &secret, owner).unwrap();
+            near.lists(variant.inlier_ratio.unwrap(), &outliers, owner).unwrap()
+        }
+    }
+}
+
+/// `row` without what a file of recovered points cannot say.
+fn without_name(row: &Row) -> Row {
+    Row {
+        scheme: "",
+        neighbors: String::new(),
+        oracle_noise: None,
+        inlier_ratio: 0.0,
+        k: 0,
+        solver: "",
+        distinct: None,
+        ..row.clone()
+    }
+}
+
+fn plan(unit: Unit, entry: &'static Entry, sources: Vec<Source>) -> Plan {
+    let mut plan = Plan::new(unit);
+    plan.schemes = vec![entry];
+    plan.sources = sources;
+    plan.sources.retain(|source| match source {
+        Source::Own(joined) => joined.fails_on(entry.name).is_none(),
+        Source::Oracle | Source::Given(_) => true,
+    });
+    plan.k = 8;
+    plan.oracle_noise = vec![Noise::Uniform, Noise::Near, Noise::Clustered];
+    plan.inlier_ratios = vec![1.0, 0.3];
+    plan.solvers = vec![Solver::Joint, Solver::Consensus];
+    plan.seed = SEED;
+    plan
+}
+
+fn assert_equal(scheme: &str, audited: &[Row], staged: &[Row]) {
+    assert_eq!(audited.len(), staged.len(), "{scheme}");
+    for (audited, staged) in audited.iter().zip(staged) {
+        let what = format!("{scheme} {} {}", audited.neighbors, audited.solver);
+        assert_eq!(without_name(audited), *staged, "{what} {:?}", audited.oracle_noise);
+    }
+}
+
+#[test]
+fn maps() {
+    let folder = tempfile::tempdir().unwrap();
+    let points = unlift::synthetic::room(4, 260).points;
+    let descriptors = descriptors(&points, 3.0);
+    let original = Original::new(PointSet::try_new(points.clone(), Unit::Meter).unwrap());
+    for entry in unlift::obfuscate::SCHEMES.iter().filter(|entry| entry.in_3d.is_some()) {
+        let mut all = sources::<3>(9);
+        all.push(given(points.len()));
+        let plan = plan(Unit::Meter, entry, all);
+        let audited = audit::run(&original, Some(&descriptors), &plan, &mut audit::Silent).unwrap();
+        let staged = staged(folder.path(), entry, &original, &descriptors, &plan, SEED);
+        assert!(audited.rows.iter().any(|row| row.recovered_percent[1] > 5.0), "{}", entry.name);
+        assert_equal(entry.name, &audited.rows, &staged);
+    }
+}
+
+/// Keeps nothing: rows come with the image.
+struct Unseen;
+
+impl Observer<2> for Unseen {
+    fn cell(&mut self, _: &Cell<'_, 2>) {}
+}
+
+struct Rows(Vec<Row>);
+
+impl audit::images::Watcher for Rows {
+    type OfImage = Unseen;
+
+    fn begin(&mut self) -> Unseen {
+        Unseen
+    }
+
+    fn image(&mut self, _: &str, rows: &[Row], _: Unseen) {
+        self.0.extend_from_slice(rows);
+    }
+}
+
+/// The stage commands are for maps; the library's stages and files are for images as well.
+#[test]
+fn images() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut draws = Draws::new(5, Stage::Synthetic, 1);
+    let points: Vec<[f64; 2]> =
+        (0..220).map(|_| [draws.between(0.0, 639.0), draws.between(0.0, 479.0)]).collect();
+    let descriptors = descriptors(&points, 200.0);
+    let bounds = Bounds::try_new([-0.5, -0.5], [639.5, 479.5]).unwrap();
+    let set = PointSet::try_new(points.clone(), Unit::Pixel).unwrap();
+    let original = Original::within(set, bounds).unwrap();
+    for entry in unlift::obfuscate::SCHEMES.iter().filter(|entry| entry.in_2d.is_some()) {
+        let plan = plan(Unit::Pixel, entry, sources::<2>(9));
+        let image = audit::images::Image {
+            name: String::new(),
+            original: original.clone(),
+            descriptors: Some(descriptors.clone()),
+        };
+        let mut audited = Rows(Vec::new());
+        audit::images::run::<unlift::Error>([Ok(image)], &plan, &mut audited).unwrap();
+        // The randomness of an image is that of its name: FNV-1a of no bytes.
+        let owner = Draws::new(SEED, Stage::Image, 0xCBF2_9CE4_8422_2325).bits();
+        let staged = staged(folder.path(), entry, &original, &descriptors, &plan, owner);
+        assert_equal(entry.name, &audited.0, &staged);
+    }
+}
