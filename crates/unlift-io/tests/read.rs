@@ -113,8 +113,90 @@ fn what_lies_beside_the_model_is_noted_or_ignored() {
         "/sparse/0/rigs.bin: header (byte 0): expected 8 bytes of the number of rigs, \
          found 1 byte before the end of the file\n\
          points3D.txt: the binary form beside it was read\n\
-         sparse/1: another model, give its path to read it"
+         sparse/0: read, the largest of 2 models (8 points)\n\
+         sparse/1: another model (8 points), give its path to read it"
     );
+}
+
+/// A copy of the fixture `from` at `to` in `root`.
+fn copy(from: &str, root: &Path, to: &str) {
+    let to = root.join(to);
+    fs::create_dir_all(&to).unwrap();
+    for file in fs::read_dir(data(from)).unwrap() {
+        let file = file.unwrap();
+        fs::copy(file.path(), to.join(file.file_name())).unwrap();
+    }
+}
+
+#[test]
+fn models_are_found_where_programs_put_them() {
+    for place in [
+        "",
+        "0",
+        "sparse",
+        "sparse/0",
+        "sparse/3",
+        "model",
+        "models/0",
+        "models/2",
+        "colmap",
+        "colmap/sparse",
+        "colmap/sparse/0",
+    ] {
+        for (fixture, format) in [("rig-bin", "COLMAP binary"), ("rig-txt", "COLMAP text")] {
+            let dir = tempfile::tempdir().unwrap();
+            copy(fixture, dir.path(), place);
+            let input = read::open(dir.path()).unwrap();
+            assert_eq!((input.format, input.positions.len()), (format, 8), "{place}");
+            assert_eq!(input.model, Some(dir.path().join(place)), "{place}");
+            assert_eq!(input.skipped, [""; 0], "{place}");
+        }
+    }
+}
+
+#[test]
+fn of_several_models_the_largest_is_read_and_told() {
+    // As hloc leaves models that it did not choose, and COLMAP models that it could not join.
+    let dir = tempfile::tempdir().unwrap();
+    copy("project/sparse/0", dir.path(), "sparse/0");
+    copy("rig-txt", dir.path(), "sparse/10");
+    copy("project/sparse/0", dir.path(), "models/2");
+    fs::create_dir_all(dir.path().join("sparse/11")).unwrap();
+    let input = read::open(dir.path()).unwrap();
+    assert_eq!((input.format, input.positions.len()), ("COLMAP text", 8));
+    assert_eq!(
+        input.skipped,
+        [
+            "sparse/10: read, the largest of 3 models (8 points)",
+            "sparse/0: another model (6 points), give its path to read it",
+            "models/2: another model (6 points), give its path to read it",
+        ]
+    );
+    // The folder that was named is meant, be it smaller: hloc's best one stands there.
+    copy("project/sparse/0", dir.path(), "");
+    let input = read::open(dir.path()).unwrap();
+    assert_eq!(input.positions.len(), 6);
+    assert_eq!(
+        input.skipped[0],
+        "the model of the folder itself: read, the first of 4 models (6 points)"
+    );
+}
+
+#[test]
+fn the_database_of_a_project_is_found_from_its_model_as_well() {
+    for (project, model, database) in [
+        ("", "sparse/0", "database.db"),
+        ("", "colmap/sparse/0", "colmap/database.db"),
+        ("sparse/0", "sparse/0", "database.db"),
+        ("sparse", "sparse", "database.db"),
+    ] {
+        let dir = tempfile::tempdir().unwrap();
+        copy("project/sparse/0", dir.path(), model);
+        fs::copy(data("project/database.db"), dir.path().join(database)).unwrap();
+        let input = read::open(&dir.path().join(project)).unwrap();
+        let found = fs::canonicalize(input.database.unwrap()).unwrap();
+        assert_eq!(found, fs::canonicalize(dir.path().join(database)).unwrap(), "{model}");
+    }
 }
 
 #[test]
@@ -259,6 +341,76 @@ fn descriptors_follow_the_ids_of_the_input() {
         let expected = read::descriptors(&path, &all).unwrap().select(&[4, 1]);
         assert_eq!(read::descriptors(&path, &some).unwrap(), expected, "{file}");
     }
+}
+
+/// The descriptors of the project as floats: of norm 1, so that halves hold them too.
+fn unit_floats(input: &Input) -> Vec<f32> {
+    let bytes = read::descriptors(&data("project/descriptors.bin"), input).unwrap();
+    let Values::U8(bytes) = bytes.values() else { panic!("bytes expected") };
+    bytes.iter().map(|&byte| f32::from(byte) / 512.0).collect()
+}
+
+/// The head of a file of the form `P3DESC01` for points `ids` in this order.
+fn p3desc(ids: &[u64], dtype: u32) -> Vec<u8> {
+    let mut file = b"P3DESC01".to_vec();
+    file.extend((ids.len() as u64).to_le_bytes());
+    file.extend(128u32.to_le_bytes());
+    file.extend(dtype.to_le_bytes());
+    ids.iter().for_each(|id| file.extend(id.to_le_bytes()));
+    file
+}
+
+#[test]
+fn binary_descriptors_may_be_floats_of_16_or_32_bits() {
+    let input = read::open(&data("project")).unwrap();
+    let floats = unit_floats(&input);
+    for dtype in [2, 3] {
+        // One point more than the map has, and rows in another order: ids join.
+        let mut file = p3desc(&[1000, 11, 9, 6, 4, 3, 2], dtype);
+        let rows = std::iter::once(&[0.5; 128][..]).chain(floats.chunks(128).rev());
+        for value in rows.flatten() {
+            match dtype {
+                2 => file.extend(half::f16::from_f32(*value).to_le_bytes()),
+                _ => file.extend(value.to_le_bytes()),
+            }
+        }
+        let (_dir, path) = write("d.bin", file);
+        let read = read::descriptors(&path, &input).unwrap();
+        assert_eq!(read.values(), &Values::F32(floats.clone()), "512ths of bytes fit a half");
+    }
+}
+
+#[test]
+fn arrays_of_descriptors_have_a_row_per_point_in_its_order() {
+    let all = read::open(&data("project")).unwrap();
+    let floats = unit_floats(&all);
+    let expected = Values::F32(floats.clone());
+    let array = |descr: &str, fortran: &str, values: Vec<u8>| {
+        let text =
+            format!("{{'descr': '{descr}', 'fortran_order': {fortran}, 'shape': (6, 128), }}");
+        let mut file = b"\x93NUMPY\x01\0".to_vec();
+        file.extend(118u16.to_le_bytes());
+        file.extend(format!("{text:117}\n").bytes());
+        file.extend(values);
+        write("d.npy", file)
+    };
+    let bytes = |of: fn(f32) -> Vec<u8>| floats.iter().flat_map(|&x| of(x)).collect::<Vec<u8>>();
+    for (descr, values) in [
+        ("<f2", bytes(|x| half::f16::from_f32(x).to_le_bytes().to_vec())),
+        (">f2", bytes(|x| half::f16::from_f32(x).to_be_bytes().to_vec())),
+        ("<f4", bytes(|x| x.to_le_bytes().to_vec())),
+        (">f8", bytes(|x| f64::from(x).to_be_bytes().to_vec())),
+    ] {
+        let (_dir, path) = array(descr, "False", values);
+        assert_eq!(read::descriptors(&path, &all).unwrap().values(), &expected, "{descr}");
+    }
+    let columns = (0..128).flat_map(|c| floats.chunks(128).map(move |row| row[c]));
+    let (_dir, path) = array("<f4", "True", columns.flat_map(f32::to_le_bytes).collect());
+    assert_eq!(read::descriptors(&path, &all).unwrap().values(), &expected, "by columns");
+    let of_bytes = read::descriptors(&data("project/descriptors.bin"), &all).unwrap();
+    let Values::U8(values) = of_bytes.values() else { panic!("bytes expected") };
+    let (_dir, path) = array("|u1", "False", values.clone());
+    assert_eq!(read::descriptors(&path, &all).unwrap(), of_bytes);
 }
 
 #[test]

@@ -86,6 +86,32 @@ fn castle_reads_as_pycolmap_reads_it() {
 }
 
 #[test]
+fn learned_descriptors_in_halves_are_read_and_name_neighbors() {
+    let Some(path) = dataset("redkitchen-aliked") else { return };
+    let input = read::open(&path).unwrap();
+    let descriptors = read::descriptors(&path.join("descriptors.bin"), &input).unwrap();
+    assert_eq!((descriptors.len(), descriptors.dim()), (9_972, 128));
+    let Values::F32(values) = descriptors.values() else { panic!("floats expected") };
+    for row in values.chunks(128) {
+        let norm2: f32 = row.iter().map(|x| x * x).sum();
+        // 128 values of about 0.09, rounded to 11 bits.
+        assert!((norm2 - 1.0).abs() < 2e-3, "{norm2}");
+    }
+    let overlap = Joined::parse("overlap").unwrap().check_descriptors(&descriptors);
+    assert!(overlap.unwrap_err().to_string().contains("none negative"));
+    let original = Original::new(PointSet::try_new(input.positions, Unit::Meter).unwrap());
+    let search = oracle::search(&original).unwrap();
+    let scheme = scheme("olc").unwrap().in_3d.unwrap();
+    let options = SchemeOptions { voxel: 1.0 };
+    let (released, secret) = obfuscate(scheme, &original, Some(&descriptors), &options, 0).unwrap();
+    let near = oracle::TrueNeighbors::new(&search, &secret, 1, 50).unwrap();
+    let lists = Joined::parse("similarity").unwrap().with_k(20).make(&released, 0).unwrap();
+    let ratio = near.measured_inlier_ratio(&lists);
+    eprintln!("similarity of learned features: {ratio:.3}");
+    assert!(ratio >= 0.3, "{ratio}");
+}
+
+#[test]
 fn patches_of_a_real_map_name_neighbors() {
     let Some(path) = dataset("castle") else { return };
     let input = read::open(&path).unwrap();

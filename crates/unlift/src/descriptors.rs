@@ -2,6 +2,9 @@
 
 use crate::Error;
 
+/// No descriptor is longer: sums of as many squares of bytes still fit 32 bits.
+const MOST_COLUMNS: usize = 1 << 16;
+
 /// The values of a descriptor matrix, row-major.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Values {
@@ -22,8 +25,8 @@ impl Descriptors {
     /// A matrix with `dim` columns.
     ///
     /// # Errors
-    /// When `dim` is 0 or does not divide the number of values, when a float is not finite, or when
-    /// the matrix carries no information: all zero, or every row the same (dummies, as some
+    /// When `dim` is 0, above 65,536 or does not divide the number of values, when a float is not finite,
+    /// or when the matrix carries no information: all zero, or every row the same (dummies, as some
     /// exporters write them).
     pub fn try_new(values: Values, dim: usize) -> Result<Self, Error> {
         let len = match &values {
@@ -33,6 +36,10 @@ impl Descriptors {
         if dim == 0 || !len.is_multiple_of(dim) {
             let expected = format!("a multiple of the dimension {dim}");
             return Err(Error::new("descriptors", expected, format!("{len} values")));
+        }
+        if dim > MOST_COLUMNS {
+            let expected = format!("at most {MOST_COLUMNS} values each");
+            return Err(Error::new("descriptors", expected, dim.to_string()));
         }
         if let Values::F32(v) = &values
             && let Some(at) = v.iter().position(|x| !x.is_finite())
@@ -118,7 +125,7 @@ impl Descriptors {
         match &self.values {
             Values::U8(v) => {
                 let (x, y) = (&v[a * dim..(a + 1) * dim], &v[b * dim..(b + 1) * dim]);
-                // 255^2 times 2^16 values still fits 32 bits; no descriptor is longer.
+                // Fits 32 bits: see MOST_COLUMNS.
                 let square = |(&x, &y): (&u8, &u8)| u32::from(x.abs_diff(y)).pow(2);
                 let sum: u32 = x.iter().zip(y).map(square).sum();
                 sum as f32

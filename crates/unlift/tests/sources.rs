@@ -198,7 +198,8 @@ fn what_cannot_be_compared_is_told_in_one_line() {
     let short = released(&[vec![1, 2, 3], vec![3, 2, 1], vec![0, 1, 0]], 1);
     assert_eq!(
         message(&short, "overlap", 1),
-        "overlap: descriptors for overlap: expected SIFT (128 values, none negative), found 3 values"
+        "overlap: descriptors for overlap: expected SIFT descriptors (128 values each, none negative), \
+         found 3 values each"
     );
     let (obfuscation, unit) = (short.obfuscation().clone(), short.unit());
     let bare = Released::try_new(obfuscation, 1, [0.0; 3], unit, None).unwrap();

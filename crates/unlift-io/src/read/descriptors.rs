@@ -1,4 +1,4 @@
-//! Descriptors of the points of a map: from our binary form, or from a COLMAP database.
+//! Descriptors of the points of a map: from our binary form, a NumPy array or a COLMAP database.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -11,17 +11,23 @@ use unlift::descriptors::Values;
 use crate::error::Error;
 use crate::read::bytes::{Bytes, open_file};
 use crate::read::lines::quoted;
-use crate::read::{Input, database};
+use crate::read::scalar::Scalar;
+use crate::read::{Input, database, npy};
 
 const MAGIC: &[u8; 8] = b"P3DESC01";
 const SQLITE: &[u8; 8] = b"SQLite f";
+const HDF5: &[u8; 8] = b"\x89HDF\r\n\x1a\n";
 
 /// The descriptors of the points of `input`, one row each in its order.
 ///
-/// `path` is a file of the form `P3DESC01` (joined by point id), or a COLMAP `database.db`: then a
-/// point's row is the mean of the descriptors of its observations, found through the model's tracks,
-/// with images joined by name. Bytes are brought to L2 norm 512, rounded and clipped to 0..=255;
-/// floats to norm 1.
+/// `path` is one of
+///
+/// - a file of the form `P3DESC01` (joined by point id), bytes or floats as they are stored;
+/// - an `.npy` array `(n, dim)` with a row per point in the order of `input`: of a COLMAP model by
+///   ascending point id, else as the file has them;
+/// - a COLMAP `database.db`: then a point's row is the mean of the descriptors of its observations,
+///   found through the model's tracks, with images joined by name. Bytes are brought to L2 norm 512,
+///   rounded and clipped to 0..=255; floats to norm 1.
 ///
 /// # Errors
 /// When the file cannot be read, is neither form, is malformed, lacks a point or an observation (the
@@ -35,11 +41,16 @@ pub fn descriptors(path: &Path, input: &Input) -> Result<Descriptors, Error> {
     match &magic {
         MAGIC => binary(path, input),
         SQLITE => database::descriptors(path, input),
+        _ if magic.starts_with(npy::MAGIC) => {
+            let (values, dim) = npy::descriptors(path, input.ids.len())?;
+            Descriptors::try_new(values, dim).map_err(|e| Error::core(path, e))
+        }
         _ => {
-            let expected = "a file that begins with P3DESC01, or a COLMAP database (SQLite)";
+            let expected = "a file that begins with P3DESC01, a NumPy array (.npy) or a COLMAP database (SQLite)";
             let found = match len {
                 0 => "an empty file".to_owned(),
                 1..8 => format!("a file of {len} bytes"),
+                _ if &magic == HDF5 => "HDF5 (features of images, not of points)".to_owned(),
                 _ => quoted(&magic),
             };
             Err(Error::new(path, "", expected, found))
@@ -52,16 +63,20 @@ fn binary(path: &Path, input: &Input) -> Result<Descriptors, Error> {
     bytes.skip(8, "magic")?;
     let n = bytes.count("descriptors", 8)?;
     let dim = bytes.u32("dimension")?;
-    let dtype = bytes.u32("type")?;
-    if dtype != 1 {
-        return Err(bytes.error("type 1 (bytes)", dtype.to_string()));
-    }
-    let row_bytes = 8 + u64::from(dim);
-    if dim == 0 || n.checked_mul(row_bytes) != Some(bytes.remaining()) {
-        let expected = format!("{n} ids and rows of {dim} bytes");
+    let scalar = match bytes.u32("type")? {
+        1 => Scalar::U8,
+        2 => Scalar::F16,
+        3 => Scalar::F32,
+        other => {
+            let expected = "type 1 (u8), 2 (float16) or 3 (float32)";
+            return Err(bytes.error(expected, other.to_string()));
+        }
+    };
+    let row_bytes = u64::from(dim) * scalar.size() as u64;
+    if dim == 0 || n.checked_mul(8 + row_bytes) != Some(bytes.remaining()) {
+        let expected = format!("{n} ids and rows of {row_bytes} bytes");
         return Err(bytes.error_ahead(expected, format!("{} bytes", bytes.remaining())));
     }
-    let dim = dim as usize;
     let mut row_of_id = HashMap::with_capacity(n as usize);
     for row in 0..n {
         bytes.record(row + 1);
@@ -70,15 +85,35 @@ fn binary(path: &Path, input: &Input) -> Result<Descriptors, Error> {
             return Err(bytes.error("each id once", format!("id {id} again")));
         }
     }
-    let mut all = vec![0; n as usize * dim];
+    let (dim, row_bytes) = (dim as usize, row_bytes as usize);
+    let mut all = vec![0; n as usize * row_bytes];
     bytes.fill(&mut all, "values")?;
-    let mut values = Vec::with_capacity(input.ids.len() * dim);
-    for id in &input.ids {
-        let Some(&row) = row_of_id.get(id) else {
+    let row = |id: &u64| match row_of_id.get(id) {
+        Some(&row) => Ok(&all[row * row_bytes..(row + 1) * row_bytes]),
+        None => {
             let found = format!("none among {n}");
-            return Err(Error::new(path, format!("point {id}"), "a descriptor", found));
-        };
-        values.extend_from_slice(&all[row * dim..(row + 1) * dim]);
-    }
-    Descriptors::try_new(Values::U8(values), dim).map_err(|e| Error::core(path, e))
+            Err(Error::new(path, format!("point {id}"), "a descriptor", found))
+        }
+    };
+    let values = if scalar == Scalar::U8 {
+        let mut values = Vec::with_capacity(input.ids.len() * dim);
+        for id in &input.ids {
+            values.extend_from_slice(row(id)?);
+        }
+        Values::U8(values)
+    } else {
+        let mut values = Vec::with_capacity(input.ids.len() * dim);
+        for id in &input.ids {
+            for (at, stored) in row(id)?.chunks_exact(scalar.size()).enumerate() {
+                let value = scalar.read(stored);
+                if !value.is_finite() {
+                    let place = format!("point {id}, value {at}");
+                    return Err(Error::new(path, place, "a finite value", value.to_string()));
+                }
+                values.push(value as f32);
+            }
+        }
+        Values::F32(values)
+    };
+    Descriptors::try_new(values, dim).map_err(|e| Error::core(path, e))
 }

@@ -5,8 +5,10 @@ pub mod colmap;
 mod database;
 mod descriptors;
 pub(crate) mod lines;
+mod models;
 mod npy;
 mod ply;
+mod scalar;
 mod table;
 
 use std::path::{Path, PathBuf};
@@ -14,6 +16,7 @@ use std::path::{Path, PathBuf};
 pub use descriptors::descriptors;
 
 use crate::error::Error;
+use models::Model;
 
 /// A map as it was read, in the units of its file.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -36,7 +39,7 @@ pub struct Input {
     pub skipped: Vec<String>,
     /// The folder of the COLMAP model, when the input is one: descriptors are found through its tracks.
     pub model: Option<PathBuf>,
-    /// The COLMAP database in the folder that was given, if there is one.
+    /// The COLMAP database of the project, if there is one where such projects have it.
     pub database: Option<PathBuf>,
 }
 
@@ -46,11 +49,8 @@ fn mean_direction(directions: impl Iterator<Item = [f64; 3]>) -> Option<[f64; 3]
     (length > 1e-9).then(|| sum.map(|x| x / length))
 }
 
-/// Where a COLMAP model may lie in a project folder, in the order of search.
-const MODEL_FOLDERS: [&str; 5] = ["", "sparse/0", "sparse", "0", "model"];
-
-/// Reads the map at `path`: a COLMAP model folder or a project folder that holds one, or a point cloud
-/// as `.ply`, `.csv`, `.xyz`, `.txt` or `.npy`.
+/// Reads the map at `path`: a COLMAP model folder or a project folder that holds one (of several, the
+/// one with the most points; `skipped` says which), or a point cloud as `.ply`, `.csv`, `.xyz`, `.txt` or `.npy`.
 ///
 /// # Errors
 /// When nothing readable is there, a file is malformed, a coordinate is not finite, or there is no point.
@@ -64,6 +64,11 @@ pub fn open(path: &Path) -> Result<Input, Error> {
     Ok(input)
 }
 
+/// Whether `path` is a folder in which [`open`] finds a COLMAP model.
+pub fn is_project(path: &Path) -> bool {
+    path.is_dir() && matches!(Model::find(path), Ok(Some(_)))
+}
+
 fn file(path: &Path) -> Result<Input, Error> {
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
@@ -75,7 +80,7 @@ fn file(path: &Path) -> Result<Input, Error> {
         }
         (_, "ply") => ply::read(path)?,
         (_, "csv" | "xyz" | "txt") => (table::read(path)?, "table"),
-        (_, "npy") => (npy::read(path)?, "npy"),
+        (_, "npy") => (npy::positions(path)?, "npy"),
         (_, other) => {
             let expected = "a COLMAP folder or a .ply, .csv, .xyz, .txt or .npy file";
             let found = match other {
@@ -108,20 +113,14 @@ fn colmap_points(path: &Path) -> Result<Input, Error> {
 }
 
 fn folder(path: &Path) -> Result<Input, Error> {
-    for sub in MODEL_FOLDERS {
-        let model = if sub.is_empty() { path.to_owned() } else { path.join(sub) };
-        for (extension, format) in [("bin", "COLMAP binary"), ("txt", "COLMAP text")] {
-            if model.join(format!("points3D.{extension}")).is_file() {
-                let mut input = colmap_model(&model, extension)?;
-                input.format = format;
-                input.database = Some(path.join("database.db")).filter(|db| db.is_file());
-                note_other_models(&mut input, path, &model, extension);
-                return Ok(input);
-            }
-        }
-    }
-    let expected = "points3D.bin or points3D.txt in it, in sparse/0, sparse, 0 or model";
-    Err(Error::new(path, "", expected, "none"))
+    let Some(model) = Model::find(path)? else {
+        return Err(Error::new(path, "", models::EXPECTED, "none"));
+    };
+    let mut input = colmap_model(&model.folder, model.extension)?;
+    input.format = if model.extension == "bin" { "COLMAP binary" } else { "COLMAP text" };
+    input.database = models::database(path, &model.folder);
+    input.skipped.extend(model.notes);
+    Ok(input)
 }
 
 fn colmap_model(model: &Path, extension: &str) -> Result<Input, Error> {
@@ -172,22 +171,4 @@ fn colmap_model(model: &Path, extension: &str) -> Result<Input, Error> {
     input.ids = points.ids;
     input.positions = points.positions;
     Ok(input)
-}
-
-/// Notes the models and forms beside the one that was read: people should know which one was audited.
-fn note_other_models(input: &mut Input, path: &Path, model: &Path, extension: &str) {
-    if extension == "bin" && model.join("points3D.txt").is_file() {
-        let note = "points3D.txt: the binary form beside it was read";
-        input.skipped.push(note.to_owned());
-    }
-    for number in 1.. {
-        let other = path.join("sparse").join(number.to_string());
-        if !other.join("points3D.bin").is_file() && !other.join("points3D.txt").is_file() {
-            break;
-        }
-        if other != model {
-            let note = format!("sparse/{number}: another model, give its path to read it");
-            input.skipped.push(note);
-        }
-    }
 }

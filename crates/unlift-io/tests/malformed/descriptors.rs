@@ -2,6 +2,7 @@
 
 use std::fs;
 
+use half::f16;
 use unlift_io::read;
 
 use super::{MANY, appended, fixture, fixtures, patched, shown};
@@ -10,6 +11,20 @@ use super::{MANY, appended, fixture, fixtures, patched, shown};
 enum Wrong {
     Bytes(Vec<u8>),
     Sql(&'static str),
+}
+
+/// Descriptors of the six points of the project, of a type of floats, whose values are all `value`.
+fn floats(dtype: u8, value: &[u8]) -> Vec<u8> {
+    let good = fixture("project/descriptors.bin");
+    let header = patched(good[..24 + 6 * 8].to_vec(), 20, &[dtype]);
+    appended(header, &value.repeat(6 * 128))
+}
+
+/// An array whose header ends at byte 128.
+fn array(descr: &str, shape: &str, values: &[u8]) -> Vec<u8> {
+    let text = format!("{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}}}");
+    let head = appended(b"\x93NUMPY\x01\0\x76\0".to_vec(), format!("{text:118}").as_bytes());
+    appended(head, values)
 }
 
 #[test]
@@ -23,11 +38,11 @@ fn every_malformed_file_of_descriptors_is_refused_with_its_line() {
     let zeros = appended(good[..n - 6 * 128].to_vec(), &[0; 6 * 128]);
     let rows: Vec<(&str, Wrong, &str)> = vec![
         bytes("empty", vec![],
-            "d: expected a file that begins with P3DESC01, or a COLMAP database (SQLite), found an empty file"),
+            "d: expected a file that begins with P3DESC01, a NumPy array (.npy) or a COLMAP database (SQLite), found an empty file"),
         bytes("short", b"P3D".to_vec(),
-            "d: expected a file that begins with P3DESC01, or a COLMAP database (SQLite), found a file of 3 bytes"),
+            "d: expected a file that begins with P3DESC01, a NumPy array (.npy) or a COLMAP database (SQLite), found a file of 3 bytes"),
         bytes("another form", b"\x89HDF\r\n\x1a\n".to_vec(),
-            "d: expected a file that begins with P3DESC01, or a COLMAP database (SQLite), found \"�HDF\\r\\n\\u{1a}\\n\""),
+            "d: expected a file that begins with P3DESC01, a NumPy array (.npy) or a COLMAP database (SQLite), found HDF5 (features of images, not of points)"),
         bytes("cut in the header", good[..18].to_vec(),
             "d: header (byte 8): expected at most 0 for the number of descriptors (2 bytes are left), found 6"),
         bytes("cut in the ids", good[..40].to_vec(),
@@ -42,8 +57,18 @@ fn every_malformed_file_of_descriptors_is_refused_with_its_line() {
             "d: header (byte 24): expected 6 ids and rows of 4294967295 bytes, found 816 bytes"),
         bytes("dimension of 0", patched(good.clone(), 16, &[0; 4]),
             "d: header (byte 24): expected 6 ids and rows of 0 bytes, found 816 bytes"),
-        bytes("unknown type", patched(good.clone(), 20, &[2]),
-            "d: header (byte 20): expected type 1 (bytes), found 2"),
+        bytes("unknown type", patched(good.clone(), 20, &[4]),
+            "d: header (byte 20): expected type 1 (u8), 2 (float16) or 3 (float32), found 4"),
+        bytes("bytes said to be halves", patched(good.clone(), 20, &[2]),
+            "d: header (byte 24): expected 6 ids and rows of 256 bytes, found 816 bytes"),
+        bytes("half that is not finite", floats(2, &f16::INFINITY.to_le_bytes()),
+            "d: point 2, value 0: expected a finite value, found inf"),
+        bytes("float that is not finite", floats(3, &f32::NAN.to_le_bytes()),
+            "d: point 2, value 0: expected a finite value, found NaN"),
+        bytes("halves that are all the same", floats(2, &f16::ONE.to_le_bytes()),
+            "d: descriptors: expected real descriptors, found the same row for every point (dummies)"),
+        bytes("floats that are all zero", floats(3, &[0; 4]),
+            "d: descriptors: expected real descriptors, found only zeros (dummies)"),
         bytes("repeated id", patched(good.clone(), 24 + 8, &[2]),
             "d: record 2 (byte 32): expected each id once, found id 2 again"),
         bytes("id of a point missing", patched(good.clone(), 24 + 8, &[100]),
@@ -78,6 +103,32 @@ fn every_malformed_file_of_descriptors_is_refused_with_its_line() {
         sql("NaN in a database", "UPDATE descriptors SET type = 1, cols = 4, data = x'0000c07f0000c07f0000c07f0000c07f0000c07f0000c07f0000c07f0000c07f'",
             "d: descriptor 0, value 0: expected a finite value, found NaN"),
     ];
+    let npy = |what, array, line| (what, Wrong::Bytes(array), line);
+    let rows = rows.into_iter().chain([
+        npy("an array of positions", array("'<f8'", "(6,)", &[0; 48]),
+            "d: header (byte 10): expected an array of shape (6, dimension), a row per point, found \"(6,)\""),
+        npy("a row too few", array("'|u1'", "(5, 4)", &[7; 20]),
+            "d: header (byte 10): expected an array of shape (6, dimension), a row per point, found \"(5, 4)\""),
+        npy("a column per point", array("'|u1'", "(4, 6)", &[7; 24]),
+            "d: header (byte 10): expected an array of shape (6, dimension), a row per point, \
+             found \"(4, 6)\", rows and columns exchanged"),
+        npy("no column", array("'|u1'", "(6, 0)", &[]),
+            "d: header (byte 10): expected an array of shape (6, dimension), a row per point, found \"(6, 0)\""),
+        npy("integers", array("'<i4'", "(6, 1)", &[7; 24]),
+            "d: header (byte 10): expected bytes, or floats of 2, 4 or 8 bytes (u1, f2, f4, f8), found \"<i4\""),
+        npy("an array cut short", array("'<f2'", "(6, 4)", &[7; 47]),
+            "d: header (byte 128): expected 6 rows of 8 bytes, found 47 bytes"),
+        npy("2^62 columns", array("'<f8'", "(6, 4611686018427387904)", &[7; 24]),
+            "d: header (byte 128): expected 6 rows of too many bytes, found 24 bytes"),
+        npy("a double that no float holds", array("'<f8'", "(6, 1)", &[1e300f64.to_le_bytes(); 6].concat()),
+            "d: header (byte 128): expected a finite value (as a float of 4 bytes) in row 0, found 1e300"),
+        npy("an array that is not finite", array("'>f2'", "(6, 1)", &[0x7e, 0].repeat(6)),
+            "d: header (byte 128): expected a finite value (as a float of 4 bytes) in row 0, found NaN"),
+        npy("an array of dummies", array("'|u1'", "(6, 2)", &[7; 12]),
+            "d: descriptors: expected real descriptors, found the same row for every point (dummies)"),
+        npy("65537 columns", array("'|u1'", "(6, 65537)", &[7; 6 * 65537]),
+            "d: descriptors: expected at most 65536 values each, found 65537"),
+    ]);
     for (what, wrong, line) in rows {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("d");

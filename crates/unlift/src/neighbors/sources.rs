@@ -3,9 +3,10 @@
 use std::any::Any;
 
 use super::compare::MOST_ROWS;
-use super::{Neighborhoods, geometric, join, overlap, similarity};
-use crate::Error;
+use super::overlap::{self, overlap};
+use super::{Neighborhoods, geometric, join, similarity};
 use crate::released::Released;
+use crate::{Descriptors, Error};
 
 /// Makes lists of a number of records per slot; the last argument is the attacker's seed.
 pub type Make<const D: usize> = fn(&Released<D>, usize, u64) -> Result<Neighborhoods, Error>;
@@ -19,6 +20,8 @@ pub struct SourceEntry {
     pub summary: &'static str,
     /// Whether the released map must have descriptors.
     pub needs_descriptors: bool,
+    /// Refuses descriptors of a kind that it cannot read.
+    pub takes: fn(&Descriptors) -> Result<(), Error>,
     /// Records per list unless asked otherwise: the attack's own choice, few where the first of a
     /// ranking are much better than the rest.
     pub usual_k: usize,
@@ -56,6 +59,7 @@ pub const SOURCES: &[SourceEntry] = &[
         name: "similarity",
         summary: "records with the most similar descriptors, of any kind",
         needs_descriptors: true,
+        takes: |_| Ok(()),
         usual_k: 30,
         usual_k_2d: 10,
         only_ranks: false,
@@ -67,6 +71,7 @@ pub const SOURCES: &[SourceEntry] = &[
         name: "overlap",
         summary: "records whose SIFT patches overlap, and a short walk from these; no training",
         needs_descriptors: true,
+        takes: overlap::check,
         usual_k: 35,
         usual_k_2d: 10,
         only_ranks: false,
@@ -78,6 +83,7 @@ pub const SOURCES: &[SourceEntry] = &[
         name: "geometric",
         summary: "records that meet where records alone say that points are; no descriptors",
         needs_descriptors: false,
+        takes: |_| Ok(()),
         usual_k: 50,
         usual_k_2d: 10,
         only_ranks: true,
@@ -157,6 +163,14 @@ impl Joined {
     /// Whether a map without descriptors is of no use.
     pub fn needs_descriptors(&self) -> bool {
         self.parts.iter().any(|entry| entry.needs_descriptors)
+    }
+
+    /// Refuses descriptors of a kind that one of the sources cannot read.
+    ///
+    /// # Errors
+    /// What that source expects, and what it found.
+    pub fn check_descriptors(&self, descriptors: &Descriptors) -> Result<(), Error> {
+        self.parts.iter().try_for_each(|entry| (entry.takes)(descriptors))
     }
 
     /// What a user should know about lists for `n_slots` hidden points, if anything.

@@ -7,7 +7,7 @@
 mod hypotheses;
 mod patches;
 
-pub use patches::Patches;
+pub use patches::{Patches, check};
 
 use super::compare::{MOST_ROWS, search};
 use super::rows::Rows;

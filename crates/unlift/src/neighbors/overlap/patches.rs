@@ -25,22 +25,33 @@ pub struct Block {
     still: Vec<i8>,
 }
 
+/// Refuses descriptors that are not SIFT: 128 columns, none negative; bytes, or floats of any norm.
+///
+/// # Errors
+/// What a SIFT descriptor is, and what was found.
+pub fn check(descriptors: &Descriptors) -> Result<(), Error> {
+    let wrong = |found: String| {
+        let expected = "SIFT descriptors (128 values each, none negative)";
+        Err(Error::new("descriptors for overlap", expected, found))
+    };
+    if descriptors.dim() != DIM {
+        return wrong(format!("{} values each", descriptors.dim()));
+    }
+    if let Values::F32(values) = descriptors.values()
+        && let Some(value) = values.iter().find(|&&x| x < 0.0)
+    {
+        return wrong(format!("values like {value}"));
+    }
+    Ok(())
+}
+
 impl Patches {
     /// For the patches of `descriptors`.
     ///
     /// # Errors
-    /// When they are not SIFT: 128 columns, none negative.
+    /// When they are not SIFT, see [`check`].
     pub fn of(descriptors: &Descriptors) -> Result<Self, Error> {
-        let expected = "SIFT (128 values, none negative)";
-        if descriptors.dim() != DIM {
-            let found = format!("{} values", descriptors.dim());
-            return Err(Error::new("descriptors for overlap", expected, found));
-        }
-        if let Values::F32(values) = descriptors.values()
-            && let Some(value) = values.iter().find(|&&x| x < 0.0)
-        {
-            return Err(Error::new("descriptors for overlap", expected, value.to_string()));
-        }
+        check(descriptors)?;
         Ok(Self { hypotheses: Hypotheses::new() })
     }
 }

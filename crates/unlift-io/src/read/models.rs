@@ -1,0 +1,156 @@
+//! Which COLMAP model of a folder is read: where programs put them, and the largest of several.
+
+use std::fs::{self, File};
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+
+use crate::error::Error;
+
+/// Where models lie, each in itself or in numbered folders inside: COLMAP's `sparse`, hloc's `models`
+/// (the best one stands in the folder itself), nerfstudio's `colmap/sparse`.
+const PLACES: [&str; 6] = ["", "sparse", "model", "models", "colmap", "colmap/sparse"];
+/// Where a database lies beside a model.
+const DATABASES: [&str; 2] = ["database.db", "colmap/database.db"];
+/// The same where the folder that was given is the model itself.
+const DATABASES_ABOVE: [&str; 2] = ["../database.db", "../../database.db"];
+
+/// A model in a folder.
+pub(super) struct Model {
+    /// Its own folder.
+    pub folder: PathBuf,
+    /// `bin` or `txt`: the form that is read.
+    pub extension: &'static str,
+    /// What people should know about other models and forms.
+    pub notes: Vec<String>,
+}
+
+impl Model {
+    /// The model in `path`: that of the folder itself, else the one with the most points (the first of
+    /// these, in the order of [`PLACES`] and of numbers); `None` when there is none.
+    ///
+    /// # Errors
+    /// When there are several, and the points of one cannot be counted.
+    pub fn find(path: &Path) -> Result<Option<Self>, Error> {
+        let found = candidates(path);
+        let Some(first) = found.first() else { return Ok(None) };
+        if found.len() == 1 {
+            return Ok(Some(first.model(Vec::new())));
+        }
+        let counts = found.iter().map(Candidate::n_points).collect::<Result<Vec<_>, _>>()?;
+        let mut chosen = 0;
+        if !first.name.is_empty() {
+            for (at, &n) in counts.iter().enumerate() {
+                if n > counts[chosen] {
+                    chosen = at;
+                }
+            }
+        }
+        let name = |at: usize| match found[at].name.as_str() {
+            "" => "the model of the folder itself",
+            name => name,
+        };
+        let why = if found[chosen].name.is_empty() { "first" } else { "largest" };
+        let mut notes = vec![format!(
+            "{}: read, the {why} of {} models ({} points)",
+            name(chosen),
+            found.len(),
+            counts[chosen]
+        )];
+        for at in (0..found.len()).filter(|&at| at != chosen) {
+            let n = counts[at];
+            notes.push(format!(
+                "{}: another model ({n} points), give its path to read it",
+                name(at)
+            ));
+        }
+        Ok(Some(found[chosen].model(notes)))
+    }
+}
+
+/// The database that belongs to the model `model`, found in `path`.
+pub(super) fn database(path: &Path, model: &Path) -> Option<PathBuf> {
+    let above: &[&str] = if model == path { &DATABASES_ABOVE } else { &[] };
+    let places = DATABASES.iter().chain(above);
+    places.map(|place| path.join(place)).find(|file| file.is_file())
+}
+
+/// Where to look, for people.
+pub(super) const EXPECTED: &str = "points3D.bin or points3D.txt in it, or in sparse, model, models, colmap/sparse \
+                                   or a numbered folder of these";
+
+/// A folder with a model.
+struct Candidate {
+    /// Relative to the folder that was given, with slashes; empty for that folder.
+    name: String,
+    folder: PathBuf,
+    extension: &'static str,
+}
+
+impl Candidate {
+    fn points(&self) -> PathBuf {
+        self.folder.join("points3D").with_extension(self.extension)
+    }
+
+    fn model(&self, mut notes: Vec<String>) -> Model {
+        if self.extension == "bin" && self.folder.join("points3D.txt").is_file() {
+            notes.insert(0, "points3D.txt: the binary form beside it was read".to_owned());
+        }
+        Model { folder: self.folder.clone(), extension: self.extension, notes }
+    }
+
+    /// How many points its file says that it holds.
+    fn n_points(&self) -> Result<u64, Error> {
+        let path = self.points();
+        let wrong = |error| Error::read(&path, error);
+        let file = BufReader::new(File::open(&path).map_err(wrong)?);
+        if self.extension == "bin" {
+            let mut count = Vec::new();
+            file.take(8).read_to_end(&mut count).map_err(wrong)?;
+            // A file that is cut off counts as empty; if it is read after all, its reader tells.
+            return Ok(count.try_into().map_or(0, u64::from_le_bytes));
+        }
+        let mut n = 0;
+        for line in file.split(b'\n') {
+            let line = line.map_err(wrong)?;
+            let line = line.trim_ascii();
+            n += u64::from(!line.is_empty() && !line.starts_with(b"#"));
+        }
+        Ok(n)
+    }
+}
+
+/// All models in `path`, each once, in the order of search.
+fn candidates(path: &Path) -> Vec<Candidate> {
+    let mut found: Vec<Candidate> = Vec::new();
+    let mut seen = Vec::new();
+    for place in PLACES {
+        let parent = path.join(place);
+        let numbers = numbered(&parent).into_iter().map(|number| match place {
+            "" => number.to_string(),
+            _ => format!("{place}/{number}"),
+        });
+        for name in std::iter::once(place.to_owned()).chain(numbers) {
+            let folder = if name.is_empty() { path.to_owned() } else { path.join(&name) };
+            let has = |extension: &&str| folder.join(format!("points3D.{extension}")).is_file();
+            let Some(extension) = ["bin", "txt"].into_iter().find(has) else { continue };
+            // Links make one model appear twice.
+            let real = fs::canonicalize(&folder).unwrap_or_else(|_| folder.clone());
+            if !seen.contains(&real) {
+                seen.push(real);
+                found.push(Candidate { name, folder, extension });
+            }
+        }
+    }
+    found
+}
+
+/// The folders of `parent` whose names are numbers, rising.
+fn numbered(parent: &Path) -> Vec<u32> {
+    let Ok(entries) = fs::read_dir(parent) else { return Vec::new() };
+    let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+    // Only as programs write them: 007 could not be found again by its number.
+    let number = |name: String| name.parse::<u32>().ok().filter(|n| n.to_string() == name);
+    let mut numbers: Vec<u32> = names.filter_map(number).collect();
+    numbers.sort_unstable();
+    numbers
+}
