@@ -1,9 +1,10 @@
 //! The command line as types. What a string means is in `values.rs`.
 
+use std::ffi::OsString;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use unlift::audit::Threshold;
 use unlift::neighbors::oracle::Noise;
 use unlift::neighbors::sources::Joined;
@@ -38,6 +39,28 @@ pub struct Cli {
     pub command: Command,
 }
 
+impl Cli {
+    /// Reads a command line, the name of the program first.
+    ///
+    /// # Errors
+    /// When it is none of ours, or asks for help.
+    pub fn read(
+        line: impl IntoIterator<Item = impl Into<OsString> + Clone>,
+    ) -> Result<Self, clap::Error> {
+        let matches = numbers_may_be_negative(Self::command()).try_get_matches_from(line)?;
+        Self::from_arg_matches(&matches)
+    }
+}
+
+/// So that `--scale -1` is told what is wrong with -1, not that there is no option `-1`.
+fn numbers_may_be_negative(command: clap::Command) -> clap::Command {
+    let forgiving = |arg: clap::Arg| match arg.get_action().takes_values() && !arg.is_positional() {
+        true => arg.allow_negative_numbers(true),
+        false => arg,
+    };
+    command.mut_args(forgiving).mut_subcommands(numbers_may_be_negative)
+}
+
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
@@ -66,6 +89,10 @@ pub enum Command {
 
 /// What can be audited.
 #[derive(Debug, Subcommand)]
+#[command(after_help = "\
+Examples:
+  unlift audit map PROJECT --scale 1
+  unlift audit images photos")]
 pub enum AuditCommand {
     /// Audit a 3D map: COLMAP, PLY, CSV, XYZ or NPY
     // Boxed: ten times the size of the other commands.
@@ -97,9 +124,10 @@ pub struct DemoArgs {
 #[command(next_help_heading = "Input")]
 pub struct MapArgs {
     /// Meters per unit of the map. Without it the unit is the median distance to the K-th neighbor
-    #[arg(long, value_name = "METERS_PER_UNIT", value_parser = values::positive)]
+    #[arg(long, value_name = "METERS_PER_UNIT", value_parser = values::scale)]
     pub scale: Option<f64>,
-    /// Descriptors of the points: a file beginning with P3DESC01, or a COLMAP database
+    /// Descriptors of the points: a COLMAP database.db, a .npy array with a row per point (of a COLMAP
+    /// model by ascending point id), or a file that begins with P3DESC01
     #[arg(long, value_name = "FILE")]
     pub descriptors: Option<PathBuf>,
     /// Use a random subset of at most this many points
@@ -127,8 +155,8 @@ Examples:
   unlift audit map PROJECT --scale 1
   unlift audit map cloud.ply --schemes ppl,ppl+ --inlier-ratios 1,0.5 --out ppl-audit
   unlift audit map PROJECT --scale 1 --gate 'ppl@0.5:0.10<=20' --gate 'all:0.25:gain<=30'
-  unlift audit map PROJECT --neighbors neighbors.parquet --solver joint,ransac
-  unlift audit map PROJECT --descriptors database.db --neighbors oracle --neighbors overlap
+  unlift audit map PROJECT --neighbors lists-by-point.parquet --solver joint,ransac
+  unlift audit map PROJECT --descriptors PROJECT/database.db --neighbors oracle --neighbors overlap
   unlift audit map PROJECT --share-safe --json
 
 Gates: SCHEME[@RATIO]:THRESHOLD[:gain]<=PERCENT. SCHEME may be all; without @RATIO every ratio
@@ -175,14 +203,15 @@ pub struct AuditMapArgs {
 /// Options of `obfuscate`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Example:
+Examples:
   unlift obfuscate PROJECT --scheme ppl --scale 1 --out hidden
+  unlift obfuscate PROJECT --scheme olc --descriptors PROJECT/database.db --out hidden
 
 Writes hidden/released.parquet (what an attacker sees) and hidden/truth.parquet (keep it private).
 The seed is part of the secret: who knows it undoes the order of the records, and cp entirely.")]
 pub struct ObfuscateArgs {
     /// A COLMAP model or project folder, or a .ply, .csv, .xyz, .txt or .npy file
-    #[arg(value_name = "MODEL")]
+    #[arg(value_name = "PATH")]
     pub path: PathBuf,
     /// The scheme, see unlift schemes
     #[arg(long, value_name = "SCHEME", value_parser = values::scheme)]
@@ -196,6 +225,10 @@ pub struct ObfuscateArgs {
 
 /// Sources of neighborhoods.
 #[derive(Debug, Subcommand)]
+#[command(after_help = "\
+Examples:
+  unlift neighbors oracle hidden/truth.parquet --inlier-ratio 0.5 --out lists.parquet
+  unlift neighbors find hidden/released.parquet --source overlap --out lists.parquet")]
 pub enum NeighborsCommand {
     /// From the truth, at a chosen inlier ratio: an attacker of stated quality
     Oracle(OracleArgs),
@@ -208,8 +241,9 @@ pub enum NeighborsCommand {
 #[command(after_help = "\
 Sources: similarity (any descriptors), overlap (SIFT), geometric (no descriptors), or several joined by +.
 
-Example:
-  unlift neighbors find hidden/released.parquet --source overlap --out hidden/neighbors.parquet")]
+Examples:
+  unlift neighbors find hidden/released.parquet --source overlap --out lists.parquet
+  unlift neighbors find hidden/released.parquet --source overlap+geometric --k 20")]
 pub struct FindArgs {
     /// A released map
     #[arg(value_name = "OBFUSCATED")]
@@ -235,7 +269,7 @@ pub struct FindArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
-  unlift neighbors oracle hidden/truth.parquet --inlier-ratio 0.5 --out hidden/neighbors.parquet")]
+  unlift neighbors oracle hidden/truth.parquet --inlier-ratio 0.5 --out lists.parquet")]
 pub struct OracleArgs {
     /// The truth.parquet of an obfuscation
     #[arg(value_name = "TRUTH")]
@@ -266,7 +300,7 @@ pub struct OracleArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
-  unlift recover hidden/released.parquet --neighbors hidden/neighbors.parquet --out back.parquet")]
+  unlift recover hidden/released.parquet --neighbors lists.parquet --out back.parquet")]
 pub struct RecoverArgs {
     /// A released map
     #[arg(value_name = "OBFUSCATED")]
@@ -328,11 +362,10 @@ pub enum BenchCommand {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     fn audit(arguments: &[&str]) -> Result<AuditMapArgs, clap::Error> {
         let line = ["unlift", "audit", "map", "PATH"].iter().chain(arguments);
-        match Cli::try_parse_from(line)?.command {
+        match Cli::read(line)?.command {
             Command::Audit(AuditCommand::Map(args)) => Ok(*args),
             other => panic!("{other:?}"),
         }
@@ -356,6 +389,20 @@ mod tests {
                 && args.attack.source_k.is_none()
         );
         assert!(args.schemes.is_empty() && args.thresholds.is_empty());
+    }
+
+    #[test]
+    fn negative_numbers_are_values_that_are_refused_as_such() {
+        for (option, expected) in [
+            ("--scale", "meters per unit of the map, a number above 0, found -1"),
+            ("--thresholds", "expected a number above 0, found -1"),
+            ("--inlier-ratios", "expected a number from 0 to 1, found -1"),
+            ("--delta", "expected auto or a number above 0, found -1"),
+            ("--k", "-1 is not in 1..=65535"),
+        ] {
+            let error = audit(&[option, "-1"]).unwrap_err().to_string();
+            assert!(error.contains(expected), "{option}: {error}");
+        }
     }
 
     #[test]

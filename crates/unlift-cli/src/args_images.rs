@@ -55,7 +55,7 @@ pub struct AuditImagesArgs {
     pub solver: Vec<Solver>,
     /// Where neighborhoods come from, repeatable: oracle (made from the keypoints themselves), or what
     /// an attacker makes from the released descriptors (similarity, overlap, or both joined by +);
-    /// overlap needs the bytes of SIFT
+    /// overlap needs SIFT
     #[arg(long, value_name = "oracle|SOURCE", value_parser = values::image_source,
           default_value = "oracle", help_heading = "Attack")]
     pub neighbors: Vec<NeighborSource>,

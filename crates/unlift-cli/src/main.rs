@@ -12,18 +12,19 @@ mod exit;
 mod gate;
 mod images;
 mod job;
+mod lengths;
 mod memory;
 mod output;
+mod pace;
 mod pictures;
 mod prepare;
 mod progress;
 mod values;
 
-use clap::Parser;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
     // Usage errors end here, with exit code 2.
-    let cli = args::Cli::parse();
+    let cli = args::Cli::read(std::env::args_os()).unwrap_or_else(|error| error.exit());
     exit::finish(commands::run(cli.command))
 }

@@ -1,62 +1,158 @@
-//! Progress on stderr: only on a terminal, and only for what takes longer than a second.
+//! Progress on stderr, for what takes longer than a second: a bar on a terminal, elsewhere (a log, a pipe) a
+//! line a minute; nothing of either when `--quiet`.
 
 use std::io::IsTerminal;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+
+use crate::pace::Pace;
 
 /// Shorter work shows nothing.
 const PATIENCE: Duration = Duration::from_secs(1);
+/// A bar is drawn anew this often, whether or not a step was made: what is left counts down.
+const TICK: Duration = Duration::from_millis(500);
+/// Lines of a log come at most this often.
+const LINES: Duration = Duration::from_secs(60);
+/// Steps of a bar per item, so that it moves within items.
+const PARTS: f64 = 1000.0;
 
-/// A progress bar that appears once it is worth it.
-pub struct Progress {
-    bar: ProgressBar,
+/// How progress is shown.
+#[derive(Clone, Copy)]
+enum Shown {
+    Nothing,
+    /// A bar, drawn to what is made when it is worth it.
+    Bar(fn() -> ProgressDrawTarget),
+    /// Lines, the last one then.
+    Lines(Duration),
+}
+
+/// Progress of work in items that can be counted; gone when dropped.
+pub struct Progress(Steps);
+
+/// What any thread may tell about it.
+#[derive(Clone)]
+pub struct Steps {
     started: Instant,
-    wanted: bool,
+    state: Arc<Mutex<State>>,
+    bar: ProgressBar,
+}
+
+struct State {
+    pace: Pace,
+    shown: Shown,
 }
 
 impl Progress {
-    /// A bar for work that begins now; none at all when `quiet` or when stderr is no terminal.
+    /// Of work that begins now.
     pub fn new(quiet: bool) -> Self {
-        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
-        let template = "{bar:30} {pos}/{len} {wide_msg}";
-        bar.set_style(ProgressStyle::with_template(template).expect("the template is ours"));
-        Self { bar, started: Instant::now(), wanted: !quiet && std::io::stderr().is_terminal() }
+        Self::with(match (quiet, std::io::stderr().is_terminal()) {
+            (true, _) => Shown::Nothing,
+            (false, true) => Shown::Bar(ProgressDrawTarget::stderr),
+            (false, false) => Shown::Lines(Duration::ZERO),
+        })
     }
 
-    /// `done` of `total` steps are made; `what` is next.
+    fn with(shown: Shown) -> Self {
+        let started = Instant::now();
+        let state = Arc::new(Mutex::new(State { pace: Pace::default(), shown }));
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
+        let template = "{bar:30} {status} {wide_msg}";
+        let style = ProgressStyle::with_template(template).expect("the template is ours");
+        let of_bar = Arc::clone(&state);
+        bar.set_style(style.with_key(
+            "status",
+            move |_: &ProgressState, text: &mut dyn std::fmt::Write| {
+                // What cannot be written is not shown.
+                let _ = write!(text, "{}", lock(&of_bar).pace.status(started.elapsed()));
+            },
+        ));
+        if let Shown::Bar(target) = shown {
+            // Not at the next step: the first one may take a minute.
+            let bar = bar.downgrade();
+            std::thread::spawn(move || {
+                std::thread::sleep(PATIENCE);
+                let bar = bar.upgrade().filter(|bar| !bar.is_finished());
+                if let Some(bar) = bar {
+                    bar.set_draw_target(target());
+                    bar.enable_steady_tick(TICK);
+                }
+            });
+        }
+        Self(Steps { started, state, bar })
+    }
+
+    /// `done` of `total` items are finished; `what` is next.
     pub fn show(&mut self, done: usize, total: usize, what: &str) {
-        if !self.wanted {
-            return;
-        }
-        if self.bar.is_hidden() && self.started.elapsed() >= PATIENCE {
-            self.bar.set_draw_target(ProgressDrawTarget::stderr());
-        }
-        self.bar.set_length(total as u64);
-        self.bar.set_position(done as u64);
-        self.bar.set_message(what.to_owned());
+        self.0.tell(what, |pace, now| pace.set(done as f64, total, now));
+    }
+
+    /// That of further work that begins now; this one is finished.
+    pub fn again(&self) -> Self {
+        self.0.bar.finish_and_clear();
+        Self::with(match lock(&self.0.state).shown {
+            Shown::Lines(_) => Shown::Lines(Duration::ZERO),
+            shown => shown,
+        })
     }
 
     /// Prints a line on stderr without tearing the bar.
     pub fn say(&self, line: &str) {
-        self.voice().say(line);
+        self.0.say(line);
     }
 
-    /// The same for whoever has something to say while another one shows progress.
-    pub fn voice(&self) -> Voice {
-        Voice(self.bar.clone())
+    /// The same for whoever makes steps, or has something to say, while another one shows progress.
+    pub fn steps(&self) -> Steps {
+        self.0.clone()
     }
 }
 
-/// Prints lines on stderr beside a progress bar.
-#[derive(Clone)]
-pub struct Voice(ProgressBar);
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.0.bar.finish_and_clear();
+    }
+}
 
-impl Voice {
+impl Steps {
+    /// A share of an item more is finished; `what` is at work, unless it is empty.
+    pub fn add(&self, share: f64, what: &str) {
+        self.tell(what, |pace, now| pace.add(share, now));
+    }
+
     /// Prints a line on stderr without tearing the bar.
     pub fn say(&self, line: &str) {
-        self.0.suspend(|| eprintln!("{line}"));
+        self.bar.suspend(|| eprintln!("{line}"));
     }
+
+    fn tell(&self, what: &str, step: impl FnOnce(&mut Pace, Duration)) {
+        let now = self.started.elapsed();
+        let mut state = lock(&self.state);
+        step(&mut state.pace, now);
+        let pace = state.pace.clone();
+        match &mut state.shown {
+            Shown::Nothing => {}
+            Shown::Lines(last) => {
+                if now.saturating_sub(*last) >= LINES {
+                    *last = now;
+                    eprintln!("unlift: {}: {what}", pace.status(now));
+                }
+            }
+            Shown::Bar(_) => {
+                // The bar asks for the state when it is drawn.
+                drop(state);
+                self.bar.set_length((pace.total() as f64 * PARTS) as u64);
+                if !what.is_empty() {
+                    self.bar.set_message(what.to_owned());
+                }
+                self.bar.set_position((pace.done() * PARTS) as u64);
+            }
+        }
+    }
+}
+
+fn lock(state: &Mutex<State>) -> MutexGuard<'_, State> {
+    state.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A sign of life for work whose steps cannot be counted; gone when dropped. Hidden where stderr is no
@@ -64,11 +160,23 @@ impl Voice {
 pub struct Spinner(ProgressBar);
 
 impl Spinner {
-    /// Says `what` is being done.
+    /// Says `what` is being done, and for how long.
     pub fn new(what: &'static str) -> Self {
+        let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed}");
         let bar = ProgressBar::new_spinner().with_message(what);
+        bar.set_style(style.expect("the template is ours"));
         bar.enable_steady_tick(PATIENCE / 8);
         Self(bar)
+    }
+
+    /// None of it when `quiet`.
+    pub fn unless(quiet: bool, what: &'static str) -> Self {
+        if quiet { Self(ProgressBar::hidden()) } else { Self::new(what) }
+    }
+
+    /// Prints a line on stderr without tearing it.
+    pub fn say(&self, line: &str) {
+        self.0.suspend(|| eprintln!("{line}"));
     }
 }
 
@@ -78,8 +186,73 @@ impl Drop for Spinner {
     }
 }
 
-impl Drop for Progress {
-    fn drop(&mut self) {
-        self.bar.finish_and_clear();
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use indicatif::TermLike;
+    use std::io;
+
+    /// What was drawn, frame by frame.
+    static DRAWN: Mutex<Vec<String>> = Mutex::new(Vec::new());
+
+    #[derive(Debug)]
+    struct Paper;
+
+    impl TermLike for Paper {
+        fn width(&self) -> u16 {
+            100
+        }
+        fn move_cursor_up(&self, _: usize) -> io::Result<()> {
+            Ok(())
+        }
+        fn move_cursor_down(&self, _: usize) -> io::Result<()> {
+            Ok(())
+        }
+        fn move_cursor_right(&self, _: usize) -> io::Result<()> {
+            Ok(())
+        }
+        fn move_cursor_left(&self, _: usize) -> io::Result<()> {
+            Ok(())
+        }
+        fn write_line(&self, text: &str) -> io::Result<()> {
+            self.write_str(text)
+        }
+        fn write_str(&self, text: &str) -> io::Result<()> {
+            DRAWN.lock().unwrap().push(text.to_owned());
+            Ok(())
+        }
+        fn clear_line(&self) -> io::Result<()> {
+            Ok(())
+        }
+        fn flush(&self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    fn wait_until(done: impl Fn() -> bool) {
+        let started = Instant::now();
+        while !done() {
+            // A busy machine may take a while; forever is a bar that never comes.
+            assert!(started.elapsed() < Duration::from_secs(20), "{:?}", DRAWN.lock().unwrap());
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    #[test]
+    fn a_bar_counts_tells_what_is_left_and_moves_at_least_once_a_second() {
+        let mut progress = Progress::with(Shown::Bar(|| {
+            ProgressDrawTarget::term_like_with_hz(Box::new(Paper), 20)
+        }));
+        let frames = || DRAWN.lock().unwrap().clone();
+        progress.show(0, 4, "a.jpg");
+        assert_eq!(frames(), [""; 0], "too early");
+        // It appears by itself, and moves by itself.
+        wait_until(|| frames().iter().any(|f| f.contains("0/4") && f.contains("a.jpg")));
+        let steps = progress.steps();
+        std::thread::spawn(move || steps.add(1.0, "b.jpg")).join().unwrap();
+        wait_until(|| frames().iter().any(|f| f.contains("1/4") && f.contains("left b.jpg")));
+        let before = frames().len();
+        std::thread::sleep(Duration::from_secs(1));
+        assert!(frames().len() > before, "no step was made, and nothing moved");
     }
 }

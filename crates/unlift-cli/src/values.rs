@@ -103,6 +103,12 @@ pub fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Meters per unit of a map.
+pub fn scale(text: &str) -> Result<f64, String> {
+    positive(text)
+        .map_err(|_| format!("expected meters per unit of the map, a number above 0, found {text}"))
+}
+
 /// A share from 0 to 1.
 pub fn ratio(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {

@@ -165,6 +165,24 @@ fn broken_images_are_named_counted_and_left_out() {
 }
 
 #[test]
+fn images_of_other_kinds_are_told() {
+    let place = photos();
+    for name in ["a.HEIC", "b.heic", "c/d.tiff", ".e.heic", "notes.txt"] {
+        fs::write(place.path("photos").join(name), "").unwrap();
+    }
+    let note = "2 .heic, 1 .tiff: only JPEG, PNG and WebP are read\n";
+    let line = format!("audit images photos {QUICK} --max-images 1 --out a");
+    let (_, stderr) = place.ends(&line, 0);
+    assert_eq!(stderr, format!("unlift: note: photos: passed over {note}"));
+    let (_, stderr) = place.ends("features photos --out f.h5", 0);
+    assert_eq!(stderr, format!("unlift: note: photos: passed over {note}"));
+    fs::create_dir(place.path("raw")).unwrap();
+    fs::write(place.path("raw/1.heic"), "").unwrap();
+    let (_, stderr) = place.ends("features raw --out g.h5", 3);
+    assert_eq!(stderr, "unlift: raw: expected JPEG, PNG or WebP photos, found only 1 .heic\n");
+}
+
+#[test]
 fn what_cannot_be_audited_is_one_line() {
     let place = photos();
     fs::create_dir(place.path("empty")).unwrap();
@@ -215,7 +233,11 @@ fn learned_descriptors_are_no_sift() {
     }
     writer.finish().unwrap();
     let (_, stderr) = place.ends("audit images floats.h5 --neighbors overlap", 2);
-    let expected = "expected SIFT descriptors in bytes, found floats\n";
-    assert_eq!(stderr, format!("unlift: --neighbors overlap: {expected}"));
+    assert_eq!(
+        stderr,
+        "unlift: --neighbors overlap: expected SIFT descriptors (128 values each, none negative), \
+         found 64 values each\n  \
+         try: --neighbors similarity, which takes descriptors of any kind\n"
+    );
     place.ends("audit images floats.h5 --k 10 --neighbors similarity --out a", 0);
 }

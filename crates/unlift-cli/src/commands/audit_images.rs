@@ -10,13 +10,13 @@ use unlift_features::SiftOptions;
 use unlift_io::Error;
 use unlift_report::pictures::MOST_PICTURES;
 
-use super::plan::{attack, check_about, own, summary, thresholds};
+use super::plan::{attack, check_about, check_fit, own, summary, thresholds};
 use super::with_threads;
 use crate::args_images::AuditImagesArgs;
 use crate::exit::{Outcome, usage};
 use crate::images::FeatureSource;
 use crate::images::audit::{ImagesJob, perform};
-use crate::images::stream::{Needs, lacking};
+use crate::images::stream::Needs;
 use crate::job::open_out;
 use crate::output::print;
 use crate::values::{NeighborSource, distinct};
@@ -31,6 +31,9 @@ pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
     let out = open_out(&args.result.out)?;
     let (finished, used) = with_threads(args.run.threads, || {
         let source = FeatureSource::open(&args.path, &extraction(args)?)?;
+        if let Some(note) = source.passed_over() {
+            eprintln!("unlift: note: {note}");
+        }
         let chosen = chosen(source.names().len(), args.max_images.map(|n| n.get()));
         check_descriptors(&source, &chosen, &plan)?;
         let job = ImagesJob {
@@ -116,7 +119,7 @@ fn chosen(n: usize, most: Option<usize>) -> Vec<usize> {
 /// image. What is wrong with single images is told when they are read.
 fn check_descriptors(source: &FeatureSource, chosen: &[usize], plan: &Plan) -> anyhow::Result<()> {
     // Extracted features always have them.
-    if matches!(source, FeatureSource::Folder(_)) || !Needs::of_plan(plan).descriptors {
+    if matches!(source, FeatureSource::Folder(_)) || !Needs::of_plan(plan).descriptors() {
         return Ok(());
     }
     let found = chosen.iter().filter_map(|&at| source.get(at).ok());
@@ -124,11 +127,14 @@ fn check_descriptors(source: &FeatureSource, chosen: &[usize], plan: &Plan) -> a
         return Ok(());
     };
     for wanted in &plan.sources {
-        if let Source::Own(joined) = wanted
-            && let Some((expected, found)) = lacking(&first, Needs::of(joined))
-        {
-            let name = joined.name();
-            return Err(usage(format!("--neighbors {name}: expected {expected}, found {found}")));
+        let Source::Own(joined) = wanted else { continue };
+        match &first.descriptors {
+            Some(descriptors) => check_fit(joined, descriptors)?,
+            None if joined.needs_descriptors() => {
+                let name = joined.name();
+                return Err(usage(format!("--neighbors {name}: expected descriptors, found none")));
+            }
+            None => {}
         }
     }
     Ok(())

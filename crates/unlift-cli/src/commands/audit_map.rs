@@ -12,12 +12,13 @@ use unlift_io::read;
 use unlift_io::stage::read_point_neighborhoods;
 use unlift_report::document::Input;
 
-use super::plan::{attack, check_about, own, summary, thresholds};
+use super::plan::{attack, check_about, check_fit, own, summary, thresholds};
 use super::{open_map, with_threads};
 use crate::args::AuditMapArgs;
 use crate::document::ordered;
-use crate::exit::{Outcome, usage};
+use crate::exit::{Outcome, advise, usage};
 use crate::job::{Job, open_out, perform};
+use crate::lengths::check_thresholds;
 use crate::output::print;
 use crate::prepare::Prepared;
 use crate::values::{NeighborSource, all_schemes, distinct};
@@ -27,17 +28,14 @@ pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
     let started = Instant::now();
     let out = open_out(&args.result.out)?;
     let finished = with_threads(args.run.threads, || {
-        let (input, prepared) = open_map(&args.path, &args.map)?;
-        for note in &input.skipped {
-            eprintln!("unlift: note: {note}");
-        }
+        let (input, prepared) = open_map(&args.path, &args.map, args.run.quiet)?;
         let scale = 1.0 / prepared.unit_in_map_units;
         let job = Job {
             original: &prepared.original,
             descriptors: prepared.descriptors.as_ref(),
             cameras: input.cameras.iter().map(|c| c.map(|x| x * scale)).collect(),
             up: input.up,
-            plan: plan(&args, &prepared, input.positions.len())?,
+            plan: plan(&args, &prepared, &input)?,
             input: provenance(&args, &input, &prepared)?,
             options: more_options(&args),
             gates: args.result.gate.clone(),
@@ -54,12 +52,17 @@ pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
     Ok(if finished.passed() { Outcome::Done } else { Outcome::GateFailed })
 }
 
-fn plan(args: &AuditMapArgs, prepared: &Prepared, n_read: usize) -> anyhow::Result<Plan> {
+fn plan(args: &AuditMapArgs, prepared: &Prepared, input: &read::Input) -> anyhow::Result<Plan> {
     let usual = Plan::new(prepared.original.reveal().unit());
     let schemes = if args.schemes.is_empty() { all_schemes() } else { args.schemes.clone() };
     let thresholds = thresholds(&args.thresholds, &usual)?;
+    let points = prepared.original.reveal();
+    let typed = !args.thresholds.is_empty();
+    if let Some(note) = check_thresholds(points.positions(), points.unit(), &thresholds, typed)? {
+        eprintln!("unlift: note: {note}");
+    }
     Ok(Plan {
-        sources: sources(args, &schemes, prepared, n_read)?,
+        sources: sources(args, &schemes, prepared, input)?,
         schemes: distinct(schemes, |a, b| a.name == b.name),
         k: usize::from(args.map.k),
         solvers: distinct(args.solver.clone(), |a, b| a == b),
@@ -74,33 +77,22 @@ fn sources(
     args: &AuditMapArgs,
     schemes: &[&'static Entry],
     prepared: &Prepared,
-    n_read: usize,
+    input: &read::Input,
 ) -> anyhow::Result<Vec<Source>> {
     let mut sources = Vec::new();
     for source in distinct(args.neighbors.clone(), |a, b| a == b) {
         sources.push(match source {
             NeighborSource::Oracle => Source::Oracle,
-            NeighborSource::Own(joined) if joined.needs_descriptors() && !has(prepared) => {
-                return Err(usage(format!(
-                    "--neighbors {}: expected descriptors (--descriptors FILE), found none",
-                    joined.name()
-                )));
-            }
-            NeighborSource::Own(joined) if blind_on(&joined, schemes).is_some() => {
-                let scheme = blind_on(&joined, schemes).unwrap_or_default();
-                return Err(usage(format!(
-                    "--neighbors {}: expected --schemes whose records alone tell where points are, \
-                     found {scheme}",
-                    joined.name()
-                )));
-            }
             NeighborSource::Own(joined) => {
+                check_own(&joined, schemes, prepared, input)?;
                 if let Some(note) = joined.note(prepared.original.len()) {
                     eprintln!("unlift: note: {note}");
                 }
                 own(joined, &args.attack)
             }
-            NeighborSource::File(path) => Source::Given(by_point(&path, prepared, n_read)?),
+            NeighborSource::File(path) => {
+                Source::Given(by_point(&path, prepared, input.positions.len())?)
+            }
         });
     }
     let files = sources.iter().filter(|s| matches!(s, Source::Given(_))).count();
@@ -111,13 +103,37 @@ fn sources(
     Ok(sources)
 }
 
+/// Refuses a source that lacks what it needs, before anything is computed.
+fn check_own(
+    joined: &Joined,
+    schemes: &[&'static Entry],
+    prepared: &Prepared,
+    input: &read::Input,
+) -> anyhow::Result<()> {
+    let name = joined.name();
+    match &prepared.descriptors {
+        None if joined.needs_descriptors() => {
+            let text = "expected descriptors (--descriptors FILE), found none";
+            let error = usage(format!("--neighbors {name}: {text}"));
+            return Err(match &input.database {
+                Some(database) => advise(error, format!("--descriptors {}", database.display())),
+                None => error,
+            });
+        }
+        None => {}
+        Some(descriptors) => check_fit(joined, descriptors)?,
+    }
+    if let Some(scheme) = blind_on(joined, schemes) {
+        return Err(usage(format!(
+            "--neighbors {name}: expected --schemes whose records alone tell where points are, found {scheme}"
+        )));
+    }
+    Ok(())
+}
+
 /// The first scheme that a source has nothing to say about.
 fn blind_on(joined: &Joined, schemes: &[&'static Entry]) -> Option<&'static str> {
     schemes.iter().map(|scheme| scheme.name).find(|name| joined.fails_on(name).is_some())
-}
-
-fn has(prepared: &Prepared) -> bool {
-    prepared.descriptors.is_some()
 }
 
 /// Lists by row of the file, for the rows that were kept.

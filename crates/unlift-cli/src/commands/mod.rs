@@ -17,9 +17,10 @@ use std::path::Path;
 
 use crate::args::{AuditCommand, BenchCommand, Command, MapArgs, NeighborsCommand};
 use crate::exit::{Outcome, advise};
+use crate::lengths::check_scale;
 use crate::prepare::{self, Preparation, Prepared};
 use crate::progress::Spinner;
-use unlift::Fingerprint;
+use unlift::{Descriptors, Fingerprint};
 use unlift_io::read::{self, Input};
 
 /// Runs one command.
@@ -68,12 +69,37 @@ fn same_map(
     }
 }
 
+/// How many descriptors are all zero: as some exporters mark points without one.
+fn n_zero(descriptors: &Descriptors) -> usize {
+    let mut row = vec![0.0; descriptors.dim()];
+    let mut zero = |at: &usize| {
+        descriptors.read_row(*at, &mut row);
+        row.iter().all(|&value| value == 0.0)
+    };
+    (0..descriptors.len()).filter(|at| zero(at)).count()
+}
+
 /// Reads a map and makes it ready: the first step of `audit map` and `obfuscate`.
-fn open_map(path: &Path, args: &MapArgs) -> anyhow::Result<(Input, Prepared)> {
-    let _alive = Spinner::new("reading the map");
-    let input = read::open(path)?;
+fn open_map(path: &Path, args: &MapArgs, quiet: bool) -> anyhow::Result<(Input, Prepared)> {
+    let alive = Spinner::unless(quiet, "reading the map");
+    let input = read::open(path).map_err(|error| {
+        let way_out = "the folder of a COLMAP model or project; for photos, unlift audit images";
+        let is_other = path.is_dir() && !read::is_project(path);
+        if is_other { advise(error, way_out) } else { error.into() }
+    })?;
+    for note in &input.skipped {
+        alive.say(&format!("unlift: note: {note}"));
+    }
+    check_scale(&input.positions, args.scale)?;
     let descriptors =
         args.descriptors.as_deref().map(|file| read::descriptors(file, &input)).transpose()?;
+    if let Some(n) = descriptors.as_ref().map(n_zero).filter(|&n| n > 0) {
+        let file = args.descriptors.as_deref().unwrap_or(path).display();
+        let of = input.positions.len();
+        alive.say(&format!(
+            "unlift: note: {file}: {n} of {of} descriptors are all zero, and tell an attacker nothing"
+        ));
+    }
     let preparation = Preparation {
         scale: args.scale,
         k: usize::from(args.k),

@@ -1,6 +1,9 @@
 //! `unlift neighbors`: from the truth at a chosen quality, or from a released map alone.
 
+use unlift::Error;
 use unlift::neighbors::oracle::{Outliers, TrueNeighbors, search};
+use unlift::neighbors::sources::Joined;
+use unlift::released::Released;
 use unlift_io::stage::{read_released, read_truth, write_neighborhoods};
 
 use super::evaluate::expect_slots;
@@ -48,6 +51,8 @@ pub fn find(args: &FindArgs) -> anyhow::Result<Outcome> {
         Some(k) => args.source.clone().with_k(usize::from(k)),
         None => args.source.clone(),
     };
+    check_own(&source, &released)
+        .map_err(|error| advise(unlift_io::Error::core(&args.released, error.0), error.1))?;
     if let Some(note) = source.note(released.n_slots()) {
         eprintln!("unlift: note: {note}");
     }
@@ -66,4 +71,20 @@ pub fn find(args: &FindArgs) -> anyhow::Result<Outcome> {
         args.out.display()
     ))?;
     Ok(Outcome::Done)
+}
+
+/// What a source lacks in a released map, and what to do about it.
+fn check_own(source: &Joined, released: &Released<3>) -> Result<(), (Error, &'static str)> {
+    match released.descriptors() {
+        None if source.needs_descriptors() => {
+            let what = format!("descriptors for {}", source.name());
+            let way_out =
+                "--source geometric, or hide the map with unlift obfuscate --descriptors FILE";
+            Err((Error::new(what, "some in the released map", "none"), way_out))
+        }
+        None => Ok(()),
+        Some(descriptors) => source
+            .check_descriptors(descriptors)
+            .map_err(|error| (error, "--source similarity, which takes descriptors of any kind")),
+    }
 }

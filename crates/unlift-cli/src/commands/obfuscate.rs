@@ -25,7 +25,7 @@ fn fresh_seed() -> u64 {
 /// Hides a map by one scheme.
 pub fn run(args: &ObfuscateArgs) -> anyhow::Result<Outcome> {
     let out = OutputDir::create(&args.out, RELEASED).map_err(|e| usage(format!("--out: {e}")))?;
-    let (_, prepared) = open_map(&args.path, &args.map)?;
+    let (_, prepared) = open_map(&args.path, &args.map, false)?;
     let name = args.scheme.name;
     let scheme = args.scheme.in_3d.ok_or_else(|| usage(format!("{name} is not for maps")))?;
     let options = Plan::new(prepared.original.reveal().unit()).scheme_options;

@@ -1,11 +1,12 @@
 //! What audits of maps and of images have in common: from arguments to a plan, and the summary.
 
 use serde_json::{Value, json};
+use unlift::Descriptors;
 use unlift::audit::{Plan, Source, Threshold};
 use unlift::neighbors::sources::Joined;
 
 use crate::args_audit::AttackArgs;
-use crate::exit::usage;
+use crate::exit::{advise, usage};
 use crate::job::Finished;
 use crate::values::distinct;
 
@@ -44,6 +45,16 @@ pub fn own(joined: Joined, args: &AttackArgs) -> Source {
     Source::Own(match args.source_k {
         Some(k) => joined.with_k(usize::from(k)),
         None => joined,
+    })
+}
+
+/// Refuses a source that cannot work on descriptors of this kind.
+pub fn check_fit(joined: &Joined, descriptors: &Descriptors) -> anyhow::Result<()> {
+    joined.check_descriptors(descriptors).map_err(|error| {
+        let name = joined.name();
+        let (expected, found) = (error.expected(), error.found());
+        let error = usage(format!("--neighbors {name}: expected {expected}, found {found}"));
+        advise(error, "--neighbors similarity, which takes descriptors of any kind")
     })
 }
 

@@ -21,7 +21,7 @@ use crate::document::{self, Found, Provenance};
 use crate::exit::line;
 use crate::gate::Gate;
 use crate::job::{Finished, MARKER, RowOfCell, check_gates, curve_errors, gate_results};
-use crate::progress::{Progress, Voice};
+use crate::progress::{Progress, Steps};
 
 /// Longest side of an embedded photo in pixels.
 const PREVIEW: u32 = 640;
@@ -70,14 +70,14 @@ pub fn perform(job: ImagesJob<'_>, out: OutputDir) -> anyhow::Result<(Option<Fin
     check_gates(&job.gates, &job.plan)?;
     let tally = RefCell::new(Tally::default());
     let mut watcher = Watcher::new(&job, &tally);
-    let voice = watcher.progress.voice();
+    let steps = watcher.progress.steps();
     for error in job.source.refused() {
         tally.borrow_mut().unusable += 1;
-        voice.say(&line(&anyhow::anyhow!("{error}")));
+        steps.say(&line(&anyhow::anyhow!("{error}")));
     }
     let of = (job.source, job.path);
     let needs = Needs::of_plan(&job.plan);
-    let images = Stream::new(of, &job.chosen, needs, &tally, voice.clone());
+    let images = Stream::new(of, &job.chosen, needs, &tally, steps.clone());
     let outcome = run(images, &job.plan, &mut watcher)?;
     let Watcher { figures, errors, curves, .. } = watcher;
     let tally = tally.into_inner();
@@ -85,7 +85,7 @@ pub fn perform(job: ImagesJob<'_>, out: OutputDir) -> anyhow::Result<(Option<Fin
     if used.used == 0 {
         return Ok((None, used));
     }
-    let pictures = if job.share_safe { Vec::new() } else { draw(&job, &tally, &figures, &voice)? };
+    let pictures = if job.share_safe { Vec::new() } else { draw(&job, &tally, &figures, &steps)? };
     let gates = gate_results(&job.gates, &job.plan, &outcome.rows)?;
     let provenance = Provenance {
         input: input(&job, &tally, &outcome)?,
@@ -143,7 +143,7 @@ fn draw(
     job: &ImagesJob<'_>,
     tally: &Tally,
     figures: &[ImageFigures],
-    voice: &Voice,
+    steps: &Steps,
 ) -> anyhow::Result<Vec<Picture>> {
     let wanted: Vec<(usize, &str)> = match &job.show {
         Some(show) => {
@@ -163,7 +163,7 @@ fn draw(
     let needs = Needs::of_plan(&plan);
     let mut album = Album::default();
     let again = RefCell::new(Tally::default());
-    let images = Stream::new((job.source, job.path), &numbers, needs, &again, voice.clone());
+    let images = Stream::new((job.source, job.path), &numbers, needs, &again, steps.clone());
     run(images, &plan, &mut album)?;
     let mut pictures = album.pictures;
     for picture in &mut pictures {
@@ -177,7 +177,7 @@ fn draw(
         };
         match unlift_features::preview::jpeg(&photo, PREVIEW) {
             Ok(jpeg) => picture.photo = Some(jpeg),
-            Err(error) => voice.say(&format!("unlift: note: {error}")),
+            Err(error) => steps.say(&format!("unlift: note: {error}")),
         }
     }
     Ok(pictures)
@@ -193,7 +193,7 @@ fn without_oracle(job: &ImagesJob<'_>, numbers: &[usize]) -> Vec<Source> {
             FeatureSource::Folder(_) => true,
             FeatureSource::File(_) => {
                 let read = job.source.get(at);
-                read.is_ok_and(|image| lacking(&image, Needs::of(joined)).is_none())
+                read.is_ok_and(|image| lacking(&image, &Needs::of(joined)).is_none())
             }
         };
         !job.plan.sources.iter().any(same) && numbers.iter().all(fits)
@@ -253,7 +253,6 @@ impl Curve {
 struct Watcher<'a> {
     progress: Progress,
     tally: &'a RefCell<Tally>,
-    total: usize,
     plan: &'a Plan,
     figures: Vec<ImageFigures>,
     /// Where curves are looked at.
@@ -264,10 +263,11 @@ struct Watcher<'a> {
 impl<'a> Watcher<'a> {
     fn new(job: &'a ImagesJob<'_>, tally: &'a RefCell<Tally>) -> Self {
         let most = job.plan.thresholds.iter().map(|t| t.value).fold(0.0, f64::max);
+        let mut progress = Progress::new(job.quiet);
+        progress.show(0, job.chosen.len(), "");
         Self {
-            progress: Progress::new(job.quiet),
+            progress,
             tally,
-            total: job.chosen.len(),
             plan: &job.plan,
             figures: Vec::new(),
             errors: curve_errors(most).collect(),
@@ -281,12 +281,14 @@ impl images::Watcher for Watcher<'_> {
 
     fn begin(&mut self) -> Curves {
         let row_of_cell = RowOfCell::new(self.plan);
-        Curves { errors: self.errors.clone(), row_of_cell, curves: Vec::new() }
+        let steps = self.progress.steps();
+        let (errors, curves) = (self.errors.clone(), Vec::new());
+        Curves { errors, row_of_cell, curves, steps, told: 0.0 }
     }
 
-    fn progress(&mut self, done: usize, _: usize, what: &str) {
-        let unusable = self.tally.borrow().unusable;
-        self.progress.show((done + unusable).min(self.total), self.total, what);
+    fn progress(&mut self, _: usize, _: usize, what: &str) {
+        // Images tell themselves how far they are.
+        self.progress.steps().add(0.0, what);
     }
 
     fn image(&mut self, name: &str, rows: &[Row], Curves { curves, .. }: Curves) {
@@ -308,9 +310,18 @@ struct Curves {
     errors: Vec<f64>,
     row_of_cell: RowOfCell,
     curves: Vec<Curve>,
+    steps: Steps,
+    /// The share of the image that was told to be finished.
+    told: f64,
 }
 
 impl Observer<2> for Curves {
+    fn progress(&mut self, done: usize, total: usize, _: &str) {
+        let share = done as f64 / total.max(1) as f64;
+        self.steps.add(share - self.told, "");
+        self.told = share;
+    }
+
     fn cell(&mut self, cell: &Cell<'_, 2>) {
         if cell.repeat > 0 {
             return;

@@ -1,5 +1,6 @@
 //! A folder of photos: which there are, and the features of one.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -11,6 +12,11 @@ use unlift_io::features::ImageFeatures;
 
 /// What is taken for a photo; what a file is, its bytes decide when it is read.
 const ENDINGS: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
+/// Other images that people have beside these, or in place of them: passed over, and told.
+const OTHER_ENDINGS: [&str; 24] = [
+    "arw", "avif", "bmp", "cr2", "cr3", "dng", "exr", "gif", "hdr", "heic", "heif", "j2k", "jp2",
+    "jxl", "nef", "orf", "pbm", "pgm", "ppm", "raf", "rw2", "tga", "tif", "tiff",
+];
 /// Pixels a side below which nothing can be an extremum.
 const LEAST_SIDE: usize = 3;
 /// Standard deviation of a SIFT keypoint in pixels of the image it was found in, as hloc states it.
@@ -23,6 +29,7 @@ pub struct Folder {
     names: Vec<String>,
     paths: Vec<PathBuf>,
     refused: Vec<Error>,
+    passed_over: Option<String>,
 }
 
 impl Folder {
@@ -37,14 +44,21 @@ impl Folder {
         if found.photos.is_empty() {
             return Err(match found.refused.pop() {
                 Some(refused) => refused,
-                None => Error::new(root, "", "JPEG, PNG or WebP photos", "none"),
+                None => {
+                    let found = found.others().map_or("none".to_owned(), |o| format!("only {o}"));
+                    Error::new(root, "", "JPEG, PNG or WebP photos", found)
+                }
             }
             .into());
         }
+        let passed_over = found.others().map(|others| {
+            let root = root.display();
+            format!("{root}: passed over {others}: only JPEG, PNG and WebP are read")
+        });
         found.photos.sort_unstable();
         let (names, paths) = found.photos.into_iter().unzip();
         let max_image_size = options.max_image_size;
-        Ok(Self { sift, max_image_size, names, paths, refused: found.refused })
+        Ok(Self { sift, max_image_size, names, paths, refused: found.refused, passed_over })
     }
 
     pub fn names(&self) -> &[String] {
@@ -53,6 +67,11 @@ impl Folder {
 
     pub fn refused(&self) -> &[Error] {
         &self.refused
+    }
+
+    /// Images of other kinds, in a line.
+    pub fn passed_over(&self) -> Option<&str> {
+        self.passed_over.as_deref()
     }
 
     /// Where photo `at` is.
@@ -108,9 +127,18 @@ fn convert(features: Features) -> ImageFeatures {
 struct Found {
     photos: Vec<(String, PathBuf)>,
     refused: Vec<Error>,
+    /// How many images of other kinds there are, by ending.
+    others: BTreeMap<String, usize>,
 }
 
 impl Found {
+    /// Images of other kinds: `12 .heic, 1 .tiff`.
+    fn others(&self) -> Option<String> {
+        let others = self.others.iter().map(|(ending, n)| format!("{n} .{ending}"));
+        let others: Vec<String> = others.collect();
+        (!others.is_empty()).then(|| others.join(", "))
+    }
+
     /// Adds what is in `folder`, whose name is `prefix`; `above` are the folders it is in.
     fn visit(&mut self, folder: &Path, prefix: &str, above: &mut Vec<PathBuf>) {
         // A link to a folder further up would never end.
@@ -141,7 +169,11 @@ impl Found {
             });
             let is_folder = path.is_dir();
             let ending = path.extension().unwrap_or_default().to_string_lossy();
-            let is_photo = ENDINGS.contains(&&*ending.to_ascii_lowercase());
+            let ending = ending.to_ascii_lowercase();
+            let is_photo = ENDINGS.contains(&&*ending);
+            if !is_folder && OTHER_ENDINGS.contains(&&*ending) {
+                *self.others.entry(ending).or_default() += 1;
+            }
             match name {
                 Some(name) if is_folder => self.visit(&path, &name, above),
                 Some(name) if is_photo => self.photos.push((name, path)),

@@ -53,6 +53,14 @@ impl FeatureSource {
         }
     }
 
+    /// What was found beside images and passed over, in a line.
+    pub fn passed_over(&self) -> Option<&str> {
+        match self {
+            Self::Folder(folder) => folder.passed_over(),
+            Self::File(_) => None,
+        }
+    }
+
     /// The features of image `at` of [`names`](Self::names).
     ///
     /// # Errors

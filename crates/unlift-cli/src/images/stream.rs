@@ -16,7 +16,7 @@ use unlift_io::features::ImageFeatures;
 
 use super::FeatureSource;
 use crate::exit::line;
-use crate::progress::Voice;
+use crate::progress::Steps;
 
 /// Images per thread that are read ahead.
 const PER_THREAD: usize = 2;
@@ -41,33 +41,28 @@ impl Tally {
     }
 }
 
-/// What an image must have, beside keypoints and a size.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Needs {
-    /// Descriptors of any kind.
-    pub descriptors: bool,
-    /// Those of SIFT, in bytes.
-    pub sift: bool,
-}
+/// What an image must have, beside keypoints and a size: what these sources need.
+#[derive(Clone, Debug, Default)]
+pub struct Needs(Vec<Joined>);
 
 impl Needs {
     /// What a source needs.
     pub fn of(joined: &Joined) -> Self {
-        let sift = joined.name().split('+').any(|name| name == "overlap");
-        Self { descriptors: joined.needs_descriptors(), sift }
+        Self(joined.needs_descriptors().then(|| joined.clone()).into_iter().collect())
     }
 
     /// What a plan needs.
     pub fn of_plan(plan: &Plan) -> Self {
-        let mut all = Self::default();
-        for source in &plan.sources {
-            if let Source::Own(joined) = source {
-                let of = Self::of(joined);
-                all.descriptors |= of.descriptors;
-                all.sift |= of.sift;
-            }
-        }
-        all
+        let own = plan.sources.iter().filter_map(|source| match source {
+            Source::Own(joined) if joined.needs_descriptors() => Some(joined.clone()),
+            Source::Own(_) | Source::Oracle | Source::Given(_) => None,
+        });
+        Self(own.collect())
+    }
+
+    /// Whether it is descriptors.
+    pub fn descriptors(&self) -> bool {
+        !self.0.is_empty()
     }
 }
 
@@ -80,27 +75,27 @@ pub struct Stream<'a> {
     next: usize,
     ready: VecDeque<(usize, Image)>,
     tally: &'a RefCell<Tally>,
-    voice: Voice,
+    steps: Steps,
 }
 
 impl<'a> Stream<'a> {
-    /// `path` names the source in errors, which `voice` tells and `tally` counts.
+    /// `path` names the source in errors, which `steps` tells and `tally` counts.
     pub fn new(
         (source, path): (&'a FeatureSource, &'a Path),
         chosen: &'a [usize],
         needs: Needs,
         tally: &'a RefCell<Tally>,
-        voice: Voice,
+        steps: Steps,
     ) -> Self {
         let ready = VecDeque::new();
-        Self { source, path, chosen, needs, next: 0, ready, tally, voice }
+        Self { source, path, chosen, needs, next: 0, ready, tally, steps }
     }
 
     fn read_ahead(&mut self) {
         let n = PER_THREAD * rayon::current_num_threads();
         let numbers = &self.chosen[self.next..self.chosen.len().min(self.next + n)];
         self.next += numbers.len();
-        let (source, path, needs) = (self.source, self.path, self.needs);
+        let (source, path, needs) = (self.source, self.path, &self.needs);
         let read = |&at: &usize| (at, image(source, path, at, needs));
         let read: Vec<_> = numbers.par_iter().with_max_len(1).map(read).collect();
         for (at, image) in read {
@@ -108,7 +103,8 @@ impl<'a> Stream<'a> {
                 Ok(image) => self.ready.push_back((at, image)),
                 Err(error) => {
                     self.tally.borrow_mut().unusable += 1;
-                    self.voice.say(&line(&error));
+                    self.steps.say(&line(&error));
+                    self.steps.add(1.0, "");
                 }
             }
         }
@@ -131,13 +127,13 @@ impl Iterator for Stream<'_> {
     }
 }
 
-fn image(source: &FeatureSource, path: &Path, at: usize, needs: Needs) -> anyhow::Result<Image> {
+fn image(source: &FeatureSource, path: &Path, at: usize, needs: &Needs) -> anyhow::Result<Image> {
     let features = source.get(at)?;
     let wrong = |expected: &str, found: &str| {
         Error::new(path, format!("image {}", features.name.escape_debug()), expected, found)
     };
-    if let Some(missing) = lacking(&features, needs) {
-        return Err(wrong(missing.0, missing.1).into());
+    if let Some((expected, found)) = lacking(&features, needs) {
+        return Err(wrong(&expected, &found).into());
     }
     let [width, height] = features.size.ok_or_else(|| wrong("a size in pixels", "none"))?;
     // The middle of the first pixel is (0, 0).
@@ -149,25 +145,19 @@ fn image(source: &FeatureSource, path: &Path, at: usize, needs: Needs) -> anyhow
     let points = PointSet::try_new(features.keypoints.clone(), Unit::Pixel).map_err(of_image)?;
     let original = Original::within(points, bounds).map_err(of_image)?;
     // Nobody asks for them otherwise, and they are most of an image.
-    let descriptors = features.descriptors.filter(|_| needs.descriptors);
+    let descriptors = features.descriptors.filter(|_| needs.descriptors());
     Ok(Image { name: features.name, original, descriptors })
 }
 
 /// What was expected of these features, and found; `None` where they have what is needed. An image
 /// without keypoints needs nothing.
-pub fn lacking(features: &ImageFeatures, needs: Needs) -> Option<(&'static str, &'static str)> {
-    if features.keypoints.is_empty() || !needs.descriptors {
+pub fn lacking(features: &ImageFeatures, needs: &Needs) -> Option<(String, String)> {
+    if features.keypoints.is_empty() || !needs.descriptors() {
         return None;
     }
-    match &features.descriptors {
-        None => Some(("descriptors", "none")),
-        Some(found) if needs.sift => match found.values() {
-            unlift::descriptors::Values::F32(_) => Some(("SIFT descriptors in bytes", "floats")),
-            unlift::descriptors::Values::U8(_) if found.dim() != 128 => {
-                Some(("SIFT descriptors of 128 bytes", "others"))
-            }
-            unlift::descriptors::Values::U8(_) => None,
-        },
-        Some(_) => None,
-    }
+    let Some(found) = &features.descriptors else {
+        return Some(("descriptors".to_owned(), "none".to_owned()));
+    };
+    let error = needs.0.iter().find_map(|joined| joined.check_descriptors(found).err())?;
+    Some((error.expected().to_owned(), error.found().to_owned()))
 }

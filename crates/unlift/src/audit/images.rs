@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::break_even::{BreakEven, break_even};
-use super::cells::{Owned, Run, cells};
+use super::cells::{Owned, Run, cells, per_scheme};
 use super::clock::Clock;
 use super::plan::Plan;
 use super::pool::Pool;
@@ -47,7 +47,7 @@ pub struct Outcome {
 /// Several images are at work at the same time: what is seen of one is collected on its own, and handed
 /// over when its turn comes.
 pub trait Watcher {
-    /// What is collected of one image; its progress is not told.
+    /// What is collected of one image. It hears the progress of that image, from a thread of its own.
     type OfImage: Observer<2> + Send;
 
     /// Before an image is begun.
@@ -154,6 +154,7 @@ impl Sums {
 fn one(image: &Image, plan: &Plan, seen: &mut impl Observer<2>) -> Result<(Vec<Row>, Sums), Error> {
     let mut sums = Sums::default();
     if image.original.is_empty() {
+        seen.progress(1, 1, "done");
         return Ok((Vec::new(), sums));
     }
     check(image, plan)?;
@@ -162,6 +163,8 @@ fn one(image: &Image, plan: &Plan, seen: &mut impl Observer<2>) -> Result<(Vec<R
     let descriptors = image.descriptors.as_ref();
     let owned =
         Owned { original: &image.original, descriptors, search: &search, one_of_many: true };
+    let total = per_scheme(plan) * plan.schemes.len() * plan.repeats as usize;
+    let mut n_done = 0;
     let mut by_repeat: Vec<Vec<Row>> = Vec::new();
     let mut first = 0;
     for &entry in &plan.schemes {
@@ -171,8 +174,12 @@ fn one(image: &Image, plan: &Plan, seen: &mut impl Observer<2>) -> Result<(Vec<R
             let seed = Draws::new(seed, Stage::Image, hash(&image.name)).bits();
             next = first;
             let run = Run { plan, entry, repeat, seed };
-            cells(&owned, &run, clock, seen, |_, _, finished| {
+            cells(&owned, &run, clock, seen, |seen, what, finished| {
+                if let Some(what) = what {
+                    seen.progress(n_done, total, &what);
+                }
                 let Some(finished) = finished else { return };
+                n_done += 1;
                 if by_repeat.len() <= next {
                     by_repeat.push(Vec::new());
                     pools.push(Vec::new());
@@ -188,6 +195,7 @@ fn one(image: &Image, plan: &Plan, seen: &mut impl Observer<2>) -> Result<(Vec<R
         }
         first = next;
     }
+    seen.progress(n_done, total, "done");
     Ok((by_repeat.iter().map(|repeats| Row::mean(repeats)).collect(), sums))
 }
 

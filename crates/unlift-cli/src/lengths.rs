@@ -1,0 +1,223 @@
+//! Whether a declared scale and thresholds fit a map: where every point counts as recovered wherever it
+//! is put, or none could ever, a figure says nothing, and 0 % would look like protection.
+
+use unlift::audit::Threshold;
+use unlift::geometry::knn::Knn;
+use unlift::geometry::vector::median;
+use unlift::{Error, Unit};
+
+use crate::exit::{advise, usage};
+
+/// How far apart the points of a map lie.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extent {
+    /// Twice the distance from the middle (the median of every coordinate) within which nine tenths of
+    /// the points lie: a few outliers make no map large.
+    pub across: f64,
+    /// The median distance to the nearest other point.
+    pub nearest: f64,
+}
+
+impl Extent {
+    /// That of `points`, of which there must be two.
+    ///
+    /// # Errors
+    /// When a coordinate is not finite.
+    pub fn of(points: &[[f64; 3]]) -> Result<Self, Error> {
+        let nearest = median(&mut Knn::new(points)?.kth_distances(1));
+        Ok(Self { across: across(points), nearest })
+    }
+}
+
+fn across(points: &[[f64; 3]]) -> f64 {
+    if points.is_empty() {
+        return 0.0;
+    }
+    let middle: [f64; 3] = std::array::from_fn(|axis| {
+        let mut coordinates: Vec<f64> = points.iter().map(|p| p[axis]).collect();
+        median(&mut coordinates)
+    });
+    let distance = |p: &[f64; 3]| -> f64 {
+        (0..3).map(|axis| (p[axis] - middle[axis]).powi(2)).sum::<f64>().sqrt()
+    };
+    let mut distances: Vec<f64> = points.iter().map(distance).collect();
+    let at = (distances.len() - 1) * 9 / 10;
+    2.0 * *distances.select_nth_unstable_by(at, f64::total_cmp).1
+}
+
+/// What a map in meters can be across: from a grain of dust to beyond the orbit of the moon.
+const ACROSS_M: [f64; 2] = [1e-6, 1e9];
+/// Where even neighboring points are this many times the largest threshold apart, no attack could hit.
+const HOPELESS: f64 = 1000.0;
+/// The same for what is possible but unusual.
+const UNUSUAL: f64 = 10.0;
+
+/// Checks a scale against the points as they were read.
+///
+/// # Errors
+/// When it makes the map smaller than dust or larger than the solar system has room for.
+pub fn check_scale(points: &[[f64; 3]], scale: Option<f64>) -> anyhow::Result<()> {
+    let Some(scale) = scale else { return Ok(()) };
+    let across = across(points);
+    let [least, most] = ACROSS_M;
+    // Points that all coincide have their own error.
+    if across == 0.0 || (least..=most).contains(&(across * scale)) {
+        return Ok(());
+    }
+    let error = usage(format!(
+        "--scale {scale:e}: expected {:.1e} to {:.1e} meters per unit, as the map is {} units across, found {scale:e}",
+        least / across,
+        most / across,
+        short(across),
+    ));
+    Err(advise(error, "--scale 1 for a map in meters, or no --scale for relative lengths"))
+}
+
+/// Checks thresholds against the points in the unit of the audit: what to tell the user, if anything.
+/// Usual thresholds in a relative unit fit by themselves.
+///
+/// # Errors
+/// When every point would count as recovered wherever it is put, or none could ever.
+pub fn check_thresholds(
+    points: &[[f64; 3]],
+    unit: Unit,
+    thresholds: &[Threshold],
+    typed: bool,
+) -> anyhow::Result<Option<String>> {
+    if unit != Unit::Meter && !typed {
+        return Ok(None);
+    }
+    let by_size = |a: &&Threshold, b: &&Threshold| a.value.total_cmp(&b.value);
+    let (Some(least), Some(most)) =
+        (thresholds.iter().min_by(by_size), thresholds.iter().max_by(by_size))
+    else {
+        return Ok(None);
+    };
+    let Extent { across, nearest } = Extent::of(points)?;
+    let option = if typed { "--thresholds" } else { "--scale" };
+    let in_unit = |length: f64| match unit {
+        Unit::Meter => format!("{} m", short(length)),
+        Unit::Pixel => format!("{} px", short(length)),
+        Unit::KthNeighbor => format!("{} (usual distances to the K-th neighbor)", short(length)),
+    };
+    let way_out = match unit {
+        Unit::Meter => "another --scale (meters per unit of the map), or other --thresholds",
+        Unit::KthNeighbor | Unit::Pixel => "other --thresholds, or none for the usual ones",
+    };
+    if across > 0.0 && least.value >= across {
+        let error = usage(format!(
+            "{option}: expected a map larger than the smallest threshold, {}, found one {} across: any guess \
+             would count as recovered",
+            least.label,
+            in_unit(across),
+        ));
+        return Err(advise(error, way_out));
+    }
+    if nearest >= HOPELESS * most.value {
+        let error = usage(format!(
+            "{option}: expected neighboring points less than {HOPELESS} times the largest threshold, {}, apart, \
+             found {}: no attack could come near",
+            most.label,
+            in_unit(nearest),
+        ));
+        return Err(advise(error, way_out));
+    }
+    if across > 0.0 && most.value >= across {
+        return Ok(Some(format!(
+            "the map is {} across, less than the threshold {}: within it any guess counts as recovered",
+            in_unit(across),
+            most.label,
+        )));
+    }
+    if nearest >= UNUSUAL * most.value {
+        return Ok(Some(format!(
+            "neighboring points are {} apart, far more than the largest threshold, {}: is {option} right?",
+            in_unit(nearest),
+            most.label,
+        )));
+    }
+    Ok(None)
+}
+
+/// Three digits, and an exponent where there would be many zeros.
+fn short(length: f64) -> String {
+    if (1e-3..1e6).contains(&length) || length == 0.0 {
+        let digits = (2 - length.max(1e-3).log10().floor() as i32).clamp(0, 6) as usize;
+        return format!("{length:.digits$}");
+    }
+    format!("{length:.1e}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use unlift::synthetic;
+
+    fn room(scale: f64) -> Vec<[f64; 3]> {
+        synthetic::room(0, 2000).points.iter().map(|p| p.map(|x| x * scale)).collect()
+    }
+
+    fn thresholds(labels: &[&str]) -> Vec<Threshold> {
+        labels.iter().map(|label| Threshold::parse(label).unwrap()).collect()
+    }
+
+    fn told(scale: f64) -> Result<Option<String>, String> {
+        let usual = thresholds(&["0.10", "0.25"]);
+        check_thresholds(&room(scale), Unit::Meter, &usual, false).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn scales_that_make_a_map_of_nothing_or_of_everything_are_refused() {
+        let points = room(1.0);
+        for scale in [1e-300, 1e-9, 1e10, 1e300] {
+            let error = check_scale(&points, Some(scale)).unwrap_err().to_string();
+            assert!(error.starts_with(&format!("--scale {scale:e}: expected")), "{error}");
+        }
+        for scale in [None, Some(1e-3), Some(1.0), Some(1000.0)] {
+            check_scale(&points, scale).unwrap();
+        }
+        // Georeferenced coordinates are large, maps are not; and an outlier makes no map large.
+        let mut far: Vec<_> = points.iter().map(|p| p.map(|x| x + 5e6)).collect();
+        far.push([1e15; 3]);
+        check_scale(&far, Some(1.0)).unwrap();
+    }
+
+    #[test]
+    fn a_map_within_the_smallest_threshold_is_refused() {
+        let error = told(0.01).unwrap_err();
+        assert!(error.starts_with("--scale: expected a map larger than"), "{error}");
+        assert!(error.ends_with("any guess would count as recovered"), "{error}");
+        // The larger one alone is still worth a word.
+        let note = told(0.03).unwrap().unwrap();
+        assert!(note.contains("less than the threshold 0.25"), "{note}");
+        assert_eq!(told(1.0), Ok(None));
+    }
+
+    #[test]
+    fn points_too_far_apart_for_any_threshold_are_refused() {
+        let error = told(10_000.0).unwrap_err();
+        assert!(error.contains("expected neighboring points less than 1000 times"), "{error}");
+        let note = told(100.0).unwrap().unwrap();
+        assert!(note.ends_with("is --scale right?"), "{note}");
+    }
+
+    #[test]
+    fn thresholds_as_typed_are_checked_in_any_unit() {
+        let of = |labels: &[&str], typed| {
+            let thresholds = thresholds(labels);
+            check_thresholds(&room(20.0), Unit::KthNeighbor, &thresholds, typed)
+                .map_err(|error| error.to_string())
+        };
+        for labels in [["1e300", "1e301"], ["1e-300", "1e-9"]] {
+            assert!(of(&labels, true).unwrap_err().starts_with("--thresholds: expected"));
+            assert_eq!(of(&labels, false), Ok(None));
+        }
+        assert_eq!(of(&["1.0", "2.5"], true), Ok(None));
+    }
+
+    #[test]
+    fn lengths_have_three_digits() {
+        let texts = [0.0154, 1.5, 85.23, 15_400.0, 3e-300, 7.2e9].map(short);
+        assert_eq!(texts, ["0.0154", "1.50", "85.2", "15400", "3.0e-300", "7.2e9"]);
+    }
+}
