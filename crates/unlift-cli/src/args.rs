@@ -142,8 +142,8 @@ pub struct MapArgs {
     #[arg(long, value_name = "K", default_value = "50",
           value_parser = clap::value_parser!(u16).range(1..))]
     pub k: u16,
-    /// The integer that all randomness comes from [default: 0 for audits, drawn anew by obfuscate,
-    /// where it is part of the secret]
+    /// The integer that all randomness comes from [default: 0 for audits; obfuscate uses a fresh key
+    /// of 256 bits instead, as whoever guesses the integer undoes the hiding]
     #[arg(long, value_name = "INTEGER")]
     pub seed: Option<u64>,
 }
@@ -208,7 +208,8 @@ Examples:
   unlift obfuscate PROJECT --scheme olc --descriptors PROJECT/database.db --out hidden
 
 Writes hidden/released.parquet (what an attacker sees) and hidden/truth.parquet (keep it private).
-The seed is part of the secret: who knows it undoes the order of the records, and cp entirely.")]
+What is drawn comes from a fresh 256-bit key that is kept nowhere. With --seed it comes from that
+number: for experiments only, since whoever guesses it undoes the order of the records, and cp entirely.")]
 pub struct ObfuscateArgs {
     /// A COLMAP model or project folder, or a .ply, .csv, .xyz, .txt or .npy file
     #[arg(value_name = "PATH")]

@@ -10,6 +10,7 @@ use unlift::neighbors::oracle;
 use unlift::neighbors::sources::Joined;
 use unlift::obfuscate::{SCHEMES, SchemeOptions, obfuscate, scheme};
 use unlift::recover::{RecoverOptions, Solver, recover};
+use unlift::seed::Key;
 use unlift::truth::Original;
 use unlift::{PointSet, Unit};
 use unlift_io::read;
@@ -129,7 +130,7 @@ fn patches_of_a_real_map_name_neighbors() {
     ] {
         let scheme = scheme(name).unwrap().in_3d.unwrap();
         let (released, secret) =
-            obfuscate(scheme, &original, Some(&descriptors), &options, 0).unwrap();
+            obfuscate(scheme, &original, Some(&descriptors), &options, &Key::from_seed(0)).unwrap();
         let slots = released.slots_per_record();
         let near =
             oracle::TrueNeighbors::new(&search, &secret.by_descriptor_row(), slots, 50).unwrap();
@@ -151,7 +152,8 @@ fn what_is_said_about_a_real_map_comes_true() {
         let mut found: Option<Reliability> = None;
         for scheme in SCHEMES.iter().filter_map(|entry| entry.in_3d) {
             let options = SchemeOptions { voxel: 5.0 * typical };
-            let (released, secret) = obfuscate(scheme, &original, None, &options, 0).unwrap();
+            let (released, secret) =
+                obfuscate(scheme, &original, None, &options, &Key::from_seed(0)).unwrap();
             let slots = released.slots_per_record();
             let near = oracle::TrueNeighbors::new(&search, &secret, slots, 50).unwrap();
             for ratio in [0.5, 0.1] {

@@ -17,6 +17,7 @@ use unlift::neighbors::oracle::{TrueNeighbors, search};
 use unlift::obfuscate::{Entry, SchemeOptions, obfuscate, scheme};
 use unlift::recover::{Delta, RecoverOptions, Solver, recover};
 use unlift::released::{Obfuscation, Released};
+use unlift::seed::Key;
 use unlift::truth::Original;
 use unlift::{PointSet, Unit, synthetic};
 
@@ -115,7 +116,7 @@ fn table(sizes: &Sizes, pools: &[ThreadPool], original: &Original<3>, entry: &En
     let Some(scheme) = entry.in_3d else { return };
     let (released, near) = {
         let options = SchemeOptions { voxel: 0.5 };
-        let hidden = obfuscate(scheme, original, None, &options, 0);
+        let hidden = obfuscate(scheme, original, None, &options, &Key::from_seed(0));
         let (released, secret) = hidden.expect("a map can be hidden");
         let started = Instant::now();
         let knn = search(original).expect("points");

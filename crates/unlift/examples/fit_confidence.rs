@@ -18,6 +18,7 @@ use unlift::geometry::vector::{distance, median};
 use unlift::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
 use unlift::obfuscate::{Entry, SCHEMES, SchemeOptions, obfuscate};
 use unlift::recover::{Cues, N_TERMS, RecoverOptions, Solver, centered, recover_and_look, terms};
+use unlift::seed::Key;
 use unlift::synthetic::room;
 use unlift::truth::Original;
 use unlift::{Error, PointSet, Unit};
@@ -95,7 +96,7 @@ fn of_scheme(
     let Some(scheme) = entry.in_3d else { return Ok(Vec::new()) };
     let knn = oracle::search(original)?;
     let options = SchemeOptions { voxel: 5.0 * typical };
-    let (released, secret) = obfuscate(scheme, original, None, &options, 0)?;
+    let (released, secret) = obfuscate(scheme, original, None, &options, &Key::from_seed(0))?;
     let near = TrueNeighbors::new(&knn, &secret, released.slots_per_record(), k)?;
     let points = original.reveal().positions();
     let mut rows = Vec::new();

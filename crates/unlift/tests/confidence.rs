@@ -6,6 +6,7 @@ use unlift::geometry::vector::median;
 use unlift::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
 use unlift::obfuscate::{SchemeOptions, obfuscate, scheme};
 use unlift::recover::{RecoverOptions, Recovered, Solver, recover};
+use unlift::seed::Key;
 use unlift::synthetic::room;
 use unlift::truth::{Original, Secret};
 use unlift::{PointSet, Unit};
@@ -26,7 +27,8 @@ fn recovered(
     let knn = oracle::search(original).unwrap();
     let options = SchemeOptions { voxel: 5.0 * typical };
     let scheme = scheme(name).unwrap().in_3d.unwrap();
-    let (released, secret) = obfuscate(scheme, original, None, &options, 7).unwrap();
+    let (released, secret) =
+        obfuscate(scheme, original, None, &options, &Key::from_seed(7)).unwrap();
     let near = TrueNeighbors::new(&knn, &secret, released.slots_per_record(), 50).unwrap();
     let outliers = Outliers::new(noise, &near, &knn, &secret, 7).unwrap();
     let lists = near.lists(ratio, &outliers, 7).unwrap();

@@ -7,6 +7,7 @@ use unlift::audit::Plan;
 use unlift::neighbors::oracle::{TrueNeighbors, search};
 use unlift::obfuscate::obfuscate;
 use unlift::recover::{RecoverOptions, recover};
+use unlift::seed::Key;
 use unlift::truth::Original;
 use unlift::{PointSet, synthetic};
 use unlift_io::read;
@@ -45,7 +46,8 @@ fn measure(args: &BenchRecoverArgs) -> anyhow::Result<Bench> {
     let original = map(args)?;
     let options = Plan::new(original.reveal().unit()).scheme_options;
     let started = Instant::now();
-    let (released, secret) = obfuscate(scheme, &original, None, &options, args.seed)?;
+    let (released, secret) =
+        obfuscate(scheme, &original, None, &options, &Key::from_seed(args.seed))?;
     let hidden = started.elapsed().as_secs_f64();
     let started = Instant::now();
     let knn = search(&original)?;

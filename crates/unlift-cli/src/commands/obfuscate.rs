@@ -2,6 +2,7 @@
 
 use unlift::audit::Plan;
 use unlift::obfuscate::obfuscate;
+use unlift::seed::Key;
 use unlift_io::atomic::OutputDir;
 use unlift_io::stage::{write_released, write_truth};
 
@@ -15,12 +16,9 @@ pub const RELEASED: &str = "released.parquet";
 /// What only the owner has.
 pub const TRUTH: &str = "truth.parquet";
 
-/// A seed from the operating system's randomness (through the standard library's hash keys): whoever
-/// could guess it could undo the hiding.
-fn fresh_seed() -> u64 {
-    use std::hash::{BuildHasher, RandomState};
-    RandomState::new().hash_one(std::process::id())
-}
+/// What an integer seed is worth.
+const GUESSABLE: &str = "unlift: note: --seed repeats experiments; whoever guesses the number undoes the hiding: \
+    do not release this map";
 
 /// Hides a map by one scheme.
 pub fn run(args: &ObfuscateArgs) -> anyhow::Result<Outcome> {
@@ -30,8 +28,14 @@ pub fn run(args: &ObfuscateArgs) -> anyhow::Result<Outcome> {
     let scheme = args.scheme.in_3d.ok_or_else(|| usage(format!("{name} is not for maps")))?;
     let options = Plan::new(prepared.original.reveal().unit()).scheme_options;
     let descriptors = prepared.descriptors.as_ref();
-    let seed = args.map.seed.unwrap_or_else(fresh_seed);
-    let hidden = obfuscate(scheme, &prepared.original, descriptors, &options, seed);
+    let key = match args.map.seed {
+        Some(seed) => {
+            eprintln!("{GUESSABLE}");
+            Key::from_seed(seed)
+        }
+        None => Key::fresh()?,
+    };
+    let hidden = obfuscate(scheme, &prepared.original, descriptors, &options, &key);
     let (released, secret) = hidden.map_err(|e| unlift_io::Error::core(&args.path, e))?;
     write_released(&out.path().join(RELEASED), &released)?;
     write_truth(&out.path().join(TRUTH), &prepared.original, &secret)?;

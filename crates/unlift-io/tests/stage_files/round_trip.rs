@@ -7,6 +7,7 @@ use unlift::geometry::frame::Bounds;
 use unlift::neighbors::Neighborhoods;
 use unlift::obfuscate::{SCHEMES, SchemeOptions, obfuscate};
 use unlift::released::{AxisCandidates, Obfuscation, Released};
+use unlift::seed::Key;
 use unlift::truth::Original;
 use unlift::{PointSet, RecordId, Unit};
 use unlift_io::stage::{self, Kind};
@@ -61,7 +62,8 @@ fn released_images() {
     for entry in SCHEMES {
         let Some(scheme) = entry.in_2d else { continue };
         let (released, _) =
-            obfuscate(scheme, &original, None, &SchemeOptions { voxel: 50.0 }, 3).unwrap();
+            obfuscate(scheme, &original, None, &SchemeOptions { voxel: 50.0 }, &Key::from_seed(3))
+                .unwrap();
         assert!(released.bounds().is_some());
         written_twice(folder.path(), |path| stage::write_released(path, &released).unwrap());
         assert!(stage::read_released::<2>(&path).unwrap() == released, "{}", entry.name);

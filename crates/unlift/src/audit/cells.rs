@@ -15,6 +15,7 @@ use crate::neighbors::oracle::Noise;
 use crate::obfuscate::{Entry, obfuscate};
 use crate::recover::{RecoverOptions, Recovered, recover};
 use crate::released::Released;
+use crate::seed::Key;
 use crate::truth::{Original, Secret};
 use crate::{Descriptors, Error};
 
@@ -57,8 +58,10 @@ pub(super) struct Run<'a> {
     pub(super) plan: &'a Plan,
     pub(super) entry: &'static Entry,
     pub(super) repeat: u32,
-    /// The owner's seed.
-    pub(super) seed: u64,
+    /// What everything that hides the points is drawn under.
+    pub(super) key: &'a Key,
+    /// The oracle's seed. It has no part in what is released.
+    pub(super) oracle_seed: u64,
 }
 
 /// One finished row, with what a pool of many needs.
@@ -89,15 +92,16 @@ pub(super) fn cells<const D: usize>(
     observer: &mut dyn Observer<D>,
     mut each: impl FnMut(&mut dyn Observer<D>, Option<String>, Option<Finished<'_>>),
 ) -> Result<(), Error> {
-    let Run { plan, entry, repeat, seed } = *run;
+    let Run { plan, entry, repeat, key, oracle_seed } = *run;
     let original = owned.original;
-    // The same integer as the owner's, in streams of its own: a released map says nothing of either.
+    // The same integer as the owner's, by the counter: what is released comes from a key, and no attack may
+    // make keys (tests/architecture).
     let attacker = plan.seed.wrapping_add(u64::from(repeat));
     let of_scheme = |error: Error| error.within(entry.name);
-    let hidden = hide(entry, original, owned.descriptors, plan, seed, clock).map_err(of_scheme)?;
+    let hidden = hide(entry, original, owned.descriptors, plan, key, clock).map_err(of_scheme)?;
     let baseline = clock.time(|s| &mut s.evaluate, || Ok(blind(&hidden.0, original, &hidden.1)))?;
     let by_row = hidden.1.by_descriptor_row();
-    let mut sources = Lists::new(plan, owned.search, &hidden, &by_row, (seed, attacker));
+    let mut sources = Lists::new(plan, owned.search, &hidden, &by_row, (oracle_seed, attacker));
     for variant in &plan.variants() {
         let source = match variant.noise {
             Some(noise) => noise.name().to_owned(),
@@ -190,7 +194,7 @@ fn hide<const D: usize>(
     original: &Original<D>,
     descriptors: Option<&Descriptors>,
     plan: &Plan,
-    seed: u64,
+    key: &Key,
     clock: &mut Clock,
 ) -> Result<(Released<D>, Secret), Error> {
     let scheme = entry
@@ -198,7 +202,7 @@ fn hide<const D: usize>(
         .ok_or_else(|| Error::new("scheme", format!("one for {D}D points"), entry.name))?;
     clock.time(
         |s| &mut s.obfuscate,
-        || obfuscate(scheme, original, descriptors, &plan.scheme_options, seed),
+        || obfuscate(scheme, original, descriptors, &plan.scheme_options, key),
     )
 }
 

@@ -10,7 +10,7 @@ use super::pool::Pool;
 use super::row::Row;
 use super::run::{Observer, RowSeconds, Seconds, Silent};
 use crate::neighbors::oracle;
-use crate::seed::{Draws, Stage};
+use crate::seed::{Draws, Key, Stage};
 use crate::truth::Original;
 use crate::{Descriptors, Error};
 
@@ -171,9 +171,11 @@ fn one(image: &Image, plan: &Plan, seen: &mut impl Observer<2>) -> Result<(Vec<R
         let mut next = first;
         for repeat in 0..plan.repeats {
             let seed = plan.seed.wrapping_add(u64::from(repeat));
-            let seed = Draws::new(seed, Stage::Image, hash(&image.name)).bits();
+            let name = hash(&image.name);
+            let key = Key::from_seed(seed).of_item(Stage::Image, name);
+            let oracle_seed = Draws::new(seed, Stage::Image, name).bits();
             next = first;
-            let run = Run { plan, entry, repeat, seed };
+            let run = Run { plan, entry, repeat, key: &key, oracle_seed };
             cells(&owned, &run, clock, seen, |seen, what, finished| {
                 if let Some(what) = what {
                     seen.progress(n_done, total, &what);

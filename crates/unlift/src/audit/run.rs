@@ -6,6 +6,7 @@ use super::clock::Clock;
 use super::plan::Plan;
 use super::row::Row;
 use crate::neighbors::oracle;
+use crate::seed::Key;
 use crate::truth::Original;
 use crate::{Descriptors, Error};
 
@@ -99,7 +100,8 @@ pub fn run(
         for repeat in 0..plan.repeats {
             let seed = plan.seed.wrapping_add(u64::from(repeat));
             let mut repeat_rows = Vec::new();
-            let run = Run { plan, entry, repeat, seed };
+            let key = Key::from_seed(seed);
+            let run = Run { plan, entry, repeat, key: &key, oracle_seed: seed };
             cells(&owned, &run, &mut clock, observer, |observer, what, finished| {
                 if let Some(what) = what {
                     observer.progress(done, total, &what);

@@ -3,13 +3,13 @@
 use rayon::prelude::*;
 
 use super::vector::squared_distance;
-use crate::seed::{Draws, Stage};
+use crate::seed::{Key, Stage};
 
 /// Lloyd rounds before a restart gives up converging (scikit-learn's default).
 const MAX_ROUNDS: usize = 300;
 
 /// The `k` centers of the best of `restarts` runs of Lloyd's algorithm, each from a k-means++ start.
-/// Deterministic in `seed`; restarts run in parallel, sums inside one run in row order.
+/// Deterministic in `key` (where centers started from is as secret as the points); restarts run in parallel, sums inside one run in row order.
 ///
 /// # Panics
 /// When `points` is empty or `k` or `restarts` is 0.
@@ -17,12 +17,12 @@ pub fn kmeans<const D: usize>(
     points: &[[f64; D]],
     k: usize,
     restarts: u64,
-    seed: u64,
+    key: &Key,
 ) -> Vec<[f64; D]> {
     assert!(!points.is_empty() && k > 0 && restarts > 0);
     let runs: Vec<(f64, Vec<[f64; D]>)> = (0..restarts)
         .into_par_iter()
-        .map(|restart| lloyd(points, spread_start(points, k, seed, restart)))
+        .map(|restart| lloyd(points, spread_start(points, k, key, restart)))
         .collect();
     let mut best = 0;
     for run in 1..runs.len() {
@@ -47,10 +47,10 @@ pub fn kmeans<const D: usize>(
 fn spread_start<const D: usize>(
     points: &[[f64; D]],
     k: usize,
-    seed: u64,
+    key: &Key,
     restart: u64,
 ) -> Vec<[f64; D]> {
-    let mut draws = Draws::new(seed, Stage::KMeans, restart);
+    let mut draws = key.draws(Stage::KMeans, restart);
     let mut centers = vec![points[draws.below(points.len() as u64) as usize]];
     while centers.len() < k {
         let weight = |p: &[f64; D]| {
@@ -110,6 +110,7 @@ fn nearest<const D: usize>(point: &[f64; D], centers: &[[f64; D]]) -> (usize, f6
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::seed::Draws;
 
     #[test]
     fn two_clouds_give_their_two_means() {
@@ -120,7 +121,7 @@ mod tests {
                 points.push(center.map(|x: f64| x + draws.between(-1.0, 1.0)));
             }
         }
-        let centers = kmeans(&points, 2, 10, 0);
+        let centers = kmeans(&points, 2, 10, &Key::from_seed(0));
         assert!(
             (centers[0][0] + 5.0).abs() < 0.2 && (centers[1][0] - 7.0).abs() < 0.2,
             "{centers:?}"

@@ -5,7 +5,7 @@ use super::{Entry, Lifted, Scheme, SchemeOptions};
 use crate::Error;
 use crate::geometry::frame::Bounds;
 use crate::released::{AxisCandidates, Obfuscation};
-use crate::seed::{Draws, Stage};
+use crate::seed::{Key, Stage};
 
 /// Coordinate permutation.
 #[derive(Clone, Copy, Debug)]
@@ -28,13 +28,14 @@ impl<const D: usize> Scheme<D> for Cp {
         points: &[[f64; D]],
         _: Option<&Bounds<D>>,
         _: &SchemeOptions,
-        seed: u64,
+        key: &Key,
     ) -> Result<Lifted<D>, Error> {
-        let (pairs, dropped) = random_pairs(points.len(), &mut Draws::new(seed, Stage::Scheme, 0));
+        let key = key.stage(Stage::Scheme);
+        let (pairs, dropped) = random_pairs(points.len(), &mut key.draws(0));
         let (mut positions, mut hidden) = (Vec::new(), Vec::new());
         let mut swapped_axis = Vec::new();
         for (at, pair) in pairs.iter().enumerate() {
-            let axis = Draws::new(seed, Stage::Scheme, 1 + at as u64).below(D as u64) as usize;
+            let axis = key.draws(1 + at as u64).below(D as u64) as usize;
             for (one, other) in [(pair[0], pair[1]), (pair[1], pair[0])] {
                 let mut position = points[one.index()];
                 position[axis] = points[other.index()][axis];

@@ -15,6 +15,7 @@ use super::{Entry, Lifted, Scheme, SchemeOptions};
 use crate::Error;
 use crate::geometry::frame::Bounds;
 use crate::released::Obfuscation;
+use crate::seed::Key;
 
 /// Dual convergent lines.
 #[derive(Clone, Copy, Debug)]
@@ -37,7 +38,7 @@ impl Scheme<2> for Dcl2d {
         points: &[[f64; 2]],
         bounds: Option<&Bounds<2>>,
         _: &SchemeOptions,
-        _: u64,
+        _: &Key,
     ) -> Result<Lifted<2>, Error> {
         let Some(image) = bounds else {
             return Err(Error::new("image size", "known, as anchors lie on its border", "none"));

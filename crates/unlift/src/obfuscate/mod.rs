@@ -21,7 +21,7 @@ pub mod ray_voxel;
 use crate::geometry::frame::{Bounds, rounded_origin};
 use crate::geometry::vector::sub;
 use crate::released::{Obfuscation, Released};
-use crate::seed::{Draws, Stage};
+use crate::seed::{Key, Stage};
 use crate::truth::{Dropped, Original, Secret};
 use crate::{Descriptors, Error, OriginalId};
 
@@ -107,7 +107,8 @@ impl SchemeOptions {
 /// A rule for hiding points: the only public seam of the library.
 pub trait Scheme<const D: usize>: Sync {
     /// Hides `points`, given about the released origin, as are the `bounds` in which all of them are
-    /// publicly known to lie (an image's). Every original ends up in exactly one slot
+    /// publicly known to lie (an image's). All chance comes from `key`, by [`Stage::Scheme`]: what is drawn
+    /// is released. Every original ends up in exactly one slot
     /// or among the dropped ones, with a reason; no record is empty.
     ///
     /// # Errors
@@ -117,7 +118,7 @@ pub trait Scheme<const D: usize>: Sync {
         points: &[[f64; D]],
         bounds: Option<&Bounds<D>>,
         options: &SchemeOptions,
-        seed: u64,
+        key: &Key,
     ) -> Result<Lifted<D>, Error>;
 }
 
@@ -137,7 +138,7 @@ pub struct Lifted<const D: usize> {
 }
 
 /// Hides `original` by `scheme`: what is released, and the secret beside it. `descriptors` has one
-/// row per original.
+/// row per original. All chance comes from `key`: [`Key::fresh`] for a map that is released.
 ///
 /// # Errors
 /// When options are out of range, rows disagree, or the scheme cannot hide these points.
@@ -146,7 +147,7 @@ pub fn obfuscate<const D: usize>(
     original: &Original<D>,
     descriptors: Option<&Descriptors>,
     options: &SchemeOptions,
-    seed: u64,
+    key: &Key,
 ) -> Result<(Released<D>, Secret), Error> {
     options.check()?;
     let points = original.reveal();
@@ -163,19 +164,22 @@ pub fn obfuscate<const D: usize>(
         None => rounded_origin(points.positions()),
     };
     let local: Vec<[f64; D]> = points.positions().iter().map(|p| sub(p, &origin)).collect();
-    let lifted = scheme.lift(&local, bounds.map(|b| b.about(&origin)).as_ref(), options, seed)?;
+    let lifted = scheme.lift(&local, bounds.map(|b| b.about(&origin)).as_ref(), options, key)?;
 
     let slots = lifted.slots_per_record;
     let n_records = lifted.obfuscation.len();
-    let order = Draws::new(seed, Stage::Shuffle, 0).permutation(n_records);
+    let order = key.draws(Stage::Shuffle, 0).permutation(n_records);
+    let (slot_key, row_key) = (key.stage(Stage::SlotOrder), key.stage(Stage::DescriptorOrder));
     let mut hidden = Vec::with_capacity(n_records * slots);
     let mut swapped_axis = lifted.swapped_axis.as_ref().map(|_| Vec::with_capacity(n_records));
     let mut descriptor_row = Vec::with_capacity(n_records * slots);
     for (record, &from) in order.iter().enumerate() {
         let mut slot_order: Vec<usize> = (0..slots).collect();
-        Draws::new(seed, Stage::SlotOrder, record as u64).shuffle(&mut slot_order);
         let mut rows: Vec<u32> = (0..slots).map(|s| (record * slots + s) as u32).collect();
-        Draws::new(seed, Stage::DescriptorOrder, record as u64).shuffle(&mut rows);
+        if slots > 1 {
+            slot_key.draws(record as u64).shuffle(&mut slot_order);
+            row_key.draws(record as u64).shuffle(&mut rows);
+        }
         for slot in slot_order {
             hidden.push(lifted.hidden[from as usize * slots + slot]);
         }

@@ -1,9 +1,11 @@
 //! `olc`: a uniformly random line through every point.
 
+use rayon::prelude::*;
+
 use super::{Entry, Lifted, Scheme, SchemeOptions};
 use crate::geometry::frame::Bounds;
 use crate::released::{Lines, Obfuscation};
-use crate::seed::{Draws, Stage};
+use crate::seed::{Key, Stage};
 use crate::{Error, OriginalId};
 
 /// Random lines ("oriented line clouds").
@@ -27,11 +29,11 @@ impl<const D: usize> Scheme<D> for Olc {
         points: &[[f64; D]],
         _: Option<&Bounds<D>>,
         _: &SchemeOptions,
-        seed: u64,
+        key: &Key,
     ) -> Result<Lifted<D>, Error> {
-        let directions: Vec<[f64; D]> = (0..points.len())
-            .map(|i| Draws::new(seed, Stage::Scheme, i as u64).direction())
-            .collect();
+        let key = key.stage(Stage::Scheme);
+        let direction = |row: usize| key.draws(row as u64).direction();
+        let directions: Vec<[f64; D]> = (0..points.len()).into_par_iter().map(direction).collect();
         Ok(Lifted {
             obfuscation: Obfuscation::Lines(Lines::through(points, &directions)?),
             slots_per_record: 1,

@@ -1,12 +1,15 @@
 //! Random pairings, shared by the schemes that hide two points together.
 
 use crate::OriginalId;
-use crate::seed::Draws;
+use crate::seed::{Cipher, Draws};
 use crate::truth::{DropReason, Dropped};
 
 /// A uniformly random pairing of `0..n`: consecutive entries of a random permutation, and the odd
 /// one out (a random one, not the last of the file as in published code).
-pub(super) fn random_pairs(n: usize, draws: &mut Draws) -> (Vec<[OriginalId; 2]>, Vec<Dropped>) {
+pub(super) fn random_pairs(
+    n: usize,
+    draws: &mut Draws<Cipher>,
+) -> (Vec<[OriginalId; 2]>, Vec<Dropped>) {
     let order = draws.permutation(n);
     let (pairs, odd) = order.as_chunks::<2>();
     let pairs = pairs.iter().map(|pair| pair.map(OriginalId)).collect();
@@ -22,7 +25,7 @@ pub(super) fn random_pairs(n: usize, draws: &mut Draws) -> (Vec<[OriginalId; 2]>
 pub(super) fn pair_again(
     pairs: &mut [[OriginalId; 2]],
     refused: usize,
-    draws: &mut Draws,
+    draws: &mut Draws<Cipher>,
     accept: impl Fn(&[OriginalId; 2]) -> bool,
 ) -> usize {
     let start = pairs.len() - refused;

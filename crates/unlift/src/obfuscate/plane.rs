@@ -3,7 +3,7 @@
 use super::{Entry, Lifted, Scheme, SchemeOptions};
 use crate::geometry::frame::Bounds;
 use crate::released::{AxisPlanes, Obfuscation};
-use crate::seed::{Draws, Stage};
+use crate::seed::{Key, Stage};
 use crate::{Error, OriginalId};
 
 /// Partial localization: random thirds, one per axis. The attacker holds all three.
@@ -27,10 +27,10 @@ impl Scheme<3> for Plane {
         points: &[[f64; 3]],
         _: Option<&Bounds<3>>,
         _: &SchemeOptions,
-        seed: u64,
+        key: &Key,
     ) -> Result<Lifted<3>, Error> {
         let mut axis: Vec<u8> = (0..points.len()).map(|i| (i % 3) as u8).collect();
-        Draws::new(seed, Stage::Scheme, 0).shuffle(&mut axis);
+        key.draws(Stage::Scheme, 0).shuffle(&mut axis);
         let offset: Vec<f64> =
             points.iter().zip(&axis).map(|(point, &a)| point[usize::from(a)]).collect();
         Ok(Lifted {

@@ -5,7 +5,7 @@ use super::{Entry, Lifted, Scheme, SchemeOptions};
 use crate::geometry::frame::Bounds;
 use crate::geometry::vector::{squared_distance, sub};
 use crate::released::{Lines, Obfuscation};
-use crate::seed::{Draws, Stage};
+use crate::seed::{Cipher, Draws, Key, Stage};
 use crate::truth::{DropReason, Dropped};
 use crate::{Error, OriginalId};
 
@@ -33,9 +33,9 @@ impl Scheme<3> for Ppl {
         points: &[[f64; 3]],
         _: Option<&Bounds<3>>,
         _: &SchemeOptions,
-        seed: u64,
+        key: &Key,
     ) -> Result<Lifted<3>, Error> {
-        let mut draws = Draws::new(seed, Stage::Scheme, 0);
+        let mut draws = key.draws(Stage::Scheme, 0);
         let (mut pairs, mut dropped) = random_pairs(points.len(), &mut draws);
         let coincident = separate(points, &mut pairs, &mut draws);
         dropped.extend(coincident);
@@ -54,7 +54,7 @@ pub(super) fn apart(points: &[[f64; 3]], pair: &[OriginalId; 2]) -> bool {
 fn separate(
     points: &[[f64; 3]],
     pairs: &mut Vec<[OriginalId; 2]>,
-    draws: &mut Draws,
+    draws: &mut Draws<Cipher>,
 ) -> Vec<Dropped> {
     let mut refused = refused_last(pairs, |pair| apart(points, pair));
     for _ in 0..RE_DRAWS {

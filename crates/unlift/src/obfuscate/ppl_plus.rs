@@ -11,7 +11,7 @@ use crate::geometry::frame::Bounds;
 use crate::geometry::knn::Knn;
 use crate::geometry::normal::local_normal;
 use crate::geometry::vector::{dot, sub};
-use crate::seed::{Draws, Stage};
+use crate::seed::{Key, Stage};
 use crate::truth::DropReason;
 use crate::{Error, OriginalId};
 
@@ -45,7 +45,7 @@ impl Scheme<3> for PplPlus {
         points: &[[f64; 3]],
         _: Option<&Bounds<3>>,
         _: &SchemeOptions,
-        seed: u64,
+        key: &Key,
     ) -> Result<Lifted<3>, Error> {
         let normals = normals(points)?;
         let on_surface = |pair: &[OriginalId; 2]| {
@@ -55,7 +55,7 @@ impl Scheme<3> for PplPlus {
                 dot(&along, &normal).abs() <= SIN_20_DEGREES * dot(&along, &along).sqrt()
             })
         };
-        let mut draws = Draws::new(seed, Stage::Scheme, 0);
+        let mut draws = key.draws(Stage::Scheme, 0);
         let (mut pairs, mut dropped) = random_pairs(points.len(), &mut draws);
         let accept = |pair: &[OriginalId; 2]| apart(points, pair) && !on_surface(pair);
         let mut refused = refused_last(&mut pairs, accept);

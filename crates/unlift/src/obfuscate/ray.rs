@@ -5,7 +5,7 @@ use crate::geometry::frame::Bounds;
 use crate::geometry::kmeans::kmeans;
 use crate::geometry::vector::{dot, sub};
 use crate::released::{Obfuscation, Rays};
-use crate::seed::{Draws, Stage};
+use crate::seed::{Key, Stage};
 use crate::truth::{DropReason, Dropped};
 use crate::{Error, OriginalId};
 
@@ -33,24 +33,23 @@ impl Scheme<3> for Ray {
         points: &[[f64; 3]],
         _: Option<&Bounds<3>>,
         _: &SchemeOptions,
-        seed: u64,
+        key: &Key,
     ) -> Result<Lifted<3>, Error> {
-        from_centers(points, seed, |row, _| {
-            Draws::new(seed, Stage::Scheme, row as u64).below(2) as usize
-        })
+        let choices = key.stage(Stage::Scheme);
+        from_centers(points, key, |row, _| choices.draws(row as u64).below(2) as usize)
     }
 }
 
 /// The rays from two k-means centers to every point; `choose` gives the center of a row.
 pub(super) fn from_centers(
     points: &[[f64; 3]],
-    seed: u64,
+    key: &Key,
     choose: impl Fn(usize, &[f64; 3]) -> usize,
 ) -> Result<Lifted<3>, Error> {
     if points.len() < 2 {
         return Err(Error::new("points", "at least 2 for two centers", points.len().to_string()));
     }
-    rays_from(&kmeans(points, 2, RESTARTS, seed), points, choose)
+    rays_from(&kmeans(points, 2, RESTARTS, key), points, choose)
 }
 
 /// The rays from `centers` to every point; `choose` gives the center of a row.

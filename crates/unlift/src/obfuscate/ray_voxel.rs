@@ -5,6 +5,7 @@ use super::{Entry, Lifted, Scheme, SchemeOptions};
 use crate::Error;
 use crate::geometry::frame::Bounds;
 use crate::released::Obfuscation;
+use crate::seed::Key;
 
 /// Ray clouds, voxel variant.
 #[derive(Clone, Copy, Debug)]
@@ -27,7 +28,7 @@ impl Scheme<3> for RayVoxel {
         points: &[[f64; 3]],
         _: Option<&Bounds<3>>,
         options: &SchemeOptions,
-        seed: u64,
+        key: &Key,
     ) -> Result<Lifted<3>, Error> {
         // The grid of the authors' code (Open3D): it starts half a voxel below the smallest coordinates.
         let mut low = [f64::INFINITY; 3];
@@ -35,7 +36,7 @@ impl Scheme<3> for RayVoxel {
             low = std::array::from_fn(|c| low[c].min(point[c]));
         }
         let start = low.map(|x| x - 0.5 * options.voxel);
-        let mut lifted = from_centers(points, seed, |_, point| {
+        let mut lifted = from_centers(points, key, |_, point| {
             let cell = |c: usize| ((point[c] - start[c]) / options.voxel).floor();
             (0..3).map(|c| cell(c).rem_euclid(2.0) as usize).sum::<usize>() % 2
         })?;

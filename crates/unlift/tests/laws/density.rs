@@ -68,23 +68,24 @@ fn density_determinism() {
     over_schemes!(threads_change_no_byte);
 }
 
-/// Points on a wall, lines in all directions: the wall comes back.
+/// Points on a wall, lines in all directions: the wall comes back (tomography: 68 or 69 % over six keys).
 #[test]
 fn a_wall_comes_back_from_random_lines() {
     let mut draws = Draws::new(2, Stage::Synthetic, 0);
     let wall: Vec<[f64; 3]> =
         (0..2000).map(|_| [draws.between(0.0, 2.0), 0.5, draws.between(0.0, 2.0)]).collect();
     let hidden = hide(&Olc, &wall, 1);
-    for (solver, least) in [(Solver::Density, 60.0), (Solver::Tomography, 70.0)] {
+    for (solver, least) in [(Solver::Density, 60.0), (Solver::Tomography, 65.0)] {
         let percent = percent_within(&hidden, &alone(&hidden.released, solver), 0.1);
         assert!(percent >= least, "{solver:?}: {percent}");
     }
 }
 
-/// Floors: measured shares within 25 cm, less three or four points.
+/// Floors: measured shares within 25 cm, less three or four points below the least of six keys (`ray` by
+/// tomography: 40 to 46 %).
 #[test]
 fn a_room_comes_back_from_its_records() {
-    let floors = [("olc", 57.0, 69.0), ("ppl", 53.0, 63.0), ("ray", 32.0, 40.0), ("cp", 0.0, 27.0)];
+    let floors = [("olc", 57.0, 69.0), ("ppl", 53.0, 63.0), ("ray", 32.0, 37.0), ("cp", 0.0, 27.0)];
     let points = furnished(4000);
     for (name, published, ours) in floors {
         let hidden = hide(scheme(name).unwrap().in_3d.unwrap(), &points, 1);

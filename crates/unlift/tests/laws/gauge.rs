@@ -5,7 +5,7 @@
 use proptest::prelude::*;
 use unlift::obfuscate::Scheme;
 use unlift::released::{AxisPlanes, Lines, Obfuscation, Rays};
-use unlift::seed::{Draws, Stage};
+use unlift::seed::{Draws, Key, Stage};
 
 use crate::maps::*;
 
@@ -144,7 +144,8 @@ fn moving_along_the_record_changes_no_byte<const D: usize>(
         match before.released.obfuscation() {
             Obfuscation::Lines(lines) if before.released.slots_per_record() == 1 => {
                 // The exact direction: what a scheme of single lines draws for a point.
-                let direction = Draws::new(seed, Stage::Scheme, id as u64).direction::<D>();
+                let direction =
+                    Key::from_seed(seed).draws(Stage::Scheme, id as u64).direction::<D>();
                 let stored = lines.direction()[slot].map(f64::from);
                 assert!(
                     (dot(&direction, &stored).abs() - 1.0).abs() < 1e-6,

@@ -25,4 +25,5 @@ mod noise;
 mod pins;
 mod records;
 mod recovery;
+mod secrets;
 mod shares;

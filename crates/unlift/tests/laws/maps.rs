@@ -7,7 +7,7 @@ use unlift::neighbors::oracle::{self, TrueNeighbors};
 use unlift::obfuscate::{Scheme, SchemeOptions, obfuscate};
 use unlift::recover::{Delta, RecoverOptions, Recovered, Solver, recover};
 use unlift::released::{Obfuscation, Released};
-use unlift::seed::{Draws, Stage};
+use unlift::seed::{Draws, Key, Stage};
 use unlift::truth::{Original, Secret};
 use unlift::{About, Error, PointSet, RecordId, RowOrder, Unit};
 
@@ -54,7 +54,8 @@ pub fn try_hide<const D: usize>(
         2 => Original::within(set, image(points, voxel))?,
         _ => Original::new(set),
     };
-    let (released, secret) = obfuscate(scheme, &original, None, &SchemeOptions { voxel }, seed)?;
+    let (released, secret) =
+        obfuscate(scheme, &original, None, &SchemeOptions { voxel }, &Key::from_seed(seed))?;
     Ok(Hidden { original, released, secret })
 }
 

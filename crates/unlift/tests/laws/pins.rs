@@ -16,13 +16,13 @@ fn hash(bytes: &[u8]) -> u64 {
 
 /// (scheme, hash of the released map, hash of what consensus makes of it).
 const PINS: &[(&str, u64, u64)] = &[
-    ("olc", 0xbc5917367dfbbb82, 0x6917d1e102e4acee),
-    ("ppl", 0x853f42e87f4d6ad1, 0xfeac798182fed30e),
-    ("ppl+", 0xd1a39aa133219c2c, 0xf3e3972ab96d0300),
-    ("ray", 0x8afdc7e564ab7e2f, 0xe831f85588e9368f),
-    ("ray-voxel", 0x8b43b3092460bcbb, 0xa498afb74ba8420f),
-    ("plane", 0xed46e9680801a7de, 0x071e9fc4935629e3),
-    ("cp", 0x96a0f41fb6eaf080, 0x5e7a880602add49d),
+    ("olc", 0xf4c87654de904dd7, 0x56234fb2c8707356),
+    ("ppl", 0x1e1970c5753fd1e8, 0x9bf32ecf478ec42c),
+    ("ppl+", 0xa8d2d6357f0d4e2b, 0x6830a65b1be3e962),
+    ("ray", 0x7a231cee11731272, 0x476ab25474a6a8c6),
+    ("ray-voxel", 0x1783515fa6a5685d, 0x1b9a2ebd8a6464f9),
+    ("plane", 0xaae739a1166fa6c6, 0x50c7c3ca90019779),
+    ("cp", 0x6120c0a7f84ce78d, 0x083ce6bec2caa280),
 ];
 
 #[test]

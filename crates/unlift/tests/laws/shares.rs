@@ -57,7 +57,8 @@ fn least_shares<const D: usize>(
     let hidden = try_hide(scheme, points, 0.5, 7).unwrap();
     let blind = blind(&hidden.released, &hidden.original, &hidden.secret).percent_within(0.25);
     assert!(blind < 30.0, "{name}: {blind} % within reach of a blind attacker");
-    [0.0, 1.1 * blind]
+    // `dcl2d` over seven keys: blind 21, recovered 22.2 to 23.9.
+    [0.0, 1.03 * blind]
 }
 
 /// With lists that tell nothing, nothing scores above the blind attacker beyond noise. On a map of
@@ -75,9 +76,12 @@ fn random_lists_tell_nothing<const D: usize>(name: &str, scheme: &dyn Scheme<D>)
             let blind = baseline.percent_within(threshold);
             // Four standard deviations of a difference of two binomial shares, and one slot.
             let p = (blind / 100.0).clamp(0.001, 0.999);
+            // Where a line meets the others is a better guess for two points on it than the one place of the
+            // blind attacker: `ppl` over nine keys is ahead by 2.2 in the mean, with lists that tell nothing.
+            let pairs = if hidden.released.slots_per_record() == 2 { 2.5 } else { 0.0 };
             let noise = 400.0 * (2.0 * p * (1.0 - p) / n as f64).sqrt() + 100.0 / n as f64;
             assert!(
-                got <= blind + noise,
+                got <= blind + noise + pairs,
                 "{name}, {options:?}: {got:.2} % within {threshold}, blind {blind:.2} %"
             );
         }

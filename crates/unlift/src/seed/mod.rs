@@ -1,11 +1,21 @@
-//! Randomness as a function: `draw(seed, stage, item, counter)`, a counter-based generator.
+//! Randomness as a function: `draw(seed, stage, item, counter)`. Nothing carries state between items, so work
+//! can be split over any number of threads and one item can be replayed alone.
 //!
-//! Nothing carries state between items, so work can be split over any number of threads and one
-//! item can be replayed alone. Only integer operations and exact float conversions are used: the
-//! same bits everywhere. The generator is ours (20 lines) so that no dependency upgrade changes a
-//! result; its mixing function is the SplitMix64 finalizer.
+//! There are two rules, and which one is used is a question of who sees the draws:
+//!
+//! - [`Draws::new`]: a counter through the SplitMix64 finalizer, for what nobody has to be kept from guessing:
+//!   synthetic rooms, the oracle of an experiment, the attacker's own choices. Three draws give its seed away.
+//! - [`Key::draws`]: ChaCha20 under a key of 256 bits, for everything that hides a point. Draws of a scheme are
+//!   published (a direction of `olc` is nothing else), so they must tell nothing about any other draw.
+//!
+//! Only integer operations and exact float conversions are used: the same bits everywhere.
 
-/// What a stream of draws is used for. Streams of different stages are unrelated.
+mod key;
+
+pub use key::{Cipher, Key};
+
+/// What a stream of draws is used for. Streams of different stages are unrelated: for a [`Key`] nothing can be
+/// computed from one about another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u64)]
 pub enum Stage {
@@ -41,6 +51,19 @@ pub enum Stage {
     Tiling = 21,
 }
 
+/// Where random bits come from: [`Counter`] or [`Cipher`], and nothing else.
+pub trait Bits: sealed::Sealed {
+    /// The next 64 random bits.
+    fn bits(&mut self) -> u64;
+}
+
+mod sealed {
+    pub trait Sealed {}
+}
+
+impl sealed::Sealed for Counter {}
+impl sealed::Sealed for Cipher {}
+
 const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
 
 #[inline(always)]
@@ -50,27 +73,43 @@ fn mix(mut z: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// The stream of draws that belongs to one item (a slot, a point, a restart) of one stage.
+/// Bits by a counter through SplitMix64's finalizer: fast, and no secret. Every step can be undone.
 #[derive(Clone, Debug)]
-pub struct Draws {
+pub struct Counter {
     key: u64,
     counter: u64,
 }
 
+impl Bits for Counter {
+    #[inline(always)]
+    fn bits(&mut self) -> u64 {
+        self.counter += 1;
+        mix(self.key.wrapping_add(self.counter.wrapping_mul(GOLDEN)))
+    }
+}
+
+/// The stream of draws that belongs to one item (a slot, a point, a restart) of one stage.
+#[derive(Clone, Debug)]
+pub struct Draws<B = Counter> {
+    source: B,
+}
+
 impl Draws {
-    /// The stream of `item` in `stage` under `seed`.
+    /// The stream of `item` in `stage` under `seed`, by the fast rule. Nothing that hides a point may come
+    /// from here: see [`Key::draws`].
     #[inline(always)]
     pub fn new(seed: u64, stage: Stage, item: u64) -> Self {
         let key = mix(mix(mix(seed.wrapping_add(GOLDEN)) ^ (stage as u64).wrapping_mul(GOLDEN))
             ^ item.wrapping_mul(0xD1B5_4A32_D192_ED03));
-        Self { key, counter: 0 }
+        Self { source: Counter { key, counter: 0 } }
     }
+}
 
+impl<B: Bits> Draws<B> {
     /// The next 64 random bits.
     #[inline(always)]
     pub fn bits(&mut self) -> u64 {
-        self.counter += 1;
-        mix(self.key.wrapping_add(self.counter.wrapping_mul(GOLDEN)))
+        self.source.bits()
     }
 
     /// Uniform in `0..n` without bias (Lemire's multiplication with rejection).
@@ -182,5 +221,48 @@ mod tests {
         let mut order = Draws::new(1, Stage::Shuffle, 0).permutation(100);
         order.sort_unstable();
         assert!(order.iter().enumerate().all(|(i, &v)| i == v as usize));
+    }
+
+    /// Undoes `z ^ (z >> by)`.
+    fn unshift(z: u64, by: u32) -> u64 {
+        (0..64 / by).fold(z, |found, _| z ^ (found >> by))
+    }
+
+    /// The inverse of an odd factor modulo 2^64, by Newton's iteration.
+    fn inverse(odd: u64) -> u64 {
+        (0..6).fold(odd, |x, _| x.wrapping_mul(2u64.wrapping_sub(odd.wrapping_mul(x))))
+    }
+
+    fn unmix(z: u64) -> u64 {
+        let z = unshift(z, 31).wrapping_mul(inverse(0x94D0_49BB_1331_11EB));
+        let z = unshift(z, 27).wrapping_mul(inverse(0xBF58_476D_1CE4_E5B9));
+        unshift(z, 30)
+    }
+
+    /// The attack on the counter: who sees three draws of an item undoes the first, is confirmed by the
+    /// other two, and holds the seed of everything.
+    fn seed_of([first, second, third]: [u64; 3], stage: Stage, item: u64) -> Option<u64> {
+        let key = unmix(first).wrapping_sub(GOLDEN);
+        let mut source = Counter { key, counter: 1 };
+        if (source.bits(), source.bits()) != (second, third) {
+            return None;
+        }
+        let stage_key = unmix(key) ^ item.wrapping_mul(0xD1B5_4A32_D192_ED03);
+        let mixed_seed = unmix(stage_key) ^ (stage as u64).wrapping_mul(GOLDEN);
+        Some(unmix(mixed_seed).wrapping_sub(GOLDEN))
+    }
+
+    #[test]
+    fn three_draws_give_a_counter_away_and_a_key_not() {
+        for seed in [0, 7, u64::MAX, 0x0123_4567_89AB_CDEF] {
+            for item in [0, 1, 999_999] {
+                let mut draws = Draws::new(seed, Stage::Scheme, item);
+                let seen = [draws.bits(), draws.bits(), draws.bits()];
+                assert_eq!(seed_of(seen, Stage::Scheme, item), Some(seed));
+                let mut draws = Key::from_seed(seed).draws(Stage::Scheme, item);
+                let seen = [draws.bits(), draws.bits(), draws.bits()];
+                assert_eq!(seed_of(seen, Stage::Scheme, item), None);
+            }
+        }
     }
 }

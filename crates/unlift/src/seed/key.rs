@@ -1,0 +1,181 @@
+//! The randomness that hides points: a key of 256 bits and the streams of a cipher under it.
+//!
+//! **Why a cipher.** Part of what a scheme draws is released with the map: three draws are a line of `olc`, two the
+//! axis and the partners of `cp`. Whoever computes the key from them undoes the order of the records, knows which
+//! file row every record came from, and rows beside each other are neighbors. ChaCha20 is believed to give nothing
+//! away: its streams cannot be told from random bits for less than 2^256 trials, however many are seen.
+//!
+//! **Why streams of their own.** A stage's key is the cipher's output under the key (no draws of any
+//! item come from there), and an item's stream is numbered by the item. So the order of records (`Shuffle`), of slots
+//! and of descriptors have nothing in common with published draws (`Scheme`) that could be computed.
+//!
+//! **What is left.** A key that comes from an integer is as good as the integer is hard to guess: every record
+//! confirms a guess at the cost of one block. [`Key::from_seed`] is for experiments, [`Key::fresh`] for a map that
+//! leaves the house.
+
+use chacha20::ChaCha20Rng;
+use chacha20::rand_core::{Rng, SeedableRng};
+
+use super::{Bits, Draws, Stage};
+use crate::Error;
+
+/// A key of 256 bits: all that hides a map comes from it. Part of the secret; it is not printed.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Key([u8; 32]);
+
+/// Says that a key was made from an integer. Fresh keys begin otherwise, but for a chance of 2^-192.
+const FROM_SEED: &[u8; 24] = b"unlift: an integer seed.";
+
+impl Key {
+    /// A key from the operating system's randomness: for maps that are released.
+    ///
+    /// # Errors
+    /// When the system has no randomness to give.
+    pub fn fresh() -> Result<Self, Error> {
+        let mut key = [0; 32];
+        getrandom::fill(&mut key).map_err(|error| {
+            Error::new("key", "256 random bits from the operating system", error.to_string())
+        })?;
+        Ok(Self(key))
+    }
+
+    /// The key of an experiment that others can repeat. Whoever guesses the integer has the key.
+    pub fn from_seed(seed: u64) -> Self {
+        let mut key = [0; 32];
+        key[..24].copy_from_slice(FROM_SEED);
+        key[24..].copy_from_slice(&seed.to_le_bytes());
+        Self(key)
+    }
+
+    /// The key of one `item` of `stage` (one image among many), from which neither this key nor that of
+    /// another item can be computed.
+    pub fn of_item(&self, stage: Stage, item: u64) -> Self {
+        Self(first_bytes(&mut self.stage(stage).stream(item)))
+    }
+
+    /// The stream of `item` in `stage`. For many items of a stage, [`stage`](Self::stage) is faster.
+    pub fn draws(&self, stage: Stage, item: u64) -> Draws<Cipher> {
+        self.stage(stage).draws(item)
+    }
+
+    /// The key of a stage: what its items' streams are drawn under.
+    pub fn stage(&self, stage: Stage) -> StageKey {
+        StageKey(first_bytes(&mut stream(&self.0, stage as u64)))
+    }
+}
+
+/// A key does not end up in a log.
+impl std::fmt::Debug for Key {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Key(..)")
+    }
+}
+
+/// The key of one stage. Streams of its items are computed when first drawn from.
+#[derive(Clone)]
+pub struct StageKey([u8; 32]);
+
+impl StageKey {
+    /// The stream of `item`.
+    pub fn draws(&self, item: u64) -> Draws<Cipher> {
+        Draws { source: Cipher(self.stream(item)) }
+    }
+
+    fn stream(&self, item: u64) -> ChaCha20Rng {
+        stream(&self.0, item)
+    }
+}
+
+impl std::fmt::Debug for StageKey {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("StageKey(..)")
+    }
+}
+
+/// Bits by ChaCha20.
+#[derive(Debug)]
+pub struct Cipher(ChaCha20Rng);
+
+impl Bits for Cipher {
+    #[inline]
+    fn bits(&mut self) -> u64 {
+        self.0.next_u64()
+    }
+}
+
+fn stream(key: &[u8; 32], number: u64) -> ChaCha20Rng {
+    let mut stream = ChaCha20Rng::from_seed(*key);
+    stream.set_stream(number);
+    stream
+}
+
+fn first_bytes(stream: &mut ChaCha20Rng) -> [u8; 32] {
+    let mut bytes = [0; 32];
+    stream.fill_bytes(&mut bytes);
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_cipher_is_chacha20() {
+        // The first block of the all-zero key and nonce: RFC 8439, appendix A.1, test vector 1.
+        let block = [
+            0x76, 0xb8, 0xe0, 0xad, 0xa0, 0xf1, 0x3d, 0x90, 0x40, 0x5d, 0x6a, 0xe5, 0x53, 0x86,
+            0xbd, 0x28, 0xbd, 0xd2, 0x19, 0xb8, 0xa0, 0x8d, 0xed, 0x1a, 0xa8, 0x36, 0xef, 0xcc,
+            0x8b, 0x77, 0x0d, 0xc7,
+        ];
+        assert_eq!(first_bytes(&mut stream(&[0; 32], 0)), block);
+        let mut bits = Cipher(stream(&[0; 32], 0));
+        assert_eq!(bits.bits().to_le_bytes(), block[..8]);
+    }
+
+    #[test]
+    fn bits_are_pinned() {
+        // Golden: a change here changes every published figure. Computed apart, by a ChaCha20 written in
+        // Python from the RFC: stage key = first half block of (key, stage), then (stage key, item).
+        let take = |key: &Key, stage, item| {
+            let mut draws = key.draws(stage, item);
+            [draws.bits(), draws.bits(), draws.below(1000), draws.unit().to_bits()]
+        };
+        assert_eq!(
+            take(&Key::from_seed(0), Stage::Scheme, 0),
+            [0xc449_d82d_52b1_ee6d, 0xef6b_294e_f0e0_3d7a, 277, 0x3fe8_6b61_3406_ebe6]
+        );
+        assert_eq!(
+            take(&Key::from_seed(7), Stage::SlotOrder, 42),
+            [0x01c5_4f6c_3e10_24ac, 0x3d75_7401_d663_bba4, 910, 0x3fd9_5d0a_8f48_ff4e]
+        );
+        let image = Key::from_seed(7).of_item(Stage::Image, 1 << 40);
+        assert_eq!(
+            take(&image, Stage::Scheme, 3),
+            [0x32fb_ce5d_3c63_1358, 0x8709_45d5_248d_60d9, 724, 0x3fe2_0ea6_3258_2814]
+        );
+        assert_eq!(
+            Key::from_seed(0).draws(Stage::Shuffle, 0).permutation(8),
+            [5, 1, 6, 2, 3, 0, 7, 4]
+        );
+    }
+
+    #[test]
+    fn keys_stages_and_items_have_streams_of_their_own() {
+        let mut seen = std::collections::BTreeSet::new();
+        let keys = [Key::from_seed(0), Key::from_seed(1), Key::from_seed(1 << 63)];
+        for key in keys.iter().flat_map(|key| [key.clone(), key.of_item(Stage::Image, 0)]) {
+            for stage in [Stage::Scheme, Stage::Shuffle, Stage::SlotOrder, Stage::DescriptorOrder] {
+                for item in [0, 1, u64::MAX] {
+                    assert!(seen.insert(key.draws(stage, item).bits()));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn fresh_keys_differ_and_are_not_printed() {
+        let (one, other) = (Key::fresh().unwrap(), Key::fresh().unwrap());
+        assert!(one != other && one.0 != [0; 32]);
+        assert_eq!(format!("{one:?} {:?}", one.stage(Stage::Scheme)), "Key(..) StageKey(..)");
+    }
+}

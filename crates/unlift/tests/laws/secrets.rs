@@ -1,0 +1,66 @@
+//! What a released map tells about the randomness that made it: nothing, unless the key is an integer.
+
+use unlift::obfuscate::{Scheme, SchemeOptions, obfuscate, scheme};
+use unlift::released::{Obfuscation, Released};
+use unlift::seed::{Key, Stage};
+use unlift::truth::{Original, Secret};
+use unlift::{PointSet, Unit};
+
+use crate::maps::*;
+
+fn olc(key: &Key, n: usize) -> (Released<3>, Secret) {
+    let points = PointSet::try_new(room(4, n), Unit::Meter).unwrap();
+    let scheme = scheme("olc").unwrap().in_3d.unwrap();
+    let options = SchemeOptions { voxel: 0.5 };
+    obfuscate(scheme, &Original::new(points), None, &options, key).unwrap()
+}
+
+/// An attacker who knows this code guesses integers: the line of the first file row confirms a guess, and the
+/// order of the records is undone. Returns the guessed file row of every record.
+fn undone(released: &Released<3>, guesses: u64) -> Option<Vec<u32>> {
+    let Obfuscation::Lines(lines) = released.obfuscation() else { panic!("olc gives lines") };
+    let is_released = |direction: [f64; 3]| {
+        // A line has no sense; what is released is rounded to f32.
+        let off = |d: &[f32; 3], sense: f64| {
+            (0..3).map(|c| (f64::from(d[c]) - sense * direction[c]).abs()).fold(0.0, f64::max)
+        };
+        lines.direction().iter().any(|d| off(d, 1.0).min(off(d, -1.0)) < 1e-6)
+    };
+    let key = (0..guesses)
+        .map(Key::from_seed)
+        .find(|key| is_released(key.draws(Stage::Scheme, 0).direction()))?;
+    Some(key.draws(Stage::Shuffle, 0).permutation(released.n_records()))
+}
+
+#[test]
+fn a_small_integer_is_guessed_and_a_fresh_key_is_not() {
+    let (released, secret) = olc(&Key::from_seed(321), 500);
+    let rows = undone(&released, 400).expect("the integer is among the guesses");
+    assert!(secret.hidden().iter().map(|id| id.0).eq(rows));
+    let (released, _) = olc(&Key::fresh().unwrap(), 500);
+    assert!(undone(&released, 400).is_none());
+}
+
+fn fresh_keys_hide_differently<const D: usize>(name: &str, scheme: &dyn Scheme<D>) {
+    let points = PointSet::try_new(room::<D>(4, 300), Unit::Meter).unwrap();
+    let bounds = unlift::geometry::frame::Bounds::quantiles(points.positions(), 0.0).unwrap();
+    let original =
+        if D == 2 { Original::within(points, bounds).unwrap() } else { Original::new(points) };
+    let hide = |key: &Key| {
+        let options = SchemeOptions { voxel: 0.5 };
+        let (released, secret) = obfuscate(scheme, &original, None, &options, key).unwrap();
+        (released_bytes(&released), secret)
+    };
+    let (one, other) = (Key::fresh().unwrap(), Key::fresh().unwrap());
+    assert!(hide(&one) == hide(&one), "{name}: the same key, other bytes");
+    let ((one, first), (other, second)) = (hide(&one), hide(&other));
+    assert!(one != other, "{name}: other keys, the same bytes");
+    // Of 300 places one is right by chance.
+    let same = first.hidden().iter().zip(second.hidden()).filter(|(a, b)| a == b).count();
+    assert!(same < 12, "{name}: {same} originals in the same slot");
+}
+
+#[test]
+fn every_scheme_draws_from_the_key() {
+    over_schemes!(fresh_keys_hide_differently);
+}
