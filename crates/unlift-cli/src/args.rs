@@ -209,7 +209,7 @@ Examples:
 
 Writes hidden/released.parquet (what an attacker sees) and hidden/truth.parquet (keep it private).
 What is drawn comes from a fresh 256-bit key that is kept nowhere. With --seed it comes from that
-number: for experiments only, since whoever guesses it undoes the order of the records, and cp entirely.")]
+number, for experiments only: whoever guesses it undoes the order of the records, and cp entirely.")]
 pub struct ObfuscateArgs {
     /// A COLMAP model or project folder, or a .ply, .csv, .xyz, .txt or .npy file
     #[arg(value_name = "PATH")]
