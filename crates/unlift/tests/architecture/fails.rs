@@ -112,3 +112,12 @@ fn long_files_and_new_dependencies_are_found() {
     assert_eq!(manifest_names(manifest, "dependencies"), ["libm", "unlift"]);
     assert_eq!(manifest_names(manifest, "dev-dependencies"), ["proptest"]);
 }
+
+#[test]
+fn keys_on_the_attackers_side_are_found() {
+    for path in ["recover/delta.rs", "neighbors/similarity.rs", "density/mod.rs"] {
+        let found = forbidden_keys(&source(path, "let key = crate::seed::Key::from_seed(seed);"));
+        assert_eq!(found.len(), 1, "{path}");
+    }
+    assert!(forbidden_keys(&source("audit/run.rs", "use crate::seed::Key;")).is_empty());
+}

@@ -55,6 +55,11 @@ fn truth_is_revealed_only_on_the_owners_side() {
 }
 
 #[test]
+fn attackers_make_no_keys() {
+    on_every_file(forbidden_keys);
+}
+
+#[test]
 fn recovery_has_no_state_and_no_files() {
     on_every_file(forbidden_state);
 }

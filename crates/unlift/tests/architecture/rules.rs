@@ -99,6 +99,15 @@ pub fn forbidden_reveals(source: &Source) -> Vec<String> {
     complain(source, &["reveal"])
 }
 
+/// Keys where the attacker works: in an audit it is handed the integer that the owner's key is made of.
+pub fn forbidden_keys(source: &Source) -> Vec<String> {
+    let attacker = ["recover/", "density/", "neighbors/", "released/", "evaluate/"];
+    if !attacker.iter().any(|prefix| source.path.starts_with(prefix)) {
+        return Vec::new();
+    }
+    complain(source, &["Key", "StageKey", "Cipher"])
+}
+
 /// Global state and the outside world, in recovery.
 pub fn forbidden_state(source: &Source) -> Vec<String> {
     if !source.path.starts_with("recover/") {
