@@ -13,7 +13,7 @@ use unlift::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
 use unlift::neighbors::sources::Joined;
 use unlift::obfuscate::{Entry, obfuscate};
 use unlift::recover::{RecoverOptions, Solver, recover};
-use unlift::seed::{Draws, Stage};
+use unlift::seed::{Draws, Key, Stage};
 use unlift::truth::Original;
 use unlift::{Descriptors, PointSet, Unit};
 use unlift_io::stage;
@@ -61,12 +61,12 @@ fn staged<const D: usize>(
     original: &Original<D>,
     descriptors: &Descriptors,
     plan: &Plan,
-    owner: u64,
+    (key, owner): (&Key, u64),
 ) -> Vec<Row> {
     let path = |name: &str| folder.join(name);
     let scheme = entry.of_dimension::<D>().unwrap();
     let (released, secret) =
-        obfuscate(scheme, original, Some(descriptors), &plan.scheme_options, owner).unwrap();
+        obfuscate(scheme, original, Some(descriptors), &plan.scheme_options, key).unwrap();
     stage::write_released(&path("released.parquet"), &released).unwrap();
     stage::write_truth(&path("truth.parquet"), original, &secret).unwrap();
     drop((released, secret));
@@ -166,7 +166,14 @@ fn maps() {
         all.push(given(points.len()));
         let plan = plan(Unit::Meter, entry, all);
         let audited = audit::run(&original, Some(&descriptors), &plan, &mut audit::Silent).unwrap();
-        let staged = staged(folder.path(), entry, &original, &descriptors, &plan, SEED);
+        let staged = staged(
+            folder.path(),
+            entry,
+            &original,
+            &descriptors,
+            &plan,
+            (&Key::from_seed(SEED), SEED),
+        );
         assert!(audited.rows.iter().any(|row| row.recovered_percent[1] > 5.0), "{}", entry.name);
         assert_equal(entry.name, &audited.rows, &staged);
     }
@@ -214,7 +221,9 @@ fn images() {
         let mut audited = Rows(Vec::new());
         audit::images::run::<unlift::Error>([Ok(image)], &plan, &mut audited).unwrap();
         // The randomness of an image is that of its name: FNV-1a of no bytes.
-        let owner = Draws::new(SEED, Stage::Image, 0xCBF2_9CE4_8422_2325).bits();
+        let name = 0xCBF2_9CE4_8422_2325;
+        let key = Key::from_seed(SEED).of_item(Stage::Image, name);
+        let owner = (&key, Draws::new(SEED, Stage::Image, name).bits());
         let staged = staged(folder.path(), entry, &original, &descriptors, &plan, owner);
         assert_equal(entry.name, &audited.0, &staged);
     }

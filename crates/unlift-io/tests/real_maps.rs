@@ -104,7 +104,9 @@ fn learned_descriptors_in_halves_are_read_and_name_neighbors() {
     let search = oracle::search(&original).unwrap();
     let scheme = scheme("olc").unwrap().in_3d.unwrap();
     let options = SchemeOptions { voxel: 1.0 };
-    let (released, secret) = obfuscate(scheme, &original, Some(&descriptors), &options, 0).unwrap();
+    let key = Key::from_seed(0);
+    let (released, secret) =
+        obfuscate(scheme, &original, Some(&descriptors), &options, &key).unwrap();
     let near = oracle::TrueNeighbors::new(&search, &secret, 1, 50).unwrap();
     let lists = Joined::parse("similarity").unwrap().with_k(20).make(&released, 0).unwrap();
     let ratio = near.measured_inlier_ratio(&lists);

@@ -45,8 +45,7 @@ const ARROWS: &[(&str, &[&str])] = &[
 ];
 
 /// Dependencies of the core: light, and known for long.
-pub const DEPENDENCIES: &[&str] =
-    &["libm", "rayon", "nalgebra", "sha2", "chacha20", "getrandom"];
+pub const DEPENDENCIES: &[&str] = &["libm", "rayon", "nalgebra", "sha2", "chacha20", "getrandom"];
 
 /// What a crate of this workspace may import of the others.
 pub const CRATES: &[(&str, &[&str])] = &[
