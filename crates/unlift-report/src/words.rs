@@ -71,18 +71,28 @@ pub(crate) fn points(unit: LengthUnit) -> &'static str {
 pub(crate) fn length(value: f64, unit: LengthUnit) -> String {
     match unit {
         LengthUnit::Meter => meters_text(value),
-        LengthUnit::KthNeighbor => format!("{}×", significant(value, 3)),
-        LengthUnit::Pixel => format!("{} px", significant(value, 3)),
+        LengthUnit::KthNeighbor => format!("{}×", grouped(value)),
+        LengthUnit::Pixel => format!("{} px", grouped(value)),
     }
 }
 
 fn meters_text(meters: f64) -> String {
     if meters >= 1.0 {
-        format!("{} m", significant(meters, 3))
+        format!("{} m", grouped(meters))
     } else if meters >= 0.01 || meters == 0.0 {
         format!("{} cm", significant(meters * 100.0, 3))
     } else {
         format!("{} mm", significant(meters * 1000.0, 3))
+    }
+}
+
+/// `value` with three significant digits, in groups of thousands.
+fn grouped(value: f64) -> String {
+    let text = significant(value, 3);
+    // From a thousand on three digits leave no fraction.
+    match text.parse::<u64>() {
+        Ok(whole) => thousands(whole),
+        Err(_) => text,
     }
 }
 
@@ -205,6 +215,8 @@ mod tests {
         assert_eq!(length(0.34567, LengthUnit::KthNeighbor), "0.346×");
         assert_eq!(threshold("10", LengthUnit::Pixel), "10 px");
         assert_eq!(length(3.4567, LengthUnit::Pixel), "3.46 px");
+        assert_eq!(length(1284.2, LengthUnit::Pixel), "1,280 px");
+        assert_eq!(length(12_345.0, LengthUnit::Meter), "12,300 m");
     }
 
     #[test]

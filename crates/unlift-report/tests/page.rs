@@ -107,6 +107,35 @@ fn the_verdict_names_the_strongest_attack_of_today() {
 }
 
 #[test]
+fn one_scheme_and_two_are_spoken_of_as_such() {
+    let of = |schemes: &[&str]| {
+        let mut document = sample::document(true);
+        document.results.retain(|row| schemes.contains(&row.scheme.as_str()));
+        document.run.seconds.rows.clear();
+        verdict(&document)
+    };
+    let one = of(&["olc"]);
+    assert!(
+        one.contains(
+            "Today, from the released data alone, at least 58 % of the points come back within"
+        ),
+        "{one}"
+    );
+    assert!(
+        one.contains(
+            "If half of the neighbors were known, at least 92 % of the points would come back"
+        ),
+        "{one}"
+    );
+    let two = of(&["olc", "plane"]);
+    assert!(two.contains("at least 58 % of the points of OLC come back within 10 cm."), "{two}");
+    assert!(two.contains("both schemes would give back at least half of their points"), "{two}");
+    let none = of(&["ppl", "cp"]);
+    assert!(none.contains("none of the 2 schemes gives back half of its points"), "{none}");
+    assert!(!none.contains("break"), "{none}");
+}
+
+#[test]
 fn a_solver_that_needs_no_neighborhoods_is_an_attack_of_today() {
     let mut document = sample::document(true);
     let mut row = document.results[0].clone();

@@ -12,7 +12,7 @@
 
   /** A length of the document's unit, as the tables say it. */
   function length(value, unit) {
-    const short = (x) => String(Number(x.toPrecision(2)));
+    const short = (x) => x.toLocaleString("en-US", { maximumSignificantDigits: 2 });
     if (unit === "×") return `${short(value)}×`;
     if (unit !== "m") return `${short(value)} ${unit}`;
     if (value >= 1) return `${short(value)} m`;
