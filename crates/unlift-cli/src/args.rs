@@ -114,7 +114,7 @@ pub struct DemoArgs {
     /// Threads to use [default: one per core]
     #[arg(long, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
-    /// No progress bars
+    /// No progress on stderr
     #[arg(long)]
     pub quiet: bool,
 }

@@ -64,7 +64,7 @@ pub struct RunArgs {
     /// Threads to use; never changes a figure [default: one per core]
     #[arg(long, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
-    /// No progress bars
+    /// No progress on stderr
     #[arg(long)]
     pub quiet: bool,
 }

@@ -44,7 +44,7 @@ pub struct FeaturesArgs {
     /// Threads to use; never changes a byte [default: one per core]
     #[arg(long, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
-    /// No progress bars
+    /// No progress on stderr
     #[arg(long)]
     pub quiet: bool,
 }

@@ -172,11 +172,19 @@ pub fn check_gates(gates: &[Gate], plan: &Plan) -> anyhow::Result<()> {
     let rows = candidates(plan, None);
     match gates.iter().find(|gate| gate.worst(rows.iter().copied()).is_none()) {
         None => Ok(()),
-        Some(gate) => Err(usage(format!(
-            "--gate {}: expected a scheme, inlier ratio and threshold of this audit, found none \
-             that fits",
-            gate.typed
-        ))),
+        Some(gate) => {
+            let thresholds: Vec<&str> = plan.thresholds.iter().map(|t| &t.label[..]).collect();
+            let error = usage(format!(
+                "--gate {}: expected a scheme, inlier ratio and threshold of this audit, found none \
+                 that fits",
+                gate.typed
+            ));
+            let of = thresholds.join(", ");
+            Err(advise(
+                error,
+                format!("a threshold of {of} (--scale and --thresholds change them)"),
+            ))
+        }
     }
 }
 

@@ -98,7 +98,14 @@ pub fn check_thresholds(
     let in_unit = |length: f64| match unit {
         Unit::Meter => format!("{} m", short(length)),
         Unit::Pixel => format!("{} px", short(length)),
-        Unit::KthNeighbor => format!("{} (usual distances to the K-th neighbor)", short(length)),
+        Unit::KthNeighbor => {
+            format!("{} times the usual distance between neighboring points", short(length))
+        }
+    };
+    let named = |threshold: &Threshold| match unit {
+        Unit::Meter => format!("{} m", threshold.label),
+        Unit::Pixel => format!("{} px", threshold.label),
+        Unit::KthNeighbor => threshold.label.clone(),
     };
     let way_out = match unit {
         Unit::Meter => "another --scale (meters per unit of the map), or other --thresholds",
@@ -108,7 +115,7 @@ pub fn check_thresholds(
         let error = usage(format!(
             "{option}: expected a map larger than the smallest threshold, {}, found one {} across: any guess \
              would count as recovered",
-            least.label,
+            named(least),
             in_unit(across),
         ));
         return Err(advise(error, way_out));
@@ -117,7 +124,7 @@ pub fn check_thresholds(
         let error = usage(format!(
             "{option}: expected neighboring points less than {HOPELESS} times the largest threshold, {}, apart, \
              found {}: no attack could come near",
-            most.label,
+            named(most),
             in_unit(nearest),
         ));
         return Err(advise(error, way_out));
@@ -126,14 +133,14 @@ pub fn check_thresholds(
         return Ok(Some(format!(
             "the map is {} across, less than the threshold {}: within it any guess counts as recovered",
             in_unit(across),
-            most.label,
+            named(most),
         )));
     }
     if nearest >= UNUSUAL * most.value {
         return Ok(Some(format!(
             "neighboring points are {} apart, far more than the largest threshold, {}: is {option} right?",
             in_unit(nearest),
-            most.label,
+            named(most),
         )));
     }
     Ok(None)
@@ -189,7 +196,7 @@ mod tests {
         assert!(error.ends_with("any guess would count as recovered"), "{error}");
         // The larger one alone is still worth a word.
         let note = told(0.03).unwrap().unwrap();
-        assert!(note.contains("less than the threshold 0.25"), "{note}");
+        assert!(note.contains("less than the threshold 0.25 m"), "{note}");
         assert_eq!(told(1.0), Ok(None));
     }
 

@@ -35,11 +35,12 @@ pub fn any_scheme(text: &str) -> Result<&'static Entry, String> {
 
 /// A scheme for maps by its name.
 pub fn scheme(text: &str) -> Result<&'static Entry, String> {
-    let entry = any_scheme(text)?;
-    match entry.in_3d {
-        Some(_) => Ok(entry),
-        None => Err(format!("expected a scheme for maps, found {text} (for images only)")),
+    if let Some(entry) = all_schemes().into_iter().find(|entry| entry.name == text) {
+        return Ok(entry);
     }
+    let note = if any_scheme(text).is_ok() { " (for images only)" } else { "" };
+    let names: Vec<&str> = all_schemes().iter().map(|entry| entry.name).collect();
+    Err(format!("expected one of {}, found {text}{note}", names.join(", ")))
 }
 
 /// A scheme for images by its name.
@@ -200,6 +201,7 @@ mod tests {
             delta("wide").unwrap_err(),
             outlier_filter("20").unwrap_err(),
             scheme("pppl").unwrap_err(),
+            scheme("cp2d").unwrap_err(),
             solver("magic").unwrap_err(),
             noise("white").unwrap_err(),
             neighbor_source("overlap+magic").unwrap_err(),
@@ -210,8 +212,8 @@ mod tests {
              expected a number from 0 to 1, found 1.5\n\
              expected auto or a number above 0, found wide\n\
              expected NEIGHBORS,RATIO with both above 0 (for example 20,2.0), found 20\n\
-             expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, lines2d, cp2d, \
-             dcl2d, found pppl\n\
+             expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, found pppl\n\
+             expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, found cp2d (for images only)\n\
              expected one of joint, consensus, ransac, density, tomography, found magic\n\
              expected one of uniform, near, clustered, found white\n\
              expected one of similarity, overlap, geometric, found magic"

@@ -55,6 +55,10 @@ fn scales_without_meaning_are_refused_with_a_way_out() {
     }
     let (_, stderr) = place.ends(&format!("audit map room.csv --thresholds 1e9 {QUICK}"), 2);
     assert!(stderr.starts_with("unlift: --thresholds: expected a map larger"), "{stderr}");
+    // Meters in a gate, none in the audit.
+    let (_, stderr) = place.ends(&format!("audit map room.csv --gate olc:0.10<=20 {QUICK}"), 2);
+    let way_out = "  try: a threshold of 1.0, 2.5 (--scale and --thresholds change them)\n";
+    assert!(stderr.ends_with(way_out), "{stderr}");
     let (_, stderr) = place.ends("obfuscate room.csv --scheme olc --scale 1e-300 --out a", 2);
     assert!(stderr.starts_with("unlift: --scale 1e-300: expected"), "{stderr}");
     // What can be meant is told and done.
@@ -156,6 +160,11 @@ fn which_of_several_models_was_read_is_told() {
     fs::create_dir(place.path("empty")).unwrap();
     let (_, stderr) = place.ends("audit map empty", 3);
     assert!(stderr.ends_with("found none\n  try: the folder of a COLMAP model or project; for photos, unlift audit images\n"));
+    let (_, stderr) = place.ends("audit images p/sparse/0", 3);
+    assert!(
+        stderr.ends_with("found none\n  try: unlift audit map, as this is a map\n"),
+        "{stderr}"
+    );
     let told = "unlift: note: models/1: read, the largest of 2 models (8 points)\n\
                 unlift: note: sparse/0: another model (6 points), give its path to read it\n";
     let (_, stderr) = place.ends("obfuscate p --scheme olc --k 3 --out hidden", 0);

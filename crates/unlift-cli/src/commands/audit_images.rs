@@ -7,13 +7,13 @@ use serde_json::{Map, json};
 use unlift::Unit;
 use unlift::audit::{Plan, Source};
 use unlift_features::SiftOptions;
-use unlift_io::Error;
+use unlift_io::{Error, read};
 use unlift_report::pictures::MOST_PICTURES;
 
 use super::plan::{attack, check_about, check_fit, own, summary, thresholds};
 use super::with_threads;
 use crate::args_images::AuditImagesArgs;
-use crate::exit::{Outcome, usage};
+use crate::exit::{Outcome, advise, usage};
 use crate::images::FeatureSource;
 use crate::images::audit::{ImagesJob, perform};
 use crate::images::stream::Needs;
@@ -30,7 +30,10 @@ pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
     let plan = plan(args)?;
     let out = open_out(&args.result.out)?;
     let (finished, used) = with_threads(args.run.threads, || {
-        let source = FeatureSource::open(&args.path, &extraction(args)?)?;
+        let source = FeatureSource::open(&args.path, &extraction(args)?).map_err(|error| {
+            let map = read::is_project(&args.path);
+            if map { advise(error, "unlift audit map, as this is a map") } else { error }
+        })?;
         if let Some(note) = source.passed_over() {
             eprintln!("unlift: note: {note}");
         }
