@@ -151,7 +151,7 @@ pub struct Row {
     pub records_alone_by: Option<IndexMap<String, String>>,
     /// Percent of points whose swapped axis was told correctly (`cp` only).
     pub axis_accuracy_percent: Option<f64>,
-    /// Percent of points recovered within a hundredth of the smallest threshold (`cp` only).
+    /// Percent of points recovered exactly: every coordinate is the original's as published (`cp`, `cp2d` only).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exact_percent: Option<f64>,
     /// Percent of descriptors assigned to the right point of their line (`ppl`, `ppl+` only).

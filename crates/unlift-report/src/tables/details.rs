@@ -63,7 +63,7 @@ pub(crate) fn choices(document: &Document) -> Option<Table> {
     });
     let rows: Vec<Vec<String>> = rows.collect();
     let names =
-        ["axis right, %", "exact, %", "descriptor right, %", "sure, %", "of the sure right, %"];
+        ["axis right, %", "exact, %", "descriptor right, %", "sure, %", "sure ones right, %"];
     let keys = key_columns();
     let n_keys = keys.len();
     let columns = keys.into_iter().chain(names.map(|name| column(name, Class::Figure)));
