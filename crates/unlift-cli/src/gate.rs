@@ -52,6 +52,11 @@ pub struct Candidate<'a> {
     pub blind_percent: f64,
 }
 
+/// The larger figure; what is not a number is worse than any.
+fn worse(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
+}
+
 impl Gate {
     /// Reads the form that the module describes.
     ///
@@ -106,7 +111,7 @@ impl Gate {
                 Figure::Recovered => c.recovered_percent,
                 Figure::Gain => c.recovered_percent - c.blind_percent,
             })
-            .reduce(f64::max)
+            .reduce(worse)
     }
 
     /// Whether a figure keeps the bound. What is not a number does not.
@@ -164,7 +169,11 @@ mod tests {
 
     #[test]
     fn a_figure_that_is_no_number_fails() {
-        assert!(!Gate::parse("ppl:0.10<=100").unwrap().passes(f64::NAN));
+        let gate = Gate::parse("ppl:0.10<=100").unwrap();
+        assert!(!gate.passes(f64::NAN));
+        // Nor does it hide behind a figure that is one.
+        let rows = [row("ppl", 1.0, 3.0), row("ppl", 0.5, f64::NAN), row("ppl", 0.3, 2.0)];
+        assert!(!gate.passes(gate.worst(rows).unwrap()));
     }
 
     #[test]

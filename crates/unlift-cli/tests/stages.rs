@@ -166,3 +166,15 @@ fn files_that_do_not_say_are_taken_with_a_note() {
     let start = "unlift: bare-back: expected positions nearer to their own points than to those of other records";
     assert!(stderr.starts_with(start), "{stderr}");
 }
+
+/// What makes figures smaller than those of the whole map is said.
+#[test]
+fn a_thinned_map_is_told() {
+    let place = Place::new();
+    let audit = "audit map room.csv --scale 1 --k 10 --schemes olc --inlier-ratios 0.5 --quiet";
+    let (_, stderr) = place.ends(&format!("{audit} --max-points 200"), 0);
+    let note = "unlift: note: --max-points: 200 of 400 points are audited";
+    assert!(stderr.contains(note), "{stderr}");
+    let (_, stderr) = place.ends(&format!("{audit} --max-points 400"), 0);
+    assert!(!stderr.contains("--max-points"), "{stderr}");
+}

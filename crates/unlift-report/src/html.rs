@@ -253,8 +253,8 @@ fn images_text(counts: &ImageCounts) -> String {
         text.push_str(&format!(" {} could not be used.", count(counts.unusable)));
     }
     if counts.too_small > 0 {
-        let (n, few) = (count(counts.too_small), "had too few keypoints to be attacked");
-        text.push_str(&format!(" {n} {few}; these keypoints count as lost."));
+        let (n, few) = (count(counts.too_small), "had fewer keypoints than neighbors asked for");
+        text.push_str(&format!(" {n} {few}, and were attacked with fewer."));
     }
     text
 }

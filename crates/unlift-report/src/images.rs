@@ -13,7 +13,7 @@ pub struct ImageCounts {
     pub used: u64,
     /// Images that could not be used; a line on stderr told why.
     pub unusable: u64,
-    /// Used images with at most K keypoints: too few to be attacked, so their keypoints count as lost.
+    /// Used images with at most K keypoints: attacked with lists as long as can be.
     pub too_small: u64,
 }
 

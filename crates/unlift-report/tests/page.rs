@@ -345,7 +345,7 @@ fn a_page_of_images_speaks_of_keypoints_and_pixels() {
     let page = render(&document, None, &options).expect("a page");
     let text = without_script(&page);
     assert!(text.contains("How much of these images comes back?"));
-    assert!(text.contains("2 of 4 images. 1 could not be used. 1 had too few keypoints"));
+    assert!(text.contains("2 of 4 images. 1 could not be used. 1 had fewer keypoints"));
     let said = verdict(&document);
     assert!(
         said.contains("would give back at least half of their keypoints within 10 px"),

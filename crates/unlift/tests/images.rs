@@ -4,6 +4,7 @@ use unlift::audit::images::{self, Image, Outcome};
 use unlift::audit::{Plan, Row, Silent, Source};
 use unlift::descriptors::Values;
 use unlift::geometry::frame::Bounds;
+use unlift::neighbors::oracle::Noise;
 use unlift::neighbors::sources::Joined;
 use unlift::obfuscate::scheme;
 use unlift::recover::Solver;
@@ -127,6 +128,31 @@ fn rows_are_pooled_over_keypoints() {
     assert_eq!(on(1), on(3));
 }
 
+/// An image with no more keypoints than a list is long is attacked with shorter lists: keypoints that nobody tried
+/// to recover would pass for protected.
+#[test]
+fn images_with_few_keypoints_are_attacked() {
+    let mut plan = plan();
+    plan.inlier_ratios = vec![1.0, 0.5, 0.1];
+    plan.oracle_noise = Noise::ALL.to_vec();
+    plan.solvers = Solver::FROM_LISTS.to_vec();
+    plan.sources.push(Source::Own(Joined::parse("similarity").unwrap().for_images()));
+    for n in [4, 12, plan.k, plan.k + 3] {
+        let outcome = run(&[image_of("few", keypoints(3, n, 0))], &plan);
+        assert_eq!(outcome.n_too_small, usize::from(n <= plan.k));
+        for row in &outcome.rows {
+            let what = format!("{n}: {} by {} at {}", row.scheme, row.neighbors, row.inlier_ratio);
+            assert!(row.k == plan.k || row.neighbors != "oracle", "{what}");
+            // Of four keypoints with wrong neighbors all may be lost.
+            let sure = n > 4 && row.inlier_ratio >= 0.5 && row.solver != "ransac";
+            assert!(!sure || 2 * row.n_lost() < row.n_points, "{what}: {:?}", row.lost);
+        }
+        let best = outcome.rows.iter().filter(|row| row.scheme == "lines2d");
+        let best = best.map(|row| row.recovered_percent[3]).fold(0.0, f64::max);
+        assert!(n < 12 || best > 50.0, "{n}: {best}");
+    }
+}
+
 /// Images without, with one, two or few keypoints, all at one place or on one line: every keypoint is
 /// counted, as lost where need be.
 #[test]
@@ -155,7 +181,6 @@ fn images_with_hardly_any_keypoints_are_counted() {
     for row in &outcome.rows {
         let what = format!("{} by {} with {}", row.scheme, row.neighbors, row.solver);
         assert_eq!(row.n_points + row.dropped.values().sum::<usize>(), n, "{what}");
-        assert!(row.n_lost() >= 22, "{what}: {:?}", row.lost);
         assert!(row.recovered_percent.iter().all(|p| (0.0..=100.0).contains(p)), "{what}");
         assert!(row.delta.is_finite(), "{what}");
     }

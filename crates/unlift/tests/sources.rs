@@ -2,11 +2,14 @@
 
 use unlift::audit::{Plan, Source};
 use unlift::descriptors::Values;
+use unlift::neighbors::oracle::{self, TrueNeighbors};
 use unlift::neighbors::sources::{Joined, SOURCES};
 use unlift::neighbors::{Neighborhoods, overlap, similarity};
+use unlift::obfuscate::{SchemeOptions, obfuscate};
 use unlift::released::{Lines, Obfuscation, Released};
-use unlift::seed::{Draws, Stage};
-use unlift::{Descriptors, RecordId, Unit};
+use unlift::seed::{Draws, Key, Stage};
+use unlift::truth::Original;
+use unlift::{About, Descriptors, PointSet, RecordId, RowOrder, Unit};
 
 /// A picture around a keypoint: blobs of gradients, each at a place, in a direction.
 struct Picture(Vec<([f64; 2], f64)>);
@@ -237,4 +240,55 @@ fn schemes_that_a_source_cannot_have_exist_and_are_refused_before_anything_runs(
     );
     plan.schemes.retain(|scheme| scheme.name != "plane");
     plan.check(1000, false).unwrap();
+}
+
+/// Positions made from lists mean nothing where nobody knows of which map the lists are, and in which order.
+#[test]
+fn lists_say_what_they_are_about() {
+    for slots_per_record in [1, 2] {
+        let map = released(&random_map(200), slots_per_record);
+        for name in SOURCES.iter().map(|entry| entry.name).chain(["overlap+geometric"]) {
+            let about = Joined::parse(name).unwrap().with_k(6).make(&map, 0).unwrap().about();
+            assert_eq!(about.map, Some(map.fingerprint()), "{name}");
+            let order = match name {
+                "geometric" => RowOrder::Either,
+                _ => RowOrder::DescriptorRows,
+            };
+            assert_eq!(about.order, order, "{name}");
+        }
+    }
+}
+
+/// Lists of a small K, of a room whose points share lines in pairs.
+fn near(k: usize) -> TrueNeighbors {
+    let points = unlift::synthetic::room(2, 120).points;
+    let original = Original::new(PointSet::try_new(points, Unit::Meter).unwrap());
+    let ppl = unlift::obfuscate::scheme("ppl").unwrap().in_3d.unwrap();
+    let options = SchemeOptions { voxel: 0.5 };
+    let (_, secret) = obfuscate(ppl, &original, None, &options, &Key::from_seed(1)).unwrap();
+    let knn = oracle::search(&original).unwrap();
+    TrueNeighbors::new(&knn, &secret, secret.slots_per_record(), k).unwrap()
+}
+
+#[test]
+fn a_ratio_above_zero_is_not_zero() {
+    let near = near(4);
+    let measured = |ratio| near.measured_inlier_ratio(&near.at_inlier_ratio(ratio, 1).unwrap());
+    assert_eq!([0.0, 0.05, 0.1, 0.25, 0.5].map(measured), [0.0, 0.25, 0.25, 0.25, 0.5]);
+}
+
+/// Lists of which nobody knows the order are as good as in the better one: half of right lists must not look wrong.
+#[test]
+fn the_ratio_of_lists_in_either_order_is_that_of_the_better_one() {
+    let near = near(9);
+    let lists = near.at_inlier_ratio(1.0, 1).unwrap();
+    let records = (0..lists.n_slots()).flat_map(|slot| lists.of(slot ^ 1).to_vec()).collect();
+    let n = lists.n_slots() / 2;
+    let turned = Neighborhoods::try_new(lists.offsets().to_vec(), records, None, n, 2).unwrap();
+    let measured = |order| {
+        let about = About { order, ..lists.about() };
+        near.measured_inlier_ratio(&turned.clone().with_about(about))
+    };
+    assert!(measured(RowOrder::Slots) < 0.9);
+    assert_eq!(measured(RowOrder::Either), 1.0);
 }

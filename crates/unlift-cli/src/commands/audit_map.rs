@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use serde_json::{Map, Value, json};
 use unlift::audit::{Plan, PointNeighbors, Source};
+use unlift::geometry::vector::distance;
 use unlift::neighbors::sources::Joined;
 use unlift::obfuscate::Entry;
 use unlift_io::hash::{hash_file, hash_files};
@@ -29,6 +30,9 @@ pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
     let out = open_out(&args.result.out)?;
     let finished = with_threads(args.run.threads, || {
         let (input, prepared) = open_map(&args.path, &args.map, args.run.quiet)?;
+        if let Some(note) = thinned(&args, &prepared, input.positions.len()) {
+            eprintln!("unlift: note: {note}");
+        }
         let scale = 1.0 / prepared.unit_in_map_units;
         let job = Job {
             original: &prepared.original,
@@ -50,6 +54,17 @@ pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
     })?;
     print(&if args.result.json { summary(&finished)? } else { finished.text() })?;
     Ok(if finished.passed() { Outcome::Done } else { Outcome::GateFailed })
+}
+
+/// What a user should know who audits a part of a map: its figures are too small for the whole.
+fn thinned(args: &AuditMapArgs, prepared: &Prepared, n_read: usize) -> Option<String> {
+    let (most, n) = (args.map.max_points?.get(), prepared.rows.len());
+    (n == most && n < n_read).then(|| {
+        format!(
+            "--max-points: {n} of {n_read} points are audited, and neighbors are farther apart: of the whole map \
+             more comes back"
+        )
+    })
 }
 
 fn plan(args: &AuditMapArgs, prepared: &Prepared, input: &read::Input) -> anyhow::Result<Plan> {
@@ -157,9 +172,41 @@ fn by_point(path: &Path, prepared: &Prepared, n_read: usize) -> anyhow::Result<P
         }
         offsets.push(neighbors.len() as u64);
     }
+    for note in doubts(&offsets, &neighbors, prepared) {
+        eprintln!("unlift: note: {}: {note}", path.display());
+    }
     // Which file it was stands in the hashes; a file called oracle must not pass for one.
     let name = "file".to_owned();
     Ok(PointNeighbors { name, offsets, neighbors, scores })
+}
+
+/// What speaks against given lists: with lists of another map little comes back, and that is no protection.
+fn doubts(offsets: &[u64], neighbors: &[u32], prepared: &Prepared) -> Vec<String> {
+    let points = prepared.original.reveal().positions();
+    let mut doubts = Vec::new();
+    let empty = offsets.windows(2).filter(|w| w[0] == w[1]).count();
+    if empty > 0 {
+        let n = points.len();
+        doubts.push(format!("{empty} of {n} points have no neighbors in it: they count as lost"));
+    }
+    let (mut nearer, mut n) = (0usize, 0usize);
+    for (point, w) in offsets.windows(2).enumerate() {
+        for &neighbor in &neighbors[w[0] as usize..w[1] as usize] {
+            // A stranger of each, spread over the map by a large odd factor.
+            let stranger = (n * 7919 + 3) % points.len();
+            let to = |other: usize| distance(&points[point], &points[other]);
+            nearer += usize::from(to(neighbor as usize) < to(stranger));
+            n += 1;
+        }
+    }
+    // Of strangers half are nearer; two standard deviations on top.
+    if n > 0 && nearer as f64 <= 0.5 * n as f64 + (n as f64).sqrt() {
+        doubts.push(format!(
+            "the neighbors in it are no nearer than any points ({nearer} of {n}): of another map, or in another order \
+             of rows?"
+        ));
+    }
+    doubts
 }
 
 fn provenance(
@@ -198,4 +245,38 @@ fn more_options(args: &AuditMapArgs) -> Map<String, Value> {
         options.insert("outlier_filter".into(), value);
     }
     options
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use unlift::truth::Original;
+    use unlift::{PointSet, Unit};
+
+    /// Lists of the next few of 200 points on a line; with a factor other than 1, of other points.
+    fn doubts_about(factor: usize, length: usize) -> Vec<String> {
+        let n = 200;
+        let points = (0..n).map(|i| [0.1 * i as f64, 0.0, 0.0]).collect();
+        let points = PointSet::try_new(points, Unit::Meter).unwrap();
+        let prepared = Prepared {
+            original: Original::new(points),
+            descriptors: None,
+            unit_in_map_units: 1.0,
+            rows: (0..n as u32).collect(),
+        };
+        let offsets: Vec<u64> = (0..=n).map(|point| (point * length) as u64).collect();
+        let row = |point: usize| (1..=length).map(move |step| (point * factor + step) % n);
+        let neighbors: Vec<u32> = (0..n).flat_map(row).map(|other| other as u32).collect();
+        doubts(&offsets, &neighbors, &prepared)
+    }
+
+    #[test]
+    fn lists_that_cannot_be_of_the_map_are_doubted() {
+        assert!(doubts_about(1, 5).is_empty());
+        let of_another = doubts_about(77, 5);
+        assert_eq!(of_another.len(), 1);
+        assert!(of_another[0].starts_with("the neighbors in it are no nearer than any points"));
+        let empty = doubts_about(1, 0);
+        assert_eq!(empty, ["200 of 200 points have no neighbors in it: they count as lost"]);
+    }
 }

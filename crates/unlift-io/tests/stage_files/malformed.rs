@@ -95,10 +95,34 @@ fn metadata() {
             "metadata unlift, slots_per_record: expected 1 or 2, found 3",
         ),
         (
+            plus("\"fingerprint\":\"5ad0\""),
+            "metadata unlift, fingerprint: expected 32 hexadecimal digits, the fingerprint of a released map, \
+             found \"5ad0\"",
+        ),
+        (
             plus("\"slots_per_record\":0"),
             "metadata unlift, slots_per_record: expected a whole number of at least 1, found 0",
         ),
     ]);
+}
+
+/// A file whose content is not what its fingerprint says was changed; without one it is taken as it is.
+#[test]
+fn a_changed_map_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.parquet");
+    write(&path, LINES, lines());
+    let map = stage::read_released::<2>(&path).unwrap();
+    let meta = LINES.replace("\"m\"", &format!("\"m\",\"fingerprint\":\"{}\"", map.fingerprint()));
+    write(&path, &meta, lines());
+    assert_eq!(stage::read_released::<2>(&path).unwrap(), map);
+    let other = with(lines(), "foot_x", Some(floats([0.0, 1.0, 2.5])));
+    let line = released(&meta, other);
+    assert!(
+        line.contains("metadata unlift, fingerprint: expected that of the content, "),
+        "{line}"
+    );
+    assert!(line.ends_with(&format!("found \"{}\"", map.fingerprint())), "{line}");
 }
 
 #[test]

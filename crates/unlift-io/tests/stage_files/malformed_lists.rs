@@ -143,6 +143,10 @@ fn recovered() {
             "metadata unlift, delta: expected a number of at least 0, found -1",
         ),
         (
+            read(&META.replace("\"m\"", "\"m\",\"rows_by\":\"point\""), good()),
+            "metadata unlift, rows_by: expected one of slots, descriptor_rows, either, found \"point\"",
+        ),
+        (
             plus("x", maybe([Some(1.0), Some(f64::NAN)])),
             "column x, row 1: expected a finite number or null, found NaN",
         ),
@@ -210,7 +214,9 @@ fn truth() {
         ]
     };
     write(&path, META, good());
-    stage::read_truth::<2>(&path).unwrap();
+    // Files of earlier versions do not say how many points share a record; crossed rows do.
+    let (_, secret) = stage::read_truth::<2>(&path).unwrap();
+    assert_eq!((secret.slots_per_record(), secret.map()), (2, None));
     let plus = |name, column| {
         write(&path, META, with(good(), name, Some(column)));
         message(&path, stage::read_truth::<2>(&path))
@@ -247,6 +253,10 @@ fn truth() {
         (
             plus("descriptor_row", maybe_ints([Some(1), Some(2), None])),
             "descriptor row of slot 1: expected below 2, found 2",
+        ),
+        (
+            plus("descriptor_row", maybe_ints([Some(1), Some(1), None])),
+            "descriptor row of slot 1: expected a row of record 0, each once, found 1",
         ),
         (
             plus("swapped_axis", maybe_ints([Some(1), Some(2), None])),

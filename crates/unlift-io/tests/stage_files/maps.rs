@@ -68,14 +68,17 @@ pub fn truth<const D: usize>(seed: u64, n: usize) -> (Original<D>, Secret) {
         Dropped { original, reason }
     });
     let axes = (0..n).map(|_| draws.below(D as u64) as u8).collect();
+    let slots = if n.is_multiple_of(2) { 1 + seed as usize % 2 } else { 1 };
+    // The rows of a record are its slots in some order.
+    let crossed = |record: usize| u32::from(slots == 2 && record.is_multiple_of(3));
+    let row = |slot: usize| slot as u32 ^ crossed(slot / slots);
     let secret = Secret::try_new(
         order[..n].to_vec(),
         seed.is_multiple_of(2).then_some(axes),
-        draws.permutation(n),
+        (0..n).map(row).collect(),
         dropped.collect(),
         n_all,
     );
-    let slots = if n.is_multiple_of(2) { 1 + seed as usize % 2 } else { 1 };
     let secret = secret.unwrap().of_map(about(seed).map, slots).unwrap();
     (Original::new(original), secret)
 }

@@ -47,8 +47,7 @@ pub(super) struct Owned<'a, const D: usize> {
     pub(super) descriptors: Option<&'a Descriptors>,
     /// A search over the originals.
     pub(super) search: &'a Knn<'a, D>,
-    /// Whether it is one of many, of which some may have too few points to be attacked: their points
-    /// count as lost.
+    /// Whether it is one of many, of which some may have fewer points than a list is long: theirs are shorter.
     pub(super) one_of_many: bool,
 }
 
@@ -111,7 +110,7 @@ pub(super) fn cells<const D: usize>(
         each(observer, Some(what), None);
         let started = Instant::now();
         let make = || match owned.one_of_many {
-            true => sources.make_if_enough(variant),
+            true => sources.make_of_what_there_is(variant),
             false => sources.make(variant),
         };
         let made = clock.time(|s| &mut s.neighbors, make).map_err(of_scheme)?;

@@ -30,13 +30,13 @@ pub struct Image {
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// One row per scheme, source, noise model, inlier ratio and solver, in this order, over the keypoints
-    /// of all images. Keypoints of images with too few to be attacked count, as lost.
+    /// of all images. Images with few keypoints are attacked with lists as long as can be.
     pub rows: Vec<Row>,
     /// The ratio at which half of the keypoints come back, per scheme, noise model and solver.
     pub break_even: Vec<BreakEven>,
     /// Images, those without keypoints included.
     pub n_images: usize,
-    /// Images with no more keypoints than a neighborhood has: too few to be attacked.
+    /// Images with no more keypoints than a neighborhood has: their lists are shorter.
     pub n_too_small: usize,
     /// Where the time went.
     pub seconds: Seconds,

@@ -29,8 +29,8 @@ pub struct Lists<'a, const D: usize> {
     /// Of the oracle, and of the attacker.
     seeds: (u64, u64),
     near: Vec<((usize, bool), TrueNeighbors)>,
-    /// Those of the last variant: variants of one noise model follow each other.
-    outliers: Option<Outliers>,
+    /// Those of the last variant, and its K: variants of one noise model follow each other.
+    outliers: Option<(usize, Outliers)>,
 }
 
 impl<'a, const D: usize> Lists<'a, D> {
@@ -56,7 +56,7 @@ impl<'a, const D: usize> Lists<'a, D> {
         match variant.source {
             Source::Oracle => {
                 let ratio = variant.inlier_ratio.unwrap_or(1.0);
-                let lists = self.oracle(variant.noise.unwrap_or(Noise::Uniform), ratio)?;
+                let lists = self.oracle(variant, self.plan.k)?;
                 Ok(Made { lists, ratio, k: self.plan.k })
             }
             Source::Given(points) => {
@@ -77,21 +77,34 @@ impl<'a, const D: usize> Lists<'a, D> {
         }
     }
 
-    /// The same where there may be too few records: lists without entries, of which nothing is recovered,
-    /// where K true neighbors and the wrong entries asked for do not exist.
+    /// The same where there may be too few records for lists as long as asked for: lists are then as long as can
+    /// be. An attacker takes what there is; only a record without others has an empty list.
     ///
     /// # Errors
     /// As [`make`](Self::make), on maps that are large enough.
-    pub fn make_if_enough(&mut self, variant: &Variant<'_>) -> Result<Made, Error> {
-        let wanted = match variant.source {
-            Source::Own(joined) => joined.k().max(self.plan.k),
-            Source::Oracle | Source::Given(_) => self.plan.k,
-        };
-        let enough = self.released.n_records() > wanted;
-        match (enough, variant.source) {
-            (true, Source::Oracle) => self.make(variant).or_else(|_| self.none(variant)),
-            (true, Source::Given(_) | Source::Own(_)) => self.make(variant),
-            (false, _) => self.none(variant),
+    pub fn make_of_what_there_is(&mut self, variant: &Variant<'_>) -> Result<Made, Error> {
+        let others = self.released.n_records().saturating_sub(1);
+        match variant.source {
+            Source::Given(_) => self.make(variant),
+            Source::Own(_) if others == 0 => self.none(variant),
+            Source::Own(joined) if others < joined.k().max(self.plan.k) => {
+                let fewer = joined.clone().with_k(joined.k().min(others));
+                let lists = fewer.make(self.released, self.seeds.1)?;
+                let near = self.near(self.plan.k.min(others), true)?;
+                let ratio = near.measured_inlier_ratio(&lists);
+                Ok(Made { lists, ratio, k: joined.k() })
+            }
+            Source::Own(_) => self.make(variant),
+            Source::Oracle => {
+                // Wrong entries must be there as well.
+                let lengths = (1..=self.plan.k.min(others)).rev();
+                let mut made = lengths.map(|k| self.oracle(variant, k).ok());
+                let Some(lists) = made.find_map(|lists| lists) else {
+                    return self.none(variant);
+                };
+                let ratio = variant.inlier_ratio.unwrap_or(1.0);
+                Ok(Made { lists, ratio, k: self.plan.k })
+            }
         }
     }
 
@@ -109,17 +122,19 @@ impl<'a, const D: usize> Lists<'a, D> {
         Ok(Made { lists, ratio: variant.inlier_ratio.unwrap_or(0.0), k })
     }
 
-    /// Of the oracle that errs as `noise` says.
-    fn oracle(&mut self, noise: Noise, ratio: f64) -> Result<Neighborhoods, Error> {
+    /// Of the oracle, `k` records per list.
+    fn oracle(&mut self, variant: &Variant<'_>, k: usize) -> Result<Neighborhoods, Error> {
+        let (noise, ratio) =
+            (variant.noise.unwrap_or(Noise::Uniform), variant.inlier_ratio.unwrap_or(1.0));
         let seed = self.seeds.0;
         let (search, secret, kept) = (self.search, self.secret, self.outliers.take());
-        let near = self.near(self.plan.k, false)?;
+        let near = self.near(k, false)?;
         let outliers = match kept {
-            Some(outliers) if outliers.noise() == noise => outliers,
+            Some((of, outliers)) if of == k && outliers.noise() == noise => outliers,
             _ => Outliers::new(noise, near, search, secret, seed)?,
         };
         let lists = near.lists(ratio, &outliers, seed);
-        self.outliers = Some(outliers);
+        self.outliers = Some((k, outliers));
         lists
     }
 

@@ -124,12 +124,22 @@ impl Secret {
     /// The same secret, of the released map `map` whose records hide `slots_per_record` points each.
     ///
     /// # Errors
-    /// When slots do not fill the records.
+    /// When slots do not fill the records, or a record's descriptor rows are not its own.
     pub fn of_map(self, map: Option<Fingerprint>, slots_per_record: usize) -> Result<Self, Error> {
         let whole = slots_per_record > 0 && self.n_slots().is_multiple_of(slots_per_record);
         if !whole {
             let expected = format!("a number that divides {} slots", self.n_slots());
             return Err(Error::new("slots per record", expected, slots_per_record.to_string()));
+        }
+        // Rows that are not a record's own, or twice, would join positions with strangers.
+        for (record, rows) in self.descriptor_row.chunks(slots_per_record).enumerate() {
+            let is_own = |row: u32| row as usize / slots_per_record == record;
+            let wrong = |at: &usize| !is_own(rows[*at]) || rows[..*at].contains(&rows[*at]);
+            if let Some(at) = (0..rows.len()).find(wrong) {
+                let what = format!("descriptor row of slot {}", record * slots_per_record + at);
+                let expected = format!("a row of record {record}, each once");
+                return Err(Error::new(what, expected, rows[at].to_string()));
+            }
         }
         Ok(Self { map, slots_per_record, ..self })
     }

@@ -57,7 +57,7 @@ impl TrueNeighbors {
         Ok(Self { k, n_records, slots_per_record, map: secret.map(), records })
     }
 
-    /// Neighborhoods of which `round(inlier_ratio * K)` entries are true neighbors, uniformly
+    /// Neighborhoods of which `round(inlier_ratio * K)` entries (one at least above 0) are true neighbors, uniformly
     /// chosen, and the others are `outliers`. Both are nested: a lower ratio keeps a subset of
     /// the true neighbors and a superset of the others.
     ///
@@ -72,7 +72,9 @@ impl TrueNeighbors {
         if !(0.0..=1.0).contains(&inlier_ratio) {
             return Err(Error::new("inlier ratio", "0 to 1", inlier_ratio.to_string()));
         }
+        // A ratio above 0 keeps one at least: lists without any would pass for lists with a few.
         let keep = (inlier_ratio * self.k as f64).round() as usize;
+        let keep = keep.max(usize::from(inlier_ratio > 0.0));
         let wanted = self.k - keep;
         let most = outliers.most(self);
         if wanted > most {
@@ -114,16 +116,27 @@ impl TrueNeighbors {
         RecordId::from_index(slot / self.slots_per_record)
     }
 
-    /// The share of listed entries that are true neighbors, over all slots with a list.
+    /// The share of listed entries that are true neighbors, over all slots with a list. Where nobody knows which
+    /// of a record's two lists is whose, the order with more true neighbors counts, as it does in evaluation.
     pub fn measured_inlier_ratio(&self, lists: &Neighborhoods) -> f64 {
-        let (hits, listed) = (0..lists.n_slots())
+        let hits = |slot: usize, of: usize| {
+            let near = self.of(of);
+            lists.of(slot).iter().filter(|record| near.contains(record)).count()
+        };
+        let slots = self.slots_per_record;
+        let either = slots == 2 && lists.about().order == RowOrder::Either;
+        let (hits, listed) = (0..lists.n_slots() / slots)
             .into_par_iter()
-            .map(|slot| {
-                let near = self.of(slot);
-                let listed = lists.of(slot);
-                (listed.iter().filter(|record| near.contains(record)).count(), listed.len())
+            .map(|record| {
+                let own = record * slots..(record + 1) * slots;
+                let straight: usize = own.clone().map(|slot| hits(slot, slot)).sum();
+                let crossed = match either {
+                    true => hits(own.start, own.start + 1) + hits(own.start + 1, own.start),
+                    false => 0,
+                };
+                (straight.max(crossed), own.map(|slot| lists.of(slot).len()).sum())
             })
-            .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+            .reduce(|| (0, 0), |a: (usize, usize), b| (a.0 + b.0, a.1 + b.1));
         if listed == 0 { 0.0 } else { hits as f64 / listed as f64 }
     }
 }
