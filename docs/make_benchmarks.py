@@ -3,10 +3,20 @@
 
     cargo build --release && python3 docs/make_benchmarks.py ../shared
 
-or parts of them (`accuracy`, `low`, `noise`, `own`, `alone`, `large`, `images`), named after the folder. Needs the scenes
-(SHARED/data) and the paper's tables (SHARED/paper/tables); standard library only. Everything between the begin and end markers of the two files is replaced.
+or parts of them, named after the folder; each tells on stderr how long it took (two idle cores):
+
+    accuracy    2 min    both scenes, three solvers, three seeds; also the README's table and the section on confidence
+    low         1 min    ratios below a tenth, three seeds
+    noise       1 min    noise models and their figure
+    own         2 min    an attacker's own sources
+    alone       1 min    attacks on the records alone
+    large       5 min    the cost of 700,000 points
+    images      5 min    keypoints of photos
+
+`± s` is the standard deviation over seeds, where it exceeds 0.5. Needs the scenes (SHARED/data) and the paper's tables (SHARED/paper/tables);
+standard library only. Everything between the begin and end markers of the two files is replaced.
 """
-import array, csv, json, math, pathlib, random, struct, subprocess, sys, tempfile
+import array, csv, json, math, pathlib, random, struct, subprocess, sys, tempfile, time
 
 import image_tables
 
@@ -19,7 +29,7 @@ SCHEMES = ["olc", "ppl", "ppl+", "ray", "ray-voxel", "plane", "cp"]
 def audit(scene, *options, solvers="consensus,ransac"):
     with tempfile.TemporaryDirectory() as out:
         command = [ROOT / "target/release/unlift", "audit", "map", SHARED / "data" / scene / "model",
-                   "--solver", solvers, "--out", f"{out}/audit", *options]
+                   "--solver", solvers, "--no-records-alone", "--quiet", "--out", f"{out}/audit", *options]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         return json.loads(pathlib.Path(out, "audit/audit.json").read_text())
 
@@ -35,7 +45,10 @@ def paper():
 
 
 def cell(row):
-    return " / ".join(f"{x:.1f}" for x in row["recovered_percent"].values())
+    """Percent within each threshold; with its standard deviation over seeds where that is worth a look."""
+    std = row.get("std", {}).get("recovered_percent", {})
+    return " / ".join(f"{x:.1f}" + (f" ± {std[t]:.1f}" if std.get(t, 0) > 0.5 else "")
+                      for t, x in row["recovered_percent"].items())
 
 
 def head(names, columns):
@@ -146,14 +159,13 @@ def own_sources(scene, *options):
     sources = ["similarity", "overlap", "geometric", "overlap+geometric", "overlap+similarity"]
     schemes = ["olc", "ppl", "ray", "plane", "cp"]
     found, seconds = {}, {}
-    for named, of in ((sources, [s for s in schemes if s != "plane"]),
-                      ([s for s in sources if "geometric" not in s], ["plane"])):
-        asked = [x for source in named for x in ("--neighbors", source)]
-        document = audit(scene, "--schemes", ",".join(of), *asked, *options, "--descriptors",
-                         str(SHARED / "data" / scene / "descriptors.bin"), solvers="joint")
-        for row, spent in zip(document["results"], document["run"]["seconds"]["rows"]):
-            found[row["neighbors"], row["scheme"]] = row
-            seconds.setdefault(row["neighbors"], []).append(spent["neighbors"])
+    # Where a source has nothing to say about a scheme (geometric, planes), the audit says so and goes on.
+    asked = [x for source in sources for x in ("--neighbors", source)]
+    document = audit(scene, "--schemes", ",".join(schemes), *asked, *options, "--descriptors",
+                     str(SHARED / "data" / scene / "descriptors.bin"), solvers="joint")
+    for row, spent in zip(document["results"], document["run"]["seconds"]["rows"]):
+        found[row["neighbors"], row["scheme"]] = row
+        seconds.setdefault(row["neighbors"], []).append(spent["neighbors"])
     yield from head(["neighbors by", "seconds of lists, per scheme"], schemes)
     for source in sources:
         cells = [f"{cell(found[source, s])} ({100 * found[source, s]['inlier_ratio']:.1f} %)" if (source, s) in found
@@ -187,7 +199,8 @@ def confidence_table(rows, solver):
         for scheme in SCHEMES:
             row = by_key[scheme, ratio]
             correct = row.get("sure_correct_percent")
-            cells.append(f"{row['sure_percent']:.0f} / " + ("-" if correct is None else f"{correct:.1f}"))
+            sure = row["sure_percent"]
+            cells.append("not known" if sure is None else f"{sure:.0f} / " + ("-" if correct is None else f"{correct:.1f}"))
         yield f"| {ratio} | " + " | ".join(cells) + " |"
 
 
@@ -198,7 +211,7 @@ def reliability(documents):
         pooled = [[0, 0.0, 0.0] for _ in range(10)]
         for row in rows:
             if row["solver"] == "joint":
-                for bin, more in zip(pooled, row["reliability"]):
+                for bin, more in zip(pooled, row.get("reliability", [])):
                     if more["n"]:
                         bin[0] += more["n"]
                         bin[1] += more["n"] * more["predicted"]
@@ -306,7 +319,7 @@ def large():
     with tempfile.TemporaryDirectory() as folder:
         tiled(pathlib.Path(folder, "map.npy"), 700_000)
         command = [ROOT / "target/release/unlift", "audit", "map", f"{folder}/map.npy", "--scale", "1", "--solver", "joint",
-                   "--schemes", "olc,ppl,ray,plane,cp,ppl+", "--out", f"{folder}/audit"]
+                   "--schemes", "olc,ppl,ray,plane,cp,ppl+", "--no-records-alone", "--quiet", "--out", f"{folder}/audit"]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         document = json.loads(pathlib.Path(folder, "audit/audit.json").read_text())
     by_scheme = {}
@@ -325,7 +338,9 @@ def main():
     sections = {"accuracy": accuracy, "low": below_a_tenth, "noise": noise, "own": own, "alone": alone, "large": large,
                 "images": images}
     for name in sys.argv[2:] or sections:
+        started = time.monotonic()
         sections[name]()
+        print(f"{name}: {time.monotonic() - started:.0f} s", file=sys.stderr)
 
 
 def put(path, name, lines):

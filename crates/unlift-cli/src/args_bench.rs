@@ -12,6 +12,9 @@ use crate::values;
 /// Options of `bench recover`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
+Seconds are those of positions alone, as the paper's are; an audit also finds out how sure each of them
+is, which --confidence adds.
+
 Examples:
   unlift bench recover --points 700000 --scheme ppl
   unlift bench recover --points 100000 --scheme plane --map PROJECT --solver joint,ransac --json
@@ -36,13 +39,17 @@ pub struct BenchRecoverArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::ratio,
           default_value = "1,0.5,0.3,0.2,0.1")]
     pub inlier_ratios: Vec<f64>,
-    /// Recovery methods, by commas or repeated: joint, consensus, ransac, density, tomography
+    /// Recovery methods, by commas or repeated: joint, joint-start, consensus, ransac, density,
+    /// tomography
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
           default_value = "joint")]
     pub solver: Vec<Solver>,
     /// Distance up to which a neighbor supports a position, in the unit of the map
     #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto")]
     pub delta: Delta,
+    /// Also find out how sure every position is, as an audit does
+    #[arg(long)]
+    pub confidence: bool,
     /// The integer that all randomness comes from
     #[arg(long, value_name = "INTEGER", default_value_t = 0)]
     pub seed: u64,

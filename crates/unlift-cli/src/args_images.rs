@@ -49,9 +49,10 @@ pub struct AuditImagesArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_scheme,
           help_heading = "Attack")]
     pub schemes: Vec<&'static Entry>,
-    /// Recovery methods, by commas or repeated: joint, consensus, ransac
+    /// Recovery methods, by commas or repeated: joint, joint-start, consensus, ransac [default: joint, and
+    /// joint-start, the pass that it begins with]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_solver,
-          default_value = "joint", help_heading = "Attack")]
+          help_heading = "Attack")]
     pub solver: Vec<Solver>,
     /// Where neighborhoods come from, repeatable: oracle (made from the keypoints themselves), or what
     /// an attacker makes from the released descriptors (similarity, overlap, or both joined by +);

@@ -5,7 +5,7 @@ use std::time::Instant;
 use indexmap::IndexMap;
 use serde_json::{Map, Value, json};
 use unlift::Unit;
-use unlift::audit::{self, Plan, Row, Source, Threshold};
+use unlift::audit::{self, NotAudited, Plan, Row, Source, Threshold};
 use unlift::recover::Delta;
 use unlift_report::document as report;
 
@@ -30,6 +30,7 @@ pub fn options(plan: &Plan, more: Map<String, Value>) -> Map<String, Value> {
     // No scheme for images has voxels.
     if plan.schemes.iter().any(|scheme| scheme.in_3d.is_some()) {
         options.insert("voxel".into(), json!(plan.scheme_options.voxel));
+        options.insert("records_alone".into(), json!(plan.records_alone));
     }
     let neighbors: Vec<String> = plan.sources.iter().map(Source::name).collect();
     options.insert("neighbors".into(), json!(neighbors));
@@ -65,6 +66,8 @@ pub fn options(plan: &Plan, more: Map<String, Value>) -> Map<String, Value> {
 pub struct Found<'a> {
     /// One row per combination.
     pub rows: &'a [Row],
+    /// What has no row.
+    pub not_audited: &'a [NotAudited],
     /// The ratios at which half comes back.
     pub break_even: &'a [audit::BreakEven],
     /// Where the time went.
@@ -79,6 +82,7 @@ pub fn document(plan: &Plan, outcome: &Found<'_>, provenance: Provenance) -> rep
         ("obfuscate", seconds.obfuscate),
         ("neighbors", seconds.neighbors),
         ("recover", seconds.recover),
+        ("records_alone", seconds.records_alone),
         ("evaluate", seconds.evaluate),
     ];
     let rows = seconds.rows.iter().map(|row| {
@@ -94,7 +98,7 @@ pub fn document(plan: &Plan, outcome: &Found<'_>, provenance: Provenance) -> rep
         options: provenance.options,
         seed: plan.seed,
         results: outcome.rows.iter().map(|r| row(r, &plan.thresholds)).collect(),
-        not_audited: Vec::new(),
+        not_audited: not_audited(plan, outcome.not_audited),
         break_even: outcome.break_even.iter().map(break_even).collect(),
         gates: provenance.gates,
         images: Vec::new(),
@@ -152,7 +156,10 @@ pub fn row(row: &Row, thresholds: &[Threshold]) -> report::Row {
     let by_reason = |counts: &std::collections::BTreeMap<&'static str, usize>| {
         ordered(counts.iter().map(|(reason, &n)| ((*reason).to_owned(), n as u64)))
     };
+    let labels = || thresholds.iter().map(|t| t.label.clone());
     let label = |p: f64| format!("{p:.0}");
+    let alone: Option<Vec<(&str, f64)>> =
+        (0..thresholds.len()).map(|at| row.best_alone(at)).collect();
     report::Row {
         scheme: row.scheme.to_owned(),
         neighbors: row.neighbors.clone(),
@@ -172,8 +179,11 @@ pub fn row(row: &Row, thresholds: &[Threshold]) -> report::Row {
         dropped: by_reason(&row.dropped),
         recovered_percent: by_threshold(&row.recovered_percent),
         blind_percent: by_threshold(&row.blind_percent),
-        records_alone_percent: None,
-        records_alone_by: None,
+        records_alone_percent: alone
+            .as_ref()
+            .map(|best| ordered(labels().zip(best.iter().map(|(_, percent)| *percent)))),
+        records_alone_by: alone
+            .map(|best| ordered(labels().zip(best.iter().map(|(name, _)| (*name).to_owned())))),
         axis_accuracy_percent: row.axis_accuracy_percent,
         exact_percent: row.exact_percent,
         assignment_accuracy_percent: row.assignment_accuracy_percent,
@@ -182,7 +192,7 @@ pub fn row(row: &Row, thresholds: &[Threshold]) -> report::Row {
         error_percentiles: ordered(
             audit::PERCENTILES.iter().map(|&p| label(p)).zip(row.error_percentiles.iter().copied()),
         ),
-        sure_unknown: None,
+        sure_unknown: row.sure_unknown.map(|unknown| unknown.reason().to_owned()),
         sure_percent: row.reliability.as_ref().map(|r| r.sure_percent()),
         sure_correct_percent: row.reliability.as_ref().and_then(|r| r.sure_correct_percent()),
         reliability: row.reliability.as_ref().map(|r| r.bins.iter().map(bin).collect()),
@@ -202,6 +212,45 @@ pub fn row(row: &Row, thresholds: &[Threshold]) -> report::Row {
             blind_percent: by_threshold(&d.blind_percent),
         }),
     }
+}
+
+/// What has no row, told once per scheme, source and reason, with the part of the source's rows that it is
+/// about where others are there.
+fn not_audited(plan: &Plan, missing: &[NotAudited]) -> Vec<report::NotAudited> {
+    let mut told: Vec<(&NotAudited, Vec<&NotAudited>)> = Vec::new();
+    for one in missing {
+        let same = |(first, _): &&mut (&NotAudited, Vec<&NotAudited>)| {
+            (first.scheme, &first.neighbors, &first.reason)
+                == (one.scheme, &one.neighbors, &one.reason)
+        };
+        match told.iter_mut().find(same) {
+            Some((_, all)) => all.push(one),
+            None => told.push((one, vec![one])),
+        }
+    }
+    let text = |(first, all): (&NotAudited, Vec<&NotAudited>)| {
+        let asked = plan.oracle_noise.len() * plan.inlier_ratios.len();
+        let part = first.oracle_noise.filter(|_| all.len() < asked);
+        let reason = part.map_or_else(
+            || first.reason.clone(),
+            |_| format!("at {}: {}", parts(plan, &all).join(", "), first.reason),
+        );
+        let (scheme, neighbors) = (first.scheme.to_owned(), first.neighbors.clone());
+        report::NotAudited { scheme, neighbors, reason }
+    };
+    told.into_iter().map(text).collect()
+}
+
+/// Inlier ratios, with the noise model where there are several.
+fn parts(plan: &Plan, missing: &[&NotAudited]) -> Vec<String> {
+    let part = |one: &&NotAudited| {
+        let ratio = one.inlier_ratio.map(|ratio| ratio.to_string()).unwrap_or_default();
+        match one.oracle_noise {
+            Some(noise) if plan.oracle_noise.len() > 1 => format!("{ratio} ({noise})"),
+            _ => ratio,
+        }
+    };
+    missing.iter().map(part).collect()
 }
 
 fn bin(bin: &unlift::evaluate::Bin) -> report::ReliabilityBin {

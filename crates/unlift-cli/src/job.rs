@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use unlift::Descriptors;
-use unlift::audit::{Cell, Observer, Plan, REFERENCE, Row, run};
+use unlift::audit::{Cell, NotAudited, Observer, Plan, REFERENCE, Row, run};
+use unlift::recover::Solver;
 use unlift::truth::Original;
 use unlift_io::atomic::{OutputDir, write_file};
 use unlift_report::document::{Document, GateResult, Input};
-use unlift_report::{RenderOptions, render, text_table};
+use unlift_report::{ErrorCdf, RenderOptions, render, text_table};
 
 use crate::clouds::Clouds;
 use crate::document::{self, Provenance};
@@ -88,12 +89,13 @@ pub fn open_out(out: &Path) -> anyhow::Result<OutputDir> {
 /// Runs the job and writes its folder, whole or not at all.
 pub fn perform(job: Job<'_>, out: OutputDir) -> anyhow::Result<Finished> {
     check_gates(&job.gates, &job.plan)?;
-    let n_cells = job.plan.schemes.len() * job.plan.variants().len() * job.plan.solvers.len();
+    let drawn = drawn(&job.plan);
+    let n_views = job.plan.schemes.len() * job.plan.variants().len() * drawn.len();
     let mut watcher = Watcher {
         progress: Progress::new(job.quiet),
-        pictures: (!job.share_safe).then(|| Pictures::new(job.original, &job.plan, n_cells)),
+        pictures: (!job.share_safe).then(|| Pictures::new(job.original, &job.plan, n_views)),
         curves: Vec::new(),
-        row_of_cell: RowOfCell::new(&job.plan),
+        drawn: drawn.iter().map(|solver| solver.name()).collect(),
         clouds: job
             .write_clouds
             .then(|| Clouds::new(out.path(), job.unit_in_map_units))
@@ -109,22 +111,21 @@ pub fn perform(job: Job<'_>, out: OutputDir) -> anyhow::Result<Finished> {
         return Err(error.into());
     }
     drop(watcher.progress);
-    let gates = gate_results(&job.gates, &job.plan, &outcome.rows)?;
+    let gates = gate_results(&job.gates, &job.plan, &outcome.rows, &outcome.not_audited)?;
     let options = document::options(&job.plan, job.options);
     let provenance = Provenance { input: job.input, options, gates, started: job.started };
     let found = document::Found {
         rows: &outcome.rows,
+        not_audited: &outcome.not_audited,
         break_even: &outcome.break_even,
         seconds: &outcome.seconds,
     };
     let document = document::document(&job.plan, &found, provenance);
     let shown = if job.share_safe { document.share_safe() } else { document };
+    let curves = curves_of(watcher.curves, &outcome.rows);
     let scene = watcher.pictures.map(|p| p.into_scene(&job.cameras, job.up));
-    let options = RenderOptions {
-        share_safe: job.share_safe,
-        error_cdf: watcher.curves,
-        ..RenderOptions::default()
-    };
+    let options =
+        RenderOptions { share_safe: job.share_safe, error_cdf: curves, ..RenderOptions::default() };
     let page = render(&shown, scene.as_ref(), &options)?;
     let json = shown.to_json()?;
     write_file(&out.path().join("report.html"), |w| std::io::Write::write_all(w, page.as_bytes()))?;
@@ -133,35 +134,21 @@ pub fn perform(job: Job<'_>, out: OutputDir) -> anyhow::Result<Finished> {
     Ok(Finished { document: shown, report: job.out.join("report.html") })
 }
 
-/// Rows that the plan will have, as gates see them.
-fn candidates<'a>(plan: &'a Plan, rows: Option<&'a [Row]>) -> Vec<Candidate<'a>> {
+/// Rows as gates see them.
+fn candidates<'a>(plan: &Plan, rows: &'a [Row]) -> Vec<Candidate<'a>> {
     let mut candidates = Vec::new();
-    if let Some(rows) = rows {
-        // The reference is no attack.
-        for row in rows.iter().filter(|row| row.solver != REFERENCE) {
-            for (at, threshold) in plan.thresholds.iter().enumerate() {
-                candidates.push(Candidate {
-                    scheme: row.scheme,
-                    inlier_ratio: row.oracle_noise.is_some().then_some(row.inlier_ratio),
-                    threshold: threshold.value,
-                    recovered_percent: row.recovered_percent[at],
-                    blind_percent: row.blind_percent[at],
-                });
-            }
-        }
-        return candidates;
-    }
-    for scheme in &plan.schemes {
-        for variant in plan.variants() {
-            for threshold in &plan.thresholds {
-                candidates.push(Candidate {
-                    scheme: scheme.name,
-                    inlier_ratio: variant.inlier_ratio,
-                    threshold: threshold.value,
-                    recovered_percent: 0.0,
-                    blind_percent: 0.0,
-                });
-            }
+    // The reference is no attack.
+    for row in rows.iter().filter(|row| row.solver != REFERENCE) {
+        for (at, threshold) in plan.thresholds.iter().enumerate() {
+            candidates.push(Candidate {
+                scheme: row.scheme,
+                solver: row.solver,
+                source: &row.neighbors,
+                inlier_ratio: row.oracle_noise.is_some().then_some(row.inlier_ratio),
+                threshold: threshold.value,
+                recovered_percent: row.recovered_percent[at],
+                baseline_percent: row.baseline_percent(at),
+            });
         }
     }
     candidates
@@ -169,40 +156,42 @@ fn candidates<'a>(plan: &'a Plan, rows: Option<&'a [Row]>) -> Vec<Candidate<'a>>
 
 /// A gate about no row is told before the audit runs, not after.
 pub fn check_gates(gates: &[Gate], plan: &Plan) -> anyhow::Result<()> {
-    let rows = candidates(plan, None);
-    match gates.iter().find(|gate| gate.worst(rows.iter().copied()).is_none()) {
+    let lacking = |gate: &Gate| gate.not_in(plan).map(|part| (gate.typed.clone(), part));
+    match gates.iter().find_map(lacking) {
         None => Ok(()),
-        Some(gate) => {
-            let thresholds: Vec<&str> = plan.thresholds.iter().map(|t| &t.label[..]).collect();
-            let error = usage(format!(
-                "--gate {}: expected a scheme, inlier ratio and threshold of this audit, found none \
-                 that fits",
-                gate.typed
-            ));
-            let of = thresholds.join(", ");
-            Err(advise(
-                error,
-                format!("a threshold of {of} (--scale and --thresholds change them)"),
-            ))
+        Some((gate, (expected, found))) => {
+            let (part, names) = expected.split_once(": ").unwrap_or(("row", &expected));
+            let error = format!("--gate {gate}: {part}: expected {names}, found {found}");
+            Err(match part {
+                "threshold" => advise(usage(error), "--scale and --thresholds, which change them"),
+                _ => usage(error),
+            })
         }
     }
 }
 
-/// How every gate ended.
-pub fn gate_results(gates: &[Gate], plan: &Plan, rows: &[Row]) -> anyhow::Result<Vec<GateResult>> {
-    let rows = candidates(plan, Some(rows));
+/// How every gate ended. One that is about something that could not be audited does not hold.
+pub fn gate_results(
+    gates: &[Gate],
+    plan: &Plan,
+    rows: &[Row],
+    not_audited: &[NotAudited],
+) -> anyhow::Result<Vec<GateResult>> {
+    let rows = candidates(plan, rows);
     let result = |gate: &Gate| {
+        let found_percent = gate.worst(rows.iter().copied());
+        let reason = not_audited.iter().find(|missing| gate.misses(missing)).map(|missing| {
+            let with = missing.neighbors.as_ref().map(|name| format!(" with neighbors by {name}"));
+            let (scheme, with) = (missing.scheme, with.unwrap_or_default());
+            format!("{scheme}{with} was not audited: {}", missing.reason)
+        });
         // A gate that is about no row must never count as held.
-        let found = gate.worst(rows.iter().copied());
-        let found_percent = found
-            .ok_or_else(|| usage(format!("--gate {}: expected a row, found none", gate.typed)))?;
-        Ok(GateResult {
-            gate: gate.typed.clone(),
-            found_percent: Some(found_percent),
-            bound_percent: gate.bound_percent,
-            passed: gate.passes(found_percent),
-            reason: None,
-        })
+        if found_percent.is_none() && reason.is_none() {
+            return Err(usage(format!("--gate {}: expected a row, found none", gate.typed)));
+        }
+        let passed = reason.is_none() && found_percent.is_some_and(|found| gate.passes(found));
+        let (gate, bound_percent) = (gate.typed.clone(), gate.bound_percent);
+        Ok(GateResult { gate, found_percent, bound_percent, passed, reason })
     };
     gates.iter().map(result).collect()
 }
@@ -211,30 +200,30 @@ pub fn gate_results(gates: &[Gate], plan: &Plan, rows: &[Row]) -> anyhow::Result
 struct Watcher {
     progress: Progress,
     pictures: Option<Pictures>,
-    curves: Vec<unlift_report::ErrorCdf>,
-    row_of_cell: RowOfCell,
+    /// The error curve of every cell.
+    curves: Vec<(Row, Vec<(f64, f64)>)>,
+    /// Names of the solvers whose points are drawn.
+    drawn: Vec<&'static str>,
     clouds: Option<Clouds>,
     thresholds: Vec<f64>,
     failed: Option<unlift_io::Error>,
 }
 
-/// Which row of the results a cell becomes: the reference of a scheme has a row, and no cell.
-#[derive(Clone, Copy, Debug)]
-pub struct RowOfCell {
-    cells_per_scheme: usize,
-    reference: bool,
+/// The solvers whose points are drawn: what joint recovery starts from is not, beside what it ends with.
+fn drawn(plan: &Plan) -> Vec<Solver> {
+    let is_drawn =
+        |solver: &Solver| *solver != Solver::JointStart || !plan.solvers.contains(&Solver::Joint);
+    plan.solvers.iter().copied().filter(is_drawn).collect()
 }
 
-impl RowOfCell {
-    pub fn new(plan: &Plan) -> Self {
-        let cells_per_scheme = plan.variants().len() * plan.solvers.len();
-        Self { cells_per_scheme, reference: plan.reference }
-    }
-
-    /// The row of cell number `cell` of the first repeat.
-    pub fn of(&self, cell: usize) -> usize {
-        cell + usize::from(self.reference) * (cell / self.cells_per_scheme.max(1))
-    }
+/// The curve of every row of `rows` that has one, by its cell.
+pub fn curves_of(cells: Vec<(Row, Vec<(f64, f64)>)>, rows: &[Row]) -> Vec<ErrorCdf> {
+    let curve = |(cell, points): (Row, Vec<(f64, f64)>)| {
+        // A cell that failed under another seed has no row.
+        let row = rows.iter().position(|row| row.is_same_cell(&cell))?;
+        Some(ErrorCdf { row, points })
+    };
+    cells.into_iter().filter_map(curve).collect()
 }
 
 /// Points of an error curve.
@@ -258,9 +247,9 @@ impl Observer for Watcher {
         }
         let most = self.thresholds.iter().copied().fold(0.0, f64::max);
         let points = curve_errors(most).map(|at| (at, cell.accuracy.percent_within(at))).collect();
-        let row = self.row_of_cell.of(self.curves.len());
-        self.curves.push(unlift_report::ErrorCdf { row, points });
-        if let Some(pictures) = &mut self.pictures {
+        self.curves.push((cell.row.clone(), points));
+        if let (Some(pictures), true) = (&mut self.pictures, self.drawn.contains(&cell.row.solver))
+        {
             pictures.add(cell);
         }
         if let (Some(clouds), None) = (&mut self.clouds, &self.failed) {
@@ -274,12 +263,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn references_stand_between_the_cells_of_schemes() {
+    fn what_joint_starts_from_is_drawn_only_by_itself() {
         let mut plan = Plan::new(unlift::Unit::Meter);
-        plan.inlier_ratios = vec![1.0, 0.5];
-        let rows = |plan: &Plan| [0, 1, 2, 3, 4].map(|cell| RowOfCell::new(plan).of(cell));
-        assert_eq!(rows(&plan), [0, 1, 2, 3, 4]);
-        plan.reference = true;
-        assert_eq!(rows(&plan), [0, 1, 3, 4, 6]);
+        assert_eq!(drawn(&plan), [Solver::Joint]);
+        plan.solvers = vec![Solver::JointStart, Solver::Ransac];
+        assert_eq!(drawn(&plan), plan.solvers);
     }
 }

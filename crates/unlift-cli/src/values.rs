@@ -214,7 +214,7 @@ mod tests {
              expected NEIGHBORS,RATIO with both above 0 (for example 20,2.0), found 20\n\
              expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, found pppl\n\
              expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, found cp2d (for images only)\n\
-             expected one of joint, consensus, ransac, density, tomography, found magic\n\
+             expected one of joint, joint-start, consensus, ransac, density, tomography, found magic\n\
              expected one of uniform, near, clustered, found white\n\
              expected one of similarity, overlap, geometric, found magic"
         );

@@ -42,7 +42,8 @@ fn photos_become_pooled_rows_rows_per_image_and_pictures() {
     let counts = &document["input"]["images"];
     assert_eq!((counts["found"].as_u64(), counts["used"].as_u64()), (Some(3), Some(3)));
     let rows = document["results"].as_array().expect("rows");
-    assert_eq!(rows.len(), 3 * (2 + 2));
+    // By joint, and by joint-start.
+    assert_eq!(rows.len(), 3 * (2 + 2) * 2);
     for row in rows {
         assert_eq!(row["unit"], "px");
         let keys: Vec<&String> = row["recovered_percent"].as_object().unwrap().keys().collect();
@@ -137,7 +138,7 @@ fn gates_hold_or_fail() {
     assert!(stdout.contains("gate lines2d@1:25<=1: FAILED"), "{stdout}");
     place.ends(&format!("{line} --gate all:25<=100"), 0);
     let (_, stderr) = place.ends(&format!("{line} --gate cp2d:25<=100"), 2);
-    assert!(stderr.starts_with("unlift: --gate cp2d:25<=100: expected a scheme"), "{stderr}");
+    assert!(stderr.starts_with("unlift: --gate cp2d:25<=100: scheme: expected one of"), "{stderr}");
 }
 
 #[test]

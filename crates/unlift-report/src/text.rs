@@ -28,10 +28,14 @@ pub fn text_table(document: &Document) -> String {
             let right = format!("{} %", words::ratio_percent(row.inlier_ratio));
             let source = attack::source(&row.neighbors, row.oracle_noise.as_deref());
             let mut cells = vec![row.scheme.clone(), source, right, row.solver.clone()];
-            cells.extend(thresholds.iter().map(|typed| percent(row.recovered_percent.get(typed))));
-            cells.push(percent(row.blind_percent.get(&headline)));
+            cells.extend(thresholds.iter().map(|typed| {
+                let spread = row.std.as_ref().and_then(|std| std.recovered_percent.get(typed));
+                percent(row.recovered_percent.get(typed), spread)
+            }));
+            cells.push(percent(row.blind_percent.get(&headline), None));
             if any_alone {
-                cells.push(percent(alone(&card.scheme).map(|(percent, _)| percent).as_ref()));
+                let alone = alone(&card.scheme).map(|(percent, _)| percent);
+                cells.push(percent(alone.as_ref(), None));
             }
             cells.push(break_even(document, row, &headline));
             lines.push(cells);
@@ -54,8 +58,11 @@ pub fn text_table(document: &Document) -> String {
     text
 }
 
-fn percent(value: Option<&f64>) -> String {
-    value.map_or("-".into(), |value| format!("{} %", words::percent(*value)))
+fn percent(value: Option<&f64>, spread: Option<&f64>) -> String {
+    match value {
+        Some(_) => format!("{} %", tables::percent_cell(value, spread)),
+        None => "-".to_owned(),
+    }
 }
 
 fn unit(document: &Document) -> &'static str {
@@ -107,4 +114,72 @@ fn align(lines: &[Vec<String>]) -> String {
         text.push('\n');
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::document::{NotAudited, Spread};
+
+    /// An audit of one scheme, `olc`, within 0.10.
+    fn document(rows: &[(&str, f64)]) -> Document {
+        let row = |(solver, percent): &(&str, f64)| {
+            serde_json::json!({
+                "scheme": "olc", "neighbors": "oracle", "oracle_noise": "uniform",
+                "inlier_ratio": 0.5, "k": 50, "solver": solver, "delta": 0.08, "unit": "m",
+                "n_points": 100, "n_lost": 0, "lost": {}, "dropped": {},
+                "recovered_percent": {"0.10": percent}, "blind_percent": {"0.10": 8.1},
+                "axis_accuracy_percent": null, "assignment_accuracy_percent": null,
+                "median_error": 0.02, "error_percentiles": {}
+            })
+        };
+        let text = serde_json::json!({
+            "unlift": "0.1.0", "schema": 1,
+            "input": {"path": null, "sha256": "00", "n_points": 100, "scale_m_per_unit": 1.0},
+            "options": {}, "seed": 0, "results": rows.iter().map(row).collect::<Vec<_>>(),
+            "break_even": [],
+            "run": {"threads": 1, "peak_memory_bytes": null, "seconds": {"total": 1.0, "rows": []}}
+        });
+        Document::from_json(&text.to_string()).expect("a valid document")
+    }
+
+    #[test]
+    fn the_strongest_attack_speaks_and_is_named() {
+        let text = text_table(&document(&[("joint", 61.6), ("joint-start", 77.8)]));
+        assert!(text.contains("joint-start  77.8 %") && !text.contains("61.6"), "{text}");
+        assert_eq!(text.lines().count(), 2, "{text}");
+    }
+
+    #[test]
+    fn both_baselines_and_what_is_missing_are_shown() {
+        let mut document = document(&[("joint", 95.6)]);
+        let row = &mut document.results[0];
+        row.records_alone_percent = Some([("0.10".to_owned(), 58.6)].into());
+        row.records_alone_by = Some([("0.10".to_owned(), "tomography".to_owned())].into());
+        let missing = |neighbors: Option<&str>, reason: &str| NotAudited {
+            scheme: "ppl+".into(),
+            neighbors: neighbors.map(str::to_owned),
+            reason: reason.into(),
+        };
+        document.not_audited = vec![missing(None, "flat"), missing(Some("geometric"), "no lists")];
+        let text = text_table(&document);
+        assert!(text.contains("95.6 %   8.1 %   58.6 %"), "{text}");
+        assert!(text.contains("not audited: ppl+: flat\n"), "{text}");
+        assert!(text.contains("not audited: ppl+ by geometric: no lists\n"), "{text}");
+    }
+
+    #[test]
+    fn a_spread_that_matters_is_shown() {
+        let mut document = document(&[("joint", 41.6)]);
+        let row = &mut document.results[0];
+        row.repeats = 3;
+        let spread = |std: f64| Spread {
+            recovered_percent: [("0.10".to_owned(), std)].into(),
+            ..Spread::default()
+        };
+        row.std = Some(spread(4.96));
+        assert!(text_table(&document).contains(" 41.6 ± 5.0 %  "));
+        document.results[0].std = Some(spread(0.5));
+        assert!(text_table(&document).contains(" 41.6 %  "));
+    }
 }

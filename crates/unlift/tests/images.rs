@@ -177,7 +177,7 @@ fn images_with_hardly_any_keypoints_are_counted() {
     let outcome = run(&images, &plan);
     assert_eq!((outcome.n_images, outcome.n_too_small), (9, 4));
     let n: usize = images.iter().map(|image| image.original.len()).sum();
-    assert_eq!(outcome.rows.len(), 3 * 4 * 3);
+    assert_eq!(outcome.rows.len(), 3 * 4 * Solver::FROM_LISTS.len());
     for row in &outcome.rows {
         let what = format!("{} by {} with {}", row.scheme, row.neighbors, row.solver);
         assert_eq!(row.n_points + row.dropped.values().sum::<usize>(), n, "{what}");

@@ -1,6 +1,5 @@
 //! Laws of every source that makes neighborhoods from a released map, and what each is for.
 
-use unlift::audit::{Plan, Source};
 use unlift::descriptors::Values;
 use unlift::neighbors::oracle::{self, TrueNeighbors};
 use unlift::neighbors::sources::{Joined, SOURCES};
@@ -222,24 +221,6 @@ fn blank_and_equal_descriptors_are_no_trouble() {
         assert!(lists.scores().unwrap().iter().all(|score| score.is_finite()));
         assert!(lists.of(7).contains(&RecordId(8)), "{}", source.name());
     }
-}
-
-#[test]
-fn schemes_that_a_source_cannot_have_exist_and_are_refused_before_anything_runs() {
-    for entry in SOURCES {
-        for name in entry.not_for {
-            unlift::obfuscate::scheme(name).unwrap();
-        }
-    }
-    let mut plan = Plan::new(unlift::Unit::Meter);
-    plan.sources = vec![Source::Own(Joined::parse("geometric").unwrap())];
-    assert_eq!(
-        plan.check(1000, false).unwrap_err().to_string(),
-        "scheme with neighbors by geometric: expected one whose records alone tell geometric where \
-         points are, found plane"
-    );
-    plan.schemes.retain(|scheme| scheme.name != "plane");
-    plan.check(1000, false).unwrap();
 }
 
 /// Positions made from lists mean nothing where nobody knows of which map the lists are, and in which order.

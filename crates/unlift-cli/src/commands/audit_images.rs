@@ -10,7 +10,7 @@ use unlift_features::SiftOptions;
 use unlift_io::{Error, read};
 use unlift_report::pictures::MOST_PICTURES;
 
-use super::plan::{attack, check_about, check_fit, own, summary, thresholds};
+use super::plan::{attack, check_about, check_fit, own, solvers, summary, thresholds};
 use super::with_threads;
 use crate::args_images::AuditImagesArgs;
 use crate::exit::{Outcome, advise, usage};
@@ -88,7 +88,7 @@ fn plan(args: &AuditImagesArgs) -> anyhow::Result<Plan> {
         sources,
         schemes,
         k: usize::from(args.k),
-        solvers: distinct(args.solver.clone(), |a, b| a == b),
+        solvers: solvers(&args.solver, &usual),
         thresholds,
         headline,
         seed: args.seed,

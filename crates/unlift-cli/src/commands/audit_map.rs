@@ -7,13 +7,12 @@ use serde_json::{Map, Value, json};
 use unlift::audit::{Plan, PointNeighbors, Source};
 use unlift::geometry::vector::distance;
 use unlift::neighbors::sources::Joined;
-use unlift::obfuscate::Entry;
 use unlift_io::hash::{hash_file, hash_files};
 use unlift_io::read;
 use unlift_io::stage::read_point_neighborhoods;
 use unlift_report::document::Input;
 
-use super::plan::{attack, check_about, check_fit, own, summary, thresholds};
+use super::plan::{attack, check_about, check_fit, own, solvers, summary, thresholds};
 use super::{open_map, with_threads};
 use crate::args::AuditMapArgs;
 use crate::document::ordered;
@@ -77,10 +76,11 @@ fn plan(args: &AuditMapArgs, prepared: &Prepared, input: &read::Input) -> anyhow
         eprintln!("unlift: note: {note}");
     }
     Ok(Plan {
-        sources: sources(args, &schemes, prepared, input)?,
+        sources: sources(args, prepared, input)?,
         schemes: distinct(schemes, |a, b| a.name == b.name),
         k: usize::from(args.map.k),
-        solvers: distinct(args.solver.clone(), |a, b| a == b),
+        solvers: solvers(&args.solver, &usual),
+        records_alone: !args.no_records_alone,
         thresholds,
         seed: args.map.seed.unwrap_or(0),
         ..attack(&args.attack, usual)
@@ -90,7 +90,6 @@ fn plan(args: &AuditMapArgs, prepared: &Prepared, input: &read::Input) -> anyhow
 /// Every source once, and no option that would be about none of them.
 fn sources(
     args: &AuditMapArgs,
-    schemes: &[&'static Entry],
     prepared: &Prepared,
     input: &read::Input,
 ) -> anyhow::Result<Vec<Source>> {
@@ -99,7 +98,7 @@ fn sources(
         sources.push(match source {
             NeighborSource::Oracle => Source::Oracle,
             NeighborSource::Own(joined) => {
-                check_own(&joined, schemes, prepared, input)?;
+                check_own(&joined, prepared, input)?;
                 if let Some(note) = joined.note(prepared.original.len()) {
                     eprintln!("unlift: note: {note}");
                 }
@@ -119,12 +118,7 @@ fn sources(
 }
 
 /// Refuses a source that lacks what it needs, before anything is computed.
-fn check_own(
-    joined: &Joined,
-    schemes: &[&'static Entry],
-    prepared: &Prepared,
-    input: &read::Input,
-) -> anyhow::Result<()> {
+fn check_own(joined: &Joined, prepared: &Prepared, input: &read::Input) -> anyhow::Result<()> {
     let name = joined.name();
     match &prepared.descriptors {
         None if joined.needs_descriptors() => {
@@ -138,17 +132,7 @@ fn check_own(
         None => {}
         Some(descriptors) => check_fit(joined, descriptors)?,
     }
-    if let Some(scheme) = blind_on(joined, schemes) {
-        return Err(usage(format!(
-            "--neighbors {name}: expected --schemes whose records alone tell where points are, found {scheme}"
-        )));
-    }
     Ok(())
-}
-
-/// The first scheme that a source has nothing to say about.
-fn blind_on(joined: &Joined, schemes: &[&'static Entry]) -> Option<&'static str> {
-    schemes.iter().map(|scheme| scheme.name).find(|name| joined.fails_on(name).is_some())
 }
 
 /// Lists by row of the file, for the rows that were kept.

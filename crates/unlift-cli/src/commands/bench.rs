@@ -62,7 +62,7 @@ fn measure(args: &BenchRecoverArgs) -> anyhow::Result<Bench> {
             let options = RecoverOptions {
                 solver,
                 delta: args.delta,
-                confidence: false,
+                confidence: args.confidence,
                 ..RecoverOptions::default()
             };
             let started = Instant::now();
@@ -115,9 +115,14 @@ fn as_table(args: &BenchRecoverArgs, bench: &Bench) -> String {
         format!(", peak memory {:.0} MiB", bytes as f64 / f64::from(1 << 20))
     });
     format!(
-        "{}: {n} points, K = {k}, {} threads\n\n{}\nobfuscation {:.2} s, true neighbors {:.2} s{memory}\n",
+        "{}: {n} points, K = {k}, {} threads; {}\n\n{}\nobfuscation {:.2} s, true neighbors {:.2} s{memory}\n",
         args.scheme.name,
         bench.threads,
+        if args.confidence {
+            "positions and how sure they are"
+        } else {
+            "positions alone, without confidence"
+        },
         table(&rows, &[1]),
         bench.obfuscate,
         bench.search,
@@ -141,6 +146,7 @@ fn as_json(args: &BenchRecoverArgs, bench: &Bench) -> String {
         "n_points": n,
         "k": k,
         "threads": bench.threads,
+        "confidence": args.confidence,
         "seed": args.seed,
         "rows": bench.rows.iter().map(row).collect::<Vec<_>>(),
         "seconds": { "obfuscate": bench.obfuscate, "true_neighbors": bench.search },

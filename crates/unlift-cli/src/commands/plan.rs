@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 use unlift::Descriptors;
 use unlift::audit::{Plan, Source, Threshold};
 use unlift::neighbors::sources::Joined;
+use unlift::recover::Solver;
 
 use crate::args_audit::AttackArgs;
 use crate::exit::{advise, usage};
@@ -24,6 +25,14 @@ pub fn attack(args: &AttackArgs, usual: Plan) -> Plan {
     plan.exact_constraints = !args.no_exact_constraints;
     plan.repeats = args.repeats;
     plan
+}
+
+/// The recovery methods asked for, each once, else the usual ones.
+pub fn solvers(given: &[Solver], usual: &Plan) -> Vec<Solver> {
+    match given {
+        [] => usual.solvers.clone(),
+        given => distinct(given.to_vec(), |a, b| a == b),
+    }
 }
 
 /// The thresholds asked for, each once, else the usual ones.
@@ -84,7 +93,7 @@ pub fn check_about(args: &AttackArgs, sources: &[Source]) -> anyhow::Result<()> 
 /// What a script wants to know: the results and where the rest is.
 pub fn summary(finished: &Finished) -> anyhow::Result<String> {
     let mut document: Value = serde_json::from_str(&finished.document.to_json()?)?;
-    let keep = ["unlift", "schema", "results", "break_even", "gates"];
+    let keep = ["unlift", "schema", "results", "not_audited", "break_even", "gates"];
     if let Some(fields) = document.as_object_mut() {
         fields.retain(|name, _| keep.contains(&name.as_str()));
         fields.insert("report".into(), json!(finished.report.display().to_string()));

@@ -12,7 +12,7 @@ use unlift_io::atomic::{OutputDir, write_file};
 use unlift_io::hash::{hash_file, hash_files};
 use unlift_report::document::{ImageCounts, ImageFigures, Input};
 use unlift_report::pictures::Picture;
-use unlift_report::{ErrorCdf, RenderOptions, render};
+use unlift_report::{RenderOptions, render};
 
 use super::FeatureSource;
 use super::pictures::Album;
@@ -20,7 +20,7 @@ use super::stream::{Needs, Stream, Tally, lacking};
 use crate::document::{self, Found, Provenance};
 use crate::exit::line;
 use crate::gate::Gate;
-use crate::job::{Finished, MARKER, RowOfCell, check_gates, curve_errors, gate_results};
+use crate::job::{Finished, MARKER, check_gates, curve_errors, curves_of, gate_results};
 use crate::progress::{Progress, Steps};
 
 /// Longest side of an embedded photo in pixels.
@@ -86,7 +86,7 @@ pub fn perform(job: ImagesJob<'_>, out: OutputDir) -> anyhow::Result<(Option<Fin
         return Ok((None, used));
     }
     let pictures = if job.share_safe { Vec::new() } else { draw(&job, &tally, &figures, &steps)? };
-    let gates = gate_results(&job.gates, &job.plan, &outcome.rows)?;
+    let gates = gate_results(&job.gates, &job.plan, &outcome.rows, &[])?;
     let provenance = Provenance {
         input: input(&job, &tally, &outcome)?,
         options: document::options(&job.plan, job.options),
@@ -94,13 +94,13 @@ pub fn perform(job: ImagesJob<'_>, out: OutputDir) -> anyhow::Result<(Option<Fin
         started: job.started,
     };
     let Outcome { rows, break_even, seconds, .. } = &outcome;
-    let found = Found { rows, break_even, seconds };
+    let found = Found { rows, not_audited: &[], break_even, seconds };
     let mut document = document::document(&job.plan, &found, provenance);
     document.images = figures;
     let document = if job.share_safe { document.share_safe() } else { document };
     let options = RenderOptions {
         share_safe: job.share_safe,
-        error_cdf: curves.iter().map(|curve| curve.shares(&errors)).collect(),
+        error_cdf: curves_of(curves.iter().map(|curve| curve.shares(&errors)).collect(), rows),
         pictures,
     };
     let page = render(&document, None, &options)?;
@@ -236,16 +236,17 @@ fn telling(plan: &Plan, figures: &[ImageFigures]) -> Vec<(usize, &'static str)> 
 
 /// An error curve over all images: counts, so that its size does not depend on their number.
 struct Curve {
-    row: usize,
+    /// The row of one image.
+    cell: Row,
     within: Vec<usize>,
     n: usize,
 }
 
 impl Curve {
-    fn shares(&self, errors: &[f64]) -> ErrorCdf {
+    fn shares(&self, errors: &[f64]) -> (Row, Vec<(f64, f64)>) {
         let percent = |count: usize| 100.0 * count as f64 / self.n.max(1) as f64;
         let points = errors.iter().zip(&self.within);
-        ErrorCdf { row: self.row, points: points.map(|(&e, &n)| (e, percent(n))).collect() }
+        (self.cell.clone(), points.map(|(&e, &n)| (e, percent(n))).collect())
     }
 }
 
@@ -280,10 +281,9 @@ impl images::Watcher for Watcher<'_> {
     type OfImage = Curves;
 
     fn begin(&mut self) -> Curves {
-        let row_of_cell = RowOfCell::new(self.plan);
         let steps = self.progress.steps();
         let (errors, curves) = (self.errors.clone(), Vec::new());
-        Curves { errors, row_of_cell, curves, steps, told: 0.0 }
+        Curves { errors, curves, steps, told: 0.0 }
     }
 
     fn progress(&mut self, _: usize, _: usize, what: &str) {
@@ -308,7 +308,6 @@ impl images::Watcher for Watcher<'_> {
 /// The error curves of one image, of the first repeat.
 struct Curves {
     errors: Vec<f64>,
-    row_of_cell: RowOfCell,
     curves: Vec<Curve>,
     steps: Steps,
     /// The share of the image that was told to be finished.
@@ -326,9 +325,8 @@ impl Observer<2> for Curves {
         if cell.repeat > 0 {
             return;
         }
-        let row = self.row_of_cell.of(self.curves.len());
         let within = self.errors.iter().map(|&error| cell.accuracy.n_within(error)).collect();
         let n = cell.accuracy.n_points();
-        self.curves.push(Curve { row, within, n });
+        self.curves.push(Curve { cell: cell.row.clone(), within, n });
     }
 }

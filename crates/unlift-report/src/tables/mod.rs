@@ -104,7 +104,9 @@ pub(crate) fn recovered(document: &Document) -> Table {
     });
     let repeats = document.results.iter().map(|row| row.repeats).max().unwrap_or(1);
     let spread = if repeats > 1 {
-        format!(" Mean ± standard deviation over {repeats} seeds.")
+        format!(
+            " Mean ± standard deviation (where above {SPREAD_THAT_COUNTS}) over {repeats} seeds."
+        )
     } else {
         String::new()
     };
@@ -294,8 +296,12 @@ pub(crate) fn threshold_text(document: &Document, typed: &str) -> String {
     }
 }
 
-fn percent_cell(value: Option<&f64>, spread: Option<&f64>) -> String {
-    match (value, spread) {
+/// A standard deviation over seeds up to this many percentage points is not worth a look.
+const SPREAD_THAT_COUNTS: f64 = 0.5;
+
+/// A percentage, with its standard deviation over seeds where that is worth a look.
+pub(crate) fn percent_cell(value: Option<&f64>, spread: Option<&f64>) -> String {
+    match (value, spread.filter(|spread| **spread > SPREAD_THAT_COUNTS)) {
         (None, _) => NONE.to_owned(),
         (Some(value), None) => words::percent(*value),
         (Some(value), Some(spread)) => {

@@ -35,7 +35,7 @@ impl Bound {
 pub struct BreakEven {
     /// Scheme name.
     pub scheme: &'static str,
-    /// Solver name.
+    /// Solver name, or [`STRONGEST`].
     pub solver: &'static str,
     /// How the oracle erred.
     pub oracle_noise: &'static str,
@@ -47,31 +47,47 @@ pub struct BreakEven {
     pub bound: Bound,
 }
 
-/// Break-even ratios within the headline threshold, for every scheme, noise model and solver with
-/// oracle rows.
+/// Stands for a solver's name: at every ratio the attack that got most.
+pub const STRONGEST: &str = "strongest";
+
+/// Break-even ratios within the headline threshold, for every scheme and noise model with oracle rows: of the
+/// strongest attack at every ratio where there are several, then of every solver.
 pub fn break_even(plan: &Plan, rows: &[Row]) -> Vec<BreakEven> {
     let mut result = Vec::new();
+    let solvers: Vec<&'static str> = plan.solvers.iter().map(|solver| solver.name()).collect();
     for scheme in &plan.schemes {
         for noise in &plan.oracle_noise {
-            for solver in &plan.solvers {
-                let (scheme, solver, oracle_noise) = (scheme.name, solver.name(), noise.name());
-                let mut curve: Vec<(f64, f64)> = rows
-                    .iter()
-                    .filter(|r| r.scheme == scheme && r.solver == solver)
-                    .filter(|r| r.oracle_noise == Some(oracle_noise))
-                    .map(|r| (r.inlier_ratio, r.recovered_percent[plan.headline]))
-                    .collect();
-                curve.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
-                if let Some((inlier_ratio, bound)) = crossing(&curve) {
+            let (scheme, oracle_noise) = (scheme.name, noise.name());
+            let of = |row: &&Row| row.scheme == scheme && row.oracle_noise == Some(oracle_noise);
+            let mut push = |solver: &'static str, rows: &[&Row]| {
+                if let Some((inlier_ratio, bound)) = crossing(&curve(rows, plan.headline)) {
                     let threshold = plan.thresholds[plan.headline].label.clone();
                     let found =
                         BreakEven { scheme, solver, oracle_noise, threshold, inlier_ratio, bound };
                     result.push(found);
                 }
+            };
+            let all: Vec<&Row> = rows.iter().filter(of).collect();
+            if solvers.len() > 1 {
+                push(STRONGEST, &all);
+            }
+            for &solver in &solvers {
+                let of_solver = |row: &&Row| row.solver == solver;
+                push(solver, &all.iter().copied().filter(of_solver).collect::<Vec<_>>());
             }
         }
     }
     result
+}
+
+/// (ratio, largest share at it) of `rows`, falling in ratio.
+fn curve(rows: &[&Row], headline: usize) -> Vec<(f64, f64)> {
+    let mut curve: Vec<(f64, f64)> =
+        rows.iter().map(|row| (row.inlier_ratio, row.recovered_percent[headline])).collect();
+    // Of one ratio the largest share first, which stays.
+    curve.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(b.1.total_cmp(&a.1)));
+    curve.dedup_by(|later, kept| later.0 == kept.0);
+    curve
 }
 
 /// The lowest ratio at which the curve, linear between tested ratios, still reaches one half. `curve` falls in

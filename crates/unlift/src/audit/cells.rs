@@ -5,7 +5,9 @@ use std::time::Instant;
 use super::clock::Clock;
 use super::lists::Lists;
 use super::measure::{measure, unmeasured};
+use super::not_audited::NotAudited;
 use super::plan::Plan;
+use super::records_alone::{Alone, records_alone};
 use super::row::Row;
 use super::run::{Observer, RowSeconds};
 use crate::evaluate::{Accuracy, blind, distinct_weights, joined, reference};
@@ -13,7 +15,7 @@ use crate::geometry::knn::Knn;
 use crate::neighbors::Neighborhoods;
 use crate::neighbors::oracle::Noise;
 use crate::obfuscate::{Entry, obfuscate};
-use crate::recover::{RecoverOptions, Recovered, recover};
+use crate::recover::{RecoverOptions, Recovered, Solver, recover, recover_with_start};
 use crate::released::Released;
 use crate::seed::Key;
 use crate::truth::{Original, Secret};
@@ -80,27 +82,38 @@ pub(super) fn per_scheme(plan: &Plan) -> usize {
     plan.variants().len() * plan.solvers.len() + usize::from(plan.reference)
 }
 
-/// Runs every cell of one scheme and repeat; `progress` hears what comes next, `each` gets every row.
+/// Runs every cell of one scheme and repeat; `each` hears what comes next and gets every row. Returns what
+/// has no row, as the scheme cannot hide these points or a source cannot make lists for them.
 ///
 /// # Errors
-/// When the scheme cannot hide the points, or a source cannot make lists for them.
+/// In an image of many, what would have no row: rows of all images are pooled.
 pub(super) fn cells<const D: usize>(
     owned: &Owned<'_, D>,
     run: &Run<'_>,
     clock: &mut Clock,
     observer: &mut dyn Observer<D>,
     mut each: impl FnMut(&mut dyn Observer<D>, Option<String>, Option<Finished<'_>>),
-) -> Result<(), Error> {
+) -> Result<Vec<NotAudited>, Error> {
     let Run { plan, entry, repeat, key, oracle_seed } = *run;
     let original = owned.original;
     // The same integer as the owner's, by the counter: what is released comes from a key, and no attack may
     // make keys (tests/architecture).
     let attacker = plan.seed.wrapping_add(u64::from(repeat));
     let of_scheme = |error: Error| error.within(entry.name);
-    let hidden = hide(entry, original, owned.descriptors, plan, key, clock).map_err(of_scheme)?;
+    let hidden = match hide(entry, original, owned.descriptors, plan, key, clock) {
+        Err(error) if !owned.one_of_many => return Ok(vec![NotAudited::scheme(entry, &error)]),
+        hidden => hidden.map_err(of_scheme)?,
+    };
     let baseline = clock.time(|s| &mut s.evaluate, || Ok(blind(&hidden.0, original, &hidden.1)))?;
+    // In the plane all lines meet: records alone tell nothing there.
+    let alone = match plan.records_alone && D == 3 {
+        true => clock
+            .time(|s| &mut s.records_alone, || records_alone(&hidden, original, plan, attacker))?,
+        false => Vec::new(),
+    };
     let by_row = hidden.1.by_descriptor_row();
     let mut sources = Lists::new(plan, owned.search, &hidden, &by_row, (oracle_seed, attacker));
+    let mut missing = Vec::new();
     for variant in &plan.variants() {
         let source = match variant.noise {
             Some(noise) => noise.name().to_owned(),
@@ -113,8 +126,15 @@ pub(super) fn cells<const D: usize>(
             true => sources.make_of_what_there_is(variant),
             false => sources.make(variant),
         };
-        let made = clock.time(|s| &mut s.neighbors, make).map_err(of_scheme)?;
+        let made = match clock.time(|s| &mut s.neighbors, make) {
+            Err(error) if !owned.one_of_many => {
+                missing.push(NotAudited::variant(entry, variant, &error, &hidden.1));
+                continue;
+            }
+            made => made.map_err(of_scheme)?,
+        };
         let making = started.elapsed().as_secs_f64();
+        let mut start = None;
         for (at, &solver) in plan.solvers.iter().enumerate() {
             let what = format!("{} at {:.2} {source}, {}", entry.name, made.ratio, solver.name());
             each(observer, Some(what), None);
@@ -126,8 +146,19 @@ pub(super) fn cells<const D: usize>(
                 ..RecoverOptions::default()
             };
             let started = Instant::now();
-            let recovered = recover(&hidden.0, &made.lists, &options)?;
-            let took = started.elapsed().as_secs_f64();
+            let is_start = |solver: &Solver| *solver == Solver::JointStart;
+            let (recovered, took) = match start.take_if(|_| is_start(&solver)) {
+                Some(kept) => (kept, 0.0),
+                None if solver == Solver::Joint && plan.solvers[at..].iter().any(is_start) => {
+                    let (joint, first) = recover_with_start(&hidden.0, &made.lists, &options)?;
+                    start = Some(first);
+                    (joint, started.elapsed().as_secs_f64())
+                }
+                None => {
+                    let recovered = recover(&hidden.0, &made.lists, &options)?;
+                    (recovered, started.elapsed().as_secs_f64())
+                }
+            };
             // Lists are made once for all solvers: the first one's row has the time.
             let making = if at == 0 { making } else { 0.0 };
             clock.seconds.recover += took;
@@ -144,6 +175,7 @@ pub(super) fn cells<const D: usize>(
                 solver: solver.name(),
                 ..measured
             };
+            row.records_alone.clone_from(&alone);
             let weights = places(owned, secret);
             if owned.one_of_many {
                 row.fill_distinct(&accuracy, &baseline, &weights, &plan.thresholds);
@@ -170,7 +202,7 @@ pub(super) fn cells<const D: usize>(
         }
     }
     if plan.reference {
-        let (row, accuracy) = reference_row(entry, &hidden, owned, &baseline, plan);
+        let (row, accuracy) = reference_row(entry, &hidden, owned, &baseline, plan, alone);
         let weights = places(owned, &hidden.1);
         let seconds = RowSeconds::default();
         let (accuracy, baseline, weights) = (&accuracy, &baseline, &weights[..]);
@@ -180,7 +212,7 @@ pub(super) fn cells<const D: usize>(
             Some(Finished { row, accuracy, baseline, weights, n_listed: 0, seconds }),
         );
     }
-    Ok(())
+    Ok(missing)
 }
 
 /// What makes distinct places count once; asked of images alone.
@@ -212,6 +244,7 @@ fn reference_row<const D: usize>(
     owned: &Owned<'_, D>,
     baseline: &Accuracy,
     plan: &Plan,
+    alone: Vec<Alone>,
 ) -> (Row, Accuracy) {
     let mut row = Row {
         scheme: entry.name,
@@ -223,6 +256,7 @@ fn reference_row<const D: usize>(
     };
     let accuracy = reference(released, owned.original, secret, owned.search);
     row.fill(&accuracy, Some(baseline), &plan.thresholds);
+    row.records_alone = alone;
     if owned.one_of_many {
         row.fill_distinct(&accuracy, baseline, &places(owned, secret), &plan.thresholds);
     }

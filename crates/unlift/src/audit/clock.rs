@@ -30,6 +30,7 @@ impl Clock {
         to.obfuscate += more.obfuscate;
         to.neighbors += more.neighbors;
         to.recover += more.recover;
+        to.records_alone += more.records_alone;
         to.evaluate += more.evaluate;
     }
 }

@@ -27,6 +27,7 @@ pub fn measure<const D: usize>(
     row.delta = recovered.delta();
     row.ransac_trials = recovered.trials().map(|trials| trials.bins().collect());
     row.fill(&accuracy, blind, thresholds);
+    row.sure_unknown = recovered.confidence_unknown();
     row.reliability = reliability(recovered, &accuracy, Row::smallest(thresholds));
     Ok((row, accuracy))
 }
@@ -54,12 +55,14 @@ pub(super) fn unmeasured(unit: Unit, secret: &Secret) -> Row {
         dropped,
         recovered_percent: Vec::new(),
         blind_percent: Vec::new(),
+        records_alone: Vec::new(),
         axis_accuracy_percent: None,
         exact_percent: None,
         assignment_accuracy_percent: None,
         error_percentiles: Vec::new(),
         blind_median_error: None,
         reliability: None,
+        sure_unknown: None,
         ransac_trials: None,
         repeats: None,
         distinct: None,

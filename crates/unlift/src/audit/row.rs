@@ -3,8 +3,10 @@
 use std::collections::BTreeMap;
 
 use super::plan::Threshold;
+use super::records_alone::Alone;
 use crate::Unit;
 use crate::evaluate::{Accuracy, Reliability};
+use crate::recover::Unknown;
 
 /// Percentiles of the error that a row keeps.
 pub const PERCENTILES: [f64; 5] = [50.0, 75.0, 90.0, 95.0, 99.0];
@@ -38,8 +40,11 @@ pub struct Row {
     pub dropped: BTreeMap<&'static str, usize>,
     /// Percentage recovered within each threshold, in the plan's order.
     pub recovered_percent: Vec<f64>,
-    /// The same for an attacker without neighborhoods.
+    /// The same for a blind guess: no neighborhoods, and no look at more than one record.
     pub blind_percent: Vec<f64>,
+    /// What attacks on the released records alone got, without neighborhoods and descriptors; the same in
+    /// all rows of a scheme, empty where there is none.
+    pub records_alone: Vec<Alone>,
     /// Share of exchanged axes named (`cp`).
     pub axis_accuracy_percent: Option<f64>,
     /// Percentage recovered exactly, that is with the very value that another record publishes (`cp`, `cp2d`):
@@ -54,6 +59,8 @@ pub struct Row {
     /// Whether the attacker's probabilities to lie within the smallest threshold came true, over all
     /// repeats; `None` for solvers that give none.
     pub reliability: Option<Reliability>,
+    /// Why there are no such probabilities; `None` where there are, and for a row that is no attack.
+    pub sure_unknown: Option<Unknown>,
     /// (trials at most, slots) of the sampling loop (`ransac`).
     pub ransac_trials: Option<Vec<(u32, u64)>>,
     /// Spread over repeats, if there are several.
@@ -91,6 +98,29 @@ impl Row {
     /// Points that could not be recovered.
     pub fn n_lost(&self) -> usize {
         self.lost.values().sum()
+    }
+
+    /// The best attack on the records alone within the threshold numbered `at`: its name, and the percentage.
+    pub fn best_alone(&self, at: usize) -> Option<(&'static str, f64)> {
+        let found = self.records_alone.iter().map(|alone| (alone.name, alone.percent[at]));
+        found.reduce(|best, other| if other.1 > best.1 { other } else { best })
+    }
+
+    /// What an attacker without neighborhoods gets within the threshold numbered `at`, in percent: the
+    /// larger of a blind guess and the best attack on the records alone.
+    pub fn baseline_percent(&self, at: usize) -> f64 {
+        let blind = self.blind_percent[at];
+        self.best_alone(at).map_or(blind, |(_, alone)| blind.max(alone))
+    }
+
+    /// Whether both are of the same scheme, source, noise model, requested inlier ratio and solver. A
+    /// measured ratio tells nothing apart: it differs from seed to seed.
+    pub fn is_same_cell(&self, other: &Self) -> bool {
+        self.scheme == other.scheme
+            && self.neighbors == other.neighbors
+            && self.oracle_noise == other.oracle_noise
+            && self.solver == other.solver
+            && (self.oracle_noise.is_none() || self.inlier_ratio == other.inlier_ratio)
     }
 
     /// The smallest of `thresholds`.
@@ -200,6 +230,20 @@ impl Row {
                 all.merge(more);
             }
         }
+        // Known in some repeats is not known: those may be the ones that went well.
+        mean.sure_unknown = rows.iter().find_map(|row| row.sure_unknown);
+        if mean.sure_unknown.is_some() {
+            mean.reliability = None;
+        }
+        mean.records_alone.retain_mut(|alone| {
+            let of = |row: &Row| row.records_alone.iter().find(|a| a.name == alone.name).cloned();
+            let all: Option<Vec<Alone>> = rows.iter().map(of).collect();
+            for (c, percent) in alone.percent.iter_mut().enumerate() {
+                let values = all.iter().flatten().map(|alone| alone.percent[c]);
+                *percent = values.sum::<f64>() / n;
+            }
+            all.is_some()
+        });
         mean.repeats = Some(repeats);
         mean
     }

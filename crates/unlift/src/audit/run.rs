@@ -3,6 +3,7 @@
 use super::break_even::{BreakEven, break_even};
 use super::cells::{Cell, Owned, Run, cells, per_scheme};
 use super::clock::Clock;
+use super::not_audited::{NotAudited, told};
 use super::plan::Plan;
 use super::row::Row;
 use crate::neighbors::oracle;
@@ -40,6 +41,8 @@ pub struct Seconds {
     pub neighbors: f64,
     /// Recovering.
     pub recover: f64,
+    /// Attacking the records alone, evaluated.
+    pub records_alone: f64,
     /// Evaluating, the blind attacker included.
     pub evaluate: f64,
     /// Per row, summed over repeats.
@@ -51,7 +54,7 @@ pub struct Seconds {
 pub struct RowSeconds {
     /// Making its neighborhoods; 0 where another solver's row already has the time.
     pub neighbors: f64,
-    /// Recovering.
+    /// Recovering; 0 for what joint recovery started from, as the row of `joint` has the time.
     pub recover: f64,
 }
 
@@ -67,6 +70,9 @@ impl RowSeconds {
 pub struct Outcome {
     /// One row per scheme, source, noise model, inlier ratio and solver, in this order.
     pub rows: Vec<Row>,
+    /// What the plan asked for and has no row: schemes that cannot be applied to the map, and sources
+    /// that have no lists for a scheme.
+    pub not_audited: Vec<NotAudited>,
     /// The ratio at which half of the points come back, per scheme, noise model and solver.
     pub break_even: Vec<BreakEven>,
     /// Where the time went.
@@ -78,8 +84,11 @@ pub struct Outcome {
 /// Rows depend on the map, the descriptors and the plan alone: the same bytes for any number of
 /// threads.
 ///
+/// A scheme that cannot be applied to the map has no rows and is told in
+/// [`not_audited`](Outcome::not_audited).
+///
 /// # Errors
-/// When the plan does not fit the map, or a scheme cannot hide it.
+/// When the plan does not fit the map, or no scheme can be applied to it.
 pub fn run(
     original: &Original<3>,
     descriptors: Option<&Descriptors>,
@@ -93,34 +102,50 @@ pub fn run(
     let per_scheme = per_scheme(plan);
     let total = per_scheme * plan.schemes.len() * plan.repeats as usize;
     let mut done = 0;
-    let mut rows = Vec::new();
+    let (mut rows, mut not_audited) = (Vec::new(), Vec::new());
     for &entry in &plan.schemes {
-        let mut by_repeat: Vec<Vec<Row>> = Vec::new();
-        let mut seconds = vec![RowSeconds::default(); per_scheme];
+        let mut by_repeat: Vec<Vec<(Row, RowSeconds)>> = Vec::new();
+        let mut missing: Vec<NotAudited> = Vec::new();
         for repeat in 0..plan.repeats {
             let seed = plan.seed.wrapping_add(u64::from(repeat));
-            let mut repeat_rows = Vec::new();
             let key = Key::from_seed(seed);
             let run = Run { plan, entry, repeat, key: &key, oracle_seed: seed };
-            cells(&owned, &run, &mut clock, observer, |observer, what, finished| {
+            let (mut of_repeat, before) = (Vec::new(), done);
+            let lacking = cells(&owned, &run, &mut clock, observer, |observer, what, finished| {
                 if let Some(what) = what {
                     observer.progress(done, total, &what);
                 }
                 if let Some(finished) = finished {
-                    seconds[repeat_rows.len()].add(&finished.seconds);
-                    repeat_rows.push(finished.row);
+                    of_repeat.push((finished.row, finished.seconds));
                     done += 1;
                 }
             })?;
-            by_repeat.push(repeat_rows);
+            done = before + per_scheme;
+            by_repeat.push(of_repeat);
+            for one in lacking {
+                if !missing.iter().any(|other| other.is_same_cell(&one)) {
+                    missing.push(one);
+                }
+            }
         }
-        for at in 0..per_scheme {
-            let same: Vec<Row> = by_repeat.iter().map(|rows| rows[at].clone()).collect();
-            rows.push(Row::mean(&same));
+        let n_before = rows.len();
+        for (row, _) in &by_repeat[0] {
+            let same = by_repeat.iter().map(|rows| rows.iter().find(|(r, _)| r.is_same_cell(row)));
+            // A mean over those seeds that went well would be no mean over seeds.
+            let Some(same) = same.collect::<Option<Vec<_>>>() else { continue };
+            let mut seconds = RowSeconds::default();
+            same.iter().for_each(|(_, more)| seconds.add(more));
+            clock.seconds.rows.push(seconds);
+            rows.push(Row::mean(&same.iter().map(|(row, _)| row.clone()).collect::<Vec<_>>()));
         }
-        clock.seconds.rows.extend(seconds);
+        not_audited.extend(told(missing, rows.len() > n_before));
+    }
+    if let (true, Some(first)) = (rows.is_empty(), not_audited.first()) {
+        let expected = "one that can be applied to this map";
+        let found = format!("none: {}: {}", first.scheme, first.reason);
+        return Err(Error::new("schemes", expected, found));
     }
     observer.progress(done, total, "done");
     let break_even = break_even(plan, &rows);
-    Ok(Outcome { rows, break_even, seconds: clock.seconds })
+    Ok(Outcome { rows, not_audited, break_even, seconds: clock.seconds })
 }

@@ -7,7 +7,7 @@
 use rayon::prelude::*;
 
 use super::Neighborhoods;
-use crate::density::{Peak, tomography};
+use crate::density::{Peak, Peaks, tomography};
 use crate::geometry::knn::Knn;
 use crate::geometry::vector::{distance, dot, sub, widen};
 use crate::released::{Obfuscation, Released};
@@ -31,24 +31,24 @@ const LOOK: usize = 3;
 /// When `k` is 0, the map is not in three dimensions, or records of its family tell nothing by
 /// themselves (planes, rays of one center).
 pub fn geometric<const D: usize>(released: &Released<D>, k: usize) -> Result<Neighborhoods, Error> {
-    if k == 0 {
-        return Err(Error::new("k", "at least 1", "0"));
-    }
-    let what = "geometric neighborhoods";
-    if D != 3 {
-        return Err(Error::new(what, "a map in three dimensions", D.to_string()));
-    }
+    check(released, k)?;
+    geometric_by(released, k, &tomography(released))
+}
+
+/// [`geometric`] from the estimates of tomography, for whoever has them.
+///
+/// # Errors
+/// As there.
+pub(crate) fn geometric_by<const D: usize>(
+    released: &Released<D>,
+    k: usize,
+    peaks: &Peaks,
+) -> Result<Neighborhoods, Error> {
+    check(released, k)?;
     let centers = match released.obfuscation() {
-        Obfuscation::AxisPlanes(_) => {
-            return Err(Error::new(what, "lines, rays or axis candidates", "planes"));
-        }
-        Obfuscation::Rays(rays) if rays.centers().len() < 2 => {
-            return Err(Error::new(what, "rays of two or more centers", "one center"));
-        }
         Obfuscation::Rays(rays) => Some(rays.center()),
-        Obfuscation::Lines(_) | Obfuscation::AxisCandidates(_) => None,
+        Obfuscation::Lines(_) | Obfuscation::AxisCandidates(_) | Obfuscation::AxisPlanes(_) => None,
     };
-    let peaks = tomography(released);
     let slots: Vec<usize> = (0..peaks.of.len()).filter(|&slot| peaks.of[slot].is_some()).collect();
     let found: Vec<Peak> = peaks.of.iter().flatten().copied().collect();
     let positions: Vec<[f64; 3]> = found.iter().map(|peak| widen(&peak.position)).collect();
@@ -98,6 +98,26 @@ pub fn geometric<const D: usize>(released: &Released<D>, k: usize) -> Result<Nei
     let slots = released.slots_per_record();
     let lists = Neighborhoods::try_new(offsets, records, Some(scores), n_records, slots)?;
     Ok(lists.with_about(About { map: Some(released.fingerprint()), order: RowOrder::Either }))
+}
+
+/// Whether records of this kind tell anything by themselves.
+fn check<const D: usize>(released: &Released<D>, k: usize) -> Result<(), Error> {
+    if k == 0 {
+        return Err(Error::new("k", "at least 1", "0"));
+    }
+    let what = "geometric neighborhoods";
+    if D != 3 {
+        return Err(Error::new(what, "a map in three dimensions", D.to_string()));
+    }
+    match released.obfuscation() {
+        Obfuscation::AxisPlanes(_) => {
+            Err(Error::new(what, "lines, rays or axis candidates", "planes"))
+        }
+        Obfuscation::Rays(rays) if rays.centers().len() < 2 => {
+            Err(Error::new(what, "rays of two or more centers", "one center"))
+        }
+        Obfuscation::Rays(_) | Obfuscation::Lines(_) | Obfuscation::AxisCandidates(_) => Ok(()),
+    }
 }
 
 /// The distance from `x` to the line of a record; 0 for axis candidates, of whose three lines any may be

@@ -18,6 +18,7 @@ pub mod sources;
 mod walk;
 
 pub use geometric::geometric;
+pub(crate) use geometric::geometric_by;
 pub use join::join;
 pub use neighborhoods::Neighborhoods;
 pub use overlap::overlap;

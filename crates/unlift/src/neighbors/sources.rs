@@ -28,8 +28,6 @@ pub struct SourceEntry {
     /// Whether in company it only ranks what the others list: recovery errs as it does, so that its own
     /// entries would confirm wrong places.
     pub only_ranks: bool,
-    /// Schemes (by name) whose records tell it nothing.
-    pub not_for: &'static [&'static str],
     /// The same for images: of their fewer keypoints, only the first of a ranking are near.
     pub usual_k_2d: usize,
     /// For images, where it is defined on them.
@@ -63,7 +61,6 @@ pub const SOURCES: &[SourceEntry] = &[
         usual_k: 30,
         usual_k_2d: 10,
         only_ranks: false,
-        not_for: &[],
         in_2d: Some(|released, k, _| similarity(released, k)),
         in_3d: Some(|released, k, _| similarity(released, k)),
     },
@@ -75,7 +72,6 @@ pub const SOURCES: &[SourceEntry] = &[
         usual_k: 35,
         usual_k_2d: 10,
         only_ranks: false,
-        not_for: &[],
         in_2d: Some(|released, k, _| overlap(released, k)),
         in_3d: Some(|released, k, _| overlap(released, k)),
     },
@@ -87,7 +83,6 @@ pub const SOURCES: &[SourceEntry] = &[
         usual_k: 50,
         usual_k_2d: 10,
         only_ranks: true,
-        not_for: &["plane"],
         in_2d: None,
         in_3d: Some(|released, k, _| geometric(released, k)),
     },
@@ -182,11 +177,6 @@ impl Joined {
                 self.name()
             )
         })
-    }
-
-    /// The first of the sources that has nothing to say about maps of `scheme`.
-    pub fn fails_on(&self, scheme: &str) -> Option<&'static SourceEntry> {
-        self.parts.iter().copied().find(|entry| entry.not_for.contains(&scheme))
     }
 
     /// Lists for every slot of a released map or image, from it alone.

@@ -21,6 +21,7 @@ mod plane_windows;
 mod ransac;
 mod recovered;
 mod sections;
+mod unknown;
 
 pub use confidence::Confidence;
 #[doc(hidden)]
@@ -29,11 +30,12 @@ pub use options::{Delta, RecoverOptions, Solver};
 pub use ransac::TrialHistogram;
 pub(crate) use recovered::stored_support;
 pub use recovered::{Estimate, Recovered, Status};
+pub use unknown::Unknown;
 
-use crate::density::{published, tomography};
+use crate::density::{Peaks, published, tomography};
 use crate::neighbors::Neighborhoods;
 use crate::released::{Obfuscation, Released};
-use crate::{About, Error};
+use crate::{About, Error, RowOrder};
 use chunks::Chunks;
 use confidence::Solved;
 use delta::Prefer;
@@ -51,7 +53,39 @@ pub fn recover<const D: usize>(
     lists: &Neighborhoods,
     options: &RecoverOptions,
 ) -> Result<Recovered<D>, Error> {
-    recover_and_look(released, lists, options).map(|found| found.0)
+    solve(released, lists, options, false).map(|found| found.recovered)
+}
+
+/// [`recover`] by [`Solver::Joint`], and beside it the pass that it starts from: bit for bit what
+/// [`Solver::JointStart`] gives, without a run of its own.
+///
+/// # Errors
+/// As there, and when `options` ask for another solver.
+pub fn recover_with_start<const D: usize>(
+    released: &Released<D>,
+    lists: &Neighborhoods,
+    options: &RecoverOptions,
+) -> Result<(Recovered<D>, Recovered<D>), Error> {
+    let found = solve(released, lists, options, true)?;
+    match found.start {
+        Some(start) => Ok((found.recovered, start)),
+        None => Err(Error::new("solver", Solver::Joint.name(), options.solver.name())),
+    }
+}
+
+/// The positions at which `peaks` puts the hidden points: which of a paired line's is whose is not known.
+///
+/// # Errors
+/// When there is not one peak, or none, per slot.
+pub(crate) fn recover_at<const D: usize>(
+    released: &Released<D>,
+    peaks: &Peaks,
+) -> Result<Recovered<D>, Error> {
+    let (n_records, slots) = (released.n_records(), released.slots_per_record());
+    let none =
+        Neighborhoods::try_new(vec![0; n_records * slots + 1], Vec::new(), None, n_records, slots)?;
+    let about = About { map: Some(released.fingerprint()), order: RowOrder::Either };
+    Ok(density::place(released, &none, peaks, None)?.with_about(about))
 }
 
 /// The least delta tried in an image, as a share of the spacing of points. A fifth of the keypoints have a
@@ -80,6 +114,31 @@ pub fn recover_and_look<const D: usize>(
     lists: &Neighborhoods,
     options: &RecoverOptions,
 ) -> Result<(Recovered<D>, Seen), Error> {
+    solve(released, lists, options, false).map(|found| (found.recovered, found.seen))
+}
+
+/// What one run leaves behind.
+struct Found<const D: usize> {
+    recovered: Recovered<D>,
+    seen: Seen,
+    /// Where joint recovery started, if it was to be kept.
+    start: Option<Recovered<D>>,
+}
+
+impl<const D: usize> Found<D> {
+    /// Positions of which nobody knows how sure they are.
+    fn without_confidence(recovered: Recovered<D>, unknown: Unknown) -> Self {
+        let recovered = recovered.without_confidence(unknown);
+        Self { recovered, seen: Seen::NOTHING, start: None }
+    }
+}
+
+fn solve<const D: usize>(
+    released: &Released<D>,
+    lists: &Neighborhoods,
+    options: &RecoverOptions,
+    keep_start: bool,
+) -> Result<Found<D>, Error> {
     options.check()?;
     if lists.n_slots() != released.n_slots() {
         let expected = format!("{} rows, one per slot", released.n_slots());
@@ -98,16 +157,15 @@ pub fn recover_and_look<const D: usize>(
     let peaks = match options.solver {
         Solver::Density => Some(published(released)),
         Solver::Tomography => Some(tomography(released)),
-        Solver::Consensus | Solver::Joint | Solver::Ransac => None,
+        Solver::Consensus | Solver::Joint | Solver::JointStart | Solver::Ransac => None,
     };
     if let Some(peaks) = peaks {
-        // Nothing is known yet about how sure these are.
-        let placed = density::place(released, lists, &peaks, descriptor_row)?;
-        return Ok((placed.with_about(about), Seen::NOTHING));
+        let placed = density::place(released, lists, &peaks, descriptor_row)?.with_about(about);
+        return Ok(Found::without_confidence(placed, Unknown::FromRecordsAlone));
     }
     let family = Family::new(released, lists);
     // Joint recovery also asks who lists whom, from the first pass on.
-    let graph = (options.solver == Solver::Joint)
+    let graph = matches!(options.solver, Solver::Joint | Solver::JointStart)
         .then(|| joint::Graph::new(lists, released.slots_per_record()));
     let both_ways = match &graph {
         Some(graph) if released.slots_per_record() == 1 => Some(graph.neighborhoods()?),
@@ -131,9 +189,12 @@ pub fn recover_and_look<const D: usize>(
         }
     };
     let consensus = || consensus::solve(&family, Lists::given(used), delta as f32, Chunks::All);
+    let mut start = None;
     let (estimates, trials) = match (options.solver, &graph) {
         (Solver::Joint, Some(graph)) => {
-            (joint::solve(&family, graph, consensus(), delta as f32, options.seed), None)
+            let first = consensus();
+            start = keep_start.then(|| first.clone());
+            (joint::solve(&family, graph, first, delta as f32, options.seed), None)
         }
         (Solver::Ransac, _) => {
             let (solved, trials) = ransac::solve(&family, lists, delta as f32, options.seed);
@@ -145,10 +206,11 @@ pub fn recover_and_look<const D: usize>(
     let exact_reach = if D == 2 { EXACT_REACH * delta } else { delta };
     // The paper's loop stays as published.
     let exact = options.exact_constraints && options.solver != Solver::Ransac;
-    let settled = (exact && exact::can_settle(released)).then(|| {
-        let settle = |estimates| exact::settle(released, estimates, exact_reach as f32);
+    let exact = exact && exact::can_settle(released);
+    let settle = |estimates| exact::settle(released, estimates, exact_reach as f32);
+    let settled = exact.then(|| {
         let mut settled = settle(estimates.clone());
-        if let Some(graph) = &graph {
+        if let (Solver::Joint, Some(graph)) = (options.solver, &graph) {
             for _ in 0..exact::feeds(released) {
                 settled = settle(joint::solve(&family, graph, settled, delta as f32, options.seed));
             }
@@ -159,16 +221,29 @@ pub fn recover_and_look<const D: usize>(
     let estimates = settled.as_ref().unwrap_or(unsettled);
     let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
     let (origin, unit) = (released.origin(), released.unit());
-    let recovered = Recovered::try_new(estimates, with_axis, descriptor_row, origin, unit, delta)?
-        .with_trials(trials)
-        .with_about(about);
-    // Its constants come from maps: in images nobody has compared them with what comes true.
-    if !options.confidence || D == 2 {
-        return Ok((recovered, Seen::NOTHING));
+    let finished = |estimates: &[Estimate<D>]| {
+        let descriptor_row = descriptor_row.clone();
+        Recovered::try_new(estimates, with_axis, descriptor_row, origin, unit, delta)
+            .map(|recovered| recovered.with_about(about))
+    };
+    let start = match start.map(|first| if exact { settle(first) } else { first }) {
+        Some(first) => Some(finished(&first)?.without_confidence(Unknown::FirstPass)),
+        None => None,
+    };
+    let recovered = finished(estimates)?.with_trials(trials);
+    let unknown = match options.solver {
+        Solver::JointStart => Some(Unknown::FirstPass),
+        _ if !options.confidence => Some(Unknown::NotAsked),
+        // Its constants come from maps: in images nobody has compared them with what comes true.
+        _ if D == 2 => Some(Unknown::OfImages),
+        _ => None,
+    };
+    if let Some(unknown) = unknown {
+        return Ok(Found { start, ..Found::without_confidence(recovered, unknown) });
     }
     let edges = (graph.as_ref(), lists);
     let solved = Solved { estimates, unsettled, delta: delta as f32 };
     let seen = confidence::look(&family, edges, released.slots_per_record(), &solved);
     let confidence = confidence::of(released, options.solver, estimates, &seen);
-    Ok((recovered.with_confidence(confidence)?, seen))
+    Ok(Found { recovered: recovered.with_confidence(confidence)?, seen, start })
 }

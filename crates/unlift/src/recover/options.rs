@@ -10,6 +10,10 @@ pub enum Solver {
     Consensus,
     /// Consensus, then rounds in which the estimates of listed neighbors vote too.
     Joint,
+    /// The consensus pass that joint recovery starts from, and no round more. It is not [`Self::Consensus`]:
+    /// with one point a record it reads every list in both directions (who lists, and who is listed by),
+    /// and its delta is a narrower one, so that estimates are sharp.
+    JointStart,
     /// The paper's sampling loop (section 4), for comparison.
     Ransac,
     /// The published density attacks on the records alone (Chelani et al. 2021, Lee et al. 2023, Moon et
@@ -22,18 +26,26 @@ pub enum Solver {
 
 impl Solver {
     /// Every solver.
-    pub const ALL: [Solver; 5] =
-        [Self::Joint, Self::Consensus, Self::Ransac, Self::Density, Self::Tomography];
+    pub const ALL: [Solver; 6] = [
+        Self::Joint,
+        Self::JointStart,
+        Self::Consensus,
+        Self::Ransac,
+        Self::Density,
+        Self::Tomography,
+    ];
 
     /// The solvers that place points by their listed records. The others read the lists only to tell the
     /// two slots of a paired line apart, and take no delta.
-    pub const FROM_LISTS: [Solver; 3] = [Self::Joint, Self::Consensus, Self::Ransac];
+    pub const FROM_LISTS: [Solver; 4] =
+        [Self::Joint, Self::JointStart, Self::Consensus, Self::Ransac];
 
     /// The name users know it by.
     pub fn name(self) -> &'static str {
         match self {
             Self::Consensus => "consensus",
             Self::Joint => "joint",
+            Self::JointStart => "joint-start",
             Self::Ransac => "ransac",
             Self::Density => "density",
             Self::Tomography => "tomography",

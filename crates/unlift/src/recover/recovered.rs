@@ -1,6 +1,6 @@
 //! The result of recovery: a position or a reason, per slot.
 
-use super::{Confidence, TrialHistogram};
+use super::{Confidence, TrialHistogram, Unknown};
 use crate::{About, Error, Unit};
 
 /// What became of a slot.
@@ -79,7 +79,7 @@ pub struct Recovered<const D: usize> {
     evidence: Vec<f32>,
     axis: Option<Vec<u8>>,
     descriptor_row: Option<Vec<u32>>,
-    confidence: Option<Vec<Confidence>>,
+    confidence: Result<Vec<Confidence>, Unknown>,
     trials: Option<TrialHistogram>,
     about: About,
 }
@@ -123,7 +123,7 @@ impl<const D: usize> Recovered<D> {
             evidence: estimates.iter().map(|e| e.evidence).collect(),
             axis: with_axis.then(|| estimates.iter().map(|e| e.axis).collect()),
             descriptor_row,
-            confidence: None,
+            confidence: Err(Unknown::NotGiven),
             trials: None,
             about: About::default(),
         })
@@ -198,15 +198,21 @@ impl<const D: usize> Recovered<D> {
         self.descriptor_row.as_deref()
     }
 
-    /// Per slot how sure the attacker is; `None` for a map read from a file without it.
+    /// Per slot how sure the attacker is; `None` where that is not known, see
+    /// [`confidence_unknown`](Self::confidence_unknown).
     pub fn confidence(&self) -> Option<&[Confidence]> {
-        self.confidence.as_deref()
+        self.confidence.as_deref().ok()
+    }
+
+    /// Why it is not known how sure the attacker is; `None` where it is.
+    pub fn confidence_unknown(&self) -> Option<Unknown> {
+        self.confidence.as_ref().err().copied()
     }
 
     /// The probability that the true place of `slot` is within `threshold` (in the unit of the map) of
     /// the recovered one, as the attacker can tell; 0 for a lost slot, `None` where it is not known.
     pub fn probability_within(&self, slot: usize, threshold: f64) -> Option<f64> {
-        self.confidence.as_ref().map(|rows| rows[slot].probability_within(threshold))
+        self.confidence().map(|rows| rows[slot].probability_within(threshold))
     }
 
     /// Adds how sure the attacker is of every slot.
@@ -218,7 +224,13 @@ impl<const D: usize> Recovered<D> {
             let expected = format!("{} rows", self.n_slots());
             return Err(Error::new("confidence", expected, confidence.len().to_string()));
         }
-        Ok(Self { confidence: Some(confidence), ..self })
+        Ok(Self { confidence: Ok(confidence), ..self })
+    }
+
+    /// Says why it is not known how sure the attacker is; what was known is dropped.
+    #[must_use]
+    pub fn without_confidence(self, unknown: Unknown) -> Self {
+        Self { confidence: Err(unknown), ..self }
     }
 
     /// How many trials the slots took (`ransac` only; not stored in files).

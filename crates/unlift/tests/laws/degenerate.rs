@@ -65,7 +65,7 @@ fn statuses<const D: usize>(
             let evidence = recovered.evidence()[slot];
             assert!(evidence >= 0.0 && evidence.is_finite(), "{what}: evidence {evidence}");
             let asked = match options.solver {
-                Solver::Joint => both_ways.len(),
+                Solver::Joint | Solver::JointStart => both_ways.len(),
                 _ => lists.of(slot).len(),
             };
             let support = usize::from(recovered.support()[slot]);
@@ -103,7 +103,9 @@ fn short_lists<const D: usize>(name: &str, scheme: &dyn Scheme<D>, seed: u64) {
         let what = format!("{name}, lists of {length}");
         let got = statuses(&what, &hidden.released, &lists, &harsh_options());
         // Joint recovery also asks who lists a record: lists of one may make two.
-        let by_lists = |options: &RecoverOptions| options.solver != Solver::Joint || length == 0;
+        let both_ways = [Solver::Joint, Solver::JointStart];
+        let by_lists =
+            |options: &RecoverOptions| !both_ways.contains(&options.solver) || length == 0;
         let told = harsh_options().iter().flat_map(|o| vec![by_lists(o); n]).collect::<Vec<_>>();
         if length < 2 {
             let few = |(&s, told): (&Status, bool)| !told || s == Status::TooFewNeighbors;

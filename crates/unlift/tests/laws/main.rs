@@ -27,3 +27,4 @@ mod records;
 mod recovery;
 mod secrets;
 mod shares;
+mod start;

@@ -105,7 +105,7 @@ pub(super) fn confidence(solver: Solver, kind: usize, cues: &Cues, radius: f32) 
     let of_solver = match solver {
         // The attacks on records alone have no cues and never come here.
         Solver::Consensus | Solver::Density | Solver::Tomography => 0,
-        Solver::Joint => 1,
+        Solver::Joint | Solver::JointStart => 1,
         Solver::Ransac => 2,
     };
     let model: &Model = &MODELS[of_solver][kind];

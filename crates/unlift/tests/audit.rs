@@ -1,0 +1,202 @@
+//! Rows of an audit: the strongest attack, two baselines, and what could not be audited.
+
+use unlift::audit::{Outcome, Plan, Row, Silent, Source, run};
+use unlift::evaluate::evaluate;
+use unlift::neighbors::Neighborhoods;
+use unlift::neighbors::sources::Joined;
+use unlift::obfuscate::{SchemeOptions, obfuscate, scheme};
+use unlift::recover::{RecoverOptions, Solver, Unknown, recover};
+use unlift::seed::Key;
+use unlift::truth::Original;
+use unlift::{About, PointSet, RowOrder, Unit, synthetic};
+
+fn original(points: Vec<[f64; 3]>) -> Original<3> {
+    Original::new(PointSet::try_new(points, Unit::Meter).unwrap())
+}
+
+fn room(n: usize) -> Original<3> {
+    original(synthetic::room(3, n).points)
+}
+
+/// A small plan of `schemes` at half of the neighbors right.
+fn plan(schemes: &[&str]) -> Plan {
+    let mut plan = Plan::new(Unit::Meter);
+    plan.schemes.retain(|entry| schemes.contains(&entry.name));
+    plan.inlier_ratios = vec![0.5];
+    plan.k = 20;
+    plan
+}
+
+fn audit(original: &Original<3>, plan: &Plan) -> Outcome {
+    run(original, None, plan, &mut Silent).unwrap()
+}
+
+#[test]
+fn a_usual_audit_has_a_row_for_what_joint_recovery_starts_from() {
+    let (room, mut plan) = (room(900), plan(&["olc", "ppl", "ray", "cp"]));
+    plan.records_alone = false;
+    let usual = audit(&room, &plan);
+    let solvers: Vec<&str> = usual.rows.iter().map(|row| row.solver).collect();
+    assert_eq!(solvers, ["joint", "joint-start"].repeat(4));
+    // The by-product is what the solver gives by itself, in either order.
+    for solvers in [vec![Solver::JointStart], vec![Solver::JointStart, Solver::Joint]] {
+        plan.solvers = solvers;
+        for row in audit(&room, &plan).rows {
+            assert!(usual.rows.contains(&row), "{} by {}", row.scheme, row.solver);
+        }
+    }
+    for (row, seconds) in usual.rows.iter().zip(&usual.seconds.rows) {
+        let is_start = row.solver == "joint-start";
+        assert_eq!(seconds.recover == 0.0, is_start, "no run of its own");
+        assert_eq!(row.sure_unknown, is_start.then_some(Unknown::FirstPass));
+        assert_eq!(row.reliability.is_none(), is_start);
+    }
+}
+
+/// The percentages of an attack on the records alone, made by hand.
+fn by_hand(original: &Original<3>, name: &str, solver: Solver, plan: &Plan) -> Vec<f64> {
+    let entry = scheme(name).unwrap();
+    let options = SchemeOptions { voxel: plan.scheme_options.voxel };
+    let (released, secret) =
+        obfuscate(entry.in_3d.unwrap(), original, None, &options, &Key::from_seed(plan.seed))
+            .unwrap();
+    let (n, slots) = (released.n_records(), released.slots_per_record());
+    let none = Neighborhoods::try_new(vec![0; n * slots + 1], Vec::new(), None, n, slots).unwrap();
+    let none = none.with_about(About { map: None, order: RowOrder::Either });
+    let options = RecoverOptions { solver, ..RecoverOptions::default() };
+    let recovered = recover(&released, &none, &options).unwrap();
+    let accuracy = evaluate(&recovered, original, &secret).unwrap();
+    plan.thresholds.iter().map(|t| accuracy.percent_within(t.value)).collect()
+}
+
+#[test]
+fn the_best_attack_on_the_records_alone_is_the_second_baseline() {
+    let (room, plan) = (room(3_000), plan(&["olc", "ppl", "plane", "cp"]));
+    let outcome = audit(&room, &plan);
+    assert!(outcome.seconds.records_alone > 0.0);
+    for row in &outcome.rows {
+        let best = |at: usize| row.best_alone(at).map(|(_, percent)| percent);
+        if row.scheme == "plane" {
+            assert_eq!((row.records_alone.len(), best(0)), (0, None), "planes alone tell nothing");
+            assert_eq!(row.baseline_percent(0), row.blind_percent[0]);
+            continue;
+        }
+        let alone = by_hand(&room, row.scheme, Solver::Tomography, &plan);
+        for (at, percent) in alone.iter().enumerate() {
+            assert!(best(at).unwrap() >= *percent, "{}: at least tomography", row.scheme);
+            assert!(row.baseline_percent(at) >= row.blind_percent[at].max(*percent));
+        }
+        let named = |name: &str| row.records_alone.iter().find(|a| a.name == name);
+        assert_eq!(named("tomography").unwrap().percent, alone, "{}", row.scheme);
+        assert!(named("geometric, joint").is_some(), "{}", row.scheme);
+    }
+    // Lines of a room are broken by themselves: a guess is no measure of what neighbors add.
+    let olc = &outcome.rows[0];
+    assert!(olc.baseline_percent(1) > olc.blind_percent[1] + 20.0, "{olc:?}");
+}
+
+#[test]
+fn the_second_baseline_is_averaged_over_seeds() {
+    let (room, mut plan) = (room(600), plan(&["olc"]));
+    let of = |plan: &Plan| audit(&room, plan).rows[0].records_alone.clone();
+    let first = of(&plan);
+    plan.seed = 1;
+    let second = of(&plan);
+    (plan.seed, plan.repeats) = (0, 2);
+    // The attacker's seed counts with the repeat, and no attack on records alone draws from it but delta.
+    let mean = of(&plan);
+    let tomography = |all: &[unlift::audit::Alone]| {
+        all.iter().find(|alone| alone.name == "tomography").unwrap().percent.clone()
+    };
+    for (at, percent) in tomography(&mean).iter().enumerate() {
+        let expected = (tomography(&first)[at] + tomography(&second)[at]) / 2.0;
+        assert!((percent - expected).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn break_even_takes_the_strongest_attack_at_every_ratio() {
+    let (room, mut plan) = (room(600), plan(&["olc", "cp"]));
+    (plan.records_alone, plan.inlier_ratios) = (false, vec![0.5, 0.1]);
+    plan.solvers.push(Solver::Ransac);
+    let outcome = audit(&room, &plan);
+    let mut rows = outcome.rows.clone();
+    // As if another attack won at each ratio.
+    for row in rows.iter_mut().filter(|row| row.scheme == "olc") {
+        row.recovered_percent[0] = match (row.solver, row.inlier_ratio) {
+            ("joint", 0.5) | ("ransac", 0.1) => 60.0,
+            _ => 40.0,
+        };
+    }
+    let found = unlift::audit::break_even(&plan, &rows);
+    let of = |solver: &str| found.iter().find(|b| (b.scheme, b.solver) == ("olc", solver)).unwrap();
+    assert_eq!(of("strongest").inlier_ratio, 0.1, "half comes back at the lowest ratio");
+    assert!((of("joint").inlier_ratio - 0.3).abs() < 1e-12);
+    assert_eq!(found.len(), 2 * 4);
+    plan.solvers.truncate(1);
+    let alone = unlift::audit::break_even(&plan, &outcome.rows);
+    assert!(alone.iter().all(|b| b.solver == "joint"), "one attack has no strongest");
+}
+
+/// Points of one plane: a scheme that avoids lines within surfaces finds none.
+fn flat(n: usize) -> Original<3> {
+    let place = |i: usize| [0.01 * ((i * 7919) % 1000) as f64, 0.01 * ((i * 104_729) % 997) as f64];
+    original((0..n).map(|i| [place(i)[0], place(i)[1], 1.0]).collect())
+}
+
+#[test]
+fn a_scheme_that_a_map_does_not_allow_is_told_and_the_audit_goes_on() {
+    let mut plan = Plan::new(Unit::Meter);
+    (plan.inlier_ratios, plan.records_alone) = (vec![1.0, 0.5], false);
+    let outcome = audit(&flat(400), &plan);
+    let missing: Vec<&str> = outcome.not_audited.iter().map(|m| m.scheme).collect();
+    assert_eq!(missing, ["ppl+"], "{:?}", outcome.not_audited);
+    let told = &outcome.not_audited[0];
+    assert_eq!(told.neighbors, None, "the scheme itself");
+    assert!(told.reason.contains("ppl+ leaves out") && told.reason.contains("of 400"), "{told:?}");
+    assert!(outcome.rows.iter().all(|row| row.scheme != "ppl+"));
+    for entry in plan.schemes.iter().filter(|entry| entry.name != "ppl+") {
+        let n = outcome.rows.iter().filter(|row| row.scheme == entry.name).count();
+        assert_eq!(n, 4, "{}", entry.name);
+    }
+    assert_eq!(outcome.rows.len(), outcome.seconds.rows.len());
+
+    plan.schemes.retain(|entry| entry.name == "ppl+");
+    let error = run(&flat(400), None, &plan, &mut Silent).unwrap_err().to_string();
+    let begin =
+        "schemes: expected one that can be applied to this map, found none: ppl+: k: expected";
+    assert!(error.starts_with(begin), "{error}");
+}
+
+#[test]
+fn a_source_without_lists_for_a_scheme_costs_its_rows_alone() {
+    let mut plan = plan(&["olc", "plane"]);
+    plan.sources.push(Source::Own(Joined::parse("geometric").unwrap()));
+    plan.repeats = 2;
+    let outcome = audit(&room(500), &plan);
+    let [missing] = outcome.not_audited.as_slice() else { panic!("{:?}", outcome.not_audited) };
+    assert_eq!((missing.scheme, missing.neighbors.as_deref()), ("plane", Some("geometric")));
+    assert!(missing.reason.ends_with("found planes"), "{}", missing.reason);
+    let of = |row: &Row| (row.scheme, row.neighbors.clone(), row.solver);
+    let rows: Vec<_> = outcome.rows.iter().map(of).collect();
+    let row = |scheme, neighbors: &str, solver| (scheme, neighbors.to_owned(), solver);
+    let expected = [
+        row("olc", "oracle", "joint"),
+        row("olc", "oracle", "joint-start"),
+        row("olc", "geometric", "joint"),
+        row("olc", "geometric", "joint-start"),
+        row("plane", "oracle", "joint"),
+        row("plane", "oracle", "joint-start"),
+    ];
+    assert_eq!(rows, expected);
+}
+
+#[test]
+fn a_map_too_small_for_wrong_neighbors_loses_these_rows_alone() {
+    let mut plan = plan(&["olc"]);
+    (plan.inlier_ratios, plan.k, plan.records_alone) = (vec![1.0, 0.1], 50, false);
+    let outcome = audit(&room(60), &plan);
+    assert!(outcome.rows.iter().all(|row| row.inlier_ratio == 1.0) && outcome.rows.len() == 2);
+    let [missing] = outcome.not_audited.as_slice() else { panic!("{:?}", outcome.not_audited) };
+    assert_eq!((missing.inlier_ratio, missing.oracle_noise), (Some(0.1), Some("uniform")));
+}
