@@ -140,8 +140,12 @@ pub fn render(
     let mut env = Environment::new();
     env.set_undefined_behavior(UndefinedBehavior::Strict);
     env.set_auto_escape_callback(|_| AutoEscape::Html);
-    // A figure and its sign stay on one line.
-    env.add_filter("tied", |text: String| text.replace(" %", "\u{a0}%"));
+    // A figure and its unit stay on one line.
+    env.add_filter("tied", |text: String| {
+        [" %", " cm", " px"]
+            .iter()
+            .fold(text, |text, unit| text.replace(unit, &unit.replace(' ', "\u{a0}")))
+    });
     for (name, source) in TEMPLATES {
         env.add_template(name, source)?;
     }
