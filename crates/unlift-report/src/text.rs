@@ -163,7 +163,7 @@ mod tests {
         };
         document.not_audited = vec![missing(None, "flat"), missing(Some("geometric"), "no lists")];
         let text = text_table(&document);
-        assert!(text.contains("95.6 %   8.1 %   58.6 %"), "{text}");
+        assert!(text.contains("95.6 %  8.1 %   58.6 %"), "{text}");
         assert!(text.contains("not audited: ppl+: flat\n"), "{text}");
         assert!(text.contains("not audited: ppl+ by geometric: no lists\n"), "{text}");
     }
