@@ -1,7 +1,7 @@
 //! Audits of images: pooled rows, twins, images with hardly any keypoints.
 
 use unlift::audit::images::{self, Image, Outcome};
-use unlift::audit::{Plan, Row, Silent, Source};
+use unlift::audit::{Observer, Plan, Row, Silent, Source};
 use unlift::descriptors::Values;
 use unlift::geometry::frame::Bounds;
 use unlift::neighbors::oracle::Noise;
@@ -150,6 +150,53 @@ fn images_with_few_keypoints_are_attacked() {
         let best = outcome.rows.iter().filter(|row| row.scheme == "lines2d");
         let best = best.map(|row| row.recovered_percent[3]).fold(0.0, f64::max);
         assert!(n < 12 || best > 50.0, "{n}: {best}");
+    }
+}
+
+/// Whoever watches hears every row of every image, not only when the next images begin.
+#[test]
+fn images_tell_how_far_they_are() {
+    #[derive(Default)]
+    struct Heard(Vec<(usize, usize)>);
+    impl Observer<2> for Heard {
+        fn progress(&mut self, done: usize, total: usize, _: &str) {
+            self.0.push((done, total));
+        }
+    }
+    #[derive(Default)]
+    struct All(Vec<Heard>);
+    impl images::Watcher for All {
+        type OfImage = Heard;
+
+        fn begin(&mut self) -> Heard {
+            Heard::default()
+        }
+
+        fn image(&mut self, _: &str, _: &[Row], heard: Heard) {
+            self.0.push(heard);
+        }
+    }
+    let images = [
+        image_of("none", Vec::new()),
+        image_of("few", keypoints(1, 5, 0)),
+        image_of("some", keypoints(2, 150, 0)),
+    ];
+    let mut plan = plan();
+    (plan.repeats, plan.reference) = (2, true);
+    let mut all = All::default();
+    images::run(images.iter().cloned().map(Ok::<_, Error>), &plan, &mut all).unwrap();
+    let rows = (plan.inlier_ratios.len() + 1) * plan.schemes.len() * 2;
+    for (image, Heard(heard)) in images.iter().zip(&all.0) {
+        let (last, total) = *heard.last().unwrap();
+        assert_eq!(last, total, "{}", image.name);
+        assert!(heard.is_sorted(), "{}: {heard:?}", image.name);
+        if !image.original.is_empty() {
+            let mut seen: Vec<usize> = heard.iter().map(|&(done, _)| done).collect();
+            seen.dedup();
+            assert_eq!(total, rows, "{}", image.name);
+            // Rows of references are made at once, so that they are told with what follows.
+            assert!(seen.len() > plan.inlier_ratios.len() * plan.schemes.len() * 2, "{seen:?}");
+        }
     }
 }
 

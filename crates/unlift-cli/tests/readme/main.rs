@@ -165,6 +165,51 @@ fn write_cloud(path: &Path) {
     fs::write(path, text).unwrap();
 }
 
+/// How GitHub names a heading in links.
+fn anchor(heading: &str) -> String {
+    let kept = heading.trim_start_matches('#').trim().to_lowercase();
+    let kept = kept.chars().filter(|c| c.is_alphanumeric() || [' ', '-', '_'].contains(c));
+    kept.map(|c| if c == ' ' { '-' } else { c }).collect()
+}
+
+/// The documents of the repository that link to each other.
+const DOCUMENTS: [&str; 6] = [
+    "README.md",
+    "ARCHITECTURE.md",
+    "CONTRIBUTING.md",
+    "STYLE.md",
+    "docs/formats.md",
+    "docs/benchmarks.md",
+];
+
+#[test]
+fn links_between_documents_lead_somewhere() {
+    let mut n = 0;
+    for document in DOCUMENTS {
+        let path = repository().join(document);
+        let text = fs::read_to_string(&path).unwrap();
+        for link in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+            // Code has brackets and parentheses, too.
+            if link.contains("://") || link.contains(' ') || !link.contains(['.', '#']) {
+                continue;
+            }
+            let (file, heading) = link.split_once('#').unwrap_or((link, ""));
+            let target = match file {
+                "" => path.clone(),
+                file => path.parent().unwrap().join(file),
+            };
+            assert!(target.exists(), "{document}: {link}");
+            if !heading.is_empty() {
+                let text = fs::read_to_string(&target).unwrap();
+                let mut headings = text.lines().filter(|line| line.starts_with('#'));
+                assert!(headings.any(|line| anchor(line) == heading), "{document}: {link}");
+            }
+            n += 1;
+        }
+    }
+    assert!(n > 10, "{n}");
+}
+
 #[test]
 fn lines_are_those_of_sh_blocks_without_comments() {
     let text = "```sh\nunlift a --gate 'x<=1'   # why\n# only a comment\n\nunlift b#c\n```\n```python\nno\n```\n\
