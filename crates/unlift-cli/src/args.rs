@@ -108,9 +108,12 @@ Examples:
   unlift demo
   unlift demo --out /tmp/room")]
 pub struct DemoArgs {
-    /// Folder to write: empty, missing, or an earlier audit (replaced whole)
+    /// Folder for report.html and audit.json; whatever else is in it stays
     #[arg(long, value_name = "DIR", default_value = "unlift-demo")]
     pub out: PathBuf,
+    /// Replace files of that name that unlift did not write
+    #[arg(long)]
+    pub force: bool,
     /// Threads to use [default: one per core]
     #[arg(long, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
@@ -226,9 +229,12 @@ pub struct ObfuscateArgs {
     /// The scheme, see unlift schemes
     #[arg(long, value_name = "SCHEME", value_parser = values::scheme)]
     pub scheme: &'static Entry,
-    /// Folder to write: empty, missing, or an earlier obfuscation (replaced whole)
+    /// Folder for released.parquet and truth.parquet; whatever else is in it stays
     #[arg(long, value_name = "DIR", default_value = "unlift-obfuscated")]
     pub out: PathBuf,
+    /// Replace files of that name that unlift did not write
+    #[arg(long)]
+    pub force: bool,
     #[command(flatten)]
     pub map: MapArgs,
 }
@@ -273,6 +279,9 @@ pub struct FindArgs {
     /// File to write
     #[arg(long, value_name = "FILE", default_value = "neighborhoods.parquet")]
     pub out: PathBuf,
+    /// Replace files of that name that unlift did not write
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Options of `neighbors oracle`.
@@ -304,6 +313,9 @@ pub struct OracleArgs {
     /// File to write
     #[arg(long, value_name = "FILE", default_value = "neighborhoods.parquet")]
     pub out: PathBuf,
+    /// Replace files of that name that unlift did not write
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Options of `recover`.
@@ -336,6 +348,9 @@ pub struct RecoverArgs {
     /// File to write
     #[arg(long, value_name = "FILE", default_value = "recovered.parquet")]
     pub out: PathBuf,
+    /// Replace files of that name that unlift did not write
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Options of `evaluate`.

@@ -46,10 +46,13 @@ pub struct ResultArgs {
     /// Fail (exit code 1) when more than this comes back; repeatable, see below
     #[arg(long, value_name = "GATE", value_parser = Gate::parse)]
     pub gate: Vec<Gate>,
-    /// Folder to write: empty, missing, or an earlier audit (replaced whole)
+    /// Folder for report.html and audit.json (and clouds); whatever else is in it stays
     #[arg(long, value_name = "DIR", default_value = "unlift-audit")]
     pub out: PathBuf,
-    /// A report that can be shown: figures only, no points, paths or names
+    /// Replace files of that name that unlift did not write
+    #[arg(long)]
+    pub force: bool,
+    /// A report that can be shown: figures only, no points, paths, names or hashes
     #[arg(long)]
     pub share_safe: bool,
     /// Print a summary as JSON on stdout in place of the table

@@ -29,6 +29,9 @@ pub struct FeaturesArgs {
     /// File to write (HDF5, hloc's layout)
     #[arg(long, value_name = "FILE", default_value = "features.h5")]
     pub out: PathBuf,
+    /// Replace files of that name that unlift did not write
+    #[arg(long)]
+    pub force: bool,
     /// Features wanted per photo; coarse ones first, and the last scale is kept whole [default: 8192]
     #[arg(long, value_name = "N")]
     pub max_features: Option<NonZeroUsize>,

@@ -6,36 +6,40 @@ use unlift::audit::Cell;
 use unlift::geometry::frame::Bounds;
 use unlift::released::{Obfuscation, Released};
 use unlift_io::Error;
+use unlift_io::atomic::{Kind, OutputSet};
 use unlift_io::clouds::{record_segments, write_lines, write_points, write_recovered};
 
 /// Writes clouds in map units, so that they lie on the owner's map.
 pub struct Clouds {
-    folder: PathBuf,
     unit_in_map_units: f64,
     schemes: Vec<&'static str>,
 }
 
 impl Clouds {
-    /// Clouds in the folder `clouds` below `out`.
-    pub fn new(out: &Path, unit_in_map_units: f64) -> Result<Self, Error> {
-        let folder = out.join("clouds");
-        std::fs::create_dir(&folder).map_err(|source| Error::write(&folder, source))?;
-        Ok(Self { folder, unit_in_map_units, schemes: Vec::new() })
+    /// No clouds yet.
+    pub fn new(unit_in_map_units: f64) -> Self {
+        Self { unit_in_map_units, schemes: Vec::new() }
     }
 
-    /// Writes the clouds of one result; `full_scale` is the error at the end of the color ramp.
-    pub fn write(&mut self, cell: &Cell<'_>, full_scale: f64) -> Result<(), Error> {
+    /// Writes the clouds of one result to the folder [`FOLDER`] of `out`; `full_scale` is the error at the end of the
+    /// color ramp.
+    pub fn write(
+        &mut self,
+        out: &mut OutputSet,
+        cell: &Cell<'_>,
+        full_scale: f64,
+    ) -> Result<(), Error> {
         let scale = self.unit_in_map_units;
         let in_map = |p: &[f64; 3]| p.map(|x| x * scale);
         let originals: Vec<[f64; 3]> =
             cell.original.reveal().positions().iter().map(in_map).collect();
         if self.schemes.is_empty() {
-            write_points(&self.folder.join("original.ply"), &originals, None)?;
+            write_points(&stage(out, "original.ply")?, &originals, None)?;
         }
         let scheme = cell.row.scheme;
         if !self.schemes.contains(&scheme) {
             self.schemes.push(scheme);
-            self.write_obfuscated(scheme, cell.released, cell.original.reveal().positions())?;
+            self.write_obfuscated(out, scheme, cell.released, cell.original.reveal().positions())?;
         }
         let row = cell.row;
         // A measured ratio is no name: two sources may share it.
@@ -49,13 +53,14 @@ impl Clouds {
             .map(|slot| cell.recovered.position(slot).map(|p| in_map(&p)))
             .collect();
         let errors: Vec<f64> = cell.accuracy.errors().iter().map(|e| e * scale).collect();
-        write_recovered(&self.folder.join(name), &points, &errors, full_scale * scale)
+        write_recovered(&stage(out, &name)?, &points, &errors, full_scale * scale)
     }
 
     /// Lines and rays clipped to the 1-99 % box as OBJ; published points as PLY. Planes have no
     /// finite shape and are left out.
     fn write_obfuscated(
         &self,
+        out: &mut OutputSet,
         scheme: &str,
         released: &Released<3>,
         originals: &[[f64; 3]],
@@ -68,7 +73,7 @@ impl Clouds {
                 for end in segments.iter_mut().flatten() {
                     *end = end.map(|x| x * scale);
                 }
-                write_lines(&self.folder.join(format!("{scheme}-obfuscated.obj")), &segments)
+                write_lines(&stage(out, &format!("{scheme}-obfuscated.obj"))?, &segments)
             }
             Obfuscation::AxisCandidates(candidates) => {
                 let origin = released.origin();
@@ -76,9 +81,27 @@ impl Clouds {
                     std::array::from_fn(|c| (f64::from(p[c]) + origin[c]) * scale)
                 };
                 let points: Vec<[f64; 3]> = candidates.position().iter().map(place).collect();
-                write_points(&self.folder.join(format!("{scheme}-obfuscated.ply")), &points, None)
+                write_points(&stage(out, &format!("{scheme}-obfuscated.ply"))?, &points, None)
             }
             Obfuscation::AxisPlanes(_) => Ok(()),
         }
     }
+}
+
+/// The folder of clouds in the folder of an audit.
+pub const FOLDER: &str = "clouds";
+
+/// Clouds in the folder `out` of an audit that another one may replace, as paths within it.
+pub fn earlier(out: &Path) -> Vec<String> {
+    let Ok(entries) = std::fs::read_dir(out.join(FOLDER)) else { return Vec::new() };
+    let names = entries.flatten().filter_map(|entry| entry.file_name().into_string().ok());
+    let is_ours = |name: &String| {
+        name == "original.ply" || name.contains("-recovered-") || name.contains("-obfuscated.")
+    };
+    names.filter(is_ours).map(|name| format!("{FOLDER}/{name}")).collect()
+}
+
+/// Where to write a cloud.
+fn stage(out: &mut OutputSet, name: &str) -> Result<PathBuf, Error> {
+    out.stage(&format!("{FOLDER}/{name}"), Kind::Cloud)
 }

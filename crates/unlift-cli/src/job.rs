@@ -1,13 +1,13 @@
 //! One audit from a prepared map to the files in its folder: what `audit map` and `demo` share.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use unlift::Descriptors;
 use unlift::audit::{Cell, NotAudited, Observer, Plan, REFERENCE, Row, run};
 use unlift::recover::Solver;
 use unlift::truth::Original;
-use unlift_io::atomic::{OutputDir, write_file};
+use unlift_io::atomic::OutputSet;
 use unlift_report::document::{Document, GateResult, Input};
 use unlift_report::{ErrorCdf, RenderOptions, render, text_table};
 
@@ -15,6 +15,7 @@ use crate::clouds::Clouds;
 use crate::document::{self, Provenance};
 use crate::exit::{advise, usage};
 use crate::gate::{Candidate, Gate};
+use crate::outputs::{PAGE, commit_audit};
 use crate::pictures::Pictures;
 use crate::progress::Progress;
 
@@ -78,16 +79,8 @@ impl Finished {
     }
 }
 
-/// The file that marks a folder as an audit.
-pub const MARKER: &str = "audit.json";
-
-/// Opens the folder an audit goes to: refused early, before anything is computed.
-pub fn open_out(out: &Path) -> anyhow::Result<OutputDir> {
-    OutputDir::create(out, MARKER).map_err(|error| usage(format!("--out: {error}")))
-}
-
-/// Runs the job and writes its folder, whole or not at all.
-pub fn perform(job: Job<'_>, out: OutputDir) -> anyhow::Result<Finished> {
+/// Runs the job and writes its files, all or none.
+pub fn perform(job: Job<'_>, mut out: OutputSet) -> anyhow::Result<Finished> {
     check_gates(&job.gates, &job.plan)?;
     let drawn = drawn(&job.plan);
     let n_views = job.plan.schemes.len() * job.plan.variants().len() * drawn.len();
@@ -96,10 +89,7 @@ pub fn perform(job: Job<'_>, out: OutputDir) -> anyhow::Result<Finished> {
         pictures: (!job.share_safe).then(|| Pictures::new(job.original, &job.plan, n_views)),
         curves: Vec::new(),
         drawn: drawn.iter().map(|solver| solver.name()).collect(),
-        clouds: job
-            .write_clouds
-            .then(|| Clouds::new(out.path(), job.unit_in_map_units))
-            .transpose()?,
+        clouds: job.write_clouds.then(|| (Clouds::new(job.unit_in_map_units), &mut out)),
         thresholds: job.plan.thresholds.iter().map(|t| t.value).collect(),
         failed: None,
     };
@@ -128,10 +118,8 @@ pub fn perform(job: Job<'_>, out: OutputDir) -> anyhow::Result<Finished> {
         RenderOptions { share_safe: job.share_safe, error_cdf: curves, ..RenderOptions::default() };
     let page = render(&shown, scene.as_ref(), &options)?;
     let json = shown.to_json()?;
-    write_file(&out.path().join("report.html"), |w| std::io::Write::write_all(w, page.as_bytes()))?;
-    write_file(&out.path().join(MARKER), |w| std::io::Write::write_all(w, json.as_bytes()))?;
-    out.commit()?;
-    Ok(Finished { document: shown, report: job.out.join("report.html") })
+    commit_audit(out, &page, &json, job.share_safe)?;
+    Ok(Finished { document: shown, report: job.out.join(PAGE) })
 }
 
 /// Rows as gates see them.
@@ -197,14 +185,14 @@ pub fn gate_results(
 }
 
 /// Shows progress and keeps what the report draws.
-struct Watcher {
+struct Watcher<'a> {
     progress: Progress,
     pictures: Option<Pictures>,
     /// The error curve of every cell.
     curves: Vec<(Row, Vec<(f64, f64)>)>,
     /// Names of the solvers whose points are drawn.
     drawn: Vec<&'static str>,
-    clouds: Option<Clouds>,
+    clouds: Option<(Clouds, &'a mut OutputSet)>,
     thresholds: Vec<f64>,
     failed: Option<unlift_io::Error>,
 }
@@ -236,7 +224,7 @@ pub fn curve_errors(largest_threshold: f64) -> impl Iterator<Item = f64> {
     (0..=CURVE_POINTS).map(move |step| largest_threshold * 10f64.powf(exponent(step)))
 }
 
-impl Observer for Watcher {
+impl Observer for Watcher<'_> {
     fn progress(&mut self, done: usize, total: usize, what: &str) {
         self.progress.show(done, total, what);
     }
@@ -252,8 +240,8 @@ impl Observer for Watcher {
         {
             pictures.add(cell);
         }
-        if let (Some(clouds), None) = (&mut self.clouds, &self.failed) {
-            self.failed = clouds.write(cell, most).err();
+        if let (Some((clouds, out)), None) = (&mut self.clouds, &self.failed) {
+            self.failed = clouds.write(out, cell, most).err();
         }
     }
 }

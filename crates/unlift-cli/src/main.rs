@@ -11,10 +11,12 @@ mod document;
 mod exit;
 mod gate;
 mod images;
+mod interrupt;
 mod job;
 mod lengths;
 mod memory;
 mod output;
+mod outputs;
 mod pace;
 mod pictures;
 mod prepare;
@@ -26,5 +28,6 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     // Usage errors end here, with exit code 2.
     let cli = args::Cli::read(std::env::args_os()).unwrap_or_else(|error| error.exit());
+    interrupt::watch();
     exit::finish(commands::run(cli.command))
 }

@@ -259,9 +259,8 @@ fn bad_input_is_one_line_and_loses_nothing() {
         "unlift: two.xyz: points: expected at least 51 (K + 1), found 2"
     );
     assert_eq!(
-        place.complaint("audit map room.csv --k 10 --out mine", 2),
-        "unlift: --out: mine: expected an empty folder or an earlier output (with audit.json), \
-         found a folder of other files"
+        place.complaint("audit map room.csv --k 10 --out mine/file", 2),
+        "unlift: --out: mine/file: expected a folder, or nothing, found a file"
     );
     assert!(place.path().join("mine/file").is_file());
     assert!(!place.path().join("unlift-audit").exists());

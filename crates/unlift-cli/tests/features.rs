@@ -152,8 +152,8 @@ fn a_run_that_was_interrupted_goes_on_and_gives_the_same_bytes() {
     // What earlier runs may have left.
     let parts = place.path("again.h5.parts");
     fs::create_dir(&parts).unwrap();
-    fs::write(parts.join(".joined.h5.x.partial"), "half").unwrap();
-    fs::write(parts.join("0123.part.h5"), "of other options").unwrap();
+    fs::write(parts.join(".joined.h5.unlift-0aZ9xy.partial"), "half").unwrap();
+    fs::write(parts.join("0123456789abcdef0123456789abcdef.part.h5"), "of other options").unwrap();
     let mut child = Command::new(env!("CARGO_BIN_EXE_unlift"))
         .args(["features", "photos", "--out", "again.h5", "--threads", "1"])
         .current_dir(place.path(""))

@@ -2,7 +2,7 @@
 //! ([`stage`]), clouds out ([`clouds`]).
 //!
 //! Bad input gets one line that names the file, the place, what was expected and what was found;
-//! outputs appear whole or not at all ([`atomic`]).
+//! outputs appear whole or not at all, and never in place of what is not theirs ([`atomic`]).
 
 pub mod atomic;
 pub mod clouds;

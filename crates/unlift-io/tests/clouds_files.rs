@@ -11,7 +11,7 @@ fn recovered_points_are_colored_and_lost_ones_left_out() {
     let path = folder.path().join("recovered.ply");
     let points = [Some([1.0, 2.0, 3.0]), None, Some([4e6, 5.0, 6.0])];
     clouds::write_recovered(&path, &points, &[0.0, f64::NAN, 1.0], 0.5).unwrap();
-    let header = "ply\nformat binary_little_endian 1.0\nelement vertex 2\n\
+    let header = "ply\nformat binary_little_endian 1.0\ncomment unlift\nelement vertex 2\n\
         property double x\nproperty double y\nproperty double z\n\
         property uchar red\nproperty uchar green\nproperty uchar blue\n\
         property float error\nend_header\n";
@@ -51,7 +51,7 @@ fn lines_are_pairs_of_vertices() {
     let path = folder.path().join("lines.obj");
     let segments = [[[0.0, 0.5, 1.0], [1.0, 2.0, 3.0]], [[0.1, 0.0, 0.0], [4e6, 0.0, 0.0]]];
     clouds::write_lines(&path, &segments).unwrap();
-    let expected = "v 0 0.5 1\nv 1 2 3\nl 1 2\nv 0.1 0 0\nv 4000000 0 0\nl 3 4\n";
+    let expected = "# unlift\nv 0 0.5 1\nv 1 2 3\nl 1 2\nv 0.1 0 0\nv 4000000 0 0\nl 3 4\n";
     assert_eq!(fs::read_to_string(&path).unwrap(), expected);
 }
 

@@ -61,8 +61,10 @@ pub struct Document {
 pub struct Input {
     /// The map as the user named it; `None` in a share-safe document.
     pub path: Option<String>,
-    /// SHA-256 over the map's files, in lowercase hexadecimal.
-    pub sha256: String,
+    /// SHA-256 over the map's files, in lowercase hexadecimal; `None` in a share-safe document: whoever guesses the
+    /// map could confirm it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sha256: Option<String>,
     /// Points read from the map, before any scheme dropped some.
     pub n_points: u64,
     /// Meters per map unit, as declared by the user; `None` when no scale was declared.

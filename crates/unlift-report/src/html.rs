@@ -123,6 +123,7 @@ pub fn render(
         times: tables::times(&document),
         options: options_text,
         command: document.run.command.as_deref(),
+        sha256: document.input.sha256.as_deref(),
         other_sha256: document.input.other_sha256.iter().collect(),
         seconds: words::seconds(document.run.seconds.total),
         memory: document.run.peak_memory_bytes.map(words::bytes),
@@ -178,6 +179,8 @@ struct Page<'a> {
     times: Option<Table>,
     options: Vec<(String, String)>,
     command: Option<&'a str>,
+    /// Of the map; nothing in a share-safe document.
+    sha256: Option<&'a str>,
     /// (role, SHA-256) of further input files.
     other_sha256: Vec<(&'a String, &'a String)>,
     seconds: String,

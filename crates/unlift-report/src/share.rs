@@ -12,10 +12,13 @@ const NAMING_OPTIONS: [&str; 8] =
     ["descriptors", "input", "map", "model", "out", "path", "photos", "show"];
 
 impl Document {
-    /// A copy without paths, names and the command line: figures, hashes and plain options only.
+    /// A copy without paths, names, hashes of inputs (which confirm a guess of them) and the command line: figures and
+    /// plain options only.
     pub fn share_safe(&self) -> Self {
         let mut safe = self.clone();
         safe.input.path = None;
+        safe.input.sha256 = None;
+        safe.input.other_sha256.clear();
         safe.run.command = None;
         for image in &mut safe.images {
             image.name = None;

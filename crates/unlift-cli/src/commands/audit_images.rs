@@ -7,6 +7,7 @@ use serde_json::{Map, json};
 use unlift::Unit;
 use unlift::audit::{Plan, Source};
 use unlift_features::SiftOptions;
+use unlift_io::atomic::Rules;
 use unlift_io::{Error, read};
 use unlift_report::pictures::MOST_PICTURES;
 
@@ -17,8 +18,8 @@ use crate::exit::{Outcome, advise, usage};
 use crate::images::FeatureSource;
 use crate::images::audit::{ImagesJob, perform};
 use crate::images::stream::Needs;
-use crate::job::open_out;
 use crate::output::print;
+use crate::outputs::{Shown, open_audit};
 use crate::values::{NeighborSource, distinct};
 
 /// The threshold that speaks for an audit, in pixels, or the nearest one asked for.
@@ -28,7 +29,10 @@ const HEADLINE_PX: f64 = 10.0;
 pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
     let started = Instant::now();
     let plan = plan(args)?;
-    let out = open_out(&args.result.out)?;
+    let inputs = [args.path.as_path()].into_iter().chain(args.photos.as_deref());
+    let rules = Rules::new(inputs, args.result.force);
+    let shown = if args.result.share_safe { Shown::Figures } else { Shown::Points };
+    let out = open_audit(&args.result.out, rules, shown)?;
     let (finished, used) = with_threads(args.run.threads, || {
         let source = FeatureSource::open(&args.path, &extraction(args)?).map_err(|error| {
             let map = read::is_project(&args.path);

@@ -7,6 +7,7 @@ use serde_json::{Map, Value, json};
 use unlift::audit::{Plan, PointNeighbors, Source};
 use unlift::geometry::vector::distance;
 use unlift::neighbors::sources::Joined;
+use unlift_io::atomic::Rules;
 use unlift_io::hash::{hash_file, hash_files};
 use unlift_io::read;
 use unlift_io::stage::read_point_neighborhoods;
@@ -17,16 +18,22 @@ use super::{open_map, with_threads};
 use crate::args::AuditMapArgs;
 use crate::document::ordered;
 use crate::exit::{Outcome, advise, usage};
-use crate::job::{Job, open_out, perform};
+use crate::job::{Job, perform};
 use crate::lengths::check_thresholds;
 use crate::output::print;
+use crate::outputs::{Shown, open_audit};
 use crate::prepare::Prepared;
 use crate::values::{NeighborSource, all_schemes, distinct};
 
 /// Audits a map.
 pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
     let started = Instant::now();
-    let out = open_out(&args.result.out)?;
+    let shown = match (args.result.share_safe, args.write_clouds) {
+        (true, _) => Shown::Figures,
+        (false, true) => Shown::Clouds,
+        (false, false) => Shown::Points,
+    };
+    let out = open_audit(&args.result.out, rules(&args), shown)?;
     let finished = with_threads(args.run.threads, || {
         let (input, prepared) = open_map(&args.path, &args.map, args.run.quiet)?;
         if let Some(note) = thinned(&args, &prepared, input.positions.len()) {
@@ -64,6 +71,16 @@ fn thinned(args: &AuditMapArgs, prepared: &Prepared, n_read: usize) -> Option<St
              more comes back"
         )
     })
+}
+
+/// What must not be written over.
+fn rules(args: &AuditMapArgs) -> Rules {
+    let lists = args.neighbors.iter().filter_map(|source| match source {
+        NeighborSource::File(path) => Some(path.as_path()),
+        NeighborSource::Oracle | NeighborSource::Own(_) => None,
+    });
+    let inputs = [args.path.as_path()].into_iter().chain(args.map.descriptors.as_deref());
+    Rules::new(inputs.chain(lists), args.result.force)
 }
 
 fn plan(args: &AuditMapArgs, prepared: &Prepared, input: &read::Input) -> anyhow::Result<Plan> {
@@ -209,7 +226,7 @@ fn provenance(
     }
     Ok(Input {
         path: Some(args.path.display().to_string()),
-        sha256: hash_files(&input.files)?,
+        sha256: Some(hash_files(&input.files)?),
         n_points: prepared.original.len() as u64,
         scale_m_per_unit: args.map.scale,
         unit_in_map_units: Some(prepared.unit_in_map_units),

@@ -6,14 +6,16 @@ use serde_json::{Map, json};
 use unlift::audit::Plan;
 use unlift::truth::Original;
 use unlift::{PointSet, Unit, synthetic};
+use unlift_io::atomic::Rules;
 use unlift_io::hash::hash_positions;
 use unlift_report::document::Input;
 
 use super::with_threads;
 use crate::args::DemoArgs;
 use crate::exit::Outcome;
-use crate::job::{Job, open_out, perform};
+use crate::job::{Job, perform};
 use crate::output::print;
+use crate::outputs::{Shown, open_audit};
 
 /// Points of the room.
 const N_POINTS: usize = 20_000;
@@ -21,7 +23,7 @@ const N_POINTS: usize = 20_000;
 /// Audits a furnished room.
 pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
     let started = Instant::now();
-    let out = open_out(&args.out)?;
+    let out = open_audit(&args.out, Rules::new([], args.force), Shown::Points)?;
     let room = synthetic::room(0, N_POINTS);
     let sha256 = hash_positions(&room.points);
     let original = Original::new(PointSet::try_new(room.points, Unit::Meter)?);
@@ -36,7 +38,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
             plan: Plan::new(Unit::Meter),
             input: Input {
                 path: Some("demo room".to_owned()),
-                sha256,
+                sha256: Some(sha256),
                 n_points: original.len() as u64,
                 scale_m_per_unit: Some(1.0),
                 unit_in_map_units: Some(1.0),

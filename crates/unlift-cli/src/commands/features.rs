@@ -5,15 +5,16 @@ use std::path::{Path, PathBuf};
 use unlift_features::SiftOptions;
 use unlift_features::batch::in_order;
 use unlift_io::Error;
-use unlift_io::atomic::OutputFile;
+use unlift_io::atomic::{Kind, Rules};
 use unlift_io::features::{FeatureWriter, ImageFeatures};
 
 use super::with_threads;
 use crate::args_features::FeaturesArgs;
 use crate::exit::{Outcome, line, usage};
-use crate::images::FeatureSource;
 use crate::images::parts::{Parts, write_part};
+use crate::images::{FeatureSource, is_photo};
 use crate::output::print;
+use crate::outputs::check_file;
 use crate::progress::Progress;
 
 /// What was done, and what could not be.
@@ -27,7 +28,9 @@ struct Tally {
 
 /// Extracts or copies the features of all images.
 pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
-    let target = OutputFile::check(&args.out).map_err(|error| usage(format!("--out: {error}")))?;
+    let rules = Rules::new([args.images.as_path()], args.force);
+    let target = check_file(&args.out, Kind::Features, &rules)?;
+    check_no_photo(&args.images, &target)?;
     let options = options(args)?;
     let tally = with_threads(args.threads, || {
         let source = FeatureSource::open(&args.images, &options)?;
@@ -63,6 +66,22 @@ pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
         return Err(Error::new(&args.images, "", expected, tally.images.to_string()).into());
     }
     Ok(Outcome::Done)
+}
+
+/// A file that would be taken for a photo by the next run.
+fn check_no_photo(images: &Path, target: &Path) -> anyhow::Result<()> {
+    let folder = match target.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let (Ok(images), Ok(folder)) = (images.canonicalize(), folder.canonicalize()) else {
+        return Ok(());
+    };
+    if folder.starts_with(images) && is_photo(target) {
+        let expected = "expected a name that is not read as a photo";
+        return Err(usage(format!("--out: {}: {expected}", target.display())));
+    }
+    Ok(())
 }
 
 /// The options of the extractor; none of them fits a file.

@@ -4,7 +4,8 @@ use unlift::Error;
 use unlift::neighbors::oracle::{Outliers, TrueNeighbors, search};
 use unlift::neighbors::sources::Joined;
 use unlift::released::Released;
-use unlift_io::stage::{read_released, read_truth, write_neighborhoods};
+use unlift_io::atomic::{Kind, Rules};
+use unlift_io::stage::{Kind as Stage, read_released, read_truth, write_neighborhoods};
 
 use super::evaluate::expect_slots;
 use super::obfuscate::RELEASED;
@@ -12,13 +13,17 @@ use super::{same_map, with_threads};
 use crate::args::{FindArgs, OracleArgs};
 use crate::exit::{Outcome, advise};
 use crate::output::print;
+use crate::outputs::check_file;
 use crate::progress::Spinner;
 
 /// Makes neighborhoods at one inlier ratio.
 pub fn oracle(args: &OracleArgs) -> anyhow::Result<Outcome> {
-    let (original, secret) = read_truth::<3>(&args.truth)?;
     let beside = || args.truth.with_file_name(RELEASED);
     let released_path = args.released.clone().unwrap_or_else(beside);
+    let rules = Rules::new([args.truth.as_path(), &released_path], args.force);
+    let kind = Kind::Stage(Stage::Neighborhoods);
+    check_file(&args.out, kind, &rules)?;
+    let (original, secret) = read_truth::<3>(&args.truth)?;
     // The truth does not say how many points share a record.
     let released = read_released::<3>(&released_path).map_err(|error| match args.released {
         None if !released_path.exists() => advise(error, "--released FILE"),
@@ -33,6 +38,7 @@ pub fn oracle(args: &OracleArgs) -> anyhow::Result<Outcome> {
     let near = TrueNeighbors::new(&knn, &secret, released.slots_per_record(), k).map_err(core)?;
     let outliers = Outliers::new(args.oracle_noise, &near, &knn, &secret, args.seed);
     let lists = near.lists(args.inlier_ratio, &outliers.map_err(core)?, args.seed).map_err(core)?;
+    check_file(&args.out, kind, &rules)?;
     write_neighborhoods(&args.out, &lists)?;
     drop(alive);
     print(&format!(
@@ -46,6 +52,9 @@ pub fn oracle(args: &OracleArgs) -> anyhow::Result<Outcome> {
 
 /// Makes neighborhoods as an attacker would.
 pub fn find(args: &FindArgs) -> anyhow::Result<Outcome> {
+    let rules = Rules::new([args.released.as_path()], args.force);
+    let kind = Kind::Stage(Stage::Neighborhoods);
+    check_file(&args.out, kind, &rules)?;
     let released = read_released::<3>(&args.released)?;
     let source = match args.k {
         Some(k) => args.source.clone().with_k(usize::from(k)),
@@ -61,6 +70,7 @@ pub fn find(args: &FindArgs) -> anyhow::Result<Outcome> {
         let lists = source.make(&released, args.seed);
         Ok(lists.map_err(|error| unlift_io::Error::core(&args.released, error))?)
     })?;
+    check_file(&args.out, kind, &rules)?;
     write_neighborhoods(&args.out, &lists)?;
     drop(alive);
     print(&format!(

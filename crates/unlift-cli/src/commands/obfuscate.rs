@@ -3,15 +3,16 @@
 use unlift::audit::Plan;
 use unlift::obfuscate::obfuscate;
 use unlift::seed::Key;
-use unlift_io::atomic::OutputDir;
-use unlift_io::stage::{write_released, write_truth};
+use unlift_io::atomic::{Access, Kind, OutputSet, Rules};
+use unlift_io::stage::{Kind as Stage, write_released, write_truth};
 
 use super::open_map;
 use crate::args::ObfuscateArgs;
 use crate::exit::{Outcome, usage};
 use crate::output::print;
+use crate::outputs::refused;
 
-/// What the attacker sees, and what marks a folder as an earlier obfuscation.
+/// What the attacker sees.
 pub const RELEASED: &str = "released.parquet";
 /// What only the owner has.
 pub const TRUTH: &str = "truth.parquet";
@@ -22,7 +23,10 @@ const GUESSABLE: &str = "unlift: note: --seed repeats experiments; whoever guess
 
 /// Hides a map by one scheme.
 pub fn run(args: &ObfuscateArgs) -> anyhow::Result<Outcome> {
-    let out = OutputDir::create(&args.out, RELEASED).map_err(|e| usage(format!("--out: {e}")))?;
+    let inputs = [args.path.as_path()].into_iter().chain(args.map.descriptors.as_deref());
+    let files = [(RELEASED, Kind::Stage(Stage::Released)), (TRUTH, Kind::Stage(Stage::Truth))];
+    let rules = Rules::new(inputs, args.force);
+    let mut out = OutputSet::create(&args.out, rules, Access::Private, &files).map_err(refused)?;
     let (_, prepared) = open_map(&args.path, &args.map, false)?;
     let name = args.scheme.name;
     let scheme = args.scheme.in_3d.ok_or_else(|| usage(format!("{name} is not for maps")))?;
@@ -37,8 +41,8 @@ pub fn run(args: &ObfuscateArgs) -> anyhow::Result<Outcome> {
     };
     let hidden = obfuscate(scheme, &prepared.original, descriptors, &options, &key);
     let (released, secret) = hidden.map_err(|e| unlift_io::Error::core(&args.path, e))?;
-    write_released(&out.path().join(RELEASED), &released)?;
-    write_truth(&out.path().join(TRUTH), &prepared.original, &secret)?;
+    write_truth(&out.stage(TRUTH, Kind::Stage(Stage::Truth))?, &prepared.original, &secret)?;
+    write_released(&out.stage(RELEASED, Kind::Stage(Stage::Released))?, &released)?;
     out.commit()?;
     print(&format!(
         "{name}: {} points hidden in {} records, {} dropped, in {}\n",

@@ -3,12 +3,14 @@
 use unlift::RowOrder;
 use unlift::neighbors::Neighborhoods;
 use unlift::recover::{RecoverOptions, Status, recover};
-use unlift_io::stage::{read_neighborhoods, read_released, write_recovered};
+use unlift_io::atomic::{Kind, Rules};
+use unlift_io::stage::{Kind as Stage, read_neighborhoods, read_released, write_recovered};
 
 use super::{same_map, with_threads};
 use crate::args::RecoverArgs;
 use crate::exit::Outcome;
 use crate::output::print;
+use crate::outputs::check_file;
 use crate::progress::Spinner;
 
 /// What a user should know about lists that somebody else wrote.
@@ -37,6 +39,9 @@ fn notes(lists: &Neighborhoods, slots_per_record: usize) -> Vec<String> {
 
 /// Recovers a released map.
 pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
+    let rules = Rules::new([args.released.as_path(), &args.neighbors], args.force);
+    let kind = Kind::Stage(Stage::Recovered);
+    check_file(&args.out, kind, &rules)?;
     let released = read_released::<3>(&args.released)?;
     let (records, slots) = (released.n_records(), released.slots_per_record());
     let lists = read_neighborhoods(&args.neighbors, records, slots)?;
@@ -57,6 +62,7 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
         let result = recover(&released, &lists, &options);
         Ok(result.map_err(|error| unlift_io::Error::core(&args.released, error))?)
     })?;
+    check_file(&args.out, kind, &rules)?;
     write_recovered(&args.out, &recovered)?;
     drop(alive);
     let n = recovered.status().iter().filter(|&&status| status == Status::Ok).count();

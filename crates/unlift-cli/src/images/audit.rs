@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 use unlift::audit::images::{self, Outcome, run};
 use unlift::audit::{Cell, Observer, Plan, Row, Source};
 use unlift::neighbors::sources::Joined;
-use unlift_io::atomic::{OutputDir, write_file};
+use unlift_io::atomic::OutputSet;
 use unlift_io::hash::{hash_file, hash_files};
 use unlift_report::document::{ImageCounts, ImageFigures, Input};
 use unlift_report::pictures::Picture;
@@ -20,7 +20,8 @@ use super::stream::{Needs, Stream, Tally, lacking};
 use crate::document::{self, Found, Provenance};
 use crate::exit::line;
 use crate::gate::Gate;
-use crate::job::{Finished, MARKER, check_gates, curve_errors, curves_of, gate_results};
+use crate::job::{Finished, check_gates, curve_errors, curves_of, gate_results};
+use crate::outputs::{PAGE, commit_audit};
 use crate::progress::{Progress, Steps};
 
 /// Longest side of an embedded photo in pixels.
@@ -66,7 +67,7 @@ pub struct Used {
 }
 
 /// Runs the job and writes its folder, whole or not at all; without a single usable image none.
-pub fn perform(job: ImagesJob<'_>, out: OutputDir) -> anyhow::Result<(Option<Finished>, Used)> {
+pub fn perform(job: ImagesJob<'_>, out: OutputSet) -> anyhow::Result<(Option<Finished>, Used)> {
     check_gates(&job.gates, &job.plan)?;
     let tally = RefCell::new(Tally::default());
     let mut watcher = Watcher::new(&job, &tally);
@@ -105,10 +106,8 @@ pub fn perform(job: ImagesJob<'_>, out: OutputDir) -> anyhow::Result<(Option<Fin
     };
     let page = render(&document, None, &options)?;
     let json = document.to_json()?;
-    write_file(&out.path().join("report.html"), |w| std::io::Write::write_all(w, page.as_bytes()))?;
-    write_file(&out.path().join(MARKER), |w| std::io::Write::write_all(w, json.as_bytes()))?;
-    out.commit()?;
-    Ok((Some(Finished { document, report: job.out.join("report.html") }), used))
+    commit_audit(out, &page, &json, job.share_safe)?;
+    Ok((Some(Finished { document, report: job.out.join(PAGE) }), used))
 }
 
 /// What was read: of photos, those that were used.
@@ -122,7 +121,7 @@ fn input(job: &ImagesJob<'_>, tally: &Tally, outcome: &Outcome) -> anyhow::Resul
     };
     Ok(Input {
         path: Some(job.path.display().to_string()),
-        sha256,
+        sha256: Some(sha256),
         n_points: tally.n_points as u64,
         scale_m_per_unit: None,
         unit_in_map_units: None,

@@ -17,6 +17,13 @@ const OTHER_ENDINGS: [&str; 24] = [
     "arw", "avif", "bmp", "cr2", "cr3", "dng", "exr", "gif", "hdr", "heic", "heif", "j2k", "jp2",
     "jxl", "nef", "orf", "pbm", "pgm", "ppm", "raf", "rw2", "tga", "tif", "tiff",
 ];
+
+/// Whether a file of this name in a folder of photos is taken for one.
+pub fn is_photo(path: &Path) -> bool {
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
+    ending.is_some_and(|ending| ENDINGS.contains(&&*ending))
+}
+
 /// Pixels a side below which nothing can be an extremum.
 const LEAST_SIDE: usize = 3;
 /// Standard deviation of a SIFT keypoint in pixels of the image it was found in, as hloc states it.

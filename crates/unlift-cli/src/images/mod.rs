@@ -11,7 +11,7 @@ use std::path::Path;
 use unlift_features::SiftOptions;
 use unlift_io::features::{self, ImageFeatures};
 
-pub use folder::Folder;
+pub use folder::{Folder, is_photo};
 
 /// Images by name, one at a time. Shared by threads; memory grows by names only.
 ///

@@ -7,13 +7,15 @@ use std::time::UNIX_EPOCH;
 
 use unlift_features::SiftOptions;
 use unlift_io::Error;
-use unlift_io::atomic::write_file;
+use unlift_io::atomic::{Access, sweep, write_file};
 use unlift_io::features::{FeatureWriter, ImageFeatures, decode, encode};
 use unlift_io::hash::hash_bytes;
 
 /// Changes when the same photo and options may give other features.
 const VERSION: &str = concat!("unlift ", env!("CARGO_PKG_VERSION"), " features 1");
 const ENDING: &str = ".part.h5";
+/// Letters of a part's name.
+const HASH: usize = 32;
 const JOINED: &str = "joined.h5";
 
 /// Writes a part, whole or not at all.
@@ -22,7 +24,7 @@ const JOINED: &str = "joined.h5";
 /// When the disk fails.
 pub fn write_part(part: &Path, image: &ImageFeatures) -> Result<(), Error> {
     let bytes = encode(image, part)?;
-    write_file(part, |out| out.write_all(&bytes))
+    write_file(part, Access::Usual, |out| out.write_all(&bytes))
 }
 
 /// The folder `FILE.parts` beside an output `FILE`.
@@ -46,6 +48,7 @@ impl Parts {
         if !folder.is_dir() {
             fs::create_dir(&folder).map_err(|source| Error::write(&folder, source))?;
         }
+        sweep(&folder);
         Ok(Self { folder, options: format!("{options:?}") })
     }
 
@@ -61,7 +64,7 @@ impl Parts {
         let length = metadata.len();
         let key = format!("{VERSION}\n{}\n{length} {changed}\n{name}", self.options);
         let hash = hash_bytes(key.as_bytes());
-        Ok(self.folder.join(format!("{}{ENDING}", &hash[..32])))
+        Ok(self.folder.join(format!("{}{ENDING}", &hash[..HASH])))
     }
 
     /// Joins the parts of these images, in this order, to the file `target`, which appears whole; then
@@ -96,7 +99,10 @@ impl Parts {
         for entry in entries.flatten() {
             let name = entry.file_name();
             let name = name.to_string_lossy();
-            if name.ends_with(ENDING) || name.ends_with(".partial") || name == JOINED {
+            let is_part = name.strip_suffix(ENDING).is_some_and(|hash| {
+                hash.len() == HASH && hash.bytes().all(|byte| byte.is_ascii_hexdigit())
+            });
+            if is_part || name == JOINED {
                 let _ = fs::remove_file(entry.path());
             }
         }

@@ -1,7 +1,8 @@
 //! Line segments as OBJ.
 
 use super::Segment;
-use crate::{Error, atomic};
+use crate::Error;
+use crate::atomic::{self, Access, CLOUD_COMMENT};
 use std::io::Write;
 use std::path::Path;
 
@@ -17,7 +18,8 @@ pub fn write_lines<const D: usize>(path: &Path, segments: &[Segment<D>]) -> Resu
         let place = format!("segment {row}");
         return Err(Error::new(path, place, "finite coordinates", found));
     }
-    atomic::write_file(path, |w| {
+    atomic::write_file(path, Access::Private, |w| {
+        writeln!(w, "# {CLOUD_COMMENT}")?;
         for (row, segment) in segments.iter().enumerate() {
             for end in segment {
                 let [x, y, z] = std::array::from_fn(|c| end.get(c).copied().unwrap_or(0.0));

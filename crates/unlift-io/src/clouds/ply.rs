@@ -1,7 +1,8 @@
 //! Point clouds as binary PLY.
 
 use super::error_color;
-use crate::{Error, atomic};
+use crate::Error;
+use crate::atomic::{self, Access, CLOUD_COMMENT};
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -24,7 +25,7 @@ pub fn write_points<const D: usize>(
     for (row, point) in points.iter().enumerate() {
         finite(path, row, point)?;
     }
-    atomic::write_file(path, |w| {
+    atomic::write_file(path, Access::Private, |w| {
         header(w, points.len(), colors.is_some(), false)?;
         for (row, point) in points.iter().enumerate() {
             coordinates(w, point)?;
@@ -59,7 +60,7 @@ pub fn write_recovered<const D: usize>(
         }
     }
     let n_found = points.iter().flatten().count();
-    atomic::write_file(path, |w| {
+    atomic::write_file(path, Access::Private, |w| {
         header(w, n_found, true, true)?;
         for (point, &error) in points.iter().zip(errors) {
             if let Some(point) = point {
@@ -73,7 +74,8 @@ pub fn write_recovered<const D: usize>(
 }
 
 fn header(w: &mut impl Write, n: usize, colored: bool, with_error: bool) -> io::Result<()> {
-    write!(w, "ply\nformat binary_little_endian 1.0\nelement vertex {n}\n")?;
+    write!(w, "ply\nformat binary_little_endian 1.0\ncomment {CLOUD_COMMENT}\n")?;
+    writeln!(w, "element vertex {n}")?;
     for axis in ["x", "y", "z"] {
         writeln!(w, "property double {axis}")?;
     }

@@ -80,7 +80,7 @@ fn every_malformed_file_of_features_is_refused_with_its_line() {
         ("a signature alone", good()[..8].to_vec(),
             "f: expected a whole HDF5 file, found HDF5 format error: unexpected EOF: need 9 bytes, have 8"),
         ("cut in the middle", good()[..900].to_vec(),
-            "f: expected a whole HDF5 file of 3608 bytes, found 900 bytes"),
+            "f: expected a whole HDF5 file of 3640 bytes, found 900 bytes"),
         ("another version", patched(8, 9), "f: expected a whole HDF5 file, found HDF5 format error: unsupported superblock version: 9"),
         ("no image", { let mut out = Cursor::new(Vec::new()); Writer::start(&mut out).unwrap().finish(&mut out).unwrap(); out.into_inner() },
             "f: expected at least one image, found none"),

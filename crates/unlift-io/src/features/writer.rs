@@ -7,7 +7,7 @@ use unlift::descriptors::Values;
 
 use super::ImageFeatures;
 use super::h5::{Array, Numbers, Writer};
-use crate::atomic::OutputFile;
+use crate::atomic::{Access, OutputFile};
 use crate::error::Error;
 use crate::read::lines::quoted;
 
@@ -27,7 +27,7 @@ impl FeatureWriter {
     /// # Errors
     /// When no file can be written there.
     pub fn create(path: &Path) -> Result<Self, Error> {
-        let mut output = OutputFile::create(path)?;
+        let mut output = OutputFile::create(path, Access::Usual)?;
         let writer = Writer::start(output.writer()).map_err(|e| Error::write(path, e))?;
         Ok(Self { output, writer })
     }

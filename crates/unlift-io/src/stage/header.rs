@@ -101,6 +101,11 @@ pub fn peek(path: &Path) -> Result<Header, Error> {
     Ok(Header { kind, dimension, n_rows })
 }
 
+/// The kind that the metadata of the file at `path` names; `None` where it names none, and where no stage file is.
+pub fn declared_kind(path: &Path) -> Option<Kind> {
+    Table::open(path).ok()?.meta().kind().ok()?
+}
+
 /// The metadata object of a file, with the file's name for messages.
 #[derive(Debug)]
 pub(super) struct Meta<'a> {

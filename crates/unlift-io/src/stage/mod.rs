@@ -19,7 +19,7 @@ mod table;
 mod truth;
 mod write;
 
-pub use header::{Header, Kind, peek};
+pub use header::{Header, Kind, declared_kind, peek};
 pub use neighborhoods::{
     PointNeighborhoods, read_neighborhoods, read_point_neighborhoods, write_neighborhoods,
 };

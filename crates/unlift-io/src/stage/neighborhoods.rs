@@ -6,6 +6,7 @@ use super::order::rows_by_key;
 use super::table::Table;
 use super::write::{field, list_field, lists, numbers, write_table};
 use crate::Error;
+use crate::atomic::Access;
 use arrow_array::types::{Float32Type, UInt32Type};
 use arrow_schema::DataType::{Float32, UInt32};
 use std::path::Path;
@@ -63,7 +64,7 @@ pub fn write_neighborhoods(path: &Path, neighborhoods: &Neighborhoods) -> Result
     }
     let mut meta = new_meta(Kind::Neighborhoods);
     insert_about(&mut meta, neighborhoods.about());
-    write_table(path, to_text(meta), fields, neighborhoods.n_slots(), |slots| {
+    write_table((path, Access::Private), to_text(meta), fields, neighborhoods.n_slots(), |slots| {
         let offsets = &neighborhoods.offsets()[slots.start..=slots.end];
         let lengths = || offsets.windows(2).map(|w| (w[1] - w[0]) as usize);
         let values = offsets[0] as usize..offsets[slots.len()] as usize;

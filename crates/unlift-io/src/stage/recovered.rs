@@ -6,6 +6,7 @@ use super::order::permutation;
 use super::table::Table;
 use super::write::{field, numbers, optional_numbers, write_table};
 use crate::Error;
+use crate::atomic::Access;
 use arrow_array::types::{Float32Type, Float64Type, UInt8Type, UInt16Type, UInt32Type};
 use arrow_array::{ArrayRef, StringArray};
 use arrow_schema::DataType::{Float32, Float64, UInt8, UInt16, UInt32, Utf8};
@@ -50,7 +51,7 @@ pub fn write_recovered<const D: usize>(path: &Path, recovered: &Recovered<D>) ->
     }
     fields.extend(recovered.axis().map(|_| field("axis", UInt8)));
     fields.extend(recovered.descriptor_row().map(|_| field("descriptor_row", UInt32)));
-    write_table(path, to_text(meta), fields, recovered.n_slots(), |slots| {
+    write_table((path, Access::Private), to_text(meta), fields, recovered.n_slots(), |slots| {
         let mut columns = vec![numbers::<UInt32Type>(slots.clone().map(|slot| slot as u32))];
         columns.extend((0..D).map(|axis| {
             let positions = slots.clone().map(|slot| recovered.position(slot));

@@ -5,6 +5,7 @@ use super::header::{Kind, insert_fingerprint, new_meta, to_text};
 use super::table::Table;
 use super::write::{field, list_field, lists, numbers, write_table};
 use crate::Error;
+use crate::atomic::Access;
 use arrow_array::ArrayRef;
 use arrow_array::types::{Float32Type, UInt8Type};
 use arrow_schema::DataType::{Float32, UInt8};
@@ -75,7 +76,7 @@ pub fn write_released<const D: usize>(path: &Path, released: &Released<D>) -> Re
         };
         fields.extend(descriptor_names(per_record).map(|name| list_field(name, of.clone())));
     }
-    write_table(path, to_text(meta), fields, released.n_records(), |rows| {
+    write_table((path, Access::Usual), to_text(meta), fields, released.n_records(), |rows| {
         let mut columns = record_columns(obfuscation, rows.clone());
         if let Some(descriptors) = released.descriptors() {
             let slots =

@@ -6,6 +6,7 @@ use super::order::permutation;
 use super::table::Table;
 use super::write::{field, numbers, optional_numbers, write_table};
 use crate::Error;
+use crate::atomic::Access;
 use arrow_array::types::{Float64Type, UInt8Type, UInt32Type};
 use arrow_array::{ArrayRef, StringArray};
 use arrow_schema::DataType::{Float64, UInt8, UInt32, Utf8};
@@ -46,7 +47,7 @@ pub fn write_truth<const D: usize>(
     let n_slots = secret.n_slots();
     let dropped = secret.dropped().iter().map(|d| d.original);
     let ids: Vec<OriginalId> = secret.hidden().iter().copied().chain(dropped).collect();
-    write_table(path, to_text(meta), fields, points.len(), |rows| {
+    write_table((path, Access::Private), to_text(meta), fields, points.len(), |rows| {
         let slot = |row: usize| (row < n_slots).then_some(row);
         let mut columns = vec![
             optional_numbers::<UInt32Type>(rows.clone().map(|row| slot(row).map(|s| s as u32))),

@@ -1,6 +1,7 @@
 //! Columns to a Parquet file: equal values, equal bytes.
 
-use crate::{Error, atomic};
+use crate::Error;
+use crate::atomic::{self, Access};
 use arrow_array::types::ArrowPrimitiveType;
 use arrow_array::{Array, ArrayRef, ListArray, PrimitiveArray, RecordBatch};
 use arrow_buffer::OffsetBuffer;
@@ -26,9 +27,9 @@ const GROUP_ROWS: usize = 1 << 20;
 /// They end earlier at this many bytes: a row group is held in memory until it is whole.
 const GROUP_BYTES: usize = 256 << 20;
 
-/// Writes `n_rows` rows; `columns` gives those of a range, in the order of `fields`.
+/// Writes `n_rows` rows for those whom `access` names; `columns` gives those of a range, in the order of `fields`.
 pub(super) fn write_table(
-    path: &Path,
+    (path, access): (&Path, Access),
     meta: String,
     fields: Vec<Field>,
     n_rows: usize,
@@ -36,7 +37,7 @@ pub(super) fn write_table(
 ) -> Result<(), Error> {
     let properties = properties(meta, &fields);
     let schema = Arc::new(Schema::new(fields));
-    atomic::write_file(path, |file| {
+    atomic::write_file(path, access, |file| {
         let options = ArrowWriterOptions::new()
             .with_properties(properties)
             .with_schema_root("schema".into())

@@ -73,7 +73,7 @@ pub fn document(metric: bool) -> Document {
         schema: SCHEMA,
         input: Input {
             path: Some("maps/furnished-room/sparse/0".into()),
-            sha256: "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08".into(),
+            sha256: Some("9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08".into()),
             n_points: 21_149,
             scale_m_per_unit: metric.then_some(1.0),
             unit_in_map_units: Some(if metric { 1.0 } else { 0.0834 }),

@@ -6,6 +6,7 @@ use std::io::{self, Seek, SeekFrom, Write};
 use super::Array;
 use super::messages::{self, UNDEFINED};
 use super::tree::{self, Entry};
+use crate::atomic::FEATURES_MARK;
 
 const SUPERBLOCK_BYTES: u64 = 96;
 
@@ -29,7 +30,10 @@ impl Writer {
     /// written last.
     pub fn start(out: &mut impl Write) -> io::Result<Self> {
         out.write_all(&[0; SUPERBLOCK_BYTES as usize])?;
-        Ok(Self { at: SUPERBLOCK_BYTES, root: BTreeMap::new() })
+        // Nothing refers to it: readers of HDF5 pass it over.
+        out.write_all(FEATURES_MARK)?;
+        let at = SUPERBLOCK_BYTES + FEATURES_MARK.len() as u64;
+        Ok(Self { at, root: BTreeMap::new() })
     }
 
     /// Whether the group `path` can be made: nothing is there yet, and no array stands in its way.

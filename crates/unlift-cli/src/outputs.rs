@@ -1,0 +1,72 @@
+//! Where results go: checked before anything is computed, and never over what is not ours.
+
+use std::path::{Path, PathBuf};
+
+use unlift_io::atomic::{Access, Kind, OutputSet, Rules, sweep};
+
+use crate::clouds;
+use crate::exit::usage;
+
+/// The page of an audit.
+pub const PAGE: &str = "report.html";
+/// The figures of an audit.
+pub const FIGURES: &str = "audit.json";
+
+/// An error of `--out`: of the command line, not of an input.
+pub fn refused(error: unlift_io::Error) -> anyhow::Error {
+    usage(format!("--out: {error}"))
+}
+
+/// Whether the one file `path` may be written, asked before the work and after it; where it will stand, links
+/// followed. What dead runs left unfinished beside it is cleared away.
+pub fn check_file(path: &Path, kind: Kind, rules: &Rules) -> anyhow::Result<PathBuf> {
+    let target = rules.check(path, kind).map_err(refused)?;
+    let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty());
+    sweep(folder.unwrap_or(Path::new(".")));
+    Ok(target)
+}
+
+/// What an audit shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shown {
+    /// Figures.
+    Figures,
+    /// Points in the page.
+    Points,
+    /// Also clouds.
+    Clouds,
+}
+
+/// Opens the folder that an audit goes to.
+pub fn open_audit(out: &Path, rules: Rules, shown: Shown) -> anyhow::Result<OutputSet> {
+    let access = if shown == Shown::Figures { Access::Usual } else { Access::Private };
+    let earlier = clouds::earlier(out);
+    let mut first = vec![(PAGE, Kind::Page), (FIGURES, Kind::AuditJson)];
+    match shown {
+        Shown::Clouds => first.extend(earlier.iter().map(|name| (name.as_str(), Kind::Cloud))),
+        Shown::Figures if !earlier.is_empty() => {
+            let folder = out.join(clouds::FOLDER);
+            let what = "clouds of an earlier audit show points, and stay";
+            eprintln!("unlift: note: {}: {what}", folder.display());
+        }
+        Shown::Figures | Shown::Points => {}
+    }
+    OutputSet::create(out, rules, access, &first).map_err(refused)
+}
+
+/// Puts an audit in its place: the page, then the figures.
+pub fn commit_audit(
+    mut out: OutputSet,
+    page: &str,
+    json: &str,
+    share_safe: bool,
+) -> Result<(), unlift_io::Error> {
+    let access = if share_safe { Access::Usual } else { Access::Private };
+    for (name, kind, text) in [(PAGE, Kind::Page, page), (FIGURES, Kind::AuditJson, json)] {
+        let staged = out.stage(name, kind)?;
+        unlift_io::atomic::write_file(&staged, access, |w| {
+            std::io::Write::write_all(w, text.as_bytes())
+        })?;
+    }
+    out.commit()
+}

@@ -1,0 +1,124 @@
+//! One output file.
+
+use std::fs::{self, File};
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use super::partial::Partial;
+use super::{Access, parent_of, resolved};
+use crate::Error;
+
+/// A file that is built in a temporary sibling and takes its place on [`commit`](Self::commit).
+///
+/// The bytes go to a temporary file in the same folder, which is flushed to disk and renamed. A
+/// symbolic link is followed: the file it names is replaced, not the link. Dropped without a commit,
+/// it leaves no trace.
+#[derive(Debug)]
+pub struct OutputFile {
+    path: PathBuf,
+    target: PathBuf,
+    writer: BufWriter<File>,
+    partial: Partial,
+}
+
+impl OutputFile {
+    /// Starts a file that will become `path`; what stands there stays as it is until the commit.
+    ///
+    /// # Errors
+    /// When the folder does not exist, `path` is a folder or a device, or the disk fails.
+    pub fn create(path: &Path, access: Access) -> Result<Self, Error> {
+        let target = Self::check(path)?;
+        let made = Partial::file(&target, access).map_err(|source| Error::write(path, source));
+        let (partial, file) = made?;
+        let writer = BufWriter::with_capacity(1 << 17, file);
+        Ok(Self { path: path.to_owned(), target, writer, partial })
+    }
+
+    /// Whether a file can be put at `path`, before hours of work go into it; where it will stand,
+    /// links followed.
+    ///
+    /// # Errors
+    /// As [`create`](Self::create).
+    pub fn check(path: &Path) -> Result<PathBuf, Error> {
+        let target = resolved(path).map_err(|source| Error::write(path, source))?;
+        match fs::metadata(&target) {
+            Ok(found) if found.is_dir() => return Err(Error::new(path, "", "a file", "a folder")),
+            // Renaming over a device or a pipe would replace it in the system.
+            Ok(found) if !found.is_file() => {
+                return Err(Error::new(path, "", "a regular file", "a device or a pipe"));
+            }
+            _ => {}
+        }
+        let folder = parent_of(&target);
+        if !folder.is_dir() {
+            return Err(Error::new(folder, "", "a folder to write in", "none"));
+        }
+        Ok(target)
+    }
+
+    /// The path as it was given, for errors.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Where the bytes go.
+    pub fn writer(&mut self) -> &mut BufWriter<File> {
+        &mut self.writer
+    }
+
+    /// Puts the file in its place.
+    ///
+    /// # Errors
+    /// When the disk fails; what stood there is still there then.
+    pub fn commit(mut self) -> Result<(), Error> {
+        let failed = |source| Error::write(&self.path, source);
+        self.writer.flush().map_err(failed)?;
+        self.writer.get_ref().sync_all().map_err(failed)?;
+        drop(self.writer);
+        self.partial.persist(&self.target).map_err(failed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{entries, write_file};
+    use super::*;
+    use std::io;
+
+    #[test]
+    fn a_failed_file_leaves_the_old_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.bin");
+        write_file(&path, Access::Usual, |w| w.write_all(b"old")).unwrap();
+        let broken = |w: &mut BufWriter<File>| {
+            w.write_all(b"new")?;
+            Err(io::Error::other("lost power"))
+        };
+        let error = write_file(&path, Access::Usual, broken).unwrap_err().to_string();
+        assert!(error.ends_with("a.bin: cannot write: lost power"), "{error}");
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        assert_eq!(entries(folder.path()), ["a.bin"]);
+    }
+
+    #[test]
+    fn a_folder_is_not_replaced_by_a_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let error = write_file(folder.path(), Access::Usual, |_| Ok(())).unwrap_err();
+        assert!(error.to_string().ends_with(": expected a file, found a folder"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_new_file_is_as_readable_as_any_other_or_private() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        write_file(&at("usual"), Access::Usual, |w| w.write_all(b"1")).unwrap();
+        fs::write(at("plain"), b"1").unwrap();
+        let mode = |name| fs::metadata(at(name)).unwrap().permissions().mode();
+        assert_eq!(mode("usual"), mode("plain"));
+        // What stood there was readable: what replaces it is not.
+        write_file(&at("usual"), Access::Private, |w| w.write_all(b"1")).unwrap();
+        assert_eq!(mode("usual") & 0o777, 0o600);
+    }
+}

@@ -1,0 +1,143 @@
+//! Whose file stands at a place: known by its content, as a name proves nothing.
+
+use std::fmt;
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::stage;
+
+/// What unlift writes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// `audit.json`: an object with a text `unlift` and a number `schema`.
+    AuditJson,
+    /// `report.html`: its head names unlift as the generator.
+    Page,
+    /// A Parquet file whose metadata names this kind.
+    Stage(stage::Kind),
+    /// A PLY or OBJ file with the comment [`CLOUD_COMMENT`] in its second line at the latest.
+    Cloud,
+    /// HDF5 with [`FEATURES_MARK`] behind the superblock.
+    Features,
+}
+
+/// The comment in clouds.
+pub(crate) const CLOUD_COMMENT: &str = "unlift";
+/// Between the superblock and the first array of features: no structure of HDF5 refers to it.
+pub(crate) const FEATURES_MARK: &[u8; 32] = b"unlift features, format 1\0\0\0\0\0\0\0";
+/// In the head of a page.
+const PAGE_MARK: &str = "<meta name=\"generator\" content=\"unlift\">";
+/// The head of a page ends before its style.
+const PAGE_HEAD: usize = 2048;
+
+impl Kind {
+    /// Whether the file at `path` is one of this kind. What cannot be read is none.
+    pub fn is_at(self, path: &Path) -> bool {
+        match self {
+            Self::AuditJson => is_audit(path),
+            Self::Page => start(path, PAGE_HEAD)
+                .is_some_and(|head| String::from_utf8_lossy(&head).contains(PAGE_MARK)),
+            Self::Stage(kind) => stage::declared_kind(path) == Some(kind),
+            Self::Cloud => start(path, 256).is_some_and(|head| is_cloud(&head)),
+            Self::Features => start(path, 128).is_some_and(|head| {
+                head.starts_with(b"\x89HDF\r\n\x1a\n") && head.get(96..) == Some(&FEATURES_MARK[..])
+            }),
+        }
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::AuditJson => f.write_str("an audit.json"),
+            Self::Page => f.write_str("a report"),
+            Self::Stage(kind) => kind.fmt(f),
+            Self::Cloud => f.write_str("a cloud"),
+            Self::Features => f.write_str("features"),
+        }
+    }
+}
+
+/// The first `n` bytes of a file that may have fewer.
+fn start(path: &Path, n: usize) -> Option<Vec<u8>> {
+    let mut head = Vec::with_capacity(n);
+    File::open(path).ok()?.take(n as u64).read_to_end(&mut head).ok()?;
+    Some(head)
+}
+
+fn is_audit(path: &Path) -> bool {
+    let Ok(file) = File::open(path) else { return false };
+    let parsed: Result<Value, _> = serde_json::from_reader(BufReader::new(file));
+    parsed.is_ok_and(|value| value["unlift"].is_string() && value["schema"].is_u64())
+}
+
+fn is_cloud(head: &[u8]) -> bool {
+    let mut lines = head.split(|&byte| byte == b'\n');
+    match lines.next() {
+        Some(b"ply") => {
+            let comment = format!("comment {CLOUD_COMMENT}");
+            lines.nth(1).is_some_and(|line| line == comment.as_bytes())
+        }
+        Some(line) => line == format!("# {CLOUD_COMMENT}").as_bytes(),
+        None => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn files_of_others_are_not_ours() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x");
+        let kinds = [
+            Kind::AuditJson,
+            Kind::Page,
+            Kind::Stage(stage::Kind::Truth),
+            Kind::Cloud,
+            Kind::Features,
+        ];
+        let of_others: [&[u8]; 9] = [
+            b"",
+            b"{}",
+            // What `npm audit --json` writes, in short.
+            br#"{"auditReportVersion": 2, "vulnerabilities": {}, "metadata": {}}"#,
+            br#"["unlift", "schema"]"#,
+            b"<!doctype html><title>my notes on unlift</title>",
+            b"ply\nformat ascii 1.0\nelement vertex 0\nend_header\n",
+            b"# Blender\nv 0 0 0\n",
+            b"\x89HDF\r\n\x1a\n",
+            b"PAR1PAR1",
+        ];
+        for content in of_others {
+            fs::write(&path, content).unwrap();
+            for kind in kinds {
+                assert!(!kind.is_at(&path), "{kind}: {}", String::from_utf8_lossy(content));
+            }
+        }
+        fs::write(&path, [b"\x89HDF\r\n\x1a\n".as_slice(), &[0; 200]].concat()).unwrap();
+        assert!(!Kind::Features.is_at(&path));
+    }
+
+    #[test]
+    fn our_own_are_known() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x");
+        let is = |kind: Kind, content: &[u8]| {
+            fs::write(&path, content).unwrap();
+            kind.is_at(&path)
+        };
+        assert!(is(Kind::AuditJson, br#"{"unlift": "0.1.0", "schema": 1, "results": []}"#));
+        assert!(is(Kind::Page, format!("<!doctype html>\n<head>{PAGE_MARK}").as_bytes()));
+        let points = [[1.0, 2.0, 3.0]];
+        crate::clouds::write_points(&path, &points, None).unwrap();
+        assert!(Kind::Cloud.is_at(&path));
+        crate::clouds::write_lines(&path, &[[[0.0; 3], [1.0; 3]]]).unwrap();
+        assert!(Kind::Cloud.is_at(&path));
+    }
+}

@@ -1,0 +1,77 @@
+//! Outputs that appear whole or not at all, and that never cost anybody a file.
+//!
+//! Everything is built under a temporary name ([`partial`]) beside its place and renamed when it is whole. What
+//! stands at the place is replaced only if it is of the kind that is written there ([`Kind`], by content), and never
+//! if it is an input of the same run ([`Rules`]). Nothing else is touched: a folder that is written to may hold
+//! anything.
+
+mod file;
+mod kind;
+mod partial;
+mod rules;
+mod set;
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter};
+use std::path::{Path, PathBuf};
+
+use crate::Error;
+
+pub use file::OutputFile;
+pub use kind::Kind;
+pub(crate) use kind::{CLOUD_COMMENT, FEATURES_MARK};
+pub use partial::{abandon, sweep};
+pub use rules::Rules;
+pub use set::OutputSet;
+
+/// Who may read what is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    /// As any new file or folder.
+    Usual,
+    /// Its owner alone: truth, recovered points, pages that show them. Unix: files 0600, folders 0700.
+    Private,
+}
+
+/// Writes the file `path` through `fill`; whatever stood there stays until the new file is whole.
+///
+/// As [`OutputFile`], for what is written in one go.
+///
+/// # Errors
+/// When the folder does not exist, `path` is a folder or a device, `fill` fails, or the disk does.
+/// Nothing is left behind then.
+pub fn write_file(
+    path: &Path,
+    access: Access,
+    fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> Result<(), Error> {
+    let mut output = OutputFile::create(path, access)?;
+    fill(output.writer()).map_err(|source| Error::write(path, source))?;
+    output.commit()
+}
+
+/// Where a symbolic link points, or the path itself.
+fn resolved(path: &Path) -> io::Result<PathBuf> {
+    let named = path.file_name().is_some();
+    if path.is_symlink() || (!named && path.exists()) {
+        fs::canonicalize(path)
+    } else {
+        Ok(path.to_owned())
+    }
+}
+
+fn parent_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}
+
+/// The names in a folder, sorted.
+#[cfg(test)]
+fn entries(folder: &Path) -> Vec<String> {
+    let name = |entry: io::Result<fs::DirEntry>| entry.unwrap().file_name().into_string().unwrap();
+    let mut names: Vec<String> = fs::read_dir(folder).unwrap().map(name).collect();
+    names.sort();
+    names
+}

@@ -1,0 +1,282 @@
+//! What an unfinished output is called, and how it goes away: by its owner, on a signal, or by a later run.
+//!
+//! A partial file or folder is `.NAME.unlift-xxxxxx.partial` beside its place. The process that makes it keeps a
+//! lock on it (`flock`), which the system takes back when that process ends in any way: so a later run can tell
+//! what a dead one left from what a living one is at, on any machine that shares the disk and locks.
+
+use std::fs::{self, File, OpenOptions};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use super::{Access, parent_of};
+
+/// What this process is building, and the folders that it made for it, in order. Whoever makes, renames or removes
+/// one holds the lock, so that [`abandon`] meets nothing half done.
+static LIVE: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+const SIGN: &str = ".unlift-";
+const ENDING: &str = ".partial";
+/// Random letters in a name.
+const RANDOM: usize = 6;
+
+fn live() -> MutexGuard<'static, Vec<PathBuf>> {
+    // A list of paths is in order whatever panicked.
+    LIVE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes everything that this process has not finished, and lets nothing new begin: the process is about to end.
+///
+/// What was put in its place is whole and stays.
+pub fn abandon() {
+    let mut live = live();
+    for path in live.drain(..).rev() {
+        remove(&path);
+    }
+    // Kept for good: a thread that works on must not begin another file.
+    std::mem::forget(live);
+}
+
+/// Files and folders of ours, or a folder that was made for an output: that one only when it is empty.
+fn remove(path: &Path) {
+    if is_partial_name(path) && path.is_dir() {
+        // Another thread may be writing in it.
+        for _ in 0..10 {
+            if fs::remove_dir_all(path).is_ok() {
+                return;
+            }
+        }
+    } else if path.is_dir() {
+        let _ = fs::remove_dir(path);
+    } else {
+        let _ = fs::remove_file(path);
+    }
+}
+
+fn is_partial_name(path: &Path) -> bool {
+    let Some(name) = path.file_name().and_then(|name| name.to_str()) else { return false };
+    let random = name.strip_suffix(ENDING).and_then(|name| name.rsplit_once(SIGN));
+    name.starts_with('.')
+        && random.is_some_and(|(_, random)| {
+            random.len() == RANDOM && random.bytes().all(|byte| byte.is_ascii_alphanumeric())
+        })
+}
+
+/// Removes what dead processes left unfinished in `folder`; what a living one works on stays.
+///
+/// By name and by lock: a file of any other name is none of ours. What cannot be removed is in nobody's way.
+pub fn sweep(folder: &Path) {
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    for entry in entries.flatten() {
+        let path = entry.path();
+        let is_link = entry.file_type().is_ok_and(|kind| kind.is_symlink());
+        if !is_link && is_partial_name(&path) && is_dead(&path) {
+            remove(&path);
+        }
+    }
+}
+
+#[cfg(unix)]
+fn is_dead(path: &Path) -> bool {
+    File::open(path).is_ok_and(|file| file.try_lock().is_ok())
+}
+
+/// Folders cannot be locked everywhere: nothing is swept.
+#[cfg(not(unix))]
+fn is_dead(_: &Path) -> bool {
+    false
+}
+
+/// A file or folder that is gone when dropped, unless it was put in its place.
+#[derive(Debug)]
+pub(super) struct Partial {
+    path: PathBuf,
+    /// Holds the lock.
+    _locked: Option<File>,
+}
+
+impl Partial {
+    /// A new file beside `target`, and the file to write to.
+    pub fn file(target: &Path, access: Access) -> io::Result<(Self, File)> {
+        make(parent_of(target), target, |path| {
+            let mut options = OpenOptions::new();
+            options.read(true).write(true).create_new(true);
+            #[cfg(unix)]
+            if access == Access::Private {
+                std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+            }
+            let file = options.open(path)?;
+            Ok((file.try_clone().ok(), file))
+        })
+    }
+
+    /// A new folder in `folder`, of which only its owner may see what is built there.
+    pub fn folder(folder: &Path) -> io::Result<Self> {
+        let made = make(folder, Path::new("output"), |path| {
+            make_folder(path, Access::Private)?;
+            Ok((File::open(path).ok(), ()))
+        });
+        made.map(|(partial, ())| partial)
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Renames it to `target`.
+    pub fn persist(mut self, target: &Path) -> io::Result<()> {
+        let mut live = live();
+        fs::rename(&self.path, target)?;
+        live.retain(|path| *path != self.path);
+        self.path.clear();
+        Ok(())
+    }
+}
+
+impl Drop for Partial {
+    fn drop(&mut self) {
+        if self.path.as_os_str().is_empty() {
+            return;
+        }
+        let mut live = live();
+        remove(&self.path);
+        live.retain(|path| *path != self.path);
+    }
+}
+
+fn make<T>(
+    folder: &Path,
+    target: &Path,
+    mut new: impl FnMut(&Path) -> io::Result<(Option<File>, T)>,
+) -> io::Result<(Partial, T)> {
+    let name = target.file_name().unwrap_or_default().to_string_lossy();
+    // File names end at 255 bytes, and this one is longer.
+    let prefix = format!(".{}{SIGN}", name.chars().take(40).collect::<String>());
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(&prefix).suffix(ENDING).rand_bytes(RANDOM);
+    let mut live = live();
+    loop {
+        let ((file, made), path) = builder.make_in(folder, &mut new)?.into_parts();
+        let path = path.keep().map_err(|refused| refused.error)?;
+        // Where there are no locks nothing is swept.
+        let locked = file.filter(|file| file.lock().is_ok());
+        // Between being made and being locked it looks dead, and may have been swept.
+        if path.exists() {
+            live.push(path.clone());
+            return Ok((Partial { path, _locked: locked }, made));
+        }
+    }
+}
+
+/// Makes a folder.
+fn make_folder(path: &Path, access: Access) -> io::Result<()> {
+    let mut builder = fs::DirBuilder::new();
+    #[cfg(unix)]
+    if access == Access::Private {
+        std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
+    }
+    builder.create(path)
+}
+
+/// A folder that was made for an output, with its parents: those that are empty are gone when this is dropped.
+#[derive(Debug)]
+pub(super) struct MadeFolders(Vec<PathBuf>);
+
+impl MadeFolders {
+    /// Makes `folder` and its missing parents.
+    pub fn make(folder: &Path, access: Access) -> io::Result<Self> {
+        let missing: Vec<&Path> = folder
+            .ancestors()
+            .take_while(|path| !path.as_os_str().is_empty() && !path.exists())
+            .collect();
+        let mut made = Self(Vec::new());
+        for path in missing.into_iter().rev() {
+            let mut live = live();
+            match make_folder(path, access) {
+                Ok(()) => {
+                    live.push(path.to_owned());
+                    made.0.push(path.to_owned());
+                }
+                // Another program made it meanwhile: it is not ours to remove.
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+                Err(error) => {
+                    drop(live);
+                    return Err(error);
+                }
+            }
+        }
+        Ok(made)
+    }
+
+    /// They stay.
+    pub fn keep(mut self) {
+        let kept = std::mem::take(&mut self.0);
+        live().retain(|path| !kept.contains(path));
+    }
+}
+
+impl Drop for MadeFolders {
+    fn drop(&mut self) {
+        let mut live = live();
+        for path in self.0.iter().rev() {
+            // Only when empty: somebody else may have put something there meanwhile.
+            let _ = fs::remove_dir(path);
+        }
+        live.retain(|path| !self.0.contains(path));
+    }
+}
+
+/// Runs `step` so that [`abandon`] comes before or after it.
+pub(super) fn undisturbed<T>(step: impl FnOnce() -> T) -> T {
+    let _live = live();
+    step()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::entries;
+    use super::*;
+
+    #[test]
+    fn only_our_names_of_dead_processes_are_swept() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let (living, _file) = Partial::file(&at("a.bin"), Access::Usual).unwrap();
+        let busy = Partial::folder(folder.path()).unwrap();
+        let others = [
+            ".a.bin.unlift-abcde.partial",
+            ".a.bin.unlift-abc+ef.partial",
+            ".a.bin.abcdef.partial",
+            "a.bin.unlift-abcdef.partial",
+            ".a.bin.unlift-abcdef.partial~",
+        ];
+        for name in others {
+            fs::write(at(name), "mine").unwrap();
+        }
+        fs::write(at(".a.bin.unlift-abcdef.partial"), "of a dead process").unwrap();
+        fs::create_dir(at(".output.unlift-ABC123.partial")).unwrap();
+        fs::write(at(".output.unlift-ABC123.partial/truth"), "of a dead process").unwrap();
+        sweep(folder.path());
+        let name = |of: &Partial| of.path().file_name().unwrap().to_str().unwrap().to_owned();
+        let mut kept: Vec<String> = others.map(str::to_owned).to_vec();
+        kept.extend([name(&living), name(&busy)]);
+        kept.sort();
+        assert_eq!(entries(folder.path()), kept);
+        drop((living, busy));
+        assert_eq!(entries(folder.path()).len(), others.len());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_to_folders_are_not_followed() {
+        let folder = tempfile::tempdir().unwrap();
+        let precious = folder.path().join("precious");
+        fs::create_dir(&precious).unwrap();
+        fs::write(precious.join("a"), "mine").unwrap();
+        let link = folder.path().join(".output.unlift-ABC123.partial");
+        std::os::unix::fs::symlink(&precious, link).unwrap();
+        sweep(folder.path());
+        assert_eq!(fs::read(precious.join("a")).unwrap(), b"mine");
+    }
+}
