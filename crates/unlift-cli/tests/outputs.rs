@@ -289,12 +289,13 @@ fn an_interrupted_audit_leaves_all_or_nothing() {
     let whole = [
         "out/audit.json",
         "out/clouds/olc-obfuscated.obj",
-        "out/clouds/olc-recovered-1-joint.ply",
+        "out/clouds/olc-recovered-1-consensus.ply",
         "out/clouds/original.ply",
         "out/report.html",
         "room.csv",
     ];
-    interrupted(&format!("audit map room.csv {QUICK} --write-clouds --out out"), 3000, &whole);
+    let line = format!("audit map room.csv {QUICK} --solver consensus --write-clouds --out out");
+    interrupted(&line, 3000, &whole);
 }
 
 /// Waits for the unfinished folder of a run.
