@@ -1,15 +1,18 @@
 //! A made-up audit of a made-up room, for tests and for looking at the page.
 
-#![allow(dead_code, reason = "each user of this file uses a part of it")]
+#![allow(dead_code, unused_imports, reason = "each user of this file uses a part of it")]
+
+mod images;
+mod scene;
 
 use indexmap::IndexMap;
-use unlift_report::Given;
 use unlift_report::document::{
-    Bound, BreakEven, Distinct, Document, GateResult, ImageCounts, ImageFigures, ImageRow, Input,
-    LengthUnit, NotAudited, ReliabilityBin, Row, Run, SCHEMA, Seconds,
+    Bound, BreakEven, Document, GateResult, Input, LengthUnit, NotAudited, ReliabilityBin, Row,
+    Run, SCHEMA, Seconds,
 };
-use unlift_report::pictures::{Graph, Marks, Picture, RecoveredView, ReleasedView};
-use unlift_report::scene::{ObfuscationView, Scene3d, SceneBox, Shapes, View};
+
+pub use images::{images, picture};
+pub use scene::scene;
 
 pub const SCHEMES: [&str; 7] = ["olc", "ppl", "ppl+", "ray", "ray-voxel", "plane", "cp"];
 pub const RATIOS: [f64; 6] = [1.0, 0.75, 0.5, 0.3, 0.2, 0.1];
@@ -216,201 +219,10 @@ fn row(s: usize, r: usize, solver: &str, thresholds: [&str; 2], unit: LengthUnit
     }
 }
 
-/// An audit of two images under two schemes.
-pub fn images() -> Document {
-    let mut document = document(true);
-    let by_threshold = |values: [f64; 4]| -> IndexMap<String, f64> {
-        ["1", "5", "10", "25"].map(str::to_owned).into_iter().zip(values).collect()
-    };
-    document
-        .results
-        .retain(|row| row.solver == "consensus" && ["olc", "cp"].contains(&&*row.scheme));
-    for (at, row) in document.results.iter_mut().enumerate() {
-        row.scheme = if row.scheme == "olc" { "lines2d" } else { "cp2d" }.into();
-        let less = at as f64;
-        row.recovered_percent = by_threshold([21.5 - less, 61.5 - less, 81.5 - less, 95.5 - less]);
-        row.blind_percent = by_threshold([0.5, 2.25, 4.5, 11.0]);
-        (row.unit, row.reliability) = (LengthUnit::Pixel, None);
-        (row.sure_percent, row.sure_correct_percent) = (None, None);
-        row.sure_unknown = Some("nobody has compared it with what comes true in images".into());
-        (row.records_alone_percent, row.records_alone_by) = (None, None);
-        row.distinct = Some(Distinct {
-            n_places: 17_000,
-            recovered_percent: by_threshold([20.25, 60.25, 80.25, 94.25]),
-            blind_percent: row.blind_percent.clone(),
-        });
-    }
-    document.break_even.clear();
-    document.gates.clear();
-    document.run.seconds.rows.clear();
-    document.input.images = Some(ImageCounts { found: 4, used: 2, unusable: 1, too_small: 1 });
-    document.images = ["kitchen/secret.jpg", "b.jpg"]
-        .map(|name| ImageFigures {
-            name: Some(name.into()),
-            n_points: 10_574,
-            rows: document
-                .results
-                .iter()
-                .map(|row| ImageRow {
-                    recovered_percent: row.recovered_percent.clone(),
-                    distinct_percent: row.recovered_percent.clone(),
-                    inlier_ratio: row.inlier_ratio,
-                    median_error: Some(3.25),
-                })
-                .collect(),
-        })
-        .into();
-    document
-}
-
-/// A picture of the first image of [`images`].
-pub fn picture() -> Picture {
-    let place = |i: u64| [0, 1].map(|c| unit_random(2 * i + c) * [640.0, 480.0][c as usize]);
-    let keypoints: Vec<[f32; 2]> = (0..300).map(place).collect();
-    let given = Given { neighbors: "oracle".into(), oracle_noise: None, inlier_ratio: 0.5 };
-    let views = ["lines2d", "cp2d"].map(|scheme| RecoveredView {
-        scheme: scheme.into(),
-        given: given.clone(),
-        solver: "joint".into(),
-        recovered: keypoints.iter().map(|p| Some(p.map(|x| x + 4.0))).collect(),
-    });
-    let lines = keypoints.iter().map(|p| Some([[p[0], 0.0], [p[0], 479.0]])).collect();
-    let released = vec![
-        ReleasedView { scheme: "lines2d".into(), marks: Marks::Lines(lines) },
-        ReleasedView {
-            scheme: "cp2d".into(),
-            marks: Marks::Points(keypoints.iter().map(|p| Some([p[0], 7.0])).collect()),
-        },
-    ];
-    let graphs = vec![Graph {
-        given,
-        neighbors: (0..300).map(|i| (1..6).map(|j| place((i + j) % 300)).collect()).collect(),
-    }];
-    let name = "kitchen/secret.jpg".into();
-    let note = "median".into();
-    Picture {
-        name,
-        note,
-        size: [640, 480],
-        photo: None,
-        keypoints,
-        released,
-        views: views.into(),
-        graphs,
-    }
-}
-
 /// A number in 0..1 from a counter.
 fn unit_random(counter: u64) -> f32 {
     let mut z = counter.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x51_7C_C1_B7_27_22_0A_95;
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
     ((z ^ (z >> 31)) >> 40) as f32 / (1u64 << 24) as f32
-}
-
-/// A room of 6 x 4.5 x 2.6 with a table, a shelf and two boxes.
-fn room(n: usize) -> Vec<[f32; 3]> {
-    let boxes: [([f32; 3], [f32; 3]); 8] = [
-        ([0.0, 0.0, 0.0], [6.0, 4.5, 2.6]),
-        ([2.0, 1.4, 0.70], [3.9, 2.6, 0.75]),
-        ([2.1, 1.5, 0.0], [2.2, 1.6, 0.7]),
-        ([3.7, 2.4, 0.0], [3.8, 2.5, 0.7]),
-        ([0.1, 0.2, 0.0], [0.5, 1.9, 2.0]),
-        ([5.2, 3.4, 0.0], [5.9, 4.3, 0.9]),
-        ([2.6, 1.7, 0.75], [2.9, 2.0, 1.1]),
-        ([4.6, 0.1, 0.0], [5.6, 0.5, 1.4]),
-    ];
-    let point = |i: usize| {
-        let at = |lane: u64| unit_random(8 * i as u64 + lane);
-        // Furniture is denser than walls.
-        let which = if at(0) < 0.45 { 0 } else { 1 + (at(1) * 6.999) as usize };
-        let (low, high) = boxes[which];
-        let axis = (at(2) * 2.999) as usize;
-        let mut p: [f32; 3] =
-            std::array::from_fn(|a| low[a] + at(3 + a as u64) * (high[a] - low[a]));
-        p[axis] = if at(6) < 0.5 { low[axis] } else { high[axis] };
-        p.map(|x| x + 0.012 * (at(7) - 0.5))
-    };
-    (0..n).map(point).collect()
-}
-
-/// Points of the room and what came back of them, in keeping with the figures of `document`.
-pub fn scene(document: &Document, n: usize) -> Scene3d {
-    let originals = room(n);
-    let bounds = SceneBox::robust(&originals);
-    let direction = |i: usize| -> [f32; 3] {
-        std::array::from_fn(|a| unit_random(900_000 + 3 * i as u64 + a as u64) - 0.5)
-    };
-    let center = [3.0, 2.2, 1.3];
-    let obfuscations = SCHEMES.map(|scheme| {
-        let indices = 0..1_500.min(n);
-        let shapes = match scheme {
-            "plane" => Shapes::Patches(
-                indices
-                    .step_by(10)
-                    .filter_map(|i| bounds.axis_patch(i / 10 % 3, originals[i][i / 10 % 3]))
-                    .collect(),
-            ),
-            "cp" => Shapes::Points(
-                originals
-                    .iter()
-                    .enumerate()
-                    .map(|(i, p)| {
-                        let mut q = *p;
-                        q[i % 3] = originals[(i * 7 + 1) % n][i % 3];
-                        q
-                    })
-                    .collect(),
-            ),
-            "ray" | "ray-voxel" => Shapes::Segments(
-                indices
-                    .filter_map(|i| {
-                        let d = std::array::from_fn(|a| originals[i][a] - center[a]);
-                        bounds.clip_ray(center, d)
-                    })
-                    .collect(),
-            ),
-            _ => Shapes::Segments(
-                indices.filter_map(|i| bounds.clip_line(originals[i], direction(i))).collect(),
-            ),
-        };
-        // Every hundredth point is left out by one scheme.
-        let withheld = (0..if scheme == "ppl+" { n } else { 0 }).step_by(100).collect();
-        ObfuscationView { scheme: scheme.into(), shapes, n_records: n as u64, withheld }
-    });
-    let views = document.results.iter().enumerate().map(|(r, row)| {
-        let share = row.recovered_percent[0] as f32 / 100.0;
-        let recovered = originals.iter().enumerate().map(|(i, p)| {
-            let chance = |lane: u64| unit_random(77 + 16 * (i as u64 + n as u64 * r as u64) + lane);
-            if chance(0) < row.n_lost as f32 / row.n_points as f32 {
-                return [f32::NAN; 3];
-            }
-            let size =
-                if chance(1) < share { 0.05 * chance(2) } else { 0.15 + 4.0 * chance(2).powi(3) };
-            std::array::from_fn(|a| p[a] + size * (chance(3 + a as u64) - 0.5))
-        });
-        View {
-            scheme: row.scheme.clone(),
-            given: Given {
-                neighbors: row.neighbors.clone(),
-                oracle_noise: row.oracle_noise.clone(),
-                inlier_ratio: row.inlier_ratio,
-            },
-            solver: row.solver.clone(),
-            recovered: recovered.collect(),
-        }
-    });
-    let views = views.collect();
-    let cameras = (0..40).map(|i| {
-        let angle = i as f32 * 0.157;
-        [3.0 + 1.6 * angle.cos(), 2.2 + 1.1 * angle.sin(), 1.5]
-    });
-    Scene3d {
-        n_points: document.input.n_points,
-        cameras: cameras.collect(),
-        up: None,
-        obfuscations: obfuscations.into(),
-        views,
-        originals,
-    }
 }

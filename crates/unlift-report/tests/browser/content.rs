@@ -1,0 +1,123 @@
+//! What the page shows: curves, tables, canvases; no errors, no network, some of it without script.
+
+use serde_json::json;
+use unlift_report::{RenderOptions, render};
+
+use super::{PageFile, browser, private_page, sample};
+
+#[test]
+fn curves_tables_and_canvas_are_there_without_errors_or_network() {
+    let Some(mut browser) = browser() else { return };
+    let file = PageFile::new("private", &private_page(true));
+    for (width, height) in [(1280, 900), (390, 844)] {
+        browser.emulate(width, height, "light");
+        browser.open(&file.0);
+        // One overview, one chart per scheme, one of errors; each with drawn curves.
+        assert_eq!(browser.evaluate("document.documentElement.dataset.charts"), json!("10"));
+        let empty = "[...document.querySelectorAll('.chart')].filter(c => c.querySelectorAll('svg path').length < 10).length";
+        assert_eq!(browser.evaluate(empty), json!(0));
+        assert_eq!(browser.evaluate("document.querySelectorAll('table').length >= 5"), json!(true));
+        assert_eq!(browser.evaluate("document.documentElement.dataset.scene"), json!("drawn"));
+        assert_eq!(
+            browser.evaluate("+document.documentElement.dataset.scenePoints > 3000"),
+            json!(true)
+        );
+        let wider = "document.documentElement.scrollWidth > document.documentElement.clientWidth";
+        assert_eq!(
+            browser.evaluate(wider),
+            json!(false),
+            "the page scrolls sideways at {width} px"
+        );
+        assert_eq!(browser.complaints, Vec::<String>::new());
+    }
+}
+
+#[test]
+fn the_canvas_shows_points_and_answers_every_choice() {
+    let Some(mut browser) = browser() else { return };
+    let file = PageFile::new("choices", &private_page(true));
+    browser.emulate(1280, 900, "dark");
+    browser.open(&file.0);
+    let choose_all = "document.querySelectorAll('.controls input').forEach(input => input.click())";
+    browser.evaluate(choose_all);
+    browser.evaluate("document.querySelector('#scene-controls input').click()");
+    browser.evaluate("document.querySelector('#stage').scrollIntoView()");
+    for key in ["ArrowLeft", "ArrowUp", "+", "-"] {
+        let press = format!(
+            "document.getElementById('canvas').dispatchEvent(new KeyboardEvent('keydown', {{key: '{key}'}}))"
+        );
+        browser.evaluate(&press);
+    }
+    // The drawing buffer is gone after the frame: read it in the same turn as the drawing.
+    let lit = "(() => {
+        const canvas = document.getElementById('canvas');
+        canvas.dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowRight'}));
+        const copy = document.createElement('canvas');
+        copy.width = canvas.width; copy.height = canvas.height;
+        const context = copy.getContext('2d');
+        context.drawImage(canvas, 0, 0);
+        const pixels = context.getImageData(0, 0, copy.width, copy.height).data;
+        let lit = 0;
+        for (let i = 0; i < pixels.length; i += 4) lit += pixels[i] + pixels[i + 1] + pixels[i + 2] > 150;
+        return lit;
+    })()";
+    let lit = browser.evaluate(lit).as_f64().expect("a number of pixels");
+    assert!(lit > 5_000.0, "{lit} pixels are lit");
+    assert_eq!(browser.complaints, Vec::<String>::new());
+}
+
+#[test]
+fn a_page_of_figures_only_has_curves_and_no_canvas() {
+    let Some(mut browser) = browser() else { return };
+    let document = sample::document(false);
+    let scene = sample::scene(&document, 500);
+    let options = RenderOptions { share_safe: true, ..RenderOptions::default() };
+    let file =
+        PageFile::new("figures", &render(&document, Some(&scene), &options).expect("a page"));
+    browser.emulate(1280, 900, "light");
+    browser.open(&file.0);
+    assert_eq!(browser.evaluate("document.documentElement.dataset.charts"), json!("10"));
+    assert_eq!(browser.evaluate("document.querySelector('canvas')"), json!(null));
+    assert_eq!(browser.complaints, Vec::<String>::new());
+}
+
+#[test]
+fn pictures_of_images_are_drawn_for_every_choice() {
+    let Some(mut browser) = browser() else { return };
+    let options = RenderOptions { pictures: vec![sample::picture()], ..RenderOptions::default() };
+    let page = render(&sample::images(), None, &options).expect("a page");
+    let file = PageFile::new("images", &page);
+    for (width, height) in [(1280, 900), (390, 844)] {
+        browser.emulate(width, height, "light");
+        browser.open(&file.0);
+        browser.evaluate("document.querySelectorAll('.controls input').forEach(i => i.click())");
+        assert_eq!(browser.evaluate("document.documentElement.dataset.pictures"), json!("drawn"));
+        let lit = "[...document.querySelectorAll('.pictures canvas')].map(canvas => {
+            const [w, h] = [canvas.width, canvas.height];
+            const pixels = canvas.getContext('2d').getImageData(0, 0, w, h).data;
+            return new Set(new Uint32Array(pixels.buffer)).size > 2;
+        }).join()";
+        assert_eq!(browser.evaluate(lit), json!("true,true,true,true"));
+        let wider = "document.documentElement.scrollWidth > document.documentElement.clientWidth";
+        assert_eq!(browser.evaluate(wider), json!(false), "sideways at {width} px");
+        assert_eq!(browser.complaints, Vec::<String>::new());
+    }
+}
+
+#[test]
+fn the_page_can_be_read_without_script() {
+    let Some(mut browser) = browser() else { return };
+    let document = sample::mixed(false);
+    let scene = sample::scene(&document, 300);
+    let page = render(&document, Some(&scene), &RenderOptions::default()).expect("a page");
+    let file = PageFile::new("no-script", &page);
+    browser.emulate(1280, 900, "light");
+    browser.call("Emulation.setScriptExecutionDisabled", json!({"value": true}));
+    browser.call("Page.navigate", json!({"url": format!("file://{}", file.0.display())}));
+    browser.wait_for("document.readyState === 'complete' && !!document.getElementById('use')");
+    let seen = "['.card', '.finding', '#gates li', 'table', '.stage', '.chart'].map(s =>
+        [...document.querySelectorAll(s)].filter(n => n.getClientRects().length && n.clientHeight > 0).length)";
+    let seen = browser.evaluate(seen);
+    // Cards, findings, gates and tables are there (seconds are folded away); nothing that needs script is.
+    assert_eq!(seen, json!([7, 14, 2, 7, 0, 0]));
+}
