@@ -49,6 +49,8 @@ pub enum Stage {
     OracleLookAlikes = 20,
     /// Copies of a map side by side, to measure on.
     Tiling = 21,
+    /// Simple shapes to try attacks on.
+    Shapes = 22,
 }
 
 /// Where random bits come from: [`Counter`] or [`Cipher`], and nothing else.

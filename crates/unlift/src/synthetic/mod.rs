@@ -9,6 +9,7 @@ mod furniture;
 mod objects;
 mod room;
 mod sampling;
+mod shapes;
 mod surfaces;
 mod tiled;
 mod views;
@@ -16,6 +17,7 @@ mod views;
 use crate::seed::{Draws, Stage};
 use surfaces::rotate;
 
+pub use shapes::{Shape, keypoints, shape};
 pub use tiled::tiled;
 
 /// The number of points of the demo's room.

@@ -1,0 +1,296 @@
+//! Small and odd maps: is joint recovery ever weaker than the pass it starts from, and is "sure" ever
+//! not sure?
+//!
+//! `cargo bench -p unlift --bench families -- [NAME=LIST ..]` prints, per map, the worst difference in points
+//! of percent between `joint` and `consensus` (at each threshold) and the least share of points called
+//! 90 % sure that are right, over every scheme, noise model, inlier ratio and source. Names: `maps`
+//! (`room`, `line`, ... or `redkitchen`, `castle`, each `:POINTS`; `image:KEYPOINTS`), `schemes`,
+//! `ratios`, `noise`, `sources`, `seeds`, `k`; `cells=1` prints every cell. The real maps are
+//! looked for beside the repository and left out, with a line, where they are not.
+
+use std::path::PathBuf;
+
+use unlift::audit::{self, Plan, Row, Silent, Source, Threshold};
+use unlift::geometry::frame::Bounds;
+use unlift::geometry::knn::Knn;
+use unlift::geometry::vector::median;
+use unlift::neighbors::oracle::Noise;
+use unlift::neighbors::sources::Joined;
+use unlift::obfuscate::{Entry, SCHEMES, scheme};
+use unlift::recover::Solver;
+use unlift::seed::{Draws, Stage};
+use unlift::synthetic::{self, Shape};
+use unlift::truth::Original;
+use unlift::{Descriptors, Error, PointSet, Unit, descriptors::Values};
+
+const IMAGE: [f64; 2] = [640.0, 480.0];
+/// Points called sure count in a verdict on "sure" from this share of a cell on, in percent.
+const LEAST_SURE: f64 = 1.0;
+
+/// What is tried.
+struct Suite {
+    maps: Vec<String>,
+    schemes: Option<Vec<&'static Entry>>,
+    ratios: Vec<f64>,
+    noise: Vec<Noise>,
+    sources: Vec<String>,
+    seeds: u32,
+    k: usize,
+    cells: bool,
+}
+
+impl Suite {
+    fn read() -> Self {
+        // `cargo test --benches` asks for a quick check that the bench still runs.
+        let quick = std::env::args().any(|a| a == "--test");
+        let mut maps = Vec::new();
+        for name in ["redkitchen", "castle", "room"] {
+            maps.extend([500, 1_000, 2_000, 4_000].map(|n| format!("{name}:{n}")));
+        }
+        let shapes = Shape::ALL.iter().filter(|shape| **shape != Shape::Room);
+        maps.extend(shapes.map(|shape| format!("{}:2000", shape.name())));
+        maps.extend([50, 200, 1_000].map(|n| format!("image:{n}")));
+        let mut suite = Self {
+            maps: if quick { vec!["cube:300".to_owned(), "image:60".to_owned()] } else { maps },
+            schemes: None,
+            ratios: vec![1.0, 0.5, 0.3, 0.2, 0.1],
+            noise: Noise::ALL.to_vec(),
+            sources: ["oracle", "similarity", "overlap", "geometric"].map(str::to_owned).to_vec(),
+            seeds: if quick { 1 } else { 2 },
+            k: 50,
+            cells: false,
+        };
+        for argument in std::env::args().skip(1) {
+            let Some((name, list)) = argument.split_once('=') else { continue };
+            let fields = list.split(',');
+            match name {
+                "maps" => suite.maps = fields.map(str::to_owned).collect(),
+                "schemes" => suite.schemes = Some(fields.map(|n| scheme(n).expect(n)).collect()),
+                "ratios" => suite.ratios = fields.map(number).collect(),
+                "noise" => {
+                    suite.noise =
+                        Noise::ALL.into_iter().filter(|x| list.contains(x.name())).collect();
+                }
+                "sources" => suite.sources = fields.map(str::to_owned).collect(),
+                "seeds" => suite.seeds = number(list),
+                "k" => suite.k = number(list),
+                "cells" => suite.cells = list == "1",
+                _ => panic!(
+                    "expected maps, schemes, ratios, noise, sources, seeds, k or cells, found {name}"
+                ),
+            }
+        }
+        suite
+    }
+
+    /// The sources for a map with or without descriptors and the schemes they are for.
+    fn plan(&self, unit: Unit, source: &str) -> Plan {
+        let usual = Plan::new(unit);
+        let of_images = unit == Unit::Pixel;
+        let own = |name: &str| {
+            let joined = Joined::parse(name).expect("a source");
+            if of_images { joined.for_images() } else { joined }
+        };
+        let meant = |entry: &&'static Entry| {
+            if of_images { entry.in_2d.is_some() } else { entry.in_3d.is_some() }
+        };
+        let all: Vec<&'static Entry> = match &self.schemes {
+            Some(schemes) => schemes.clone(),
+            None => SCHEMES.iter().collect(),
+        };
+        let threshold =
+            |label: &str| Threshold::parse(label).unwrap_or_else(|e| panic!("{label}: {e}"));
+        let thresholds = if of_images {
+            usual.thresholds.clone()
+        } else {
+            ["1.0", "2.5"].map(threshold).to_vec()
+        };
+        Plan {
+            schemes: all.into_iter().filter(meant).collect(),
+            sources: vec![match source {
+                "oracle" => Source::Oracle,
+                name => Source::Own(own(name)),
+            }],
+            oracle_noise: self.noise.clone(),
+            inlier_ratios: self.ratios.clone(),
+            k: if of_images { 20 } else { self.k },
+            solvers: vec![Solver::Joint, Solver::Consensus],
+            thresholds,
+            repeats: self.seeds,
+            records_alone: false,
+            ..usual
+        }
+    }
+}
+
+fn number<T: std::str::FromStr>(text: &str) -> T {
+    text.parse().unwrap_or_else(|_| panic!("expected a number, found {text}"))
+}
+
+fn main() {
+    let suite = Suite::read();
+    println!(
+        "{:<22} {:<10} {:>6} {:<44} {:>6} {:<44} {:>6} {:>6} {:<44} {:>6}",
+        "map",
+        "source",
+        "worst",
+        "joint less consensus, in",
+        "mean",
+        "least right of sure",
+        "right",
+        "sure",
+        "",
+        "cells"
+    );
+    for map in &suite.maps {
+        for source in &suite.sources {
+            match rows(&suite, map, source) {
+                Ok(Some(rows)) => table(&suite, map, source, &rows),
+                Ok(None) => {}
+                Err(error) => println!("{map:<22} {source:<10} {error}"),
+            }
+        }
+    }
+}
+
+/// Joint recovery beside consensus, cell by cell.
+fn table(suite: &Suite, map: &str, source: &str, rows: &[Row]) {
+    let cell = |row: &Row| {
+        let noise = row.oracle_noise.unwrap_or("");
+        format!("{} {:.2} {noise}", row.scheme, row.inlier_ratio)
+    };
+    let (mut worst, mut least) =
+        ((f64::INFINITY, String::new()), (f64::INFINITY, 0.0, String::new()));
+    let (mut sum, mut n) = (0.0, 0);
+    for pair in rows.chunks(2) {
+        let [joint, consensus] = pair else { continue };
+        for at in 0..joint.recovered_percent.len() {
+            let (a, b) = (joint.recovered_percent[at], consensus.recovered_percent[at]);
+            if a - b < worst.0 {
+                worst = (a - b, format!("{} {a:.1} / {b:.1} ({at})", cell(joint)));
+            }
+        }
+        sum += joint.recovered_percent[0] - consensus.recovered_percent[0];
+        n += 1;
+        for row in pair {
+            let Some(reliability) = &row.reliability else { continue };
+            let (sure, right) = (reliability.sure_percent(), reliability.sure_correct_percent());
+            if let Some(right) = right.filter(|_| sure >= LEAST_SURE)
+                && right < least.0
+            {
+                least = (right, sure, format!("{} {}", cell(row), row.solver));
+            }
+        }
+        if suite.cells {
+            let sure = |row: &Row| match &row.reliability {
+                Some(r) => format!(
+                    "{:5.1}/{:5.1}",
+                    r.sure_percent(),
+                    r.sure_correct_percent().unwrap_or(f64::NAN)
+                ),
+                None => "-".to_owned(),
+            };
+            let percent = |row: &Row| {
+                let of: Vec<String> =
+                    row.recovered_percent.iter().map(|p| format!("{p:5.1}")).collect();
+                of.join("/")
+            };
+            println!(
+                "    {map:<20} {source:<10} {:<24} joint {} delta {:.3} sure {} | consensus {} delta {:.3} sure {}",
+                cell(joint),
+                percent(joint),
+                joint.delta,
+                sure(joint),
+                percent(consensus),
+                consensus.delta,
+                sure(consensus)
+            );
+        }
+    }
+    let mean = sum / f64::from(n.max(1));
+    println!(
+        "{map:<22} {source:<10} {:>6.1} {:<44} {mean:>6.1} {:>6.1} {:>6.1} {:<44} {n:>6}",
+        worst.0, worst.1, least.0, least.1, least.2
+    );
+}
+
+/// The rows of one map and source; `None` where they do not go together or the map is not there.
+fn rows(suite: &Suite, map: &str, source: &str) -> Result<Option<Vec<Row>>, Error> {
+    let (name, n) = map.split_once(':').unwrap_or((map, "2000"));
+    let n: usize = number(n);
+    if name == "image" {
+        let plan = suite.plan(Unit::Pixel, source);
+        if plan.schemes.is_empty() || source != "oracle" {
+            return Ok(None);
+        }
+        let image = |at: u32| {
+            let points = synthetic::keypoints(u64::from(at), n, IMAGE);
+            let points = PointSet::try_new(points, Unit::Pixel)?;
+            let original = Original::within(points, Bounds { low: [0.0; 2], high: IMAGE })?;
+            Ok(audit::images::Image { name: format!("{at}"), original, descriptors: None })
+        };
+        let images: Vec<Result<_, Error>> = (0..8).map(image).collect();
+        return Ok(Some(audit::images::run(images, &plan, &mut Silent)?.rows));
+    }
+    let Some((points, descriptors)) = points(name, n) else {
+        if source == "oracle" {
+            println!("{map:<22} not here");
+        }
+        return Ok(None);
+    };
+    let plan = suite.plan(Unit::KthNeighbor, source);
+    let needs = source != "oracle" && Joined::parse(source)?.needs_descriptors();
+    if plan.schemes.is_empty() || (needs && descriptors.is_none()) {
+        return Ok(None);
+    }
+    let typical = median(&mut Knn::new(&points)?.kth_distances(suite.k));
+    let points = points.iter().map(|p| p.map(|x| x / typical)).collect();
+    let original = Original::new(PointSet::try_new(points, Unit::KthNeighbor)?);
+    Ok(Some(audit::run(&original, descriptors.as_ref(), &plan, &mut Silent)?.rows))
+}
+
+/// `n` points of a map, with descriptors where it has some.
+fn points(name: &str, n: usize) -> Option<(Vec<[f64; 3]>, Option<Descriptors>)> {
+    if let Some(shape) = Shape::ALL.into_iter().find(|shape| shape.name() == name) {
+        return Some((synthetic::shape(shape, 1, n), None));
+    }
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data").join(name);
+    let all = colmap_points(&std::fs::read(folder.join("model/points3D.bin")).ok()?);
+    let rows = std::fs::read(folder.join("descriptors.bin")).ok();
+    let mut order = Draws::new(0, Stage::Subset, 0).permutation(all.len());
+    order.truncate(n);
+    let points = order.iter().map(|&i| all[i as usize].1).collect();
+    // Joined by id.
+    let descriptors = rows.and_then(|rows| {
+        let n_all = u64_at(&rows, 8) as usize;
+        let id = |row: usize| u64_at(&rows, 24 + 8 * row);
+        let row_of = |id_wanted: u64| {
+            let ids: Vec<u64> = (0..n_all).map(id).collect();
+            ids.binary_search(&id_wanted).expect("a descriptor for every point")
+        };
+        let start = 24 + 8 * n_all;
+        let values = order.iter().flat_map(|&i| {
+            let row = row_of(all[i as usize].0);
+            rows[start + 128 * row..start + 128 * (row + 1)].to_vec()
+        });
+        Descriptors::try_new(Values::U8(values.collect()), 128).ok()
+    });
+    Some((points, descriptors))
+}
+
+fn u64_at(bytes: &[u8], at: usize) -> u64 {
+    u64::from_le_bytes(bytes[at..at + 8].try_into().expect("8 bytes"))
+}
+
+/// Ids and points of a COLMAP `points3D.bin`.
+fn colmap_points(bytes: &[u8]) -> Vec<(u64, [f64; 3])> {
+    let mut points = Vec::new();
+    let mut at = 8;
+    for _ in 0..u64_at(bytes, 0) {
+        let place = [8, 16, 24].map(|field| f64::from_bits(u64_at(bytes, at + field)));
+        points.push((u64_at(bytes, at), place));
+        // Id, position, color, error, then a track of two 32-bit ids per entry.
+        at += 51 + 8 * u64_at(bytes, at + 43) as usize;
+    }
+    points
+}
