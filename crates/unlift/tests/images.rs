@@ -185,7 +185,7 @@ fn images_tell_how_far_they_are() {
     (plan.repeats, plan.reference) = (2, true);
     let mut all = All::default();
     images::run(images.iter().cloned().map(Ok::<_, Error>), &plan, &mut all).unwrap();
-    let rows = (plan.inlier_ratios.len() + 1) * plan.schemes.len() * 2;
+    let rows = (plan.inlier_ratios.len() * plan.solvers.len() + 1) * plan.schemes.len() * 2;
     for (image, Heard(heard)) in images.iter().zip(&all.0) {
         let (last, total) = *heard.last().unwrap();
         assert_eq!(last, total, "{}", image.name);
