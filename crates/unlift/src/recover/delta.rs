@@ -43,6 +43,9 @@ const BEYOND_EDGE: f64 = 2.25;
 /// where a source gives scores, at most so many times.
 const BEYOND_EDGE_OF_SCORED: f64 = 2.0;
 
+/// Lists read both ways are about so many times as long.
+const BOTH_WAYS: f64 = 1.9;
+
 /// The maximum is flat: which of the deltas near it to take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Prefer {
@@ -79,6 +82,11 @@ pub(crate) fn choose<const D: usize>(
         Family::Candidates { .. } if D == 2 => TOO_WIDE_IN_IMAGE,
         Family::Candidates { .. } | Family::Lines { .. } | Family::Planes { .. } => TOO_WIDE,
     };
+    let share = share_listed(lists, family.slots_per_record(), prefer);
+    let (wide, narrow) = limits::<D>(family);
+    let too_wide = too_wide.max(wide.at(share));
+    // Some steps of the ladder lie between the two.
+    let too_narrow = narrow.at(share).min(too_wide / 8.0);
     // Few points are far apart: at least one halving lies between the two limits.
     let too_wide = too_wide.max(family.typical_chance((2.0 * least) as f32));
     // The fine ladder reaches beyond the coarse one, but not where its limit is one of an image.
@@ -101,13 +109,14 @@ pub(crate) fn choose<const D: usize>(
         solved.iter().map(|e| f64::from(e.evidence)).sum::<f64>() / solved.len() as f64
     };
     let value = |delta: f64| {
-        mean_evidence(Lists::given(lists), delta) - mean_evidence(Lists::mixed(lists), delta)
+        mean_evidence(Lists::given(lists), delta)
+            - mean_evidence(Lists::mixed(lists, family.slots_per_record()), delta)
     };
     // From large to small; once well below the maximum, smaller deltas only lose more neighbors.
     let (mut coarse, mut most) = (extent, f64::NEG_INFINITY);
     for step in 1..=HALVINGS {
         let delta = extent / f64::from(1u32 << step);
-        if delta < least {
+        if delta < least || family.typical_chance(delta as f32) < too_narrow {
             break;
         }
         if family.typical_chance(delta as f32) > too_wide {
@@ -122,7 +131,11 @@ pub(crate) fn choose<const D: usize>(
     }
     let fine: Vec<(f64, f64)> = (1 - FINE..2 * FINE)
         .map(|step| coarse * libm::exp2(f64::from(step) / f64::from(FINE)))
-        .filter(|&delta| delta >= least && family.typical_chance(delta as f32) <= most_chance)
+        .filter(|&delta| {
+            delta >= least
+                && family.typical_chance(delta as f32) >= too_narrow
+                && family.typical_chance(delta as f32) <= most_chance
+        })
         .map(|delta| (delta, value(delta)))
         .collect();
     let most = fine.iter().map(|&(_, value)| value).fold(f64::NEG_INFINITY, f64::max);
@@ -150,6 +163,49 @@ pub(crate) fn choose<const D: usize>(
             Some((low * libm::pow(high / low, across)).min(most))
         }
     }
+}
+
+/// A chance that goes with the share of all records that a list holds: `factor * share^power`.
+struct Limit {
+    factor: f64,
+    power: f64,
+}
+
+impl Limit {
+    fn at(&self, share: f64) -> f32 {
+        (self.factor * libm::pow(share, self.power)) as f32
+    }
+}
+
+/// A delta with more chance than the first is too wide whatever else, one with less than the second too narrow.
+///
+/// Where a list holds a share `s` of all records, neighbors are within a ball that holds as much of the map.
+/// A random line passes as near with a chance of `s^(2/3)` if points fill space and `s^2` if they lie on a curve; a
+/// random plane with `s^(1/3)` and `s`.
+fn limits<const D: usize>(family: &Family<'_, D>) -> (Limit, Limit) {
+    let none = || Limit { factor: 0.0, power: 1.0 };
+    match family {
+        // Coordinates of images are few and bounds known: other limits hold there.
+        _ if D == 2 => (none(), none()),
+        Family::Planes { .. } => {
+            (Limit { factor: 0.5, power: 0.5 }, Limit { factor: 1.0, power: 1.0 })
+        }
+        Family::Lines { .. } | Family::Candidates { .. } => {
+            // Rays are dense near their centers, so that chance is large at a typical place.
+            let factor = if family.is_of_rays() { 3.0 } else { 1.0 };
+            (Limit { factor, power: 2.0 / 3.0 }, Limit { factor: 1.0, power: 2.0 })
+        }
+    }
+}
+
+/// The share of all records that a list holds.
+fn share_listed(lists: &Neighborhoods, slots_per_record: usize, prefer: Prefer) -> f64 {
+    let n_slots = lists.n_slots().max(1);
+    let n_records = (n_slots / slots_per_record).max(1);
+    let mean = lists.records().len() as f64 / n_slots as f64;
+    // Joint recovery reads lists both ways, and few entries are mutual.
+    let ways = if prefer == Prefer::Wide { 1.0 } else { BOTH_WAYS };
+    mean / ways / n_records as f64
 }
 
 /// Where evidence begins to fall when delta shrinks below `coarse`, the best of the coarse ladder.

@@ -40,6 +40,22 @@ impl<'a, const D: usize> Family<'a, D> {
         }
     }
 
+    /// Slots per record.
+    pub(crate) fn slots_per_record(&self) -> usize {
+        match self {
+            Self::Lines { slots_per_record, .. } => *slots_per_record,
+            Self::Planes { .. } | Self::Candidates { .. } => 1,
+        }
+    }
+
+    /// Whether these are rays.
+    pub(crate) fn is_of_rays(&self) -> bool {
+        match self {
+            Self::Lines { rows, .. } => rows.first().is_some_and(LineRow::is_ray),
+            Self::Planes { .. } | Self::Candidates { .. } => false,
+        }
+    }
+
     /// Whether these are rays of which it is known where each center's points lie: one ray says nothing
     /// about another of its center, and rays of two centers do not meet.
     pub(crate) fn has_regions(&self) -> bool {

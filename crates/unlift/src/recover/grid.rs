@@ -147,19 +147,25 @@ impl<const D: usize> Grid<D> {
 
     /// Replaces every value by the mean of its neighborhood, weights 1 2 1 along each axis.
     pub(crate) fn smooth(&mut self) {
+        self.smooth_apart(1);
+    }
+
+    /// The same with neighbors so many cells apart.
+    pub(crate) fn smooth_apart(&mut self, apart: usize) {
         let mut stride = 1;
+        let mut line = Vec::new();
         for c in (0..D).rev() {
             let n = self.dims[c];
             let block = stride * n;
             for start in (0..self.values.len()).step_by(block) {
                 for inner in 0..stride {
                     let at = |i: usize| start + inner + i * stride;
-                    let mut before = self.values[at(0)];
+                    line.clear();
+                    line.extend((0..n).map(|i| self.values[at(i)]));
                     for i in 0..n {
-                        let here = self.values[at(i)];
-                        let after = self.values[at((i + 1).min(n - 1))];
-                        self.values[at(i)] = 0.25 * (before + after) + 0.5 * here;
-                        before = here;
+                        let (before, after) =
+                            (line[i.saturating_sub(apart)], line[(i + apart).min(n - 1)]);
+                        self.values[at(i)] = 0.25 * (before + after) + 0.5 * line[i];
                     }
                 }
             }

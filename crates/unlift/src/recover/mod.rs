@@ -244,6 +244,12 @@ fn solve<const D: usize>(
     let edges = (graph.as_ref(), lists);
     let solved = Solved { estimates, unsettled, delta: delta as f32 };
     let seen = confidence::look(&family, edges, released.slots_per_record(), &solved);
-    let confidence = confidence::of(released, options.solver, estimates, &seen);
-    Ok(Found { recovered: recovered.with_confidence(confidence)?, seen, start })
+    let recovered = match confidence::unknown(lists) {
+        Some(unknown) => recovered.without_confidence(unknown),
+        None => {
+            let confidence = confidence::of(released, options.solver, estimates, &seen);
+            recovered.with_confidence(confidence)?
+        }
+    };
+    Ok(Found { recovered, seen, start })
 }

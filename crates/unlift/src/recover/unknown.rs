@@ -13,6 +13,10 @@ pub enum Unknown {
     FromRecordsAlone,
     /// The positions are what joint recovery starts from: nothing has been fitted for them.
     FirstPass,
+    /// The lists have scores, as sources that rank give them: nothing was fitted on how those err.
+    RankedLists,
+    /// Lists have more entries per hidden point than in any map that the model was fitted on.
+    SmallMap,
 }
 
 impl Unknown {
@@ -26,6 +30,10 @@ impl Unknown {
             }
             Self::FromRecordsAlone => "nothing was fitted for attacks on the records alone",
             Self::FirstPass => "nothing was fitted for the pass that joint recovery starts from",
+            Self::RankedLists => "nothing was fitted on how lists err that a source ranked",
+            Self::SmallMap => {
+                "lists have more entries than a hundredth of all points, more than in any map that it was fitted on"
+            }
         }
     }
 }

@@ -18,7 +18,7 @@ pub use model::{Confidence, N_TERMS, centered, terms};
 
 use super::family::Family;
 use super::joint::{CandidatePieces, Graph, LinePieces, PlanePieces};
-use super::{Estimate, Solver, Status};
+use super::{Estimate, Solver, Status, Unknown};
 use crate::neighbors::Neighborhoods;
 use crate::released::Released;
 
@@ -44,6 +44,24 @@ pub(super) struct Solved<'a, const D: usize> {
     pub(super) unsettled: &'a [Estimate<D>],
     /// The distance that decided support.
     pub(super) delta: f32,
+}
+
+/// A list has at most as many entries as this share of all hidden points in the maps that the model was fitted on.
+const MOST_LISTED: f64 = 0.01;
+
+/// Why the model says nothing that comes true about maps recovered from `lists`, if so.
+///
+/// On smaller maps, and with lists that sources rank, a tenth to nine tenths of those called 90 % sure were right.
+pub(super) fn unknown(lists: &Neighborhoods) -> Option<Unknown> {
+    let n_slots = lists.n_slots() as f64;
+    let mean = lists.records().len() as f64 / n_slots.max(1.0);
+    if lists.scores().is_some() {
+        Some(Unknown::RankedLists)
+    } else if mean > MOST_LISTED * n_slots {
+        Some(Unknown::SmallMap)
+    } else {
+        None
+    }
 }
 
 /// Looks around estimates, along `graph` where there is one, else along `lists`.

@@ -12,6 +12,10 @@ pub(crate) struct Density<const D: usize> {
 
 /// A cell has at least the density of this part of one estimate.
 const LEAST: f32 = 0.5;
+/// Cells with less than this many estimates take their density from a wider neighborhood,
+const ENOUGH: f32 = 0.25;
+/// twice as wide at most this many times over.
+const WIDER: usize = 3;
 /// Sparse places are taken as so much wider at most.
 const WIDEST: f32 = 2.5;
 
@@ -36,7 +40,8 @@ impl<const D: usize> Density<D> {
         let volume: f32 = (0..D).map(|_| grid.cell()).product();
         let mean_times = (weight / n.max(1) as f64) as f32;
         // Linear spreading and smoothing leave about 1 / 2^D of an estimate in its own cell.
-        let least = LEAST * mean_times / (1 << D) as f32;
+        let least = LEAST * mean_times / (1 << (D * (1 + WIDER))) as f32;
+        look_wider(&mut grid, ENOUGH * mean_times);
         let scale = 1.0 / (weight.max(1.0) as f32 * volume);
         for value in &mut grid.values {
             *value = value.max(least) * scale;
@@ -81,6 +86,22 @@ impl<const D: usize> Density<D> {
     }
 }
 
+/// Where a cell of `grid` holds less than `enough`, its value becomes that of a wider smoothing, the first of several
+/// under which as many estimates stand behind it.
+fn look_wider<const D: usize>(grid: &mut Grid<D>, enough: f32) {
+    let mut wide = grid.clone();
+    let mut open: Vec<u32> =
+        (0..grid.values.len() as u32).filter(|&i| grid.values[i as usize] < enough).collect();
+    for wider in 1..=WIDER {
+        wide.smooth_apart(1 << wider);
+        let enough = enough / (1 << (D * wider)) as f32;
+        open.retain(|&i| {
+            grid.values[i as usize] = wide.values[i as usize];
+            wide.values[i as usize] < enough
+        });
+    }
+}
+
 /// Cells per radius: linear spreading, smoothing and lookup by cell together spread an estimate as far
 /// (in variance) as the kernel `1 - r^2 / radius^2` in three dimensions.
 const CELL: f32 = 0.436;
@@ -93,4 +114,30 @@ fn cube_root(x: f32) -> f32 {
         y = (2.0 * y + x / (y * y)) / 3.0;
     }
     y
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sparse_cells_look_wider_and_dense_ones_do_not() {
+        let mut grid = Grid::<2>::over([0.0; 2], [64.0; 2], 64 * 64);
+        // A dense corner, and one estimate far from it.
+        for x in 0..8 {
+            for y in 0..8 {
+                grid.spread(&[x as f32 + 0.5, y as f32 + 0.5], 1.0);
+            }
+        }
+        grid.spread(&[40.5, 40.5], 1.0);
+        grid.smooth();
+        let before = grid.clone();
+        look_wider(&mut grid, ENOUGH);
+        let (dense, lone, beside) =
+            (grid.index(&[4.5, 4.5]), grid.index(&[40.5, 40.5]), grid.index(&[44.5, 40.5]));
+        assert_eq!(grid.values[dense], before.values[dense]);
+        assert!(before.values[beside] == 0.0 && grid.values[beside] > 0.0);
+        assert!(grid.values[lone] >= grid.values[beside]);
+        assert!(grid.values[lone] < grid.values[dense]);
+    }
 }

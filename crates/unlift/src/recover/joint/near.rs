@@ -254,6 +254,12 @@ impl<const D: usize> Columns<D> {
         self.side.resize(n, Side::Mutual);
     }
 
+    /// The odds in vectors.
+    #[inline(always)]
+    pub(crate) fn odds(&self) -> &[Lanes] {
+        self.odds.as_chunks().0
+    }
+
     /// The logarithm of how much likelier these estimates are about a point at `x` than by chance, where the law has
     /// this gain and `1 / a^2`: the sum of `ln(1 + odds * gain * (1 + r^2 / a^2)^-3)`.
     #[inline(always)]

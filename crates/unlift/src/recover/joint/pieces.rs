@@ -52,6 +52,9 @@ pub(crate) trait Pieces<const D: usize>: Sync {
     const MOST_ALONG: f32;
     /// How fast that falls with the number of votes.
     const ALONG: f32;
+    /// An estimate that is so many times as likely a true neighbor's as one of chance counts half when a place is
+    /// made anew.
+    const DOUBT: f32 = 1.0;
     /// The radius of the law is at most this many deltas: where most estimates are wrong, those that are
     /// near by accident would widen it without end.
     const MOST_RADIUS: f32 = 0.95;
@@ -195,6 +198,8 @@ impl<'a, const D: usize> PlanePieces<'a, D> {
 impl<const D: usize> Pieces<D> for PlanePieces<'_, D> {
     const PER_SLOT: usize = 1;
     const NORMAL: bool = true;
+    // Two coordinates are open: where few neighbors are right, their estimates are all that tells.
+    const DOUBT: f32 = 0.2;
     const MOST_ALONG: f32 = 0.25;
     const ALONG: f32 = 2.0;
 

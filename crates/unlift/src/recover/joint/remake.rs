@@ -64,9 +64,12 @@ impl<const D: usize> Sums<D> {
         directions: &Directions<D>,
         x: &[f32; D],
         inverse_kernel2: f32,
+        (gain, inverse_a2): (f32, f32),
+        doubt: f32,
     ) -> Self {
         let mut sums = Self::ZERO;
         let places = near.vectors();
+        let odds = near.odds();
         let directions: [&[Lanes]; D] =
             std::array::from_fn(|c| &directions[c].as_chunks().0[..places[0].len()]);
         for i in 0..places[0].len() {
@@ -79,7 +82,11 @@ impl<const D: usize> Sums<D> {
                     along += toward[c] * away[c];
                 }
                 let closeness = (1.0 - r2 * inverse_kernel2).max(0.0);
+                let q = 1.0 / (1.0 + r2 * inverse_a2);
+                let likelier = odds[i][lane] * gain * (q * q * q);
                 sums.n[lane] += u32::from(closeness > 0.0);
+                // What is near by chance does not hold: on a small map half of everything is near.
+                let closeness = closeness * likelier / (doubt + likelier);
                 sums.weight[lane] += closeness;
                 for r in 0..D {
                     let held = closeness * toward[r];
@@ -110,13 +117,13 @@ pub(crate) fn remade<const D: usize, P: Pieces<D>>(
     own: &Piece<D>,
     (near, directions): (&mut Columns<D>, &mut Directions<D>),
     mut x: [f32; D],
-    inverse_kernel2: impl Fn(&[f32; D]) -> f32,
+    kernel_and_law: impl Fn(&[f32; D]) -> (f32, (f32, f32)),
 ) -> ([f32; D], u32) {
     gather(directions, (pieces, places), near);
     let mut records = 0;
     for step in 1..=STEPS {
-        let inverse_kernel2 = inverse_kernel2(&x);
-        let sums = Sums::new(near, directions, &x, inverse_kernel2);
+        let (inverse_kernel2, law) = kernel_and_law(&x);
+        let sums = Sums::new(near, directions, &x, inverse_kernel2, law, P::DOUBT);
         let n: u32 = sums.n.iter().sum();
         if step == STEPS {
             records = n;

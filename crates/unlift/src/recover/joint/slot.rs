@@ -172,12 +172,13 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         if near.len() == 0 {
             return (*old, 0.0);
         }
-        let inverse_kernel2 = |x: &[f32; D]| {
-            let kernel = self.kernel * self.density.width(self.density.at(x));
-            1.0 / (kernel * kernel)
+        let kernel_and_law = |x: &[f32; D]| {
+            let density = self.density.at(x);
+            let kernel = self.kernel * self.density.width(density);
+            (1.0 / (kernel * kernel), self.law_where(density))
         };
         let near = (near, &mut scratch.directions);
-        let (x, support) = remade(self.pieces, self.places, &own, near, first.x, inverse_kernel2);
+        let (x, support) = remade(self.pieces, self.places, &own, near, first.x, kernel_and_law);
         if !x.iter().all(|c| c.is_finite()) {
             return (*old, 0.0);
         }
