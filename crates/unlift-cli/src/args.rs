@@ -183,7 +183,7 @@ pub struct AuditMapArgs {
           help_heading = "Attack")]
     pub schemes: Vec<&'static Entry>,
     /// Recovery methods, by commas or repeated: joint, joint-start, consensus, ransac, density, tomography
-    /// [default: joint, and joint-start, the pass that it begins with]
+    /// [default: joint, and joint-start, the pass that it begins with; consensus on maps of fewer than 150 K points]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
           help_heading = "Attack")]
     pub solver: Vec<Solver>,

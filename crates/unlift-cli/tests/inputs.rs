@@ -57,7 +57,8 @@ fn scales_without_meaning_are_refused_with_a_way_out() {
     assert!(stderr.starts_with("unlift: --thresholds: expected a map larger"), "{stderr}");
     // Meters in a gate, none in the audit.
     let (_, stderr) = place.ends(&format!("audit map room.csv --gate olc:0.10<=20 {QUICK}"), 2);
-    let way_out = "  try: a threshold of 1.0, 2.5 (--scale and --thresholds change them)\n";
+    let way_out =
+        "expected one of 1.0, 2.5, found 0.1\n  try: --scale and --thresholds, which change them\n";
     assert!(stderr.ends_with(way_out), "{stderr}");
     let (_, stderr) = place.ends("obfuscate room.csv --scheme olc --scale 1e-300 --out a", 2);
     assert!(stderr.starts_with("unlift: --scale 1e-300: expected"), "{stderr}");

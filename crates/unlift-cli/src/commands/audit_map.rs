@@ -84,7 +84,8 @@ fn rules(args: &AuditMapArgs) -> Rules {
 }
 
 fn plan(args: &AuditMapArgs, prepared: &Prepared, input: &read::Input) -> anyhow::Result<Plan> {
-    let usual = Plan::new(prepared.original.reveal().unit());
+    let k = usize::from(args.map.k);
+    let usual = Plan::new(prepared.original.reveal().unit()).for_map(prepared.original.len(), k);
     let schemes = if args.schemes.is_empty() { all_schemes() } else { args.schemes.clone() };
     let thresholds = thresholds(&args.thresholds, &usual)?;
     let points = prepared.original.reveal();
@@ -95,7 +96,7 @@ fn plan(args: &AuditMapArgs, prepared: &Prepared, input: &read::Input) -> anyhow
     Ok(Plan {
         sources: sources(args, prepared, input)?,
         schemes: distinct(schemes, |a, b| a.name == b.name),
-        k: usize::from(args.map.k),
+        k,
         solvers: solvers(&args.solver, &usual),
         records_alone: !args.no_records_alone,
         thresholds,

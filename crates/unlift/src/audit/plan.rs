@@ -112,6 +112,9 @@ pub struct Plan {
     pub repeats: u32,
 }
 
+/// A map is small if it has fewer points than this many lists have entries.
+const SMALL: usize = 150;
+
 impl Plan {
     /// The plan of a default audit of points in `unit`: six inlier ratios; of maps all 3D schemes at
     /// K = 50, of images (pixels) all 2D schemes at K = 20.
@@ -146,6 +149,16 @@ impl Plan {
             seed: 0,
             repeats: 1,
         }
+    }
+
+    /// The same for a map of `n_points` with lists of `k`: where a list holds more than a 150th of the points, `joint`
+    /// can come out weaker than plain `consensus`, which then has a row of its own.
+    #[must_use]
+    pub fn for_map(mut self, n_points: usize, k: usize) -> Self {
+        if n_points < SMALL * k && !self.solvers.contains(&Solver::Consensus) {
+            self.solvers.push(Solver::Consensus);
+        }
+        self
     }
 
     /// The rows of one scheme and solver, source by source; those of the oracle noise model by
