@@ -18,9 +18,9 @@ pub enum Kind {
     Page,
     /// A Parquet file whose metadata names this kind.
     Stage(stage::Kind),
-    /// A PLY or OBJ file with the comment [`CLOUD_COMMENT`] in its second line at the latest.
+    /// A PLY or OBJ file with the comment `CLOUD_COMMENT` in its second line at the latest.
     Cloud,
-    /// HDF5 with [`FEATURES_MARK`] behind the superblock.
+    /// HDF5 with `FEATURES_MARK` behind the superblock.
     Features,
 }
 

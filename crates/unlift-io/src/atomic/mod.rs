@@ -1,6 +1,6 @@
 //! Outputs that appear whole or not at all, and that never cost anybody a file.
 //!
-//! Everything is built under a temporary name ([`partial`]) beside its place and renamed when it is whole. What
+//! Everything is built under a temporary name (`partial`) beside its place and renamed when it is whole. What
 //! stands at the place is replaced only if it is of the kind that is written there ([`Kind`], by content), and never
 //! if it is an input of the same run ([`Rules`]). Nothing else is touched: a folder that is written to may hold
 //! anything.
