@@ -9,14 +9,7 @@ use serde_json::Value;
 
 /// A folder with a small room in it.
 fn place() -> Place {
-    let place = Place::with_photos(&[]);
-    write(&place, "room.csv", &unlift::synthetic::room(1, 700).points);
-    place
-}
-
-fn write(place: &Place, name: &str, points: &[[f64; 3]]) {
-    let text: String = points.iter().map(|[x, y, z]| format!("{x},{y},{z}\n")).collect();
-    fs::write(place.path(name), text).unwrap();
+    Place::with_room(700)
 }
 
 fn json(place: &Place, name: &str) -> Value {
@@ -88,7 +81,7 @@ fn the_gain_of_a_gate_is_over_the_larger_baseline() {
 fn a_scheme_that_the_map_does_not_allow_is_told_and_no_gate_on_it_holds() {
     let place = place();
     let spread = |i: usize| [((i * 7919) % 1000) as f64, ((i * 104_729) % 997) as f64, 1.0];
-    write(&place, "flat.csv", &(0..400).map(spread).collect::<Vec<_>>());
+    place.write_points("flat.csv", &(0..400).map(spread).collect::<Vec<_>>());
     let audit = "audit map flat.csv --schemes olc,ppl+ --inlier-ratios 1,0.5 --no-records-alone \
                  --out a";
     let text = place.ends(audit, 0).0;
@@ -117,7 +110,7 @@ fn a_scheme_that_the_map_does_not_allow_is_told_and_no_gate_on_it_holds() {
 #[test]
 fn lists_that_cannot_be_made_at_some_ratios_cost_these_rows() {
     let place = place();
-    write(&place, "tiny.csv", &unlift::synthetic::room(1, 60).points);
+    place.write_points("tiny.csv", &unlift::synthetic::room(1, 60).points);
     let line = "audit map tiny.csv --schemes olc --inlier-ratios 1,0.3,0.1 --no-records-alone";
     place.ends(&format!("{line} --out a"), 0);
     let document = json(&place, "a/audit.json");

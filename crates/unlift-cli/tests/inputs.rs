@@ -9,11 +9,7 @@ use common::Place;
 
 /// A place with a made-up room in `room.csv`.
 fn room() -> Place {
-    let place = Place::with_photos(&[]);
-    let rows = unlift::synthetic::room(1, 700).points;
-    let text: String = rows.iter().map(|[x, y, z]| format!("{x},{y},{z}\n")).collect();
-    fs::write(place.path("room.csv"), text).unwrap();
-    place
+    Place::with_room(700)
 }
 
 /// Descriptors of `dim` values for the points of `room.csv` as an array of `descr`: near rows of the file

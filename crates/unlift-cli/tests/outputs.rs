@@ -13,11 +13,7 @@ const QUICK: &str = "--k 10 --schemes olc --inlier-ratios 1 --quiet";
 
 /// A folder with `room.csv`, a map of so many points.
 fn place(n_points: usize) -> Place {
-    let place = Place::with_photos(&[]);
-    let rows = unlift::synthetic::room(1, n_points).points;
-    let text: String = rows.iter().map(|[x, y, z]| format!("{x},{y},{z}\n")).collect();
-    fs::write(place.path("room.csv"), text).unwrap();
-    place
+    Place::with_room(n_points)
 }
 
 /// All files below the folder, as paths within it, sorted.

@@ -1,23 +1,29 @@
 //! The stages as a user chains them: the audit's figures, and no file of another map.
 
-use std::path::Path;
-use std::process::{Command, Output};
+mod common;
 
+use common::Place;
 use serde_json::Value;
 use unlift::About;
 use unlift_io::stage::{read_neighborhoods, read_recovered, write_neighborhoods, write_recovered};
 
-/// A folder of its own per test, with a small map and made-up descriptors in it.
-struct Place(tempfile::TempDir);
-
 const POINTS: u32 = 400;
 
-impl Place {
+/// A small room with made-up descriptors.
+struct Stages(Place);
+
+impl std::ops::Deref for Stages {
+    type Target = Place;
+
+    fn deref(&self) -> &Place {
+        &self.0
+    }
+}
+
+impl Stages {
     fn new() -> Self {
-        let folder = tempfile::tempdir().expect("a temporary folder");
+        let place = Place::with_room(POINTS as usize);
         let rows = unlift::synthetic::room(1, POINTS as usize).points;
-        let text: String = rows.iter().map(|[x, y, z]| format!("{x},{y},{z}\n")).collect();
-        std::fs::write(folder.path().join("room.csv"), text).expect("a writable folder");
         let mut bytes = b"P3DESC01".to_vec();
         bytes.extend(u64::from(POINTS).to_le_bytes());
         bytes.extend(128u32.to_le_bytes());
@@ -30,28 +36,8 @@ impl Place {
             };
             bytes.extend((0..128).map(wave));
         }
-        std::fs::write(folder.path().join("d.bin"), bytes).expect("a writable folder");
-        Self(folder)
-    }
-
-    fn path(&self) -> &Path {
-        self.0.path()
-    }
-
-    fn run(&self, line: &str) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_unlift"))
-            .args(line.split_whitespace())
-            .current_dir(self.path())
-            .output()
-            .expect("the program starts")
-    }
-
-    /// Standard output and standard error of a run that must end with `code`.
-    fn ends(&self, line: &str, code: i32) -> (String, String) {
-        let output = self.run(line);
-        let stderr = String::from_utf8(output.stderr).expect("UTF-8");
-        assert_eq!(output.status.code(), Some(code), "{line}\n{stderr}");
-        (String::from_utf8(output.stdout).expect("UTF-8"), stderr)
+        std::fs::write(place.path("d.bin"), bytes).expect("a writable folder");
+        Self(place)
     }
 
     fn json(&self, line: &str) -> Value {
@@ -76,7 +62,7 @@ fn remove(row: &mut Value, name: &str) -> Option<Value> {
 /// The same `--seed` everywhere: `evaluate` prints the row of the audit, figure by figure.
 #[test]
 fn the_stages_print_the_row_of_the_audit() {
-    let place = Place::new();
+    let place = Stages::new();
     for scheme in ["ppl", "cp"] {
         place.chain("hidden", scheme, 7);
         let audit = format!(
@@ -110,7 +96,7 @@ fn the_stages_print_the_row_of_the_audit() {
 
 #[test]
 fn files_of_another_map_are_refused() {
-    let place = Place::new();
+    let place = Stages::new();
     place.chain("one", "ppl", 1);
     // As many points and records; only the released content differs.
     place.chain("two", "ppl", 2);
@@ -136,7 +122,7 @@ fn files_of_another_map_are_refused() {
         assert!(stdout.is_empty() && stderr.lines().count() == 1, "{line}\n{stderr}");
         assert!(stderr.starts_with(&format!("unlift: {file}: fingerprint: expected ")), "{stderr}");
         assert!(stderr.contains(&format!("that of the released map of {of}, found ")), "{stderr}");
-        assert!(!place.path().join("x").exists(), "{line}");
+        assert!(!place.path("x").exists(), "{line}");
     }
 }
 
@@ -144,10 +130,10 @@ fn files_of_another_map_are_refused() {
 /// only those of another map would.
 #[test]
 fn files_that_do_not_say_are_taken_with_a_note() {
-    let place = Place::new();
+    let place = Stages::new();
     place.chain("one", "ppl", 1);
     place.chain("two", "ppl", 2);
-    let at = |name: &str| place.path().join(name);
+    let at = |name: &str| place.path(name);
     let records = POINTS as usize / 2;
     let lists = read_neighborhoods(&at("one-lists"), records, 2).unwrap();
     write_neighborhoods(&at("bare-lists"), &lists.with_about(About::default())).unwrap();
@@ -177,7 +163,7 @@ fn files_that_do_not_say_are_taken_with_a_note() {
 /// What makes figures smaller than those of the whole map is said.
 #[test]
 fn a_thinned_map_is_told() {
-    let place = Place::new();
+    let place = Stages::new();
     let audit = "audit map room.csv --scale 1 --k 10 --schemes olc --inlier-ratios 0.5 --quiet";
     let (_, stderr) = place.ends(&format!("{audit} --max-points 200"), 0);
     let note = "unlift: note: --max-points: 200 of 400 points are audited";

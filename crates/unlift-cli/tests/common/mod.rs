@@ -1,4 +1,7 @@
-//! A folder of photos, and the program run in it as a user would.
+//! A folder of photos or with a small map, and the program run in it as a user would.
+
+// Every test program has a copy of this file and uses its own part of it.
+#![allow(dead_code)]
 
 use std::fs;
 use std::path::PathBuf;
@@ -19,6 +22,19 @@ impl Place {
             photo(at as u32).save(path).unwrap();
         }
         place
+    }
+
+    /// With `n_points` of a made-up room in `room.csv`.
+    pub fn with_room(n_points: usize) -> Self {
+        let place = Self(tempfile::tempdir().expect("a temporary folder"));
+        place.write_points("room.csv", &unlift::synthetic::room(1, n_points).points);
+        place
+    }
+
+    /// Writes `points` as a table.
+    pub fn write_points(&self, name: &str, points: &[[f64; 3]]) {
+        let text: String = points.iter().map(|[x, y, z]| format!("{x},{y},{z}\n")).collect();
+        fs::write(self.path(name), text).unwrap();
     }
 
     pub fn path(&self, name: &str) -> PathBuf {
