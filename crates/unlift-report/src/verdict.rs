@@ -245,7 +245,11 @@ fn baselines(
     let guess = words::significant(blind, 2);
     let (without, floor) = match alone {
         Some((percent, _)) => {
-            let said = words::significant(percent, 2);
+            // The figure of the card, as there.
+            let said = match percent < 10.0 {
+                true => words::significant(percent, 2),
+                false => words::at_least(percent),
+            };
             (
                 format!("A blind guess gets {guess} %, the records alone {said} %."),
                 percent.max(blind),

@@ -43,9 +43,6 @@ const BEYOND_EDGE: f64 = 2.25;
 /// where a source gives scores, at most so many times.
 const BEYOND_EDGE_OF_SCORED: f64 = 2.0;
 
-/// Lists read both ways are about so many times as long.
-const BOTH_WAYS: f64 = 1.9;
-
 /// The maximum is flat: which of the deltas near it to take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Prefer {
@@ -70,19 +67,18 @@ impl Prefer {
     }
 }
 
-/// The delta with the best mean evidence, not below `least`; `None` for an empty map or one without extent.
+/// The delta with the best mean evidence, not below `least`, where a list as given holds a `share` of all records; `None` for an empty map or one without extent.
 pub(crate) fn choose<const D: usize>(
     family: &Family<'_, D>,
     lists: &Neighborhoods,
     prefer: Prefer,
-    least: f64,
+    (least, share): (f64, f64),
     seed: u64,
 ) -> Option<f64> {
     let too_wide = match family {
         Family::Candidates { .. } if D == 2 => TOO_WIDE_IN_IMAGE,
         Family::Candidates { .. } | Family::Lines { .. } | Family::Planes { .. } => TOO_WIDE,
     };
-    let share = share_listed(lists, family.slots_per_record(), prefer);
     let (wide, narrow) = limits::<D>(family);
     let too_wide = too_wide.max(wide.at(share));
     // Some steps of the ladder lie between the two.
@@ -196,16 +192,6 @@ fn limits<const D: usize>(family: &Family<'_, D>) -> (Limit, Limit) {
             (Limit { factor, power: 2.0 / 3.0 }, Limit { factor: 1.0, power: 2.0 })
         }
     }
-}
-
-/// The share of all records that a list holds.
-fn share_listed(lists: &Neighborhoods, slots_per_record: usize, prefer: Prefer) -> f64 {
-    let n_slots = lists.n_slots().max(1);
-    let n_records = (n_slots / slots_per_record).max(1);
-    let mean = lists.records().len() as f64 / n_slots as f64;
-    // Joint recovery reads lists both ways, and few entries are mutual.
-    let ways = if prefer == Prefer::Wide { 1.0 } else { BOTH_WAYS };
-    mean / ways / n_records as f64
 }
 
 /// Where evidence begins to fall when delta shrinks below `coarse`, the best of the coarse ladder.

@@ -185,7 +185,9 @@ fn solve<const D: usize>(
         Delta::Auto if family.has_regions() => ANCHOR_DELTA * spacing,
         Delta::Auto => {
             let least = LEAST_DELTA * spacing;
-            delta::choose(&family, used, prefer, least, options.seed).unwrap_or(1.0)
+            let per_list = lists.records().len() as f64 / lists.n_slots().max(1) as f64;
+            let share = per_list / n_records.max(1) as f64;
+            delta::choose(&family, used, prefer, (least, share), options.seed).unwrap_or(1.0)
         }
     };
     let consensus = || consensus::solve(&family, Lists::given(used), delta as f32, Chunks::All);

@@ -28,6 +28,9 @@ const PART: usize = 256;
 const ENOUGH: f64 = 250.0;
 /// and within this share of the radius of all.
 const TIGHTER: f64 = 0.65;
+/// Of the excess over chance the tail of true neighbors takes so much with it when what is merely in the
+/// region is taken off: measured on maps whose wrong entries are anywhere.
+const TAIL: f64 = 0.1;
 /// The share of neighbors in a class is at most and at least this.
 const SHARE: (f64, f64) = (5e-4, 0.95);
 
@@ -43,6 +46,8 @@ pub(crate) struct Law {
     /// `(1 + r^2 / a^2)^-3`: 1 / a^2, and the density at the center.
     pub(crate) inverse_a2: f32,
     pub(crate) center: f32,
+    /// The odds of a wrong entry that is near all the same, times its density: the same all over the reach.
+    pub(crate) region: f32,
     /// Nats by which those who list a slot, or those it lists, may be ahead of the others beyond what both
     /// say; infinite where nothing bounds them.
     pub(crate) surplus: f32,
@@ -56,6 +61,8 @@ pub(crate) struct Look<'a, const D: usize> {
     pub(crate) slots_per_record: usize,
     /// True neighbors are looked for within this many local widths.
     pub(crate) reach: f32,
+    /// Whether entries that are near without being neighbors are told from neighbors.
+    pub(crate) tells_region: bool,
     /// The radius of the law at least and at most.
     pub(crate) least_radius: f32,
     pub(crate) most_radius: f32,
@@ -227,8 +234,9 @@ impl Tally {
         neighbors / all.max(1.0)
     }
 
-    /// Close edges beyond those expected by chance or merely in the same region, per bin; of all edges or of mutual ones.
-    fn excess(&self, kind: usize, dimensions: i32) -> [f64; BINS] {
+    /// Close edges beyond those expected by chance or merely in the same region, per bin, and their share of
+    /// those beyond chance; of all edges or of mutual ones.
+    fn excess(&self, kind: usize, dimensions: i32) -> ([f64; BINS], f64) {
         let bins = &self.bins[kind];
         let of_kind = |class: &u8| kind == 0 || side(*class) == Side::Mutual;
         let classes = (0..CLASSES as u8).filter(of_kind);
@@ -247,12 +255,26 @@ impl Tally {
             _ => excess[OUTSIDE..].iter().sum::<f64>().max(0.0),
         };
         let density = outside / (OUTSIDE..BINS).map(volume).sum::<f64>();
-        std::array::from_fn(|bin| (excess[bin] - density * volume(bin)).max(0.0))
+        let neighbors = std::array::from_fn(|bin| (excess[bin] - density * volume(bin)).max(0.0));
+        let share = neighbors.iter().sum::<f64>() / excess.iter().sum::<f64>().max(1.0);
+        (neighbors, (share / (1.0 - TAIL)).min(1.0))
+    }
+
+    /// The odds that an edge leads into the region, but not to a neighbor.
+    fn odds_of_region(&self, close: &[f64; CLASSES], neighbors: impl Fn(usize) -> f64) -> f64 {
+        let (mut all, mut in_region) = (0.0, 0.0);
+        for (class, [edges, _]) in self.classes.iter().enumerate() {
+            all += f64::from(*edges);
+            in_region += f64::from(*edges) * close[class] * (1.0 - neighbors(class));
+        }
+        let p = (in_region / all.max(1.0)).min(SHARE.1);
+        p / (1.0 - p)
     }
 
     fn law<const D: usize>(&self, look: &Look<'_, D>) -> Law {
         let chance = self.random.map(share_found);
-        let [all, mutual] = [0, 1].map(|kind| self.excess(kind, D as i32));
+        let [(all, share_of_all), (mutual, share_of_mutual)] =
+            [0, 1].map(|kind| self.excess(kind, D as i32));
         let mut radius = middle(&all);
         // Wrong entries that are near all the same are rarely mutual.
         if mutual.iter().sum::<f64>() >= ENOUGH && middle(&mutual) < TIGHTER * radius {
@@ -261,16 +283,25 @@ impl Tally {
         let radius = (radius as f32 * look.reach).min(look.most_radius).max(look.least_radius);
         let (median, mass) = profile(D);
         let a = radius / median;
+        let neighbors = |class: usize| match side(class as u8) {
+            _ if !look.tells_region => 1.0,
+            Side::Mutual => share_of_mutual,
+            Side::Forward | Side::Reverse => share_of_all,
+        };
+        let close = std::array::from_fn(|class| {
+            let chance = chance[usize::from(either(class as u8, look.slots_per_record))];
+            share_of(share_found(self.classes[class]), chance)
+        });
         Law {
             radius,
             share: self.share(look.slots_per_record) as f32,
             odds: std::array::from_fn(|class| {
-                let chance = chance[usize::from(either(class as u8, look.slots_per_record))];
-                let p = share_of(share_found(self.classes[class]), chance);
+                let p = (close[class] * neighbors(class)).max(SHARE.0);
                 (p / (1.0 - p)) as f32
             }),
             inverse_a2: 1.0 / (a * a),
             center: 1.0 / (mass * a.powi(D as i32)),
+            region: (self.odds_of_region(&close, neighbors) / ball(D, look.reach)) as f32,
             surplus: crowds::surplus(look),
         }
     }
@@ -298,6 +329,13 @@ fn middle(excess: &[f64; BINS]) -> f64 {
 /// neighbors are, and `chance` of the others.
 fn share_of(found: f64, chance: f64) -> f64 {
     ((found - chance) / (1.0 - chance.min(0.99))).clamp(SHARE.0, SHARE.1)
+}
+
+/// The volume of a ball.
+fn ball(dimensions: usize, radius: f32) -> f64 {
+    use std::f64::consts::PI;
+    let unit = if dimensions == 2 { PI } else { 4.0 / 3.0 * PI };
+    unit * f64::from(radius).powi(dimensions as i32)
 }
 
 /// Of `(1 + r^2)^-3` in so many dimensions: the radius that holds half of its mass, and the mass.

@@ -127,6 +127,7 @@ fn rounds<const D: usize, P: Pieces<D>>(
             density: &density,
             slots_per_record,
             reach: REACH * radius,
+            tells_region: P::TELLS_REGION,
             least_radius,
             most_radius,
             sample: &sample,

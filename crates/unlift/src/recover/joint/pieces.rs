@@ -55,6 +55,9 @@ pub(crate) trait Pieces<const D: usize>: Sync {
     /// An estimate that is so many times as likely a true neighbor's as one of chance counts half when a place is
     /// made anew.
     const DOUBT: f32 = 1.0;
+    /// Whether entries that are near without being neighbors are told from neighbors: they would draw a place into
+    /// the middle of its region. Where a neighbor speaks about one coordinate, the more voices the better.
+    const TELLS_REGION: bool = false;
     /// The radius of the law is at most this many deltas: where most estimates are wrong, those that are
     /// near by accident would widen it without end.
     const MOST_RADIUS: f32 = 0.95;
@@ -119,6 +122,7 @@ impl<const D: usize> Pieces<D> for LinePieces<'_, D> {
     const PER_SLOT: usize = 1;
     const MOST_ALONG: f32 = 0.35;
     const ALONG: f32 = 50.0;
+    const TELLS_REGION: bool = true;
 
     fn slots_per_record(&self) -> usize {
         self.slots_per_record

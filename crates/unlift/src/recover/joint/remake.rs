@@ -109,7 +109,7 @@ fn total(lanes: &Lanes) -> f32 {
 
 /// `x` moved along `own` to the least squares of the records of near neighbors, weighted by how near their
 /// estimates are: within `1 / sqrt(inverse_kernel2)`. Estimates hold fully across their own pieces, and
-/// a little along them. With it the number of these records.
+/// a little along them. With it the number of these records. `at` tells kernel, law and doubt at a place.
 #[inline(always)]
 pub(crate) fn remade<const D: usize, P: Pieces<D>>(
     pieces: &P,
@@ -117,13 +117,13 @@ pub(crate) fn remade<const D: usize, P: Pieces<D>>(
     own: &Piece<D>,
     (near, directions): (&mut Columns<D>, &mut Directions<D>),
     mut x: [f32; D],
-    kernel_and_law: impl Fn(&[f32; D]) -> (f32, (f32, f32)),
+    at: impl Fn(&[f32; D]) -> (f32, (f32, f32), f32),
 ) -> ([f32; D], u32) {
     gather(directions, (pieces, places), near);
     let mut records = 0;
     for step in 1..=STEPS {
-        let (inverse_kernel2, law) = kernel_and_law(&x);
-        let sums = Sums::new(near, directions, &x, inverse_kernel2, law, P::DOUBT);
+        let (inverse_kernel2, law, doubt) = at(&x);
+        let sums = Sums::new(near, directions, &x, inverse_kernel2, law, doubt);
         let n: u32 = sums.n.iter().sum();
         if step == STEPS {
             records = n;

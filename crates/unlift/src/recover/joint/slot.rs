@@ -172,13 +172,14 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         if near.len() == 0 {
             return (*old, 0.0);
         }
-        let kernel_and_law = |x: &[f32; D]| {
+        let at = |x: &[f32; D]| {
             let density = self.density.at(x);
             let kernel = self.kernel * self.density.width(density);
-            (1.0 / (kernel * kernel), self.law_where(density))
+            let doubt = P::DOUBT * (1.0 + self.law.region / self.volume(density) / density);
+            (1.0 / (kernel * kernel), self.law_where(density), doubt)
         };
         let near = (near, &mut scratch.directions);
-        let (x, support) = remade(self.pieces, self.places, &own, near, first.x, kernel_and_law);
+        let (x, support) = remade(self.pieces, self.places, &own, near, first.x, at);
         if !x.iter().all(|c| c.is_finite()) {
             return (*old, 0.0);
         }
@@ -211,11 +212,19 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
     #[inline(always)]
     fn law_where(&self, density: f32) -> (f32, f32) {
         let width = self.density.width(density);
+        let gain = self.law.center / (self.volume(density) * density);
+        (gain, self.law.inverse_a2 / (width * width))
+    }
+
+    /// The volume of a cube of the local width.
+    #[inline(always)]
+    fn volume(&self, density: f32) -> f32 {
+        let width = self.density.width(density);
         let mut volume = 1.0;
         for _ in 0..D {
             volume *= width;
         }
-        (self.law.center / (volume * density), self.law.inverse_a2 / (width * width))
+        volume
     }
 
     /// Adds the candidates of one piece to the best: neighbors' estimates, and the old one.
