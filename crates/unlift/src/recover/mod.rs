@@ -25,7 +25,7 @@ mod unknown;
 
 pub use confidence::Confidence;
 #[doc(hidden)]
-pub use confidence::{Cues, N_TERMS, Seen, centered, terms};
+pub use confidence::{Cues, N_KINDS, N_TERMS, Seen, centered, terms};
 pub use options::{Delta, RecoverOptions, Solver};
 pub use ransac::TrialHistogram;
 pub(crate) use recovered::stored_support;
@@ -245,11 +245,11 @@ fn solve<const D: usize>(
     }
     let edges = (graph.as_ref(), lists);
     let solved = Solved { estimates, unsettled, delta: delta as f32 };
-    let seen = confidence::look(&family, edges, released.slots_per_record(), &solved);
+    let seen = confidence::look(&family, edges, released, &solved);
     let recovered = match confidence::unknown(lists) {
         Some(unknown) => recovered.without_confidence(unknown),
         None => {
-            let confidence = confidence::of(released, options.solver, estimates, &seen);
+            let confidence = confidence::of(options.solver, estimates, &seen);
             recovered.with_confidence(confidence)?
         }
     };

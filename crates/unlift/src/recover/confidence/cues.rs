@@ -131,7 +131,7 @@ pub(super) fn of<const D: usize, P: Pieces<D>, E: Edges>(
     }
     let map = Map::new(&crowds, delta);
     let cues = crowds.par_iter().map(|crowd| map.cues(crowd)).collect();
-    Seen { cues, radius: f64::from(map.radius) }
+    Seen { cues, radius: f64::from(map.radius), ..Seen::NOTHING }
 }
 
 impl<const D: usize, P: Pieces<D>, E: Edges> Look<'_, D, P, E> {

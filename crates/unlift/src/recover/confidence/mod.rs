@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 pub use cues::Cues;
 use edges::{BothWays, Edges, Listed};
-pub use model::{Confidence, N_TERMS, centered, terms};
+pub use model::{Confidence, N_KINDS, N_TERMS, centered, terms};
 
 use super::family::Family;
 use super::joint::{CandidatePieces, Graph, LinePieces, PlanePieces};
@@ -29,11 +29,13 @@ pub struct Seen {
     pub cues: Vec<Cues>,
     /// The typical radius of crowds, in the unit of the map: errors scale with it.
     pub radius: f64,
+    /// The kind of the records, below [`N_KINDS`]: each has a model of its own.
+    pub kind: usize,
 }
 
 impl Seen {
     /// Nobody looked.
-    pub(super) const NOTHING: Self = Self { cues: Vec::new(), radius: 1.0 };
+    pub(super) const NOTHING: Self = Self { cues: Vec::new(), radius: 1.0, kind: 0 };
 }
 
 /// What recovery found.
@@ -68,13 +70,15 @@ pub(super) fn unknown(lists: &Neighborhoods) -> Option<Unknown> {
 pub(super) fn look<const D: usize>(
     family: &Family<'_, D>,
     (graph, lists): (Option<&Graph>, &Neighborhoods),
-    slots_per_record: usize,
+    released: &Released<D>,
     solved: &Solved<'_, D>,
 ) -> Seen {
-    match graph {
+    let slots_per_record = released.slots_per_record();
+    let seen = match graph {
         Some(graph) => look_along(family, &BothWays { graph, slots_per_record }, solved),
         None => look_along(family, &Listed { lists, slots_per_record }, solved),
-    }
+    };
+    Seen { kind: model::kind(released), ..seen }
 }
 
 fn look_along<const D: usize, E: Edges>(
@@ -98,18 +102,16 @@ fn look_along<const D: usize, E: Edges>(
 
 /// How sure the attacker is of every slot.
 pub(super) fn of<const D: usize>(
-    released: &Released<D>,
     solver: Solver,
     estimates: &[Estimate<D>],
     seen: &Seen,
 ) -> Vec<Confidence> {
-    let kind = model::kind(released);
     let radius = seen.radius as f32;
     estimates
         .par_iter()
         .zip(&seen.cues)
         .map(|(estimate, cues)| match estimate.status {
-            Status::Ok => model::confidence(solver, kind, cues, radius),
+            Status::Ok => model::confidence(solver, seen.kind, cues, radius),
             _ => Confidence::LOST,
         })
         .collect()
