@@ -9,7 +9,7 @@ use unlift::evaluate::{blind, nearer_to_own};
 use unlift::recover::Recovered;
 use unlift::released::Released;
 use unlift::truth::{Original, Secret};
-use unlift_io::stage::{read_recovered, read_released, read_truth};
+use unlift_io::stage::{read_recovered_in, read_released, read_truth};
 use unlift_report::rounded;
 
 use super::obfuscate::RELEASED;
@@ -21,8 +21,8 @@ use crate::output::{print, table};
 
 /// Compares recovered points with the truth.
 pub fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
-    let recovered = read_recovered::<3>(&args.recovered)?;
     let (original, secret) = read_truth::<3>(&args.truth)?;
+    let recovered = read_recovered_in::<3>(&args.recovered, original.reveal().unit())?;
     same_map(&args.recovered, recovered.about().map, &args.truth, secret.map())?;
     let released = released(args, &secret)?;
     let unit = original.reveal().unit();
@@ -52,17 +52,27 @@ fn released(args: &EvaluateArgs, secret: &Secret) -> anyhow::Result<Option<Relea
     let Some(path) = args.released.clone().or(beside) else { return Ok(None) };
     let released = read_released::<3>(&path)?;
     same_map(&path, Some(released.fingerprint()), &args.truth, secret.map())?;
-    expect_slots(&path, released.n_slots(), secret)?;
+    expect_slots(&path, &released, secret)?;
     Ok(Some(released))
 }
 
-/// Refuses a released map with another number of hidden points than the truth.
-pub fn expect_slots(path: &Path, found: usize, secret: &Secret) -> anyhow::Result<()> {
-    if found == secret.n_slots() {
-        return Ok(());
+/// Refuses a released map that hides another number of points than the truth, or another number per record.
+pub fn expect_slots<const D: usize>(
+    path: &Path,
+    released: &Released<D>,
+    secret: &Secret,
+) -> anyhow::Result<()> {
+    let wrong = |expected: usize, what: &str, found: usize| {
+        let expected = format!("{expected} hidden points{what}, as in the truth");
+        Err(unlift_io::Error::new(path, "", expected, found.to_string()).into())
+    };
+    if released.n_slots() != secret.n_slots() {
+        return wrong(secret.n_slots(), "", released.n_slots());
     }
-    let expected = format!("{} hidden points, as in the truth", secret.n_slots());
-    Err(unlift_io::Error::new(path, "", expected, found.to_string()).into())
+    if released.slots_per_record() != secret.slots_per_record() {
+        return wrong(secret.slots_per_record(), " per record", released.slots_per_record());
+    }
+    Ok(())
 }
 
 /// Positions that fewer than this many slots have are too few to judge.

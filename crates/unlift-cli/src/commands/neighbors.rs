@@ -30,7 +30,7 @@ pub fn oracle(args: &OracleArgs) -> anyhow::Result<Outcome> {
         _ => error.into(),
     })?;
     same_map(&released_path, Some(released.fingerprint()), &args.truth, secret.map())?;
-    expect_slots(&released_path, released.n_slots(), &secret)?;
+    expect_slots(&released_path, &released, &secret)?;
     let alive = Spinner::new("searching neighbors");
     let core = |error| unlift_io::Error::core(&args.truth, error);
     let knn = search(&original).map_err(core)?;

@@ -9,6 +9,7 @@ use arrow_array::types::{
 use arrow_array::{Array, ArrayRef, RecordBatch};
 use arrow_schema::DataType;
 use std::fmt;
+use std::ops::Range;
 use std::path::Path;
 
 /// What a column must hold; its width does not matter.
@@ -32,13 +33,16 @@ impl Type {
     pub(super) fn admits(self, found: &DataType) -> bool {
         let float = DataType::is_floating;
         match (self, found) {
-            (Self::Float, found) => float(found),
-            (Self::Integer, found) => found.is_integer(),
+            // Whole numbers in a column of the other kind lose nothing: a table without decimals, or one of
+            // pandas, which makes floats of integers beside a null.
+            (Self::Float | Self::Integer, found) => float(found) || found.is_integer(),
             (Self::Text, found) => *found == DataType::Utf8,
-            (Self::Floats, DataType::List(of)) => float(of.data_type()),
-            (Self::Integers, DataType::List(of)) => of.data_type().is_integer(),
-            (Self::Numbers, DataType::List(of)) => {
-                float(of.data_type()) || of.data_type().is_integer()
+            (Self::Floats | Self::Numbers, DataType::List(of)) => {
+                float(of.data_type()) || of.data_type().is_integer() || of.data_type().is_null()
+            }
+            // Lists that are all empty may have no type.
+            (Self::Integers, DataType::List(of)) => {
+                of.data_type().is_integer() || of.data_type().is_null()
             }
             (Self::Floats | Self::Integers | Self::Numbers, _) => false,
         }
@@ -97,21 +101,21 @@ impl<'a> Batch<'a> {
     /// Finite floats.
     pub(super) fn floats(&self, name: &str) -> Result<Vec<f64>, Error> {
         self.no_null(name, FINITE)?;
-        let values = floats(self.column(name));
+        let values = self.widened(name)?;
         match values.iter().position(|x| !x.is_finite()) {
             None => Ok(values),
             Some(row) => Err(self.wrong(name, row, FINITE, values[row].to_string())),
         }
     }
 
-    /// Finite floats or null.
+    /// Finite floats; null and NaN, which are the same to many programs, are none.
     pub(super) fn optional_floats(&self, name: &str) -> Result<Vec<Option<f64>>, Error> {
         let column = self.column(name);
-        let values = floats(column).into_iter().enumerate();
-        let checked = values.map(|(row, x)| match column.is_valid(row) {
+        let values = self.widened(name)?.into_iter().enumerate();
+        let checked = values.map(|(row, x)| match column.is_valid(row) && !x.is_nan() {
             false => Ok(None),
             true if x.is_finite() => Ok(Some(x)),
-            true => Err(self.wrong(name, row, "a finite number or null", x.to_string())),
+            true => Err(self.wrong(name, row, "a finite number, NaN or null", x.to_string())),
         });
         checked.collect()
     }
@@ -132,19 +136,27 @@ impl<'a> Batch<'a> {
 
     /// Integers from 0 to below `below` (at most 2^32).
     pub(super) fn integers(&self, name: &str, below: u64) -> Result<Vec<u32>, Error> {
-        self.no_null(name, &whole_below(below))?;
-        let values = integers(self.column(name)).into_iter().enumerate();
-        let checked = values.map(|(row, x)| self.in_range(name, row, x, below));
-        checked.collect()
+        let values = self.optional_integers(name, below)?.into_iter().enumerate();
+        let null = |row| self.wrong(name, row, whole_below(below), "null");
+        values.map(|(row, x)| x.ok_or_else(|| null(row))).collect()
     }
 
-    /// Integers from 0 to below `below` (at most 2^32), or null.
+    /// Integers from 0 to below `below` (at most 2^32); null, or NaN among floats, is none.
     pub(super) fn optional_integers(
         &self,
         name: &str,
         below: u64,
     ) -> Result<Vec<Option<u32>>, Error> {
         let column = self.column(name);
+        if column.data_type().is_floating() {
+            let values = floats(column).into_iter().enumerate();
+            let whole = values.map(|(row, x)| match column.is_valid(row) && !x.is_nan() {
+                false => Ok(None),
+                true if x >= 0.0 && x < below as f64 && x.trunc() == x => Ok(Some(x as u32)),
+                true => Err(self.wrong(name, row, whole_below(below), x.to_string())),
+            });
+            return whole.collect();
+        }
         let values = integers(column).into_iter().enumerate();
         let checked = values.map(|(row, x)| match column.is_valid(row) {
             false => Ok(None),
@@ -159,7 +171,7 @@ impl<'a> Batch<'a> {
     }
 
     /// Lists of integers from 0 to below `below` (at most 2^32): values appended to `to`, the end of
-    /// each list to `offsets`. Lists longer than `most` are refused before they are copied.
+    /// each list to `offsets`. Null is an empty list. Lists longer than `most` are refused before they are copied.
     pub(super) fn integer_lists(
         &self,
         name: &str,
@@ -171,7 +183,7 @@ impl<'a> Batch<'a> {
         let lists = self.lists(name)?;
         let values = integers(&lists.values);
         for row in 0..self.len() {
-            let list = &values[lists.ends[row]..lists.ends[row + 1]];
+            let list = &values[lists.range(row)];
             if list.len() as u64 > most {
                 let expected = format!("at most {most} values");
                 return Err(self.wrong(name, row, expected, list.len().to_string()));
@@ -184,13 +196,16 @@ impl<'a> Batch<'a> {
         Ok(())
     }
 
-    /// Lists of finite floats: values appended to `to`, and returned the length of each list.
+    /// Lists of finite floats: values appended to `to`, and returned the length of each list. Null is an empty list.
     pub(super) fn float_lists(&self, name: &str, to: &mut Vec<f32>) -> Result<Vec<usize>, Error> {
         let lists = self.lists(name)?;
-        let values = floats(&lists.values);
+        let values = match lists.values.data_type().is_floating() {
+            true => floats(&lists.values),
+            false => integers(&lists.values).into_iter().map(|x| x as f64).collect(),
+        };
         let mut lengths = Vec::with_capacity(self.len());
         for row in 0..self.len() {
-            let list = &values[lists.ends[row]..lists.ends[row + 1]];
+            let list = &values[lists.range(row)];
             for &x in list {
                 if !(x as f32).is_finite() {
                     let expected = "finite numbers in the range of f32";
@@ -201,6 +216,25 @@ impl<'a> Batch<'a> {
             lengths.push(list.len());
         }
         Ok(lengths)
+    }
+
+    /// Whether the column `name` is null in every row here.
+    pub(super) fn is_null(&self, name: &str) -> bool {
+        self.column(name).null_count() == self.len()
+    }
+
+    /// Floats, or integers that a double holds exactly; what stands at nulls has no meaning.
+    fn widened(&self, name: &str) -> Result<Vec<f64>, Error> {
+        let column = self.column(name);
+        if column.data_type().is_floating() {
+            return Ok(floats(column));
+        }
+        let values = integers(column).into_iter().enumerate();
+        let exact = values.map(|(row, x)| match x as f64 as i128 == x {
+            true => Ok(x as f64),
+            false => Err(self.wrong(name, row, "a number that a double holds", x.to_string())),
+        });
+        exact.collect()
     }
 
     fn column(&self, name: &str) -> &'a ArrayRef {
@@ -225,26 +259,38 @@ impl<'a> Batch<'a> {
     }
 
     fn lists(&self, name: &str) -> Result<Lists, Error> {
-        self.no_null(name, "a list")?;
         let lists = self.column(name).as_list::<i32>();
-        let ends: Vec<usize> = lists.value_offsets().iter().map(|&at| at as usize).collect();
+        let offsets = lists.value_offsets();
+        // What stands at a null may have a length.
+        let range = |row: usize| match lists.is_valid(row) {
+            true => offsets[row] as usize..offsets[row + 1] as usize,
+            false => 0..0,
+        };
+        let ranges: Vec<Range<usize>> = (0..self.len()).map(range).collect();
         let values = lists.values();
-        if values.null_count() > 0 {
-            let holds_null =
-                |row: &usize| (ends[*row]..ends[*row + 1]).any(|at| values.is_null(at));
+        if values.logical_null_count() > 0 {
+            let nulls = values.logical_nulls();
+            let is_null = |at: usize| nulls.as_ref().is_some_and(|nulls| nulls.is_null(at));
+            let holds_null = |row: &usize| ranges[*row].clone().any(is_null);
             if let Some(row) = (0..self.len()).find(holds_null) {
                 return Err(self.wrong(name, row, "a list of numbers", "null in the list"));
             }
         }
         let values = values.clone();
-        Ok(Lists { ends, values })
+        Ok(Lists { ranges, values })
     }
 }
 
-/// Where lists end (`ends[row]..ends[row + 1]`) in their values.
+/// Where lists lie in their values.
 struct Lists {
-    ends: Vec<usize>,
+    ranges: Vec<Range<usize>>,
     values: ArrayRef,
+}
+
+impl Lists {
+    fn range(&self, row: usize) -> Range<usize> {
+        self.ranges[row].clone()
+    }
 }
 
 const FINITE: &str = "a finite number";
@@ -262,6 +308,8 @@ fn integers(array: &ArrayRef) -> Vec<i128> {
                     let values = array.as_primitive::<$of>().values();
                     values.iter().map(|&x| i128::from(x)).collect()
                 })*
+                // Nothing but nulls.
+                DataType::Null => vec![0; array.len()],
                 other => unreachable!("{other} was checked to be integers"),
             }
         };

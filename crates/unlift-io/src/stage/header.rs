@@ -54,12 +54,6 @@ impl Kind {
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
-
-    /// Whether the columns alone say what the file is, so that the metadata may be missing (engines
-    /// such as Spark cannot write it).
-    pub(super) fn needs_metadata(self) -> bool {
-        !matches!(self, Self::Neighborhoods | Self::PointNeighborhoods)
-    }
 }
 
 impl fmt::Display for Kind {
@@ -95,7 +89,7 @@ pub fn peek(path: &Path) -> Result<Header, Error> {
     let kind = table.kind()?;
     let dimension = match kind {
         Kind::Neighborhoods | Kind::PointNeighborhoods => None,
-        Kind::Released | Kind::Truth | Kind::Recovered => Some(table.meta().dimension()?),
+        Kind::Released | Kind::Truth | Kind::Recovered => Some(table.dimension()?),
     };
     let n_rows = table.n_rows();
     Ok(Header { kind, dimension, n_rows })
@@ -130,43 +124,42 @@ impl<'a> Meta<'a> {
         Ok(Self { path, object })
     }
 
-    /// Kind of the file as declared; `None` when nothing is declared.
+    /// Kind of the file, if it is declared.
     pub(super) fn kind(&self) -> Result<Option<Kind>, Error> {
-        if self.object.is_empty() {
-            return Ok(None);
-        }
-        let Some(version) = self.object.get("version") else {
-            return Err(self.wrong("version", VERSION.to_string()));
-        };
-        if version.as_u64() != Some(VERSION) {
+        if self.object.get("version").is_some_and(|version| version.as_u64() != Some(VERSION)) {
             return Err(self.wrong("version", VERSION.to_string()));
         }
+        let Some(kind) = self.object.get("kind") else { return Ok(None) };
         let names: Vec<&str> = Kind::ALL.into_iter().map(Kind::name).collect();
-        let kind = self.text("kind").and_then(Kind::from_name);
-        match kind {
-            Some(kind) => Ok(Some(kind)),
-            None => Err(self.wrong("kind", format!("one of {}", names.join(", ")))),
+        let kind = kind.as_str().and_then(Kind::from_name);
+        let wrong = || self.wrong("kind", format!("one of {}", names.join(", ")));
+        kind.map(Some).ok_or_else(wrong)
+    }
+
+    /// 2 or 3, if it is declared.
+    pub(super) fn dimension(&self) -> Result<Option<usize>, Error> {
+        match self.object.get("dimension").map(Value::as_u64) {
+            None => Ok(None),
+            Some(Some(2)) => Ok(Some(2)),
+            Some(Some(3)) => Ok(Some(3)),
+            Some(_) => Err(self.wrong("dimension", "2 or 3")),
         }
     }
 
-    /// 2 or 3.
-    pub(super) fn dimension(&self) -> Result<usize, Error> {
-        match self.object.get("dimension").and_then(Value::as_u64) {
-            Some(2) => Ok(2),
-            Some(3) => Ok(3),
-            _ => Err(self.wrong("dimension", "2 or 3")),
+    /// The unit of every length, if it is declared.
+    pub(super) fn unit(&self) -> Result<Option<Unit>, Error> {
+        match self.object.get("unit") {
+            None => Ok(None),
+            Some(unit) => match unit.as_str().and_then(Unit::from_name) {
+                Some(unit) => Ok(Some(unit)),
+                None => Err(self.wrong_unit()),
+            },
         }
     }
 
-    /// Refuses a file of another dimension than `D`.
-    pub(super) fn expect_dimension<const D: usize>(&self) -> Result<(), Error> {
-        if self.dimension()? == D { Ok(()) } else { Err(self.wrong("dimension", D.to_string())) }
-    }
-
-    /// The unit of every length.
-    pub(super) fn unit(&self) -> Result<Unit, Error> {
-        let unit = self.text("unit").and_then(Unit::from_name);
-        unit.ok_or_else(|| self.wrong("unit", "m, px or kth_neighbor"))
+    /// The error about a unit that is needed.
+    pub(super) fn wrong_unit(&self) -> Error {
+        self.wrong("unit", "m, px or kth_neighbor")
     }
 
     /// The origin; 0 when it is not given.

@@ -4,11 +4,12 @@
 //! one kind only, and released maps, neighborhoods and recovered points hold nothing of the truth:
 //! no ids, names or times of their source, so that equal values make equal bytes.
 //!
-//! Readers take any integer width, float or double, any kind of list, and ignore columns and
-//! metadata they do not know. Everything else that is not as documented is one line naming the
+//! Readers are lenient where nothing is lost: any width of numbers, any kind of list, null or NaN for what is not
+//! there, metadata only where columns do not tell, columns only where they mean something. Everything else that is not as documented is one line naming the
 //! file, the column and row (counted from 0), what was expected and what was found.
 
 mod column;
+mod file;
 mod guard;
 mod header;
 mod neighborhoods;
@@ -23,6 +24,6 @@ pub use header::{Header, Kind, declared_kind, peek};
 pub use neighborhoods::{
     PointNeighborhoods, read_neighborhoods, read_point_neighborhoods, write_neighborhoods,
 };
-pub use recovered::{read_recovered, write_recovered};
+pub use recovered::{read_recovered, read_recovered_in, write_recovered};
 pub use released::{read_released, write_released};
 pub use truth::{read_truth, write_truth};

@@ -83,7 +83,7 @@ pub fn write_neighborhoods(path: &Path, neighborhoods: &Neighborhoods) -> Result
 /// Reads neighborhoods for a released map of `n_records` records with `slots_per_record` slots each.
 ///
 /// Rows are in slot order or, when there is a column `slot`, in any. Every slot has a row; its list
-/// may be empty. Metadata may be missing, but not say another kind.
+/// may be empty or null. Metadata may be missing, but not say another kind.
 ///
 /// # Errors
 /// When the file is not as `docs/formats.md` describes it: another number of rows than slots, or a
@@ -164,6 +164,7 @@ impl Lists {
             columns.push(("scores", Type::Floats));
         }
         let (mut keys, mut offsets, mut ids, mut scores) = (vec![], vec![0], vec![], vec![]);
+        let mut n_unscored = 0;
         table.read(&columns, |batch| {
             if let Some(key) = key {
                 keys.extend(batch.integers(key, n_keys as u64)?);
@@ -172,6 +173,10 @@ impl Lists {
             // Each id once: no list is longer than there are ids.
             batch.integer_lists(column, n_ids as u64, n_ids as u64, &mut offsets, &mut ids)?;
             if with_scores {
+                if batch.is_null("scores") {
+                    n_unscored += batch.len();
+                    return Ok(());
+                }
                 let lengths = batch.float_lists("scores", &mut scores)?;
                 for (row, (length, w)) in
                     lengths.iter().zip(offsets[first..].windows(2)).enumerate()
@@ -185,7 +190,7 @@ impl Lists {
             }
             Ok(())
         })?;
-        let scores = with_scores.then_some(scores);
+        let scores = (with_scores && !table.is_without("scores", n_unscored)?).then_some(scores);
         Ok(Self { keys, offsets, ids, scores })
     }
 

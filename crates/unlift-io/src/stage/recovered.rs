@@ -14,6 +14,7 @@ use arrow_schema::Field;
 use serde_json::json;
 use std::path::Path;
 use std::sync::Arc;
+use unlift::Unit;
 use unlift::recover::{Confidence, Estimate, Recovered, Status};
 
 /// Writes recovered points, one row per slot; positions in the map's frame (the origin is added).
@@ -82,7 +83,7 @@ pub fn write_recovered<const D: usize>(path: &Path, recovered: &Recovered<D>) ->
 
 /// Reads recovered points of dimension `D` (see [`peek`](super::peek)).
 ///
-/// Only the coordinates are needed: without `status`, a point is `ok` or, where they are null,
+/// Only the coordinates are needed: without `status`, a point is `ok` or, where they are null or NaN,
 /// `no_support`; `support` and `evidence` default to 0. Confidence is known where both of its
 /// columns are there. Rows are in slot order or, when there is a
 /// column `slot`, in any.
@@ -91,9 +92,29 @@ pub fn write_recovered<const D: usize>(path: &Path, recovered: &Recovered<D>) ->
 /// When the file is not as `docs/formats.md` describes it.
 pub fn read_recovered<const D: usize>(path: &Path) -> Result<Recovered<D>, Error> {
     let table = Table::open_kind(path, Kind::Recovered)?;
+    recovered_of(path, &table, None)
+}
+
+/// As [`read_recovered`], for positions that are compared with a map in `unit`: what does not say its unit has that
+/// of the map.
+///
+/// # Errors
+/// As [`read_recovered`].
+pub fn read_recovered_in<const D: usize>(path: &Path, unit: Unit) -> Result<Recovered<D>, Error> {
+    let table = Table::open_kind(path, Kind::Recovered)?;
+    recovered_of(path, &table, Some(unit))
+}
+
+/// The recovered points of a table.
+pub(super) fn recovered_of<const D: usize>(
+    path: &Path,
+    table: &Table<'_>,
+    usual: Option<Unit>,
+) -> Result<Recovered<D>, Error> {
     let meta = table.meta();
-    meta.expect_dimension::<D>()?;
-    let (origin, unit, delta) = (meta.origin::<D>()?, meta.unit()?, meta.number_or_0("delta")?);
+    table.expect_dimension::<D>()?;
+    let (origin, unit) = (meta.origin::<D>()?, table.unit::<D>(usual)?);
+    let delta = meta.number_or_0("delta")?;
     let about = meta.about()?;
     let coordinates = coordinate_names::<D>("");
     let mut columns: Vec<(&str, Type)> = vec![];
@@ -121,10 +142,12 @@ pub fn read_recovered<const D: usize>(path: &Path) -> Result<Recovered<D>, Error
         if table.has("descriptor_row") {
             rows.extend(batch.integers("descriptor_row", n_slots)?);
         }
-        if with_confidence {
-            read_confidence(batch, &mut confidence)?;
+        let first = estimates.len();
+        read_estimates(table, batch, &coordinates, &origin, &mut estimates)?;
+        match with_confidence {
+            true => read_confidence(batch, &estimates[first..], &mut confidence),
+            false => Ok(()),
         }
-        read_estimates(&table, batch, &coordinates, &origin, &mut estimates)
     })?;
     if table.has("slot") {
         let order = permutation(path, "slot", &slots)?;
@@ -144,16 +167,25 @@ pub fn read_recovered<const D: usize>(path: &Path) -> Result<Recovered<D>, Error
             false => Ok(recovered),
         })
         .map(|recovered| recovered.with_about(about))
-        .map_err(|source| Error::core(path, source))
+        .map_err(|source| table.refused(source))
 }
 
-/// The confidence of one batch, appended to `to`.
-fn read_confidence(batch: &Batch<'_>, to: &mut Vec<Confidence>) -> Result<(), Error> {
-    let (found, scale) = (batch.floats("found")?, batch.optional_floats("error_scale")?);
+/// The confidence of one batch, appended to `to`. Of lost points (see `estimates`) nothing need be known.
+fn read_confidence<const D: usize>(
+    batch: &Batch<'_>,
+    estimates: &[Estimate<D>],
+    to: &mut Vec<Confidence>,
+) -> Result<(), Error> {
+    let (found, scale) = (batch.optional_floats("found")?, batch.optional_floats("error_scale")?);
     for (row, (found, scale)) in found.into_iter().zip(scale).enumerate() {
-        if !(0.0..=1.0).contains(&found) {
-            return Err(batch.wrong("found", row, "a probability", found.to_string()));
-        }
+        let found = match found {
+            None if estimates[row].status != Status::Ok => 0.0,
+            None => return Err(batch.wrong("found", row, "a probability", "null")),
+            Some(found) if (0.0..=1.0).contains(&found) => found,
+            Some(found) => {
+                return Err(batch.wrong("found", row, "a probability", found.to_string()));
+            }
+        };
         if let Some(negative) = scale.filter(|&scale| scale < 0.0) {
             return Err(batch.wrong("error_scale", row, "a length", negative.to_string()));
         }
@@ -165,7 +197,7 @@ fn read_confidence(batch: &Batch<'_>, to: &mut Vec<Confidence>) -> Result<(), Er
 
 /// The estimates of one batch, appended to `to`.
 fn read_estimates<const D: usize>(
-    table: &Table,
+    table: &Table<'_>,
     batch: &Batch<'_>,
     coordinates: &[String; D],
     origin: &[f64; D],
@@ -175,16 +207,19 @@ fn read_estimates<const D: usize>(
     for (column, name) in position.iter_mut().zip(coordinates) {
         *column = batch.optional_floats(name)?;
     }
-    let status = table.has("status").then(|| batch.texts("status"));
+    let status = match table.has("status") {
+        true => batch.texts("status"),
+        false => vec![None; batch.len()],
+    };
     let integers = |name, below| match table.has(name) {
-        true => batch.integers(name, below),
-        false => Ok(vec![0; batch.len()]),
+        true => batch.optional_integers(name, below),
+        false => Ok(vec![None; batch.len()]),
     };
     let support = integers("support", 1 << 16)?;
     let axis = integers("axis", D as u64)?;
     let evidence = match table.has("evidence") {
-        true => batch.floats("evidence")?,
-        false => vec![0.0; batch.len()],
+        true => batch.optional_floats("evidence")?,
+        false => vec![None; batch.len()],
     };
     for row in 0..batch.len() {
         let found = position[0][row].is_some();
@@ -203,17 +238,16 @@ fn read_estimates<const D: usize>(
                 None => return Err(batch.wrong(name, row, "a number as in x", "null")),
             }
         }
-        let status = match &status {
-            Some(names) => read_status(batch, row, names[row], found)?,
-            None if found => Status::Ok,
-            None => Status::NoSupport,
-        };
+        if found && table.has("axis") && axis[row].is_none() {
+            let expected = format!("a whole number below {D}, as there is a position");
+            return Err(batch.wrong("axis", row, expected, "null"));
+        }
         to.push(Estimate {
             position: about_origin,
-            status,
-            support: support[row] as u16,
-            axis: axis[row] as u8,
-            evidence: evidence[row] as f32,
+            status: read_status(batch, row, status[row], found)?,
+            support: support[row].unwrap_or(0) as u16,
+            axis: axis[row].unwrap_or(0) as u8,
+            evidence: evidence[row].unwrap_or(0.0) as f32,
         });
     }
     Ok(())
@@ -225,8 +259,11 @@ fn read_status(
     name: Option<&str>,
     has_position: bool,
 ) -> Result<Status, Error> {
-    let wrong = |expected: String| batch.wrong("status", row, expected, name.unwrap_or("null"));
-    let Some(status) = name.and_then(Status::from_name) else {
+    let Some(name) = name else {
+        return Ok(if has_position { Status::Ok } else { Status::NoSupport });
+    };
+    let wrong = |expected: String| batch.wrong("status", row, expected, name);
+    let Some(status) = Status::from_name(name) else {
         let names = Status::ALL.map(Status::name).join(", ");
         return Err(wrong(format!("one of {names}")));
     };

@@ -90,34 +90,36 @@ pub fn write_released<const D: usize>(path: &Path, released: &Released<D>) -> Re
 /// Reads a released map of dimension `D` (see [`peek`](super::peek)).
 ///
 /// Directions need not have unit length, nor feet lie nearest the origin: records are brought to
-/// normal form. A map without records has no descriptors.
+/// normal form. A map without records has no descriptors. What the metadata does not say is told from the columns,
+/// where they tell it.
 ///
 /// # Errors
 /// When the file is not a released map of this dimension as `docs/formats.md` describes it.
 pub fn read_released<const D: usize>(path: &Path) -> Result<Released<D>, Error> {
-    let core = |source| Error::core(path, source);
-    let table = Table::open_kind(path, Kind::Released)?;
+    released_of(&Table::open_kind(path, Kind::Released)?)
+}
+
+/// The released map of a table.
+pub(super) fn released_of<const D: usize>(table: &Table<'_>) -> Result<Released<D>, Error> {
+    let core = |source| table.refused(source);
     let meta = table.meta();
-    meta.expect_dimension::<D>()?;
-    let (origin, unit) = (meta.origin::<D>()?, meta.unit()?);
+    let family = family(table)?;
+    table.expect_dimension::<D>()?;
+    let (origin, unit) = (meta.origin::<D>()?, table.unit::<D>(None)?);
     let per_record = meta.count_or_1("slots_per_record")?;
     if per_record > 2 {
         return Err(meta.wrong("slots_per_record", "1 or 2"));
     }
-    let obfuscation = match meta.text("family") {
-        Some("lines") => read_lines(path, &table)?,
-        Some("rays") => read_rays(path, &table)?,
-        Some("axis_planes") => read_axis_planes(path, &table)?,
-        Some("axis_candidates") => {
-            let [position] = read_vectors(&table, [""])?;
+    let obfuscation = match family {
+        Family::Lines => read_lines(table)?,
+        Family::Rays => read_rays(table)?,
+        Family::AxisPlanes => read_axis_planes(table)?,
+        Family::AxisCandidates => {
+            let [position] = read_vectors(table, [""])?;
             Obfuscation::AxisCandidates(AxisCandidates::try_new(&position).map_err(core)?)
         }
-        _ => {
-            let expected = "lines, rays, axis_planes or axis_candidates";
-            return Err(meta.wrong("family", expected));
-        }
     };
-    let descriptors = read_descriptors(path, &table, per_record)?;
+    let descriptors = read_descriptors(table, per_record)?;
     let bounds = meta.bounds::<D>()?;
     let released = Released::try_new(obfuscation, per_record, origin, unit, descriptors);
     let released = released.map_err(core)?.with_bounds(bounds);
@@ -128,6 +130,31 @@ pub fn read_released<const D: usize>(path: &Path) -> Result<Released<D>, Error> 
             Err(meta.wrong("fingerprint", expected))
         }
         _ => Ok(released),
+    }
+}
+
+/// The kinds of records, by their columns.
+enum Family {
+    Lines,
+    Rays,
+    AxisPlanes,
+    AxisCandidates,
+}
+
+/// The family that the metadata names or, where it names none, the one that the columns are of.
+fn family(table: &Table<'_>) -> Result<Family, Error> {
+    let names = "lines, rays, axis_planes or axis_candidates";
+    match table.meta().text("family") {
+        Some("lines") => Ok(Family::Lines),
+        Some("rays") => Ok(Family::Rays),
+        Some("axis_planes") => Ok(Family::AxisPlanes),
+        Some("axis_candidates") => Ok(Family::AxisCandidates),
+        Some(_) => Err(table.meta().wrong("family", names)),
+        None if table.has("foot_x") => Ok(Family::Lines),
+        None if table.has("center") => Ok(Family::Rays),
+        None if table.has("offset") => Ok(Family::AxisPlanes),
+        None if table.has("x") => Ok(Family::AxisCandidates),
+        None => Err(table.meta().wrong("family", format!("{names}, or the columns of one"))),
     }
 }
 
@@ -196,13 +223,13 @@ fn descriptor_column(
     }
 }
 
-fn read_lines<const D: usize>(path: &Path, table: &Table) -> Result<Obfuscation<D>, Error> {
+fn read_lines<const D: usize>(table: &Table<'_>) -> Result<Obfuscation<D>, Error> {
     let [foot, direction] = read_vectors(table, ["foot_", "direction_"])?;
     let lines = Lines::through(&foot, &direction);
-    lines.map(Obfuscation::Lines).map_err(|source| Error::core(path, source))
+    lines.map(Obfuscation::Lines).map_err(|source| table.refused(source))
 }
 
-fn read_rays<const D: usize>(path: &Path, table: &Table) -> Result<Obfuscation<D>, Error> {
+fn read_rays<const D: usize>(table: &Table<'_>) -> Result<Obfuscation<D>, Error> {
     let centers = table.meta().centers::<D>()?;
     if centers.is_empty() || centers.len() > 255 {
         return Err(table.meta().wrong("centers", "1 to 255 centers"));
@@ -223,10 +250,10 @@ fn read_rays<const D: usize>(path: &Path, table: &Table) -> Result<Obfuscation<D
         Some(regions) => rays.and_then(|rays| rays.with_regions(regions)),
         None => rays,
     };
-    rays.map(Obfuscation::Rays).map_err(|source| Error::core(path, source))
+    rays.map(Obfuscation::Rays).map_err(|source| table.refused(source))
 }
 
-fn read_axis_planes<const D: usize>(path: &Path, table: &Table) -> Result<Obfuscation<D>, Error> {
+fn read_axis_planes<const D: usize>(table: &Table<'_>) -> Result<Obfuscation<D>, Error> {
     let (mut axis, mut offset): (Vec<u8>, Vec<f64>) = (Vec::new(), Vec::new());
     let columns = [("axis", Type::Integer), ("offset", Type::Float)];
     table.read(&columns, |batch| {
@@ -236,12 +263,12 @@ fn read_axis_planes<const D: usize>(path: &Path, table: &Table) -> Result<Obfusc
         Ok(())
     })?;
     let planes = AxisPlanes::try_new(axis, &offset);
-    planes.map(Obfuscation::AxisPlanes).map_err(|source| Error::core(path, source))
+    planes.map(Obfuscation::AxisPlanes).map_err(|source| table.refused(source))
 }
 
 /// Vector columns by their prefixes.
 fn read_vectors<const D: usize, const N: usize>(
-    table: &Table,
+    table: &Table<'_>,
     prefixes: [&str; N],
 ) -> Result<[Vec<[f64; D]>; N], Error> {
     let names = prefixes.map(coordinate_names::<D>);
@@ -258,11 +285,7 @@ fn read_vectors<const D: usize, const N: usize>(
 }
 
 /// The descriptor columns, if there is any: bytes from integers, `f32` from floats.
-fn read_descriptors(
-    path: &Path,
-    table: &Table,
-    per_record: usize,
-) -> Result<Option<Descriptors>, Error> {
+fn read_descriptors(table: &Table<'_>, per_record: usize) -> Result<Option<Descriptors>, Error> {
     let names: Vec<String> = descriptor_names(per_record).collect();
     if !names.iter().any(|name| table.has(name)) || table.n_rows() == 0 {
         return Ok(None);
@@ -276,8 +299,12 @@ fn read_descriptors(
     };
     let columns: Vec<(&str, Type)> = names.iter().map(|name| (name.as_str(), class)).collect();
     let (mut u8s, mut f32s) = (Vec::new(), Vec::new());
-    let mut dim = None;
+    let (mut dim, mut n_without) = (None, 0);
     table.read(&columns, |batch| {
+        if names.iter().all(|name| batch.is_null(name)) {
+            n_without += batch.len();
+            return Ok(());
+        }
         let mut read = Vec::with_capacity(per_record);
         for name in &names {
             read.push(DescriptorRows::read(batch, name, bytes, &mut dim)?);
@@ -296,9 +323,12 @@ fn read_descriptors(
         }
         Ok(())
     })?;
+    if table.is_without(&names[0], n_without)? {
+        return Ok(None);
+    }
     let values = if bytes { Values::U8(u8s) } else { Values::F32(f32s) };
     let descriptors = Descriptors::try_new(values, dim.unwrap_or(0));
-    descriptors.map(Some).map_err(|source| Error::core(path, source))
+    descriptors.map(Some).map_err(|source| table.refused(source))
 }
 
 /// One descriptor column of a batch, rows end to end.

@@ -1,72 +1,36 @@
-//! A Parquet file: opened, checked, and read batch by batch.
+//! A table of one kind: from a Parquet file, or the rows of one image in it.
 
 use super::column::{Batch, Type};
-use super::guard::without_panic;
-use super::header::{KEY, Kind, Meta};
+use super::file::ParquetFile;
+use super::header::{Kind, Meta};
 use crate::Error;
-use parquet::arrow::ProjectionMask;
-use parquet::arrow::arrow_reader::{
-    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder,
-};
-use parquet::basic::Compression;
-use parquet::errors::ParquetError;
-use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom};
+use arrow_schema::SchemaRef;
 use std::path::Path;
+use unlift::Unit;
 
-/// Rows decoded at a time: with 128-byte descriptors a megabyte, with 4096 floats 128.
-const BATCH_ROWS: usize = 1 << 13;
-
-/// More rows than this per byte of the file are a declared count that nothing stands behind: even
-/// equal rows, run-length encoded in pages of 20,000, take more room.
-const ROWS_PER_BYTE: u64 = 1000;
-
-/// An open Parquet file.
+/// A table whose columns are asked for by name.
 #[derive(Debug)]
 pub(super) struct Table<'a> {
     path: &'a Path,
-    file: File,
-    parquet: ArrowReaderMetadata,
+    file: ParquetFile<'a>,
     meta: Meta<'a>,
-    n_rows: u64,
 }
 
 impl<'a> Table<'a> {
     /// Opens `path` and reads its footer.
     pub(super) fn open(path: &'a Path) -> Result<Self, Error> {
-        let failed = |source| Error::read(path, source);
-        let mut file = File::open(path).map_err(failed)?;
-        let found = file.metadata().map_err(failed)?;
-        if found.is_dir() {
-            return Err(failed(io::ErrorKind::IsADirectory.into()));
-        }
-        check_magic(path, &mut file, found.len())?;
-        // The Arrow schema that Arrow writers embed is left aside: the Parquet schema says all that
-        // counts, and then large, fixed-size and dictionary columns need no code of their own.
-        let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-        let parquet = guarded(path, || ArrowReaderMetadata::load(&file, options))?;
-        let footer = parquet.metadata().file_metadata();
-        let most = (i32::MAX as u64).min(found.len().saturating_mul(ROWS_PER_BYTE));
-        let n_rows = match u64::try_from(footer.num_rows()) {
-            Ok(n_rows) if n_rows <= most => n_rows,
-            _ => {
-                let expected = format!("at most {most} rows in {} bytes", found.len());
-                return Err(Error::new(path, "", expected, footer.num_rows().to_string()));
-            }
-        };
-        let entries = footer.key_value_metadata();
-        let entry = entries.and_then(|all| all.iter().find(|entry| entry.key == KEY));
-        let meta = Meta::parse(path, entry.and_then(|entry| entry.value.as_deref()))?;
-        Ok(Self { path, file, parquet, meta, n_rows })
+        let file = ParquetFile::open(path)?;
+        let meta = Meta::parse(path, file.meta_text())?;
+        Ok(Self { path, file, meta })
     }
 
     /// Opens `path`, which should hold `kind`.
     pub(super) fn open_kind(path: &'a Path, kind: Kind) -> Result<Self, Error> {
         let table = Self::open(path)?;
         let found = match table.meta.kind()? {
-            None if !kind.needs_metadata() => table.kind().unwrap_or(kind),
-            None => return Err(Error::new(path, "", kind.to_string(), NO_METADATA)),
             Some(found) => found,
+            // What could be several kinds is the one that is asked for.
+            None => table.kind_by_columns().unwrap_or(kind),
         };
         if found == kind {
             Ok(table)
@@ -75,18 +39,33 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// What the file holds: by its metadata or, for neighborhoods without, by its columns.
+    /// What the file holds: by its metadata or, where it does not say, by its columns.
     pub(super) fn kind(&self) -> Result<Kind, Error> {
-        if let Some(kind) = self.meta.kind()? {
-            return Ok(kind);
-        }
+        let kind = self.meta.kind()?.or_else(|| self.kind_by_columns());
+        kind.ok_or_else(|| Error::new(self.path, "", "a stage file of unlift", NO_METADATA))
+    }
+
+    /// What only one kind has columns for; `None` where it could be several kinds, or none.
+    fn kind_by_columns(&self) -> Option<Kind> {
+        let any = |names: &[&str]| names.iter().any(|name| self.has(name));
         if self.has("point") && self.has("neighbors") {
-            return Ok(Kind::PointNeighborhoods);
+            Some(Kind::PointNeighborhoods)
+        } else if self.has("records") {
+            Some(Kind::Neighborhoods)
+        } else if any(&["foot_x", "direction_x", "offset"]) {
+            Some(Kind::Released)
+        } else if any(&["original", "dropped", "swapped_axis"]) {
+            Some(Kind::Truth)
+        } else if any(&["status", "support", "evidence", "error_scale"]) {
+            Some(Kind::Recovered)
+        } else {
+            None
         }
-        if self.has("records") {
-            return Ok(Kind::Neighborhoods);
-        }
-        Err(Error::new(self.path, "", "a stage file of unlift", NO_METADATA))
+    }
+
+    /// The error about values that the core refused.
+    pub(super) fn refused(&self, source: unlift::Error) -> Error {
+        Error::core(self.path, source)
     }
 
     /// The metadata object.
@@ -94,19 +73,57 @@ impl<'a> Table<'a> {
         &self.meta
     }
 
-    /// Number of rows, as the footer declares it.
-    pub(super) fn n_rows(&self) -> u64 {
-        self.n_rows
+    /// 2 or 3, as declared or as the columns have it.
+    pub(super) fn dimension(&self) -> Result<usize, Error> {
+        if let Some(declared) = self.meta.dimension()? {
+            return Ok(declared);
+        }
+        let any = |names: [&str; 3]| names.iter().any(|name| self.has(name));
+        if any(["z", "foot_z", "direction_z"]) {
+            Ok(3)
+        } else if any(["y", "foot_y", "direction_y"]) {
+            Ok(2)
+        } else {
+            // Planes have no column per axis.
+            Err(self.meta.wrong("dimension", "2 or 3"))
+        }
     }
 
-    /// Whether there is a column called `name`.
+    /// Refuses a table of another dimension than `D`.
+    pub(super) fn expect_dimension<const D: usize>(&self) -> Result<(), Error> {
+        let found = self.dimension()?;
+        if found == D {
+            return Ok(());
+        }
+        if self.meta.dimension()?.is_some() {
+            return Err(self.meta.wrong("dimension", D.to_string()));
+        }
+        let found = format!("columns of {found}");
+        Err(Error::new(self.path, "", format!("{D} dimensions"), found))
+    }
+
+    /// The unit of every length, as declared or `usual`; in the plane it is pixels.
+    pub(super) fn unit<const D: usize>(&self, usual: Option<Unit>) -> Result<Unit, Error> {
+        let in_plane = (D == 2).then_some(Unit::Pixel);
+        let unit = self.meta.unit()?.or(usual).or(in_plane);
+        unit.ok_or_else(|| self.meta.wrong_unit())
+    }
+
+    /// Number of rows.
+    pub(super) fn n_rows(&self) -> u64 {
+        self.file.n_rows()
+    }
+
+    /// Whether there is a column called `name` with a value in it, as far as can be told without reading it.
     pub(super) fn has(&self, name: &str) -> bool {
-        self.parquet.schema().column_with_name(name).is_some()
+        let field = self.schema().column_with_name(name);
+        let named = field.is_some_and(|(_, field)| !field.data_type().is_null());
+        named && (self.n_rows() == 0 || !self.file.is_all_null(name))
     }
 
     /// Whether the column `name` is there and of type `class`.
     pub(super) fn is(&self, name: &str, class: Type) -> bool {
-        let field = self.parquet.schema().column_with_name(name);
+        let field = self.schema().column_with_name(name);
         field.is_some_and(|(_, field)| class.admits(field.data_type()))
     }
 
@@ -120,24 +137,30 @@ impl<'a> Table<'a> {
         for &(name, class) in columns {
             roots.push(self.find(name, class)?);
         }
-        let file = self.file.try_clone();
-        let file = file.map_err(|source| Error::read(self.path, source))?;
-        let mut reader = guarded(self.path, || {
-            let builder =
-                ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.parquet.clone());
-            let mask = ProjectionMask::roots(builder.parquet_schema(), roots);
-            builder.with_projection(mask).with_batch_size(BATCH_ROWS).build()
-        })?;
+        let mut batches = self.file.batches(roots)?;
         let mut first_row = 0;
-        while let Some(batch) = guarded(self.path, || reader.next().transpose())? {
+        while let Some(batch) = batches.next()? {
             each(&Batch::new(self.path, &batch, first_row))?;
             first_row += batch.num_rows() as u64;
         }
-        if first_row != self.n_rows {
-            let expected = format!("{} rows, as its footer says", self.n_rows);
-            return Err(Error::new(self.path, "", expected, first_row.to_string()));
-        }
         Ok(())
+    }
+
+    /// Whether the column `name`, of which `n_null` rows were passed over as whole batches of nulls, has no value.
+    ///
+    /// # Errors
+    /// When some rows have one and others do not.
+    pub(super) fn is_without(&self, name: &str, n_null: usize) -> Result<bool, Error> {
+        if n_null == 0 || n_null as u64 == self.n_rows() {
+            return Ok(n_null > 0);
+        }
+        let found = format!("null in {n_null} of {}", self.n_rows());
+        let place = format!("column {name}");
+        Err(Error::new(self.path, place, "a list in every row, or in none", found))
+    }
+
+    fn schema(&self) -> &SchemaRef {
+        self.file.schema()
     }
 
     /// The index of the column `name`, which must be there once and be of type `class`.
@@ -145,7 +168,7 @@ impl<'a> Table<'a> {
         let wrong = |found: String| {
             Error::new(self.path, format!("column {name}"), class.to_string(), found)
         };
-        let fields = self.parquet.schema().fields().iter().enumerate();
+        let fields = self.schema().fields().iter().enumerate();
         let mut named = fields.filter(|(_, field)| field.name() == name);
         let Some((at, field)) = named.next() else {
             return Err(wrong("no such column".into()));
@@ -156,72 +179,8 @@ impl<'a> Table<'a> {
         if !class.admits(field.data_type()) {
             return Err(wrong(format!("type {}", field.data_type())));
         }
-        self.check_codec(name)?;
         Ok(at)
-    }
-
-    /// Refuses compression by code that this program was built without.
-    fn check_codec(&self, name: &str) -> Result<(), Error> {
-        let groups = self.parquet.metadata().row_groups().iter();
-        let chunks = groups.flat_map(|group| group.columns());
-        let mut of_column = chunks.filter(|chunk| chunk.column_path().parts()[0] == name);
-        let known = [Compression::UNCOMPRESSED, Compression::SNAPPY];
-        match of_column.find(|chunk| !known.contains(&chunk.compression())) {
-            None => Ok(()),
-            Some(chunk) => {
-                // `ZSTD(ZstdLevel(1))`: the level does not matter here.
-                let codec = chunk.compression().to_string();
-                let found = codec.split('(').next().unwrap_or_default();
-                let place = format!("column {name}");
-                Err(Error::new(self.path, place, "no compression or Snappy", found))
-            }
-        }
     }
 }
 
 const NO_METADATA: &str = "a Parquet file without metadata of unlift";
-
-/// Tells a file that never was Parquet from one that was cut short: the usual accidents.
-fn check_magic(path: &Path, file: &mut File, n_bytes: u64) -> Result<(), Error> {
-    let failed = |source| Error::read(path, source);
-    let wrong = |found: String| Err(Error::new(path, "", "a Parquet file", found));
-    if n_bytes == 0 {
-        return wrong("an empty file".into());
-    }
-    let mut start = [0; 4];
-    let n_start = n_bytes.min(4) as usize;
-    file.read_exact(&mut start[..n_start]).map_err(failed)?;
-    if !b"PAR1".starts_with(&start[..n_start]) {
-        return wrong("a file that does not begin with PAR1".into());
-    }
-    let mut end = [0; 4];
-    if n_bytes >= 12 {
-        file.seek(SeekFrom::End(-4)).map_err(failed)?;
-        file.read_exact(&mut end).map_err(failed)?;
-    }
-    if end != *b"PAR1" {
-        return wrong(format!("one cut short after {n_bytes} bytes"));
-    }
-    Ok(())
-}
-
-/// Runs a step of the `parquet` crate on bytes nobody vouches for: its error, or a panic on damaged
-/// data that it did not foresee, becomes an error about the file.
-fn guarded<T, E: Into<ParquetError>>(
-    path: &Path,
-    step: impl FnOnce() -> Result<T, E>,
-) -> Result<T, Error> {
-    let found = match without_panic(step) {
-        Some(Ok(value)) => return Ok(value),
-        Some(Err(error)) => match error.into() {
-            ParquetError::External(source) => source.to_string(),
-            ParquetError::General(message)
-            | ParquetError::NYI(message)
-            | ParquetError::EOF(message)
-            | ParquetError::ArrowError(message) => message,
-            other => other.to_string(),
-        },
-        None => "damaged data".into(),
-    };
-    Err(Error::new(path, "", "readable Parquet data", found))
-}

@@ -1,6 +1,6 @@
 //! The owner's file: originals, and which slot hides which.
 
-use super::column::{Type, coordinate_names};
+use super::column::{Batch, Type, coordinate_names};
 use super::header::{Kind, insert_fingerprint, new_meta, to_text};
 use super::order::permutation;
 use super::table::Table;
@@ -73,67 +73,57 @@ pub fn write_truth<const D: usize>(
 /// Reads the truth of an obfuscation of dimension `D` (see [`peek`](super::peek)): the owner's side
 /// only.
 ///
+/// Columns are needed where they mean something: `slot` and `original` where they are not the order of rows,
+/// `dropped` where a point is in no record, `descriptor_row` where records hide two points.
+///
 /// # Errors
 /// When the file is not as `docs/formats.md` describes it.
 pub fn read_truth<const D: usize>(path: &Path) -> Result<(Original<D>, Secret), Error> {
-    let core = |source| Error::core(path, source);
-    let table = Table::open_kind(path, Kind::Truth)?;
-    table.meta().expect_dimension::<D>()?;
-    let unit = table.meta().unit()?;
+    truth_of(path, &Table::open_kind(path, Kind::Truth)?)
+}
+
+/// The rows of a truth, as they stand.
+#[derive(Default)]
+struct Rows<const D: usize> {
+    originals: Vec<u32>,
+    positions: Vec<[f64; D]>,
+    /// Of the points that are in a record, in the order of rows.
+    slots: Vec<u32>,
+    hidden: Vec<OriginalId>,
+    axes: Vec<u8>,
+    descriptor_rows: Vec<Option<u32>>,
+    dropped: Vec<Dropped>,
+}
+
+/// The truth of a table.
+pub(super) fn truth_of<const D: usize>(
+    path: &Path,
+    table: &Table<'_>,
+) -> Result<(Original<D>, Secret), Error> {
+    let core = |source| table.refused(source);
+    table.expect_dimension::<D>()?;
+    let unit = table.unit::<D>(None)?;
     let n_rows = table.n_rows();
-    let with_axis = table.has("swapped_axis");
     let coordinates = coordinate_names::<D>("");
-    let mut columns = vec![
+    let optional = [
         ("slot", Type::Integer),
         ("original", Type::Integer),
         ("descriptor_row", Type::Integer),
         ("dropped", Type::Text),
+        ("swapped_axis", Type::Integer),
     ];
+    let mut columns: Vec<(&str, Type)> =
+        optional.into_iter().filter(|(name, _)| table.has(name)).collect();
     columns.extend(coordinates.iter().map(|name| (name.as_str(), Type::Float)));
-    if with_axis {
-        columns.push(("swapped_axis", Type::Integer));
-    }
-    let (mut originals, mut positions) = (Vec::new(), Vec::new());
-    let (mut slots, mut hidden, mut axes, mut rows) = (vec![], vec![], vec![], vec![]);
-    let mut dropped = Vec::new();
+    let declared = table.meta().count("slots_per_record")?;
+    let with_axis = table.has("swapped_axis");
+    let paired = declared.is_some_and(|slots| slots > 1) || table.has("descriptor_row");
+    let mut rows = Rows::<D>::default();
     table.read(&columns, |batch| {
-        let ids = batch.integers("original", n_rows)?;
-        batch.vectors(&coordinates, &mut positions)?;
-        let slot = batch.optional_integers("slot", n_rows)?;
-        let descriptor_row = batch.optional_integers("descriptor_row", n_rows)?;
-        let axis = match with_axis {
-            true => batch.optional_integers("swapped_axis", D as u64)?,
-            false => vec![None; batch.len()],
-        };
-        let reasons = batch.texts("dropped");
-        for (row, &id) in ids.iter().enumerate() {
-            let original = OriginalId(id);
-            let Some(slot) = slot[row] else {
-                let reason = reasons[row].and_then(DropReason::from_name);
-                let names = || DropReason::ALL.map(DropReason::name).join(", ");
-                let reason = reason.ok_or_else(|| {
-                    let expected = format!("one of {}, as slot is null", names());
-                    batch.wrong("dropped", row, expected, reasons[row].unwrap_or("null"))
-                })?;
-                dropped.push(Dropped { original, reason });
-                continue;
-            };
-            if let Some(reason) = reasons[row] {
-                return Err(batch.wrong("dropped", row, "null, as there is a slot", reason));
-            }
-            let needed = |name: &str, value: Option<u32>| {
-                value.ok_or_else(|| batch.wrong(name, row, "a number, as there is a slot", "null"))
-            };
-            slots.push(slot);
-            hidden.push(original);
-            rows.push(needed("descriptor_row", descriptor_row[row])?);
-            if with_axis {
-                axes.push(needed("swapped_axis", axis[row])? as u8);
-            }
-        }
-        originals.extend(ids);
-        Ok(())
+        batch.vectors(&coordinates, &mut rows.positions)?;
+        read_rows(table, batch, paired, &mut rows)
     })?;
+    let Rows { originals, positions, slots, hidden, axes, descriptor_rows, dropped } = rows;
     if let Some(&slot) = slots.iter().find(|&&slot| slot as usize >= slots.len()) {
         let expected = format!("slots below {}, as many have one", slots.len());
         return Err(Error::new(path, "column slot", expected, slot.to_string()));
@@ -142,19 +132,76 @@ pub fn read_truth<const D: usize>(path: &Path) -> Result<(Original<D>, Secret), 
     let row_of = permutation(path, "original", &originals)?;
     let positions = row_of.iter().map(|&row| positions[row as usize]).collect();
     let points = PointSet::try_new(positions, unit).map_err(core)?;
+    let own = |(slot, &at): (usize, &u32)| descriptor_rows[at as usize].unwrap_or(slot as u32);
     let secret = Secret::try_new(
         order.iter().map(|&at| hidden[at as usize]).collect(),
         with_axis.then(|| order.iter().map(|&at| axes[at as usize]).collect()),
-        order.iter().map(|&at| rows[at as usize]).collect(),
+        order.iter().enumerate().map(own).collect(),
         dropped,
         n_rows as usize,
     );
     let secret = secret.map_err(core)?;
     // Files of earlier versions do not say: where descriptor rows are crossed, records hide two points.
-    let slots = match table.meta().count("slots_per_record")? {
-        None => secret.slots_per_record(),
-        Some(slots) => slots,
-    };
+    let slots = declared.unwrap_or(secret.slots_per_record());
     let secret = secret.of_map(table.meta().fingerprint()?, slots).map_err(core)?;
     Ok((Original::new(points), secret))
+}
+
+/// What one batch says of slots and choices, appended to `to`.
+fn read_rows<const D: usize>(
+    table: &Table<'_>,
+    batch: &Batch<'_>,
+    paired: bool,
+    to: &mut Rows<D>,
+) -> Result<(), Error> {
+    let n_rows = table.n_rows();
+    let integers = |name: &str, below: u64| match table.has(name) {
+        true => batch.optional_integers(name, below),
+        false => Ok(vec![None; batch.len()]),
+    };
+    let first = to.originals.len() as u32;
+    let originals = match table.has("original") {
+        true => batch.integers("original", n_rows)?,
+        false => (first..first + batch.len() as u32).collect(),
+    };
+    let slot = integers("slot", n_rows)?;
+    let descriptor_row = integers("descriptor_row", n_rows)?;
+    let axis = integers("swapped_axis", D as u64)?;
+    let reasons = match table.has("dropped") {
+        true => batch.texts("dropped"),
+        false => vec![None; batch.len()],
+    };
+    for (row, &id) in originals.iter().enumerate() {
+        let original = OriginalId(id);
+        // Without slots, points that were not dropped are in the order of slots.
+        let in_order =
+            (!table.has("slot") && reasons[row].is_none()).then_some(to.slots.len() as u32);
+        let Some(slot) = slot[row].or(in_order) else {
+            let reason = reasons[row].and_then(DropReason::from_name);
+            let names = || DropReason::ALL.map(DropReason::name).join(", ");
+            let reason = reason.ok_or_else(|| {
+                let expected = format!("one of {}, as slot is null", names());
+                batch.wrong("dropped", row, expected, reasons[row].unwrap_or("null"))
+            })?;
+            to.dropped.push(Dropped { original, reason });
+            continue;
+        };
+        if let Some(reason) = reasons[row] {
+            return Err(batch.wrong("dropped", row, "null, as there is a slot", reason));
+        }
+        let needed = |name: &str, value: Option<u32>| {
+            value.ok_or_else(|| batch.wrong(name, row, "a number, as there is a slot", "null"))
+        };
+        to.slots.push(slot);
+        to.hidden.push(original);
+        to.descriptor_rows.push(match paired {
+            true => Some(needed("descriptor_row", descriptor_row[row])?),
+            false => None,
+        });
+        if table.has("swapped_axis") {
+            to.axes.push(needed("swapped_axis", axis[row])? as u8);
+        }
+    }
+    to.originals.extend(originals);
+    Ok(())
 }

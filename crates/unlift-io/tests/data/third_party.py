@@ -1,10 +1,10 @@
-"""Writes third_party/ beside this script: the examples of docs/formats.md, run with pyarrow.
+"""Writes third_party/ beside this script with pyarrow, for tests on machines without it.
 
     python3 crates/unlift-io/tests/data/third_party.py
 
 The map: 12 points on a grid, a line through each (records in reverse order, so that nothing hangs
-on order); neighborhoods are all other records. The block between the marks stands in the document
-word for word; a test compares them.
+on order); neighborhoods are all other records. docs/formats.md writes the first two files alike, and its
+snippets are run where pyarrow is installed.
 """
 import os
 import pathlib
@@ -19,7 +19,6 @@ records = [[r for r in range(len(foot)) if r != own] for own in range(len(foot))
 folder = pathlib.Path(__file__).parent / "third_party"
 folder.mkdir(exist_ok=True)
 os.chdir(folder)
-# --- write
 import json, pyarrow as pa, pyarrow.parquet as pq
 meta = {"kind": "released", "version": 1, "family": "lines", "dimension": 3, "unit": "m",
         "slots_per_record": 1, "origin": [0.0, 0.0, 0.0]}
@@ -29,7 +28,6 @@ pq.write_table(pa.table(columns).replace_schema_metadata({"unlift": json.dumps(m
 meta = {"kind": "neighborhoods", "version": 1}
 lists = pa.table({"slot": range(len(records)), "records": records})
 pq.write_table(lists.replace_schema_metadata({"unlift": json.dumps(meta)}), "neighborhoods.parquet")
-# --- end
 
 # The same in other types: 64-bit, large and fixed-size lists, a dictionary, columns we do not know,
 # rows out of order, no metadata.
@@ -50,6 +48,7 @@ pq.write_table(pa.table({
 lists = pa.table({"point": [5, 0], "neighbors": [[4, 3], [2, 1]]})
 pq.write_table(lists, "points.parquet")
 pq.write_table(lists, "zstd.parquet", compression="zstd")
+pq.write_table(lists, "gzip.parquet", compression="gzip")
 meta = {"kind": "recovered", "version": 1, "dimension": 2, "unit": "px"}
 found = pa.table({"x": pa.array([1.5, None], pa.float32()), "y": pa.array([2.5, None], pa.float32())})
 pq.write_table(found.replace_schema_metadata({"unlift": json.dumps(meta)}), "found.parquet")

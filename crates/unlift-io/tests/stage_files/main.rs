@@ -1,9 +1,12 @@
 //! Stage files, as a user of the public API sees them.
 
 mod damaged;
+mod document;
+mod lenient;
 mod malformed;
 mod malformed_lists;
 mod maps;
+mod python;
 mod round_trip;
 mod tables;
 mod third_party;

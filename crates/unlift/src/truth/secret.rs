@@ -13,12 +13,14 @@ pub enum DropReason {
     RejectedPair,
     /// It lies on a center of a ray cloud or an anchor of an image, so its ray has no direction.
     OnCenter,
+    /// A scheme of somebody else left it out, for a reason of its own.
+    Other,
 }
 
 impl DropReason {
     /// Every reason.
-    pub const ALL: [DropReason; 4] =
-        [Self::OddPoint, Self::CoincidentPair, Self::RejectedPair, Self::OnCenter];
+    pub const ALL: [DropReason; 5] =
+        [Self::OddPoint, Self::CoincidentPair, Self::RejectedPair, Self::OnCenter, Self::Other];
 
     /// The name used in files and reports.
     pub fn name(self) -> &'static str {
@@ -27,6 +29,7 @@ impl DropReason {
             Self::CoincidentPair => "coincident_pair",
             Self::RejectedPair => "rejected_pair",
             Self::OnCenter => "on_center",
+            Self::Other => "other",
         }
     }
 

@@ -1,0 +1,193 @@
+//! A Parquet file: opened, checked, and decoded batch by batch.
+
+use super::guard::without_panic;
+use super::header::KEY;
+use crate::Error;
+use arrow_array::RecordBatch;
+use arrow_schema::SchemaRef;
+use parquet::arrow::ProjectionMask;
+use parquet::arrow::arrow_reader::{
+    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader,
+    ParquetRecordBatchReaderBuilder,
+};
+use parquet::basic::Compression;
+use parquet::errors::ParquetError;
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::Path;
+
+/// Rows decoded at a time: with 128-byte descriptors a megabyte, with 4096 floats 128.
+const BATCH_ROWS: usize = 1 << 13;
+
+/// More rows than this per byte of the file are a declared count that nothing stands behind: even
+/// equal rows, run-length encoded in pages of 20,000, take more room.
+const ROWS_PER_BYTE: u64 = 1000;
+
+/// An open Parquet file whose footer was read.
+#[derive(Debug)]
+pub(super) struct ParquetFile<'a> {
+    path: &'a Path,
+    file: File,
+    parquet: ArrowReaderMetadata,
+    n_rows: u64,
+}
+
+impl<'a> ParquetFile<'a> {
+    /// Opens `path` and reads its footer.
+    pub(super) fn open(path: &'a Path) -> Result<Self, Error> {
+        let failed = |source| Error::read(path, source);
+        let mut file = File::open(path).map_err(failed)?;
+        let found = file.metadata().map_err(failed)?;
+        if found.is_dir() {
+            return Err(failed(io::ErrorKind::IsADirectory.into()));
+        }
+        check_magic(path, &mut file, found.len())?;
+        // The Arrow schema that Arrow writers embed is left aside: the Parquet schema says all that
+        // counts, and then large, fixed-size and dictionary columns need no code of their own.
+        let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
+        let parquet = guarded(path, || ArrowReaderMetadata::load(&file, options))?;
+        let footer = parquet.metadata().file_metadata();
+        let most = (i32::MAX as u64).min(found.len().saturating_mul(ROWS_PER_BYTE));
+        let n_rows = match u64::try_from(footer.num_rows()) {
+            Ok(n_rows) if n_rows <= most => n_rows,
+            _ => {
+                let expected = format!("at most {most} rows in {} bytes", found.len());
+                return Err(Error::new(path, "", expected, footer.num_rows().to_string()));
+            }
+        };
+        Ok(Self { path, file, parquet, n_rows })
+    }
+
+    /// Number of rows, as the footer declares it.
+    pub(super) fn n_rows(&self) -> u64 {
+        self.n_rows
+    }
+
+    /// The columns, as their Parquet types say.
+    pub(super) fn schema(&self) -> &SchemaRef {
+        self.parquet.schema()
+    }
+
+    /// The text under the metadata key of unlift, if there is any.
+    pub(super) fn meta_text(&self) -> Option<&str> {
+        let entries = self.parquet.metadata().file_metadata().key_value_metadata();
+        let entry = entries.and_then(|all| all.iter().find(|entry| entry.key == KEY));
+        entry.and_then(|entry| entry.value.as_deref())
+    }
+
+    /// Whether the file itself says that no row has a value in the column `name`, which is no list.
+    pub(super) fn is_all_null(&self, name: &str) -> bool {
+        let groups = self.parquet.metadata().row_groups();
+        groups.iter().all(|group| {
+            let mut chunks = group.columns().iter();
+            let chunk = chunks.find(|chunk| chunk.column_path().parts() == [name]);
+            let nulls = chunk.and_then(|chunk| chunk.statistics()?.null_count_opt());
+            nulls.is_some_and(|nulls| nulls as i64 == group.num_rows())
+        })
+    }
+
+    /// Starts to decode the columns at `roots`, in the order of the file.
+    pub(super) fn batches(&self, roots: Vec<usize>) -> Result<Batches<'a>, Error> {
+        for &root in &roots {
+            self.check_codec(self.schema().field(root).name())?;
+        }
+        let file = self.file.try_clone();
+        let file = file.map_err(|source| Error::read(self.path, source))?;
+        let reader = guarded(self.path, || {
+            let builder =
+                ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.parquet.clone());
+            let mask = ProjectionMask::roots(builder.parquet_schema(), roots);
+            builder.with_projection(mask).with_batch_size(BATCH_ROWS).build()
+        })?;
+        Ok(Batches { path: self.path, reader, decoded: 0, n_rows: self.n_rows })
+    }
+
+    /// Refuses compression by code that this program was built without.
+    fn check_codec(&self, name: &str) -> Result<(), Error> {
+        let groups = self.parquet.metadata().row_groups().iter();
+        let chunks = groups.flat_map(|group| group.columns());
+        let mut of_column = chunks.filter(|chunk| chunk.column_path().parts()[0] == name);
+        let known = |codec| {
+            matches!(codec, Compression::UNCOMPRESSED | Compression::SNAPPY | Compression::ZSTD(_))
+        };
+        match of_column.find(|chunk| !known(chunk.compression())) {
+            None => Ok(()),
+            Some(chunk) => {
+                // `GZIP(GzipLevel(6))`: the level does not matter here.
+                let codec = chunk.compression().to_string();
+                let found = codec.split('(').next().unwrap_or_default();
+                let place = format!("column {name}");
+                Err(Error::new(self.path, place, "no compression, Snappy or zstd", found))
+            }
+        }
+    }
+}
+
+/// Rows as they are decoded, some thousand at a time.
+pub(super) struct Batches<'a> {
+    path: &'a Path,
+    reader: ParquetRecordBatchReader,
+    decoded: u64,
+    n_rows: u64,
+}
+
+impl Batches<'_> {
+    /// The next rows; `None` at the end, where there were as many as the footer says.
+    pub(super) fn next(&mut self) -> Result<Option<RecordBatch>, Error> {
+        let batch = guarded(self.path, || self.reader.next().transpose())?;
+        match &batch {
+            Some(batch) => self.decoded += batch.num_rows() as u64,
+            None if self.decoded == self.n_rows => {}
+            None => {
+                let expected = format!("{} rows, as its footer says", self.n_rows);
+                return Err(Error::new(self.path, "", expected, self.decoded.to_string()));
+            }
+        }
+        Ok(batch)
+    }
+}
+
+/// Tells a file that never was Parquet from one that was cut short: the usual accidents.
+fn check_magic(path: &Path, file: &mut File, n_bytes: u64) -> Result<(), Error> {
+    let failed = |source| Error::read(path, source);
+    let wrong = |found: String| Err(Error::new(path, "", "a Parquet file", found));
+    if n_bytes == 0 {
+        return wrong("an empty file".into());
+    }
+    let mut start = [0; 4];
+    let n_start = n_bytes.min(4) as usize;
+    file.read_exact(&mut start[..n_start]).map_err(failed)?;
+    if !b"PAR1".starts_with(&start[..n_start]) {
+        return wrong("a file that does not begin with PAR1".into());
+    }
+    let mut end = [0; 4];
+    if n_bytes >= 12 {
+        file.seek(SeekFrom::End(-4)).map_err(failed)?;
+        file.read_exact(&mut end).map_err(failed)?;
+    }
+    if end != *b"PAR1" {
+        return wrong(format!("one cut short after {n_bytes} bytes"));
+    }
+    Ok(())
+}
+
+/// Runs a step of the `parquet` crate on bytes nobody vouches for: its error, or a panic on damaged
+/// data that it did not foresee, becomes an error about the file.
+fn guarded<T, E: Into<ParquetError>>(
+    path: &Path,
+    step: impl FnOnce() -> Result<T, E>,
+) -> Result<T, Error> {
+    let found = match without_panic(step) {
+        Some(Ok(value)) => return Ok(value),
+        Some(Err(error)) => match error.into() {
+            ParquetError::External(source) => source.to_string(),
+            ParquetError::General(message)
+            | ParquetError::NYI(message)
+            | ParquetError::EOF(message)
+            | ParquetError::ArrowError(message) => message,
+            other => other.to_string(),
+        },
+        None => "damaged data".into(),
+    };
+    Err(Error::new(path, "", "readable Parquet data", found))
+}

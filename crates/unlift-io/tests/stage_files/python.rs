@@ -1,0 +1,23 @@
+//! Scripts of somebody else, where there is a Python with pyarrow.
+
+use std::path::Path;
+use std::process::Command;
+
+/// The Python to use; `None`, with a message, where it or pyarrow is not installed.
+pub fn python() -> Option<String> {
+    let python = "python3".to_owned();
+    let has = Command::new(&python).args(["-c", "import numpy, pyarrow.parquet"]).output();
+    if has.is_ok_and(|output| output.status.success()) {
+        return Some(python);
+    }
+    eprintln!("skipped: python3 with numpy and pyarrow is not installed");
+    None
+}
+
+/// Runs `script` in `folder`, and returns what it printed.
+pub fn run(python: &str, folder: &Path, script: &str) -> String {
+    let output = Command::new(python).args(["-c", script]).current_dir(folder).output().unwrap();
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{told}\nof the script\n{script}");
+    String::from_utf8(output.stdout).unwrap()
+}
