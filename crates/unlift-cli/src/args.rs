@@ -69,7 +69,7 @@ pub enum Command {
     /// Audit what you have
     #[command(subcommand)]
     Audit(AuditCommand),
-    /// Hide the points of a map by one scheme: a released file and a truth file
+    /// Hide the points of a map, or the keypoints of images, by one scheme: a released file and a truth file
     Obfuscate(ObfuscateArgs),
     /// Make neighborhoods
     #[command(subcommand)]
@@ -218,16 +218,18 @@ pub struct AuditMapArgs {
 Examples:
   unlift obfuscate PROJECT --scheme ppl --scale 1 --out hidden
   unlift obfuscate PROJECT --scheme olc --descriptors PROJECT/database.db --out hidden
+  unlift obfuscate features.h5 --scheme dcl2d --out hidden-images
 
 Writes hidden/released.parquet (what an attacker sees) and hidden/truth.parquet (keep it private).
 What is drawn comes from a fresh 256-bit key that is kept nowhere. With --seed it comes from that
 number, for experiments only: whoever guesses it undoes the order of the records, and cp entirely.")]
 pub struct ObfuscateArgs {
-    /// A COLMAP model or project folder, or a .ply, .csv, .xyz, .txt or .npy file
+    /// A COLMAP model or project folder, or a .ply, .csv, .xyz, .txt or .npy file; of images hloc's features.h5, a
+    /// COLMAP database.db, or a folder of photos
     #[arg(value_name = "PATH")]
     pub path: PathBuf,
-    /// The scheme, see unlift schemes
-    #[arg(long, value_name = "SCHEME", value_parser = values::scheme)]
+    /// The scheme, see unlift schemes; those for images take features of images
+    #[arg(long, value_name = "SCHEME", value_parser = values::any_scheme)]
     pub scheme: &'static Entry,
     /// Folder for released.parquet and truth.parquet; whatever else is in it stays
     #[arg(long, value_name = "DIR", default_value = "unlift-obfuscated")]

@@ -94,6 +94,54 @@ fn the_stages_print_the_row_of_the_audit() {
     }
 }
 
+/// The same of many images in one file, whatever the number of threads.
+#[test]
+fn the_stages_of_images_print_the_row_of_the_audit() {
+    let place = Place::with_photos(&["a.png", "b.png", "c/d.png"]);
+    let ends = |line: &str| place.ends(line, 0);
+    let json = |line: &str| -> Value { serde_json::from_str(&ends(line).0).expect("JSON") };
+    ends("features photos --out f.h5");
+    for scheme in ["lines2d", "cp2d", "dcl2d"] {
+        ends(&format!("obfuscate f.h5 --scheme {scheme} --seed 7 --out hidden"));
+        let audit = json(&format!(
+            "audit images f.h5 --k 10 --seed 7 --schemes {scheme} --inlier-ratios 0.5 --neighbors oracle \
+             --neighbors overlap --solver joint --json"
+        ));
+        for row in audit["results"].as_array().expect("rows") {
+            match row["neighbors"].as_str() {
+                Some("oracle") => ends(
+                    "neighbors oracle hidden/truth.parquet --k 10 --inlier-ratio 0.5 --seed 7 --out lists",
+                ),
+                _ => ends(
+                    "neighbors find hidden/released.parquet --source overlap --seed 7 --threads 1 --out lists",
+                ),
+            };
+            let recover = "recover hidden/released.parquet --neighbors lists --seed 7";
+            ends(&format!("{recover} --threads 1 --out one"));
+            ends(&format!("{recover} --threads 2 --out back"));
+            let bytes = |name: &str| std::fs::read(place.path(name)).unwrap();
+            assert!(bytes("one") == bytes("back"), "{scheme}");
+            let mut staged = json("evaluate back --truth hidden/truth.parquet --json");
+            let mut row = row.clone();
+            for name in ["scheme", "neighbors", "oracle_noise", "inlier_ratio", "k", "solver"] {
+                assert!(remove(&mut row, name).is_some(), "{name}");
+            }
+            // That confidence is not known travels in files, the reason why does not.
+            let reasons = [remove(&mut row, "sure_unknown"), remove(&mut staged, "sure_unknown")];
+            assert!(reasons.iter().all(|why| why.as_ref().is_some_and(Value::is_string)));
+            assert_eq!(row, staged, "{scheme}");
+        }
+    }
+    // Files of another obfuscation, and of maps.
+    ends("obfuscate f.h5 --scheme lines2d --seed 8 --out other");
+    let (_, stderr) = place.ends("evaluate back --truth other/truth.parquet", 3);
+    assert!(stderr.starts_with("unlift: back: fingerprint: expected "), "{stderr}");
+    let (_, stderr) = place.ends("obfuscate f.h5 --scheme lines2d --scale 1 --out x", 2);
+    assert_eq!(stderr, "unlift: --scale: expected with a map, found lines2d, which hides images\n");
+    let (_, stderr) = place.ends("neighbors find hidden/released.parquet --source geometric", 2);
+    assert_eq!(stderr, "unlift: --source geometric: expected with a map, found images\n");
+}
+
 #[test]
 fn files_of_another_map_are_refused() {
     let place = Stages::new();

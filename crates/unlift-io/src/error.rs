@@ -89,6 +89,21 @@ impl Error {
         Self { path: path.into(), kind: Kind::Core(source) }
     }
 
+    /// The same error as part of something larger: `images.parquet: image a.jpg, column x: expected ...`.
+    pub(crate) fn within(self, what: &str) -> Self {
+        let kind = match self.kind {
+            Kind::Content { place: Place::Whole, expected, found } => {
+                Kind::Content { place: what.into(), expected, found }
+            }
+            Kind::Content { place: Place::Named(name), expected, found } => {
+                Kind::Content { place: format!("{what}, {name}").into(), expected, found }
+            }
+            Kind::Core(source) => Kind::Core(source.within(what)),
+            other => other,
+        };
+        Self { kind, ..self }
+    }
+
     /// The file or folder the error is about.
     pub fn path(&self) -> &Path {
         &self.path

@@ -4,6 +4,7 @@
 
 use std::path::Path;
 
+use unlift::audit::staged::{Pooled, key_of, oracle_lists, oracle_seed};
 use unlift::audit::{self, Cell, Observer, Plan, PointNeighbors, Row, Source, Variant, measure};
 use unlift::descriptors::Values;
 use unlift::evaluate::blind;
@@ -16,7 +17,8 @@ use unlift::recover::{RecoverOptions, Solver, recover};
 use unlift::seed::{Draws, Key, Stage};
 use unlift::truth::Original;
 use unlift::{Descriptors, PointSet, Unit};
-use unlift_io::stage;
+use unlift_io::atomic::{Access, OutputFile};
+use unlift_io::stage::{self, ImageFile, ImageWriter, Kind};
 
 /// A seed that is no default anywhere: all stages are given it.
 const SEED: u64 = 7;
@@ -208,17 +210,130 @@ impl audit::images::Watcher for Rows {
     }
 }
 
-/// The stage commands are for maps; the library's stages and files are for images as well.
+/// Random keypoints in a picture of 640 x 480.
+fn keypoints(seed: u64, n: usize) -> (Original<2>, Descriptors) {
+    let mut draws = Draws::new(seed, Stage::Synthetic, 1);
+    let points: Vec<[f64; 2]> =
+        (0..n).map(|_| [draws.between(0.0, 639.0), draws.between(0.0, 479.0)]).collect();
+    let descriptors = descriptors(&points, 200.0);
+    let bounds = Bounds::try_new([-0.5, -0.5], [639.5, 479.5]).unwrap();
+    let set = PointSet::try_new(points, Unit::Pixel).unwrap();
+    (Original::within(set, bounds).unwrap(), descriptors)
+}
+
+/// Many images in one file of each kind, read and written image by image: the pooled row of the audit. One image has
+/// fewer records than a list, one a single keypoint, which some schemes do not release.
+#[test]
+fn many_images_in_one_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let images: Vec<(String, Original<2>, Descriptors)> = [(1, 90), (2, 5), (3, 1), (4, 70)]
+        .map(|(seed, n)| {
+            let (original, descriptors) = keypoints(seed, n);
+            (format!("{seed}.png"), original, descriptors)
+        })
+        .into();
+    let overlap = Joined::parse("overlap").unwrap().with_k(9);
+    for entry in unlift::obfuscate::SCHEMES.iter().filter(|entry| entry.in_2d.is_some()) {
+        let mut plan = plan(Unit::Pixel, entry, vec![Source::Oracle, Source::Own(overlap.clone())]);
+        plan.solvers = vec![Solver::Joint];
+        plan.oracle_noise = vec![Noise::Uniform];
+        plan.inlier_ratios = vec![0.5];
+        let of_audit = images.iter().map(|(name, original, descriptors)| {
+            let (original, descriptors) = (original.clone(), Some(descriptors.clone()));
+            Ok(audit::images::Image { name: name.clone(), original, descriptors })
+        });
+        let audited =
+            audit::images::run::<unlift::Error>(of_audit, &plan, &mut audit::Silent).unwrap();
+        for (row, source) in audited.rows.iter().zip(["oracle", "overlap"]) {
+            // Hidden.
+            let mut truth = OutputFile::create(&path("truth"), Access::Private).unwrap();
+            let mut released = OutputFile::create(&path("released"), Access::Usual).unwrap();
+            let mut truths = ImageWriter::start(&mut truth, Kind::Truth);
+            let mut maps = ImageWriter::start(&mut released, Kind::Released);
+            for (name, original, descriptors) in &images {
+                let key = key_of(&Key::from_seed(SEED), name);
+                let scheme = entry.in_2d.unwrap();
+                let options = &plan.scheme_options;
+                let hidden = obfuscate(scheme, original, Some(descriptors), options, &key).unwrap();
+                truths.truth(name, original, &hidden.1).unwrap();
+                maps.released(name, &hidden.0).unwrap();
+            }
+            truths.finish().unwrap();
+            maps.finish().unwrap();
+            truth.commit().unwrap();
+            released.commit().unwrap();
+            // Listed.
+            let (truth, released) = (path("truth"), path("released"));
+            assert!(stage::has_images(&truth).unwrap());
+            let mut truths = ImageFile::open(&truth, Kind::Truth).unwrap();
+            let mut maps = ImageFile::open(&released, Kind::Released).unwrap();
+            let mut output = OutputFile::create(&path("lists"), Access::Private).unwrap();
+            let mut lists = ImageWriter::start(&mut output, Kind::Neighborhoods);
+            while let Some(rows) = truths.next_image().unwrap() {
+                let name = rows.name().to_owned();
+                let (original, secret) = rows.truth().unwrap();
+                if secret.n_slots() == 0 {
+                    continue;
+                }
+                let map = maps.expect(&name, &truth).unwrap().released().unwrap();
+                let made = match source {
+                    "oracle" => {
+                        let how = (Noise::Uniform, 0.5, plan.k);
+                        oracle_lists(&original, &(map, secret), how, oracle_seed(SEED, &name))
+                    }
+                    _ => overlap.make_of_what_there_is(&map, SEED),
+                };
+                lists.neighborhoods(&name, &made.unwrap()).unwrap();
+            }
+            lists.finish().unwrap();
+            output.commit().unwrap();
+            // Recovered.
+            let lists = path("lists");
+            let mut lists = ImageFile::open(&lists, Kind::Neighborhoods).unwrap();
+            let mut maps = ImageFile::open(&released, Kind::Released).unwrap();
+            let mut output = OutputFile::create(&path("back"), Access::Private).unwrap();
+            let mut back = ImageWriter::start(&mut output, Kind::Recovered);
+            while let Some(rows) = maps.next_image().unwrap() {
+                let name = rows.name().to_owned();
+                let map = rows.released().unwrap();
+                let lists = lists.expect(&name, &released).unwrap();
+                let lists = lists.neighborhoods(map.n_records(), 1).unwrap();
+                let options =
+                    RecoverOptions { solver: Solver::Joint, seed: SEED, ..Default::default() };
+                back.recovered(&name, &recover(&map, &lists, &options).unwrap()).unwrap();
+            }
+            back.finish().unwrap();
+            output.commit().unwrap();
+            // Evaluated.
+            let back = path("back");
+            let mut back = ImageFile::open(&back, Kind::Recovered).unwrap();
+            let mut truths = ImageFile::open(&truth, Kind::Truth).unwrap();
+            let mut maps = ImageFile::open(&released, Kind::Released).unwrap();
+            let mut pooled = Pooled::new(&plan.thresholds);
+            while let Some(rows) = truths.next_image().unwrap() {
+                let name = rows.name().to_owned();
+                let (original, secret) = rows.truth().unwrap();
+                if secret.n_slots() == 0 {
+                    pooled.add_unreleased(&secret);
+                    continue;
+                }
+                let map = maps.expect(&name, &truth).unwrap().released().unwrap();
+                let back = back.expect(&name, &truth).unwrap().recovered().unwrap();
+                pooled.add(&back, &original, &secret, Some(&map)).unwrap();
+            }
+            let staged = pooled.row().unwrap();
+            assert_eq!(without_name(row), without_name(&staged), "{} {source}", entry.name);
+            assert_eq!(row.distinct, staged.distinct, "{} {source}", entry.name);
+        }
+    }
+}
+
+/// One image in one file, without its name.
 #[test]
 fn images() {
     let folder = tempfile::tempdir().unwrap();
-    let mut draws = Draws::new(5, Stage::Synthetic, 1);
-    let points: Vec<[f64; 2]> =
-        (0..220).map(|_| [draws.between(0.0, 639.0), draws.between(0.0, 479.0)]).collect();
-    let descriptors = descriptors(&points, 200.0);
-    let bounds = Bounds::try_new([-0.5, -0.5], [639.5, 479.5]).unwrap();
-    let set = PointSet::try_new(points.clone(), Unit::Pixel).unwrap();
-    let original = Original::within(set, bounds).unwrap();
+    let (original, descriptors) = keypoints(5, 220);
     for entry in unlift::obfuscate::SCHEMES.iter().filter(|entry| entry.in_2d.is_some()) {
         let plan = plan(Unit::Pixel, entry, sources::<2>(9));
         let image = audit::images::Image {

@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
-use unlift::RowOrder;
+
 use unlift::audit::{Plan, Row, Threshold, measure};
 use unlift::evaluate::{blind, nearer_to_own};
-use unlift::recover::Recovered;
 use unlift::released::Released;
-use unlift::truth::{Original, Secret};
-use unlift_io::stage::{read_recovered_in, read_released, read_truth};
+use unlift::truth::Secret;
+use unlift::{About, RowOrder, Unit};
+use unlift_io::stage::{has_images, read_recovered_in, read_released, read_truth};
 use unlift_report::rounded;
 
 use super::obfuscate::RELEASED;
@@ -17,10 +17,14 @@ use super::same_map;
 use crate::args::EvaluateArgs;
 use crate::document;
 use crate::exit::Outcome;
+use crate::images::stages::{Evaluated, evaluate_all};
 use crate::output::{print, table};
 
 /// Compares recovered points with the truth.
 pub fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
+    if has_images(&args.truth)? {
+        return images(args);
+    }
     let (original, secret) = read_truth::<3>(&args.truth)?;
     let recovered = read_recovered_in::<3>(&args.recovered, original.reveal().unit())?;
     same_map(&args.recovered, recovered.about().map, &args.truth, secret.map())?;
@@ -33,23 +37,54 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     let baseline = released.map(|released| blind(&released, &original, &secret));
     let (row, _) = measure(&recovered, &original, &secret, baseline.as_ref(), &thresholds)
         .map_err(|error| unlift_io::Error::core(&args.recovered, error))?;
-    check_plausible(&args.recovered, &recovered, &original, &secret)?;
-    for note in notes(&recovered, &secret) {
+    if recovered.about().map.is_none() || secret.map().is_none() {
+        check_plausible(&args.recovered, nearer_to_own(&recovered, &original, &secret))?;
+    }
+    told(args, &row, &thresholds, &notes(recovered.about(), secret.slots_per_record()))
+}
+
+/// Compares recovered images with the truth.
+fn images(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
+    let thresholds = match args.thresholds.as_slice() {
+        [] => Plan::new(Unit::Pixel).thresholds,
+        given => given.to_vec(),
+    };
+    let released = released_path(args);
+    let Evaluated { row, about, nearer } = evaluate_all(args, released.as_deref(), &thresholds)?;
+    if nearer.1 > 0 {
+        check_plausible(&args.recovered, nearer)?;
+    }
+    told(args, &row, &thresholds, &notes(about, 1))
+}
+
+/// Prints what was found.
+fn told(
+    args: &EvaluateArgs,
+    row: &Row,
+    thresholds: &[Threshold],
+    notes: &[&str],
+) -> anyhow::Result<Outcome> {
+    for note in notes {
         eprintln!("unlift: note: {}: {note}", args.recovered.display());
     }
     print(&if args.json {
-        format!("{:#}\n", as_json(&row, &thresholds)?)
+        format!("{:#}\n", as_json(row, thresholds)?)
     } else {
-        as_table(&row, &thresholds)
+        as_table(row, thresholds)
     })?;
     Ok(Outcome::Done)
 }
 
-/// The released map of the truth, for the figures of a blind attacker: the one given, or that beside the truth if
-/// there is one.
-fn released(args: &EvaluateArgs, secret: &Secret) -> anyhow::Result<Option<Released<3>>> {
+/// Where the released map of the truth is, for the figures of a blind attacker: the one given, or that beside the
+/// truth if there is one.
+fn released_path(args: &EvaluateArgs) -> Option<PathBuf> {
     let beside = Some(args.truth.with_file_name(RELEASED)).filter(|path: &PathBuf| path.exists());
-    let Some(path) = args.released.clone().or(beside) else { return Ok(None) };
+    args.released.clone().or(beside)
+}
+
+/// That map.
+fn released(args: &EvaluateArgs, secret: &Secret) -> anyhow::Result<Option<Released<3>>> {
+    let Some(path) = released_path(args) else { return Ok(None) };
     let released = read_released::<3>(&path)?;
     same_map(&path, Some(released.fingerprint()), &args.truth, secret.map())?;
     expect_slots(&path, &released, secret)?;
@@ -78,18 +113,9 @@ pub fn expect_slots<const D: usize>(
 /// Positions that fewer than this many slots have are too few to judge.
 const FEW: usize = 30;
 
-/// Refuses positions that do not say which map they are of and, by where they lie, are not of this one: the figures
-/// would be next to nothing and read as "safe".
-fn check_plausible(
-    path: &Path,
-    recovered: &Recovered<3>,
-    original: &Original<3>,
-    secret: &Secret,
-) -> anyhow::Result<()> {
-    if recovered.about().map.is_some() && secret.map().is_some() {
-        return Ok(());
-    }
-    let (nearer, n) = nearer_to_own(recovered, original, secret);
+/// Refuses positions that by where they lie are not of this truth, of which `nearer` of all are nearer to their own
+/// points: asked where files do not say which map they are of. The figures would be next to nothing and read as "safe".
+fn check_plausible(path: &Path, (nearer, n): (usize, usize)) -> anyhow::Result<()> {
     // Of strangers half are nearer; two standard deviations on top.
     let chance = 0.5 * n as f64 + (n as f64).sqrt();
     if n < FEW || nearer as f64 > chance {
@@ -101,12 +127,12 @@ fn check_plausible(
 }
 
 /// What a user should know about a file that somebody else wrote.
-fn notes(recovered: &Recovered<3>, secret: &Secret) -> Vec<&'static str> {
+fn notes(about: About, slots_per_record: usize) -> Vec<&'static str> {
     let mut notes = Vec::new();
-    if recovered.about().map.is_none() {
+    if about.map.is_none() {
         notes.push("says not which released map it is of: taken to be of that of the truth");
     }
-    if recovered.about().order == RowOrder::Unstated && secret.slots_per_record() > 1 {
+    if about.order == RowOrder::Unstated && slots_per_record > 1 {
         notes.push(
             "says not what its rows are counted by: every position is compared with the nearer point of its \
              record, so the figures are upper bounds",

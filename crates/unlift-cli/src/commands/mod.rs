@@ -15,6 +15,9 @@ mod schemes;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
+pub use evaluate::expect_slots;
+pub use obfuscate::{RELEASED, TRUTH};
+
 use crate::args::{AuditCommand, BenchCommand, Command, MapArgs, NeighborsCommand};
 use crate::exit::{Outcome, advise};
 use crate::lengths::check_scale;
@@ -54,7 +57,7 @@ fn with_threads<T: Send>(
 }
 
 /// Refuses `file` when it is about another released map than `of`; what does not say is taken.
-fn same_map(
+pub fn same_map(
     file: &Path,
     found: Option<Fingerprint>,
     of: &Path,

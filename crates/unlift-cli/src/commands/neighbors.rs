@@ -1,17 +1,20 @@
 //! `unlift neighbors`: from the truth at a chosen quality, or from a released map alone.
 
+use std::path::Path;
+
 use unlift::Error;
 use unlift::neighbors::oracle::{Outliers, TrueNeighbors, search};
 use unlift::neighbors::sources::Joined;
 use unlift::released::Released;
 use unlift_io::atomic::{Kind, Rules};
-use unlift_io::stage::{Kind as Stage, read_released, read_truth, write_neighborhoods};
+use unlift_io::stage::{Kind as Stage, has_images, read_released, read_truth, write_neighborhoods};
 
 use super::evaluate::expect_slots;
 use super::obfuscate::RELEASED;
 use super::{same_map, with_threads};
 use crate::args::{FindArgs, OracleArgs};
-use crate::exit::{Outcome, advise};
+use crate::exit::{Outcome, advise, usage};
+use crate::images::stages::{list_by_oracle, list_by_source};
 use crate::output::print;
 use crate::outputs::check_file;
 use crate::progress::Spinner;
@@ -23,31 +26,47 @@ pub fn oracle(args: &OracleArgs) -> anyhow::Result<Outcome> {
     let rules = Rules::new([args.truth.as_path(), &released_path], args.force);
     let kind = Kind::Stage(Stage::Neighborhoods);
     check_file(&args.out, kind, &rules)?;
+    let k = usize::from(args.k);
+    let listed = |n: usize| {
+        let out = args.out.display();
+        print(&format!(
+            "{n} neighborhoods of {k} at inlier ratio {}, in {out}\n",
+            args.inlier_ratio
+        ))
+    };
+    if has_images(&args.truth)? {
+        let alive = Spinner::new("searching neighbors");
+        let counts = list_by_oracle(args, &released_path, &rules)
+            .map_err(|error| without_released(error, args, &released_path))?;
+        drop(alive);
+        listed(counts.slots)?;
+        return Ok(Outcome::Done);
+    }
     let (original, secret) = read_truth::<3>(&args.truth)?;
     // The truth does not say how many points share a record.
-    let released = read_released::<3>(&released_path).map_err(|error| match args.released {
-        None if !released_path.exists() => advise(error, "--released FILE"),
-        _ => error.into(),
-    })?;
+    let released = read_released::<3>(&released_path)
+        .map_err(|error| without_released(error.into(), args, &released_path))?;
     same_map(&released_path, Some(released.fingerprint()), &args.truth, secret.map())?;
     expect_slots(&released_path, &released, &secret)?;
     let alive = Spinner::new("searching neighbors");
     let core = |error| unlift_io::Error::core(&args.truth, error);
     let knn = search(&original).map_err(core)?;
-    let k = usize::from(args.k);
     let near = TrueNeighbors::new(&knn, &secret, released.slots_per_record(), k).map_err(core)?;
     let outliers = Outliers::new(args.oracle_noise, &near, &knn, &secret, args.seed);
     let lists = near.lists(args.inlier_ratio, &outliers.map_err(core)?, args.seed).map_err(core)?;
     check_file(&args.out, kind, &rules)?;
     write_neighborhoods(&args.out, &lists)?;
     drop(alive);
-    print(&format!(
-        "{} neighborhoods of {k} at inlier ratio {}, in {}\n",
-        lists.n_slots(),
-        args.inlier_ratio,
-        args.out.display()
-    ))?;
+    listed(lists.n_slots())?;
     Ok(Outcome::Done)
+}
+
+/// `error` with a way out where there is no released map beside the truth.
+fn without_released(error: anyhow::Error, args: &OracleArgs, path: &Path) -> anyhow::Error {
+    match args.released {
+        None if !path.exists() => advise(error, "--released FILE"),
+        _ => error,
+    }
 }
 
 /// Makes neighborhoods as an attacker would.
@@ -55,11 +74,32 @@ pub fn find(args: &FindArgs) -> anyhow::Result<Outcome> {
     let rules = Rules::new([args.released.as_path()], args.force);
     let kind = Kind::Stage(Stage::Neighborhoods);
     check_file(&args.out, kind, &rules)?;
-    let released = read_released::<3>(&args.released)?;
+    let images = has_images(&args.released)?;
     let source = match args.k {
         Some(k) => args.source.clone().with_k(usize::from(k)),
+        None if images => args.source.clone().for_images(),
         None => args.source.clone(),
     };
+    let listed = |n: usize| {
+        let (k, name, out) = (source.k(), source.name(), args.out.display());
+        print(&format!("{n} neighborhoods of up to {k} by {name}, in {out}\n"))
+    };
+    if images {
+        if let Some(entry) = source.not_in_dimension::<2>() {
+            return Err(usage(format!(
+                "--source {}: expected with a map, found images",
+                entry.name
+            )));
+        }
+        let alive = Spinner::new("finding neighbors");
+        let counts = with_threads(args.threads, || {
+            list_by_source(&args.released, &source, args.seed, (&args.out, &rules))
+        })?;
+        drop(alive);
+        listed(counts.slots)?;
+        return Ok(Outcome::Done);
+    }
+    let released = read_released::<3>(&args.released)?;
     check_own(&source, &released)
         .map_err(|error| advise(unlift_io::Error::core(&args.released, error.0), error.1))?;
     if let Some(note) = source.note(released.n_slots()) {
@@ -73,13 +113,7 @@ pub fn find(args: &FindArgs) -> anyhow::Result<Outcome> {
     check_file(&args.out, kind, &rules)?;
     write_neighborhoods(&args.out, &lists)?;
     drop(alive);
-    print(&format!(
-        "{} neighborhoods of up to {} by {}, in {}\n",
-        lists.n_slots(),
-        source.k(),
-        source.name(),
-        args.out.display()
-    ))?;
+    listed(lists.n_slots())?;
     Ok(Outcome::Done)
 }
 

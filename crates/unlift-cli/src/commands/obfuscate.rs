@@ -1,4 +1,4 @@
-//! `unlift obfuscate`: a map in, a released file and a truth file out.
+//! `unlift obfuscate`: a map, or features of images, in; a released file and a truth file out.
 
 use unlift::audit::Plan;
 use unlift::obfuscate::obfuscate;
@@ -9,6 +9,7 @@ use unlift_io::stage::{Kind as Stage, write_released, write_truth};
 use super::open_map;
 use crate::args::ObfuscateArgs;
 use crate::exit::{Outcome, usage};
+use crate::images::stages::hide;
 use crate::output::print;
 use crate::outputs::refused;
 
@@ -21,24 +22,18 @@ pub const TRUTH: &str = "truth.parquet";
 const GUESSABLE: &str = "unlift: note: --seed repeats experiments; whoever guesses the number undoes the hiding: \
     do not release this map";
 
-/// Hides a map by one scheme.
+/// Hides a map, or images, by one scheme.
 pub fn run(args: &ObfuscateArgs) -> anyhow::Result<Outcome> {
     let inputs = [args.path.as_path()].into_iter().chain(args.map.descriptors.as_deref());
     let files = [(RELEASED, Kind::Stage(Stage::Released)), (TRUTH, Kind::Stage(Stage::Truth))];
     let rules = Rules::new(inputs, args.force);
     let mut out = OutputSet::create(&args.out, rules, Access::Private, &files).map_err(refused)?;
-    let (_, prepared) = open_map(&args.path, &args.map, false)?;
     let name = args.scheme.name;
-    let scheme = args.scheme.in_3d.ok_or_else(|| usage(format!("{name} is not for maps")))?;
+    let Some(scheme) = args.scheme.in_3d else { return images(args, out) };
+    let (_, prepared) = open_map(&args.path, &args.map, false)?;
     let options = Plan::new(prepared.original.reveal().unit()).scheme_options;
     let descriptors = prepared.descriptors.as_ref();
-    let key = match args.map.seed {
-        Some(seed) => {
-            eprintln!("{GUESSABLE}");
-            Key::from_seed(seed)
-        }
-        None => Key::fresh()?,
-    };
+    let key = key(args)?;
     let hidden = obfuscate(scheme, &prepared.original, descriptors, &options, &key);
     let (released, secret) = hidden.map_err(|e| unlift_io::Error::core(&args.path, e))?;
     write_truth(&out.stage(TRUTH, Kind::Stage(Stage::Truth))?, &prepared.original, &secret)?;
@@ -52,4 +47,51 @@ pub fn run(args: &ObfuscateArgs) -> anyhow::Result<Outcome> {
         args.out.display()
     ))?;
     Ok(Outcome::Done)
+}
+
+/// What everything is drawn under.
+fn key(args: &ObfuscateArgs) -> anyhow::Result<Key> {
+    Ok(match args.map.seed {
+        Some(seed) => {
+            eprintln!("{GUESSABLE}");
+            Key::from_seed(seed)
+        }
+        None => Key::fresh()?,
+    })
+}
+
+/// Hides the keypoints of many images, each under a key of its own.
+fn images(args: &ObfuscateArgs, mut out: OutputSet) -> anyhow::Result<Outcome> {
+    let map = &args.map;
+    for (option, given) in [
+        ("--scale", map.scale.is_some()),
+        ("--descriptors", map.descriptors.is_some()),
+        ("--max-points", map.max_points.is_some()),
+        ("--outlier-filter", map.outlier_filter.is_some()),
+    ] {
+        if given {
+            let name = args.scheme.name;
+            return Err(usage(format!(
+                "{option}: expected with a map, found {name}, which hides images"
+            )));
+        }
+    }
+    let counts = hide(args, &key(args)?, &mut out)?;
+    out.commit()?;
+    print(&format!(
+        "{}: {} keypoints of {} images hidden, {} dropped, in {}\n",
+        args.scheme.name,
+        counts.slots,
+        counts.images,
+        counts.points,
+        args.out.display()
+    ))?;
+    match counts.unusable {
+        0 => Ok(Outcome::Done),
+        unusable => {
+            let expected = format!("{} images that can be used", counts.images + unusable);
+            let found = counts.images.to_string();
+            Err(unlift_io::Error::new(&args.path, "", expected, found).into())
+        }
+    }
 }

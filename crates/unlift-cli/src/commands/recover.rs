@@ -1,14 +1,19 @@
 //! `unlift recover`: released files in, positions out; no truth needed.
 
+use std::collections::HashSet;
+
 use unlift::RowOrder;
 use unlift::neighbors::Neighborhoods;
 use unlift::recover::{RecoverOptions, Status, recover};
 use unlift_io::atomic::{Kind, Rules};
-use unlift_io::stage::{Kind as Stage, read_neighborhoods, read_released, write_recovered};
+use unlift_io::stage::{
+    Kind as Stage, has_images, read_neighborhoods, read_released, write_recovered,
+};
 
 use super::{same_map, with_threads};
 use crate::args::RecoverArgs;
 use crate::exit::Outcome;
+use crate::images::stages::recover_all;
 use crate::output::print;
 use crate::outputs::check_file;
 use crate::progress::Spinner;
@@ -42,6 +47,16 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
     let rules = Rules::new([args.released.as_path(), &args.neighbors], args.force);
     let kind = Kind::Stage(Stage::Recovered);
     check_file(&args.out, kind, &rules)?;
+    let options = RecoverOptions {
+        solver: args.solver,
+        delta: args.delta,
+        seed: args.seed,
+        exact_constraints: !args.no_exact_constraints,
+        ..RecoverOptions::default()
+    };
+    if has_images(&args.released)? {
+        return images(args, &options, &rules);
+    }
     let released = read_released::<3>(&args.released)?;
     let (records, slots) = (released.n_records(), released.slots_per_record());
     let lists = read_neighborhoods(&args.neighbors, records, slots)?;
@@ -50,13 +65,6 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
     for note in notes(&lists, slots) {
         eprintln!("unlift: note: {}: {note}", args.neighbors.display());
     }
-    let options = RecoverOptions {
-        solver: args.solver,
-        delta: args.delta,
-        seed: args.seed,
-        exact_constraints: !args.no_exact_constraints,
-        ..RecoverOptions::default()
-    };
     let alive = Spinner::new("recovering");
     let recovered = with_threads(args.threads, || {
         let result = recover(&released, &lists, &options);
@@ -71,6 +79,35 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
         recovered.n_slots(),
         recovered.delta(),
         recovered.unit().name(),
+        args.out.display()
+    ))?;
+    Ok(Outcome::Done)
+}
+
+/// Recovers released images, one after the other.
+fn images(args: &RecoverArgs, options: &RecoverOptions, rules: &Rules) -> anyhow::Result<Outcome> {
+    let alive = Spinner::new("recovering");
+    // A note says of one image what is so of many.
+    let mut told = HashSet::new();
+    let note = |lists: &Neighborhoods, slots: usize| {
+        for note in notes(lists, slots) {
+            let what = note.split(|c: char| c.is_ascii_digit()).next_back().unwrap_or_default();
+            if told.insert(what.to_owned()) {
+                eprintln!("unlift: note: {}: {note}", args.neighbors.display());
+            }
+        }
+    };
+    let counts = with_threads(args.threads, || {
+        let (files, out) =
+            ((args.released.as_path(), args.neighbors.as_path()), args.out.as_path());
+        recover_all(files, options, (out, rules), note)
+    })?;
+    drop(alive);
+    print(&format!(
+        "{} of {} keypoints of {} images recovered, in {}\n",
+        counts.points,
+        counts.slots,
+        counts.images,
         args.out.display()
     ))?;
     Ok(Outcome::Done)

@@ -4,6 +4,7 @@ pub mod audit;
 mod folder;
 pub mod parts;
 mod pictures;
+pub mod stages;
 pub mod stream;
 
 use std::path::Path;

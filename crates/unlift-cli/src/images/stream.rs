@@ -43,12 +43,17 @@ impl Tally {
 
 /// What an image must have, beside keypoints and a size: what these sources need.
 #[derive(Clone, Debug, Default)]
-pub struct Needs(Vec<Joined>);
+pub struct Needs {
+    sources: Vec<Joined>,
+    /// Descriptors are kept where there are any.
+    whatever: bool,
+}
 
 impl Needs {
     /// What a source needs.
     pub fn of(joined: &Joined) -> Self {
-        Self(joined.needs_descriptors().then(|| joined.clone()).into_iter().collect())
+        let sources = joined.needs_descriptors().then(|| joined.clone()).into_iter().collect();
+        Self { sources, whatever: false }
     }
 
     /// What a plan needs.
@@ -57,12 +62,17 @@ impl Needs {
             Source::Own(joined) if joined.needs_descriptors() => Some(joined.clone()),
             Source::Own(_) | Source::Oracle | Source::Given(_) => None,
         });
-        Self(own.collect())
+        Self { sources: own.collect(), whatever: false }
+    }
+
+    /// Nothing, and descriptors are handed on where there are any.
+    pub fn whatever_there_is() -> Self {
+        Self { sources: Vec::new(), whatever: true }
     }
 
     /// Whether it is descriptors.
     pub fn descriptors(&self) -> bool {
-        !self.0.is_empty()
+        !self.sources.is_empty()
     }
 }
 
@@ -145,7 +155,7 @@ fn image(source: &FeatureSource, path: &Path, at: usize, needs: &Needs) -> anyho
     let points = PointSet::try_new(features.keypoints.clone(), Unit::Pixel).map_err(of_image)?;
     let original = Original::within(points, bounds).map_err(of_image)?;
     // Nobody asks for them otherwise, and they are most of an image.
-    let descriptors = features.descriptors.filter(|_| needs.descriptors());
+    let descriptors = features.descriptors.filter(|_| needs.descriptors() || needs.whatever);
     Ok(Image { name: features.name, original, descriptors })
 }
 
@@ -158,6 +168,6 @@ pub fn lacking(features: &ImageFeatures, needs: &Needs) -> Option<(String, Strin
     let Some(found) = &features.descriptors else {
         return Some(("descriptors".to_owned(), "none".to_owned()));
     };
-    let error = needs.0.iter().find_map(|joined| joined.check_descriptors(found).err())?;
+    let error = needs.sources.iter().find_map(|joined| joined.check_descriptors(found).err())?;
     Some((error.expected().to_owned(), error.found().to_owned()))
 }

@@ -124,6 +124,13 @@ impl<'a> Meta<'a> {
         Ok(Self { path, object })
     }
 
+    /// The same for one image, of which `text` says more: what it says goes before what is said of all.
+    pub(super) fn of_image(&self, text: Option<&str>) -> Result<Self, Error> {
+        let mut object = self.object.clone();
+        object.extend(Self::parse(self.path, text)?.object);
+        Ok(Self { path: self.path, object })
+    }
+
     /// Kind of the file, if it is declared.
     pub(super) fn kind(&self) -> Result<Option<Kind>, Error> {
         if self.object.get("version").is_some_and(|version| version.as_u64() != Some(VERSION)) {

@@ -12,6 +12,8 @@ mod column;
 mod file;
 mod guard;
 mod header;
+mod image_writer;
+mod images;
 mod neighborhoods;
 mod order;
 mod recovered;
@@ -21,6 +23,8 @@ mod truth;
 mod write;
 
 pub use header::{Header, Kind, declared_kind, peek};
+pub use image_writer::ImageWriter;
+pub use images::{ImageFile, ImageRows, has_images};
 pub use neighborhoods::{
     PointNeighborhoods, read_neighborhoods, read_point_neighborhoods, write_neighborhoods,
 };

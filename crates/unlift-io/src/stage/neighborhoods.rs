@@ -1,14 +1,15 @@
 //! Neighborhoods: lists of records per slot, or of original points per point.
 
 use super::column::Type;
-use super::header::{Kind, insert_about, new_meta, to_text};
+use super::header::{Kind, insert_about, new_meta};
 use super::order::rows_by_key;
 use super::table::Table;
-use super::write::{field, list_field, lists, numbers, write_table};
+use super::write::{Written, field, list_field, lists, numbers, write_table};
 use crate::Error;
 use crate::atomic::Access;
 use arrow_array::types::{Float32Type, UInt32Type};
 use arrow_schema::DataType::{Float32, UInt32};
+use std::ops::Range;
 use std::path::Path;
 use unlift::RecordId;
 use unlift::neighbors::Neighborhoods;
@@ -58,13 +59,18 @@ impl PointNeighborhoods {
 /// # Errors
 /// When the file cannot be written.
 pub fn write_neighborhoods(path: &Path, neighborhoods: &Neighborhoods) -> Result<(), Error> {
+    write_table((path, Access::Private), written(neighborhoods))
+}
+
+/// What is written of neighborhoods.
+pub(super) fn written(neighborhoods: &Neighborhoods) -> Written<'_> {
     let mut fields = vec![field("slot", UInt32), list_field("records", UInt32)];
     if neighborhoods.scores().is_some() {
         fields.push(list_field("scores", Float32));
     }
     let mut meta = new_meta(Kind::Neighborhoods);
     insert_about(&mut meta, neighborhoods.about());
-    write_table((path, Access::Private), to_text(meta), fields, neighborhoods.n_slots(), |slots| {
+    let columns = Box::new(move |slots: Range<usize>| {
         let offsets = &neighborhoods.offsets()[slots.start..=slots.end];
         let lengths = || offsets.windows(2).map(|w| (w[1] - w[0]) as usize);
         let values = offsets[0] as usize..offsets[slots.len()] as usize;
@@ -77,7 +83,8 @@ pub fn write_neighborhoods(path: &Path, neighborhoods: &Neighborhoods) -> Result
             columns.push(lists::<Float32Type>(scores[values].iter().copied(), lengths()));
         }
         columns
-    })
+    });
+    Written { meta, fields, n_rows: neighborhoods.n_slots(), columns }
 }
 
 /// Reads neighborhoods for a released map of `n_records` records with `slots_per_record` slots each.
@@ -93,7 +100,16 @@ pub fn read_neighborhoods(
     n_records: usize,
     slots_per_record: usize,
 ) -> Result<Neighborhoods, Error> {
-    let table = Table::open_kind(path, Kind::Neighborhoods)?;
+    neighborhoods_of(&Table::open_kind(path, Kind::Neighborhoods)?, n_records, slots_per_record)
+}
+
+/// The neighborhoods of a table.
+pub(super) fn neighborhoods_of(
+    table: &Table<'_>,
+    n_records: usize,
+    slots_per_record: usize,
+) -> Result<Neighborhoods, Error> {
+    let path = table.path();
     let n_slots = n_records * slots_per_record;
     if table.n_rows() != n_slots as u64 {
         let expected = format!("{n_slots} rows, one per slot of the released map");
@@ -101,7 +117,7 @@ pub fn read_neighborhoods(
     }
     let key = table.has("slot").then_some("slot");
     let lists =
-        Lists::read(&table, key, "records", n_slots, n_records)?.by_key(path, key, n_slots)?;
+        Lists::read(table, key, "records", n_slots, n_records)?.by_key(path, key, n_slots)?;
     for slot in 0..n_slots {
         // The core checks this too, but cannot name the file's column.
         let own = (slot / slots_per_record) as u32;
@@ -111,7 +127,7 @@ pub fn read_neighborhoods(
     let about = table.meta().about()?;
     Neighborhoods::try_new(lists.offsets, records, lists.scores, n_records, slots_per_record)
         .map(|lists| lists.with_about(about))
-        .map_err(|source| Error::core(path, source))
+        .map_err(|source| table.refused(source))
 }
 
 /// Reads neighborhoods in the point form: columns `point`, `neighbors` (both rows of the original
@@ -224,7 +240,7 @@ impl Lists {
         &self.ids[self.range(row)]
     }
 
-    fn range(&self, row: usize) -> std::ops::Range<usize> {
+    fn range(&self, row: usize) -> Range<usize> {
         self.offsets[row] as usize..self.offsets[row + 1] as usize
     }
 }

@@ -1,10 +1,10 @@
 //! Recovered points: a position or a reason, per slot.
 
 use super::column::{Batch, Type, coordinate_names};
-use super::header::{Kind, insert_about, new_meta, to_text};
+use super::header::{Kind, insert_about, new_meta};
 use super::order::permutation;
 use super::table::Table;
-use super::write::{field, numbers, optional_numbers, write_table};
+use super::write::{Written, field, numbers, optional_numbers, write_table};
 use crate::Error;
 use crate::atomic::Access;
 use arrow_array::types::{Float32Type, Float64Type, UInt8Type, UInt16Type, UInt32Type};
@@ -12,6 +12,7 @@ use arrow_array::{ArrayRef, StringArray};
 use arrow_schema::DataType::{Float32, Float64, UInt8, UInt16, UInt32, Utf8};
 use arrow_schema::Field;
 use serde_json::json;
+use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 use unlift::Unit;
@@ -25,6 +26,17 @@ use unlift::recover::{Confidence, Estimate, Recovered, Status};
 /// # Errors
 /// When an evidence or delta is not finite, or the file cannot be written.
 pub fn write_recovered<const D: usize>(path: &Path, recovered: &Recovered<D>) -> Result<(), Error> {
+    write_table((path, Access::Private), written(path, recovered)?)
+}
+
+/// What is written of recovered points.
+///
+/// # Errors
+/// When an evidence or delta is not finite; `path` is for the message.
+pub(super) fn written<'a, const D: usize>(
+    path: &Path,
+    recovered: &'a Recovered<D>,
+) -> Result<Written<'a>, Error> {
     let finite = |x: &f32| x.is_finite();
     if let Some(slot) = recovered.evidence().iter().position(|x| !finite(x)) {
         let found = recovered.evidence()[slot].to_string();
@@ -52,7 +64,7 @@ pub fn write_recovered<const D: usize>(path: &Path, recovered: &Recovered<D>) ->
     }
     fields.extend(recovered.axis().map(|_| field("axis", UInt8)));
     fields.extend(recovered.descriptor_row().map(|_| field("descriptor_row", UInt32)));
-    write_table((path, Access::Private), to_text(meta), fields, recovered.n_slots(), |slots| {
+    let columns = Box::new(move |slots: Range<usize>| {
         let mut columns = vec![numbers::<UInt32Type>(slots.clone().map(|slot| slot as u32))];
         columns.extend((0..D).map(|axis| {
             let positions = slots.clone().map(|slot| recovered.position(slot));
@@ -78,7 +90,8 @@ pub fn write_recovered<const D: usize>(path: &Path, recovered: &Recovered<D>) ->
             columns.push(numbers::<UInt32Type>(row[slots].iter().copied()));
         }
         columns
-    })
+    });
+    Ok(Written { meta, fields, n_rows: recovered.n_slots(), columns })
 }
 
 /// Reads recovered points of dimension `D` (see [`peek`](super::peek)).
@@ -92,7 +105,7 @@ pub fn write_recovered<const D: usize>(path: &Path, recovered: &Recovered<D>) ->
 /// When the file is not as `docs/formats.md` describes it.
 pub fn read_recovered<const D: usize>(path: &Path) -> Result<Recovered<D>, Error> {
     let table = Table::open_kind(path, Kind::Recovered)?;
-    recovered_of(path, &table, None)
+    recovered_of(&table, None)
 }
 
 /// As [`read_recovered`], for positions that are compared with a map in `unit`: what does not say its unit has that
@@ -102,15 +115,15 @@ pub fn read_recovered<const D: usize>(path: &Path) -> Result<Recovered<D>, Error
 /// As [`read_recovered`].
 pub fn read_recovered_in<const D: usize>(path: &Path, unit: Unit) -> Result<Recovered<D>, Error> {
     let table = Table::open_kind(path, Kind::Recovered)?;
-    recovered_of(path, &table, Some(unit))
+    recovered_of(&table, Some(unit))
 }
 
 /// The recovered points of a table.
 pub(super) fn recovered_of<const D: usize>(
-    path: &Path,
     table: &Table<'_>,
     usual: Option<Unit>,
 ) -> Result<Recovered<D>, Error> {
+    let path = table.path();
     let meta = table.meta();
     table.expect_dimension::<D>()?;
     let (origin, unit) = (meta.origin::<D>()?, table.unit::<D>(usual)?);

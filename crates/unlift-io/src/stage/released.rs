@@ -1,9 +1,9 @@
 //! Released maps: records by family, and descriptors.
 
 use super::column::{Batch, Type, coordinate_names};
-use super::header::{Kind, insert_fingerprint, new_meta, to_text};
+use super::header::{Kind, insert_fingerprint, new_meta};
 use super::table::Table;
-use super::write::{field, list_field, lists, numbers, write_table};
+use super::write::{Written, field, list_field, lists, numbers, write_table};
 use crate::Error;
 use crate::atomic::Access;
 use arrow_array::ArrayRef;
@@ -28,6 +28,11 @@ const MOST_VALUES: u64 = 1 << 16;
 /// # Errors
 /// When the file cannot be written.
 pub fn write_released<const D: usize>(path: &Path, released: &Released<D>) -> Result<(), Error> {
+    write_table((path, Access::Usual), written(released))
+}
+
+/// What is written of a released map.
+pub(super) fn written<const D: usize>(released: &Released<D>) -> Written<'_> {
     let obfuscation = released.obfuscation();
     let per_record = released.slots_per_record();
     let mut meta = new_meta(Kind::Released);
@@ -76,7 +81,7 @@ pub fn write_released<const D: usize>(path: &Path, released: &Released<D>) -> Re
         };
         fields.extend(descriptor_names(per_record).map(|name| list_field(name, of.clone())));
     }
-    write_table((path, Access::Usual), to_text(meta), fields, released.n_records(), |rows| {
+    let columns = Box::new(move |rows: Range<usize>| {
         let mut columns = record_columns(obfuscation, rows.clone());
         if let Some(descriptors) = released.descriptors() {
             let slots =
@@ -84,7 +89,8 @@ pub fn write_released<const D: usize>(path: &Path, released: &Released<D>) -> Re
             columns.extend(slots);
         }
         columns
-    })
+    });
+    Written { meta, fields, n_rows: released.n_records(), columns }
 }
 
 /// Reads a released map of dimension `D` (see [`peek`](super::peek)).

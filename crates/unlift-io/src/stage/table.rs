@@ -3,7 +3,9 @@
 use super::column::{Batch, Type};
 use super::file::ParquetFile;
 use super::header::{Kind, Meta};
+use super::images::each_held;
 use crate::Error;
+use arrow_array::RecordBatch;
 use arrow_schema::SchemaRef;
 use std::path::Path;
 use unlift::Unit;
@@ -12,8 +14,16 @@ use unlift::Unit;
 #[derive(Debug)]
 pub(super) struct Table<'a> {
     path: &'a Path,
-    file: ParquetFile<'a>,
+    rows: Rows<'a>,
     meta: Meta<'a>,
+}
+
+/// Where the rows of a table are.
+#[derive(Debug)]
+enum Rows<'a> {
+    File(ParquetFile<'a>),
+    /// In memory: those of one image, at least one batch.
+    Held(Vec<RecordBatch>),
 }
 
 impl<'a> Table<'a> {
@@ -21,7 +31,12 @@ impl<'a> Table<'a> {
     pub(super) fn open(path: &'a Path) -> Result<Self, Error> {
         let file = ParquetFile::open(path)?;
         let meta = Meta::parse(path, file.meta_text())?;
-        Ok(Self { path, file, meta })
+        Ok(Self { path, rows: Rows::File(file), meta })
+    }
+
+    /// The rows of one image, which were read already.
+    pub(super) fn held(path: &'a Path, meta: Meta<'a>, held: Vec<RecordBatch>) -> Self {
+        Self { path, rows: Rows::Held(held), meta }
     }
 
     /// Opens `path`, which should hold `kind`.
@@ -61,6 +76,11 @@ impl<'a> Table<'a> {
         } else {
             None
         }
+    }
+
+    /// The file, for errors.
+    pub(super) fn path(&self) -> &'a Path {
+        self.path
     }
 
     /// The error about values that the core refused.
@@ -111,14 +131,17 @@ impl<'a> Table<'a> {
 
     /// Number of rows.
     pub(super) fn n_rows(&self) -> u64 {
-        self.file.n_rows()
+        match &self.rows {
+            Rows::File(file) => file.n_rows(),
+            Rows::Held(held) => held.iter().map(|rows| rows.num_rows() as u64).sum(),
+        }
     }
 
     /// Whether there is a column called `name` with a value in it, as far as can be told without reading it.
     pub(super) fn has(&self, name: &str) -> bool {
         let field = self.schema().column_with_name(name);
         let named = field.is_some_and(|(_, field)| !field.data_type().is_null());
-        named && (self.n_rows() == 0 || !self.file.is_all_null(name))
+        named && (self.n_rows() == 0 || !self.is_all_null(name))
     }
 
     /// Whether the column `name` is there and of type `class`.
@@ -137,7 +160,11 @@ impl<'a> Table<'a> {
         for &(name, class) in columns {
             roots.push(self.find(name, class)?);
         }
-        let mut batches = self.file.batches(roots)?;
+        let file = match &self.rows {
+            Rows::File(file) => file,
+            Rows::Held(held) => return each_held(self.path, held, each),
+        };
+        let mut batches = file.batches(roots)?;
         let mut first_row = 0;
         while let Some(batch) = batches.next()? {
             each(&Batch::new(self.path, &batch, first_row))?;
@@ -160,7 +187,20 @@ impl<'a> Table<'a> {
     }
 
     fn schema(&self) -> &SchemaRef {
-        self.file.schema()
+        match &self.rows {
+            Rows::File(file) => file.schema(),
+            Rows::Held(held) => held[0].schema_ref(),
+        }
+    }
+
+    fn is_all_null(&self, name: &str) -> bool {
+        match &self.rows {
+            Rows::File(file) => file.is_all_null(name),
+            Rows::Held(held) => held.iter().all(|rows| {
+                let column = rows.column_by_name(name);
+                column.is_some_and(|column| column.null_count() == column.len())
+            }),
+        }
     }
 
     /// The index of the column `name`, which must be there once and be of type `class`.

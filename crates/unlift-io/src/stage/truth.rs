@@ -1,10 +1,10 @@
 //! The owner's file: originals, and which slot hides which.
 
 use super::column::{Batch, Type, coordinate_names};
-use super::header::{Kind, insert_fingerprint, new_meta, to_text};
+use super::header::{Kind, insert_fingerprint, new_meta};
 use super::order::permutation;
 use super::table::Table;
-use super::write::{field, numbers, optional_numbers, write_table};
+use super::write::{Written, field, numbers, optional_numbers, write_table};
 use crate::Error;
 use crate::atomic::Access;
 use arrow_array::types::{Float64Type, UInt8Type, UInt32Type};
@@ -12,6 +12,7 @@ use arrow_array::{ArrayRef, StringArray};
 use arrow_schema::DataType::{Float64, UInt8, UInt32, Utf8};
 use arrow_schema::Field;
 use serde_json::json;
+use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 use unlift::truth::{DropReason, Dropped, Original, Secret};
@@ -27,6 +28,18 @@ pub fn write_truth<const D: usize>(
     original: &Original<D>,
     secret: &Secret,
 ) -> Result<(), Error> {
+    write_table((path, Access::Private), written(path, original, secret)?)
+}
+
+/// What is written of a truth.
+///
+/// # Errors
+/// When `secret` is about another number of points; `path` is for the message.
+pub(super) fn written<'a, const D: usize>(
+    path: &Path,
+    original: &'a Original<D>,
+    secret: &'a Secret,
+) -> Result<Written<'a>, Error> {
     let points = original.reveal();
     if points.len() != secret.n_originals() {
         let expected = format!("{} originals, as in the secret", secret.n_originals());
@@ -47,7 +60,7 @@ pub fn write_truth<const D: usize>(
     let n_slots = secret.n_slots();
     let dropped = secret.dropped().iter().map(|d| d.original);
     let ids: Vec<OriginalId> = secret.hidden().iter().copied().chain(dropped).collect();
-    write_table((path, Access::Private), to_text(meta), fields, points.len(), |rows| {
+    let columns = Box::new(move |rows: Range<usize>| {
         let slot = |row: usize| (row < n_slots).then_some(row);
         let mut columns = vec![
             optional_numbers::<UInt32Type>(rows.clone().map(|row| slot(row).map(|s| s as u32))),
@@ -67,7 +80,8 @@ pub fn write_truth<const D: usize>(
             rows.map(|row| Some(secret.dropped()[row.checked_sub(n_slots)?].reason.name()));
         columns.push(Arc::new(reasons.collect::<StringArray>()) as ArrayRef);
         columns
-    })
+    });
+    Ok(Written { meta, fields, n_rows: points.len(), columns })
 }
 
 /// Reads the truth of an obfuscation of dimension `D` (see [`peek`](super::peek)): the owner's side
@@ -79,7 +93,7 @@ pub fn write_truth<const D: usize>(
 /// # Errors
 /// When the file is not as `docs/formats.md` describes it.
 pub fn read_truth<const D: usize>(path: &Path) -> Result<(Original<D>, Secret), Error> {
-    truth_of(path, &Table::open_kind(path, Kind::Truth)?)
+    truth_of(&Table::open_kind(path, Kind::Truth)?)
 }
 
 /// The rows of a truth, as they stand.
@@ -96,10 +110,8 @@ struct Rows<const D: usize> {
 }
 
 /// The truth of a table.
-pub(super) fn truth_of<const D: usize>(
-    path: &Path,
-    table: &Table<'_>,
-) -> Result<(Original<D>, Secret), Error> {
+pub(super) fn truth_of<const D: usize>(table: &Table<'_>) -> Result<(Original<D>, Secret), Error> {
+    let path = table.path();
     let core = |source| table.refused(source);
     table.expect_dimension::<D>()?;
     let unit = table.unit::<D>(None)?;

@@ -1,11 +1,12 @@
 //! Columns to a Parquet file: equal values, equal bytes.
 
+use super::header::to_text;
 use crate::Error;
 use crate::atomic::{self, Access};
 use arrow_array::types::ArrowPrimitiveType;
 use arrow_array::{Array, ArrayRef, ListArray, PrimitiveArray, RecordBatch};
 use arrow_buffer::OffsetBuffer;
-use arrow_schema::{DataType, Field, Schema};
+use arrow_schema::{DataType, Field, Schema, SchemaRef};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_writer::ArrowWriterOptions;
 use parquet::basic::Compression;
@@ -13,6 +14,7 @@ use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::schema::types::ColumnPath;
+use serde_json::{Map, Value};
 use std::io;
 use std::ops::Range;
 use std::path::Path;
@@ -27,23 +29,28 @@ const GROUP_ROWS: usize = 1 << 20;
 /// They end earlier at this many bytes: a row group is held in memory until it is whole.
 const GROUP_BYTES: usize = 256 << 20;
 
-/// Writes `n_rows` rows for those whom `access` names; `columns` gives those of a range, in the order of `fields`.
+/// What is written of one value: its metadata, and its rows by column.
+pub(super) struct Written<'a> {
+    /// To be completed by nobody.
+    pub(super) meta: Map<String, Value>,
+    /// The columns.
+    pub(super) fields: Vec<Field>,
+    /// Number of rows.
+    pub(super) n_rows: usize,
+    /// The columns of a range of rows, in the order of `fields`.
+    pub(super) columns: Box<dyn Fn(Range<usize>) -> Vec<ArrayRef> + 'a>,
+}
+
+/// Writes one value for those whom `access` names.
 pub(super) fn write_table(
     (path, access): (&Path, Access),
-    meta: String,
-    fields: Vec<Field>,
-    n_rows: usize,
-    columns: impl Fn(Range<usize>) -> Vec<ArrayRef>,
+    written: Written<'_>,
 ) -> Result<(), Error> {
-    let properties = properties(meta, &fields);
+    let Written { meta, fields, n_rows, columns } = written;
+    let properties = properties(to_text(meta), &fields, GROUP_ROWS);
     let schema = Arc::new(Schema::new(fields));
     atomic::write_file(path, access, |file| {
-        let options = ArrowWriterOptions::new()
-            .with_properties(properties)
-            .with_schema_root("schema".into())
-            .with_skip_arrow_metadata(true);
-        let mut writer =
-            ArrowWriter::try_new_with_options(file, schema.clone(), options).map_err(to_io)?;
+        let mut writer = writer(file, schema.clone(), properties).map_err(to_io)?;
         let mut start = 0;
         while start < n_rows {
             let end = n_rows.min(start + CHUNK_ROWS);
@@ -54,6 +61,19 @@ pub(super) fn write_table(
         writer.close().map_err(to_io)?;
         Ok(())
     })
+}
+
+/// Starts a Parquet file.
+pub(super) fn writer<W: io::Write + Send>(
+    file: W,
+    schema: SchemaRef,
+    properties: WriterProperties,
+) -> Result<ArrowWriter<W>, ParquetError> {
+    let options = ArrowWriterOptions::new()
+        .with_properties(properties)
+        .with_schema_root("schema".into())
+        .with_skip_arrow_metadata(true);
+    ArrowWriter::try_new_with_options(file, schema, options)
 }
 
 /// A column of numbers or text without nulls.
@@ -91,12 +111,13 @@ pub(super) fn lists<T: ArrowPrimitiveType>(
     Arc::new(ListArray::new(of, offsets, Arc::new(values), None))
 }
 
-fn properties(meta: String, fields: &[Field]) -> WriterProperties {
+/// How a file with this metadata and these columns is written, in row groups of at most `group_rows` rows.
+pub(super) fn properties(meta: String, fields: &[Field], group_rows: usize) -> WriterProperties {
     let mut properties = WriterProperties::builder()
         // Not the version of a crate: an upgrade changes no byte by its name.
         .set_created_by("unlift version 1".into())
         .set_compression(Compression::SNAPPY)
-        .set_max_row_group_row_count(Some(GROUP_ROWS))
+        .set_max_row_group_row_count(Some(group_rows))
         .set_max_row_group_bytes(Some(GROUP_BYTES))
         .set_statistics_enabled(EnabledStatistics::None)
         .set_offset_index_disabled(true)
@@ -118,7 +139,7 @@ fn properties(meta: String, fields: &[Field]) -> WriterProperties {
 }
 
 /// The disk's own error where there is one, so that a full disk is called so.
-fn to_io(error: ParquetError) -> io::Error {
+pub(super) fn to_io(error: ParquetError) -> io::Error {
     match error {
         ParquetError::External(source) => match source.downcast::<io::Error>() {
             Ok(source) => *source,

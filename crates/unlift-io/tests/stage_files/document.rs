@@ -2,11 +2,11 @@
 
 use crate::python::{python, run};
 use std::path::Path;
-use unlift::RecordId;
 use unlift::recover::Status;
 use unlift::released::{Lines, Obfuscation};
 use unlift::truth::DropReason;
-use unlift_io::stage;
+use unlift::{RecordId, Unit};
+use unlift_io::stage::{self, ImageFile, Kind};
 
 /// What the document takes as given: 12 points on a grid and a line through each, all but the last two of which
 /// are released, in reverse order.
@@ -18,6 +18,7 @@ towards = np.random.default_rng(0).normal(size=points.shape)
 foot, direction = points[hidden], towards[hidden]
 records = [[r for r in range(10) if r != own] for own in range(10)]
 near = [[q for q in range(12) if q != p] for p in range(12)]
+photos = {f"{n}.jpg": ((640, 480), np.full((n, 2), 9.0 * n), np.ones((n, 2))) for n in (3, 1, 20000)}
 found = np.where(np.arange(10)[:, None] % 5 == 4, np.nan, points[hidden])
 "#;
 
@@ -62,6 +63,16 @@ fn what_the_snippets_write_is_read_and_the_other_way_round() {
     let found = stage::read_recovered::<3>(&at("found.parquet")).unwrap();
     assert_eq!(found.status().iter().filter(|&&status| status == Status::Ok).count(), 8);
     assert_eq!((found.position(0), found.position(4)), (Some([2.0, 0.0, 1.0]), None));
+    let images = at("images.parquet");
+    let mut images = ImageFile::open(&images, Kind::Released).unwrap();
+    for n in [3, 1, 20000] {
+        let image = images.next_image().unwrap().unwrap();
+        assert_eq!(image.name(), format!("{n}.jpg"));
+        let image = image.released().unwrap();
+        assert_eq!((image.n_records(), image.unit()), (n, Unit::Pixel));
+        assert_eq!(image.bounds().unwrap().high, [639.5, 479.5]);
+    }
+    assert!(images.next_image().unwrap().is_none());
 
     // The other way round: the snippets read what unlift wrote.
     stage::write_released(&at("released.parquet"), &released).unwrap();

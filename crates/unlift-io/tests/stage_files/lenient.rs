@@ -10,7 +10,7 @@ use std::sync::Arc;
 use unlift::Unit;
 use unlift::recover::Status;
 use unlift::truth::DropReason;
-use unlift_io::stage::{self, Kind};
+use unlift_io::stage::{self, ImageFile, Kind};
 
 fn place() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
@@ -202,4 +202,49 @@ fn lost_positions_are_null_or_nan() {
     write(&path, UNIT, unsure);
     let line = message(&path, stage::read_recovered::<3>(&path));
     assert_eq!(line, "column found, row 0: expected a probability, found null");
+}
+
+/// What is wrong with images in one file is said of the image.
+#[test]
+fn images_are_told_by_name() {
+    let (_folder, path) = place();
+    let of = |names, rows: [f64; 3], meta: Option<&'static str>| {
+        let columns = vec![
+            ("image", texts(names)),
+            ("x", floats(rows)),
+            ("y", floats([0.0, 1.0, 2.0])),
+            ("image_meta", texts([meta; 3])),
+        ];
+        write(&path, "", columns);
+        let mut images = ImageFile::open(&path, Kind::Released).unwrap();
+        let read = || -> Result<Vec<usize>, unlift_io::Error> {
+            let mut sizes = Vec::new();
+            while let Some(image) = images.next_image()? {
+                sizes.push(image.released()?.n_records());
+            }
+            Ok(sizes)
+        };
+        let mut read = read;
+        read()
+    };
+    let good = [Some("a"), Some("a"), Some("b")];
+    assert_eq!(of(good, [0.0; 3], None).unwrap(), [2, 1]);
+    let line = |result| message(&path, result);
+    let found = line(of(good, [0.0, f64::NAN, 0.0], None));
+    assert_eq!(found, "image a, column x, row 1: expected a finite number, found NaN");
+    let found = line(of([Some("a"), Some("b"), Some("a")], [0.0; 3], None));
+    assert_eq!(found, "column image, row 2: expected the rows of an image together, found a again");
+    let found = line(of([Some("a"), None, Some("b")], [0.0; 3], None));
+    assert_eq!(found, "column image, row 1: expected the name of an image, found null");
+    let found = line(of(good, [0.0; 3], Some(r#"{"bounds":[0,1]}"#)));
+    let expected = "image a, metadata unlift, bounds: expected a low and a high corner of 2 numbers, found [0,1]";
+    assert_eq!(found, expected);
+    let found = line(of(good, [0.0; 3], Some("{")));
+    assert!(
+        found.starts_with("image a, metadata unlift: expected a JSON object, found "),
+        "{found}"
+    );
+    write(&path, "", points()[..2].to_vec());
+    let found = message(&path, ImageFile::open(&path, Kind::Released));
+    assert_eq!(found, "column image: expected text, found no such column");
 }

@@ -9,8 +9,9 @@ use super::plan::Plan;
 use super::pool::Pool;
 use super::row::Row;
 use super::run::{Observer, RowSeconds, Seconds, Silent};
+use super::staged::{key_of, oracle_seed};
 use crate::neighbors::oracle;
-use crate::seed::{Draws, Key, Stage};
+use crate::seed::Key;
 use crate::truth::Original;
 use crate::{Descriptors, Error};
 
@@ -171,9 +172,8 @@ fn one(image: &Image, plan: &Plan, seen: &mut impl Observer<2>) -> Result<(Vec<R
         let mut next = first;
         for repeat in 0..plan.repeats {
             let seed = plan.seed.wrapping_add(u64::from(repeat));
-            let name = hash(&image.name);
-            let key = Key::from_seed(seed).of_item(Stage::Image, name);
-            let oracle_seed = Draws::new(seed, Stage::Image, name).bits();
+            let key = key_of(&Key::from_seed(seed), &image.name);
+            let oracle_seed = oracle_seed(seed, &image.name);
             next = first;
             let run = Run { plan, entry, repeat, key: &key, oracle_seed };
             cells(&owned, &run, clock, seen, |seen, what, finished| {
@@ -216,7 +216,7 @@ fn check(image: &Image, plan: &Plan) -> Result<(), Error> {
 }
 
 /// FNV-1a, 64 bits.
-fn hash(name: &str) -> u64 {
+pub(super) fn hash(name: &str) -> u64 {
     let step = |h: u64, byte: u8| (h ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3);
     name.bytes().fold(0xCBF2_9CE4_8422_2325, step)
 }

@@ -88,8 +88,7 @@ impl<'a, const D: usize> Lists<'a, D> {
             Source::Given(_) => self.make(variant),
             Source::Own(_) if others == 0 => self.none(variant),
             Source::Own(joined) if others < joined.k().max(self.plan.k) => {
-                let fewer = joined.clone().with_k(joined.k().min(others));
-                let lists = fewer.make(self.released, self.seeds.1)?;
+                let lists = joined.make_of_what_there_is(self.released, self.seeds.1)?;
                 let near = self.near(self.plan.k.min(others), true)?;
                 let ratio = near.measured_inlier_ratio(&lists);
                 Ok(Made { lists, ratio, k: joined.k() })

@@ -14,6 +14,7 @@ mod pool;
 mod records_alone;
 mod row;
 mod run;
+pub mod staged;
 
 pub use break_even::{Bound, BreakEven, STRONGEST, break_even};
 pub use cells::{Cell, REFERENCE};

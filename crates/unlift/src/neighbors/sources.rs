@@ -6,7 +6,7 @@ use super::compare::MOST_ROWS;
 use super::overlap::{self, overlap};
 use super::{Neighborhoods, geometric, join, similarity};
 use crate::released::Released;
-use crate::{Descriptors, Error};
+use crate::{About, Descriptors, Error, RowOrder};
 
 /// Makes lists of a number of records per slot; the last argument is the attacker's seed.
 pub type Make<const D: usize> = fn(&Released<D>, usize, u64) -> Result<Neighborhoods, Error>;
@@ -204,6 +204,27 @@ impl Joined {
                 join(&lists, &ranks, self.k, n_records, slots)
             }
         }
+    }
+
+    /// The same, with lists as long as can be where there are fewer other records than a list has: empty ones of a
+    /// single record. An attacker takes what there is.
+    ///
+    /// # Errors
+    /// As [`make`](Self::make).
+    pub fn make_of_what_there_is<const D: usize>(
+        &self,
+        released: &Released<D>,
+        seed: u64,
+    ) -> Result<Neighborhoods, Error> {
+        let (n_slots, n_records) = (released.n_slots(), released.n_records());
+        let others = n_records.saturating_sub(1);
+        if others > 0 {
+            return self.clone().with_k(self.k.min(others)).make(released, seed);
+        }
+        let (offsets, slots) = (vec![0; n_slots + 1], released.slots_per_record());
+        let lists = Neighborhoods::try_new(offsets, Vec::new(), None, n_records, slots)?;
+        let map = Some(released.fingerprint());
+        Ok(lists.with_about(About { map, order: RowOrder::DescriptorRows }))
     }
 }
 

@@ -1,0 +1,325 @@
+//! The stages for many images: from file to file, a few images in memory at a time.
+
+use std::cell::RefCell;
+use std::path::Path;
+
+use rayon::prelude::*;
+use unlift::audit::staged::{Pooled, key_of, oracle_lists, oracle_seed};
+use unlift::audit::{Plan, Row, Threshold};
+use unlift::evaluate::nearer_to_own;
+use unlift::neighbors::Neighborhoods;
+use unlift::neighbors::sources::Joined;
+use unlift::obfuscate::obfuscate;
+use unlift::recover::{RecoverOptions, Recovered, Status, recover};
+use unlift::released::Released;
+use unlift::seed::Key;
+use unlift::truth::{Original, Secret};
+use unlift::{About, Unit};
+use unlift_features::SiftOptions;
+use unlift_io::Error;
+use unlift_io::atomic::{Access, Kind, OutputFile, OutputSet, Rules};
+use unlift_io::stage::{ImageFile, ImageRows, ImageWriter, Kind as Stage};
+
+use super::FeatureSource;
+use super::stream::{Needs, Stream, Tally};
+use crate::args::{EvaluateArgs, ObfuscateArgs, OracleArgs};
+use crate::commands::{RELEASED, TRUTH, expect_slots, same_map};
+use crate::outputs::check_file;
+use crate::progress::Progress;
+
+/// Images at work per thread.
+const AT_WORK: usize = 2;
+
+/// What became of the images of a stage.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Counts {
+    /// Images.
+    pub images: usize,
+    /// Hidden points, or lists, of all of them.
+    pub slots: usize,
+    /// Points that were left out, or recovered.
+    pub points: usize,
+    /// Images that could not be used.
+    pub unusable: usize,
+}
+
+/// Hands what `next` gives to `work`, some at a time in parallel, and its results to `done` in their order.
+fn each<T: Send, U: Send>(
+    mut next: impl FnMut() -> anyhow::Result<Option<T>>,
+    work: impl Fn(T) -> anyhow::Result<U> + Sync,
+    mut done: impl FnMut(U) -> anyhow::Result<()>,
+) -> anyhow::Result<()> {
+    loop {
+        let mut batch = Vec::new();
+        while batch.len() < AT_WORK * rayon::current_num_threads() {
+            match next()? {
+                Some(one) => batch.push(one),
+                None => break,
+            }
+        }
+        if batch.is_empty() {
+            return Ok(());
+        }
+        let results: Vec<_> = batch.into_par_iter().with_max_len(1).map(&work).collect();
+        for result in results {
+            done(result?)?;
+        }
+    }
+}
+
+/// Hides the keypoints of all images of `args.path` and writes both files into `out`.
+pub fn hide(args: &ObfuscateArgs, key: &Key, out: &mut OutputSet) -> anyhow::Result<Counts> {
+    let scheme = args.scheme.in_2d.ok_or_else(|| anyhow::anyhow!("not a scheme for images"))?;
+    let source = FeatureSource::open(&args.path, &SiftOptions::default())?;
+    let options = Plan::new(Unit::Pixel).scheme_options;
+    let tally = RefCell::new(Tally::default());
+    let steps = Progress::new(true).steps();
+    for error in source.refused() {
+        tally.borrow_mut().unusable += 1;
+        steps.say(&crate::exit::line(&anyhow::anyhow!("{error}")));
+    }
+    let all: Vec<usize> = (0..source.names().len()).collect();
+    let mut images =
+        Stream::new((&source, &args.path), &all, Needs::whatever_there_is(), &tally, steps);
+    let staged = |out: &mut OutputSet, name, kind, access| {
+        let path = out.stage(name, Kind::Stage(kind))?;
+        OutputFile::create(&path, access)
+    };
+    let mut truth = staged(out, TRUTH, Stage::Truth, Access::Private)?;
+    let mut released = staged(out, RELEASED, Stage::Released, Access::Usual)?;
+    let mut truths = ImageWriter::start(&mut truth, Stage::Truth);
+    let mut maps = ImageWriter::start(&mut released, Stage::Released);
+    let mut counts = Counts::default();
+    each(
+        || images.next().transpose(),
+        |image| {
+            let key = key_of(key, &image.name);
+            let descriptors = image.descriptors.as_ref();
+            let hidden = obfuscate(scheme, &image.original, descriptors, &options, &key);
+            let of_image = |error: unlift::Error| {
+                Error::core(&args.path, error.within(&format!("image {}", image.name)))
+            };
+            let (released, secret) = hidden.map_err(of_image)?;
+            Ok((image.name, image.original, released, secret))
+        },
+        |(name, original, released, secret)| {
+            counts.images += 1;
+            counts.slots += released.n_slots();
+            counts.points += secret.dropped().len();
+            truths.truth(&name, &original, &secret)?;
+            Ok(maps.released(&name, &released)?)
+        },
+    )?;
+    counts.unusable = tally.borrow().unusable;
+    truths.finish()?;
+    maps.finish()?;
+    truth.commit()?;
+    released.commit()?;
+    Ok(counts)
+}
+
+/// Lists by the oracle for all images of `args.truth`, written to `args.out` where `rules` allow it.
+pub fn list_by_oracle(args: &OracleArgs, released: &Path, rules: &Rules) -> anyhow::Result<Counts> {
+    let mut pairs = Pairs::open(&args.truth, Some(released))?;
+    let how = (args.oracle_noise, args.inlier_ratio, usize::from(args.k));
+    let work = |pair: Pair| {
+        let Pair { name, original, secret, released } = pair;
+        let Some(released) = released else { return Ok(None) };
+        let seed = oracle_seed(args.seed, &name);
+        let lists = oracle_lists(&original, &(released, secret), how, seed);
+        let of_image =
+            |error: unlift::Error| Error::core(&args.truth, error.within(&format!("image {name}")));
+        let lists = lists.map_err(of_image)?;
+        Ok(Some((name, lists)))
+    };
+    write((&args.out, rules), Stage::Neighborhoods, || pairs.next(), work, list)
+}
+
+/// Lists by a source of the attacker for all images of `released`, written to `out`.
+pub fn list_by_source(
+    released: &Path,
+    source: &Joined,
+    seed: u64,
+    out: (&Path, &Rules),
+) -> anyhow::Result<Counts> {
+    let mut images = ImageFile::open(released, Stage::Released)?;
+    let work = |rows: ImageRows<'_>| {
+        let name = rows.name().to_owned();
+        let image = rows.released()?;
+        let of_image =
+            |error: unlift::Error| Error::core(released, error.within(&format!("image {name}")));
+        if image.descriptors().is_none() && source.needs_descriptors() {
+            let what = format!("descriptors for {}", source.name());
+            return Err(of_image(unlift::Error::new(what, "some", "none")).into());
+        }
+        if let Some(descriptors) = image.descriptors() {
+            source.check_descriptors(descriptors).map_err(of_image)?;
+        }
+        let lists = source.make_of_what_there_is(&image, seed).map_err(of_image)?;
+        Ok(Some((name, lists)))
+    };
+    write(out, Stage::Neighborhoods, || Ok(images.next_image()?), work, list)
+}
+
+/// Positions for all images of `released` from the lists in `neighbors`, written to `out`. `note` hears about the
+/// lists of each.
+pub fn recover_all(
+    (released, neighbors): (&Path, &Path),
+    options: &RecoverOptions,
+    out: (&Path, &Rules),
+    mut note: impl FnMut(&Neighborhoods, usize),
+) -> anyhow::Result<Counts> {
+    let mut images = ImageFile::open(released, Stage::Released)?;
+    let mut lists = ImageFile::open(neighbors, Stage::Neighborhoods)?;
+    let next = || {
+        let Some(rows) = images.next_image()? else {
+            lists.expect_end(released)?;
+            return Ok(None);
+        };
+        let name = rows.name().to_owned();
+        let image = rows.released()?;
+        let (records, slots) = (image.n_records(), image.slots_per_record());
+        let of_image = lists.expect(&name, released)?.neighborhoods(records, slots)?;
+        same_map(neighbors, of_image.about().map, released, Some(image.fingerprint()))?;
+        note(&of_image, slots);
+        Ok(Some((name, image, of_image)))
+    };
+    let work = |(name, image, lists): (String, Released<2>, Neighborhoods)| {
+        let recovered = recover(&image, &lists, options);
+        let recovered = recovered
+            .map_err(|error| Error::core(released, error.within(&format!("image {name}"))))?;
+        Ok(Some((name, recovered)))
+    };
+    write(out, Stage::Recovered, next, work, |writer, counts, name, recovered: &Recovered<2>| {
+        counts.slots += recovered.n_slots();
+        counts.points += recovered.status().iter().filter(|&&s| s == Status::Ok).count();
+        writer.recovered(name, recovered)
+    })
+}
+
+/// What evaluation found of images.
+pub struct Evaluated {
+    /// The row over all of them.
+    pub row: Row,
+    /// Whether every image says which released image it is of.
+    pub about: About,
+    /// Positions nearer to their own points than to strangers, and how many have any, where files do not say.
+    pub nearer: (usize, usize),
+}
+
+/// The row over all images of `args.recovered`.
+pub fn evaluate_all(
+    args: &EvaluateArgs,
+    released: Option<&Path>,
+    thresholds: &[Threshold],
+) -> anyhow::Result<Evaluated> {
+    let mut pairs = Pairs::open(&args.truth, released)?;
+    let mut found = ImageFile::open(&args.recovered, Stage::Recovered)?;
+    let mut pooled = Pooled::new(thresholds);
+    let (mut about, mut nearer) = (None, (0, 0));
+    while let Some(pair) = pairs.next()? {
+        let Pair { name, original, secret, released } = pair;
+        if secret.n_slots() == 0 {
+            pooled.add_unreleased(&secret);
+            continue;
+        }
+        let recovered = found.expect(&name, &args.truth)?.recovered()?;
+        same_map(&args.recovered, recovered.about().map, &args.truth, secret.map())?;
+        let added = pooled.add(&recovered, &original, &secret, released.as_ref());
+        let of_image = |error: unlift::Error| {
+            Error::core(&args.recovered, error.within(&format!("image {name}")))
+        };
+        added.map_err(of_image)?;
+        if recovered.about().map.is_none() || secret.map().is_none() {
+            let (closer, n) = nearer_to_own(&recovered, &original, &secret);
+            nearer = (nearer.0 + closer, nearer.1 + n);
+        }
+        // One image that does not say is enough for a note.
+        if about.is_none_or(|about: About| about.map.is_some()) {
+            about = Some(recovered.about());
+        }
+    }
+    found.expect_end(&args.truth)?;
+    let row = pooled.row();
+    let row =
+        row.ok_or_else(|| Error::new(&args.truth, "", "images with hidden points", "none"))?;
+    Ok(Evaluated { row, about: about.unwrap_or_default(), nearer })
+}
+
+/// Truths of images with what was released of them.
+struct Pairs<'a> {
+    truth: (&'a Path, ImageFile<'a>),
+    released: Option<(&'a Path, ImageFile<'a>)>,
+}
+
+struct Pair {
+    name: String,
+    original: Original<2>,
+    secret: Secret,
+    /// `None` where nothing was released, or the file is not at hand.
+    released: Option<Released<2>>,
+}
+
+impl<'a> Pairs<'a> {
+    fn open(truth: &'a Path, released: Option<&'a Path>) -> anyhow::Result<Self> {
+        let images = ImageFile::open(truth, Stage::Truth)?;
+        let open = |path| Ok::<_, Error>((path, ImageFile::open(path, Stage::Released)?));
+        Ok(Self { truth: (truth, images), released: released.map(open).transpose()? })
+    }
+
+    fn next(&mut self) -> anyhow::Result<Option<Pair>> {
+        let truth = self.truth.0;
+        let Some(rows) = self.truth.1.next_image()? else {
+            if let Some((_, released)) = &mut self.released {
+                released.expect_end(truth)?;
+            }
+            return Ok(None);
+        };
+        let name = rows.name().to_owned();
+        let (original, secret) = rows.truth()?;
+        let released = match &mut self.released {
+            Some((path, images)) if secret.n_slots() > 0 => {
+                let image = images.expect(&name, truth)?.released()?;
+                same_map(path, Some(image.fingerprint()), truth, secret.map())?;
+                expect_slots(path, &image, &secret)?;
+                Some(image)
+            }
+            _ => None,
+        };
+        Ok(Some(Pair { name, original, secret, released }))
+    }
+}
+
+/// Adds the lists of one image.
+fn list(
+    writer: &mut ImageWriter<'_>,
+    counts: &mut Counts,
+    name: &str,
+    lists: &Neighborhoods,
+) -> Result<(), Error> {
+    counts.slots += lists.n_slots();
+    writer.neighborhoods(name, lists)
+}
+
+/// Writes a file of images: what `work` makes of what `next` gives, by `add`.
+fn write<T: Send, U: Send>(
+    (out, rules): (&Path, &Rules),
+    kind: Stage,
+    next: impl FnMut() -> anyhow::Result<Option<T>>,
+    work: impl Fn(T) -> anyhow::Result<Option<(String, U)>> + Sync,
+    mut add: impl FnMut(&mut ImageWriter<'_>, &mut Counts, &str, &U) -> Result<(), Error>,
+) -> anyhow::Result<Counts> {
+    let mut output = OutputFile::create(out, Access::Private)?;
+    let mut writer = ImageWriter::start(&mut output, kind);
+    let mut counts = Counts::default();
+    each(next, work, |made| {
+        let Some((name, made)) = made else { return Ok(()) };
+        counts.images += 1;
+        Ok(add(&mut writer, &mut counts, &name, &made)?)
+    })?;
+    writer.finish()?;
+    // What came to stand there meanwhile stays.
+    check_file(out, Kind::Stage(kind), rules)?;
+    output.commit()?;
+    Ok(counts)
+}

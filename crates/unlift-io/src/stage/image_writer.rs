@@ -1,0 +1,187 @@
+//! Many images to one stage file, one after the other.
+
+use super::header::{Kind, to_text};
+use super::images::{IMAGE, IMAGE_META};
+use super::write::{Written, properties, to_io, writer};
+use super::{neighborhoods, recovered, released, truth};
+use crate::Error;
+use crate::atomic::OutputFile;
+use arrow_array::{ArrayRef, RecordBatch, StringArray, new_null_array};
+use arrow_schema::DataType::{Float32, UInt8, UInt32, Utf8};
+use arrow_schema::{Field, Schema, SchemaRef};
+use parquet::arrow::ArrowWriter;
+use parquet::errors::ParquetError;
+use serde_json::{Map, Value};
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use unlift::neighbors::Neighborhoods;
+use unlift::recover::Recovered;
+use unlift::released::Released;
+use unlift::truth::{Original, Secret};
+
+/// Row groups of images end after this many rows: about 8 MB of descriptors are in memory until then.
+const GROUP_ROWS: usize = 1 << 16;
+
+/// What is said of all images at once; everything else is said of each.
+const OF_ALL: [&str; 6] = ["kind", "version", "dimension", "unit", "family", "slots_per_record"];
+
+/// A stage file that is written image by image, into an [`OutputFile`] that the caller commits.
+///
+/// Memory grows by a row group, not by the number of images. The same images in the same order give the same
+/// bytes. Images without rows leave no trace.
+pub struct ImageWriter<'a> {
+    path: PathBuf,
+    kind: Kind,
+    /// Until the first image, whose columns are those of all.
+    file: Option<&'a mut BufWriter<File>>,
+    started: Option<Started<'a>>,
+}
+
+struct Started<'a> {
+    of_all: Map<String, Value>,
+    schema: SchemaRef,
+    writer: ArrowWriter<&'a mut BufWriter<File>>,
+}
+
+impl<'a> ImageWriter<'a> {
+    /// Starts a file of images of `kind`.
+    pub fn start(output: &'a mut OutputFile, kind: Kind) -> Self {
+        let path = output.path().to_owned();
+        Self { path, kind, file: Some(output.writer()), started: None }
+    }
+
+    /// Adds a released image.
+    ///
+    /// # Errors
+    /// When it differs from the first one in its family or kind of descriptors, or the disk fails.
+    pub fn released(&mut self, name: &str, released: &Released<2>) -> Result<(), Error> {
+        self.append(name, released::written(released))
+    }
+
+    /// Adds the truth of an image.
+    ///
+    /// # Errors
+    /// When the secret is not of these points, or the disk fails.
+    pub fn truth(
+        &mut self,
+        name: &str,
+        original: &Original<2>,
+        secret: &Secret,
+    ) -> Result<(), Error> {
+        let written = truth::written(&self.path, original, secret);
+        let written = written.map_err(|error| error.within(&format!("image {name}")))?;
+        self.append(name, written)
+    }
+
+    /// Adds the neighborhoods of an image.
+    ///
+    /// # Errors
+    /// When the disk fails.
+    pub fn neighborhoods(&mut self, name: &str, lists: &Neighborhoods) -> Result<(), Error> {
+        self.append(name, neighborhoods::written(lists))
+    }
+
+    /// Adds the recovered points of an image.
+    ///
+    /// # Errors
+    /// When they have no finite evidence, or the disk fails.
+    pub fn recovered(&mut self, name: &str, recovered: &Recovered<2>) -> Result<(), Error> {
+        let written = recovered::written(&self.path, recovered);
+        let written = written.map_err(|error| error.within(&format!("image {name}")))?;
+        self.append(name, written)
+    }
+
+    /// Ends the file; it is in its place once its [`OutputFile`] is committed.
+    ///
+    /// # Errors
+    /// When there was no image with rows, or the disk fails.
+    pub fn finish(self) -> Result<(), Error> {
+        let Some(started) = self.started else {
+            return Err(Error::new(self.path, "", "an image with points", "none"));
+        };
+        let closed = started.writer.close();
+        closed.map(drop).map_err(|error| failed(&self.path, error))
+    }
+
+    fn append(&mut self, name: &str, written: Written<'_>) -> Result<(), Error> {
+        let Written { meta, fields, n_rows, columns } = written;
+        if n_rows == 0 {
+            return Ok(());
+        }
+        let (of_all, own): (Map<_, _>, Map<_, _>) =
+            meta.into_iter().partition(|(key, _)| OF_ALL.contains(&key.as_str()));
+        if let Some(file) = self.file.take() {
+            self.started = Some(Started::with(file, &self.path, self.kind, &of_all, &fields)?);
+        }
+        let Some(started) = &mut self.started else { unreachable!("started by the first image") };
+        let same = started.of_all == of_all;
+        let mut named: Vec<(String, ArrayRef)> =
+            fields.iter().map(|field| field.name().clone()).zip(columns(0..n_rows)).collect();
+        let texts = |text: &str| {
+            Arc::new(StringArray::from_iter_values(std::iter::repeat_n(text, n_rows))) as ArrayRef
+        };
+        named.push((IMAGE.to_owned(), texts(name)));
+        named.push((IMAGE_META.to_owned(), texts(&to_text(own))));
+        let of_field = |field: &Arc<Field>| {
+            let at = named.iter().position(|(name, _)| name == field.name());
+            let column = at.map(|at| named.swap_remove(at).1);
+            column.unwrap_or_else(|| new_null_array(field.data_type(), n_rows))
+        };
+        let in_order: Vec<ArrayRef> = {
+            let mut of_field = of_field;
+            started.schema.fields().iter().map(&mut of_field).collect()
+        };
+        let batch = RecordBatch::try_new(started.schema.clone(), in_order);
+        match batch {
+            Ok(batch) if same && named.is_empty() => {
+                started.writer.write(&batch).map_err(|error| failed(&self.path, error))
+            }
+            _ => {
+                let expected = "the same family and kind of descriptors as of the first image";
+                Err(Error::new(&self.path, format!("image {name}"), expected, "others"))
+            }
+        }
+    }
+}
+
+impl<'a> Started<'a> {
+    /// Starts with the columns of the first image, and those that only some images may have.
+    fn with(
+        file: &'a mut BufWriter<File>,
+        path: &Path,
+        kind: Kind,
+        of_all: &Map<String, Value>,
+        fields: &[Field],
+    ) -> Result<Self, Error> {
+        let mut all = vec![Field::new(IMAGE, Utf8, false), Field::new(IMAGE_META, Utf8, false)];
+        all.extend(fields.iter().map(|field| field.clone().with_nullable(true)));
+        let scores = || Field::new_list("scores", Field::new("element", Float32, false), true);
+        let sometimes = match kind {
+            Kind::Neighborhoods => vec![scores()],
+            Kind::Recovered => vec![
+                Field::new("found", Float32, true),
+                Field::new("error_scale", Float32, true),
+                Field::new("axis", UInt8, true),
+                Field::new("descriptor_row", UInt32, true),
+            ],
+            Kind::Truth => vec![Field::new("swapped_axis", UInt8, true)],
+            Kind::Released | Kind::PointNeighborhoods => Vec::new(),
+        };
+        for field in sometimes {
+            if !all.iter().any(|other| other.name() == field.name()) {
+                all.push(field);
+            }
+        }
+        let properties = properties(to_text(of_all.clone()), &all, GROUP_ROWS);
+        let schema = Arc::new(Schema::new(all));
+        let writer = writer(file, schema.clone(), properties);
+        let writer = writer.map_err(|error| failed(path, error))?;
+        Ok(Self { of_all: of_all.clone(), schema, writer })
+    }
+}
+
+fn failed(path: &Path, error: ParquetError) -> Error {
+    Error::write(path, to_io(error))
+}

@@ -1,0 +1,124 @@
+//! The stages of one image at a time, chained by whoever has files: with the randomness, the lists and the sums of
+//! an audit of images.
+
+use super::cells::Finished;
+use super::images::hash;
+use super::lists::Lists;
+use super::measure::measure;
+use super::plan::{Plan, Source, Threshold, Variant};
+use super::pool::Pool;
+use super::row::Row;
+use super::run::RowSeconds;
+use crate::evaluate::{blind, distinct_weights};
+use crate::neighbors::Neighborhoods;
+use crate::neighbors::oracle::{self, Noise};
+use crate::recover::Recovered;
+use crate::released::Released;
+use crate::seed::{Draws, Key, Stage};
+use crate::truth::{DropReason, Original, Secret};
+use crate::{Error, Unit};
+
+/// The key that the image `name` is hidden under, of a set whose key is `key`.
+pub fn key_of(key: &Key, name: &str) -> Key {
+    key.of_item(Stage::Image, hash(name))
+}
+
+/// The integer that the oracle of the image `name` draws from, in a run with `seed`.
+pub fn oracle_seed(seed: u64, name: &str) -> u64 {
+    Draws::new(seed, Stage::Image, hash(name)).bits()
+}
+
+/// Lists of `k` records at `ratio`, or as long as can be in an image with fewer; `seed` is that of the image
+/// ([`oracle_seed`]).
+///
+/// # Errors
+/// When the secret is not of these points.
+pub fn oracle_lists(
+    original: &Original<2>,
+    hidden: &(Released<2>, Secret),
+    (noise, ratio, k): (Noise, f64, usize),
+    seed: u64,
+) -> Result<Neighborhoods, Error> {
+    let plan = Plan { k, ..Plan::new(Unit::Pixel) };
+    let search = oracle::search(original)?;
+    let variant =
+        Variant { source: &Source::Oracle, noise: Some(noise), inlier_ratio: Some(ratio) };
+    // The attacker's seed has no part in the oracle's lists.
+    let mut lists = Lists::new(&plan, &search, hidden, &hidden.1, (seed, 0));
+    lists.make_of_what_there_is(&variant).map(|made| made.lists)
+}
+
+/// A row over many images, one added after the other: that of an audit of images. Memory does not grow with their
+/// number.
+#[derive(Debug)]
+pub struct Pooled {
+    pool: Option<Pool>,
+    thresholds: Vec<Threshold>,
+    /// Whether a blind attacker's figures are known of every image.
+    with_blind: bool,
+    /// Points that were not released, of images of which nothing was.
+    dropped: Vec<(DropReason, usize)>,
+}
+
+impl Pooled {
+    /// Nothing yet, to be measured within these thresholds.
+    pub fn new(thresholds: &[Threshold]) -> Self {
+        let thresholds = thresholds.to_vec();
+        Self { pool: None, thresholds, with_blind: true, dropped: Vec::new() }
+    }
+
+    /// Adds what came back of one image; without its released map there are no figures of a blind attacker.
+    ///
+    /// # Errors
+    /// When these do not belong together.
+    pub fn add(
+        &mut self,
+        recovered: &Recovered<2>,
+        original: &Original<2>,
+        secret: &Secret,
+        released: Option<&Released<2>>,
+    ) -> Result<(), Error> {
+        let baseline = released.map(|released| blind(released, original, secret));
+        let (mut row, accuracy) =
+            measure(recovered, original, secret, baseline.as_ref(), &self.thresholds)?;
+        self.with_blind &= baseline.is_some();
+        let baseline = baseline.as_ref().unwrap_or(&accuracy);
+        let weights = distinct_weights(original, secret);
+        row.fill_distinct(&accuracy, baseline, &weights, &self.thresholds);
+        let mut pool = Pool::new(&row, &self.thresholds);
+        let finished = Finished {
+            row,
+            accuracy: &accuracy,
+            baseline,
+            weights: &weights,
+            n_listed: 0,
+            seconds: RowSeconds::default(),
+        };
+        pool.add(&finished, &self.thresholds);
+        match &mut self.pool {
+            None => self.pool = Some(pool),
+            Some(all) => all.merge(&pool),
+        }
+        Ok(())
+    }
+
+    /// Adds an image of which no point was released.
+    pub fn add_unreleased(&mut self, secret: &Secret) {
+        let count = |reason| secret.dropped().iter().filter(|d| d.reason == reason).count();
+        self.dropped.extend(DropReason::ALL.map(|reason| (reason, count(reason))));
+    }
+
+    /// The row over all images, without its name; `None` when nothing was released of any.
+    pub fn row(&self) -> Option<Row> {
+        let mut row = self.pool.as_ref()?.row(&self.thresholds);
+        for &(reason, n) in self.dropped.iter().filter(|(_, n)| *n > 0) {
+            *row.dropped.entry(reason.name()).or_insert(0) += n;
+        }
+        if !self.with_blind {
+            row.blind_percent.clear();
+            row.blind_median_error = None;
+            row.distinct.iter_mut().for_each(|distinct| distinct.blind_percent.clear());
+        }
+        Some(row)
+    }
+}
