@@ -2,7 +2,7 @@
 //! since only exact operations and a portable logarithm feed them. A change on purpose is blessed by
 //! copying what the failing test prints, and shows in the diff.
 
-use unlift::obfuscate::SCHEMES;
+use unlift::obfuscate::{SCHEMES, Scheme};
 use unlift::recover::{Delta, RecoverOptions, Solver};
 
 use crate::maps::*;
@@ -47,4 +47,43 @@ fn bytes_are_pinned() {
         |(name, a, b): &(&str, u64, u64)| format!("    (\"{name}\", {a:#018x}, {b:#018x}),");
     let printed: Vec<String> = found.iter().map(literal).collect();
     assert!(found == PINS, "the bytes are now\n{}", printed.join("\n"));
+}
+
+/// (scheme, dimensions, hash of what joint recovery makes of it with everything on automatic).
+const JOINT: &[(&str, usize, u64)] = &[
+    ("olc", 3, 0x12ace5151c708ef2),
+    ("ppl", 3, 0xbed8cc3ed2969408),
+    ("ppl+", 3, 0xda096a133b606659),
+    ("ray", 3, 0x87e001b2e5bf8777),
+    ("ray-voxel", 3, 0x7797981135ef9150),
+    ("plane", 3, 0x6e60b82ba944b65f),
+    ("cp", 3, 0x1c80ebec8c5acf9b),
+    ("lines2d", 2, 0x650477145b52659f),
+    ("cp2d", 2, 0x99c4f1d8314430be),
+    ("dcl2d", 2, 0xbc91503f8c7f82d4),
+];
+
+fn joint_bytes<const D: usize>(
+    name: &'static str,
+    scheme: &dyn Scheme<D>,
+) -> (&'static str, usize, u64) {
+    let hidden = hide(scheme, &room::<D>(2027, 500), 0);
+    let lists = hidden.lists(20, 0.5, 0);
+    let recovered = solve(&hidden.released, &lists, RecoverOptions::default());
+    (name, D, hash(&recovered_bytes(&recovered)))
+}
+
+/// Joint recovery with delta on automatic runs through nearly all of `recover`: delta, consensus, graph, law,
+/// rounds and exact constraints.
+#[test]
+fn bytes_of_joint_recovery_are_pinned() {
+    let mut found = Vec::new();
+    for entry in SCHEMES {
+        found.extend(entry.in_3d.map(|scheme| joint_bytes::<3>(entry.name, scheme)));
+        found.extend(entry.in_2d.map(|scheme| joint_bytes::<2>(entry.name, scheme)));
+    }
+    let literal =
+        |(name, d, bytes): &(&str, usize, u64)| format!("    (\"{name}\", {d}, {bytes:#018x}),");
+    let printed: Vec<String> = found.iter().map(literal).collect();
+    assert!(found == JOINT, "the bytes are now\n{}", printed.join("\n"));
 }
