@@ -19,6 +19,7 @@ mod feasible;
 mod grid;
 mod peaks;
 mod published;
+mod spread;
 mod tomography;
 
 pub(crate) use published::published;

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::feasible::{FeasibleLine, Hides};
 use super::grid::Span;
-use super::tomography::Spread;
+use super::spread::Spread;
 use super::{Peak, Peaks};
 
 /// Samples to either side that count as the same place: about what smoothing spreads.

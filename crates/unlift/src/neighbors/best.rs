@@ -1,5 +1,16 @@
 //! The best few of a stream, whatever its order.
 
+/// What a row found.
+#[derive(Clone, Debug, Default)]
+pub struct Found {
+    /// The best rows of other records, best first; equal scores in row order.
+    pub best: Vec<(f32, u32)>,
+    /// Mean of the scores with rows of other records, wherever they are; 0 unless scores are exact.
+    pub mean: f64,
+    /// Their standard deviation; 0 unless scores are exact.
+    pub deviation: f64,
+}
+
 /// Keeps the entries with the highest scores; among equal scores those with the lowest ids. What is
 /// kept depends on the set of entries alone.
 #[derive(Clone, Debug)]

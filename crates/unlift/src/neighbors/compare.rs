@@ -4,7 +4,7 @@ use std::sync::Mutex;
 
 use rayon::prelude::*;
 
-use super::best::Best;
+use super::best::{Best, Found};
 use super::pairs::{Pairs, Tile};
 use super::rows::Rows;
 use super::{alike, pairs};
@@ -33,17 +33,6 @@ pub trait Likeness: Sync {
     /// Scores of all rows of `a` with all of `b`, `(BLOCK, BLOCK)`; what stands for rows beyond the last
     /// has no meaning.
     fn scores(&self, a: &Self::Block, b: &Self::Block, scores: &mut [f32]);
-}
-
-/// What a row found.
-#[derive(Clone, Debug, Default)]
-pub struct Found {
-    /// The best rows of other records, best first; equal scores in row order.
-    pub best: Vec<(f32, u32)>,
-    /// Mean of the scores with rows of other records, wherever they are; 0 unless scores are exact.
-    pub mean: f64,
-    /// Their standard deviation; 0 unless scores are exact.
-    pub deviation: f64,
 }
 
 /// The `most` best partners of every row among the rows of other records: exact up to `exact` rows. Beyond, rows

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-use super::compare::Found;
+use super::best::Found;
 
 /// Blocks held at a time where not all pairs are compared.
 const HELD: usize = 256;

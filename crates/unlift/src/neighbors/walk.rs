@@ -5,8 +5,8 @@
 
 use rayon::prelude::*;
 
+use super::best::Found;
 use super::best::{Best, higher_first};
-use super::compare::Found;
 
 /// Edges that a row keeps.
 const EDGES: usize = 6;

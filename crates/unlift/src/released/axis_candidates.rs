@@ -1,6 +1,6 @@
 //! Axis candidates: a published point, one coordinate of which belongs to another point.
 
-use super::finite_f32;
+use super::normal_form::finite_f32;
 use crate::Error;
 
 /// Published points; the hidden one lies on one of the `D` axis-parallel lines through each.
@@ -25,7 +25,7 @@ impl<const D: usize> AxisCandidates<D> {
 
     /// The rows `order[0], order[1], ...`.
     pub(crate) fn select(&self, order: &[u32]) -> Self {
-        Self { position: super::rows(&self.position, order) }
+        Self { position: super::normal_form::rows(&self.position, order) }
     }
 
     /// Number of records.

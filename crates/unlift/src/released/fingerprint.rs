@@ -2,24 +2,28 @@
 
 use sha2::{Digest, Sha256};
 
-use super::{Obfuscation, Released};
-use crate::Fingerprint;
+use super::obfuscation::Obfuscation;
 use crate::descriptors::Values;
 use crate::geometry::frame::Bounds;
+use crate::{Descriptors, Fingerprint, Unit};
 
 /// The first 16 bytes of the SHA-256 of everything in the map, in normal form and about its origin. It covers what
 /// an attacker holds and nothing else, so it may stand in every file made from the map.
-pub(super) fn of<const D: usize>(released: &Released<D>) -> Fingerprint {
+pub(super) fn of<const D: usize>(
+    obfuscation: &Obfuscation<D>,
+    slots_per_record: usize,
+    (origin, unit, bounds): ([f64; D], Unit, Option<Bounds<D>>),
+    descriptors: Option<&Descriptors>,
+) -> Fingerprint {
     let mut hasher = Sha256::new();
-    let obfuscation = released.obfuscation();
     hasher.update(format!(
         "unlift released 1, {D}D, {} {} of {}, {}\n",
         obfuscation.len(),
         obfuscation.family(),
-        released.slots_per_record(),
-        released.unit().name()
+        slots_per_record,
+        unit.name()
     ));
-    f64s(&mut hasher, &released.origin());
+    f64s(&mut hasher, &origin);
     match obfuscation {
         Obfuscation::Lines(lines) => {
             f32s(&mut hasher, lines.foot().as_flattened());
@@ -41,12 +45,12 @@ pub(super) fn of<const D: usize>(released: &Released<D>) -> Fingerprint {
             f32s(&mut hasher, candidates.position().as_flattened());
         }
     }
-    if let Some(bounds) = released.bounds() {
+    if let Some(bounds) = bounds {
         hasher.update("bounds");
         corners(&mut hasher, &bounds);
     }
     // A map without records has no descriptors in a file.
-    if let Some(descriptors) = released.descriptors().filter(|_| !obfuscation.is_empty()) {
+    if let Some(descriptors) = descriptors.filter(|_| !obfuscation.is_empty()) {
         hasher.update(format!("descriptors of {}", descriptors.dim()));
         match descriptors.values() {
             Values::U8(values) => hasher.update(values),

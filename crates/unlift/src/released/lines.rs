@@ -1,6 +1,6 @@
 //! Lines: unit direction with a fixed sign, and the foot (the point nearest the origin).
 
-use super::{finite_f32, is_f32, unit_direction};
+use super::normal_form::{finite_f32, is_f32, unit_direction};
 use crate::Error;
 
 /// Lines in normal form, `(n, D)` columns of `f32` about the released origin.
@@ -43,8 +43,8 @@ impl<const D: usize> Lines<D> {
     /// The rows `order[0], order[1], ...`.
     pub(crate) fn select(&self, order: &[u32]) -> Self {
         Self {
-            foot: super::rows(&self.foot, order),
-            direction: super::rows(&self.direction, order),
+            foot: super::normal_form::rows(&self.foot, order),
+            direction: super::normal_form::rows(&self.direction, order),
         }
     }
 

@@ -7,65 +7,18 @@ mod axis_candidates;
 mod axis_planes;
 mod fingerprint;
 mod lines;
+mod normal_form;
+mod obfuscation;
 mod rays;
 
 pub use axis_candidates::AxisCandidates;
 pub use axis_planes::AxisPlanes;
 pub use lines::Lines;
+pub use obfuscation::Obfuscation;
 pub use rays::Rays;
 
 use crate::geometry::frame::Bounds;
 use crate::{Descriptors, Error, Fingerprint, Unit};
-
-/// The records of a map: what the set `O(x)` of Eq. (1) is for each hidden point.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Obfuscation<const D: usize> {
-    /// A line through the point, or through two points (`olc`, `ppl`, `ppl+`).
-    Lines(Lines<D>),
-    /// A half-line from one of a few published centers (`ray`, `ray-voxel`).
-    Rays(Rays<D>),
-    /// A plane perpendicular to an axis (`plane`).
-    AxisPlanes(AxisPlanes<D>),
-    /// One of the `D` axis-parallel lines through a published point (`cp`).
-    AxisCandidates(AxisCandidates<D>),
-}
-
-impl<const D: usize> Obfuscation<D> {
-    /// Number of records.
-    pub fn len(&self) -> usize {
-        match self {
-            Self::Lines(lines) => lines.len(),
-            Self::Rays(rays) => rays.len(),
-            Self::AxisPlanes(planes) => planes.len(),
-            Self::AxisCandidates(candidates) => candidates.len(),
-        }
-    }
-
-    /// Whether there are no records.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// The records `order[0], order[1], ...`.
-    pub(crate) fn select(&self, order: &[u32]) -> Self {
-        match self {
-            Self::Lines(lines) => Self::Lines(lines.select(order)),
-            Self::Rays(rays) => Self::Rays(rays.select(order)),
-            Self::AxisPlanes(planes) => Self::AxisPlanes(planes.select(order)),
-            Self::AxisCandidates(candidates) => Self::AxisCandidates(candidates.select(order)),
-        }
-    }
-
-    /// The family's name in files.
-    pub fn family(&self) -> &'static str {
-        match self {
-            Self::Lines(_) => "lines",
-            Self::Rays(_) => "rays",
-            Self::AxisPlanes(_) => "axis_planes",
-            Self::AxisCandidates(_) => "axis_candidates",
-        }
-    }
-}
 
 /// A released map: all that an attacker sees.
 #[derive(Clone, Debug, PartialEq)]
@@ -119,7 +72,13 @@ impl<const D: usize> Released<D> {
             bounds: None,
             fingerprint,
         };
-        Ok(Self { fingerprint: fingerprint::of(&bare), ..bare })
+        Ok(Self { fingerprint: bare.hashed(), ..bare })
+    }
+
+    fn hashed(&self) -> Fingerprint {
+        let Self { obfuscation, slots_per_record, origin, unit, descriptors, bounds, .. } = self;
+        let frame = (*origin, *unit, *bounds);
+        fingerprint::of(obfuscation, *slots_per_record, frame, descriptors.as_ref())
     }
 
     /// The same map, every hidden point of which is known to lie within `bounds` (in the map's frame):
@@ -129,7 +88,7 @@ impl<const D: usize> Released<D> {
         let known = self.bounds.is_some() || bounds.is_some();
         let bounded = Self { bounds, ..self };
         match known {
-            true => Self { fingerprint: fingerprint::of(&bounded), ..bounded },
+            true => Self { fingerprint: bounded.hashed(), ..bounded },
             false => bounded,
         }
     }
@@ -179,48 +138,5 @@ impl<const D: usize> Released<D> {
     /// One row per slot, in random order within a record.
     pub fn descriptors(&self) -> Option<&Descriptors> {
         self.descriptors.as_ref()
-    }
-}
-
-/// The rows `order[0], order[1], ...` of one column.
-fn rows<T: Copy>(column: &[T], order: &[u32]) -> Vec<T> {
-    order.iter().map(|&row| column[row as usize]).collect()
-}
-
-/// Stored directions closer to unit length than this (in squared length) stay as they are, so that
-/// normalizing twice changes no bit. `f32` rounding of a unit vector stays below it.
-const UNIT_SLACK: f64 = 6e-7;
-
-/// Whether `v` may have been stored before. Only then may a normal form keep it: a length near 1 or
-/// a point near its foot would otherwise show in the last bits.
-fn is_f32<const D: usize>(v: &[f64; D]) -> bool {
-    v.iter().all(|&x| f64::from(x as f32) == x)
-}
-
-/// The unit vector along `v`, as stored: left alone when it already is one up to `f32` rounding.
-///
-/// # Errors
-/// When `v` is not finite or has no length.
-fn unit_direction<const D: usize>(v: [f64; D], row: usize) -> Result<[f64; D], Error> {
-    let norm2: f64 = v.iter().map(|x| x * x).sum();
-    if !norm2.is_finite() || norm2 <= 0.0 {
-        let what = format!("direction of record {row}");
-        return Err(Error::new(what, "a finite vector with length", format!("{v:?}")));
-    }
-    if is_f32(&v) && (norm2 - 1.0).abs() <= UNIT_SLACK {
-        return Ok(v);
-    }
-    let norm = norm2.sqrt();
-    Ok(v.map(|x| x / norm))
-}
-
-/// `v` in `f32`, or an error that names the row.
-fn finite_f32<const D: usize>(v: [f64; D], what: &str, row: usize) -> Result<[f32; D], Error> {
-    let rounded = v.map(|x| x as f32);
-    if rounded.iter().all(|x| x.is_finite()) {
-        Ok(rounded)
-    } else {
-        let what = format!("{what} of record {row}");
-        Err(Error::new(what, "coordinates in the range of f32", format!("{v:?}")))
     }
 }

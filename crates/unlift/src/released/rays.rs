@@ -1,6 +1,6 @@
 //! Rays: half-lines from a small table of published centers.
 
-use super::{finite_f32, unit_direction};
+use super::normal_form::{finite_f32, unit_direction};
 use crate::Error;
 use crate::geometry::frame::Bounds;
 
@@ -57,8 +57,8 @@ impl<const D: usize> Rays<D> {
     pub(crate) fn select(&self, order: &[u32]) -> Self {
         Self {
             centers: self.centers.clone(),
-            center: super::rows(&self.center, order),
-            direction: super::rows(&self.direction, order),
+            center: super::normal_form::rows(&self.center, order),
+            direction: super::normal_form::rows(&self.direction, order),
             voxel: self.voxel,
             regions: self.regions.clone(),
         }

@@ -7,6 +7,7 @@
 
 mod furniture;
 mod objects;
+mod purpose;
 mod room;
 mod sampling;
 mod shapes;
@@ -14,33 +15,19 @@ mod surfaces;
 mod tiled;
 mod views;
 
-use crate::seed::{Draws, Stage};
 use surfaces::rotate;
 
+pub use sampling::{COINCIDENT_SHARE, OUTLIER_SHARE};
 pub use shapes::{Shape, keypoints, shape};
 pub use tiled::tiled;
+pub use views::Camera;
 
 /// The number of points of the demo's room.
 pub const DEFAULT_N_POINTS: usize = 20_000;
 
-/// Share of points that are exact copies of another point.
-pub const COINCIDENT_SHARE: f64 = 0.03;
-
-/// Share of points that lie far from any surface.
-pub const OUTLIER_SHARE: f64 = 0.015;
-
 /// Tangent of half the angle (17.06 degrees) by which walls are turned against the frame's axes: no
 /// real map is aligned with its walls, and axis-wise schemes must not profit from one that is.
 const HALF_YAW_TANGENT: f64 = 0.15;
-
-/// Where a photo was taken, in meters.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Camera {
-    /// The center of projection.
-    pub center: [f64; 3],
-    /// The viewing direction, of unit length.
-    pub look: [f64; 3],
-}
 
 /// A map of a furnished room, in meters; `z` points up and the origin is the middle of the floor.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,21 +62,6 @@ pub fn room(seed: u64, n_points: usize) -> Room {
         camera.look = rotate(yaw, camera.look);
     }
     Room { points, cameras }
-}
-
-/// What a stream of draws decides, so that no two decisions share one.
-#[derive(Clone, Copy)]
-enum Purpose {
-    Layout = 0,
-    Texture = 1,
-    Walk = 2,
-    Copies = 3,
-    Order = 4,
-    FirstPoint = 16,
-}
-
-fn draws(seed: u64, purpose: Purpose, item: usize) -> Draws {
-    Draws::new(seed, Stage::Synthetic, purpose as u64 + item as u64)
 }
 
 #[cfg(test)]

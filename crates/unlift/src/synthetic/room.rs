@@ -1,8 +1,8 @@
 //! The room: its shell, and what stands where.
 
 use super::furniture as piece;
+use super::purpose::{Purpose, draws};
 use super::surfaces::{Faces, Place, Scene, Texture, turn};
-use super::{Purpose, draws};
 use crate::seed::Draws;
 
 /// Free space kept at the ends of a short wall, where the long walls' furniture stands.

@@ -1,9 +1,15 @@
 //! Points on the surfaces as structure from motion finds them, with its noise and its mistakes.
 
+use super::purpose::{Purpose, draws};
 use super::surfaces::{Scene, add, norm, scale, sub};
-use super::views::{MANY_VIEWS, Track, track};
-use super::{COINCIDENT_SHARE, Camera, OUTLIER_SHARE, Purpose, draws};
+use super::views::{Camera, MANY_VIEWS, Track, track};
 use crate::seed::Draws;
+
+/// Share of points that are exact copies of another point.
+pub const COINCIDENT_SHARE: f64 = 0.03;
+
+/// Share of points that lie far from any surface.
+pub const OUTLIER_SHARE: f64 = 0.015;
 
 /// Photos that must see a point.
 const MIN_VIEWS: usize = 2;

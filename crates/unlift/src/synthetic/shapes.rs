@@ -4,7 +4,8 @@
 //! dimension, a cube three; clusters leave most of space empty; a lattice has neighbors at equal
 //! distances; of two densities no one length fits both.
 
-use super::{COINCIDENT_SHARE, room};
+use super::room;
+use super::sampling::COINCIDENT_SHARE;
 use crate::seed::{Draws, Stage};
 
 /// A shape of points.

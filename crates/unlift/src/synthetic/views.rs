@@ -1,7 +1,16 @@
 //! Who sees what: a walk of handheld cameras, and the views of a surface point.
 
+use super::purpose::{Purpose, draws};
 use super::surfaces::{Scene, Surface, dot, norm, scale, sub};
-use super::{Camera, Purpose, draws};
+
+/// Where a photo was taken, in meters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// The center of projection.
+    pub center: [f64; 3],
+    /// The viewing direction, of unit length.
+    pub look: [f64; 3],
+}
 
 /// Photos of one walk.
 const N_CAMERAS: usize = 72;

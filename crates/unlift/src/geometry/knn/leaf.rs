@@ -5,7 +5,7 @@
 //! others within `R + r` of itself, so all its neighbors lie within `R + 2 r` of `c`. These
 //! candidates are gathered once; each query then is a few passes over short columns.
 
-use super::{Knn, canonical};
+use super::tree::{Knn, canonical};
 use crate::geometry::vector::squared_distance;
 use crate::simd::{Kernel, dispatch};
 

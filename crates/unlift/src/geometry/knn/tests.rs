@@ -1,6 +1,7 @@
 //! Exact neighbors, compared with brute force.
 
-use super::*;
+use super::Knn;
+use super::tree::canonical;
 use crate::geometry::vector::squared_distance;
 use crate::seed::{Draws, Stage};
 

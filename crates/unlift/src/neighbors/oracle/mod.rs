@@ -141,12 +141,6 @@ impl TrueNeighbors {
     }
 }
 
-/// Whether `records` holds `record`: looks at all of them, which is faster than to stop at a hit.
-#[inline(always)]
-fn listed(records: &[RecordId], record: RecordId) -> bool {
-    records.iter().fold(false, |hit, &other| hit | (other == record))
-}
-
 /// A search over the originals, for [`TrueNeighbors::new`]; built once per map.
 ///
 /// # Errors

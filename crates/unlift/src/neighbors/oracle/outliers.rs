@@ -3,8 +3,9 @@
 //! Learned neighborhoods do not err at random: they list points a little too far away, and points
 //! of other places that look alike. Each model here is one such way to err, alone.
 
+use super::TrueNeighbors;
 use super::walk::Walk;
-use super::{TrueNeighbors, listed};
+use super::walk::listed;
 use crate::geometry::knn::Knn;
 use crate::seed::{Draws, Stage};
 use crate::truth::Secret;

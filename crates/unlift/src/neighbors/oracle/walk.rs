@@ -4,8 +4,6 @@ use crate::RecordId;
 use crate::geometry::knn::Knn;
 use crate::truth::Secret;
 
-use super::listed;
-
 /// Own partner, shared records and dropped points cost places: how much further is looked at once.
 const MARGIN: usize = 8;
 
@@ -106,4 +104,10 @@ pub(super) fn record_of_originals(
         record_of[original.index()] = Some(RecordId::from_index(slot / slots_per_record));
     }
     record_of
+}
+
+/// Whether `records` holds `record`: looks at all of them, which is faster than to stop at a hit.
+#[inline(always)]
+pub(super) fn listed(records: &[RecordId], record: RecordId) -> bool {
+    records.iter().fold(false, |hit, &other| hit | (other == record))
 }

@@ -1,0 +1,295 @@
+//! The tree, and one query after the other.
+
+use crate::Error;
+use crate::simd::{Kernel, dispatch};
+
+/// Points per leaf at most: small enough to skip most, large enough to be worth a jump.
+const LEAF: usize = 16;
+/// Points of a node that rayon is not worth asking for.
+const ALONE: usize = 1 << 14;
+
+/// A search tree over points that are looked up by row.
+pub struct Knn<'a, const D: usize> {
+    pub(super) points: &'a [[f64; D]],
+    /// Number of levels below the root: there are `2^depth` leaves.
+    pub(super) depth: u32,
+    /// Boxes of the nodes: the root is 1, node `i` has the halves `2 i` and `2 i + 1`.
+    pub(super) boxes: Vec<Bounds<D>>,
+    /// Coordinates in leaf order.
+    pub(super) columns: [Vec<f64>; D],
+    /// The row at each place of the leaf order.
+    pub(super) rows: Vec<u32>,
+    /// The place of each row.
+    pub(super) places: Vec<u32>,
+}
+
+#[derive(Clone, Copy)]
+pub(super) struct Bounds<const D: usize> {
+    pub(super) low: [f64; D],
+    pub(super) high: [f64; D],
+}
+
+impl<const D: usize> Bounds<D> {
+    const EMPTY: Self = Self { low: [f64::INFINITY; D], high: [f64::NEG_INFINITY; D] };
+
+    fn and(mut self, other: &Self) -> Self {
+        for c in 0..D {
+            self.low[c] = self.low[c].min(other.low[c]);
+            self.high[c] = self.high[c].max(other.high[c]);
+        }
+        self
+    }
+
+    fn of(points: impl Iterator<Item = [f64; D]>) -> Self {
+        points.fold(Self::EMPTY, |all, p| all.and(&Self { low: p, high: p }))
+    }
+
+    /// At most the squared distance from `query` to any point inside, rounding included: every
+    /// operation is that of the distance itself, and each rounds monotonically.
+    #[inline(always)]
+    fn squared_distance(&self, query: &[f64; D]) -> f64 {
+        let mut sum = 0.0;
+        for (c, x) in query.iter().enumerate() {
+            let gap = (self.low[c] - x).max(x - self.high[c]).max(0.0);
+            sum += gap * gap;
+        }
+        sum
+    }
+}
+
+impl<'a, const D: usize> Knn<'a, D> {
+    /// A tree over `points`.
+    ///
+    /// # Errors
+    /// When there are no points, more than 2^32 of them, or one is not finite.
+    pub fn new(points: &'a [[f64; D]]) -> Result<Self, Error> {
+        let n = points.len();
+        if n == 0 || u32::try_from(n).is_err() {
+            return Err(Error::new("points", "1 to 4294967295 of them", n.to_string()));
+        }
+        if let Some(at) = points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+            let what = format!("point {at}");
+            return Err(Error::new(what, "finite coordinates", format!("{:?}", points[at])));
+        }
+        let depth = n.div_ceil(LEAF).next_power_of_two().trailing_zeros();
+        let mut items: Vec<([f64; D], u32)> = points.iter().copied().zip(0..).collect();
+        split(&mut items, depth, &|leaf| (leaf * n) >> depth, 0);
+        let columns = std::array::from_fn(|c| items.iter().map(|item| item.0[c]).collect());
+        let rows: Vec<u32> = items.iter().map(|item| item.1).collect();
+        let mut places = vec![0; n];
+        for (place, &row) in rows.iter().enumerate() {
+            places[row as usize] = place as u32;
+        }
+        let n_leaves = 1usize << depth;
+        let mut boxes = vec![Bounds::EMPTY; 2 * n_leaves];
+        for leaf in 0..n_leaves {
+            let places = (leaf * n) >> depth..((leaf + 1) * n) >> depth;
+            boxes[n_leaves + leaf] = Bounds::of(items[places].iter().map(|item| item.0));
+        }
+        for node in (1..n_leaves).rev() {
+            boxes[node] = boxes[2 * node].and(&boxes[2 * node + 1]);
+        }
+        Ok(Self { points, depth, boxes, columns, rows, places })
+    }
+
+    /// All rows, in an order in which near rows are near: queries in this order are fastest.
+    pub fn spatial_order(&self) -> &[u32] {
+        &self.rows
+    }
+
+    /// All rows in patches of near ones: halved along the longest side of their box until a patch
+    /// holds at most `most` (or as few as a leaf of the tree).
+    pub fn patches(&self, most: usize) -> Vec<&[u32]> {
+        let n = self.rows.len();
+        let fits = |level: &u32| n.div_ceil(1 << level) <= most.max(1);
+        let level = (0..self.depth).find(fits).unwrap_or(self.depth);
+        (1usize << level..2 << level).map(|node| &self.rows[self.range(node)]).collect()
+    }
+
+    /// The `k` nearest other rows of row `row` (fewer when there are fewer), as (squared distance,
+    /// row) in canonical order, into `found`.
+    pub fn nearest(&self, row: usize, k: usize, found: &mut Vec<(f64, u32)>) {
+        let place = self.places[row] as usize;
+        self.search(self.points[row], Some(place), k, found);
+    }
+
+    /// The `k` nearest rows of any position, in the same form.
+    pub fn nearest_to(&self, position: [f64; D], k: usize, found: &mut Vec<(f64, u32)>) {
+        self.search(position, None, k, found);
+    }
+
+    fn search(&self, query: [f64; D], own: Option<usize>, k: usize, found: &mut Vec<(f64, u32)>) {
+        found.clear();
+        if k == 0 {
+            return;
+        }
+        // Any place will do to start from; a position of its own has none, so it walks down.
+        let leaf = match own {
+            Some(place) => (((place + 1) << self.depth) - 1) / self.rows.len(),
+            None => self.leaf_towards(&query),
+        };
+        let own = own.map_or(u32::MAX, |place| place as u32);
+        dispatch(Search { tree: self, query, own, leaf, k, found: &mut *found });
+        if found.len() > k {
+            found.select_nth_unstable_by_key(k - 1, canonical);
+            found.truncate(k);
+        }
+        found.sort_unstable_by_key(canonical);
+    }
+
+    fn leaf_towards(&self, query: &[f64; D]) -> usize {
+        let mut node = 1;
+        for _ in 0..self.depth {
+            let [a, b] = [2 * node, 2 * node + 1].map(|n| self.boxes[n].squared_distance(query));
+            node = 2 * node + usize::from(b < a);
+        }
+        node - (1 << self.depth)
+    }
+
+    /// Calls `take` with the places of every leaf within the squared distance `bound`, those below
+    /// node `but` left out.
+    #[inline(always)]
+    pub(super) fn leaves_within(
+        &self,
+        query: &[f64; D],
+        bound: f64,
+        but: usize,
+        mut take: impl FnMut(std::ops::Range<usize>),
+    ) {
+        let mut stack = [0usize; usize::BITS as usize];
+        let mut height = 1;
+        stack[0] = 1;
+        while height > 0 {
+            height -= 1;
+            let node = stack[height];
+            if node == but {
+                continue;
+            }
+            if node >> self.depth != 0 {
+                take(self.range(node));
+                continue;
+            }
+            for half in [2 * node, 2 * node + 1] {
+                if self.boxes[half].squared_distance(query) <= bound {
+                    stack[height] = half;
+                    height += 1;
+                }
+            }
+        }
+    }
+
+    /// The places of a node.
+    #[inline(always)]
+    pub(super) fn range(&self, node: usize) -> std::ops::Range<usize> {
+        let level = usize::BITS - 1 - node.leading_zeros();
+        let below = self.depth - level;
+        let first = (node << below) - (1 << self.depth);
+        let n = self.rows.len();
+        (first * n) >> self.depth..((first + (1 << below)) * n) >> self.depth
+    }
+}
+
+/// Distance and row as one integer: the bits of numbers from 0 up are ordered as the numbers are.
+#[inline(always)]
+pub(super) fn canonical(&(squared, row): &(f64, u32)) -> u128 {
+    (u128::from(squared.to_bits()) << 32) | u128::from(row)
+}
+
+/// Puts `items`, the leaves from `first` on, in leaf order: halves along the longest side, `depth`
+/// times. `starts` is the place at which a leaf begins.
+fn split<const D: usize>(
+    items: &mut [([f64; D], u32)],
+    depth: u32,
+    starts: &(impl Fn(usize) -> usize + Sync),
+    first: usize,
+) {
+    if depth == 0 {
+        return;
+    }
+    let bounds = Bounds::of(items.iter().map(|item| item.0));
+    let side = |c: usize| bounds.high[c] - bounds.low[c];
+    let longest = (1..D).fold(0, |best, c| if side(c) > side(best) { c } else { best });
+    let middle = first + (1 << (depth - 1));
+    let at = starts(middle) - starts(first);
+    if at < items.len() {
+        items.select_nth_unstable_by(at, |a, b| {
+            a.0[longest].total_cmp(&b.0[longest]).then(a.1.cmp(&b.1))
+        });
+    }
+    let alone = items.len() < ALONE;
+    let (left, right) = items.split_at_mut(at);
+    if alone {
+        split(left, depth - 1, starts, first);
+        split(right, depth - 1, starts, middle);
+    } else {
+        rayon::join(
+            || split(left, depth - 1, starts, first),
+            || split(right, depth - 1, starts, middle),
+        );
+    }
+}
+
+/// Everything within the K-th distance, and a little more, in no order.
+struct Search<'a, 'b, const D: usize> {
+    tree: &'a Knn<'b, D>,
+    query: [f64; D],
+    /// The place that is no neighbor.
+    own: u32,
+    leaf: usize,
+    k: usize,
+    found: &'a mut Vec<(f64, u32)>,
+}
+
+impl<const D: usize> Kernel for Search<'_, '_, D> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { tree, query, own, leaf, k, found } = self;
+        let n_leaves = 1usize << tree.depth;
+        // The smallest node with so many others that its K-th is not far beyond the true one.
+        let mut near = n_leaves + leaf;
+        while near > 1 && tree.range(near).len() < 2 * k + 1 {
+            near /= 2;
+        }
+        take(tree, &query, own, tree.range(near), f64::INFINITY, found);
+        if near == 1 {
+            return;
+        }
+        let bound = found.select_nth_unstable_by_key(k - 1, canonical).1.0;
+        found.retain(|item| item.0 <= bound);
+        tree.leaves_within(&query, bound, near, |places| {
+            take(tree, &query, own, places, bound, found);
+        });
+    }
+}
+
+/// Appends the points at `places` that lie within the squared distance `bound` of `query`.
+#[inline(always)]
+fn take<const D: usize>(
+    tree: &Knn<'_, D>,
+    query: &[f64; D],
+    own: u32,
+    places: std::ops::Range<usize>,
+    bound: f64,
+    found: &mut Vec<(f64, u32)>,
+) {
+    let mut at = places.start;
+    while at < places.end {
+        let end = places.end.min(at + LEAF);
+        let mut squared = [0.0; LEAF];
+        // The order of operations is that of `vector::squared_distance`: the same bits.
+        for (column, center) in tree.columns.iter().zip(query) {
+            for (sum, x) in squared.iter_mut().zip(&column[at..end]) {
+                let d = center - x;
+                *sum += d * d;
+            }
+        }
+        for (place, &distance) in (at..end).zip(&squared) {
+            if distance <= bound && place as u32 != own {
+                found.push((distance, tree.rows[place]));
+            }
+        }
+        at = end;
+    }
+}
