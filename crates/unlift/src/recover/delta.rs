@@ -6,26 +6,27 @@
 //! evidence in excess of what the same slots yield with lists mixed from other slots': the
 //! number of places tried, uneven density and the noise of the null sample are in both.
 
-use super::chunks::{CHUNK, Chunks};
 use super::consensus;
-use super::family::Family;
-use super::lists::Lists;
+use super::map::chunks::{CHUNK, Slots};
+use super::map::family::Family;
+use super::map::lists::Lists;
+use super::map::settings::Settings;
 use crate::neighbors::Neighborhoods;
+use crate::released::Released;
 use crate::seed::{Draws, Stage};
 
-/// Chunks solved per delta; more of planes, whose evidence hardly depends on delta, so that luck widens the plateau;
-/// fewer of an image, where they are most of the time and few of all.
-const SAMPLE: usize = 12;
-const SAMPLE_OF_PLANES: usize = 24;
-const SAMPLE_IN_IMAGE: usize = 4;
+/// The least delta tried within known bounds, as a share of the spacing of points. A fifth of the keypoints of an image have a
+/// twin at the same place, and coordinates may be whole numbers: such records agree exactly, so that
+/// the evidence of a few slots grows without end as delta shrinks. But the neighbors that a list names
+/// are farther apart than that.
+const LEAST_DELTA: f64 = 0.25;
+/// Delta for rays from anchors, as a share of the spacing of points: anchors say nothing at one delta rather than at another.
+const ANCHOR_DELTA: f64 = 1.75;
 /// Halvings of the extent that the coarse ladder spans.
 const HALVINGS: u32 = 14;
 /// Where a random record agrees with a typical place this often, its agreement tells nothing, and the
 /// density of records within delta is no longer that of the place.
 const TOO_WIDE: f32 = 0.04;
-/// The same for axis candidates of an image: both of a record's lines cross all of a small plane, so that
-/// at a delta as wide as neighbors are apart a random record agrees this often.
-const TOO_WIDE_IN_IMAGE: f32 = 0.12;
 /// Steps per octave of the fine ladder.
 const FINE: i32 = 3;
 /// How far across the plateau a narrow delta lies, as a share in logarithm. Planes leave two coordinates
@@ -43,9 +44,43 @@ const BEYOND_EDGE: f64 = 2.25;
 /// where a source gives scores, at most so many times.
 const BEYOND_EDGE_OF_SCORED: f64 = 2.0;
 
+/// Delta for `released` as `family`, whose consensus reads `used`: the lists as `given`, or those of both directions. Where
+/// estimates of neighbors are to vote it is a `sharp` one. In the unit of the map.
+pub(super) fn learn<const D: usize>(
+    released: &Released<D>,
+    family: &Family<'_, D>,
+    (used, given): (&Neighborhoods, &Neighborhoods),
+    sharp: bool,
+    seed: u64,
+) -> f64 {
+    let spacing = spacing(released);
+    if family.has_regions() {
+        return ANCHOR_DELTA * spacing;
+    }
+    let prefer = match family {
+        _ if !sharp => Prefer::Wide,
+        Family::Candidates { .. } if Settings::of_dimension::<D>().narrowest_of_candidates => {
+            Prefer::Narrowest
+        }
+        _ if given.scores().is_some() => Prefer::NarrowOfScored,
+        _ => Prefer::Narrow,
+    };
+    let least = LEAST_DELTA * spacing;
+    let per_list = given.records().len() as f64 / given.n_slots().max(1) as f64;
+    let share = per_list / released.n_records().max(1) as f64;
+    choose(family, used, prefer, (least, share), seed).unwrap_or(1.0)
+}
+
+/// How far apart points would be if they were spread evenly over known bounds; 0 without bounds.
+fn spacing<const D: usize>(released: &Released<D>) -> f64 {
+    let Some(bounds) = released.bounds() else { return 0.0 };
+    let volume: f64 = (0..D).map(|c| bounds.high[c] - bounds.low[c]).product();
+    libm::pow(volume / released.n_slots().max(1) as f64, 1.0 / D as f64)
+}
+
 /// The maximum is flat: which of the deltas near it to take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Prefer {
+enum Prefer {
     /// The widest: a wider support is the steadier one.
     Wide,
     /// A narrow one: joint recovery looks for neighbors' estimates, which are sharper than records.
@@ -68,16 +103,17 @@ impl Prefer {
 }
 
 /// The delta with the best mean evidence, not below `least`, where a list as given holds a `share` of all records; `None` for an empty map or one without extent.
-pub(crate) fn choose<const D: usize>(
+fn choose<const D: usize>(
     family: &Family<'_, D>,
     lists: &Neighborhoods,
     prefer: Prefer,
     (least, share): (f64, f64),
     seed: u64,
 ) -> Option<f64> {
+    let settings = Settings::of_dimension::<D>();
     let too_wide = match family {
-        Family::Candidates { .. } if D == 2 => TOO_WIDE_IN_IMAGE,
-        Family::Candidates { .. } | Family::Lines { .. } | Family::Planes { .. } => TOO_WIDE,
+        Family::Candidates { .. } => settings.too_wide_of_candidates,
+        Family::Lines { .. } | Family::Planes { .. } => TOO_WIDE,
     };
     let (wide, narrow) = limits::<D>(family);
     let too_wide = too_wide.max(wide.at(share));
@@ -87,7 +123,7 @@ pub(crate) fn choose<const D: usize>(
     let too_wide = too_wide.max(family.typical_chance((2.0 * least) as f32));
     // The fine ladder reaches beyond the coarse one, but not where its limit is one of an image.
     let most_chance = match family {
-        Family::Candidates { .. } if D == 2 => too_wide,
+        Family::Candidates { .. } if settings.candidates_keep_to_limit => too_wide,
         Family::Candidates { .. } | Family::Lines { .. } | Family::Planes { .. } => f32::INFINITY,
     };
     let extent = family.extent();
@@ -95,13 +131,12 @@ pub(crate) fn choose<const D: usize>(
         return None;
     }
     let sample = match family {
-        _ if D == 2 => SAMPLE_IN_IMAGE,
-        Family::Planes { .. } => SAMPLE_OF_PLANES,
-        Family::Lines { .. } | Family::Candidates { .. } => SAMPLE,
+        Family::Planes { .. } => settings.delta_chunks_of_planes,
+        Family::Lines { .. } | Family::Candidates { .. } => settings.delta_chunks,
     };
     let chunks = sample_chunks(lists.n_slots(), sample, seed);
     let mean_evidence = |lists: Lists<'_>, delta: f64| {
-        let solved = consensus::solve(family, lists, delta as f32, Chunks::Some(&chunks));
+        let solved = consensus::solve(family, lists, delta as f32, Slots::Chunks(&chunks));
         solved.iter().map(|e| f64::from(e.evidence)).sum::<f64>() / solved.len() as f64
     };
     let value = |delta: f64| {
@@ -148,8 +183,7 @@ pub(crate) fn choose<const D: usize>(
             let (low, high) = (fine.iter().find(near)?.0, fine.iter().rev().find(near)?.0);
             let (across, most) = match family {
                 Family::Planes { .. } => (ACROSS_OF_PLANES, f64::INFINITY),
-                // In an image lines cross everywhere: the lower edge is that of chance.
-                Family::Lines { .. } | Family::Candidates { .. } if D == 2 => {
+                Family::Lines { .. } | Family::Candidates { .. } if !settings.keeps_near_edge => {
                     (ACROSS, f64::INFINITY)
                 }
                 Family::Lines { .. } | Family::Candidates { .. } => {
@@ -181,8 +215,7 @@ impl Limit {
 fn limits<const D: usize>(family: &Family<'_, D>) -> (Limit, Limit) {
     let none = || Limit { factor: 0.0, power: 1.0 };
     match family {
-        // Coordinates of images are few and bounds known: other limits hold there.
-        _ if D == 2 => (none(), none()),
+        _ if !Settings::of_dimension::<D>().limits_by_share => (none(), none()),
         Family::Planes { .. } => {
             (Limit { factor: 0.5, power: 0.5 }, Limit { factor: 1.0, power: 1.0 })
         }

@@ -1,5 +1,6 @@
 //! Each check of the house can fail.
 
+use crate::circles::{back_arrows, circles};
 use crate::rules::*;
 use crate::rust::{Source, code_of};
 
@@ -51,7 +52,7 @@ fn arrows_against_the_stream_are_found_however_they_are_written() {
 fn arrows_with_the_stream_pass() {
     let right = [
         ("recover/mod.rs", "use crate::neighbors::Neighborhoods;\nuse crate::{Error, RecordId};"),
-        ("recover/ransac/loops.rs", "use crate::recover::sections::{NO_VOTE, Sections};"),
+        ("recover/ransac/loops.rs", "use crate::recover::map::sections::{NO_VOTE, Sections};"),
         ("recover/mod.rs", "//! Never imports `crate::truth`.\nconst A: &str = \"crate::truth\";"),
         ("geometry/kmeans.rs", "use super::vector::dot;\nuse crate::seed::{Draws, Stage};"),
         ("neighbors/oracle/mod.rs", "use crate::truth::{Original, Secret};"),
@@ -61,6 +62,84 @@ fn arrows_with_the_stream_pass() {
     for (path, text) in right {
         assert_eq!(arrows(path, text), Vec::<String>::new(), "{path}");
     }
+}
+
+fn sources(texts: &[(&str, &str)]) -> Vec<Source> {
+    texts.iter().map(|(path, text)| source(path, text)).collect()
+}
+
+#[test]
+fn circles_are_found_however_long_they_are() {
+    let two = sources(&[
+        ("a/mod.rs", "mod b;\nmod c;"),
+        ("a/b.rs", "use super::c::C;"),
+        ("a/c.rs", "use crate::a::b::{self, B};"),
+    ]);
+    assert_eq!(circles(&two, &[]), ["in a circle: a/b.rs, a/c.rs"]);
+    assert!(circles(&two, &["a/"]).is_empty());
+    let three = sources(&[
+        ("a.rs", "use crate::b::B;"),
+        ("b.rs", "fn f() -> crate::c::C {}"),
+        ("c.rs", "use crate::{a::A, Error};"),
+    ]);
+    assert_eq!(circles(&three, &[]), ["in a circle: a.rs, b.rs, c.rs"]);
+    // A folder that uses its child, which uses the folder's own items.
+    let nested = sources(&[
+        ("a/mod.rs", "mod b;\nuse b::B;\nconst N: usize = 1;"),
+        ("a/b.rs", "use super::N;"),
+    ]);
+    assert_eq!(circles(&nested, &[]), ["in a circle: a/b.rs, a/mod.rs"]);
+    let by_an_exported_name = sources(&[
+        ("a/mod.rs", "mod b;\nmod c;\npub(crate) use b::B;"),
+        ("a/b.rs", "use super::c::C;"),
+        ("a/c.rs", "use super::B;"),
+    ]);
+    assert_eq!(circles(&by_an_exported_name, &[]), ["in a circle: a/b.rs, a/c.rs"]);
+}
+
+#[test]
+fn tables_of_contents_and_tests_make_no_circles() {
+    let right = sources(&[
+        ("lib.rs", "mod a;\nmod error;\npub use error::Error;"),
+        ("error.rs", ""),
+        ("a/mod.rs", "mod b;\nmod c;\npub use b::B;\npub(crate) use c::{C, D};"),
+        ("a/b.rs", "use super::C;\nuse crate::Error;"),
+        ("a/c.rs", "#[cfg(test)]\nmod tests {\n    use super::*;\n    use crate::a::B;\n}"),
+        ("a/c/tests.rs", "use super::*;"),
+    ]);
+    assert_eq!(circles(&right, &[]), Vec::<String>::new());
+}
+
+#[test]
+fn arrows_back_up_inside_recover_are_found() {
+    let folders = [
+        ("recover/mod.rs", "pub use result::estimate::Estimate;"),
+        ("recover/result/mod.rs", ""),
+        ("recover/result/estimate.rs", ""),
+        ("recover/map/mod.rs", ""),
+        ("recover/map/graph.rs", ""),
+        ("recover/consensus/refit.rs", ""),
+        ("recover/consensus/mod.rs", "use crate::recover::map::graph::Graph;"),
+    ];
+    let found = |path: &str, text: &str| {
+        back_arrows(&sources(&[&folders[..], &[(path, text)]].concat())).len()
+    };
+    let right = "use crate::recover::map::graph::Graph;\nuse super::refit::refit;\n\
+                 use crate::recover::result::estimate::Estimate;";
+    assert_eq!(found("recover/consensus/on_lines.rs", right), 0);
+    for wrong in [
+        "use super::Consensus;",
+        "use crate::recover::consensus::Consensus;",
+        "use crate::recover::Estimate;",
+        "use super::super::recover;",
+        "use crate::recover::joint::Joint;",
+        "use crate::recover::{map::graph::Graph, ransac::Ransac};",
+    ] {
+        assert_eq!(found("recover/consensus/on_lines.rs", wrong), 1, "{wrong}");
+    }
+    assert_eq!(found("recover/map/places.rs", "use crate::recover::joint::Joint;"), 1);
+    assert_eq!(found("recover/delta.rs", "use super::options::Solver;"), 1);
+    assert_eq!(found("recover/new.rs", ""), 1);
 }
 
 #[test]

@@ -2,6 +2,7 @@
 //! truth, what recovery may touch. Every check is a function over text, so that `fails` can show
 //! that it fails when it should.
 
+mod circles;
 mod fails;
 mod rules;
 mod rust;
@@ -9,6 +10,7 @@ mod rust;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use circles::{back_arrows, circles};
 use rules::*;
 use rust::{Source, code_of};
 
@@ -47,6 +49,18 @@ fn on_every_file(check: fn(&Source) -> Vec<String>) {
 fn no_module_imports_against_the_arrows() {
     assert!(core_sources().len() > 40, "the sources were not found");
     on_every_file(forbidden_arrows);
+}
+
+#[test]
+fn no_files_import_each_other() {
+    let found = circles(&core_sources(), MAY_BE_CIRCLES);
+    assert!(found.is_empty(), "\n{}", found.join("\n"));
+}
+
+#[test]
+fn no_arrow_inside_recover_runs_back() {
+    let found = back_arrows(&core_sources());
+    assert!(found.is_empty(), "\n{}", found.join("\n"));
 }
 
 #[test]

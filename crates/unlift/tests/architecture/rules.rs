@@ -45,6 +45,50 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("audit", &["truth", "released", "density", "obfuscate", "neighbors", "recover", "evaluate"]),
 ];
 
+/// Inside `recover`, per file or folder those that it may import; `mod.rs` stands above all of them. What several
+/// solvers share is `map`, and nothing there knows of a solver.
+pub const INSIDE_RECOVER: &[(&str, &[&str])] = &[
+    ("options", &[]),
+    ("result", &[]),
+    ("map", &["result"]),
+    ("solve", &["result"]),
+    ("consensus", &["map", "result", "solve"]),
+    // It starts from a pass of consensus.
+    ("joint", &["map", "result", "solve", "consensus"]),
+    ("ransac", &["map", "result", "solve"]),
+    ("placement", &["map", "result", "solve"]),
+    // Chosen by how well consensus does.
+    ("delta", &["map", "consensus"]),
+    ("exact", &["map", "result"]),
+    ("confidence", &["map", "result", "options"]),
+    ("pairs_of_descriptors", &[]),
+    ("model", &["map", "options"]),
+    ("rounds", &["result", "solve"]),
+    (
+        "task",
+        &[
+            "options",
+            "result",
+            "map",
+            "solve",
+            "consensus",
+            "joint",
+            "ransac",
+            "placement",
+            "delta",
+            "exact",
+            "confidence",
+            "pairs_of_descriptors",
+            "model",
+            "rounds",
+        ],
+    ),
+];
+
+/// Folders whose files may still import each other in circles: a registry beside the trait of its rows, and an observer beside
+/// what it observes.
+pub const MAY_BE_CIRCLES: &[&str] = &["audit/", "obfuscate/"];
+
 /// Dependencies of the core: light, and known for long.
 pub const DEPENDENCIES: &[&str] = &["libm", "rayon", "nalgebra", "sha2", "chacha20", "getrandom"];
 

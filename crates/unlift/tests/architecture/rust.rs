@@ -50,6 +50,36 @@ pub fn code_of(text: &str) -> String {
     code
 }
 
+/// Where a `pub use` of any visibility begins and ends.
+fn exports(code: &str) -> Vec<(usize, usize)> {
+    let mut found = Vec::new();
+    for (at, _) in code.match_indices("use ") {
+        let before = code[..at].trim_end();
+        let visibility = before.rfind("pub").map(|from| &before[from + 3..]).unwrap_or("no");
+        let is_pub = visibility.is_empty()
+            || visibility.starts_with('(') && visibility.find(')') == Some(visibility.len() - 1);
+        if is_pub && let Some(end) = code[at..].find(';') {
+            found.push((at, at + end + 1));
+        }
+    }
+    found
+}
+
+/// What `code` only hands on: its `pub use` lines, without their visibility.
+pub fn exported(code: &str) -> String {
+    exports(code).into_iter().map(|(from, to)| &code[from..to]).collect()
+}
+
+/// `code` without what it only hands on.
+pub fn without_exports(code: &str) -> String {
+    let (mut left, mut at) = (String::new(), 0);
+    for (from, to) in exports(code) {
+        left.push_str(&code[at..from]);
+        at = to;
+    }
+    left + &code[at..]
+}
+
 /// Words, `::`, and every other character by itself.
 pub fn tokens(code: &str) -> Vec<String> {
     let mut tokens: Vec<String> = Vec::new();

@@ -22,6 +22,7 @@ mod exact;
 mod gauge;
 mod maps;
 mod noise;
+mod parts;
 mod pins;
 mod records;
 mod recovery;

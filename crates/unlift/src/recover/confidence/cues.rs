@@ -8,16 +8,45 @@
 use rayon::prelude::*;
 
 use super::edges::{Edge, Edges};
-use super::{Seen, Solved};
-use crate::recover::chance;
-use crate::recover::joint::{Density, Pieces, Places, along_curve, distance2, record_of};
-use crate::recover::{Estimate, Status};
+use crate::recover::map::along_curve::along_curve;
+use crate::recover::map::crowding::Density;
+use crate::recover::map::evidence::evidence;
+use crate::recover::map::graph::record_of;
+use crate::recover::map::pieces::Pieces;
+use crate::recover::map::places::{Places, distance2};
+use crate::recover::result::estimate::{Estimate, Status};
 
 /// Number of cues.
 pub const N_CUES: usize = 20;
 
 /// The cues of one slot.
 pub type Cues = [f32; N_CUES];
+
+/// What the attacker sees around every slot.
+#[derive(Clone, Debug)]
+pub struct Seen {
+    /// Per slot.
+    pub cues: Vec<Cues>,
+    /// The typical radius of crowds, in the unit of the map: errors scale with it.
+    pub radius: f64,
+    /// The kind of the records, below [`N_KINDS`](super::model::N_KINDS): each has a model of its own.
+    pub kind: usize,
+}
+
+impl Seen {
+    /// Nobody looked.
+    pub(crate) const NOTHING: Self = Self { cues: Vec::new(), radius: 1.0, kind: 0 };
+}
+
+/// What recovery found.
+pub(crate) struct Solved<'a, const D: usize> {
+    /// Per slot.
+    pub(crate) estimates: &'a [Estimate<D>],
+    /// The same before exact constraints moved them.
+    pub(crate) unsettled: &'a [Estimate<D>],
+    /// The distance that decided support.
+    pub(crate) delta: f32,
+}
 
 /// Crowds are looked for where chance expects at most this share of the listed estimates.
 const MOST_CHANCE: f32 = 0.3;
@@ -180,10 +209,10 @@ impl<const D: usize, P: Pieces<D>, E: Edges> Look<'_, D, P, E> {
             let last = near.get(at + 1).is_none_or(|next| next.distance2() > d2);
             let p = (mean_rate * power::<D>(d2)).clamp(1e-9, MOST_CHANCE);
             if last && at > 0 {
-                let evidence = chance::evidence((at + 1) as f32, all as f32, p);
-                if evidence > crowd.evidence {
+                let nats = evidence((at + 1) as f32, all as f32, p);
+                if nats > crowd.evidence {
                     members = at + 1;
-                    crowd.evidence = evidence;
+                    crowd.evidence = nats;
                     crowd.radius = d2.sqrt();
                     crowd.excess = (members as f32 - p * all as f32).max(0.0);
                 }
@@ -213,7 +242,7 @@ impl<const D: usize, P: Pieces<D>, E: Edges> Look<'_, D, P, E> {
         }
         let p = self.pieces.record_chance(slot, &x).clamp(1e-9, 0.5);
         crowd.record_evidence =
-            if voting > 0 { chance::evidence(votes as f32, voting as f32, p) } else { 0.0 };
+            if voting > 0 { evidence(votes as f32, voting as f32, p) } else { 0.0 };
         crowd.record_excess = votes as f32 - p * voting as f32;
         crowd
     }

@@ -1,8 +1,8 @@
 //! Who is listed for a slot, in one form for solvers with and without a graph.
 
 use crate::neighbors::Neighborhoods;
-use crate::recover::chance_field;
-use crate::recover::joint::{Graph, Side, either, side};
+use crate::recover::map::chance_field;
+use crate::recover::map::graph::{Graph, Side, either, side};
 
 /// One edge of a slot.
 #[derive(Clone, Copy, Debug)]

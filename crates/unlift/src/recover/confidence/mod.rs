@@ -6,50 +6,40 @@
 //! (`examples/fit_confidence.rs`), never from a real map. Cues are ratios: a scaled map has the same.
 
 mod constants;
-mod cues;
+pub(super) mod cues;
 mod edges;
-mod model;
+mod judge;
+pub(super) mod model;
 
 use rayon::prelude::*;
 
-pub use cues::Cues;
+use cues::{Seen, Solved};
 use edges::{BothWays, Edges, Listed};
-pub use model::{Confidence, N_KINDS, N_TERMS, centered, terms};
 
-use super::family::Family;
-use super::joint::{CandidatePieces, Graph, LinePieces, PlanePieces};
-use super::{Estimate, Solver, Status, Unknown};
 use crate::neighbors::Neighborhoods;
+use crate::recover::map::family::Family;
+use crate::recover::map::graph::Graph;
+use crate::recover::map::pieces::{CandidatePieces, LinePieces, PlanePieces};
+use crate::recover::map::settings::Settings;
+use crate::recover::options::{RecoverOptions, Solver};
+use crate::recover::result::estimate::{Estimate, Status};
+use crate::recover::result::probability::Confidence;
+use crate::recover::result::unknown::Unknown;
 use crate::released::Released;
-
-/// What the attacker sees around every slot.
-#[derive(Clone, Debug)]
-pub struct Seen {
-    /// Per slot.
-    pub cues: Vec<Cues>,
-    /// The typical radius of crowds, in the unit of the map: errors scale with it.
-    pub radius: f64,
-    /// The kind of the records, below [`N_KINDS`]: each has a model of its own.
-    pub kind: usize,
-}
-
-impl Seen {
-    /// Nobody looked.
-    pub(super) const NOTHING: Self = Self { cues: Vec::new(), radius: 1.0, kind: 0 };
-}
-
-/// What recovery found.
-pub(super) struct Solved<'a, const D: usize> {
-    /// Per slot.
-    pub(super) estimates: &'a [Estimate<D>],
-    /// The same before exact constraints moved them.
-    pub(super) unsettled: &'a [Estimate<D>],
-    /// The distance that decided support.
-    pub(super) delta: f32,
-}
 
 /// A list has at most as many entries as this share of all hidden points in the maps that the model was fitted on.
 const MOST_LISTED: f64 = 0.01;
+
+/// Why nobody looks how sure the attacker is, if `options` or the kind of map say so.
+pub(super) fn not_asked<const D: usize>(options: &RecoverOptions) -> Option<Unknown> {
+    match options.solver {
+        Solver::Density | Solver::Tomography => Some(Unknown::FromRecordsAlone),
+        Solver::JointStart => Some(Unknown::FirstPass),
+        _ if !options.confidence => Some(Unknown::NotAsked),
+        _ if !Settings::of_dimension::<D>().confidence => Some(Unknown::OfImages),
+        Solver::Consensus | Solver::Joint | Solver::Ransac => None,
+    }
+}
 
 /// Why the model says nothing that comes true about maps recovered from `lists`, if so.
 ///
@@ -111,7 +101,7 @@ pub(super) fn of<const D: usize>(
         .par_iter()
         .zip(&seen.cues)
         .map(|(estimate, cues)| match estimate.status {
-            Status::Ok => model::confidence(solver, seen.kind, cues, radius),
+            Status::Ok => judge::confidence(solver, seen.kind, cues, radius),
             _ => Confidence::LOST,
         })
         .collect()

@@ -9,11 +9,11 @@
 
 use rayon::prelude::*;
 
-use crate::recover::chance::evidence;
-use crate::recover::chunks::{Chunks, solve_chunks};
-use crate::recover::line_rows::LineRow;
-use crate::recover::lists::Lists;
-use crate::recover::{Estimate, Status, stored_support};
+use crate::recover::map::chunks::{Slots, solve_chunks};
+use crate::recover::map::evidence::evidence;
+use crate::recover::map::line_rows::LineRow;
+use crate::recover::map::lists::Lists;
+use crate::recover::result::estimate::{Estimate, Status, stored_support};
 
 /// Slots whose lists are mixed to see what chance alone yields.
 const SAMPLE: usize = 1 << 9;
@@ -34,11 +34,11 @@ struct Window {
     evidence: f32,
 }
 
-/// Estimates for the slots of `chunks`, one slot per record.
+/// Estimates for `slots`, one slot per record.
 pub(super) fn solve<const D: usize>(
     rows: &[LineRow<D>],
     lists: Lists<'_>,
-    chunks: Chunks<'_>,
+    slots: Slots<'_>,
 ) -> Vec<Estimate<D>> {
     let bearings = Bearings::new(rows);
     let windows: Vec<Option<Window>> = (0..lists.n_slots())
@@ -56,7 +56,7 @@ pub(super) fn solve<const D: usize>(
     let shares = shares(rows, lists, &bearings, &windows);
     solve_chunks(
         lists.n_slots(),
-        chunks,
+        slots,
         || (),
         |(), first, out| {
             for (at, estimate) in out.iter_mut().enumerate() {

@@ -2,48 +2,49 @@
 //! is least probable by chance. One file per record family.
 
 mod anchors;
-mod candidates;
-mod lines;
-mod planes;
+mod on_candidates;
+mod on_lines;
+mod on_planes;
+mod refit;
 
-use super::Estimate;
-use super::chunks::Chunks;
-use super::family::Family;
-use super::lists::Lists;
-use super::sections::Sections;
+use std::ops::Range;
 
-/// Estimates for the slots of `chunks` at a given `delta`.
+use crate::neighbors::Neighborhoods;
+use crate::recover::map::chunks::Slots;
+use crate::recover::map::family::Family;
+use crate::recover::map::lists::Lists;
+use crate::recover::result::estimate::Estimate;
+use crate::recover::solve::Solve;
+
+/// Consensus over one map.
+pub(crate) struct Consensus<'a, const D: usize> {
+    pub(crate) family: &'a Family<'a, D>,
+    pub(crate) lists: &'a Neighborhoods,
+    /// The distance up to which a record supports a place, in the unit of the map.
+    pub(crate) delta: f32,
+}
+
+impl<'a, const D: usize> Solve<'a, D> for Consensus<'a, D> {
+    fn solve(&self, slots: Range<usize>) -> Vec<Estimate<D>> {
+        solve(self.family, Lists::given(self.lists), self.delta, Slots::Range(slots))
+    }
+}
+
+/// Estimates for `slots` at a given `delta`.
 pub(crate) fn solve<const D: usize>(
     family: &Family<'_, D>,
     lists: Lists<'_>,
     delta: f32,
-    chunks: Chunks<'_>,
+    slots: Slots<'_>,
 ) -> Vec<Estimate<D>> {
     match family {
-        Family::Lines { rows, .. } if family.has_regions() => anchors::solve(rows, lists, chunks),
+        Family::Lines { rows, .. } if family.has_regions() => anchors::solve(rows, lists, slots),
         Family::Lines { rows, slots_per_record, chance } => {
-            lines::solve(rows, *slots_per_record, chance, lists, delta, chunks)
+            on_lines::solve(rows, *slots_per_record, chance, lists, delta, slots)
         }
-        Family::Planes { planes, sorted } => planes::solve(planes, sorted, lists, delta, chunks),
+        Family::Planes { planes, sorted } => on_planes::solve(planes, sorted, lists, delta, slots),
         Family::Candidates { rows, chance } => {
-            candidates::solve(rows, chance, lists, delta, chunks)
+            on_candidates::solve(rows, chance, lists, delta, slots)
         }
     }
 }
-
-/// Least squares over the records within delta of `t` (Eq. (4) with squared distances: on a line a
-/// weighted mean of the closest approaches), the support selected anew once. Returns the position
-/// and its support.
-#[inline(always)]
-pub(crate) fn refit(sections: &Sections, t: f32, delta2: f32) -> (f32, u32) {
-    // The start of an interval is at delta up to rounding, of delta and of t: it counts as within.
-    let reach = delta2.sqrt() * (1.0 + 5e-5) + 4.0 * f32::EPSILON * t.abs();
-    let reach2 = reach * reach;
-    let (shift, _) = sections.least_squares_step(t, reach2);
-    let t = t + shift;
-    let (shift, support) = sections.least_squares_step(t, reach2);
-    (t + shift, support)
-}
-
-#[cfg(test)]
-mod twin;

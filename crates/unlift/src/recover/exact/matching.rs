@@ -6,7 +6,7 @@
 
 use rayon::prelude::*;
 
-use super::candidates::{PART, Partners};
+use super::partners::{PART, Partners};
 
 /// Passes at most.
 const PASSES: usize = 30;

@@ -5,7 +5,7 @@
 
 use rayon::prelude::*;
 
-use crate::recover::{Estimate, Status};
+use crate::recover::result::estimate::{Estimate, Status};
 use crate::released::Rays;
 
 /// Starts tried per axis, at first and in each finer step.

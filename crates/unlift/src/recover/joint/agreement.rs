@@ -6,9 +6,9 @@
 
 use rayon::prelude::*;
 
-use super::graph::{Graph, record_of};
-use super::pieces::Pieces;
-use crate::recover::{Estimate, Status};
+use crate::recover::map::graph::{Graph, record_of};
+use crate::recover::map::pieces::Pieces;
+use crate::recover::result::estimate::{Estimate, Status};
 
 /// Slots looked at.
 const SLOTS: usize = 1 << 12;

@@ -5,9 +5,9 @@
 //! evidence as the right one. But those there do not list back, while at the right place as many list as are
 //! listed. So where crowds are found, one side may be ahead of the other only so far.
 
-use super::graph::{Side, side};
-use super::law::Look;
-use super::places::distance2;
+use super::look::Look;
+use crate::recover::map::graph::{Side, side};
+use crate::recover::map::places::distance2;
 
 /// Every so many slots of the sample are looked at,
 const EVERY: usize = 2;

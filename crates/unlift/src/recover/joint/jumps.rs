@@ -8,9 +8,9 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use rayon::prelude::*;
 
-use super::graph::{Graph, either};
-use super::pieces::Pieces;
-use super::places::{Places, distance2};
+use crate::recover::map::graph::{Graph, either};
+use crate::recover::map::pieces::Pieces;
+use crate::recover::map::places::{Places, distance2};
 
 /// Per slot that is ahead, how many jumps concern it since it was last its turn. Sums of integers: the same however threads
 /// share the work.
@@ -24,10 +24,15 @@ impl Jumps {
         Self { concerning: (0..n_slots).map(|_| AtomicU32::new(0)).collect() }
     }
 
-    /// How many jumps concern `slot` since this was asked last, whether it was then looked at or passed over.
+    /// How many jumps concern `slot` since it was its turn last, whether it was then looked at or passed over.
     #[inline(always)]
-    pub(super) fn take(&self, slot: usize) -> u32 {
-        self.concerning[slot].swap(0, Ordering::Relaxed)
+    pub(super) fn of(&self, slot: usize) -> u32 {
+        self.concerning[slot].load(Ordering::Relaxed)
+    }
+
+    /// It was the turn of `slot`.
+    pub(super) fn forget(&mut self, slot: usize) {
+        *self.concerning[slot].get_mut() = 0;
     }
 
     /// Tells whom it concerns that `slots` jumped from one place to another: whoever may lie within

@@ -1,9 +1,9 @@
 //! Columns of neighbors' estimates, and how likely they are about a place.
 
-use super::graph::{CLASSES, Side, either, side};
-use super::pieces::Piece;
-use super::places::{FAR, Places, distance2};
-use crate::recover::lanes::{LANES, Lanes, ln};
+use crate::recover::map::graph::{CLASSES, Side, either, side};
+use crate::recover::map::lanes::{LANES, Lanes, ln};
+use crate::recover::map::pieces::Piece;
+use crate::recover::map::places::{FAR, Places, distance2};
 
 /// Vectors are filled up with estimates this far away: beyond any reach, and still a number when squared.
 const BEYOND: f32 = 1e19;

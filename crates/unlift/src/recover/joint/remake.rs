@@ -1,10 +1,10 @@
 //! A place made anew: least squares to the records of the neighbors found near it.
 
+use super::equations::solve_symmetric;
 use super::near::Columns;
-use super::pieces::{Piece, Pieces};
-use super::places::Places;
-use super::small::solve_symmetric;
-use crate::recover::lanes::{LANES, Lanes};
+use crate::recover::map::lanes::{LANES, Lanes};
+use crate::recover::map::pieces::{Piece, Pieces};
+use crate::recover::map::places::Places;
 
 /// Least squares steps.
 const STEPS: usize = 2;

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::RecordId;
 use crate::neighbors::Neighborhoods;
-use crate::recover::sections::{NO_VOTE, Sections};
+use crate::recover::map::sections::{NO_VOTE, Sections};
 
 /// The exchanged axis of every record, by majority over all neighborhoods it appears in.
 ///

@@ -1,8 +1,8 @@
 //! The sampling loop itself: along a line, and on an axis plane.
 
-use super::MAX_TRIALS;
-use crate::recover::Status;
-use crate::recover::sections::{NO_VOTE, Sections};
+use crate::recover::map::sections::{NO_VOTE, Sections};
+use crate::recover::result::estimate::Status;
+use crate::recover::result::trials::MAX_TRIALS;
 use crate::seed::Draws;
 
 /// Probability of having drawn a sample free of outliers at which the loop stops.

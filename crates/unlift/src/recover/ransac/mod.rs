@@ -9,72 +9,56 @@
 mod axis_vote;
 mod loops;
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::ops::Range;
 
-use super::chunks::{Chunks, solve_chunks};
-use super::family::Family;
-use super::line_rows::LineColumns;
-use super::sections::Sections;
-use super::{Estimate, Status, stored_support};
 use crate::RecordId;
 use crate::neighbors::Neighborhoods;
+use crate::recover::map::chunks::{Slots, solve_chunks};
+use crate::recover::map::family::Family;
+use crate::recover::map::line_rows::LineColumns;
+use crate::recover::map::sections::Sections;
+use crate::recover::result::estimate::{Estimate, Status, stored_support};
+use crate::recover::result::trials::TrialCounts;
+use crate::recover::solve::Solve;
 use crate::released::AxisPlanes;
 use crate::seed::{Draws, Stage};
 use crate::simd::{Kernel, dispatch};
 use axis_vote::VotedColumns;
 use loops::{LineLoop, PlaneLoop};
 
-/// Trials at most, as in the paper's timings.
-pub(crate) const MAX_TRIALS: u32 = 10_000;
-
-/// How many slots took how many trials.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct TrialHistogram {
-    counts: [u64; TrialHistogram::UP_TO.len()],
+/// The sampling loop over one map.
+pub(crate) struct Ransac<'a, const D: usize> {
+    pub(crate) family: &'a Family<'a, D>,
+    pub(crate) lists: &'a Neighborhoods,
+    /// The distance up to which a record supports a place, in the unit of the map.
+    pub(crate) delta: f32,
+    pub(crate) seed: u64,
+    /// Where it is noted how many trials slots took.
+    pub(crate) trials: &'a TrialCounts,
 }
 
-impl TrialHistogram {
-    /// Upper ends (inclusive) of the bins.
-    pub const UP_TO: [u32; 9] = [1, 3, 10, 30, 100, 300, 1_000, 3_000, MAX_TRIALS];
-
-    /// (upper end, slots) per bin.
-    pub fn bins(&self) -> impl Iterator<Item = (u32, u64)> {
-        Self::UP_TO.into_iter().zip(self.counts)
-    }
-}
-
-/// Estimates for all slots, and how many trials they took.
-pub(crate) fn solve<const D: usize>(
-    family: &Family<'_, D>,
-    lists: &Neighborhoods,
-    delta: f32,
-    seed: u64,
-) -> (Vec<Estimate<D>>, TrialHistogram) {
-    let bins: [AtomicU64; TrialHistogram::UP_TO.len()] = Default::default();
-    // Sums of integers: the order in which threads add does not matter.
-    let note = |trials: u32| {
-        let bin = TrialHistogram::UP_TO.partition_point(|&up_to| up_to < trials);
-        bins[bin.min(bins.len() - 1)].fetch_add(1, Ordering::Relaxed);
-    };
-    let n = lists.n_slots();
-    let axes = match family {
-        Family::Candidates { rows, .. } => axis_vote::vote(rows, lists),
-        _ => Vec::new(),
-    };
-    let estimates = solve_chunks(n, Chunks::All, Scratch::default, |scratch, first, out| {
-        for (at, estimate) in out.iter_mut().enumerate() {
-            let slot = first + at;
-            let draws = Draws::new(seed, Stage::Ransac, slot as u64);
-            let trial = Trial { family, axes: &axes, lists, delta, slot, draws, scratch };
-            let (solved, trials) = dispatch(trial);
-            *estimate = solved;
-            // Slots that could not be tried at all are lost with a reason, not solved in no time.
-            if trials > 0 {
-                note(trials);
+impl<'a, const D: usize> Solve<'a, D> for Ransac<'a, D> {
+    fn solve(&self, slots: Range<usize>) -> Vec<Estimate<D>> {
+        let Self { family, lists, delta, seed, .. } = *self;
+        let axes = match family {
+            Family::Candidates { rows, .. } => axis_vote::vote(rows, lists),
+            _ => Vec::new(),
+        };
+        let slots = Slots::Range(slots);
+        solve_chunks(lists.n_slots(), slots, Scratch::default, |scratch, first, out| {
+            for (at, estimate) in out.iter_mut().enumerate() {
+                let slot = first + at;
+                let draws = Draws::new(seed, Stage::Ransac, slot as u64);
+                let trial = Trial { family, axes: &axes, lists, delta, slot, draws, scratch };
+                let (solved, trials) = dispatch(trial);
+                *estimate = solved;
+                // Slots that could not be tried at all are lost with a reason, not solved in no time.
+                if trials > 0 {
+                    self.trials.note(trials);
+                }
             }
-        }
-    });
-    (estimates, TrialHistogram { counts: bins.map(AtomicU64::into_inner) })
+        })
+    }
 }
 
 #[derive(Default)]

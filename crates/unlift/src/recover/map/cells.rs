@@ -1,0 +1,256 @@
+//! A dense grid over the part of space where a map lies: sums per cell, smoothed, looked up by place.
+
+use super::bytes::{Reader, Writer};
+use crate::Error;
+
+/// Axis-parallel cells of one size over a box. Places outside belong to the nearest cell.
+#[derive(Clone, Debug)]
+pub(crate) struct Grid<const D: usize> {
+    low: [f32; D],
+    cell: f32,
+    /// Cells per length.
+    per_length: f32,
+    dims: [usize; D],
+    /// The last cell along each axis, as places are compared with it.
+    last: [f32; D],
+    pub(crate) values: Vec<f32>,
+}
+
+/// From here on every number is whole.
+const ROUNDING: f32 = 8_388_608.0;
+
+impl<const D: usize> Grid<D> {
+    /// About `n_cells` empty cells over the box from `low` to `high`; an axis without extent gets one.
+    pub(crate) fn over(low: [f32; D], high: [f32; D], n_cells: usize) -> Self {
+        let extent: [f64; D] =
+            std::array::from_fn(|c| (f64::from(high[c]) - f64::from(low[c])).max(0.0));
+        // A flat box has no volume: only axes with extent are divided.
+        let long: Vec<f64> = extent.into_iter().filter(|&e| e > 0.0).collect();
+        let mean = long.iter().map(|e| libm::pow(*e, 1.0 / long.len() as f64)).product::<f64>();
+        let per_axis = libm::pow(n_cells as f64, 1.0 / long.len().max(1) as f64);
+        let mut cell = (mean / per_axis).max(f64::from(f32::MIN_POSITIVE));
+        while long.iter().map(|e| (e / cell).ceil()).product::<f64>() > n_cells as f64 {
+            cell *= 1.05;
+        }
+        Self::of_cells(low, high, cell as f32)
+    }
+
+    /// Empty cells of a given size over the box from `low` to `high`, larger ones if it takes more than
+    /// `most`.
+    pub(crate) fn with_cell(low: [f32; D], high: [f32; D], cell: f32, most: usize) -> Self {
+        let cells =
+            (0..D).map(|c| f64::from((high[c] - low[c]) / cell).ceil().max(1.0)).product::<f64>();
+        if cells <= most as f64 {
+            Self::of_cells(low, high, cell)
+        } else {
+            Self::over(low, high, most)
+        }
+    }
+
+    fn of_cells(low: [f32; D], high: [f32; D], cell: f32) -> Self {
+        let dims: [usize; D] = std::array::from_fn(|c| {
+            (((high[c] - low[c]) / cell).ceil() as usize).clamp(1, 1 << 20)
+        });
+        let values = vec![0.0; dims.iter().product()];
+        let last = dims.map(|n| (n - 1) as f32);
+        Self { low, cell, per_length: 1.0 / cell, dims, last, values }
+    }
+
+    /// Appends the grid to `to`.
+    pub(crate) fn write(&self, to: &mut Writer) {
+        to.f32s(&self.low);
+        to.f32s(&[self.cell]);
+        self.dims.iter().for_each(|&n| to.u64(n as u64));
+        to.f32s(&self.values);
+    }
+
+    /// The grid that [`write`](Self::write) appended.
+    ///
+    /// # Errors
+    /// When it is none, or has more than `most` cells.
+    pub(crate) fn read(from: &mut Reader<'_>, most: usize) -> Result<Self, Error> {
+        let (mut low, mut dims) = ([0.0; D], [0; D]);
+        for x in &mut low {
+            *x = from.f32()?;
+        }
+        let cell = from.f32()?;
+        for n in &mut dims {
+            *n = from.count(most)?.max(1);
+        }
+        let n_cells = dims.iter().try_fold(1usize, |all, &n| all.checked_mul(n));
+        let n_cells = n_cells.filter(|&n| n <= most && cell > 0.0);
+        let Some(n_cells) = n_cells else {
+            return Err(Error::new(
+                "model",
+                format!("a grid of at most {most} cells"),
+                format!("{dims:?}"),
+            ));
+        };
+        let last = dims.map(|n| (n - 1) as f32);
+        let values = from.f32s(n_cells)?;
+        Ok(Self { low, cell, per_length: 1.0 / cell, dims, last, values })
+    }
+
+    /// The edge of a cell.
+    pub(crate) fn cell(&self) -> f32 {
+        self.cell
+    }
+
+    /// The cell of `place`; far places, infinite ones included, land in border cells.
+    #[inline(always)]
+    pub(crate) fn index(&self, place: &[f32; D]) -> usize {
+        self.number(|c| place[c]) as usize
+    }
+
+    /// The number of the cell of a place with these coordinates.
+    #[inline(always)]
+    fn number(&self, x: impl Fn(usize) -> f32) -> u32 {
+        let mut number = 0;
+        for c in 0..D {
+            let at = ((x(c) - self.low[c]) * self.per_length - 0.5).max(0.0).min(self.last[c]);
+            // Rounded to a whole number by running out of digits: a cast that minds infinities is no vector
+            // instruction. What is exactly between two cells belongs to either.
+            let whole = (at + ROUNDING).to_bits() - ROUNDING.to_bits();
+            number = number * self.dims[c] as u32 + whole;
+        }
+        number
+    }
+
+    /// The cells of the places `through + t direction`.
+    #[inline(always)]
+    pub(crate) fn cells_along(
+        &self,
+        through: &[f32; D],
+        direction: &[f32; D],
+        t: &[f32],
+        cells: &mut [u32],
+    ) {
+        for (cell, t) in cells.iter_mut().zip(t) {
+            *cell = self.number(|c| through[c] + t * direction[c]);
+        }
+    }
+
+    /// The cells of places in columns.
+    #[inline(always)]
+    pub(crate) fn cells_of(&self, columns: &[&[f32]; D], cells: &mut [u32]) {
+        let columns: [&[f32]; D] = columns.map(|column| &column[..cells.len()]);
+        for (i, cell) in cells.iter_mut().enumerate() {
+            *cell = self.number(|c| columns[c][i]);
+        }
+    }
+
+    /// Adds `weight` at `place`, shared linearly among the cells around it.
+    pub(crate) fn spread(&mut self, place: &[f32; D], weight: f32) {
+        let mut first = [0usize; D];
+        let mut share = [0.0f32; D];
+        for c in 0..D {
+            let at =
+                ((place[c] - self.low[c]) / self.cell - 0.5).clamp(0.0, (self.dims[c] - 1) as f32);
+            first[c] = at as usize;
+            share[c] = at - first[c] as f32;
+        }
+        for corner in 0..1usize << D {
+            let (mut index, mut w) = (0, weight);
+            for c in 0..D {
+                let up = corner >> c & 1;
+                index = index * self.dims[c] + (first[c] + up).min(self.dims[c] - 1);
+                w *= if up == 1 { share[c] } else { 1.0 - share[c] };
+            }
+            self.values[index] += w;
+        }
+    }
+
+    /// The part `[from, to]` of the line `through + t direction` that lies inside, if any.
+    pub(crate) fn clip(
+        &self,
+        through: &[f32; D],
+        direction: &[f32; D],
+        mut from: f32,
+        mut to: f32,
+    ) -> Option<(f32, f32)> {
+        for c in 0..D {
+            let (low, high) = (self.low[c], self.low[c] + self.cell * self.dims[c] as f32);
+            if direction[c].abs() < 1e-12 {
+                if through[c] < low || through[c] > high {
+                    return None;
+                }
+                continue;
+            }
+            let (a, b) = ((low - through[c]) / direction[c], (high - through[c]) / direction[c]);
+            from = from.max(a.min(b));
+            to = to.min(a.max(b));
+        }
+        (from < to).then_some((from, to))
+    }
+
+    /// Replaces every value by the mean of its neighborhood, weights 1 2 1 along each axis.
+    pub(crate) fn smooth(&mut self) {
+        self.smooth_apart(1);
+    }
+
+    /// The same with neighbors so many cells apart.
+    pub(crate) fn smooth_apart(&mut self, apart: usize) {
+        let mut stride = 1;
+        let mut line = Vec::new();
+        for c in (0..D).rev() {
+            let n = self.dims[c];
+            let block = stride * n;
+            for start in (0..self.values.len()).step_by(block) {
+                for inner in 0..stride {
+                    let at = |i: usize| start + inner + i * stride;
+                    line.clear();
+                    line.extend((0..n).map(|i| self.values[at(i)]));
+                    for i in 0..n {
+                        let (before, after) =
+                            (line[i.saturating_sub(apart)], line[(i + apart).min(n - 1)]);
+                        self.values[at(i)] = 0.25 * (before + after) + 0.5 * line[i];
+                    }
+                }
+            }
+            stride = block;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::seed::{Draws, Stage};
+
+    /// The cell of a place, counted in another way.
+    fn counted(grid: &Grid<3>, place: &[f32; 3]) -> usize {
+        (0..3).fold(0, |number, c| {
+            let at = f64::from(place[c] - grid.low[c]) / f64::from(grid.cell);
+            // Not a number is nowhere, and nowhere is the first cell.
+            let whole = if at.is_nan() { 0.0 } else { at.floor() };
+            number * grid.dims[c] + whole.clamp(0.0, (grid.dims[c] - 1) as f64) as usize
+        })
+    }
+
+    #[test]
+    fn places_fall_into_their_cells_however_they_are_asked_for() {
+        let grid = Grid::over([-3.0, 0.0, 2.0], [4.0, 5.0, 2.0], 4096);
+        assert_eq!(grid.dims[2], 1);
+        let mut draws = Draws::new(3, Stage::Synthetic, 0);
+        let mut places: Vec<[f32; 3]> =
+            (0..5000).map(|_| std::array::from_fn(|_| draws.between(-6.0, 8.0) as f32)).collect();
+        places.extend([
+            [f32::INFINITY, 1.0, f32::NEG_INFINITY],
+            [1e30, -1e30, 2.0],
+            [f32::NAN, 1.0, 2.0],
+            [f32::MAX, f32::MIN, 0.0],
+        ]);
+        let columns: [Vec<f32>; 3] =
+            std::array::from_fn(|c| places.iter().map(|place| place[c]).collect());
+        let mut cells = vec![0; places.len()];
+        grid.cells_of(&columns.each_ref().map(|column| &column[..]), &mut cells);
+        for (place, &cell) in places.iter().zip(&cells) {
+            let number = grid.index(place);
+            assert_eq!(number, cell as usize, "{place:?}");
+            assert_eq!(number, counted(&grid, place), "{place:?}");
+            let mut along = [0; 1];
+            grid.cells_along(place, &[0.0; 3], &[0.0], &mut along);
+            assert_eq!(along[0], cell, "{place:?}");
+        }
+    }
+}

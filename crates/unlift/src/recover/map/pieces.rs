@@ -1,0 +1,307 @@
+//! Where a slot may lie, as flat pieces: all that joint recovery knows of a record family.
+
+use super::chance_field::{CandidateField, ChanceField, tube};
+use super::graph::record_of;
+use super::lanes::ln;
+use super::line_rows::LineRow;
+use super::plane_windows::SortedPlanes;
+use super::settings::Settings;
+use crate::released::AxisPlanes;
+use crate::simd::prefetch;
+
+/// A flat piece of a feasible set: a line, a half-line or a plane.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Piece<const D: usize> {
+    /// A point of it; the end of a half-line.
+    pub(crate) through: [f32; D],
+    /// The projector onto its directions.
+    pub(crate) along: [[f32; D]; D],
+    /// The sense of a half-line or a chord; zero for others.
+    pub(crate) sense: [f32; D],
+    /// How far it reaches in that sense.
+    pub(crate) to: f32,
+    /// Whether those of other slots end in `through`, too: what is near it is near all of them.
+    pub(crate) from_center: bool,
+}
+
+impl<const D: usize> Piece<D> {
+    /// A whole line.
+    fn line(through: [f32; D], direction: [f32; D]) -> Self {
+        let along = std::array::from_fn(|r| std::array::from_fn(|c| direction[r] * direction[c]));
+        Self { through, along, sense: [0.0; D], to: f32::INFINITY, from_center: false }
+    }
+
+    /// The place of the piece nearest to `x`.
+    #[inline(always)]
+    pub(crate) fn project(&self, x: &[f32; D]) -> [f32; D] {
+        let away: [f32; D] = std::array::from_fn(|c| x[c] - self.through[c]);
+        let ahead: f32 = away.iter().zip(&self.sense).map(|(a, s)| s * a).sum();
+        let keep = if ahead < 0.0 { 0.0 } else { 1.0 };
+        let keep = if ahead > self.to { self.to / ahead } else { keep };
+        std::array::from_fn(|r| {
+            let moved: f32 = away.iter().zip(&self.along[r]).map(|(a, along)| along * a).sum();
+            self.through[r] + keep * moved
+        })
+    }
+}
+
+/// The feasible sets of a map.
+pub(crate) trait Pieces<const D: usize>: Sync {
+    /// Pieces per slot.
+    const PER_SLOT: usize;
+    /// How much an estimate counts along its own piece at most, against 1 across it.
+    const MOST_ALONG: f32;
+    /// How fast that falls with the number of votes.
+    const ALONG: f32;
+    /// An estimate that is so many times as likely a true neighbor's as one of chance counts half when a place is
+    /// made anew.
+    const DOUBT: f32 = 1.0;
+    /// Whether entries that are near without being neighbors are told from neighbors: they would draw a place into
+    /// the middle of its region. Where a neighbor speaks about one coordinate, the more voices the better.
+    const TELLS_REGION: bool = false;
+    /// The radius of the law is at most this many deltas: where most estimates are wrong, those that are
+    /// near by accident would widen it without end.
+    const MOST_RADIUS: f32 = 0.95;
+
+    /// Whether pieces are planes with a normal, not lines with a direction.
+    const NORMAL: bool = false;
+
+    /// Slots per record.
+    fn slots_per_record(&self) -> usize {
+        1
+    }
+    /// One piece of a slot.
+    fn piece(&self, slot: usize, piece: usize) -> Piece<D>;
+    /// The unit direction of a piece, or its normal.
+    fn direction(&self, slot: usize, piece: usize) -> [f32; D];
+    /// Whether a record near a place is evidence for a point of `slot`.
+    fn may_vote(&self, slot: usize, record: usize) -> bool;
+    /// Brings the row of `record` near.
+    fn prefetch(&self, record: usize);
+    /// Squared distance from `x` to where `record` may lie.
+    fn record_distance2(&self, record: usize, x: &[f32; D]) -> f32;
+    /// The chance that a random record that may vote for `slot` passes within delta of `x`.
+    fn record_chance(&self, slot: usize, x: &[f32; D]) -> f32;
+    /// The logarithm of how much of its feasible set `slot` has per length at `x`, where that differs.
+    #[inline(always)]
+    fn ln_spread(&self, _: usize, _: &[f32; D]) -> f32 {
+        0.0
+    }
+}
+
+/// Lines and rays.
+pub(crate) struct LinePieces<'a, const D: usize> {
+    rows: &'a [LineRow<D>],
+    slots_per_record: usize,
+    chance: &'a [ChanceField<D>],
+    tube: f32,
+    /// Whether these are rays from anchors, each with a region of its own.
+    anchored: bool,
+}
+
+/// Ranges below this share of a ray are as unlikely as this one.
+const LEAST_RANGE: f32 = 1e-3;
+
+impl<'a, const D: usize> LinePieces<'a, D> {
+    pub(crate) fn new(
+        rows: &'a [LineRow<D>],
+        slots_per_record: usize,
+        chance: &'a [ChanceField<D>],
+        delta: f32,
+    ) -> Self {
+        let anchored = rows.iter().any(|row| row.is_ray() && row.to.is_finite());
+        Self { rows, slots_per_record, chance, tube: tube(D, delta), anchored }
+    }
+
+    #[inline(always)]
+    fn own(&self, slot: usize) -> &LineRow<D> {
+        &self.rows[record_of(slot, self.slots_per_record)]
+    }
+}
+
+impl<const D: usize> Pieces<D> for LinePieces<'_, D> {
+    const PER_SLOT: usize = 1;
+    const MOST_ALONG: f32 = 0.35;
+    const ALONG: f32 = 50.0;
+    const TELLS_REGION: bool = true;
+
+    fn slots_per_record(&self) -> usize {
+        self.slots_per_record
+    }
+
+    #[inline(always)]
+    fn piece(&self, slot: usize, _: usize) -> Piece<D> {
+        let own = self.own(slot);
+        let sense = if own.floor() == 0.0 { own.direction } else { [0.0; D] };
+        let line = Piece::line(own.through, own.direction);
+        Piece { sense, to: own.to, from_center: own.is_ray(), ..line }
+    }
+
+    #[inline(always)]
+    fn direction(&self, slot: usize, _: usize) -> [f32; D] {
+        self.own(slot).direction
+    }
+
+    #[inline(always)]
+    fn may_vote(&self, slot: usize, record: usize) -> bool {
+        self.rows[record].may_vote_for(self.own(slot))
+    }
+
+    #[inline(always)]
+    fn prefetch(&self, record: usize) {
+        prefetch(self.rows, record);
+    }
+
+    #[inline(always)]
+    fn record_distance2(&self, record: usize, x: &[f32; D]) -> f32 {
+        let row = &self.rows[record];
+        let away: [f32; D] = std::array::from_fn(|c| x[c] - row.through[c]);
+        let t: f32 = away.iter().zip(&row.direction).map(|(a, d)| a * d).sum();
+        let t = row.clamp(t);
+        away.iter().zip(&row.direction).map(|(a, d)| (a - t * d) * (a - t * d)).sum()
+    }
+
+    #[inline(always)]
+    fn record_chance(&self, slot: usize, x: &[f32; D]) -> f32 {
+        let own = self.own(slot);
+        let field = &self.chance[if own.is_ray() { own.group as usize } else { 0 }];
+        field.at(x, self.tube)
+    }
+
+    // Points are spread over the region of an anchor, and its rays diverge: without this term estimates
+    // drift to where all bearings meet.
+    #[inline(always)]
+    fn ln_spread(&self, slot: usize, x: &[f32; D]) -> f32 {
+        if !self.anchored {
+            return 0.0;
+        }
+        let own = self.own(slot);
+        let t: f32 = (0..D).map(|c| (x[c] - own.through[c]) * own.direction[c]).sum();
+        (D - 1) as f32 * ln((t / own.to).max(LEAST_RANGE))
+    }
+}
+
+/// The direction of an axis.
+#[inline(always)]
+fn unit<const D: usize>(axis: usize) -> [f32; D] {
+    std::array::from_fn(|c| if c == axis { 1.0 } else { 0.0 })
+}
+
+/// Axis planes.
+pub(crate) struct PlanePieces<'a, const D: usize> {
+    planes: &'a AxisPlanes<D>,
+    chance: f32,
+}
+
+impl<'a, const D: usize> PlanePieces<'a, D> {
+    pub(crate) fn new(planes: &'a AxisPlanes<D>, sorted: &SortedPlanes, delta: f32) -> Self {
+        let chance = sorted.typical_chance(planes, delta);
+        Self { planes, chance }
+    }
+}
+
+impl<const D: usize> Pieces<D> for PlanePieces<'_, D> {
+    const PER_SLOT: usize = 1;
+    const NORMAL: bool = true;
+    // Two coordinates are open: where few neighbors are right, their estimates are all that tells.
+    const DOUBT: f32 = 0.2;
+    const MOST_ALONG: f32 = 0.25;
+    const ALONG: f32 = 2.0;
+
+    #[inline(always)]
+    fn piece(&self, slot: usize, _: usize) -> Piece<D> {
+        let (own, offset) = (usize::from(self.planes.axis()[slot]), self.planes.offset()[slot]);
+        let at = |c: usize| if c == own { offset } else { 0.0 };
+        let along = |r: usize, c: usize| if r == c && r != own { 1.0 } else { 0.0 };
+        Piece {
+            through: std::array::from_fn(at),
+            along: std::array::from_fn(|r| std::array::from_fn(|c| along(r, c))),
+            sense: [0.0; D],
+            to: f32::INFINITY,
+            from_center: false,
+        }
+    }
+
+    #[inline(always)]
+    fn direction(&self, slot: usize, _: usize) -> [f32; D] {
+        unit(usize::from(self.planes.axis()[slot]))
+    }
+
+    #[inline(always)]
+    fn may_vote(&self, slot: usize, record: usize) -> bool {
+        self.planes.axis()[slot] != self.planes.axis()[record]
+    }
+
+    #[inline(always)]
+    fn prefetch(&self, record: usize) {
+        prefetch(self.planes.offset(), record);
+    }
+
+    #[inline(always)]
+    fn record_distance2(&self, record: usize, x: &[f32; D]) -> f32 {
+        let axis = usize::from(self.planes.axis()[record]);
+        let d = x[axis] - self.planes.offset()[record];
+        d * d
+    }
+
+    #[inline(always)]
+    fn record_chance(&self, _: usize, _: &[f32; D]) -> f32 {
+        self.chance
+    }
+}
+
+/// Axis candidates.
+pub(crate) struct CandidatePieces<'a, const D: usize> {
+    rows: &'a [[f32; D]],
+    chance: &'a CandidateField<D>,
+    tube: f32,
+}
+
+impl<'a, const D: usize> CandidatePieces<'a, D> {
+    pub(crate) fn new(rows: &'a [[f32; D]], chance: &'a CandidateField<D>, delta: f32) -> Self {
+        Self { rows, chance, tube: tube(D, delta) }
+    }
+}
+
+impl<const D: usize> Pieces<D> for CandidatePieces<'_, D> {
+    const PER_SLOT: usize = D;
+    const MOST_RADIUS: f32 = Settings::of_dimension::<D>().most_radius_of_candidates;
+    const MOST_ALONG: f32 = 0.25;
+    const ALONG: f32 = 2.0;
+
+    #[inline(always)]
+    fn piece(&self, slot: usize, piece: usize) -> Piece<D> {
+        Piece::line(self.rows[slot], unit(piece))
+    }
+
+    #[inline(always)]
+    fn direction(&self, _: usize, piece: usize) -> [f32; D] {
+        unit(piece)
+    }
+
+    #[inline(always)]
+    fn may_vote(&self, _: usize, _: usize) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn prefetch(&self, record: usize) {
+        prefetch(self.rows, record);
+    }
+
+    #[inline(always)]
+    fn record_distance2(&self, record: usize, x: &[f32; D]) -> f32 {
+        let (mut sum, mut largest) = (0.0f32, 0.0f32);
+        for (x, published) in x.iter().zip(&self.rows[record]) {
+            let d = x - published;
+            sum += d * d;
+            largest = largest.max(d * d);
+        }
+        (sum - largest).max(0.0)
+    }
+
+    #[inline(always)]
+    fn record_chance(&self, _: usize, x: &[f32; D]) -> f32 {
+        self.chance.at(x, self.tube)
+    }
+}

@@ -1,0 +1,109 @@
+//! Where slots are believed to be, in the form the rounds read.
+
+use super::chance_field::trimmed;
+use crate::recover::result::estimate::{Estimate, Status};
+use crate::simd::prefetch;
+
+/// A slot's estimate: one memory access.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(16))]
+struct Place<const D: usize> {
+    x: [f32; D],
+    piece: u32,
+}
+
+/// Lost slots lie this far away: near nothing, and still a number when squared.
+pub(crate) const FAR: f32 = 1e18;
+
+/// Places that stand for all.
+const SAMPLE: usize = 1 << 14;
+
+/// One place per slot.
+#[derive(Clone, Debug)]
+pub(crate) struct Places<const D: usize> {
+    rows: Vec<Place<D>>,
+}
+
+impl<const D: usize> Places<D> {
+    /// From estimates in slot order.
+    pub(crate) fn new(estimates: &[Estimate<D>]) -> Self {
+        let place = |e: &Estimate<D>| match e.status {
+            Status::Ok => Place { x: e.position, piece: u32::from(e.axis) },
+            _ => Place { x: [FAR; D], piece: 0 },
+        };
+        Self { rows: estimates.iter().map(place).collect() }
+    }
+
+    /// Number of slots.
+    pub(crate) fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Whether `slot` has a place.
+    #[inline(always)]
+    pub(crate) fn is_known(&self, slot: usize) -> bool {
+        self.rows[slot].x[0] != FAR
+    }
+
+    /// The place of `slot`; far away if it has none.
+    #[inline(always)]
+    pub(crate) fn of(&self, slot: usize) -> [f32; D] {
+        self.rows[slot].x
+    }
+
+    /// Brings the place of `slot` near.
+    #[inline(always)]
+    pub(crate) fn prefetch(&self, slot: usize) {
+        prefetch(&self.rows, slot);
+    }
+
+    /// The largest coordinate of a known place, without its sign.
+    pub(crate) fn farthest(&self) -> f32 {
+        let known = (0..self.len()).filter(|&slot| self.is_known(slot));
+        known.flat_map(|slot| self.of(slot)).fold(0.0, |most, x| most.max(x.abs()))
+    }
+
+    /// Some of the known places, evenly over the slots.
+    pub(crate) fn sample(&self) -> impl Iterator<Item = [f32; D]> + '_ {
+        let every = self.len().div_ceil(SAMPLE).max(1);
+        (0..self.len()).step_by(every).filter(|&slot| self.is_known(slot)).map(|slot| self.of(slot))
+    }
+
+    /// The corners of a box around the known places, without the farthest.
+    pub(crate) fn trimmed_box(&self) -> ([f32; D], [f32; D]) {
+        let ends: [(f32, f32); D] = std::array::from_fn(|c| {
+            trimmed(&mut self.sample().map(|x| x[c]).collect::<Vec<f32>>())
+        });
+        (ends.map(|e| e.0), ends.map(|e| e.1))
+    }
+
+    /// The piece of its feasible set that `slot` lies on.
+    #[inline(always)]
+    pub(crate) fn piece(&self, slot: usize) -> usize {
+        self.rows[slot].piece as usize
+    }
+
+    /// The squared distance from `x` to the slot at the other end of an edge, and that slot: `end`, or
+    /// with `either` the nearer of it and the next.
+    #[inline(always)]
+    pub(crate) fn nearest(&self, end: u32, either: bool, x: &[f32; D]) -> (f32, usize) {
+        let one = distance2(&self.of(end as usize), x);
+        if either {
+            let other = distance2(&self.of(end as usize + 1), x);
+            if other < one {
+                return (other, end as usize + 1);
+            }
+        }
+        (one, end as usize)
+    }
+}
+
+/// The squared distance.
+#[inline(always)]
+pub(crate) fn distance2<const D: usize>(a: &[f32; D], b: &[f32; D]) -> f32 {
+    let mut sum = 0.0;
+    for c in 0..D {
+        sum += (a[c] - b[c]) * (a[c] - b[c]);
+    }
+    sum
+}

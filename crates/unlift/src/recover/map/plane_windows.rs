@@ -1,0 +1,125 @@
+//! Axis planes: the free coordinates separate, each is the densest window of offsets.
+
+use super::evidence::evidence;
+use super::extent::interquartile_range;
+use super::lanes::ln;
+use crate::RecordId;
+use crate::released::AxisPlanes;
+
+/// The planes of each axis in order of their offsets.
+#[derive(Clone, Debug)]
+pub(crate) struct SortedPlanes {
+    by_axis: Vec<Vec<u32>>,
+}
+
+impl SortedPlanes {
+    /// Sorts the planes of each axis.
+    pub(crate) fn new<const D: usize>(planes: &AxisPlanes<D>) -> Self {
+        let mut by_axis = vec![Vec::new(); D];
+        for (record, &axis) in planes.axis().iter().enumerate() {
+            by_axis[usize::from(axis)].push(record as u32);
+        }
+        let offset = |record: u32| planes.offset()[record as usize];
+        for order in &mut by_axis {
+            order.sort_unstable_by(|&a, &b| offset(a).total_cmp(&offset(b)).then(a.cmp(&b)));
+        }
+        Self { by_axis }
+    }
+
+    /// The largest interquartile range of offsets over the axes.
+    pub(crate) fn interquartile_range<const D: usize>(&self, planes: &AxisPlanes<D>) -> f64 {
+        let range = |order: &Vec<u32>| {
+            let offsets: Vec<f32> = order.iter().map(|&r| planes.offset()[r as usize]).collect();
+            interquartile_range(&offsets)
+        };
+        self.by_axis.iter().map(range).fold(0.0, f64::max)
+    }
+}
+
+impl SortedPlanes {
+    /// How likely a random plane of any axis passes within `delta` of a typical place.
+    pub(crate) fn typical_chance<const D: usize>(&self, planes: &AxisPlanes<D>, delta: f32) -> f32 {
+        // Half of the planes of an axis lie within the interquartile range.
+        let range = self.interquartile_range(planes).max(f64::from(f32::MIN_POSITIVE));
+        (f64::from(delta) / range).min(0.5) as f32
+    }
+}
+
+/// How likely a random plane of the same axis falls into the window that starts at each plane.
+#[derive(Clone, Debug)]
+pub(crate) struct WindowChance {
+    probability: Vec<f32>,
+}
+
+impl WindowChance {
+    /// Counts, per record, the planes of its axis with offsets in `[offset, offset + 2 delta]`:
+    /// exact, no sample is needed where chance has one dimension.
+    pub(crate) fn new<const D: usize>(
+        planes: &AxisPlanes<D>,
+        sorted: &SortedPlanes,
+        delta: f32,
+    ) -> Self {
+        let mut probability = vec![0.0; planes.len()];
+        for order in &sorted.by_axis {
+            let mut end = 0;
+            for (start, &record) in order.iter().enumerate() {
+                let reach = planes.offset()[record as usize] + 2.0 * delta;
+                while end < order.len() && planes.offset()[order[end] as usize] <= reach {
+                    end += 1;
+                }
+                probability[record as usize] =
+                    ((end - start) as f32 - 0.5) / (order.len() as f32 + 1.0);
+            }
+        }
+        Self { probability }
+    }
+}
+
+/// The final mean runs over this many deltas on either side of the window's own: where the window
+/// is sharp (few neighbors are needed to name it), a wider mean is steadier.
+const REFIT: f32 = 1.5;
+
+/// The window of one axis and why it was chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Window {
+    /// Mean of the offsets in the window, after one re-selection.
+    pub(crate) offset: f32,
+    /// How many offsets support it.
+    pub(crate) count: u32,
+    /// Improbability of the agreement by chance, in nats.
+    pub(crate) evidence: f32,
+}
+
+/// The window of width `2 delta` over the listed planes of one axis that maximizes evidence plus
+/// prior. `listed` holds (offset, record) of these planes and is sorted here.
+pub(crate) fn best_window(
+    listed: &mut [(f32, RecordId)],
+    chance: &WindowChance,
+    delta: f32,
+) -> Option<Window> {
+    listed.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut best: Option<(f32, f32, usize, usize)> = None;
+    let mut end = 0;
+    for start in 0..listed.len() {
+        while end < listed.len() && listed[end].0 <= listed[start].0 + 2.0 * delta {
+            end += 1;
+        }
+        let p = chance.probability[listed[start].1.index()];
+        let evidence = evidence((end - start) as f32, listed.len() as f32, p);
+        let score = evidence + ln(p);
+        if best.is_none_or(|b| score > b.0) {
+            best = Some((score, evidence, start, end));
+        }
+    }
+    let (_, evidence, start, end) = best?;
+    // Offsets are summed from the first, so that far maps lose no digits.
+    let mean = |rows: &[(f32, RecordId)]| {
+        rows[0].0 + rows.iter().map(|r| r.0 - rows[0].0).sum::<f32>() / rows.len() as f32
+    };
+    let first = mean(&listed[start..end]);
+    let low = listed.partition_point(|r| r.0 < first - REFIT * delta);
+    let high = listed.partition_point(|r| r.0 <= first + REFIT * delta);
+    let (offset, count) =
+        if low < high { (mean(&listed[low..high]), high - low) } else { (first, end - start) };
+    Some(Window { offset, count: count as u32, evidence })
+}

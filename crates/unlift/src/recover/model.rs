@@ -1,0 +1,129 @@
+//! What recovery learns of a map before any point is placed.
+
+use super::map::bytes::{Reader, Writer};
+use super::map::chance_field::{CandidateField, ChanceField, tube};
+use super::map::family::Chance;
+use super::options::{Delta, RecoverOptions, Solver};
+use crate::{Error, Fingerprint};
+
+/// What is learned of one released map and its lists: delta, and how likely a random listed record passes near a place.
+///
+/// It is small, whatever the size of the map (grids of 32,768 cells at most, one for lines, one per center of rays or per axis
+/// of candidates), so that whoever has the same map and lists can solve a part of the slots with it, see
+/// [`Task`](crate::recover::Task).
+#[derive(Clone, Debug)]
+pub struct Model<const D: usize> {
+    pub(super) options: RecoverOptions,
+    pub(super) map: Fingerprint,
+    pub(super) delta: f64,
+    /// `None` for attacks on the records alone, which learn nothing that is small.
+    pub(super) chance: Option<Chance<D>>,
+}
+
+/// How a model begins as bytes.
+const MAGIC: [u8; 8] = *b"unliftM1";
+/// Centers of rays at most: they are counted in a byte.
+const MOST_FIELDS: usize = 256;
+
+impl<const D: usize> Model<D> {
+    /// The options that it was made with.
+    pub fn options(&self) -> &RecoverOptions {
+        &self.options
+    }
+
+    /// The released map that it is about.
+    pub fn map(&self) -> Fingerprint {
+        self.map
+    }
+
+    /// The distance up to which a record supports a position, in the unit of the map.
+    pub fn delta(&self) -> f64 {
+        self.delta
+    }
+
+    /// The chance that a random listed record passes within delta of `x` (about the released origin), for a slot of
+    /// the center `group` of rays; of other records any group will do. `None` where chance is no field: of planes, whose
+    /// offsets are counted, and of attacks on the records alone.
+    pub fn chance(&self, group: usize, x: &[f32; D]) -> Option<f32> {
+        let tube = tube(D, self.delta as f32);
+        match self.chance.as_ref()? {
+            Chance::Lines(fields) => {
+                fields.get(group).or(fields.first()).map(|field| field.at(x, tube))
+            }
+            Chance::Planes => None,
+            Chance::Candidates(field) => Some(field.at(x, tube)),
+        }
+    }
+
+    /// The model as bytes: a few hundred kilobytes at most, the same on every machine.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut to = Writer::default();
+        let RecoverOptions { solver, delta, seed, exact_constraints, confidence } = self.options;
+        to.bytes(&MAGIC);
+        to.bytes(&[D as u8, solver.name().len() as u8]);
+        to.bytes(solver.name().as_bytes());
+        to.bytes(&[u8::from(exact_constraints), u8::from(confidence)]);
+        to.u64(seed);
+        // No given delta is 0.
+        to.f64(if let Delta::Fixed(delta) = delta { delta } else { 0.0 });
+        to.bytes(&self.map.0);
+        to.f64(self.delta);
+        match &self.chance {
+            None => to.bytes(&[0]),
+            Some(Chance::Lines(fields)) => {
+                to.bytes(&[1]);
+                to.u64(fields.len() as u64);
+                fields.iter().for_each(|field| field.write(&mut to));
+            }
+            Some(Chance::Planes) => to.bytes(&[2]),
+            Some(Chance::Candidates(field)) => {
+                to.bytes(&[3]);
+                field.write(&mut to);
+            }
+        }
+        to.into_bytes()
+    }
+
+    /// The model that [`to_bytes`](Self::to_bytes) gave.
+    ///
+    /// # Errors
+    /// When `bytes` are anything else, or a model in another number of dimensions.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
+        let mut from = Reader::new(bytes);
+        let magic: [u8; 8] = from.array()?;
+        if magic != MAGIC {
+            return Err(Error::new("model", "a model of this version", "other bytes"));
+        }
+        let [dimensions, name] = from.array()?;
+        if usize::from(dimensions) != D {
+            let expected = format!("a model in {D} dimensions");
+            return Err(Error::new("model", expected, dimensions.to_string()));
+        }
+        let name = String::from_utf8_lossy(from.bytes(name.into())?);
+        let solver = Solver::from_name(&name).map_err(|error| error.within("model"))?;
+        let [exact_constraints, confidence] = from.array()?.map(|byte: u8| byte != 0);
+        let seed = from.u64()?;
+        let given = from.f64()?;
+        let delta = if given == 0.0 { Delta::Auto } else { Delta::Fixed(given) };
+        let options = RecoverOptions { solver, delta, seed, exact_constraints, confidence };
+        options.check().map_err(|error| error.within("model"))?;
+        let map = Fingerprint(from.array()?);
+        let delta = from.f64()?;
+        let [kind] = from.array()?;
+        let chance = match kind {
+            0 => None,
+            1 => {
+                let n = from.count(MOST_FIELDS)?;
+                let fields = (0..n).map(|_| ChanceField::read(&mut from));
+                Some(Chance::Lines(fields.collect::<Result<_, _>>()?))
+            }
+            2 => Some(Chance::Planes),
+            3 => Some(Chance::Candidates(CandidateField::read(&mut from)?)),
+            other => {
+                return Err(Error::new("model", "a kind of chance below 4", other.to_string()));
+            }
+        };
+        from.end()?;
+        Ok(Self { options, map, delta, chance })
+    }
+}

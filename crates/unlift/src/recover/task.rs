@@ -1,0 +1,339 @@
+//! One map to be recovered: records and lists in the form that solvers read, with what was learned of them.
+
+use std::ops::Range;
+
+use super::confidence::cues::{Seen, Solved};
+use super::consensus::Consensus;
+use super::joint::{Joint, JointStart};
+use super::map::family::Family;
+use super::map::graph::Graph;
+use super::model::Model;
+use super::options::{Delta, RecoverOptions, Solver};
+use super::pairs_of_descriptors::descriptor_rows;
+use super::placement::{self, Placement};
+use super::ransac::Ransac;
+use super::result::estimate::Estimate;
+use super::result::recovered::Recovered;
+use super::result::trials::TrialCounts;
+use super::result::unknown::Unknown;
+use super::rounds::Rounds;
+use super::solve::Solve;
+use super::{confidence, delta, exact};
+use crate::density::{Peaks, published, tomography};
+use crate::neighbors::Neighborhoods;
+use crate::released::{Obfuscation, Released};
+use crate::{About, Error, Fingerprint};
+
+/// A released map and its lists, ready to be solved in any parts.
+///
+/// ```
+/// # use unlift::recover::{RecoverOptions, Solver};
+/// # use unlift::{neighbors::Neighborhoods, released::Released, Error};
+/// use unlift::recover::{Model, Recovered, Task, prepare};
+///
+/// fn in_two_parts(map: &Released<3>, lists: &Neighborhoods) -> Result<Recovered<3>, Error> {
+///     let options = RecoverOptions { solver: Solver::Consensus, ..RecoverOptions::default() };
+///     let model: Model<3> = prepare(map, lists, &options)?;
+///     // Elsewhere, from `model.to_bytes()`:
+///     let task = Task::new(&model, map, lists)?;
+///     let half = map.n_slots() / 2;
+///     let mut estimates = task.solve(0..half)?;
+///     estimates.extend(task.solve(half..map.n_slots())?);
+///     task.finish(estimates)
+/// }
+/// ```
+#[derive(Debug)]
+pub struct Task<'a, const D: usize> {
+    released: &'a Released<D>,
+    map: Fingerprint,
+    lists: &'a Neighborhoods,
+    options: RecoverOptions,
+    delta: f64,
+    records: Records<'a, D>,
+    trials: TrialCounts,
+}
+
+/// Records as solvers read them.
+#[derive(Debug)]
+enum Records<'a, const D: usize> {
+    /// Where records alone say that points are.
+    Alone(Peaks),
+    /// Records with their lists.
+    Listed {
+        family: Family<'a, D>,
+        /// Who lists whom, where the solver asks.
+        graph: Option<Graph>,
+        /// The same as lists, where records have one slot.
+        both_ways: Option<Neighborhoods>,
+    },
+}
+
+impl<'a, const D: usize> Task<'a, D> {
+    /// `released` with its `lists`, and `model` made of these very two.
+    ///
+    /// # Errors
+    /// When the model or the lists are of another map.
+    pub fn new(
+        model: &Model<D>,
+        released: &'a Released<D>,
+        lists: &'a Neighborhoods,
+    ) -> Result<Self, Error> {
+        Self::make(released, lists, &model.options, Some(model))
+    }
+
+    /// The same, with what the model says learned here.
+    pub(super) fn learn(
+        released: &'a Released<D>,
+        lists: &'a Neighborhoods,
+        options: &RecoverOptions,
+    ) -> Result<Self, Error> {
+        Self::make(released, lists, options, None)
+    }
+
+    fn make(
+        released: &'a Released<D>,
+        lists: &'a Neighborhoods,
+        options: &RecoverOptions,
+        model: Option<&Model<D>>,
+    ) -> Result<Self, Error> {
+        options.check()?;
+        let map = released.fingerprint();
+        check_lists(released, lists)?;
+        map.expect(lists.about().map)?;
+        map.expect(model.map(|model| model.map)).map_err(|error| error.within("model"))?;
+        let (records, delta) = match options.solver {
+            Solver::Density => at_peaks(published(released)),
+            Solver::Tomography => at_peaks(tomography(released)),
+            Solver::Consensus | Solver::Joint | Solver::JointStart | Solver::Ransac => {
+                listed(released, lists, options, model)?
+            }
+        };
+        let trials = TrialCounts::default();
+        Ok(Self { released, map, lists, options: *options, delta, records, trials })
+    }
+
+    /// What was learned of the map.
+    pub(super) fn model(&self) -> Model<D> {
+        let chance = match &self.records {
+            Records::Alone(_) => None,
+            Records::Listed { family, .. } => Some(family.chance()),
+        };
+        Model { options: self.options, map: self.map, delta: self.delta, chance }
+    }
+
+    /// Number of slots.
+    pub fn n_slots(&self) -> usize {
+        self.released.n_slots()
+    }
+
+    /// The estimates of `slots`, in order: for joint recovery those that its rounds start from. They are the same
+    /// whichever slots are asked for together.
+    ///
+    /// What slots share beyond the model (ranks of windows of anchors, votes on the exchanged axis) is made anew by every call:
+    /// ranges should be large.
+    ///
+    /// # Errors
+    /// When the map has fewer slots.
+    pub fn solve(&self, slots: Range<usize>) -> Result<Vec<Estimate<D>>, Error> {
+        if slots.end > self.n_slots() || slots.start > slots.end {
+            let expected = format!("a range of slots up to {}", self.n_slots());
+            return Err(Error::new("slots", expected, format!("{slots:?}")));
+        }
+        Ok(self.solver(self.options.solver).solve(slots))
+    }
+
+    /// The rounds of joint recovery from `start`, the estimates of all slots; `None` where there are none to come: for other
+    /// solvers, and where estimates say nothing about each other.
+    ///
+    /// # Errors
+    /// When there is not one estimate per slot.
+    pub fn rounds(&self, start: &[Estimate<D>]) -> Result<Option<Rounds<'_, D>>, Error> {
+        self.check_estimates(start)?;
+        Ok(self.solver(self.options.solver).rounds(start).map(Rounds::new))
+    }
+
+    /// Recovered points from the last estimates of all slots: exact constraints are met where a rule fixes coordinates, and it
+    /// is said how sure the attacker is. Both look at the whole map.
+    ///
+    /// # Errors
+    /// When there is not one estimate per slot.
+    pub fn finish(&self, estimates: Vec<Estimate<D>>) -> Result<Recovered<D>, Error> {
+        self.finish_and_look(estimates).map(|(recovered, _)| recovered)
+    }
+
+    /// [`finish`](Self::finish), with what confidence is made of.
+    pub(super) fn finish_and_look(
+        &self,
+        estimates: Vec<Estimate<D>>,
+    ) -> Result<(Recovered<D>, Seen), Error> {
+        self.check_estimates(&estimates)?;
+        let settled = self.settled(&estimates)?;
+        let unsettled = &estimates[..];
+        let estimates = settled.as_deref().unwrap_or(unsettled);
+        let rows = descriptor_rows(self.released, self.lists);
+        let recovered = self.in_columns(estimates, rows)?;
+        let trials = (self.options.solver == Solver::Ransac).then(|| self.trials.histogram());
+        let recovered = recovered.with_trials(trials);
+        let (family, graph) = match (&self.records, self.no_confidence()) {
+            (Records::Listed { family, graph, .. }, None) => (family, graph),
+            (_, unknown) => {
+                let unknown = unknown.unwrap_or(Unknown::FromRecordsAlone);
+                return Ok((recovered.without_confidence(unknown), Seen::NOTHING));
+            }
+        };
+        let edges = (graph.as_ref(), self.lists);
+        let solved = Solved { estimates, unsettled, delta: self.delta as f32 };
+        let seen = confidence::look(family, edges, self.released, &solved);
+        let recovered = match confidence::unknown(self.lists) {
+            Some(unknown) => recovered.without_confidence(unknown),
+            None => {
+                let solver = self.options.solver;
+                let confidence = confidence::of(solver, estimates, &seen);
+                recovered.with_confidence(confidence)?
+            }
+        };
+        Ok((recovered, seen))
+    }
+
+    /// The first pass of joint recovery as [`Solver::JointStart`] finishes it, beside the `last` one.
+    pub(super) fn finish_start(
+        &self,
+        start: Vec<Estimate<D>>,
+        last: &Recovered<D>,
+    ) -> Result<Recovered<D>, Error> {
+        let start = if self.is_settled() { self.settle(start) } else { start };
+        let rows = last.descriptor_row().map(<[u32]>::to_vec);
+        Ok(self.in_columns(&start, rows)?.without_confidence(Unknown::FirstPass))
+    }
+
+    /// The solver called so, over this map.
+    fn solver(&self, solver: Solver) -> Box<dyn Solve<'_, D> + '_> {
+        let (lists, delta, seed) = (self.lists, self.delta as f32, self.options.seed);
+        match &self.records {
+            Records::Alone(peaks) => Box::new(Placement::new(self.released, lists, peaks)),
+            Records::Listed { family, graph, both_ways } => {
+                let used = both_ways.as_ref().unwrap_or(lists);
+                let start = JointStart(Consensus { family, lists: used, delta });
+                match (solver, graph) {
+                    (Solver::Joint, Some(graph)) => {
+                        Box::new(Joint { start, family, graph, delta, seed })
+                    }
+                    (Solver::JointStart, _) => Box::new(start),
+                    (Solver::Ransac, _) => {
+                        Box::new(Ransac { family, lists, delta, seed, trials: &self.trials })
+                    }
+                    _ => Box::new(Consensus { family, lists, delta }),
+                }
+            }
+        }
+    }
+
+    /// Whether a rule of the scheme moves estimates. The paper's loop stays as published.
+    fn is_settled(&self) -> bool {
+        let asked = self.options.exact_constraints && self.options.solver != Solver::Ransac;
+        let listed = matches!(self.records, Records::Listed { .. });
+        asked && listed && exact::can_settle(self.released)
+    }
+
+    fn settle(&self, estimates: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
+        exact::settle(self.released, estimates, self.delta)
+    }
+
+    /// Estimates moved to where rules allow them to be, if they move any; joint recovery may go on from there.
+    fn settled(&self, estimates: &[Estimate<D>]) -> Result<Option<Vec<Estimate<D>>>, Error> {
+        if !self.is_settled() {
+            return Ok(None);
+        }
+        let mut settled = self.settle(estimates.to_vec());
+        if self.options.solver == Solver::Joint {
+            for _ in 0..exact::feeds(self.released) {
+                settled = self.settle(self.go_on(settled)?);
+            }
+        }
+        Ok(Some(settled))
+    }
+
+    /// Estimates after all rounds from `start`.
+    pub(super) fn go_on(&self, start: Vec<Estimate<D>>) -> Result<Vec<Estimate<D>>, Error> {
+        match self.rounds(&start)? {
+            Some(rounds) => rounds.run(),
+            None => Ok(start),
+        }
+    }
+
+    /// Why nobody is asked how sure the attacker is, if so.
+    fn no_confidence(&self) -> Option<Unknown> {
+        confidence::not_asked::<D>(&self.options)
+    }
+
+    fn in_columns(
+        &self,
+        estimates: &[Estimate<D>],
+        descriptor_row: Option<Vec<u32>>,
+    ) -> Result<Recovered<D>, Error> {
+        let released = self.released;
+        let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
+        let (origin, unit) = (released.origin(), released.unit());
+        let about = About { map: Some(self.map), order: self.lists.about().order };
+        Recovered::try_new(estimates, with_axis, descriptor_row, origin, unit, self.delta)
+            .map(|recovered| recovered.with_about(about))
+    }
+
+    fn check_estimates(&self, estimates: &[Estimate<D>]) -> Result<(), Error> {
+        if estimates.len() == self.n_slots() {
+            return Ok(());
+        }
+        let expected = format!("{}, one per slot", self.n_slots());
+        Err(Error::new("estimates", expected, estimates.len().to_string()))
+    }
+}
+
+/// What attacks on the records alone leave to do.
+fn at_peaks<'a, const D: usize>(peaks: Peaks) -> (Records<'a, D>, f64) {
+    let delta = placement::delta(&peaks);
+    (Records::Alone(peaks), delta)
+}
+
+/// Records with their lists, and delta: learned, or as `model` says.
+fn listed<'a, const D: usize>(
+    released: &'a Released<D>,
+    lists: &'a Neighborhoods,
+    options: &RecoverOptions,
+    model: Option<&Model<D>>,
+) -> Result<(Records<'a, D>, f64), Error> {
+    let family = match model.and_then(|model| model.chance.clone()) {
+        Some(chance) => Family::with_chance(released, chance)?,
+        None => Family::learn(released, lists),
+    };
+    // Joint recovery also asks who lists whom, from the first pass on.
+    let graph = matches!(options.solver, Solver::Joint | Solver::JointStart)
+        .then(|| Graph::new(lists, released.slots_per_record()));
+    let both_ways = match &graph {
+        Some(graph) if released.slots_per_record() == 1 => Some(graph.neighborhoods()?),
+        _ => None,
+    };
+    let delta = match (model, options.delta) {
+        (Some(model), _) => model.delta,
+        (None, Delta::Fixed(delta)) => delta,
+        (None, Delta::Auto) => {
+            let used = both_ways.as_ref().unwrap_or(lists);
+            delta::learn(released, &family, (used, lists), graph.is_some(), options.seed)
+        }
+    };
+    Ok((Records::Listed { family, graph, both_ways }, delta))
+}
+
+/// Refuses lists that are not of this map.
+fn check_lists<const D: usize>(released: &Released<D>, lists: &Neighborhoods) -> Result<(), Error> {
+    if lists.n_slots() != released.n_slots() {
+        let expected = format!("{} rows, one per slot", released.n_slots());
+        return Err(Error::new("neighborhoods", expected, lists.n_slots().to_string()));
+    }
+    // Lists of another map may have as many rows.
+    let n_records = released.n_records();
+    if let Some(record) = lists.records().iter().find(|record| record.index() >= n_records) {
+        let expected = format!("records below {n_records}");
+        return Err(Error::new("neighborhoods", expected, record.0.to_string()));
+    }
+    Ok(())
+}

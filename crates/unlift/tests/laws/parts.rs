@@ -1,0 +1,112 @@
+//! Recovery in two steps and in parts gives what it gives at once, bit for bit.
+
+use unlift::obfuscate::Scheme;
+use unlift::recover::{Delta, Model, RecoverOptions, Solver, Task, prepare};
+
+use crate::maps::*;
+
+/// Where slots are cut: parts of all sizes, one of them empty, none at the end of a chunk.
+fn cuts(n: usize) -> Vec<std::ops::Range<usize>> {
+    let at = [0, n / 7, n / 7, n / 3 + 1, n - 1, n];
+    at.windows(2).map(|pair| pair[0]..pair[1]).collect()
+}
+
+/// A model learned here, sent as bytes, solved in parts, joined.
+fn parts_are_the_whole<const D: usize>(name: &str, scheme: &dyn Scheme<D>) {
+    let hidden = hide(scheme, &room(61, 500), 6);
+    let lists = hidden.lists(15, 0.5, 6);
+    let n = hidden.released.n_slots();
+    for solver in Solver::ALL {
+        let options = RecoverOptions { solver, seed: 9, ..RecoverOptions::default() };
+        let whole = solve(&hidden.released, &lists, options);
+        let bytes = prepare(&hidden.released, &lists, &options).unwrap().to_bytes();
+        let model = Model::<D>::from_bytes(&bytes).unwrap();
+        assert_eq!(model.to_bytes(), bytes, "{name}");
+        assert_eq!(model.options(), &options, "{name}");
+        let task = Task::new(&model, &hidden.released, &lists).unwrap();
+        let mut estimates = Vec::new();
+        for part in cuts(n) {
+            estimates.extend(task.solve(part).unwrap());
+        }
+        if let Some(mut rounds) = task.rounds(&estimates).unwrap() {
+            assert_eq!(solver, Solver::Joint, "{name}");
+            while !rounds.is_done() {
+                let parts = cuts(n).into_iter().rev();
+                let moved: Vec<_> = parts.flat_map(|part| rounds.solve(part)).collect();
+                rounds.go_on(&moved).unwrap();
+            }
+            estimates = rounds.estimates().to_vec();
+        }
+        let joined = task.finish(estimates).unwrap();
+        assert!(recovered_bytes(&joined) == recovered_bytes(&whole), "{name}, {solver:?}");
+        assert_eq!(joined.confidence(), whole.confidence(), "{name}, {solver:?}");
+        assert_eq!(joined.trials(), whole.trials(), "{name}, {solver:?}");
+    }
+}
+
+#[test]
+fn recovery_in_parts_is_recovery_at_once() {
+    over_schemes!(parts_are_the_whole);
+}
+
+fn hidden_lines() -> Hidden<3> {
+    let olc = unlift::obfuscate::scheme("olc").unwrap().in_3d.unwrap();
+    hide(olc, &room(62, 200), 6)
+}
+
+#[test]
+fn a_round_takes_each_slot_in_its_turn() {
+    let hidden = hidden_lines();
+    let lists = hidden.lists(12, 0.5, 6);
+    let options = RecoverOptions::default();
+    let model = prepare(&hidden.released, &lists, &options).unwrap();
+    let task = Task::new(&model, &hidden.released, &lists).unwrap();
+    let mut rounds = task.rounds(&task.solve(0..200).unwrap()).unwrap().unwrap();
+    let mut moved = rounds.solve(0..200);
+    let error = |found: Result<(), unlift::Error>| found.unwrap_err().to_string();
+    assert_eq!(
+        error(rounds.go_on(&moved[1..])),
+        format!("round: expected slot {}, found none", moved[0].slot)
+    );
+    moved.push(moved[0]);
+    let twice = format!("round: expected each slot in its turn, found {}", moved[0].slot);
+    assert_eq!(error(rounds.go_on(&moved)), twice);
+    moved.pop();
+    rounds.go_on(&moved).unwrap();
+    // From the second sweep on every other slot holds still.
+    assert_eq!(rounds.solve(0..200).len(), 100);
+}
+
+#[test]
+fn a_model_is_one_of_its_map() {
+    let (hidden, lists) = (hidden_lines(), hidden_lines().lists(12, 0.5, 6));
+    let options = RecoverOptions { delta: Delta::Fixed(0.1), ..RecoverOptions::default() };
+    let model = prepare(&hidden.released, &lists, &options).unwrap();
+    assert_eq!((model.delta(), model.map()), (0.1, hidden.released.fingerprint()));
+    let task = Task::new(&model, &hidden.released, &lists).unwrap();
+    assert!(task.solve(150..201).is_err());
+    assert!(task.rounds(&[]).is_err() && task.finish(Vec::new()).is_err());
+    let ppl = unlift::obfuscate::scheme("ppl").unwrap().in_3d.unwrap();
+    let other = hide(ppl, &room(62, 200), 6);
+    let error = Task::new(&model, &other.released, &other.lists(12, 0.5, 6)).unwrap_err();
+    assert!(error.to_string().starts_with("model: fingerprint: "), "{error}");
+}
+
+#[test]
+fn other_bytes_are_no_model() {
+    let (hidden, lists) = (hidden_lines(), hidden_lines().lists(12, 0.5, 6));
+    let options = RecoverOptions { solver: Solver::Consensus, ..RecoverOptions::default() };
+    let bytes = prepare(&hidden.released, &lists, &options).unwrap().to_bytes();
+    assert!(bytes.len() < 200_000, "{} bytes", bytes.len());
+    for n in (0..100).chain([bytes.len() / 2, bytes.len() - 1]) {
+        assert!(Model::<3>::from_bytes(&bytes[..n]).is_err(), "{n} bytes");
+    }
+    assert!(Model::<3>::from_bytes(&[&bytes[..], &[0]].concat()).is_err());
+    assert!(Model::<2>::from_bytes(&bytes).is_err());
+    // A broken byte is an error or another model, but no panic.
+    for at in 0..80 {
+        let mut broken = bytes.clone();
+        broken[at] ^= 0xff;
+        let _ = Model::<3>::from_bytes(&broken);
+    }
+}
