@@ -30,9 +30,9 @@ mod solve;
 mod task;
 
 #[doc(hidden)]
-pub use confidence::cues::{Cues, Seen};
-#[doc(hidden)]
 pub use confidence::model::{N_KINDS, N_TERMS, centered, terms};
+#[doc(hidden)]
+pub use confidence::seen::{Cues, Seen};
 pub use model::Model;
 pub use options::{Delta, RecoverOptions, Solver};
 pub use result::estimate::{Estimate, Status};

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::confidence::cues::{Seen, Solved};
+use super::confidence::seen::{Seen, Solved};
 use super::consensus::Consensus;
 use super::joint::{Joint, JointStart};
 use super::map::family::Family;

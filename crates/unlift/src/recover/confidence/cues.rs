@@ -8,6 +8,7 @@
 use rayon::prelude::*;
 
 use super::edges::{Edge, Edges};
+use super::seen::{Cues, Seen, Solved};
 use crate::recover::map::along_curve::along_curve;
 use crate::recover::map::crowding::Density;
 use crate::recover::map::evidence::evidence;
@@ -16,45 +17,13 @@ use crate::recover::map::pieces::Pieces;
 use crate::recover::map::places::{Places, distance2};
 use crate::recover::result::estimate::{Estimate, Status};
 
-/// Number of cues.
-pub const N_CUES: usize = 20;
-
-/// The cues of one slot.
-pub type Cues = [f32; N_CUES];
-
-/// What the attacker sees around every slot.
-#[derive(Clone, Debug)]
-pub struct Seen {
-    /// Per slot.
-    pub cues: Vec<Cues>,
-    /// The typical radius of crowds, in the unit of the map: errors scale with it.
-    pub radius: f64,
-    /// The kind of the records, below [`N_KINDS`](super::model::N_KINDS): each has a model of its own.
-    pub kind: usize,
-}
-
-impl Seen {
-    /// Nobody looked.
-    pub(crate) const NOTHING: Self = Self { cues: Vec::new(), radius: 1.0, kind: 0 };
-}
-
-/// What recovery found.
-pub(crate) struct Solved<'a, const D: usize> {
-    /// Per slot.
-    pub(crate) estimates: &'a [Estimate<D>],
-    /// The same before exact constraints moved them.
-    pub(crate) unsettled: &'a [Estimate<D>],
-    /// The distance that decided support.
-    pub(crate) delta: f32,
-}
-
-/// Crowds are looked for where chance expects at most this share of the listed estimates.
+/// Crowds are looked for where chance expects at most this share of the listed estimates: beyond, a crowd is no news.
 const MOST_CHANCE: f32 = 0.3;
-/// The density of estimates is smooth over this many deltas.
+/// The density of estimates is smooth over this many deltas: wider than a crowd.
 const SMOOTH: f32 = 4.0;
-/// Ratios of lengths are told apart down to this.
+/// Ratios of lengths are told apart down to this: a logarithm needs a floor.
 const LEAST_RATIO: f32 = 1e-3;
-/// Slots whose cues are taken together.
+/// Slots whose cues are taken by one thread at a time.
 const PART: usize = 1 << 10;
 
 /// The listed estimates that crowd around one estimate.
@@ -311,29 +280,29 @@ impl Map {
         let ln = |x: f32| libm::logf(x.max(LEAST_RATIO));
         let evidence = libm::log1pf(crowd.evidence);
         let record_evidence = libm::log1pf(crowd.record_evidence);
-        let radius = ln(crowd.radius / self.radius);
-        [
+        let ln_radius = ln(crowd.radius / self.radius);
+        Cues {
             evidence,
-            ln(crowd.excess.max(0.1)),
-            radius,
+            ln_excess: ln(crowd.excess.max(0.1)),
+            ln_radius,
             record_evidence,
-            ln(crowd.record_excess.max(0.1)),
-            crowd.off[0],
-            crowd.off[1],
-            crowd.of_members,
-            crowd.sparsity,
-            self.evidence,
-            self.share,
-            self.record_share,
-            self.ln_radius_per_delta,
-            ln(crowd.listed.max(0.1)),
-            crowd.voting_share,
-            self.voting_share,
-            if crowd.settled.is_some() { 1.0 } else { 0.0 },
-            libm::log1pf(crowd.settled.unwrap_or(0.0) / self.radius),
-            crowd.one_sided,
-            self.one_sided,
-        ]
+            ln_record_excess: ln(crowd.record_excess.max(0.1)),
+            off_along: crowd.off[0],
+            off_across: crowd.off[1],
+            of_members: crowd.of_members,
+            sparsity: crowd.sparsity,
+            map_evidence: self.evidence,
+            map_share: self.share,
+            map_record_share: self.record_share,
+            map_ln_radius_per_delta: self.ln_radius_per_delta,
+            ln_listed: ln(crowd.listed.max(0.1)),
+            voting_share: crowd.voting_share,
+            map_voting_share: self.voting_share,
+            is_settled: if crowd.settled.is_some() { 1.0 } else { 0.0 },
+            settled_by: libm::log1pf(crowd.settled.unwrap_or(0.0) / self.radius),
+            one_sided: crowd.one_sided,
+            map_one_sided: self.one_sided,
+        }
     }
 }
 

@@ -1,8 +1,8 @@
 //! What cues say about one slot, by the constants that were fitted.
 
 use super::constants::{CENTER, MODELS, SPREAD};
-use super::cues::Cues;
 use super::model::{Model, N_TERMS, centered, terms};
+use super::seen::Cues;
 use crate::recover::options::Solver;
 use crate::recover::result::probability::Confidence;
 

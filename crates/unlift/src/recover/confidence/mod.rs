@@ -1,19 +1,19 @@
 //! How sure the attacker can be of each recovered point, from attacker-side data alone.
 //!
 //! After recovery every slot is looked at once more: `cues.rs` measures how much better than by chance
-//! estimates and records agree around it, and `model.rs` turns that into the probability that the right
+//! estimates and records agree around it, and `judge.rs` turns that into the probability that the right
 //! place was found and a scale of its error. Its constants come from synthetic rooms
 //! (`examples/fit_confidence.rs`), never from a real map. Cues are ratios: a scaled map has the same.
 
 mod constants;
-pub(super) mod cues;
+mod cues;
 mod edges;
 mod judge;
 pub(super) mod model;
+pub(super) mod seen;
 
 use rayon::prelude::*;
 
-use cues::{Seen, Solved};
 use edges::{BothWays, Edges, Listed};
 
 use crate::neighbors::Neighborhoods;
@@ -26,6 +26,7 @@ use crate::recover::result::estimate::{Estimate, Status};
 use crate::recover::result::probability::Confidence;
 use crate::recover::result::unknown::Unknown;
 use crate::released::Released;
+use seen::{Seen, Solved};
 
 /// A list has at most as many entries as this share of all hidden points in the maps that the model was fitted on.
 const MOST_LISTED: f64 = 0.01;

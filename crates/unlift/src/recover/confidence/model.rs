@@ -1,44 +1,16 @@
 //! From cues to a probability: one small model per solver and kind of record, fitted on synthetic rooms.
 
-use super::cues::{Cues, N_CUES};
+use super::seen::{Cues, N_CUES};
 use crate::released::{Obfuscation, Released};
 
 /// Kinds of records that are calibrated apart: lines, paired lines, rays, axis planes, axis candidates.
 pub const N_KINDS: usize = 5;
 
-/// Pairs of cues whose products count too.
-const PRODUCTS: [(usize, usize); 27] = [
-    (0, 0),
-    (2, 2),
-    (3, 3),
-    (7, 7),
-    (8, 8),
-    (0, 7),
-    (0, 9),
-    (7, 9),
-    (9, 9),
-    (0, 2),
-    (10, 10),
-    (11, 11),
-    (0, 10),
-    (3, 11),
-    (3, 9),
-    (14, 14),
-    (0, 14),
-    (0, 15),
-    (14, 15),
-    (0, 16),
-    (9, 16),
-    (18, 18),
-    (0, 18),
-    (18, 19),
-    (19, 19),
-    (9, 19),
-    (10, 19),
-];
+/// Number of products of two cues that count too.
+const N_PRODUCTS: usize = 27;
 
 /// Number of terms: the constant, the cues, and the products.
-pub const N_TERMS: usize = 1 + N_CUES + PRODUCTS.len();
+pub const N_TERMS: usize = 1 + N_CUES + N_PRODUCTS;
 
 /// Terms farther than this many spreads from the center count as that far: nothing was seen there.
 const FARTHEST: f32 = 4.0;
@@ -61,13 +33,44 @@ pub(super) fn kind<const D: usize>(released: &Released<D>) -> usize {
     }
 }
 
-/// The cues, their products and a constant, before they are centered.
+/// The products of two cues that count too: what one says depends on the other, or bends.
+fn products(c: &Cues) -> [f32; N_PRODUCTS] {
+    [
+        c.evidence * c.evidence,
+        c.ln_radius * c.ln_radius,
+        c.record_evidence * c.record_evidence,
+        c.of_members * c.of_members,
+        c.sparsity * c.sparsity,
+        c.evidence * c.of_members,
+        c.evidence * c.map_evidence,
+        c.of_members * c.map_evidence,
+        c.map_evidence * c.map_evidence,
+        c.evidence * c.ln_radius,
+        c.map_share * c.map_share,
+        c.map_record_share * c.map_record_share,
+        c.evidence * c.map_share,
+        c.record_evidence * c.map_record_share,
+        c.record_evidence * c.map_evidence,
+        c.voting_share * c.voting_share,
+        c.evidence * c.voting_share,
+        c.evidence * c.map_voting_share,
+        c.voting_share * c.map_voting_share,
+        c.evidence * c.is_settled,
+        c.map_evidence * c.is_settled,
+        c.one_sided * c.one_sided,
+        c.evidence * c.one_sided,
+        c.one_sided * c.map_one_sided,
+        c.map_one_sided * c.map_one_sided,
+        c.map_evidence * c.map_one_sided,
+        c.map_share * c.map_one_sided,
+    ]
+}
+
+/// A constant, the cues and their products, before they are centered.
 pub fn terms(cues: &Cues) -> [f32; N_TERMS] {
     let mut terms = [1.0; N_TERMS];
-    terms[1..=N_CUES].copy_from_slice(cues);
-    for (term, (a, b)) in terms[1 + N_CUES..].iter_mut().zip(PRODUCTS) {
-        *term = cues[a] * cues[b];
-    }
+    terms[1..=N_CUES].copy_from_slice(&cues.in_order());
+    terms[1 + N_CUES..].copy_from_slice(&products(cues));
     terms
 }
 
