@@ -22,26 +22,28 @@ use crate::seed::{Draws, Stage};
 const LEAST_DELTA: f64 = 0.25;
 /// Delta for rays from anchors, as a share of the spacing of points: anchors say nothing at one delta rather than at another.
 const ANCHOR_DELTA: f64 = 1.75;
-/// Halvings of the extent that the coarse ladder spans.
+/// Halvings of the extent that the coarse ladder spans: down to 1 / 16,384 of it.
 const HALVINGS: u32 = 14;
 /// Where a random record agrees with a typical place this often, its agreement tells nothing, and the
 /// density of records within delta is no longer that of the place.
 const TOO_WIDE: f32 = 0.04;
-/// Steps per octave of the fine ladder.
+/// Steps per octave of the fine ladder: the maximum is flat, finer steps would tell nothing.
 const FINE: i32 = 3;
 /// How far across the plateau a narrow delta lies, as a share in logarithm. Planes leave two coordinates
 /// open: estimates gain from a wider support.
 const ACROSS: f64 = 1.0 / 3.0;
+/// The same of planes.
 const ACROSS_OF_PLANES: f64 = 3.0 / 4.0;
-/// Below the lower edge of the plateau evidence grows by more than this per octave, or is less than this
-/// share of the best of the coarse ladder.
+/// Below the lower edge of the plateau evidence grows by more than this factor per octave, or is less than a share of the
+/// best of the coarse ladder: on a plateau it hardly grows.
 const GROWTH: f64 = 1.2;
+/// The share.
 const FAR_BELOW: f64 = 0.8;
-/// Steps below the best delta in which the edge is looked for.
+/// Steps below the best delta in which the edge is looked for: five octaves.
 const LOWEST: i32 = 15;
-/// A narrow delta is at most this many times the edge;
+/// A narrow delta is at most this many times the edge: beyond, wrong entries that are not far away keep it evident;
 const BEYOND_EDGE: f64 = 2.25;
-/// where a source gives scores, at most so many times.
+/// where a source gives scores, at most so many times, as its wrong entries look alike.
 const BEYOND_EDGE_OF_SCORED: f64 = 2.0;
 
 /// Delta for `released` as `family`, whose consensus reads `used`: the lists as `given`, or those of both directions. Where

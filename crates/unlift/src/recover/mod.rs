@@ -2,13 +2,13 @@
 //!
 //! In order, a file or a folder per step, each of which imports only what stands above it and `map`:
 //!
-//! 1. [`options`]: what a user may choose; `result`: what comes out.
+//! 1. `options`: what a user may choose; `result`: what comes out.
 //! 2. `map`: records, lists and places as solvers read them; `map/settings` is all that differs between maps and images.
-//! 3. Solvers, each of which implements the trait of `solve`: [`consensus`], [`joint`], [`ransac`], [`placement`].
-//! 4. [`delta`]: the distance that decides support, chosen by how well consensus then does.
-//! 5. [`exact`]: coordinates that a rule of the scheme fixes. [`confidence`]: how sure the attacker is.
-//!    [`pairs_of_descriptors`]: whose descriptor is whose on a paired line.
-//! 6. [`model`]: what is learned of a map. [`task`]: model, records and lists together, solved in any parts; [`rounds`]: joint
+//! 3. Solvers, each of which implements the trait of `solve`: `consensus`, `joint`, `ransac`, `placement`.
+//! 4. `delta`: the distance that decides support, chosen by how well consensus then does.
+//! 5. `exact`: coordinates that a rule of the scheme fixes. `confidence`: how sure the attacker is.
+//!    `pairs_of_descriptors`: whose descriptor is whose on a paired line.
+//! 6. `model`: what is learned of a map. `task`: model, records and lists together, solved in any parts; `rounds`: joint
 //!    recovery one round at a time.
 //!
 //! [`prepare`] learns a model, [`Task`] solves with it, and [`recover`] does both.

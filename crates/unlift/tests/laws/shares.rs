@@ -159,8 +159,8 @@ fn order_of_records_hardly_matters<const D: usize>(name: &str, scheme: &dyn Sche
     };
     let same = (0..released.n_slots()).filter(|&slot| is_same(slot)).count();
     let share = same as f64 / released.n_slots() as f64;
-    eprintln!("{name} {D}: {share}");
-    assert!(share > 0.9, "{name}: {share} of the points are where they were");
+    // Measured: 98.5 (`cp`, `cp2d`) to 99.9 %.
+    assert!(share > 0.97, "{name}: {share} of the points are where they were");
 }
 
 #[test]

@@ -19,7 +19,7 @@ use crate::recover::result::estimate::{Estimate, Status};
 
 /// Crowds are looked for where chance expects at most this share of the listed estimates: beyond, a crowd is no news.
 const MOST_CHANCE: f32 = 0.3;
-/// The density of estimates is smooth over this many deltas: wider than a crowd.
+/// The density of estimates is smooth over this many deltas: it must not follow the crowds that it judges.
 const SMOOTH: f32 = 4.0;
 /// Ratios of lengths are told apart down to this: a logarithm needs a floor.
 const LEAST_RATIO: f32 = 1e-3;

@@ -15,14 +15,15 @@ use crate::recover::map::line_rows::LineRow;
 use crate::recover::map::lists::Lists;
 use crate::recover::result::estimate::{Estimate, Status, stored_support};
 
-/// Slots whose lists are mixed to see what chance alone yields.
+/// Slots whose lists are mixed to see what chance alone yields: a mean over so many is known to a few percent.
 const SAMPLE: usize = 1 << 9;
-/// Evidence counts in excess of this many times what chance alone yields in the mean.
+/// Evidence counts in excess of this many times what chance alone yields in the mean: half of the slots lie above the mean.
 const CHANCE: f32 = 2.0;
-/// How often scores are averaged with those of neighbors.
+/// How often scores are averaged with those of neighbors: each time takes half of what is a slot's own.
 const SMOOTHINGS: usize = 3;
-/// Ranges are compared on each side among this part of an anchor's rays, and at least so many.
+/// Ranges are compared on each side among this part of an anchor's rays (as a divisor): density differs by bearing.
 const SECTORS: usize = 12;
+/// But among so many rays at least: ranks among fewer are coarse.
 const LEAST_SECTOR: usize = 20;
 
 /// What the listed rays of a slot's own anchor say.

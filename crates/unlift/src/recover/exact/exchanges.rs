@@ -14,12 +14,13 @@ use super::side_by_side::side_by_side;
 use crate::recover::map::settings::Settings;
 use crate::recover::result::estimate::{Estimate, Status};
 
-/// Rounds of learning.
+/// Rounds of learning: a fixed number, so that time does not depend on the map.
 const ROUNDS: usize = 6;
-/// Messages have settled when none moves by more than this share: while the law is learned, and at last.
+/// Messages have settled when none moves by more than this share, while the law is learned: it will change again.
 const LEARNING: f32 = 0.02;
+/// The same at last.
 const SETTLED: f32 = 1e-3;
-/// Pairs less probable than this teach nothing.
+/// Pairs less probable than this teach nothing: there are many, and together they weigh little.
 const NOTHING: f32 = 1e-3;
 /// `estimates` with the exact coordinate wherever the partner is known.
 pub(super) fn settle<const D: usize>(

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::partners::{PART, Partners};
 
-/// Passes at most.
+/// Passes at most: a bound for pairs that settle slowly.
 const PASSES: usize = 30;
 
 /// Messages along pairs: `at[e]` is what the record of entry `e` tells the partner: how free it is.

@@ -8,19 +8,20 @@ use rayon::prelude::*;
 use crate::recover::result::estimate::{Estimate, Status};
 use crate::released::Rays;
 
-/// Starts tried per axis, at first and in each finer step.
+/// Starts tried per axis and voxel, at first and in each finer step: between two of them most voxels keep their parity.
 const STARTS: usize = 16;
-/// Finer steps, each over the two intervals around the best start so far.
+/// Finer steps (each eight times as fine), each over the two intervals around the best start so far.
 const FINER: usize = 4;
-/// Sweeps over the axes in each finer step.
+/// Sweeps over the axes in each finer step: the second one sees the other axes mended.
 const SWEEPS: usize = 2;
-/// Estimates looked at for the first start, and for finer ones.
+/// Estimates looked at for the first start, of which there are thousands, and for finer ones.
 const SAMPLE: (usize, usize) = (1 << 12, 1 << 15);
 /// The grid is believed when so many more of these estimates agree than do not: as a share, and in
 /// standard deviations of what a wrong grid yields (the best of all starts reaches 4 or 5).
 const LEAST: f64 = 0.1;
+/// The standard deviations.
 const SIGMAS: f64 = 8.0;
-/// An estimate is moved this far past the wall, in voxels.
+/// An estimate is moved this far past the wall, in voxels: on it, rounding would decide.
 const INSIDE: f32 = 1e-3;
 
 /// A checkerboard: its start, and the center of the voxel there.

@@ -4,11 +4,11 @@ use rayon::prelude::*;
 
 use super::side::Side;
 
-/// Records whose partners are looked for by one thread at a time.
+/// Records whose partners are looked for by one thread at a time: a fixed number, so that sums do not depend on threads.
 pub(super) const PART: usize = 1 << 10;
-/// Partners looked at per record, as a mean over the records.
+/// Partners looked at per record, as a mean over the records: time and memory stay linear in the map.
 const MOST: f64 = 16.0;
-/// Records on which the number of partners is counted.
+/// Records on which the number of partners is counted: a mean needs no more.
 const SAMPLE: usize = 1 << 12;
 
 /// Possible partners of every record: each pair from both sides.
@@ -86,7 +86,7 @@ struct Strips {
     step: f64,
 }
 
-/// Steps along one axis at most.
+/// Steps along one axis at most: with the axis above them they fit a sorting key.
 const MOST_STEPS: f64 = (1u64 << 40) as f64;
 
 impl Strips {

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::side::Side;
 use crate::geometry::curve;
 
-/// Cells per value, as a power of two.
+/// Cells per value, as a power of two: two of them and the axis make a key.
 const BITS: u32 = 20;
 
 /// All records, so that those that may have exchanged a coordinate stand side by side: the estimate of each is

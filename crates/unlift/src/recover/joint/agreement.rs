@@ -10,7 +10,7 @@ use crate::recover::map::graph::{Graph, record_of};
 use crate::recover::map::pieces::Pieces;
 use crate::recover::result::estimate::{Estimate, Status};
 
-/// Slots looked at.
+/// Slots looked at: the mean over so many is known better than the share by which it may fall.
 const SLOTS: usize = 1 << 12;
 
 /// The mean number of records at the other ends of a slot's edges that pass near its estimate, less

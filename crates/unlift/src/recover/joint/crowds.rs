@@ -9,7 +9,7 @@ use super::look::Look;
 use crate::recover::map::graph::{Side, side};
 use crate::recover::map::places::distance2;
 
-/// Every so many slots of the sample are looked at,
+/// Every so many slots of the sample are looked at, as one mean of all is asked for,
 const EVERY: usize = 2;
 /// and so many entries of each.
 const ENTRIES: usize = 2;

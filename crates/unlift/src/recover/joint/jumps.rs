@@ -72,5 +72,5 @@ impl Jumps {
     }
 }
 
-/// Slots whose jumps one thread tells at a time.
+/// Slots whose jumps one thread tells at a time: enough that sharing them out costs nothing.
 const CHUNK: usize = 64;

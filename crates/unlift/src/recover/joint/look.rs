@@ -5,11 +5,11 @@ use crate::recover::map::graph::Graph;
 use crate::recover::map::places::Places;
 use crate::seed::{Draws, Stage};
 
-/// Random edges per slot.
+/// Random edges per slot: together of the order of the edges that are looked at.
 pub(super) const RANDOM: usize = 24;
 /// Random edges of one slot: other ends, and the class of each.
 pub(super) type RandomEdges = [(u32, u8); RANDOM];
-/// Slots looked at.
+/// Slots looked at: about 100,000 edges of lists of 50.
 const SLOTS: usize = 1 << 11;
 
 /// What the law is learned from.

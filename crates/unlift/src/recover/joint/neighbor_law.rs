@@ -13,20 +13,20 @@ use crate::recover::map::graph::{CLASSES, Side, either, side};
 use crate::recover::map::settings::Settings;
 use crate::simd::{Kernel, dispatch};
 
-/// Bins of the radius.
+/// Bins of the radius, up to the reach: a dozen within the radius of the law.
 const BINS: usize = 48;
-/// From this bin on an edge is too long for one of a neighbor.
+/// From this bin on an edge is too long for one of a neighbor: three radii of the law.
 const OUTSIDE: usize = BINS / 4 * 3;
-/// Slots looked at by one thread at a time.
+/// Slots looked at by one thread at a time: a fixed number, so that sums do not depend on threads.
 const PART: usize = 256;
-/// Mutual edges tell the radius if so many of them are close,
+/// Mutual edges tell the radius if so many of them are close (a median of fewer is noise),
 const ENOUGH: f64 = 250.0;
 /// and within this share of the radius of all.
 const TIGHTER: f64 = 0.65;
 /// Of the excess over chance the tail of true neighbors takes so much with it when what is merely in the
 /// region is taken off: measured on maps whose wrong entries are anywhere.
 const TAIL: f64 = 0.1;
-/// The share of neighbors in a class is at most and at least this.
+/// The share of neighbors in a class is at least and at most this: odds of nothing or without end would never change again.
 const SHARE: (f64, f64) = (5e-4, 0.95);
 
 /// What is known about true neighbors.

@@ -35,9 +35,9 @@ const TRUE_CANDIDATES: f32 = 5.0;
 const CANDIDATES: (f32, f32) = (8.0, 16.0);
 /// Records decide between the best candidates that lie within this many nats of each other.
 const DOUBT: f32 = 8.0;
-/// The share of neighbors whose estimate is wrong, though their record is near.
+/// The share of neighbors whose estimate is taken to be wrong though their record is near: what a record may still add.
 const ASTRAY: f32 = 0.2;
-/// The weight of the density prior.
+/// The weight of the density prior: candidates are estimates, which lie where density is large as it is.
 const PRIOR: f32 = 0.5;
 
 /// So many places (8 MB) stay in the cache: no memory is asked for ahead.

@@ -6,7 +6,7 @@ use crate::recover::map::lanes::{LANES, Lanes};
 use crate::recover::map::pieces::{Piece, Pieces};
 use crate::recover::map::places::Places;
 
-/// Least squares steps.
+/// Least squares steps: the second one weighs neighbors from where the first one led.
 const STEPS: usize = 2;
 
 /// The directions of the pieces that neighbors lie on, in columns.

@@ -19,18 +19,18 @@ use crate::recover::result::estimate::Estimate;
 use crate::recover::solve::{InRounds, Moved};
 use crate::simd::{Kernel, dispatch};
 
-/// Sweeps over all slots at most.
+/// Sweeps over all slots at most: a bound for maps that never settle.
 const SWEEPS: usize = 16;
 /// Rounds of a sweep: in each, every so many-th slot moves. In the first sweep all move at once: its
 /// estimates come from records alone, no slot has followed another yet.
 const TURNS: usize = 2;
-/// True neighbors are looked for within this many radii of the law.
+/// True neighbors are looked for within this many radii of the law: nearly all of its mass.
 const REACH: f32 = 4.0;
-/// Estimates enter the re-made position within this many radii of the law.
+/// Estimates enter the re-made position within this many radii of the law, less the farther they are.
 const KERNEL: f32 = 3.75;
 /// The radius of the law is at least this share of the largest coordinate: estimates of one place differ by rounding.
 const ROUNDING: f32 = 8.0 * f32::EPSILON;
-/// The density of estimates is smooth over this many radii of the law.
+/// The density of estimates is smooth over this many radii of the law: it must not follow the very crowds that it judges.
 const SMOOTH: f32 = 4.5;
 /// Sweeps end when fewer than this share of the slots jump farther than a radius of the law: so few hardly change anything.
 const SETTLED: f64 = 0.03;

@@ -16,15 +16,15 @@ use crate::Error;
 use crate::neighbors::Neighborhoods;
 use crate::simd::{Kernel, dispatch};
 
-/// Cells of a grid at most.
+/// Cells of a grid at most: 32 per axis, as density varies over the size of a room.
 const CELLS: usize = 1 << 15;
-/// Records whose density is summed; of a larger map a part, spread over the file.
+/// Records whose density is summed, one per cell; of a larger map a part, spread over the file.
 const RECORDS: usize = 1 << 15;
-/// Pairs of a slot and a listed record that tell where the map lies.
+/// Slots whose crossings with listed records tell where the map lies: enough for a quantile of 3 %.
 const CROSSINGS: usize = 1 << 12;
-/// The share of crossings left out on either side of the box.
+/// The share of crossings left out on either side of the box: those of wrong entries may lie anywhere.
 const TRIM: f64 = 0.03;
-/// Every place has at least this share of the mean density.
+/// Every place has at least this share of the mean density: where no record was counted one vote would prove all.
 const FLOOR: f32 = 0.05;
 
 /// The density of records, per cell.

@@ -10,13 +10,13 @@ pub(crate) struct Density<const D: usize> {
     typical: f32,
 }
 
-/// A cell has at least the density of this part of one estimate.
+/// A cell has at least the density of this part of one estimate: no place is without chance.
 const LEAST: f32 = 0.5;
-/// Cells with less than this many estimates take their density from a wider neighborhood,
+/// Cells with less than this many estimates, which is noise, take their density from a wider neighborhood,
 const ENOUGH: f32 = 0.25;
 /// twice as wide at most this many times over.
 const WIDER: usize = 3;
-/// Sparse places are taken as so much wider at most.
+/// Sparse places are taken as so much wider at most: the farthest points have no neighbors worth the name.
 const WIDEST: f32 = 2.5;
 
 impl<const D: usize> Density<D> {

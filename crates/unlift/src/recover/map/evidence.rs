@@ -6,7 +6,7 @@
 
 use super::lanes::ln;
 
-/// The chance that a random record agrees is taken for at most this.
+/// The chance that a random record agrees is taken for at most this: beyond, a density is no probability.
 pub(crate) const MOST_CHANCE: f32 = 0.5;
 
 /// Evidence in nats that `n` of `k` listed records agree where a random one does with probability

@@ -15,7 +15,7 @@ fn length<const D: usize>(v: &[f32; D]) -> f64 {
     v.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>().sqrt()
 }
 
-/// Lines and rounds in which [`line_extent`] looks for the middle of a map.
+/// Lines, and rounds (each leaves a third of the error), in which [`line_extent`] looks for the middle of a map.
 const MIDDLE: (usize, usize) = (1000, 60);
 
 /// The median distance of the lines from their middle. Distances from the origin would not do: it is

@@ -15,7 +15,7 @@ pub(crate) struct Lists<'a> {
 /// Mixed lists take entries this share of all entries apart (the golden section spreads them
 /// evenly), so that no two of them come from one list.
 const SPREAD: f64 = 0.618_033_988_749_895;
-/// So many entries are looked at for each that a mixed list takes.
+/// So many entries are looked at for each that a mixed list takes: enough wherever there are others to find.
 const TRIES: usize = 8;
 
 impl<'a> Lists<'a> {

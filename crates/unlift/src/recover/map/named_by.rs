@@ -12,9 +12,11 @@ use crate::neighbors::Neighborhoods;
 /// Records in a block, and slots whose entries are turned around by one thread at a time: what belongs to them stays in the
 /// cache.
 pub(super) const BLOCK: usize = 1 << BITS;
+/// Bits of a slot or a record within its block: 4,096.
 const BITS: u32 = 12;
 /// Classes of scores are less than this.
 pub(super) const MOST_CLASSES: usize = 1 << CLASS_BITS;
+/// Bits of a class of scores: what two times twelve leave of an entry, and no more than serves.
 const CLASS_BITS: u32 = 3;
 /// A slot, a record and a class side by side.
 const _: () = assert!(2 * BITS + CLASS_BITS <= u32::BITS);

@@ -49,9 +49,9 @@ impl<const D: usize> Piece<D> {
 pub(crate) trait Pieces<const D: usize>: Sync {
     /// Pieces per slot.
     const PER_SLOT: usize;
-    /// How much an estimate counts along its own piece at most, against 1 across it.
+    /// How much an estimate counts along its own piece at most, against 1 across it: its record says nothing there.
     const MOST_ALONG: f32;
-    /// How fast that falls with the number of votes.
+    /// With more than so many votes over that share, it counts less: `ALONG / votes`.
     const ALONG: f32;
     /// An estimate that is so many times as likely a true neighbor's as one of chance counts half when a place is
     /// made anew.
@@ -99,7 +99,7 @@ pub(crate) struct LinePieces<'a, const D: usize> {
     anchored: bool,
 }
 
-/// Ranges below this share of a ray are as unlikely as this one.
+/// Ranges below this share of a ray are as unlikely as this one: a logarithm needs a floor.
 const LEAST_RANGE: f32 = 1e-3;
 
 impl<'a, const D: usize> LinePieces<'a, D> {

@@ -44,6 +44,7 @@ pub(crate) struct Settings {
     pub(crate) confidence: bool,
 }
 
+/// Chosen on RedKitchen and Castle.
 const OF_MAPS: Settings = Settings {
     delta_chunks: 12,
     delta_chunks_of_planes: 24,
@@ -60,6 +61,7 @@ const OF_MAPS: Settings = Settings {
     confidence: true,
 };
 
+/// Chosen on six photos of RedKitchen.
 const OF_IMAGES: Settings = Settings {
     delta_chunks: 4,
     delta_chunks_of_planes: 4,

@@ -28,7 +28,7 @@ pub(super) struct LineLoop {
     votes: Sections,
 }
 
-/// Records per sample along a line.
+/// Records per sample along a line: twice what fixes a place, as the paper leaves it open.
 const LINE_SAMPLE: u32 = 2;
 
 impl LineLoop {
@@ -102,7 +102,7 @@ pub(super) struct PlaneLoop {
     offsets: Vec<Vec<f32>>,
 }
 
-/// Records per sample and free axis of a plane.
+/// Records per sample and free axis of a plane: the same.
 const PLANE_SAMPLE: u32 = 2;
 
 impl PlaneLoop {
