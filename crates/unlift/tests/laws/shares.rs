@@ -102,7 +102,7 @@ fn equivariance() {
 /// What differs in one round spreads in the next.
 #[test]
 fn equivariance_of_joint_recovery() {
-    over_schemes!(shifted_and_scaled_maps_leak_the_same, Solver::Joint, 1.0);
+    over_schemes!(shifted_and_scaled_maps_leak_the_same, Solver::Joint, 0.5);
 }
 
 /// The same records in another order, each row with the same number of slots; `None` where regions or voxels
