@@ -5,9 +5,9 @@ use std::sync::Mutex;
 use rayon::prelude::*;
 
 use super::best::{Best, Found};
-use super::pairs::{Pairs, Tile};
 use super::rows::Rows;
-use super::{alike, pairs};
+use super::tiles::{Pairs, Tile};
+use super::{alike, tiles};
 use crate::simd::BLOCK;
 use crate::{Descriptors, Error};
 
@@ -57,7 +57,7 @@ pub fn search<L: Likeness>(
     let all = Pairs::all(n_blocks.div_ceil(BLOCK));
     let alike = compare(likeness, &of_blocks, PARTNERS, (&all, None));
     let every = rows.len().div_ceil(USUAL);
-    Ok(compare(likeness, rows, most, (&pairs::chosen(&alike), Some(every))))
+    Ok(compare(likeness, rows, most, (&tiles::chosen(&alike), Some(every))))
 }
 
 /// Compares rows as far as `pairs` says; each keeps its `most` best partners of other records. What scores are usual

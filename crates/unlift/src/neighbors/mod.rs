@@ -11,10 +11,10 @@ mod join;
 mod neighborhoods;
 pub mod oracle;
 mod overlap;
-mod pairs;
 mod rows;
 mod similarity;
 pub mod sources;
+mod tiles;
 mod walk;
 
 pub use geometric::geometric;

@@ -8,7 +8,7 @@
 //! 4. `delta`: the distance that decides support, chosen by how well consensus then does.
 //! 5. `exact`: coordinates that a rule of the scheme fixes. `confidence`: how sure the attacker is.
 //!    `pairs_of_descriptors`: whose descriptor is whose on a paired line.
-//! 6. `model`: what is learned of a map. `task`: model, records and lists together, solved in any parts; `rounds`: joint
+//! 6. `learned`: what is learned of a map. `task`: model, records and lists together, solved in any parts; `rounds`: joint
 //!    recovery one round at a time.
 //!
 //! [`prepare`] learns a model, [`Task`] solves with it, and [`recover`] does both.
@@ -18,8 +18,8 @@ mod consensus;
 mod delta;
 mod exact;
 mod joint;
+mod learned;
 mod map;
-mod model;
 mod options;
 mod pairs_of_descriptors;
 mod placement;
@@ -33,7 +33,7 @@ mod task;
 pub use confidence::model::{N_KINDS, N_TERMS, centered, terms};
 #[doc(hidden)]
 pub use confidence::seen::{Cues, Seen};
-pub use model::Model;
+pub use learned::Model;
 pub use options::{Delta, RecoverOptions, Solver};
 pub use result::estimate::{Estimate, Status};
 pub use result::probability::Confidence;

@@ -62,7 +62,7 @@ pub const INSIDE_RECOVER: &[(&str, &[&str])] = &[
     ("exact", &["map", "result"]),
     ("confidence", &["map", "result", "options"]),
     ("pairs_of_descriptors", &[]),
-    ("model", &["map", "options"]),
+    ("learned", &["map", "options"]),
     ("rounds", &["result", "solve"]),
     (
         "task",
@@ -79,7 +79,7 @@ pub const INSIDE_RECOVER: &[(&str, &[&str])] = &[
             "exact",
             "confidence",
             "pairs_of_descriptors",
-            "model",
+            "learned",
             "rounds",
         ],
     ),

@@ -19,8 +19,8 @@ mod near;
 mod neighbor_law;
 mod one_slot;
 mod remake;
-mod rounds;
 mod start;
+mod sweeps;
 
 use std::ops::Range;
 
@@ -29,8 +29,8 @@ use crate::recover::map::graph::Graph;
 use crate::recover::map::pieces::{CandidatePieces, LinePieces, PlanePieces};
 use crate::recover::result::estimate::Estimate;
 use crate::recover::solve::{InRounds, Solve};
-use rounds::Sweeps;
 pub(crate) use start::JointStart;
+use sweeps::Sweeps;
 
 /// Joint recovery of one map.
 pub(crate) struct Joint<'a, const D: usize> {
