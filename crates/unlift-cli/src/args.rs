@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use unlift::audit::Threshold;
 use unlift::neighbors::oracle::Noise;
-use unlift::neighbors::sources::Joined;
+use unlift::neighbors::sources::Named;
 use unlift::obfuscate::Entry;
 use unlift::recover::{Delta, Solver};
 
@@ -268,7 +268,7 @@ pub struct FindArgs {
     pub released: PathBuf,
     /// How: a source, or several joined by +
     #[arg(long, value_name = "SOURCE", value_parser = values::joined)]
-    pub source: Joined,
+    pub source: Named,
     /// Records per list [default: the source's own choice]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
     pub k: Option<u16>,

@@ -12,7 +12,7 @@ use unlift_io::clouds::{record_segments, write_lines, write_points, write_recove
 /// Writes clouds in map units, so that they lie on the owner's map.
 pub struct Clouds {
     unit_in_map_units: f64,
-    schemes: Vec<&'static str>,
+    schemes: Vec<String>,
 }
 
 impl Clouds {
@@ -36,9 +36,9 @@ impl Clouds {
         if self.schemes.is_empty() {
             write_points(&stage(out, "original.ply")?, &originals, None)?;
         }
-        let scheme = cell.row.scheme;
-        if !self.schemes.contains(&scheme) {
-            self.schemes.push(scheme);
+        let scheme = &cell.row.scheme;
+        if !self.schemes.contains(scheme) {
+            self.schemes.push(scheme.clone());
             self.write_obfuscated(out, scheme, cell.released, cell.original.reveal().positions())?;
         }
         let row = cell.row;

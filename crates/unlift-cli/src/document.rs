@@ -5,7 +5,7 @@ use std::time::Instant;
 use indexmap::IndexMap;
 use serde_json::{Map, Value, json};
 use unlift::Unit;
-use unlift::audit::{self, NotAudited, Plan, Row, Source, Threshold};
+use unlift::audit::{self, NeighborsBy, NotAudited, Plan, Row, Threshold};
 use unlift::recover::Delta;
 use unlift_report::document as report;
 
@@ -22,29 +22,27 @@ pub struct Provenance {
 }
 
 /// The plan and `more` as options for the record.
-pub fn options(plan: &Plan, more: Map<String, Value>) -> Map<String, Value> {
-    let names: Vec<&str> = plan.schemes.iter().map(|scheme| scheme.name).collect();
+pub fn options<const D: usize>(plan: &Plan<D>, more: Map<String, Value>) -> Map<String, Value> {
+    let names: Vec<&str> = plan.schemes.iter().map(|scheme| scheme.name()).collect();
     let labels: Vec<&str> = plan.thresholds.iter().map(|t| t.label.as_str()).collect();
     let mut options = Map::new();
     options.insert("schemes".into(), json!(names));
-    // No scheme for images has voxels.
-    if plan.schemes.iter().any(|scheme| scheme.in_3d.is_some()) {
-        options.insert("voxel".into(), json!(plan.scheme_options.voxel));
+    for (name, value) in plan.schemes.iter().flat_map(|scheme| scheme.parameters()) {
+        options.insert(name.into(), json!(value));
+    }
+    if D == 3 {
         options.insert("records_alone".into(), json!(plan.records_alone));
     }
-    let neighbors: Vec<String> = plan.sources.iter().map(Source::name).collect();
+    let neighbors: Vec<&str> = plan.neighbors.iter().map(NeighborsBy::name).collect();
     options.insert("neighbors".into(), json!(neighbors));
-    if plan.sources.contains(&Source::Oracle) {
+    if plan.asks_oracle() {
         let names: Vec<&str> = plan.oracle_noise.iter().map(|noise| noise.name()).collect();
         options.insert("oracle_noise".into(), json!(names));
     }
     options.insert("inlier_ratios".into(), json!(plan.inlier_ratios));
     options.insert("k".into(), json!(plan.k));
-    let own = |source: &Source| match source {
-        Source::Own(joined) => Some((joined.name(), json!(joined.k()))),
-        Source::Oracle | Source::Given(_) => None,
-    };
-    let own: Map<String, Value> = plan.sources.iter().filter_map(own).collect();
+    let own: Map<String, Value> =
+        plan.own_sources().map(|source| (source.name().to_owned(), json!(source.k()))).collect();
     if !own.is_empty() {
         options.insert("source_k".into(), Value::Object(own));
     }
@@ -75,7 +73,11 @@ pub struct Found<'a> {
 }
 
 /// The document of an audit; of images it lacks the figures of each.
-pub fn document(plan: &Plan, outcome: &Found<'_>, provenance: Provenance) -> report::Document {
+pub fn document<const D: usize>(
+    plan: &Plan<D>,
+    outcome: &Found<'_>,
+    provenance: Provenance,
+) -> report::Document {
     let seconds = outcome.seconds;
     let stages = [
         ("search", seconds.search),
@@ -161,7 +163,7 @@ pub fn row(row: &Row, thresholds: &[Threshold]) -> report::Row {
     let alone: Option<Vec<(&str, f64)>> =
         (0..thresholds.len()).map(|at| row.best_alone(at)).collect();
     report::Row {
-        scheme: row.scheme.to_owned(),
+        scheme: row.scheme.clone(),
         neighbors: row.neighbors.clone(),
         oracle_noise: row.oracle_noise.map(str::to_owned),
         inlier_ratio: row.inlier_ratio,
@@ -216,12 +218,12 @@ pub fn row(row: &Row, thresholds: &[Threshold]) -> report::Row {
 
 /// What has no row, told once per scheme, source and reason, with the part of the source's rows that it is
 /// about where others are there.
-fn not_audited(plan: &Plan, missing: &[NotAudited]) -> Vec<report::NotAudited> {
+fn not_audited<const D: usize>(plan: &Plan<D>, missing: &[NotAudited]) -> Vec<report::NotAudited> {
     let mut told: Vec<(&NotAudited, Vec<&NotAudited>)> = Vec::new();
     for one in missing {
         let same = |(first, _): &&mut (&NotAudited, Vec<&NotAudited>)| {
-            (first.scheme, &first.neighbors, &first.reason)
-                == (one.scheme, &one.neighbors, &one.reason)
+            (&first.scheme, &first.neighbors, &first.reason)
+                == (&one.scheme, &one.neighbors, &one.reason)
         };
         match told.iter_mut().find(same) {
             Some((_, all)) => all.push(one),
@@ -235,14 +237,14 @@ fn not_audited(plan: &Plan, missing: &[NotAudited]) -> Vec<report::NotAudited> {
             || first.reason.clone(),
             |_| format!("at {}: {}", parts(plan, &all).join(", "), first.reason),
         );
-        let (scheme, neighbors) = (first.scheme.to_owned(), first.neighbors.clone());
+        let (scheme, neighbors) = (first.scheme.clone(), first.neighbors.clone());
         report::NotAudited { scheme, neighbors, reason }
     };
     told.into_iter().map(text).collect()
 }
 
 /// Inlier ratios, with the noise model where there are several.
-fn parts(plan: &Plan, missing: &[&NotAudited]) -> Vec<String> {
+fn parts<const D: usize>(plan: &Plan<D>, missing: &[&NotAudited]) -> Vec<String> {
     let part = |one: &&NotAudited| {
         let ratio = one.inlier_ratio.map(|ratio| ratio.to_string()).unwrap_or_default();
         match one.oracle_noise {
@@ -259,7 +261,7 @@ fn bin(bin: &unlift::evaluate::Bin) -> report::ReliabilityBin {
 
 fn break_even(row: &audit::BreakEven) -> report::BreakEven {
     report::BreakEven {
-        scheme: row.scheme.to_owned(),
+        scheme: row.scheme.clone(),
         solver: row.solver.to_owned(),
         oracle_noise: Some(row.oracle_noise.to_owned()),
         threshold: row.threshold.clone(),

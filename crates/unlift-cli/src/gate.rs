@@ -12,8 +12,8 @@
 //! numbers, so `0.1` finds the threshold `0.10`. No name of a solver or a source is a number, so the first
 //! number after the scheme is the threshold.
 
-use unlift::audit::{NotAudited, Plan, Source};
-use unlift::neighbors::sources::{Joined, SOURCES};
+use unlift::audit::{NotAudited, Plan};
+use unlift::neighbors::sources::{Named, SOURCES};
 use unlift::recover::Solver;
 
 use crate::values::{positive, ratio};
@@ -143,19 +143,19 @@ impl Gate {
     }
 
     /// The part of the gate that `plan` has no row for, as expected and found.
-    pub fn not_in(&self, plan: &Plan) -> Option<(String, String)> {
+    pub fn not_in<const D: usize>(&self, plan: &Plan<D>) -> Option<(String, String)> {
         let listed = |names: Vec<String>| format!("one of {}", names.join(", "));
         let lacks = |what: &str, wanted: &str, names: Vec<String>| {
             let found = (wanted.to_owned(), !names.iter().any(|name| name == wanted));
             found.1.then(|| (format!("{what}: {}", listed(names)), found.0))
         };
-        let schemes = || plan.schemes.iter().map(|s| s.name.to_owned()).collect();
+        let schemes = || plan.schemes.iter().map(|s| s.name().to_owned()).collect();
         let solvers = || plan.solvers.iter().map(|s| s.name().to_owned()).collect();
-        let sources = || plan.sources.iter().map(Source::name).collect();
+        let sources = || plan.neighbors.iter().map(|by| by.name().to_owned()).collect();
         let scheme = self.scheme.as_ref().and_then(|name| lacks("scheme", name, schemes()));
         let solver = || self.solver.and_then(|name| lacks("solver", name, solvers()));
         let source = || self.source.as_ref().and_then(|name| lacks("neighbors", name, sources()));
-        let oracle = plan.sources.contains(&Source::Oracle);
+        let oracle = plan.asks_oracle();
         let ratios = if oracle { plan.inlier_ratios.as_slice() } else { &[] };
         let ratio = || {
             let wanted = self.inlier_ratio.filter(|wanted| !ratios.contains(wanted))?;
@@ -215,7 +215,7 @@ fn solver_name(text: &str) -> Option<&'static str> {
 fn source_name(text: &str) -> Option<String> {
     match text.trim() {
         name @ (ORACLE | "file") => Some(name.to_owned()),
-        name => Joined::parse(name).ok().map(|joined| joined.name()),
+        name => Named::parse(name).ok().map(|joined| joined.name()),
     }
 }
 
@@ -335,8 +335,8 @@ mod tests {
 
     #[test]
     fn what_the_plan_lacks_is_named() {
-        let mut plan = Plan::new(unlift::Unit::Meter);
-        plan.schemes.retain(|entry| entry.name == "ppl");
+        let mut plan = Plan::<3>::new(unlift::Unit::Meter);
+        plan.schemes.retain(|scheme| scheme.name() == "ppl");
         plan.inlier_ratios = vec![1.0, 0.5];
         let lacking = |text: &str| {
             let part = Gate::parse(text).unwrap().not_in(&plan);
@@ -355,7 +355,7 @@ mod tests {
     #[test]
     fn what_was_not_audited_is_missed() {
         let scheme = NotAudited {
-            scheme: "ppl",
+            scheme: "ppl".to_owned(),
             neighbors: None,
             oracle_noise: None,
             inlier_ratio: None,

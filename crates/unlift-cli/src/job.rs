@@ -30,7 +30,7 @@ pub struct Job<'a> {
     /// The direction that is up in the picture, where known.
     pub up: Option<[f64; 3]>,
     /// What is to be done.
-    pub plan: Plan,
+    pub plan: Plan<3>,
     /// What was read.
     pub input: Input,
     /// Options for the record, beside those in the plan.
@@ -123,13 +123,13 @@ pub fn perform(job: Job<'_>, mut out: OutputSet) -> anyhow::Result<Finished> {
 }
 
 /// Rows as gates see them.
-fn candidates<'a>(plan: &Plan, rows: &'a [Row]) -> Vec<Candidate<'a>> {
+fn candidates<'a, const D: usize>(plan: &Plan<D>, rows: &'a [Row]) -> Vec<Candidate<'a>> {
     let mut candidates = Vec::new();
     // The reference is no attack.
     for row in rows.iter().filter(|row| row.solver != REFERENCE) {
         for (at, threshold) in plan.thresholds.iter().enumerate() {
             candidates.push(Candidate {
-                scheme: row.scheme,
+                scheme: &row.scheme,
                 solver: row.solver,
                 source: &row.neighbors,
                 inlier_ratio: row.oracle_noise.is_some().then_some(row.inlier_ratio),
@@ -143,7 +143,7 @@ fn candidates<'a>(plan: &Plan, rows: &'a [Row]) -> Vec<Candidate<'a>> {
 }
 
 /// A gate about no row is told before the audit runs, not after.
-pub fn check_gates(gates: &[Gate], plan: &Plan) -> anyhow::Result<()> {
+pub fn check_gates<const D: usize>(gates: &[Gate], plan: &Plan<D>) -> anyhow::Result<()> {
     let lacking = |gate: &Gate| gate.not_in(plan).map(|part| (gate.typed.clone(), part));
     match gates.iter().find_map(lacking) {
         None => Ok(()),
@@ -159,9 +159,9 @@ pub fn check_gates(gates: &[Gate], plan: &Plan) -> anyhow::Result<()> {
 }
 
 /// How every gate ended. One that is about something that could not be audited does not hold.
-pub fn gate_results(
+pub fn gate_results<const D: usize>(
     gates: &[Gate],
-    plan: &Plan,
+    plan: &Plan<D>,
     rows: &[Row],
     not_audited: &[NotAudited],
 ) -> anyhow::Result<Vec<GateResult>> {
@@ -170,7 +170,7 @@ pub fn gate_results(
         let found_percent = gate.worst(rows.iter().copied());
         let reason = not_audited.iter().find(|missing| gate.misses(missing)).map(|missing| {
             let with = missing.neighbors.as_ref().map(|name| format!(" with neighbors by {name}"));
-            let (scheme, with) = (missing.scheme, with.unwrap_or_default());
+            let (scheme, with) = (&missing.scheme, with.unwrap_or_default());
             format!("{scheme}{with} was not audited: {}", missing.reason)
         });
         // A gate that is about no row must never count as held.
@@ -198,7 +198,7 @@ struct Watcher<'a> {
 }
 
 /// The solvers whose points are drawn: what joint recovery starts from is not, beside what it ends with.
-fn drawn(plan: &Plan) -> Vec<Solver> {
+fn drawn<const D: usize>(plan: &Plan<D>) -> Vec<Solver> {
     let is_drawn =
         |solver: &Solver| *solver != Solver::JointStart || !plan.solvers.contains(&Solver::Joint);
     plan.solvers.iter().copied().filter(is_drawn).collect()
@@ -252,7 +252,7 @@ mod tests {
 
     #[test]
     fn what_joint_starts_from_is_drawn_only_by_itself() {
-        let mut plan = Plan::new(unlift::Unit::Meter);
+        let mut plan = Plan::<3>::new(unlift::Unit::Meter);
         assert_eq!(drawn(&plan), [Solver::Joint]);
         plan.solvers = vec![Solver::JointStart, Solver::Ransac];
         assert_eq!(drawn(&plan), plan.solvers);

@@ -22,7 +22,7 @@ const MOST_SHAPES: usize = 3_000;
 
 impl Pictures {
     /// Chooses the points to show; `n_views` results will be shown on them.
-    pub fn new(original: &Original<3>, plan: &Plan, n_views: usize) -> Self {
+    pub fn new(original: &Original<3>, plan: &Plan<3>, n_views: usize) -> Self {
         let points = original.reveal().positions();
         let most = points_within_budget(n_views, plan.schemes.len());
         let sample = subsample(points.len(), most, plan.seed);

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use unlift::audit::Threshold;
 use unlift::neighbors::oracle::Noise;
-use unlift::neighbors::sources::{Joined, source};
+use unlift::neighbors::sources::{Named, source};
 use unlift::obfuscate::{Entry, SCHEMES};
 use unlift::recover::{Delta, Solver};
 
@@ -14,7 +14,7 @@ pub enum NeighborSource {
     /// Made from the originals at chosen inlier ratios.
     Oracle,
     /// Made from the released map alone, by one source or several: names joined by `+`.
-    Own(Joined),
+    Own(Named),
     /// Lists by point, in a file.
     File(PathBuf),
 }
@@ -72,7 +72,7 @@ pub fn image_source(text: &str) -> Result<NeighborSource, String> {
         || format!("expected oracle, similarity, overlap or both joined by +, found {text}");
     let joined = joined(text).map_err(|_| wrong())?;
     match joined.not_in_dimension::<2>() {
-        None => Ok(NeighborSource::Own(joined.for_images())),
+        None => Ok(NeighborSource::Own(joined)),
         Some(_) => Err(wrong()),
     }
 }
@@ -155,8 +155,8 @@ pub fn neighbor_source(text: &str) -> Result<NeighborSource, String> {
 }
 
 /// Names of sources joined by `+`.
-pub fn joined(text: &str) -> Result<Joined, String> {
-    Joined::parse(text).map_err(|error| expected(&error))
+pub fn joined(text: &str) -> Result<Named, String> {
+    Named::parse(text).map_err(|error| expected(&error))
 }
 
 /// `NEIGHBORS,RATIO`, for example `20,2.0`.
@@ -222,7 +222,7 @@ mod tests {
 
     #[test]
     fn names_of_sources_are_names_and_the_rest_are_files() {
-        let own = |name: &str| NeighborSource::Own(Joined::parse(name).unwrap());
+        let own = |name: &str| NeighborSource::Own(Named::parse(name).unwrap());
         assert_eq!(neighbor_source("overlap"), Ok(own("overlap")));
         assert_eq!(neighbor_source("overlap+similarity"), Ok(own("overlap+similarity")));
         assert_eq!(neighbor_source("./overlap"), Ok(NeighborSource::File("./overlap".into())));

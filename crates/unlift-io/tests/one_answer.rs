@@ -5,14 +5,16 @@
 use std::path::Path;
 
 use unlift::audit::staged::{Pooled, key_of, oracle_lists, oracle_seed};
-use unlift::audit::{self, Cell, Observer, Plan, PointNeighbors, Row, Source, Variant, measure};
+use unlift::audit::{
+    self, Cell, NeighborsBy, Observer, Plan, PointNeighbors, Row, Variant, measure,
+};
 use unlift::descriptors::Values;
 use unlift::evaluate::blind;
 use unlift::geometry::frame::Bounds;
-use unlift::neighbors::Neighborhoods;
 use unlift::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
-use unlift::neighbors::sources::Joined;
-use unlift::obfuscate::{Entry, obfuscate};
+use unlift::neighbors::sources::Named;
+use unlift::neighbors::{Neighborhoods, of_what_there_is};
+use unlift::obfuscate::{SCHEMES, Scheme, obfuscate};
 use unlift::recover::{RecoverOptions, Solver, recover};
 use unlift::seed::{Draws, Key, Stage};
 use unlift::truth::Original;
@@ -35,17 +37,15 @@ fn descriptors<const D: usize>(points: &[[f64; D]], extent: f64) -> Descriptors 
 }
 
 /// Every source: the oracle at two ratios with three kinds of noise, all that work alone, and lists by point.
-fn sources<const D: usize>(k: usize) -> Vec<Source> {
-    let joined = |name: &str| Joined::parse(name).unwrap().with_k(k);
-    let own = ["similarity", "overlap", "geometric", "overlap+geometric"].map(joined);
-    let own = own.into_iter().filter(|own| own.not_in_dimension::<D>().is_none());
-    let mut sources = vec![Source::Oracle];
-    sources.extend(own.map(Source::Own));
-    sources
+fn sources<const D: usize>(k: usize) -> Vec<NeighborsBy<D>> {
+    let names = ["similarity", "overlap", "geometric", "overlap+geometric"];
+    let named = names.map(|name| Named::parse(name).unwrap().with_k(k));
+    let own = named.into_iter().filter_map(|named| named.of_dimension::<D>().ok());
+    [NeighborsBy::Oracle].into_iter().chain(own.map(NeighborsBy::Source)).collect()
 }
 
 /// Lists by point: the next rows of the map, some lists empty.
-fn given(n: usize) -> Source {
+fn given(n: usize) -> NeighborsBy<3> {
     let row = |point: usize| (1..=(point % 9)).map(move |step| ((point + step) % n) as u32);
     let mut offsets = vec![0];
     let mut neighbors: Vec<u32> = Vec::new();
@@ -53,22 +53,20 @@ fn given(n: usize) -> Source {
         neighbors.extend(row(point));
         offsets.push(neighbors.len() as u64);
     }
-    Source::Given(PointNeighbors { name: "file".into(), offsets, neighbors, scores: None })
+    NeighborsBy::Given(PointNeighbors { name: "file".into(), offsets, neighbors, scores: None })
 }
 
 /// The rows of the stages, one per variant and solver: every arrow between two stages goes through a file.
 fn staged<const D: usize>(
     folder: &Path,
-    entry: &Entry,
+    scheme: &dyn Scheme<D>,
     original: &Original<D>,
     descriptors: &Descriptors,
-    plan: &Plan,
+    plan: &Plan<D>,
     (key, owner): (&Key, u64),
 ) -> Vec<Row> {
     let path = |name: &str| folder.join(name);
-    let scheme = entry.of_dimension::<D>().unwrap();
-    let (released, secret) =
-        obfuscate(scheme, original, Some(descriptors), &plan.scheme_options, key).unwrap();
+    let (released, secret) = obfuscate(scheme, original, Some(descriptors), key).unwrap();
     stage::write_released(&path("released.parquet"), &released).unwrap();
     stage::write_truth(&path("truth.parquet"), original, &secret).unwrap();
     drop((released, secret));
@@ -97,19 +95,19 @@ fn staged<const D: usize>(
 /// The lists of one variant, made from files alone.
 fn lists<const D: usize>(
     folder: &Path,
-    variant: &Variant<'_>,
-    plan: &Plan,
+    variant: &Variant<'_, D>,
+    plan: &Plan<D>,
     owner: u64,
 ) -> Neighborhoods {
     let released = stage::read_released::<D>(&folder.join("released.parquet")).unwrap();
     let (original, secret) = stage::read_truth::<D>(&folder.join("truth.parquet")).unwrap();
     let slots = secret.slots_per_record();
-    match variant.source {
-        Source::Own(joined) => joined.make(&released, SEED).unwrap(),
-        Source::Given(points) => {
+    match variant.by {
+        NeighborsBy::Source(source) => source.lists(&released, source.k(), SEED).unwrap(),
+        NeighborsBy::Given(points) => {
             oracle::from_points(&points.offsets, &points.neighbors, None, &secret, slots).unwrap()
         }
-        Source::Oracle => {
+        NeighborsBy::Oracle => {
             let knn = oracle::search(&original).unwrap();
             let near = TrueNeighbors::new(&knn, &secret, slots, plan.k).unwrap();
             let noise = variant.noise.unwrap();
@@ -122,7 +120,7 @@ fn lists<const D: usize>(
 /// `row` without what a file of recovered points cannot say.
 fn without_name(row: &Row) -> Row {
     Row {
-        scheme: "",
+        scheme: String::new(),
         neighbors: String::new(),
         oracle_noise: None,
         inlier_ratio: 0.0,
@@ -134,15 +132,13 @@ fn without_name(row: &Row) -> Row {
     }
 }
 
-fn plan(unit: Unit, entry: &'static Entry, sources: Vec<Source>) -> Plan {
+/// The plan of the scheme called `name`.
+fn plan<const D: usize>(unit: Unit, name: &str, sources: Vec<NeighborsBy<D>>) -> Plan<D> {
     let mut plan = Plan::new(unit);
-    plan.schemes = vec![entry];
-    plan.sources = sources;
-    plan.sources.retain(|source| match source {
-        // Planes alone tell nothing.
-        Source::Own(joined) => entry.name != "plane" || !joined.name().contains("geometric"),
-        Source::Oracle | Source::Given(_) => true,
-    });
+    plan.schemes.retain(|scheme| scheme.name() == name);
+    plan.neighbors = sources;
+    // Planes alone tell nothing.
+    plan.neighbors.retain(|by| name != "plane" || !by.name().contains("geometric"));
     plan.k = 8;
     plan.oracle_noise = vec![Noise::Uniform, Noise::Near, Noise::Clustered];
     plan.inlier_ratios = vec![1.0, 0.3];
@@ -171,14 +167,14 @@ fn maps() {
     let points = unlift::synthetic::room(4, 260).points;
     let descriptors = descriptors(&points, 3.0);
     let original = Original::new(PointSet::try_new(points.clone(), Unit::Meter).unwrap());
-    for entry in unlift::obfuscate::SCHEMES.iter().filter(|entry| entry.in_3d.is_some()) {
+    for entry in SCHEMES.iter().filter(|entry| entry.in_3d.is_some()) {
         let mut all = sources::<3>(9);
         all.push(given(points.len()));
-        let plan = plan(Unit::Meter, entry, all);
+        let plan = plan(Unit::Meter, entry.name, all);
         let audited = audit::run(&original, Some(&descriptors), &plan, &mut audit::Silent).unwrap();
         let staged = staged(
             folder.path(),
-            entry,
+            &*plan.schemes[0],
             &original,
             &descriptors,
             &plan,
@@ -198,7 +194,7 @@ impl Observer<2> for Unseen {
 
 struct Rows(Vec<Row>);
 
-impl audit::images::Watcher for Rows {
+impl audit::Watcher for Rows {
     type OfImage = Unseen;
 
     fn begin(&mut self) -> Unseen {
@@ -233,18 +229,19 @@ fn many_images_in_one_file() {
             (format!("{seed}.png"), original, descriptors)
         })
         .into();
-    let overlap = Joined::parse("overlap").unwrap().with_k(9);
-    for entry in unlift::obfuscate::SCHEMES.iter().filter(|entry| entry.in_2d.is_some()) {
-        let mut plan = plan(Unit::Pixel, entry, vec![Source::Oracle, Source::Own(overlap.clone())]);
+    let overlap = Named::parse("overlap").unwrap().with_k(9).of_dimension::<2>().unwrap();
+    for entry in SCHEMES.iter().filter(|entry| entry.in_2d.is_some()) {
+        let sources = vec![NeighborsBy::Oracle, NeighborsBy::Source(overlap.clone())];
+        let mut plan = plan(Unit::Pixel, entry.name, sources);
         plan.solvers = vec![Solver::Joint];
         plan.oracle_noise = vec![Noise::Uniform];
         plan.inlier_ratios = vec![0.5];
         let of_audit = images.iter().map(|(name, original, descriptors)| {
             let (original, descriptors) = (original.clone(), Some(descriptors.clone()));
-            Ok(audit::images::Image { name: name.clone(), original, descriptors })
+            Ok(audit::Image { name: name.clone(), original, descriptors })
         });
         let audited =
-            audit::images::run::<unlift::Error>(of_audit, &plan, &mut audit::Silent).unwrap();
+            audit::run_images::<unlift::Error>(of_audit, &plan, &mut audit::Silent).unwrap();
         for (row, source) in audited.rows.iter().zip(["oracle", "overlap"]) {
             // Hidden.
             let mut truth = OutputFile::create(&path("truth"), Access::Private).unwrap();
@@ -253,9 +250,8 @@ fn many_images_in_one_file() {
             let mut maps = ImageWriter::start(&mut released, Kind::Released);
             for (name, original, descriptors) in &images {
                 let key = key_of(&Key::from_seed(SEED), name);
-                let scheme = entry.in_2d.unwrap();
-                let options = &plan.scheme_options;
-                let hidden = obfuscate(scheme, original, Some(descriptors), options, &key).unwrap();
+                let hidden =
+                    obfuscate(&*plan.schemes[0], original, Some(descriptors), &key).unwrap();
                 truths.truth(name, original, &hidden.1).unwrap();
                 maps.released(name, &hidden.0).unwrap();
             }
@@ -282,7 +278,7 @@ fn many_images_in_one_file() {
                         let how = (Noise::Uniform, 0.5, plan.k);
                         oracle_lists(&original, &(map, secret), how, oracle_seed(SEED, &name))
                     }
-                    _ => overlap.make_of_what_there_is(&map, SEED),
+                    _ => of_what_there_is(&*overlap, &map, SEED),
                 };
                 lists.neighborhoods(&name, &made.unwrap()).unwrap();
             }
@@ -334,20 +330,21 @@ fn many_images_in_one_file() {
 fn images() {
     let folder = tempfile::tempdir().unwrap();
     let (original, descriptors) = keypoints(5, 220);
-    for entry in unlift::obfuscate::SCHEMES.iter().filter(|entry| entry.in_2d.is_some()) {
-        let plan = plan(Unit::Pixel, entry, sources::<2>(9));
-        let image = audit::images::Image {
+    for entry in SCHEMES.iter().filter(|entry| entry.in_2d.is_some()) {
+        let plan = plan(Unit::Pixel, entry.name, sources::<2>(9));
+        let image = audit::Image {
             name: String::new(),
             original: original.clone(),
             descriptors: Some(descriptors.clone()),
         };
         let mut audited = Rows(Vec::new());
-        audit::images::run::<unlift::Error>([Ok(image)], &plan, &mut audited).unwrap();
+        audit::run_images::<unlift::Error>([Ok(image)], &plan, &mut audited).unwrap();
         // The randomness of an image is that of its name: FNV-1a of no bytes.
         let name = 0xCBF2_9CE4_8422_2325;
         let key = Key::from_seed(SEED).of_item(Stage::Image, name);
         let owner = (&key, Draws::new(SEED, Stage::Image, name).bits());
-        let staged = staged(folder.path(), entry, &original, &descriptors, &plan, owner);
+        let staged =
+            staged(folder.path(), &*plan.schemes[0], &original, &descriptors, &plan, owner);
         assert_equal(entry.name, &audited.0, &staged);
     }
 }

@@ -2,12 +2,15 @@
 //! tell about neighborhoods.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use unlift::descriptors::Values;
 use unlift::evaluate::{Reliability, evaluate, reliability};
 use unlift::geometry::vector::median;
+use unlift::neighbors::Source;
 use unlift::neighbors::oracle;
-use unlift::neighbors::sources::Joined;
+use unlift::neighbors::sources::Named;
+use unlift::obfuscate::olc::Olc;
 use unlift::obfuscate::{SCHEMES, SchemeOptions, obfuscate, scheme};
 use unlift::recover::{RecoverOptions, Solver, recover};
 use unlift::seed::Key;
@@ -98,20 +101,21 @@ fn learned_descriptors_in_halves_are_read_and_name_neighbors() {
         // 128 values of about 0.09, rounded to 11 bits.
         assert!((norm2 - 1.0).abs() < 2e-3, "{norm2}");
     }
-    let overlap = Joined::parse("overlap").unwrap().check_descriptors(&descriptors);
+    let overlap = source("overlap", 20).takes(&descriptors);
     assert!(overlap.unwrap_err().to_string().contains("none negative"));
     let original = Original::new(PointSet::try_new(input.positions, Unit::Meter).unwrap());
     let search = oracle::search(&original).unwrap();
-    let scheme = scheme("olc").unwrap().in_3d.unwrap();
-    let options = SchemeOptions { voxel: 1.0 };
     let key = Key::from_seed(0);
-    let (released, secret) =
-        obfuscate(scheme, &original, Some(&descriptors), &options, &key).unwrap();
+    let (released, secret) = obfuscate(&Olc, &original, Some(&descriptors), &key).unwrap();
     let near = oracle::TrueNeighbors::new(&search, &secret, 1, 50).unwrap();
-    let lists = Joined::parse("similarity").unwrap().with_k(20).make(&released, 0).unwrap();
+    let lists = source("similarity", 20).lists(&released, 20, 0).unwrap();
     let ratio = near.measured_inlier_ratio(&lists);
     eprintln!("similarity of learned features: {ratio:.3}");
     assert!(ratio >= 0.3, "{ratio}");
+}
+
+fn source(name: &str, k: usize) -> Arc<dyn Source<3>> {
+    Named::parse(name).unwrap().with_k(k).of_dimension::<3>().unwrap()
 }
 
 #[test]
@@ -123,22 +127,22 @@ fn patches_of_a_real_map_name_neighbors() {
     let original = Original::new(points);
     let search = oracle::search(&original).unwrap();
     let options = SchemeOptions { voxel: 1.0 };
-    for (name, source, at_least) in [
+    for (name, by, at_least) in [
         // Measured on olc: 5.1 % and 14.5 %. On pairs the list of a slot is that of its descriptor
         // row.
         ("olc", "similarity", 0.045),
         ("olc", "overlap", 0.14),
         ("ppl", "overlap", 0.13),
     ] {
-        let scheme = scheme(name).unwrap().in_3d.unwrap();
+        let scheme = scheme(name).unwrap().of_dimension::<3>(&options).unwrap();
         let (released, secret) =
-            obfuscate(scheme, &original, Some(&descriptors), &options, &Key::from_seed(0)).unwrap();
+            obfuscate(&*scheme, &original, Some(&descriptors), &Key::from_seed(0)).unwrap();
         let slots = released.slots_per_record();
         let near =
             oracle::TrueNeighbors::new(&search, &secret.by_descriptor_row(), slots, 50).unwrap();
-        let lists = Joined::parse(source).unwrap().with_k(20).make(&released, 0).unwrap();
+        let lists = source(by, 20).lists(&released, 20, 0).unwrap();
         let ratio = near.measured_inlier_ratio(&lists);
-        assert!(ratio >= at_least, "{source} on {name}: {ratio}");
+        assert!(ratio >= at_least, "{by} on {name}: {ratio}");
     }
 }
 
@@ -152,10 +156,10 @@ fn what_is_said_about_a_real_map_comes_true() {
         let typical = median(&mut search.kth_distances(50));
         let threshold = meters.unwrap_or(typical);
         let mut found: Option<Reliability> = None;
-        for scheme in SCHEMES.iter().filter_map(|entry| entry.in_3d) {
-            let options = SchemeOptions { voxel: 5.0 * typical };
+        let options = SchemeOptions { voxel: 5.0 * typical };
+        for scheme in SCHEMES.iter().filter_map(|entry| entry.of_dimension::<3>(&options)) {
             let (released, secret) =
-                obfuscate(scheme, &original, None, &options, &Key::from_seed(0)).unwrap();
+                obfuscate(&*scheme, &original, None, &Key::from_seed(0)).unwrap();
             let slots = released.slots_per_record();
             let near = oracle::TrueNeighbors::new(&search, &secret, slots, 50).unwrap();
             for ratio in [0.5, 0.1] {

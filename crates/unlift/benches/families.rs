@@ -10,13 +10,13 @@
 
 use std::path::PathBuf;
 
-use unlift::audit::{self, Plan, Row, Silent, Source, Threshold};
+use unlift::audit::{self, NeighborsBy, Plan, Row, Silent, Threshold};
 use unlift::geometry::frame::Bounds;
 use unlift::geometry::knn::Knn;
 use unlift::geometry::vector::median;
+use unlift::neighbors::Needs;
 use unlift::neighbors::oracle::Noise;
-use unlift::neighbors::sources::Joined;
-use unlift::obfuscate::{Entry, SCHEMES, scheme};
+use unlift::neighbors::sources::Named;
 use unlift::recover::Solver;
 use unlift::seed::{Draws, Stage};
 use unlift::synthetic::{self, Shape};
@@ -30,7 +30,7 @@ const LEAST_SURE: f64 = 1.0;
 /// What is tried.
 struct Suite {
     maps: Vec<String>,
-    schemes: Option<Vec<&'static Entry>>,
+    schemes: Option<Vec<String>>,
     ratios: Vec<f64>,
     noise: Vec<Noise>,
     sources: Vec<String>,
@@ -65,7 +65,7 @@ impl Suite {
             let fields = list.split(',');
             match name {
                 "maps" => suite.maps = fields.map(str::to_owned).collect(),
-                "schemes" => suite.schemes = Some(fields.map(|n| scheme(n).expect(n)).collect()),
+                "schemes" => suite.schemes = Some(fields.map(str::to_owned).collect()),
                 "ratios" => suite.ratios = fields.map(number).collect(),
                 "noise" => {
                     suite.noise =
@@ -83,21 +83,13 @@ impl Suite {
         suite
     }
 
-    /// The sources for a map with or without descriptors and the schemes they are for.
-    fn plan(&self, unit: Unit, source: &str) -> Plan {
-        let usual = Plan::new(unit);
+    /// The plan for maps or images of `unit`, with one source.
+    fn plan<const D: usize>(&self, unit: Unit, by: NeighborsBy<D>) -> Plan<D> {
+        let mut usual = Plan::new(unit);
         let of_images = unit == Unit::Pixel;
-        let own = |name: &str| {
-            let joined = Joined::parse(name).expect("a source");
-            if of_images { joined.for_images() } else { joined }
-        };
-        let meant = |entry: &&'static Entry| {
-            if of_images { entry.in_2d.is_some() } else { entry.in_3d.is_some() }
-        };
-        let all: Vec<&'static Entry> = match &self.schemes {
-            Some(schemes) => schemes.clone(),
-            None => SCHEMES.iter().collect(),
-        };
+        if let Some(names) = &self.schemes {
+            usual.schemes.retain(|scheme| names.iter().any(|name| name == scheme.name()));
+        }
         let threshold =
             |label: &str| Threshold::parse(label).unwrap_or_else(|e| panic!("{label}: {e}"));
         let thresholds = if of_images {
@@ -106,11 +98,7 @@ impl Suite {
             ["1.0", "2.5"].map(threshold).to_vec()
         };
         Plan {
-            schemes: all.into_iter().filter(meant).collect(),
-            sources: vec![match source {
-                "oracle" => Source::Oracle,
-                name => Source::Own(own(name)),
-            }],
+            neighbors: vec![by],
             oracle_noise: self.noise.clone(),
             inlier_ratios: self.ratios.clone(),
             k: if of_images { 20 } else { self.k },
@@ -219,7 +207,7 @@ fn rows(suite: &Suite, map: &str, source: &str) -> Result<Option<Vec<Row>>, Erro
     let (name, n) = map.split_once(':').unwrap_or((map, "2000"));
     let n: usize = number(n);
     if name == "image" {
-        let plan = suite.plan(Unit::Pixel, source);
+        let plan = suite.plan(Unit::Pixel, NeighborsBy::<2>::Oracle);
         if plan.schemes.is_empty() || source != "oracle" {
             return Ok(None);
         }
@@ -227,10 +215,10 @@ fn rows(suite: &Suite, map: &str, source: &str) -> Result<Option<Vec<Row>>, Erro
             let points = synthetic::keypoints(u64::from(at), n, IMAGE);
             let points = PointSet::try_new(points, Unit::Pixel)?;
             let original = Original::within(points, Bounds { low: [0.0; 2], high: IMAGE })?;
-            Ok(audit::images::Image { name: format!("{at}"), original, descriptors: None })
+            Ok(audit::Image { name: format!("{at}"), original, descriptors: None })
         };
         let images: Vec<Result<_, Error>> = (0..8).map(image).collect();
-        return Ok(Some(audit::images::run(images, &plan, &mut Silent)?.rows));
+        return Ok(Some(audit::run_images(images, &plan, &mut Silent)?.rows));
     }
     let Some((points, descriptors)) = points(name, n) else {
         if source == "oracle" {
@@ -238,8 +226,12 @@ fn rows(suite: &Suite, map: &str, source: &str) -> Result<Option<Vec<Row>>, Erro
         }
         return Ok(None);
     };
-    let plan = suite.plan(Unit::KthNeighbor, source);
-    let needs = source != "oracle" && Joined::parse(source)?.needs_descriptors();
+    let by = match source {
+        "oracle" => NeighborsBy::<3>::Oracle,
+        name => NeighborsBy::Source(Named::parse(name)?.of_dimension()?),
+    };
+    let needs = by.source().is_some_and(|source| source.needs() == Needs::Descriptors);
+    let plan = suite.plan(Unit::KthNeighbor, by);
     if plan.schemes.is_empty() || (needs && descriptors.is_none()) {
         return Ok(None);
     }

@@ -113,10 +113,9 @@ fn main() {
 }
 
 fn table(sizes: &Sizes, pools: &[ThreadPool], original: &Original<3>, entry: &Entry) {
-    let Some(scheme) = entry.in_3d else { return };
+    let Some(scheme) = entry.of_dimension::<3>(&SchemeOptions { voxel: 0.5 }) else { return };
     let (released, near) = {
-        let options = SchemeOptions { voxel: 0.5 };
-        let hidden = obfuscate(scheme, original, None, &options, &Key::from_seed(0));
+        let hidden = obfuscate(&*scheme, original, None, &Key::from_seed(0));
         let (released, secret) = hidden.expect("a map can be hidden");
         let started = Instant::now();
         let knn = search(original).expect("points");

@@ -109,10 +109,10 @@ fn of_scheme(
     k: usize,
     typical: f64,
 ) -> Result<Vec<(usize, Row)>, Error> {
-    let Some(scheme) = entry.in_3d else { return Ok(Vec::new()) };
     let knn = oracle::search(original)?;
     let options = SchemeOptions { voxel: 5.0 * typical };
-    let (released, secret) = obfuscate(scheme, original, None, &options, &Key::from_seed(0))?;
+    let Some(scheme) = entry.of_dimension::<3>(&options) else { return Ok(Vec::new()) };
+    let (released, secret) = obfuscate(&*scheme, original, None, &Key::from_seed(0))?;
     let near = TrueNeighbors::new(&knn, &secret, released.slots_per_record(), k)?;
     let points = original.reveal().positions();
     let mut rows = Vec::new();

@@ -1,9 +1,10 @@
 //! Rows of an audit: the strongest attack, two baselines, and what could not be audited.
 
-use unlift::audit::{Outcome, Plan, Row, Silent, Source, run};
+use std::sync::Arc;
+
+use unlift::audit::{NeighborsBy, Outcome, Plan, Row, Silent, run};
 use unlift::evaluate::evaluate;
-use unlift::neighbors::Neighborhoods;
-use unlift::neighbors::sources::Joined;
+use unlift::neighbors::{Geometric, Neighborhoods};
 use unlift::obfuscate::{SchemeOptions, obfuscate, scheme};
 use unlift::recover::{RecoverOptions, Solver, Unknown, recover};
 use unlift::seed::Key;
@@ -19,15 +20,15 @@ fn room(n: usize) -> Original<3> {
 }
 
 /// A small plan of `schemes` at half of the neighbors right.
-fn plan(schemes: &[&str]) -> Plan {
+fn plan(schemes: &[&str]) -> Plan<3> {
     let mut plan = Plan::new(Unit::Meter);
-    plan.schemes.retain(|entry| schemes.contains(&entry.name));
+    plan.schemes.retain(|scheme| schemes.contains(&scheme.name()));
     plan.inlier_ratios = vec![0.5];
     plan.k = 20;
     plan
 }
 
-fn audit(original: &Original<3>, plan: &Plan) -> Outcome {
+fn audit(original: &Original<3>, plan: &Plan<3>) -> Outcome {
     run(original, None, plan, &mut Silent).unwrap()
 }
 
@@ -55,12 +56,11 @@ fn a_usual_audit_has_a_row_for_what_joint_recovery_starts_from() {
 }
 
 /// The percentages of an attack on the records alone, made by hand.
-fn by_hand(original: &Original<3>, name: &str, solver: Solver, plan: &Plan) -> Vec<f64> {
+fn by_hand(original: &Original<3>, name: &str, solver: Solver, plan: &Plan<3>) -> Vec<f64> {
     let entry = scheme(name).unwrap();
-    let options = SchemeOptions { voxel: plan.scheme_options.voxel };
+    let scheme = entry.of_dimension::<3>(&SchemeOptions { voxel: 0.5 }).unwrap();
     let (released, secret) =
-        obfuscate(entry.in_3d.unwrap(), original, None, &options, &Key::from_seed(plan.seed))
-            .unwrap();
+        obfuscate(&*scheme, original, None, &Key::from_seed(plan.seed)).unwrap();
     let (n, slots) = (released.n_records(), released.slots_per_record());
     let none = Neighborhoods::try_new(vec![0; n * slots + 1], Vec::new(), None, n, slots).unwrap();
     let none = none.with_about(About { map: None, order: RowOrder::Either });
@@ -82,7 +82,7 @@ fn the_best_attack_on_the_records_alone_is_the_second_baseline() {
             assert_eq!(row.baseline_percent(0), row.blind_percent[0]);
             continue;
         }
-        let alone = by_hand(&room, row.scheme, Solver::Tomography, &plan);
+        let alone = by_hand(&room, &row.scheme, Solver::Tomography, &plan);
         for (at, percent) in alone.iter().enumerate() {
             assert!(best(at).unwrap() >= *percent, "{}: at least tomography", row.scheme);
             assert!(row.baseline_percent(at) >= row.blind_percent[at].max(*percent));
@@ -99,7 +99,7 @@ fn the_best_attack_on_the_records_alone_is_the_second_baseline() {
 #[test]
 fn the_second_baseline_is_averaged_over_seeds() {
     let (room, mut plan) = (room(600), plan(&["olc"]));
-    let of = |plan: &Plan| audit(&room, plan).rows[0].records_alone.clone();
+    let of = |plan: &Plan<3>| audit(&room, plan).rows[0].records_alone.clone();
     let first = of(&plan);
     plan.seed = 1;
     let second = of(&plan);
@@ -130,7 +130,8 @@ fn break_even_takes_the_strongest_attack_at_every_ratio() {
         };
     }
     let found = unlift::audit::break_even(&plan, &rows);
-    let of = |solver: &str| found.iter().find(|b| (b.scheme, b.solver) == ("olc", solver)).unwrap();
+    let of =
+        |solver: &str| found.iter().find(|b| (&*b.scheme, b.solver) == ("olc", solver)).unwrap();
     assert_eq!(of("strongest").inlier_ratio, 0.1, "half comes back at the lowest ratio");
     assert!((of("joint").inlier_ratio - 0.3).abs() < 1e-12);
     assert_eq!(found.len(), 2 * 4);
@@ -150,19 +151,19 @@ fn a_scheme_that_a_map_does_not_allow_is_told_and_the_audit_goes_on() {
     let mut plan = Plan::new(Unit::Meter);
     (plan.inlier_ratios, plan.records_alone) = (vec![1.0, 0.5], false);
     let outcome = audit(&flat(400), &plan);
-    let missing: Vec<&str> = outcome.not_audited.iter().map(|m| m.scheme).collect();
+    let missing: Vec<&str> = outcome.not_audited.iter().map(|m| &*m.scheme).collect();
     assert_eq!(missing, ["ppl+"], "{:?}", outcome.not_audited);
     let told = &outcome.not_audited[0];
     assert_eq!(told.neighbors, None, "the scheme itself");
     assert!(told.reason.contains("ppl+ leaves out") && told.reason.contains("of 400"), "{told:?}");
     assert!(outcome.rows.iter().all(|row| row.scheme != "ppl+"));
-    for entry in plan.schemes.iter().filter(|entry| entry.name != "ppl+") {
-        let n = outcome.rows.iter().filter(|row| row.scheme == entry.name).count();
-        assert_eq!(n, 4, "{}", entry.name);
+    for scheme in plan.schemes.iter().filter(|scheme| scheme.name() != "ppl+") {
+        let n = outcome.rows.iter().filter(|row| row.scheme == scheme.name()).count();
+        assert_eq!(n, 4, "{}", scheme.name());
     }
     assert_eq!(outcome.rows.len(), outcome.seconds.rows.len());
 
-    plan.schemes.retain(|entry| entry.name == "ppl+");
+    plan.schemes.retain(|scheme| scheme.name() == "ppl+");
     let error = run(&flat(400), None, &plan, &mut Silent).unwrap_err().to_string();
     let begin =
         "schemes: expected one that can be applied to this map, found none: ppl+: k: expected";
@@ -172,15 +173,16 @@ fn a_scheme_that_a_map_does_not_allow_is_told_and_the_audit_goes_on() {
 #[test]
 fn a_source_without_lists_for_a_scheme_costs_its_rows_alone() {
     let mut plan = plan(&["olc", "plane"]);
-    plan.sources.push(Source::Own(Joined::parse("geometric").unwrap()));
+    plan.neighbors.push(NeighborsBy::Source(Arc::new(Geometric)));
     plan.repeats = 2;
     let outcome = audit(&room(500), &plan);
     let [missing] = outcome.not_audited.as_slice() else { panic!("{:?}", outcome.not_audited) };
-    assert_eq!((missing.scheme, missing.neighbors.as_deref()), ("plane", Some("geometric")));
+    assert_eq!((&*missing.scheme, missing.neighbors.as_deref()), ("plane", Some("geometric")));
     assert!(missing.reason.ends_with("found planes"), "{}", missing.reason);
-    let of = |row: &Row| (row.scheme, row.neighbors.clone(), row.solver);
+    let of = |row: &Row| (row.scheme.clone(), row.neighbors.clone(), row.solver);
     let rows: Vec<_> = outcome.rows.iter().map(of).collect();
-    let row = |scheme, neighbors: &str, solver| (scheme, neighbors.to_owned(), solver);
+    let row =
+        |scheme: &str, neighbors: &str, solver| (scheme.to_owned(), neighbors.to_owned(), solver);
     let expected = [
         row("olc", "oracle", "joint"),
         row("olc", "oracle", "joint-start"),

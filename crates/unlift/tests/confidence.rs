@@ -26,9 +26,8 @@ fn recovered(
 ) -> (Recovered<3>, Secret) {
     let knn = oracle::search(original).unwrap();
     let options = SchemeOptions { voxel: 5.0 * typical };
-    let scheme = scheme(name).unwrap().in_3d.unwrap();
-    let (released, secret) =
-        obfuscate(scheme, original, None, &options, &Key::from_seed(7)).unwrap();
+    let scheme = scheme(name).unwrap().of_dimension::<3>(&options).unwrap();
+    let (released, secret) = obfuscate(&*scheme, original, None, &Key::from_seed(7)).unwrap();
     let near = TrueNeighbors::new(&knn, &secret, released.slots_per_record(), 50).unwrap();
     let outliers = Outliers::new(noise, &near, &knn, &secret, 7).unwrap();
     let lists = near.lists(ratio, &outliers, 7).unwrap();

@@ -4,7 +4,6 @@
 use std::path::Path;
 
 use unlift::audit::{Plan, Row, Silent, run};
-use unlift::obfuscate::scheme;
 use unlift::recover::Solver;
 use unlift::truth::Original;
 use unlift::{PointSet, Unit};
@@ -56,7 +55,7 @@ fn redkitchen() -> Option<Original<3>> {
 
 fn rows(original: &Original<3>, schemes: &[&str], ratios: &[f64], solvers: &[Solver]) -> Vec<Row> {
     let mut plan = Plan::new(Unit::Meter);
-    plan.schemes = schemes.iter().map(|name| scheme(name).unwrap()).collect();
+    plan.schemes.retain(|scheme| schemes.contains(&scheme.name()));
     plan.inlier_ratios = ratios.to_vec();
     plan.solvers = solvers.to_vec();
     let rows = run(original, None, &plan, &mut Silent).unwrap().rows;

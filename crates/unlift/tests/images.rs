@@ -1,12 +1,15 @@
 //! Audits of images: pooled rows, twins, images with hardly any keypoints.
 
-use unlift::audit::images::{self, Image, Outcome};
-use unlift::audit::{Observer, Plan, Row, Silent, Source};
+use std::sync::Arc;
+
+use unlift::audit::{
+    Image, NeighborsBy, Observer, Outcome, Plan, PointNeighbors, Row, Silent, Watcher, run_images,
+};
 use unlift::descriptors::Values;
 use unlift::geometry::frame::Bounds;
 use unlift::neighbors::oracle::Noise;
-use unlift::neighbors::sources::Joined;
-use unlift::obfuscate::scheme;
+use unlift::neighbors::sources::Named;
+use unlift::neighbors::{Overlap, Similarity};
 use unlift::recover::Solver;
 use unlift::seed::{Draws, Stage};
 use unlift::truth::Original;
@@ -43,23 +46,23 @@ fn keypoints(seed: u64, n: usize, twins: u64) -> Vec<[f64; 2]> {
     points
 }
 
-fn plan() -> Plan {
+fn plan() -> Plan<2> {
     let mut plan = Plan::new(Unit::Pixel);
     plan.inlier_ratios = vec![1.0, 0.5];
     plan
 }
 
-fn run(images: &[Image], plan: &Plan) -> Outcome {
+fn run(images: &[Image], plan: &Plan<2>) -> Outcome {
     let images = images.iter().cloned().map(Ok::<_, Error>);
-    images::run(images, plan, &mut Silent).unwrap()
+    run_images(images, plan, &mut Silent).unwrap()
 }
 
 #[test]
 fn the_default_plan_takes_all_2d_schemes() {
-    let names: Vec<&str> = Plan::new(Unit::Pixel).schemes.iter().map(|s| s.name).collect();
+    let plan = Plan::<2>::new(Unit::Pixel);
+    let names: Vec<&str> = plan.schemes.iter().map(|s| s.name()).collect();
     assert_eq!(names, ["lines2d", "cp2d", "dcl2d"]);
-    let in_3d = Plan::new(Unit::Meter).schemes;
-    assert!(in_3d.iter().all(|s| s.in_3d.is_some()) && in_3d.len() == 7);
+    assert_eq!(Plan::<3>::new(Unit::Meter).schemes.len(), 7);
 }
 
 #[test]
@@ -81,7 +84,7 @@ fn keypoints_come_back() {
 fn rows_are_pooled_over_keypoints() {
     #[derive(Default)]
     struct Each(Vec<Vec<Row>>);
-    impl images::Watcher for Each {
+    impl Watcher for Each {
         type OfImage = Silent;
 
         fn begin(&mut self) -> Silent {
@@ -97,7 +100,7 @@ fn rows_are_pooled_over_keypoints() {
     let images = [image_of("a", keypoints(1, 300, 20)), image_of("b", keypoints(2, 150, 0))];
     let mut each = Each::default();
     let all = images.iter().cloned().map(Ok::<_, Error>);
-    let pooled = images::run(all, &plan, &mut each).unwrap().rows;
+    let pooled = run_images(all, &plan, &mut each).unwrap().rows;
     for (at, row) in pooled.iter().enumerate() {
         let [a, b] = [0, 1].map(|image: usize| &each.0[image][at]);
         assert_eq!(row.n_points, a.n_points + b.n_points);
@@ -136,7 +139,7 @@ fn images_with_few_keypoints_are_attacked() {
     plan.inlier_ratios = vec![1.0, 0.5, 0.1];
     plan.oracle_noise = Noise::ALL.to_vec();
     plan.solvers = Solver::FROM_LISTS.to_vec();
-    plan.sources.push(Source::Own(Joined::parse("similarity").unwrap().for_images()));
+    plan.neighbors.push(NeighborsBy::Source(Arc::new(Similarity)));
     for n in [4, 12, plan.k, plan.k + 3] {
         let outcome = run(&[image_of("few", keypoints(3, n, 0))], &plan);
         assert_eq!(outcome.n_too_small, usize::from(n <= plan.k));
@@ -165,7 +168,7 @@ fn images_tell_how_far_they_are() {
     }
     #[derive(Default)]
     struct All(Vec<Heard>);
-    impl images::Watcher for All {
+    impl Watcher for All {
         type OfImage = Heard;
 
         fn begin(&mut self) -> Heard {
@@ -184,7 +187,7 @@ fn images_tell_how_far_they_are() {
     let mut plan = plan();
     (plan.repeats, plan.reference) = (2, true);
     let mut all = All::default();
-    images::run(images.iter().cloned().map(Ok::<_, Error>), &plan, &mut all).unwrap();
+    run_images(images.iter().cloned().map(Ok::<_, Error>), &plan, &mut all).unwrap();
     let rows = (plan.inlier_ratios.len() * plan.solvers.len() + 1) * plan.schemes.len() * 2;
     for (image, Heard(heard)) in images.iter().zip(&all.0) {
         let (last, total) = *heard.last().unwrap();
@@ -219,10 +222,10 @@ fn images_with_hardly_any_keypoints_are_counted() {
     let mut plan = plan();
     plan.inlier_ratios = vec![1.0, 0.1];
     plan.solvers = Solver::FROM_LISTS.to_vec();
-    plan.sources.push(Source::Own(Joined::parse("similarity").unwrap().for_images()));
-    plan.sources.push(Source::Own(Joined::parse("overlap").unwrap().for_images()));
+    plan.neighbors.push(NeighborsBy::Source(Arc::new(Similarity)));
+    plan.neighbors.push(NeighborsBy::Source(Arc::new(Overlap)));
     let outcome = run(&images, &plan);
-    assert_eq!((outcome.n_images, outcome.n_too_small), (9, 4));
+    assert_eq!((outcome.n_items, outcome.n_too_small), (9, 4));
     let n: usize = images.iter().map(|image| image.original.len()).sum();
     assert_eq!(outcome.rows.len(), 3 * 4 * Solver::FROM_LISTS.len());
     for row in &outcome.rows {
@@ -241,7 +244,7 @@ fn images_with_hardly_any_keypoints_are_counted() {
 fn twins_do_not_shrink_delta() {
     for (name, twins) in [("lines2d", 0), ("lines2d", 35), ("cp2d", 0), ("cp2d", 35)] {
         let mut plan = plan();
-        plan.schemes = vec![scheme(name).unwrap()];
+        plan.schemes.retain(|scheme| scheme.name() == name);
         let row = &run(&[image_of("twins", keypoints(6, 900, twins))], &plan).rows[1];
         assert!((1.0..40.0).contains(&row.delta), "{name}, {twins} %: {}", row.delta);
         assert!(row.recovered_percent[3] > 75.0, "{name}, {twins} %: {:?}", row.recovered_percent);
@@ -250,20 +253,27 @@ fn twins_do_not_shrink_delta() {
 
 #[test]
 fn what_is_not_for_images_is_refused() {
-    let message = |plan: &Plan| {
+    let message = |plan: &Plan<2>| {
         let images = [image_of("a", keypoints(1, 100, 0))];
         let images = images.into_iter().map(Ok::<_, Error>);
-        images::run(images, plan, &mut Silent).unwrap_err().to_string()
+        run_images(images, plan, &mut Silent).unwrap_err().to_string()
     };
-    let mut of_maps = plan();
-    of_maps.schemes = vec![scheme("olc").unwrap()];
-    assert_eq!(message(&of_maps), "scheme: expected one for 2D points, found olc");
     let mut alone = plan();
     alone.solvers = vec![Solver::Density];
     assert_eq!(message(&alone), "solver: expected one that recovers from lists, found density");
-    let mut geometric = plan();
-    geometric.sources = vec![Source::Own(Joined::parse("geometric").unwrap())];
-    assert_eq!(message(&geometric), "neighbors: expected a source for images, found geometric");
+    let mut given = plan();
+    given.neighbors = vec![NeighborsBy::Given(PointNeighbors {
+        name: "file".to_owned(),
+        offsets: vec![0],
+        neighbors: Vec::new(),
+        scores: None,
+    })];
+    let expected = "neighbors: expected the oracle or one that works on each alone, found file";
+    assert_eq!(message(&given), expected);
+    // What is defined on maps alone has no type that a plan of images could hold.
+    let geometric = Named::parse("geometric").unwrap().of_dimension::<2>().unwrap_err();
+    let expected = "source: expected one that is defined in 2 dimensions, found geometric";
+    assert_eq!(geometric.to_string(), expected);
     let outside = PointSet::try_new(vec![[1.0, 2.0], [400.0, 2.0]], Unit::Pixel).unwrap();
     let error = Original::within(outside, Bounds::try_new([0.0; 2], SIZE).unwrap()).unwrap_err();
     assert_eq!(

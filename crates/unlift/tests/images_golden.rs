@@ -2,10 +2,9 @@
 //! K = 20, everything automatic, joint recovery. Floors are about two points below the first measurement: they guard
 //! against losses and claim nothing.
 
-use unlift::audit::images::{self, Image};
+use unlift::audit::{Image, run_images};
 use unlift::audit::{Plan, Row, Silent};
 use unlift::geometry::frame::Bounds;
-use unlift::obfuscate::scheme;
 use unlift::recover::Solver;
 use unlift::seed::{Draws, Stage};
 use unlift::truth::Original;
@@ -49,11 +48,11 @@ const FLOORS: &[(f64, &str, [f64; 3])] = &[
 
 fn rows(schemes: &[&str], ratios: &[f64]) -> Vec<Row> {
     let mut plan = Plan::new(Unit::Pixel);
-    plan.schemes = schemes.iter().map(|name| scheme(name).unwrap()).collect();
+    plan.schemes.retain(|scheme| schemes.contains(&scheme.name()));
     plan.inlier_ratios = ratios.to_vec();
     plan.solvers = vec![Solver::Joint];
     let images = (1..=3).map(|seed| Ok::<_, Error>(image(seed)));
-    let rows = images::run(images, &plan, &mut Silent).unwrap().rows;
+    let rows = run_images(images, &plan, &mut Silent).unwrap().rows;
     for row in &rows {
         let (found, blind) = (&row.recovered_percent, &row.blind_percent);
         let error = row.error_percentiles[0];

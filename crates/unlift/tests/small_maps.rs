@@ -6,7 +6,6 @@
 use unlift::audit::{Plan, Silent, run};
 use unlift::geometry::knn::Knn;
 use unlift::geometry::vector::median;
-use unlift::obfuscate::scheme;
 use unlift::recover::Solver;
 use unlift::synthetic::{Shape, shape};
 use unlift::truth::Original;
@@ -19,7 +18,7 @@ fn both(of: Shape, n: usize, name: &str, ratio: f64) -> ([f64; 2], [f64; 2]) {
     let points = points.iter().map(|p| p.map(|x| x / typical)).collect();
     let original = Original::new(PointSet::try_new(points, Unit::KthNeighbor).unwrap());
     let mut plan = Plan::new(Unit::KthNeighbor);
-    plan.schemes = vec![scheme(name).unwrap()];
+    plan.schemes.retain(|scheme| scheme.name() == name);
     plan.inlier_ratios = vec![ratio];
     plan.records_alone = false;
     plan.solvers = vec![Solver::Joint, Solver::Consensus];

@@ -1,10 +1,12 @@
 //! Laws of every source that makes neighborhoods from a released map, and what each is for.
 
+use std::sync::Arc;
+
 use unlift::descriptors::Values;
 use unlift::neighbors::oracle::{self, TrueNeighbors};
-use unlift::neighbors::sources::{Joined, SOURCES};
-use unlift::neighbors::{Neighborhoods, overlap, similarity};
-use unlift::obfuscate::{SchemeOptions, obfuscate};
+use unlift::neighbors::sources::{Named, SOURCES};
+use unlift::neighbors::{Needs, Neighborhoods, Source, overlap, similarity};
+use unlift::obfuscate::{obfuscate, ppl::Ppl};
 use unlift::released::{Lines, Obfuscation, Released};
 use unlift::seed::{Draws, Key, Stage};
 use unlift::truth::Original;
@@ -122,10 +124,14 @@ fn similarity_is_the_cosine() {
 
 /// Every source that compares descriptors, and two joined; the laws of lists by records alone are with
 /// those of the density.
-fn sources() -> Vec<Joined> {
-    let described = SOURCES.iter().filter(|entry| entry.needs_descriptors);
-    let names = described.map(|entry| entry.name).chain(["overlap+similarity"]);
-    names.map(|name| Joined::parse(name).unwrap().with_k(6)).collect()
+fn sources() -> Vec<Arc<dyn Source<3>>> {
+    let names = SOURCES.iter().map(|entry| entry.name).chain(["overlap+similarity"]);
+    let sources = names.map(of_name);
+    sources.filter(|source| source.needs() == Needs::Descriptors).collect()
+}
+
+fn of_name(name: &str) -> Arc<dyn Source<3>> {
+    Named::parse(name).unwrap().of_dimension::<3>().unwrap()
 }
 
 #[test]
@@ -134,7 +140,7 @@ fn lists_have_k_other_records_each_once_also_for_paired_lines() {
         let map = released(&random_map(200), slots_per_record);
         for source in sources() {
             // `try_new` refuses the own record and repeats.
-            let lists = source.make(&map, 0).unwrap();
+            let lists = source.lists(&map, 6, 0).unwrap();
             assert_eq!(lists.n_slots(), 200);
             for slot in 0..200 {
                 assert_eq!(lists.of(slot).len(), 6, "{} {slot}", source.name());
@@ -150,7 +156,7 @@ fn the_same_bytes_for_any_number_of_threads() {
     for source in sources() {
         let on = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| source.make(&map, 0).unwrap())
+            pool.install(|| source.lists(&map, 6, 0).unwrap())
         };
         let one = on(1);
         assert_eq!(one, on(2), "{}", source.name());
@@ -165,8 +171,8 @@ fn permuting_records_permutes_lists() {
     Draws::new(5, Stage::Synthetic, 0).shuffle(&mut order);
     let permuted: Vec<Vec<u8>> = order.iter().map(|&at| rows[at as usize].clone()).collect();
     for source in sources() {
-        let plain = source.make(&released(&rows, 1), 0).unwrap();
-        let other = source.make(&released(&permuted, 1), 0).unwrap();
+        let plain = source.lists(&released(&rows, 1), 6, 0).unwrap();
+        let other = source.lists(&released(&permuted, 1), 6, 0).unwrap();
         for (slot, &was) in order.iter().enumerate() {
             let mut entries: Vec<(u32, f32)> = other
                 .of(slot)
@@ -190,8 +196,7 @@ fn permuting_records_permutes_lists() {
 fn what_cannot_be_compared_is_told_in_one_line() {
     let map = released(&random_map(9), 1);
     let message = |map: &Released<3>, name: &str, k: usize| {
-        let source = Joined::parse(name).unwrap().with_k(k);
-        source.make(map, 0).unwrap_err().to_string()
+        of_name(name).lists(map, k, 0).unwrap_err().to_string()
     };
     assert_eq!(
         message(&map, "overlap", 9),
@@ -217,7 +222,7 @@ fn blank_and_equal_descriptors_are_no_trouble() {
     rows[3] = vec![0; 128];
     rows[7] = rows[8].clone();
     for source in sources() {
-        let lists = source.make(&released(&rows, 1), 0).unwrap();
+        let lists = source.lists(&released(&rows, 1), 6, 0).unwrap();
         assert!(lists.scores().unwrap().iter().all(|score| score.is_finite()));
         assert!(lists.of(7).contains(&RecordId(8)), "{}", source.name());
     }
@@ -229,7 +234,7 @@ fn lists_say_what_they_are_about() {
     for slots_per_record in [1, 2] {
         let map = released(&random_map(200), slots_per_record);
         for name in SOURCES.iter().map(|entry| entry.name).chain(["overlap+geometric"]) {
-            let about = Joined::parse(name).unwrap().with_k(6).make(&map, 0).unwrap().about();
+            let about = of_name(name).lists(&map, 6, 0).unwrap().about();
             assert_eq!(about.map, Some(map.fingerprint()), "{name}");
             let order = match name {
                 "geometric" => RowOrder::Either,
@@ -244,9 +249,7 @@ fn lists_say_what_they_are_about() {
 fn near(k: usize) -> TrueNeighbors {
     let points = unlift::synthetic::room(2, 120).points;
     let original = Original::new(PointSet::try_new(points, Unit::Meter).unwrap());
-    let ppl = unlift::obfuscate::scheme("ppl").unwrap().in_3d.unwrap();
-    let options = SchemeOptions { voxel: 0.5 };
-    let (_, secret) = obfuscate(ppl, &original, None, &options, &Key::from_seed(1)).unwrap();
+    let (_, secret) = obfuscate(&Ppl, &original, None, &Key::from_seed(1)).unwrap();
     let knn = oracle::search(&original).unwrap();
     TrueNeighbors::new(&knn, &secret, secret.slots_per_record(), k).unwrap()
 }

@@ -5,7 +5,8 @@ use std::time::Instant;
 
 use serde_json::{Map, json};
 use unlift::Unit;
-use unlift::audit::{Plan, Source};
+use unlift::audit::{NeighborsBy, Plan};
+use unlift::obfuscate::SchemeOptions;
 use unlift_features::SiftOptions;
 use unlift_io::atomic::Rules;
 use unlift_io::{Error, read};
@@ -71,25 +72,29 @@ pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
     Ok(if passed { Outcome::Done } else { Outcome::GateFailed })
 }
 
-fn plan(args: &AuditImagesArgs) -> anyhow::Result<Plan> {
+fn plan(args: &AuditImagesArgs) -> anyhow::Result<Plan<2>> {
     let usual = Plan::new(Unit::Pixel);
     let mut sources = Vec::new();
     for source in distinct(args.neighbors.clone(), |a, b| a == b) {
         match source {
-            NeighborSource::Own(joined) => sources.push(own(joined, &args.attack)),
-            NeighborSource::Oracle | NeighborSource::File(_) => sources.push(Source::Oracle),
+            NeighborSource::Own(joined) => sources.push(own(joined, &args.attack)?),
+            NeighborSource::Oracle | NeighborSource::File(_) => sources.push(NeighborsBy::Oracle),
         }
     }
     check_about(&args.attack, &sources)?;
     let schemes = match args.schemes.as_slice() {
         [] => usual.schemes.clone(),
-        given => distinct(given.to_vec(), |a, b| a.name == b.name),
+        given => {
+            let options = SchemeOptions::usual(Unit::Pixel);
+            let entries = distinct(given.to_vec(), |a, b| a.name == b.name);
+            entries.iter().filter_map(|entry| entry.of_dimension(&options)).collect()
+        }
     };
     let thresholds = thresholds(&args.thresholds, &usual)?;
     let away = |at: &usize| (thresholds[*at].value / HEADLINE_PX).ln().abs();
     let headline = (0..thresholds.len()).min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0);
     let plan = Plan {
-        sources,
+        neighbors: sources,
         schemes,
         k: usize::from(args.k),
         solvers: solvers(&args.solver, &usual),
@@ -98,7 +103,7 @@ fn plan(args: &AuditImagesArgs) -> anyhow::Result<Plan> {
         seed: args.seed,
         ..attack(&args.attack, usual)
     };
-    plan.check_for_images().map_err(|error| usage(error.to_string()))?;
+    plan.check_for_many().map_err(|error| usage(error.to_string()))?;
     Ok(plan)
 }
 
@@ -124,7 +129,11 @@ fn chosen(n: usize, most: Option<usize>) -> Vec<usize> {
 
 /// Asks the first image with keypoints whether it has what the sources need: one line in place of one per
 /// image. What is wrong with single images is told when they are read.
-fn check_descriptors(source: &FeatureSource, chosen: &[usize], plan: &Plan) -> anyhow::Result<()> {
+fn check_descriptors(
+    source: &FeatureSource,
+    chosen: &[usize],
+    plan: &Plan<2>,
+) -> anyhow::Result<()> {
     // Extracted features always have them.
     if matches!(source, FeatureSource::Folder(_)) || !Needs::of_plan(plan).descriptors() {
         return Ok(());
@@ -133,12 +142,11 @@ fn check_descriptors(source: &FeatureSource, chosen: &[usize], plan: &Plan) -> a
     let Some(first) = found.into_iter().find(|image| !image.keypoints.is_empty()) else {
         return Ok(());
     };
-    for wanted in &plan.sources {
-        let Source::Own(joined) = wanted else { continue };
+    for source in plan.own_sources() {
         match &first.descriptors {
-            Some(descriptors) => check_fit(joined, descriptors)?,
-            None if joined.needs_descriptors() => {
-                let name = joined.name();
+            Some(descriptors) => check_fit(source, descriptors)?,
+            None if source.needs() == unlift::neighbors::Needs::Descriptors => {
+                let name = source.name();
                 return Err(usage(format!("--neighbors {name}: expected descriptors, found none")));
             }
             None => {}

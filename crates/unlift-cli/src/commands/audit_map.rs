@@ -4,9 +4,10 @@ use std::path::Path;
 use std::time::Instant;
 
 use serde_json::{Map, Value, json};
-use unlift::audit::{Plan, PointNeighbors, Source};
+use unlift::audit::{NeighborsBy, Plan, PointNeighbors};
 use unlift::geometry::vector::distance;
-use unlift::neighbors::sources::Joined;
+use unlift::neighbors::{Needs, Source};
+use unlift::obfuscate::SchemeOptions;
 use unlift_io::atomic::Rules;
 use unlift_io::hash::{hash_file, hash_files};
 use unlift_io::read;
@@ -83,10 +84,14 @@ fn rules(args: &AuditMapArgs) -> Rules {
     Rules::new(inputs.chain(lists), args.result.force)
 }
 
-fn plan(args: &AuditMapArgs, prepared: &Prepared, input: &read::Input) -> anyhow::Result<Plan> {
+fn plan(args: &AuditMapArgs, prepared: &Prepared, input: &read::Input) -> anyhow::Result<Plan<3>> {
     let k = usize::from(args.map.k);
-    let usual = Plan::new(prepared.original.reveal().unit()).for_map(prepared.original.len(), k);
-    let schemes = if args.schemes.is_empty() { all_schemes() } else { args.schemes.clone() };
+    let unit = prepared.original.reveal().unit();
+    let usual = Plan::new(unit).for_map(prepared.original.len(), k);
+    let entries = if args.schemes.is_empty() { all_schemes() } else { args.schemes.clone() };
+    let entries = distinct(entries, |a, b| a.name == b.name);
+    let options = SchemeOptions::usual(unit);
+    let schemes = entries.iter().filter_map(|entry| entry.of_dimension(&options)).collect();
     let thresholds = thresholds(&args.thresholds, &usual)?;
     let points = prepared.original.reveal();
     let typed = !args.thresholds.is_empty();
@@ -94,8 +99,8 @@ fn plan(args: &AuditMapArgs, prepared: &Prepared, input: &read::Input) -> anyhow
         eprintln!("unlift: note: {note}");
     }
     Ok(Plan {
-        sources: sources(args, prepared, input)?,
-        schemes: distinct(schemes, |a, b| a.name == b.name),
+        neighbors: neighbors(args, prepared, input)?,
+        schemes,
         k,
         solvers: solvers(&args.solver, &usual),
         records_alone: !args.no_records_alone,
@@ -106,28 +111,31 @@ fn plan(args: &AuditMapArgs, prepared: &Prepared, input: &read::Input) -> anyhow
 }
 
 /// Every source once, and no option that would be about none of them.
-fn sources(
+fn neighbors(
     args: &AuditMapArgs,
     prepared: &Prepared,
     input: &read::Input,
-) -> anyhow::Result<Vec<Source>> {
+) -> anyhow::Result<Vec<NeighborsBy<3>>> {
     let mut sources = Vec::new();
     for source in distinct(args.neighbors.clone(), |a, b| a == b) {
         sources.push(match source {
-            NeighborSource::Oracle => Source::Oracle,
-            NeighborSource::Own(joined) => {
-                check_own(&joined, prepared, input)?;
-                if let Some(note) = joined.note(prepared.original.len()) {
-                    eprintln!("unlift: note: {note}");
+            NeighborSource::Oracle => NeighborsBy::Oracle,
+            NeighborSource::Own(named) => {
+                let by = own(named, &args.attack)?;
+                if let Some(source) = by.source() {
+                    check_own(source, prepared, input)?;
+                    if let Some(note) = source.note(prepared.original.len()) {
+                        eprintln!("unlift: note: {note}");
+                    }
                 }
-                own(joined, &args.attack)
+                by
             }
             NeighborSource::File(path) => {
-                Source::Given(by_point(&path, prepared, input.positions.len())?)
+                NeighborsBy::Given(by_point(&path, prepared, input.positions.len())?)
             }
         });
     }
-    let files = sources.iter().filter(|s| matches!(s, Source::Given(_))).count();
+    let files = sources.iter().filter(|s| matches!(s, NeighborsBy::Given(_))).count();
     if files > 1 {
         return Err(usage(format!("--neighbors: expected at most one file, found {files}")));
     }
@@ -136,10 +144,14 @@ fn sources(
 }
 
 /// Refuses a source that lacks what it needs, before anything is computed.
-fn check_own(joined: &Joined, prepared: &Prepared, input: &read::Input) -> anyhow::Result<()> {
-    let name = joined.name();
+fn check_own(
+    source: &dyn Source<3>,
+    prepared: &Prepared,
+    input: &read::Input,
+) -> anyhow::Result<()> {
+    let name = source.name();
     match &prepared.descriptors {
-        None if joined.needs_descriptors() => {
+        None if source.needs() == Needs::Descriptors => {
             let text = "expected descriptors (--descriptors FILE), found none";
             let error = usage(format!("--neighbors {name}: {text}"));
             return Err(match &input.database {
@@ -148,7 +160,7 @@ fn check_own(joined: &Joined, prepared: &Prepared, input: &read::Input) -> anyho
             });
         }
         None => {}
-        Some(descriptors) => check_fit(joined, descriptors)?,
+        Some(descriptors) => check_fit(source, descriptors)?,
     }
     Ok(())
 }

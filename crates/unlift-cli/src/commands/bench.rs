@@ -3,9 +3,8 @@
 use std::time::Instant;
 
 use serde_json::{Value, json};
-use unlift::audit::Plan;
 use unlift::neighbors::oracle::{TrueNeighbors, search};
-use unlift::obfuscate::obfuscate;
+use unlift::obfuscate::{SchemeOptions, obfuscate};
 use unlift::recover::{RecoverOptions, recover};
 use unlift::seed::Key;
 use unlift::truth::Original;
@@ -42,12 +41,12 @@ pub fn recovery(args: &BenchRecoverArgs) -> anyhow::Result<Outcome> {
 
 fn measure(args: &BenchRecoverArgs) -> anyhow::Result<Bench> {
     let name = args.scheme.name;
-    let scheme = args.scheme.in_3d.ok_or_else(|| usage(format!("{name} is not for maps")))?;
     let original = map(args)?;
-    let options = Plan::new(original.reveal().unit()).scheme_options;
+    let options = SchemeOptions::usual(original.reveal().unit());
+    let scheme = args.scheme.of_dimension::<3>(&options);
+    let scheme = scheme.ok_or_else(|| usage(format!("{name} is not for maps")))?;
     let started = Instant::now();
-    let (released, secret) =
-        obfuscate(scheme, &original, None, &options, &Key::from_seed(args.seed))?;
+    let (released, secret) = obfuscate(&*scheme, &original, None, &Key::from_seed(args.seed))?;
     let hidden = started.elapsed().as_secs_f64();
     let started = Instant::now();
     let knn = search(&original)?;

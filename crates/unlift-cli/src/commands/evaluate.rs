@@ -31,7 +31,7 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     let released = released(args, &secret)?;
     let unit = original.reveal().unit();
     let thresholds = match args.thresholds.as_slice() {
-        [] => Plan::new(unit).thresholds,
+        [] => Plan::<3>::new(unit).thresholds,
         given => given.to_vec(),
     };
     let baseline = released.map(|released| blind(&released, &original, &secret));
@@ -46,7 +46,7 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
 /// Compares recovered images with the truth.
 fn images(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     let thresholds = match args.thresholds.as_slice() {
-        [] => Plan::new(Unit::Pixel).thresholds,
+        [] => Plan::<2>::new(Unit::Pixel).thresholds,
         given => given.to_vec(),
     };
     let released = released_path(args);

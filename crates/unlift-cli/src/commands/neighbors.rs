@@ -4,7 +4,7 @@ use std::path::Path;
 
 use unlift::Error;
 use unlift::neighbors::oracle::{Outliers, TrueNeighbors, search};
-use unlift::neighbors::sources::Joined;
+use unlift::neighbors::{Needs, Source};
 use unlift::released::Released;
 use unlift_io::atomic::{Kind, Rules};
 use unlift_io::stage::{Kind as Stage, has_images, read_released, read_truth, write_neighborhoods};
@@ -75,52 +75,53 @@ pub fn find(args: &FindArgs) -> anyhow::Result<Outcome> {
     let kind = Kind::Stage(Stage::Neighborhoods);
     check_file(&args.out, kind, &rules)?;
     let images = has_images(&args.released)?;
-    let source = match args.k {
+    let named = match args.k {
         Some(k) => args.source.clone().with_k(usize::from(k)),
-        None if images => args.source.clone().for_images(),
         None => args.source.clone(),
     };
-    let listed = |n: usize| {
-        let (k, name, out) = (source.k(), source.name(), args.out.display());
-        print(&format!("{n} neighborhoods of up to {k} by {name}, in {out}\n"))
-    };
     if images {
-        if let Some(entry) = source.not_in_dimension::<2>() {
+        if let Some(entry) = named.not_in_dimension::<2>() {
             return Err(usage(format!(
                 "--source {}: expected with a map, found images",
                 entry.name
             )));
         }
+        let source = named.of_dimension::<2>()?;
         let alive = Spinner::new("finding neighbors");
         let counts = with_threads(args.threads, || {
-            list_by_source(&args.released, &source, args.seed, (&args.out, &rules))
+            list_by_source(&args.released, &*source, args.seed, (&args.out, &rules))
         })?;
         drop(alive);
-        listed(counts.slots)?;
-        return Ok(Outcome::Done);
+        return listed(counts.slots, source.k(), args);
     }
     let released = read_released::<3>(&args.released)?;
-    check_own(&source, &released)
+    let source = named.of_dimension::<3>()?;
+    check_own(&*source, &released)
         .map_err(|error| advise(unlift_io::Error::core(&args.released, error.0), error.1))?;
     if let Some(note) = source.note(released.n_slots()) {
         eprintln!("unlift: note: {note}");
     }
     let alive = Spinner::new("finding neighbors");
     let lists = with_threads(args.threads, || {
-        let lists = source.make(&released, args.seed);
+        let lists = source.lists(&released, source.k(), args.seed);
         Ok(lists.map_err(|error| unlift_io::Error::core(&args.released, error))?)
     })?;
     check_file(&args.out, kind, &rules)?;
     write_neighborhoods(&args.out, &lists)?;
     drop(alive);
-    listed(lists.n_slots())?;
+    listed(lists.n_slots(), source.k(), args)
+}
+
+fn listed(n: usize, k: usize, args: &FindArgs) -> anyhow::Result<Outcome> {
+    let (name, out) = (args.source.name(), args.out.display());
+    print(&format!("{n} neighborhoods of up to {k} by {name}, in {out}\n"))?;
     Ok(Outcome::Done)
 }
 
 /// What a source lacks in a released map, and what to do about it.
-fn check_own(source: &Joined, released: &Released<3>) -> Result<(), (Error, &'static str)> {
+fn check_own(source: &dyn Source<3>, released: &Released<3>) -> Result<(), (Error, &'static str)> {
     match released.descriptors() {
-        None if source.needs_descriptors() => {
+        None if source.needs() == Needs::Descriptors => {
             let what = format!("descriptors for {}", source.name());
             let way_out =
                 "--source geometric, or hide the map with unlift obfuscate --descriptors FILE";
@@ -128,7 +129,7 @@ fn check_own(source: &Joined, released: &Released<3>) -> Result<(), (Error, &'st
         }
         None => Ok(()),
         Some(descriptors) => source
-            .check_descriptors(descriptors)
+            .takes(descriptors)
             .map_err(|error| (error, "--source similarity, which takes descriptors of any kind")),
     }
 }

@@ -1,7 +1,7 @@
 //! `unlift obfuscate`: a map, or features of images, in; a released file and a truth file out.
 
-use unlift::audit::Plan;
-use unlift::obfuscate::obfuscate;
+use unlift::Unit;
+use unlift::obfuscate::{SchemeOptions, obfuscate};
 use unlift::seed::Key;
 use unlift_io::atomic::{Access, Kind, OutputSet, Rules};
 use unlift_io::stage::{Kind as Stage, write_released, write_truth};
@@ -29,12 +29,14 @@ pub fn run(args: &ObfuscateArgs) -> anyhow::Result<Outcome> {
     let rules = Rules::new(inputs, args.force);
     let mut out = OutputSet::create(&args.out, rules, Access::Private, &files).map_err(refused)?;
     let name = args.scheme.name;
-    let Some(scheme) = args.scheme.in_3d else { return images(args, out) };
+    let unit = if args.map.scale.is_some() { Unit::Meter } else { Unit::KthNeighbor };
+    let Some(scheme) = args.scheme.of_dimension::<3>(&SchemeOptions::usual(unit)) else {
+        return images(args, out);
+    };
     let (_, prepared) = open_map(&args.path, &args.map, false)?;
-    let options = Plan::new(prepared.original.reveal().unit()).scheme_options;
     let descriptors = prepared.descriptors.as_ref();
     let key = key(args)?;
-    let hidden = obfuscate(scheme, &prepared.original, descriptors, &options, &key);
+    let hidden = obfuscate(&*scheme, &prepared.original, descriptors, &key);
     let (released, secret) = hidden.map_err(|e| unlift_io::Error::core(&args.path, e))?;
     write_truth(&out.stage(TRUTH, Kind::Stage(Stage::Truth))?, &prepared.original, &secret)?;
     write_released(&out.stage(RELEASED, Kind::Stage(Stage::Released))?, &released)?;

@@ -2,8 +2,9 @@
 
 use serde_json::{Value, json};
 use unlift::Descriptors;
-use unlift::audit::{Plan, Source, Threshold};
-use unlift::neighbors::sources::Joined;
+use unlift::audit::{NeighborsBy, Plan, Threshold};
+use unlift::neighbors::Source;
+use unlift::neighbors::sources::Named;
 use unlift::recover::Solver;
 
 use crate::args_audit::AttackArgs;
@@ -12,7 +13,7 @@ use crate::job::Finished;
 use crate::values::distinct;
 
 /// `usual` with what was asked for.
-pub fn attack(args: &AttackArgs, usual: Plan) -> Plan {
+pub fn attack<const D: usize>(args: &AttackArgs, usual: Plan<D>) -> Plan<D> {
     let mut plan = usual;
     if !args.inlier_ratios.is_empty() {
         plan.inlier_ratios = distinct(args.inlier_ratios.clone(), |a, b| a == b);
@@ -28,7 +29,7 @@ pub fn attack(args: &AttackArgs, usual: Plan) -> Plan {
 }
 
 /// The recovery methods asked for, each once, else the usual ones.
-pub fn solvers(given: &[Solver], usual: &Plan) -> Vec<Solver> {
+pub fn solvers<const D: usize>(given: &[Solver], usual: &Plan<D>) -> Vec<Solver> {
     match given {
         [] => usual.solvers.clone(),
         given => distinct(given.to_vec(), |a, b| a == b),
@@ -36,7 +37,10 @@ pub fn solvers(given: &[Solver], usual: &Plan) -> Vec<Solver> {
 }
 
 /// The thresholds asked for, each once, else the usual ones.
-pub fn thresholds(given: &[Threshold], usual: &Plan) -> anyhow::Result<Vec<Threshold>> {
+pub fn thresholds<const D: usize>(
+    given: &[Threshold],
+    usual: &Plan<D>,
+) -> anyhow::Result<Vec<Threshold>> {
     let thresholds = if given.is_empty() { &usual.thresholds } else { given };
     for (at, threshold) in thresholds.iter().enumerate() {
         if thresholds[..at].iter().any(|other| other.value == threshold.value) {
@@ -50,17 +54,21 @@ pub fn thresholds(given: &[Threshold], usual: &Plan) -> anyhow::Result<Vec<Thres
 }
 
 /// A source of the attacker's own, with lists as long as asked for.
-pub fn own(joined: Joined, args: &AttackArgs) -> Source {
-    Source::Own(match args.source_k {
-        Some(k) => joined.with_k(usize::from(k)),
-        None => joined,
-    })
+pub fn own<const D: usize>(named: Named, args: &AttackArgs) -> anyhow::Result<NeighborsBy<D>> {
+    let named = match args.source_k {
+        Some(k) => named.with_k(usize::from(k)),
+        None => named,
+    };
+    Ok(NeighborsBy::Source(named.of_dimension()?))
 }
 
 /// Refuses a source that cannot work on descriptors of this kind.
-pub fn check_fit(joined: &Joined, descriptors: &Descriptors) -> anyhow::Result<()> {
-    joined.check_descriptors(descriptors).map_err(|error| {
-        let name = joined.name();
+pub fn check_fit<const D: usize>(
+    source: &dyn Source<D>,
+    descriptors: &Descriptors,
+) -> anyhow::Result<()> {
+    source.takes(descriptors).map_err(|error| {
+        let name = source.name();
         let (expected, found) = (error.expected(), error.found());
         let error = usage(format!("--neighbors {name}: expected {expected}, found {found}"));
         advise(error, "--neighbors similarity, which takes descriptors of any kind")
@@ -68,20 +76,23 @@ pub fn check_fit(joined: &Joined, descriptors: &Descriptors) -> anyhow::Result<(
 }
 
 /// Refuses options that would be about none of the sources.
-pub fn check_about(args: &AttackArgs, sources: &[Source]) -> anyhow::Result<()> {
-    let names = || sources.iter().map(Source::name).collect::<Vec<_>>().join(", ");
+pub fn check_about<const D: usize>(
+    args: &AttackArgs,
+    sources: &[NeighborsBy<D>],
+) -> anyhow::Result<()> {
+    let names = || sources.iter().map(NeighborsBy::name).collect::<Vec<_>>().join(", ");
     for (option, given) in [
         ("--inlier-ratios", !args.inlier_ratios.is_empty()),
         ("--oracle-noise", !args.oracle_noise.is_empty()),
     ] {
-        if given && !sources.contains(&Source::Oracle) {
+        if given && !sources.iter().any(NeighborsBy::is_oracle) {
             let found = names();
             return Err(usage(format!(
                 "{option}: expected with --neighbors oracle, found only {found}"
             )));
         }
     }
-    if args.source_k.is_some() && !sources.iter().any(|s| matches!(s, Source::Own(_))) {
+    if args.source_k.is_some() && !sources.iter().any(|by| by.source().is_some()) {
         let found = names();
         return Err(usage(format!(
             "--source-k: expected with a source that makes its own lists, found only {found}"

@@ -14,9 +14,10 @@ pub fn run() -> anyhow::Result<Outcome> {
             (Some(_), None) => "maps",
             (None, _) => "images",
         };
+        let facts = scheme.facts;
         text.push_str(&format!(
             "{}\n  for      {meant_for}\n  rule     {}\n  hidden   {}\n  source   {}\n  patents  {}\n",
-            scheme.name, scheme.summary, scheme.hidden, scheme.source, scheme.patents
+            scheme.name, facts.summary, facts.hidden, facts.source, facts.patents
         ));
     }
     print(&text)?;

@@ -5,9 +5,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use serde_json::{Map, Value};
-use unlift::audit::images::{self, Outcome, run};
-use unlift::audit::{Cell, Observer, Plan, Row, Source};
-use unlift::neighbors::sources::Joined;
+use unlift::audit::{self, Cell, NeighborsBy, Observer, Outcome, Plan, Row, run_images};
+use unlift::neighbors::sources::SOURCES;
 use unlift_io::atomic::OutputSet;
 use unlift_io::hash::{hash_file, hash_files};
 use unlift_report::document::{ImageCounts, ImageFigures, Input};
@@ -38,7 +37,7 @@ pub struct ImagesJob<'a> {
     /// Numbers of the images to be used, rising.
     pub chosen: Vec<usize>,
     /// What is to be done.
-    pub plan: Plan,
+    pub plan: Plan<2>,
     /// Options for the record, beside those in the plan.
     pub options: Map<String, Value>,
     /// Bounds to hold.
@@ -79,7 +78,7 @@ pub fn perform(job: ImagesJob<'_>, out: OutputSet) -> anyhow::Result<(Option<Fin
     let of = (job.source, job.path);
     let needs = Needs::of_plan(&job.plan);
     let images = Stream::new(of, &job.chosen, needs, &tally, steps.clone());
-    let outcome = run(images, &job.plan, &mut watcher)?;
+    let outcome = run_images(images, &job.plan, &mut watcher)?;
     let Watcher { figures, errors, curves, .. } = watcher;
     let tally = tally.into_inner();
     let used = Used { used: tally.used.len(), unusable: tally.unusable };
@@ -158,12 +157,12 @@ fn draw(
     let mut plan = job.plan.clone();
     plan.solvers.truncate(1);
     (plan.repeats, plan.reference) = (1, false);
-    plan.sources.extend(without_oracle(job, &numbers));
+    plan.neighbors.extend(without_oracle(job, &numbers));
     let needs = Needs::of_plan(&plan);
     let mut album = Album::default();
     let again = RefCell::new(Tally::default());
     let images = Stream::new((job.source, job.path), &numbers, needs, &again, steps.clone());
-    run(images, &plan, &mut album)?;
+    run_images(images, &plan, &mut album)?;
     let mut pictures = album.pictures;
     for picture in &mut pictures {
         let at = numbers.iter().position(|&at| job.source.names()[at] == picture.name);
@@ -183,29 +182,28 @@ fn draw(
 }
 
 /// Sources by descriptors that the plan lacks and all images `numbers` have what it takes for.
-fn without_oracle(job: &ImagesJob<'_>, numbers: &[usize]) -> Vec<Source> {
-    let missing = ["similarity", "overlap"].into_iter().filter_map(|name| Joined::parse(name).ok());
-    let missing = missing.filter(|joined| {
-        let same =
-            |source: &Source| matches!(source, Source::Own(own) if own.name() == joined.name());
+fn without_oracle(job: &ImagesJob<'_>, numbers: &[usize]) -> Vec<NeighborsBy<2>> {
+    let missing = SOURCES.iter().filter_map(|entry| entry.of_dimension::<2>());
+    let missing = missing.filter(|source| {
+        let needs = Needs::of(source);
         let fits = |&at: &usize| match job.source {
             FeatureSource::Folder(_) => true,
             FeatureSource::File(_) => {
-                let read = job.source.get(at);
-                read.is_ok_and(|image| lacking(&image, &Needs::of(joined)).is_none())
+                job.source.get(at).is_ok_and(|image| lacking(&image, &needs).is_none())
             }
         };
-        !job.plan.sources.iter().any(same) && numbers.iter().all(fits)
+        let asked = job.plan.own_sources().any(|own| own.name() == source.name());
+        needs.descriptors() && !asked && numbers.iter().all(fits)
     });
-    missing.map(Source::Own).collect()
+    missing.map(NeighborsBy::Source).collect()
 }
 
 /// Positions in `figures` of the images of which least, about half and most came back, by the mean over
 /// schemes within the headline threshold; fewer when there are fewer.
-fn telling(plan: &Plan, figures: &[ImageFigures]) -> Vec<(usize, &'static str)> {
+fn telling(plan: &Plan<2>, figures: &[ImageFigures]) -> Vec<(usize, &'static str)> {
     let label = &plan.thresholds[plan.headline].label;
     let away = |ratio: &f64| (ratio - USUAL_RATIO).abs();
-    let per_scheme = plan.variants().len() * plan.solvers.len() + usize::from(plan.reference);
+    let per_scheme = plan.rows_per_scheme();
     let variants = plan.variants();
     // The first solver's row of the variant nearest to the usual ratio; an own source has no ratio yet.
     let at = (0..variants.len())
@@ -253,7 +251,7 @@ impl Curve {
 struct Watcher<'a> {
     progress: Progress,
     tally: &'a RefCell<Tally>,
-    plan: &'a Plan,
+    plan: &'a Plan<2>,
     figures: Vec<ImageFigures>,
     /// Where curves are looked at.
     errors: Vec<f64>,
@@ -276,7 +274,7 @@ impl<'a> Watcher<'a> {
     }
 }
 
-impl images::Watcher for Watcher<'_> {
+impl audit::Watcher for Watcher<'_> {
     type OfImage = Curves;
 
     fn begin(&mut self) -> Curves {

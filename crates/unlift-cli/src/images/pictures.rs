@@ -1,7 +1,6 @@
 //! What the report draws of chosen images, collected while these are audited once more.
 
-use unlift::audit::images::Watcher;
-use unlift::audit::{Cell, Observer, Row};
+use unlift::audit::{Cell, Observer, Row, Watcher};
 use unlift::released::{Obfuscation, Released};
 use unlift_report::pictures::{
     GRAPH_NEIGHBORS, Given, Graph, Marks, Picture, RecoveredView, ReleasedView,
@@ -46,18 +45,18 @@ impl Observer<2> for Page {
         for (slot, original) in cell.secret.hidden().iter().enumerate() {
             slot_of[original.index()] = Some(slot);
         }
-        let scheme = cell.row.scheme;
-        if picture.released.iter().all(|view| view.scheme != scheme)
+        let scheme = &cell.row.scheme;
+        if picture.released.iter().all(|view| view.scheme != *scheme)
             && let Some(marks) = marks(cell.released, &slot_of)
         {
-            picture.released.push(ReleasedView { scheme: scheme.to_owned(), marks });
+            picture.released.push(ReleasedView { scheme: scheme.clone(), marks });
         }
         let given = Given {
             neighbors: cell.row.neighbors.clone(),
             oracle_noise: cell.row.oracle_noise.map(str::to_owned),
             inlier_ratio: cell.row.inlier_ratio,
         };
-        let first = picture.released.first().is_some_and(|view| view.scheme == scheme);
+        let first = picture.released.first().is_some_and(|view| view.scheme == *scheme);
         if first && picture.graphs.iter().all(|graph| graph.given != given) {
             let neighbors = slot_of.iter().map(|slot| slot.map_or(Vec::new(), |s| best(cell, s)));
             picture.graphs.push(Graph { given: given.clone(), neighbors: neighbors.collect() });

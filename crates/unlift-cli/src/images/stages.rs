@@ -5,11 +5,10 @@ use std::path::Path;
 
 use rayon::prelude::*;
 use unlift::audit::staged::{Pooled, key_of, oracle_lists, oracle_seed};
-use unlift::audit::{Plan, Row, Threshold};
+use unlift::audit::{Row, Threshold};
 use unlift::evaluate::nearer_to_own;
-use unlift::neighbors::Neighborhoods;
-use unlift::neighbors::sources::Joined;
-use unlift::obfuscate::obfuscate;
+use unlift::neighbors::{Needs as SourceNeeds, Neighborhoods, Source, of_what_there_is};
+use unlift::obfuscate::{SchemeOptions, obfuscate};
 use unlift::recover::{RecoverOptions, Recovered, Status, recover};
 use unlift::released::Released;
 use unlift::seed::Key;
@@ -69,9 +68,9 @@ fn each<T: Send, U: Send>(
 
 /// Hides the keypoints of all images of `args.path` and writes both files into `out`.
 pub fn hide(args: &ObfuscateArgs, key: &Key, out: &mut OutputSet) -> anyhow::Result<Counts> {
-    let scheme = args.scheme.in_2d.ok_or_else(|| anyhow::anyhow!("not a scheme for images"))?;
+    let scheme = args.scheme.of_dimension::<2>(&SchemeOptions::usual(Unit::Pixel));
+    let scheme = scheme.ok_or_else(|| anyhow::anyhow!("not a scheme for images"))?;
     let source = FeatureSource::open(&args.path, &SiftOptions::default())?;
-    let options = Plan::new(Unit::Pixel).scheme_options;
     let tally = RefCell::new(Tally::default());
     let steps = Progress::new(true).steps();
     for error in source.refused() {
@@ -95,7 +94,7 @@ pub fn hide(args: &ObfuscateArgs, key: &Key, out: &mut OutputSet) -> anyhow::Res
         |image| {
             let key = key_of(key, &image.name);
             let descriptors = image.descriptors.as_ref();
-            let hidden = obfuscate(scheme, &image.original, descriptors, &options, &key);
+            let hidden = obfuscate(&*scheme, &image.original, descriptors, &key);
             let of_image = |error: unlift::Error| {
                 Error::core(&args.path, error.within(&format!("image {}", image.name)))
             };
@@ -138,7 +137,7 @@ pub fn list_by_oracle(args: &OracleArgs, released: &Path, rules: &Rules) -> anyh
 /// Lists by a source of the attacker for all images of `released`, written to `out`.
 pub fn list_by_source(
     released: &Path,
-    source: &Joined,
+    source: &dyn Source<2>,
     seed: u64,
     out: (&Path, &Rules),
 ) -> anyhow::Result<Counts> {
@@ -148,14 +147,14 @@ pub fn list_by_source(
         let image = rows.released()?;
         let of_image =
             |error: unlift::Error| Error::core(released, error.within(&format!("image {name}")));
-        if image.descriptors().is_none() && source.needs_descriptors() {
+        if image.descriptors().is_none() && source.needs() == SourceNeeds::Descriptors {
             let what = format!("descriptors for {}", source.name());
             return Err(of_image(unlift::Error::new(what, "some", "none")).into());
         }
         if let Some(descriptors) = image.descriptors() {
-            source.check_descriptors(descriptors).map_err(of_image)?;
+            source.takes(descriptors).map_err(of_image)?;
         }
-        let lists = source.make_of_what_there_is(&image, seed).map_err(of_image)?;
+        let lists = of_what_there_is(source, &image, seed).map_err(of_image)?;
         Ok(Some((name, lists)))
     };
     write(out, Stage::Neighborhoods, || Ok(images.next_image()?), work, list)

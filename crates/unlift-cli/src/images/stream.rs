@@ -3,12 +3,13 @@
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::path::Path;
+use std::sync::Arc;
 
 use rayon::prelude::*;
-use unlift::audit::images::Image;
-use unlift::audit::{Plan, Source};
+use unlift::audit::Image;
+use unlift::audit::{NeighborsBy, Plan};
 use unlift::geometry::frame::Bounds;
-use unlift::neighbors::sources::Joined;
+use unlift::neighbors::{self, Source};
 use unlift::truth::Original;
 use unlift::{PointSet, Unit};
 use unlift_io::Error;
@@ -44,23 +45,24 @@ impl Tally {
 /// What an image must have, beside keypoints and a size: what these sources need.
 #[derive(Clone, Debug, Default)]
 pub struct Needs {
-    sources: Vec<Joined>,
+    sources: Vec<Arc<dyn Source<2>>>,
     /// Descriptors are kept where there are any.
     whatever: bool,
 }
 
 impl Needs {
     /// What a source needs.
-    pub fn of(joined: &Joined) -> Self {
-        let sources = joined.needs_descriptors().then(|| joined.clone()).into_iter().collect();
+    pub fn of(source: &Arc<dyn Source<2>>) -> Self {
+        let needy = |source: &Arc<dyn Source<2>>| source.needs() == neighbors::Needs::Descriptors;
+        let sources = Some(source.clone()).filter(needy).into_iter().collect();
         Self { sources, whatever: false }
     }
 
     /// What a plan needs.
-    pub fn of_plan(plan: &Plan) -> Self {
-        let own = plan.sources.iter().filter_map(|source| match source {
-            Source::Own(joined) if joined.needs_descriptors() => Some(joined.clone()),
-            Source::Own(_) | Source::Oracle | Source::Given(_) => None,
+    pub fn of_plan(plan: &Plan<2>) -> Self {
+        let own = plan.neighbors.iter().flat_map(|by| match by {
+            NeighborsBy::Source(source) => Self::of(source).sources,
+            NeighborsBy::Oracle | NeighborsBy::Given(_) => Vec::new(),
         });
         Self { sources: own.collect(), whatever: false }
     }
@@ -168,6 +170,6 @@ pub fn lacking(features: &ImageFeatures, needs: &Needs) -> Option<(String, Strin
     let Some(found) = &features.descriptors else {
         return Some(("descriptors".to_owned(), "none".to_owned()));
     };
-    let error = needs.sources.iter().find_map(|joined| joined.check_descriptors(found).err())?;
+    let error = needs.sources.iter().find_map(|source| source.takes(found).err())?;
     Some((error.expected().to_owned(), error.found().to_owned()))
 }

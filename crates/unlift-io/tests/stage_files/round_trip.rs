@@ -60,10 +60,10 @@ fn released_images() {
     let points = PointSet::try_new(keypoints, Unit::Pixel).unwrap();
     let original = Original::within(points, bounds).unwrap();
     for entry in SCHEMES {
-        let Some(scheme) = entry.in_2d else { continue };
-        let (released, _) =
-            obfuscate(scheme, &original, None, &SchemeOptions { voxel: 50.0 }, &Key::from_seed(3))
-                .unwrap();
+        let Some(scheme) = entry.of_dimension::<2>(&SchemeOptions { voxel: 50.0 }) else {
+            continue;
+        };
+        let (released, _) = obfuscate(&*scheme, &original, None, &Key::from_seed(3)).unwrap();
         assert!(released.bounds().is_some());
         written_twice(folder.path(), |path| stage::write_released(path, &released).unwrap());
         assert!(stage::read_released::<2>(&path).unwrap() == released, "{}", entry.name);

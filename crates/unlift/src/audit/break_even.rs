@@ -34,7 +34,7 @@ impl Bound {
 #[derive(Clone, Debug, PartialEq)]
 pub struct BreakEven {
     /// Scheme name.
-    pub scheme: &'static str,
+    pub scheme: String,
     /// Solver name, or [`STRONGEST`].
     pub solver: &'static str,
     /// How the oracle erred.
@@ -52,16 +52,17 @@ pub const STRONGEST: &str = "strongest";
 
 /// Break-even ratios within the headline threshold, for every scheme and noise model with oracle rows: of the
 /// strongest attack at every ratio where there are several, then of every solver.
-pub fn break_even(plan: &Plan, rows: &[Row]) -> Vec<BreakEven> {
+pub fn break_even<const D: usize>(plan: &Plan<D>, rows: &[Row]) -> Vec<BreakEven> {
     let mut result = Vec::new();
     let solvers: Vec<&'static str> = plan.solvers.iter().map(|solver| solver.name()).collect();
     for scheme in &plan.schemes {
         for noise in &plan.oracle_noise {
-            let (scheme, oracle_noise) = (scheme.name, noise.name());
+            let (scheme, oracle_noise) = (scheme.name(), noise.name());
             let of = |row: &&Row| row.scheme == scheme && row.oracle_noise == Some(oracle_noise);
             let mut push = |solver: &'static str, rows: &[&Row]| {
                 if let Some((inlier_ratio, bound)) = crossing(&curve(rows, plan.headline)) {
                     let threshold = plan.thresholds[plan.headline].label.clone();
+                    let scheme = scheme.to_owned();
                     let found =
                         BreakEven { scheme, solver, oracle_noise, threshold, inlier_ratio, bound };
                     result.push(found);

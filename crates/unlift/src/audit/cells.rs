@@ -14,14 +14,15 @@ use crate::evaluate::{Accuracy, blind, distinct_weights, joined, reference};
 use crate::geometry::knn::Knn;
 use crate::neighbors::Neighborhoods;
 use crate::neighbors::oracle::Noise;
-use crate::obfuscate::{Entry, obfuscate};
+use crate::obfuscate::{Scheme, obfuscate};
 use crate::recover::{RecoverOptions, Recovered, Solver, recover, recover_with_start};
 use crate::released::Released;
 use crate::seed::Key;
 use crate::truth::{Original, Secret};
 use crate::{Descriptors, Error};
 
-/// Everything known about one row of one repeat, for whoever writes clouds or draws pictures.
+/// Everything known about one row of one repeat, for whoever writes clouds, draws pictures or measures more.
+#[derive(Clone, Copy)]
 pub struct Cell<'a, const D: usize = 3> {
     /// The row of this repeat.
     pub row: &'a Row,
@@ -49,18 +50,23 @@ pub(super) struct Owned<'a, const D: usize> {
     pub(super) descriptors: Option<&'a Descriptors>,
     /// A search over the originals.
     pub(super) search: &'a Knn<'a, D>,
-    /// Whether it is one of many, of which some may have fewer points than a list is long: theirs are shorter.
-    pub(super) one_of_many: bool,
+    /// Its name, if it is one of many, of which some may have fewer points than a list is long: theirs are shorter.
+    pub(super) name: Option<&'a str>,
+}
+
+impl<const D: usize> Owned<'_, D> {
+    fn is_one_of_many(&self) -> bool {
+        self.name.is_some()
+    }
 }
 
 /// Which rows are wanted, and how chance falls.
 #[derive(Clone, Copy)]
-pub(super) struct Run<'a> {
-    pub(super) plan: &'a Plan,
-    pub(super) entry: &'static Entry,
+pub(super) struct Run<'a, const D: usize> {
+    pub(super) plan: &'a Plan<D>,
+    /// The name of the scheme.
+    pub(super) scheme: &'a str,
     pub(super) repeat: u32,
-    /// What everything that hides the points is drawn under.
-    pub(super) key: &'a Key,
     /// The oracle's seed. It has no part in what is released.
     pub(super) oracle_seed: u64,
 }
@@ -77,58 +83,70 @@ pub(super) struct Finished<'a> {
     pub(super) seconds: RowSeconds,
 }
 
-/// Rows per scheme and repeat.
-pub(super) fn per_scheme(plan: &Plan) -> usize {
-    plan.variants().len() * plan.solvers.len() + usize::from(plan.reference)
-}
-
-/// Runs every cell of one scheme and repeat; `each` hears what comes next and gets every row. Returns what
-/// has no row, as the scheme cannot hide these points or a source cannot make lists for them.
+/// Hides the points by `scheme`, everything drawn under `key`, and runs every cell.
 ///
 /// # Errors
-/// In an image of many, what would have no row: rows of all images are pooled.
+/// As [`attack`], and in one of many when the scheme cannot hide these points.
 pub(super) fn cells<const D: usize>(
     owned: &Owned<'_, D>,
-    run: &Run<'_>,
+    run: &Run<'_, D>,
+    (scheme, key): (&dyn Scheme<D>, &Key),
+    clock: &mut Clock,
+    observer: &mut dyn Observer<D>,
+    each: impl FnMut(&mut dyn Observer<D>, Option<String>, Option<Finished<'_>>),
+) -> Result<Vec<NotAudited>, Error> {
+    let hide = || obfuscate(scheme, owned.original, owned.descriptors, key);
+    match clock.time(|s| &mut s.obfuscate, hide) {
+        Ok(hidden) => attack(owned, run, &hidden, clock, observer, each),
+        Err(error) if !owned.is_one_of_many() => Ok(vec![NotAudited::scheme(run.scheme, &error)]),
+        Err(error) => Err(error.within(run.scheme)),
+    }
+}
+
+/// Runs every cell of one scheme and repeat on `hidden`, what is released and its secret; `each` hears what comes
+/// next and gets every row. Returns what has no row, as a source cannot make lists for it.
+///
+/// # Errors
+/// In one of many, what would have no row: rows of all are pooled.
+pub(super) fn attack<const D: usize>(
+    owned: &Owned<'_, D>,
+    run: &Run<'_, D>,
+    hidden: &(Released<D>, Secret),
     clock: &mut Clock,
     observer: &mut dyn Observer<D>,
     mut each: impl FnMut(&mut dyn Observer<D>, Option<String>, Option<Finished<'_>>),
 ) -> Result<Vec<NotAudited>, Error> {
-    let Run { plan, entry, repeat, key, oracle_seed } = *run;
+    let Run { plan, scheme, repeat, oracle_seed } = *run;
     let original = owned.original;
     // The same integer as the owner's, by the counter: what is released comes from a key, and no attack may
     // make keys (tests/architecture).
     let attacker = plan.seed.wrapping_add(u64::from(repeat));
-    let of_scheme = |error: Error| error.within(entry.name);
-    let hidden = match hide(entry, original, owned.descriptors, plan, key, clock) {
-        Err(error) if !owned.one_of_many => return Ok(vec![NotAudited::scheme(entry, &error)]),
-        hidden => hidden.map_err(of_scheme)?,
-    };
+    let of_scheme = |error: Error| error.within(scheme);
     let baseline = clock.time(|s| &mut s.evaluate, || Ok(blind(&hidden.0, original, &hidden.1)))?;
     // In the plane all lines meet: records alone tell nothing there.
     let alone = match plan.records_alone && D == 3 {
         true => clock
-            .time(|s| &mut s.records_alone, || records_alone(&hidden, original, plan, attacker))?,
+            .time(|s| &mut s.records_alone, || records_alone(hidden, original, plan, attacker))?,
         false => Vec::new(),
     };
     let by_row = hidden.1.by_descriptor_row();
-    let mut sources = Lists::new(plan, owned.search, &hidden, &by_row, (oracle_seed, attacker));
+    let mut sources = Lists::new(plan, owned.search, hidden, &by_row, (oracle_seed, attacker));
     let mut missing = Vec::new();
     for variant in &plan.variants() {
         let source = match variant.noise {
             Some(noise) => noise.name().to_owned(),
-            None => variant.source.name(),
+            None => variant.by.name().to_owned(),
         };
-        let what = format!("{}, neighbors by {}", entry.name, variant.source.name());
+        let what = format!("{scheme}, neighbors by {}", variant.by.name());
         each(observer, Some(what), None);
         let started = Instant::now();
-        let make = || match owned.one_of_many {
+        let make = || match owned.is_one_of_many() {
             true => sources.make_of_what_there_is(variant),
             false => sources.make(variant),
         };
         let made = match clock.time(|s| &mut s.neighbors, make) {
-            Err(error) if !owned.one_of_many => {
-                missing.push(NotAudited::variant(entry, variant, &error, &hidden.1));
+            Err(error) if !owned.is_one_of_many() => {
+                missing.push(NotAudited::variant(scheme, variant, &error, &hidden.1));
                 continue;
             }
             made => made.map_err(of_scheme)?,
@@ -136,7 +154,7 @@ pub(super) fn cells<const D: usize>(
         let making = started.elapsed().as_secs_f64();
         let mut start = None;
         for (at, &solver) in plan.solvers.iter().enumerate() {
-            let what = format!("{} at {:.2} {source}, {}", entry.name, made.ratio, solver.name());
+            let what = format!("{scheme} at {:.2} {source}, {}", made.ratio, solver.name());
             each(observer, Some(what), None);
             let options = RecoverOptions {
                 solver,
@@ -167,8 +185,8 @@ pub(super) fn cells<const D: usize>(
             let (measured, accuracy) = clock.time(|s| &mut s.evaluate, measure)?;
             let secret = &*joined(&recovered, original, &hidden.1);
             let mut row = Row {
-                scheme: entry.name,
-                neighbors: variant.source.name(),
+                scheme: scheme.to_owned(),
+                neighbors: variant.by.name().to_owned(),
                 oracle_noise: variant.noise.map(Noise::name),
                 inlier_ratio: made.ratio,
                 k: made.k,
@@ -177,11 +195,12 @@ pub(super) fn cells<const D: usize>(
             };
             row.records_alone.clone_from(&alone);
             let weights = places(owned, secret);
-            if owned.one_of_many {
+            if owned.is_one_of_many() {
                 row.fill_distinct(&accuracy, &baseline, &weights, &plan.thresholds);
             }
-            observer.cell(&Cell {
-                row: &row,
+            let bare = row.clone();
+            let cell = Cell {
+                row: &bare,
                 repeat,
                 original,
                 secret,
@@ -189,7 +208,12 @@ pub(super) fn cells<const D: usize>(
                 lists: &made.lists,
                 recovered: &recovered,
                 accuracy: &accuracy,
-            });
+            };
+            for measure in &plan.measures {
+                let measured = clock.time(|s| &mut s.evaluate, || measure.measure(&cell))?;
+                row.metrics.extend(measured);
+            }
+            observer.cell(&Cell { row: &row, ..cell });
             let finished = Finished {
                 row,
                 accuracy: &accuracy,
@@ -202,7 +226,7 @@ pub(super) fn cells<const D: usize>(
         }
     }
     if plan.reference {
-        let (row, accuracy) = reference_row(entry, &hidden, owned, &baseline, plan, alone);
+        let (row, accuracy) = reference_row(scheme, hidden, owned, &baseline, plan, alone);
         let weights = places(owned, &hidden.1);
         let seconds = RowSeconds::default();
         let (accuracy, baseline, weights) = (&accuracy, &baseline, &weights[..]);
@@ -217,37 +241,20 @@ pub(super) fn cells<const D: usize>(
 
 /// What makes distinct places count once; asked of images alone.
 fn places<const D: usize>(owned: &Owned<'_, D>, secret: &Secret) -> Vec<f64> {
-    if owned.one_of_many { distinct_weights(owned.original, secret) } else { Vec::new() }
-}
-
-fn hide<const D: usize>(
-    entry: &Entry,
-    original: &Original<D>,
-    descriptors: Option<&Descriptors>,
-    plan: &Plan,
-    key: &Key,
-    clock: &mut Clock,
-) -> Result<(Released<D>, Secret), Error> {
-    let scheme = entry
-        .of_dimension::<D>()
-        .ok_or_else(|| Error::new("scheme", format!("one for {D}D points"), entry.name))?;
-    clock.time(
-        |s| &mut s.obfuscate,
-        || obfuscate(scheme, original, descriptors, &plan.scheme_options, key),
-    )
+    if owned.is_one_of_many() { distinct_weights(owned.original, secret) } else { Vec::new() }
 }
 
 /// The row of an attacker who is told where three true neighbors of every point are.
 fn reference_row<const D: usize>(
-    entry: &Entry,
+    scheme: &str,
     (released, secret): &(Released<D>, Secret),
     owned: &Owned<'_, D>,
     baseline: &Accuracy,
-    plan: &Plan,
+    plan: &Plan<D>,
     alone: Vec<Alone>,
 ) -> (Row, Accuracy) {
     let mut row = Row {
-        scheme: entry.name,
+        scheme: scheme.to_owned(),
         neighbors: REFERENCE.to_owned(),
         inlier_ratio: 1.0,
         k: 3,
@@ -257,7 +264,7 @@ fn reference_row<const D: usize>(
     let accuracy = reference(released, owned.original, secret, owned.search);
     row.fill(&accuracy, Some(baseline), &plan.thresholds);
     row.records_alone = alone;
-    if owned.one_of_many {
+    if owned.is_one_of_many() {
         row.fill_distinct(&accuracy, baseline, &places(owned, secret), &plan.thresholds);
     }
     (row, accuracy)

@@ -1,17 +1,16 @@
-//! An audit of many images: their keypoints pooled, a few images in memory at a time.
+//! An audit of many: their points pooled, a few of them in memory at a time.
 
 use rayon::prelude::*;
 
-use super::break_even::{BreakEven, break_even};
-use super::cells::{Owned, Run, cells, per_scheme};
+use super::break_even::break_even;
+use super::cells::Owned;
 use super::clock::Clock;
+use super::item::of_item;
 use super::plan::Plan;
 use super::pool::Pool;
 use super::row::Row;
-use super::run::{Observer, RowSeconds, Seconds, Silent};
-use super::staged::{key_of, oracle_seed};
+use super::run::{Observer, Outcome, RowSeconds, Seconds, Silent};
 use crate::neighbors::oracle;
-use crate::seed::Key;
 use crate::truth::Original;
 use crate::{Descriptors, Error};
 
@@ -25,22 +24,6 @@ pub struct Image {
     pub original: Original<2>,
     /// One row per keypoint.
     pub descriptors: Option<Descriptors>,
-}
-
-/// What an audit of images found.
-#[derive(Clone, Debug)]
-pub struct Outcome {
-    /// One row per scheme, source, noise model, inlier ratio and solver, in this order, over the keypoints
-    /// of all images. Images with few keypoints are attacked with lists as long as can be.
-    pub rows: Vec<Row>,
-    /// The ratio at which half of the keypoints come back, per scheme, noise model and solver.
-    pub break_even: Vec<BreakEven>,
-    /// Images, those without keypoints included.
-    pub n_images: usize,
-    /// Images with no more keypoints than a neighborhood has: their lists are shorter.
-    pub n_too_small: usize,
-    /// Where the time went.
-    pub seconds: Seconds,
 }
 
 /// Hears how an audit of images goes.
@@ -86,12 +69,12 @@ const AT_WORK: usize = 2;
 /// # Errors
 /// When the plan is not for images, an image cannot be read or has no bounds or descriptors that are
 /// needed.
-pub fn run<E: From<Error>>(
+pub fn run_images<E: From<Error>>(
     images: impl IntoIterator<Item = Result<Image, E>>,
-    plan: &Plan,
+    plan: &Plan<2>,
     watcher: &mut impl Watcher,
 ) -> Result<Outcome, E> {
-    plan.check_for_images()?;
+    plan.check_for_many()?;
     let mut images = images.into_iter();
     let expected = images.size_hint().0;
     let at_work = AT_WORK * rayon::current_num_threads();
@@ -124,7 +107,8 @@ pub fn run<E: From<Error>>(
     let rows: Vec<Row> = pools.iter().map(pooled).collect();
     let break_even = break_even(plan, &rows);
     let seconds = Seconds { rows: seconds, ..clock.seconds };
-    Ok(Outcome { rows, break_even, n_images, n_too_small, seconds })
+    let (n_items, not_audited) = (n_images, Vec::new());
+    Ok(Outcome { rows, not_audited, break_even, n_items, n_too_small, seconds })
 }
 
 /// What is summed over images.
@@ -152,7 +136,11 @@ impl Sums {
 }
 
 /// The rows of one image, and its sums; nothing without keypoints.
-fn one(image: &Image, plan: &Plan, seen: &mut impl Observer<2>) -> Result<(Vec<Row>, Sums), Error> {
+fn one(
+    image: &Image,
+    plan: &Plan<2>,
+    seen: &mut impl Observer<2>,
+) -> Result<(Vec<Row>, Sums), Error> {
     let mut sums = Sums::default();
     if image.original.is_empty() {
         seen.progress(1, 1, "done");
@@ -161,62 +149,24 @@ fn one(image: &Image, plan: &Plan, seen: &mut impl Observer<2>) -> Result<(Vec<R
     check(image, plan)?;
     let Sums { pools, rows: seconds, clock } = &mut sums;
     let search = clock.time(|s| &mut s.search, || oracle::search(&image.original))?;
-    let descriptors = image.descriptors.as_ref();
-    let owned =
-        Owned { original: &image.original, descriptors, search: &search, one_of_many: true };
-    let total = per_scheme(plan) * plan.schemes.len() * plan.repeats as usize;
-    let mut n_done = 0;
-    let mut by_repeat: Vec<Vec<Row>> = Vec::new();
-    let mut first = 0;
-    for &entry in &plan.schemes {
-        let mut next = first;
-        for repeat in 0..plan.repeats {
-            let seed = plan.seed.wrapping_add(u64::from(repeat));
-            let key = key_of(&Key::from_seed(seed), &image.name);
-            let oracle_seed = oracle_seed(seed, &image.name);
-            next = first;
-            let run = Run { plan, entry, repeat, key: &key, oracle_seed };
-            cells(&owned, &run, clock, seen, |seen, what, finished| {
-                if let Some(what) = what {
-                    seen.progress(n_done, total, &what);
-                }
-                let Some(finished) = finished else { return };
-                n_done += 1;
-                if by_repeat.len() <= next {
-                    by_repeat.push(Vec::new());
-                    pools.push(Vec::new());
-                    seconds.push(RowSeconds::default());
-                }
-                let mut pool = Pool::new(&finished.row, &plan.thresholds);
-                pool.add(&finished, &plan.thresholds);
-                pools[next].push(pool);
-                seconds[next].add(&finished.seconds);
-                by_repeat[next].push(finished.row);
-                next += 1;
-            })?;
+    let (original, descriptors) = (&image.original, image.descriptors.as_ref());
+    let owned = Owned { original, descriptors, search: &search, name: Some(&image.name) };
+    let found = of_item(&owned, plan, clock, seen, |row, finished| {
+        if pools.len() <= row {
+            pools.push(Vec::new());
         }
-        first = next;
-    }
-    seen.progress(n_done, total, "done");
-    Ok((by_repeat.iter().map(|repeats| Row::mean(repeats)).collect(), sums))
+        let mut pool = Pool::new(&finished.row, &plan.thresholds);
+        pool.add(finished, &plan.thresholds);
+        pools[row].push(pool);
+    })?;
+    *seconds = found.seconds;
+    Ok((found.rows, sums))
 }
 
-/// What [`Plan::check_for_images`] cannot know.
-fn check(image: &Image, plan: &Plan) -> Result<(), Error> {
+/// What [`Plan::check_for_many`] cannot know.
+fn check(image: &Image, plan: &Plan<2>) -> Result<(), Error> {
     if image.original.bounds().is_none() {
         return Err(Error::new("image size", "known", "none"));
     }
-    if image.descriptors.is_none()
-        && let Some(source) = plan.needs_descriptors()
-    {
-        let expected = format!("some, as neighbors by {} need them", source.name());
-        return Err(Error::new("descriptors", expected, "none"));
-    }
-    Ok(())
-}
-
-/// FNV-1a, 64 bits.
-pub(super) fn hash(name: &str) -> u64 {
-    let step = |h: u64, byte: u8| (h ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3);
-    name.bytes().fold(0xCBF2_9CE4_8422_2325, step)
+    if image.descriptors.is_some() { Ok(()) } else { plan.without_descriptors() }
 }

@@ -1,9 +1,9 @@
 //! The neighborhoods of one obfuscation, from every source of a plan.
 
-use super::plan::{Plan, Source, Variant};
+use super::plan::{NeighborsBy, Plan, Variant};
 use crate::geometry::knn::Knn;
-use crate::neighbors::Neighborhoods;
 use crate::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
+use crate::neighbors::{Neighborhoods, of_what_there_is};
 use crate::released::Released;
 use crate::truth::Secret;
 use crate::{About, Error, RowOrder};
@@ -21,7 +21,7 @@ pub struct Made {
 
 /// Makes lists for one obfuscation. True neighborhoods are searched when first needed, and kept.
 pub struct Lists<'a, const D: usize> {
-    plan: &'a Plan,
+    plan: &'a Plan<D>,
     search: &'a Knn<'a, D>,
     released: &'a Released<D>,
     secret: &'a Secret,
@@ -37,7 +37,7 @@ impl<'a, const D: usize> Lists<'a, D> {
     /// Lists for `hidden`, whose secret by descriptor row is `by_row`; `seeds` are the owner's and
     /// the attacker's.
     pub fn new(
-        plan: &'a Plan,
+        plan: &'a Plan<D>,
         search: &'a Knn<'a, D>,
         hidden: &'a (Released<D>, Secret),
         by_row: &'a Secret,
@@ -51,15 +51,15 @@ impl<'a, const D: usize> Lists<'a, D> {
     ///
     /// # Errors
     /// When the source cannot make them for this obfuscation.
-    pub fn make(&mut self, variant: &Variant<'_>) -> Result<Made, Error> {
+    pub fn make(&mut self, variant: &Variant<'_, D>) -> Result<Made, Error> {
         let slots = self.released.slots_per_record();
-        match variant.source {
-            Source::Oracle => {
+        match variant.by {
+            NeighborsBy::Oracle => {
                 let ratio = variant.inlier_ratio.unwrap_or(1.0);
                 let lists = self.oracle(variant, self.plan.k)?;
                 Ok(Made { lists, ratio, k: self.plan.k })
             }
-            Source::Given(points) => {
+            NeighborsBy::Given(points) => {
                 let scores = points.scores.as_deref();
                 let (offsets, neighbors) = (&points.offsets, &points.neighbors);
                 let lists = oracle::from_points(offsets, neighbors, scores, self.secret, slots)?;
@@ -68,11 +68,12 @@ impl<'a, const D: usize> Lists<'a, D> {
                 let ratio = self.near(k, false)?.measured_inlier_ratio(&lists);
                 Ok(Made { lists, ratio, k })
             }
-            Source::Own(joined) => {
+            NeighborsBy::Source(source) => {
                 // The list of slot s is that of descriptor row s.
-                let lists = joined.make(self.released, self.seeds.1)?;
+                source.supports(self.released)?;
+                let lists = source.lists(self.released, source.k(), self.seeds.1)?;
                 let ratio = self.near(self.plan.k, true)?.measured_inlier_ratio(&lists);
-                Ok(Made { lists, ratio, k: joined.k() })
+                Ok(Made { lists, ratio, k: source.k() })
             }
         }
     }
@@ -82,19 +83,19 @@ impl<'a, const D: usize> Lists<'a, D> {
     ///
     /// # Errors
     /// As [`make`](Self::make), on maps that are large enough.
-    pub fn make_of_what_there_is(&mut self, variant: &Variant<'_>) -> Result<Made, Error> {
+    pub fn make_of_what_there_is(&mut self, variant: &Variant<'_, D>) -> Result<Made, Error> {
         let others = self.released.n_records().saturating_sub(1);
-        match variant.source {
-            Source::Given(_) => self.make(variant),
-            Source::Own(_) if others == 0 => self.none(variant),
-            Source::Own(joined) if others < joined.k().max(self.plan.k) => {
-                let lists = joined.make_of_what_there_is(self.released, self.seeds.1)?;
+        match variant.by {
+            NeighborsBy::Given(_) => self.make(variant),
+            NeighborsBy::Source(_) if others == 0 => self.none(variant),
+            NeighborsBy::Source(source) if others < source.k().max(self.plan.k) => {
+                let lists = of_what_there_is(&**source, self.released, self.seeds.1)?;
                 let near = self.near(self.plan.k.min(others), true)?;
                 let ratio = near.measured_inlier_ratio(&lists);
-                Ok(Made { lists, ratio, k: joined.k() })
+                Ok(Made { lists, ratio, k: source.k() })
             }
-            Source::Own(_) => self.make(variant),
-            Source::Oracle => {
+            NeighborsBy::Source(_) => self.make(variant),
+            NeighborsBy::Oracle => {
                 // Wrong entries must be there as well.
                 let lengths = (1..=self.plan.k.min(others)).rev();
                 let mut made = lengths.map(|k| self.oracle(variant, k).ok());
@@ -107,22 +108,22 @@ impl<'a, const D: usize> Lists<'a, D> {
         }
     }
 
-    fn none(&self, variant: &Variant<'_>) -> Result<Made, Error> {
+    fn none(&self, variant: &Variant<'_, D>) -> Result<Made, Error> {
         let (n_slots, n_records) = (self.released.n_slots(), self.released.n_records());
         let slots = self.released.slots_per_record();
         let lists =
             Neighborhoods::try_new(vec![0; n_slots + 1], Vec::new(), None, n_records, slots)?;
         let map = Some(self.released.fingerprint());
         let lists = lists.with_about(About { map, order: RowOrder::Slots });
-        let k = match variant.source {
-            Source::Own(joined) => joined.k(),
-            Source::Oracle | Source::Given(_) => self.plan.k,
+        let k = match variant.by {
+            NeighborsBy::Source(source) => source.k(),
+            NeighborsBy::Oracle | NeighborsBy::Given(_) => self.plan.k,
         };
         Ok(Made { lists, ratio: variant.inlier_ratio.unwrap_or(0.0), k })
     }
 
     /// Of the oracle, `k` records per list.
-    fn oracle(&mut self, variant: &Variant<'_>, k: usize) -> Result<Neighborhoods, Error> {
+    fn oracle(&mut self, variant: &Variant<'_, D>, k: usize) -> Result<Neighborhoods, Error> {
         let (noise, ratio) =
             (variant.noise.unwrap_or(Noise::Uniform), variant.inlier_ratio.unwrap_or(1.0));
         let seed = self.seeds.0;

@@ -1,11 +1,14 @@
 //! One whole audit as a value: a plan in, rows out. The only module that sees the whole pipeline.
 //!
-//! [`run`](fn@run) audits a map, [`images::run`] many images; both go through the same cells.
+//! [`run`](fn@run) audits a map, [`run_images`] many images; both go through the same loop and the same cells.
+//! Schemes, sources of neighborhoods and measures of a [`Plan`] may be anybody's.
 
 mod break_even;
 mod cells;
+mod chance;
 mod clock;
-pub mod images;
+mod images;
+mod item;
 mod lists;
 mod measure;
 mod not_audited;
@@ -18,9 +21,10 @@ pub mod staged;
 
 pub use break_even::{Bound, BreakEven, STRONGEST, break_even};
 pub use cells::{Cell, REFERENCE};
-pub use measure::measure;
+pub use images::{Image, Watcher, run_images};
+pub use measure::{Measure, measure};
 pub use not_audited::NotAudited;
-pub use plan::{Plan, PointNeighbors, Source, Threshold, Variant};
+pub use plan::{NeighborsBy, Plan, PointNeighbors, Threshold, Variant};
 pub use records_alone::Alone;
 pub use row::{Distinct, PERCENTILES, Repeats, Row};
 pub use run::{Observer, Outcome, RowSeconds, Seconds, Silent, run};

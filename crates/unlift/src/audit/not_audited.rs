@@ -3,7 +3,6 @@
 use super::plan::Variant;
 use crate::Error;
 use crate::neighbors::oracle::Noise;
-use crate::obfuscate::Entry;
 use crate::truth::{DropReason, Secret};
 
 /// A scheme that cannot be applied to a map, or one source of neighborhoods for it. It has no row: nothing
@@ -11,7 +10,7 @@ use crate::truth::{DropReason, Secret};
 #[derive(Clone, Debug, PartialEq)]
 pub struct NotAudited {
     /// The scheme.
-    pub scheme: &'static str,
+    pub scheme: String,
     /// The source without lists, as [`Row::neighbors`](super::Row::neighbors); `None` when the scheme has
     /// no rows at all.
     pub neighbors: Option<String>,
@@ -25,9 +24,9 @@ pub struct NotAudited {
 
 impl NotAudited {
     /// A scheme that cannot hide the points.
-    pub(super) fn scheme(entry: &Entry, error: &Error) -> Self {
+    pub(super) fn scheme(scheme: &str, error: &Error) -> Self {
         Self {
-            scheme: entry.name,
+            scheme: scheme.to_owned(),
             neighbors: None,
             oracle_noise: None,
             inlier_ratio: None,
@@ -36,9 +35,9 @@ impl NotAudited {
     }
 
     /// A variant without lists for points that are hidden as `secret` says.
-    pub(super) fn variant(
-        entry: &Entry,
-        variant: &Variant<'_>,
+    pub(super) fn variant<const D: usize>(
+        scheme: &str,
+        variant: &Variant<'_, D>,
         error: &Error,
         secret: &Secret,
     ) -> Self {
@@ -50,13 +49,12 @@ impl NotAudited {
             let most = why.into_iter().max_by_key(|(_, n)| *n).map_or("", |(why, _)| why.name());
             let most = most.replace('_', " ");
             reason.push_str(&format!(
-                " ({} leaves out {left} of {all} points, most as {most})",
-                entry.name
+                " ({scheme} leaves out {left} of {all} points, most as {most})"
             ));
         }
         Self {
-            scheme: entry.name,
-            neighbors: Some(variant.source.name()),
+            scheme: scheme.to_owned(),
+            neighbors: Some(variant.by.name().to_owned()),
             oracle_noise: variant.noise.map(Noise::name),
             inlier_ratio: variant.inlier_ratio,
             reason,
@@ -77,7 +75,7 @@ impl NotAudited {
 pub(super) fn told(missing: Vec<NotAudited>, has_rows: bool) -> Vec<NotAudited> {
     match missing.first() {
         Some(first) if !has_rows && missing.iter().all(|m| m.reason == first.reason) => {
-            let (scheme, reason) = (first.scheme, first.reason.clone());
+            let (scheme, reason) = (first.scheme.clone(), first.reason.clone());
             let (neighbors, oracle_noise, inlier_ratio) = (None, None, None);
             vec![NotAudited { scheme, neighbors, oracle_noise, inlier_ratio, reason }]
         }

@@ -1,8 +1,11 @@
 //! What is to be audited.
 
+use std::sync::Arc;
+
+use super::measure::Measure;
 use crate::neighbors::oracle::Noise;
-use crate::neighbors::sources::Joined;
-use crate::obfuscate::{Entry, SchemeOptions};
+use crate::neighbors::{Needs, Source, lacks_descriptors};
+use crate::obfuscate::{SCHEMES, Scheme, SchemeOptions};
 use crate::recover::{Delta, Solver};
 use crate::{Error, Unit};
 
@@ -44,32 +47,45 @@ pub struct PointNeighbors {
 }
 
 /// Where the attacker's neighborhoods come from.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Source {
+#[derive(Clone, Debug)]
+pub enum NeighborsBy<const D: usize> {
     /// From the originals, at each inlier ratio of the plan.
     Oracle,
     /// Given; the inlier ratio is measured.
     Given(PointNeighbors),
     /// From the released map alone, as an attacker would; the inlier ratio is measured.
-    Own(Joined),
+    Source(Arc<dyn Source<D>>),
 }
 
-impl Source {
+impl<const D: usize> NeighborsBy<D> {
     /// The name in reports.
-    pub fn name(&self) -> String {
+    pub fn name(&self) -> &str {
         match self {
-            Self::Oracle => "oracle".to_owned(),
-            Self::Given(given) => given.name.clone(),
-            Self::Own(joined) => joined.name(),
+            Self::Oracle => "oracle",
+            Self::Given(given) => &given.name,
+            Self::Source(source) => source.name(),
+        }
+    }
+
+    /// Whether it is the oracle.
+    pub fn is_oracle(&self) -> bool {
+        matches!(self, Self::Oracle)
+    }
+
+    /// The attacker's own source, if it is one.
+    pub fn source(&self) -> Option<&dyn Source<D>> {
+        match self {
+            Self::Source(source) => Some(&**source),
+            Self::Oracle | Self::Given(_) => None,
         }
     }
 }
 
 /// What tells the rows of one scheme and solver apart.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Variant<'a> {
+#[derive(Clone, Copy, Debug)]
+pub struct Variant<'a, const D: usize> {
     /// Where neighborhoods come from.
-    pub source: &'a Source,
+    pub by: &'a NeighborsBy<D>,
     /// How the oracle errs; `None` for other sources.
     pub noise: Option<Noise>,
     /// The inlier ratio; `None` where it will be measured.
@@ -78,13 +94,11 @@ pub struct Variant<'a> {
 
 /// A plan: every combination of scheme, source, noise model, inlier ratio and solver becomes a row.
 #[derive(Clone, Debug)]
-pub struct Plan {
-    /// Schemes to audit.
-    pub schemes: Vec<&'static Entry>,
-    /// Parameters of schemes.
-    pub scheme_options: SchemeOptions,
+pub struct Plan<const D: usize> {
+    /// Schemes to audit, ours or anybody's.
+    pub schemes: Vec<Arc<dyn Scheme<D>>>,
     /// Where neighborhoods come from; each has its own rows.
-    pub sources: Vec<Source>,
+    pub neighbors: Vec<NeighborsBy<D>>,
     /// How the oracle errs; a row each.
     pub oracle_noise: Vec<Noise>,
     /// Shares of true neighbors (oracle).
@@ -102,6 +116,8 @@ pub struct Plan {
     pub delta: Delta,
     /// Whether rules that tie records together fix coordinates.
     pub exact_constraints: bool,
+    /// What is measured beside errors: figures by name.
+    pub measures: Vec<Arc<dyn Measure<D>>>,
     /// When a point counts as recovered.
     pub thresholds: Vec<Threshold>,
     /// Which of the thresholds break-even ratios are about.
@@ -115,26 +131,24 @@ pub struct Plan {
 /// A map is small if it has fewer points than this many lists have entries.
 const SMALL: usize = 150;
 
-impl Plan {
-    /// The plan of a default audit of points in `unit`: six inlier ratios; of maps all 3D schemes at
-    /// K = 50, of images (pixels) all 2D schemes at K = 20.
+impl<const D: usize> Plan<D> {
+    /// The plan of a default audit of points in `unit`: all schemes of the registry that are defined on them, six
+    /// inlier ratios; of maps at K = 50, of images (pixels) at K = 20.
     pub fn new(unit: Unit) -> Self {
-        let (voxel, thresholds): (f64, &[&str]) = match unit {
-            Unit::Meter => (0.5, &["0.10", "0.25"]),
-            Unit::KthNeighbor => (5.0, &["1.0", "2.5"]),
-            // No 2D scheme has voxels.
-            Unit::Pixel => (1.0, &["1", "5", "10", "25"]),
+        let thresholds: &[&str] = match unit {
+            Unit::Meter => &["0.10", "0.25"],
+            Unit::KthNeighbor => &["1.0", "2.5"],
+            Unit::Pixel => &["1", "5", "10", "25"],
         };
         let of_images = unit == Unit::Pixel;
-        let is_meant = |s: &&Entry| if of_images { s.in_2d.is_some() } else { s.in_3d.is_some() };
+        let options = SchemeOptions::usual(unit);
         let threshold = |label: &str| Threshold {
             label: label.to_owned(),
             value: label.parse().unwrap_or(1.0),
         };
         Self {
-            schemes: crate::obfuscate::SCHEMES.iter().filter(is_meant).collect(),
-            scheme_options: SchemeOptions { voxel },
-            sources: vec![Source::Oracle],
+            schemes: SCHEMES.iter().filter_map(|entry| entry.of_dimension(&options)).collect(),
+            neighbors: vec![NeighborsBy::Oracle],
             oracle_noise: vec![Noise::Uniform],
             inlier_ratios: vec![1.0, 0.75, 0.5, 0.3, 0.2, 0.1],
             k: if of_images { 20 } else { 50 },
@@ -144,6 +158,7 @@ impl Plan {
             reference: false,
             delta: Delta::Auto,
             exact_constraints: true,
+            measures: Vec::new(),
             thresholds: thresholds.iter().copied().map(threshold).collect(),
             headline: if of_images { 2 } else { 0 },
             seed: 0,
@@ -161,88 +176,98 @@ impl Plan {
         self
     }
 
+    /// Whether the oracle is among the sources.
+    pub fn asks_oracle(&self) -> bool {
+        self.neighbors.iter().any(NeighborsBy::is_oracle)
+    }
+
+    /// The attacker's own sources.
+    pub fn own_sources(&self) -> impl Iterator<Item = &dyn Source<D>> {
+        self.neighbors.iter().filter_map(NeighborsBy::source)
+    }
+
     /// The rows of one scheme and solver, source by source; those of the oracle noise model by
     /// noise model.
-    pub fn variants(&self) -> Vec<Variant<'_>> {
+    pub fn variants(&self) -> Vec<Variant<'_, D>> {
         let mut variants = Vec::new();
-        for source in &self.sources {
-            match source {
-                Source::Oracle => {
+        for by in &self.neighbors {
+            match by {
+                NeighborsBy::Oracle => {
                     for &noise in &self.oracle_noise {
                         let ratios = self.inlier_ratios.iter().map(|&ratio| Some(ratio));
                         let noise = Some(noise);
                         variants.extend(ratios.map(|inlier_ratio| Variant {
-                            source,
+                            by,
                             noise,
                             inlier_ratio,
                         }));
                     }
                 }
-                Source::Given(_) | Source::Own(_) => {
-                    variants.push(Variant { source, noise: None, inlier_ratio: None });
+                NeighborsBy::Given(_) | NeighborsBy::Source(_) => {
+                    variants.push(Variant { by, noise: None, inlier_ratio: None });
                 }
             }
         }
         variants
     }
 
-    /// Checks every field against the map it is meant for.
+    /// Rows per scheme.
+    pub fn rows_per_scheme(&self) -> usize {
+        self.variants().len() * self.solvers.len() + usize::from(self.reference)
+    }
+
+    /// Checks every field against the one map that it is meant for.
     ///
     /// # Errors
     /// Names the first field out of range.
     pub fn check(&self, n_points: usize, has_descriptors: bool) -> Result<(), Error> {
-        self.scheme_options.check()?;
         if n_points < self.k + 1 {
             let expected = format!("at least K + 1 = {}", self.k + 1);
             return Err(Error::new("points", expected, n_points.to_string()));
         }
-        self.check_fields::<3>(has_descriptors)
+        self.check_fields()?;
+        if has_descriptors { Ok(()) } else { self.without_descriptors() }
     }
 
-    /// Checks every field, before any image is looked at.
+    /// Checks every field for a set of many, before any of them is looked at.
     ///
     /// # Errors
-    /// Names the first field out of range, or that is for maps alone.
-    pub fn check_for_images(&self) -> Result<(), Error> {
-        self.check_fields::<2>(true)?;
+    /// Names the first field out of range, or that is for one map alone.
+    pub fn check_for_many(&self) -> Result<(), Error> {
+        self.check_fields()?;
         let lone = |solver: &&Solver| !Solver::FROM_LISTS.contains(solver);
-        if let Some(solver) = self.solvers.iter().find(lone) {
+        if let (2, Some(solver)) = (D, self.solvers.iter().find(lone)) {
             // In the plane all lines meet: records alone tell nothing.
             return Err(Error::new("solver", "one that recovers from lists", solver.name()));
         }
         if self.k == 0 {
             return Err(Error::new("k", "at least 1", "0"));
         }
-        for source in &self.sources {
-            match source {
-                Source::Oracle => {}
-                Source::Given(given) => {
-                    let expected = "the oracle or one that works on images alone";
-                    return Err(Error::new("neighbors", expected, given.name.as_str()));
-                }
-                Source::Own(joined) => {
-                    if let Some(part) = joined.not_in_dimension::<2>() {
-                        return Err(Error::new("neighbors", "a source for images", part.name));
-                    }
-                }
-            }
+        let given = self.neighbors.iter().find(|by| matches!(by, NeighborsBy::Given(_)));
+        if let Some(given) = given {
+            let expected = "the oracle or one that works on each alone";
+            return Err(Error::new("neighbors", expected, given.name()));
         }
         Ok(())
     }
 
-    /// The first source that needs descriptors.
-    pub(super) fn needs_descriptors(&self) -> Option<&Source> {
-        let needs = |source: &&Source| match source {
-            Source::Own(joined) => joined.needs_descriptors(),
-            Source::Oracle | Source::Given(_) => false,
-        };
-        self.sources.iter().find(needs)
+    /// Refuses a source that needs descriptors, where there are none.
+    pub(super) fn without_descriptors(&self) -> Result<(), Error> {
+        let needy = self.own_sources().find(|source| source.needs() == Needs::Descriptors);
+        needy.map_or(Ok(()), |source| Err(lacks_descriptors(source.name())))
     }
 
-    fn check_fields<const D: usize>(&self, has_descriptors: bool) -> Result<(), Error> {
-        let other = |scheme: &&&Entry| scheme.of_dimension::<D>().is_none();
-        if let Some(scheme) = self.schemes.iter().find(other) {
-            return Err(Error::new("scheme", format!("one for {D}D points"), scheme.name));
+    fn check_fields(&self) -> Result<(), Error> {
+        for (at, scheme) in self.schemes.iter().enumerate() {
+            if self.schemes[..at].iter().any(|other| other.name() == scheme.name()) {
+                return Err(Error::new("schemes", "each name once", scheme.name()));
+            }
+            // Names become parts of gates and of file names.
+            let is_plain = |c: char| c.is_ascii_alphanumeric() || "-+_.".contains(c);
+            if scheme.name().is_empty() || !scheme.name().chars().all(is_plain) {
+                let expected = "a name of letters, digits, - + _ and .";
+                return Err(Error::new("scheme", expected, format!("{:?}", scheme.name())));
+            }
         }
         if self.headline >= self.thresholds.len().max(1) {
             let expected = format!("below {}", self.thresholds.len());
@@ -251,16 +276,12 @@ impl Plan {
         if let Some(ratio) = self.inlier_ratios.iter().find(|r| !(0.0..=1.0).contains(*r)) {
             return Err(Error::new("inlier ratio", "0 to 1", ratio.to_string()));
         }
-        if !has_descriptors && let Some(source) = self.needs_descriptors() {
-            let expected = format!("some, as neighbors by {} need them", source.name());
-            return Err(Error::new("descriptors", expected, "none"));
-        }
         if self.repeats == 0 {
             return Err(Error::new("repeats", "at least 1", "0"));
         }
         for (what, empty) in [
             ("schemes", self.schemes.is_empty()),
-            ("sources", self.sources.is_empty()),
+            ("sources", self.neighbors.is_empty()),
             ("oracle noise models", self.oracle_noise.is_empty()),
             ("inlier ratios", self.inlier_ratios.is_empty()),
             ("solvers", self.solvers.is_empty()),

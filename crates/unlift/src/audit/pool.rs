@@ -25,6 +25,8 @@ pub(super) struct Pool {
     n_places: f64,
     places_within: Vec<f64>,
     blind_places_within: Vec<f64>,
+    /// Figures times slots, and in how many slots they are known.
+    metrics: BTreeMap<String, (f64, usize)>,
     /// Deltas times slots.
     delta: f64,
     /// True entries of lists, and all.
@@ -51,6 +53,7 @@ impl Pool {
             n_places: 0.0,
             places_within: vec![0.0; n],
             blind_places_within: vec![0.0; n],
+            metrics: BTreeMap::new(),
             delta: 0.0,
             hits: 0.0,
             n_listed: 0,
@@ -78,6 +81,10 @@ impl Pool {
         }
         if let Some(percent) = row.axis_accuracy_percent {
             *self.axis.get_or_insert(0.0) += percent * n as f64;
+        }
+        for (name, value) in &row.metrics {
+            let sum = self.metrics.entry(name.clone()).or_insert((0.0, 0));
+            *sum = (sum.0 + value * n as f64, sum.1 + n);
         }
         self.n_places += weights.iter().sum::<f64>();
         self.delta += row.delta * n as f64;
@@ -116,6 +123,10 @@ impl Pool {
         if let Some(more) = more.axis {
             *self.axis.get_or_insert(0.0) += more;
         }
+        for (name, more) in &more.metrics {
+            let sum = self.metrics.entry(name.clone()).or_insert((0.0, 0));
+            *sum = (sum.0 + more.0, sum.1 + more.1);
+        }
         self.n_places += more.n_places;
         self.delta += more.delta;
         self.hits += more.hits;
@@ -150,6 +161,12 @@ impl Pool {
             blind_percent: percent(&self.blind_within),
             axis_accuracy_percent: self.axis.map(|sum| sum / n),
             exact_percent: self.exact.map(|exact| 100.0 * exact as f64 / n),
+            metrics: self
+                .metrics
+                .iter()
+                .filter(|(_, (_, known))| *known == self.n_points)
+                .map(|(name, (sum, known))| (name.clone(), sum / (*known).max(1) as f64))
+                .collect(),
             error_percentiles: PERCENTILES
                 .map(|p| self.errors.percentile(p, self.n_points))
                 .to_vec(),

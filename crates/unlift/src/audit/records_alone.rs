@@ -4,8 +4,7 @@ use super::plan::{Plan, Threshold};
 use crate::Error;
 use crate::density::{published, tomography};
 use crate::evaluate::{Accuracy, evaluate};
-use crate::neighbors::geometric_by;
-use crate::neighbors::sources::source;
+use crate::neighbors::{Geometric, geometric_by};
 use crate::recover::{RecoverOptions, Solver, recover_at, recover_with_start};
 use crate::released::{Obfuscation, Released};
 use crate::truth::{Original, Secret};
@@ -29,7 +28,7 @@ pub struct Alone {
 pub(super) fn records_alone<const D: usize>(
     (released, secret): &(Released<D>, Secret),
     original: &Original<D>,
-    plan: &Plan,
+    plan: &Plan<D>,
     seed: u64,
 ) -> Result<Vec<Alone>, Error> {
     let mut attacks = Vec::new();
@@ -39,7 +38,7 @@ pub(super) fn records_alone<const D: usize>(
     let peaks = tomography(released);
     attacks.push((Solver::Tomography.name(), recover_at(released, &peaks)?));
     // A map of planes, or of rays from one center, has no such lists.
-    if let Ok(lists) = geometric_by(released, source("geometric")?.usual_k, &peaks) {
+    if let Ok(lists) = geometric_by(released, Geometric::K, &peaks) {
         let options = RecoverOptions {
             seed,
             exact_constraints: plan.exact_constraints,

@@ -15,7 +15,7 @@ pub const PERCENTILES: [f64; 5] = [50.0, 75.0, 90.0, 95.0, 99.0];
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     /// Scheme name.
-    pub scheme: &'static str,
+    pub scheme: String,
     /// Source of the neighborhoods: `oracle`, `file`, or names joined by `+`.
     pub neighbors: String,
     /// Noise model of the oracle; `None` for other sources.
@@ -52,6 +52,9 @@ pub struct Row {
     pub exact_percent: Option<f64>,
     /// Share of descriptors given to their own point (paired lines with descriptors).
     pub assignment_accuracy_percent: Option<f64>,
+    /// Figures of the plan's [measures](super::Measure), by name; means over repeats and, weighted by points, over
+    /// images.
+    pub metrics: BTreeMap<String, f64>,
     /// Errors at [`PERCENTILES`]; `None` where that many points were lost.
     pub error_percentiles: Vec<Option<f64>>,
     /// Median error of an attacker without neighborhoods.
@@ -224,6 +227,11 @@ impl Row {
         }
         mean.exact_percent = average(&|r| r.exact_percent);
         mean.axis_accuracy_percent = average(&|r| r.axis_accuracy_percent);
+        mean.metrics.retain(|name, value| {
+            let all = average(&|r| r.metrics.get(name).copied());
+            *value = all.unwrap_or(*value);
+            all.is_some()
+        });
         mean.assignment_accuracy_percent = average(&|r| r.assignment_accuracy_percent);
         for row in &rows[1..] {
             if let (Some(all), Some(more)) = (&mut mean.reliability, &row.reliability) {

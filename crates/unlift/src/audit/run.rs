@@ -1,13 +1,13 @@
 //! An audit of one map.
 
 use super::break_even::{BreakEven, break_even};
-use super::cells::{Cell, Owned, Run, cells, per_scheme};
+use super::cells::{Cell, Owned};
 use super::clock::Clock;
-use super::not_audited::{NotAudited, told};
+use super::item::{Rows, of_item};
+use super::not_audited::NotAudited;
 use super::plan::Plan;
 use super::row::Row;
 use crate::neighbors::oracle;
-use crate::seed::Key;
 use crate::truth::Original;
 use crate::{Descriptors, Error};
 
@@ -68,13 +68,17 @@ impl RowSeconds {
 /// What an audit found.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// One row per scheme, source, noise model, inlier ratio and solver, in this order.
+    /// One row per scheme, source, noise model, inlier ratio and solver, in this order; of many, over the points of all.
     pub rows: Vec<Row>,
     /// What the plan asked for and has no row: schemes that cannot be applied to the map, and sources
     /// that have no lists for a scheme.
     pub not_audited: Vec<NotAudited>,
     /// The ratio at which half of the points come back, per scheme, noise model and solver.
     pub break_even: Vec<BreakEven>,
+    /// Maps or images, those without points included.
+    pub n_items: usize,
+    /// Those of them with no more points than a neighborhood has: their lists are shorter.
+    pub n_too_small: usize,
     /// Where the time went.
     pub seconds: Seconds,
 }
@@ -89,63 +93,24 @@ pub struct Outcome {
 ///
 /// # Errors
 /// When the plan does not fit the map, or no scheme can be applied to it.
-pub fn run(
-    original: &Original<3>,
+pub fn run<const D: usize>(
+    original: &Original<D>,
     descriptors: Option<&Descriptors>,
-    plan: &Plan,
-    observer: &mut dyn Observer,
+    plan: &Plan<D>,
+    observer: &mut dyn Observer<D>,
 ) -> Result<Outcome, Error> {
     plan.check(original.len(), descriptors.is_some())?;
     let mut clock = Clock::default();
     let search = clock.time(|s| &mut s.search, || oracle::search(original))?;
-    let owned = Owned { original, descriptors, search: &search, one_of_many: false };
-    let per_scheme = per_scheme(plan);
-    let total = per_scheme * plan.schemes.len() * plan.repeats as usize;
-    let mut done = 0;
-    let (mut rows, mut not_audited) = (Vec::new(), Vec::new());
-    for &entry in &plan.schemes {
-        let mut by_repeat: Vec<Vec<(Row, RowSeconds)>> = Vec::new();
-        let mut missing: Vec<NotAudited> = Vec::new();
-        for repeat in 0..plan.repeats {
-            let seed = plan.seed.wrapping_add(u64::from(repeat));
-            let key = Key::from_seed(seed);
-            let run = Run { plan, entry, repeat, key: &key, oracle_seed: seed };
-            let (mut of_repeat, before) = (Vec::new(), done);
-            let lacking = cells(&owned, &run, &mut clock, observer, |observer, what, finished| {
-                if let Some(what) = what {
-                    observer.progress(done, total, &what);
-                }
-                if let Some(finished) = finished {
-                    of_repeat.push((finished.row, finished.seconds));
-                    done += 1;
-                }
-            })?;
-            done = before + per_scheme;
-            by_repeat.push(of_repeat);
-            for one in lacking {
-                if !missing.iter().any(|other| other.is_same_cell(&one)) {
-                    missing.push(one);
-                }
-            }
-        }
-        let n_before = rows.len();
-        for (row, _) in &by_repeat[0] {
-            let same = by_repeat.iter().map(|rows| rows.iter().find(|(r, _)| r.is_same_cell(row)));
-            // A mean over those seeds that went well would be no mean over seeds.
-            let Some(same) = same.collect::<Option<Vec<_>>>() else { continue };
-            let mut seconds = RowSeconds::default();
-            same.iter().for_each(|(_, more)| seconds.add(more));
-            clock.seconds.rows.push(seconds);
-            rows.push(Row::mean(&same.iter().map(|(row, _)| row.clone()).collect::<Vec<_>>()));
-        }
-        not_audited.extend(told(missing, rows.len() > n_before));
-    }
+    let owned = Owned { original, descriptors, search: &search, name: None };
+    let Rows { rows, seconds, not_audited } =
+        of_item(&owned, plan, &mut clock, observer, |_, _| ())?;
     if let (true, Some(first)) = (rows.is_empty(), not_audited.first()) {
         let expected = "one that can be applied to this map";
         let found = format!("none: {}: {}", first.scheme, first.reason);
         return Err(Error::new("schemes", expected, found));
     }
-    observer.progress(done, total, "done");
     let break_even = break_even(plan, &rows);
-    Ok(Outcome { rows, not_audited, break_even, seconds: clock.seconds })
+    let seconds = Seconds { rows: seconds, ..clock.seconds };
+    Ok(Outcome { rows, not_audited, break_even, n_items: 1, n_too_small: 0, seconds })
 }

@@ -1,11 +1,12 @@
 //! The stages of one image at a time, chained by whoever has files: with the randomness, the lists and the sums of
 //! an audit of images.
 
+pub use super::chance::{key_of, oracle_seed};
+
 use super::cells::Finished;
-use super::images::hash;
 use super::lists::Lists;
 use super::measure::measure;
-use super::plan::{Plan, Source, Threshold, Variant};
+use super::plan::{NeighborsBy, Plan, Threshold, Variant};
 use super::pool::Pool;
 use super::row::Row;
 use super::run::RowSeconds;
@@ -14,19 +15,8 @@ use crate::neighbors::Neighborhoods;
 use crate::neighbors::oracle::{self, Noise};
 use crate::recover::Recovered;
 use crate::released::Released;
-use crate::seed::{Draws, Key, Stage};
 use crate::truth::{DropReason, Original, Secret};
 use crate::{Error, Unit};
-
-/// The key that the image `name` is hidden under, of a set whose key is `key`.
-pub fn key_of(key: &Key, name: &str) -> Key {
-    key.of_item(Stage::Image, hash(name))
-}
-
-/// The integer that the oracle of the image `name` draws from, in a run with `seed`.
-pub fn oracle_seed(seed: u64, name: &str) -> u64 {
-    Draws::new(seed, Stage::Image, hash(name)).bits()
-}
 
 /// Lists of `k` records at `ratio`, or as long as can be in an image with fewer; `seed` is that of the image
 /// ([`oracle_seed`]).
@@ -39,10 +29,10 @@ pub fn oracle_lists(
     (noise, ratio, k): (Noise, f64, usize),
     seed: u64,
 ) -> Result<Neighborhoods, Error> {
-    let plan = Plan { k, ..Plan::new(Unit::Pixel) };
+    let plan = Plan { k, ..Plan::<2>::new(Unit::Pixel) };
     let search = oracle::search(original)?;
-    let variant =
-        Variant { source: &Source::Oracle, noise: Some(noise), inlier_ratio: Some(ratio) };
+    let by = &NeighborsBy::Oracle;
+    let variant = Variant { by, noise: Some(noise), inlier_ratio: Some(ratio) };
     // The attacker's seed has no part in the oracle's lists.
     let mut lists = Lists::new(&plan, &search, hidden, &hidden.1, (seed, 0));
     lists.make_of_what_there_is(&variant).map(|made| made.lists)

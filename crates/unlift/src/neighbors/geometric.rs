@@ -7,6 +7,7 @@
 use rayon::prelude::*;
 
 use super::Neighborhoods;
+use super::source::{Needs, Source};
 use crate::density::{Peak, Peaks, tomography};
 use crate::geometry::knn::Knn;
 use crate::geometry::vector::{distance, dot, sub, widen};
@@ -33,6 +34,42 @@ const LOOK: usize = 3;
 pub fn geometric<const D: usize>(released: &Released<D>, k: usize) -> Result<Neighborhoods, Error> {
     check(released, k)?;
     geometric_by(released, k, &tomography(released))
+}
+
+/// [`geometric`] as a source.
+#[derive(Clone, Copy, Debug)]
+pub struct Geometric;
+
+impl Geometric {
+    /// Records per list.
+    pub const K: usize = 50;
+}
+
+impl Source<3> for Geometric {
+    fn name(&self) -> &str {
+        "geometric"
+    }
+
+    fn needs(&self) -> Needs {
+        Needs::Nothing
+    }
+
+    fn k(&self) -> usize {
+        Self::K
+    }
+
+    fn lists(&self, released: &Released<3>, k: usize, _: u64) -> Result<Neighborhoods, Error> {
+        geometric(released, k)
+    }
+
+    fn supports(&self, released: &Released<3>) -> Result<(), Error> {
+        check(released, Self::K)
+    }
+
+    /// Recovery errs as it does.
+    fn only_ranks(&self) -> bool {
+        true
+    }
 }
 
 /// [`geometric`] from the estimates of tomography, for whoever has them.

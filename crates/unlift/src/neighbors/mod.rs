@@ -1,7 +1,7 @@
 //! Neighborhoods: which records are said to hide points near the point of a slot.
 //!
 //! `oracle` makes them from the originals, for experiments. All others take what an attacker has, a
-//! released map, and stand in [`sources::SOURCES`].
+//! released map: [`Source`] is what they have in common, and ours stand in [`sources::SOURCES`].
 
 mod alike;
 mod best;
@@ -13,13 +13,16 @@ pub mod oracle;
 mod overlap;
 mod rows;
 mod similarity;
+mod source;
 pub mod sources;
 mod tiles;
 mod walk;
 
-pub use geometric::geometric;
 pub(crate) use geometric::geometric_by;
+pub use geometric::{Geometric, geometric};
 pub use join::join;
 pub use neighborhoods::Neighborhoods;
-pub use overlap::overlap;
-pub use similarity::similarity;
+pub use overlap::{Overlap, overlap};
+pub use similarity::{Similarity, similarity};
+pub(crate) use source::lacks_descriptors;
+pub use source::{Needs, Source, of_what_there_is};

@@ -3,6 +3,7 @@
 use super::Neighborhoods;
 use super::compare::{Likeness, MOST_ROWS, search};
 use super::rows::Rows;
+use super::source::{Needs, Source};
 use crate::released::Released;
 use crate::simd::{self, BLOCK, Kernel};
 use crate::{Descriptors, Error};
@@ -24,6 +25,29 @@ pub fn similarity<const D: usize>(
     let found = search(&Cosine, &mut rows, enough, MOST_ROWS)?;
     let ranked: Vec<_> = found.into_iter().map(|found| found.best).collect();
     rows.lists(&ranked, k)
+}
+
+/// [`similarity`] as a source.
+#[derive(Clone, Copy, Debug)]
+pub struct Similarity;
+
+impl<const D: usize> Source<D> for Similarity {
+    fn name(&self) -> &str {
+        "similarity"
+    }
+
+    fn needs(&self) -> Needs {
+        Needs::Descriptors
+    }
+
+    fn k(&self) -> usize {
+        // Of an image's fewer keypoints only the first of a ranking are near.
+        if D == 2 { 10 } else { 30 }
+    }
+
+    fn lists(&self, released: &Released<D>, k: usize, _: u64) -> Result<Neighborhoods, Error> {
+        similarity(released, k)
+    }
 }
 
 /// The cosine of two descriptors.

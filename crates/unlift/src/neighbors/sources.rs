@@ -1,47 +1,37 @@
-//! Where an attacker gets neighborhoods from a released map alone: one entry per source.
+//! Sources by name: the registry, and several of its sources joined into one.
 
 use std::any::Any;
+use std::sync::Arc;
 
 use super::compare::MOST_ROWS;
-use super::overlap::{self, overlap};
-use super::{Neighborhoods, geometric, join, similarity};
+use super::geometric::Geometric;
+use super::overlap::Overlap;
+use super::similarity::Similarity;
+use super::source::{Needs, Source};
+use super::{Neighborhoods, join};
 use crate::released::Released;
-use crate::{About, Descriptors, Error, RowOrder};
+use crate::{Descriptors, Error};
 
-/// Makes lists of a number of records per slot; the last argument is the attacker's seed.
-pub type Make<const D: usize> = fn(&Released<D>, usize, u64) -> Result<Neighborhoods, Error>;
-
-/// A source as users choose it.
-#[derive(Clone, Copy, Debug)]
+/// A source of ours as users choose it.
+#[derive(Debug)]
 pub struct SourceEntry {
     /// Its name.
     pub name: &'static str,
     /// What it does, in one line.
     pub summary: &'static str,
-    /// Whether the released map must have descriptors.
-    pub needs_descriptors: bool,
-    /// Refuses descriptors of a kind that it cannot read.
-    pub takes: fn(&Descriptors) -> Result<(), Error>,
-    /// Records per list unless asked otherwise: the attack's own choice, few where the first of a
-    /// ranking are much better than the rest.
-    pub usual_k: usize,
-    /// Whether in company it only ranks what the others list: recovery errs as it does, so that its own
-    /// entries would confirm wrong places.
-    pub only_ranks: bool,
-    /// The same for images: of their fewer keypoints, only the first of a ranking are near.
-    pub usual_k_2d: usize,
     /// For images, where it is defined on them.
-    pub in_2d: Option<Make<2>>,
+    pub in_2d: Option<fn() -> Arc<dyn Source<2>>>,
     /// For maps, where it is defined on them.
-    pub in_3d: Option<Make<3>>,
+    pub in_3d: Option<fn() -> Arc<dyn Source<3>>>,
 }
 
 impl SourceEntry {
-    /// How it makes lists in `D` dimensions, if it does.
-    pub fn of_dimension<const D: usize>(&self) -> Option<Make<D>> {
+    /// The source in `D` dimensions, if it is defined there.
+    pub fn of_dimension<const D: usize>(&self) -> Option<Arc<dyn Source<D>>> {
         // A constant cannot choose between two types; `Any` asks whether they are the same.
         let of: &dyn Any = if D == 2 { &self.in_2d } else { &self.in_3d };
-        of.downcast_ref::<Option<Make<D>>>().copied().flatten()
+        let build = of.downcast_ref::<Option<fn() -> Arc<dyn Source<D>>>>().copied().flatten();
+        build.map(|build| build())
     }
 }
 
@@ -56,35 +46,20 @@ pub const SOURCES: &[SourceEntry] = &[
     SourceEntry {
         name: "similarity",
         summary: "records with the most similar descriptors, of any kind",
-        needs_descriptors: true,
-        takes: |_| Ok(()),
-        usual_k: 30,
-        usual_k_2d: 10,
-        only_ranks: false,
-        in_2d: Some(|released, k, _| similarity(released, k)),
-        in_3d: Some(|released, k, _| similarity(released, k)),
+        in_2d: Some(|| Arc::new(Similarity)),
+        in_3d: Some(|| Arc::new(Similarity)),
     },
     SourceEntry {
         name: "overlap",
         summary: "records whose SIFT patches overlap, and a short walk from these; no training",
-        needs_descriptors: true,
-        takes: overlap::check,
-        usual_k: 35,
-        usual_k_2d: 10,
-        only_ranks: false,
-        in_2d: Some(|released, k, _| overlap(released, k)),
-        in_3d: Some(|released, k, _| overlap(released, k)),
+        in_2d: Some(|| Arc::new(Overlap)),
+        in_3d: Some(|| Arc::new(Overlap)),
     },
     SourceEntry {
         name: "geometric",
         summary: "records that meet where records alone say that points are; no descriptors",
-        needs_descriptors: false,
-        takes: |_| Ok(()),
-        usual_k: 50,
-        usual_k_2d: 10,
-        only_ranks: true,
         in_2d: None,
-        in_3d: Some(|released, k, _| geometric(released, k)),
+        in_3d: Some(|| Arc::new(Geometric)),
     },
 ];
 
@@ -99,44 +74,87 @@ pub fn source(name: &str) -> Result<&'static SourceEntry, Error> {
     })
 }
 
-/// One source or several joined ones, and how many records a list has.
+/// Sources of the registry as a user names them, and how long their lists shall be.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Joined {
-    parts: Vec<&'static SourceEntry>,
-    k: usize,
+pub struct Named {
+    entries: Vec<&'static SourceEntry>,
+    k: Option<usize>,
 }
 
-impl Joined {
-    /// The sources named in `text`, joined by `+`, each once. A list has as many records as the
-    /// source that chooses most; those that only rank choose none in company.
+impl Named {
+    /// The sources named in `text`, joined by `+`, each once.
     ///
     /// # Errors
     /// When a name is unknown or stands twice.
     pub fn parse(text: &str) -> Result<Self, Error> {
-        let mut parts: Vec<&'static SourceEntry> = Vec::new();
+        let mut entries: Vec<&'static SourceEntry> = Vec::new();
         for name in text.split('+') {
             let entry = source(name.trim())?;
-            if parts.contains(&entry) {
+            if entries.contains(&entry) {
                 return Err(Error::new("joined sources", "each once", format!("{name} twice")));
             }
-            parts.push(entry);
+            entries.push(entry);
         }
-        let names = parts.iter().any(|entry| !entry.only_ranks);
-        let chosen = parts.iter().filter(|entry| !(names && entry.only_ranks));
-        let k = chosen.map(|entry| entry.usual_k).max().unwrap_or(1);
-        Ok(Self { parts, k })
+        Ok(Self { entries, k: None })
     }
 
-    /// The same sources with as many records per list as they choose in images.
+    /// The same sources with `k` records per list, not as many as they choose.
     #[must_use]
-    pub fn for_images(self) -> Self {
-        let k = self.parts.iter().map(|entry| entry.usual_k_2d).max().unwrap_or(1);
-        self.with_k(k)
+    pub fn with_k(self, k: usize) -> Self {
+        Self { k: Some(k), ..self }
+    }
+
+    /// The names, joined by `+`.
+    pub fn name(&self) -> String {
+        self.entries.iter().map(|entry| entry.name).collect::<Vec<_>>().join("+")
     }
 
     /// The first of the sources that is not defined in `D` dimensions.
     pub fn not_in_dimension<const D: usize>(&self) -> Option<&'static SourceEntry> {
-        self.parts.iter().copied().find(|entry| entry.of_dimension::<D>().is_none())
+        self.entries.iter().copied().find(|entry| entry.of_dimension::<D>().is_none())
+    }
+
+    /// The source in `D` dimensions.
+    ///
+    /// # Errors
+    /// When one of them is not defined there.
+    pub fn of_dimension<const D: usize>(&self) -> Result<Arc<dyn Source<D>>, Error> {
+        let part = |entry: &&'static SourceEntry| {
+            entry.of_dimension::<D>().ok_or_else(|| {
+                let expected = format!("one that is defined in {D} dimensions");
+                Error::new("source", expected, entry.name)
+            })
+        };
+        let joined = Joined::new(self.entries.iter().map(part).collect::<Result<_, _>>()?)?;
+        Ok(Arc::new(match self.k {
+            Some(k) => joined.with_k(k),
+            None => joined,
+        }))
+    }
+}
+
+/// Several sources as one. Alone a source stays what it is.
+#[derive(Clone, Debug)]
+pub struct Joined<const D: usize> {
+    parts: Vec<Arc<dyn Source<D>>>,
+    name: String,
+    k: usize,
+}
+
+impl<const D: usize> Joined<D> {
+    /// Joins `parts`. A list has as many records as the source that chooses most; those that only rank choose
+    /// none in company.
+    ///
+    /// # Errors
+    /// When there is no part.
+    pub fn new(parts: Vec<Arc<dyn Source<D>>>) -> Result<Self, Error> {
+        let names = parts.iter().any(|part| !part.only_ranks());
+        let chosen = parts.iter().filter(|part| !(names && part.only_ranks()));
+        let Some(k) = chosen.map(|part| part.k()).max() else {
+            return Err(Error::new("joined sources", "at least one", "none"));
+        };
+        let name = parts.iter().map(|part| part.name()).collect::<Vec<_>>().join("+");
+        Ok(Self { parts, name, k })
     }
 
     /// The same sources with `k` records per list.
@@ -144,87 +162,60 @@ impl Joined {
     pub fn with_k(self, k: usize) -> Self {
         Self { k, ..self }
     }
+}
 
-    /// The names, joined by `+`.
-    pub fn name(&self) -> String {
-        self.parts.iter().map(|entry| entry.name).collect::<Vec<_>>().join("+")
+impl<const D: usize> Source<D> for Joined<D> {
+    fn name(&self) -> &str {
+        &self.name
     }
 
-    /// Records per list.
-    pub fn k(&self) -> usize {
+    fn needs(&self) -> Needs {
+        let needs = |part: &Arc<dyn Source<D>>| part.needs() == Needs::Descriptors;
+        if self.parts.iter().any(needs) { Needs::Descriptors } else { Needs::Nothing }
+    }
+
+    fn k(&self) -> usize {
         self.k
     }
 
-    /// Whether a map without descriptors is of no use.
-    pub fn needs_descriptors(&self) -> bool {
-        self.parts.iter().any(|entry| entry.needs_descriptors)
-    }
-
-    /// Refuses descriptors of a kind that one of the sources cannot read.
-    ///
-    /// # Errors
-    /// What that source expects, and what it found.
-    pub fn check_descriptors(&self, descriptors: &Descriptors) -> Result<(), Error> {
-        self.parts.iter().try_for_each(|entry| (entry.takes)(descriptors))
-    }
-
-    /// What a user should know about lists for `n_slots` hidden points, if anything.
-    pub fn note(&self, n_slots: usize) -> Option<String> {
-        (self.needs_descriptors() && n_slots > MOST_ROWS).then(|| {
-            format!(
-                "{}: of more than {MOST_ROWS} points each is compared with those whose descriptors look alike on the \
-                 whole: some neighbors that all pairs would tell are missed",
-                self.name()
-            )
-        })
-    }
-
-    /// Lists for every slot of a released map or image, from it alone.
-    ///
-    /// # Errors
-    /// When a source is not defined in `D` dimensions, or cannot work on this one.
-    pub fn make<const D: usize>(
-        &self,
-        released: &Released<D>,
-        seed: u64,
-    ) -> Result<Neighborhoods, Error> {
-        let lists = self.parts.iter().map(|entry| {
-            let make = entry.of_dimension::<D>().ok_or_else(|| {
-                let expected = format!("one that is defined in {D} dimensions");
-                Error::new("source", expected, entry.name)
-            })?;
-            make(released, self.k, seed).map_err(|error| error.within(entry.name))
-        });
+    fn lists(&self, released: &Released<D>, k: usize, seed: u64) -> Result<Neighborhoods, Error> {
+        let lists = self
+            .parts
+            .iter()
+            .map(|part| part.lists(released, k, seed).map_err(|error| error.within(part.name())));
         let mut lists = lists.collect::<Result<Vec<_>, _>>()?;
         match lists.len() {
             1 => Ok(lists.remove(0)),
             _ => {
-                let ranks: Vec<bool> = self.parts.iter().map(|entry| entry.only_ranks).collect();
-                let (n_records, slots) = (released.n_records(), released.slots_per_record());
-                join(&lists, &ranks, self.k, n_records, slots)
+                let ranks: Vec<bool> = self.parts.iter().map(|part| part.only_ranks()).collect();
+                join(&lists, &ranks, k, released.n_records(), released.slots_per_record())
             }
         }
     }
 
-    /// The same, with lists as long as can be where there are fewer other records than a list has: empty ones of a
-    /// single record. An attacker takes what there is.
-    ///
-    /// # Errors
-    /// As [`make`](Self::make).
-    pub fn make_of_what_there_is<const D: usize>(
-        &self,
-        released: &Released<D>,
-        seed: u64,
-    ) -> Result<Neighborhoods, Error> {
-        let (n_slots, n_records) = (released.n_slots(), released.n_records());
-        let others = n_records.saturating_sub(1);
-        if others > 0 {
-            return self.clone().with_k(self.k.min(others)).make(released, seed);
-        }
-        let (offsets, slots) = (vec![0; n_slots + 1], released.slots_per_record());
-        let lists = Neighborhoods::try_new(offsets, Vec::new(), None, n_records, slots)?;
-        let map = Some(released.fingerprint());
-        Ok(lists.with_about(About { map, order: RowOrder::DescriptorRows }))
+    fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {
+        self.parts.iter().try_for_each(|part| part.takes(descriptors))
+    }
+
+    fn supports(&self, released: &Released<D>) -> Result<(), Error> {
+        let supports = |part: &Arc<dyn Source<D>>| {
+            part.supports(released).map_err(|error| error.within(part.name()))
+        };
+        self.parts.iter().try_for_each(supports)
+    }
+
+    fn only_ranks(&self) -> bool {
+        self.parts.iter().all(|part| part.only_ranks())
+    }
+
+    fn note(&self, n_slots: usize) -> Option<String> {
+        (self.needs() == Needs::Descriptors && n_slots > MOST_ROWS).then(|| {
+            format!(
+                "{}: of more than {MOST_ROWS} points each is compared with those whose descriptors look alike on the \
+                 whole: some neighbors that all pairs would tell are missed",
+                self.name
+            )
+        })
     }
 }
 
@@ -234,15 +225,20 @@ mod tests {
 
     #[test]
     fn names_are_joined_and_the_largest_usual_k_counts() {
-        let joined = Joined::parse("overlap+similarity").unwrap();
-        assert_eq!((joined.name().as_str(), joined.k()), ("overlap+similarity", 35));
-        assert_eq!(Joined::parse("overlap").unwrap().k(), 35);
-        assert_eq!(Joined::parse("overlap").unwrap().with_k(7).k(), 7);
+        let source = |name: &str| Named::parse(name).unwrap().of_dimension::<3>().unwrap();
+        let joined = source("overlap+similarity");
+        assert_eq!((joined.name(), joined.k()), ("overlap+similarity", 35));
+        assert_eq!(source("overlap").k(), 35);
+        assert_eq!(source("overlap+geometric").k(), 35);
+        let few = Named::parse("overlap").unwrap().with_k(7);
+        assert_eq!(few.of_dimension::<3>().unwrap().k(), 7);
+        assert_eq!(few.of_dimension::<2>().unwrap().k(), 7);
+        assert_eq!(Named::parse("overlap").unwrap().of_dimension::<2>().unwrap().k(), 10);
     }
 
     #[test]
     fn unknown_and_repeated_names_are_told() {
-        let message = |text: &str| Joined::parse(text).unwrap_err().to_string();
+        let message = |text: &str| Named::parse(text).unwrap_err().to_string();
         assert!(message("overlop").starts_with("source: expected one of similarity, overlap"));
         assert_eq!(
             message("overlap+overlap"),
@@ -252,7 +248,7 @@ mod tests {
 
     #[test]
     fn only_large_maps_with_descriptors_call_for_a_note() {
-        let note = |name: &str, n| Joined::parse(name).unwrap().note(n);
+        let note = |name: &str, n| Named::parse(name).unwrap().of_dimension::<3>().unwrap().note(n);
         assert!(
             note("overlap+geometric", MOST_ROWS + 1)
                 .unwrap()

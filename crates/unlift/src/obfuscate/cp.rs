@@ -1,7 +1,9 @@
 //! `cp`: random pairs exchange one coordinate.
 
+use std::sync::Arc;
+
 use super::pairs::random_pairs;
-use super::{Entry, Lifted, Scheme, SchemeOptions};
+use super::{Entry, Facts, Lifted, Scheme};
 use crate::Error;
 use crate::geometry::frame::Bounds;
 use crate::released::{AxisCandidates, Obfuscation};
@@ -14,20 +16,29 @@ pub struct Cp;
 /// The registry row.
 pub const ENTRY: Entry = Entry {
     name: "cp",
-    summary: "random pairs exchange one random coordinate",
-    source: "Pan et al., Privacy Preserving Localization via Coordinate Permutations, ICCV 2023",
-    hidden: "which coordinate was exchanged, and its value",
-    patents: "none found",
+    facts: Facts {
+        summary: "random pairs exchange one random coordinate",
+        source: "Pan et al., Privacy Preserving Localization via Coordinate Permutations, ICCV 2023",
+        hidden: "which coordinate was exchanged, and its value",
+        patents: "none found",
+    },
     in_2d: None,
-    in_3d: Some(&Cp),
+    in_3d: Some(|_| Arc::new(Cp)),
 };
 
 impl<const D: usize> Scheme<D> for Cp {
+    fn name(&self) -> &str {
+        ENTRY.name
+    }
+
+    fn facts(&self) -> Facts {
+        ENTRY.facts
+    }
+
     fn lift(
         &self,
         points: &[[f64; D]],
         _: Option<&Bounds<D>>,
-        _: &SchemeOptions,
         key: &Key,
     ) -> Result<Lifted<D>, Error> {
         let key = key.stage(Stage::Scheme);

@@ -10,8 +10,10 @@
 //! - which anchor a line belongs to, and so in which half its keypoint lies, can be seen from the line:
 //!   it is released as a ray from the anchor.
 
+use std::sync::Arc;
+
 use super::ray::rays_from;
-use super::{Entry, Lifted, Scheme, SchemeOptions};
+use super::{Entry, Facts, Lifted, Scheme};
 use crate::Error;
 use crate::geometry::frame::Bounds;
 use crate::released::Obfuscation;
@@ -24,20 +26,29 @@ pub struct Dcl2d;
 /// The registry row.
 pub const ENTRY: Entry = Entry {
     name: "dcl2d",
-    summary: "a line from every keypoint to the anchor of its half of the image",
-    source: "Kim et al., Dual Convergent Lines, CVPR 2026",
-    hidden: "the range from the anchor (1 of 2 coordinates)",
-    patents: "none found",
-    in_2d: Some(&Dcl2d),
+    facts: Facts {
+        summary: "a line from every keypoint to the anchor of its half of the image",
+        source: "Kim et al., Dual Convergent Lines, CVPR 2026",
+        hidden: "the range from the anchor (1 of 2 coordinates)",
+        patents: "none found",
+    },
+    in_2d: Some(|_| Arc::new(Dcl2d)),
     in_3d: None,
 };
 
 impl Scheme<2> for Dcl2d {
+    fn name(&self) -> &str {
+        ENTRY.name
+    }
+
+    fn facts(&self) -> Facts {
+        ENTRY.facts
+    }
+
     fn lift(
         &self,
         points: &[[f64; 2]],
         bounds: Option<&Bounds<2>>,
-        _: &SchemeOptions,
         _: &Key,
     ) -> Result<Lifted<2>, Error> {
         let Some(image) = bounds else {

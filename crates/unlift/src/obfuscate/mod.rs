@@ -1,9 +1,11 @@
 //! The owner's side: originals in, released records and a secret out. One scheme per file.
 //!
-//! A scheme only states its rule ([`Scheme::lift`]); what every scheme needs to be free of truth
+//! A scheme only states its rule ([`Scheme::lift`]), here or in a crate of somebody else; what every scheme needs to be free of truth
 //! (the origin, the normal form, the order of records, slots and descriptors) happens here, once.
 
 use std::any::Any;
+use std::fmt::Debug;
+use std::sync::Arc;
 
 mod pairs;
 
@@ -23,7 +25,7 @@ use crate::geometry::vector::sub;
 use crate::released::{Obfuscation, Released};
 use crate::seed::{Key, Stage};
 use crate::truth::{Dropped, Original, Secret};
-use crate::{Descriptors, Error, OriginalId};
+use crate::{Descriptors, Error, OriginalId, Unit};
 
 /// All schemes, in the order of the paper's tables. A file that is missing here fails
 /// `tests/architecture.rs`.
@@ -51,10 +53,38 @@ pub fn scheme(name: &str) -> Result<&'static Entry, Error> {
     })
 }
 
-/// A row of the registry: a scheme and what is known about it.
+/// A row of the registry: a scheme of ours, and how it is made.
+#[derive(Debug)]
 pub struct Entry {
     /// The name users know it by.
     pub name: &'static str,
+    /// What is known about it.
+    pub facts: Facts,
+    /// The scheme on keypoints, if it is defined there.
+    pub in_2d: Option<Build<2>>,
+    /// The scheme on map points, if it is defined there.
+    pub in_3d: Option<Build<3>>,
+}
+
+/// Makes a scheme with the parameters that it has.
+pub type Build<const D: usize> = fn(&SchemeOptions) -> Arc<dyn Scheme<D>>;
+
+impl Entry {
+    /// The scheme on points of `D` dimensions, if it is defined there.
+    pub fn of_dimension<const D: usize>(
+        &self,
+        options: &SchemeOptions,
+    ) -> Option<Arc<dyn Scheme<D>>> {
+        // A constant cannot choose between two types; `Any` asks whether they are the same.
+        let of: &dyn Any = if D == 2 { &self.in_2d } else { &self.in_3d };
+        let build = of.downcast_ref::<Option<Build<D>>>().copied().flatten();
+        build.map(|build| build(options))
+    }
+}
+
+/// What is known about a scheme; empty where nothing is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Facts {
     /// The rule in one line.
     pub summary: &'static str,
     /// Where it was published.
@@ -63,28 +93,9 @@ pub struct Entry {
     pub hidden: &'static str,
     /// Patents its authors state (facts, no legal advice).
     pub patents: &'static str,
-    /// The scheme on keypoints, if it is defined there.
-    pub in_2d: Option<&'static dyn Scheme<2>>,
-    /// The scheme on map points, if it is defined there.
-    pub in_3d: Option<&'static dyn Scheme<3>>,
 }
 
-impl Entry {
-    /// The scheme on points of `D` dimensions, if it is defined there.
-    pub fn of_dimension<const D: usize>(&self) -> Option<&'static dyn Scheme<D>> {
-        // A constant cannot choose between two types; `Any` asks whether they are the same.
-        let of: &dyn Any = if D == 2 { &self.in_2d } else { &self.in_3d };
-        of.downcast_ref::<Option<&'static dyn Scheme<D>>>().copied().flatten()
-    }
-}
-
-impl std::fmt::Debug for Entry {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Entry").field("name", &self.name).finish_non_exhaustive()
-    }
-}
-
-/// Parameters of schemes, in the unit of the points.
+/// Parameters of the schemes of the registry, in the unit of the points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SchemeOptions {
     /// Edge of a voxel of `ray-voxel`. The paper's authors use 0.5 m.
@@ -92,32 +103,45 @@ pub struct SchemeOptions {
 }
 
 impl SchemeOptions {
-    /// Checks every field.
-    ///
-    /// # Errors
-    /// Names the first field out of range.
-    pub fn check(&self) -> Result<(), Error> {
-        if !(self.voxel.is_finite() && self.voxel > 0.0) {
-            return Err(Error::new("voxel", "a positive length", self.voxel.to_string()));
-        }
-        Ok(())
+    /// The usual ones for points in `unit`.
+    pub fn usual(unit: Unit) -> Self {
+        let voxel = match unit {
+            Unit::Meter => 0.5,
+            Unit::KthNeighbor => 5.0,
+            // No scheme on keypoints has voxels.
+            Unit::Pixel => 1.0,
+        };
+        Self { voxel }
     }
 }
 
-/// A rule for hiding points: the only public seam of the library.
-pub trait Scheme<const D: usize>: Sync {
+/// A rule for hiding points. Anybody may write one: what is audited is `Arc<dyn Scheme<D>>`, and the registry
+/// only lists ours. Parameters are fields of the type.
+pub trait Scheme<const D: usize>: Debug + Send + Sync {
+    /// The name in rows, gates and reports: one word, told apart from those of other schemes of a plan.
+    fn name(&self) -> &str;
+
+    /// What is known about it.
+    fn facts(&self) -> Facts {
+        Facts::default()
+    }
+
+    /// Its parameters, by name, for the record. Lengths are in the unit of the points.
+    fn parameters(&self) -> Vec<(&'static str, f64)> {
+        Vec::new()
+    }
+
     /// Hides `points`, given about the released origin, as are the `bounds` in which all of them are
     /// publicly known to lie (an image's). All chance comes from `key`, by [`Stage::Scheme`]: what is drawn
     /// is released. Every original ends up in exactly one slot
     /// or among the dropped ones, with a reason; no record is empty.
     ///
     /// # Errors
-    /// When the points cannot be hidden by this rule at all.
+    /// When the points cannot be hidden by this rule at all, or a parameter is out of range.
     fn lift(
         &self,
         points: &[[f64; D]],
         bounds: Option<&Bounds<D>>,
-        options: &SchemeOptions,
         key: &Key,
     ) -> Result<Lifted<D>, Error>;
 }
@@ -141,15 +165,13 @@ pub struct Lifted<const D: usize> {
 /// row per original. All chance comes from `key`: [`Key::fresh`] for a map that is released.
 ///
 /// # Errors
-/// When options are out of range, rows disagree, or the scheme cannot hide these points.
+/// When rows disagree, or the scheme cannot hide these points.
 pub fn obfuscate<const D: usize>(
     scheme: &dyn Scheme<D>,
     original: &Original<D>,
     descriptors: Option<&Descriptors>,
-    options: &SchemeOptions,
     key: &Key,
 ) -> Result<(Released<D>, Secret), Error> {
-    options.check()?;
     let points = original.reveal();
     if let Some(descriptors) = descriptors
         && descriptors.len() != points.len()
@@ -164,7 +186,7 @@ pub fn obfuscate<const D: usize>(
         None => rounded_origin(points.positions()),
     };
     let local: Vec<[f64; D]> = points.positions().iter().map(|p| sub(p, &origin)).collect();
-    let lifted = scheme.lift(&local, bounds.map(|b| b.about(&origin)).as_ref(), options, key)?;
+    let lifted = scheme.lift(&local, bounds.map(|b| b.about(&origin)).as_ref(), key)?;
 
     let slots = lifted.slots_per_record;
     let n_records = lifted.obfuscation.len();

@@ -1,8 +1,10 @@
 //! `olc`: a uniformly random line through every point.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
-use super::{Entry, Lifted, Scheme, SchemeOptions};
+use super::{Entry, Facts, Lifted, Scheme};
 use crate::geometry::frame::Bounds;
 use crate::released::{Lines, Obfuscation};
 use crate::seed::{Key, Stage};
@@ -15,20 +17,29 @@ pub struct Olc;
 /// The registry row.
 pub const ENTRY: Entry = Entry {
     name: "olc",
-    summary: "a random line through every point",
-    source: "Speciale et al., Privacy Preserving Image-Based Localization, CVPR 2019",
-    hidden: "the position along the line (1 of 3 coordinates)",
-    patents: "EP 3818501 B1 / WO 2020/009829 \"3D line clouds\", Microsoft (US 16/025,120)",
+    facts: Facts {
+        summary: "a random line through every point",
+        source: "Speciale et al., Privacy Preserving Image-Based Localization, CVPR 2019",
+        hidden: "the position along the line (1 of 3 coordinates)",
+        patents: "EP 3818501 B1 / WO 2020/009829 \"3D line clouds\", Microsoft (US 16/025,120)",
+    },
     in_2d: None,
-    in_3d: Some(&Olc),
+    in_3d: Some(|_| Arc::new(Olc)),
 };
 
 impl<const D: usize> Scheme<D> for Olc {
+    fn name(&self) -> &str {
+        ENTRY.name
+    }
+
+    fn facts(&self) -> Facts {
+        ENTRY.facts
+    }
+
     fn lift(
         &self,
         points: &[[f64; D]],
         _: Option<&Bounds<D>>,
-        _: &SchemeOptions,
         key: &Key,
     ) -> Result<Lifted<D>, Error> {
         let key = key.stage(Stage::Scheme);

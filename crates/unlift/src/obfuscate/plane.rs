@@ -1,6 +1,8 @@
 //! `plane`: of every point one coordinate is kept, on one of three servers.
 
-use super::{Entry, Lifted, Scheme, SchemeOptions};
+use std::sync::Arc;
+
+use super::{Entry, Facts, Lifted, Scheme};
 use crate::geometry::frame::Bounds;
 use crate::released::{AxisPlanes, Obfuscation};
 use crate::seed::{Key, Stage};
@@ -13,20 +15,29 @@ pub struct Plane;
 /// The registry row.
 pub const ENTRY: Entry = Entry {
     name: "plane",
-    summary: "an axis-parallel plane through every point, the axis drawn in equal thirds",
-    source: "Geppert et al., Privacy Preserving Partial Localization, CVPR 2022",
-    hidden: "two of three coordinates",
-    patents: "none found",
+    facts: Facts {
+        summary: "an axis-parallel plane through every point, the axis drawn in equal thirds",
+        source: "Geppert et al., Privacy Preserving Partial Localization, CVPR 2022",
+        hidden: "two of three coordinates",
+        patents: "none found",
+    },
     in_2d: None,
-    in_3d: Some(&Plane),
+    in_3d: Some(|_| Arc::new(Plane)),
 };
 
 impl Scheme<3> for Plane {
+    fn name(&self) -> &str {
+        ENTRY.name
+    }
+
+    fn facts(&self) -> Facts {
+        ENTRY.facts
+    }
+
     fn lift(
         &self,
         points: &[[f64; 3]],
         _: Option<&Bounds<3>>,
-        _: &SchemeOptions,
         key: &Key,
     ) -> Result<Lifted<3>, Error> {
         let mut axis: Vec<u8> = (0..points.len()).map(|i| (i % 3) as u8).collect();

@@ -1,7 +1,9 @@
 //! `ppl`: a line through every pair of a random pairing.
 
+use std::sync::Arc;
+
 use super::pairs::{drop_pairs, pair_again, random_pairs, refused_last};
-use super::{Entry, Lifted, Scheme, SchemeOptions};
+use super::{Entry, Facts, Lifted, Scheme};
 use crate::geometry::frame::Bounds;
 use crate::geometry::vector::{squared_distance, sub};
 use crate::released::{Lines, Obfuscation};
@@ -16,23 +18,32 @@ pub struct Ppl;
 /// The registry row.
 pub const ENTRY: Entry = Entry {
     name: "ppl",
-    summary: "one line through two random points",
-    source: "Lee et al., Paired-Point Lifting for Enhanced Privacy-Preserving Visual Localization, CVPR 2023",
-    hidden: "two positions along the line and which descriptor is whose",
-    patents: "application declared by its authors; line clouds as for olc",
+    facts: Facts {
+        summary: "one line through two random points",
+        source: "Lee et al., Paired-Point Lifting for Enhanced Privacy-Preserving Visual Localization, CVPR 2023",
+        hidden: "two positions along the line and which descriptor is whose",
+        patents: "application declared by its authors; line clouds as for olc",
+    },
     in_2d: None,
-    in_3d: Some(&Ppl),
+    in_3d: Some(|_| Arc::new(Ppl)),
 };
 
 /// How often coincident pairs are paired anew before they are dropped.
 const RE_DRAWS: usize = 100;
 
 impl Scheme<3> for Ppl {
+    fn name(&self) -> &str {
+        ENTRY.name
+    }
+
+    fn facts(&self) -> Facts {
+        ENTRY.facts
+    }
+
     fn lift(
         &self,
         points: &[[f64; 3]],
         _: Option<&Bounds<3>>,
-        _: &SchemeOptions,
         key: &Key,
     ) -> Result<Lifted<3>, Error> {
         let mut draws = key.draws(Stage::Scheme, 0);

@@ -4,9 +4,11 @@
 //! wrong matrix and depends on the orientation of the map; here it is the direction in which the
 //! neighbors spread least, which is the rule the authors describe.
 
+use std::sync::Arc;
+
 use super::pairs::{drop_pairs, pair_again, random_pairs, refused_last};
 use super::ppl::{apart, lines_through};
-use super::{Entry, Lifted, Scheme, SchemeOptions};
+use super::{Entry, Facts, Lifted, Scheme};
 use crate::geometry::frame::Bounds;
 use crate::geometry::knn::Knn;
 use crate::geometry::normal::local_normal;
@@ -22,12 +24,14 @@ pub struct PplPlus;
 /// The registry row.
 pub const ENTRY: Entry = Entry {
     name: "ppl+",
-    summary: "as ppl, but no line lies within the local surface of its first point",
-    source: "Lee et al., Paired-Point Lifting for Enhanced Privacy-Preserving Visual Localization, CVPR 2023",
-    hidden: "two positions along the line and which descriptor is whose",
-    patents: "as ppl",
+    facts: Facts {
+        summary: "as ppl, but no line lies within the local surface of its first point",
+        source: "Lee et al., Paired-Point Lifting for Enhanced Privacy-Preserving Visual Localization, CVPR 2023",
+        hidden: "two positions along the line and which descriptor is whose",
+        patents: "as ppl",
+    },
     in_2d: None,
-    in_3d: Some(&PplPlus),
+    in_3d: Some(|_| Arc::new(PplPlus)),
 };
 
 /// Re-pairing rounds at most.
@@ -40,11 +44,18 @@ const STALL: (usize, usize) = (100, 50);
 const SIN_20_DEGREES: f64 = 0.342_020_143_325_668_7;
 
 impl Scheme<3> for PplPlus {
+    fn name(&self) -> &str {
+        ENTRY.name
+    }
+
+    fn facts(&self) -> Facts {
+        ENTRY.facts
+    }
+
     fn lift(
         &self,
         points: &[[f64; 3]],
         _: Option<&Bounds<3>>,
-        _: &SchemeOptions,
         key: &Key,
     ) -> Result<Lifted<3>, Error> {
         let normals = normals(points)?;

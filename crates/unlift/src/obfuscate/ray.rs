@@ -1,6 +1,8 @@
 //! `ray`: a half-line from one of two centers, chosen at random for every point.
 
-use super::{Entry, Lifted, Scheme, SchemeOptions};
+use std::sync::Arc;
+
+use super::{Entry, Facts, Lifted, Scheme};
 use crate::geometry::frame::Bounds;
 use crate::geometry::kmeans::kmeans;
 use crate::geometry::vector::{dot, sub};
@@ -16,23 +18,32 @@ pub struct Ray;
 /// The registry row.
 pub const ENTRY: Entry = Entry {
     name: "ray",
-    summary: "a half-line from one of two k-means centers, drawn at random",
-    source: "Moon et al., Efficient Privacy-Preserving Visual Localization Using 3D Ray Clouds, CVPR 2024",
-    hidden: "the range from the center (1 of 3 coordinates)",
-    patents: "US 2025/0329045 A1; PCT application declared by its authors",
+    facts: Facts {
+        summary: "a half-line from one of two k-means centers, drawn at random",
+        source: "Moon et al., Efficient Privacy-Preserving Visual Localization Using 3D Ray Clouds, CVPR 2024",
+        hidden: "the range from the center (1 of 3 coordinates)",
+        patents: "US 2025/0329045 A1; PCT application declared by its authors",
+    },
     in_2d: None,
-    in_3d: Some(&Ray),
+    in_3d: Some(|_| Arc::new(Ray)),
 };
 
 /// Restarts of k-means (scikit-learn's `n_init` in the authors' code).
 const RESTARTS: u64 = 10;
 
 impl Scheme<3> for Ray {
+    fn name(&self) -> &str {
+        ENTRY.name
+    }
+
+    fn facts(&self) -> Facts {
+        ENTRY.facts
+    }
+
     fn lift(
         &self,
         points: &[[f64; 3]],
         _: Option<&Bounds<3>>,
-        _: &SchemeOptions,
         key: &Key,
     ) -> Result<Lifted<3>, Error> {
         let choices = key.stage(Stage::Scheme);

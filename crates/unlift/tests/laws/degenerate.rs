@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use proptest::prelude::*;
 use unlift::Unit;
 use unlift::neighbors::Neighborhoods;
-use unlift::obfuscate::Scheme;
+use unlift::obfuscate::Entry;
 use unlift::recover::{Delta, RecoverOptions, Solver, Status, recover};
 use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
 use unlift::seed::{Draws, Stage};
@@ -85,8 +85,8 @@ fn deltas_beyond_f32_are_refused() {
     }
 }
 
-fn short_lists<const D: usize>(name: &str, scheme: &dyn Scheme<D>, seed: u64) {
-    let hidden = hide(scheme, &room(seed, 120), seed);
+fn short_lists<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
+    let hidden = hide::<D>(scheme, &room(seed, 120), seed);
     let (n, per) = (hidden.released.n_slots(), hidden.released.slots_per_record());
     let mut draws = Draws::new(seed, Stage::Synthetic, 30);
     for length in [0, 1, 2, 3, 4] {
@@ -114,9 +114,9 @@ fn short_lists<const D: usize>(name: &str, scheme: &dyn Scheme<D>, seed: u64) {
     }
 }
 
-fn coincident_maps<const D: usize>(name: &str, scheme: &dyn Scheme<D>, seed: u64) {
+fn coincident_maps<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     for (places, copies) in [(1, 30), (2, 15), (1, 2), (30, 1)] {
-        let hidden = hide(scheme, &piles(seed, places, copies, 0.0), seed);
+        let hidden = hide::<D>(scheme, &piles(seed, places, copies, 0.0), seed);
         let n = hidden.released.n_records();
         let per = hidden.released.slots_per_record();
         let row = |slot: usize| (0..n as u32).filter(|&r| r as usize != slot / per).collect();

@@ -1,7 +1,7 @@
 //! Attacks on the records alone: what must hold for them besides the laws of degenerate maps.
 
 use unlift::neighbors::{Neighborhoods, geometric};
-use unlift::obfuscate::{Scheme, olc::Olc, scheme};
+use unlift::obfuscate::{Entry, scheme};
 use unlift::recover::{RecoverOptions, Recovered, Solver, Status};
 use unlift::released::{Lines, Obfuscation, Released};
 use unlift::seed::{Draws, Stage};
@@ -44,8 +44,8 @@ fn percent_within(hidden: &Hidden<3>, recovered: &Recovered<3>, reach: f64) -> f
     100.0 * within as f64 / hidden.released.n_slots() as f64
 }
 
-fn threads_change_no_byte<const D: usize>(name: &str, scheme: &dyn Scheme<D>) {
-    let released = hide(scheme, &room(5, 500), 5).released;
+fn threads_change_no_byte<const D: usize>(name: &str, scheme: &Entry) {
+    let released = hide::<D>(scheme, &room(5, 500), 5).released;
     let run = || {
         let mut bytes: Vec<u8> =
             ALONE.iter().flat_map(|&solver| recovered_bytes(&alone(&released, solver))).collect();
@@ -74,7 +74,7 @@ fn a_wall_comes_back_from_random_lines() {
     let mut draws = Draws::new(2, Stage::Synthetic, 0);
     let wall: Vec<[f64; 3]> =
         (0..2000).map(|_| [draws.between(0.0, 2.0), 0.5, draws.between(0.0, 2.0)]).collect();
-    let hidden = hide(&Olc, &wall, 1);
+    let hidden = hide::<3>(scheme("olc").unwrap(), &wall, 1);
     for (solver, least) in [(Solver::Density, 60.0), (Solver::Tomography, 65.0)] {
         let percent = percent_within(&hidden, &alone(&hidden.released, solver), 0.1);
         assert!(percent >= least, "{solver:?}: {percent}");
@@ -88,7 +88,7 @@ fn a_room_comes_back_from_its_records() {
     let floors = [("olc", 57.0, 69.0), ("ppl", 53.0, 63.0), ("ray", 32.0, 37.0), ("cp", 0.0, 27.0)];
     let points = furnished(4000);
     for (name, published, ours) in floors {
-        let hidden = hide(scheme(name).unwrap().in_3d.unwrap(), &points, 1);
+        let hidden = hide(scheme(name).unwrap(), &points, 1);
         for (solver, least) in [(Solver::Density, published), (Solver::Tomography, ours)] {
             let percent = percent_within(&hidden, &alone(&hidden.released, solver), 0.25);
             assert!(percent >= least, "{name}, {solver:?}: {percent}");
@@ -102,7 +102,7 @@ fn a_scaled_map_has_the_same_shares() {
     let points = furnished(1500);
     let scaled: Vec<[f64; 3]> = points.iter().map(|p| p.map(|x| 7.3 * x)).collect();
     for name in ["olc", "ppl", "ray", "cp"] {
-        let scheme = scheme(name).unwrap().in_3d.unwrap();
+        let scheme = scheme(name).unwrap();
         let (one, other) = (hide(scheme, &points, 1), hide(scheme, &scaled, 1));
         for solver in ALONE {
             let one = percent_within(&one, &alone(&one.released, solver), 0.25);
@@ -116,7 +116,7 @@ fn a_scaled_map_has_the_same_shares() {
 /// Records in another order give the same positions in that order.
 #[test]
 fn permuted_records_give_permuted_positions() {
-    let released = hide(&Olc, &furnished(1000), 1).released;
+    let released = hide::<3>(scheme("olc").unwrap(), &furnished(1000), 1).released;
     let Obfuscation::Lines(lines) = released.obfuscation() else { panic!("lines") };
     let order = Draws::new(1, Stage::Shuffle, 9).permutation(lines.len());
     let rows = |of: &[[f32; 3]]| -> Vec<[f64; 3]> {
@@ -140,7 +140,7 @@ fn permuted_records_give_permuted_positions() {
 fn geometric_lists_hold_neighbors() {
     let points = furnished(3000);
     for (name, least) in [("olc", 0.40), ("ppl", 0.17), ("ray", 0.13), ("cp", 0.11)] {
-        let hidden = hide(scheme(name).unwrap().in_3d.unwrap(), &points, 1);
+        let hidden = hide(scheme(name).unwrap(), &points, 1);
         let lists = geometric(&hidden.released, 20).unwrap();
         let ratio = hidden.near(20).measured_inlier_ratio(&lists);
         assert!(ratio >= least, "{name}: {ratio}, {} by chance", 20.0 / 3000.0);
@@ -156,11 +156,11 @@ fn geometric_lists_hold_neighbors() {
 }
 
 /// Maps that fix little or nothing: a status, never a NaN, never a panic.
-fn odd_maps_are_answered<const D: usize>(name: &str, scheme: &dyn Scheme<D>) {
+fn odd_maps_are_answered<const D: usize>(name: &str, scheme: &Entry) {
     let far = [vec![[1e6; D]; 3], uniform(1, 60)].concat();
     let maps = [piles(3, 1, 40, 0.0), piles(3, 2, 40, 1e-7), uniform(3, 2), uniform(3, 9), far];
     for points in maps {
-        let Ok(hidden) = try_hide(scheme, &points, 0.5, 1) else { continue };
+        let Ok(hidden) = try_hide::<D>(scheme, &points, 0.5, 1) else { continue };
         for solver in ALONE {
             let recovered = alone(&hidden.released, solver);
             for slot in 0..recovered.n_slots() {
@@ -195,19 +195,19 @@ fn density_of_odd_maps() {
 #[test]
 fn where_records_alone_tell_nothing_the_error_says_so() {
     let message = |name: &str| {
-        let released = hide(scheme(name).unwrap().in_3d.unwrap(), &furnished(200), 1).released;
+        let released = hide(scheme(name).unwrap(), &furnished(200), 1).released;
         geometric(&released, 5).unwrap_err().to_string()
     };
     assert_eq!(
         message("plane"),
         "geometric neighborhoods: expected lines, rays or axis candidates, found planes"
     );
-    let flat = hide::<2>(&Olc, &room(1, 100), 1).released;
+    let flat = hide::<2>(scheme("lines2d").unwrap(), &room(1, 100), 1).released;
     assert_eq!(
         geometric(&flat, 5).unwrap_err().to_string(),
         "geometric neighborhoods: expected a map in three dimensions, found 2"
     );
-    let planes = hide(scheme("plane").unwrap().in_3d.unwrap(), &furnished(200), 1).released;
+    let planes = hide(scheme("plane").unwrap(), &furnished(200), 1).released;
     for solver in ALONE {
         assert!(alone(&planes, solver).status().iter().all(|&s| s == Status::NoSupport));
     }

@@ -11,7 +11,7 @@ const K: usize = 20;
 
 fn hidden(name: &str, scale: f64) -> Hidden<3> {
     let points: Vec<[f64; 3]> = room(5, N).iter().map(|p| p.map(|x| x * scale)).collect();
-    let scheme = scheme(name).unwrap().in_3d.unwrap();
+    let scheme = scheme(name).unwrap();
     crate::maps::try_hide(scheme, &points, 0.5 * scale, 5).unwrap()
 }
 
@@ -137,7 +137,7 @@ fn threads_change_nothing_and_scale_hardly_anything() {
 /// Without the rule there is nothing to find: rays whose centers were drawn stay as they are.
 #[test]
 fn rays_without_voxels_stay_where_they_are() {
-    let hidden = hide(scheme("ray").unwrap().in_3d.unwrap(), &room(5, 500), 5);
+    let hidden = hide::<3>(scheme("ray").unwrap(), &room(5, 500), 5);
     let lists = hidden.lists(K, 1.0, 2);
     let with = solve(&hidden.released, &lists, options(true));
     assert!(

@@ -3,7 +3,7 @@
 //! exempt: the hidden value is published on the partner.
 
 use proptest::prelude::*;
-use unlift::obfuscate::Scheme;
+use unlift::obfuscate::Entry;
 use unlift::released::{AxisPlanes, Lines, Obfuscation, Rays};
 use unlift::seed::{Draws, Key, Stage};
 
@@ -123,15 +123,11 @@ fn symmetric_clouds<const D: usize>(seed: u64) -> Vec<[f64; D]> {
 }
 
 /// End to end: obfuscate, move one original (or an opposite pair) along its record, obfuscate again.
-fn moving_along_the_record_changes_no_byte<const D: usize>(
-    name: &str,
-    scheme: &dyn Scheme<D>,
-    seed: u64,
-) {
+fn moving_along_the_record_changes_no_byte<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     let points = symmetric_clouds::<D>(seed);
     // One voxel holds everything: the grid is fixed.
     let voxel = 1e3;
-    let before = try_hide(scheme, &points, voxel, seed).unwrap();
+    let before = try_hide::<D>(scheme, &points, voxel, seed).unwrap();
     let origin = before.released.origin();
     let original_of = |slot: usize| before.secret.hidden()[slot].index();
     let slot_of = |id: usize| (0..before.secret.n_slots()).find(|&slot| original_of(slot) == id);
@@ -183,7 +179,7 @@ fn moving_along_the_record_changes_no_byte<const D: usize>(
             }
             Obfuscation::AxisCandidates(_) => return,
         }
-        let after = try_hide(scheme, &moved, voxel, seed).unwrap();
+        let after = try_hide::<D>(scheme, &moved, voxel, seed).unwrap();
         let fixed = after.secret == before.secret && after.released.origin() == origin;
         let centers_fixed = match (before.released.obfuscation(), after.released.obfuscation()) {
             (Obfuscation::Rays(a), Obfuscation::Rays(b)) => a.centers() == b.centers(),

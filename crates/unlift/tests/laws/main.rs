@@ -6,11 +6,11 @@
 macro_rules! over_schemes {
     ($law:ident $(, $argument:expr)*) => {
         for entry in unlift::obfuscate::SCHEMES {
-            if let Some(scheme) = entry.in_3d {
-                $law::<3>(entry.name, scheme $(, $argument)*);
+            if entry.in_3d.is_some() {
+                $law::<3>(entry.name, entry $(, $argument)*);
             }
-            if let Some(scheme) = entry.in_2d {
-                $law::<2>(entry.name, scheme $(, $argument)*);
+            if entry.in_2d.is_some() {
+                $law::<2>(entry.name, entry $(, $argument)*);
             }
         }
     };

@@ -4,7 +4,7 @@ use proptest::prelude::ProptestConfig;
 use unlift::geometry::frame::Bounds;
 use unlift::neighbors::Neighborhoods;
 use unlift::neighbors::oracle::{self, TrueNeighbors};
-use unlift::obfuscate::{Scheme, SchemeOptions, obfuscate};
+use unlift::obfuscate::{Entry, SchemeOptions, obfuscate};
 use unlift::recover::{Delta, RecoverOptions, Recovered, Solver, recover};
 use unlift::released::{Obfuscation, Released};
 use unlift::seed::{Draws, Key, Stage};
@@ -44,7 +44,7 @@ fn image<const D: usize>(points: &[[f64; D]], voxel: f64) -> Bounds<D> {
 
 /// Hides `points` with voxels of `voxel`; in the plane they are keypoints of an image.
 pub fn try_hide<const D: usize>(
-    scheme: &dyn Scheme<D>,
+    scheme: &Entry,
     points: &[[f64; D]],
     voxel: f64,
     seed: u64,
@@ -54,13 +54,13 @@ pub fn try_hide<const D: usize>(
         2 => Original::within(set, image(points, voxel))?,
         _ => Original::new(set),
     };
-    let (released, secret) =
-        obfuscate(scheme, &original, None, &SchemeOptions { voxel }, &Key::from_seed(seed))?;
+    let scheme = scheme.of_dimension(&SchemeOptions { voxel }).expect("defined there");
+    let (released, secret) = obfuscate(&*scheme, &original, None, &Key::from_seed(seed))?;
     Ok(Hidden { original, released, secret })
 }
 
 /// [`try_hide`] with half-meter voxels.
-pub fn hide<const D: usize>(scheme: &dyn Scheme<D>, points: &[[f64; D]], seed: u64) -> Hidden<D> {
+pub fn hide<const D: usize>(scheme: &Entry, points: &[[f64; D]], seed: u64) -> Hidden<D> {
     try_hide(scheme, points, 0.5, seed).unwrap()
 }
 

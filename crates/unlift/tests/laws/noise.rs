@@ -5,13 +5,13 @@ use std::collections::BTreeSet;
 use unlift::RecordId;
 use unlift::neighbors::Neighborhoods;
 use unlift::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
-use unlift::obfuscate::{Scheme, olc::Olc, ppl::Ppl};
+use unlift::obfuscate::{Entry, olc, ppl};
 
 use crate::maps::*;
 
 const K: usize = 10;
 const N: usize = 1200;
-const SCHEMES: [&dyn Scheme<3>; 2] = [&Olc, &Ppl];
+const SCHEMES: [&Entry; 2] = [&olc::ENTRY, &ppl::ENTRY];
 
 struct Oracle {
     hidden: Hidden<3>,
@@ -19,7 +19,7 @@ struct Oracle {
 }
 
 impl Oracle {
-    fn new(scheme: &dyn Scheme<3>) -> Self {
+    fn new(scheme: &Entry) -> Self {
         let hidden = hide(scheme, &room(17, N), 5);
         let near = hidden.near(K);
         Self { hidden, near }
@@ -172,7 +172,7 @@ fn lists_of_every_model_are_the_same_on_any_number_of_threads() {
 
 #[test]
 fn a_map_without_a_ring_is_told() {
-    let hidden = hide::<3>(&Olc, &room(17, 2 * K + 4), 5);
+    let hidden = hide::<3>(&olc::ENTRY, &room(17, 2 * K + 4), 5);
     let oracle = Oracle { near: hidden.near(K), hidden };
     let outliers = oracle.outliers(Noise::Near, 0);
     assert!(oracle.near.lists(0.7, &outliers, 0).is_ok());

@@ -1,6 +1,6 @@
 //! Recovery in two steps and in parts gives what it gives at once, bit for bit.
 
-use unlift::obfuscate::Scheme;
+use unlift::obfuscate::Entry;
 use unlift::recover::{Delta, Model, RecoverOptions, Solver, Task, prepare};
 
 use crate::maps::*;
@@ -12,8 +12,8 @@ fn cuts(n: usize) -> Vec<std::ops::Range<usize>> {
 }
 
 /// A model learned here, sent as bytes, solved in parts, joined.
-fn parts_are_the_whole<const D: usize>(name: &str, scheme: &dyn Scheme<D>) {
-    let hidden = hide(scheme, &room(61, 500), 6);
+fn parts_are_the_whole<const D: usize>(name: &str, scheme: &Entry) {
+    let hidden = hide::<D>(scheme, &room(61, 500), 6);
     let lists = hidden.lists(15, 0.5, 6);
     let n = hidden.released.n_slots();
     for solver in Solver::ALL {

@@ -30,8 +30,10 @@ fn bytes_are_pinned() {
     let points = room::<3>(2026, 301);
     let mut found = Vec::new();
     for entry in SCHEMES {
-        let Some(scheme) = entry.in_3d else { continue };
-        let hidden = hide(scheme, &points, 0);
+        if entry.in_3d.is_none() {
+            continue;
+        }
+        let hidden = hide(entry, &points, 0);
         let lists = hidden.lists(20, 0.5, 0);
         let options = RecoverOptions {
             solver: Solver::Consensus,

@@ -1,7 +1,7 @@
 //! What a released map holds: containment, normal form, shape, determinism.
 
 use proptest::prelude::*;
-use unlift::obfuscate::Scheme;
+use unlift::obfuscate::Entry;
 use unlift::recover::Solver;
 use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays};
 
@@ -13,13 +13,13 @@ const F32: f64 = 5e-7;
 /// Each original lies on its record; for axis candidates also on the line of the exchanged axis.
 fn originals_lie_on_their_records<const D: usize>(
     name: &str,
-    scheme: &dyn Scheme<D>,
+    scheme: &Entry,
     n: usize,
     seed: u64,
     shift: f64,
 ) {
     let points: Vec<[f64; D]> = room(seed, n).iter().map(|p| p.map(|x| x + shift)).collect();
-    let hidden = hide(scheme, &points, seed);
+    let hidden = hide::<D>(scheme, &points, seed);
     // Differences of far coordinates are exact only to their own last place.
     let tolerance = F32 * 8.0 + shift * f64::EPSILON;
     for slot in 0..hidden.secret.n_slots() {
@@ -41,13 +41,8 @@ fn originals_lie_on_their_records<const D: usize>(
 }
 
 /// Normalizing what is stored changes no bit.
-fn normal_form_is_idempotent<const D: usize>(
-    name: &str,
-    scheme: &dyn Scheme<D>,
-    n: usize,
-    seed: u64,
-) {
-    let hidden = hide(scheme, &room(seed, n), seed);
+fn normal_form_is_idempotent<const D: usize>(name: &str, scheme: &Entry, n: usize, seed: u64) {
+    let hidden = hide::<D>(scheme, &room(seed, n), seed);
     let stored = hidden.released.obfuscation();
     let widen = |rows: &[[f32; D]]| rows.iter().map(|r| r.map(f64::from)).collect::<Vec<_>>();
     let again = match stored {
@@ -72,11 +67,11 @@ fn normal_form_is_idempotent<const D: usize>(
 /// Every original has one slot or one reason; records are full; nothing else is released.
 fn every_original_is_accounted_for<const D: usize>(
     name: &str,
-    scheme: &dyn Scheme<D>,
+    scheme: &Entry,
     points: &[[f64; D]],
     seed: u64,
 ) {
-    let hidden = match try_hide(scheme, points, 0.5, seed) {
+    let hidden = match try_hide::<D>(scheme, points, 0.5, seed) {
         Ok(hidden) => hidden,
         // Too few points is bad input, in one line that names it.
         Err(error) => {
@@ -103,10 +98,10 @@ fn every_original_is_accounted_for<const D: usize>(
 }
 
 /// The same seed gives the same bytes on any number of threads.
-fn threads_change_no_byte<const D: usize>(name: &str, scheme: &dyn Scheme<D>, seed: u64) {
+fn threads_change_no_byte<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     let points = room(seed, 700);
     let run = || {
-        let hidden = hide(scheme, &points, seed);
+        let hidden = hide::<D>(scheme, &points, seed);
         let lists = hidden.lists(20, 0.5, seed);
         let mut bytes = released_bytes(&hidden.released);
         bytes.extend(lists.records().iter().flat_map(|r| r.0.to_le_bytes()));
@@ -127,9 +122,9 @@ fn threads_change_no_byte<const D: usize>(name: &str, scheme: &dyn Scheme<D>, se
 }
 
 /// Another seed hides differently.
-fn seeds_matter<const D: usize>(name: &str, scheme: &dyn Scheme<D>) {
+fn seeds_matter<const D: usize>(name: &str, scheme: &Entry) {
     let points = room(1, 200);
-    let bytes = |seed| released_bytes(&hide(scheme, &points, seed).released);
+    let bytes = |seed| released_bytes(&hide::<D>(scheme, &points, seed).released);
     assert!(bytes(1) != bytes(2), "{name}");
 }
 

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use unlift::neighbors::Neighborhoods;
-use unlift::obfuscate::Scheme;
+use unlift::obfuscate::Entry;
 use unlift::recover::{Delta, RecoverOptions, Solver, Status, recover};
 use unlift::released::{Obfuscation, Released};
 use unlift::seed::{Draws, Stage};
@@ -56,9 +56,9 @@ fn fixed_by<const D: usize>(
 
 /// If all of a slot's neighbors hide at its original and their records fix a point, recovery
 /// returns it within rounding.
-fn exact_limit<const D: usize>(name: &str, scheme: &dyn Scheme<D>, seed: u64) {
+fn exact_limit<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     const COPIES: usize = 16;
-    let hidden = hide(scheme, &piles(seed, 30, COPIES, 0.0), seed);
+    let hidden = hide::<D>(scheme, &piles(seed, 30, COPIES, 0.0), seed);
     let per = hidden.released.slots_per_record();
     let pile = |slot: usize| hidden.secret.hidden()[slot].index() / COPIES;
     let n = hidden.released.n_slots();
@@ -119,7 +119,7 @@ fn exact_limit<const D: usize>(name: &str, scheme: &dyn Scheme<D>, seed: u64) {
 
 /// Sending one of K agreeing neighbors arbitrarily far leaves the result where the other K - 1
 /// alone put it (consensus, fixed delta).
-fn bounded_influence<const D: usize>(name: &str, scheme: &dyn Scheme<D>, seed: u64) {
+fn bounded_influence<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     const PILES: usize = 60;
     const COPIES: usize = 21;
     const DELTA: f64 = 0.05;
@@ -131,7 +131,7 @@ fn bounded_influence<const D: usize>(name: &str, scheme: &dyn Scheme<D>, seed: u
         points.push(draws.direction().map(|x: f64| 3.0 + far * x));
     }
     // Voxels smaller than a pile, so that its points have rays from both centers.
-    let hidden = try_hide(scheme, &points, 0.004, seed).unwrap();
+    let hidden = try_hide::<D>(scheme, &points, 0.004, seed).unwrap();
     if let Obfuscation::Rays(rays) = hidden.released.obfuscation()
         && rays.regions().is_some()
     {
@@ -202,8 +202,8 @@ fn bounded_influence<const D: usize>(name: &str, scheme: &dyn Scheme<D>, seed: u
 }
 
 /// The order in which a list is given changes no result.
-fn order_tells_nothing<const D: usize>(name: &str, scheme: &dyn Scheme<D>, seed: u64) {
-    let hidden = hide(scheme, &room(seed, 300), seed);
+fn order_tells_nothing<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
+    let hidden = hide::<D>(scheme, &room(seed, 300), seed);
     let lists = hidden.lists(15, 0.6, seed);
     let shuffled: Vec<Vec<u32>> = (0..lists.n_slots())
         .map(|slot| {
@@ -222,8 +222,8 @@ fn order_tells_nothing<const D: usize>(name: &str, scheme: &dyn Scheme<D>, seed:
 
 /// Recovery reads nothing but the released map and the lists: columns copied out of them, after
 /// everything else is gone, give the same bytes.
-fn no_hidden_input<const D: usize>(name: &str, scheme: &dyn Scheme<D>, seed: u64) {
-    let hidden = hide(scheme, &room(seed, 300), seed);
+fn no_hidden_input<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
+    let hidden = hide::<D>(scheme, &room(seed, 300), seed);
     let lists = hidden.lists(15, 0.6, seed);
     for options in all_options() {
         let first = recovered_bytes(&solve(&hidden.released, &lists, options));
@@ -254,9 +254,9 @@ fn no_hidden_input<const D: usize>(name: &str, scheme: &dyn Scheme<D>, seed: u64
 }
 
 /// Lists for another map are refused, not misread.
-fn foreign_lists_are_refused<const D: usize>(name: &str, scheme: &dyn Scheme<D>) {
-    let one = hide(scheme, &room(1, 100), 1);
-    let other = hide(scheme, &room(1, 160), 1);
+fn foreign_lists_are_refused<const D: usize>(name: &str, scheme: &Entry) {
+    let one = hide::<D>(scheme, &room(1, 100), 1);
+    let other = hide::<D>(scheme, &room(1, 160), 1);
     let error = recover(&one.released, &other.lists(5, 1.0, 1), &RecoverOptions::default());
     assert!(error.unwrap_err().to_string().contains("one per slot"), "{name}");
     let n = one.released.n_slots();
@@ -303,6 +303,6 @@ fn lists_belong_to_a_map() {
 #[test]
 fn rounding_is_no_distance() {
     const SEED: u64 = 7_442_521_786_000_528_742;
-    let scheme = unlift::obfuscate::scheme("ppl+").unwrap().in_3d.unwrap();
-    exact_limit("ppl+", scheme, SEED);
+    let scheme = unlift::obfuscate::scheme("ppl+").unwrap();
+    exact_limit::<3>("ppl+", scheme, SEED);
 }

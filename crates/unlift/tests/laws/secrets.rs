@@ -1,6 +1,7 @@
 //! What a released map tells about the randomness that made it: nothing, unless the key is an integer.
 
-use unlift::obfuscate::{Scheme, SchemeOptions, obfuscate, scheme};
+use unlift::obfuscate::olc::Olc;
+use unlift::obfuscate::{Entry, SchemeOptions, obfuscate};
 use unlift::released::{Obfuscation, Released};
 use unlift::seed::{Key, Stage};
 use unlift::truth::{Original, Secret};
@@ -10,9 +11,7 @@ use crate::maps::*;
 
 fn olc(key: &Key, n: usize) -> (Released<3>, Secret) {
     let points = PointSet::try_new(room(4, n), Unit::Meter).unwrap();
-    let scheme = scheme("olc").unwrap().in_3d.unwrap();
-    let options = SchemeOptions { voxel: 0.5 };
-    obfuscate(scheme, &Original::new(points), None, &options, key).unwrap()
+    obfuscate(&Olc, &Original::new(points), None, key).unwrap()
 }
 
 /// An attacker who knows this code guesses integers: the line of the first file row confirms a guess, and the
@@ -41,14 +40,14 @@ fn a_small_integer_is_guessed_and_a_fresh_key_is_not() {
     assert!(undone(&released, 400).is_none());
 }
 
-fn fresh_keys_hide_differently<const D: usize>(name: &str, scheme: &dyn Scheme<D>) {
+fn fresh_keys_hide_differently<const D: usize>(name: &str, scheme: &Entry) {
     let points = PointSet::try_new(room::<D>(4, 300), Unit::Meter).unwrap();
     let bounds = unlift::geometry::frame::Bounds::quantiles(points.positions(), 0.0).unwrap();
     let original =
         if D == 2 { Original::within(points, bounds).unwrap() } else { Original::new(points) };
+    let scheme = scheme.of_dimension::<D>(&SchemeOptions { voxel: 0.5 }).unwrap();
     let hide = |key: &Key| {
-        let options = SchemeOptions { voxel: 0.5 };
-        let (released, secret) = obfuscate(scheme, &original, None, &options, key).unwrap();
+        let (released, secret) = obfuscate(&*scheme, &original, None, key).unwrap();
         (released_bytes(&released), secret)
     };
     let (one, other) = (Key::fresh().unwrap(), Key::fresh().unwrap());

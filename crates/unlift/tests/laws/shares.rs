@@ -1,7 +1,7 @@
 //! Laws about shares of a whole map: equivariance, and random lists against the blind attacker.
 
 use unlift::evaluate::{blind, evaluate};
-use unlift::obfuscate::Scheme;
+use unlift::obfuscate::Entry;
 use unlift::recover::{RecoverOptions, Solver};
 use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
 use unlift::seed::{Draws, Stage};
@@ -11,12 +11,12 @@ use crate::maps::*;
 
 /// Shares within 1 and 2.5 units of `scale` after recovery with everything on automatic.
 fn shares<const D: usize>(
-    scheme: &dyn Scheme<D>,
+    scheme: &Entry,
     points: &[[f64; D]],
     scale: f64,
     solver: Solver,
 ) -> [f64; 2] {
-    let hidden = try_hide(scheme, points, 0.5 * scale, 7).unwrap();
+    let hidden = try_hide::<D>(scheme, points, 0.5 * scale, 7).unwrap();
     let lists = hidden.lists(30, 0.5, 7);
     let options = RecoverOptions { solver, ..RecoverOptions::default() };
     let recovered = solve(&hidden.released, &lists, options);
@@ -28,7 +28,7 @@ fn shares<const D: usize>(
 /// points: rounding decides some slots differently.
 fn shifted_and_scaled_maps_leak_the_same<const D: usize>(
     name: &str,
-    scheme: &dyn Scheme<D>,
+    scheme: &Entry,
     solver: Solver,
     most: f64,
 ) {
@@ -51,15 +51,11 @@ fn shifted_and_scaled_maps_leak_the_same<const D: usize>(
 
 /// What must come back for the law to say anything: of an image more than a blind attacker gets, as rays
 /// from anchors give back little.
-fn least_shares<const D: usize>(
-    name: &str,
-    scheme: &dyn Scheme<D>,
-    points: &[[f64; D]],
-) -> [f64; 2] {
+fn least_shares<const D: usize>(name: &str, scheme: &Entry, points: &[[f64; D]]) -> [f64; 2] {
     if D == 3 {
         return [10.0, 10.0];
     }
-    let hidden = try_hide(scheme, points, 0.5, 7).unwrap();
+    let hidden = try_hide::<D>(scheme, points, 0.5, 7).unwrap();
     let blind = blind(&hidden.released, &hidden.original, &hidden.secret).percent_within(0.25);
     assert!(blind < 30.0, "{name}: {blind} % within reach of a blind attacker");
     // `dcl2d` over seven keys: blind 21, recovered 22.2 to 23.9.
@@ -68,9 +64,9 @@ fn least_shares<const D: usize>(
 
 /// With lists that tell nothing, nothing scores above the blind attacker beyond noise. On a map of
 /// even density: where density differs, the records themselves tell it.
-fn random_lists_tell_nothing<const D: usize>(name: &str, scheme: &dyn Scheme<D>) {
+fn random_lists_tell_nothing<const D: usize>(name: &str, scheme: &Entry) {
     let n = 3000;
-    let hidden = hide(scheme, &uniform(41, n), 7);
+    let hidden = hide::<D>(scheme, &uniform(41, n), 7);
     let lists = random_lists(&hidden, 20, 7);
     let baseline = blind(&hidden.released, &hidden.original, &hidden.secret);
     for options in all_options() {
@@ -138,8 +134,8 @@ fn in_order<const D: usize>(released: &Released<D>, order: &[u32]) -> Option<Rel
 
 /// Joint recovery looks at samples and takes turns by number, so the order of records is no matter of bytes. But nearly all
 /// points come back at the same place.
-fn order_of_records_hardly_matters<const D: usize>(name: &str, scheme: &dyn Scheme<D>) {
-    let hidden = hide(scheme, &room(35, 2000), 7);
+fn order_of_records_hardly_matters<const D: usize>(name: &str, scheme: &Entry) {
+    let hidden = hide::<D>(scheme, &room(35, 2000), 7);
     let (lists, per) = (hidden.lists(30, 0.6, 7), hidden.released.slots_per_record());
     let order = Draws::new(3, Stage::Synthetic, 0).permutation(hidden.released.n_records());
     let Some(released) = in_order(&hidden.released, &order) else { return };
@@ -177,7 +173,7 @@ fn random_lists_yield_no_more_than_none() {
 #[test]
 fn pairs_in_better_order_do_not_depend_on_the_order() {
     let points: Vec<[f64; 3]> = room(33, 1000);
-    let ppl = unlift::obfuscate::scheme("ppl").unwrap().in_3d.unwrap();
+    let ppl = unlift::obfuscate::scheme("ppl").unwrap();
     let hidden = try_hide(ppl, &points, 0.5, 7).unwrap();
     let lists = hidden.lists(20, 0.6, 7);
     let recovered = solve(&hidden.released, &lists, RecoverOptions::default());

@@ -1,12 +1,12 @@
 //! The pass that joint recovery starts from is the same whether it is asked for or left over.
 
-use unlift::obfuscate::Scheme;
+use unlift::obfuscate::Entry;
 use unlift::recover::{RecoverOptions, Solver, Unknown, recover, recover_with_start};
 
 use crate::maps::{hide, recovered_bytes, room};
 
-fn the_start_is_a_solver_of_its_own<const D: usize>(name: &str, scheme: &dyn Scheme<D>) {
-    let hidden = hide(scheme, &room(5, 400), 5);
+fn the_start_is_a_solver_of_its_own<const D: usize>(name: &str, scheme: &Entry) {
+    let hidden = hide::<D>(scheme, &room(5, 400), 5);
     let lists = hidden.lists(12, 0.5, 5);
     for exact_constraints in [true, false] {
         let by = |solver| RecoverOptions {
@@ -33,8 +33,8 @@ fn the_start_of_joint_recovery_is_a_solver_of_its_own() {
     over_schemes!(the_start_is_a_solver_of_its_own);
 }
 
-fn only_joint_has_a_start<const D: usize>(_: &str, scheme: &dyn Scheme<D>) {
-    let hidden = hide(scheme, &room(5, 60), 5);
+fn only_joint_has_a_start<const D: usize>(_: &str, scheme: &Entry) {
+    let hidden = hide::<D>(scheme, &room(5, 60), 5);
     let lists = hidden.lists(6, 1.0, 5);
     let options = RecoverOptions { solver: Solver::Ransac, ..RecoverOptions::default() };
     let error = recover_with_start(&hidden.released, &lists, &options).unwrap_err();

@@ -11,9 +11,10 @@ pub use patches::{Patches, check};
 
 use super::compare::{MOST_ROWS, search};
 use super::rows::Rows;
+use super::source::{Needs, Source};
 use super::{Neighborhoods, walk};
-use crate::Error;
 use crate::released::Released;
+use crate::{Descriptors, Error};
 
 /// Partners that a row keeps for the walk, at least.
 const CANDIDATES: usize = 64;
@@ -33,4 +34,31 @@ pub fn overlap<const D: usize>(released: &Released<D>, k: usize) -> Result<Neigh
     let found = search(&patches, &mut rows, enough.max(CANDIDATES), MOST_ROWS)?;
     let ranked = walk::standardized(&found);
     rows.lists(&walk::walk(&ranked, &rows.records, enough), k)
+}
+
+/// [`overlap`] as a source.
+#[derive(Clone, Copy, Debug)]
+pub struct Overlap;
+
+impl<const D: usize> Source<D> for Overlap {
+    fn name(&self) -> &str {
+        "overlap"
+    }
+
+    fn needs(&self) -> Needs {
+        Needs::Descriptors
+    }
+
+    fn k(&self) -> usize {
+        // Of an image's fewer keypoints only the first of a ranking are near.
+        if D == 2 { 10 } else { 35 }
+    }
+
+    fn lists(&self, released: &Released<D>, k: usize, _: u64) -> Result<Neighborhoods, Error> {
+        overlap(released, k)
+    }
+
+    fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {
+        check(descriptors)
+    }
 }

@@ -1,0 +1,89 @@
+//! One map or image, every scheme and every repeat: the loop that audits of one and of many share.
+
+use super::cells::{Finished, Owned, Run, cells};
+use super::chance::{key_of, oracle_seed};
+use super::clock::Clock;
+use super::not_audited::{NotAudited, told};
+use super::plan::Plan;
+use super::row::Row;
+use super::run::{Observer, RowSeconds};
+use crate::Error;
+use crate::seed::Key;
+
+/// What one map or image gave.
+#[derive(Default)]
+pub(super) struct Rows {
+    /// One row per scheme, source, noise model, inlier ratio and solver, in this order: means over repeats.
+    pub(super) rows: Vec<Row>,
+    /// Per row, summed over repeats.
+    pub(super) seconds: Vec<RowSeconds>,
+    /// What has no row.
+    pub(super) not_audited: Vec<NotAudited>,
+}
+
+/// The rows of `owned`. `finished` hears of every row of every repeat, numbered in the order of rows.
+///
+/// # Errors
+/// As [`cells`].
+pub(super) fn of_item<const D: usize>(
+    owned: &Owned<'_, D>,
+    plan: &Plan<D>,
+    clock: &mut Clock,
+    observer: &mut dyn Observer<D>,
+    mut finished: impl FnMut(usize, &Finished<'_>),
+) -> Result<Rows, Error> {
+    let per_scheme = plan.rows_per_scheme();
+    let total = per_scheme * plan.schemes.len() * plan.repeats as usize;
+    let (mut found, mut done) = (Rows::default(), 0);
+    for scheme in &plan.schemes {
+        let mut by_repeat: Vec<Vec<(Row, RowSeconds)>> = Vec::new();
+        let mut missing: Vec<NotAudited> = Vec::new();
+        let n_before = found.rows.len();
+        for repeat in 0..plan.repeats {
+            let (key, oracle_seed) = seeds(plan.seed.wrapping_add(u64::from(repeat)), owned.name);
+            let run = Run { plan, scheme: scheme.name(), repeat, oracle_seed };
+            let (mut of_repeat, before) = (Vec::new(), done);
+            let hide = (&**scheme, &key);
+            let lacking = cells(owned, &run, hide, clock, observer, |observer, what, one| {
+                if let Some(what) = what {
+                    observer.progress(done, total, &what);
+                }
+                if let Some(one) = one {
+                    finished(n_before + of_repeat.len(), &one);
+                    of_repeat.push((one.row, one.seconds));
+                    done += 1;
+                }
+            })?;
+            done = before + per_scheme;
+            by_repeat.push(of_repeat);
+            for one in lacking {
+                if !missing.iter().any(|other| other.is_same_cell(&one)) {
+                    missing.push(one);
+                }
+            }
+        }
+        for (row, _) in &by_repeat[0] {
+            let same = by_repeat.iter().map(|rows| rows.iter().find(|(r, _)| r.is_same_cell(row)));
+            // A mean over those seeds that went well would be no mean over seeds.
+            let Some(same) = same.collect::<Option<Vec<_>>>() else { continue };
+            let mut seconds = RowSeconds::default();
+            same.iter().for_each(|(_, more)| seconds.add(more));
+            found.seconds.push(seconds);
+            found
+                .rows
+                .push(Row::mean(&same.iter().map(|(row, _)| row.clone()).collect::<Vec<_>>()));
+        }
+        found.not_audited.extend(told(missing, found.rows.len() > n_before));
+    }
+    observer.progress(done, total, "done");
+    Ok(found)
+}
+
+/// What everything that hides the points is drawn under, and the oracle's seed.
+fn seeds(seed: u64, name: Option<&str>) -> (Key, u64) {
+    let key = Key::from_seed(seed);
+    match name {
+        None => (key, seed),
+        Some(name) => (key_of(&key, name), oracle_seed(seed, name)),
+    }
+}
