@@ -69,8 +69,13 @@ pub fn finish(result: anyhow::Result<Outcome>) -> ExitCode {
 /// The lines on stderr.
 fn text(error: &anyhow::Error) -> String {
     let line = line(error);
-    match error.downcast_ref::<Advised>() {
-        Some(advised) => format!("{line}\n  try: {}\n", advised.advice),
+    let of_audit = |error: &anyhow::Error| {
+        let error = error.downcast_ref::<unlift_audit::Error>();
+        error.and_then(|error| error.advice().map(str::to_owned))
+    };
+    let advised = error.downcast_ref::<Advised>().map(|advised| advised.advice.clone());
+    match advised.or_else(|| of_audit(error)) {
+        Some(advice) => format!("{line}\n  try: {advice}\n"),
         None => format!("{line}\n"),
     }
 }
@@ -84,7 +89,10 @@ fn code(error: &anyhow::Error) -> u8 {
     if let Some(advised) = error.downcast_ref::<Advised>() {
         return code(&advised.error);
     }
-    if error.downcast_ref::<Usage>().is_some() { USAGE } else { BAD_INPUT }
+    let of_audit = error.downcast_ref::<unlift_audit::Error>();
+    let is_usage =
+        error.downcast_ref::<Usage>().is_some() || of_audit.is_some_and(|error| error.is_request());
+    if is_usage { USAGE } else { BAD_INPUT }
 }
 
 #[cfg(test)]

@@ -1,25 +1,11 @@
 //! The command line of unlift: parse, call the library, print.
 
 mod args;
-mod args_audit;
-mod args_bench;
-mod args_features;
-mod args_images;
-mod clouds;
 mod commands;
-mod document;
 mod exit;
-mod gate;
-mod images;
 mod interrupt;
-mod job;
-mod lengths;
-mod memory;
 mod output;
-mod outputs;
 mod pace;
-mod pictures;
-mod prepare;
 mod progress;
 mod values;
 

@@ -44,6 +44,21 @@ pub fn table(rows: &[Vec<String>], left: &[usize]) -> String {
     text
 }
 
+/// The command line as a shell would need it, for the record.
+pub fn command_line() -> String {
+    let words = std::env::args_os().skip(1).map(|word| quoted(&word.to_string_lossy()));
+    ["unlift".to_owned()].into_iter().chain(words).collect::<Vec<_>>().join(" ")
+}
+
+/// A word of the command line as a shell would need it.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@+%".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -53,5 +68,12 @@ mod tests {
         let row = |cells: [&str; 3]| cells.map(str::to_owned).to_vec();
         let rows = [row(["scheme", "10 cm", "note"]), row(["ppl+", "9.5", "x"])];
         assert_eq!(table(&rows, &[2]), "scheme  10 cm  note\nppl+      9.5  x\n");
+    }
+
+    #[test]
+    fn words_are_quoted_for_a_shell() {
+        assert_eq!(quoted("ppl@0.5:0.10"), "ppl@0.5:0.10");
+        assert_eq!(quoted("a b"), "'a b'");
+        assert_eq!(quoted("it's<=1"), r"'it'\''s<=1'");
     }
 }

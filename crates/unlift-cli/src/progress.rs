@@ -84,7 +84,7 @@ impl Progress {
     }
 
     /// `done` of `total` items are finished; `what` is next.
-    pub fn show(&mut self, done: usize, total: usize, what: &str) {
+    pub fn show(&self, done: usize, total: usize, what: &str) {
         self.0.tell(what, |pace, now| pace.set(done as f64, total, now));
     }
 
@@ -106,6 +106,41 @@ impl Progress {
     pub fn steps(&self) -> Steps {
         self.0.clone()
     }
+}
+
+impl unlift_audit::Progress for Progress {
+    fn show(&self, done: usize, total: usize, what: &str) {
+        Self::show(self, done, total, what);
+    }
+
+    fn add(&self, share: f64, what: &str) {
+        self.0.add(share, what);
+    }
+
+    fn say(&self, line: &str) {
+        self.0.say(&one_line(line));
+    }
+}
+
+/// Only what a user should know, without bars.
+#[derive(Clone, Copy, Debug)]
+pub struct Stderr;
+
+impl unlift_audit::Progress for Stderr {
+    fn say(&self, line: &str) {
+        eprintln!("{}", one_line(line));
+    }
+}
+
+impl unlift_audit::Progress for Spinner {
+    fn say(&self, line: &str) {
+        Self::say(self, &one_line(line));
+    }
+}
+
+/// A line of this program: a newline in a file name must not fake a second one.
+fn one_line(text: &str) -> String {
+    format!("unlift: {}", text.replace(['\n', '\r'], " "))
 }
 
 impl Drop for Progress {
@@ -240,7 +275,7 @@ mod tests {
 
     #[test]
     fn a_bar_counts_tells_what_is_left_and_moves_at_least_once_a_second() {
-        let mut progress = Progress::with(Shown::Bar(|| {
+        let progress = Progress::with(Shown::Bar(|| {
             ProgressDrawTarget::term_like_with_hz(Box::new(Paper), 20)
         }));
         let frames = || DRAWN.lock().unwrap().clone();

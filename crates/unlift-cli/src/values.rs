@@ -7,6 +7,7 @@ use unlift::neighbors::oracle::Noise;
 use unlift::neighbors::sources::{Named, source};
 use unlift::obfuscate::{Entry, SCHEMES};
 use unlift::recover::{Delta, Solver};
+use unlift_audit::OutlierFilter;
 
 /// Where neighborhoods come from.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,15 +18,6 @@ pub enum NeighborSource {
     Own(Named),
     /// Lists by point, in a file.
     File(PathBuf),
-}
-
-/// Statistical outlier removal.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct OutlierFilter {
-    /// Neighbors whose mean distance is judged.
-    pub neighbors: usize,
-    /// Points beyond the mean of that distance by this many standard deviations go.
-    pub std_ratio: f64,
 }
 
 /// A scheme by its name, be it for maps or for images.

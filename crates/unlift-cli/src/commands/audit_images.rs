@@ -7,6 +7,10 @@ use serde_json::{Map, json};
 use unlift::Unit;
 use unlift::audit::{NeighborsBy, Plan};
 use unlift::obfuscate::SchemeOptions;
+use unlift_audit::images::FeatureSource;
+use unlift_audit::images::audit::{ImagesJob, perform};
+use unlift_audit::images::stream::Needs;
+use unlift_audit::{Shown, open_audit};
 use unlift_features::SiftOptions;
 use unlift_io::atomic::Rules;
 use unlift_io::{Error, read};
@@ -14,13 +18,10 @@ use unlift_report::pictures::MOST_PICTURES;
 
 use super::plan::{attack, check_about, check_fit, own, solvers, summary, thresholds};
 use super::with_threads;
-use crate::args_images::AuditImagesArgs;
+use crate::args::AuditImagesArgs;
 use crate::exit::{Outcome, advise, usage};
-use crate::images::FeatureSource;
-use crate::images::audit::{ImagesJob, perform};
-use crate::images::stream::Needs;
-use crate::output::print;
-use crate::outputs::{Shown, open_audit};
+use crate::output::{command_line, print};
+use crate::progress::{Progress, Stderr};
 use crate::values::{NeighborSource, distinct};
 
 /// The threshold that speaks for an audit, in pixels, or the nearest one asked for.
@@ -33,10 +34,11 @@ pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
     let inputs = [args.path.as_path()].into_iter().chain(args.photos.as_deref());
     let rules = Rules::new(inputs, args.result.force);
     let shown = if args.result.share_safe { Shown::Figures } else { Shown::Points };
-    let out = open_audit(&args.result.out, rules, shown)?;
+    let out = open_audit(&args.result.out, rules, shown, &Stderr)?;
     let (finished, used) = with_threads(args.run.threads, || {
         let source = FeatureSource::open(&args.path, &extraction(args)?).map_err(|error| {
             let map = read::is_project(&args.path);
+            let error = anyhow::Error::from(error);
             if map { advise(error, "unlift audit map, as this is a map") } else { error }
         })?;
         if let Some(note) = source.passed_over() {
@@ -44,6 +46,7 @@ pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
         }
         let chosen = chosen(source.names().len(), args.max_images.map(|n| n.get()));
         check_descriptors(&source, &chosen, &plan)?;
+        let progress = Progress::new(args.run.quiet);
         let job = ImagesJob {
             source: &source,
             path: &args.path,
@@ -55,10 +58,11 @@ pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
             photos: args.photos.clone(),
             out: args.result.out.clone(),
             share_safe: args.result.share_safe,
-            quiet: args.run.quiet,
+            progress: &progress,
+            command: Some(command_line()),
             started,
         };
-        perform(job, out)
+        Ok(perform(job, out)?)
     })?;
     if let Some(finished) = &finished {
         print(&if args.result.json { summary(finished)? } else { finished.text() })?;

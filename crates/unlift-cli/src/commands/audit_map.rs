@@ -1,29 +1,25 @@
 //! `unlift audit map`: a map in, one honest answer out.
 
-use std::path::Path;
+use std::path::PathBuf;
 use std::time::Instant;
 
+use indexmap::IndexMap;
 use serde_json::{Map, Value, json};
-use unlift::audit::{NeighborsBy, Plan, PointNeighbors};
-use unlift::geometry::vector::distance;
+use unlift::audit::{NeighborsBy, Plan};
 use unlift::neighbors::{Needs, Source};
 use unlift::obfuscate::SchemeOptions;
+use unlift_audit::maps::perform;
+use unlift_audit::{Job, Prepared, Shown, by_point, check_thresholds, open_audit};
 use unlift_io::atomic::Rules;
-use unlift_io::hash::{hash_file, hash_files};
+use unlift_io::hash::hash_file;
 use unlift_io::read;
-use unlift_io::stage::read_point_neighborhoods;
-use unlift_report::document::Input;
 
 use super::plan::{attack, check_about, check_fit, own, solvers, summary, thresholds};
 use super::{open_map, with_threads};
 use crate::args::AuditMapArgs;
-use crate::document::ordered;
 use crate::exit::{Outcome, advise, usage};
-use crate::job::{Job, perform};
-use crate::lengths::check_thresholds;
-use crate::output::print;
-use crate::outputs::{Shown, open_audit};
-use crate::prepare::Prepared;
+use crate::output::{command_line, print};
+use crate::progress::{Progress, Stderr};
 use crate::values::{NeighborSource, all_schemes, distinct};
 
 /// Audits a map.
@@ -34,30 +30,26 @@ pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
         (false, true) => Shown::Clouds,
         (false, false) => Shown::Points,
     };
-    let out = open_audit(&args.result.out, rules(&args), shown)?;
+    let out = open_audit(&args.result.out, rules(&args), shown, &Stderr)?;
     let finished = with_threads(args.run.threads, || {
         let (input, prepared) = open_map(&args.path, &args.map, args.run.quiet)?;
         if let Some(note) = thinned(&args, &prepared, input.positions.len()) {
             eprintln!("unlift: note: {note}");
         }
-        let scale = 1.0 / prepared.unit_in_map_units;
-        let job = Job {
-            original: &prepared.original,
-            descriptors: prepared.descriptors.as_ref(),
-            cameras: input.cameras.iter().map(|c| c.map(|x| x * scale)).collect(),
-            up: input.up,
+        let progress = Progress::new(args.run.quiet);
+        let (path, result) = (&args.path, &args.result);
+        let mut job = Job {
             plan: plan(&args, &prepared, &input)?,
-            input: provenance(&args, &input, &prepared)?,
             options: more_options(&args),
-            gates: args.result.gate.clone(),
-            out: args.result.out.clone(),
-            unit_in_map_units: prepared.unit_in_map_units,
+            gates: result.gate.clone(),
             write_clouds: args.write_clouds,
-            share_safe: args.result.share_safe,
-            quiet: args.run.quiet,
-            started,
+            share_safe: result.share_safe,
+            progress: &progress,
+            command: Some(command_line()),
+            ..Job::new(path, &input, &prepared, &result.out, started)?
         };
-        perform(job, out)
+        job.input.other_sha256 = others(&args)?;
+        Ok(perform(job, out)?)
     })?;
     print(&if args.result.json { summary(&finished)? } else { finished.text() })?;
     Ok(if finished.passed() { Outcome::Done } else { Outcome::GateFailed })
@@ -131,7 +123,7 @@ fn neighbors(
                 by
             }
             NeighborSource::File(path) => {
-                NeighborsBy::Given(by_point(&path, prepared, input.positions.len())?)
+                NeighborsBy::Given(by_point(&path, prepared, input.positions.len(), &Stderr)?)
             }
         });
     }
@@ -165,87 +157,15 @@ fn check_own(
     Ok(())
 }
 
-/// Lists by row of the file, for the rows that were kept.
-fn by_point(path: &Path, prepared: &Prepared, n_read: usize) -> anyhow::Result<PointNeighbors> {
-    let lists = read_point_neighborhoods(path, n_read)?;
-    let mut kept_as = vec![None; n_read];
-    for (kept, &row) in prepared.rows.iter().enumerate() {
-        kept_as[row as usize] = Some(kept as u32);
-    }
-    let (mut offsets, mut neighbors) = (vec![0u64], Vec::new());
-    let mut scores = lists.scores().map(|_| Vec::new());
-    for &row in &prepared.rows {
-        let start = lists.offsets()[row as usize] as usize;
-        for (at, &neighbor) in lists.of(row as usize).iter().enumerate() {
-            if let Some(kept) = kept_as[neighbor as usize] {
-                neighbors.push(kept);
-                if let (Some(scores), Some(all)) = (&mut scores, lists.scores()) {
-                    scores.push(all[start + at]);
-                }
-            }
-        }
-        offsets.push(neighbors.len() as u64);
-    }
-    for note in doubts(&offsets, &neighbors, prepared) {
-        eprintln!("unlift: note: {}: {note}", path.display());
-    }
-    // Which file it was stands in the hashes; a file called oracle must not pass for one.
-    let name = "file".to_owned();
-    Ok(PointNeighbors { name, offsets, neighbors, scores })
-}
-
-/// What speaks against given lists: with lists of another map little comes back, and that is no protection.
-fn doubts(offsets: &[u64], neighbors: &[u32], prepared: &Prepared) -> Vec<String> {
-    let points = prepared.original.reveal().positions();
-    let mut doubts = Vec::new();
-    let empty = offsets.windows(2).filter(|w| w[0] == w[1]).count();
-    if empty > 0 {
-        let n = points.len();
-        doubts.push(format!("{empty} of {n} points have no neighbors in it: they count as lost"));
-    }
-    let (mut nearer, mut n) = (0usize, 0usize);
-    for (point, w) in offsets.windows(2).enumerate() {
-        for &neighbor in &neighbors[w[0] as usize..w[1] as usize] {
-            // A stranger of each, spread over the map by a large odd factor.
-            let stranger = (n * 7919 + 3) % points.len();
-            let to = |other: usize| distance(&points[point], &points[other]);
-            nearer += usize::from(to(neighbor as usize) < to(stranger));
-            n += 1;
-        }
-    }
-    // Of strangers half are nearer; two standard deviations on top.
-    if n > 0 && nearer as f64 <= 0.5 * n as f64 + (n as f64).sqrt() {
-        doubts.push(format!(
-            "the neighbors in it are no nearer than any points ({nearer} of {n}): of another map, or in another order \
-             of rows?"
-        ));
-    }
-    doubts
-}
-
-fn provenance(
-    args: &AuditMapArgs,
-    input: &read::Input,
-    prepared: &Prepared,
-) -> anyhow::Result<Input> {
-    let mut others = Vec::new();
-    if let Some(path) = &args.map.descriptors {
-        others.push(("descriptors".to_owned(), hash_file(path)?));
-    }
-    for source in &args.neighbors {
-        if let NeighborSource::File(path) = source {
-            others.push(("neighbors".to_owned(), hash_file(path)?));
-        }
-    }
-    Ok(Input {
-        path: Some(args.path.display().to_string()),
-        sha256: Some(hash_files(&input.files)?),
-        n_points: prepared.original.len() as u64,
-        scale_m_per_unit: args.map.scale,
-        unit_in_map_units: Some(prepared.unit_in_map_units),
-        other_sha256: ordered(others),
-        images: None,
-    })
+/// Hashes of the files that were read beside the map.
+fn others(args: &AuditMapArgs) -> anyhow::Result<IndexMap<String, String>> {
+    let lists = args.neighbors.iter().filter_map(|source| match source {
+        NeighborSource::File(path) => Some(("neighbors", path)),
+        NeighborSource::Oracle | NeighborSource::Own(_) => None,
+    });
+    let descriptors = args.map.descriptors.iter().map(|path| ("descriptors", path));
+    let hash = |(name, path): (&str, &PathBuf)| Ok((name.to_owned(), hash_file(path)?));
+    descriptors.chain(lists).map(hash).collect()
 }
 
 /// Options that change the points, not the plan.
@@ -259,38 +179,4 @@ fn more_options(args: &AuditMapArgs) -> Map<String, Value> {
         options.insert("outlier_filter".into(), value);
     }
     options
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use unlift::truth::Original;
-    use unlift::{PointSet, Unit};
-
-    /// Lists of the next few of 200 points on a line; with a factor other than 1, of other points.
-    fn doubts_about(factor: usize, length: usize) -> Vec<String> {
-        let n = 200;
-        let points = (0..n).map(|i| [0.1 * i as f64, 0.0, 0.0]).collect();
-        let points = PointSet::try_new(points, Unit::Meter).unwrap();
-        let prepared = Prepared {
-            original: Original::new(points),
-            descriptors: None,
-            unit_in_map_units: 1.0,
-            rows: (0..n as u32).collect(),
-        };
-        let offsets: Vec<u64> = (0..=n).map(|point| (point * length) as u64).collect();
-        let row = |point: usize| (1..=length).map(move |step| (point * factor + step) % n);
-        let neighbors: Vec<u32> = (0..n).flat_map(row).map(|other| other as u32).collect();
-        doubts(&offsets, &neighbors, &prepared)
-    }
-
-    #[test]
-    fn lists_that_cannot_be_of_the_map_are_doubted() {
-        assert!(doubts_about(1, 5).is_empty());
-        let of_another = doubts_about(77, 5);
-        assert_eq!(of_another.len(), 1);
-        assert!(of_another[0].starts_with("the neighbors in it are no nearer than any points"));
-        let empty = doubts_about(1, 0);
-        assert_eq!(empty, ["200 of 200 points have no neighbors in it: they count as lost"]);
-    }
 }

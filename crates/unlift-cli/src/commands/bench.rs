@@ -13,12 +13,12 @@ use unlift_io::read;
 use unlift_report::paper::published_seconds;
 
 use super::with_threads;
-use crate::args_bench::BenchRecoverArgs;
+use crate::args::BenchRecoverArgs;
 use crate::exit::{Outcome, usage};
-use crate::memory::peak_bytes;
 use crate::output::{print, table};
-use crate::prepare::{Preparation, prepare};
 use crate::progress::Spinner;
+use unlift_audit::peak_bytes;
+use unlift_audit::{Preparation, prepare};
 
 /// What was measured, in seconds of the wall clock.
 struct Bench {

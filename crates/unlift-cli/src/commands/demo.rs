@@ -6,6 +6,8 @@ use serde_json::{Map, json};
 use unlift::audit::Plan;
 use unlift::truth::Original;
 use unlift::{PointSet, Unit, synthetic};
+use unlift_audit::maps::perform;
+use unlift_audit::{Job, Shown, open_audit};
 use unlift_io::atomic::Rules;
 use unlift_io::hash::hash_positions;
 use unlift_report::document::Input;
@@ -13,9 +15,8 @@ use unlift_report::document::Input;
 use super::with_threads;
 use crate::args::DemoArgs;
 use crate::exit::Outcome;
-use crate::job::{Job, perform};
-use crate::output::print;
-use crate::outputs::{Shown, open_audit};
+use crate::output::{command_line, print};
+use crate::progress::{Progress, Stderr};
 
 /// Points of the room.
 const N_POINTS: usize = 20_000;
@@ -23,13 +24,14 @@ const N_POINTS: usize = 20_000;
 /// Audits a furnished room.
 pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
     let started = Instant::now();
-    let out = open_audit(&args.out, Rules::new([], args.force), Shown::Points)?;
+    let out = open_audit(&args.out, Rules::new([], args.force), Shown::Points, &Stderr)?;
     let room = synthetic::room(0, N_POINTS);
     let sha256 = hash_positions(&room.points);
     let original = Original::new(PointSet::try_new(room.points, Unit::Meter)?);
     let mut options = Map::new();
     options.insert("room".into(), json!({ "seed": 0, "points": N_POINTS }));
     let finished = with_threads(args.threads, || {
+        let progress = Progress::new(args.quiet);
         let job = Job {
             original: &original,
             descriptors: None,
@@ -51,10 +53,11 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
             unit_in_map_units: 1.0,
             write_clouds: false,
             share_safe: false,
-            quiet: args.quiet,
+            progress: &progress,
+            command: Some(command_line()),
             started,
         };
-        perform(job, out)
+        Ok(perform(job, out)?)
     })?;
     print(&finished.text())?;
     Ok(Outcome::Done)

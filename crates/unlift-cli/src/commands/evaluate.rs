@@ -12,12 +12,11 @@ use unlift::{About, RowOrder, Unit};
 use unlift_io::stage::{has_images, read_recovered_in, read_released, read_truth};
 use unlift_report::rounded;
 
+use super::image_stages::{Evaluated, evaluate_all};
 use super::obfuscate::RELEASED;
 use super::same_map;
 use crate::args::EvaluateArgs;
-use crate::document;
 use crate::exit::Outcome;
-use crate::images::stages::{Evaluated, evaluate_all};
 use crate::output::{print, table};
 
 /// Compares recovered points with the truth.
@@ -146,7 +145,7 @@ const UNKNOWN: [&str; 6] = ["scheme", "neighbors", "oracle_noise", "inlier_ratio
 
 /// The row as it stands in `audit.json`, without what the files do not say.
 fn as_json(row: &Row, thresholds: &[Threshold]) -> anyhow::Result<Value> {
-    let mut value = rounded(&document::row(row, thresholds))?;
+    let mut value = rounded(&unlift_audit::row(row, thresholds))?;
     if let Some(fields) = value.as_object_mut() {
         fields.retain(|name, _| !UNKNOWN.contains(&name.as_str()));
         if row.blind_percent.is_empty() {

@@ -9,13 +9,13 @@ use unlift_io::atomic::{Kind, Rules};
 use unlift_io::features::{FeatureWriter, ImageFeatures};
 
 use super::with_threads;
-use crate::args_features::FeaturesArgs;
+use crate::args::FeaturesArgs;
 use crate::exit::{Outcome, line, usage};
-use crate::images::parts::{Parts, write_part};
-use crate::images::{FeatureSource, is_photo};
 use crate::output::print;
-use crate::outputs::check_file;
 use crate::progress::Progress;
+use unlift_audit::check_file;
+use unlift_audit::images::parts::{Parts, write_part};
+use unlift_audit::images::{FeatureSource, is_photo};
 
 /// What was done, and what could not be.
 #[derive(Default)]
@@ -162,7 +162,7 @@ fn extract(
     }
     tally.images = finished.len();
     // Far faster than what was done before: it has a pace of its own.
-    let mut joining = progress.again();
+    let joining = progress.again();
     parts.join(&finished, target, |at, image| {
         tally.features += image.keypoints.len();
         joining.show(at + 1, finished.len(), "joining");

@@ -6,6 +6,7 @@ mod bench;
 mod demo;
 mod evaluate;
 mod features;
+mod image_stages;
 mod neighbors;
 mod obfuscate;
 mod plan;
@@ -19,12 +20,11 @@ pub use evaluate::expect_slots;
 pub use obfuscate::{RELEASED, TRUTH};
 
 use crate::args::{AuditCommand, BenchCommand, Command, MapArgs, NeighborsCommand};
-use crate::exit::{Outcome, advise};
-use crate::lengths::check_scale;
-use crate::prepare::{self, Preparation, Prepared};
+use crate::exit::Outcome;
 use crate::progress::Spinner;
-use unlift::{Descriptors, Fingerprint};
-use unlift_io::read::{self, Input};
+use unlift::Fingerprint;
+use unlift_audit::{Preparation, Prepared, maps};
+use unlift_io::read::Input;
 
 /// Runs one command.
 ///
@@ -72,37 +72,9 @@ pub fn same_map(
     }
 }
 
-/// How many descriptors are all zero: as some exporters mark points without one.
-fn n_zero(descriptors: &Descriptors) -> usize {
-    let mut row = vec![0.0; descriptors.dim()];
-    let mut zero = |at: &usize| {
-        descriptors.read_row(*at, &mut row);
-        row.iter().all(|&value| value == 0.0)
-    };
-    (0..descriptors.len()).filter(|at| zero(at)).count()
-}
-
 /// Reads a map and makes it ready: the first step of `audit map` and `obfuscate`.
 fn open_map(path: &Path, args: &MapArgs, quiet: bool) -> anyhow::Result<(Input, Prepared)> {
     let alive = Spinner::unless(quiet, "reading the map");
-    let input = read::open(path).map_err(|error| {
-        let way_out = "the folder of a COLMAP model or project; for photos, unlift audit images";
-        let is_other = path.is_dir() && !read::is_project(path);
-        if is_other { advise(error, way_out) } else { error.into() }
-    })?;
-    for note in &input.skipped {
-        alive.say(&format!("unlift: note: {note}"));
-    }
-    check_scale(&input.positions, args.scale)?;
-    let descriptors =
-        args.descriptors.as_deref().map(|file| read::descriptors(file, &input)).transpose()?;
-    if let Some(n) = descriptors.as_ref().map(n_zero).filter(|&n| n > 0) {
-        let file = args.descriptors.as_deref().unwrap_or(path).display();
-        let of = input.positions.len();
-        alive.say(&format!(
-            "unlift: note: {file}: {n} of {of} descriptors are all zero, and tell an attacker nothing"
-        ));
-    }
     let preparation = Preparation {
         scale: args.scale,
         k: usize::from(args.k),
@@ -110,14 +82,5 @@ fn open_map(path: &Path, args: &MapArgs, quiet: bool) -> anyhow::Result<(Input, 
         max_points: args.max_points.map(NonZeroUsize::get),
         seed: args.seed.unwrap_or(0),
     };
-    let prepared = prepare::prepare(&input.positions, descriptors.as_ref(), &preparation);
-    let prepared = prepared.map_err(|error| {
-        let few = error.what() == "points" && input.positions.len() > 2;
-        let error = unlift_io::Error::core(path, error);
-        if few {
-            return advise(error, "a smaller --k, or more points");
-        }
-        error.into()
-    })?;
-    Ok((input, prepared))
+    Ok(maps::open(path, args.descriptors.as_deref(), &preparation, &alive)?)
 }

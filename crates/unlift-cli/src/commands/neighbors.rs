@@ -10,14 +10,14 @@ use unlift_io::atomic::{Kind, Rules};
 use unlift_io::stage::{Kind as Stage, has_images, read_released, read_truth, write_neighborhoods};
 
 use super::evaluate::expect_slots;
+use super::image_stages::{list_by_oracle, list_by_source};
 use super::obfuscate::RELEASED;
 use super::{same_map, with_threads};
 use crate::args::{FindArgs, OracleArgs};
 use crate::exit::{Outcome, advise, usage};
-use crate::images::stages::{list_by_oracle, list_by_source};
 use crate::output::print;
-use crate::outputs::check_file;
 use crate::progress::Spinner;
+use unlift_audit::check_file;
 
 /// Makes neighborhoods at one inlier ratio.
 pub fn oracle(args: &OracleArgs) -> anyhow::Result<Outcome> {

@@ -6,12 +6,12 @@ use unlift::seed::Key;
 use unlift_io::atomic::{Access, Kind, OutputSet, Rules};
 use unlift_io::stage::{Kind as Stage, write_released, write_truth};
 
+use super::image_stages::hide;
 use super::open_map;
 use crate::args::ObfuscateArgs;
 use crate::exit::{Outcome, usage};
-use crate::images::stages::hide;
 use crate::output::print;
-use crate::outputs::refused;
+use unlift_audit::refused;
 
 /// What the attacker sees.
 pub const RELEASED: &str = "released.parquet";

@@ -7,10 +7,10 @@ use unlift::neighbors::Source;
 use unlift::neighbors::sources::Named;
 use unlift::recover::Solver;
 
-use crate::args_audit::AttackArgs;
+use crate::args::AttackArgs;
 use crate::exit::{advise, usage};
-use crate::job::Finished;
 use crate::values::distinct;
+use unlift_audit::Finished;
 
 /// `usual` with what was asked for.
 pub fn attack<const D: usize>(args: &AttackArgs, usual: Plan<D>) -> Plan<D> {

@@ -10,13 +10,13 @@ use unlift_io::stage::{
     Kind as Stage, has_images, read_neighborhoods, read_released, write_recovered,
 };
 
+use super::image_stages::recover_all;
 use super::{same_map, with_threads};
 use crate::args::RecoverArgs;
 use crate::exit::Outcome;
-use crate::images::stages::recover_all;
 use crate::output::print;
-use crate::outputs::check_file;
 use crate::progress::Spinner;
+use unlift_audit::check_file;
 
 /// What a user should know about lists that somebody else wrote.
 fn notes(lists: &Neighborhoods, slots_per_record: usize) -> Vec<String> {

@@ -154,6 +154,9 @@ pub(super) fn attack<const D: usize>(
         let making = started.elapsed().as_secs_f64();
         let mut start = None;
         for (at, &solver) in plan.solvers.iter().enumerate() {
+            if !observer.goes_on() {
+                return Err(Error::new("audit", "to go on", "a request to stop"));
+            }
             let what = format!("{scheme} at {:.2} {source}, {}", made.ratio, solver.name());
             each(observer, Some(what), None);
             let options = RecoverOptions {

@@ -18,6 +18,11 @@ pub trait Observer<const D: usize = 3> {
         let _ = (done, total, what);
     }
 
+    /// Whether the audit shall go on; asked between cells.
+    fn goes_on(&self) -> bool {
+        true
+    }
+
     /// One cell is finished.
     fn cell(&mut self, cell: &Cell<'_, D>) {
         let _ = cell;
@@ -92,7 +97,7 @@ pub struct Outcome {
 /// [`not_audited`](Outcome::not_audited).
 ///
 /// # Errors
-/// When the plan does not fit the map, or no scheme can be applied to it.
+/// When the plan does not fit the map, no scheme can be applied to it, or the observer stops the audit.
 pub fn run<const D: usize>(
     original: &Original<D>,
     descriptors: Option<&Descriptors>,

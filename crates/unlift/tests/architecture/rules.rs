@@ -98,7 +98,8 @@ pub const CRATES: &[(&str, &[&str])] = &[
     ("unlift-io", &["unlift"]),
     ("unlift-features", &["unlift"]),
     ("unlift-report", &[]),
-    ("unlift-cli", &["unlift", "unlift-io", "unlift-features", "unlift-report"]),
+    ("unlift-audit", &["unlift", "unlift-io", "unlift-features", "unlift-report"]),
+    ("unlift-cli", &["unlift", "unlift-audit", "unlift-io", "unlift-features", "unlift-report"]),
 ];
 
 /// Lines of a file at most, its unit tests not counted.

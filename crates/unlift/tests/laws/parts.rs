@@ -50,8 +50,8 @@ fn recovery_in_parts_is_recovery_at_once() {
 }
 
 fn hidden_lines() -> Hidden<3> {
-    let olc = unlift::obfuscate::scheme("olc").unwrap().in_3d.unwrap();
-    hide(olc, &room(62, 200), 6)
+    let olc = unlift::obfuscate::scheme("olc").unwrap();
+    hide::<3>(olc, &room(62, 200), 6)
 }
 
 #[test]
@@ -86,8 +86,8 @@ fn a_model_is_one_of_its_map() {
     let task = Task::new(&model, &hidden.released, &lists).unwrap();
     assert!(task.solve(150..201).is_err());
     assert!(task.rounds(&[]).is_err() && task.finish(Vec::new()).is_err());
-    let ppl = unlift::obfuscate::scheme("ppl").unwrap().in_3d.unwrap();
-    let other = hide(ppl, &room(62, 200), 6);
+    let ppl = unlift::obfuscate::scheme("ppl").unwrap();
+    let other = hide::<3>(ppl, &room(62, 200), 6);
     let error = Task::new(&model, &other.released, &other.lists(12, 0.5, 6)).unwrap_err();
     assert!(error.to_string().starts_with("model: fingerprint: "), "{error}");
 }

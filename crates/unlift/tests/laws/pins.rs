@@ -2,7 +2,7 @@
 //! since only exact operations and a portable logarithm feed them. A change on purpose is blessed by
 //! copying what the failing test prints, and shows in the diff.
 
-use unlift::obfuscate::{SCHEMES, Scheme};
+use unlift::obfuscate::{Entry, SCHEMES};
 use unlift::recover::{Delta, RecoverOptions, Solver};
 
 use crate::maps::*;
@@ -65,14 +65,11 @@ const JOINT: &[(&str, usize, u64)] = &[
     ("dcl2d", 2, 0xbc91503f8c7f82d4),
 ];
 
-fn joint_bytes<const D: usize>(
-    name: &'static str,
-    scheme: &dyn Scheme<D>,
-) -> (&'static str, usize, u64) {
-    let hidden = hide(scheme, &room::<D>(2027, 500), 0);
+fn joint_bytes<const D: usize>(entry: &Entry) -> (&'static str, usize, u64) {
+    let hidden = hide::<D>(entry, &room(2027, 500), 0);
     let lists = hidden.lists(20, 0.5, 0);
     let recovered = solve(&hidden.released, &lists, RecoverOptions::default());
-    (name, D, hash(&recovered_bytes(&recovered)))
+    (entry.name, D, hash(&recovered_bytes(&recovered)))
 }
 
 /// Joint recovery with delta on automatic runs through nearly all of `recover`: delta, consensus, graph, law,
@@ -81,8 +78,8 @@ fn joint_bytes<const D: usize>(
 fn bytes_of_joint_recovery_are_pinned() {
     let mut found = Vec::new();
     for entry in SCHEMES {
-        found.extend(entry.in_3d.map(|scheme| joint_bytes::<3>(entry.name, scheme)));
-        found.extend(entry.in_2d.map(|scheme| joint_bytes::<2>(entry.name, scheme)));
+        found.extend(entry.in_3d.map(|_| joint_bytes::<3>(entry)));
+        found.extend(entry.in_2d.map(|_| joint_bytes::<2>(entry)));
     }
     let literal =
         |(name, d, bytes): &(&str, usize, u64)| format!("    (\"{name}\", {d}, {bytes:#018x}),");

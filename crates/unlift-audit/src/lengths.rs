@@ -1,12 +1,12 @@
 //! Whether a declared scale and thresholds fit a map: where every point counts as recovered wherever it
 //! is put, or none could ever, a figure says nothing, and 0 % would look like protection.
 
+use unlift::Unit;
 use unlift::audit::Threshold;
 use unlift::geometry::knn::Knn;
 use unlift::geometry::vector::median;
-use unlift::{Error, Unit};
 
-use crate::exit::{advise, usage};
+use crate::Error;
 
 /// How far apart the points of a map lie.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,7 +23,7 @@ impl Extent {
     ///
     /// # Errors
     /// When a coordinate is not finite.
-    pub fn of(points: &[[f64; 3]]) -> Result<Self, Error> {
+    pub fn of(points: &[[f64; 3]]) -> Result<Self, unlift::Error> {
         let nearest = median(&mut Knn::new(points)?.kth_distances(1));
         Ok(Self { across: across(points), nearest })
     }
@@ -56,7 +56,7 @@ const UNUSUAL: f64 = 10.0;
 ///
 /// # Errors
 /// When it makes the map smaller than dust or larger than the solar system has room for.
-pub fn check_scale(points: &[[f64; 3]], scale: Option<f64>) -> anyhow::Result<()> {
+pub fn check_scale(points: &[[f64; 3]], scale: Option<f64>) -> Result<(), Error> {
     let Some(scale) = scale else { return Ok(()) };
     let across = across(points);
     let [least, most] = ACROSS_M;
@@ -64,13 +64,13 @@ pub fn check_scale(points: &[[f64; 3]], scale: Option<f64>) -> anyhow::Result<()
     if across == 0.0 || (least..=most).contains(&(across * scale)) {
         return Ok(());
     }
-    let error = usage(format!(
+    let error = Error::request(format!(
         "--scale {scale:e}: expected {:.1e} to {:.1e} meters per unit, as the map is {} units across, found {scale:e}",
         least / across,
         most / across,
         short(across),
     ));
-    Err(advise(error, "--scale 1 for a map in meters, or no --scale for relative lengths"))
+    Err(error.advise("--scale 1 for a map in meters, or no --scale for relative lengths"))
 }
 
 /// Checks thresholds against the points in the unit of the audit: what to tell the user, if anything.
@@ -83,7 +83,7 @@ pub fn check_thresholds(
     unit: Unit,
     thresholds: &[Threshold],
     typed: bool,
-) -> anyhow::Result<Option<String>> {
+) -> Result<Option<String>, Error> {
     if unit != Unit::Meter && !typed {
         return Ok(None);
     }
@@ -112,22 +112,22 @@ pub fn check_thresholds(
         Unit::KthNeighbor | Unit::Pixel => "other --thresholds, or none for the usual ones",
     };
     if across > 0.0 && least.value >= across {
-        let error = usage(format!(
+        let error = Error::request(format!(
             "{option}: expected a map larger than the smallest threshold, {}, found one {} across: any guess \
              would count as recovered",
             named(least),
             in_unit(across),
         ));
-        return Err(advise(error, way_out));
+        return Err(error.advise(way_out));
     }
     if nearest >= HOPELESS * most.value {
-        let error = usage(format!(
+        let error = Error::request(format!(
             "{option}: expected neighboring points less than {HOPELESS} times the largest threshold, {}, apart, \
              found {}: no attack could come near",
             named(most),
             in_unit(nearest),
         ));
-        return Err(advise(error, way_out));
+        return Err(error.advise(way_out));
     }
     if across > 0.0 && most.value >= across {
         return Ok(Some(format!(

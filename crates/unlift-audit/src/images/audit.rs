@@ -16,12 +16,12 @@ use unlift_report::{RenderOptions, render};
 use super::FeatureSource;
 use super::pictures::Album;
 use super::stream::{Needs, Stream, Tally, lacking};
+use crate::Error;
 use crate::document::{self, Found, Provenance};
-use crate::exit::line;
 use crate::gate::Gate;
-use crate::job::{Finished, check_gates, curve_errors, curves_of, gate_results};
+use crate::maps::{Finished, check_gates, curve_errors, curves_of, gate_results};
 use crate::outputs::{PAGE, commit_audit};
-use crate::progress::{Progress, Steps};
+use crate::progress::Progress;
 
 /// Longest side of an embedded photo in pixels.
 const PREVIEW: u32 = 640;
@@ -50,8 +50,10 @@ pub struct ImagesJob<'a> {
     pub out: PathBuf,
     /// Figures only.
     pub share_safe: bool,
-    /// No progress bars.
-    pub quiet: bool,
+    /// Hears how it goes.
+    pub progress: &'a dyn Progress,
+    /// The command line, for the record.
+    pub command: Option<String>,
     /// When the command began.
     pub started: Instant,
 }
@@ -66,18 +68,18 @@ pub struct Used {
 }
 
 /// Runs the job and writes its folder, whole or not at all; without a single usable image none.
-pub fn perform(job: ImagesJob<'_>, out: OutputSet) -> anyhow::Result<(Option<Finished>, Used)> {
+pub fn perform(job: ImagesJob<'_>, out: OutputSet) -> Result<(Option<Finished>, Used), Error> {
     check_gates(&job.gates, &job.plan)?;
     let tally = RefCell::new(Tally::default());
     let mut watcher = Watcher::new(&job, &tally);
-    let steps = watcher.progress.steps();
+    let steps = job.progress;
     for error in job.source.refused() {
         tally.borrow_mut().unusable += 1;
-        steps.say(&line(&anyhow::anyhow!("{error}")));
+        steps.say(&error.to_string());
     }
     let of = (job.source, job.path);
     let needs = Needs::of_plan(&job.plan);
-    let images = Stream::new(of, &job.chosen, needs, &tally, steps.clone());
+    let images = Stream::new(of, &job.chosen, needs, &tally, steps);
     let outcome = run_images(images, &job.plan, &mut watcher)?;
     let Watcher { figures, errors, curves, .. } = watcher;
     let tally = tally.into_inner();
@@ -85,12 +87,13 @@ pub fn perform(job: ImagesJob<'_>, out: OutputSet) -> anyhow::Result<(Option<Fin
     if used.used == 0 {
         return Ok((None, used));
     }
-    let pictures = if job.share_safe { Vec::new() } else { draw(&job, &tally, &figures, &steps)? };
+    let pictures = if job.share_safe { Vec::new() } else { draw(&job, &tally, &figures)? };
     let gates = gate_results(&job.gates, &job.plan, &outcome.rows, &[])?;
     let provenance = Provenance {
         input: input(&job, &tally, &outcome)?,
         options: document::options(&job.plan, job.options),
         gates,
+        command: job.command.clone(),
         started: job.started,
     };
     let Outcome { rows, break_even, seconds, .. } = &outcome;
@@ -110,7 +113,7 @@ pub fn perform(job: ImagesJob<'_>, out: OutputSet) -> anyhow::Result<(Option<Fin
 }
 
 /// What was read: of photos, those that were used.
-fn input(job: &ImagesJob<'_>, tally: &Tally, outcome: &Outcome) -> anyhow::Result<Input> {
+fn input(job: &ImagesJob<'_>, tally: &Tally, outcome: &Outcome) -> Result<Input, Error> {
     let sha256 = match job.source {
         FeatureSource::File(_) => hash_file(job.path)?,
         FeatureSource::Folder(folder) => {
@@ -141,8 +144,7 @@ fn draw(
     job: &ImagesJob<'_>,
     tally: &Tally,
     figures: &[ImageFigures],
-    steps: &Steps,
-) -> anyhow::Result<Vec<Picture>> {
+) -> Result<Vec<Picture>, Error> {
     let wanted: Vec<(usize, &str)> = match &job.show {
         Some(show) => {
             let usable = show.iter().filter(|at| tally.used.contains(at));
@@ -161,7 +163,7 @@ fn draw(
     let needs = Needs::of_plan(&plan);
     let mut album = Album::default();
     let again = RefCell::new(Tally::default());
-    let images = Stream::new((job.source, job.path), &numbers, needs, &again, steps.clone());
+    let images = Stream::new((job.source, job.path), &numbers, needs, &again, job.progress);
     run_images(images, &plan, &mut album)?;
     let mut pictures = album.pictures;
     for picture in &mut pictures {
@@ -175,7 +177,7 @@ fn draw(
         };
         match unlift_features::preview::jpeg(&photo, PREVIEW) {
             Ok(jpeg) => picture.photo = Some(jpeg),
-            Err(error) => steps.say(&format!("unlift: note: {error}")),
+            Err(error) => job.progress.say(&format!("note: {error}")),
         }
     }
     Ok(pictures)
@@ -249,7 +251,7 @@ impl Curve {
 
 /// Shows progress and keeps the figures of every image.
 struct Watcher<'a> {
-    progress: Progress,
+    progress: &'a dyn Progress,
     tally: &'a RefCell<Tally>,
     plan: &'a Plan<2>,
     figures: Vec<ImageFigures>,
@@ -261,7 +263,7 @@ struct Watcher<'a> {
 impl<'a> Watcher<'a> {
     fn new(job: &'a ImagesJob<'_>, tally: &'a RefCell<Tally>) -> Self {
         let most = job.plan.thresholds.iter().map(|t| t.value).fold(0.0, f64::max);
-        let mut progress = Progress::new(job.quiet);
+        let progress = job.progress;
         progress.show(0, job.chosen.len(), "");
         Self {
             progress,
@@ -274,21 +276,21 @@ impl<'a> Watcher<'a> {
     }
 }
 
-impl audit::Watcher for Watcher<'_> {
-    type OfImage = Curves;
+impl<'a> audit::Watcher for Watcher<'a> {
+    type OfImage = Curves<'a>;
 
-    fn begin(&mut self) -> Curves {
-        let steps = self.progress.steps();
+    fn begin(&mut self) -> Curves<'a> {
+        let steps = self.progress;
         let (errors, curves) = (self.errors.clone(), Vec::new());
         Curves { errors, curves, steps, told: 0.0 }
     }
 
     fn progress(&mut self, _: usize, _: usize, what: &str) {
         // Images tell themselves how far they are.
-        self.progress.steps().add(0.0, what);
+        self.progress.add(0.0, what);
     }
 
-    fn image(&mut self, name: &str, rows: &[Row], Curves { curves, .. }: Curves) {
+    fn image(&mut self, name: &str, rows: &[Row], Curves { curves, .. }: Curves<'a>) {
         if self.curves.is_empty() {
             self.curves = curves;
         } else {
@@ -303,19 +305,23 @@ impl audit::Watcher for Watcher<'_> {
 }
 
 /// The error curves of one image, of the first repeat.
-struct Curves {
+struct Curves<'a> {
     errors: Vec<f64>,
     curves: Vec<Curve>,
-    steps: Steps,
+    steps: &'a dyn Progress,
     /// The share of the image that was told to be finished.
     told: f64,
 }
 
-impl Observer<2> for Curves {
+impl Observer<2> for Curves<'_> {
     fn progress(&mut self, done: usize, total: usize, _: &str) {
         let share = done as f64 / total.max(1) as f64;
         self.steps.add(share - self.told, "");
         self.told = share;
+    }
+
+    fn goes_on(&self) -> bool {
+        self.steps.goes_on()
     }
 
     fn cell(&mut self, cell: &Cell<'_, 2>) {

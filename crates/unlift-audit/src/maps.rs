@@ -1,23 +1,27 @@
 //! One audit from a prepared map to the files in its folder: what `audit map` and `demo` share.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use unlift::Descriptors;
 use unlift::audit::{Cell, NotAudited, Observer, Plan, REFERENCE, Row, run};
 use unlift::recover::Solver;
 use unlift::truth::Original;
+use unlift::{Descriptors, Unit};
 use unlift_io::atomic::OutputSet;
+use unlift_io::hash::hash_files;
+use unlift_io::read;
 use unlift_report::document::{Document, GateResult, Input};
 use unlift_report::{ErrorCdf, RenderOptions, render, text_table};
 
+use crate::Error;
 use crate::clouds::Clouds;
-use crate::document::{self, Provenance};
-use crate::exit::{advise, usage};
+use crate::document::{self, Provenance, ordered};
 use crate::gate::{Candidate, Gate};
+use crate::lengths::check_scale;
 use crate::outputs::{PAGE, commit_audit};
-use crate::pictures::Pictures;
-use crate::progress::Progress;
+use crate::prepare::{Preparation, Prepared, prepare};
+use crate::progress::{Progress, Quiet};
+use crate::scene::Pictures;
 
 /// Everything an audit needs.
 pub struct Job<'a> {
@@ -45,8 +49,10 @@ pub struct Job<'a> {
     pub write_clouds: bool,
     /// Figures only.
     pub share_safe: bool,
-    /// No progress bars.
-    pub quiet: bool,
+    /// Hears how it goes.
+    pub progress: &'a dyn Progress,
+    /// The command line, for the record.
+    pub command: Option<String>,
     /// When the command began.
     pub started: Instant,
 }
@@ -57,6 +63,96 @@ pub struct Finished {
     pub document: Document,
     /// Where the report is.
     pub report: PathBuf,
+}
+
+impl<'a> Job<'a> {
+    /// The default audit of the map at `path`, as [`open`] read it, into the folder `out`.
+    ///
+    /// # Errors
+    /// When the files of the map cannot be read again, for their hash.
+    pub fn new(
+        path: &Path,
+        input: &read::Input,
+        prepared: &'a Prepared,
+        out: &Path,
+        started: Instant,
+    ) -> Result<Self, Error> {
+        let points = prepared.original.reveal();
+        let scale = 1.0 / prepared.unit_in_map_units;
+        Ok(Self {
+            original: &prepared.original,
+            descriptors: prepared.descriptors.as_ref(),
+            cameras: input.cameras.iter().map(|c| c.map(|x| x * scale)).collect(),
+            up: input.up,
+            plan: Plan::new(points.unit()).for_map(points.len(), USUAL_K),
+            input: Input {
+                path: Some(path.display().to_string()),
+                sha256: Some(hash_files(&input.files)?),
+                n_points: prepared.original.len() as u64,
+                scale_m_per_unit: (points.unit() == Unit::Meter).then_some(scale),
+                unit_in_map_units: Some(prepared.unit_in_map_units),
+                other_sha256: ordered([]),
+                images: None,
+            },
+            options: serde_json::Map::new(),
+            gates: Vec::new(),
+            out: out.to_owned(),
+            unit_in_map_units: prepared.unit_in_map_units,
+            write_clouds: false,
+            share_safe: false,
+            progress: &Quiet,
+            command: None,
+            started,
+        })
+    }
+}
+
+/// Neighbors of every point in a default audit of a map.
+const USUAL_K: usize = 50;
+
+/// Reads a map and makes it ready for an audit; `descriptors` is a file of them, beside the map. What a user should
+/// know is told to `progress`.
+///
+/// # Errors
+/// When a file cannot be read, the scale makes every length meaningless, or too few points are left.
+pub fn open(
+    path: &Path,
+    descriptors: Option<&Path>,
+    preparation: &Preparation,
+    progress: &dyn Progress,
+) -> Result<(read::Input, Prepared), Error> {
+    let input = read::open(path).map_err(|error| {
+        let way_out = "the folder of a COLMAP model or project; for photos, unlift audit images";
+        let is_other = path.is_dir() && !read::is_project(path);
+        let error = Error::from(error);
+        if is_other { error.advise(way_out) } else { error }
+    })?;
+    for note in &input.skipped {
+        progress.say(&format!("note: {note}"));
+    }
+    check_scale(&input.positions, preparation.scale)?;
+    let rows = descriptors.map(|file| read::descriptors(file, &input)).transpose()?;
+    if let Some(n) = rows.as_ref().map(n_zero).filter(|&n| n > 0) {
+        let (file, of) = (descriptors.unwrap_or(path).display(), input.positions.len());
+        let what = "descriptors are all zero, and tell an attacker nothing";
+        progress.say(&format!("note: {file}: {n} of {of} {what}"));
+    }
+    let prepared = prepare(&input.positions, rows.as_ref(), preparation).map_err(|error| {
+        let few = error.what() == "points" && input.positions.len() > 2;
+        let error = Error::from(unlift_io::Error::core(path, error));
+        if few { error.advise("a smaller --k, or more points") } else { error }
+    })?;
+    Ok((input, prepared))
+}
+
+/// How many descriptors are all zero: as some exporters mark points without one.
+fn n_zero(descriptors: &Descriptors) -> usize {
+    let mut row = vec![0.0; descriptors.dim()];
+    let mut zero = |at: &usize| {
+        descriptors.read_row(*at, &mut row);
+        row.iter().all(|&value| value == 0.0)
+    };
+    (0..descriptors.len()).filter(|at| zero(at)).count()
 }
 
 impl Finished {
@@ -80,12 +176,12 @@ impl Finished {
 }
 
 /// Runs the job and writes its files, all or none.
-pub fn perform(job: Job<'_>, mut out: OutputSet) -> anyhow::Result<Finished> {
+pub fn perform(job: Job<'_>, mut out: OutputSet) -> Result<Finished, Error> {
     check_gates(&job.gates, &job.plan)?;
     let drawn = drawn(&job.plan);
     let n_views = job.plan.schemes.len() * job.plan.variants().len() * drawn.len();
     let mut watcher = Watcher {
-        progress: Progress::new(job.quiet),
+        progress: job.progress,
         pictures: (!job.share_safe).then(|| Pictures::new(job.original, &job.plan, n_views)),
         curves: Vec::new(),
         drawn: drawn.iter().map(|solver| solver.name()).collect(),
@@ -95,15 +191,15 @@ pub fn perform(job: Job<'_>, mut out: OutputSet) -> anyhow::Result<Finished> {
     };
     let outcome = run(job.original, job.descriptors, &job.plan, &mut watcher).map_err(|error| {
         let file = job.input.path.clone().unwrap_or_default();
-        advise(unlift_io::Error::core(file, error), "a smaller --k, or fewer --schemes")
+        Error::from(unlift_io::Error::core(file, error)).advise("a smaller --k, or fewer --schemes")
     })?;
     if let Some(error) = watcher.failed {
         return Err(error.into());
     }
-    drop(watcher.progress);
     let gates = gate_results(&job.gates, &job.plan, &outcome.rows, &outcome.not_audited)?;
     let options = document::options(&job.plan, job.options);
-    let provenance = Provenance { input: job.input, options, gates, started: job.started };
+    let provenance =
+        Provenance { input: job.input, options, gates, command: job.command, started: job.started };
     let found = document::Found {
         rows: &outcome.rows,
         not_audited: &outcome.not_audited,
@@ -143,7 +239,7 @@ fn candidates<'a, const D: usize>(plan: &Plan<D>, rows: &'a [Row]) -> Vec<Candid
 }
 
 /// A gate about no row is told before the audit runs, not after.
-pub fn check_gates<const D: usize>(gates: &[Gate], plan: &Plan<D>) -> anyhow::Result<()> {
+pub fn check_gates<const D: usize>(gates: &[Gate], plan: &Plan<D>) -> Result<(), Error> {
     let lacking = |gate: &Gate| gate.not_in(plan).map(|part| (gate.typed.clone(), part));
     match gates.iter().find_map(lacking) {
         None => Ok(()),
@@ -151,8 +247,10 @@ pub fn check_gates<const D: usize>(gates: &[Gate], plan: &Plan<D>) -> anyhow::Re
             let (part, names) = expected.split_once(": ").unwrap_or(("row", &expected));
             let error = format!("--gate {gate}: {part}: expected {names}, found {found}");
             Err(match part {
-                "threshold" => advise(usage(error), "--scale and --thresholds, which change them"),
-                _ => usage(error),
+                "threshold" => {
+                    Error::request(error).advise("--scale and --thresholds, which change them")
+                }
+                _ => Error::request(error),
             })
         }
     }
@@ -164,7 +262,7 @@ pub fn gate_results<const D: usize>(
     plan: &Plan<D>,
     rows: &[Row],
     not_audited: &[NotAudited],
-) -> anyhow::Result<Vec<GateResult>> {
+) -> Result<Vec<GateResult>, Error> {
     let rows = candidates(plan, rows);
     let result = |gate: &Gate| {
         let found_percent = gate.worst(rows.iter().copied());
@@ -175,7 +273,10 @@ pub fn gate_results<const D: usize>(
         });
         // A gate that is about no row must never count as held.
         if found_percent.is_none() && reason.is_none() {
-            return Err(usage(format!("--gate {}: expected a row, found none", gate.typed)));
+            return Err(Error::request(format!(
+                "--gate {}: expected a row, found none",
+                gate.typed
+            )));
         }
         let passed = reason.is_none() && found_percent.is_some_and(|found| gate.passes(found));
         let (gate, bound_percent) = (gate.typed.clone(), gate.bound_percent);
@@ -186,7 +287,7 @@ pub fn gate_results<const D: usize>(
 
 /// Shows progress and keeps what the report draws.
 struct Watcher<'a> {
-    progress: Progress,
+    progress: &'a dyn Progress,
     pictures: Option<Pictures>,
     /// The error curve of every cell.
     curves: Vec<(Row, Vec<(f64, f64)>)>,
@@ -227,6 +328,10 @@ pub fn curve_errors(largest_threshold: f64) -> impl Iterator<Item = f64> {
 impl Observer for Watcher<'_> {
     fn progress(&mut self, done: usize, total: usize, what: &str) {
         self.progress.show(done, total, what);
+    }
+
+    fn goes_on(&self) -> bool {
+        self.progress.goes_on()
     }
 
     fn cell(&mut self, cell: &Cell<'_>) {

@@ -4,13 +4,14 @@ pub mod audit;
 mod folder;
 pub mod parts;
 mod pictures;
-pub mod stages;
 pub mod stream;
 
 use std::path::Path;
 
 use unlift_features::SiftOptions;
 use unlift_io::features::{self, ImageFeatures};
+
+use crate::Error;
 
 pub use folder::{Folder, is_photo};
 
@@ -30,7 +31,7 @@ impl FeatureSource {
     ///
     /// # Errors
     /// When there is no such thing, or no image in it.
-    pub fn open(path: &Path, options: &SiftOptions) -> anyhow::Result<Self> {
+    pub fn open(path: &Path, options: &SiftOptions) -> Result<Self, Error> {
         let metadata = std::fs::metadata(path).map_err(|e| unlift_io::Error::read(path, e))?;
         Ok(match metadata.is_dir() {
             true => Self::Folder(Folder::open(path, options)?),
@@ -66,7 +67,7 @@ impl FeatureSource {
     ///
     /// # Errors
     /// One line when this image cannot be used; others may be.
-    pub fn get(&self, at: usize) -> anyhow::Result<ImageFeatures> {
+    pub fn get(&self, at: usize) -> Result<ImageFeatures, Error> {
         match self {
             Self::Folder(folder) => folder.get(at),
             Self::File(file) => Ok(file.get(at)?),

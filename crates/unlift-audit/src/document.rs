@@ -17,7 +17,9 @@ pub struct Provenance {
     pub options: Map<String, Value>,
     /// Gates and what they found.
     pub gates: Vec<report::GateResult>,
-    /// When the command began.
+    /// The command line, if there was one.
+    pub command: Option<String>,
+    /// When it began.
     pub started: Instant,
 }
 
@@ -91,8 +93,6 @@ pub fn document<const D: usize>(
         let made = (row.neighbors > 0.0).then(|| ("neighbors".to_owned(), row.neighbors));
         ordered(made.into_iter().chain([("recover".to_owned(), row.recover)]))
     });
-    let line: Vec<String> =
-        std::env::args_os().map(|word| quoted(&word.to_string_lossy())).collect();
     report::Document {
         unlift: env!("CARGO_PKG_VERSION").to_owned(),
         schema: report::SCHEMA,
@@ -105,13 +105,7 @@ pub fn document<const D: usize>(
         gates: provenance.gates,
         images: Vec::new(),
         run: report::Run {
-            command: Some(
-                ["unlift".to_owned()]
-                    .into_iter()
-                    .chain(line.into_iter().skip(1))
-                    .collect::<Vec<_>>()
-                    .join(" "),
-            ),
+            command: provenance.command,
             threads: rayon::current_num_threads() as u32,
             peak_memory_bytes: crate::memory::peak_bytes(),
             seconds: report::Seconds {
@@ -274,28 +268,7 @@ fn break_even(row: &audit::BreakEven) -> report::BreakEven {
     }
 }
 
-/// A word of the command line as a shell would need it.
-fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@+%".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        return word.to_owned();
-    }
-    format!("'{}'", word.replace('\'', r"'\''"))
-}
-
 /// An ordered map from pairs.
 pub fn ordered<V>(pairs: impl IntoIterator<Item = (String, V)>) -> IndexMap<String, V> {
     pairs.into_iter().collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn words_are_quoted_for_a_shell() {
-        assert_eq!(quoted("ppl@0.5:0.10"), "ppl@0.5:0.10");
-        assert_eq!(quoted("a b"), "'a b'");
-        assert_eq!(quoted("it's<=1"), r"'it'\''s<=1'");
-    }
 }

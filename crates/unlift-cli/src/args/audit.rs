@@ -7,8 +7,8 @@ use clap::Args;
 use unlift::neighbors::oracle::Noise;
 use unlift::recover::Delta;
 
-use crate::gate::Gate;
 use crate::values;
+use unlift_audit::Gate;
 
 /// How the attacker works.
 #[derive(Clone, Debug, Args)]

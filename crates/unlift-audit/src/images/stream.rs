@@ -16,8 +16,7 @@ use unlift_io::Error;
 use unlift_io::features::ImageFeatures;
 
 use super::FeatureSource;
-use crate::exit::line;
-use crate::progress::Steps;
+use crate::progress::Progress;
 
 /// Images per thread that are read ahead.
 const PER_THREAD: usize = 2;
@@ -87,7 +86,7 @@ pub struct Stream<'a> {
     next: usize,
     ready: VecDeque<(usize, Image)>,
     tally: &'a RefCell<Tally>,
-    steps: Steps,
+    steps: &'a dyn Progress,
 }
 
 impl<'a> Stream<'a> {
@@ -97,7 +96,7 @@ impl<'a> Stream<'a> {
         chosen: &'a [usize],
         needs: Needs,
         tally: &'a RefCell<Tally>,
-        steps: Steps,
+        steps: &'a dyn Progress,
     ) -> Self {
         let ready = VecDeque::new();
         Self { source, path, chosen, needs, next: 0, ready, tally, steps }
@@ -115,7 +114,7 @@ impl<'a> Stream<'a> {
                 Ok(image) => self.ready.push_back((at, image)),
                 Err(error) => {
                     self.tally.borrow_mut().unusable += 1;
-                    self.steps.say(&line(&error));
+                    self.steps.say(&error.to_string());
                     self.steps.add(1.0, "");
                 }
             }
@@ -124,7 +123,7 @@ impl<'a> Stream<'a> {
 }
 
 impl Iterator for Stream<'_> {
-    type Item = anyhow::Result<Image>;
+    type Item = Result<Image, crate::Error>;
 
     fn next(&mut self) -> Option<Self::Item> {
         while self.ready.is_empty() && self.next < self.chosen.len() {
@@ -139,7 +138,12 @@ impl Iterator for Stream<'_> {
     }
 }
 
-fn image(source: &FeatureSource, path: &Path, at: usize, needs: &Needs) -> anyhow::Result<Image> {
+fn image(
+    source: &FeatureSource,
+    path: &Path,
+    at: usize,
+    needs: &Needs,
+) -> Result<Image, crate::Error> {
     let features = source.get(at)?;
     let wrong = |expected: &str, found: &str| {
         Error::new(path, format!("image {}", features.name.escape_debug()), expected, found)

@@ -44,7 +44,7 @@ impl Folder {
     ///
     /// # Errors
     /// When the folder cannot be read or holds no photo, or an option is out of range.
-    pub fn open(root: &Path, options: &SiftOptions) -> anyhow::Result<Self> {
+    pub fn open(root: &Path, options: &SiftOptions) -> Result<Self, crate::Error> {
         let sift = Sift::try_new(options.clone())?;
         let mut found = Found::default();
         found.visit(root, "", &mut Vec::new());
@@ -68,10 +68,12 @@ impl Folder {
         Ok(Self { sift, max_image_size, names, paths, refused: found.refused, passed_over })
     }
 
+    /// Names of all photos, sorted by their bytes.
     pub fn names(&self) -> &[String] {
         &self.names
     }
 
+    /// What cannot be used, one error each.
     pub fn refused(&self) -> &[Error] {
         &self.refused
     }
@@ -86,7 +88,11 @@ impl Folder {
         &self.paths[at]
     }
 
-    pub fn get(&self, at: usize) -> anyhow::Result<ImageFeatures> {
+    /// The features of photo `at`.
+    ///
+    /// # Errors
+    /// When this photo cannot be used.
+    pub fn get(&self, at: usize) -> Result<ImageFeatures, crate::Error> {
         let path = &self.paths[at];
         let photo = load::read(path)?;
         let size = [photo.width(), photo.height()];

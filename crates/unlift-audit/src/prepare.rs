@@ -5,7 +5,14 @@ use unlift::seed::{Draws, Stage};
 use unlift::truth::Original;
 use unlift::{Descriptors, Error, PointSet, Unit};
 
-use crate::values::OutlierFilter;
+/// Statistical outlier removal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OutlierFilter {
+    /// Neighbors whose mean distance is judged.
+    pub neighbors: usize,
+    /// Points beyond the mean of that distance by this many standard deviations go.
+    pub std_ratio: f64,
+}
 
 /// What to do with the points of a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,6 +27,13 @@ pub struct Preparation {
     pub max_points: Option<usize>,
     /// Seed of the subset.
     pub seed: u64,
+}
+
+/// In the unit of the usual distance to the 50th neighbor, all points.
+impl Default for Preparation {
+    fn default() -> Self {
+        Self { scale: None, k: 50, outlier_filter: None, max_points: None, seed: 0 }
+    }
 }
 
 /// Points ready for an audit.

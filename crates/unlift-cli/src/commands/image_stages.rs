@@ -19,12 +19,13 @@ use unlift_io::Error;
 use unlift_io::atomic::{Access, Kind, OutputFile, OutputSet, Rules};
 use unlift_io::stage::{ImageFile, ImageRows, ImageWriter, Kind as Stage};
 
-use super::FeatureSource;
-use super::stream::{Needs, Stream, Tally};
+use super::{RELEASED, TRUTH, expect_slots, same_map};
 use crate::args::{EvaluateArgs, ObfuscateArgs, OracleArgs};
-use crate::commands::{RELEASED, TRUTH, expect_slots, same_map};
-use crate::outputs::check_file;
-use crate::progress::Progress;
+use crate::progress::Stderr;
+use unlift_audit::Progress as _;
+use unlift_audit::check_file;
+use unlift_audit::images::FeatureSource;
+use unlift_audit::images::stream::{Needs, Stream, Tally};
 
 /// Images at work per thread.
 const AT_WORK: usize = 2;
@@ -72,14 +73,13 @@ pub fn hide(args: &ObfuscateArgs, key: &Key, out: &mut OutputSet) -> anyhow::Res
     let scheme = scheme.ok_or_else(|| anyhow::anyhow!("not a scheme for images"))?;
     let source = FeatureSource::open(&args.path, &SiftOptions::default())?;
     let tally = RefCell::new(Tally::default());
-    let steps = Progress::new(true).steps();
     for error in source.refused() {
         tally.borrow_mut().unusable += 1;
-        steps.say(&crate::exit::line(&anyhow::anyhow!("{error}")));
+        Stderr.say(&error.to_string());
     }
     let all: Vec<usize> = (0..source.names().len()).collect();
     let mut images =
-        Stream::new((&source, &args.path), &all, Needs::whatever_there_is(), &tally, steps);
+        Stream::new((&source, &args.path), &all, Needs::whatever_there_is(), &tally, &Stderr);
     let staged = |out: &mut OutputSet, name, kind, access| {
         let path = out.stage(name, Kind::Stage(kind))?;
         OutputFile::create(&path, access)
@@ -90,7 +90,7 @@ pub fn hide(args: &ObfuscateArgs, key: &Key, out: &mut OutputSet) -> anyhow::Res
     let mut maps = ImageWriter::start(&mut released, Stage::Released);
     let mut counts = Counts::default();
     each(
-        || images.next().transpose(),
+        || Ok(images.next().transpose()?),
         |image| {
             let key = key_of(key, &image.name);
             let descriptors = image.descriptors.as_ref();

@@ -8,7 +8,7 @@ use unlift::audit::Threshold;
 use unlift::obfuscate::Entry;
 use unlift::recover::Solver;
 
-use crate::args_audit::{AttackArgs, ResultArgs, RunArgs};
+use crate::args::audit::{AttackArgs, ResultArgs, RunArgs};
 use crate::values::{self, NeighborSource};
 
 /// Options of `audit images`.

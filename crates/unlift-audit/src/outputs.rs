@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use unlift_io::atomic::{Access, Kind, OutputSet, Rules, sweep};
 
 use crate::clouds;
-use crate::exit::usage;
+use crate::{Error, Progress};
 
 /// The page of an audit.
 pub const PAGE: &str = "report.html";
@@ -13,13 +13,13 @@ pub const PAGE: &str = "report.html";
 pub const FIGURES: &str = "audit.json";
 
 /// An error of `--out`: of the command line, not of an input.
-pub fn refused(error: unlift_io::Error) -> anyhow::Error {
-    usage(format!("--out: {error}"))
+pub fn refused(error: unlift_io::Error) -> Error {
+    Error::request(format!("--out: {error}"))
 }
 
 /// Whether the one file `path` may be written, asked before the work and after it; where it will stand, links
 /// followed. What dead runs left unfinished beside it is cleared away.
-pub fn check_file(path: &Path, kind: Kind, rules: &Rules) -> anyhow::Result<PathBuf> {
+pub fn check_file(path: &Path, kind: Kind, rules: &Rules) -> Result<PathBuf, Error> {
     let target = rules.check(path, kind).map_err(refused)?;
     let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty());
     sweep(folder.unwrap_or(Path::new(".")));
@@ -38,7 +38,12 @@ pub enum Shown {
 }
 
 /// Opens the folder that an audit goes to.
-pub fn open_audit(out: &Path, rules: Rules, shown: Shown) -> anyhow::Result<OutputSet> {
+pub fn open_audit(
+    out: &Path,
+    rules: Rules,
+    shown: Shown,
+    progress: &dyn Progress,
+) -> Result<OutputSet, Error> {
     let access = if shown == Shown::Figures { Access::Usual } else { Access::Private };
     let earlier = clouds::earlier(out);
     let mut first = vec![(PAGE, Kind::Page), (FIGURES, Kind::AuditJson)];
@@ -47,7 +52,7 @@ pub fn open_audit(out: &Path, rules: Rules, shown: Shown) -> anyhow::Result<Outp
         Shown::Figures if !earlier.is_empty() => {
             let folder = out.join(clouds::FOLDER);
             let what = "clouds of an earlier audit show points, and stay";
-            eprintln!("unlift: note: {}: {what}", folder.display());
+            progress.say(&format!("note: {}: {what}", folder.display()));
         }
         Shown::Figures | Shown::Points => {}
     }

@@ -1,0 +1,60 @@
+//! An audit as a library call: from a map or images on disk to figures and a page.
+//!
+//! ```text
+//! open ──> Plan ──> perform (run, gate, draw) ──> audit.json, report.html
+//! ```
+//!
+//! ```no_run
+//! use std::path::Path;
+//! use std::time::Instant;
+//!
+//! use unlift::Unit;
+//! use unlift::audit::Plan;
+//! use unlift_audit::{Gate, Job, Preparation, Quiet, Shown, maps, open_audit};
+//! use unlift_io::atomic::Rules;
+//!
+//! # fn main() -> Result<(), unlift_audit::Error> {
+//! let (started, path) = (Instant::now(), Path::new("reconstruction/0"));
+//! let preparation = Preparation { scale: Some(1.0), ..Preparation::default() };
+//! let (input, prepared) = maps::open(path, None, &preparation, &Quiet)?;
+//! let out = Path::new("audit");
+//! let files = open_audit(out, Rules::new([path], false), Shown::Points, &Quiet)?;
+//! let finished = maps::perform(
+//!     Job {
+//!         plan: Plan::new(Unit::Meter).for_map(prepared.original.len(), 50),
+//!         gates: vec![Gate::parse("all@0.5:0.10<=20").expect("a gate")],
+//!         ..Job::new(path, &input, &prepared, out, started)?
+//!     },
+//!     files,
+//! )?;
+//! assert!(finished.passed());
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Schemes, sources of neighborhoods and measures of the plan may be anybody's; see `unlift`.
+
+mod clouds;
+mod document;
+mod error;
+mod gate;
+mod given;
+pub mod images;
+mod lengths;
+pub mod maps;
+mod memory;
+mod outputs;
+mod prepare;
+mod progress;
+mod scene;
+
+pub use document::{ordered, row};
+pub use error::Error;
+pub use gate::{Candidate, Figure, Gate};
+pub use given::by_point;
+pub use lengths::{Extent, check_scale, check_thresholds};
+pub use maps::{Finished, Job};
+pub use memory::peak_bytes;
+pub use outputs::{FIGURES, PAGE, Shown, check_file, open_audit, refused};
+pub use prepare::{OutlierFilter, Preparation, Prepared, prepare};
+pub use progress::{Progress, Quiet};

@@ -1,0 +1,74 @@
+//! Arguments of `unlift audit map`.
+
+use super::audit::AttackArgs;
+use super::audit::ResultArgs;
+use super::audit::RunArgs;
+use super::map::MapArgs;
+use crate::values;
+use crate::values::NeighborSource;
+use clap::Args;
+use std::path::PathBuf;
+use unlift::audit::Threshold;
+use unlift::obfuscate::Entry;
+use unlift::recover::Solver;
+
+/// Options of `audit map`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  unlift audit map PROJECT --scale 1
+  unlift audit map cloud.ply --schemes ppl,ppl+ --inlier-ratios 1,0.5 --out ppl-audit
+  unlift audit map PROJECT --scale 1 --gate 'ppl@0.5:0.10<=20' --gate 'all:0.25:gain<=30'
+  unlift audit map PROJECT --descriptors PROJECT/database.db --neighbors overlap \
+    --gate 'all:overlap:1.0<=20'
+  unlift audit map PROJECT --neighbors lists-by-point.parquet --solver joint,ransac
+  unlift audit map PROJECT --descriptors PROJECT/database.db --neighbors oracle --neighbors overlap
+  unlift audit map PROJECT --share-safe --json
+
+Gates: SCHEME[:SOLVER][:SOURCE][@RATIO]:THRESHOLD[:gain]<=PERCENT. SCHEME may be all; without @RATIO
+every ratio counts, without a solver or a source of neighborhoods every one; every noise model
+counts; the largest figure decides, which is that of the strongest attack. :gain bounds what
+neighborhoods add to an attacker without them (a blind guess, or what the records alone give, the
+larger), in percentage points. A gate that names something not in the audit is a usage error; one on
+a scheme that could not be applied to the map fails.
+
+Exit codes: 0 done, 1 a gate failed, 2 usage, 3 bad input.")]
+pub struct AuditMapArgs {
+    /// A COLMAP model or project folder, or a .ply, .csv, .xyz, .txt or .npy file
+    #[arg(value_name = "PATH")]
+    pub path: PathBuf,
+    #[command(flatten)]
+    pub map: MapArgs,
+    /// Schemes to audit, by commas [default: all, see unlift schemes]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::scheme,
+          help_heading = "Attack")]
+    pub schemes: Vec<&'static Entry>,
+    /// Recovery methods, by commas or repeated: joint, joint-start, consensus, ransac, density, tomography
+    /// [default: joint, and joint-start, the pass that it begins with; consensus on maps of fewer than 150 K points]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
+          help_heading = "Attack")]
+    pub solver: Vec<Solver>,
+    /// Leave out the second baseline: attacks on the released records alone, without neighborhoods and
+    /// descriptors
+    #[arg(long, help_heading = "Attack")]
+    pub no_records_alone: bool,
+    /// Where neighborhoods come from, repeatable: oracle (made from the map itself); what an attacker
+    /// makes from the released map (similarity, overlap, geometric, or several joined by +); or a file
+    #[arg(long, value_name = "oracle|SOURCE|FILE", value_parser = values::neighbor_source,
+          default_value = "oracle", help_heading = "Attack")]
+    pub neighbors: Vec<NeighborSource>,
+    #[command(flatten)]
+    pub attack: AttackArgs,
+    /// Errors up to which a point counts as recovered, by commas; kept as typed
+    /// [default: 0.10,0.25 with --scale, else 1.0,2.5]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold,
+          help_heading = "Result")]
+    pub thresholds: Vec<Threshold>,
+    /// Also write original, obfuscated and recovered clouds (PLY, OBJ)
+    #[arg(long, help_heading = "Result", conflicts_with = "share_safe")]
+    pub write_clouds: bool,
+    #[command(flatten)]
+    pub result: ResultArgs,
+    #[command(flatten)]
+    pub run: RunArgs,
+}

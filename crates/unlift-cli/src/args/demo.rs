@@ -1,0 +1,26 @@
+//! Arguments of `unlift demo`.
+
+use clap::Args;
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+/// Options of `demo`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  unlift demo
+  unlift demo --out /tmp/room")]
+pub struct DemoArgs {
+    /// Folder for report.html and audit.json; whatever else is in it stays
+    #[arg(long, value_name = "DIR", default_value = "unlift-demo")]
+    pub out: PathBuf,
+    /// Replace files of that name that unlift did not write
+    #[arg(long)]
+    pub force: bool,
+    /// Threads to use [default: one per core]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+    /// No progress on stderr
+    #[arg(long)]
+    pub quiet: bool,
+}

@@ -1,0 +1,194 @@
+//! The command line as types. What a string means is in `values.rs`.
+
+mod audit;
+mod audit_images;
+mod audit_map;
+mod bench;
+mod demo;
+mod evaluate;
+mod features;
+mod map;
+mod neighbors;
+mod obfuscate;
+mod recover;
+
+use std::ffi::OsString;
+
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+
+pub use audit::AttackArgs;
+pub use audit_images::AuditImagesArgs;
+pub use audit_map::AuditMapArgs;
+pub use bench::BenchRecoverArgs;
+pub use demo::DemoArgs;
+pub use evaluate::EvaluateArgs;
+pub use features::FeaturesArgs;
+pub use map::MapArgs;
+pub use neighbors::{FindArgs, NeighborsCommand, OracleArgs};
+pub use obfuscate::ObfuscateArgs;
+pub use recover::RecoverArgs;
+
+/// How much of a privacy-preserving ("obfuscated") SfM map or image comes back?
+#[derive(Debug, Parser)]
+#[command(
+    name = "unlift",
+    version,
+    term_width = 100,
+    after_help = "\
+Examples:
+  unlift demo                                  audit a made-up room, no data needed
+  unlift audit map PROJECT/sparse/0 --scale 1  audit a COLMAP map that is in meters
+  unlift audit images photos                   audit the keypoints of photos
+  unlift schemes                               what can be audited
+
+Exit codes: 0 done, 1 a gate failed, 2 usage, 3 bad input.
+Recovered points are as private as the original map."
+)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+impl Cli {
+    /// Reads a command line, the name of the program first.
+    ///
+    /// # Errors
+    /// When it is none of ours, or asks for help.
+    pub fn read(
+        line: impl IntoIterator<Item = impl Into<OsString> + Clone>,
+    ) -> Result<Self, clap::Error> {
+        let matches = numbers_may_be_negative(Self::command()).try_get_matches_from(line)?;
+        Self::from_arg_matches(&matches)
+    }
+}
+
+/// So that `--scale -1` is told what is wrong with -1, not that there is no option `-1`.
+fn numbers_may_be_negative(command: clap::Command) -> clap::Command {
+    let forgiving = |arg: clap::Arg| match arg.get_action().takes_values() && !arg.is_positional() {
+        true => arg.allow_negative_numbers(true),
+        false => arg,
+    };
+    command.mut_args(forgiving).mut_subcommands(numbers_may_be_negative)
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Audit a made-up furnished room under every scheme
+    Demo(DemoArgs),
+    /// Audit what you have
+    #[command(subcommand)]
+    Audit(AuditCommand),
+    /// Hide the points of a map, or the keypoints of images, by one scheme: a released file and a truth file
+    Obfuscate(ObfuscateArgs),
+    /// Make neighborhoods
+    #[command(subcommand)]
+    Neighbors(NeighborsCommand),
+    /// Recover the points of an obfuscated map, from released files alone
+    Recover(RecoverArgs),
+    /// Compare recovered points with the truth
+    Evaluate(EvaluateArgs),
+    /// Measure speed and memory
+    #[command(subcommand)]
+    Bench(BenchCommand),
+    /// Keypoints and descriptors of photos, or of a file of features, as hloc stores them
+    Features(FeaturesArgs),
+    /// List the schemes: rule, what stays hidden, source, stated patents
+    Schemes,
+}
+
+/// What can be audited.
+#[derive(Debug, Subcommand)]
+#[command(after_help = "\
+Examples:
+  unlift audit map PROJECT --scale 1
+  unlift audit images photos")]
+pub enum AuditCommand {
+    /// Audit a 3D map: COLMAP, PLY, CSV, XYZ or NPY
+    // Boxed: ten times the size of the other commands.
+    Map(Box<AuditMapArgs>),
+    /// Audit images: a folder of photos, hloc's features.h5, or a COLMAP database.db
+    Images(Box<AuditImagesArgs>),
+}
+
+/// What can be measured.
+#[derive(Debug, Subcommand)]
+pub enum BenchCommand {
+    /// Seconds of recovery per inlier ratio, beside those of the paper
+    Recover(BenchRecoverArgs),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::values::NeighborSource;
+    use unlift::recover::{Delta, Solver};
+    use unlift_audit::OutlierFilter;
+
+    fn audit(arguments: &[&str]) -> Result<AuditMapArgs, clap::Error> {
+        let line = ["unlift", "audit", "map", "PATH"].iter().chain(arguments);
+        match Cli::read(line)?.command {
+            Command::Audit(AuditCommand::Map(args)) => Ok(*args),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn the_definition_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn defaults_are_those_of_the_documentation() {
+        let args = audit(&[]).unwrap();
+        assert_eq!((args.map.k, args.map.seed, args.attack.repeats), (50, None, 1));
+        assert!(args.solver.is_empty() && !args.no_records_alone);
+        assert_eq!((args.attack.delta, args.map.outlier_filter), (Delta::Auto, None));
+        assert_eq!(args.neighbors, [NeighborSource::Oracle]);
+        assert!(
+            args.attack.inlier_ratios.is_empty()
+                && args.attack.oracle_noise.is_empty()
+                && args.attack.source_k.is_none()
+        );
+        assert!(args.schemes.is_empty() && args.thresholds.is_empty());
+    }
+
+    #[test]
+    fn negative_numbers_are_values_that_are_refused_as_such() {
+        for (option, expected) in [
+            ("--scale", "meters per unit of the map, a number above 0, found -1"),
+            ("--thresholds", "expected a number above 0, found -1"),
+            ("--inlier-ratios", "expected a number from 0 to 1, found -1"),
+            ("--delta", "expected auto or a number above 0, found -1"),
+            ("--k", "-1 is not in 1..=65535"),
+        ] {
+            let error = audit(&[option, "-1"]).unwrap_err().to_string();
+            assert!(error.contains(expected), "{option}: {error}");
+        }
+    }
+
+    #[test]
+    fn lists_are_split_at_commas_and_repeated_options_add_up() {
+        let args =
+            audit(&["--solver", "consensus", "--solver", "ransac", "--schemes=ppl+,cp"]).unwrap();
+        assert_eq!(args.solver, [Solver::Consensus, Solver::Ransac]);
+        let names: Vec<&str> = args.schemes.iter().map(|scheme| scheme.name).collect();
+        assert_eq!(names, ["ppl+", "cp"]);
+    }
+
+    #[test]
+    fn the_outlier_filter_has_a_default_when_named() {
+        let filter = |arguments: &[&str]| audit(arguments).unwrap().map.outlier_filter;
+        let usual = OutlierFilter { neighbors: 20, std_ratio: 2.0 };
+        assert_eq!(filter(&["--outlier-filter"]), Some(usual));
+        let strict = OutlierFilter { neighbors: 8, std_ratio: 1.5 };
+        assert_eq!(filter(&["--outlier-filter=8,1.5"]), Some(strict));
+    }
+
+    #[test]
+    fn private_clouds_and_a_shareable_report_exclude_each_other() {
+        let error = audit(&["--write-clouds", "--share-safe"]).unwrap_err();
+        assert_eq!(error.exit_code(), 2);
+    }
+}
