@@ -161,6 +161,15 @@ pub struct Lifted<const D: usize> {
     pub dropped: Vec<Dropped>,
 }
 
+impl<const D: usize> Lifted<D> {
+    /// Of a scheme that gives every original a record of its own, in order.
+    pub fn one_each(obfuscation: Obfuscation<D>) -> Self {
+        let hidden = (0..obfuscation.len()).map(OriginalId::from_index).collect();
+        let (swapped_axis, dropped) = (None, Vec::new());
+        Self { obfuscation, slots_per_record: 1, hidden, swapped_axis, dropped }
+    }
+}
+
 /// Hides `original` by `scheme`: what is released, and the secret beside it. `descriptors` has one
 /// row per original. All chance comes from `key`: [`Key::fresh`] for a map that is released.
 ///

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::{Entry, Facts, Lifted, Scheme};
+use crate::Error;
 use crate::geometry::frame::Bounds;
 use crate::released::{Lines, Obfuscation};
 use crate::seed::{Key, Stage};
-use crate::{Error, OriginalId};
 
 /// Random lines ("oriented line clouds").
 #[derive(Clone, Copy, Debug)]
@@ -45,12 +45,6 @@ impl<const D: usize> Scheme<D> for Olc {
         let key = key.stage(Stage::Scheme);
         let direction = |row: usize| key.draws(row as u64).direction();
         let directions: Vec<[f64; D]> = (0..points.len()).into_par_iter().map(direction).collect();
-        Ok(Lifted {
-            obfuscation: Obfuscation::Lines(Lines::through(points, &directions)?),
-            slots_per_record: 1,
-            hidden: (0..points.len()).map(OriginalId::from_index).collect(),
-            swapped_axis: None,
-            dropped: Vec::new(),
-        })
+        Ok(Lifted::one_each(Obfuscation::Lines(Lines::through(points, &directions)?)))
     }
 }

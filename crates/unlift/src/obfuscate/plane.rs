@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use super::{Entry, Facts, Lifted, Scheme};
+use crate::Error;
 use crate::geometry::frame::Bounds;
 use crate::released::{AxisPlanes, Obfuscation};
 use crate::seed::{Key, Stage};
-use crate::{Error, OriginalId};
 
 /// Partial localization: random thirds, one per axis. The attacker holds all three.
 #[derive(Clone, Copy, Debug)]
@@ -44,12 +44,6 @@ impl Scheme<3> for Plane {
         key.draws(Stage::Scheme, 0).shuffle(&mut axis);
         let offset: Vec<f64> =
             points.iter().zip(&axis).map(|(point, &a)| point[usize::from(a)]).collect();
-        Ok(Lifted {
-            obfuscation: Obfuscation::AxisPlanes(AxisPlanes::try_new(axis, &offset)?),
-            slots_per_record: 1,
-            hidden: (0..points.len()).map(OriginalId::from_index).collect(),
-            swapped_axis: None,
-            dropped: Vec::new(),
-        })
+        Ok(Lifted::one_each(Obfuscation::AxisPlanes(AxisPlanes::try_new(axis, &offset)?)))
     }
 }

@@ -98,6 +98,7 @@ pub const CRATES: &[(&str, &[&str])] = &[
     ("unlift-io", &["unlift"]),
     ("unlift-features", &["unlift"]),
     ("unlift-report", &[]),
+    ("unlift-testkit", &["unlift"]),
     ("unlift-audit", &["unlift", "unlift-io", "unlift-features", "unlift-report"]),
     ("unlift-cli", &["unlift", "unlift-audit", "unlift-io", "unlift-features", "unlift-report"]),
 ];

@@ -1,0 +1,127 @@
+//! What a scheme owes its users, whatever its rule.
+
+use std::collections::BTreeSet;
+
+use unlift::geometry::frame::Bounds;
+use unlift::obfuscate::{Scheme, obfuscate};
+use unlift::released::Released;
+use unlift::seed::Key;
+use unlift::truth::{Original, Secret};
+use unlift::{Error, PointSet, Unit};
+
+use crate::points::{distance_to_record, piles, room, uniform};
+
+/// Records are stored in `f32`: a few units in the last place of the largest coordinate involved, in meters.
+const TOLERANCE: f64 = 4e-6;
+/// Of so many originals, hardly more than this many may stay where they were.
+const MOST_IN_PLACE: f64 = 0.05;
+
+/// Checks all laws of a scheme:
+///
+/// 1. its name is one plain word;
+/// 2. every original has one slot or is dropped with a reason, on rooms, on piles of coincident points and on maps
+///    of hardly any points; maps that it refuses it refuses with an error;
+/// 3. every hidden point lies on its record, near the origin and a thousand kilometers off;
+/// 4. one key gives the same records on any number of threads, another key gives others;
+/// 5. the order of records tells nothing about that of the originals.
+///
+/// In the plane, points are keypoints of an image.
+///
+/// # Panics
+/// When a law is broken.
+pub fn scheme_laws<const D: usize>(scheme: &dyn Scheme<D>) {
+    let name = scheme.name();
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-+_.".contains(c);
+    assert!(!name.is_empty() && name.chars().all(is_plain), "{name:?} is no plain name");
+    for n in [0, 1, 2, 3, 7] {
+        accounts_for_all(scheme, &uniform(9, n));
+        accounts_for_all(scheme, &piles(9, 1, n, 0.0));
+    }
+    for points in [room(5, 300), piles(9, 40, 3, 0.0), uniform(8, 301)] {
+        accounts_for_all(scheme, &points);
+    }
+    for shift in [0.0, 1e6] {
+        let points: Vec<[f64; D]> = room(6, 200).iter().map(|p| p.map(|x| x + shift)).collect();
+        points_lie_on_their_records(scheme, &points, TOLERANCE + 8.0 * shift * f64::EPSILON);
+    }
+    keys_decide_alone(scheme);
+    order_tells_nothing(scheme);
+}
+
+fn hide<const D: usize>(
+    scheme: &dyn Scheme<D>,
+    points: &[[f64; D]],
+    seed: u64,
+) -> Result<(Original<D>, Released<D>, Secret), Error> {
+    let set = PointSet::try_new(points.to_vec(), Unit::Meter)?;
+    let original = match D {
+        2 => Original::within(set, image(points))?,
+        _ => Original::new(set),
+    };
+    let (released, secret) = obfuscate(scheme, &original, None, &Key::from_seed(seed))?;
+    Ok((original, released, secret))
+}
+
+/// The image that `points` are keypoints of: whole units around them.
+fn image<const D: usize>(points: &[[f64; D]]) -> Bounds<D> {
+    if points.is_empty() {
+        return Bounds { low: [0.0; D], high: [1.0; D] };
+    }
+    let column = |c: usize| points.iter().map(move |p| p[c]);
+    Bounds {
+        low: std::array::from_fn(|c| column(c).fold(f64::INFINITY, f64::min).floor() - 1.0),
+        high: std::array::from_fn(|c| column(c).fold(f64::NEG_INFINITY, f64::max).ceil() + 1.0),
+    }
+}
+
+fn accounts_for_all<const D: usize>(scheme: &dyn Scheme<D>, points: &[[f64; D]]) {
+    let (name, n) = (scheme.name(), points.len());
+    let Ok((_, released, secret)) = hide(scheme, points, 5) else { return };
+    let mut seen = vec![0; n];
+    for id in secret.hidden().iter().copied().chain(secret.dropped().iter().map(|d| d.original)) {
+        seen[id.index()] += 1;
+    }
+    let wrong = seen.iter().position(|&times| times != 1);
+    assert_eq!(wrong, None, "{name}: of {n} originals one is not in one slot or dropped once");
+    assert_eq!(secret.n_slots(), released.n_slots(), "{name}: slots of {n} originals");
+}
+
+fn points_lie_on_their_records<const D: usize>(
+    scheme: &dyn Scheme<D>,
+    points: &[[f64; D]],
+    tolerance: f64,
+) {
+    let name = scheme.name();
+    let (original, released, secret) =
+        hide(scheme, points, 3).unwrap_or_else(|e| panic!("{name} refuses a room: {e}"));
+    for (slot, id) in secret.hidden().iter().enumerate() {
+        let point = original.reveal().positions()[id.index()];
+        let local: [f64; D] = std::array::from_fn(|c| point[c] - released.origin()[c]);
+        let record = slot / released.slots_per_record();
+        let off = distance_to_record(released.obfuscation(), record, &local);
+        assert!(off <= tolerance, "{name}: the point of slot {slot} is {off} off its record");
+    }
+}
+
+fn keys_decide_alone<const D: usize>(scheme: &dyn Scheme<D>) {
+    let points = room(11, 700);
+    let on = |threads: usize, seed: u64| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        let (_, released, secret) = pool.install(|| hide(scheme, &points, seed)).expect("a room");
+        (released, secret)
+    };
+    let (name, one) = (scheme.name(), on(1, 7));
+    assert!(one == on(1, 7), "{name}: one key, two maps");
+    assert!(one == on(3, 7), "{name}: another number of threads, another map");
+    assert!(one.0 != on(1, 8).0, "{name}: two keys, one map");
+}
+
+fn order_tells_nothing<const D: usize>(scheme: &dyn Scheme<D>) {
+    let (_, _, secret) = hide(scheme, &room(12, 600), 2).expect("a room");
+    let in_place = secret.hidden().iter().enumerate().filter(|(slot, id)| id.index() == *slot);
+    let share = in_place.count() as f64 / secret.n_slots().max(1) as f64;
+    let name = scheme.name();
+    assert!(share <= MOST_IN_PLACE, "{name}: {share:.2} of the points are in the owner's order");
+    let distinct: BTreeSet<usize> = secret.hidden().iter().map(|id| id.index()).collect();
+    assert_eq!(distinct.len(), secret.n_slots(), "{name}: an original is hidden twice");
+}

@@ -1,0 +1,73 @@
+//! What a source of neighborhoods owes its users.
+
+use unlift::descriptors::Values;
+use unlift::neighbors::{Neighborhoods, Source};
+use unlift::obfuscate::{Scheme, obfuscate};
+use unlift::released::Released;
+use unlift::seed::{Draws, Key, Stage};
+use unlift::truth::{Original, Secret};
+use unlift::{Descriptors, PointSet, Unit};
+
+use crate::points::room;
+
+/// Checks all laws of a source on a map that it supports:
+///
+/// 1. its name is one word, or words joined by `+`, and it chooses at least one record;
+/// 2. one list per slot, of at most as many records as asked for, finite scores or none;
+/// 3. lists say of which map they are;
+/// 4. the same lists on any number of threads;
+/// 5. a map without records, and lists longer than there are records, are refused by an error or answered by
+///    shorter lists, not by a panic.
+///
+/// # Panics
+/// When a law is broken, or the source does not support the map.
+pub fn source_laws<const D: usize>(source: &dyn Source<D>, released: &Released<D>) {
+    let name = source.name();
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-+_.".contains(c);
+    assert!(!name.is_empty() && name.chars().all(is_plain), "{name:?} is no plain name");
+    assert!(source.k() > 0, "{name}: lists of no record");
+    if let Err(error) = source.supports(released) {
+        panic!("{name} does not support this map: {error}");
+    }
+    let lists = on(1, source, released, 6);
+    assert_eq!(lists.n_slots(), released.n_slots(), "{name}: one list per slot");
+    assert!(lists.longest() <= 6, "{name}: a list of {} where 6 were asked for", lists.longest());
+    let finite = lists.scores().is_none_or(|scores| scores.iter().all(|score| score.is_finite()));
+    assert!(finite, "{name}: a score is no number");
+    assert_eq!(lists.about().map, Some(released.fingerprint()), "{name}: of which map?");
+    assert!(lists == on(3, source, released, 6), "{name}: another number of threads, other lists");
+    if let Ok(lists) = source.lists(released, released.n_records() + 1, 0) {
+        assert!(lists.longest() < released.n_records(), "{name}: a record lists itself");
+    }
+}
+
+fn on<const D: usize>(
+    threads: usize,
+    source: &dyn Source<D>,
+    released: &Released<D>,
+    k: usize,
+) -> Neighborhoods {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+    let made = pool.install(|| source.lists(released, k, 1));
+    made.unwrap_or_else(|error| panic!("{} makes no lists: {error}", source.name()))
+}
+
+/// A room hidden by `scheme`, with SIFT-like descriptors (128 bytes) that change slowly over the room; and its
+/// secret, to measure lists by.
+///
+/// # Panics
+/// When the scheme refuses a room of `n` points.
+pub fn described_map(scheme: &dyn Scheme<3>, n: usize) -> (Original<3>, Released<3>, Secret) {
+    let points: Vec<[f64; 3]> = room(4, n);
+    let value = |point: &[f64; 3], bin: usize| {
+        let mut draws = Draws::new(99, Stage::Synthetic, bin as u64);
+        let phase: f64 = point.iter().map(|x| draws.between(-3.0, 3.0) * x).sum();
+        (60.0 + 55.0 * (phase + draws.between(0.0, 6.0)).sin()) as u8
+    };
+    let bytes = points.iter().flat_map(|point| (0..128).map(|bin| value(point, bin))).collect();
+    let descriptors = Descriptors::try_new(Values::U8(bytes), 128).expect("128 bytes a point");
+    let original = Original::new(PointSet::try_new(points, Unit::Meter).expect("finite points"));
+    let (released, secret) = obfuscate(scheme, &original, Some(&descriptors), &Key::from_seed(1))
+        .unwrap_or_else(|error| panic!("{} refuses a room: {error}", scheme.name()));
+    (original, released, secret)
+}

@@ -1,0 +1,90 @@
+//! The laws on all of ours, and on ones that break them.
+
+use unlift::geometry::frame::Bounds;
+use unlift::neighbors::sources::SOURCES;
+use unlift::neighbors::{Needs, Neighborhoods, Source};
+use unlift::obfuscate::olc::Olc;
+use unlift::obfuscate::{Lifted, SCHEMES, Scheme, SchemeOptions};
+use unlift::released::{Lines, Obfuscation, Released};
+use unlift::seed::Key;
+use unlift::{Error, Unit};
+use unlift_testkit::{described_map, scheme_laws, source_laws};
+
+#[test]
+fn our_schemes() {
+    let options = SchemeOptions::usual(Unit::Meter);
+    for entry in SCHEMES {
+        if let Some(scheme) = entry.of_dimension::<3>(&options) {
+            scheme_laws(&*scheme);
+        }
+        if let Some(scheme) = entry.of_dimension::<2>(&options) {
+            scheme_laws(&*scheme);
+        }
+    }
+}
+
+#[test]
+fn our_sources() {
+    let (_, released, _) = described_map(&Olc, 300);
+    for source in SOURCES.iter().filter_map(|entry| entry.of_dimension::<3>()) {
+        source_laws(&*source, &released);
+    }
+}
+
+/// Draws nothing: all lines are level, whatever the key.
+#[derive(Debug)]
+struct Keyless;
+
+impl Scheme<3> for Keyless {
+    fn name(&self) -> &str {
+        "keyless"
+    }
+
+    fn lift(
+        &self,
+        points: &[[f64; 3]],
+        _: Option<&Bounds<3>>,
+        _: &Key,
+    ) -> Result<Lifted<3>, Error> {
+        // A hand's breadth beside the point.
+        let beside: Vec<[f64; 3]> = points.iter().map(|p| [p[0], p[1], p[2] + 0.1]).collect();
+        let lines = Lines::through(&beside, &vec![[1.0, 0.0, 0.0]; points.len()])?;
+        Ok(Lifted::one_each(Obfuscation::Lines(lines)))
+    }
+}
+
+#[test]
+#[should_panic(expected = "off its record")]
+fn a_scheme_that_loses_its_points_is_found_out() {
+    scheme_laws(&Keyless);
+}
+
+/// Lists of no map.
+#[derive(Debug)]
+struct Nameless;
+
+impl Source<3> for Nameless {
+    fn name(&self) -> &str {
+        "nameless"
+    }
+
+    fn needs(&self) -> Needs {
+        Needs::Nothing
+    }
+
+    fn k(&self) -> usize {
+        1
+    }
+
+    fn lists(&self, released: &Released<3>, _: usize, _: u64) -> Result<Neighborhoods, Error> {
+        let (n, slots) = (released.n_records(), released.slots_per_record());
+        Neighborhoods::try_new(vec![0; n * slots + 1], Vec::new(), None, n, slots)
+    }
+}
+
+#[test]
+#[should_panic(expected = "of which map?")]
+fn a_source_that_hides_its_map_is_found_out() {
+    let (_, released, _) = described_map(&Olc, 50);
+    source_laws(&Nameless, &released);
+}

@@ -1,0 +1,80 @@
+//! A scheme that is not ours, audited: `cargo run --release -p unlift --example own_scheme`.
+//!
+//! Records are of four families (lines, rays, axis planes, axis candidates): that is what the attacks know. These are lines
+//! that are all nearly upright. Is that safer than lines in all directions?
+
+use std::sync::Arc;
+
+use unlift::audit::{Plan, Silent, run};
+use unlift::geometry::frame::Bounds;
+use unlift::obfuscate::olc::Olc;
+use unlift::obfuscate::{Facts, Lifted, Scheme};
+use unlift::released::{Lines, Obfuscation};
+use unlift::seed::{Key, Stage};
+use unlift::truth::Original;
+use unlift::{Error, PointSet, Unit, synthetic};
+
+/// A line through every point, tilted from the vertical by a random direction.
+#[derive(Debug)]
+struct Tilted {
+    /// The tangent of the tilt, at most.
+    most: f64,
+}
+
+impl Scheme<3> for Tilted {
+    fn name(&self) -> &str {
+        "tilted"
+    }
+
+    fn facts(&self) -> Facts {
+        Facts { summary: "a nearly upright line through every point", ..Facts::default() }
+    }
+
+    fn parameters(&self) -> Vec<(&'static str, f64)> {
+        vec![("tilt", self.most)]
+    }
+
+    fn lift(
+        &self,
+        points: &[[f64; 3]],
+        _: Option<&Bounds<3>>,
+        key: &Key,
+    ) -> Result<Lifted<3>, Error> {
+        let key = key.stage(Stage::Scheme);
+        let direction = |row: usize| {
+            let mut draws = key.draws(row as u64);
+            let [x, y] = draws.direction::<2>();
+            let tilt = self.most * draws.between(0.0, 1.0);
+            [tilt * x, tilt * y, 1.0]
+        };
+        let directions: Vec<[f64; 3]> = (0..points.len()).map(direction).collect();
+        Ok(Lifted::one_each(Obfuscation::Lines(Lines::through(points, &directions)?)))
+    }
+}
+
+fn main() -> Result<(), Error> {
+    // In a test of your crate: that it hides every point, on its record, by its key alone.
+    unlift_testkit::scheme_laws(&Tilted { most: 0.5 });
+
+    let room = Original::new(PointSet::try_new(synthetic::room(1, 3_000).points, Unit::Meter)?);
+    let plan = Plan {
+        schemes: vec![Arc::new(Olc), Arc::new(Tilted { most: 0.5 })],
+        inlier_ratios: vec![0.5, 0.1],
+        ..Plan::new(Unit::Meter)
+    };
+    println!("scheme   right  within 0.10 and 0.25 m, by the strongest attack");
+    let outcome = run(&room, None, &plan, &mut Silent)?;
+    for scheme in &plan.schemes {
+        for &ratio in &plan.inlier_ratios {
+            let rows = outcome.rows.iter();
+            let rows = rows.filter(|row| row.scheme == scheme.name() && row.inlier_ratio == ratio);
+            let best =
+                rows.max_by(|a, b| a.recovered_percent[0].total_cmp(&b.recovered_percent[0]));
+            if let Some(row) = best {
+                let [near, far] = row.recovered_percent[..] else { continue };
+                println!("{:8} {ratio:>5}  {near:5.1} {far:5.1} %, {}", row.scheme, row.solver);
+            }
+        }
+    }
+    Ok(())
+}
