@@ -71,7 +71,7 @@ fn the_verdict_leads_with_what_needs_no_neighborhoods() {
          points within 10 cm; the shares run from 83 % (RAY-VOXEL) to 92 % (OLC).",
         "OLC Random lines Today, from the released data alone at least 58 % most by records alone \
          (tomography) If half of the neighbors were known at least 92 % the great majority by oracle, \
-         50 % right, consensus A blind guess gets 1.9 %, the records alone 59 %. To that, neighborhoods \
+         50 % right, consensus A blind guess gets 1.9 %, the records alone 58 %. To that, neighborhoods \
          add 33 percentage points (oracle). Half of the points come back even when 10 % of the neighbors \
          are right, the fewest tested.",
         "PLANE Axis-aligned planes Today, from the released data alone Not tried on this scheme, so \
