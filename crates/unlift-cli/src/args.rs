@@ -15,6 +15,7 @@ use crate::args_audit::{AttackArgs, ResultArgs, RunArgs};
 use crate::args_bench::BenchRecoverArgs;
 use crate::args_features::FeaturesArgs;
 use crate::args_images::AuditImagesArgs;
+use crate::args_released::AuditReleasedArgs;
 use crate::values::{self, NeighborSource, OutlierFilter};
 
 /// How much of a privacy-preserving ("obfuscated") SfM map or image comes back?
@@ -92,13 +93,16 @@ pub enum Command {
 #[command(after_help = "\
 Examples:
   unlift audit map PROJECT --scale 1
-  unlift audit images photos")]
+  unlift audit images photos
+  unlift audit released mine.parquet --truth truth.parquet")]
 pub enum AuditCommand {
     /// Audit a 3D map: COLMAP, PLY, CSV, XYZ or NPY
     // Boxed: ten times the size of the other commands.
     Map(Box<AuditMapArgs>),
     /// Audit images: a folder of photos, hloc's features.h5, or a COLMAP database.db
     Images(Box<AuditImagesArgs>),
+    /// Audit records that you made yourself: released.parquet and truth.parquet of a scheme of your own
+    Released(Box<AuditReleasedArgs>),
 }
 
 /// Options of `demo`.

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use unlift::Descriptors;
-use unlift::audit::{Cell, NotAudited, Observer, Plan, REFERENCE, Row, run};
+use unlift::audit::{Cell, NotAudited, Observer, Plan, REFERENCE, Row, run, run_released};
 use unlift::recover::Solver;
-use unlift::truth::Original;
+use unlift::released::Released;
+use unlift::truth::{Original, Secret};
 use unlift_io::atomic::OutputSet;
 use unlift_report::document::{Document, GateResult, Input};
 use unlift_report::{ErrorCdf, RenderOptions, render, text_table};
@@ -25,6 +26,8 @@ pub struct Job<'a> {
     pub original: &'a Original<3>,
     /// One row per point.
     pub descriptors: Option<&'a Descriptors>,
+    /// What is released of them and the secret, where they are hidden already.
+    pub hidden: Option<&'a (Released<3>, Secret)>,
     /// Camera centers in the unit of the audit, for the picture.
     pub cameras: Vec<[f64; 3]>,
     /// The direction that is up in the picture, where known.
@@ -93,10 +96,14 @@ pub fn perform(job: Job<'_>, mut out: OutputSet) -> anyhow::Result<Finished> {
         thresholds: job.plan.thresholds.iter().map(|t| t.value).collect(),
         failed: None,
     };
-    let outcome = run(job.original, job.descriptors, &job.plan, &mut watcher).map_err(|error| {
-        let file = job.input.path.clone().unwrap_or_default();
-        advise(unlift_io::Error::core(file, error), "a smaller --k, or fewer --schemes")
-    })?;
+    let of_file = |error| unlift_io::Error::core(job.input.path.clone().unwrap_or_default(), error);
+    let outcome = match job.hidden {
+        None => run(job.original, job.descriptors, &job.plan, &mut watcher)
+            .map_err(|error| advise(of_file(error), "a smaller --k, or fewer --schemes"))?,
+        Some(hidden) => {
+            run_released(job.original, hidden, &job.plan, &mut watcher).map_err(of_file)?
+        }
+    };
     if let Some(error) = watcher.failed {
         return Err(error.into());
     }

@@ -5,6 +5,7 @@ mod args_audit;
 mod args_bench;
 mod args_features;
 mod args_images;
+mod args_released;
 mod clouds;
 mod commands;
 mod document;

@@ -43,6 +43,7 @@ pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
         let job = Job {
             original: &prepared.original,
             descriptors: prepared.descriptors.as_ref(),
+            hidden: None,
             cameras: input.cameras.iter().map(|c| c.map(|x| x * scale)).collect(),
             up: input.up,
             plan: plan(&args, &prepared, &input)?,
@@ -154,7 +155,11 @@ fn check_own(joined: &Joined, prepared: &Prepared, input: &read::Input) -> anyho
 }
 
 /// Lists by row of the file, for the rows that were kept.
-fn by_point(path: &Path, prepared: &Prepared, n_read: usize) -> anyhow::Result<PointNeighbors> {
+pub(super) fn by_point(
+    path: &Path,
+    prepared: &Prepared,
+    n_read: usize,
+) -> anyhow::Result<PointNeighbors> {
     let lists = read_point_neighborhoods(path, n_read)?;
     let mut kept_as = vec![None; n_read];
     for (kept, &row) in prepared.rows.iter().enumerate() {

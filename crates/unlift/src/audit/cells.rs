@@ -47,6 +47,8 @@ pub(super) struct Owned<'a, const D: usize> {
     pub(super) original: &'a Original<D>,
     /// One row per original.
     pub(super) descriptors: Option<&'a Descriptors>,
+    /// What is released of them and the secret, where they are hidden already: no scheme is applied then.
+    pub(super) hidden: Option<&'a (Released<D>, Secret)>,
     /// A search over the originals.
     pub(super) search: &'a Knn<'a, D>,
     /// Whether it is one of many, of which some may have fewer points than a list is long: theirs are shorter.
@@ -100,19 +102,26 @@ pub(super) fn cells<const D: usize>(
     // make keys (tests/architecture).
     let attacker = plan.seed.wrapping_add(u64::from(repeat));
     let of_scheme = |error: Error| error.within(entry.name);
-    let hidden = match hide(entry, original, owned.descriptors, plan, key, clock) {
-        Err(error) if !owned.one_of_many => return Ok(vec![NotAudited::scheme(entry, &error)]),
-        hidden => hidden.map_err(of_scheme)?,
+    let made;
+    let hidden = match owned.hidden {
+        Some(hidden) => hidden,
+        None => match hide(entry, original, owned.descriptors, plan, key, clock) {
+            Err(error) if !owned.one_of_many => return Ok(vec![NotAudited::scheme(entry, &error)]),
+            hidden => {
+                made = hidden.map_err(of_scheme)?;
+                &made
+            }
+        },
     };
     let baseline = clock.time(|s| &mut s.evaluate, || Ok(blind(&hidden.0, original, &hidden.1)))?;
     // In the plane all lines meet: records alone tell nothing there.
     let alone = match plan.records_alone && D == 3 {
         true => clock
-            .time(|s| &mut s.records_alone, || records_alone(&hidden, original, plan, attacker))?,
+            .time(|s| &mut s.records_alone, || records_alone(hidden, original, plan, attacker))?,
         false => Vec::new(),
     };
     let by_row = hidden.1.by_descriptor_row();
-    let mut sources = Lists::new(plan, owned.search, &hidden, &by_row, (oracle_seed, attacker));
+    let mut sources = Lists::new(plan, owned.search, hidden, &by_row, (oracle_seed, attacker));
     let mut missing = Vec::new();
     for variant in &plan.variants() {
         let source = match variant.noise {
@@ -202,7 +211,7 @@ pub(super) fn cells<const D: usize>(
         }
     }
     if plan.reference {
-        let (row, accuracy) = reference_row(entry, &hidden, owned, &baseline, plan, alone);
+        let (row, accuracy) = reference_row(entry, hidden, owned, &baseline, plan, alone);
         let weights = places(owned, &hidden.1);
         let seconds = RowSeconds::default();
         let (accuracy, baseline, weights) = (&accuracy, &baseline, &weights[..]);

@@ -162,8 +162,13 @@ fn one(image: &Image, plan: &Plan, seen: &mut impl Observer<2>) -> Result<(Vec<R
     let Sums { pools, rows: seconds, clock } = &mut sums;
     let search = clock.time(|s| &mut s.search, || oracle::search(&image.original))?;
     let descriptors = image.descriptors.as_ref();
-    let owned =
-        Owned { original: &image.original, descriptors, search: &search, one_of_many: true };
+    let owned = Owned {
+        original: &image.original,
+        descriptors,
+        hidden: None,
+        search: &search,
+        one_of_many: true,
+    };
     let total = per_scheme(plan) * plan.schemes.len() * plan.repeats as usize;
     let mut n_done = 0;
     let mut by_repeat: Vec<Vec<Row>> = Vec::new();
@@ -213,10 +218,4 @@ fn check(image: &Image, plan: &Plan) -> Result<(), Error> {
         return Err(Error::new("descriptors", expected, "none"));
     }
     Ok(())
-}
-
-/// FNV-1a, 64 bits.
-pub(super) fn hash(name: &str) -> u64 {
-    let step = |h: u64, byte: u8| (h ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3);
-    name.bytes().fold(0xCBF2_9CE4_8422_2325, step)
 }

@@ -7,8 +7,9 @@ use super::not_audited::{NotAudited, told};
 use super::plan::Plan;
 use super::row::Row;
 use crate::neighbors::oracle;
+use crate::released::Released;
 use crate::seed::Key;
-use crate::truth::Original;
+use crate::truth::{Original, Secret};
 use crate::{Descriptors, Error};
 
 /// Hears how an audit goes.
@@ -96,9 +97,19 @@ pub fn run(
     observer: &mut dyn Observer,
 ) -> Result<Outcome, Error> {
     plan.check(original.len(), descriptors.is_some())?;
+    every_cell((original, descriptors), None, plan, observer)
+}
+
+/// The same for a map that is `hidden` already, if so for the one scheme of the plan.
+pub(super) fn every_cell(
+    (original, descriptors): (&Original<3>, Option<&Descriptors>),
+    hidden: Option<&(Released<3>, Secret)>,
+    plan: &Plan,
+    observer: &mut dyn Observer,
+) -> Result<Outcome, Error> {
     let mut clock = Clock::default();
     let search = clock.time(|s| &mut s.search, || oracle::search(original))?;
-    let owned = Owned { original, descriptors, search: &search, one_of_many: false };
+    let owned = Owned { original, descriptors, hidden, search: &search, one_of_many: false };
     let per_scheme = per_scheme(plan);
     let total = per_scheme * plan.schemes.len() * plan.repeats as usize;
     let mut done = 0;

@@ -2,7 +2,6 @@
 //! an audit of images.
 
 use super::cells::Finished;
-use super::images::hash;
 use super::lists::Lists;
 use super::measure::measure;
 use super::plan::{Plan, Source, Threshold, Variant};
@@ -121,4 +120,10 @@ impl Pooled {
         }
         Some(row)
     }
+}
+
+/// FNV-1a, 64 bits.
+fn hash(name: &str) -> u64 {
+    let step = |h: u64, byte: u8| (h ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3);
+    name.bytes().fold(0xCBF2_9CE4_8422_2325, step)
 }
