@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use unlift::audit::{Cell, NotAudited, Observer, Plan, REFERENCE, Row, run};
+use unlift::audit::{Cell, NotAudited, Observer, Plan, REFERENCE, Row, run, run_released};
 use unlift::recover::Solver;
-use unlift::truth::Original;
+use unlift::released::Released;
+use unlift::truth::{Original, Secret};
 use unlift::{Descriptors, Unit};
 use unlift_io::atomic::OutputSet;
 use unlift_io::hash::hash_files;
@@ -29,6 +30,8 @@ pub struct Job<'a> {
     pub original: &'a Original<3>,
     /// One row per point.
     pub descriptors: Option<&'a Descriptors>,
+    /// What is released of them and the secret, where they are hidden already.
+    pub hidden: Option<&'a (Released<3>, Secret)>,
     /// Camera centers in the unit of the audit, for the picture.
     pub cameras: Vec<[f64; 3]>,
     /// The direction that is up in the picture, where known.
@@ -82,6 +85,7 @@ impl<'a> Job<'a> {
         Ok(Self {
             original: &prepared.original,
             descriptors: prepared.descriptors.as_ref(),
+            hidden: None,
             cameras: input.cameras.iter().map(|c| c.map(|x| x * scale)).collect(),
             up: input.up,
             plan: Plan::new(points.unit()).for_map(points.len(), USUAL_K),
@@ -189,10 +193,17 @@ pub fn perform(job: Job<'_>, mut out: OutputSet) -> Result<Finished, Error> {
         thresholds: job.plan.thresholds.iter().map(|t| t.value).collect(),
         failed: None,
     };
-    let outcome = run(job.original, job.descriptors, &job.plan, &mut watcher).map_err(|error| {
+    let of_file = |error| {
         let file = job.input.path.clone().unwrap_or_default();
-        Error::from(unlift_io::Error::core(file, error)).advise("a smaller --k, or fewer --schemes")
-    })?;
+        Error::from(unlift_io::Error::core(file, error))
+    };
+    let outcome = match job.hidden {
+        None => run(job.original, job.descriptors, &job.plan, &mut watcher)
+            .map_err(|error| of_file(error).advise("a smaller --k, or fewer --schemes"))?,
+        Some(hidden) => {
+            run_released(job.original, hidden, &job.plan, &mut watcher).map_err(of_file)?
+        }
+    };
     if let Some(error) = watcher.failed {
         return Err(error.into());
     }

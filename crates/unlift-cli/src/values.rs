@@ -25,6 +25,16 @@ pub fn any_scheme(text: &str) -> Result<&'static Entry, String> {
     unlift::obfuscate::scheme(text).map_err(|error| expected(&error))
 }
 
+/// A name for a scheme of somebody else, as it can stand in a gate and in the name of a file.
+pub fn scheme_name(text: &str) -> Result<String, String> {
+    let known = |c: char| c.is_ascii_alphanumeric() || "+-_.".contains(c);
+    let fits = (1..=40).contains(&text.len()) && text.chars().all(known);
+    if fits && text != "all" && text.starts_with(|c: char| c.is_ascii_alphanumeric()) {
+        return Ok(text.to_owned());
+    }
+    Err(format!("expected up to 40 letters, digits, +, -, _ and . (not all), found {text}"))
+}
+
 /// A scheme for maps by its name.
 pub fn scheme(text: &str) -> Result<&'static Entry, String> {
     if let Some(entry) = all_schemes().into_iter().find(|entry| entry.name == text) {

@@ -340,6 +340,7 @@ fn help_is_part_of_the_interface() {
         "demo",
         "audit map",
         "audit images",
+        "audit released",
         "obfuscate",
         "neighbors oracle",
         "neighbors find",

@@ -46,6 +46,7 @@ impl Gate {
         }
         let scheme = match scheme.trim() {
             "all" => None,
+            "" => return Err(form("no scheme")),
             // Whether a plan has it, the plan knows.
             name => Some(name.to_owned()),
         };

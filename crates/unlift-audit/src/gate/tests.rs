@@ -138,6 +138,7 @@ fn each_wrong_part_is_named() {
     assert_eq!(message("ppl@2:0.1<=20"), "inlier ratio: expected a number from 0 to 1, found 2");
     assert_eq!(message("ppl:x<=20"), "threshold: expected a number above 0, found x");
     assert_eq!(message("ppl:0.1<=120"), "bound: expected 0 to 100 percent, found 120");
+    assert_eq!(message(":0.1<=20"), format!("{form}, found no scheme"));
     // A scheme may be anybody's: the plan knows whether it has it.
     let unknown = Gate::parse("pl:0.1<=20").unwrap().not_in(&Plan::<3>::new(unlift::Unit::Meter));
     assert!(unknown.unwrap().0.starts_with("scheme: one of olc, ppl"));

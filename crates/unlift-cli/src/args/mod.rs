@@ -3,6 +3,7 @@
 mod audit;
 mod audit_images;
 mod audit_map;
+mod audit_released;
 mod bench;
 mod demo;
 mod evaluate;
@@ -19,6 +20,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 pub use audit::AttackArgs;
 pub use audit_images::AuditImagesArgs;
 pub use audit_map::AuditMapArgs;
+pub use audit_released::AuditReleasedArgs;
 pub use bench::BenchRecoverArgs;
 pub use demo::DemoArgs;
 pub use evaluate::EvaluateArgs;
@@ -103,13 +105,16 @@ pub enum Command {
 #[command(after_help = "\
 Examples:
   unlift audit map PROJECT --scale 1
-  unlift audit images photos")]
+  unlift audit images photos
+  unlift audit released mine.parquet --truth truth.parquet")]
 pub enum AuditCommand {
     /// Audit a 3D map: COLMAP, PLY, CSV, XYZ or NPY
     // Boxed: ten times the size of the other commands.
     Map(Box<AuditMapArgs>),
     /// Audit images: a folder of photos, hloc's features.h5, or a COLMAP database.db
     Images(Box<AuditImagesArgs>),
+    /// Audit records that you made yourself: released.parquet and truth.parquet of a scheme of your own
+    Released(Box<AuditReleasedArgs>),
 }
 
 /// What can be measured.

@@ -35,6 +35,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
         let job = Job {
             original: &original,
             descriptors: None,
+            hidden: None,
             cameras: room.cameras.iter().map(|camera| camera.center).collect(),
             up: None,
             plan: Plan::new(Unit::Meter),

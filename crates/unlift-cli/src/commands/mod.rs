@@ -2,6 +2,7 @@
 
 mod audit_images;
 mod audit_map;
+mod audit_released;
 mod bench;
 mod demo;
 mod evaluate;
@@ -35,6 +36,7 @@ pub fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Demo(args) => demo::run(&args),
         Command::Audit(AuditCommand::Map(args)) => audit_map::run(*args),
         Command::Audit(AuditCommand::Images(args)) => audit_images::run(&args),
+        Command::Audit(AuditCommand::Released(args)) => audit_released::run(&args),
         Command::Obfuscate(args) => obfuscate::run(&args),
         Command::Neighbors(NeighborsCommand::Oracle(args)) => neighbors::oracle(&args),
         Command::Neighbors(NeighborsCommand::Find(args)) => neighbors::find(&args),

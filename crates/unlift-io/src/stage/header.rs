@@ -225,6 +225,15 @@ impl<'a> Meta<'a> {
         self.object.get(key).and_then(Value::as_str)
     }
 
+    /// A text, if the key is there.
+    pub(super) fn optional_text(&self, key: &str) -> Result<Option<String>, Error> {
+        match self.object.get(key) {
+            None => Ok(None),
+            Some(Value::String(text)) => Ok(Some(text.clone())),
+            Some(_) => Err(self.wrong(key, "text")),
+        }
+    }
+
     /// A whole number of at least 1; 1 when it is not given.
     pub(super) fn count_or_1(&self, key: &str) -> Result<usize, Error> {
         Ok(self.count(key)?.unwrap_or(1))

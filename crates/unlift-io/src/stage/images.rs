@@ -1,6 +1,5 @@
 //! Many images in one stage file: their rows stand together, and are read image by image.
 
-use super::column::Batch;
 use super::file::{Batches, ParquetFile};
 use super::header::{Kind, Meta};
 use super::neighborhoods::neighborhoods_of;
@@ -279,18 +278,4 @@ impl ImageRows<'_> {
         let table = Table::held(self.path, self.meta, self.held);
         read(&table).map_err(|error| error.within(&place(&self.name)))
     }
-}
-
-/// Hands batches of held rows to `each`, rows counted from the first on.
-pub(super) fn each_held(
-    path: &Path,
-    held: &[RecordBatch],
-    mut each: impl FnMut(&Batch<'_>) -> Result<(), Error>,
-) -> Result<(), Error> {
-    let mut first_row = 0;
-    for rows in held {
-        each(&Batch::new(path, rows, first_row))?;
-        first_row += rows.num_rows() as u64;
-    }
-    Ok(())
 }

@@ -29,5 +29,5 @@ pub use neighborhoods::{
     PointNeighborhoods, read_neighborhoods, read_point_neighborhoods, write_neighborhoods,
 };
 pub use recovered::{read_recovered, read_recovered_in, write_recovered};
-pub use released::{read_released, write_released};
+pub use released::{read_released, scheme_name, write_released};
 pub use truth::{read_truth, write_truth};

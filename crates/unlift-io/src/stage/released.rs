@@ -105,6 +105,15 @@ pub fn read_released<const D: usize>(path: &Path) -> Result<Released<D>, Error> 
     released_of(&Table::open_kind(path, Kind::Released)?)
 }
 
+/// What the released map at `path` calls its scheme; `None` where it does not say. unlift writes no such name.
+///
+/// # Errors
+/// When it is no Parquet file, or the name is no text.
+pub fn scheme_name(path: &Path) -> Result<Option<String>, Error> {
+    let table = Table::open(path)?;
+    table.meta().optional_text("scheme")
+}
+
 /// The released map of a table.
 pub(super) fn released_of<const D: usize>(table: &Table<'_>) -> Result<Released<D>, Error> {
     let core = |source| table.refused(source);

@@ -3,7 +3,6 @@
 use super::column::{Batch, Type};
 use super::file::ParquetFile;
 use super::header::{Kind, Meta};
-use super::images::each_held;
 use crate::Error;
 use arrow_array::RecordBatch;
 use arrow_schema::SchemaRef;
@@ -162,7 +161,14 @@ impl<'a> Table<'a> {
         }
         let file = match &self.rows {
             Rows::File(file) => file,
-            Rows::Held(held) => return each_held(self.path, held, each),
+            Rows::Held(held) => {
+                let mut first_row = 0;
+                for rows in held {
+                    each(&Batch::new(self.path, rows, first_row))?;
+                    first_row += rows.num_rows() as u64;
+                }
+                return Ok(());
+            }
         };
         let mut batches = file.batches(roots)?;
         let mut first_row = 0;

@@ -48,6 +48,8 @@ pub(super) struct Owned<'a, const D: usize> {
     pub(super) original: &'a Original<D>,
     /// One row per original.
     pub(super) descriptors: Option<&'a Descriptors>,
+    /// What is released of them and the secret, where they are hidden already: no scheme is applied then.
+    pub(super) hidden: Option<&'a (Released<D>, Secret)>,
     /// A search over the originals.
     pub(super) search: &'a Knn<'a, D>,
     /// Its name, if it is one of many, of which some may have fewer points than a list is long: theirs are shorter.
@@ -95,6 +97,9 @@ pub(super) fn cells<const D: usize>(
     observer: &mut dyn Observer<D>,
     each: impl FnMut(&mut dyn Observer<D>, Option<String>, Option<Finished<'_>>),
 ) -> Result<Vec<NotAudited>, Error> {
+    if let Some(hidden) = owned.hidden {
+        return attack(owned, run, hidden, clock, observer, each);
+    }
     let hide = || obfuscate(scheme, owned.original, owned.descriptors, key);
     match clock.time(|s| &mut s.obfuscate, hide) {
         Ok(hidden) => attack(owned, run, &hidden, clock, observer, each),

@@ -150,7 +150,8 @@ fn one(
     let Sums { pools, rows: seconds, clock } = &mut sums;
     let search = clock.time(|s| &mut s.search, || oracle::search(&image.original))?;
     let (original, descriptors) = (&image.original, image.descriptors.as_ref());
-    let owned = Owned { original, descriptors, search: &search, name: Some(&image.name) };
+    let (hidden, name) = (None, Some(&*image.name));
+    let owned = Owned { original, descriptors, hidden, search: &search, name };
     let found = of_item(&owned, plan, clock, seen, |row, finished| {
         if pools.len() <= row {
             pools.push(Vec::new());

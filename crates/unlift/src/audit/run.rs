@@ -8,7 +8,8 @@ use super::not_audited::NotAudited;
 use super::plan::Plan;
 use super::row::Row;
 use crate::neighbors::oracle;
-use crate::truth::Original;
+use crate::released::Released;
+use crate::truth::{Original, Secret};
 use crate::{Descriptors, Error};
 
 /// Hears how an audit goes.
@@ -105,9 +106,19 @@ pub fn run<const D: usize>(
     observer: &mut dyn Observer<D>,
 ) -> Result<Outcome, Error> {
     plan.check(original.len(), descriptors.is_some())?;
+    every_cell((original, descriptors), None, plan, observer)
+}
+
+/// The same for a map that is `hidden` already, if so for the one scheme of the plan.
+pub(super) fn every_cell<const D: usize>(
+    (original, descriptors): (&Original<D>, Option<&Descriptors>),
+    hidden: Option<&(Released<D>, Secret)>,
+    plan: &Plan<D>,
+    observer: &mut dyn Observer<D>,
+) -> Result<Outcome, Error> {
     let mut clock = Clock::default();
     let search = clock.time(|s| &mut s.search, || oracle::search(original))?;
-    let owned = Owned { original, descriptors, search: &search, name: None };
+    let owned = Owned { original, descriptors, hidden, search: &search, name: None };
     let Rows { rows, seconds, not_audited } =
         of_item(&owned, plan, &mut clock, observer, |_, _| ())?;
     if let (true, Some(first)) = (rows.is_empty(), not_audited.first()) {

@@ -1,7 +1,9 @@
-//! Whether positions that do not say which map they are of can be of this one.
+//! Whether positions or points that do not say which map they are of can be of this one.
 
-use crate::geometry::vector::distance;
+use crate::Error;
+use crate::geometry::vector::{distance, dot, sub};
 use crate::recover::Recovered;
+use crate::released::{Obfuscation, Released};
 use crate::truth::{Original, Secret};
 
 /// Of how many recovered positions, how many are nearer to a point of their own record than to one of a record half
@@ -29,4 +31,95 @@ pub fn nearer_to_own<const D: usize>(
         nearer += usize::from(nearest(&position, record) < nearest(&position, other));
     }
     (nearer, n)
+}
+
+/// Fewer slots than this are too few to judge.
+const FEW: usize = 30;
+
+/// Refuses a truth that is not that of the released map: of another unit, number of points or fingerprint, or, by
+/// where its points lie, of another map. What comes back would be next to nothing, and read as "safe".
+///
+/// # Errors
+/// When the three do not belong together.
+pub fn belongs<const D: usize>(
+    original: &Original<D>,
+    released: &Released<D>,
+    secret: &Secret,
+) -> Result<(), Error> {
+    let (unit, found) = (original.reveal().unit(), released.unit());
+    if unit != found {
+        let expected = format!("{}, as of the originals", unit.name());
+        return Err(Error::new("unit of the released map", expected, found.name()));
+    }
+    for (what, expected, found) in [
+        ("originals", secret.n_originals(), original.len()),
+        ("hidden points", secret.n_slots(), released.n_slots()),
+        ("hidden points per record", secret.slots_per_record(), released.slots_per_record()),
+    ] {
+        if expected != found {
+            let expected = format!("{expected}, as in the secret");
+            return Err(Error::new(what, expected, found.to_string()));
+        }
+    }
+    released.fingerprint().expect(secret.map())?;
+    let (nearer, n) = nearer_to_own_record(released, original, secret);
+    // Of strangers half are nearer; two standard deviations on top.
+    if n >= FEW && nearer as f64 <= 0.5 * n as f64 + (n as f64).sqrt() {
+        let expected = "points nearer to their own records than to others";
+        let found = format!(
+            "{nearer} of {n} (of another map, in another frame, or in another order of slots)"
+        );
+        return Err(Error::new("truth", expected, found));
+    }
+    Ok(())
+}
+
+/// Of how many hidden points, how many are nearer to their own record than to one half a map away. Of points of
+/// another map, or in another order, it is half of them.
+fn nearer_to_own_record<const D: usize>(
+    released: &Released<D>,
+    original: &Original<D>,
+    secret: &Secret,
+) -> (usize, usize) {
+    let (points, origin) = (original.reveal().positions(), released.origin());
+    let (slots, n_records) = (released.slots_per_record(), released.n_records());
+    let n = secret.n_slots().min(released.n_slots());
+    let is_nearer = |slot: &usize| {
+        let point = sub(&points[secret.hidden()[*slot].index()], &origin);
+        let record = slot / slots;
+        let other = (record + n_records.div_ceil(2)) % n_records;
+        let away = |record: usize| to_record(released.obfuscation(), record, &point);
+        away(record) < away(other)
+    };
+    ((0..n).filter(is_nearer).count(), n)
+}
+
+/// The distance from `point`, about the released origin, to a record.
+fn to_record<const D: usize>(obfuscation: &Obfuscation<D>, record: usize, point: &[f64; D]) -> f64 {
+    let to_line = |from: [f32; D], direction: [f32; D], least: f64| {
+        let (from, direction) = (from.map(f64::from), direction.map(f64::from));
+        let t = dot(&sub(point, &from), &direction).max(least);
+        distance(point, &std::array::from_fn(|axis| from[axis] + t * direction[axis]))
+    };
+    match obfuscation {
+        Obfuscation::Lines(lines) => {
+            to_line(lines.foot()[record], lines.direction()[record], f64::NEG_INFINITY)
+        }
+        Obfuscation::Rays(rays) => {
+            let center = rays.centers()[usize::from(rays.center()[record])];
+            to_line(center, rays.direction()[record], 0.0)
+        }
+        Obfuscation::AxisPlanes(planes) => {
+            let axis = usize::from(planes.axis()[record]);
+            (point[axis] - f64::from(planes.offset()[record])).abs()
+        }
+        Obfuscation::AxisCandidates(candidates) => {
+            let published = candidates.position()[record];
+            let lines = (0..D).map(|axis| {
+                let direction = std::array::from_fn(|other| f32::from(u8::from(other == axis)));
+                to_line(published, direction, f64::NEG_INFINITY)
+            });
+            lines.fold(f64::INFINITY, f64::min)
+        }
+    }
 }

@@ -1,0 +1,234 @@
+//! `unlift audit released`: records that somebody else made, and their truth, in; one honest answer out.
+
+use std::time::Instant;
+
+use serde_json::{Map, json};
+use unlift::audit::{NeighborsBy, Plan, scheme_called};
+use unlift::neighbors::Needs;
+use unlift::released::Released;
+use unlift::truth::Secret;
+use unlift_audit::maps::perform;
+use unlift_audit::{Job, Prepared, Shown, by_point, check_thresholds, open_audit, ordered};
+use unlift_io::atomic::Rules;
+use unlift_io::hash::{hash_file, hash_files};
+use unlift_io::read::{self, Input as Points};
+use unlift_io::stage::{has_images, read_released, read_truth, scheme_name};
+use unlift_report::document::Input;
+
+use super::evaluate::expect_slots;
+use super::plan::{attack, check_about, check_fit, own, solvers, summary, thresholds};
+use super::{same_map, with_threads};
+use crate::args::AuditReleasedArgs;
+use crate::exit::{Outcome, advise, usage};
+use crate::output::{command_line, print};
+use crate::progress::{Progress, Stderr};
+use crate::values::{self, NeighborSource, distinct};
+
+/// What a scheme is called that nobody named.
+const UNNAMED: &str = "released";
+
+/// Audits a map that is hidden already.
+pub fn run(args: &AuditReleasedArgs) -> anyhow::Result<Outcome> {
+    let started = Instant::now();
+    let shown = match (args.result.share_safe, args.write_clouds) {
+        (true, _) => Shown::Figures,
+        (false, true) => Shown::Clouds,
+        (false, false) => Shown::Points,
+    };
+    let inputs = [args.released.as_path(), &args.truth].into_iter();
+    let inputs = inputs.chain(args.descriptors.as_deref()).chain(lists(args));
+    let out = open_audit(&args.result.out, Rules::new(inputs, args.result.force), shown, &Stderr)?;
+    let finished = with_threads(args.run.threads, || {
+        let name = name(args)?;
+        let (prepared, hidden) = open(args)?;
+        let progress = Progress::new(args.run.quiet);
+        let job = Job {
+            original: &prepared.original,
+            descriptors: None,
+            hidden: Some(&hidden),
+            cameras: Vec::new(),
+            up: None,
+            plan: plan(args, &name, &prepared, &hidden.0)?,
+            input: provenance(args, &prepared)?,
+            options: Map::from_iter([("released".to_owned(), json!(true))]),
+            gates: args.result.gate.clone(),
+            out: args.result.out.clone(),
+            unit_in_map_units: 1.0,
+            write_clouds: args.write_clouds,
+            share_safe: args.result.share_safe,
+            progress: &progress,
+            command: Some(command_line()),
+            started,
+        };
+        Ok(perform(job, out)?)
+    })?;
+    print(&if args.result.json { summary(&finished)? } else { finished.text() })?;
+    Ok(if finished.passed() { Outcome::Done } else { Outcome::GateFailed })
+}
+
+/// Files of lists.
+fn lists(args: &AuditReleasedArgs) -> impl Iterator<Item = &std::path::Path> {
+    args.neighbors.iter().filter_map(|source| match source {
+        NeighborSource::File(path) => Some(path.as_path()),
+        NeighborSource::Oracle | NeighborSource::Own(_) => None,
+    })
+}
+
+/// What the scheme is called: as the user says, else as the file does.
+fn name(args: &AuditReleasedArgs) -> anyhow::Result<String> {
+    if let Some(name) = &args.name {
+        return Ok(name.clone());
+    }
+    let Some(stated) = scheme_name(&args.released)? else { return Ok(UNNAMED.to_owned()) };
+    values::scheme_name(&stated).map_err(|wrong| {
+        let (expected, found) = wrong.split_once(", found ").unwrap_or((&wrong, &stated));
+        let expected = expected.trim_start_matches("expected ");
+        let place = "metadata unlift, scheme";
+        advise(unlift_io::Error::new(&args.released, place, expected, found), "--name NAME")
+    })
+}
+
+/// The originals, what is released of them and the secret, known to belong together.
+fn open(args: &AuditReleasedArgs) -> anyhow::Result<(Prepared, (Released<3>, Secret))> {
+    if has_images(&args.released)? {
+        let error = unlift_io::Error::new(&args.released, "", "a released map", "released images");
+        return Err(advise(error, "unlift recover and unlift evaluate, which take images, too"));
+    }
+    let released = read_released::<3>(&args.released)?;
+    let (original, secret) = read_truth::<3>(&args.truth)?;
+    same_map(&args.released, Some(released.fingerprint()), &args.truth, secret.map())?;
+    expect_slots(&args.released, &released, &secret)?;
+    let released = described(args, released, &secret)?;
+    let slots = secret.slots_per_record();
+    let secret = secret.of_map(Some(released.fingerprint()), slots);
+    let secret = secret.map_err(|error| unlift_io::Error::core(&args.truth, error))?;
+    let rows = (0..original.len() as u32).collect();
+    let prepared = Prepared { original, descriptors: None, unit_in_map_units: 1.0, rows };
+    Ok((prepared, (released, secret)))
+}
+
+/// The released map with the descriptors of the originals, if a file of them is given.
+fn described(
+    args: &AuditReleasedArgs,
+    released: Released<3>,
+    secret: &Secret,
+) -> anyhow::Result<Released<3>> {
+    let Some(path) = &args.descriptors else { return Ok(released) };
+    if released.descriptors().is_some() {
+        let found = args.released.display();
+        return Err(usage(format!(
+            "--descriptors: expected with a released map without, found some in {found}"
+        )));
+    }
+    // Which points they are of is all that is asked.
+    let points = Points {
+        positions: Vec::new(),
+        ids: (0..secret.n_originals() as u64).collect(),
+        cameras: Vec::new(),
+        up: None,
+        files: Vec::new(),
+        format: "",
+        skipped: Vec::new(),
+        model: None,
+        database: None,
+    };
+    let of_originals = read::descriptors(path, &points)?;
+    let mut of_rows = vec![0; secret.n_slots()];
+    for (slot, &row) in secret.descriptor_row().iter().enumerate() {
+        of_rows[row as usize] = secret.hidden()[slot].0;
+    }
+    let described = Released::try_new(
+        released.obfuscation().clone(),
+        released.slots_per_record(),
+        released.origin(),
+        released.unit(),
+        Some(of_originals.select(&of_rows)),
+    );
+    let described = described.map_err(|error| unlift_io::Error::core(path, error))?;
+    Ok(described.with_bounds(released.bounds()))
+}
+
+fn plan(
+    args: &AuditReleasedArgs,
+    name: &str,
+    prepared: &Prepared,
+    released: &Released<3>,
+) -> anyhow::Result<Plan<3>> {
+    let (k, points) = (usize::from(args.k), prepared.original.reveal());
+    let usual = Plan::new(points.unit()).for_map(prepared.original.len(), k);
+    let thresholds = thresholds(&args.thresholds, &usual)?;
+    let typed = !args.thresholds.is_empty();
+    if let Some(note) = check_thresholds(points.positions(), points.unit(), &thresholds, typed)? {
+        eprintln!("unlift: note: {note}");
+    }
+    Ok(Plan {
+        neighbors: sources(args, prepared, released)?,
+        schemes: vec![scheme_called(name)],
+        k,
+        solvers: solvers(&args.solver, &usual),
+        records_alone: !args.no_records_alone,
+        thresholds,
+        seed: args.seed,
+        ..attack(&args.attack, usual)
+    })
+}
+
+/// Every source once, each with what it needs.
+fn sources(
+    args: &AuditReleasedArgs,
+    prepared: &Prepared,
+    released: &Released<3>,
+) -> anyhow::Result<Vec<NeighborsBy<3>>> {
+    let mut sources = Vec::new();
+    for source in distinct(args.neighbors.clone(), |a, b| a == b) {
+        sources.push(match source {
+            NeighborSource::Oracle => NeighborsBy::Oracle,
+            NeighborSource::Own(named) => {
+                let by = own(named, &args.attack)?;
+                if let Some(source) = by.source() {
+                    let name = source.name();
+                    match released.descriptors() {
+                        Some(descriptors) => check_fit(source, descriptors)?,
+                        None if source.needs() == Needs::Descriptors => {
+                            let text = "expected descriptors in the released map, found none";
+                            return Err(usage(format!("--neighbors {name}: {text}")));
+                        }
+                        None => {}
+                    }
+                    if let Some(note) = source.note(released.n_slots()) {
+                        eprintln!("unlift: note: {note}");
+                    }
+                }
+                by
+            }
+            NeighborSource::File(path) => {
+                NeighborsBy::Given(by_point(&path, prepared, prepared.original.len(), &Stderr)?)
+            }
+        });
+    }
+    let files = lists(args).count();
+    if files > 1 {
+        return Err(usage(format!("--neighbors: expected at most one file, found {files}")));
+    }
+    check_about(&args.attack, &sources)?;
+    Ok(sources)
+}
+
+fn provenance(args: &AuditReleasedArgs, prepared: &Prepared) -> anyhow::Result<Input> {
+    let mut others = vec![("truth".to_owned(), hash_file(&args.truth)?)];
+    if let Some(path) = &args.descriptors {
+        others.push(("descriptors".to_owned(), hash_file(path)?));
+    }
+    for path in lists(args) {
+        others.push(("neighbors".to_owned(), hash_file(path)?));
+    }
+    Ok(Input {
+        path: Some(args.released.display().to_string()),
+        sha256: Some(hash_files(&[args.released.as_path()])?),
+        n_points: prepared.original.len() as u64,
+        scale_m_per_unit: None,
+        unit_in_map_units: None,
+        other_sha256: ordered(others),
+        images: None,
+    })
+}
