@@ -3,44 +3,23 @@
 use std::time::Instant;
 
 use super::clock::Clock;
+use super::clock::RowSeconds;
 use super::lists::Lists;
 use super::measure::{measure, unmeasured};
 use super::not_audited::NotAudited;
+use super::observer::{Cell, Observer};
 use super::plan::Plan;
-use super::records_alone::{Alone, records_alone};
-use super::row::Row;
-use super::run::{Observer, RowSeconds};
+use super::records_alone::records_alone;
+use super::row::{Alone, Row};
 use crate::evaluate::{Accuracy, blind, distinct_weights, joined, reference};
 use crate::geometry::knn::Knn;
-use crate::neighbors::Neighborhoods;
 use crate::neighbors::oracle::Noise;
 use crate::obfuscate::{Scheme, obfuscate};
-use crate::recover::{RecoverOptions, Recovered, Solver, recover, recover_with_start};
+use crate::recover::{RecoverOptions, Solver, recover, recover_with_start};
 use crate::released::Released;
 use crate::seed::Key;
 use crate::truth::{Original, Secret};
 use crate::{Descriptors, Error};
-
-/// Everything known about one row of one repeat, for whoever writes clouds, draws pictures or measures more.
-#[derive(Clone, Copy)]
-pub struct Cell<'a, const D: usize = 3> {
-    /// The row of this repeat.
-    pub row: &'a Row,
-    /// Which repeat, from 0.
-    pub repeat: u32,
-    /// The truth.
-    pub original: &'a Original<D>,
-    /// The secret of this obfuscation, its slots counted as the rows of `recovered` are.
-    pub secret: &'a Secret,
-    /// What the attacker saw.
-    pub released: &'a Released<D>,
-    /// The lists it was recovered from: one per slot, by descriptor row for an attacker's own sources.
-    pub lists: &'a Neighborhoods,
-    /// What the attacker got.
-    pub recovered: &'a Recovered<D>,
-    /// Error per slot.
-    pub accuracy: &'a Accuracy,
-}
 
 /// A map or an image as its owner holds it.
 #[derive(Clone, Copy)]

@@ -2,8 +2,42 @@
 
 use std::time::Instant;
 
-use super::run::Seconds;
 use crate::Error;
+
+/// Where the time went. Never part of results.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Seconds {
+    /// Searching nearest neighbors of the originals.
+    pub search: f64,
+    /// Obfuscating, over all schemes and repeats.
+    pub obfuscate: f64,
+    /// Making neighborhoods.
+    pub neighbors: f64,
+    /// Recovering.
+    pub recover: f64,
+    /// Attacking the records alone, evaluated.
+    pub records_alone: f64,
+    /// Evaluating, the blind attacker included.
+    pub evaluate: f64,
+    /// Per row, summed over repeats.
+    pub rows: Vec<RowSeconds>,
+}
+
+/// Where the time of one row went.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RowSeconds {
+    /// Making its neighborhoods; 0 where another solver's row already has the time.
+    pub neighbors: f64,
+    /// Recovering; 0 for what joint recovery started from, as the row of `joint` has the time.
+    pub recover: f64,
+}
+
+impl RowSeconds {
+    pub(super) fn add(&mut self, more: &Self) {
+        self.neighbors += more.neighbors;
+        self.recover += more.recover;
+    }
+}
 
 #[derive(Default)]
 pub(super) struct Clock {

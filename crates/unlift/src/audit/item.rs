@@ -3,10 +3,11 @@
 use super::cells::{Finished, Owned, Run, cells};
 use super::chance::{key_of, oracle_seed};
 use super::clock::Clock;
+use super::clock::RowSeconds;
 use super::not_audited::{NotAudited, told};
+use super::observer::Observer;
 use super::plan::Plan;
 use super::row::Row;
-use super::run::{Observer, RowSeconds};
 use crate::Error;
 use crate::seed::Key;
 

@@ -1,24 +1,13 @@
 //! All figures of one recovery: what a row of an audit says beside its name, and what `evaluate` prints.
 
 use std::collections::BTreeMap;
-use std::fmt::Debug;
 
-use super::cells::Cell;
-use super::plan::Threshold;
 use super::row::Row;
+use super::threshold::Threshold;
 use crate::evaluate::{Accuracy, evaluate, reliability};
 use crate::recover::Recovered;
 use crate::truth::{DropReason, Original, Secret};
 use crate::{Error, Unit};
-
-/// Something to be measured of every row beside errors: anybody may write one.
-pub trait Measure<const D: usize>: Debug + Send + Sync {
-    /// Figures by name. The same names for every cell: a figure that some repeats or images lack is left out.
-    ///
-    /// # Errors
-    /// When it cannot be measured.
-    fn measure(&self, cell: &Cell<'_, D>) -> Result<Vec<(String, f64)>, Error>;
-}
 
 /// The row of `recovered` without its name: scheme, source, inlier ratio, K and solver are for the caller to fill
 /// in. `secret` is that of the obfuscation, as it was made; `blind` the errors of an attacker without

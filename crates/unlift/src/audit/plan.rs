@@ -2,36 +2,13 @@
 
 use std::sync::Arc;
 
-use super::measure::Measure;
+use super::observer::Measure;
+use super::threshold::Threshold;
 use crate::neighbors::oracle::Noise;
 use crate::neighbors::{Needs, Source, lacks_descriptors};
 use crate::obfuscate::{SCHEMES, Scheme, SchemeOptions};
 use crate::recover::{Delta, Solver};
 use crate::{Error, Unit};
-
-/// An error below which a point counts as recovered.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Threshold {
-    /// As the user typed it: the key in reports.
-    pub label: String,
-    /// In the unit of the points.
-    pub value: f64,
-}
-
-impl Threshold {
-    /// Reads a positive number and keeps its text.
-    ///
-    /// # Errors
-    /// When `text` is not a positive number.
-    pub fn parse(text: &str) -> Result<Self, Error> {
-        match text.trim().parse::<f64>() {
-            Ok(value) if value.is_finite() && value > 0.0 => {
-                Ok(Self { label: text.trim().to_owned(), value })
-            }
-            _ => Err(Error::new("threshold", "a positive number", format!("{text:?}"))),
-        }
-    }
-}
 
 /// Neighbors of every original, by row, as an owner lists them from any source.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::cells::Finished;
-use super::plan::Threshold;
 use super::row::{Distinct, PERCENTILES, Row};
+use super::threshold::Threshold;
 use crate::evaluate::Accuracy;
 
 /// Bits of the mantissa of an `f32` that are left out of an error's bin: bins are 0.05 % wide.

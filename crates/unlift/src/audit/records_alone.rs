@@ -1,6 +1,8 @@
 //! The second baseline: what the released records alone tell, without neighborhoods and descriptors.
 
-use super::plan::{Plan, Threshold};
+use super::plan::Plan;
+use super::row::Alone;
+use super::threshold::Threshold;
 use crate::Error;
 use crate::density::{published, tomography};
 use crate::evaluate::{Accuracy, evaluate};
@@ -8,15 +10,6 @@ use crate::neighbors::{Geometric, geometric_by};
 use crate::recover::{RecoverOptions, Solver, recover_at, recover_with_start};
 use crate::released::{Obfuscation, Released};
 use crate::truth::{Original, Secret};
-
-/// An attack on the records alone, and how much it got.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Alone {
-    /// The solver, or source and solver: `tomography`, `geometric, joint`.
-    pub name: &'static str,
-    /// Percentage recovered within each threshold, in the plan's order.
-    pub percent: Vec<f64>,
-}
 
 /// Our attacks on the records alone that place any point of `hidden`; none of planes, of which the records
 /// alone tell nothing.

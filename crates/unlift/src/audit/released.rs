@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use super::observer::Observer;
 use super::plan::Plan;
-use super::run::{Observer, Outcome, every_cell};
+use super::run::{Outcome, every_cell};
 use crate::Error;
 use crate::evaluate::belongs;
 use crate::geometry::frame::Bounds;

@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::plan::Threshold;
-use super::records_alone::Alone;
+use super::threshold::Threshold;
 use crate::Unit;
 use crate::evaluate::{Accuracy, Reliability};
 use crate::recover::Unknown;
@@ -70,6 +69,15 @@ pub struct Row {
     pub repeats: Option<Repeats>,
     /// The shares over distinct places (images only).
     pub distinct: Option<Distinct>,
+}
+
+/// An attack on the records alone, and how much it got.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Alone {
+    /// The solver, or source and solver: `tomography`, `geometric, joint`.
+    pub name: &'static str,
+    /// Percentage recovered within each threshold, in the plan's order.
+    pub percent: Vec<f64>,
 }
 
 /// Shares over distinct places: a fifth of the keypoints of an image have a twin at the same place, and

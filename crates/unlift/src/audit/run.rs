@@ -1,75 +1,17 @@
 //! An audit of one map.
 
 use super::break_even::{BreakEven, break_even};
-use super::cells::{Cell, Owned};
-use super::clock::Clock;
+use super::cells::Owned;
+use super::clock::{Clock, Seconds};
 use super::item::{Rows, of_item};
 use super::not_audited::NotAudited;
+use super::observer::Observer;
 use super::plan::Plan;
 use super::row::Row;
 use crate::neighbors::oracle;
 use crate::released::Released;
 use crate::truth::{Original, Secret};
 use crate::{Descriptors, Error};
-
-/// Hears how an audit goes.
-pub trait Observer<const D: usize = 3> {
-    /// `done` of `total` cells are finished; `what` comes next.
-    fn progress(&mut self, done: usize, total: usize, what: &str) {
-        let _ = (done, total, what);
-    }
-
-    /// Whether the audit shall go on; asked between cells.
-    fn goes_on(&self) -> bool {
-        true
-    }
-
-    /// One cell is finished.
-    fn cell(&mut self, cell: &Cell<'_, D>) {
-        let _ = cell;
-    }
-}
-
-/// An observer that does nothing.
-#[derive(Clone, Copy, Debug)]
-pub struct Silent;
-
-impl<const D: usize> Observer<D> for Silent {}
-
-/// Where the time went. Never part of results.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Seconds {
-    /// Searching nearest neighbors of the originals.
-    pub search: f64,
-    /// Obfuscating, over all schemes and repeats.
-    pub obfuscate: f64,
-    /// Making neighborhoods.
-    pub neighbors: f64,
-    /// Recovering.
-    pub recover: f64,
-    /// Attacking the records alone, evaluated.
-    pub records_alone: f64,
-    /// Evaluating, the blind attacker included.
-    pub evaluate: f64,
-    /// Per row, summed over repeats.
-    pub rows: Vec<RowSeconds>,
-}
-
-/// Where the time of one row went.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct RowSeconds {
-    /// Making its neighborhoods; 0 where another solver's row already has the time.
-    pub neighbors: f64,
-    /// Recovering; 0 for what joint recovery started from, as the row of `joint` has the time.
-    pub recover: f64,
-}
-
-impl RowSeconds {
-    pub(super) fn add(&mut self, more: &Self) {
-        self.neighbors += more.neighbors;
-        self.recover += more.recover;
-    }
-}
 
 /// What an audit found.
 #[derive(Clone, Debug)]

@@ -4,12 +4,13 @@
 pub use super::chance::{key_of, oracle_seed};
 
 use super::cells::Finished;
+use super::clock::RowSeconds;
 use super::lists::Lists;
 use super::measure::measure;
-use super::plan::{NeighborsBy, Plan, Threshold, Variant};
+use super::plan::{NeighborsBy, Plan, Variant};
 use super::pool::Pool;
 use super::row::Row;
-use super::run::RowSeconds;
+use super::threshold::Threshold;
 use crate::evaluate::{blind, distinct_weights};
 use crate::neighbors::Neighborhoods;
 use crate::neighbors::oracle::{self, Noise};

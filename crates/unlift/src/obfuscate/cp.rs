@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::pairs::random_pairs;
-use super::{Entry, Facts, Lifted, Scheme};
+use super::scheme::{Entry, Facts, Lifted, Scheme};
 use crate::Error;
 use crate::geometry::frame::Bounds;
 use crate::released::{AxisCandidates, Obfuscation};

@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use super::cp::Cp;
-use super::{Entry, Facts, Lifted, Scheme};
+use super::scheme::{Entry, Facts, Lifted, Scheme};
 use crate::Error;
 use crate::geometry::frame::Bounds;
 use crate::seed::Key;

@@ -13,7 +13,7 @@
 use std::sync::Arc;
 
 use super::ray::rays_from;
-use super::{Entry, Facts, Lifted, Scheme};
+use super::scheme::{Entry, Facts, Lifted, Scheme};
 use crate::Error;
 use crate::geometry::frame::Bounds;
 use crate::released::Obfuscation;

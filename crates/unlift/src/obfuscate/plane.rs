@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Entry, Facts, Lifted, Scheme};
+use super::scheme::{Entry, Facts, Lifted, Scheme};
 use crate::Error;
 use crate::geometry::frame::Bounds;
 use crate::released::{AxisPlanes, Obfuscation};

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::pairs::{drop_pairs, pair_again, random_pairs, refused_last};
-use super::{Entry, Facts, Lifted, Scheme};
+use super::scheme::{Entry, Facts, Lifted, Scheme};
 use crate::geometry::frame::Bounds;
 use crate::geometry::vector::{squared_distance, sub};
 use crate::released::{Lines, Obfuscation};

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use super::pairs::{drop_pairs, pair_again, random_pairs, refused_last};
 use super::ppl::{apart, lines_through};
-use super::{Entry, Facts, Lifted, Scheme};
+use super::scheme::{Entry, Facts, Lifted, Scheme};
 use crate::geometry::frame::Bounds;
 use crate::geometry::knn::Knn;
 use crate::geometry::normal::local_normal;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Entry, Facts, Lifted, Scheme};
+use super::scheme::{Entry, Facts, Lifted, Scheme};
 use crate::geometry::frame::Bounds;
 use crate::geometry::kmeans::kmeans;
 use crate::geometry::vector::{dot, sub};

@@ -87,8 +87,8 @@ fn imports(sources: &[Source]) -> BTreeMap<String, BTreeSet<String>> {
     all
 }
 
-/// Files that import each other, in circles of any length; folders in `except` are not looked at.
-pub fn circles(sources: &[Source], except: &[&str]) -> Vec<String> {
+/// Files that import each other, in circles of any length.
+pub fn circles(sources: &[Source]) -> Vec<String> {
     let imports = imports(sources);
     let reached = |from: &String| {
         let mut seen = BTreeSet::new();
@@ -106,8 +106,7 @@ pub fn circles(sources: &[Source], except: &[&str]) -> Vec<String> {
         imports.keys().map(|file| (file, reached(file))).collect();
     let mut found = BTreeSet::new();
     for (file, reached) in &all {
-        let is_left_out = except.iter().any(|folder| file.starts_with(folder));
-        if !is_left_out && reached.contains(*file) {
+        if reached.contains(*file) {
             let circle: Vec<&str> = reached
                 .iter()
                 .filter(|other| all.get(other).is_some_and(|there| there.contains(*file)))

@@ -85,10 +85,6 @@ pub const INSIDE_RECOVER: &[(&str, &[&str])] = &[
     ),
 ];
 
-/// Folders whose files may still import each other in circles: a registry beside the trait of its rows, and an observer beside
-/// what it observes.
-pub const MAY_BE_CIRCLES: &[&str] = &["audit/", "obfuscate/"];
-
 /// Dependencies of the core: light, and known for long.
 pub const DEPENDENCIES: &[&str] = &["libm", "rayon", "nalgebra", "sha2", "chacha20", "getrandom"];
 
@@ -107,7 +103,7 @@ pub const CRATES: &[(&str, &[&str])] = &[
 pub const MOST_LINES: usize = 400;
 
 /// Files of `obfuscate/` that are not schemes.
-pub const NO_SCHEMES: &[&str] = &["mod", "pairs"];
+pub const NO_SCHEMES: &[&str] = &["mod", "pairs", "scheme", "hide"];
 
 /// Imports of `source` that no row of [`ARROWS`] allows.
 pub fn forbidden_arrows(source: &Source) -> Vec<String> {

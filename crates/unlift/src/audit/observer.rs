@@ -1,0 +1,65 @@
+//! Who hears how an audit goes, and what they see of every row.
+
+use std::fmt::Debug;
+
+use super::row::Row;
+use crate::Error;
+use crate::evaluate::Accuracy;
+use crate::neighbors::Neighborhoods;
+use crate::recover::Recovered;
+use crate::released::Released;
+use crate::truth::{Original, Secret};
+
+/// Everything known about one row of one repeat, for whoever writes clouds, draws pictures or measures more.
+#[derive(Clone, Copy)]
+pub struct Cell<'a, const D: usize = 3> {
+    /// The row of this repeat.
+    pub row: &'a Row,
+    /// Which repeat, from 0.
+    pub repeat: u32,
+    /// The truth.
+    pub original: &'a Original<D>,
+    /// The secret of this obfuscation, its slots counted as the rows of `recovered` are.
+    pub secret: &'a Secret,
+    /// What the attacker saw.
+    pub released: &'a Released<D>,
+    /// The lists it was recovered from: one per slot, by descriptor row for an attacker's own sources.
+    pub lists: &'a Neighborhoods,
+    /// What the attacker got.
+    pub recovered: &'a Recovered<D>,
+    /// Error per slot.
+    pub accuracy: &'a Accuracy,
+}
+
+/// Hears how an audit goes.
+pub trait Observer<const D: usize = 3> {
+    /// `done` of `total` cells are finished; `what` comes next.
+    fn progress(&mut self, done: usize, total: usize, what: &str) {
+        let _ = (done, total, what);
+    }
+
+    /// Whether the audit shall go on; asked between cells.
+    fn goes_on(&self) -> bool {
+        true
+    }
+
+    /// One cell is finished.
+    fn cell(&mut self, cell: &Cell<'_, D>) {
+        let _ = cell;
+    }
+}
+
+/// An observer that does nothing.
+#[derive(Clone, Copy, Debug)]
+pub struct Silent;
+
+impl<const D: usize> Observer<D> for Silent {}
+
+/// Something to be measured of every row beside errors: anybody may write one.
+pub trait Measure<const D: usize>: Debug + Send + Sync {
+    /// Figures by name. The same names for every cell: a figure that some repeats or images lack is left out.
+    ///
+    /// # Errors
+    /// When it cannot be measured.
+    fn measure(&self, cell: &Cell<'_, D>) -> Result<Vec<(String, f64)>, Error>;
+}

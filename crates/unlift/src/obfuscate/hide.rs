@@ -1,0 +1,80 @@
+//! From originals and a scheme to what is released, and the secret: what every scheme needs to be free of truth.
+
+use super::scheme::Scheme;
+use crate::geometry::frame::rounded_origin;
+use crate::geometry::vector::sub;
+use crate::released::Released;
+use crate::seed::{Key, Stage};
+use crate::truth::{Original, Secret};
+use crate::{Descriptors, Error};
+
+/// Hides `original` by `scheme`: what is released, and the secret beside it. `descriptors` has one
+/// row per original. All chance comes from `key`: [`Key::fresh`] for a map that is released.
+///
+/// # Errors
+/// When rows disagree, or the scheme cannot hide these points.
+pub fn obfuscate<const D: usize>(
+    scheme: &dyn Scheme<D>,
+    original: &Original<D>,
+    descriptors: Option<&Descriptors>,
+    key: &Key,
+) -> Result<(Released<D>, Secret), Error> {
+    let points = original.reveal();
+    if let Some(descriptors) = descriptors
+        && descriptors.len() != points.len()
+    {
+        let expected = format!("{} rows, one per point", points.len());
+        return Err(Error::new("descriptors", expected, descriptors.len().to_string()));
+    }
+    // The middle of known bounds tells nothing about the points.
+    let bounds = original.bounds();
+    let origin = match &bounds {
+        Some(bounds) => bounds.center(),
+        None => rounded_origin(points.positions()),
+    };
+    let local: Vec<[f64; D]> = points.positions().iter().map(|p| sub(p, &origin)).collect();
+    let lifted = scheme.lift(&local, bounds.map(|b| b.about(&origin)).as_ref(), key)?;
+
+    let slots = lifted.slots_per_record;
+    let n_records = lifted.obfuscation.len();
+    let order = key.draws(Stage::Shuffle, 0).permutation(n_records);
+    let (slot_key, row_key) = (key.stage(Stage::SlotOrder), key.stage(Stage::DescriptorOrder));
+    let mut hidden = Vec::with_capacity(n_records * slots);
+    let mut swapped_axis = lifted.swapped_axis.as_ref().map(|_| Vec::with_capacity(n_records));
+    let mut descriptor_row = Vec::with_capacity(n_records * slots);
+    for (record, &from) in order.iter().enumerate() {
+        let mut slot_order: Vec<usize> = (0..slots).collect();
+        let mut rows: Vec<u32> = (0..slots).map(|s| (record * slots + s) as u32).collect();
+        if slots > 1 {
+            slot_key.draws(record as u64).shuffle(&mut slot_order);
+            row_key.draws(record as u64).shuffle(&mut rows);
+        }
+        for slot in slot_order {
+            hidden.push(lifted.hidden[from as usize * slots + slot]);
+        }
+        descriptor_row.extend(rows);
+        if let (Some(kept), Some(axes)) = (&mut swapped_axis, &lifted.swapped_axis) {
+            kept.push(axes[from as usize]);
+        }
+    }
+    let released_descriptors = descriptors.map(|descriptors| {
+        // Released row r holds the descriptor of the original whose slot was given row r.
+        let mut source = vec![0; hidden.len()];
+        for (slot, &row) in descriptor_row.iter().enumerate() {
+            source[row as usize] = hidden[slot].0;
+        }
+        descriptors.select(&source)
+    });
+    let released = Released::try_new(
+        lifted.obfuscation.select(&order),
+        slots,
+        origin,
+        points.unit(),
+        released_descriptors,
+    )?
+    .with_bounds(bounds);
+    let secret =
+        Secret::try_new(hidden, swapped_axis, descriptor_row, lifted.dropped, points.len())?;
+    let secret = secret.of_map(Some(released.fingerprint()), slots)?;
+    Ok((released, secret))
+}
