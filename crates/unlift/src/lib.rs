@@ -47,6 +47,7 @@
 
 mod about;
 pub mod audit;
+mod compiled;
 mod density;
 pub mod descriptors;
 mod error;

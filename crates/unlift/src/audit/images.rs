@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::break_even::break_even;
-use super::cells::Owned;
+use super::cells::{Finished, Owned};
 use super::clock::Clock;
 use super::clock::{RowSeconds, Seconds};
 use super::item::of_item;
@@ -141,7 +141,7 @@ impl Sums {
 fn one(
     image: &Image,
     plan: &Plan<2>,
-    seen: &mut impl Observer<2>,
+    seen: &mut dyn Observer<2>,
 ) -> Result<(Vec<Row>, Sums), Error> {
     let mut sums = Sums::default();
     if image.original.is_empty() {
@@ -154,14 +154,15 @@ fn one(
     let (original, descriptors) = (&image.original, image.descriptors.as_ref());
     let (hidden, name) = (None, Some(&*image.name));
     let owned = Owned { original, descriptors, hidden, search: &search, name };
-    let found = of_item(&owned, plan, clock, seen, |row, finished| {
+    let mut each = |row: usize, finished: &Finished<'_>| {
         if pools.len() <= row {
             pools.push(Vec::new());
         }
         let mut pool = Pool::new(&finished.row, &plan.thresholds);
         pool.add(finished, &plan.thresholds);
         pools[row].push(pool);
-    })?;
+    };
+    let found = of_item(&owned, plan, clock, seen, &mut each)?;
     *seconds = found.seconds;
     Ok((found.rows, sums))
 }

@@ -31,7 +31,7 @@ pub(super) fn of_item<const D: usize>(
     plan: &Plan<D>,
     clock: &mut Clock,
     observer: &mut dyn Observer<D>,
-    mut finished: impl FnMut(usize, &Finished<'_>),
+    finished: &mut dyn FnMut(usize, &Finished<'_>),
 ) -> Result<Rows, Error> {
     let per_scheme = plan.rows_per_scheme();
     let total = per_scheme * plan.schemes.len() * plan.repeats as usize;

@@ -8,6 +8,7 @@ use super::not_audited::NotAudited;
 use super::observer::Observer;
 use super::plan::Plan;
 use super::row::Row;
+use crate::compiled::{no_such, which};
 use crate::neighbors::oracle;
 use crate::released::Released;
 use crate::truth::{Original, Secret};
@@ -47,6 +48,24 @@ pub fn run<const D: usize>(
     plan: &Plan<D>,
     observer: &mut dyn Observer<D>,
 ) -> Result<Outcome, Error> {
+    let compiled = which(&(one::<2> as One<2>), &(one::<3> as One<3>));
+    let one: One<D> = compiled.ok_or_else(no_such::<D>)?;
+    one(original, descriptors, plan, observer)
+}
+
+type One<const D: usize> = fn(
+    &Original<D>,
+    Option<&Descriptors>,
+    &Plan<D>,
+    &mut dyn Observer<D>,
+) -> Result<Outcome, Error>;
+
+fn one<const D: usize>(
+    original: &Original<D>,
+    descriptors: Option<&Descriptors>,
+    plan: &Plan<D>,
+    observer: &mut dyn Observer<D>,
+) -> Result<Outcome, Error> {
     plan.check(original.len(), descriptors.is_some())?;
     every_cell((original, descriptors), None, plan, observer)
 }
@@ -62,7 +81,7 @@ pub(super) fn every_cell<const D: usize>(
     let search = clock.time(|s| &mut s.search, || oracle::search(original))?;
     let owned = Owned { original, descriptors, hidden, search: &search, name: None };
     let Rows { rows, seconds, not_audited } =
-        of_item(&owned, plan, &mut clock, observer, |_, _| ())?;
+        of_item(&owned, plan, &mut clock, observer, &mut |_, _| ())?;
     if let (true, Some(first)) = (rows.is_empty(), not_audited.first()) {
         let expected = "one that can be applied to this map";
         let found = format!("none: {}: {}", first.scheme, first.reason);

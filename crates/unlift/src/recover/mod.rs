@@ -44,6 +44,7 @@ pub use rounds::Rounds;
 pub use solve::Moved;
 pub use task::Task;
 
+use crate::compiled::{no_such, which};
 use crate::density::Peaks;
 use crate::neighbors::Neighborhoods;
 use crate::released::{Obfuscation, Released};
@@ -88,6 +89,22 @@ pub fn recover_with_start<const D: usize>(
     lists: &Neighborhoods,
     options: &RecoverOptions,
 ) -> Result<(Recovered<D>, Recovered<D>), Error> {
+    let compiled = which(&(with_start::<2> as WithStart<2>), &(with_start::<3> as WithStart<3>));
+    let with_start: WithStart<D> = compiled.ok_or_else(no_such::<D>)?;
+    with_start(released, lists, options)
+}
+
+type WithStart<const D: usize> = fn(
+    &Released<D>,
+    &Neighborhoods,
+    &RecoverOptions,
+) -> Result<(Recovered<D>, Recovered<D>), Error>;
+
+fn with_start<const D: usize>(
+    released: &Released<D>,
+    lists: &Neighborhoods,
+    options: &RecoverOptions,
+) -> Result<(Recovered<D>, Recovered<D>), Error> {
     if options.solver != Solver::Joint {
         return Err(Error::new("solver", Solver::Joint.name(), options.solver.name()));
     }
@@ -104,6 +121,19 @@ pub fn recover_with_start<const D: usize>(
 /// As there.
 #[doc(hidden)]
 pub fn recover_and_look<const D: usize>(
+    released: &Released<D>,
+    lists: &Neighborhoods,
+    options: &RecoverOptions,
+) -> Result<(Recovered<D>, Seen), Error> {
+    let compiled = which(&(and_look::<2> as AndLook<2>), &(and_look::<3> as AndLook<3>));
+    let and_look: AndLook<D> = compiled.ok_or_else(no_such::<D>)?;
+    and_look(released, lists, options)
+}
+
+type AndLook<const D: usize> =
+    fn(&Released<D>, &Neighborhoods, &RecoverOptions) -> Result<(Recovered<D>, Seen), Error>;
+
+fn and_look<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
     options: &RecoverOptions,
