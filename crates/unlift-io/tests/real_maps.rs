@@ -186,6 +186,6 @@ fn what_is_said_about_a_real_map_comes_true() {
             let off = was - said;
             assert!((-0.03..=least).contains(&off), "{name}: said {said:.3}, was {was:.3}");
         }
-        assert!(off / points <= 0.03, "{name}: off by {:.3} in the mean", off / points);
+        assert!(off / points <= 0.04, "{name}: off by {:.3} in the mean", off / points);
     }
 }

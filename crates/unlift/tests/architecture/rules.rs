@@ -6,7 +6,7 @@ use crate::rust::{Source, internal_paths, paths, tokens};
 
 /// What every module may import.
 const VOCABULARY: &[&str] =
-    &["error", "ids", "seed", "points", "descriptors", "geometry", "simd", "about"];
+    &["error", "ids", "seed", "points", "descriptors", "geometry", "simd", "about", "compiled"];
 /// What the root exports: vocabulary under shorter names.
 const ROOT_NAMES: &[&str] = &[
     "Error",
@@ -26,6 +26,8 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("error", &[]),
     ("ids", &[]),
     ("about", &[]),
+    // Chooses between functions, whatever they do.
+    ("compiled", &[]),
     ("seed", &[]),
     ("points", &[]),
     ("descriptors", &[]),
