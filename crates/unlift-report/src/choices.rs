@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::attack::{self, Basis, Given};
 use crate::document::{Document, LengthUnit, Row};
-use crate::page_data::slot;
+use crate::slot::slot;
 use crate::{tables, verdict, words};
 
 /// The lists. A row is found by its place in them and by nothing else.

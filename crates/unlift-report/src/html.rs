@@ -6,9 +6,10 @@ use serde::Serialize;
 
 use crate::document::{Document, ImageCounts, LengthUnit};
 use crate::gates::{Gates, gates};
-use crate::page_data::{page_data, slot};
-use crate::pictures::Picture;
+use crate::options::RenderOptions;
+use crate::page_data::page_data;
 use crate::scene::{Scene3d, encode};
+use crate::slot::slot;
 use crate::tables::Table;
 use crate::verdict::Verdict;
 use crate::{Error, attack, paper, pictures, tables, verdict, words};
@@ -34,27 +35,6 @@ const SCRIPTS: [&str; 6] = [
     include_str!("../web/pictures.js"),
     include_str!("../web/report.js"),
 ];
-
-/// How to draw the page.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct RenderOptions {
-    /// Leave out everything but figures: no points, paths, names, command line.
-    pub share_safe: bool,
-    /// Finer error curves than the percentiles of the document; may be empty.
-    pub error_cdf: Vec<ErrorCdf>,
-    /// Audits of images: those to be drawn, at most [`MOST_PICTURES`](crate::pictures::MOST_PICTURES).
-    pub pictures: Vec<Picture>,
-}
-
-/// The error curve of one row of the results.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ErrorCdf {
-    /// Index into [`Document::results`].
-    pub row: usize,
-    /// (error in the row's unit, percent of the released points within it), rising; a hundred
-    /// points are plenty.
-    pub points: Vec<(f64, f64)>,
-}
 
 /// Draws `document` as one self-contained HTML page below 10 MB.
 ///

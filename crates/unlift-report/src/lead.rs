@@ -1,8 +1,8 @@
 //! The verdict in a few sentences, the worst news first.
 
 use crate::attack::Basis;
+use crate::cards::{Card, Finding, Refusal};
 use crate::document::{Document, LengthUnit};
-use crate::verdict::{Card, Finding, Refusal};
 use crate::{tables, words};
 
 /// Percent from which on the records alone are said to break a scheme: half of the points, as for break-even.

@@ -4,6 +4,7 @@
 //! nothing is measured in this crate, and a number on the page is a number of the document.
 
 mod attack;
+mod cards;
 mod check;
 mod choices;
 pub mod document;
@@ -12,6 +13,7 @@ mod gates;
 mod html;
 mod images;
 mod lead;
+mod options;
 mod page_data;
 pub mod paper;
 pub mod pictures;
@@ -19,6 +21,7 @@ mod quantity;
 mod round;
 pub mod scene;
 mod share;
+mod slot;
 mod tables;
 mod text;
 mod verdict;
@@ -27,7 +30,8 @@ mod words;
 pub use attack::Given;
 pub use document::Document;
 pub use error::Error;
-pub use html::{ErrorCdf, RenderOptions, render};
+pub use html::render;
+pub use options::{ErrorCdf, RenderOptions};
 pub use round::rounded;
 pub use scene::Scene3d;
 pub use text::text_table;

@@ -5,16 +5,11 @@ use serde::Serialize;
 use crate::attack::{self, Given};
 use crate::choices::{Choices, unit_sign};
 use crate::document::{Document, LengthUnit, Row};
-use crate::html::RenderOptions;
+use crate::options::RenderOptions;
 use crate::paper::{PublishedCurve, published_2d, published_3d};
 use crate::pictures::{EncodedPicture, first_choice};
 use crate::scene::Encoded;
 use crate::tables;
-
-/// Schemes with a color and a mark of their own, the same on every page.
-const KNOWN_SCHEMES: [&str; 7] = ["olc", "ppl", "ppl+", "ray", "ray-voxel", "plane", "cp"];
-/// Colors and marks there are; further schemes reuse them in turn.
-const SLOTS: usize = 8;
 
 #[derive(Debug, Serialize)]
 pub(crate) struct PageData<'a> {
@@ -74,29 +69,6 @@ struct PublishedData {
     scheme: &'static str,
     threshold: usize,
     points: Vec<(f64, f64)>,
-}
-
-/// The color and mark of `scheme`; unknown ones take turns in the order they appear.
-pub(crate) fn slot(document: &Document, scheme: &str) -> usize {
-    // Schemes for images have the color of the scheme for maps that they are most like.
-    let known = match scheme {
-        "lines2d" => "olc",
-        "cp2d" => "cp",
-        "dcl2d" => "ray",
-        other => other,
-    };
-    if let Some(slot) = KNOWN_SCHEMES.iter().position(|name| *name == known) {
-        return slot;
-    }
-    let mut unknown: Vec<&str> = Vec::new();
-    for row in &document.results {
-        let name = row.scheme.as_str();
-        if !KNOWN_SCHEMES.contains(&name) && !unknown.contains(&name) {
-            unknown.push(name);
-        }
-    }
-    let turn = unknown.iter().position(|name| *name == scheme).unwrap_or(0);
-    (KNOWN_SCHEMES.len() + turn) % SLOTS
 }
 
 /// Whether `row` is the first of those that recover most of its scheme from its neighborhoods.

@@ -42,8 +42,7 @@
 //! # Ok::<(), Error>(())
 //! ```
 //!
-//! A source of neighborhoods is a [`neighbors::Source`], and `examples/` has one of each, with the laws of
-//! `unlift-testkit`. Audits of files, with figures and a page, are calls of `unlift-audit`.
+//! A source of neighborhoods is a [`neighbors::Source`]; `unlift-testkit` has the laws of both, and an example of each. Audits of files, with figures and a page, are calls of `unlift-audit`.
 
 mod about;
 pub mod audit;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use unlift::neighbors::oracle::Noise;
-use unlift::recover::Delta;
+use unlift::recover::{Delta, Solver};
 
 use crate::values;
 use unlift_audit::Gate;
@@ -70,4 +70,18 @@ pub struct RunArgs {
     /// No progress on stderr
     #[arg(long)]
     pub quiet: bool,
+}
+
+/// What recovers a map.
+#[derive(Clone, Debug, Args)]
+pub struct SolverArgs {
+    /// Recovery methods, by commas or repeated: joint, joint-start, consensus, ransac, density, tomography
+    /// [default: joint, and joint-start, the pass that it begins with; consensus on maps of fewer than 150 K points]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
+          help_heading = "Attack")]
+    pub solver: Vec<Solver>,
+    /// Leave out the second baseline: attacks on the released records alone, without neighborhoods and
+    /// descriptors
+    #[arg(long, help_heading = "Attack")]
+    pub no_records_alone: bool,
 }

@@ -1,16 +1,14 @@
 //! Arguments of `unlift audit map`.
 
-use super::audit::AttackArgs;
-use super::audit::ResultArgs;
-use super::audit::RunArgs;
-use super::map::MapArgs;
-use crate::values;
-use crate::values::NeighborSource;
-use clap::Args;
 use std::path::PathBuf;
+
+use clap::Args;
 use unlift::audit::Threshold;
 use unlift::obfuscate::Entry;
-use unlift::recover::Solver;
+
+use super::audit::{AttackArgs, ResultArgs, RunArgs, SolverArgs};
+use super::map::MapArgs;
+use crate::values::{self, NeighborSource};
 
 /// Options of `audit map`.
 #[derive(Debug, Args)]
@@ -43,15 +41,8 @@ pub struct AuditMapArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::scheme,
           help_heading = "Attack")]
     pub schemes: Vec<&'static Entry>,
-    /// Recovery methods, by commas or repeated: joint, joint-start, consensus, ransac, density, tomography
-    /// [default: joint, and joint-start, the pass that it begins with; consensus on maps of fewer than 150 K points]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
-          help_heading = "Attack")]
-    pub solver: Vec<Solver>,
-    /// Leave out the second baseline: attacks on the released records alone, without neighborhoods and
-    /// descriptors
-    #[arg(long, help_heading = "Attack")]
-    pub no_records_alone: bool,
+    #[command(flatten)]
+    pub solvers: SolverArgs,
     /// Where neighborhoods come from, repeatable: oracle (made from the map itself); what an attacker
     /// makes from the released map (similarity, overlap, geometric, or several joined by +); or a file
     #[arg(long, value_name = "oracle|SOURCE|FILE", value_parser = values::neighbor_source,

@@ -4,9 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use unlift::audit::Threshold;
-use unlift::recover::Solver;
 
-use super::audit::{AttackArgs, ResultArgs, RunArgs};
+use super::audit::{AttackArgs, ResultArgs, RunArgs, SolverArgs};
 use crate::values::{self, NeighborSource};
 
 /// Options of `audit released`.
@@ -45,15 +44,8 @@ pub struct AuditReleasedArgs {
     /// The integer that the oracle and the attacker draw from
     #[arg(long, value_name = "INTEGER", default_value_t = 0, help_heading = "Input")]
     pub seed: u64,
-    /// Recovery methods, by commas or repeated: joint, joint-start, consensus, ransac, density, tomography
-    /// [default: joint, and joint-start, the pass that it begins with; consensus on maps of fewer than 150 K points]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
-          help_heading = "Attack")]
-    pub solver: Vec<Solver>,
-    /// Leave out the second baseline: attacks on the released records alone, without neighborhoods and
-    /// descriptors
-    #[arg(long, help_heading = "Attack")]
-    pub no_records_alone: bool,
+    #[command(flatten)]
+    pub solvers: SolverArgs,
     /// Where neighborhoods come from, repeatable: oracle (made from the truth); what an attacker makes
     /// from the released map (similarity, overlap, geometric, or several joined by +); or a file of lists by original
     #[arg(long, value_name = "oracle|SOURCE|FILE", value_parser = values::neighbor_source,

@@ -148,7 +148,7 @@ mod tests {
     fn defaults_are_those_of_the_documentation() {
         let args = audit(&[]).unwrap();
         assert_eq!((args.map.k, args.map.seed, args.attack.repeats), (50, None, 1));
-        assert!(args.solver.is_empty() && !args.no_records_alone);
+        assert!(args.solvers.solver.is_empty() && !args.solvers.no_records_alone);
         assert_eq!((args.attack.delta, args.map.outlier_filter), (Delta::Auto, None));
         assert_eq!(args.neighbors, [NeighborSource::Oracle]);
         assert!(
@@ -177,7 +177,7 @@ mod tests {
     fn lists_are_split_at_commas_and_repeated_options_add_up() {
         let args =
             audit(&["--solver", "consensus", "--solver", "ransac", "--schemes=ppl+,cp"]).unwrap();
-        assert_eq!(args.solver, [Solver::Consensus, Solver::Ransac]);
+        assert_eq!(args.solvers.solver, [Solver::Consensus, Solver::Ransac]);
         let names: Vec<&str> = args.schemes.iter().map(|scheme| scheme.name).collect();
         assert_eq!(names, ["ppl+", "cp"]);
     }

@@ -16,8 +16,8 @@ use unlift_io::atomic::Rules;
 use unlift_io::{Error, read};
 use unlift_report::pictures::MOST_PICTURES;
 
+use super::common::with_threads;
 use super::plan::{attack, check_about, check_fit, own, solvers, summary, thresholds};
-use super::with_threads;
 use crate::args::AuditImagesArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};

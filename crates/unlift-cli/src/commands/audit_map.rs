@@ -5,17 +5,16 @@ use std::time::Instant;
 
 use indexmap::IndexMap;
 use serde_json::{Map, Value, json};
-use unlift::audit::{NeighborsBy, Plan};
-use unlift::neighbors::{Needs, Source};
+use unlift::audit::Plan;
 use unlift::obfuscate::SchemeOptions;
 use unlift_audit::maps::perform;
-use unlift_audit::{Job, Prepared, Shown, by_point, check_thresholds, open_audit};
+use unlift_audit::{Job, Prepared, Shown, check_thresholds, open_audit};
 use unlift_io::atomic::Rules;
 use unlift_io::hash::hash_file;
 use unlift_io::read;
 
-use super::plan::{attack, check_about, check_fit, own, solvers, summary, thresholds};
-use super::{open_map, with_threads};
+use super::common::{open_map, with_threads};
+use super::plan::{attack, neighbors, solvers, summary, thresholds};
 use crate::args::AuditMapArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
@@ -90,71 +89,25 @@ fn plan(args: &AuditMapArgs, prepared: &Prepared, input: &read::Input) -> anyhow
     if let Some(note) = check_thresholds(points.positions(), points.unit(), &thresholds, typed)? {
         eprintln!("unlift: note: {note}");
     }
+    let asked = (&*args.neighbors, &args.attack);
+    let descriptors = prepared.descriptors.as_ref();
+    let lacking = |text: String| {
+        let error = usage(format!("{text} (--descriptors FILE), found none"));
+        match &input.database {
+            Some(database) => advise(error, format!("--descriptors {}", database.display())),
+            None => error,
+        }
+    };
     Ok(Plan {
-        neighbors: neighbors(args, prepared, input)?,
+        neighbors: neighbors(asked, (prepared, descriptors), lacking, input.positions.len())?,
         schemes,
         k,
-        solvers: solvers(&args.solver, &usual),
-        records_alone: !args.no_records_alone,
+        solvers: solvers(&args.solvers.solver, &usual),
+        records_alone: !args.solvers.no_records_alone,
         thresholds,
         seed: args.map.seed.unwrap_or(0),
         ..attack(&args.attack, usual)
     })
-}
-
-/// Every source once, and no option that would be about none of them.
-fn neighbors(
-    args: &AuditMapArgs,
-    prepared: &Prepared,
-    input: &read::Input,
-) -> anyhow::Result<Vec<NeighborsBy<3>>> {
-    let mut sources = Vec::new();
-    for source in distinct(args.neighbors.clone(), |a, b| a == b) {
-        sources.push(match source {
-            NeighborSource::Oracle => NeighborsBy::Oracle,
-            NeighborSource::Own(named) => {
-                let by = own(named, &args.attack)?;
-                if let Some(source) = by.source() {
-                    check_own(source, prepared, input)?;
-                    if let Some(note) = source.note(prepared.original.len()) {
-                        eprintln!("unlift: note: {note}");
-                    }
-                }
-                by
-            }
-            NeighborSource::File(path) => {
-                NeighborsBy::Given(by_point(&path, prepared, input.positions.len(), &Stderr)?)
-            }
-        });
-    }
-    let files = sources.iter().filter(|s| matches!(s, NeighborsBy::Given(_))).count();
-    if files > 1 {
-        return Err(usage(format!("--neighbors: expected at most one file, found {files}")));
-    }
-    check_about(&args.attack, &sources)?;
-    Ok(sources)
-}
-
-/// Refuses a source that lacks what it needs, before anything is computed.
-fn check_own(
-    source: &dyn Source<3>,
-    prepared: &Prepared,
-    input: &read::Input,
-) -> anyhow::Result<()> {
-    let name = source.name();
-    match &prepared.descriptors {
-        None if source.needs() == Needs::Descriptors => {
-            let text = "expected descriptors (--descriptors FILE), found none";
-            let error = usage(format!("--neighbors {name}: {text}"));
-            return Err(match &input.database {
-                Some(database) => advise(error, format!("--descriptors {}", database.display())),
-                None => error,
-            });
-        }
-        None => {}
-        Some(descriptors) => check_fit(source, descriptors)?,
-    }
-    Ok(())
 }
 
 /// Hashes of the files that were read beside the map.

@@ -3,26 +3,24 @@
 use std::time::Instant;
 
 use serde_json::{Map, json};
-use unlift::audit::{NeighborsBy, Plan, scheme_called};
-use unlift::neighbors::Needs;
+use unlift::audit::{Plan, scheme_called};
 use unlift::released::Released;
 use unlift::truth::Secret;
 use unlift_audit::maps::perform;
-use unlift_audit::{Job, Prepared, Shown, by_point, check_thresholds, open_audit, ordered};
+use unlift_audit::{Job, Prepared, Shown, check_thresholds, open_audit, ordered};
 use unlift_io::atomic::Rules;
 use unlift_io::hash::{hash_file, hash_files};
 use unlift_io::read::{self, Input as Points};
 use unlift_io::stage::{has_images, read_released, read_truth, scheme_name};
 use unlift_report::document::Input;
 
-use super::evaluate::expect_slots;
-use super::plan::{attack, check_about, check_fit, own, solvers, summary, thresholds};
-use super::{same_map, with_threads};
+use super::common::{expect_slots, same_map, with_threads};
+use super::plan::{attack, neighbors, solvers, summary, thresholds};
 use crate::args::AuditReleasedArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
 use crate::progress::{Progress, Stderr};
-use crate::values::{self, NeighborSource, distinct};
+use crate::values::{self, NeighborSource};
 
 /// What a scheme is called that nobody named.
 const UNNAMED: &str = "released";
@@ -161,57 +159,18 @@ fn plan(
     if let Some(note) = check_thresholds(points.positions(), points.unit(), &thresholds, typed)? {
         eprintln!("unlift: note: {note}");
     }
+    let asked = (&*args.neighbors, &args.attack);
+    let lacking = |text: String| usage(format!("{text} in the released map, found none"));
     Ok(Plan {
-        neighbors: sources(args, prepared, released)?,
+        neighbors: neighbors(asked, (prepared, released.descriptors()), lacking, points.len())?,
         schemes: vec![scheme_called(name)],
         k,
-        solvers: solvers(&args.solver, &usual),
-        records_alone: !args.no_records_alone,
+        solvers: solvers(&args.solvers.solver, &usual),
+        records_alone: !args.solvers.no_records_alone,
         thresholds,
         seed: args.seed,
         ..attack(&args.attack, usual)
     })
-}
-
-/// Every source once, each with what it needs.
-fn sources(
-    args: &AuditReleasedArgs,
-    prepared: &Prepared,
-    released: &Released<3>,
-) -> anyhow::Result<Vec<NeighborsBy<3>>> {
-    let mut sources = Vec::new();
-    for source in distinct(args.neighbors.clone(), |a, b| a == b) {
-        sources.push(match source {
-            NeighborSource::Oracle => NeighborsBy::Oracle,
-            NeighborSource::Own(named) => {
-                let by = own(named, &args.attack)?;
-                if let Some(source) = by.source() {
-                    let name = source.name();
-                    match released.descriptors() {
-                        Some(descriptors) => check_fit(source, descriptors)?,
-                        None if source.needs() == Needs::Descriptors => {
-                            let text = "expected descriptors in the released map, found none";
-                            return Err(usage(format!("--neighbors {name}: {text}")));
-                        }
-                        None => {}
-                    }
-                    if let Some(note) = source.note(released.n_slots()) {
-                        eprintln!("unlift: note: {note}");
-                    }
-                }
-                by
-            }
-            NeighborSource::File(path) => {
-                NeighborsBy::Given(by_point(&path, prepared, prepared.original.len(), &Stderr)?)
-            }
-        });
-    }
-    let files = lists(args).count();
-    if files > 1 {
-        return Err(usage(format!("--neighbors: expected at most one file, found {files}")));
-    }
-    check_about(&args.attack, &sources)?;
-    Ok(sources)
 }
 
 fn provenance(args: &AuditReleasedArgs, prepared: &Prepared) -> anyhow::Result<Input> {

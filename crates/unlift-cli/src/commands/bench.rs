@@ -12,7 +12,7 @@ use unlift::{PointSet, synthetic};
 use unlift_io::read;
 use unlift_report::paper::published_seconds;
 
-use super::with_threads;
+use super::common::with_threads;
 use crate::args::BenchRecoverArgs;
 use crate::exit::{Outcome, usage};
 use crate::output::{print, table};

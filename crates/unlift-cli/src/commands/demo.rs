@@ -12,7 +12,7 @@ use unlift_io::atomic::Rules;
 use unlift_io::hash::hash_positions;
 use unlift_report::document::Input;
 
-use super::with_threads;
+use super::common::with_threads;
 use crate::args::DemoArgs;
 use crate::exit::Outcome;
 use crate::output::{command_line, print};

@@ -12,9 +12,8 @@ use unlift::{About, RowOrder, Unit};
 use unlift_io::stage::{has_images, read_recovered_in, read_released, read_truth};
 use unlift_report::rounded;
 
+use super::common::{RELEASED, expect_slots, same_map};
 use super::image_stages::{Evaluated, evaluate_all};
-use super::obfuscate::RELEASED;
-use super::same_map;
 use crate::args::EvaluateArgs;
 use crate::exit::Outcome;
 use crate::output::{print, table};
@@ -88,25 +87,6 @@ fn released(args: &EvaluateArgs, secret: &Secret) -> anyhow::Result<Option<Relea
     same_map(&path, Some(released.fingerprint()), &args.truth, secret.map())?;
     expect_slots(&path, &released, secret)?;
     Ok(Some(released))
-}
-
-/// Refuses a released map that hides another number of points than the truth, or another number per record.
-pub fn expect_slots<const D: usize>(
-    path: &Path,
-    released: &Released<D>,
-    secret: &Secret,
-) -> anyhow::Result<()> {
-    let wrong = |expected: usize, what: &str, found: usize| {
-        let expected = format!("{expected} hidden points{what}, as in the truth");
-        Err(unlift_io::Error::new(path, "", expected, found.to_string()).into())
-    };
-    if released.n_slots() != secret.n_slots() {
-        return wrong(secret.n_slots(), "", released.n_slots());
-    }
-    if released.slots_per_record() != secret.slots_per_record() {
-        return wrong(secret.slots_per_record(), " per record", released.slots_per_record());
-    }
-    Ok(())
 }
 
 /// Positions that fewer than this many slots have are too few to judge.

@@ -8,7 +8,7 @@ use unlift_io::Error;
 use unlift_io::atomic::{Kind, Rules};
 use unlift_io::features::{FeatureWriter, ImageFeatures};
 
-use super::with_threads;
+use super::common::with_threads;
 use crate::args::FeaturesArgs;
 use crate::exit::{Outcome, line, usage};
 use crate::output::print;

@@ -19,7 +19,7 @@ use unlift_io::Error;
 use unlift_io::atomic::{Access, Kind, OutputFile, OutputSet, Rules};
 use unlift_io::stage::{ImageFile, ImageRows, ImageWriter, Kind as Stage};
 
-use super::{RELEASED, TRUTH, expect_slots, same_map};
+use super::common::{RELEASED, TRUTH, expect_slots, same_map};
 use crate::args::{EvaluateArgs, ObfuscateArgs, OracleArgs};
 use crate::progress::Stderr;
 use unlift_audit::Progress as _;

@@ -9,10 +9,8 @@ use unlift::released::Released;
 use unlift_io::atomic::{Kind, Rules};
 use unlift_io::stage::{Kind as Stage, has_images, read_released, read_truth, write_neighborhoods};
 
-use super::evaluate::expect_slots;
+use super::common::{RELEASED, expect_slots, same_map, with_threads};
 use super::image_stages::{list_by_oracle, list_by_source};
-use super::obfuscate::RELEASED;
-use super::{same_map, with_threads};
 use crate::args::{FindArgs, OracleArgs};
 use crate::exit::{Outcome, advise, usage};
 use crate::output::print;

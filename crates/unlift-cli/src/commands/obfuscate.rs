@@ -6,17 +6,12 @@ use unlift::seed::Key;
 use unlift_io::atomic::{Access, Kind, OutputSet, Rules};
 use unlift_io::stage::{Kind as Stage, write_released, write_truth};
 
+use super::common::{RELEASED, TRUTH, open_map};
 use super::image_stages::hide;
-use super::open_map;
 use crate::args::ObfuscateArgs;
 use crate::exit::{Outcome, usage};
 use crate::output::print;
 use unlift_audit::refused;
-
-/// What the attacker sees.
-pub const RELEASED: &str = "released.parquet";
-/// What only the owner has.
-pub const TRUTH: &str = "truth.parquet";
 
 /// What an integer seed is worth.
 const GUESSABLE: &str = "unlift: note: --seed repeats experiments; whoever guesses the number undoes the hiding: \

@@ -3,14 +3,15 @@
 use serde_json::{Value, json};
 use unlift::Descriptors;
 use unlift::audit::{NeighborsBy, Plan, Threshold};
-use unlift::neighbors::Source;
 use unlift::neighbors::sources::Named;
+use unlift::neighbors::{Needs, Source};
 use unlift::recover::Solver;
 
 use crate::args::AttackArgs;
 use crate::exit::{advise, usage};
-use crate::values::distinct;
-use unlift_audit::Finished;
+use crate::progress::Stderr;
+use crate::values::{NeighborSource, distinct};
+use unlift_audit::{Finished, Prepared, Progress as _, by_point};
 
 /// `usual` with what was asked for.
 pub fn attack<const D: usize>(args: &AttackArgs, usual: Plan<D>) -> Plan<D> {
@@ -60,6 +61,50 @@ pub fn own<const D: usize>(named: Named, args: &AttackArgs) -> anyhow::Result<Ne
         None => named,
     };
     Ok(NeighborsBy::Source(named.of_dimension()?))
+}
+
+/// The sources of an audit of a map: every one once, each with what it needs, and no option that would be about none of
+/// them. `n_read` points were read from the file; `lacking` makes the error of a source without descriptors.
+pub fn neighbors(
+    (asked, args): (&[NeighborSource], &AttackArgs),
+    (prepared, descriptors): (&Prepared, Option<&Descriptors>),
+    lacking: impl Fn(String) -> anyhow::Error,
+    n_read: usize,
+) -> anyhow::Result<Vec<NeighborsBy<3>>> {
+    let mut sources = Vec::new();
+    for source in distinct(asked.to_vec(), |a, b| a == b) {
+        sources.push(match source {
+            NeighborSource::Oracle => NeighborsBy::Oracle,
+            NeighborSource::File(path) => {
+                NeighborsBy::Given(by_point(&path, prepared, n_read, &Stderr)?)
+            }
+            NeighborSource::Own(named) => {
+                let by = own(named, args)?;
+                if let Some(source) = by.source() {
+                    match descriptors {
+                        Some(descriptors) => check_fit(source, descriptors)?,
+                        None if source.needs() == Needs::Descriptors => {
+                            let name = source.name();
+                            return Err(lacking(format!(
+                                "--neighbors {name}: expected descriptors"
+                            )));
+                        }
+                        None => {}
+                    }
+                    if let Some(note) = source.note(prepared.original.len()) {
+                        Stderr.say(&format!("note: {note}"));
+                    }
+                }
+                by
+            }
+        });
+    }
+    let files = sources.iter().filter(|by| matches!(by, NeighborsBy::Given(_))).count();
+    if files > 1 {
+        return Err(usage(format!("--neighbors: expected at most one file, found {files}")));
+    }
+    check_about(args, &sources)?;
+    Ok(sources)
 }
 
 /// Refuses a source that cannot work on descriptors of this kind.

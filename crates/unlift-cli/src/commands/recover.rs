@@ -10,8 +10,8 @@ use unlift_io::stage::{
     Kind as Stage, has_images, read_neighborhoods, read_released, write_recovered,
 };
 
+use super::common::{same_map, with_threads};
 use super::image_stages::recover_all;
-use super::{same_map, with_threads};
 use crate::args::RecoverArgs;
 use crate::exit::Outcome;
 use crate::output::print;

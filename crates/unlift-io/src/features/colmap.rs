@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use unlift::Descriptors;
 use unlift::descriptors::Values;
 
-use super::ImageFeatures;
+use super::image::ImageFeatures;
 use crate::database::{Database, Kind, Rows};
 use crate::error::Error;
 

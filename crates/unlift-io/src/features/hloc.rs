@@ -5,8 +5,8 @@ use std::path::Path;
 use unlift::Descriptors;
 use unlift::descriptors::Values;
 
-use super::ImageFeatures;
 use super::h5::{Array, FeatureStore, Numbers, shape_text};
+use super::image::ImageFeatures;
 use crate::error::Error;
 
 /// An open file of features.

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use unlift::descriptors::Values;
 
-use super::ImageFeatures;
 use super::h5::{Array, Numbers, Writer};
+use super::image::ImageFeatures;
 use crate::atomic::{Access, OutputFile};
 use crate::error::Error;
 use crate::read::lines::quoted;

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use super::{Camera, CameraModel, Image, Points, Tracks, place};
+use super::camera_models::CameraModel;
+use super::model::{Camera, Image, Points, Tracks, place};
 use crate::error::Error;
 use crate::read::lines::{Lines, number, quoted, words};
 

@@ -1,4 +1,4 @@
-//! A source of neighborhoods that is not ours, audited: `cargo run --release -p unlift --example own_source`.
+//! A source of neighborhoods that is not ours, audited: `cargo run --release -p unlift-testkit --example own_source`.
 //!
 //! An attacker sorts the released records by the mean of their descriptors and takes the next ones in that order for
 //! neighbors. That is a poor attack; yours may have learned its weights elsewhere and carry them as fields.

@@ -1,4 +1,4 @@
-//! A scheme that is not ours, audited: `cargo run --release -p unlift --example own_scheme`.
+//! A scheme that is not ours, audited: `cargo run --release -p unlift-testkit --example own_scheme`.
 //!
 //! Records are of four families (lines, rays, axis planes, axis candidates): that is what the attacks know. These are lines
 //! that are all nearly upright. Is that safer than lines in all directions?

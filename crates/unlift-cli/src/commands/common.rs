@@ -1,0 +1,76 @@
+//! What several commands share.
+
+use std::num::NonZeroUsize;
+use std::path::Path;
+
+use unlift::Fingerprint;
+use unlift::released::Released;
+use unlift::truth::Secret;
+use unlift_audit::{Preparation, Prepared, maps};
+use unlift_io::read::Input;
+
+use crate::args::MapArgs;
+use crate::progress::Spinner;
+
+/// What the attacker sees.
+pub const RELEASED: &str = "released.parquet";
+/// What only the owner has.
+pub const TRUTH: &str = "truth.parquet";
+
+/// Runs `work` on `threads` threads (all cores without a number); never changes a result.
+pub fn with_threads<T: Send>(
+    threads: Option<NonZeroUsize>,
+    work: impl FnOnce() -> anyhow::Result<T> + Send,
+) -> anyhow::Result<T> {
+    let n = threads.map_or(0, NonZeroUsize::get);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build()?;
+    pool.install(work)
+}
+
+/// Refuses `file` when it is about another released map than `of`; what does not say is taken.
+pub fn same_map(
+    file: &Path,
+    found: Option<Fingerprint>,
+    of: &Path,
+    expected: Option<Fingerprint>,
+) -> Result<(), unlift_io::Error> {
+    match (found, expected) {
+        (Some(found), Some(expected)) if found != expected => {
+            let expected = format!("{expected}, that of the released map of {}", of.display());
+            Err(unlift_io::Error::new(file, "fingerprint", expected, found.to_string()))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Reads a map and makes it ready: the first step of `audit map` and `obfuscate`.
+pub fn open_map(path: &Path, args: &MapArgs, quiet: bool) -> anyhow::Result<(Input, Prepared)> {
+    let alive = Spinner::unless(quiet, "reading the map");
+    let preparation = Preparation {
+        scale: args.scale,
+        k: usize::from(args.k),
+        outlier_filter: args.outlier_filter,
+        max_points: args.max_points.map(NonZeroUsize::get),
+        seed: args.seed.unwrap_or(0),
+    };
+    Ok(maps::open(path, args.descriptors.as_deref(), &preparation, &alive)?)
+}
+
+/// Refuses a released map that hides another number of points than the truth, or another number per record.
+pub fn expect_slots<const D: usize>(
+    path: &Path,
+    released: &Released<D>,
+    secret: &Secret,
+) -> anyhow::Result<()> {
+    let wrong = |expected: usize, what: &str, found: usize| {
+        let expected = format!("{expected} hidden points{what}, as in the truth");
+        Err(unlift_io::Error::new(path, "", expected, found.to_string()).into())
+    };
+    if released.n_slots() != secret.n_slots() {
+        return wrong(secret.n_slots(), "", released.n_slots());
+    }
+    if released.slots_per_record() != secret.slots_per_record() {
+        return wrong(secret.slots_per_record(), " per record", released.slots_per_record());
+    }
+    Ok(())
+}
