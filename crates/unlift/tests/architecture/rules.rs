@@ -94,7 +94,8 @@ pub const DEPENDENCIES: &[&str] = &["libm", "rayon", "nalgebra", "sha2", "chacha
 pub const CRATES: &[(&str, &[&str])] = &[
     ("unlift", &[]),
     ("unlift-io", &["unlift"]),
-    ("unlift-features", &["unlift"]),
+    ("unlift-nn", &["unlift"]),
+    ("unlift-features", &["unlift", "unlift-nn"]),
     ("unlift-report", &[]),
     ("unlift-testkit", &["unlift"]),
     ("unlift-audit", &["unlift", "unlift-io", "unlift-features", "unlift-report"]),

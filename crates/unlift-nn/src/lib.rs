@@ -1,0 +1,29 @@
+//! Learned networks: which models there are, where their files lie, and running them.
+//!
+//! ```text
+//! name ──> registry ──> folders, or what the program carries ──> hash, ports ──> Network ──> run
+//! ```
+//!
+//! A *model* is a file in ONNX, a *network* is one that is loaded. [`MODELS`] lists all models that the program
+//! knows: some it carries, others are the user's to supply. This crate knows no pictures and no points: what goes
+//! into a network and comes out are [`Tensor`]s, made and read by whoever uses it.
+//!
+//! ```
+//! use unlift_nn::{Network, Tensor};
+//!
+//! let network = Network::load("aliked-n16rot")?;
+//! let image = Tensor::try_new(&[1, 3, 32, 32], vec![0.5; 3 * 32 * 32])?;
+//! let [score] = network.run(vec![("image", image)], ["score"])?;
+//! assert_eq!(score.shape(), [1, 1, 32, 32]);
+//! # Ok::<(), unlift::Error>(())
+//! ```
+
+mod folders;
+mod network;
+mod registry;
+mod tensor;
+
+pub use folders::{Folders, Place, VARIABLE};
+pub use network::Network;
+pub use registry::{Entry, MODELS, Port, entry};
+pub use tensor::Tensor;

@@ -1,0 +1,94 @@
+//! All models that the program knows.
+
+use unlift::Error;
+
+/// What is known about a model.
+#[derive(Debug)]
+pub struct Entry {
+    /// Its name; the file is called so, with `.onnx` behind.
+    pub name: &'static str,
+    /// What it is for, in a line.
+    pub purpose: &'static str,
+    /// Licence of the weights, as an SPDX identifier where there is one.
+    pub licence: &'static str,
+    /// Where its owner publishes it.
+    pub owner: &'static str,
+    /// SHA-256 of the file, in hexadecimal; `None` where users make the file themselves, so that its bytes
+    /// depend on what they made it with.
+    pub sha256: Option<&'static str>,
+    /// What goes in, in the order of the file.
+    pub inputs: &'static [Port],
+    /// What comes out.
+    pub outputs: &'static [Port],
+    /// The file itself, where the program carries it.
+    pub carried: Option<&'static [u8]>,
+}
+
+/// An input or output of a network.
+#[derive(Debug)]
+pub struct Port {
+    /// Its name in the file.
+    pub name: &'static str,
+    /// Lengths of its sides; `None` is any.
+    pub shape: &'static [Option<usize>],
+}
+
+impl Entry {
+    /// The name of the file: `aliked-n16rot.onnx`.
+    pub fn file(&self) -> String {
+        format!("{}.onnx", self.name)
+    }
+}
+
+/// The entry called `name`.
+///
+/// # Errors
+/// When there is none.
+pub fn entry(name: &str) -> Result<&'static Entry, Error> {
+    let known = || MODELS.iter().map(|entry| entry.name).collect::<Vec<_>>().join(", ");
+    MODELS.iter().find(|entry| entry.name == name).ok_or_else(|| {
+        Error::new("model", format!("one of {}", known()), name.escape_debug().to_string())
+    })
+}
+
+/// All models, by name.
+pub const MODELS: &[Entry] = &[ALIKED_N16ROT, SUPERPOINT];
+
+const ALIKED_N16ROT: Entry = Entry {
+    name: "aliked-n16rot",
+    purpose: "keypoints and descriptors of photos (ALIKED)",
+    licence: "BSD-3-Clause",
+    owner: "https://github.com/Shiaoming/ALIKED",
+    sha256: Some("94bcc6401df51e1368e44f997f16f17765fba2fbe8050ffc59f54f6876f58754"),
+    inputs: &[
+        Port { name: "image", shape: &[Some(1), Some(3), None, None] },
+        Port { name: "patch", shape: &[None, Some(9), Some(128)] },
+        Port { name: "samples", shape: &[None, Some(16), Some(128)] },
+    ],
+    outputs: &[
+        Port { name: "score", shape: &[Some(1), Some(1), None, None] },
+        Port { name: "level1", shape: &[Some(1), Some(32), None, None] },
+        Port { name: "level2", shape: &[Some(1), None, None, Some(32)] },
+        Port { name: "level3", shape: &[Some(1), None, None, Some(32)] },
+        Port { name: "level4", shape: &[Some(1), None, None, Some(32)] },
+        Port { name: "offsets", shape: &[None, Some(2), Some(16)] },
+        Port { name: "descriptors", shape: &[None, Some(128)] },
+    ],
+    carried: Some(include_bytes!("../../../models/aliked-n16rot/aliked-n16rot.onnx")),
+};
+
+const SUPERPOINT: Entry = Entry {
+    name: "superpoint",
+    purpose: "keypoints and descriptors of photos (SuperPoint), made of the owner's superpoint_v1.pth by \
+              training/export/superpoint.py",
+    licence: "non-commercial research only, not to be passed on",
+    owner: "https://github.com/magicleap/SuperPointPretrainedNetwork",
+    // What an exporter writes depends on its version; the script checks the hash of the published weights.
+    sha256: None,
+    inputs: &[Port { name: "image", shape: &[Some(1), Some(1), None, None] }],
+    outputs: &[
+        Port { name: "score", shape: &[Some(1), None, None] },
+        Port { name: "coarse", shape: &[Some(1), None, None, Some(256)] },
+    ],
+    carried: None,
+};

@@ -1,0 +1,111 @@
+//! What keeps a network from being loaded or run is one line.
+
+use std::fs;
+use std::path::PathBuf;
+
+use tempfile::TempDir;
+use unlift_nn::{Entry, Folders, MODELS, Network, Port, Tensor, entry};
+
+fn aliked() -> &'static Entry {
+    entry("aliked-n16rot").unwrap()
+}
+
+/// A folder of models with the bytes of `entry`'s file.
+fn with_file(entry: &Entry, bytes: &[u8]) -> (TempDir, Folders) {
+    let place = tempfile::tempdir().unwrap();
+    fs::write(place.path().join(entry.file()), bytes).unwrap();
+    let given = Some(PathBuf::from(place.path()));
+    (place, Folders { given, user: None })
+}
+
+fn refused(entry: &Entry, bytes: &[u8]) -> String {
+    let (place, folders) = with_file(entry, bytes);
+    let error = Network::load_from(&folders, entry).err().expect("it is refused").to_string();
+    assert!(!error.contains('\n'), "{error}");
+    error.replace(&place.path().display().to_string(), "DIR")
+}
+
+#[test]
+fn another_file_of_that_name_is_refused() {
+    let hash = aliked().sha256.unwrap();
+    // The empty string's hash.
+    let empty = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855";
+    assert_eq!(
+        refused(aliked(), b""),
+        format!("DIR/aliked-n16rot.onnx: expected SHA-256 {hash}, found {empty}")
+    );
+}
+
+#[test]
+fn what_is_no_onnx_or_has_other_ports_is_refused() {
+    let unknown = Entry { sha256: None, inputs: &[], outputs: &[], ..*aliked() };
+    for bytes in [&b""[..], b"text", &aliked().carried.unwrap()[..1000]] {
+        let error = refused(&unknown, bytes);
+        assert!(error.starts_with("DIR/aliked-n16rot.onnx: expected "), "{error}");
+    }
+    let port = |name, shape| Port { name, shape };
+    let bytes = aliked().carried.unwrap();
+    let other = Entry {
+        inputs: Box::leak(Box::new([port("picture", &[Some(1), Some(3), None, None])])),
+        ..unknown
+    };
+    assert_eq!(
+        refused(&other, bytes),
+        "DIR/aliked-n16rot.onnx: expected an input picture of shape (1, 3, any, any), found inputs \
+         image, patch, samples"
+    );
+    let other = Entry {
+        outputs: Box::leak(Box::new([port("descriptors", &[None, Some(256)])])),
+        ..unknown
+    };
+    let error = refused(&other, bytes);
+    assert!(error.contains("an output descriptors of shape (any, 256), found"), "{error}");
+}
+
+#[test]
+fn a_model_that_is_nowhere_is_told_and_an_unknown_name_too() {
+    let entry = Entry { carried: None, ..*aliked() };
+    let error = Network::load_from(&Folders::default(), &entry).err().unwrap().to_string();
+    assert_eq!(
+        error,
+        "aliked-n16rot.onnx: expected in the folder that UNLIFT_MODELS names \
+         (https://github.com/Shiaoming/ALIKED), found nothing"
+    );
+    let error = Network::load("no such model").err().unwrap().to_string();
+    let known: Vec<&str> = MODELS.iter().map(|entry| entry.name).collect();
+    let known = known.join(", ");
+    assert_eq!(error, format!("model: expected one of {known}, found no such model"));
+}
+
+#[test]
+fn inputs_that_do_not_fit_are_one_line() {
+    let network = Network::load("aliked-n16rot").unwrap();
+    let image =
+        |channels: usize| Tensor::try_new(&[1, channels, 32, 32], vec![0.0; channels << 10]);
+    for (inputs, output) in [
+        (vec![("image", image(2).unwrap())], "score"),
+        (vec![("picture", image(3).unwrap())], "score"),
+        (vec![("image", image(3).unwrap())], "descriptors"),
+        (vec![], "score"),
+    ] {
+        let error = network.run(inputs, [output]).unwrap_err().to_string();
+        assert!(error.starts_with("aliked-n16rot: expected ") && !error.contains('\n'), "{error}");
+    }
+}
+
+#[test]
+fn many_threads_give_the_same_bytes() {
+    let network = Network::load("aliked-n16rot").unwrap();
+    let run = |_| {
+        let values = (0..3 * 64 * 96).map(|at| (at % 251) as f32 / 251.0).collect();
+        let image = Tensor::try_new(&[1, 3, 64, 96], values).unwrap();
+        network.run(vec![("image", image)], ["score", "level4"]).unwrap()
+    };
+    let alone = run(0);
+    std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..4).map(|at| scope.spawn(move || run(at))).collect();
+        for thread in threads {
+            assert_eq!(thread.join().unwrap(), alone);
+        }
+    });
+}
