@@ -1,11 +1,13 @@
-//! Photos in, keypoints and descriptors out: SIFT as COLMAP extracts it by default.
+//! Photos in, keypoints and descriptors out: SIFT as COLMAP extracts it by default, or learned features.
 //!
 //! ```text
 //! photo ──> GrayImage ──> octaves ──> extrema ──> orientations ──> descriptors ──> Features
+//! photo ──> ColorImage ──> network ──> maxima ──> descriptors ──> LearnedFeatures
 //! ```
 //!
-//! [`read`](load::read) decodes a photo, [`Sift`] extracts, [`in_order`](batch::in_order) does many in
-//! constant memory. The same image gives the same bytes for any number of threads.
+//! [`read`](load::read) decodes a photo, [`Sift`] or [`Aliked`] extracts, [`in_order`](batch::in_order) does many in
+//! constant memory; [`Extractor`] is whichever was asked for. The same image gives the same bytes for any number of
+//! threads.
 //!
 //! ```
 //! use unlift_features::{GrayImage, Sift};
@@ -24,10 +26,13 @@
 
 pub mod batch;
 mod blur;
+mod color;
 mod descriptor;
+mod extractor;
 mod extrema;
 mod gradient;
 mod image;
+mod learned;
 pub mod load;
 mod octave;
 mod options;
@@ -38,6 +43,9 @@ mod quantize;
 mod refine;
 mod sift;
 
+pub use color::ColorImage;
+pub use extractor::{Extraction, Extractor, Found, Photo};
 pub use image::GrayImage;
+pub use learned::{Aliked, AlikedOptions, LearnedFeatures, SuperPoint, SuperPointOptions};
 pub use options::SiftOptions;
 pub use sift::{Features, Keypoint, Sift};

@@ -1,4 +1,4 @@
-//! From a photo in a file to gray values.
+//! From a photo in a file to gray values or colors.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -7,6 +7,7 @@ use ::image::metadata::Orientation;
 use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 use unlift::Error;
 
+use crate::color::ColorImage;
 use crate::image::GrayImage;
 
 /// What is read, as told to people.
@@ -25,6 +26,17 @@ const MOST_PIXELS: u64 = 1 << 28;
 pub fn read(path: &Path) -> Result<GrayImage, Error> {
     let (bytes, name) = bytes_of(path)?;
     decode(&bytes, &name)
+}
+
+/// The same in colors.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_color(path: &Path) -> Result<ColorImage, Error> {
+    let (bytes, name) = bytes_of(path)?;
+    let photo = upright(&bytes, &name)?;
+    let (width, height) = (photo.width() as usize, photo.height() as usize);
+    ColorImage::try_new(width, height, photo.into_rgb8().into_raw())
 }
 
 /// The bytes of a file, and how it is called in errors.

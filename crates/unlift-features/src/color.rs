@@ -1,0 +1,111 @@
+//! What learned extractors read: colors, row by row.
+
+use image::imageops::{FilterType, resize};
+use image::{ImageBuffer, Rgb};
+use unlift::Error;
+
+/// A color image.
+///
+/// `pixels` is `(height, width, 3)`, row-major: red, green and blue as bytes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ColorImage {
+    width: usize,
+    height: usize,
+    pixels: Vec<u8>,
+}
+
+impl ColorImage {
+    /// An image of `width` x `height` pixels from its rows.
+    ///
+    /// # Errors
+    /// When a side is zero or above 2^24, or `pixels` has another length than `3 * width * height`.
+    pub fn try_new(width: usize, height: usize, pixels: Vec<u8>) -> Result<Self, Error> {
+        let sides = 1..=1 << 24;
+        if !sides.contains(&width) || !sides.contains(&height) {
+            let found = format!("{width} x {height}");
+            return Err(Error::new("image", "1 to 16777216 pixels a side", found));
+        }
+        if 3 * width * height != pixels.len() {
+            let expected = format!("{width} x {height} pixels of 3 bytes");
+            return Err(Error::new("image", expected, format!("{} bytes", pixels.len())));
+        }
+        Ok(Self { width, height, pixels })
+    }
+
+    /// Pixels in a row.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Rows.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Red, green and blue of the pixel in column `x` of row `y`.
+    ///
+    /// # Panics
+    /// When there is no such pixel.
+    pub fn pixel(&self, x: usize, y: usize) -> [u8; 3] {
+        let at = 3 * (y * self.width + x);
+        [self.pixels[at], self.pixels[at + 1], self.pixels[at + 2]]
+    }
+
+    /// Where the middle of pixel `place` of `small`, this image shrunk, is in pixels of this image.
+    pub(crate) fn unshrunk<T: Into<f64>>(&self, small: &Self, place: [T; 2]) -> [f32; 2] {
+        let scales = [(self.width, small.width), (self.height, small.height)];
+        let [x, y] = place.map(Into::into);
+        let full = |at: f64, (large, small): (usize, usize)| match large == small {
+            true => at as f32,
+            false => ((at + 0.5) * (large as f64 / small as f64) - 0.5) as f32,
+        };
+        [full(x, scales[0]), full(y, scales[1])]
+    }
+
+    /// The image shrunk so that no side exceeds `most` pixels, or `None` if it is small enough.
+    ///
+    /// Sides are rounded down, as COLMAP does; the filter is Lanczos of three lobes, as for SIFT.
+    pub(crate) fn fitted(&self, most: usize) -> Option<Self> {
+        let longer = self.width.max(self.height);
+        if longer <= most {
+            return None;
+        }
+        let scale = most as f64 / longer as f64;
+        let side = |length: usize| ((length as f64 * scale) as usize).max(1);
+        let (width, height) = (side(self.width), side(self.height));
+        let buffer: ImageBuffer<Rgb<u8>, &[u8]> =
+            ImageBuffer::from_raw(self.width as u32, self.height as u32, &self.pixels[..])?;
+        let small = resize(&buffer, width as u32, height as u32, FilterType::Lanczos3);
+        Some(Self { width, height, pixels: small.into_raw() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_image_states_what_is_wrong_with_it() {
+        let text = |result: Result<ColorImage, Error>| result.unwrap_err().to_string();
+        assert_eq!(
+            text(ColorImage::try_new(0, 4, vec![])),
+            "image: expected 1 to 16777216 pixels a side, found 0 x 4"
+        );
+        assert_eq!(
+            text(ColorImage::try_new(2, 2, vec![1; 4])),
+            "image: expected 2 x 2 pixels of 3 bytes, found 4 bytes"
+        );
+    }
+
+    #[test]
+    fn fitting_rounds_sides_down_and_keeps_colors() {
+        let image = ColorImage::try_new(100, 33, [10, 20, 30].repeat(3300)).unwrap();
+        assert!(image.fitted(100).is_none());
+        let small = image.fitted(50).unwrap();
+        assert_eq!((small.width(), small.height()), (50, 16));
+        assert_eq!(small.pixel(49, 15), [10, 20, 30]);
+        assert_eq!(image.unshrunk(&small, [0.0, 0.0])[0], 0.5);
+        assert_eq!(image.unshrunk(&image, [7.25, 3.0]), [7.25, 3.0]);
+        assert_eq!(image.fitted(1).unwrap().height(), 1);
+    }
+}

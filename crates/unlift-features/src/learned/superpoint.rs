@@ -1,0 +1,139 @@
+//! SuperPoint: keypoints on pixels, descriptors between the middles of cells of 8 x 8 pixels.
+//!
+//! Source: DeTone, Malisiewicz, Rabinovich, "SuperPoint: Self-Supervised Interest Point Detection and Description", CVPR
+//! workshops 2018. Its weights may not be passed on: users supply them, made into ONNX by
+//! `training/export/superpoint.py`.
+
+use unlift::Error;
+use unlift_nn::{Network, Tensor};
+
+use super::LearnedFeatures;
+use super::maxima::{Scores, Wanted, corners};
+use crate::color::ColorImage;
+
+/// Name of the model.
+const MODEL: &str = "superpoint";
+/// Pixels a side of a cell.
+const CELL: usize = 8;
+/// Pixels around a keypoint, to each side, in which there is no other one, and at the edge of the image.
+const RADIUS: usize = 4;
+
+/// What a user may choose about SuperPoint. The defaults are hloc's.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SuperPointOptions {
+    /// Features at most, the best, 4096.
+    pub max_features: usize,
+    /// Score that a keypoint must exceed, 0 to 1: 0.005.
+    pub min_score: f32,
+    /// Longest side in pixels, 1600; larger images are shrunk first, keypoints are in pixels of the image as it was
+    /// given.
+    pub max_image_size: usize,
+}
+
+impl Default for SuperPointOptions {
+    fn default() -> Self {
+        Self { max_features: 4096, min_score: 0.005, max_image_size: 1600 }
+    }
+}
+
+/// The extractor.
+pub struct SuperPoint {
+    network: Network,
+    options: SuperPointOptions,
+}
+
+impl SuperPoint {
+    /// An extractor with these options, and with the weights that the user supplies.
+    ///
+    /// # Errors
+    /// Names the first field that is out of range; says where the model belongs that is missing.
+    pub fn try_new(options: SuperPointOptions) -> Result<Self, Error> {
+        Self::of_network(Network::load(MODEL)?, options)
+    }
+
+    /// The same with a network that has the inputs and outputs of SuperPoint's.
+    ///
+    /// # Errors
+    /// Names the first field that is out of range.
+    pub fn of_network(network: Network, options: SuperPointOptions) -> Result<Self, Error> {
+        super::check(options.max_features, options.min_score, options.max_image_size)?;
+        Ok(Self { network, options })
+    }
+
+    /// Hash of the file of the network.
+    pub fn sha256(&self) -> &str {
+        self.network.sha256()
+    }
+
+    /// The features of an image.
+    ///
+    /// # Errors
+    /// Only when the network is not what its names say.
+    pub fn extract(&self, image: &ColorImage) -> Result<LearnedFeatures, Error> {
+        let small = image.fitted(self.options.max_image_size);
+        let seen = small.as_ref().unwrap_or(image);
+        if seen.width().min(seen.height()) < CELL {
+            return Ok(LearnedFeatures::default());
+        }
+        let pixels = (0..seen.width() * seen.height())
+            .map(|at| gray(seen.pixel(at % seen.width(), at / seen.width())));
+        let input = Tensor::try_new(&[1, 1, seen.height(), seen.width()], pixels.collect())?;
+        let [score, coarse] = self.network.run(vec![("image", input)], ["score", "coarse"])?;
+        let &[_, height, width] = score.shape() else {
+            let found = format!("{:?}", score.shape());
+            return Err(Error::new(MODEL, "scores of shape (1, any, any)", found));
+        };
+        let scores = Scores { width, height, values: score.into_values() };
+        let wanted = Wanted {
+            radius: RADIUS,
+            border: RADIUS,
+            min_score: self.options.min_score,
+            most: self.options.max_features,
+        };
+        let places = scores.maxima(&wanted);
+        let dim = coarse.shape().last().copied().unwrap_or(0);
+        let mut descriptors = vec![0.0; places.len() * dim];
+        for (&place, out) in places.iter().zip(descriptors.chunks_exact_mut(dim)) {
+            describe(&coarse, place, [width, height], out);
+        }
+        Ok(LearnedFeatures {
+            keypoints: places
+                .iter()
+                .map(|&[x, y]| image.unshrunk(seen, [x as f64, y as f64]))
+                .collect(),
+            scores: places.iter().map(|&[x, y]| scores.values[y * width + x]).collect(),
+            descriptors,
+            dim,
+        })
+    }
+}
+
+/// Gray as OpenCV makes it, whose weights are those of Rec. 601, in 0..1.
+fn gray([red, green, blue]: [u8; 3]) -> f32 {
+    let [red, green, blue] = [red, green, blue].map(f32::from);
+    (0.299 * red + 0.587 * green + 0.114 * blue).round() / 255.0
+}
+
+/// The descriptor of a pixel, from the four cells around it, brought to length 1.
+///
+/// A cell's stands at its middle. Pixels are brought to cells by the scale of the authors' code, which is a little
+/// less than eight.
+fn describe(coarse: &Tensor, place: [usize; 2], size: [usize; 2], out: &mut [f32]) {
+    let dim = out.len();
+    let cells = [coarse.shape()[2], coarse.shape()[1]];
+    let [x, y] = [0, 1].map(|side| {
+        let middle = (CELL as f32 - 1.0) / 2.0;
+        let share = (place[side] as f32 - middle) / (size[side] as f32 - (CELL as f32 + 1.0) / 2.0);
+        share * (cells[side] - 1) as f32
+    });
+    for ([x, y], weight) in corners(x, y) {
+        if !(0..cells[0] as isize).contains(&x) || !(0..cells[1] as isize).contains(&y) {
+            continue;
+        }
+        let at = (y as usize * cells[0] + x as usize) * dim;
+        let cell = &coarse.values()[at..at + dim];
+        out.iter_mut().zip(cell).for_each(|(out, value)| *out += weight * value);
+    }
+    let length = out.iter().map(|value| value * value).sum::<f32>().sqrt().max(1e-12);
+    out.iter_mut().for_each(|value| *value /= length);
+}
