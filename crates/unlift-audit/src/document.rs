@@ -183,6 +183,7 @@ pub fn row(row: &Row, thresholds: &[Threshold]) -> report::Row {
         axis_accuracy_percent: row.axis_accuracy_percent,
         exact_percent: row.exact_percent,
         assignment_accuracy_percent: row.assignment_accuracy_percent,
+        metrics: ordered(row.metrics.iter().map(|(name, &value)| (name.clone(), value))),
         median_error: row.error_percentiles[0],
         blind_median_error: row.blind_median_error,
         error_percentiles: ordered(

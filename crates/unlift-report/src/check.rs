@@ -123,6 +123,9 @@ fn check_row(place: &str, row: &Row) -> Result<(), Error> {
             finite(&format!("{place}.{field}"), value)?;
         }
     }
+    for (name, &value) in &row.metrics {
+        finite(&format!("{place}.metrics[{name:?}]"), value)?;
+    }
     for (percentile, value) in &row.error_percentiles {
         if let Some(value) = value {
             finite(&format!("{place}.error_percentiles[{percentile:?}]"), *value)?;

@@ -158,6 +158,9 @@ pub struct Row {
     pub exact_percent: Option<f64>,
     /// Percent of descriptors assigned to the right point of their line (`ppl`, `ppl+` only).
     pub assignment_accuracy_percent: Option<f64>,
+    /// Figures of measures that whoever planned the audit added, by name; each in a unit of its own.
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    pub metrics: IndexMap<String, f64>,
     /// Median error over the released points, in `unit`; lost points count as infinitely far, so
     /// `None` when half of them or more are lost.
     pub median_error: Option<f64>,

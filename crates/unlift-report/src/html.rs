@@ -70,6 +70,7 @@ pub fn render(
         Some(tables::recovered(&document)),
         Some(tables::baselines(&document)),
         tables::distinct(&document),
+        tables::metrics(&document),
         Some(tables::errors(&document)),
         Some(tables::break_even(&document)).filter(|table| !table.rows.is_empty()),
     ];

@@ -3,7 +3,7 @@
 mod sample;
 
 use unlift_report::document::{GateResult, NotAudited};
-use unlift_report::{Document, Error};
+use unlift_report::{Document, Error, RenderOptions, render};
 
 #[test]
 fn a_document_survives_its_text() {
@@ -40,6 +40,21 @@ fn what_could_not_be_audited_and_what_is_not_known_survive() {
     assert_eq!((read.sure_percent, &read.sure_unknown), (None, &row.sure_unknown));
     assert_eq!(read.records_alone_percent, row.records_alone_percent);
     assert_eq!(read.records_alone_by, row.records_alone_by);
+}
+
+#[test]
+fn added_measures_survive_and_are_drawn() {
+    let mut document = sample::document(true);
+    assert!(!document.to_json().unwrap().contains("\"metrics\""));
+    document.results[0].metrics = [("ssim".to_owned(), 0.512_345_6), ("faces".into(), 7.0)].into();
+    let read = Document::from_json(&document.to_json().unwrap()).unwrap();
+    assert_eq!(
+        read.results[0].metrics.iter().map(|(name, x)| (name.as_str(), *x)).collect::<Vec<_>>(),
+        [("ssim", 0.512_346), ("faces", 7.0)]
+    );
+    assert!(read.results[1].metrics.is_empty());
+    let page = render(&document, None, &RenderOptions::default()).unwrap();
+    assert!(page.contains("id=\"table-metrics\"") && page.contains("<td>0.512</td>"));
 }
 
 #[test]
@@ -101,6 +116,10 @@ fn a_broken_rule_names_its_place() {
     assert_eq!(
         message(|d| d.results[1].median_error = Some(f64::NAN)),
         "audit.json: results[1].median_error: expected a finite number, found NaN"
+    );
+    assert_eq!(
+        message(|d| _ = d.results[1].metrics.insert("faces".into(), f64::INFINITY)),
+        "audit.json: results[1].metrics[\"faces\"]: expected a finite number, found inf"
     );
     assert_eq!(
         message(|d| d.results[2].recovered_percent[0] = 100.5),

@@ -111,6 +111,7 @@ fn documents_keep_the_schema() {
     full.results[0].repeats = 3;
     full.results[0].std = Some(Spread { median_error: Some(0.1), ..Spread::default() });
     full.results[0].delta = None;
+    full.results[0].metrics.insert("faces found".into(), 0.25);
     (full.results[1].sure_percent, full.results[1].sure_unknown) = (None, Some("few".into()));
     let missing = NotAudited { scheme: "star".into(), neighbors: None, reason: "flat".into() };
     full.not_audited =

@@ -79,6 +79,29 @@ pub(crate) fn choices(document: &Document) -> Option<Table> {
     (table.columns.len() > n_keys).then_some(table)
 }
 
+/// Figures of measures that were added to the audit, a column each; `None` when no row has any.
+pub(crate) fn metrics(document: &Document) -> Option<Table> {
+    let mut names: Vec<&String> = Vec::new();
+    for name in document.results.iter().flat_map(|row| row.metrics.keys()) {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    let rows = document.results.iter().map(|row| {
+        let text = |name: &&String| {
+            row.metrics.get(*name).map_or(NONE.into(), |value| words::significant(*value, 3))
+        };
+        let mut cells = key_cells(row);
+        cells.extend(names.iter().map(text));
+        cells
+    });
+    let rows = rows.collect();
+    let mut columns = key_columns();
+    columns.extend(names.iter().map(|name| column(name.as_str(), Class::Figure)));
+    let caption = "Measures that were added to this audit.".to_owned();
+    (!names.is_empty()).then(|| Table { id: "metrics", caption, columns, rows, notes: Vec::new() })
+}
+
 /// RANSAC's trials per point; `None` when no row has them.
 pub(crate) fn trials(document: &Document) -> Option<Table> {
     let mut rows = Vec::new();

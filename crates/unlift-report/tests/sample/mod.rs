@@ -193,6 +193,7 @@ fn row(s: usize, r: usize, solver: &str, thresholds: [&str; 2], unit: LengthUnit
         axis_accuracy_percent: has(&["cp"], 97.3 - 6.0 * r as f64),
         exact_percent: has(&["cp"], 26.1 - 3.0 * r as f64),
         assignment_accuracy_percent: has(&["ppl", "ppl+"], 98.0 - 3.0 * r as f64),
+        metrics: IndexMap::new(),
         median_error: percentiles[0].1,
         blind_median_error: Some(1.25 * scale),
         error_percentiles: percentiles.into_iter().collect(),

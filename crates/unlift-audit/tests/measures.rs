@@ -1,0 +1,82 @@
+//! A measure of somebody's own, from the plan to the files.
+
+use std::fs;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use unlift::audit::{Cell, Measure, Plan};
+use unlift::recover::Solver;
+use unlift::{Error, Unit};
+use unlift_audit::{Error as AuditError, Finished, Job, Preparation, Quiet, Shown};
+use unlift_audit::{maps, open_audit};
+use unlift_io::atomic::Rules;
+use unlift_report::Document;
+
+/// Points that were found, as `found`, and a third of them times `factor`.
+#[derive(Debug)]
+struct Found {
+    factor: f64,
+}
+
+impl Measure<3> for Found {
+    fn measure(&self, cell: &Cell<'_>) -> Result<Vec<(String, f64)>, Error> {
+        let n = cell.recovered.positions().len();
+        let found = (0..n).filter(|&slot| cell.recovered.position(slot).is_some()).count() as f64;
+        Ok(vec![("found".to_owned(), found), ("thirds".to_owned(), self.factor * found / 3.0)])
+    }
+}
+
+/// An audit of a small room with this measure, in `folder`.
+fn audit(folder: &Path, factor: f64) -> Result<Finished, AuditError> {
+    let map = folder.join("room.csv");
+    let points = unlift::synthetic::room(1, 400).points;
+    let text: String = points.iter().map(|[x, y, z]| format!("{x},{y},{z}\n")).collect();
+    fs::write(&map, text).expect("room.csv");
+    let preparation = Preparation { scale: Some(1.0), k: 10, ..Preparation::default() };
+    let (input, prepared) = maps::open(&map, None, &preparation, &Quiet)?;
+    let usual = Plan::new(Unit::Meter);
+    let plan = Plan {
+        schemes: usual.schemes.iter().filter(|s| s.name() == "cp").cloned().collect(),
+        inlier_ratios: vec![1.0, 0.1],
+        k: 10,
+        solvers: vec![Solver::Joint, Solver::Ransac],
+        measures: vec![Arc::new(Found { factor })],
+        ..usual
+    };
+    let out = folder.join("audit");
+    let files = open_audit(&out, Rules::new([map.as_path()], false), Shown::Points, &Quiet)?;
+    let job = Job { plan, ..Job::new(&map, &input, &prepared, &out, Instant::now())? };
+    maps::perform(job, files)
+}
+
+#[test]
+fn figures_of_a_measure_stand_in_the_files() {
+    let place = tempfile::tempdir().expect("a temporary folder");
+    audit(place.path(), 1.0).expect("an audit");
+    let text = fs::read_to_string(place.path().join("audit/audit.json")).expect("audit.json");
+    let document = Document::from_json(&text).expect("a document");
+    assert_eq!(document.results.len(), 4);
+    for row in &document.results {
+        assert_eq!(row.metrics.keys().collect::<Vec<_>>(), ["found", "thirds"]);
+        let found = (row.n_points - row.n_lost) as f64;
+        assert!(found > 0.0, "{} {}", row.solver, row.inlier_ratio);
+        assert_eq!(row.metrics["found"], found, "{} {}", row.solver, row.inlier_ratio);
+        assert!((row.metrics["thirds"] - found / 3.0).abs() < 1e-3, "{}", row.metrics["thirds"]);
+    }
+    // Rows differ, so that no constant passes.
+    let lost: Vec<u64> = document.results.iter().map(|row| row.n_lost).collect();
+    assert!(lost.iter().any(|&n| n != lost[0]), "{lost:?}");
+    let page = fs::read_to_string(place.path().join("audit/report.html")).expect("a page");
+    assert!(page.contains("id=\"table-metrics\"") && page.contains(">thirds<"));
+}
+
+/// No file is written with a figure that JSON cannot hold.
+#[test]
+fn a_measure_that_is_no_number_is_refused() {
+    let place = tempfile::tempdir().expect("a temporary folder");
+    let error = audit(place.path(), f64::NAN).err().expect("an error").to_string();
+    let expected = "results[0].metrics[\"thirds\"]: expected a finite number, found NaN";
+    assert!(error.ends_with(expected) && error.lines().count() == 1, "{error}");
+    assert!(!place.path().join("audit/audit.json").exists());
+}
