@@ -1,4 +1,4 @@
-//! Strings become types, here and in `gate.rs` and nowhere else.
+//! Strings become types, here and in `unlift_audit::Gate` and nowhere else.
 
 use std::path::PathBuf;
 

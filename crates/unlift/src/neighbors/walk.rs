@@ -1,7 +1,7 @@
 //! A short walk over the graph of best matches: neighbors of neighbors are neighbors.
 //!
 //! Two points near each other need not have patches that overlap, but a few steps over sure matches
-//! lead from one to the other (`learning.md` 3.2).
+//! lead from one to the other.
 
 use rayon::prelude::*;
 

@@ -24,7 +24,7 @@ pub use scheme::{Build, Entry, Facts, Lifted, Scheme, SchemeOptions};
 use crate::Error;
 
 /// All schemes, in the order of the paper's tables. A file that is missing here fails
-/// `tests/architecture.rs`.
+/// `tests/architecture`.
 pub const SCHEMES: &[Entry] = &[
     olc::ENTRY,
     ppl::ENTRY,

@@ -1,7 +1,7 @@
 //! The owner's side: what recovery must never see.
 //!
 //! Only `obfuscate`, `neighbors::oracle`, `evaluate` and `audit` may import from here; a test
-//! (`tests/architecture.rs`) fails the build otherwise.
+//! (`tests/architecture`) fails the build otherwise.
 
 mod original;
 mod secret;

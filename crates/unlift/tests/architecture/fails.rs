@@ -1,6 +1,7 @@
 //! Each check of the house can fail.
 
 use crate::circles::{back_arrows, circles};
+use crate::names::dangling;
 use crate::rules::*;
 use crate::rust::{Source, code_of};
 
@@ -198,4 +199,22 @@ fn keys_on_the_attackers_side_are_found() {
         assert_eq!(found.len(), 1, "{path}");
     }
     assert!(forbidden_keys(&source("audit/run.rs", "use crate::seed::Key;")).is_empty());
+}
+
+#[test]
+fn names_of_files_that_are_not_there_are_found() {
+    let files = ["docs/decisions/joint.md", "crates/unlift/src/seed.rs"].map(str::to_owned);
+    let found = |path: &str, text: &str| dangling(path, text, &files);
+    let wrong = "see [why](docs/joint.md)\n\nand `seeds.rs`, or eed.rs.";
+    assert_eq!(
+        found("README.md", wrong),
+        [
+            "README.md:1: there is no file docs/joint.md",
+            "README.md:3: there is no file seeds.rs",
+            "README.md:3: there is no file eed.rs",
+        ]
+    );
+    assert_eq!(found("src/a.rs", "/// As in `README.md`.\nlet a = \"mod.rs\";").len(), 1);
+    let right = "[a](decisions/joint.md#top), ../../unlift/src/seed.rs: https://a.b/no.md, `.rs`";
+    assert_eq!(found("docs/formats.md", right), Vec::<String>::new());
 }

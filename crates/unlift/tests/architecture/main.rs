@@ -4,6 +4,7 @@
 
 mod circles;
 mod fails;
+mod names;
 mod rules;
 mod rust;
 
@@ -11,22 +12,29 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use circles::{back_arrows, circles};
+use names::dangling;
 use rules::*;
 use rust::{Source, code_of};
 
 const CORE: &str = env!("CARGO_MANIFEST_DIR");
 
-fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
+/// All files under `folder`, but for what builds leave and what git keeps.
+fn all_files(folder: &Path, found: &mut Vec<PathBuf>) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for entry in entries {
         let path = entry.unwrap().path();
-        if path.is_dir() {
-            rust_files(&path, found);
-        } else if path.extension().is_some_and(|e| e == "rs") {
+        if !path.is_dir() {
             found.push(path);
+        } else if !["target", ".git"].iter().any(|name| path.ends_with(name)) {
+            all_files(&path, found);
         }
     }
     found.sort();
+}
+
+fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
+    all_files(folder, found);
+    found.retain(|path| path.extension().is_some_and(|e| e == "rs"));
 }
 
 fn core_sources() -> Vec<Source> {
@@ -133,4 +141,21 @@ fn manifests_follow_the_arrows() {
             assert!(!heavy, "the core has a new dependency: {dependency}");
         }
     }
+}
+
+#[test]
+fn files_that_are_named_exist() {
+    let root = Path::new(CORE).join("../..");
+    let mut files = Vec::new();
+    all_files(&root, &mut files);
+    let from_root =
+        |path: &PathBuf| path.strip_prefix(&root).unwrap().to_string_lossy().replace('\\', "/");
+    let names: Vec<String> = files.iter().map(from_root).collect();
+    let read = |name: &&String| name.ends_with(".rs") || name.ends_with(".md");
+    let found: Vec<String> = names
+        .iter()
+        .filter(read)
+        .flat_map(|name| dangling(name, &fs::read_to_string(root.join(name)).unwrap(), &names))
+        .collect();
+    assert!(names.len() > 200 && found.is_empty(), "\n{}", found.join("\n"));
 }

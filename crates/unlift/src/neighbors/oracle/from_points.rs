@@ -1,6 +1,6 @@
 //! Lists that an owner gives by point, translated to the records of one obfuscation.
 
-use super::walk::record_of_originals;
+use super::nearness::record_of_originals;
 use crate::neighbors::Neighborhoods;
 use crate::truth::Secret;
 use crate::{About, Error, RecordId, RowOrder};

@@ -3,15 +3,15 @@
 //! The one module of this stage that reveals: it stands for an attacker of stated quality.
 
 mod from_points;
+mod nearness;
 mod outliers;
-mod walk;
 
 use rayon::prelude::*;
 
 pub use from_points::from_points;
 pub use outliers::{Noise, Outliers};
 
-use walk::Walk;
+use nearness::Nearness;
 
 use super::Neighborhoods;
 use crate::geometry::knn::Knn;
@@ -19,7 +19,7 @@ use crate::seed::{Draws, Stage};
 use crate::truth::{Original, Secret};
 use crate::{About, Error, Fingerprint, RecordId, RowOrder};
 
-/// The true neighborhoods of every slot: the first K records met by walking outward from its
+/// The true neighborhoods of every slot: the first K records met by going outward from its
 /// original in order of (distance, original id). Never the slot's own, each once (a paired line may
 /// hide two near points), dropped points skipped.
 #[derive(Clone, Debug)]
@@ -51,7 +51,7 @@ impl TrueNeighbors {
             return Err(Error::new("k", expected, k.to_string()));
         }
         let mut records = vec![RecordId(0); n_slots * k];
-        Walk::new(knn, secret, slots_per_record).each(k, &mut records, |_, near, row| {
+        Nearness::new(knn, secret, slots_per_record).each(k, &mut records, |_, near, row| {
             row.copy_from_slice(near);
         });
         Ok(Self { k, n_records, slots_per_record, map: secret.map(), records })

@@ -4,8 +4,8 @@
 //! of other places that look alike. Each model here is one such way to err, alone.
 
 use super::TrueNeighbors;
-use super::walk::Walk;
-use super::walk::listed;
+use super::nearness::Nearness;
+use super::nearness::listed;
 use crate::geometry::knn::Knn;
 use crate::seed::{Draws, Stage};
 use crate::truth::Secret;
@@ -100,17 +100,17 @@ impl Outliers {
             let found = secret.n_slots().to_string();
             return Err(Error::new("secret", format!("{n_slots} slots"), found));
         }
-        let walk = Walk::new(knn, secret, truth.slots_per_record);
+        let nearness = Nearness::new(knn, secret, truth.slots_per_record);
         Ok(match noise {
             Noise::Uniform => Self::uniform(),
-            Noise::Near => Self::near(truth, &walk, n_slots, seed),
-            Noise::Clustered => Self::clustered(truth, knn, secret, &walk, seed),
+            Noise::Near => Self::near(truth, &nearness, n_slots, seed),
+            Noise::Clustered => Self::clustered(truth, knn, secret, &nearness, seed),
         })
     }
 
     fn near<const D: usize>(
         truth: &TrueNeighbors,
-        walk: &Walk<'_, D>,
+        nearness: &Nearness<'_, D>,
         n_slots: usize,
         seed: u64,
     ) -> Self {
@@ -119,7 +119,7 @@ impl Outliers {
         let per_slot = truth.k.min(end.saturating_sub(first));
         let mut records = vec![RecordId(0); n_slots * per_slot];
         if per_slot > 0 {
-            walk.each(end, &mut records, |slot, near, row| {
+            nearness.each(end, &mut records, |slot, near, row| {
                 let ring = &mut near[first..];
                 let mut draws = Draws::new(seed, Stage::OracleOutliers, slot as u64);
                 for (at, entry) in row.iter_mut().enumerate() {
@@ -136,7 +136,7 @@ impl Outliers {
         truth: &TrueNeighbors,
         knn: &Knn<'_, D>,
         secret: &Secret,
-        walk: &Walk<'_, D>,
+        nearness: &Nearness<'_, D>,
         seed: u64,
     ) -> Self {
         let patches = knn.patches(PATCH * truth.k);
@@ -156,8 +156,8 @@ impl Outliers {
                         break;
                     }
                 }
-                let hidden_there = walk.record_of(place as usize);
-                walk.from(place as usize, truth.k, &mut near);
+                let hidden_there = nearness.record_of(place as usize);
+                nearness.from(place as usize, truth.k, &mut near);
                 for record in hidden_there.into_iter().chain(near.iter().copied()).take(truth.k) {
                     if !listed(&records[start..], record) {
                         records.push(record);

@@ -79,7 +79,7 @@ impl Hypotheses {
                     kept.cells.push([(cell as u8, 1.0), (0, 0.0), (0, 0.0), (0, 0.0)]);
                 }
             }
-            // Few shared cells agree more easily by chance; the exponent is from learning.md 3.1.
+            // Few shared cells agree more easily by chance.
             let share = version.cells.len() as f64 / CELLS as f64;
             version.root_weight = libm::pow(share, 0.5 * WEIGHT_EXPONENT) as f32;
             kept.root_weight = version.root_weight;

@@ -8,14 +8,14 @@ use crate::truth::Secret;
 const MARGIN: usize = 8;
 
 /// A search over originals, read as a search over records.
-pub(super) struct Walk<'a, const D: usize> {
+pub(super) struct Nearness<'a, const D: usize> {
     knn: &'a Knn<'a, D>,
     secret: &'a Secret,
     record_of: Vec<Option<RecordId>>,
     slots_per_record: usize,
 }
 
-impl<'a, const D: usize> Walk<'a, D> {
+impl<'a, const D: usize> Nearness<'a, D> {
     pub(super) fn new(knn: &'a Knn<'a, D>, secret: &'a Secret, slots_per_record: usize) -> Self {
         let record_of = record_of_originals(secret, slots_per_record);
         Self { knn, secret, record_of, slots_per_record }
