@@ -4,8 +4,12 @@ mod common;
 
 use std::fs;
 use std::process::Command;
+use std::sync::Arc;
 
+use arrow_array::types::UInt32Type;
+use arrow_array::{ArrayRef, ListArray, RecordBatch, UInt32Array};
 use common::Place;
+use parquet::arrow::ArrowWriter;
 use serde_json::Value;
 use unlift_io::stage::{read_truth, write_truth};
 
@@ -110,6 +114,69 @@ fn the_rows_are_those_of_an_audit_of_the_map() {
         assert_eq!(ours["results"], map["results"], "{scheme}");
         assert_eq!(ours["break_even"], map["break_even"], "{scheme}");
     }
+}
+
+/// The `k` nearest points of every point, for the `n` first ones, as a file that any program could write.
+fn write_lists(place: &Place, name: &str, points: &[[f64; 3]], n: usize, k: usize) {
+    let near = |at: usize| {
+        let off = |other: &u32| {
+            let point = points[*other as usize];
+            (0..3).map(|c| (point[c] - points[at][c]).powi(2)).sum::<f64>()
+        };
+        let mut others: Vec<u32> = (0..points.len() as u32).filter(|&p| p as usize != at).collect();
+        others.sort_by(|a, b| off(a).total_cmp(&off(b)));
+        Some(others.into_iter().take(k).map(Some).collect::<Vec<_>>())
+    };
+    let neighbors = ListArray::from_iter_primitive::<UInt32Type, _, _>((0..n).map(near));
+    let point = UInt32Array::from_iter_values(0..n as u32);
+    let columns: [(&str, ArrayRef); 2] =
+        [("point", Arc::new(point)), ("neighbors", Arc::new(neighbors))];
+    let batch = RecordBatch::try_from_iter(columns).unwrap();
+    let file = fs::File::create(place.path(name)).unwrap();
+    let mut writer = ArrowWriter::try_new(file, batch.schema(), None).unwrap();
+    writer.write(&batch).unwrap();
+    writer.close().unwrap();
+}
+
+/// Lists by original are read as `audit map` reads them.
+#[test]
+fn lists_of_a_file_are_those_of_an_audit_of_the_map() {
+    let place = Place::with_room(400);
+    let points = unlift::synthetic::room(1, 400).points;
+    write_lists(&place, "lists.parquet", &points, 400, 10);
+    for scheme in ["olc", "ppl", "cp"] {
+        let hide = "obfuscate room.csv --scale 1 --k 10 --seed 7 --scheme";
+        place.ends(&format!("{hide} {scheme} --out hidden"), 0);
+        let options = "--k 10 --seed 7 --neighbors lists.parquet --json";
+        let released = "audit released hidden/released.parquet --truth hidden/truth.parquet";
+        let ours = json(&place, &format!("{released} --name {scheme} {options}"), 0);
+        let map =
+            json(&place, &format!("audit map room.csv --scale 1 --schemes {scheme} {options}"), 0);
+        assert_eq!(ours["results"], map["results"], "{scheme}");
+        let rows = ours["results"].as_array().unwrap();
+        assert_eq!(rows.len(), 3, "joint, joint-start and consensus");
+        for row in rows {
+            assert_eq!(row["neighbors"], "file");
+            // All of them right, but for a partner on the same line.
+            assert!(row["inlier_ratio"].as_f64() > Some(0.9), "{scheme}: {}", row["inlier_ratio"]);
+            let percent = |of: &str| row[of]["0.25"].as_f64().unwrap();
+            assert!(percent("recovered_percent") > 2.0 * percent("blind_percent"), "{row}");
+        }
+    }
+    // Points without a row have no neighbors, and that is told.
+    write_lists(&place, "few.parquet", &points, 300, 10);
+    let released = "audit released hidden/released.parquet --truth hidden/truth.parquet --k 10";
+    let (_, stderr) = place.ends(&format!("{released} --neighbors few.parquet --out few"), 0);
+    assert!(stderr.contains("few.parquet: 100 of 400 points have no neighbors in it"), "{stderr}");
+    // Lists of another map name points that this one lacks.
+    let more = unlift::synthetic::room(1, 401).points;
+    write_lists(&place, "other.parquet", &more, 401, 10);
+    let (_, stderr) = place.ends(&format!("{released} --neighbors other.parquet --out other"), 3);
+    assert!(
+        stderr.starts_with("unlift: other.parquet: ") && stderr.lines().count() == 1,
+        "{stderr}"
+    );
+    assert!(!place.path("other").exists());
 }
 
 /// Descriptors of the originals go to the records that hide them, also where a record hides two.
