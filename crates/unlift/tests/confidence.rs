@@ -70,12 +70,15 @@ const CASES: [(Noise, f64); 5] = [
 #[test]
 fn what_is_said_comes_true_as_often_as_said() {
     let schemes = ["olc", "ppl", "ppl+", "ray", "ray-voxel", "plane", "cp"];
-    for solver in [Solver::Joint, Solver::Consensus] {
+    // 1.9 and 2.7 points off; sure of 43.8 and 33.8 %, of which 98.0 and 97.6 % are right.
+    for (solver, most, least_sure, least_right) in
+        [(Solver::Joint, 3.8, 41.8, 96.0), (Solver::Consensus, 4.0, 31.8, 95.6)]
+    {
         let found = judge(solver, &schemes, &CASES);
         let off = off_diagonal(&found);
-        assert!(off <= 4.0, "{solver:?}: {off:.1} points off the diagonal, {:?}", found.bins);
-        let correct = found.sure_correct_percent().unwrap();
-        assert!(found.sure_percent() > 15.0 && correct > 90.0, "{solver:?}: {correct}");
+        assert!(off <= most, "{solver:?}: {off:.1} points off the diagonal, {:?}", found.bins);
+        let (sure, right) = (found.sure_percent(), found.sure_correct_percent().unwrap());
+        assert!(sure > least_sure && right > least_right, "{solver:?}: {sure}, {right}");
     }
 }
 
@@ -91,9 +94,9 @@ fn the_unit_of_the_map_changes_nothing() {
             let q = b.probability_within(slot, large.1).unwrap();
             (p - q).abs() > 0.01
         });
-        // Rounding tips a few slots to another place: up to 2 % of them, as the key falls.
+        // Rounding tips a few slots to another place: a thousandth of them with this key, up to 2 % with others.
         let off = off.count();
-        assert!(off * 33 < a.n_slots(), "{name}: {off} of {}", a.n_slots());
+        assert!(off * 50 < a.n_slots(), "{name}: {off} of {}", a.n_slots());
     }
 }
 
@@ -128,16 +131,16 @@ fn crowds_that_do_not_list_back_are_not_believed() {
     let sure_percent = |case| judge(Solver::Joint, &["plane"], &[case]).sure_percent();
     let of_good = sure_percent((Noise::Uniform, 0.3));
     let of_shared = sure_percent((Noise::Clustered, 0.2));
-    assert!(of_good > 60.0, "sure of {of_good} % where lists are good");
-    // 5 to 7 %, as the key falls.
-    assert!(of_shared < 10.0, "sure of {of_shared} % where wrong entries share a place");
+    assert!(of_good > 67.0, "sure of {of_good} % where lists are good");
+    // None today.
+    assert!(of_shared < 2.0, "sure of {of_shared} % where wrong entries share a place");
 }
 
 #[test]
 fn crowds_that_do_not_list_back_are_not_followed() {
     let scene = scene(207, 6_000, 1.0);
-    // Between what came back when they were followed (89, 75, 72) and when not (93, 78, 78), when the rule was made.
-    for (name, least) in [("olc", 91.0), ("ppl", 76.5), ("ray", 75.0)] {
+    // Two points below what comes back, and above what did when they were followed (89, 75, 72).
+    for (name, least) in [("olc", 90.9), ("ppl", 84.3), ("ray", 79.7)] {
         let (recovered, secret) = recovered(&scene, name, Solver::Joint, (Noise::Clustered, 0.15));
         let accuracy = evaluate(&recovered, &scene.0, &secret).unwrap();
         let percent = accuracy.percent_within(scene.1);

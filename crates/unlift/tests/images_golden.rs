@@ -1,5 +1,5 @@
 //! The figures of synthetic images, where no data set is at hand: keypoints as SIFT spreads them,
-//! K = 20, everything automatic, joint recovery. Floors are about two points below the first measurement: they guard
+//! K = 20, everything automatic, joint recovery. Floors are two points below what came back, or less: they guard
 //! against losses and claim nothing.
 
 use unlift::audit::{Image, run_images};
@@ -40,9 +40,9 @@ fn image(seed: u64) -> Image {
 
 /// (inlier ratio, scheme, percent within 5, 10 and 25 px) at least; `dcl2d` against blind instead.
 const FLOORS: &[(f64, &str, [f64; 3])] = &[
-    (1.0, "lines2d", [43.0, 71.0, 93.5]),
+    (1.0, "lines2d", [44.7, 71.4, 93.6]),
     (0.3, "lines2d", [40.0, 66.5, 92.5]),
-    (1.0, "cp2d", [55.5, 73.0, 93.0]),
+    (1.0, "cp2d", [56.6, 73.0, 93.4]),
     (0.3, "cp2d", [46.0, 64.5, 90.5]),
 ];
 
@@ -76,12 +76,14 @@ fn lines_and_permutations_come_back() {
     assert!(missed.is_empty(), "{missed:#?}");
 }
 
-/// Convergent lines hide much, but lists must never make an attacker worse than blind.
+/// Convergent lines hide much, but lists tell more than none: 1.5 to 1.8 times what a blind attacker gets. With a tenth of
+/// right entries they tell nothing (3.2, 6.6 and 16.7 % beside 3.4, 6.4 and 16.3), and must not lead astray.
 #[test]
 fn convergent_lines_are_never_worse_than_blind() {
     for row in rows(&["dcl2d"], &[1.0, 0.5, 0.3, 0.1]) {
         for (found, blind) in row.recovered_percent.iter().zip(&row.blind_percent).skip(1) {
-            assert!(found >= &(0.9 * blind), "{}: {found:.2} < {blind:.2}", row.inlier_ratio);
+            let least = if row.inlier_ratio > 0.2 { 1.4 * blind } else { blind - 0.3 };
+            assert!(*found >= least, "{}: {found:.2} < {least:.2}", row.inlier_ratio);
         }
     }
 }
