@@ -68,29 +68,40 @@ fn density_determinism() {
     over_schemes!(threads_change_no_byte);
 }
 
-/// Points on a wall, lines in all directions: the wall comes back (tomography: 68 or 69 % over six keys).
+/// Points on a wall, lines in all directions: the wall comes back (67.2 and 67.8 %; tomography 68 or 69 over six other keys).
 #[test]
 fn a_wall_comes_back_from_random_lines() {
     let mut draws = Draws::new(2, Stage::Synthetic, 0);
     let wall: Vec<[f64; 3]> =
         (0..2000).map(|_| [draws.between(0.0, 2.0), 0.5, draws.between(0.0, 2.0)]).collect();
     let hidden = hide::<3>(scheme("olc").unwrap(), &wall, 1);
-    for (solver, least) in [(Solver::Density, 60.0), (Solver::Tomography, 65.0)] {
+    for (solver, least) in [(Solver::Density, 65.1), (Solver::Tomography, 65.7)] {
         let percent = percent_within(&hidden, &alone(&hidden.released, solver), 0.1);
         assert!(percent >= least, "{solver:?}: {percent}");
     }
 }
 
-/// Floors: measured shares within 25 cm, less three or four points below the least of six keys (`ray` by
-/// tomography: 40 to 46 %).
+/// Floors: shares within 25 cm, two points below what comes back or less. Nobody published an attack on candidates, and
+/// none is made up.
 #[test]
 fn a_room_comes_back_from_its_records() {
-    let floors = [("olc", 57.0, 69.0), ("ppl", 53.0, 63.0), ("ray", 32.0, 37.0), ("cp", 0.0, 27.0)];
+    let floors = [
+        ("olc", Some(59.8), 70.6),
+        ("ppl", Some(55.4), 65.5),
+        ("ray", Some(32.0), 37.7),
+        ("cp", None, 29.2),
+    ];
     let points = furnished(4000);
     for (name, published, ours) in floors {
         let hidden = hide(scheme(name).unwrap(), &points, 1);
-        for (solver, least) in [(Solver::Density, published), (Solver::Tomography, ours)] {
-            let percent = percent_within(&hidden, &alone(&hidden.released, solver), 0.25);
+        for (solver, least) in [(Solver::Density, published), (Solver::Tomography, Some(ours))] {
+            let recovered = alone(&hidden.released, solver);
+            let Some(least) = least else {
+                let lost = recovered.status().iter().all(|&status| status == Status::NoSupport);
+                assert!(lost, "{name}, {solver:?}: a position from nowhere");
+                continue;
+            };
+            let percent = percent_within(&hidden, &recovered, 0.25);
             assert!(percent >= least, "{name}, {solver:?}: {percent}");
         }
     }
@@ -107,8 +118,9 @@ fn a_scaled_map_has_the_same_shares() {
         for solver in ALONE {
             let one = percent_within(&one, &alone(&one.released, solver), 0.25);
             let other = percent_within(&other, &alone(&other.released, solver), 7.3 * 0.25);
-            // Records are rounded to f32 after scaling: a sample on the border of two voxels may change sides.
-            assert!((one - other).abs() <= 0.5, "{name}, {solver:?}: {one} and {other}");
+            // Records are rounded to f32 after scaling: a sample on the border of two voxels may change sides. Two of
+            // 1,500 points; none today.
+            assert!((one - other).abs() <= 0.14, "{name}, {solver:?}: {one} and {other}");
         }
     }
 }
@@ -139,7 +151,7 @@ fn permuted_records_give_permuted_positions() {
 #[test]
 fn geometric_lists_hold_neighbors() {
     let points = furnished(3000);
-    for (name, least) in [("olc", 0.40), ("ppl", 0.17), ("ray", 0.13), ("cp", 0.11)] {
+    for (name, least) in [("olc", 0.42), ("ppl", 0.37), ("ray", 0.14), ("cp", 0.112)] {
         let hidden = hide(scheme(name).unwrap(), &points, 1);
         let lists = geometric(&hidden.released, 20).unwrap();
         let ratio = hidden.near(20).measured_inlier_ratio(&lists);

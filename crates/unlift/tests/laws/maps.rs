@@ -1,6 +1,7 @@
 //! Maps, lists and bytes that the laws share.
 
 use proptest::prelude::ProptestConfig;
+use proptest::test_runner::RngSeed;
 use unlift::geometry::frame::Bounds;
 use unlift::neighbors::Neighborhoods;
 use unlift::neighbors::oracle::{self, TrueNeighbors};
@@ -12,13 +13,21 @@ use unlift::truth::{Original, Secret};
 use unlift::{About, Error, PointSet, RecordId, RowOrder, Unit};
 pub use unlift_testkit::{distance_to_record, dot, norm, piles, room, uniform};
 
-/// Few cases, really random ones; a failure prints its arguments.
+/// What the cases of property tests are drawn from, unless other ones are asked for.
+const SEED: u64 = 25;
+
+/// Few cases, the same in every run; with `UNLIFT_RANDOM_TESTS=1` others in every run, as many as `PROPTEST_CASES` says, and
+/// with `PROPTEST_RNG_SEED` those of that seed. A failure prints its arguments and leaves no file.
 pub fn cases(n: u32) -> ProptestConfig {
+    let asked = ProptestConfig::default();
+    let is_set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    let of_asked = is_set("UNLIFT_RANDOM_TESTS") || is_set("PROPTEST_RNG_SEED");
     ProptestConfig {
-        cases: n,
+        cases: if is_set("PROPTEST_CASES") { asked.cases } else { n },
+        rng_seed: if of_asked { asked.rng_seed } else { RngSeed::Fixed(SEED) },
         failure_persistence: None,
         max_shrink_iters: 0,
-        ..ProptestConfig::default()
+        ..asked
     }
 }
 

@@ -108,12 +108,14 @@ fn exact_limit<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
                 "{name}, {options:?}: slot {slot} is {off} off at {sine}, {delta}"
             );
         }
-        // Coincident points share a voxel, hence a center: `ray-voxel` never fixes them. In a small plane
-        // chance lies near most places, so few are fixed.
+        // Coincident points share a voxel or region, hence a center: these rays never fix them, and the law says nothing
+        // of them. Of candidates in a small plane it says little, as chance lies near most places: 25 of 480 and more.
         let obfuscation = hidden.released.obfuscation();
-        let is_of_voxels = matches!(obfuscation, Obfuscation::Rays(rays) if rays.voxel().is_some());
-        let enough = fixed > n / 50 || is_of_voxels || D == 2;
-        assert!(enough, "{name}, {options:?}: {fixed} of {n} fixed");
+        let of_places = matches!(obfuscation, Obfuscation::Rays(rays)
+            if rays.voxel().is_some() || rays.regions().is_some());
+        let least = if D == 2 { n / 100 } else { n / 5 };
+        let as_usual = if of_places { fixed == 0 } else { fixed > least };
+        assert!(as_usual, "{name}, {options:?}: {fixed} of {n} fixed");
     }
 }
 
@@ -186,12 +188,10 @@ fn bounded_influence<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
             replaced[slot] = true;
         }
     }
-    let enough = replaced.iter().filter(|&&r| r).count() > n / 50;
-    if D == 2 && !enough {
-        // Both lines of a candidate cross all of the plane: some draws have few that pass far away.
-        return;
-    }
-    assert!(enough, "{name}: too few far records");
+    // Both lines of a candidate cross all of the plane: some draws have few that pass far away, 45 of 1,340.
+    let least = if D == 2 { n / 100 } else { n / 5 };
+    let replacing = replaced.iter().filter(|&&r| r).count();
+    assert!(replacing > least, "{name}: {replacing} far records for {n} slots");
     let pulled = solve(&hidden.released, &hidden.lists_of(&with), options);
     for slot in (0..n).filter(|&slot| replaced[slot]) {
         assert_eq!(pulled.status()[slot], Status::Ok, "{name}: slot {slot}");

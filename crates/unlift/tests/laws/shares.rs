@@ -34,7 +34,7 @@ fn shifted_and_scaled_maps_leak_the_same<const D: usize>(
 ) {
     let points: Vec<[f64; D]> = room(31, 4000);
     let here = shares(scheme, &points, 1.0, solver);
-    let least = least_shares(name, scheme, &points);
+    let least = least_shares(name, scheme, &points, solver);
     let back = (0..2).all(|at| here[at] > least[at]);
     assert!(back, "{name}: a map that does not come back shows nothing: {here:?}");
     let scaled: Vec<[f64; D]> = points.iter().map(|p| p.map(|x| 7.3 * x)).collect();
@@ -49,17 +49,22 @@ fn shifted_and_scaled_maps_leak_the_same<const D: usize>(
     }
 }
 
-/// What must come back for the law to say anything: of an image more than a blind attacker gets, as rays
+/// What must come back for the law to say anything: two points below the least of all schemes, `plane`; of an image more than a blind attacker gets, as rays
 /// from anchors give back little.
-fn least_shares<const D: usize>(name: &str, scheme: &Entry, points: &[[f64; D]]) -> [f64; 2] {
+fn least_shares<const D: usize>(
+    name: &str,
+    scheme: &Entry,
+    points: &[[f64; D]],
+    solver: Solver,
+) -> [f64; 2] {
     if D == 3 {
-        return [10.0, 10.0];
+        return [19.4, 59.8];
     }
     let hidden = try_hide::<D>(scheme, points, 0.5, 7).unwrap();
     let blind = blind(&hidden.released, &hidden.original, &hidden.secret).percent_within(0.25);
     assert!(blind < 30.0, "{name}: {blind} % within reach of a blind attacker");
-    // `dcl2d` over seven keys: blind 21, recovered 22.2 to 23.9.
-    [0.0, 1.03 * blind]
+    // `dcl2d`: blind 21, recovered by consensus 22.1 (22.2 to 23.9 over seven other keys), by joint recovery 25.4.
+    [0.0, if solver == Solver::Joint { 1.1 * blind } else { 1.03 * blind }]
 }
 
 /// With lists that tell nothing, nothing scores above the blind attacker beyond noise. On a map of
@@ -78,8 +83,9 @@ fn random_lists_tell_nothing<const D: usize>(name: &str, scheme: &Entry) {
             // Four standard deviations of a difference of two binomial shares, and one slot.
             let p = (blind / 100.0).clamp(0.001, 0.999);
             // Where a line meets the others is a better guess for two points on it than the one place of the
-            // blind attacker: `ppl` over nine keys is ahead by 2.2 in the mean, with lists that tell nothing.
-            let pairs = if hidden.released.slots_per_record() == 2 { 2.5 } else { 0.0 };
+            // blind attacker: `ppl` over nine keys is ahead by 2.2 in the mean, with lists that tell nothing, and pairs
+            // with this key by up to 0.4 more than noise.
+            let pairs = if hidden.released.slots_per_record() == 2 { 1.0 } else { 0.0 };
             let noise = 400.0 * (2.0 * p * (1.0 - p) / n as f64).sqrt() + 100.0 / n as f64;
             assert!(
                 got <= blind + noise + pairs,
@@ -89,13 +95,13 @@ fn random_lists_tell_nothing<const D: usize>(name: &str, scheme: &Entry) {
     }
 }
 
-/// A dozen slots of 4,000 (eight of `ray-voxel` with the present key).
+/// Ten slots of 4,000 (eight of `ray-voxel` with the present key, one of all others together).
 #[test]
 fn equivariance() {
-    over_schemes!(shifted_and_scaled_maps_leak_the_same, Solver::Consensus, 0.3);
+    over_schemes!(shifted_and_scaled_maps_leak_the_same, Solver::Consensus, 0.25);
 }
 
-/// What differs in one round spreads in the next.
+/// What differs in one round spreads in the next: sixteen slots of `dcl2d` with the present key, three of any other.
 #[test]
 fn equivariance_of_joint_recovery() {
     over_schemes!(shifted_and_scaled_maps_leak_the_same, Solver::Joint, 0.5);
