@@ -3,8 +3,8 @@
 //!
 //! `cargo bench -p unlift --bench families -- [NAME=LIST ..]` prints, per map, the worst difference in points
 //! of percent between `joint` and `consensus` (at each threshold) and the least share of points called
-//! 90 % sure that are right, over every scheme, noise model, inlier ratio and source. Names: `maps`
-//! (`room`, `line`, ... or `redkitchen`, `castle`, each `:POINTS`; `image:KEYPOINTS`), `schemes`,
+//! 90 % sure that are right, over every scheme, noise model, inlier ratio and source; at the end, in how many of all cells
+//! either is the case. Names: `maps` (`room`, `line`, ... or `redkitchen`, `castle`, each `:POINTS`; `image:KEYPOINTS`), `schemes`,
 //! `ratios`, `noise`, `sources`, `seeds`, `k`; `cells=1` prints every cell. The real maps are
 //! looked for beside the repository and left out, with a line, where they are not.
 
@@ -26,6 +26,38 @@ use unlift::{Descriptors, Error, PointSet, Unit, descriptors::Values};
 const IMAGE: [f64; 2] = [640.0, 480.0];
 /// Points called sure count in a verdict on "sure" from this share of a cell on, in percent.
 const LEAST_SURE: f64 = 1.0;
+
+/// "Sure" is wrong in a cell where fewer are right, in percent.
+const LEAST_RIGHT: f64 = 85.0;
+/// By how many points of percent `consensus` may be ahead before it is counted.
+const AHEAD: [f64; 3] = [1.0, 3.0, 10.0];
+
+/// In how many cells, over all maps and sources.
+#[derive(Default)]
+struct Totals {
+    /// Pairs of `joint` and `consensus`.
+    n: usize,
+    /// Those in which `consensus` is [`AHEAD`] within any threshold.
+    behind: [usize; AHEAD.len()],
+    /// Rows, of either, with enough points that are called sure.
+    n_sure: usize,
+    /// Those in which too few of these are right.
+    wrong: usize,
+}
+
+impl Totals {
+    fn print(&self) {
+        let [a, b, c] = self.behind;
+        println!(
+            "of {} cells consensus is ahead by more than 1, 3, 10 points in {a}, {b}, {c}",
+            self.n
+        );
+        println!(
+            "of {} rows with at least {LEAST_SURE} % of points called 90 % sure, {} have fewer than {LEAST_RIGHT} % of those right",
+            self.n_sure, self.wrong
+        );
+    }
+}
 
 /// What is tried.
 struct Suite {
@@ -130,19 +162,21 @@ fn main() {
         "",
         "cells"
     );
+    let mut totals = Totals::default();
     for map in &suite.maps {
         for source in &suite.sources {
             match rows(&suite, map, source) {
-                Ok(Some(rows)) => table(&suite, map, source, &rows),
+                Ok(Some(rows)) => table(&suite, map, source, &rows, &mut totals),
                 Ok(None) => {}
                 Err(error) => println!("{map:<22} {source:<10} {error}"),
             }
         }
     }
+    totals.print();
 }
 
 /// Joint recovery beside consensus, cell by cell.
-fn table(suite: &Suite, map: &str, source: &str, rows: &[Row]) {
+fn table(suite: &Suite, map: &str, source: &str, rows: &[Row], totals: &mut Totals) {
     let cell = |row: &Row| {
         let noise = row.oracle_noise.unwrap_or("");
         format!("{} {:.2} {noise}", row.scheme, row.inlier_ratio)
@@ -152,20 +186,27 @@ fn table(suite: &Suite, map: &str, source: &str, rows: &[Row]) {
     let (mut sum, mut n) = (0.0, 0);
     for pair in rows.chunks(2) {
         let [joint, consensus] = pair else { continue };
+        let mut ahead = f64::NEG_INFINITY;
         for at in 0..joint.recovered_percent.len() {
             let (a, b) = (joint.recovered_percent[at], consensus.recovered_percent[at]);
+            ahead = ahead.max(b - a);
             if a - b < worst.0 {
                 worst = (a - b, format!("{} {a:.1} / {b:.1} ({at})", cell(joint)));
             }
         }
         sum += joint.recovered_percent[0] - consensus.recovered_percent[0];
         n += 1;
+        totals.n += 1;
+        for (count, least) in totals.behind.iter_mut().zip(AHEAD) {
+            *count += usize::from(ahead > least);
+        }
         for row in pair {
             let Some(reliability) = &row.reliability else { continue };
             let (sure, right) = (reliability.sure_percent(), reliability.sure_correct_percent());
-            if let Some(right) = right.filter(|_| sure >= LEAST_SURE)
-                && right < least.0
-            {
+            let Some(right) = right.filter(|_| sure >= LEAST_SURE) else { continue };
+            totals.n_sure += 1;
+            totals.wrong += usize::from(right < LEAST_RIGHT);
+            if right < least.0 {
                 least = (right, sure, format!("{} {}", cell(row), row.solver));
             }
         }
