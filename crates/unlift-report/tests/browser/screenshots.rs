@@ -1,43 +1,80 @@
-//! Pictures of the page, to be looked at; taken only where `UNLIFT_SCREENSHOTS` names a folder.
+//! Pictures of the page: every section can be seen, in light and in dark. Where `UNLIFT_SCREENSHOTS` names a folder they
+//! are written there, to be looked at, of more pages and narrow screens.
 
 use std::path::PathBuf;
 
+use serde_json::json;
 use unlift_report::{RenderOptions, render};
 
+use super::chromium::Browser;
 use super::{PageFile, browser, private_page, sample};
 
+const SECTIONS: [&str; 6] = ["curves", "distribution", "scene", "numbers", "losses", "reading"];
+
+/// What an open page looks like, and how far down: first as it opens, then from each section on.
+fn pictures(browser: &mut Browser, (width, colors): (u32, &str)) -> Vec<(Vec<u8>, i64)> {
+    let mut pictures = vec![(browser.screenshot(), -1)];
+    for section in SECTIONS {
+        browser.emulate(width, 1400, colors);
+        let place = format!("document.getElementById('{section}')");
+        browser.evaluate(&format!("{place}.scrollIntoView({{behavior: 'instant'}})"));
+        std::thread::sleep(std::time::Duration::from_millis(300));
+        let seen = format!(
+            "(r => r.top < innerHeight && r.bottom > 0 && r.width > 0)({place}.getBoundingClientRect())"
+        );
+        assert_eq!(browser.evaluate(&seen), json!(true), "{section} at {width} px");
+        let down = browser.evaluate("Math.round(scrollY)").as_i64().expect("pixels");
+        pictures.push((browser.screenshot(), down));
+    }
+    pictures
+}
+
+/// Width and height of a PNG.
+fn size(picture: &[u8]) -> [u32; 2] {
+    assert!(picture.starts_with(b"\x89PNG"));
+    [16, 20].map(|at| u32::from_be_bytes(picture[at..at + 4].try_into().expect("four bytes")))
+}
+
 #[test]
-fn pictures_are_taken_when_asked_for() {
-    let Some(folder) = std::env::var_os("UNLIFT_SCREENSHOTS") else {
-        return;
-    };
+fn every_section_is_seen_in_light_and_dark() {
     let Some(mut browser) = browser() else { return };
-    let folder = PathBuf::from(folder);
+    let asked = std::env::var_os("UNLIFT_SCREENSHOTS").map(PathBuf::from);
     let mixed = |metric| {
         let document = sample::mixed(metric);
         let scene = sample::scene(&document, 4_000);
         render(&document, Some(&scene), &RenderOptions::default()).expect("a page")
     };
-    let pages =
-        [("metric", private_page(true)), ("mixed", mixed(true)), ("mixed-no-scale", mixed(false))];
+    let mut pages = vec![("metric", private_page(true))];
+    let mut screens = vec![(1280, "light"), (1280, "dark")];
+    if asked.is_some() {
+        pages.extend([("mixed", mixed(true)), ("mixed-no-scale", mixed(false))]);
+        screens.extend([(390, "light"), (390, "dark")]);
+    }
     for (name, page) in pages {
         let file = PageFile::new(name, &page);
-        for (width, color_scheme) in
-            [(1280, "light"), (1280, "dark"), (390, "light"), (390, "dark")]
-        {
-            browser.emulate(width, 1000, color_scheme);
+        let mut all: Vec<Vec<u8>> = Vec::new();
+        let mut n_places = 0;
+        for screen in screens.iter().copied() {
+            browser.emulate(screen.0, 1000, screen.1);
             browser.open(&file.0);
-            let shot =
-                |kind: &str| folder.join(format!("{name}-{width}-{color_scheme}-{kind}.png"));
-            std::fs::write(shot("fold"), browser.screenshot()).expect("a picture");
-            for section in ["curves", "distribution", "scene", "numbers", "losses", "reading"] {
-                browser.emulate(width, 1400, color_scheme);
-                browser.evaluate(&format!(
-                    "document.getElementById('{section}').scrollIntoView({{behavior: 'instant'}})"
-                ));
-                std::thread::sleep(std::time::Duration::from_millis(300));
-                std::fs::write(shot(section), browser.screenshot()).expect("a picture");
+            let pictures = pictures(&mut browser, screen);
+            for (at, (picture, down)) in pictures.iter().enumerate() {
+                let kind = at.checked_sub(1).map_or("fold", |section| SECTIONS[section]);
+                assert_eq!(size(picture), [screen.0, if at == 0 { 1000 } else { 1400 }]);
+                // The last sections share the end of the page. Else nothing is drawn, or dark is as light, where a
+                // picture is there twice.
+                if pictures[..at].iter().all(|(_, other)| other != down) {
+                    assert!(!all.contains(picture), "{name}, {kind}, {screen:?}: seen before");
+                    all.push(picture.clone());
+                    n_places += 1;
+                }
+                if let Some(folder) = &asked {
+                    let shot = format!("{name}-{}-{}-{kind}.png", screen.0, screen.1);
+                    std::fs::write(folder.join(shot), picture).expect("a folder that takes files");
+                }
             }
         }
+        assert!(n_places >= 5 * screens.len(), "{name}: {n_places} places of the page");
+        assert_eq!(browser.complaints, Vec::<String>::new());
     }
 }
