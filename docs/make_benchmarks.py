@@ -156,7 +156,7 @@ def noise_figure(rows):
 
 def own_sources(scene, *options):
     """What an attacker gets without an oracle: sources by scheme, joint recovery."""
-    sources = ["similarity", "overlap", "geometric", "overlap+geometric", "overlap+similarity"]
+    sources = ["similarity", "overlap", "geometric"]
     schemes = ["olc", "ppl", "ray", "plane", "cp"]
     found, seconds = {}, {}
     # Where a source has nothing to say about a scheme (geometric, planes), the audit says so and goes on.

@@ -14,10 +14,49 @@ use unlift_audit::OutlierFilter;
 pub enum NeighborSource {
     /// Made from the originals at chosen inlier ratios.
     Oracle,
-    /// Made from the released map alone, by one source or several: names joined by `+`.
+    /// Made from the released map alone.
     Own(Named),
     /// Lists by point, in a file.
     File(PathBuf),
+}
+
+/// Which features are extracted from photos.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FeatureType {
+    /// SIFT.
+    Sift,
+    /// ALIKED.
+    Aliked,
+    /// SuperPoint.
+    SuperPoint,
+}
+
+impl FeatureType {
+    const ALL: [Self; 3] = [Self::Sift, Self::Aliked, Self::SuperPoint];
+
+    /// As users type it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sift => "sift",
+            Self::Aliked => "aliked",
+            Self::SuperPoint => "superpoint",
+        }
+    }
+}
+
+/// Features by their name.
+pub fn feature_type(text: &str) -> Result<FeatureType, String> {
+    let names = || FeatureType::ALL.map(FeatureType::name).join(", ");
+    let found = FeatureType::ALL.into_iter().find(|kind| kind.name() == text);
+    found.ok_or_else(|| format!("expected one of {}, found {text}", names()))
+}
+
+/// A score from 0 to below 1.
+pub fn score(text: &str) -> Result<f32, String> {
+    match text.trim().parse::<f32>() {
+        Ok(value) if (0.0..1.0).contains(&value) => Ok(value),
+        _ => Err(format!("expected a number from 0 to below 1, found {text}")),
+    }
 }
 
 /// A scheme by its name, be it for maps or for images.
@@ -65,18 +104,14 @@ pub fn image_solver(text: &str) -> Result<Solver, String> {
     found.ok_or_else(|| format!("expected one of {}, found {text}", names()))
 }
 
-/// `oracle`, or names of sources for images joined by `+`, with the lengths of lists usual there.
+/// `oracle`, or a source for images, with the length of lists usual there.
 pub fn image_source(text: &str) -> Result<NeighborSource, String> {
     if text == "oracle" {
         return Ok(NeighborSource::Oracle);
     }
-    let wrong =
-        || format!("expected oracle, similarity, overlap or both joined by +, found {text}");
-    let joined = joined(text).map_err(|_| wrong())?;
-    match joined.not_in_dimension::<2>() {
-        None => Ok(NeighborSource::Own(joined)),
-        Some(_) => Err(wrong()),
-    }
+    let own = Named::parse(text).ok().filter(|named| named.of_dimension::<2>().is_ok());
+    own.map(NeighborSource::Own)
+        .ok_or_else(|| format!("expected oracle, similarity or overlap, found {text}"))
 }
 
 /// Every scheme that is defined on maps.
@@ -135,29 +170,25 @@ pub fn delta(text: &str) -> Result<Delta, String> {
     value.map(Delta::Fixed)
 }
 
-/// `oracle`, names of sources joined by `+`, or a file.
+/// `oracle`, a source, or a file.
 pub fn neighbor_source(text: &str) -> Result<NeighborSource, String> {
     match text {
         "" => Err("expected oracle, a source or a file".to_owned()),
         "oracle" => Ok(NeighborSource::Oracle),
+        name if source(name).is_ok() => own_source(name).map(NeighborSource::Own),
         // One name that is known makes the others names as well: a slip is no missing file.
-        names if names.split('+').any(|name| source(name).is_ok()) => {
-            joined(names).map(NeighborSource::Own)
-        }
         names
             if !names.contains(std::path::is_separator)
-                && names.split(',').any(|name| name == "oracle" || source(name).is_ok()) =>
+                && names.split([',', '+']).any(|name| name == "oracle" || source(name).is_ok()) =>
         {
-            Err(format!(
-                "expected one source (repeat the option for rows of each, + joins sources), found {names}"
-            ))
+            Err(format!("expected one source (repeat the option for rows of each), found {names}"))
         }
         path => Ok(NeighborSource::File(path.into())),
     }
 }
 
-/// Names of sources joined by `+`.
-pub fn joined(text: &str) -> Result<Named, String> {
+/// A source that needs no oracle, by its name.
+pub fn own_source(text: &str) -> Result<Named, String> {
     Named::parse(text).map_err(|error| expected(&error))
 }
 
@@ -206,7 +237,9 @@ mod tests {
             scheme("cp2d").unwrap_err(),
             solver("magic").unwrap_err(),
             noise("white").unwrap_err(),
-            neighbor_source("overlap+magic").unwrap_err(),
+            feature_type("SIFT").unwrap_err(),
+            score("1").unwrap_err(),
+            own_source("magic").unwrap_err(),
         ];
         assert_eq!(
             texts.join("\n"),
@@ -218,6 +251,8 @@ mod tests {
              expected one of olc, ppl, ppl+, ray, ray-voxel, plane, cp, found cp2d (for images only)\n\
              expected one of joint, joint-start, consensus, ransac, density, tomography, found magic\n\
              expected one of uniform, near, clustered, found white\n\
+             expected one of sift, aliked, superpoint, found SIFT\n\
+             expected a number from 0 to below 1, found 1\n\
              expected one of similarity, overlap, geometric, found magic"
         );
     }
@@ -226,11 +261,12 @@ mod tests {
     fn names_of_sources_are_names_and_the_rest_are_files() {
         let own = |name: &str| NeighborSource::Own(Named::parse(name).unwrap());
         assert_eq!(neighbor_source("overlap"), Ok(own("overlap")));
-        assert_eq!(neighbor_source("overlap+similarity"), Ok(own("overlap+similarity")));
         assert_eq!(neighbor_source("./overlap"), Ok(NeighborSource::File("./overlap".into())));
         assert_eq!(neighbor_source("oracle"), Ok(NeighborSource::Oracle));
-        let several = neighbor_source("overlap,similarity").unwrap_err();
-        assert!(several.starts_with("expected one source (repeat the option"), "{several}");
+        for names in ["overlap,similarity", "overlap+similarity", "oracle,overlop"] {
+            let several = neighbor_source(names).unwrap_err();
+            assert!(several.starts_with("expected one source (repeat the option"), "{several}");
+        }
         let file = NeighborSource::File("lists,overlapping.parquet".into());
         assert_eq!(neighbor_source("lists,overlapping.parquet"), Ok(file));
         let file = NeighborSource::File("./lists,overlap".into());

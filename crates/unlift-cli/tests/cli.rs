@@ -162,8 +162,7 @@ fn sources_without_an_oracle_have_rows_of_their_own() {
     let place = Place::new();
     write_descriptors(&place);
     let line = "audit map room.csv --k 10 --schemes olc,ppl --inlier-ratios 0.5 --descriptors d.bin \
-                --neighbors oracle --neighbors overlap --neighbors overlap+similarity \
-                --neighbors geometric --neighbors overlap+geometric --out a";
+                --neighbors oracle --neighbors overlap --neighbors geometric --out a";
     place.stdout(line, 0);
     let document = place.json("a/audit.json");
     let rows: Vec<(String, Value, u64)> = document["results"]
@@ -181,9 +180,7 @@ fn sources_without_an_oracle_have_rows_of_their_own() {
     let expected = [
         ("oracle".to_owned(), Value::from("uniform"), 10),
         ("overlap".to_owned(), Value::Null, 35),
-        ("overlap+similarity".to_owned(), Value::Null, 35),
         ("geometric".to_owned(), Value::Null, 50),
-        ("overlap+geometric".to_owned(), Value::Null, 35),
     ];
     // By joint, by joint-start, and by consensus, as the map is small.
     assert_eq!(rows, both([expected.clone(), expected].concat()));
@@ -349,6 +346,7 @@ fn help_is_part_of_the_interface() {
         "bench recover",
         "features",
         "schemes",
+        "models",
     ] {
         let text = place.stdout(&format!("{command} --help"), 0);
         let name = if command.is_empty() { "unlift" } else { command }.replace(' ', "-");

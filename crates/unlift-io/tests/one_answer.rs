@@ -38,7 +38,7 @@ fn descriptors<const D: usize>(points: &[[f64; D]], extent: f64) -> Descriptors 
 
 /// Every source: the oracle at two ratios with three kinds of noise, all that work alone, and lists by point.
 fn sources<const D: usize>(k: usize) -> Vec<NeighborsBy<D>> {
-    let names = ["similarity", "overlap", "geometric", "overlap+geometric"];
+    let names = ["similarity", "overlap", "geometric"];
     let named = names.map(|name| Named::parse(name).unwrap().with_k(k));
     let own = named.into_iter().filter_map(|named| named.of_dimension::<D>().ok());
     [NeighborsBy::Oracle].into_iter().chain(own.map(NeighborsBy::Source)).collect()

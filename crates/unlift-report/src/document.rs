@@ -115,7 +115,7 @@ pub enum LengthUnit {
 pub struct Row {
     /// The scheme's user-facing name, for example `ppl+`.
     pub scheme: String,
-    /// Where the neighborhoods came from: `oracle`, `file`, or names of sources joined by `+`.
+    /// Where the neighborhoods came from: `oracle`, `file`, or the name of a source.
     pub neighbors: String,
     /// How the oracle chose the false neighbors: `uniform`, `near` or `clustered`; `None` without
     /// an oracle.

@@ -12,7 +12,7 @@ use crate::points::room;
 
 /// Checks all laws of a source on a map that it supports:
 ///
-/// 1. its name is one word, or words joined by `+`, and it chooses at least one record;
+/// 1. its name is one word, and it chooses at least one record;
 /// 2. one list per slot, of at most as many records as asked for, finite scores or none;
 /// 3. lists say of which map they are;
 /// 4. the same lists on any number of threads;

@@ -5,7 +5,7 @@
 //! mv constants.rs crates/unlift/src/recover/confidence/ && cargo fmt
 //! ```
 //!
-//! Every scheme, solver, noise model and ratio is recovered in rooms and other shapes of several sizes, some of them
+//! Every scheme, noise model and ratio is recovered by `joint` in rooms and other shapes of several sizes, some of them
 //! stretched so that points thin out with distance, as outdoors. The likelihood of "the error is within
 //! t", for thresholds t around the typical distance of the K-th neighbor, is maximized by damped Newton
 //! steps. The same constants come out on every machine and for any number of threads.
@@ -17,9 +17,7 @@ use unlift::geometry::knn::Knn;
 use unlift::geometry::vector::{distance, median};
 use unlift::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
 use unlift::obfuscate::{Entry, SCHEMES, SchemeOptions, obfuscate};
-use unlift::recover::{
-    Cues, N_KINDS, N_TERMS, RecoverOptions, Solver, centered, recover_and_look, terms,
-};
+use unlift::recover::{Cues, N_KINDS, N_TERMS, RecoverOptions, centered, recover_and_look, terms};
 use unlift::seed::Key;
 use unlift::synthetic::{Shape, shape};
 use unlift::truth::Original;
@@ -61,8 +59,6 @@ const SCENES: [Scene; 12] = [
     scene(Shape::LongRoom, 116, 8_000, 0.0, 50),
     scene(Shape::RoomWithOutliers, 117, 10_000, 0.0, 50),
 ];
-/// RANSAC takes ten times as long as the others: it is fitted on maps of at most so many points.
-const MOST_BY_RANSAC: usize = 6_000;
 /// Every noise model with its inlier ratios.
 const RATIOS: [(Noise, &[f64]); 3] = [
     (Noise::Uniform, &[1.0, 0.75, 0.5, 0.3, 0.2, 0.15, 0.1, 0.06]),
@@ -73,7 +69,7 @@ const RATIOS: [(Noise, &[f64]); 3] = [
 const SLOTS: usize = 400;
 
 fn main() -> Result<(), Error> {
-    let mut rows: Vec<Vec<Row>> = (0..3 * N_KINDS).map(|_| Vec::new()).collect();
+    let mut rows: Vec<Vec<Row>> = (0..N_KINDS).map(|_| Vec::new()).collect();
     for scene in SCENES {
         let original = Original::new(points(&scene)?);
         let typical = {
@@ -83,8 +79,8 @@ fn main() -> Result<(), Error> {
         let for_maps = SCHEMES.iter().filter(|entry| entry.in_3d.is_some());
         for entry in for_maps {
             eprintln!("{} {}, {}", scene.shape.name(), scene.seed, entry.name);
-            for (model, row) in of_scheme(&original, entry, scene.k, typical)? {
-                rows[model].push(row);
+            for (kind, row) in of_scheme(&original, entry, scene.k, typical)? {
+                rows[kind].push(row);
             }
         }
     }
@@ -102,7 +98,7 @@ fn points(scene: &Scene) -> Result<PointSet<3>, Error> {
     PointSet::try_new(points, Unit::Meter)
 }
 
-/// Rows of one scheme in one scene, each with the number of its model.
+/// Rows of one scheme in one scene, each with the kind of its records.
 fn of_scheme(
     original: &Original<3>,
     entry: &Entry,
@@ -120,22 +116,15 @@ fn of_scheme(
         let outliers = Outliers::new(noise, &near, &knn, &secret, 0)?;
         for &ratio in ratios {
             let lists = near.lists(ratio, &outliers, 0)?;
-            for (at, solver) in
-                [Solver::Consensus, Solver::Joint, Solver::Ransac].into_iter().enumerate()
-            {
-                if solver == Solver::Ransac && points.len() > MOST_BY_RANSAC {
-                    continue;
-                }
-                let options = RecoverOptions { solver, seed: 1, ..RecoverOptions::default() };
-                let (recovered, seen) = recover_and_look(&released, &lists, &options)?;
-                let every = recovered.n_slots().div_ceil(SLOTS).max(1);
-                for slot in (0..recovered.n_slots()).step_by(every) {
-                    if let Some(position) = recovered.position(slot) {
-                        let error = distance(&position, &points[secret.hidden()[slot].index()]);
-                        let cues = seen.cues[slot];
-                        let (error, typical) = (error / seen.radius, typical / seen.radius);
-                        rows.push((at * N_KINDS + seen.kind, Row { cues, error, typical }));
-                    }
+            let options = RecoverOptions { seed: 1, ..RecoverOptions::default() };
+            let (recovered, seen) = recover_and_look(&released, &lists, &options)?;
+            let every = recovered.n_slots().div_ceil(SLOTS).max(1);
+            for slot in (0..recovered.n_slots()).step_by(every) {
+                if let Some(position) = recovered.position(slot) {
+                    let error = distance(&position, &points[secret.hidden()[slot].index()]);
+                    let cues = seen.cues[slot];
+                    let (error, typical) = (error / seen.radius, typical / seen.radius);
+                    rows.push((seen.kind, Row { cues, error, typical }));
                 }
             }
         }
@@ -181,16 +170,12 @@ fn constants(rows: &[Vec<Row>]) -> String {
         "/// Standard deviations of terms.\npub(super) const SPREAD: [f32; N_TERMS] = [{}];\n",
         list(&spread)
     );
-    let _ = writeln!(text, "/// Per solver (consensus, joint, ransac) and kind of records.");
-    let _ = writeln!(text, "pub(super) const MODELS: [[Model; N_KINDS]; 3] = [");
-    for of_solver in models.chunks(N_KINDS) {
-        let _ = writeln!(text, "[");
-        for fitted in of_solver {
-            eprintln!("{} rows, mean negative log-likelihood {:.4}", fitted.n, fitted.loss);
-            let (found, scale) = (list(&fitted.found), list(&fitted.scale));
-            let _ = writeln!(text, "Model {{ found: [{found}], scale: [{scale}] }},");
-        }
-        let _ = writeln!(text, "],");
+    let _ = writeln!(text, "/// Per kind of records.");
+    let _ = writeln!(text, "pub(super) const MODELS: [Model; N_KINDS] = [");
+    for fitted in &models {
+        eprintln!("{} rows, mean negative log-likelihood {:.4}", fitted.n, fitted.loss);
+        let (found, scale) = (list(&fitted.found), list(&fitted.scale));
+        let _ = writeln!(text, "Model {{ found: [{found}], scale: [{scale}] }},");
     }
     let _ = writeln!(text, "];");
     text

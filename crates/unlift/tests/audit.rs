@@ -49,7 +49,7 @@ fn a_usual_audit_has_a_row_for_what_joint_recovery_starts_from() {
     for (row, seconds) in usual.rows.iter().zip(&usual.seconds.rows) {
         let is_start = row.solver == "joint-start";
         assert_eq!(seconds.recover == 0.0, is_start, "no run of its own");
-        let reason = if is_start { Unknown::FirstPass } else { Unknown::SmallMap };
+        let reason = if is_start { Unknown::OtherSolver } else { Unknown::SmallMap };
         assert_eq!(row.sure_unknown, Some(reason));
         assert!(row.reliability.is_none());
     }

@@ -122,10 +122,10 @@ fn similarity_is_the_cosine() {
     }
 }
 
-/// Every source that compares descriptors, and two joined; the laws of lists by records alone are with
+/// Every source that compares descriptors; the laws of lists by records alone are with
 /// those of the density.
 fn sources() -> Vec<Arc<dyn Source<3>>> {
-    let names = SOURCES.iter().map(|entry| entry.name).chain(["overlap+similarity"]);
+    let names = SOURCES.iter().map(|entry| entry.name);
     let sources = names.map(of_name);
     sources.filter(|source| source.needs() == Needs::Descriptors).collect()
 }
@@ -233,7 +233,7 @@ fn blank_and_equal_descriptors_are_no_trouble() {
 fn lists_say_what_they_are_about() {
     for slots_per_record in [1, 2] {
         let map = released(&random_map(200), slots_per_record);
-        for name in SOURCES.iter().map(|entry| entry.name).chain(["overlap+geometric"]) {
+        for name in SOURCES.iter().map(|entry| entry.name) {
             let about = of_name(name).lists(&map, 6, 0).unwrap().about();
             assert_eq!(about.map, Some(map.fingerprint()), "{name}");
             let order = match name {

@@ -1,6 +1,6 @@
 //! From the text of a gate to a gate.
 
-use unlift::neighbors::sources::{Named, SOURCES};
+use unlift::neighbors::sources::{SOURCES, source};
 use unlift::recover::Solver;
 
 use super::{Figure, Gate};
@@ -83,7 +83,7 @@ fn solver_name(text: &str) -> Option<&'static str> {
 fn source_name(text: &str) -> Option<String> {
     match text.trim() {
         name @ (ORACLE | "file") => Some(name.to_owned()),
-        name => Named::parse(name).ok().map(|joined| joined.name()),
+        name => source(name).ok().map(|entry| entry.name.to_owned()),
     }
 }
 
@@ -108,8 +108,8 @@ fn qualifiers(names: &[&str]) -> Result<(Option<&'static str>, Option<String>), 
                 let solvers = Solver::ALL.map(Solver::name).join(", ");
                 let sources: Vec<&str> = SOURCES.iter().map(|entry| entry.name).collect();
                 return Err(format!(
-                    "expected a solver ({solvers}) or a source of neighborhoods ({ORACLE}, file, {}, or \
-                     several joined by +), found {name}",
+                    "expected a solver ({solvers}) or a source of neighborhoods ({ORACLE}, file, {}), \
+                     found {name}",
                     sources.join(", ")
                 ));
             }

@@ -62,8 +62,8 @@ fn a_solver_and_a_source_may_be_named_in_any_order() {
         assert_eq!((gate.solver, gate.source.as_deref()), (Some("joint"), Some("oracle")));
         assert_eq!((gate.inlier_ratio, gate.threshold), (Some(0.5), 0.1));
     }
-    let gate = Gate::parse("all:overlap+geometric:0.10:gain<=20").unwrap();
-    assert_eq!((gate.solver, gate.source.as_deref()), (None, Some("overlap+geometric")));
+    let gate = Gate::parse("all:overlap:0.10:gain<=20").unwrap();
+    assert_eq!((gate.solver, gate.source.as_deref()), (None, Some("overlap")));
     assert_eq!((gate.threshold, gate.figure), (0.1, Figure::Gain));
     let gate = Gate::parse("ppl+:joint-start:0.10<=20").unwrap();
     assert_eq!((gate.solver, gate.source), (Some("joint-start"), None));
@@ -145,8 +145,7 @@ fn each_wrong_part_is_named() {
     assert_eq!(message("ppl:joint<=20"), format!("{form}, found no threshold"));
     assert_eq!(message("ppl:joint@0.5<=20"), format!("{form}, found no threshold"));
     let names = "expected a solver (joint, joint-start, consensus, ransac, density, tomography) or \
-                 a source of neighborhoods (oracle, file, similarity, overlap, geometric, or \
-                 several joined by +)";
+                 a source of neighborhoods (oracle, file, similarity, overlap, geometric)";
     assert_eq!(message("ppl:jiont:0.1<=20"), format!("{names}, found jiont"));
     assert_eq!(message("ppl:jiont@0.5:0.1<=20"), format!("{names}, found jiont"));
     assert_eq!(message("ppl:0.1@0.5:0.1<=20"), format!("{names}, found 0.1"));

@@ -189,10 +189,9 @@ fn without_oracle(job: &ImagesJob<'_>, numbers: &[usize]) -> Vec<NeighborsBy<2>>
     let missing = missing.filter(|source| {
         let needs = Needs::of(source);
         let fits = |&at: &usize| match job.source {
-            FeatureSource::Folder(_) => true,
-            FeatureSource::File(_) => {
-                job.source.get(at).is_ok_and(|image| lacking(&image, &needs).is_none())
-            }
+            // What was extracted as SIFT is what every source takes.
+            FeatureSource::Folder(folder) if folder.extraction().is_sift() => true,
+            _ => job.source.get(at).is_ok_and(|image| lacking(&image, &needs).is_none()),
         };
         let asked = job.plan.own_sources().any(|own| own.name() == source.name());
         needs.descriptors() && !asked && numbers.iter().all(fits)

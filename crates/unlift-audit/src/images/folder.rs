@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 
 use unlift::Descriptors;
 use unlift::descriptors::Values;
-use unlift_features::{Features, Sift, SiftOptions, load};
+use unlift_features::{Extraction, Extractor, Features, Found as FoundFeatures, LearnedFeatures};
 use unlift_io::Error;
-use unlift_io::features::ImageFeatures;
+use unlift_io::features::{ImageFeatures, round_to_half};
 
 /// What is taken for a photo; what a file is, its bytes decide when it is read.
 const ENDINGS: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
@@ -24,15 +24,10 @@ pub fn is_photo(path: &Path) -> bool {
     ending.is_some_and(|ending| ENDINGS.contains(&&*ending))
 }
 
-/// Pixels a side below which nothing can be an extremum.
-const LEAST_SIDE: usize = 3;
-/// Standard deviation of a SIFT keypoint in pixels of the image it was found in, as hloc states it.
-const DETECTION_NOISE: f64 = 1.0;
-
 /// The photos of a folder, sorted by name.
 pub struct Folder {
-    sift: Sift,
-    max_image_size: usize,
+    extractor: Extractor,
+    extraction: Extraction,
     names: Vec<String>,
     paths: Vec<PathBuf>,
     refused: Vec<Error>,
@@ -43,9 +38,9 @@ impl Folder {
     /// Lists the photos in `root` and in folders inside it. Names that begin with a dot are passed over.
     ///
     /// # Errors
-    /// When the folder cannot be read or holds no photo, or an option is out of range.
-    pub fn open(root: &Path, options: &SiftOptions) -> Result<Self, crate::Error> {
-        let sift = Sift::try_new(options.clone())?;
+    /// When the folder cannot be read or holds no photo, an option is out of range, or a model is missing.
+    pub fn open(root: &Path, extraction: &Extraction) -> Result<Self, crate::Error> {
+        let extractor = Extractor::try_new(extraction)?;
         let mut found = Found::default();
         found.visit(root, "", &mut Vec::new());
         if found.photos.is_empty() {
@@ -64,8 +59,8 @@ impl Folder {
         });
         found.photos.sort_unstable();
         let (names, paths) = found.photos.into_iter().unzip();
-        let max_image_size = options.max_image_size;
-        Ok(Self { sift, max_image_size, names, paths, refused: found.refused, passed_over })
+        let (extraction, refused) = (extraction.clone(), found.refused);
+        Ok(Self { extractor, extraction, names, paths, refused, passed_over })
     }
 
     /// Names of all photos, sorted by their bytes.
@@ -94,29 +89,34 @@ impl Folder {
     /// When this photo cannot be used.
     pub fn get(&self, at: usize) -> Result<ImageFeatures, crate::Error> {
         let path = &self.paths[at];
-        let photo = load::read(path)?;
-        let size = [photo.width(), photo.height()];
-        if size.iter().any(|&side| side < LEAST_SIDE) {
-            let found = format!("{} x {}", size[0], size[1]);
-            let expected = format!("at least {LEAST_SIDE} pixels a side");
-            return Err(Error::new(path, "", expected, found).into());
-        }
-        let shrunk = size[0].max(size[1]) as f64 / self.max_image_size as f64;
-        let features = self.sift.extract(&photo);
-        let image = ImageFeatures {
-            name: self.names[at].clone(),
-            size: Some(size.map(|side| side as u32)),
-            uncertainty_px: Some(DETECTION_NOISE * shrunk.max(1.0)),
-            photo: Some(path.clone()),
-            ..convert(features)
+        let photo = self.extractor.read(path, &self.extraction)?;
+        let features = match photo.found {
+            FoundFeatures::Sift(features) => of_sift(features),
+            FoundFeatures::Learned(features) => of_network(features),
         };
-        Ok(image)
+        Ok(ImageFeatures {
+            name: self.names[at].clone(),
+            size: Some(photo.size.map(|side| side as u32)),
+            uncertainty_px: Some(photo.noise_px),
+            photo: Some(path.clone()),
+            ..features
+        })
+    }
+
+    /// All that features depend on beside the photo, as text.
+    pub(crate) fn settings(&self) -> String {
+        format!("{:?} {}", self.extraction, self.extractor.sha256().unwrap_or_default())
+    }
+
+    /// Which features they are.
+    pub fn extraction(&self) -> &Extraction {
+        &self.extraction
     }
 }
 
 /// Features in hloc's convention: here, and nowhere else, the middle of the first pixel goes from
 /// (0.5, 0.5) to (0, 0).
-fn convert(features: Features) -> ImageFeatures {
+fn of_sift(features: Features) -> ImageFeatures {
     let keypoints = &features.keypoints;
     let scales: Vec<f32> = keypoints.iter().map(|keypoint| keypoint.scale).collect();
     let bytes = features.descriptors.into_flattened();
@@ -132,6 +132,18 @@ fn convert(features: Features) -> ImageFeatures {
         scores: Some(scales.clone()),
         scales: Some(scales),
         descriptors,
+        ..ImageFeatures::default()
+    }
+}
+
+/// What a network found, which is in hloc's convention.
+fn of_network(features: LearnedFeatures) -> ImageFeatures {
+    let LearnedFeatures { keypoints, scores, mut descriptors, dim } = features;
+    round_to_half(&mut descriptors);
+    ImageFeatures {
+        keypoints: keypoints.into_iter().map(|place| place.map(f64::from)).collect(),
+        scores: Some(scores),
+        descriptors: Descriptors::try_new(Values::F32(descriptors), dim).ok(),
         ..ImageFeatures::default()
     }
 }

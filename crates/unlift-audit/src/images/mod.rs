@@ -8,7 +8,7 @@ pub mod stream;
 
 use std::path::Path;
 
-use unlift_features::SiftOptions;
+use unlift_features::Extraction;
 use unlift_io::features::{self, ImageFeatures};
 
 use crate::Error;
@@ -31,10 +31,10 @@ impl FeatureSource {
     ///
     /// # Errors
     /// When there is no such thing, or no image in it.
-    pub fn open(path: &Path, options: &SiftOptions) -> Result<Self, Error> {
+    pub fn open(path: &Path, extraction: &Extraction) -> Result<Self, Error> {
         let metadata = std::fs::metadata(path).map_err(|e| unlift_io::Error::read(path, e))?;
         Ok(match metadata.is_dir() {
-            true => Self::Folder(Folder::open(path, options)?),
+            true => Self::Folder(Folder::open(path, extraction)?),
             false => Self::File(features::FeatureSource::open(path)?),
         })
     }

@@ -5,11 +5,12 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
-use unlift_features::SiftOptions;
 use unlift_io::Error;
 use unlift_io::atomic::{Access, sweep, write_file};
 use unlift_io::features::{FeatureWriter, ImageFeatures, decode, encode};
 use unlift_io::hash::hash_bytes;
+
+use super::folder::Folder;
 
 /// Changes when the same photo and options may give other features.
 const VERSION: &str = concat!("unlift ", env!("CARGO_PKG_VERSION"), " features 1");
@@ -37,11 +38,11 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// The parts of the output `target`; the folder is made if it is not there.
+    /// The parts of the output `target` with these features; the folder of parts is made if it is not there.
     ///
     /// # Errors
     /// When it cannot be made.
-    pub fn open(target: &Path, options: &SiftOptions) -> Result<Self, Error> {
+    pub fn open(target: &Path, features: &Folder) -> Result<Self, Error> {
         let mut folder = target.as_os_str().to_owned();
         folder.push(".parts");
         let folder = PathBuf::from(folder);
@@ -49,7 +50,7 @@ impl Parts {
             fs::create_dir(&folder).map_err(|source| Error::write(&folder, source))?;
         }
         sweep(&folder);
-        Ok(Self { folder, options: format!("{options:?}") })
+        Ok(Self { folder, options: features.settings() })
     }
 
     /// Where the part of the photo `name` at `photo` is, or will be.

@@ -9,7 +9,7 @@ use unlift::obfuscate::Entry;
 use unlift::recover::Solver;
 
 use crate::args::audit::{AttackArgs, ResultArgs, RunArgs};
-use crate::values::{self, NeighborSource};
+use crate::values::{self, FeatureType, NeighborSource};
 
 /// Options of `audit images`.
 #[derive(Debug, Args)]
@@ -19,9 +19,10 @@ Examples:
   unlift audit images features.h5 --photos photos --solver joint,ransac --out audit
   unlift audit images PROJECT/database.db --max-images 100 --schemes lines2d --inlier-ratios 1,0.5
   unlift audit images photos --neighbors oracle --neighbors similarity --neighbors overlap
+  unlift audit images photos --features aliked --neighbors similarity
   unlift audit images photos --gate 'cp2d@0.5:10<=20' --share-safe --json
 
-Photos are JPEG, PNG or WebP files at any depth; features are those of unlift features (SIFT).
+Photos are JPEG, PNG or WebP files at any depth; features are those of unlift features.
 Figures are over the keypoints of all images; lengths are in pixels.
 
 Gates are those of unlift audit map. An image that cannot be used gets one line on stderr and is
@@ -32,9 +33,18 @@ pub struct AuditImagesArgs {
     /// A folder of photos, hloc's features.h5, or a COLMAP database.db
     #[arg(value_name = "PATH")]
     pub path: PathBuf,
-    /// Features wanted per photo; coarse ones first, and the last scale is kept whole [default: 8192]
+    /// Which features of photos: sift, aliked, or superpoint, whose weights you supply (see unlift
+    /// models) [default: sift]
+    #[arg(long, value_name = "TYPE", value_parser = values::feature_type, help_heading = "Input")]
+    pub features: Option<FeatureType>,
+    /// Features wanted per photo; sift: coarse ones first, and the last scale is kept whole, others:
+    /// the best [default: 8192, aliked 2048, superpoint 4096]
     #[arg(long, value_name = "N", help_heading = "Input")]
     pub max_features: Option<NonZeroUsize>,
+    /// Score that a keypoint must exceed, not for sift [default: aliked 0.2, superpoint
+    /// 0.005]
+    #[arg(long, value_name = "SCORE", value_parser = values::score, help_heading = "Input")]
+    pub min_score: Option<f32>,
     /// Use at most this many images, evenly spaced over their sorted names
     #[arg(long, value_name = "N", help_heading = "Input")]
     pub max_images: Option<NonZeroUsize>,
@@ -55,7 +65,7 @@ pub struct AuditImagesArgs {
           help_heading = "Attack")]
     pub solver: Vec<Solver>,
     /// Where neighborhoods come from, repeatable: oracle (made from the keypoints themselves), or what
-    /// an attacker makes from the released descriptors (similarity, overlap, or both joined by +);
+    /// an attacker makes from the released descriptors (similarity, overlap);
     /// overlap needs SIFT
     #[arg(long, value_name = "oracle|SOURCE", value_parser = values::image_source,
           default_value = "oracle", help_heading = "Attack")]

@@ -47,7 +47,7 @@ pub struct AuditReleasedArgs {
     #[command(flatten)]
     pub solvers: SolverArgs,
     /// Where neighborhoods come from, repeatable: oracle (made from the truth); what an attacker makes
-    /// from the released map (similarity, overlap, geometric, or several joined by +); or a file of lists by original
+    /// from the released map (similarity, overlap, geometric); or a file of lists by original
     #[arg(long, value_name = "oracle|SOURCE|FILE", value_parser = values::neighbor_source,
           default_value = "oracle", help_heading = "Attack")]
     pub neighbors: Vec<NeighborSource>,

@@ -5,17 +5,20 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use crate::values::{self, FeatureType};
+
 /// Options of `features`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   unlift features photos --out features.h5
   unlift features photos --max-features 2048 --first-octave 0
+  unlift features photos --type aliked --out features.h5
   unlift features PROJECT/database.db --out features.h5
 
 Photos are JPEG, PNG or WebP files at any depth, named relative to the folder. Features are SIFT as
-COLMAP extracts it, descriptors bytes: RootSIFT times 512. Features of a file are copied, not
-extracted.
+COLMAP extracts it, descriptors bytes: RootSIFT times 512; or learned ones, descriptors floats of
+length 1 (see unlift models). Features of a file are copied, not extracted.
 
 A run that is interrupted goes on where it was when the same command is given again: finished images
 wait in FILE.parts, which is gone when FILE is there. An image that cannot be used gets one line;
@@ -32,15 +35,24 @@ pub struct FeaturesArgs {
     /// Replace files of that name that unlift did not write
     #[arg(long)]
     pub force: bool,
-    /// Features wanted per photo; coarse ones first, and the last scale is kept whole [default: 8192]
+    /// Which features: sift, aliked, or superpoint, whose weights you supply (see unlift
+    /// models) [default: sift]
+    #[arg(long = "type", value_name = "TYPE", value_parser = values::feature_type)]
+    pub kind: Option<FeatureType>,
+    /// Features wanted per photo; sift: coarse ones first, and the last scale is kept whole, others:
+    /// the best [default: 8192, aliked 2048, superpoint 4096]
     #[arg(long, value_name = "N")]
     pub max_features: Option<NonZeroUsize>,
+    /// Score that a keypoint must exceed, not for sift [default: aliked 0.2, superpoint
+    /// 0.005]
+    #[arg(long, value_name = "SCORE", value_parser = values::score)]
+    pub min_score: Option<f32>,
     /// Longest side in pixels; larger photos are shrunk, their keypoints are in pixels of the photo
-    /// [default: 3200]
+    /// [default: 3200, others 1600]
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(16..=65536))]
     pub max_image_size: Option<u32>,
     /// -1 doubles the photo first and finds the finest features, 0 does not and takes a third of the
-    /// time [default: -1]
+    /// time; sift only [default: -1]
     #[arg(long, value_name = "OCTAVE", allow_hyphen_values = true,
           value_parser = clap::value_parser!(i8).range(-1..=0))]
     pub first_octave: Option<i8>,

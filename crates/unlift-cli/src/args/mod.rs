@@ -9,6 +9,7 @@ mod demo;
 mod evaluate;
 mod features;
 mod map;
+mod models;
 mod neighbors;
 mod obfuscate;
 mod recover;
@@ -26,6 +27,7 @@ pub use demo::DemoArgs;
 pub use evaluate::EvaluateArgs;
 pub use features::FeaturesArgs;
 pub use map::MapArgs;
+pub use models::ModelsArgs;
 pub use neighbors::{FindArgs, NeighborsCommand, OracleArgs};
 pub use obfuscate::ObfuscateArgs;
 pub use recover::RecoverArgs;
@@ -98,6 +100,8 @@ pub enum Command {
     Features(FeaturesArgs),
     /// List the schemes: rule, what stays hidden, source, stated patents
     Schemes,
+    /// List the networks that can be used: purpose, licence, hash, owner, and whether they are here
+    Models(ModelsArgs),
 }
 
 /// What can be audited.

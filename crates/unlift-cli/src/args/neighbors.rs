@@ -24,17 +24,17 @@ pub enum NeighborsCommand {
 /// Options of `neighbors find`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Sources: similarity (any descriptors), overlap (SIFT), geometric (no descriptors), or several joined by +.
+Sources: similarity (any descriptors), overlap (SIFT), geometric (no descriptors).
 
 Examples:
   unlift neighbors find hidden/released.parquet --source overlap --out lists.parquet
-  unlift neighbors find hidden/released.parquet --source overlap+geometric --k 20")]
+  unlift neighbors find hidden/released.parquet --source geometric --k 20")]
 pub struct FindArgs {
     /// A released map
     #[arg(value_name = "OBFUSCATED")]
     pub released: PathBuf,
-    /// How: a source, or several joined by +
-    #[arg(long, value_name = "SOURCE", value_parser = values::joined)]
+    /// How
+    #[arg(long, value_name = "SOURCE", value_parser = values::own_source)]
     pub source: Named,
     /// Records per list [default: the source's own choice]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]

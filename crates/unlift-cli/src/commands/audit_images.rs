@@ -4,19 +4,21 @@ use std::path::Path;
 use std::time::Instant;
 
 use serde_json::{Map, json};
-use unlift::Unit;
 use unlift::audit::{NeighborsBy, Plan};
+use unlift::descriptors::Values;
 use unlift::obfuscate::SchemeOptions;
+use unlift::{Descriptors, Unit};
 use unlift_audit::images::FeatureSource;
 use unlift_audit::images::audit::{ImagesJob, perform};
 use unlift_audit::images::stream::Needs;
 use unlift_audit::{Shown, open_audit};
-use unlift_features::SiftOptions;
+use unlift_features::Extraction;
 use unlift_io::atomic::Rules;
 use unlift_io::{Error, read};
 use unlift_report::pictures::MOST_PICTURES;
 
 use super::common::with_threads;
+use super::extraction::Typed;
 use super::plan::{attack, check_about, check_fit, own, solvers, summary, thresholds};
 use crate::args::AuditImagesArgs;
 use crate::exit::{Outcome, advise, usage};
@@ -36,11 +38,12 @@ pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
     let shown = if args.result.share_safe { Shown::Figures } else { Shown::Points };
     let out = open_audit(&args.result.out, rules, shown, &Stderr)?;
     let (finished, used) = with_threads(args.run.threads, || {
-        let source = FeatureSource::open(&args.path, &extraction(args)?).map_err(|error| {
-            let map = read::is_project(&args.path);
-            let error = anyhow::Error::from(error);
-            if map { advise(error, "unlift audit map, as this is a map") } else { error }
-        })?;
+        let source =
+            FeatureSource::open(&args.path, &extraction(args, &plan)?).map_err(|error| {
+                let map = read::is_project(&args.path);
+                let error = anyhow::Error::from(error);
+                if map { advise(error, "unlift audit map, as this is a map") } else { error }
+            })?;
         if let Some(note) = source.passed_over() {
             eprintln!("unlift: note: {note}");
         }
@@ -81,7 +84,7 @@ fn plan(args: &AuditImagesArgs) -> anyhow::Result<Plan<2>> {
     let mut sources = Vec::new();
     for source in distinct(args.neighbors.clone(), |a, b| a == b) {
         match source {
-            NeighborSource::Own(joined) => sources.push(own(joined, &args.attack)?),
+            NeighborSource::Own(named) => sources.push(own(named, &args.attack)?),
             NeighborSource::Oracle | NeighborSource::File(_) => sources.push(NeighborsBy::Oracle),
         }
     }
@@ -111,18 +114,26 @@ fn plan(args: &AuditImagesArgs) -> anyhow::Result<Plan<2>> {
     Ok(plan)
 }
 
-/// The options of the extractor; none of them fits a file.
-fn extraction(args: &AuditImagesArgs) -> anyhow::Result<SiftOptions> {
-    let folder = args.path.is_dir();
-    if args.max_features.is_some() && args.path.is_file() {
-        return Err(usage("--max-features: expected with a folder of photos, found a file"));
-    }
-    if args.photos.is_some() && folder {
+/// The options of the extractor, fit for the sources of the plan.
+fn extraction(args: &AuditImagesArgs, plan: &Plan<2>) -> anyhow::Result<Extraction> {
+    if args.photos.is_some() && args.path.is_dir() {
         return Err(usage("--photos: expected with a file of features, found a folder of photos"));
     }
-    let defaults = SiftOptions::default();
-    let max_features = args.max_features.map_or(defaults.max_features, |n| n.get());
-    Ok(SiftOptions { max_features, ..defaults })
+    let typed = Typed {
+        option: "--features",
+        kind: args.features,
+        max_features: args.max_features,
+        min_score: args.min_score,
+        ..Typed::default()
+    };
+    let extraction = typed.extraction(&args.path)?;
+    if !extraction.is_sift() && args.path.is_dir() {
+        // Any two rows of floats that are not all alike.
+        let rows = (0..2 * 128).map(|at| if at < 128 { 0.1 } else { -0.1 }).collect();
+        let learned = Descriptors::try_new(Values::F32(rows), 128)?;
+        plan.own_sources().try_for_each(|source| check_fit(source, &learned))?;
+    }
+    Ok(extraction)
 }
 
 /// Numbers of at most `most` images, evenly spaced over all `n`: the middles of as many equal parts.
@@ -194,8 +205,14 @@ fn show(
 /// Options that change the images, not the plan.
 fn more_options(args: &AuditImagesArgs) -> Map<String, serde_json::Value> {
     let mut options = Map::new();
+    if let Some(kind) = args.features {
+        options.insert("features".into(), json!(kind.name()));
+    }
     if let Some(most) = args.max_features {
         options.insert("max_features".into(), json!(most.get()));
+    }
+    if let Some(score) = args.min_score {
+        options.insert("min_score".into(), json!(score));
     }
     if let Some(most) = args.max_images {
         options.insert("max_images".into(), json!(most.get()));

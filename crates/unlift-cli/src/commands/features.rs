@@ -2,20 +2,21 @@
 
 use std::path::{Path, PathBuf};
 
-use unlift_features::SiftOptions;
+use unlift_features::Extraction;
 use unlift_features::batch::in_order;
 use unlift_io::Error;
 use unlift_io::atomic::{Kind, Rules};
 use unlift_io::features::{FeatureWriter, ImageFeatures};
 
 use super::common::with_threads;
+use super::extraction::Typed;
 use crate::args::FeaturesArgs;
 use crate::exit::{Outcome, line, usage};
 use crate::output::print;
 use crate::progress::Progress;
 use unlift_audit::check_file;
 use unlift_audit::images::parts::{Parts, write_part};
-use unlift_audit::images::{FeatureSource, is_photo};
+use unlift_audit::images::{FeatureSource, Folder, is_photo};
 
 /// What was done, and what could not be.
 #[derive(Default)]
@@ -31,9 +32,9 @@ pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
     let rules = Rules::new([args.images.as_path()], args.force);
     let target = check_file(&args.out, Kind::Features, &rules)?;
     check_no_photo(&args.images, &target)?;
-    let options = options(args)?;
+    let extraction = extraction(args)?;
     let tally = with_threads(args.threads, || {
-        let source = FeatureSource::open(&args.images, &options)?;
+        let source = FeatureSource::open(&args.images, &extraction)?;
         let mut progress = Progress::new(args.quiet);
         let mut tally = Tally::default();
         if let Some(note) = source.passed_over() {
@@ -44,8 +45,8 @@ pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
             progress.say(&line(&anyhow::anyhow!("{error}")));
         }
         match &source {
-            FeatureSource::Folder(_) => {
-                extract(&source, &target, &options, &mut tally, &mut progress)?;
+            FeatureSource::Folder(folder) => {
+                extract(folder, &target, &mut tally, &mut progress)?;
             }
             FeatureSource::File(_) => copy(&source, args, &mut tally, &mut progress)?,
         }
@@ -84,25 +85,17 @@ fn check_no_photo(images: &Path, target: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The options of the extractor; none of them fits a file.
-fn options(args: &FeaturesArgs) -> anyhow::Result<SiftOptions> {
-    let given = [
-        ("--max-features", args.max_features.is_some()),
-        ("--max-image-size", args.max_image_size.is_some()),
-        ("--first-octave", args.first_octave.is_some()),
-    ];
-    if args.images.is_file()
-        && let Some((name, _)) = given.iter().find(|(_, given)| *given)
-    {
-        return Err(usage(format!("{name}: expected with a folder of photos, found a file")));
-    }
-    let defaults = SiftOptions::default();
-    Ok(SiftOptions {
-        max_features: args.max_features.map_or(defaults.max_features, |n| n.get()),
-        max_image_size: args.max_image_size.map_or(defaults.max_image_size, |n| n as usize),
-        doubled: args.first_octave.map_or(defaults.doubled, |octave| octave < 0),
-        ..defaults
-    })
+/// The options of the extractor.
+fn extraction(args: &FeaturesArgs) -> anyhow::Result<Extraction> {
+    let typed = Typed {
+        option: "--type",
+        kind: args.kind,
+        max_features: args.max_features,
+        min_score: args.min_score,
+        max_image_size: args.max_image_size,
+        first_octave: args.first_octave,
+    };
+    typed.extraction(&args.images)
 }
 
 /// What became of one photo.
@@ -113,14 +106,12 @@ enum Done {
 
 /// Features of photos: each into a part, then all parts into the file.
 fn extract(
-    source: &FeatureSource,
+    folder: &Folder,
     target: &Path,
-    options: &SiftOptions,
     tally: &mut Tally,
     progress: &mut Progress,
 ) -> anyhow::Result<()> {
-    let FeatureSource::Folder(folder) = source else { return Ok(()) };
-    let parts = Parts::open(target, options)?;
+    let parts = Parts::open(target, folder)?;
     let names = folder.names();
     let all: Vec<usize> = (0..names.len()).collect();
     let extract = |at: usize| -> anyhow::Result<Done> {

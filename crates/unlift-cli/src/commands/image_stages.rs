@@ -14,7 +14,7 @@ use unlift::released::Released;
 use unlift::seed::Key;
 use unlift::truth::{Original, Secret};
 use unlift::{About, Unit};
-use unlift_features::SiftOptions;
+use unlift_features::Extraction;
 use unlift_io::Error;
 use unlift_io::atomic::{Access, Kind, OutputFile, OutputSet, Rules};
 use unlift_io::stage::{ImageFile, ImageRows, ImageWriter, Kind as Stage};
@@ -71,7 +71,7 @@ fn each<T: Send, U: Send>(
 pub fn hide(args: &ObfuscateArgs, key: &Key, out: &mut OutputSet) -> anyhow::Result<Counts> {
     let scheme = args.scheme.of_dimension::<2>(&SchemeOptions::usual(Unit::Pixel));
     let scheme = scheme.ok_or_else(|| anyhow::anyhow!("not a scheme for images"))?;
-    let source = FeatureSource::open(&args.path, &SiftOptions::default())?;
+    let source = FeatureSource::open(&args.path, &Extraction::default())?;
     let tally = RefCell::new(Tally::default());
     for error in source.refused() {
         tally.borrow_mut().unusable += 1;

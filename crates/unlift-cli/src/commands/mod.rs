@@ -7,8 +7,10 @@ mod bench;
 mod common;
 mod demo;
 mod evaluate;
+mod extraction;
 mod features;
 mod image_stages;
+mod models;
 mod neighbors;
 mod obfuscate;
 mod plan;
@@ -36,5 +38,6 @@ pub fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Bench(BenchCommand::Recover(args)) => bench::recovery(&args),
         Command::Features(args) => features::run(&args),
         Command::Schemes => schemes::run(),
+        Command::Models(args) => models::run(&args),
     }
 }

@@ -78,13 +78,9 @@ pub fn find(args: &FindArgs) -> anyhow::Result<Outcome> {
         None => args.source.clone(),
     };
     if images {
-        if let Some(entry) = named.not_in_dimension::<2>() {
-            return Err(usage(format!(
-                "--source {}: expected with a map, found images",
-                entry.name
-            )));
-        }
-        let source = named.of_dimension::<2>()?;
+        let source = named.of_dimension::<2>().map_err(|_| {
+            usage(format!("--source {}: expected with a map, found images", named.name()))
+        })?;
         let alive = Spinner::new("finding neighbors");
         let counts = with_threads(args.threads, || {
             list_by_source(&args.released, &*source, args.seed, (&args.out, &rules))

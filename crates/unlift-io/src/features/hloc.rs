@@ -120,6 +120,10 @@ fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
     };
     let values = match array.values {
         Numbers::U8(bytes) => Values::U8(rows(&bytes, dim, n)),
+        Numbers::F16(halves) => {
+            let floats: Vec<f32> = halves.iter().map(|half| half.to_f32()).collect();
+            Values::F32(rows(&floats, dim, n))
+        }
         Numbers::F32(floats) => Values::F32(rows(&floats, dim, n)),
         Numbers::F64(doubles) => {
             let floats: Vec<f32> = doubles.iter().map(|&value| value as f32).collect();

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use half::f16;
 use unlift::Descriptors;
 
 use crate::error::Error;
@@ -41,4 +42,9 @@ impl ImageFeatures {
         let missing = || Error::new(source, place(), "descriptors", "none");
         self.descriptors.as_ref().ok_or_else(missing)
     }
+}
+
+/// Rounds descriptors of a network to half floats, as hloc stores them: what is in memory is what a file would hold.
+pub fn round_to_half(values: &mut [f32]) {
+    values.iter_mut().for_each(|value| *value = f16::from_f32(*value).to_f32());
 }

@@ -34,7 +34,7 @@ use crate::read::bytes::open_file;
 use crate::read::lines::quoted;
 
 pub use hloc::decode;
-pub use image::ImageFeatures;
+pub use image::{ImageFeatures, round_to_half};
 pub use writer::{FeatureWriter, encode};
 
 /// Features in a file, one image at a time: memory does not grow with the number of images.

@@ -3,6 +3,7 @@
 use std::io::{self, Cursor, Seek, Write};
 use std::path::Path;
 
+use half::f16;
 use unlift::descriptors::Values;
 
 use super::h5::{Array, Numbers, Writer};
@@ -121,7 +122,10 @@ fn write(
         let dim = rows.dim();
         let values = match rows.values() {
             Values::U8(values) => Numbers::U8(columns(values, dim)),
-            Values::F32(values) => Numbers::F32(columns(values, dim)),
+            Values::F32(values) => match halves(values) {
+                Some(halves) => Numbers::F16(columns(&halves, dim)),
+                None => Numbers::F32(columns(values, dim)),
+            },
         };
         put("descriptors", vec![dim as u64, n], values, &[])?;
     }
@@ -136,6 +140,12 @@ fn write(
         put("image_size", vec![2], Numbers::I64(size.map(i64::from).to_vec()), &[])?;
     }
     Ok(())
+}
+
+/// The same as half floats, as hloc stores what a network made, where nothing is lost by it.
+fn halves(values: &[f32]) -> Option<Vec<f16>> {
+    let exact = |&value: &f32| Some(f16::from_f32(value)).filter(|half| half.to_f32() == value);
+    values.iter().map(exact).collect()
 }
 
 /// The transpose of `(n, dim)`.

@@ -4,10 +4,10 @@ use super::plan::Plan;
 use super::row::Alone;
 use super::threshold::Threshold;
 use crate::Error;
-use crate::density::{published, tomography};
+use crate::density::tomography;
 use crate::evaluate::{Accuracy, evaluate};
 use crate::neighbors::{Geometric, geometric_by};
-use crate::recover::{RecoverOptions, Solver, recover_at, recover_with_start};
+use crate::recover::{RecoverOptions, Solver, published, recover_at, recover_with_start};
 use crate::released::{Obfuscation, Released};
 use crate::truth::{Original, Secret};
 

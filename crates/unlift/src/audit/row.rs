@@ -15,7 +15,7 @@ pub const PERCENTILES: [f64; 5] = [50.0, 75.0, 90.0, 95.0, 99.0];
 pub struct Row {
     /// Scheme name.
     pub scheme: String,
-    /// Source of the neighborhoods: `oracle`, `file`, or names joined by `+`.
+    /// Source of the neighborhoods: `oracle`, `file`, or the name of a source.
     pub neighbors: String,
     /// Noise model of the oracle; `None` for other sources.
     pub oracle_noise: Option<&'static str>,

@@ -7,21 +7,21 @@ use crate::released::{AxisCandidates, Obfuscation, Released};
 
 /// A line, or the part of it beyond `from`, that may hold a hidden point.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct FeasibleLine {
-    pub(super) through: [f32; 3],
+pub(crate) struct FeasibleLine {
+    pub(crate) through: [f32; 3],
     /// Of unit length.
-    pub(super) direction: [f32; 3],
+    pub(crate) direction: [f32; 3],
     /// Where it begins.
-    pub(super) from: f32,
+    pub(crate) from: f32,
     /// How likely the point is on this line rather than on the record's others; any common factor.
-    pub(super) prior: f32,
+    pub(crate) prior: f32,
     /// Lines of one group meet trivially and say nothing about each other: the center of a ray.
-    pub(super) group: Option<u8>,
+    pub(crate) group: Option<u8>,
 }
 
 /// What a record hides, and so how likely a place on it is at a given density of points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Hides {
+pub(crate) enum Hides {
     /// One point, of which the record is a projection along a random direction.
     One,
     /// Two points. Few pairs are close together: a pair `d` apart is as likely as `d` squared.
@@ -34,18 +34,18 @@ pub(super) enum Hides {
 
 /// All records of a map.
 #[derive(Debug)]
-pub(super) struct Feasible {
-    pub(super) hides: Hides,
+pub(crate) struct Feasible {
+    pub(crate) hides: Hides,
     /// `per_record` rows per record.
-    pub(super) lines: Vec<FeasibleLine>,
-    pub(super) per_record: usize,
-    pub(super) n_groups: usize,
+    pub(crate) lines: Vec<FeasibleLine>,
+    pub(crate) per_record: usize,
+    pub(crate) n_groups: usize,
 }
 
 impl Feasible {
     /// The records of `released`; `None` for planes, whose points may be anywhere on a plane: three
     /// sets of offsets are three histograms, and tell nothing about which offsets belong together.
-    pub(super) fn new<const D: usize>(released: &Released<D>) -> Option<Self> {
+    pub(crate) fn new<const D: usize>(released: &Released<D>) -> Option<Self> {
         // The only dimension these attacks know, in a function generic over it.
         let solid = |v: &[f32; D]| -> [f32; 3] { std::array::from_fn(|c| v[c % D]) };
         if D != 3 {
@@ -99,13 +99,13 @@ impl Feasible {
     }
 
     /// Number of records.
-    pub(super) fn n_records(&self) -> usize {
+    pub(crate) fn n_records(&self) -> usize {
         self.lines.len() / self.per_record
     }
 
     /// The same lines, counted from where they pass `middle`: the origin of a map is rounded, so that a
     /// shifted or scaled map has its feet elsewhere. Rays keep their center.
-    pub(super) fn counted_from(mut self, middle: &[f64; 3]) -> Self {
+    pub(crate) fn counted_from(mut self, middle: &[f64; 3]) -> Self {
         for line in self.lines.iter_mut().filter(|line| line.group.is_none()) {
             line.through = nearest(line, middle).map(|x| x as f32);
         }
@@ -114,7 +114,7 @@ impl Feasible {
 
     /// Where the map lies and a length of the order of its size, from the records alone; `None` when
     /// they have no extent.
-    pub(super) fn middle(&self) -> Option<([f64; 3], f64)> {
+    pub(crate) fn middle(&self) -> Option<([f64; 3], f64)> {
         let (middle, extent) = match self.hides {
             Hides::OnRay => between_centers(&self.lines),
             _ => crossing(&self.lines),

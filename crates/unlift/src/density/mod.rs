@@ -1,28 +1,22 @@
 //! Attacks that need neither neighborhoods nor descriptors: the records alone tell where points are.
 //!
 //! Every record is a line (a half-line, one of three lines) known to hold a hidden point, and points
-//! crowd on surfaces. Two attacks use that:
-//!
-//! - [`published`]: the density attack of Chelani et al. (CVPR 2021) for one point per line, its form
-//!   for paired points (Lee et al., CVPR 2023) and for two-center rays (Moon et al., CVPR 2024), for
-//!   comparison (paper, supplement, "Comparison to other 3D line recoveries");
-//! - [`tomography`]: ours. Records are to the density of hidden points what coincidence lines are to the
-//!   activity in positron emission tomography, so the density that makes all records likeliest is found
-//!   by the same rounds (maximum likelihood by expectation maximization, Shepp and Vardi 1982, with
-//!   smoothing, Silverman et al. 1990), and each point lies where its record meets most of it.
+//! crowd on surfaces. [`tomography`] uses that: records are to the density of hidden points what coincidence lines are to the
+//! activity in positron emission tomography, so the density that makes all records likeliest is found
+//! by the same rounds (maximum likelihood by expectation maximization, Shepp and Vardi 1982, with
+//! smoothing, Silverman et al. 1990), and each point lies where its record meets most of it. The published
+//! attacks read the same [`feasible`] lines (`recover/baselines/density`).
 //!
 //! This stage stands between `released` and its two users: `neighbors` lists records that end up close,
-//! `recover` takes the positions as they are. Both attacks are for three dimensions: in the plane all
+//! `recover` takes the positions as they are. It is for three dimensions: in the plane all
 //! lines meet, and meeting tells nothing.
 
-mod feasible;
+pub(crate) mod feasible;
 mod grid;
 mod peaks;
-mod published;
 mod spread;
 mod tomography;
 
-pub(crate) use published::published;
 pub(crate) use tomography::tomography;
 
 /// What an attack says about one slot.
@@ -47,7 +41,7 @@ pub(crate) struct Peaks {
 
 impl Peaks {
     /// No answer for any of `n_slots`.
-    fn none(n_slots: usize) -> Self {
+    pub(crate) fn none(n_slots: usize) -> Self {
         Self { of: vec![None; n_slots], resolution: 0.0 }
     }
 }

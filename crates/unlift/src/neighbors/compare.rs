@@ -14,6 +14,16 @@ use crate::{Descriptors, Error};
 /// Rows of which all pairs are compared at most: minutes on two cores. Of more, the blocks that look most alike.
 pub const MOST_ROWS: usize = 1 << 17;
 
+/// What a user of the source called `name` should know about lists for more slots than that.
+pub fn note(name: &str, n_slots: usize) -> Option<String> {
+    (n_slots > MOST_ROWS).then(|| {
+        format!(
+            "{name}: of more than {MOST_ROWS} points each is compared with those whose descriptors look alike on the \
+             whole: some neighbors that all pairs would tell are missed"
+        )
+    })
+}
+
 /// Rows that tell what scores are usual, where not all pairs are compared.
 const USUAL: usize = 16 * BLOCK;
 

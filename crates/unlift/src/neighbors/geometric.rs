@@ -65,11 +65,6 @@ impl Source<3> for Geometric {
     fn supports(&self, released: &Released<3>) -> Result<(), Error> {
         check(released, Self::K)
     }
-
-    /// Recovery errs as it does.
-    fn only_ranks(&self) -> bool {
-        true
-    }
 }
 
 /// [`geometric`] from the estimates of tomography, for whoever has them.

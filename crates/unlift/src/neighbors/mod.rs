@@ -7,7 +7,6 @@ mod alike;
 mod best;
 mod compare;
 mod geometric;
-mod join;
 mod neighborhoods;
 pub mod oracle;
 mod overlap;
@@ -20,7 +19,6 @@ mod walk;
 
 pub(crate) use geometric::geometric_by;
 pub use geometric::{Geometric, geometric};
-pub use join::join;
 pub use neighborhoods::Neighborhoods;
 pub use overlap::{Overlap, overlap};
 pub use similarity::{Similarity, similarity};

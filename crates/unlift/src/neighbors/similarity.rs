@@ -1,7 +1,7 @@
 //! Neighborhoods from any descriptors: near points look alike more often than far ones.
 
 use super::Neighborhoods;
-use super::compare::{Likeness, MOST_ROWS, search};
+use super::compare::{Likeness, MOST_ROWS, note, search};
 use super::rows::Rows;
 use super::source::{Needs, Source};
 use crate::released::Released;
@@ -47,6 +47,10 @@ impl<const D: usize> Source<D> for Similarity {
 
     fn lists(&self, released: &Released<D>, k: usize, _: u64) -> Result<Neighborhoods, Error> {
         similarity(released, k)
+    }
+
+    fn note(&self, n_slots: usize) -> Option<String> {
+        note("similarity", n_slots)
     }
 }
 

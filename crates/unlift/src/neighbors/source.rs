@@ -20,7 +20,7 @@ pub enum Needs {
 /// `Arc<dyn Source<D>>`, and [`SOURCES`](super::sources::SOURCES) only lists ours. What it has learned elsewhere
 /// (weights of a network) are fields of the type.
 pub trait Source<const D: usize>: Debug + Send + Sync {
-    /// The name in rows, gates and reports: one word, or words joined by `+`.
+    /// The name in rows, gates and reports: one word.
     fn name(&self) -> &str;
 
     /// What it needs beside the records.
@@ -57,12 +57,6 @@ pub trait Source<const D: usize>: Debug + Send + Sync {
             (Needs::Descriptors, Some(descriptors)) => self.takes(descriptors),
             (Needs::Descriptors, None) => Err(lacks_descriptors(self.name())),
         }
-    }
-
-    /// Whether in company it only ranks what the others list: a source that errs as recovery does would confirm
-    /// wrong places by entries of its own.
-    fn only_ranks(&self) -> bool {
-        false
     }
 
     /// What a user should know about lists for `n_slots` hidden points, if anything.

@@ -1,14 +1,13 @@
-//! Sources by name: the registry, and several of its sources joined into one.
+//! Sources by name: the registry.
 
 use std::any::Any;
 use std::sync::Arc;
 
-use super::compare::MOST_ROWS;
+use super::Neighborhoods;
 use super::geometric::Geometric;
 use super::overlap::Overlap;
 use super::similarity::Similarity;
 use super::source::{Needs, Source};
-use super::{Neighborhoods, join};
 use crate::released::Released;
 use crate::{Descriptors, Error};
 
@@ -74,104 +73,61 @@ pub fn source(name: &str) -> Result<&'static SourceEntry, Error> {
     })
 }
 
-/// Sources of the registry as a user names them, and how long their lists shall be.
+/// A source of the registry as a user names it, and how long its lists shall be.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Named {
-    entries: Vec<&'static SourceEntry>,
+    entry: &'static SourceEntry,
     k: Option<usize>,
 }
 
 impl Named {
-    /// The sources named in `text`, joined by `+`, each once.
+    /// The source called `name`.
     ///
     /// # Errors
-    /// When a name is unknown or stands twice.
-    pub fn parse(text: &str) -> Result<Self, Error> {
-        let mut entries: Vec<&'static SourceEntry> = Vec::new();
-        for name in text.split('+') {
-            let entry = source(name.trim())?;
-            if entries.contains(&entry) {
-                return Err(Error::new("joined sources", "each once", format!("{name} twice")));
-            }
-            entries.push(entry);
-        }
-        Ok(Self { entries, k: None })
+    /// When there is none; the error lists the names.
+    pub fn parse(name: &str) -> Result<Self, Error> {
+        Ok(Self { entry: source(name.trim())?, k: None })
     }
 
-    /// The same sources with `k` records per list, not as many as they choose.
+    /// The same source with `k` records per list, not as many as it chooses.
     #[must_use]
     pub fn with_k(self, k: usize) -> Self {
         Self { k: Some(k), ..self }
     }
 
-    /// The names, joined by `+`.
-    pub fn name(&self) -> String {
-        self.entries.iter().map(|entry| entry.name).collect::<Vec<_>>().join("+")
-    }
-
-    /// The first of the sources that is not defined in `D` dimensions.
-    pub fn not_in_dimension<const D: usize>(&self) -> Option<&'static SourceEntry> {
-        self.entries.iter().copied().find(|entry| entry.of_dimension::<D>().is_none())
+    /// Its name.
+    pub fn name(&self) -> &'static str {
+        self.entry.name
     }
 
     /// The source in `D` dimensions.
     ///
     /// # Errors
-    /// When one of them is not defined there.
+    /// When it is not defined there.
     pub fn of_dimension<const D: usize>(&self) -> Result<Arc<dyn Source<D>>, Error> {
-        let part = |entry: &&'static SourceEntry| {
-            entry.of_dimension::<D>().ok_or_else(|| {
-                let expected = format!("one that is defined in {D} dimensions");
-                Error::new("source", expected, entry.name)
-            })
+        let Some(source) = self.entry.of_dimension::<D>() else {
+            let expected = format!("one that is defined in {D} dimensions");
+            return Err(Error::new("source", expected, self.entry.name));
         };
-        let joined = Joined::new(self.entries.iter().map(part).collect::<Result<_, _>>()?)?;
-        Ok(Arc::new(match self.k {
-            Some(k) => joined.with_k(k),
-            None => joined,
-        }))
+        let k = self.k.unwrap_or(source.k());
+        Ok(Arc::new(Chosen { source, k }))
     }
 }
 
-/// Several sources as one. Alone a source stays what it is.
+/// A source with lists of a chosen length, whose errors name it.
 #[derive(Clone, Debug)]
-pub struct Joined<const D: usize> {
-    parts: Vec<Arc<dyn Source<D>>>,
-    name: String,
+struct Chosen<const D: usize> {
+    source: Arc<dyn Source<D>>,
     k: usize,
 }
 
-impl<const D: usize> Joined<D> {
-    /// Joins `parts`. A list has as many records as the source that chooses most; those that only rank choose
-    /// none in company.
-    ///
-    /// # Errors
-    /// When there is no part.
-    pub fn new(parts: Vec<Arc<dyn Source<D>>>) -> Result<Self, Error> {
-        let names = parts.iter().any(|part| !part.only_ranks());
-        let chosen = parts.iter().filter(|part| !(names && part.only_ranks()));
-        let Some(k) = chosen.map(|part| part.k()).max() else {
-            return Err(Error::new("joined sources", "at least one", "none"));
-        };
-        let name = parts.iter().map(|part| part.name()).collect::<Vec<_>>().join("+");
-        Ok(Self { parts, name, k })
-    }
-
-    /// The same sources with `k` records per list.
-    #[must_use]
-    pub fn with_k(self, k: usize) -> Self {
-        Self { k, ..self }
-    }
-}
-
-impl<const D: usize> Source<D> for Joined<D> {
+impl<const D: usize> Source<D> for Chosen<D> {
     fn name(&self) -> &str {
-        &self.name
+        self.source.name()
     }
 
     fn needs(&self) -> Needs {
-        let needs = |part: &Arc<dyn Source<D>>| part.needs() == Needs::Descriptors;
-        if self.parts.iter().any(needs) { Needs::Descriptors } else { Needs::Nothing }
+        self.source.needs()
     }
 
     fn k(&self) -> usize {
@@ -179,81 +135,48 @@ impl<const D: usize> Source<D> for Joined<D> {
     }
 
     fn lists(&self, released: &Released<D>, k: usize, seed: u64) -> Result<Neighborhoods, Error> {
-        let lists = self
-            .parts
-            .iter()
-            .map(|part| part.lists(released, k, seed).map_err(|error| error.within(part.name())));
-        let mut lists = lists.collect::<Result<Vec<_>, _>>()?;
-        match lists.len() {
-            1 => Ok(lists.remove(0)),
-            _ => {
-                let ranks: Vec<bool> = self.parts.iter().map(|part| part.only_ranks()).collect();
-                join(&lists, &ranks, k, released.n_records(), released.slots_per_record())
-            }
-        }
+        self.source.lists(released, k, seed).map_err(|error| error.within(self.name()))
     }
 
     fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {
-        self.parts.iter().try_for_each(|part| part.takes(descriptors))
+        self.source.takes(descriptors)
     }
 
     fn supports(&self, released: &Released<D>) -> Result<(), Error> {
-        let supports = |part: &Arc<dyn Source<D>>| {
-            part.supports(released).map_err(|error| error.within(part.name()))
-        };
-        self.parts.iter().try_for_each(supports)
-    }
-
-    fn only_ranks(&self) -> bool {
-        self.parts.iter().all(|part| part.only_ranks())
+        self.source.supports(released).map_err(|error| error.within(self.name()))
     }
 
     fn note(&self, n_slots: usize) -> Option<String> {
-        (self.needs() == Needs::Descriptors && n_slots > MOST_ROWS).then(|| {
-            format!(
-                "{}: of more than {MOST_ROWS} points each is compared with those whose descriptors look alike on the \
-                 whole: some neighbors that all pairs would tell are missed",
-                self.name
-            )
-        })
+        self.source.note(n_slots)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::neighbors::compare::MOST_ROWS;
 
     #[test]
-    fn names_are_joined_and_the_largest_usual_k_counts() {
-        let source = |name: &str| Named::parse(name).unwrap().of_dimension::<3>().unwrap();
-        let joined = source("overlap+similarity");
-        assert_eq!((joined.name(), joined.k()), ("overlap+similarity", 35));
-        assert_eq!(source("overlap").k(), 35);
-        assert_eq!(source("overlap+geometric").k(), 35);
-        let few = Named::parse("overlap").unwrap().with_k(7);
+    fn lists_are_as_long_as_the_source_chooses_or_as_asked() {
+        let named = |name: &str| Named::parse(name).unwrap();
+        assert_eq!(named("overlap").of_dimension::<3>().unwrap().k(), 35);
+        assert_eq!(named("overlap").of_dimension::<2>().unwrap().k(), 10);
+        let few = named("overlap").with_k(7);
         assert_eq!(few.of_dimension::<3>().unwrap().k(), 7);
         assert_eq!(few.of_dimension::<2>().unwrap().k(), 7);
-        assert_eq!(Named::parse("overlap").unwrap().of_dimension::<2>().unwrap().k(), 10);
     }
 
     #[test]
-    fn unknown_and_repeated_names_are_told() {
-        let message = |text: &str| Named::parse(text).unwrap_err().to_string();
-        assert!(message("overlop").starts_with("source: expected one of similarity, overlap"));
-        assert_eq!(
-            message("overlap+overlap"),
-            "joined sources: expected each once, found overlap twice"
-        );
+    fn unknown_names_are_told() {
+        let message = Named::parse("overlap+similarity").unwrap_err().to_string();
+        let expected = "source: expected one of similarity, overlap, geometric";
+        assert_eq!(message, format!("{expected}, found overlap+similarity"));
     }
 
     #[test]
     fn only_large_maps_with_descriptors_call_for_a_note() {
         let note = |name: &str, n| Named::parse(name).unwrap().of_dimension::<3>().unwrap().note(n);
-        assert!(
-            note("overlap+geometric", MOST_ROWS + 1)
-                .unwrap()
-                .starts_with("overlap+geometric: of more")
-        );
+        assert!(note("similarity", MOST_ROWS + 1).unwrap().starts_with("similarity: of more"));
         assert_eq!(note("overlap", MOST_ROWS), None);
         assert_eq!(note("geometric", MOST_ROWS + 1), None);
     }

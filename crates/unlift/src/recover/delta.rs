@@ -59,13 +59,10 @@ pub(super) fn learn<const D: usize>(
     if family.has_regions() {
         return ANCHOR_DELTA * spacing;
     }
-    let prefer = match family {
+    let prefer = match given.scores() {
         _ if !sharp => Prefer::Wide,
-        Family::Candidates { .. } if Settings::of_dimension::<D>().narrowest_of_candidates => {
-            Prefer::Narrowest
-        }
-        _ if given.scores().is_some() => Prefer::NarrowOfScored,
-        _ => Prefer::Narrow,
+        Some(_) => Prefer::NarrowOfScored,
+        None => Prefer::Narrow,
     };
     let least = LEAST_DELTA * spacing;
     let per_list = given.records().len() as f64 / given.n_slots().max(1) as f64;
@@ -90,8 +87,6 @@ enum Prefer {
     /// A narrower one: lists with scores, as an attacker's own sources give them. Their wrong entries look alike
     /// and so keep a wide delta evident.
     NarrowOfScored,
-    /// The narrowest: where records cross each other all over a small plane.
-    Narrowest,
 }
 
 impl Prefer {
@@ -99,7 +94,7 @@ impl Prefer {
     fn near_most(self) -> f64 {
         match self {
             Self::Wide => 0.94,
-            Self::Narrow | Self::NarrowOfScored | Self::Narrowest => 0.95,
+            Self::Narrow | Self::NarrowOfScored => 0.95,
         }
     }
 }
@@ -175,7 +170,6 @@ fn choose<const D: usize>(
     let near = |&&(_, value): &&(f64, f64)| value >= prefer.near_most() * most || value == most;
     match prefer {
         Prefer::Wide => fine.iter().rev().find(near).map(|x| x.0),
-        Prefer::Narrowest => fine.iter().find(near).map(|x| x.0),
         Prefer::Narrow | Prefer::NarrowOfScored => {
             let beyond_edge = match prefer {
                 Prefer::NarrowOfScored => BEYOND_EDGE_OF_SCORED,

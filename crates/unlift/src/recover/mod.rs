@@ -4,7 +4,7 @@
 //!
 //! 1. `options`: what a user may choose; `result`: what comes out.
 //! 2. `map`: records, lists and places as solvers read them; `map/settings` is all that differs between maps and images.
-//! 3. Solvers, each of which implements the trait of `solve`: `consensus`, `joint`, `ransac`, `placement`.
+//! 3. Solvers, each of which implements the trait of `solve`: `consensus`, `joint`, `placement`, and those of `baselines`.
 //! 4. `delta`: the distance that decides support, chosen by how well consensus then does.
 //! 5. `exact`: coordinates that a rule of the scheme fixes. `confidence`: how sure the attacker is.
 //!    `pairs_of_descriptors`: whose descriptor is whose on a paired line.
@@ -13,6 +13,7 @@
 //!
 //! [`prepare`] learns a model, [`Task`] solves with it, and [`recover`] does both.
 
+mod baselines;
 mod confidence;
 mod consensus;
 mod delta;
@@ -23,12 +24,12 @@ mod map;
 mod options;
 mod pairs_of_descriptors;
 mod placement;
-mod ransac;
 mod result;
 mod rounds;
 mod solve;
 mod task;
 
+pub(crate) use baselines::density::published;
 #[doc(hidden)]
 pub use confidence::model::{N_KINDS, N_TERMS, centered, terms};
 #[doc(hidden)]

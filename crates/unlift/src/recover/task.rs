@@ -2,16 +2,17 @@
 
 use std::ops::Range;
 
+use super::baselines::density::published;
+use super::baselines::ransac::Ransac;
 use super::confidence::seen::{Seen, Solved};
 use super::consensus::Consensus;
-use super::joint::{Joint, JointStart};
+use super::joint::Joint;
 use super::learned::Model;
 use super::map::family::Family;
 use super::map::graph::Graph;
 use super::options::{Delta, RecoverOptions, Solver};
 use super::pairs_of_descriptors::descriptor_rows;
 use super::placement::{self, Placement};
-use super::ransac::Ransac;
 use super::result::estimate::Estimate;
 use super::result::recovered::Recovered;
 use super::result::trials::TrialCounts;
@@ -19,7 +20,7 @@ use super::result::unknown::Unknown;
 use super::rounds::Rounds;
 use super::solve::Solve;
 use super::{confidence, delta, exact};
-use crate::density::{Peaks, published, tomography};
+use crate::density::{Peaks, tomography};
 use crate::neighbors::Neighborhoods;
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, Fingerprint};
@@ -174,23 +175,17 @@ impl<'a, const D: usize> Task<'a, D> {
         let recovered = self.in_columns(estimates, rows)?;
         let trials = (self.options.solver == Solver::Ransac).then(|| self.trials.histogram());
         let recovered = recovered.with_trials(trials);
-        let (family, graph) = match (&self.records, self.no_confidence()) {
-            (Records::Listed { family, graph, .. }, None) => (family, graph),
-            (_, unknown) => {
-                let unknown = unknown.unwrap_or(Unknown::FromRecordsAlone);
-                return Ok((recovered.without_confidence(unknown), Seen::NOTHING));
-            }
+        if let Some(unknown) = confidence::not_asked::<D>(&self.options) {
+            return Ok((recovered.without_confidence(unknown), Seen::NOTHING));
+        }
+        let Records::Listed { family, graph: Some(graph), .. } = &self.records else {
+            return Ok((recovered.without_confidence(Unknown::OtherSolver), Seen::NOTHING));
         };
-        let edges = (graph.as_ref(), self.lists);
         let solved = Solved { estimates, unsettled, delta: self.delta as f32 };
-        let seen = confidence::look(family, edges, self.released, &solved);
+        let seen = confidence::look(family, graph, self.released, &solved);
         let recovered = match confidence::unknown(self.lists) {
             Some(unknown) => recovered.without_confidence(unknown),
-            None => {
-                let solver = self.options.solver;
-                let confidence = confidence::of(solver, estimates, &seen);
-                recovered.with_confidence(confidence)?
-            }
+            None => recovered.with_confidence(confidence::of(estimates, &seen))?,
         };
         Ok((recovered, seen))
     }
@@ -203,7 +198,7 @@ impl<'a, const D: usize> Task<'a, D> {
     ) -> Result<Recovered<D>, Error> {
         let start = if self.is_settled() { self.settle(start) } else { start };
         let rows = last.descriptor_row().map(<[u32]>::to_vec);
-        Ok(self.in_columns(&start, rows)?.without_confidence(Unknown::FirstPass))
+        Ok(self.in_columns(&start, rows)?.without_confidence(Unknown::OtherSolver))
     }
 
     /// The solver called so, over this map.
@@ -212,17 +207,17 @@ impl<'a, const D: usize> Task<'a, D> {
         match &self.records {
             Records::Alone(peaks) => Box::new(Placement::new(self.released, lists, peaks)),
             Records::Listed { family, graph, both_ways } => {
+                // Joint recovery starts from who lists whom in both directions, where a record hides one point.
                 let used = both_ways.as_ref().unwrap_or(lists);
-                let start = JointStart(Consensus { family, lists: used, delta });
+                let start = Consensus { family, lists: used, delta };
                 match (solver, graph) {
                     (Solver::Joint, Some(graph)) => {
                         Box::new(Joint { start, family, graph, delta, seed })
                     }
-                    (Solver::JointStart, _) => Box::new(start),
                     (Solver::Ransac, _) => {
                         Box::new(Ransac { family, lists, delta, seed, trials: &self.trials })
                     }
-                    _ => Box::new(Consensus { family, lists, delta }),
+                    _ => Box::new(start),
                 }
             }
         }
@@ -259,11 +254,6 @@ impl<'a, const D: usize> Task<'a, D> {
             Some(rounds) => rounds.run(),
             None => Ok(start),
         }
-    }
-
-    /// Why nobody is asked how sure the attacker is, if so.
-    fn no_confidence(&self) -> Option<Unknown> {
-        confidence::not_asked::<D>(&self.options)
     }
 
     fn in_columns(

@@ -21,7 +21,7 @@ fn arrows_against_the_stream_are_found_however_they_are_written() {
         ("recover/joint.rs", "use crate::{\n    released::{Lines, Rays},\n    truth::Secret,\n};"),
         ("recover/joint.rs", "use crate::{released as r, truth as t};"),
         ("recover/joint.rs", "use super::super::truth;"),
-        ("recover/ransac/loops.rs", "use super::super::super::truth::Original;"),
+        ("recover/joint/sweeps.rs", "use super::super::super::truth::Original;"),
         ("recover/mod.rs", "fn f(secret: &crate::truth::Secret) {}"),
         ("recover/mod.rs", "use crate::neighbors::oracle::TrueNeighbors;"),
         ("recover/mod.rs", "use crate::neighbors::{Neighborhoods, oracle};"),
@@ -53,7 +53,10 @@ fn arrows_against_the_stream_are_found_however_they_are_written() {
 fn arrows_with_the_stream_pass() {
     let right = [
         ("recover/mod.rs", "use crate::neighbors::Neighborhoods;\nuse crate::{Error, RecordId};"),
-        ("recover/ransac/loops.rs", "use crate::recover::map::sections::{NO_VOTE, Sections};"),
+        (
+            "recover/baselines/ransac/loops.rs",
+            "use crate::recover::map::sections::{NO_VOTE, Sections};",
+        ),
         ("recover/mod.rs", "//! Never imports `crate::truth`.\nconst A: &str = \"crate::truth\";"),
         ("geometry/kmeans.rs", "use super::vector::dot;\nuse crate::seed::{Draws, Stage};"),
         ("neighbors/oracle/mod.rs", "use crate::truth::{Original, Secret};"),

@@ -57,7 +57,8 @@ pub const INSIDE_RECOVER: &[(&str, &[&str])] = &[
     ("consensus", &["map", "result", "solve"]),
     // It starts from a pass of consensus.
     ("joint", &["map", "result", "solve", "consensus"]),
-    ("ransac", &["map", "result", "solve"]),
+    // The published density attacks stand on `density` alone.
+    ("baselines", &["map", "result", "solve"]),
     ("placement", &["map", "result", "solve"]),
     // Chosen by how well consensus does.
     ("delta", &["map", "consensus"]),
@@ -75,7 +76,7 @@ pub const INSIDE_RECOVER: &[(&str, &[&str])] = &[
             "solve",
             "consensus",
             "joint",
-            "ransac",
+            "baselines",
             "placement",
             "delta",
             "exact",
@@ -99,7 +100,10 @@ pub const CRATES: &[(&str, &[&str])] = &[
     ("unlift-report", &[]),
     ("unlift-testkit", &["unlift"]),
     ("unlift-audit", &["unlift", "unlift-io", "unlift-features", "unlift-report"]),
-    ("unlift-cli", &["unlift", "unlift-audit", "unlift-io", "unlift-features", "unlift-report"]),
+    (
+        "unlift-cli",
+        &["unlift", "unlift-audit", "unlift-io", "unlift-nn", "unlift-features", "unlift-report"],
+    ),
 ];
 
 /// Lines of a file at most, its unit tests not counted.

@@ -59,9 +59,9 @@ const JOINT: &[(&str, usize, u64)] = &[
     ("ray", 3, 0x87e001b2e5bf8777),
     ("ray-voxel", 3, 0x7797981135ef9150),
     ("plane", 3, 0x6e60b82ba944b65f),
-    ("cp", 3, 0x1c80ebec8c5acf9b),
+    ("cp", 3, 0x570e2cc62c1348f9),
     ("lines2d", 2, 0x650477145b52659f),
-    ("cp2d", 2, 0x99c4f1d8314430be),
+    ("cp2d", 2, 0x4052474d74de81a8),
     ("dcl2d", 2, 0xbc91503f8c7f82d4),
 ];
 

@@ -22,7 +22,7 @@ fn the_start_is_a_solver_of_its_own<const D: usize>(name: &str, scheme: &Entry) 
         let of_start = alone(Solver::JointStart);
         assert_eq!(recovered_bytes(&start), recovered_bytes(&of_start), "{name}");
         for start in [&start, &of_start] {
-            assert_eq!(start.confidence_unknown(), Some(Unknown::FirstPass), "{name}");
+            assert_eq!(start.confidence_unknown(), Some(Unknown::OtherSolver), "{name}");
         }
         assert_eq!(start.delta(), joint.delta(), "{name}");
     }

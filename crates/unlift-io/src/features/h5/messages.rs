@@ -71,6 +71,7 @@ fn datatype(values: &Numbers) -> Vec<u8> {
     match values {
         Numbers::U8(_) => integer(1, false),
         Numbers::I64(_) => integer(8, true),
+        Numbers::F16(_) => float(2, 10, 5, 15),
         Numbers::F32(_) => float(4, 23, 8, 127),
         Numbers::F64(_) => float(8, 52, 11, 1023),
     }

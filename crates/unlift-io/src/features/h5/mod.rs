@@ -9,6 +9,8 @@ mod read;
 mod tree;
 mod write;
 
+use half::f16;
+
 pub(crate) use read::FeatureStore;
 pub(crate) use write::Writer;
 
@@ -16,6 +18,7 @@ pub(crate) use write::Writer;
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Numbers {
     U8(Vec<u8>),
+    F16(Vec<f16>),
     F32(Vec<f32>),
     F64(Vec<f64>),
     I64(Vec<i64>),
@@ -33,6 +36,7 @@ impl Numbers {
     pub fn len(&self) -> usize {
         match self {
             Self::U8(v) => v.len(),
+            Self::F16(v) => v.len(),
             Self::F32(v) => v.len(),
             Self::F64(v) => v.len(),
             Self::I64(v) => v.len(),
@@ -43,6 +47,7 @@ impl Numbers {
     fn bytes(&self) -> Vec<u8> {
         match self {
             Self::U8(v) => v.clone(),
+            Self::F16(v) => v.iter().flat_map(|x| x.to_le_bytes()).collect(),
             Self::F32(v) => v.iter().flat_map(|x| x.to_le_bytes()).collect(),
             Self::F64(v) => v.iter().flat_map(|x| x.to_le_bytes()).collect(),
             Self::I64(v) => v.iter().flat_map(|x| x.to_le_bytes()).collect(),
@@ -53,6 +58,7 @@ impl Numbers {
     pub fn to_f64(&self) -> Vec<f64> {
         match self {
             Self::U8(v) => v.iter().map(|&x| f64::from(x)).collect(),
+            Self::F16(v) => v.iter().map(|&x| f64::from(x)).collect(),
             Self::F32(v) => v.iter().map(|&x| f64::from(x)).collect(),
             Self::F64(v) => v.clone(),
             Self::I64(v) => v.iter().map(|&x| x as f64).collect(),

@@ -108,7 +108,7 @@ impl FeatureStore {
                 Some(from_bytes) => {
                     let bytes = dataset.read_raw().map_err(refuse)?;
                     let halves = bytes.as_chunks::<2>().0.iter();
-                    Numbers::F32(halves.map(|&half| from_bytes(half).to_f32()).collect())
+                    Numbers::F16(halves.map(|&half| from_bytes(half)).collect())
                 }
                 None => {
                     let expected = "floats of 16, 32 or 64 bits, or integers";

@@ -9,7 +9,7 @@ mod patches;
 
 pub use patches::{Patches, check};
 
-use super::compare::{MOST_ROWS, search};
+use super::compare::{MOST_ROWS, note, search};
 use super::rows::Rows;
 use super::source::{Needs, Source};
 use super::{Neighborhoods, walk};
@@ -60,5 +60,9 @@ impl<const D: usize> Source<D> for Overlap {
 
     fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {
         check(descriptors)
+    }
+
+    fn note(&self, n_slots: usize) -> Option<String> {
+        note("overlap", n_slots)
     }
 }

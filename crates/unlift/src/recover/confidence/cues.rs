@@ -7,12 +7,11 @@
 
 use rayon::prelude::*;
 
-use super::edges::{Edge, Edges};
 use super::seen::{Cues, Seen, Solved};
 use crate::recover::map::along_curve::along_curve;
 use crate::recover::map::crowding::Density;
 use crate::recover::map::evidence::evidence;
-use crate::recover::map::graph::record_of;
+use crate::recover::map::graph::{Graph, Side, either, record_of, side};
 use crate::recover::map::pieces::Pieces;
 use crate::recover::map::places::{Places, distance2};
 use crate::recover::result::estimate::{Estimate, Status};
@@ -49,7 +48,7 @@ struct Crowd {
     /// The mean of the logarithm of the members' own evidence; of the second pass.
     of_members: f32,
     /// The logarithm of how many more members the slot lists than list it. Look-alikes agree on a wrong place, but
-    /// those who are there do not name who is not. Of the second pass; 0 where nobody knows who lists a slot.
+    /// those who are there do not name who is not. Of the second pass.
     one_sided: f32,
     sparsity: f32,
 }
@@ -74,26 +73,26 @@ impl Near {
 }
 
 /// What all slots are looked at with.
-struct Look<'a, const D: usize, P, E> {
+struct Look<'a, const D: usize, P> {
     pieces: &'a P,
-    edges: &'a E,
+    graph: &'a Graph,
     places: &'a Places<D>,
     density: &'a Density<D>,
     delta2: f32,
 }
 
 /// The cues of every slot, and the length (typical radius of crowds) that scales predicted errors.
-pub(super) fn of<const D: usize, P: Pieces<D>, E: Edges>(
+pub(super) fn of<const D: usize, P: Pieces<D>>(
     pieces: &P,
-    edges: &E,
+    graph: &Graph,
     solved: &Solved<'_, D>,
 ) -> Seen {
     let Solved { estimates, unsettled, delta } = *solved;
     let slots_per_record = pieces.slots_per_record();
     let places = Places::new(estimates);
-    let listed = edges.times_listed(estimates.len() / slots_per_record);
+    let listed = graph.times_listed(estimates.len() / slots_per_record, slots_per_record);
     let density = Density::new(&places, &listed, SMOOTH * delta);
-    let look = Look { pieces, edges, places: &places, density: &density, delta2: delta * delta };
+    let look = Look { pieces, graph, places: &places, density: &density, delta2: delta * delta };
     // Crowds in the order in which they are looked at, then by slot: neighbors are found in the cache.
     let order = along_curve(&places);
     let mut along = vec![Crowd::default(); estimates.len()];
@@ -132,14 +131,14 @@ pub(super) fn of<const D: usize, P: Pieces<D>, E: Edges>(
     Seen { cues, radius: f64::from(map.radius), ..Seen::NOTHING }
 }
 
-impl<const D: usize, P: Pieces<D>, E: Edges> Look<'_, D, P, E> {
+impl<const D: usize, P: Pieces<D>> Look<'_, D, P> {
     /// Brings near what [`crowd`](Self::crowd) looks at.
     fn prefetch(&self, slot: usize) {
         let slots_per_record = self.pieces.slots_per_record();
-        self.edges.each(slot, |edge| {
-            self.places.prefetch(edge.end as usize);
-            self.pieces.prefetch(record_of(edge.end as usize, slots_per_record));
-        });
+        for &end in self.graph.of(slot).0 {
+            self.places.prefetch(end as usize);
+            self.pieces.prefetch(record_of(end as usize, slots_per_record));
+        }
     }
 
     fn crowd(&self, slot: usize, own: &Estimate<D>, near: &mut Vec<Near>) -> Crowd {
@@ -152,7 +151,9 @@ impl<const D: usize, P: Pieces<D>, E: Edges> Look<'_, D, P, E> {
         let (mut all, mut rates) = (0usize, 0.0f32);
         let (mut voting, mut votes) = (0usize, 0usize);
         let slots_per_record = self.pieces.slots_per_record();
-        self.edges.each(slot, |Edge { end, either, .. }| {
+        let (ends, class) = self.graph.of(slot);
+        for (&end, &class) in ends.iter().zip(class) {
+            let either = either(class, slots_per_record);
             let (d2, at) = self.places.nearest(end, either, &x);
             all += 1;
             rates += if either { 2.0 * rate } else { rate };
@@ -164,7 +165,7 @@ impl<const D: usize, P: Pieces<D>, E: Edges> Look<'_, D, P, E> {
                 voting += 1;
                 votes += usize::from(self.pieces.record_distance2(record, &x) <= self.delta2);
             }
-        });
+        }
         near.sort_unstable();
         let mean_rate = rates / all.max(1) as f32;
         let mut crowd = Crowd {
@@ -225,19 +226,19 @@ impl<const D: usize, P: Pieces<D>, E: Edges> Look<'_, D, P, E> {
         let reach2 = crowd.radius * crowd.radius * (1.0 + 1e-6);
         let (mut n, mut sum) = (0u32, 0.0);
         let (mut listed, mut listing) = (0u32, 0u32);
-        self.edges.each(slot, |edge| {
-            let (d2, at) = self.places.nearest(edge.end, edge.either, &x);
+        let (ends, class) = self.graph.of(slot);
+        for (&end, &class) in ends.iter().zip(class) {
+            let either = either(class, self.pieces.slots_per_record());
+            let (d2, at) = self.places.nearest(end, either, &x);
             if d2 <= reach2 {
                 n += 1;
                 sum += evidence[at];
-                listed += u32::from(edge.lists);
-                listing += u32::from(edge.is_listed);
+                listed += u32::from(side(class) != Side::Reverse);
+                listing += u32::from(side(class) != Side::Forward);
             }
-        });
-        crowd.of_members = sum / n.max(1) as f32;
-        if E::BOTH_WAYS {
-            crowd.one_sided = libm::logf((listed + 1) as f32 / (listing + 1) as f32);
         }
+        crowd.of_members = sum / n.max(1) as f32;
+        crowd.one_sided = libm::logf((listed + 1) as f32 / (listing + 1) as f32);
     }
 }
 

@@ -1,20 +1,16 @@
 //! How sure the attacker can be of each recovered point, from attacker-side data alone.
 //!
-//! After recovery every slot is looked at once more: `cues.rs` measures how much better than by chance
-//! estimates and records agree around it, and `judge.rs` turns that into the probability that the right
+//! After joint recovery every slot is looked at once more: `cues.rs` measures how much better than by chance
+//! estimates and records agree around it, and `model.rs` turns that into the probability that the right
 //! place was found and a scale of its error. Its constants come from synthetic rooms
 //! (`examples/fit_confidence.rs`), never from a real map. Cues are ratios: a scaled map has the same.
 
 mod constants;
 mod cues;
-mod edges;
-mod judge;
 pub(super) mod model;
 pub(super) mod seen;
 
 use rayon::prelude::*;
-
-use edges::{BothWays, Edges, Listed};
 
 use crate::neighbors::Neighborhoods;
 use crate::recover::map::family::Family;
@@ -26,7 +22,9 @@ use crate::recover::result::estimate::{Estimate, Status};
 use crate::recover::result::probability::Confidence;
 use crate::recover::result::unknown::Unknown;
 use crate::released::Released;
-use seen::{Seen, Solved};
+use constants::{CENTER, MODELS, SPREAD};
+use model::{Model, N_TERMS, centered, terms};
+use seen::{Cues, Seen, Solved};
 
 /// A list has at most as many entries as this share of all hidden points in the maps that the model was fitted on.
 const MOST_LISTED: f64 = 0.01;
@@ -34,11 +32,10 @@ const MOST_LISTED: f64 = 0.01;
 /// Why nobody looks how sure the attacker is, if `options` or the kind of map say so.
 pub(super) fn not_asked<const D: usize>(options: &RecoverOptions) -> Option<Unknown> {
     match options.solver {
-        Solver::Density | Solver::Tomography => Some(Unknown::FromRecordsAlone),
-        Solver::JointStart => Some(Unknown::FirstPass),
-        _ if !options.confidence => Some(Unknown::NotAsked),
-        _ if !Settings::of_dimension::<D>().confidence => Some(Unknown::OfImages),
-        Solver::Consensus | Solver::Joint | Solver::Ransac => None,
+        Solver::Joint if !options.confidence => Some(Unknown::NotAsked),
+        Solver::Joint if !Settings::of_dimension::<D>().confidence => Some(Unknown::OfImages),
+        Solver::Joint => None,
+        _ => Some(Unknown::OtherSolver),
     }
 }
 
@@ -57,53 +54,43 @@ pub(super) fn unknown(lists: &Neighborhoods) -> Option<Unknown> {
     }
 }
 
-/// Looks around estimates, along `graph` where there is one, else along `lists`.
+/// Looks around the estimates of joint recovery.
 pub(super) fn look<const D: usize>(
     family: &Family<'_, D>,
-    (graph, lists): (Option<&Graph>, &Neighborhoods),
+    graph: &Graph,
     released: &Released<D>,
     solved: &Solved<'_, D>,
 ) -> Seen {
-    let slots_per_record = released.slots_per_record();
-    let seen = match graph {
-        Some(graph) => look_along(family, &BothWays { graph, slots_per_record }, solved),
-        None => look_along(family, &Listed { lists, slots_per_record }, solved),
+    let seen = match family {
+        Family::Lines { rows, slots_per_record, chance } => {
+            let pieces = LinePieces::new(rows, *slots_per_record, chance, solved.delta);
+            cues::of(&pieces, graph, solved)
+        }
+        Family::Planes { planes, sorted } => {
+            cues::of(&PlanePieces::new(planes, sorted, solved.delta), graph, solved)
+        }
+        Family::Candidates { rows, chance } => {
+            cues::of(&CandidatePieces::new(rows, chance, solved.delta), graph, solved)
+        }
     };
     Seen { kind: model::kind(released), ..seen }
 }
 
-fn look_along<const D: usize, E: Edges>(
-    family: &Family<'_, D>,
-    edges: &E,
-    solved: &Solved<'_, D>,
-) -> Seen {
-    match family {
-        Family::Lines { rows, slots_per_record, chance } => {
-            let pieces = LinePieces::new(rows, *slots_per_record, chance, solved.delta);
-            cues::of(&pieces, edges, solved)
-        }
-        Family::Planes { planes, sorted } => {
-            cues::of(&PlanePieces::new(planes, sorted, solved.delta), edges, solved)
-        }
-        Family::Candidates { rows, chance } => {
-            cues::of(&CandidatePieces::new(rows, chance, solved.delta), edges, solved)
-        }
-    }
+/// How sure the attacker is of every slot.
+pub(super) fn of<const D: usize>(estimates: &[Estimate<D>], seen: &Seen) -> Vec<Confidence> {
+    let radius = seen.radius as f32;
+    let of_slot = |(estimate, cues): (&Estimate<D>, &Cues)| match estimate.status {
+        Status::Ok => judged(&MODELS[seen.kind], cues, radius),
+        _ => Confidence::LOST,
+    };
+    estimates.par_iter().zip(&seen.cues).map(of_slot).collect()
 }
 
-/// How sure the attacker is of every slot.
-pub(super) fn of<const D: usize>(
-    solver: Solver,
-    estimates: &[Estimate<D>],
-    seen: &Seen,
-) -> Vec<Confidence> {
-    let radius = seen.radius as f32;
-    estimates
-        .par_iter()
-        .zip(&seen.cues)
-        .map(|(estimate, cues)| match estimate.status {
-            Status::Ok => judge::confidence(solver, seen.kind, cues, radius),
-            _ => Confidence::LOST,
-        })
-        .collect()
+/// What `cues` say about one slot; lengths are multiples of `radius`.
+fn judged(model: &Model, cues: &Cues, radius: f32) -> Confidence {
+    let terms = centered(terms(cues), &CENTER, &SPREAD);
+    let sum =
+        |weights: &[f32; N_TERMS]| -> f32 { terms.iter().zip(weights).map(|(t, w)| t * w).sum() };
+    let scale = libm::expf(sum(&model.scale).clamp(-12.0, 12.0)) * radius;
+    Confidence { found: 1.0 / (1.0 + libm::expf(-sum(&model.found))), scale }
 }

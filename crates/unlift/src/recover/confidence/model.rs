@@ -1,4 +1,4 @@
-//! From cues to a probability: one small model per solver and kind of record, fitted on synthetic rooms.
+//! From cues to a probability: one small model per kind of record, fitted on synthetic rooms.
 
 use super::seen::{Cues, N_CUES};
 use crate::released::{Obfuscation, Released};
@@ -15,7 +15,7 @@ pub const N_TERMS: usize = 1 + N_CUES + N_PRODUCTS;
 /// Terms farther than this many spreads from the center count as that far: nothing was seen there.
 const FARTHEST: f32 = 4.0;
 
-/// The weights of one solver and kind of record.
+/// The weights of one kind of record.
 pub(super) struct Model {
     /// Of the logit of the right place.
     pub(super) found: [f32; N_TERMS],

@@ -16,12 +16,9 @@ use crate::recover::result::estimate::{Estimate, Status};
 
 /// Rounds of learning: a fixed number, so that time does not depend on the map.
 const ROUNDS: usize = 6;
-/// Messages have settled when none moves by more than this share, while the law is learned: it will change again.
-const LEARNING: f32 = 0.02;
-/// The same at last.
-const SETTLED: f32 = 1e-3;
 /// Pairs less probable than this teach nothing: there are many, and together they weigh little.
 const NOTHING: f32 = 1e-3;
+
 /// `estimates` with the exact coordinate wherever the partner is known.
 pub(super) fn settle<const D: usize>(
     published: &[[f32; D]],
@@ -65,7 +62,7 @@ pub(super) fn pairs<const D: usize>(
     let mut law = Law::new(partners.reach);
     let mut messages = Messages::new(&partners);
     let mut weight = vec![0.0f32; partners.of.len()];
-    for round in 0..ROUNDS {
+    for _ in 0..ROUNDS {
         let likelier = |i: usize, j: usize| {
             let away = (sides[j].published - sides[i].estimate).abs();
             law.density(usize::from(class[i]), away) * rarity[i]
@@ -84,8 +81,7 @@ pub(super) fn pairs<const D: usize>(
         let others = law.mean_good();
         let alone: Vec<f32> =
             class.iter().map(|&c| law.alone(usize::from(c), others) as f32).collect();
-        let settled = if round + 1 < ROUNDS { LEARNING } else { SETTLED };
-        messages.settle(&partners, &weight, &alone, settled);
+        messages.send(&partners, &weight, &alone);
         let tallies: Vec<Tally> = (0..n.div_ceil(PART))
             .into_par_iter()
             .map(|part| {

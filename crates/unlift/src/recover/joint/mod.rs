@@ -19,22 +19,22 @@ mod near;
 mod neighbor_law;
 mod one_slot;
 mod remake;
-mod start;
 mod sweeps;
 
 use std::ops::Range;
 
+use crate::recover::consensus::Consensus;
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::Graph;
 use crate::recover::map::pieces::{CandidatePieces, LinePieces, PlanePieces};
 use crate::recover::result::estimate::Estimate;
 use crate::recover::solve::{InRounds, Solve};
-pub(crate) use start::JointStart;
 use sweeps::Sweeps;
 
 /// Joint recovery of one map.
 pub(crate) struct Joint<'a, const D: usize> {
-    pub(crate) start: JointStart<'a, D>,
+    /// The pass that the rounds start from.
+    pub(crate) start: Consensus<'a, D>,
     pub(crate) family: &'a Family<'a, D>,
     pub(crate) graph: &'a Graph,
     /// The distance up to which a record supports a place, in the unit of the map.

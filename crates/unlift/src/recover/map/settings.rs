@@ -16,9 +16,6 @@ pub(crate) struct Settings {
     pub(crate) too_wide_of_candidates: f32,
     /// Whether that limit holds for the fine ladder, too. In a map it may reach beyond.
     pub(crate) candidates_keep_to_limit: bool,
-    /// Whether joint recovery of candidates takes the narrowest of all deltas that are as good: where records cross each
-    /// other all over a small plane.
-    pub(crate) narrowest_of_candidates: bool,
     /// Whether the share of all records that a list holds says which deltas are out of question. In an image
     /// coordinates are few and bounds known: other limits hold there.
     pub(crate) limits_by_share: bool,
@@ -50,7 +47,6 @@ const OF_MAPS: Settings = Settings {
     delta_chunks_of_planes: 24,
     too_wide_of_candidates: 0.04,
     candidates_keep_to_limit: false,
-    narrowest_of_candidates: false,
     limits_by_share: true,
     keeps_near_edge: true,
     most_radius_of_candidates: 0.95,
@@ -67,7 +63,6 @@ const OF_IMAGES: Settings = Settings {
     delta_chunks_of_planes: 4,
     too_wide_of_candidates: 0.12,
     candidates_keep_to_limit: true,
-    narrowest_of_candidates: true,
     limits_by_share: false,
     keeps_near_edge: false,
     most_radius_of_candidates: 3.0,

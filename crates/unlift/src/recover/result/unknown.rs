@@ -9,10 +9,8 @@ pub enum Unknown {
     NotGiven,
     /// The model was fitted on maps: in images nobody has compared it with what comes true.
     OfImages,
-    /// The positions come from the records alone: nothing has been fitted for them.
-    FromRecordsAlone,
-    /// The positions are what joint recovery starts from: nothing has been fitted for them.
-    FirstPass,
+    /// The solver is not `joint`: nothing was fitted for others.
+    OtherSolver,
     /// The lists have scores, as sources that rank give them: nothing was fitted on how those err.
     RankedLists,
     /// Lists have more entries per hidden point than in any map that the model was fitted on.
@@ -28,8 +26,7 @@ impl Unknown {
             Self::OfImages => {
                 "it was fitted on maps and never compared with what comes true in images"
             }
-            Self::FromRecordsAlone => "nothing was fitted for attacks on the records alone",
-            Self::FirstPass => "nothing was fitted for the pass that joint recovery starts from",
+            Self::OtherSolver => "nothing was fitted for solvers other than joint",
             Self::RankedLists => "nothing was fitted on how lists err that a source ranked",
             Self::SmallMap => {
                 "lists have more entries than a hundredth of all points, more than in any map that it was fitted on"

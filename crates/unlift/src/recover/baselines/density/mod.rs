@@ -3,7 +3,7 @@
 //! One point per line (Chelani et al., CVPR 2021): the nearest lines vote where they pass; the peak of
 //! the votes is the estimate; then lines vote again, chosen near the present estimates. Two points per
 //! line (Lee et al., CVPR 2023): the two highest peaks of a kernel density of the votes. Rays (Moon et
-//! al., CVPR 2024): rays of other centers vote, once.
+//! al., CVPR 2024): rays of other centers vote, once. (Paper, supplement, "Comparison to other 3D line recoveries".)
 //!
 //! The published programs read more than the records: votes counted from the true point, a line that
 //! votes for itself exactly there, ranges from true distances. Here votes are counted from the foot, a line
@@ -14,8 +14,8 @@ mod peak;
 
 use rayon::prelude::*;
 
-use super::feasible::{Feasible, FeasibleLine, Hides};
-use super::{Peak, Peaks};
+use crate::density::feasible::{Feasible, FeasibleLine, Hides};
+use crate::density::{Peak, Peaks};
 use crate::released::Released;
 use columns::{LineColumns, PointColumns, nearest};
 use peak::{crowd, two_crowds};

@@ -1,0 +1,47 @@
+//! `unlift models`: which networks there are, and whether their files are here.
+
+use serde_json::json;
+use unlift_nn::{Entry, Folders, MODELS, Place};
+
+use crate::args::ModelsArgs;
+use crate::exit::Outcome;
+use crate::output::print;
+
+/// Lists every model with what is known about it.
+pub fn run(args: &ModelsArgs) -> anyhow::Result<Outcome> {
+    let folders = Folders::of_process();
+    let mut text = String::new();
+    let mut rows = Vec::with_capacity(MODELS.len());
+    for entry in MODELS {
+        let place = folders.find(entry)?;
+        let here = here(place.as_ref(), &folders, entry);
+        let hash = entry.sha256.unwrap_or("not known: its bytes depend on what it was made with");
+        text.push_str(&format!(
+            "{}\n  for      {}\n  licence  {}\n  owner    {}\n  sha256   {hash}\n  here     {here}\n",
+            entry.name, entry.purpose, entry.licence, entry.owner
+        ));
+        rows.push(json!({
+            "name": entry.name,
+            "for": entry.purpose,
+            "licence": entry.licence,
+            "owner": entry.owner,
+            "sha256": entry.sha256,
+            "carried": entry.carried.is_some(),
+            "here": place.is_some(),
+            "file": match &place {
+                Some(Place::File(path)) => Some(path.display().to_string()),
+                Some(Place::Carried) | None => None,
+            },
+        }));
+    }
+    print(&if args.json { serde_json::to_string_pretty(&rows)? + "\n" } else { text })?;
+    Ok(Outcome::Done)
+}
+
+fn here(place: Option<&Place>, folders: &Folders, entry: &Entry) -> String {
+    match place {
+        Some(Place::Carried) => "in the program".to_owned(),
+        Some(Place::File(path)) => path.display().to_string(),
+        None => format!("no: {}", folders.missing(entry)),
+    }
+}

@@ -1,0 +1,162 @@
+"""Trains a network of neighborhoods: `train.py OUT DATA.. --minutes 60 [--validate FOLDER]`.
+
+DATA are folders of crops (`training_crops`), FOLDER one of whole images. OUT gets `curve.csv`, `best.safetensors` (by
+inlier ratio at 20 after the walk, on FOLDER) and `checkpoint.pt`, from which the same command goes on. Time is CPU
+time of the training alone; it sets the schedule, so that a run may be stopped at any moment but ends as planned.
+"""
+
+import argparse
+import csv
+import dataclasses
+import math
+import pathlib
+import time
+
+import torch
+
+import data
+import evaluate
+import ranking
+import weights
+from model import Network, Shape
+
+
+def parsed():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", type=pathlib.Path)
+    parser.add_argument("data", type=pathlib.Path, nargs="+")
+    parser.add_argument("--minutes", type=float, default=60.0, help="CPU time of the training, validation apart")
+    parser.add_argument("--steps", type=int, help="stop after so many steps")
+    parser.add_argument("--repeat", action="store_true", help="the first batch only: its loss must fall")
+    parser.add_argument("--validate", type=pathlib.Path, help="folder of whole images")
+    parser.add_argument("--images", type=int, default=8, help="images of it that are used")
+    parser.add_argument("--every", type=float, default=5.0, help="minutes between validations")
+    parser.add_argument("--points", type=int, default=2048, help="points per step")
+    parser.add_argument("--rate", type=float, default=1.2e-3)
+    parser.add_argument("--muon", type=float, default=0.0, help="rate of the matrices by Muon; 0: all by AdamW")
+    parser.add_argument("--walked", type=float, default=0.0, help="weight of the loss after the walk")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--half", action="store_true", help="bf16 where that is fast")
+    for field in dataclasses.fields(Shape):
+        parser.add_argument(f"--{field.name}", type=int, default=field.default)
+    return parser.parse_args()
+
+
+def loss_of(scores: torch.Tensor, target: torch.Tensor, walked: float) -> torch.Tensor:
+    """Cross entropy of every row's softmax over the other points, and `walked` times that of where the walk leads."""
+    itself = torch.eye(scores.shape[-1], dtype=torch.bool)
+    logs = torch.log_softmax(scores.float().masked_fill(itself, -1e9), -1)
+    loss = -(target * logs).sum(-1).mean()
+    if walked:
+        loss = loss - walked * (target * ranking.walked(logs, itself)).sum(-1).mean()
+    return loss
+
+
+def optimizers(network: Network, rate: float, muon: float) -> list[torch.optim.Optimizer]:
+    """Muon for the matrices within blocks where a rate is given, AdamW for the rest."""
+    matrices, rest = [], []
+    for name, value in network.named_parameters():
+        (matrices if muon and value.ndim == 2 and not name.startswith("pairs") else rest).append(value)
+    chosen = [torch.optim.AdamW(rest, lr=rate, weight_decay=0.01, betas=(0.9, 0.98))]
+    if matrices:
+        chosen.append(torch.optim.Muon(matrices, lr=muon, weight_decay=0.01, adjust_lr_fn="original"))
+    return chosen
+
+
+class Run:
+    """All that a checkpoint keeps."""
+
+    def __init__(self, options):
+        torch.manual_seed(options.seed)
+        shape = Shape(**{field.name: getattr(options, field.name) for field in dataclasses.fields(Shape)})
+        self.options, self.network = options, Network(shape)
+        self.optimizers = optimizers(self.network, options.rate, options.muon)
+        self.rates = [group["lr"] for optimizer in self.optimizers for group in optimizer.param_groups]
+        self.step, self.seconds, self.best = 0, 0.0, 0.0
+        self.path = options.out / "checkpoint.pt"
+        if self.path.exists():
+            state = torch.load(self.path, weights_only=True)
+            self.network.load_state_dict(state["network"])
+            for optimizer, kept in zip(self.optimizers, state["optimizers"]):
+                optimizer.load_state_dict(kept)
+            self.step, self.seconds, self.best = state["step"], state["seconds"], state["best"]
+
+    def save(self):
+        state = {"network": self.network.state_dict(), "step": self.step, "seconds": self.seconds, "best": self.best}
+        state["optimizers"] = [optimizer.state_dict() for optimizer in self.optimizers]
+        scratch = self.path.with_suffix(".part")
+        torch.save(state, scratch)
+        scratch.replace(self.path)
+
+    def set_rates(self):
+        """Warm-up over 100 steps, then half a cosine over the planned time, down to 2 %."""
+        done = min(self.seconds / (60 * self.options.minutes), 1.0)
+        share = min(1.0, (self.step + 1) / 100) * (0.02 + 0.98 * (1 + math.cos(math.pi * done)) / 2)
+        groups = [group for optimizer in self.optimizers for group in optimizer.param_groups]
+        for group, rate in zip(groups, self.rates):
+            group["lr"] = rate * share
+
+    def train(self, batch) -> float:
+        """One step; the loss before it."""
+        descriptors, pairs, target = batch
+        self.set_rates()
+        if self.options.half:
+            pairs = pairs.bfloat16()
+        with torch.autocast("cpu", torch.bfloat16, enabled=self.options.half):
+            scores = self.network(descriptors, pairs)
+        loss = loss_of(scores, target, self.options.walked)
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(self.network.parameters(), 1.0)
+        for optimizer in self.optimizers:
+            optimizer.step()
+            optimizer.zero_grad(set_to_none=True)
+        self.step += 1
+        return loss.item()
+
+    def validate(self) -> list[float]:
+        """Inlier ratios at 20, plain and after the walk; keeps the weights if they are the best."""
+        options = self.options
+        if options.validate is None:
+            return []
+        found = evaluate.measure(self.network, options.validate, options.images, False)
+        at = evaluate.AT.index(20)
+        plain, walked = found["network"][at], found["network+walk"][at]
+        if walked >= self.best:
+            self.best = walked
+            about = {"step": str(self.step), "minutes": f"{self.seconds / 60:.1f}", "validated": f"{walked:.4f}"}
+            weights.save(self.network, options.out / "best.safetensors", about)
+        return [100 * plain, 100 * walked]
+
+
+def main():
+    options = parsed()
+    # With other work on the machine, threads wait for each other: two are slower than one.
+    torch.set_num_threads(1)
+    options.out.mkdir(parents=True, exist_ok=True)
+    batches = data.Batches(data.shards(options.data), options.points, options.seed)
+    run = Run(options)
+    fresh = run.step == 0
+    with open(options.out / "curve.csv", "a" if not fresh else "w", newline="") as file:
+        curve = csv.writer(file)
+        if fresh:
+            curve.writerow(["minutes", "step", "points", "loss", "plain at 20", "walk at 20"])
+        losses, since = [], run.seconds
+        done = False
+        while not done:
+            start = time.process_time()
+            losses.append(run.train(batches.batch(0 if options.repeat else run.step)))
+            run.seconds += time.process_time() - start
+            done = run.seconds >= 60 * options.minutes or run.step == options.steps
+            if done or run.seconds - since >= 60 * options.every:
+                since = run.seconds
+                run.save()
+                row = [f"{run.seconds / 60:.2f}", run.step, run.step * options.points]
+                row += [f"{sum(losses) / len(losses):.4f}", *(f"{ratio:.2f}" for ratio in run.validate())]
+                curve.writerow(row)
+                file.flush()
+                print(*row, flush=True)
+                losses = []
+
+
+if __name__ == "__main__":
+    main()
