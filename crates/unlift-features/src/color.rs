@@ -1,8 +1,9 @@
 //! What learned extractors read: colors, row by row.
 
-use image::imageops::{FilterType, resize};
 use image::{ImageBuffer, Rgb};
 use unlift::Error;
+
+use crate::fit::fitted;
 
 /// A color image.
 ///
@@ -63,19 +64,14 @@ impl ColorImage {
     }
 
     /// The image shrunk so that no side exceeds `most` pixels, or `None` if it is small enough.
-    ///
-    /// Sides are rounded down, as COLMAP does; the filter is Lanczos of three lobes, as for SIFT.
     pub(crate) fn fitted(&self, most: usize) -> Option<Self> {
-        let longer = self.width.max(self.height);
-        if longer <= most {
-            return None;
-        }
-        let scale = most as f64 / longer as f64;
-        let side = |length: usize| ((length as f64 * scale) as usize).max(1);
-        let (width, height) = (side(self.width), side(self.height));
-        let buffer: ImageBuffer<Rgb<u8>, &[u8]> =
-            ImageBuffer::from_raw(self.width as u32, self.height as u32, &self.pixels[..])?;
-        let small = resize(&buffer, width as u32, height as u32, FilterType::Lanczos3);
+        let pixels = ImageBuffer::<Rgb<u8>, &[u8]>::from_raw(
+            self.width as u32,
+            self.height as u32,
+            &self.pixels,
+        )?;
+        let small = fitted(&pixels, most)?;
+        let (width, height) = (small.width() as usize, small.height() as usize);
         Some(Self { width, height, pixels: small.into_raw() })
     }
 }

@@ -40,8 +40,7 @@ impl Extraction {
         matches!(self, Self::Sift(_))
     }
 
-    /// Longest side in pixels of what is looked at.
-    pub fn max_image_size(&self) -> usize {
+    fn max_image_size(&self) -> usize {
         match self {
             Self::Sift(options) => options.max_image_size,
             Self::Aliked(options) => options.max_image_size,
@@ -51,12 +50,14 @@ impl Extraction {
 }
 
 /// What extracts them. Shared by threads.
-pub enum Extractor {
-    /// SIFT.
+pub struct Extractor {
+    of: Of,
+    max_image_size: usize,
+}
+
+enum Of {
     Sift(Sift),
-    /// ALIKED.
     Aliked(Aliked),
-    /// SuperPoint.
     SuperPoint(SuperPoint),
 }
 
@@ -84,44 +85,45 @@ impl Extractor {
     /// # Errors
     /// Names the first option that is out of range; says which model is missing.
     pub fn try_new(extraction: &Extraction) -> Result<Self, Error> {
-        Ok(match extraction {
-            Extraction::Sift(options) => Self::Sift(Sift::try_new(options.clone())?),
-            Extraction::Aliked(options) => Self::Aliked(Aliked::try_new(options.clone())?),
+        let of = match extraction {
+            Extraction::Sift(options) => Of::Sift(Sift::try_new(options.clone())?),
+            Extraction::Aliked(options) => Of::Aliked(Aliked::try_new(options.clone())?),
             Extraction::SuperPoint(options) => {
-                Self::SuperPoint(SuperPoint::try_new(options.clone())?)
+                Of::SuperPoint(SuperPoint::try_new(options.clone())?)
             }
-        })
+        };
+        Ok(Self { of, max_image_size: extraction.max_image_size() })
     }
 
     /// The features of the photo at `path`.
     ///
     /// # Errors
     /// As [`load::read`], and when a side has fewer than 3 pixels.
-    pub fn read(&self, path: &Path, extraction: &Extraction) -> Result<Photo, Error> {
-        let (size, noise_px, found) = match self {
-            Self::Sift(sift) => {
+    pub fn read(&self, path: &Path) -> Result<Photo, Error> {
+        let (size, noise_px, found) = match &self.of {
+            Of::Sift(sift) => {
                 let image = load::read(path)?;
                 let size = large_enough(path, [image.width(), image.height()])?;
                 (size, DETECTION_NOISE, Found::Sift(sift.extract(&image)))
             }
-            Self::Aliked(aliked) => {
+            Of::Aliked(aliked) => {
                 let (image, size) = color(path)?;
                 (size, DETECTION_NOISE, Found::Learned(aliked.extract(&image)?))
             }
-            Self::SuperPoint(superpoint) => {
+            Of::SuperPoint(superpoint) => {
                 let (image, size) = color(path)?;
                 (size, SUPERPOINT_NOISE, Found::Learned(superpoint.extract(&image)?))
             }
         };
-        let shrunk = size[0].max(size[1]) as f64 / extraction.max_image_size() as f64;
+        let shrunk = size[0].max(size[1]) as f64 / self.max_image_size as f64;
         Ok(Photo { size, noise_px: noise_px * shrunk.max(1.0), found })
     }
 
     /// Hash of the network's file where it is the user's: what they supply may change between runs.
     pub fn sha256(&self) -> Option<&str> {
-        match self {
-            Self::Sift(_) | Self::Aliked(_) => None,
-            Self::SuperPoint(superpoint) => Some(superpoint.sha256()),
+        match &self.of {
+            Of::Sift(_) | Of::Aliked(_) => None,
+            Of::SuperPoint(superpoint) => Some(superpoint.sha256()),
         }
     }
 }

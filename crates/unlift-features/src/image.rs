@@ -1,6 +1,9 @@
 //! What an extractor reads: gray values, row by row.
 
+use image::{ImageBuffer, Luma};
 use unlift::Error;
+
+use crate::fit::fitted;
 
 /// A gray image.
 ///
@@ -62,20 +65,14 @@ impl GrayImage {
     }
 
     /// The image shrunk so that no side exceeds `most` pixels, or `None` if it is small enough.
-    ///
-    /// Sides are rounded down, as COLMAP does; the filter is Lanczos of three lobes.
     pub(crate) fn fitted(&self, most: usize) -> Option<Self> {
-        let longer = self.width.max(self.height);
-        if longer <= most {
-            return None;
-        }
-        let scale = most as f64 / longer as f64;
-        let side = |length: usize| ((length as f64 * scale) as usize).max(1);
-        let (width, height) = (side(self.width), side(self.height));
-        let buffer: image::ImageBuffer<image::Luma<f32>, &[f32]> =
-            image::ImageBuffer::from_raw(self.width as u32, self.height as u32, &self.pixels[..])?;
-        let filter = image::imageops::FilterType::Lanczos3;
-        let small = image::imageops::resize(&buffer, width as u32, height as u32, filter);
+        let pixels = ImageBuffer::<Luma<f32>, &[f32]>::from_raw(
+            self.width as u32,
+            self.height as u32,
+            &self.pixels,
+        )?;
+        let small = fitted(&pixels, most)?;
+        let (width, height) = (small.width() as usize, small.height() as usize);
         Some(Self { width, height, pixels: small.into_raw() })
     }
 }

@@ -30,6 +30,7 @@ mod color;
 mod descriptor;
 mod extractor;
 mod extrema;
+mod fit;
 mod gradient;
 mod image;
 mod learned;

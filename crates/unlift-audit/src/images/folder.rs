@@ -89,7 +89,7 @@ impl Folder {
     /// When this photo cannot be used.
     pub fn get(&self, at: usize) -> Result<ImageFeatures, crate::Error> {
         let path = &self.paths[at];
-        let photo = self.extractor.read(path, &self.extraction)?;
+        let photo = self.extractor.read(path)?;
         let features = match photo.found {
             FoundFeatures::Sift(features) => of_sift(features),
             FoundFeatures::Learned(features) => of_network(features),

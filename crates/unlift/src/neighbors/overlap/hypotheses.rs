@@ -35,6 +35,8 @@ pub struct Pair {
     pub turned: usize,
     /// Index into [`Hypotheses::still`].
     pub still: usize,
+    /// Cells by which it shifts, along both axes together.
+    pub shift: usize,
     /// Whether exchanging the patches gives other hypotheses: turns by odd multiples resample the
     /// cells of the turned patch. Turns by even multiples come in pairs of a map and its inverse.
     pub both_ways: bool,
@@ -87,7 +89,8 @@ impl Hypotheses {
             if at == 0 {
                 self.still.push(kept);
             }
-            self.pairs.push(Pair { turned: self.turned.len(), still, both_ways });
+            let shift = (shift[0].abs() + shift[1].abs()) as usize;
+            self.pairs.push(Pair { turned: self.turned.len(), still, shift, both_ways });
             self.turned.push(version);
         }
     }

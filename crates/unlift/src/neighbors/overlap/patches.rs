@@ -66,11 +66,18 @@ impl Likeness for Patches {
 
     /// The best cosine of shared cells over all hypotheses, as a product of bytes.
     fn scores(&self, a: &Block, b: &Block, scores: &mut [f32]) {
+        self.best(a, b, |_| true, scores);
+    }
+}
+
+impl Patches {
+    /// The same over those hypotheses that shift by a number of cells that `counts`.
+    pub fn best(&self, a: &Block, b: &Block, counts: impl Fn(usize) -> bool, scores: &mut [f32]) {
         let mut forth = vec![0i16; BLOCK * BLOCK];
         let mut back = forth.clone();
         let turned = starts(&self.hypotheses.turned);
         let still = starts(&self.hypotheses.still);
-        for pair in &self.hypotheses.pairs {
+        for pair in self.hypotheses.pairs.iter().filter(|pair| counts(pair.shift)) {
             let depth = self.hypotheses.turned[pair.turned].cells.len() * BINS;
             let left = turned[pair.turned]..turned[pair.turned] + BLOCK * depth;
             let right = still[pair.still]..still[pair.still] + BLOCK * depth;

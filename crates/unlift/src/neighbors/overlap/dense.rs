@@ -1,0 +1,153 @@
+//! Scores of all pairs of a few patches, told apart by how far one is shifted over the other: what a network is fed.
+
+use rayon::prelude::*;
+
+use super::Patches;
+use crate::neighbors::compare::Likeness;
+use crate::simd::BLOCK;
+use crate::{Descriptors, Error};
+
+/// How far the best hypothesis shifts: not at all, by one cell, by more.
+pub const REACHES: usize = 3;
+/// Patches at most: matrices of all pairs take 800 MB.
+const MOST: usize = 1 << 13;
+
+/// Scores of all pairs of `n` patches.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dense {
+    n: usize,
+    scores: Vec<f32>,
+}
+
+impl Dense {
+    /// Number of patches.
+    pub fn n(&self) -> usize {
+        self.n
+    }
+
+    /// `(REACHES, n, n)`: the best score of each reach in standard deviations above what the rows of the pair score
+    /// with others by the best of all reaches, mean of both rows. Symmetric; 0 between a patch and itself.
+    pub fn scores(&self) -> &[f32] {
+        &self.scores
+    }
+
+    /// The same, handed over.
+    pub fn into_scores(self) -> Vec<f32> {
+        self.scores
+    }
+}
+
+/// How well every two of the SIFT patches behind `descriptors` overlap, by reach.
+///
+/// The largest of a pair's [`REACHES`] scores is what [`overlap`](super::overlap) starts its walk from; which one is
+/// the largest says how far the patches lie apart. Deviations are those among the given patches: a part of an image
+/// has others than the whole.
+///
+/// # Errors
+/// When descriptors are not SIFT, or there are fewer than two or more than 8,192.
+pub fn dense(descriptors: &Descriptors) -> Result<Dense, Error> {
+    let n = descriptors.len();
+    if !(2..=MOST).contains(&n) {
+        return Err(Error::new("dense overlap", format!("2 to {MOST} patches"), n.to_string()));
+    }
+    let patches = Patches::of(descriptors)?;
+    let slots: Vec<u32> = (0..n as u32).collect();
+    let blocks: Vec<_> =
+        slots.par_chunks(BLOCK).map(|slots| patches.block(descriptors, slots)).collect();
+    let mut scores = vec![0.0f32; REACHES * n * n];
+    for (reach, scores) in scores.chunks_exact_mut(n * n).enumerate() {
+        let counts = |shift: usize| shift.min(REACHES - 1) == reach;
+        let scratch = || vec![0.0f32; BLOCK * BLOCK];
+        let stripes = scores.par_chunks_mut(BLOCK * n).enumerate().with_max_len(1);
+        stripes.for_each_init(scratch, |found, (a, stripe)| {
+            for (b, block) in blocks.iter().enumerate().skip(a) {
+                patches.best(&blocks[a], block, counts, found);
+                let columns = b * BLOCK..n.min((b + 1) * BLOCK);
+                for (row, found) in stripe.chunks_exact_mut(n).zip(found.chunks_exact(BLOCK)) {
+                    row[columns.clone()].copy_from_slice(&found[..columns.len()]);
+                }
+            }
+        });
+        for row in 1..n {
+            for column in 0..row {
+                scores[row * n + column] = scores[column * n + row];
+            }
+        }
+    }
+    standardize(&mut scores, n);
+    Ok(Dense { n, scores })
+}
+
+fn standardize(scores: &mut [f32], n: usize) {
+    let usual: Vec<(f64, f64)> = (0..n)
+        .into_par_iter()
+        .map(|row| {
+            let (mut sum, mut squares) = (0.0f64, 0.0f64);
+            for column in (0..n).filter(|&column| column != row) {
+                let of = |reach: usize| scores[(reach * n + row) * n + column];
+                // Whole numbers far below 2^53 in total: exact.
+                let best = f64::from((0..REACHES).map(of).fold(0.0, f32::max));
+                sum += best;
+                squares += best * best;
+            }
+            let others = (n - 1) as f64;
+            let mean = sum / others;
+            (mean, (squares / others - mean * mean).max(0.0).sqrt().max(1e-9))
+        })
+        .collect();
+    scores.par_chunks_mut(n).enumerate().for_each(|(at, line)| {
+        let row = at % n;
+        let (mean, deviation) = usual[row];
+        for (column, score) in line.iter_mut().enumerate() {
+            let (other_mean, other_deviation) = usual[column];
+            let own = (f64::from(*score) - mean) / deviation;
+            let others = (f64::from(*score) - other_mean) / other_deviation;
+            *score = if column == row { 0.0 } else { ((own + others) / 2.0) as f32 };
+        }
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::descriptors::Values;
+    use crate::seed::{Draws, Stage};
+
+    fn patches(n: usize) -> Vec<[u8; 128]> {
+        let mut draws = Draws::new(3, Stage::Synthetic, 0);
+        (0..n).map(|_| std::array::from_fn(|_| draws.below(60) as u8)).collect()
+    }
+
+    fn scores(patches: &[[u8; 128]]) -> Dense {
+        dense(&Descriptors::try_new(Values::U8(patches.concat()), 128).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn a_shifted_copy_is_found_at_its_reach() {
+        let mut all = patches(200);
+        // Patch 150 shows what patch 3 shows, a cell to the right; the cells that come in are new.
+        for row in 0..4 {
+            for column in 0..3 {
+                let (from, to) = ((4 * row + column + 1) * 8, (4 * row + column) * 8);
+                let cell: [u8; 8] = all[3][from..from + 8].try_into().unwrap();
+                all[150][to..to + 8].copy_from_slice(&cell);
+            }
+        }
+        let found = scores(&all);
+        let of = |reach: usize, i: usize, j: usize| found.scores()[(reach * 200 + i) * 200 + j];
+        assert!(of(1, 3, 150) > of(0, 3, 150) + 2.0 && of(1, 3, 150) > of(2, 3, 150) + 2.0);
+        let best = (0..200).max_by(|&a, &b| of(1, 3, a).total_cmp(&of(1, 3, b)));
+        assert_eq!(best, Some(150));
+        for (i, j) in [(3, 150), (0, 199), (17, 17)] {
+            assert_eq!(of(2, i, j), of(2, j, i));
+        }
+        assert_eq!(of(0, 17, 17), 0.0);
+    }
+
+    #[test]
+    fn one_patch_has_no_pairs() {
+        let one = Descriptors::try_new(Values::U8(patches(1).concat()), 128).unwrap();
+        let message = dense(&one).unwrap_err().to_string();
+        assert_eq!(message, "dense overlap: expected 2 to 8192 patches, found 1");
+    }
+}
