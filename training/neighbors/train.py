@@ -32,6 +32,7 @@ def parsed():
     parser.add_argument("--images", type=int, default=8, help="images of it that are used")
     parser.add_argument("--every", type=float, default=5.0, help="minutes between validations")
     parser.add_argument("--points", type=int, default=2048, help="points per step")
+    parser.add_argument("--warm-up", type=int, default=100, help="steps over which rates rise")
     parser.add_argument("--rate", type=float, default=1.2e-3)
     parser.add_argument("--muon", type=float, default=0.0, help="rate of the matrices by Muon; 0: all by AdamW")
     parser.add_argument("--walked", type=float, default=0.0, help="weight of the loss after the walk")
@@ -89,9 +90,9 @@ class Run:
         scratch.replace(self.path)
 
     def set_rates(self):
-        """Warm-up over 100 steps, then half a cosine over the planned time, down to 2 %."""
+        """Warm-up, then half a cosine over the planned time, down to 2 %."""
         done = min(self.seconds / (60 * self.options.minutes), 1.0)
-        share = min(1.0, (self.step + 1) / 100) * (0.02 + 0.98 * (1 + math.cos(math.pi * done)) / 2)
+        share = min(1.0, (self.step + 1) / self.options.warm_up) * (0.02 + 0.98 * (1 + math.cos(math.pi * done)) / 2)
         groups = [group for optimizer in self.optimizers for group in optimizer.param_groups]
         for group, rate in zip(groups, self.rates):
             group["lr"] = rate * share

@@ -127,7 +127,7 @@ fn crop(features: &Features, photo: u32, rows: &[u32]) -> Result<Crop, unlift::E
     let descriptors: Vec<u8> =
         rows.iter().flat_map(|&row| features.descriptors[row as usize]).collect();
     let matrix = unlift::Descriptors::try_new(Values::U8(descriptors.clone()), 128)?;
-    Ok(Crop { photo, places, descriptors, pairs: dense(&matrix)?.scores().to_vec() })
+    Ok(Crop { photo, places, descriptors, pairs: dense(&matrix)?.into_scores() })
 }
 
 /// Files of crops of one size.

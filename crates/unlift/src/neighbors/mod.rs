@@ -20,7 +20,7 @@ mod walk;
 pub(crate) use geometric::geometric_by;
 pub use geometric::{Geometric, geometric};
 pub use neighborhoods::Neighborhoods;
-pub use overlap::{Overlap, overlap};
+pub use overlap::{Dense, Overlap, REACHES, dense, overlap};
 pub use similarity::{Similarity, similarity};
 pub(crate) use source::lacks_descriptors;
 pub use source::{Needs, Source, of_what_there_is};

@@ -4,9 +4,11 @@
 //! best hypothesis counts. A short walk over the best matches reaches neighbors whose patches do not
 //! overlap. Nothing is trained.
 
+mod dense;
 mod hypotheses;
 mod patches;
 
+pub use dense::{Dense, REACHES, dense};
 pub use patches::{Patches, check};
 
 use super::compare::{MOST_ROWS, note, search};
