@@ -43,11 +43,6 @@ pub fn options<const D: usize>(plan: &Plan<D>, more: Map<String, Value>) -> Map<
     }
     options.insert("inlier_ratios".into(), json!(plan.inlier_ratios));
     options.insert("k".into(), json!(plan.k));
-    let own: Map<String, Value> =
-        plan.own_sources().map(|source| (source.name().to_owned(), json!(source.k()))).collect();
-    if !own.is_empty() {
-        options.insert("source_k".into(), Value::Object(own));
-    }
     options
         .insert("solver".into(), json!(plan.solvers.iter().map(|s| s.name()).collect::<Vec<_>>()));
     let delta = match plan.delta {

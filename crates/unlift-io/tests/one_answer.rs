@@ -103,7 +103,7 @@ fn lists<const D: usize>(
     let (original, secret) = stage::read_truth::<D>(&folder.join("truth.parquet")).unwrap();
     let slots = secret.slots_per_record();
     match variant.by {
-        NeighborsBy::Source(source) => source.lists(&released, source.k(), SEED).unwrap(),
+        NeighborsBy::Source(source) => source.lists(&released, source.k(&released), SEED).unwrap(),
         NeighborsBy::Given(points) => {
             oracle::from_points(&points.offsets, &points.neighbors, None, &secret, slots).unwrap()
         }

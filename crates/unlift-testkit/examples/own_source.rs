@@ -24,7 +24,7 @@ impl Source<3> for Brightness {
         Needs::Descriptors
     }
 
-    fn k(&self) -> usize {
+    fn k(&self, _: &Released<3>) -> usize {
         20
     }
 

@@ -25,7 +25,7 @@ pub fn source_laws<const D: usize>(source: &dyn Source<D>, released: &Released<D
     let name = source.name();
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-+_.".contains(c);
     assert!(!name.is_empty() && name.chars().all(is_plain), "{name:?} is no plain name");
-    assert!(source.k() > 0, "{name}: lists of no record");
+    assert!(source.k(released) > 0, "{name}: lists of no record");
     if let Err(error) = source.supports(released) {
         panic!("{name} does not support this map: {error}");
     }

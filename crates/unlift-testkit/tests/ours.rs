@@ -72,7 +72,7 @@ impl Source<3> for Nameless {
         Needs::Nothing
     }
 
-    fn k(&self) -> usize {
+    fn k(&self, _: &Released<3>) -> usize {
         1
     }
 

@@ -19,7 +19,7 @@ use unlift_report::pictures::MOST_PICTURES;
 
 use super::common::with_threads;
 use super::extraction::Typed;
-use super::plan::{attack, check_about, check_fit, own, solvers, summary, thresholds};
+use super::plan::{attack, check_about, check_fit, own, solvers, summary, thresholds, with_attack};
 use crate::args::AuditImagesArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
@@ -56,7 +56,7 @@ pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
             show: show(args, &source, &chosen)?,
             chosen,
             plan,
-            options: more_options(args),
+            options: with_attack(more_options(args), &args.attack),
             gates: args.result.gate.clone(),
             photos: args.photos.clone(),
             out: args.result.out.clone(),

@@ -14,7 +14,7 @@ use unlift_io::hash::hash_file;
 use unlift_io::read;
 
 use super::common::{open_map, with_threads};
-use super::plan::{attack, neighbors, solvers, summary, thresholds};
+use super::plan::{attack, neighbors, solvers, summary, thresholds, with_attack};
 use crate::args::AuditMapArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
@@ -39,7 +39,7 @@ pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
         let (path, result) = (&args.path, &args.result);
         let mut job = Job {
             plan: plan(&args, &prepared, &input)?,
-            options: more_options(&args),
+            options: with_attack(more_options(&args), &args.attack),
             gates: result.gate.clone(),
             write_clouds: args.write_clouds,
             share_safe: result.share_safe,

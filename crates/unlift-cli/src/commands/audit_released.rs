@@ -15,7 +15,7 @@ use unlift_io::stage::{has_images, read_released, read_truth, scheme_name};
 use unlift_report::document::Input;
 
 use super::common::{expect_slots, same_map, with_threads};
-use super::plan::{attack, neighbors, solvers, summary, thresholds};
+use super::plan::{attack, neighbors, solvers, summary, thresholds, with_attack};
 use crate::args::AuditReleasedArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
@@ -48,7 +48,10 @@ pub fn run(args: &AuditReleasedArgs) -> anyhow::Result<Outcome> {
             up: None,
             plan: plan(args, &name, &prepared, &hidden.0)?,
             input: provenance(args, &prepared)?,
-            options: Map::from_iter([("released".to_owned(), json!(true))]),
+            options: with_attack(
+                Map::from_iter([("released".to_owned(), json!(true))]),
+                &args.attack,
+            ),
             gates: args.result.gate.clone(),
             out: args.result.out.clone(),
             unit_in_map_units: 1.0,

@@ -37,6 +37,8 @@ pub struct Counts {
     pub images: usize,
     /// Hidden points, or lists, of all of them.
     pub slots: usize,
+    /// Records of the longest list.
+    pub longest: usize,
     /// Points that were left out, or recovered.
     pub points: usize,
     /// Images that could not be used.
@@ -297,6 +299,7 @@ fn list(
     lists: &Neighborhoods,
 ) -> Result<(), Error> {
     counts.slots += lists.n_slots();
+    counts.longest = counts.longest.max(lists.longest());
     writer.neighborhoods(name, lists)
 }
 

@@ -86,7 +86,7 @@ pub fn find(args: &FindArgs) -> anyhow::Result<Outcome> {
             list_by_source(&args.released, &*source, args.seed, (&args.out, &rules))
         })?;
         drop(alive);
-        return listed(counts.slots, source.k(), args);
+        return listed(counts.slots, counts.longest, args);
     }
     let released = read_released::<3>(&args.released)?;
     let source = named.of_dimension::<3>()?;
@@ -97,13 +97,13 @@ pub fn find(args: &FindArgs) -> anyhow::Result<Outcome> {
     }
     let alive = Spinner::new("finding neighbors");
     let lists = with_threads(args.threads, || {
-        let lists = source.lists(&released, source.k(), args.seed);
+        let lists = source.lists(&released, source.k(&released), args.seed);
         Ok(lists.map_err(|error| unlift_io::Error::core(&args.released, error))?)
     })?;
     check_file(&args.out, kind, &rules)?;
     write_neighborhoods(&args.out, &lists)?;
     drop(alive);
-    listed(lists.n_slots(), source.k(), args)
+    listed(lists.n_slots(), lists.longest(), args)
 }
 
 fn listed(n: usize, k: usize, args: &FindArgs) -> anyhow::Result<Outcome> {

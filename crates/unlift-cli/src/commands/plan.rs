@@ -1,6 +1,6 @@
 //! What audits of maps and of images have in common: from arguments to a plan, and the summary.
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use unlift::Descriptors;
 use unlift::audit::{NeighborsBy, Plan, Threshold};
 use unlift::neighbors::sources::Named;
@@ -27,6 +27,12 @@ pub fn attack<const D: usize>(args: &AttackArgs, usual: Plan<D>) -> Plan<D> {
     plan.exact_constraints = !args.no_exact_constraints;
     plan.repeats = args.repeats;
     plan
+}
+
+/// `options` with what the attack was told beyond the plan, for the record.
+pub fn with_attack(mut options: Map<String, Value>, args: &AttackArgs) -> Map<String, Value> {
+    options.extend(args.source_k.map(|k| ("source_k".to_owned(), json!(k))));
+    options
 }
 
 /// The recovery methods asked for, each once, else the usual ones.

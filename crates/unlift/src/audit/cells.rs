@@ -21,6 +21,10 @@ use crate::seed::Key;
 use crate::truth::{Original, Secret};
 use crate::{Descriptors, Error};
 
+/// The [metric](Row::metrics) of an attacker's own lists: the inlier ratio against as many true neighbors as the lists
+/// have records.
+const RATIO_AT_K: &str = "inlier_ratio_at_k";
+
 /// A map or an image as its owner holds it.
 #[derive(Clone, Copy)]
 pub(super) struct Owned<'a, const D: usize> {
@@ -181,6 +185,7 @@ pub(super) fn attack<const D: usize>(
                 ..measured
             };
             row.records_alone.clone_from(&alone);
+            row.metrics.extend(made.ratio_at_k.map(|ratio| (RATIO_AT_K.to_owned(), ratio)));
             let weights = places(owned, secret);
             if owned.is_one_of_many() {
                 row.fill_distinct(&accuracy, &baseline, &weights, &plan.thresholds);

@@ -17,6 +17,9 @@ pub struct Made {
     pub ratio: f64,
     /// Records per list.
     pub k: usize,
+    /// The inlier ratio of an attacker's own lists against as many true neighbors as they have records, where
+    /// `ratio` is against those of the plan.
+    pub ratio_at_k: Option<f64>,
 }
 
 /// Makes lists for one obfuscation. True neighborhoods are searched when first needed, and kept.
@@ -57,7 +60,7 @@ impl<'a, const D: usize> Lists<'a, D> {
             NeighborsBy::Oracle => {
                 let ratio = variant.inlier_ratio.unwrap_or(1.0);
                 let lists = self.oracle(variant, self.plan.k)?;
-                Ok(Made { lists, ratio, k: self.plan.k })
+                Ok(Made { lists, ratio, k: self.plan.k, ratio_at_k: None })
             }
             NeighborsBy::Given(points) => {
                 let scores = points.scores.as_deref();
@@ -66,14 +69,16 @@ impl<'a, const D: usize> Lists<'a, D> {
                 let others = self.released.n_records().saturating_sub(1);
                 let k = lists.longest().min(others).max(1);
                 let ratio = self.near(k, false)?.measured_inlier_ratio(&lists);
-                Ok(Made { lists, ratio, k })
+                Ok(Made { lists, ratio, k, ratio_at_k: None })
             }
             NeighborsBy::Source(source) => {
                 // The list of slot s is that of descriptor row s.
                 source.supports(self.released)?;
-                let lists = source.lists(self.released, source.k(), self.seeds.1)?;
+                let k = source.k(self.released);
+                let lists = source.lists(self.released, k, self.seeds.1)?;
                 let ratio = self.near(self.plan.k, true)?.measured_inlier_ratio(&lists);
-                Ok(Made { lists, ratio, k: source.k() })
+                let ratio_at_k = Some(self.near(k, true)?.measured_inlier_ratio(&lists));
+                Ok(Made { lists, ratio, k, ratio_at_k })
             }
         }
     }
@@ -88,11 +93,15 @@ impl<'a, const D: usize> Lists<'a, D> {
         match variant.by {
             NeighborsBy::Given(_) => self.make(variant),
             NeighborsBy::Source(_) if others == 0 => self.none(variant),
-            NeighborsBy::Source(source) if others < source.k().max(self.plan.k) => {
+            NeighborsBy::Source(source) if others < source.k(self.released).max(self.plan.k) => {
                 let lists = of_what_there_is(&**source, self.released, self.seeds.1)?;
-                let near = self.near(self.plan.k.min(others), true)?;
-                let ratio = near.measured_inlier_ratio(&lists);
-                Ok(Made { lists, ratio, k: source.k() })
+                let k = source.k(self.released);
+                let plan_k = self.plan.k;
+                let mut ratio = |k: usize| -> Result<f64, Error> {
+                    Ok(self.near(k.min(others), true)?.measured_inlier_ratio(&lists))
+                };
+                let (ratio, ratio_at_k) = (ratio(plan_k)?, Some(ratio(k)?));
+                Ok(Made { lists, ratio, k, ratio_at_k })
             }
             NeighborsBy::Source(_) => self.make(variant),
             NeighborsBy::Oracle => {
@@ -103,7 +112,7 @@ impl<'a, const D: usize> Lists<'a, D> {
                     return self.none(variant);
                 };
                 let ratio = variant.inlier_ratio.unwrap_or(1.0);
-                Ok(Made { lists, ratio, k: self.plan.k })
+                Ok(Made { lists, ratio, k: self.plan.k, ratio_at_k: None })
             }
         }
     }
@@ -116,10 +125,10 @@ impl<'a, const D: usize> Lists<'a, D> {
         let map = Some(self.released.fingerprint());
         let lists = lists.with_about(About { map, order: RowOrder::Slots });
         let k = match variant.by {
-            NeighborsBy::Source(source) => source.k(),
+            NeighborsBy::Source(source) => source.k(self.released),
             NeighborsBy::Oracle | NeighborsBy::Given(_) => self.plan.k,
         };
-        Ok(Made { lists, ratio: variant.inlier_ratio.unwrap_or(0.0), k })
+        Ok(Made { lists, ratio: variant.inlier_ratio.unwrap_or(0.0), k, ratio_at_k: None })
     }
 
     /// Of the oracle, `k` records per list.

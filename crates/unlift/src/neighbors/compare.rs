@@ -32,13 +32,18 @@ const PARTNERS: usize = 64;
 
 /// How alike two descriptors are. The score of a pair does not depend on its order.
 pub trait Likeness: Sync {
-    /// Whether scores are integers: then their sums are exact in any order, and are kept.
-    const EXACT: bool;
+    /// Scores are counted in whole multiples of it, whose sums are exact in any order.
+    const STEP: f32;
     /// [`BLOCK`] rows, ready to be compared.
     type Block: Send + Sync;
 
     /// The rows of `slots`, at most [`BLOCK`].
     fn block(&self, descriptors: &Descriptors, slots: &[u32]) -> Self::Block;
+
+    /// Whether it is asked what scores are usual.
+    fn counts(&self) -> bool {
+        true
+    }
 
     /// Scores of all rows of `a` with all of `b`, `(BLOCK, BLOCK)`; what stands for rows beyond the last
     /// has no meaning.
@@ -89,8 +94,8 @@ fn compare<L: Likeness>(
         let end = rows.len().min((at + 1) * BLOCK);
         likeness.block(rows.descriptors, &rows.slots[at * BLOCK..end])
     };
-    let counts = L::EXACT && every.is_none();
-    let usual = every.filter(|_| L::EXACT).map(|every| Usual::new(likeness, rows, every));
+    let counts = likeness.counts() && every.is_none();
+    let usual = every.filter(|_| likeness.counts()).map(|every| Usual::new(likeness, rows, every));
     let scratch = || (vec![0.0f32; BLOCK * BLOCK], vec![0.0f32; BLOCK * BLOCK]);
     for Tile { held, meetings } in pairs.tiles() {
         let first = held.start;
@@ -111,7 +116,7 @@ fn compare<L: Likeness>(
             let b = of_one.block as usize;
             let made = (b < first || b - first >= held.len()).then(|| block(b));
             let own = made.as_ref().unwrap_or_else(|| &held[b - first]);
-            let of_b = Met::of(rows, b, counts);
+            let of_b = Met::of(rows, b, counts, L::STEP);
             for &a in &of_one.with {
                 let a = a as usize;
                 likeness.scores(&held[a - first], own, scores);
@@ -124,7 +129,7 @@ fn compare<L: Likeness>(
                         turned[j * BLOCK + i] = scores[i * BLOCK + j];
                     }
                 }
-                let of_a = Met::of(rows, a, counts);
+                let of_a = Met::of(rows, a, counts, L::STEP);
                 of_a.offer(&mut lock(&kept[b]), turned, &rows.records[b * BLOCK..]);
             }
         });
@@ -133,7 +138,7 @@ fn compare<L: Likeness>(
         Ok(rows) => rows,
         Err(poisoned) => poisoned.into_inner(),
     });
-    rows.map(Row::found).collect()
+    rows.map(|row| row.found(L::STEP)).collect()
 }
 
 /// Rows from all over the map, which tell what scores are usual.
@@ -164,7 +169,7 @@ impl<B> Usual<B> {
         for (usual, records) in &self.blocks {
             likeness.scores(block, usual, scores);
             for (i, row) in rows.iter_mut().enumerate() {
-                row.count(&scores[i * BLOCK..], records, record_of[i]);
+                row.count(&scores[i * BLOCK..], records, record_of[i], L::STEP);
             }
         }
     }
@@ -190,11 +195,15 @@ impl Row {
         Self { best: Best::new(most), n: 0, sum: 0.0, squares: 0.0 }
     }
 
-    /// Counts the scores with rows of other records than `own`.
-    fn count(&mut self, scores: &[f32], records: &[u32], own: u32) {
+    /// Counts the scores with rows of other records than `own`, in steps.
+    fn count(&mut self, scores: &[f32], records: &[u32], own: u32, step: f32) {
+        // To the nearest whole number, without a call: beyond 2^23 floats have no fractions.
+        const WHOLE: f32 = 1.5 * 8_388_608.0;
+        let per_step = 1.0 / step;
         let (mut n, mut sum, mut squares) = (0u64, 0.0f64, 0.0f64);
         for (&score, &record) in scores.iter().zip(records) {
             // Whole numbers far below 2^53 in total: exact.
+            let score = (score * per_step + WHOLE) - WHOLE;
             let score = if record == own { 0.0 } else { f64::from(score) };
             n += u64::from(record != own);
             sum += score;
@@ -205,10 +214,11 @@ impl Row {
         self.squares += squares;
     }
 
-    fn found(self) -> Found {
-        let n = self.n.max(1) as f64;
+    fn found(self, step: f32) -> Found {
+        let (n, step) = (self.n.max(1) as f64, f64::from(step));
         let mean = self.sum / n;
         let deviation = (self.squares / n - mean * mean).max(0.0).sqrt();
+        let (mean, deviation) = (mean * step, deviation * step);
         Found { best: self.best.into_sorted(), mean, deviation }
     }
 }
@@ -218,12 +228,14 @@ struct Met<'a> {
     first: usize,
     records: &'a [u32],
     counts: bool,
+    step: f32,
 }
 
 impl<'a> Met<'a> {
-    fn of(rows: &'a Rows<'_>, block: usize, counts: bool) -> Self {
+    fn of(rows: &'a Rows<'_>, block: usize, counts: bool, step: f32) -> Self {
         let first = block * BLOCK;
-        Self { first, records: &rows.records[first..rows.len().min(first + BLOCK)], counts }
+        let records = &rows.records[first..rows.len().min(first + BLOCK)];
+        Self { first, records, counts, step }
     }
 
     /// Offers its rows to `rows` with these scores; `record_of` tells the record of each of `rows`.
@@ -232,7 +244,7 @@ impl<'a> Met<'a> {
             let scores = &scores[i * BLOCK..];
             let own = record_of[i];
             if self.counts {
-                row.count(scores, self.records, own);
+                row.count(scores, self.records, own, self.step);
             }
             for (j, (&score, &record)) in scores.iter().zip(self.records).enumerate() {
                 if score >= row.best.floor() && record != own {

@@ -54,7 +54,7 @@ impl Source<3> for Geometric {
         Needs::Nothing
     }
 
-    fn k(&self) -> usize {
+    fn k(&self, _: &Released<3>) -> usize {
         Self::K
     }
 

@@ -5,6 +5,7 @@
 
 mod alike;
 mod best;
+mod by_descriptors;
 mod compare;
 mod geometric;
 mod neighborhoods;
@@ -17,6 +18,7 @@ pub mod sources;
 mod tiles;
 mod walk;
 
+pub use by_descriptors::ByDescriptors;
 pub(crate) use geometric::geometric_by;
 pub use geometric::{Geometric, geometric};
 pub use neighborhoods::Neighborhoods;

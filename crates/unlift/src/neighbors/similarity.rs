@@ -4,12 +4,21 @@ use super::Neighborhoods;
 use super::compare::{Likeness, MOST_ROWS, note, search};
 use super::rows::Rows;
 use super::source::{Needs, Source};
+use super::walk::{self, Walk};
+use crate::descriptors::Values;
 use crate::released::Released;
 use crate::simd::{self, BLOCK, Kernel};
 use crate::{Descriptors, Error};
 
+/// How far a walk goes. The most similar are mostly right: more steps name more of the 20 nearest, but fewer of the
+/// very nearest (docs/decisions/sources.md).
+const WALK: Walk = Walk { steps: 3, decay: 0.4 };
+
 /// The `k` records with the most similar descriptors. Scores: cosine similarity; of a record with two
 /// descriptors the larger.
+///
+/// Of learned descriptors, which see far around their point, those that a short walk over the most similar reaches
+/// first: whom they resemble is near, too. Scores: log of the (discounted) probability to be reached.
 ///
 /// Exact up to 131,072 slots (`MOST_ROWS`). Of more, each is compared with those that look
 /// alike on the whole.
@@ -22,9 +31,20 @@ pub fn similarity<const D: usize>(
 ) -> Result<Neighborhoods, Error> {
     let mut rows = Rows::new(released, k)?;
     let enough = rows.enough_for(k);
-    let found = search(&Cosine, &mut rows, enough, MOST_ROWS)?;
-    let ranked: Vec<_> = found.into_iter().map(|found| found.best).collect();
-    rows.lists(&ranked, k)
+    if !are_learned(rows.descriptors) {
+        let found = search(&Cosine { counts: false }, &mut rows, enough, MOST_ROWS)?;
+        let ranked: Vec<_> = found.into_iter().map(|found| found.best).collect();
+        return rows.lists(&ranked, k);
+    }
+    let most = enough.max(walk::CANDIDATES);
+    let found = search(&Cosine { counts: true }, &mut rows, most, MOST_ROWS)?;
+    let ranked = walk::standardized(&found);
+    rows.lists(&walk::walk(&ranked, &rows.records, enough, WALK), k)
+}
+
+/// Whether descriptors come from a network: floats, and no histograms of gradients.
+fn are_learned(descriptors: &Descriptors) -> bool {
+    matches!(descriptors.values(), Values::F32(_)) && super::overlap::check(descriptors).is_err()
 }
 
 /// [`similarity`] as a source.
@@ -40,9 +60,15 @@ impl<const D: usize> Source<D> for Similarity {
         Needs::Descriptors
     }
 
-    fn k(&self) -> usize {
-        // Of an image's fewer keypoints only the first of a ranking are near.
-        if D == 2 { 10 } else { 30 }
+    fn k(&self, released: &Released<D>) -> usize {
+        // Of an image's fewer keypoints only the first of a ranking are near. Of learned descriptors the first are
+        // mostly right, and more would only add what is farther away.
+        match (D, released.descriptors().is_some_and(are_learned)) {
+            (2, true) => 7,
+            (2, false) => 10,
+            (_, true) => 12,
+            (_, false) => 30,
+        }
     }
 
     fn lists(&self, released: &Released<D>, k: usize, _: u64) -> Result<Neighborhoods, Error> {
@@ -55,7 +81,10 @@ impl<const D: usize> Source<D> for Similarity {
 }
 
 /// The cosine of two descriptors.
-pub struct Cosine;
+pub struct Cosine {
+    /// Whether it is asked which cosines are usual.
+    pub counts: bool,
+}
 
 /// Descriptors of unit length, as rows and, transposed, as columns.
 pub struct Units {
@@ -65,7 +94,8 @@ pub struct Units {
 }
 
 impl Likeness for Cosine {
-    const EXACT: bool = false;
+    /// Finer than any difference that tells neighbors from others.
+    const STEP: f32 = 1.0 / 32_768.0;
     type Block = Units;
 
     fn block(&self, descriptors: &Descriptors, slots: &[u32]) -> Units {
@@ -84,6 +114,10 @@ impl Likeness for Cosine {
             }
         }
         Units { dim, rows, columns }
+    }
+
+    fn counts(&self) -> bool {
+        self.counts
     }
 
     fn scores(&self, a: &Units, b: &Units, scores: &mut [f32]) {

@@ -26,9 +26,9 @@ pub trait Source<const D: usize>: Debug + Send + Sync {
     /// What it needs beside the records.
     fn needs(&self) -> Needs;
 
-    /// Records per list unless asked otherwise: the attack's own choice, few where the first of a ranking are
-    /// much better than the rest.
-    fn k(&self) -> usize;
+    /// Records per list for this map unless asked otherwise: the attack's own choice, few where the first of a
+    /// ranking are much better than the rest.
+    fn k(&self, released: &Released<D>) -> usize;
 
     /// Lists of at most `k` records for every slot, by descriptor row where slots of a record are told apart by
     /// descriptors ([`RowOrder`](crate::RowOrder)). Scores, where there are some, are higher for likelier
@@ -80,7 +80,7 @@ pub fn of_what_there_is<const D: usize>(
     let others = n_records.saturating_sub(1);
     if others > 0 {
         source.supports(released)?;
-        return source.lists(released, source.k().min(others), seed);
+        return source.lists(released, source.k(released).min(others), seed);
     }
     let (offsets, slots) = (vec![0; n_slots + 1], released.slots_per_record());
     let lists = Neighborhoods::try_new(offsets, Vec::new(), None, n_records, slots)?;

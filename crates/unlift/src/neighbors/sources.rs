@@ -4,6 +4,7 @@ use std::any::Any;
 use std::sync::Arc;
 
 use super::Neighborhoods;
+use super::by_descriptors::ByDescriptors;
 use super::geometric::Geometric;
 use super::overlap::Overlap;
 use super::similarity::Similarity;
@@ -44,7 +45,7 @@ impl PartialEq for SourceEntry {
 pub const SOURCES: &[SourceEntry] = &[
     SourceEntry {
         name: "similarity",
-        summary: "records with the most similar descriptors, of any kind",
+        summary: "records with the most similar descriptors, of any kind; of learned ones with a short walk",
         in_2d: Some(|| Arc::new(Similarity)),
         in_3d: Some(|| Arc::new(Similarity)),
     },
@@ -53,6 +54,12 @@ pub const SOURCES: &[SourceEntry] = &[
         summary: "records whose SIFT patches overlap, and a short walk from these; no training",
         in_2d: Some(|| Arc::new(Overlap)),
         in_3d: Some(|| Arc::new(Overlap)),
+    },
+    SourceEntry {
+        name: "descriptors",
+        summary: "the best that descriptors allow without training: overlap of SIFT, similarity of others",
+        in_2d: Some(|| Arc::new(ByDescriptors)),
+        in_3d: Some(|| Arc::new(ByDescriptors)),
     },
     SourceEntry {
         name: "geometric",
@@ -109,16 +116,15 @@ impl Named {
             let expected = format!("one that is defined in {D} dimensions");
             return Err(Error::new("source", expected, self.entry.name));
         };
-        let k = self.k.unwrap_or(source.k());
-        Ok(Arc::new(Chosen { source, k }))
+        Ok(Arc::new(Chosen { source, k: self.k }))
     }
 }
 
-/// A source with lists of a chosen length, whose errors name it.
+/// A source with lists of a length that may be chosen, whose errors name it.
 #[derive(Clone, Debug)]
 struct Chosen<const D: usize> {
     source: Arc<dyn Source<D>>,
-    k: usize,
+    k: Option<usize>,
 }
 
 impl<const D: usize> Source<D> for Chosen<D> {
@@ -130,8 +136,8 @@ impl<const D: usize> Source<D> for Chosen<D> {
         self.source.needs()
     }
 
-    fn k(&self) -> usize {
-        self.k
+    fn k(&self, released: &Released<D>) -> usize {
+        self.k.unwrap_or_else(|| self.source.k(released))
     }
 
     fn lists(&self, released: &Released<D>, k: usize, seed: u64) -> Result<Neighborhoods, Error> {
@@ -154,22 +160,39 @@ impl<const D: usize> Source<D> for Chosen<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Unit;
+    use crate::descriptors::Values;
     use crate::neighbors::compare::MOST_ROWS;
+    use crate::released::{Lines, Obfuscation};
+
+    /// Two hidden points with these descriptors.
+    fn map(values: Values) -> Released<3> {
+        let lines = Lines::through(&[[0.0; 3], [1.0; 3]], &[[0.0, 1.0, 0.5]; 2]).unwrap();
+        let dim = match &values {
+            Values::U8(values) => values.len() / 2,
+            Values::F32(values) => values.len() / 2,
+        };
+        let descriptors = Descriptors::try_new(values, dim).unwrap();
+        let obfuscation = Obfuscation::Lines(lines);
+        Released::try_new(obfuscation, 1, [0.0; 3], Unit::Meter, Some(descriptors)).unwrap()
+    }
 
     #[test]
     fn lists_are_as_long_as_the_source_chooses_or_as_asked() {
         let named = |name: &str| Named::parse(name).unwrap();
-        assert_eq!(named("overlap").of_dimension::<3>().unwrap().k(), 35);
-        assert_eq!(named("overlap").of_dimension::<2>().unwrap().k(), 10);
-        let few = named("overlap").with_k(7);
-        assert_eq!(few.of_dimension::<3>().unwrap().k(), 7);
-        assert_eq!(few.of_dimension::<2>().unwrap().k(), 7);
+        let (sift, learned) = (map(Values::U8(vec![1; 256])), map(Values::F32(vec![-0.1; 128])));
+        let k = |named: Named, map: &Released<3>| named.of_dimension::<3>().unwrap().k(map);
+        assert_eq!(k(named("overlap"), &sift), 35);
+        assert_eq!(k(named("similarity"), &sift), 30);
+        assert_eq!(k(named("similarity"), &learned), 12);
+        assert_eq!(k(named("descriptors"), &sift), 35);
+        assert_eq!(k(named("overlap").with_k(7), &sift), 7);
     }
 
     #[test]
     fn unknown_names_are_told() {
         let message = Named::parse("overlap+similarity").unwrap_err().to_string();
-        let expected = "source: expected one of similarity, overlap, geometric";
+        let expected = "source: expected one of similarity, overlap, descriptors, geometric";
         assert_eq!(message, format!("{expected}, found overlap+similarity"));
     }
 

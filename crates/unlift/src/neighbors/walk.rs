@@ -13,10 +13,17 @@ const EDGES: usize = 6;
 /// Edge weight is `exp(SHARPNESS * (z - USUAL))`.
 const SHARPNESS: f64 = 2.0;
 const USUAL: f64 = 3.0;
-/// Weight of each further step.
-const DECAY: f64 = 0.7;
-/// Steps.
-const STEPS: usize = 5;
+/// Partners that a row keeps for the walk, at least.
+pub const CANDIDATES: usize = 64;
+/// How far a walk goes.
+#[derive(Clone, Copy, Debug)]
+pub struct Walk {
+    /// Steps.
+    pub steps: usize,
+    /// Weight of each further step.
+    pub decay: f64,
+}
+
 /// Rows that a walk visits at most after each step; the rest is pruned.
 const WIDEST: usize = 128;
 
@@ -38,13 +45,18 @@ pub fn standardized(found: &[Found]) -> Vec<Vec<(f32, u32)>> {
 
 /// Ranks the rows that a walk from each row reaches, at most `most`, and after them those that stand
 /// in `ranked` (standardized scores, best first) but were not reached. Scores are natural logarithms.
-pub fn walk(ranked: &[Vec<(f32, u32)>], record_of: &[u32], most: usize) -> Vec<Vec<(f32, u32)>> {
+pub fn walk(
+    ranked: &[Vec<(f32, u32)>],
+    record_of: &[u32],
+    most: usize,
+    how: Walk,
+) -> Vec<Vec<(f32, u32)>> {
     let steps = graph(ranked);
     let scratch = || Scratch { at: vec![0.0; ranked.len()], sum: vec![0.0; ranked.len()] };
     (0..ranked.len())
         .into_par_iter()
         .map_init(scratch, |scratch, row| {
-            let reached = scratch.reached(&steps, row);
+            let reached = scratch.reached(&steps, row, how);
             let mut best = Best::new(most);
             for &(other, sum) in &reached {
                 if record_of[other as usize] != record_of[row] {
@@ -95,11 +107,11 @@ struct Scratch {
 impl Scratch {
     /// The rows that a walk from `start` reaches, ascending, with the discounted sum of the
     /// probabilities to be there after 1, 2, ... steps.
-    fn reached(&mut self, steps: &[Vec<(u32, f64)>], start: usize) -> Vec<(u32, f64)> {
+    fn reached(&mut self, steps: &[Vec<(u32, f64)>], start: usize, how: Walk) -> Vec<(u32, f64)> {
         let mut here = vec![(start as u32, 1.0)];
         let (mut touched, mut ever) = (Vec::new(), Vec::new());
         let mut discount = 1.0;
-        for _ in 0..STEPS {
+        for _ in 0..how.steps {
             for &(row, probability) in &here {
                 for &(other, step) in &steps[row as usize] {
                     if self.at[other as usize] == 0.0 {
@@ -125,7 +137,7 @@ impl Scratch {
             }
             // Sums in row order, whatever was pruned.
             here.sort_unstable_by_key(|&(row, _)| row);
-            discount *= DECAY;
+            discount *= how.decay;
         }
         ever.sort_unstable();
         ever.into_iter()

@@ -62,7 +62,7 @@ fn few_blocks_all_meet() {
     let scores = |found: Vec<Vec<(f32, u32)>>| -> Vec<Vec<f32>> {
         found.iter().map(|list| list.iter().map(|&(score, _)| score).collect()).collect()
     };
-    let cosines = |exact| scores(found(&Cosine, &descriptors, 10, exact));
+    let cosines = |exact| scores(found(&Cosine { counts: false }, &descriptors, 10, exact));
     assert_eq!(cosines(0), cosines(MOST_ROWS));
     let patches = Patches::of(&descriptors).unwrap();
     let overlaps = |exact| scores(found(&patches, &descriptors, 10, exact));
@@ -74,12 +74,12 @@ fn of_many_blocks_those_meet_that_look_alike() {
     let descriptors = crowds(30_000, 16);
     let n_blocks = 30_000usize.div_ceil(BLOCK);
     assert!(n_blocks > 3 * PARTNERS, "a third of the blocks");
-    let right = found(&Cosine, &descriptors, 5, MOST_ROWS);
-    let some = found(&Cosine, &descriptors, 5, 0);
+    let right = found(&Cosine { counts: false }, &descriptors, 5, MOST_ROWS);
+    let some = found(&Cosine { counts: false }, &descriptors, 5, 0);
     let recall = recall(&some, &right);
     assert!(recall >= 0.9, "{recall}");
     let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
-    assert_eq!(pool.install(|| found(&Cosine, &descriptors, 5, 0)), some);
+    assert_eq!(pool.install(|| found(&Cosine { counts: false }, &descriptors, 5, 0)), some);
 }
 
 #[test]

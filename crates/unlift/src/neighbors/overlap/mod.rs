@@ -11,15 +11,16 @@ mod patches;
 pub use dense::{Dense, REACHES, dense};
 pub use patches::{Patches, check};
 
+use super::Neighborhoods;
 use super::compare::{MOST_ROWS, note, search};
 use super::rows::Rows;
 use super::source::{Needs, Source};
-use super::{Neighborhoods, walk};
+use super::walk::{self, Walk};
 use crate::released::Released;
 use crate::{Descriptors, Error};
 
-/// Partners that a row keeps for the walk, at least.
-const CANDIDATES: usize = 64;
+/// Patches of near points need not overlap: neighbors are some steps apart.
+const WALK: Walk = Walk { steps: 5, decay: 0.7 };
 
 /// The `k` records whose patches overlap each slot's patch most, or that a short walk over such
 /// records reaches. Scores: log of the (discounted) probability to be reached.
@@ -33,9 +34,9 @@ pub fn overlap<const D: usize>(released: &Released<D>, k: usize) -> Result<Neigh
     let mut rows = Rows::new(released, k)?;
     let enough = rows.enough_for(k);
     let patches = Patches::of(rows.descriptors)?;
-    let found = search(&patches, &mut rows, enough.max(CANDIDATES), MOST_ROWS)?;
+    let found = search(&patches, &mut rows, enough.max(walk::CANDIDATES), MOST_ROWS)?;
     let ranked = walk::standardized(&found);
-    rows.lists(&walk::walk(&ranked, &rows.records, enough), k)
+    rows.lists(&walk::walk(&ranked, &rows.records, enough, WALK), k)
 }
 
 /// [`overlap`] as a source.
@@ -51,7 +52,7 @@ impl<const D: usize> Source<D> for Overlap {
         Needs::Descriptors
     }
 
-    fn k(&self) -> usize {
+    fn k(&self, _: &Released<D>) -> usize {
         // Of an image's fewer keypoints only the first of a ranking are near.
         if D == 2 { 10 } else { 35 }
     }

@@ -57,7 +57,8 @@ impl Patches {
 }
 
 impl Likeness for Patches {
-    const EXACT: bool = true;
+    /// Scores are whole numbers.
+    const STEP: f32 = 1.0;
     type Block = Block;
 
     fn block(&self, descriptors: &Descriptors, slots: &[u32]) -> Block {
