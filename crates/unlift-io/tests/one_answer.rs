@@ -128,6 +128,8 @@ fn without_name(row: &Row) -> Row {
         solver: "",
         distinct: None,
         sure_unknown: None,
+        // Of the lists alone, as their ratio and K.
+        metrics: Default::default(),
         ..row.clone()
     }
 }

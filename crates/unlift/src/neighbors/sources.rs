@@ -180,7 +180,7 @@ mod tests {
     #[test]
     fn lists_are_as_long_as_the_source_chooses_or_as_asked() {
         let named = |name: &str| Named::parse(name).unwrap();
-        let (sift, learned) = (map(Values::U8(vec![1; 256])), map(Values::F32(vec![-0.1; 128])));
+        let (sift, learned) = (map(Values::U8(vec![1; 256])), map(Values::F32(vec![-0.1; 256])));
         let k = |named: Named, map: &Released<3>| named.of_dimension::<3>().unwrap().k(map);
         assert_eq!(k(named("overlap"), &sift), 35);
         assert_eq!(k(named("similarity"), &sift), 30);
