@@ -7,7 +7,9 @@ import csv, json, pathlib, subprocess, tempfile
 SCHEMES = ["lines2d", "cp2d", "dcl2d"]
 RATIOS = [1.0, 0.75, 0.5, 0.3, 0.2, 0.1]
 SOLVERS = ["joint", "consensus", "ransac"]
-SOURCES = ["overlap", "similarity"]
+SOURCES = ["learned", "overlap", "similarity"]
+# Of learned features: the options of extraction.
+ALIKED = {"the best 2,048": ["--min-score", "0.02"], "score above 0.2": []}
 SHOWN = ["5", "10", "25"]
 
 
@@ -18,15 +20,15 @@ def audit(program, images, *options):
         return json.loads(pathlib.Path(out, "audit/audit.json").read_text())
 
 
-def published(shared):
-    """The paper's shares: {(scheme, ratio or 'estimated', threshold): percent} for SIFT on 7-Scenes."""
+def published(shared, feature="sift"):
+    """The paper's shares: {(scheme, ratio or 'estimated', threshold): percent} on 7-Scenes."""
     table = {}
     for name, ratio_of in (("geometric_2d", lambda row: float(row["inlier_ratio"])),
                            ("end_to_end_2d", lambda row: row["neighborhood"])):
         with open(shared / f"paper/tables/{name}.csv") as lines:
             for row in csv.DictReader(lines):
                 wanted = row["dataset"], row["feature"], row.get("metric", "recovered_percent")
-                if wanted == ("7-scenes", "sift", "recovered_percent"):
+                if wanted == ("7-scenes", feature, "recovered_percent"):
                     value = row.get("recovered_percent") or row.get("value")
                     table[row["scheme"], ratio_of(row), row["threshold_px"]] = value
     return table
@@ -82,11 +84,11 @@ def scene(name, document, paper, solvers):
     yield ""
 
 
-def without_oracle(name, document, paper):
+def without_oracle(name, document, paper, sources=SOURCES, trained_on="SIFT"):
     found = {(r["neighbors"], r["scheme"]): r for r in document["results"]}
     yield from [f"### {name}, neighborhoods from descriptors alone", ""]
     yield from head(["neighbors by", *SCHEMES])
-    for source in SOURCES:
+    for source in sources:
         cells = [f"{percents(found[source, s]['recovered_percent'])} ({100 * found[source, s]['inlier_ratio']:.1f} %)"
                  for s in SCHEMES]
         yield f"| `{source}` | " + " | ".join(cells) + " |"
@@ -94,7 +96,8 @@ def without_oracle(name, document, paper):
     for scheme in SCHEMES:
         known = [paper.get((scheme, "estimated", t)) for t in ("10", "25")]
         trained.append(f"- / {known[0]} / {known[1]}" if all(known) else "-")
-    yield "| paper on 7-Scenes, by a network trained on 97,000 images of ScanNet | " + " | ".join(trained) + " |"
+    if paper:
+        yield f"| paper on 7-Scenes, {trained_on}, by a network trained on 97,000 images of ScanNet | " + " | ".join(trained) + " |"
     yield ""
 
 
@@ -110,4 +113,10 @@ def tables(program, shared):
                                 ("Castle, features-sift.h5", "castle/features-sift.h5", nothing)):
         solvers = SOLVERS if known and "40" in name else SOLVERS[:1]
         yield from scene(name, audit(program, data / images, *oracle), known, solvers)
-        yield from without_oracle(name, audit(program, data / images, "--solver", "joint", *own), paper)
+        yield from without_oracle(name, audit(program, data / images, "--solver", "joint", *own), known)
+    superpoint = published(shared, "superpoint")
+    for place, known in (("RedKitchen, 40 photos", superpoint), ("Castle, 11 photos", nothing)):
+        for kept, options in ALIKED.items():
+            images = data / place.split(",")[0].lower() / "images"
+            found = audit(program, images, "--solver", "joint", "--features", "aliked", *options, "--neighbors", "similarity")
+            yield from without_oracle(f"{place}, ALIKED, {kept}", found, known, ["similarity"], "SuperPoint")

@@ -47,6 +47,7 @@ mod outputs;
 mod prepare;
 mod progress;
 mod scene;
+pub mod sources;
 
 pub use document::{ordered, row};
 pub use error::Error;

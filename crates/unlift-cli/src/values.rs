@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use unlift::audit::Threshold;
 use unlift::neighbors::oracle::Noise;
-use unlift::neighbors::sources::{Named, source};
+use unlift::neighbors::sources::Named;
 use unlift::obfuscate::{Entry, SCHEMES};
 use unlift::recover::{Delta, Solver};
-use unlift_audit::OutlierFilter;
+use unlift_audit::{OutlierFilter, sources};
 
 /// Where neighborhoods come from.
 #[derive(Clone, Debug, PartialEq)]
@@ -109,9 +109,13 @@ pub fn image_source(text: &str) -> Result<NeighborSource, String> {
     if text == "oracle" {
         return Ok(NeighborSource::Oracle);
     }
-    let own = Named::parse(text).ok().filter(|named| named.of_dimension::<2>().is_ok());
-    own.map(NeighborSource::Own)
-        .ok_or_else(|| format!("expected oracle, similarity or overlap, found {text}"))
+    let own = sources::named(text).ok().filter(|named| named.of_dimension::<2>().is_ok());
+    own.map(NeighborSource::Own).ok_or_else(|| {
+        let all = sources::all();
+        let of_images = all.iter().filter(|entry| entry.in_2d.is_some()).map(|entry| entry.name);
+        let names: Vec<&str> = ["oracle"].into_iter().chain(of_images).collect();
+        format!("expected one of {}, found {text}", names.join(", "))
+    })
 }
 
 /// Every scheme that is defined on maps.
@@ -175,11 +179,13 @@ pub fn neighbor_source(text: &str) -> Result<NeighborSource, String> {
     match text {
         "" => Err("expected oracle, a source or a file".to_owned()),
         "oracle" => Ok(NeighborSource::Oracle),
-        name if source(name).is_ok() => own_source(name).map(NeighborSource::Own),
+        name if sources::named(name).is_ok() => own_source(name).map(NeighborSource::Own),
         // One name that is known makes the others names as well: a slip is no missing file.
         names
             if !names.contains(std::path::is_separator)
-                && names.split([',', '+']).any(|name| name == "oracle" || source(name).is_ok()) =>
+                && names
+                    .split([',', '+'])
+                    .any(|name| name == "oracle" || sources::named(name).is_ok()) =>
         {
             Err(format!("expected one source (repeat the option for rows of each), found {names}"))
         }
@@ -189,7 +195,7 @@ pub fn neighbor_source(text: &str) -> Result<NeighborSource, String> {
 
 /// A source that needs no oracle, by its name.
 pub fn own_source(text: &str) -> Result<Named, String> {
-    Named::parse(text).map_err(|error| expected(&error))
+    sources::named(text).map_err(|error| expected(&error))
 }
 
 /// `NEIGHBORS,RATIO`, for example `20,2.0`.
@@ -253,7 +259,7 @@ mod tests {
              expected one of uniform, near, clustered, found white\n\
              expected one of sift, aliked, superpoint, found SIFT\n\
              expected a number from 0 to below 1, found 1\n\
-             expected one of similarity, overlap, descriptors, geometric, found magic"
+             expected one of similarity, overlap, descriptors, geometric, learned, found magic"
         );
     }
 

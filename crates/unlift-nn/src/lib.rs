@@ -5,8 +5,9 @@
 //! ```
 //!
 //! A *model* is a file in ONNX, a *network* is one that is loaded. [`MODELS`] lists all models that the program
-//! knows: some it carries, others are the user's to supply. This crate knows no pictures and no points: what goes
-//! into a network and comes out are [`Tensor`]s, made and read by whoever uses it.
+//! knows: some it carries, others are the user's to supply. What goes into a
+//! network and comes out are [`Tensor`]s, made and read by whoever uses it: [`Learned`], a source of neighborhoods,
+//! and the extractors of `unlift-features`.
 //!
 //! ```
 //! use unlift_nn::{Network, Tensor};
@@ -19,11 +20,13 @@
 //! ```
 
 mod folders;
+mod learned;
 mod network;
 mod registry;
 mod tensor;
 
 pub use folders::{Folders, Place, VARIABLE};
+pub use learned::{Learned, SOURCES};
 pub use network::Network;
 pub use registry::{Entry, MODELS, Port, entry};
 pub use tensor::Tensor;

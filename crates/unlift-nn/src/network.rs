@@ -1,6 +1,7 @@
 //! A network from a file of a model: checked, loaded, run.
 
 use std::borrow::Cow;
+use std::fmt;
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
@@ -23,6 +24,15 @@ pub struct Network {
     model: Box<rten::Model>,
     /// One per call that runs at the same time, each of one thread.
     idle: Mutex<Vec<Arc<ThreadPool>>>,
+}
+
+impl fmt::Debug for Network {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Network")
+            .field("place", &self.place)
+            .field("sha256", &self.sha256)
+            .finish_non_exhaustive()
+    }
 }
 
 impl Network {
@@ -68,13 +78,15 @@ impl Network {
         {
             return Err(Error::new(place, format!("SHA-256 {expected}"), sha256));
         }
-        let mut options = ModelOptions::with_all_ops();
-        // Twice the memory of the weights, a tenth of the time.
-        options.prepack_weights(true);
-        let model = match bytes {
-            Cow::Borrowed(bytes) => options.load_static_slice(bytes),
-            Cow::Owned(bytes) => options.load(bytes),
-        };
+        let model = aside(|| {
+            let mut options = ModelOptions::with_all_ops();
+            // Twice the memory of the weights, a tenth of the time.
+            options.prepack_weights(true);
+            match bytes {
+                Cow::Borrowed(bytes) => options.load_static_slice(bytes),
+                Cow::Owned(bytes) => options.load(bytes),
+            }
+        });
         let model = model
             .map_err(|error| Error::new(place, "a model in ONNX", one_line(&error.to_string())))?;
         let network = Self {
@@ -137,12 +149,7 @@ impl Network {
         let asked = outputs.iter().map(|name| id(name)).collect::<Result<Vec<_>, _>>()?;
         let pool = self.idle().pop().unwrap_or_else(|| Arc::new(ThreadPool::with_num_threads(1)));
         let options = RunOptions::default().with_thread_pool(Some(Arc::clone(&pool)));
-        // A thread of rayon that waits for another pool takes up other work in the meantime: one more picture, with all
-        // its maps in memory, and one more above it. A thread of its own waits.
-        let result = thread::scope(|scope| {
-            let run = || self.model.run(given, &asked, Some(options));
-            scope.spawn(run).join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-        });
+        let result = aside(|| self.model.run(given, &asked, Some(options)));
         self.idle().push(pool);
         let values = result.map_err(|error| wrong("inputs that fit", &error.to_string()))?;
         let tensors = values.into_iter().zip(outputs).map(|(value, name)| match value {
@@ -191,6 +198,15 @@ impl Network {
         }
         Ok(())
     }
+}
+
+/// Does `work`, which waits for a pool of rten, on a thread of its own. A thread of rayon that waits for another pool
+/// takes up other work in the meantime: one more picture, with all its maps in memory, and one more above it; or work
+/// that needs the very network that it is loading.
+fn aside<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    thread::scope(|scope| {
+        scope.spawn(work).join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    })
 }
 
 /// What others say, in one line that holds nothing odd.

@@ -52,7 +52,7 @@ pub fn entry(name: &str) -> Result<&'static Entry, Error> {
 }
 
 /// All models, by name.
-pub const MODELS: &[Entry] = &[ALIKED_N16ROT, SUPERPOINT];
+pub const MODELS: &[Entry] = &[ALIKED_N16ROT, NEIGHBORS_SIFT, SUPERPOINT];
 
 const ALIKED_N16ROT: Entry = Entry {
     name: "aliked-n16rot",
@@ -75,6 +75,20 @@ const ALIKED_N16ROT: Entry = Entry {
         Port { name: "descriptors", shape: &[None, Some(128)] },
     ],
     carried: Some(include_bytes!("../../../models/aliked-n16rot/aliked-n16rot.onnx")),
+};
+
+const NEIGHBORS_SIFT: Entry = Entry {
+    name: "neighbors-sift",
+    purpose: "near points by their SIFT descriptors (the source `learned`)",
+    licence: "MIT OR Apache-2.0",
+    owner: "https://github.com/unlift/unlift",
+    sha256: Some("70a05b3e7c40fdbd4f542f1e4a85374a6b24b2050d831b8ce1f11a42e76fe2e8"),
+    inputs: &[
+        Port { name: "descriptors", shape: &[None, Some(128)] },
+        Port { name: "pairs", shape: &[Some(3), None, None] },
+    ],
+    outputs: &[Port { name: "scores", shape: &[None, None] }],
+    carried: Some(include_bytes!("../../../models/neighbors-sift/neighbors-sift.onnx")),
 };
 
 const SUPERPOINT: Entry = Entry {

@@ -20,7 +20,7 @@ fn with_file(entry: &Entry, bytes: &[u8]) -> (TempDir, Folders) {
 
 fn refused(entry: &Entry, bytes: &[u8]) -> String {
     let (place, folders) = with_file(entry, bytes);
-    let error = Network::load_from(&folders, entry).err().expect("it is refused").to_string();
+    let error = Network::load_from(&folders, entry).expect_err("it is refused").to_string();
     assert!(!error.contains('\n'), "{error}");
     error.replace(&place.path().display().to_string(), "DIR")
 }

@@ -1,9 +1,9 @@
 //! From the text of a gate to a gate.
 
-use unlift::neighbors::sources::{SOURCES, source};
 use unlift::recover::Solver;
 
 use super::{Figure, Gate};
+use crate::sources;
 
 impl Gate {
     /// Reads the form that the module describes.
@@ -83,7 +83,7 @@ fn solver_name(text: &str) -> Option<&'static str> {
 fn source_name(text: &str) -> Option<String> {
     match text.trim() {
         name @ (ORACLE | "file") => Some(name.to_owned()),
-        name => source(name).ok().map(|entry| entry.name.to_owned()),
+        name => sources::named(name).ok().map(|named| named.name().to_owned()),
     }
 }
 
@@ -106,7 +106,7 @@ fn qualifiers(names: &[&str]) -> Result<(Option<&'static str>, Option<String>), 
             }
             (None, None) => {
                 let solvers = Solver::ALL.map(Solver::name).join(", ");
-                let sources: Vec<&str> = SOURCES.iter().map(|entry| entry.name).collect();
+                let sources: Vec<&str> = sources::all().iter().map(|entry| entry.name).collect();
                 return Err(format!(
                     "expected a solver ({solvers}) or a source of neighborhoods ({ORACLE}, file, {}), \
                      found {name}",

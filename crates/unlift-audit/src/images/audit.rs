@@ -2,11 +2,12 @@
 
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use serde_json::{Map, Value};
 use unlift::audit::{self, Cell, NeighborsBy, Observer, Outcome, Plan, Row, run_images};
-use unlift::neighbors::sources::SOURCES;
+use unlift::neighbors::{Overlap, Similarity, Source};
 use unlift_io::atomic::OutputSet;
 use unlift_io::hash::{hash_file, hash_files};
 use unlift_report::document::{ImageCounts, ImageFigures, Input};
@@ -183,10 +184,10 @@ fn draw(
     Ok(pictures)
 }
 
-/// Sources by descriptors that the plan lacks and all images `numbers` have what it takes for.
+/// What needs no training and the plan lacks, where all images `numbers` have what it takes.
 fn without_oracle(job: &ImagesJob<'_>, numbers: &[usize]) -> Vec<NeighborsBy<2>> {
-    let missing = SOURCES.iter().filter_map(|entry| entry.of_dimension::<2>());
-    let missing = missing.filter(|source| {
+    let untrained: [Arc<dyn Source<2>>; 2] = [Arc::new(Similarity), Arc::new(Overlap)];
+    let missing = untrained.into_iter().filter(|source| {
         let needs = Needs::of(source);
         let fits = |&at: &usize| match job.source {
             // What was extracted as SIFT is what every source takes.

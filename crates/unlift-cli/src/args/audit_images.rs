@@ -19,7 +19,7 @@ Examples:
   unlift audit images features.h5 --photos photos --solver joint,ransac --out audit
   unlift audit images PROJECT/database.db --max-images 100 --schemes lines2d --inlier-ratios 1,0.5
   unlift audit images photos --neighbors oracle --neighbors similarity --neighbors overlap
-  unlift audit images photos --features aliked --neighbors similarity
+  unlift audit images photos --features aliked --neighbors descriptors
   unlift audit images photos --gate 'cp2d@0.5:10<=20' --share-safe --json
 
 Photos are JPEG, PNG or WebP files at any depth; features are those of unlift features.
@@ -65,8 +65,8 @@ pub struct AuditImagesArgs {
           help_heading = "Attack")]
     pub solver: Vec<Solver>,
     /// Where neighborhoods come from, repeatable: oracle (made from the keypoints themselves), or what
-    /// an attacker makes from the released descriptors (similarity, overlap);
-    /// overlap needs SIFT
+    /// an attacker makes from the released descriptors: descriptors (the best that they allow without training),
+    /// similarity, overlap (SIFT), learned (a network; SIFT)
     #[arg(long, value_name = "oracle|SOURCE", value_parser = values::image_source,
           default_value = "oracle", help_heading = "Attack")]
     pub neighbors: Vec<NeighborSource>,

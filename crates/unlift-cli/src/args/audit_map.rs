@@ -44,7 +44,8 @@ pub struct AuditMapArgs {
     #[command(flatten)]
     pub solvers: SolverArgs,
     /// Where neighborhoods come from, repeatable: oracle (made from the map itself); what an attacker
-    /// makes from the released map (similarity, overlap, geometric); or a file
+    /// makes from the released map: descriptors (the best that they allow without training), similarity, overlap (SIFT),
+    /// learned (a network; SIFT), geometric (no descriptors); or a file
     #[arg(long, value_name = "oracle|SOURCE|FILE", value_parser = values::neighbor_source,
           default_value = "oracle", help_heading = "Attack")]
     pub neighbors: Vec<NeighborSource>,

@@ -24,7 +24,8 @@ pub enum NeighborsCommand {
 /// Options of `neighbors find`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Sources: similarity (any descriptors), overlap (SIFT), geometric (no descriptors).
+Sources: descriptors (the best that they allow without training: overlap or similarity), similarity (any descriptors),
+overlap (SIFT), learned (a network; SIFT), geometric (no descriptors).
 
 Examples:
   unlift neighbors find hidden/released.parquet --source overlap --out lists.parquet

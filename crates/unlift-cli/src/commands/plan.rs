@@ -120,6 +120,10 @@ pub fn check_fit<const D: usize>(
 ) -> anyhow::Result<()> {
     source.takes(descriptors).map_err(|error| {
         let name = source.name();
+        // What is wrong may be the source's model, of which the error tells the path.
+        if !error.what().starts_with("descriptors") {
+            return usage(format!("--neighbors {name}: {error}"));
+        }
         let (expected, found) = (error.expected(), error.found());
         let error = usage(format!("--neighbors {name}: expected {expected}, found {found}"));
         advise(error, "--neighbors similarity, which takes descriptors of any kind")

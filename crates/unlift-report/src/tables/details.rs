@@ -79,7 +79,7 @@ pub(crate) fn choices(document: &Document) -> Option<Table> {
     (table.columns.len() > n_keys).then_some(table)
 }
 
-/// Figures of measures that were added to the audit, a column each; `None` when no row has any.
+/// Metrics, a column each; `None` when no row has any.
 pub(crate) fn metrics(document: &Document) -> Option<Table> {
     let mut names: Vec<&String> = Vec::new();
     for name in document.results.iter().flat_map(|row| row.metrics.keys()) {
@@ -98,7 +98,7 @@ pub(crate) fn metrics(document: &Document) -> Option<Table> {
     let rows = rows.collect();
     let mut columns = key_columns();
     columns.extend(names.iter().map(|name| column(name.as_str(), Class::Figure)));
-    let caption = "Measures that were added to this audit.".to_owned();
+    let caption = "Further figures.".to_owned();
     (!names.is_empty()).then(|| Table { id: "metrics", caption, columns, rows, notes: Vec::new() })
 }
 

@@ -124,11 +124,12 @@ impl<'a, const D: usize> Lists<'a, D> {
             Neighborhoods::try_new(vec![0; n_slots + 1], Vec::new(), None, n_records, slots)?;
         let map = Some(self.released.fingerprint());
         let lists = lists.with_about(About { map, order: RowOrder::Slots });
-        let k = match variant.by {
-            NeighborsBy::Source(source) => source.k(self.released),
-            NeighborsBy::Oracle | NeighborsBy::Given(_) => self.plan.k,
+        let (k, ratio_at_k) = match variant.by {
+            // Nothing listed, nothing right: over images, whose figures are means, one more point that counts.
+            NeighborsBy::Source(source) => (source.k(self.released), Some(0.0)),
+            NeighborsBy::Oracle | NeighborsBy::Given(_) => (self.plan.k, None),
         };
-        Ok(Made { lists, ratio: variant.inlier_ratio.unwrap_or(0.0), k, ratio_at_k: None })
+        Ok(Made { lists, ratio: variant.inlier_ratio.unwrap_or(0.0), k, ratio_at_k })
     }
 
     /// Of the oracle, `k` records per list.

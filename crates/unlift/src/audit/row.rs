@@ -51,7 +51,8 @@ pub struct Row {
     pub exact_percent: Option<f64>,
     /// Share of descriptors given to their own point (paired lines with descriptors).
     pub assignment_accuracy_percent: Option<f64>,
-    /// Figures of the plan's [measures](super::Measure), by name; means over repeats and, weighted by points, over
+    /// `inlier_ratio_at_k` of an attacker's own lists, against as many true neighbors as they have records; and figures
+    /// of the plan's [measures](super::Measure), by name; means over repeats and, weighted by points, over
     /// images.
     pub metrics: BTreeMap<String, f64>,
     /// Errors at [`PERCENTILES`]; `None` where that many points were lost.

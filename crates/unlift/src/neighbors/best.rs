@@ -5,9 +5,9 @@
 pub struct Found {
     /// The best rows of other records, best first; equal scores in row order.
     pub best: Vec<(f32, u32)>,
-    /// Mean of the scores with rows of other records, wherever they are; 0 unless scores are exact.
+    /// Mean of the scores with rows of other records, wherever they are; 0 unless they were counted.
     pub mean: f64,
-    /// Their standard deviation; 0 unless scores are exact.
+    /// Their standard deviation; 0 unless they were counted.
     pub deviation: f64,
 }
 

@@ -12,7 +12,7 @@ use crate::{Descriptors, Error};
 
 /// How far a walk goes. The most similar are mostly right: more steps name more of the 20 nearest, but fewer of the
 /// very nearest (docs/decisions/sources.md).
-const WALK: Walk = Walk { steps: 3, decay: 0.4 };
+pub const WALK: Walk = Walk { steps: 2, decay: 0.2 };
 
 /// The `k` records with the most similar descriptors. Scores: cosine similarity; of a record with two
 /// descriptors the larger.
@@ -64,7 +64,7 @@ impl<const D: usize> Source<D> for Similarity {
         // Of an image's fewer keypoints only the first of a ranking are near. Of learned descriptors the first are
         // mostly right, and more would only add what is farther away.
         match (D, released.descriptors().is_some_and(are_learned)) {
-            (2, true) => 7,
+            (2, true) => 5,
             (2, false) => 10,
             (_, true) => 12,
             (_, false) => 30,

@@ -41,7 +41,7 @@ impl PartialEq for SourceEntry {
     }
 }
 
-/// All sources.
+/// All sources of this crate; `unlift-audit` adds those that need a network.
 pub const SOURCES: &[SourceEntry] = &[
     SourceEntry {
         name: "similarity",
@@ -69,13 +69,13 @@ pub const SOURCES: &[SourceEntry] = &[
     },
 ];
 
-/// The source called `name`.
+/// The source of `known` that is called `name`.
 ///
 /// # Errors
 /// When there is none; the error lists the names.
-pub fn source(name: &str) -> Result<&'static SourceEntry, Error> {
-    SOURCES.iter().find(|entry| entry.name == name).ok_or_else(|| {
-        let names: Vec<&str> = SOURCES.iter().map(|entry| entry.name).collect();
+pub fn source(name: &str, known: &[&'static SourceEntry]) -> Result<&'static SourceEntry, Error> {
+    known.iter().copied().find(|entry| entry.name == name).ok_or_else(|| {
+        let names: Vec<&str> = known.iter().map(|entry| entry.name).collect();
         Error::new("source", format!("one of {}", names.join(", ")), name)
     })
 }
@@ -88,12 +88,20 @@ pub struct Named {
 }
 
 impl Named {
-    /// The source called `name`.
+    /// The source of [`SOURCES`] called `name`.
     ///
     /// # Errors
     /// When there is none; the error lists the names.
     pub fn parse(name: &str) -> Result<Self, Error> {
-        Ok(Self { entry: source(name.trim())?, k: None })
+        Self::parse_among(name, &SOURCES.iter().collect::<Vec<_>>())
+    }
+
+    /// The same from a registry that other crates have added to.
+    ///
+    /// # Errors
+    /// As [`parse`](Self::parse).
+    pub fn parse_among(name: &str, known: &[&'static SourceEntry]) -> Result<Self, Error> {
+        Ok(Self { entry: source(name.trim(), known)?, k: None })
     }
 
     /// The same source with `k` records per list, not as many as it chooses.
@@ -180,7 +188,10 @@ mod tests {
     #[test]
     fn lists_are_as_long_as_the_source_chooses_or_as_asked() {
         let named = |name: &str| Named::parse(name).unwrap();
-        let (sift, learned) = (map(Values::U8(vec![1; 256])), map(Values::F32(vec![-0.1; 256])));
+        let (sift, learned) = (
+            map(Values::U8((0..=255).collect())),
+            map(Values::F32((0..256).map(|at| -(at as f32)).collect())),
+        );
         let k = |named: Named, map: &Released<3>| named.of_dimension::<3>().unwrap().k(map);
         assert_eq!(k(named("overlap"), &sift), 35);
         assert_eq!(k(named("similarity"), &sift), 30);

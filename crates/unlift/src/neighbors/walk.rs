@@ -44,7 +44,7 @@ pub fn standardized(found: &[Found]) -> Vec<Vec<(f32, u32)>> {
 }
 
 /// Ranks the rows that a walk from each row reaches, at most `most`, and after them those that stand
-/// in `ranked` (standardized scores, best first) but were not reached. Scores are natural logarithms.
+/// in `ranked` (standardized scores or log probabilities, best first) but were not reached. Scores are natural logarithms.
 pub fn walk(
     ranked: &[Vec<(f32, u32)>],
     record_of: &[u32],
@@ -82,18 +82,24 @@ fn graph(ranked: &[Vec<(f32, u32)>]) -> Vec<Vec<(u32, f64)>> {
     let mut steps: Vec<Vec<(u32, f64)>> = vec![Vec::new(); ranked.len()];
     for (row, list) in ranked.iter().enumerate() {
         for &(z, other) in list.iter().take(EDGES) {
-            let weight = libm::exp(SHARPNESS * (f64::from(z) - USUAL));
-            steps[row].push((other, weight));
-            steps[other as usize].push((row as u32, weight));
+            steps[row].push((other, f64::from(z)));
+            steps[other as usize].push((row as u32, f64::from(z)));
         }
     }
     steps.par_iter_mut().for_each(|row| {
         // An edge that both ends keep is one edge: z is the same from either.
         row.sort_unstable_by_key(|&(other, _)| other);
         row.dedup_by_key(|&mut (other, _)| other);
-        let sum: f64 = row.iter().map(|&(_, weight)| weight).sum();
-        for (_, weight) in row.iter_mut() {
-            *weight /= sum;
+        let weight = |z: f64, usual: f64| libm::exp(SHARPNESS * (z - usual));
+        let total = |usual: f64| row.iter().map(|&(_, z)| weight(z, usual)).sum::<f64>();
+        // Rows without any spread score beyond what an exponential holds.
+        let top = row.iter().map(|&(_, z)| z).fold(f64::NEG_INFINITY, f64::max);
+        let (usual, sum) = match total(USUAL) {
+            sum if sum.is_normal() => (USUAL, sum),
+            _ => (top, total(top)),
+        };
+        for (_, z) in row.iter_mut() {
+            *z = weight(*z, usual) / sum;
         }
     });
     steps

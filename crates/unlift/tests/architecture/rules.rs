@@ -99,7 +99,7 @@ pub const CRATES: &[(&str, &[&str])] = &[
     ("unlift-features", &["unlift", "unlift-nn"]),
     ("unlift-report", &[]),
     ("unlift-testkit", &["unlift"]),
-    ("unlift-audit", &["unlift", "unlift-io", "unlift-features", "unlift-report"]),
+    ("unlift-audit", &["unlift", "unlift-io", "unlift-nn", "unlift-features", "unlift-report"]),
     (
         "unlift-cli",
         &["unlift", "unlift-audit", "unlift-io", "unlift-nn", "unlift-features", "unlift-report"],

@@ -46,9 +46,25 @@ impl Dense {
 /// # Errors
 /// When descriptors are not SIFT, or there are fewer than two or more than 8,192.
 pub fn dense(descriptors: &Descriptors) -> Result<Dense, Error> {
+    dense_among(descriptors, None)
+}
+
+/// The same for patches that are a part of something larger: `usual` has mean and deviation of what each of them scores
+/// with patches from everywhere. A part of look-alikes would take its own likeness for usual.
+///
+/// # Errors
+/// As [`dense`], and when `usual` has not as many entries as there are patches.
+pub fn dense_among(
+    descriptors: &Descriptors,
+    usual: Option<&[(f64, f64)]>,
+) -> Result<Dense, Error> {
     let n = descriptors.len();
     if !(2..=MOST).contains(&n) {
         return Err(Error::new("dense overlap", format!("2 to {MOST} patches"), n.to_string()));
+    }
+    if let Some(usual) = usual.filter(|usual| usual.len() != n) {
+        let expected = format!("{n} means and deviations");
+        return Err(Error::new("dense overlap", expected, usual.len().to_string()));
     }
     let patches = Patches::of(descriptors)?;
     let slots: Vec<u32> = (0..n as u32).collect();
@@ -74,12 +90,19 @@ pub fn dense(descriptors: &Descriptors) -> Result<Dense, Error> {
             }
         }
     }
-    standardize(&mut scores, n);
+    match usual {
+        Some(usual) => standardize(&mut scores, usual),
+        None => {
+            let usual = within(&scores, n);
+            standardize(&mut scores, &usual);
+        }
+    }
     Ok(Dense { n, scores })
 }
 
-fn standardize(scores: &mut [f32], n: usize) {
-    let usual: Vec<(f64, f64)> = (0..n)
+/// Mean and deviation of what every patch scores with the others, by the best of all reaches.
+fn within(scores: &[f32], n: usize) -> Vec<(f64, f64)> {
+    (0..n)
         .into_par_iter()
         .map(|row| {
             let (mut sum, mut squares) = (0.0f64, 0.0f64);
@@ -92,16 +115,21 @@ fn standardize(scores: &mut [f32], n: usize) {
             }
             let others = (n - 1) as f64;
             let mean = sum / others;
-            (mean, (squares / others - mean * mean).max(0.0).sqrt().max(1e-9))
+            (mean, (squares / others - mean * mean).max(0.0).sqrt())
         })
-        .collect();
+        .collect()
+}
+
+fn standardize(scores: &mut [f32], usual: &[(f64, f64)]) {
+    let n = usual.len();
     scores.par_chunks_mut(n).enumerate().for_each(|(at, line)| {
         let row = at % n;
         let (mean, deviation) = usual[row];
         for (column, score) in line.iter_mut().enumerate() {
             let (other_mean, other_deviation) = usual[column];
-            let own = (f64::from(*score) - mean) / deviation;
-            let others = (f64::from(*score) - other_mean) / other_deviation;
+            // A blank patch overlaps none: no deviation.
+            let own = (f64::from(*score) - mean) / deviation.max(1e-9);
+            let others = (f64::from(*score) - other_mean) / other_deviation.max(1e-9);
             *score = if column == row { 0.0 } else { ((own + others) / 2.0) as f32 };
         }
     });

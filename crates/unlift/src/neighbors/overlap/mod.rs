@@ -8,7 +8,7 @@ mod dense;
 mod hypotheses;
 mod patches;
 
-pub use dense::{Dense, REACHES, dense};
+pub use dense::{Dense, REACHES, dense, dense_among};
 pub use patches::{Patches, check};
 
 use super::Neighborhoods;
@@ -20,7 +20,7 @@ use crate::released::Released;
 use crate::{Descriptors, Error};
 
 /// Patches of near points need not overlap: neighbors are some steps apart.
-const WALK: Walk = Walk { steps: 5, decay: 0.7 };
+pub const WALK: Walk = Walk { steps: 5, decay: 0.7 };
 
 /// The `k` records whose patches overlap each slot's patch most, or that a short walk over such
 /// records reaches. Scores: log of the (discounted) probability to be reached.

@@ -1,0 +1,286 @@
+//! Neighborhoods from scores of all pairs within sets of descriptors, whoever gives the scores: a network, say.
+//!
+//! A map of a few thousand points is one set. A larger one is cut into sets of points that may be near each other by
+//! what is known without training; every point is well inside several sets, and what these say of a pair is averaged.
+//! Two short walks follow, one over the pairs that score best, one over those that are best without training: what the
+//! two get wrong is not the same.
+
+use rayon::prelude::*;
+
+use super::Neighborhoods;
+use super::best::{Best, higher_first};
+use super::compare::{MOST_ROWS, search};
+use super::overlap::{self, Patches};
+use super::rows::Rows;
+use super::sets::{self, Set};
+use super::similarity::{self, Cosine};
+use super::walk::{self, CANDIDATES};
+use crate::released::Released;
+use crate::{Descriptors, Error};
+
+/// Points of a map that is one set, at most.
+const WHOLE: usize = 3072;
+/// What a walk may reach, of as many as are wanted of two walks: what both reach late may come first of all.
+const REACHED: usize = 4;
+
+/// Partners of a row, best first.
+type Ranked = Vec<(f32, u32)>;
+
+/// Descriptors that are looked at together.
+#[derive(Debug)]
+pub struct Part {
+    /// One row per point.
+    pub descriptors: Descriptors,
+    /// Where there are more points than these: mean and deviation of how well the patch of each overlaps patches from
+    /// everywhere ([`dense_among`](super::dense_among)); of others than SIFT, of its cosines.
+    pub usual: Option<Vec<(f64, f64)>>,
+}
+
+/// Scores of all pairs of the `n` descriptors of a part, `(n, n)`, row-major: the natural logarithm of how likely a
+/// column's point is among the nearest of a row's, up to a constant per row. All finite; what stands between the points of one record is not read.
+pub type Scores<'a> = dyn Fn(&Part) -> Result<Vec<f32>, Error> + Sync + 'a;
+
+/// The `k` records that two short walks reach most likely: one over records that `scores` finds near each slot, one as
+/// that of [`overlap`](super::overlap()) or, of others than SIFT, of learned ones by [`similarity`](super::similarity()). Scores: log of
+/// the (discounted) probability to be reached, mean of both.
+///
+/// # Errors
+/// Those of `scores`; when the map has no descriptors, or fewer than `k` other records.
+pub fn scored<const D: usize>(
+    released: &Released<D>,
+    k: usize,
+    scores: &Scores<'_>,
+) -> Result<Neighborhoods, Error> {
+    let mut rows = Rows::new(released, k)?;
+    let enough = rows.enough_for(k);
+    let kept = enough.max(CANDIDATES);
+    let (found, how) = match Patches::of(rows.descriptors) {
+        Ok(patches) => (search(&patches, &mut rows, kept, MOST_ROWS)?, overlap::WALK),
+        Err(_) => (search(&Cosine { counts: true }, &mut rows, kept, MOST_ROWS)?, similarity::WALK),
+    };
+    let untrained = walk::standardized(&found);
+    let n = rows.len();
+    let (sets, usual) = if n <= WHOLE {
+        (vec![Set { rows: (0..n as u32).collect(), inner: vec![true; n] }], None)
+    } else {
+        let usual: Vec<_> = found.iter().map(|found| (found.mean, found.deviation)).collect();
+        (sets::around(&untrained), Some(usual))
+    };
+    drop(found);
+    let part = |set: &Set| {
+        let slots: Vec<u32> = set.rows.iter().map(|&row| rows.slots[row as usize]).collect();
+        let of_set = |all: &Vec<_>| set.rows.iter().map(|&row| all[row as usize]).collect();
+        let usual = usual.as_ref().map(of_set);
+        Part { descriptors: rows.descriptors.select(&slots), usual }
+    };
+    let found: Vec<Vec<Vec<(u32, f32)>>> = sets
+        .par_iter()
+        .map(|set| within(&rows, set, scores(&part(set))?, kept))
+        .collect::<Result<_, _>>()?;
+    let mut ranked: Vec<Vec<(u32, f32)>> = vec![Vec::new(); rows.len()];
+    for (set, found) in sets.iter().zip(found) {
+        for (&row, pairs) in set.rows.iter().zip(found) {
+            ranked[row as usize].extend(pairs);
+        }
+    }
+    let ranked: Vec<Ranked> = ranked.into_par_iter().map(merged).collect();
+    let walked = |ranked: &[_], how| walk::walk(ranked, &rows.records, REACHED * enough, how);
+    let (by_scores, free) = (walked(&both_ways(ranked), overlap::WALK), walked(&untrained, how));
+    rows.lists(&mixed(&by_scores, &free, enough), k)
+}
+
+/// The `most` rows that either of two walks reaches, with the mean of their probabilities.
+fn mixed(a: &[Ranked], b: &[Ranked], most: usize) -> Vec<Ranked> {
+    let row = |(a, b): (&Ranked, &Ranked)| {
+        let both = a.iter().chain(b).map(|&(log, row)| (row, libm::exp(f64::from(log)) / 2.0));
+        let mut both: Vec<(u32, f64)> = both.collect();
+        both.sort_by_key(|&(row, _)| row);
+        let one = |same: &[(u32, f64)]| {
+            let sum: f64 = same.iter().map(|&(_, probability)| probability).sum();
+            (libm::log(sum.max(f64::MIN_POSITIVE)) as f32, same[0].0)
+        };
+        let mut ranked: Vec<_> = both.chunk_by(|a, b| a.0 == b.0).map(one).collect();
+        ranked.sort_unstable_by(higher_first);
+        ranked.truncate(most);
+        ranked
+    };
+    a.par_iter().zip(b).map(row).collect()
+}
+
+/// Per row of a set its best partners by the mean of both rows' log probabilities.
+fn within(
+    rows: &Rows<'_>,
+    Set { rows: set, inner }: &Set,
+    mut logs: Vec<f32>,
+    most: usize,
+) -> Result<Vec<Vec<(u32, f32)>>, Error> {
+    let n = set.len();
+    let wrong = |found: String| Error::new("scores of pairs", format!("{n} x {n} numbers"), found);
+    if logs.len() != n * n {
+        return Err(wrong(logs.len().to_string()));
+    }
+    let other = |i: usize, j: usize| rows.records[set[i] as usize] != rows.records[set[j] as usize];
+    let odd = |&(at, score): &(usize, &f32)| !score.is_finite() && other(at / n, at % n);
+    if let Some((_, score)) = logs.iter().enumerate().find(odd) {
+        return Err(wrong(score.to_string()));
+    }
+    for (i, line) in logs.chunks_exact_mut(n).enumerate() {
+        let of_others = || (0..n).filter(|&j| other(i, j));
+        let top = of_others().map(|j| line[j]).fold(f32::NEG_INFINITY, f32::max);
+        let sum: f64 = of_others().map(|j| libm::exp(f64::from(line[j] - top))).sum();
+        let log = top + libm::log(sum.max(f64::MIN_POSITIVE)) as f32;
+        line.iter_mut().for_each(|score| *score -= log);
+    }
+    let best = |i: usize| {
+        let mut best = Best::new(most);
+        for j in (0..n).filter(|&j| other(i, j)) {
+            best.push((logs[i * n + j] + logs[j * n + i]) / 2.0, set[j]);
+        }
+        best.into_sorted().into_iter().map(|(score, row)| (row, score)).collect()
+    };
+    Ok((0..n).map(|i| if inner[i] { best(i) } else { Vec::new() }).collect())
+}
+
+/// One entry per partner, with the mean of what sets say of it; best first.
+fn merged(mut pairs: Vec<(u32, f32)>) -> Ranked {
+    // Of one partner in the order of sets: sums are the same on any number of threads.
+    pairs.sort_by_key(|&(other, _)| other);
+    let one = |pairs: &[(u32, f32)]| {
+        let sum: f32 = pairs.iter().map(|&(_, score)| score).sum();
+        (sum / pairs.len() as f32, pairs[0].0)
+    };
+    let mut ranked: Vec<_> = pairs.chunk_by(|a, b| a.0 == b.0).map(one).collect();
+    ranked.sort_unstable_by(higher_first);
+    ranked
+}
+
+/// The same score from either end: what a row keeps of a pair in more sets than its partner does, its partner gets.
+fn both_ways(ranked: Vec<Ranked>) -> Vec<Ranked> {
+    let score = |row: u32, other: u32| {
+        ranked[row as usize].iter().find(|&&(_, at)| at == other).map(|&(score, _)| score)
+    };
+    let row = |(row, list): (usize, &Ranked)| {
+        let shared = |&(own, other): &(f32, u32)| match score(other, row as u32) {
+            Some(others) => ((own + others) / 2.0, other),
+            None => (own, other),
+        };
+        let mut list: Ranked = list.iter().map(shared).collect();
+        list.sort_unstable_by(higher_first);
+        list
+    };
+    ranked.par_iter().enumerate().map(row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Unit;
+    use crate::descriptors::Values;
+    use crate::released::{Lines, Obfuscation};
+
+    /// Points along a closed curve; what they look like changes slowly.
+    fn released(n: usize) -> Released<3> {
+        let points: Vec<[f64; 3]> = (0..n).map(|i| [i as f64, 0.0, (i % 7) as f64]).collect();
+        let lines = Lines::through(&points, &vec![[0.0, 1.0, 0.5]; n]).unwrap();
+        let byte = |at: usize, bin: usize| {
+            let turn = std::f64::consts::TAU * at as f64 / n as f64;
+            let wave = libm::sin(turn * (1 + bin % 9) as f64 + (bin * bin) as f64);
+            (60.0 + 50.0 * wave) as u8
+        };
+        let bytes = (0..n).flat_map(|at| (0..128).map(move |bin| byte(at, bin))).collect();
+        let descriptors = Descriptors::try_new(Values::U8(bytes), 128).unwrap();
+        let obfuscation = Obfuscation::Lines(lines);
+        Released::try_new(obfuscation, 1, [0.0; 3], Unit::Meter, Some(descriptors)).unwrap()
+    }
+
+    fn alike(part: &Part) -> Result<Vec<f32>, Error> {
+        // Some of the values tell points apart, too.
+        let Values::U8(values) = part.descriptors.values() else { panic!("bytes") };
+        let rows: Vec<&[u8]> = values.chunks_exact(128).map(|row| &row[..9]).collect();
+        let apart = |a: &[u8], b: &[u8]| -> i32 {
+            a.iter().zip(b).map(|(&a, &b)| (i32::from(a) - i32::from(b)).pow(2)).sum()
+        };
+        let score = |(a, b): (&&[u8], &&[u8])| apart(a, b) as f32 / -30.0;
+        let pairs = rows.iter().flat_map(|a| rows.iter().map(move |b| (a, b)));
+        Ok(pairs.map(score).collect())
+    }
+
+    /// Share of lists' entries that are no farther along the curve than half of `k`, and a few.
+    fn right(lists: &Neighborhoods, n: usize, k: usize) -> f64 {
+        let apart = |slot: usize, record: usize| {
+            let steps = slot.abs_diff(record);
+            steps.min(n - steps)
+        };
+        let near = |slot: usize| {
+            lists.of(slot).iter().filter(|record| apart(slot, record.index()) <= k / 2 + 3).count()
+        };
+        (0..n).map(near).sum::<usize>() as f64 / (n * k) as f64
+    }
+
+    #[test]
+    fn what_scores_call_near_is_listed_in_one_set_and_in_several() {
+        for n in [300, WHOLE + 500] {
+            let map = released(n);
+            let lists = scored(&map, 10, &alike).unwrap();
+            let right = right(&lists, n, 10);
+            assert!(right > 0.9, "{n} points: {right}");
+        }
+    }
+
+    /// The scores of one set, where half a turn away is near.
+    fn opposite(part: &Part) -> Result<Vec<f32>, Error> {
+        let n = part.descriptors.len();
+        let near = |i: usize, j: usize| -((i.abs_diff(j) as f32 - n as f32 / 2.0).abs());
+        Ok((0..n * n).map(|at| near(at / n, at % n)).collect())
+    }
+
+    #[test]
+    fn scores_decide_half_of_the_lists() {
+        let map = released(300);
+        // Rows are in an order of their own content; which points are half of it apart, the scores know alone.
+        let (by_likeness, by_order) = (scored(&map, 10, &alike), scored(&map, 10, &opposite));
+        let (by_likeness, by_order) =
+            (right(&by_likeness.unwrap(), 300, 10), right(&by_order.unwrap(), 300, 10));
+        assert!(by_order < by_likeness - 0.2 && by_order > 0.2, "{by_likeness}, {by_order}");
+    }
+
+    #[test]
+    fn others_than_sift_are_walked_by_their_cosines() {
+        let sift = released(300);
+        let Values::U8(bytes) = sift.descriptors().unwrap().values() else { panic!("bytes") };
+        let signed = bytes.iter().map(|&byte| f32::from(byte) - 60.0).collect();
+        let descriptors = Descriptors::try_new(Values::F32(signed), 128).unwrap();
+        let map = Released::try_new(
+            sift.obfuscation().clone(),
+            1,
+            [0.0; 3],
+            Unit::Meter,
+            Some(descriptors),
+        );
+        let flat = |part: &Part| Ok(vec![0.0; part.descriptors.len() * part.descriptors.len()]);
+        let right = right(&scored(&map.unwrap(), 10, &flat).unwrap(), 300, 10);
+        assert!(right > 0.4, "{right}");
+    }
+
+    #[test]
+    fn the_same_lists_on_any_number_of_threads() {
+        let map = released(WHOLE + 200);
+        let on = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| scored(&map, 10, &alike)).unwrap()
+        };
+        assert_eq!(on(1), on(3));
+    }
+
+    #[test]
+    fn scores_that_are_none_are_refused() {
+        let message =
+            |scores: &Scores<'_>| scored(&released(20), 5, scores).unwrap_err().to_string();
+        let expected = "scores of pairs: expected 20 x 20 numbers, found";
+        assert_eq!(message(&|_| Ok(vec![0.0; 7])), format!("{expected} 7"));
+        assert_eq!(message(&|_| Ok(vec![f32::NAN; 400])), format!("{expected} NaN"));
+        assert_eq!(message(&|_| Ok(vec![f32::NEG_INFINITY; 400])), format!("{expected} -inf"));
+        let diagonal = (0..400).map(|at| if at % 21 == 0 { f32::NAN } else { 0.0 });
+        assert!(scored(&released(20), 5, &|_| Ok(diagonal.clone().collect())).is_ok());
+    }
+}
