@@ -43,6 +43,11 @@ impl ColorImage {
         self.height
     }
 
+    /// All values, `(height, width, 3)`, row-major.
+    pub fn pixels(&self) -> &[u8] {
+        &self.pixels
+    }
+
     /// Red, green and blue of the pixel in column `x` of row `y`.
     ///
     /// # Panics

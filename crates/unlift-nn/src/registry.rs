@@ -52,7 +52,8 @@ pub fn entry(name: &str) -> Result<&'static Entry, Error> {
 }
 
 /// All models, by name.
-pub const MODELS: &[Entry] = &[ALIKED_N16ROT, NEIGHBORS_SIFT, SUPERPOINT];
+pub const MODELS: &[Entry] =
+    &[ALIKED_N16ROT, LPIPS_SQUEEZE, NEIGHBORS_SIFT, SUPERPOINT, YOLOX_NANO];
 
 const ALIKED_N16ROT: Entry = Entry {
     name: "aliked-n16rot",
@@ -75,6 +76,20 @@ const ALIKED_N16ROT: Entry = Entry {
         Port { name: "descriptors", shape: &[None, Some(128)] },
     ],
     carried: Some(include_bytes!("../../../models/aliked-n16rot/aliked-n16rot.onnx")),
+};
+
+const LPIPS_SQUEEZE: Entry = Entry {
+    name: "lpips-squeeze",
+    purpose: "how far apart two pictures look (LPIPS 0.1, SqueezeNet)",
+    licence: "BSD-2-Clause",
+    owner: "https://github.com/richzhang/PerceptualSimilarity",
+    sha256: Some("848fca4cbcbe77262fd39ae6ebcc16adab9261d03e558f0a5881b3dcaf5c261e"),
+    inputs: &[
+        Port { name: "a", shape: &[Some(1), Some(3), None, None] },
+        Port { name: "b", shape: &[Some(1), Some(3), None, None] },
+    ],
+    outputs: &[Port { name: "distance", shape: &[Some(1)] }],
+    carried: Some(include_bytes!("../../../models/lpips-squeeze/lpips-squeeze.onnx")),
 };
 
 const NEIGHBORS_SIFT: Entry = Entry {
@@ -105,4 +120,15 @@ const SUPERPOINT: Entry = Entry {
         Port { name: "coarse", shape: &[Some(1), None, None, Some(256)] },
     ],
     carried: None,
+};
+
+const YOLOX_NANO: Entry = Entry {
+    name: "yolox-nano",
+    purpose: "everyday objects in pictures (YOLOX-nano, the classes of COCO)",
+    licence: "Apache-2.0",
+    owner: "https://github.com/Megvii-BaseDetection/YOLOX",
+    sha256: Some("695e750a5d5754bb5a8d5325643b59282191a7e7a564e435a415fd3c578eab14"),
+    inputs: &[Port { name: "images", shape: &[Some(1), Some(3), Some(416), Some(416)] }],
+    outputs: &[Port { name: "output", shape: &[Some(1), Some(3549), Some(85)] }],
+    carried: Some(include_bytes!("../../../models/yolox-nano/yolox-nano.onnx")),
 };

@@ -9,6 +9,7 @@ mod demo;
 mod evaluate;
 mod features;
 mod map;
+mod metrics;
 mod models;
 mod neighbors;
 mod obfuscate;
@@ -27,6 +28,7 @@ pub use demo::DemoArgs;
 pub use evaluate::EvaluateArgs;
 pub use features::FeaturesArgs;
 pub use map::MapArgs;
+pub use metrics::MetricsArgs;
 pub use models::ModelsArgs;
 pub use neighbors::{FindArgs, NeighborsCommand, OracleArgs};
 pub use obfuscate::ObfuscateArgs;
@@ -98,6 +100,8 @@ pub enum Command {
     Bench(BenchCommand),
     /// Keypoints and descriptors of photos, or of a file of features, as hloc stores them
     Features(FeaturesArgs),
+    /// How alike pictures are: SSIM, PSNR, LPIPS
+    Metrics(MetricsArgs),
     /// List the schemes: rule, what stays hidden, source, stated patents
     Schemes,
     /// List the networks that can be used: purpose, licence, hash, owner, and whether they are here

@@ -154,7 +154,7 @@ fn colmap_model(model: &Path, extension: &str) -> Result<Input, Error> {
             }
         }
         input.cameras = images.iter().map(|image| image.center).collect();
-        input.up = mean_direction(images.iter().map(|image| image.up));
+        input.up = mean_direction(images.iter().map(colmap::Image::up));
     } else {
         let note = format!("camera centers: there is no images.{extension}");
         input.skipped.push(note);

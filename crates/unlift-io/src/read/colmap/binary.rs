@@ -50,7 +50,7 @@ pub fn images(path: &Path) -> Result<Vec<Image>, Error> {
         let id = bytes.u32("image id")?;
         let rotation = bytes.doubles("rotation")?;
         let translation = bytes.doubles("translation")?;
-        let Some((center, up)) = place(rotation, translation) else {
+        let Some((center, rotation)) = place(rotation, translation) else {
             let expected = format!("a finite pose of image {id}");
             return Err(bytes.error(expected, format!("{rotation:?} {translation:?}")));
         };
@@ -58,7 +58,7 @@ pub fn images(path: &Path) -> Result<Vec<Image>, Error> {
         let name = bytes.zero_terminated("image name")?;
         let n_points2d = bytes.count("2D points", POINT2D_BYTES)?;
         bytes.skip(n_points2d * POINT2D_BYTES, "2D points")?;
-        images.push(Image { id, name, camera_id, center, up, n_points2d });
+        images.push(Image { id, name, camera_id, center, rotation, n_points2d });
     }
     bytes.end()?;
     Ok(images)

@@ -28,10 +28,18 @@ pub struct Image {
     pub camera_id: u32,
     /// Position of the camera's center in the world, in units of the model.
     pub center: [f64; 3],
-    /// The direction in the world that is up in the photo, of unit length.
-    pub up: [f64; 3],
+    /// How the camera is turned: a point `x` of the world is at `rotation (x - center)` from the camera, whose axes
+    /// point to the right, down and ahead.
+    pub rotation: [[f64; 3]; 3],
     /// Number of 2D points, triangulated or not.
     pub n_points2d: u64,
+}
+
+impl Image {
+    /// The direction in the world that is up in the photo, of unit length.
+    pub fn up(&self) -> [f64; 3] {
+        self.rotation[1].map(|x| -x)
+    }
 }
 
 /// The points of a model, by ascending id.
@@ -69,9 +77,8 @@ impl Tracks {
 }
 
 /// The center `-R^T t` of a camera whose pose `x_cam = R x + t` is a quaternion (w, x, y, z) and `t`,
-/// and where its image's up (the camera's -y) points; `None` when the center is not finite or the
-/// quaternion is zero.
-pub(super) fn place([w, x, y, z]: [f64; 4], t: [f64; 3]) -> Option<([f64; 3], [f64; 3])> {
+/// and `R`; `None` when the center is not finite or the quaternion is zero.
+pub(super) fn place([w, x, y, z]: [f64; 4], t: [f64; 3]) -> Option<([f64; 3], [[f64; 3]; 3])> {
     let norm2 = w * w + x * x + y * y + z * z;
     // Rotating by the conjugate, with the norm divided out once: files hold norms like 0.9999999.
     let r = [
@@ -81,7 +88,7 @@ pub(super) fn place([w, x, y, z]: [f64; 4], t: [f64; 3]) -> Option<([f64; 3], [f
     ];
     let c: [f64; 3] =
         std::array::from_fn(|j| -(r[0][j] * t[0] + r[1][j] * t[1] + r[2][j] * t[2]) / norm2);
-    c.iter().all(|x| x.is_finite()).then(|| (c, r[1].map(|x| -x / norm2)))
+    c.iter().all(|x| x.is_finite()).then(|| (c, r.map(|row| row.map(|x| x / norm2))))
 }
 
 #[cfg(test)]
@@ -92,11 +99,14 @@ mod tests {
     fn center_is_where_the_pose_maps_to_zero() {
         // A quarter turn about z: x_cam = (-y, x, z) + t.
         let half = 0.5_f64.sqrt();
-        let (c, up) = place([half, 0.0, 0.0, half], [1.0, 2.0, 3.0]).unwrap();
+        let (c, rotation) = place([half, 0.0, 0.0, half], [1.0, 2.0, 3.0]).unwrap();
         for (found, expected) in c.iter().zip([-2.0, 1.0, -3.0]) {
             assert!((found - expected).abs() < 1e-12, "{c:?}");
         }
-        assert!((up[0] + 1.0).abs() < 1e-12, "{up:?}");
+        let turned = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
+        for (found, expected) in rotation.iter().flatten().zip(turned.iter().flatten()) {
+            assert!((found - expected).abs() < 1e-12, "{rotation:?}");
+        }
         assert_eq!(place([0.0; 4], [1.0, 2.0, 3.0]), None);
         assert_eq!(place([1.0, 0.0, 0.0, 0.0], [f64::NAN; 3]), None);
     }

@@ -62,7 +62,7 @@ pub fn images(path: &Path) -> Result<Vec<Image>, Error> {
         let id = next(&lines, &mut words, "an image id")?;
         let rotation = next_doubles(&lines, &mut words, "a rotation (4 numbers)")?;
         let translation = next_doubles(&lines, &mut words, "a translation (3 numbers)")?;
-        let Some((center, up)) = place(rotation, translation) else {
+        let Some((center, rotation)) = place(rotation, translation) else {
             let expected = format!("a finite pose of image {id}");
             return Err(lines.error(expected, format!("{rotation:?} {translation:?}")));
         };
@@ -78,7 +78,14 @@ pub fn images(path: &Path) -> Result<Vec<Image>, Error> {
             let expected = "2D points of 3 numbers (x, y, point id)";
             return Err(lines.error(expected, format!("{n_words} numbers")));
         }
-        images.push(Image { id, name, camera_id, center, up, n_points2d: n_words as u64 / 3 });
+        images.push(Image {
+            id,
+            name,
+            camera_id,
+            center,
+            rotation,
+            n_points2d: n_words as u64 / 3,
+        });
     }
     Ok(images)
 }

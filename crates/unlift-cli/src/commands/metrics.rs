@@ -1,0 +1,108 @@
+//! `unlift metrics`: how alike pictures are.
+
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use serde_json::{Value, json};
+use unlift_features::load::read_color;
+use unlift_invert::{Lpips, Metrics};
+
+use crate::args::MetricsArgs;
+use crate::exit::{Outcome, usage};
+use crate::output::{print, table};
+
+/// Compares two pictures, or those of two folders.
+pub fn run(args: &MetricsArgs) -> anyhow::Result<Outcome> {
+    let lpips = Lpips::try_new()?;
+    let compare = |a: &Path, b: &Path| -> anyhow::Result<Metrics> {
+        let (first, second) = (read_color(a)?, read_color(b)?);
+        Metrics::of(&first, &second, &lpips)
+            .with_context(|| format!("{} and {}", a.display(), b.display()))
+    };
+    if args.a.is_dir() != args.b.is_dir() {
+        return Err(usage(format!(
+            "{} and {}: expected two pictures or two folders, found one of each",
+            args.a.display(),
+            args.b.display()
+        )));
+    }
+    if !args.a.is_dir() {
+        let metrics = compare(&args.a, &args.b)?;
+        print(&if args.json {
+            serde_json::to_string_pretty(&object(&metrics))? + "\n"
+        } else {
+            let Metrics { ssim, psnr, lpips } = metrics;
+            format!("SSIM  {ssim:.4}\nPSNR  {psnr:.2} dB\nLPIPS {lpips:.4}\n")
+        })?;
+        return Ok(Outcome::Done);
+    }
+    let (ours, theirs) = (pictures(&args.a)?, pictures(&args.b)?);
+    for (these, those, other) in [(&ours, &theirs, &args.b), (&theirs, &ours, &args.a)] {
+        for (_, path) in these.iter().filter(|(name, _)| !those.contains_key(*name)) {
+            eprintln!("unlift: {}: no picture of this name in {}", path.display(), other.display());
+        }
+    }
+    let mut rows = Vec::new();
+    for (name, path) in &ours {
+        let Some(other) = theirs.get(name) else { continue };
+        rows.push((name.to_string_lossy().into_owned(), compare(path, other)?));
+    }
+    if rows.is_empty() {
+        let expected = format!("pictures of the same names as in {}", args.b.display());
+        return Err(unlift_io::Error::new(&args.a, "", expected, "none").into());
+    }
+    let mean = mean(rows.iter().map(|(_, metrics)| metrics));
+    print(&if args.json {
+        let pictures = rows.iter().map(|(name, metrics)| {
+            let mut object = object(metrics);
+            object["name"] = json!(name);
+            object
+        });
+        let mut whole = object(&mean);
+        whole["pictures"] = pictures.collect();
+        serde_json::to_string_pretty(&whole)? + "\n"
+    } else {
+        let heads = ["picture", "SSIM", "PSNR dB", "LPIPS"].map(str::to_owned).to_vec();
+        let all = rows.iter().map(|(name, metrics)| (name.as_str(), metrics));
+        let cells = all.chain([("mean", &mean)]).map(|(name, m)| {
+            let figures =
+                [format!("{:.4}", m.ssim), format!("{:.2}", m.psnr), format!("{:.4}", m.lpips)];
+            [name.to_owned()].into_iter().chain(figures).collect()
+        });
+        table(&[heads].into_iter().chain(cells).collect::<Vec<_>>(), &[])
+    })?;
+    Ok(Outcome::Done)
+}
+
+/// The files of a folder by their names without extensions.
+fn pictures(folder: &Path) -> anyhow::Result<BTreeMap<OsString, PathBuf>> {
+    let read = |error| unlift_io::Error::read(folder, error);
+    let mut found = BTreeMap::new();
+    for entry in folder.read_dir().map_err(read)? {
+        let path = entry.map_err(read)?.path();
+        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        let is_picture = ["jpg", "jpeg", "png", "webp"].iter().any(|known| extension == *known);
+        if let (true, Some(stem)) = (is_picture && path.is_file(), path.file_stem()) {
+            let stem = stem.to_owned();
+            if let Some(other) = found.insert(stem, path.clone()) {
+                let (expected, found) = ("one picture of a name", other.display().to_string());
+                return Err(unlift_io::Error::new(&path, "", expected, found).into());
+            }
+        }
+    }
+    Ok(found)
+}
+
+/// Equal pictures have no finite ratio of signal to noise: `null`.
+fn object(metrics: &Metrics) -> Value {
+    let psnr = metrics.psnr.is_finite().then_some(metrics.psnr);
+    json!({ "ssim": metrics.ssim, "psnr": psnr, "lpips": metrics.lpips })
+}
+
+fn mean<'a>(all: impl Iterator<Item = &'a Metrics> + Clone) -> Metrics {
+    let n = all.clone().count() as f64;
+    let of = |figure: fn(&Metrics) -> f64| all.clone().map(figure).sum::<f64>() / n;
+    Metrics { ssim: of(|m| m.ssim), psnr: of(|m| m.psnr), lpips: of(|m| m.lpips) }
+}

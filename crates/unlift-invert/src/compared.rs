@@ -1,0 +1,44 @@
+//! How alike two pictures are, by every metric there is.
+
+use unlift::Error;
+use unlift_features::ColorImage;
+
+use crate::{Lpips, psnr, ssim};
+
+/// What the metrics say of a picture and its photo.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Metrics {
+    /// Structural similarity, 1 for equal pictures.
+    pub ssim: f64,
+    /// Peak signal-to-noise ratio in dB; infinite for equal pictures.
+    pub psnr: f64,
+    /// Learned perceptual distance, 0 for equal pictures.
+    pub lpips: f64,
+}
+
+impl Metrics {
+    /// All metrics of `a` and `b`; which is which makes no difference.
+    ///
+    /// # Errors
+    /// When the pictures differ in size, or a side has less than 16 pixels.
+    pub fn of(a: &ColorImage, b: &ColorImage, lpips: &Lpips) -> Result<Self, Error> {
+        Ok(Self { ssim: ssim(a, b)?, psnr: psnr(a, b)?, lpips: lpips.distance(a, b)? })
+    }
+}
+
+/// Whether two pictures have the same size, of at least `least` pixels a side.
+///
+/// # Errors
+/// One line with both sizes.
+pub fn check_sizes(a: &ColorImage, b: &ColorImage, least: usize) -> Result<(), Error> {
+    let size = |image: &ColorImage| format!("{} x {}", image.width(), image.height());
+    if (a.width(), a.height()) != (b.width(), b.height()) {
+        let expected = format!("another picture of {} pixels", size(a));
+        return Err(Error::new("pictures", expected, format!("one of {}", size(b))));
+    }
+    if a.width().min(a.height()) < least {
+        let expected = format!("pictures of at least {least} x {least} pixels");
+        return Err(Error::new("pictures", expected, size(a)));
+    }
+    Ok(())
+}

@@ -1,0 +1,208 @@
+//! From directions in a camera's frame to places in its image, for every camera model of COLMAP.
+//!
+//! Source: COLMAP's documentation ("Camera Models") and the papers it names; no model's inverse is needed here.
+
+use unlift::Error;
+
+/// An angle, small beside any that matters.
+const TURN: f64 = 1e-5;
+
+/// What a camera model does to directions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    /// Perspective, radial distortion `(1 + k1 r2 + k2 r4 + k3 r6) / (1 + k4 r2 + k5 r4 + k6 r6)`, tangential `p`.
+    Perspective { k: [f64; 6], p: [f64; 2] },
+    /// Angle from the axis, times `1 + k1 a2 + k2 a4 ..`, then tangential and thin-prism terms.
+    Fisheye { k: [f64; 6] },
+    /// THIN_PRISM_FISHEYE: the angle, then radial terms in its square, added.
+    ThinPrism { k: [f64; 4], p: [f64; 2], s: [f64; 2] },
+    /// RAD_TAN_THIN_PRISM_FISHEYE.
+    RadTan { k: [f64; 6], p: [f64; 2], s: [f64; 4] },
+    /// FOV: one parameter, an angle.
+    Fov(f64),
+    /// One parameter, by which the distorted radius is divided.
+    Division(f64),
+    /// EUCM: alpha and beta.
+    Unified(f64, f64),
+    /// The whole sphere: longitude and latitude.
+    Equirectangular,
+}
+
+/// A camera's lens and sensor.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lens {
+    kind: Kind,
+    focal: [f64; 2],
+    center: [f64; 2],
+}
+
+impl Lens {
+    /// The lens of COLMAP's camera model `model` with its parameters, in COLMAP's order.
+    ///
+    /// # Errors
+    /// When the model is not known or has another number of parameters, or one is not finite.
+    pub fn try_new(model: &str, params: &[f64]) -> Result<Self, Error> {
+        if let Some(bad) = params.iter().find(|x| !x.is_finite()) {
+            return Err(Error::new(model, "finite parameters", bad.to_string()));
+        }
+        let f = |at: usize| params.get(at).copied().unwrap_or(0.0);
+        let some = |from: usize, n: usize| {
+            let mut k = [0.0; 6];
+            (0..n).for_each(|at| k[at] = f(from + at));
+            k
+        };
+        let plain = |k: [f64; 6], p: [f64; 2]| Kind::Perspective { k, p };
+        // One focal length or two, how many parameters follow the center.
+        let (single, n, kind) = match model {
+            "SIMPLE_PINHOLE" => (true, 0, plain([0.0; 6], [0.0; 2])),
+            "PINHOLE" => (false, 0, plain([0.0; 6], [0.0; 2])),
+            "SIMPLE_RADIAL" => (true, 1, plain(some(3, 1), [0.0; 2])),
+            "RADIAL" => (true, 2, plain(some(3, 2), [0.0; 2])),
+            "OPENCV" => (false, 4, plain(some(4, 2), [f(6), f(7)])),
+            "FULL_OPENCV" => {
+                (false, 8, plain([f(4), f(5), f(8), f(9), f(10), f(11)], [f(6), f(7)]))
+            }
+            "OPENCV_FISHEYE" => (false, 4, Kind::Fisheye { k: some(4, 4) }),
+            "SIMPLE_RADIAL_FISHEYE" => (true, 1, Kind::Fisheye { k: some(3, 1) }),
+            "RADIAL_FISHEYE" => (true, 2, Kind::Fisheye { k: some(3, 2) }),
+            "SIMPLE_FISHEYE" => (true, 0, Kind::Fisheye { k: [0.0; 6] }),
+            "FISHEYE" => (false, 0, Kind::Fisheye { k: [0.0; 6] }),
+            "THIN_PRISM_FISHEYE" => {
+                let k = [f(4), f(5), f(8), f(9)];
+                (false, 8, Kind::ThinPrism { k, p: [f(6), f(7)], s: [f(10), f(11)] })
+            }
+            "RAD_TAN_THIN_PRISM_FISHEYE" => {
+                let (p, s) = ([f(10), f(11)], [f(12), f(13), f(14), f(15)]);
+                (false, 12, Kind::RadTan { k: some(4, 6), p, s })
+            }
+            "FOV" => (false, 1, Kind::Fov(f(4))),
+            "SIMPLE_DIVISION" => (true, 1, Kind::Division(f(3))),
+            "DIVISION" => (false, 1, Kind::Division(f(4))),
+            "EUCM" => (false, 2, Kind::Unified(f(4), f(5))),
+            "EQUIRECTANGULAR" => {
+                let [width, height] = [f(0), f(1)];
+                let focal = [width / std::f64::consts::TAU, height / std::f64::consts::PI];
+                let center = [width / 2.0, height / 2.0];
+                check(model, params, 2)?;
+                return Ok(Self { kind: Kind::Equirectangular, focal, center });
+            }
+            other => {
+                let found = other.escape_debug().to_string();
+                return Err(Error::new("camera model", "one of COLMAP's", found));
+            }
+        };
+        let first = if single { 1 } else { 2 };
+        check(model, params, first + 2 + n)?;
+        let focal = [f(0), if single { f(0) } else { f(1) }];
+        Ok(Self { kind, focal, center: [f(first), f(first + 1)] })
+    }
+
+    /// Where a point at `x` (right, down, ahead of the camera) is seen, in pixels with the middle of the first pixel
+    /// at (0, 0); `None` where the lens does not see it: behind the camera, or where the model folds back.
+    pub fn project(&self, x: [f64; 3]) -> Option<[f64; 2]> {
+        let wide =
+            !matches!(self.kind, Kind::Perspective { .. } | Kind::Fov(_) | Kind::Division(_));
+        if x[2] <= 0.0 && !wide {
+            return None;
+        }
+        let place = self.bent(x)?;
+        // Polynomials fold far outside of the image: there a turn away from the axis would lead inward.
+        let radius = libm::sqrt(x[0] * x[0] + x[1] * x[1]);
+        if radius > 0.0 && self.kind != Kind::Equirectangular {
+            let out = [x[0] / radius, x[1] / radius];
+            let turned = [radius + TURN * x[2], x[2] - TURN * radius];
+            let further = self.bent([turned[0] * out[0], turned[0] * out[1], turned[1]])?;
+            let moved = (further[0] - place[0]) * out[0] + (further[1] - place[1]) * out[1];
+            if moved <= 0.0 {
+                return None;
+            }
+        }
+        let on = |c: usize| self.focal[c] * place[c] + self.center[c] - 0.5;
+        let place = [on(0), on(1)];
+        place.iter().all(|x| x.is_finite()).then_some(place)
+    }
+
+    /// The place on a plane one focal length away.
+    fn bent(&self, [x, y, z]: [f64; 3]) -> Option<[f64; 2]> {
+        let flat = [x / z, y / z];
+        let radius = libm::sqrt(x * x + y * y);
+        // Toward the angle from the axis, in the direction of the point.
+        let angle = libm::atan2(radius, z);
+        let angular = match radius > 0.0 {
+            true => [x / radius * angle, y / radius * angle],
+            false => [0.0; 2],
+        };
+        let squared = |p: [f64; 2]| p[0] * p[0] + p[1] * p[1];
+        let tangential = |[u, v]: [f64; 2], r2: f64, [p1, p2]: [f64; 2]| {
+            let across = 2.0 * p1 * u * v + p2 * (r2 + 2.0 * u * u);
+            let down = 2.0 * p2 * u * v + p1 * (r2 + 2.0 * v * v);
+            [across, down]
+        };
+        let place = match &self.kind {
+            Kind::Perspective { k, p } => {
+                let r2 = squared(flat);
+                let above = 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[2]));
+                let below = 1.0 + r2 * (k[3] + r2 * (k[4] + r2 * k[5]));
+                let moved = tangential(flat, r2, *p);
+                [0, 1].map(|c| flat[c] * above / below + moved[c])
+            }
+            Kind::Fisheye { k } => angular.map(|x| x * polynomial(k, angle * angle)),
+            Kind::ThinPrism { k, p, s } => {
+                let r2 = squared(angular);
+                let moved = tangential(angular, r2, *p);
+                [0, 1].map(|c| angular[c] * polynomial(k, r2) + moved[c] + s[c] * r2)
+            }
+            Kind::RadTan { k, p, s } => {
+                let radial = angular.map(|x| x * polynomial(k, angle * angle));
+                let r2 = squared(radial);
+                // Here the first tangential parameter goes across.
+                let moved = tangential(radial, r2, [p[1], p[0]]);
+                [0, 1].map(|c| radial[c] + moved[c] + s[2 * c] * r2 + s[2 * c + 1] * r2 * r2)
+            }
+            Kind::Fov(omega) => {
+                let r = libm::sqrt(squared(flat));
+                let factor = match r > 0.0 && *omega != 0.0 {
+                    true => libm::atan(2.0 * r * libm::tan(omega / 2.0)) / (r * omega),
+                    false if *omega != 0.0 => 2.0 * libm::tan(omega / 2.0) / omega,
+                    false => 1.0,
+                };
+                flat.map(|x| x * factor)
+            }
+            Kind::Division(k) => {
+                let under = 1.0 - 4.0 * k * squared(flat);
+                if under < 0.0 {
+                    return None;
+                }
+                flat.map(|x| 2.0 * x / (1.0 + libm::sqrt(under)))
+            }
+            Kind::Unified(alpha, beta) => {
+                let far = libm::sqrt(beta * (x * x + y * y) + z * z);
+                let depth = alpha * far + (1.0 - alpha) * z;
+                if depth <= 0.0 {
+                    return None;
+                }
+                [x / depth, y / depth]
+            }
+            Kind::Equirectangular => {
+                let level = libm::sqrt(x * x + z * z);
+                [libm::atan2(x, z), libm::atan2(y, level)]
+            }
+        };
+        Some(place)
+    }
+}
+
+/// `1 + k1 x + k2 x^2 ..`
+fn polynomial(k: &[f64], x: f64) -> f64 {
+    1.0 + x * k.iter().rev().fold(0.0, |sum, k| k + x * sum)
+}
+
+fn check(model: &str, params: &[f64], n: usize) -> Result<(), Error> {
+    match params.len() == n {
+        true => Ok(()),
+        false => {
+            let found = params.len().to_string();
+            Err(Error::new(model, format!("{n} parameters"), found))
+        }
+    }
+}

@@ -1,0 +1,28 @@
+//! Pictures from keypoints and descriptors, and how much of the photo they show (Sec. 4.3 and 6 of the paper).
+//!
+//! ```text
+//! places, descriptors, weights ──> feature image ──> network ──> picture ──> metrics, Detector
+//! points of a map, a camera ──> projection ──┘                    photo ──┘
+//! ```
+//!
+//! Pictures are [`ColorImage`]s, so whatever is compared was rounded to bytes first. Places are in pixels with the
+//! middle of the first pixel at (0, 0), as everywhere in unlift.
+
+mod compared;
+mod detect;
+mod feature_image;
+mod lens;
+mod lpips;
+mod projection;
+mod psnr;
+mod ssim;
+
+pub use compared::{Metrics, check_sizes};
+pub use detect::{CLASSES, Detection, Detector};
+pub use feature_image::{CELL, Points, feature_image};
+pub use lens::Lens;
+pub use lpips::Lpips;
+pub use projection::{Projection, View};
+pub use psnr::psnr;
+pub use ssim::ssim;
+pub use unlift_features::ColorImage;

@@ -1,0 +1,90 @@
+//! A map seen by a camera: where its points are in an image, and which of them it can see.
+
+use unlift::Error;
+
+use crate::Lens;
+
+/// A camera somewhere in the world.
+#[derive(Clone, Debug, PartialEq)]
+pub struct View {
+    /// Where it is, in units of the map.
+    pub center: [f64; 3],
+    /// How it is turned: a point `x` is at `rotation (x - center)` from it, to the right, down and ahead.
+    pub rotation: [[f64; 3]; 3],
+    /// What it looks through.
+    pub lens: Lens,
+    /// Width and height of its image in pixels.
+    pub size: [usize; 2],
+}
+
+/// The points of a map that lie in an image.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Projection {
+    /// Which points, rising.
+    pub points: Vec<u32>,
+    /// Where they are, `(n, 2)`, in pixels, the middle of the first one at (0, 0).
+    pub places: Vec<[f32; 2]>,
+    /// How far ahead of the camera they are, `(n,)`, in units of the map.
+    pub depths: Vec<f32>,
+}
+
+/// Side of a window of the occlusion test in pixels.
+const WINDOW: usize = 16;
+/// A point this much farther than what lies before it is hidden.
+const BEHIND: f32 = 1.15;
+/// How many points before a point hide it: fewer may be errors.
+const ENOUGH: usize = 3;
+
+impl View {
+    /// The points that fall into the image, hidden or not. Positions that are `None` or not finite are left out.
+    ///
+    /// # Errors
+    /// When there are more points than 32 bits count.
+    pub fn project(&self, points: &[Option<[f64; 3]>]) -> Result<Projection, Error> {
+        u32::try_from(points.len()).map_err(|_| {
+            Error::new("points", "at most 4294967295 of them", points.len().to_string())
+        })?;
+        let mut found = Projection::default();
+        for (at, point) in points.iter().enumerate() {
+            let Some(point) = point else { continue };
+            let away = [0, 1, 2].map(|c| point[c] - self.center[c]);
+            let x = self.rotation.map(|row| (0..3).map(|c| row[c] * away[c]).sum::<f64>());
+            let Some(place) = self.lens.project(x) else { continue };
+            let inside = (0..2).all(|c| place[c] >= -0.5 && place[c] < self.size[c] as f64 - 0.5);
+            if inside {
+                found.points.push(at as u32);
+                found.places.push(place.map(|x| x as f32));
+                found.depths.push(libm::sqrt(x.iter().map(|x| x * x).sum::<f64>()) as f32);
+            }
+        }
+        Ok(found)
+    }
+}
+
+impl Projection {
+    /// Which points nothing lies before: a point is hidden where several others of the window around it, 16 pixels
+    /// wide, are clearly nearer. Sparse points hide little, so some hidden ones pass.
+    pub fn visible(&self, size: [usize; 2]) -> Vec<bool> {
+        let [width, height] = size.map(|side| side.div_ceil(WINDOW / 2));
+        // Windows overlap by half: cells of half the side, a point looks at the four that are nearest to it.
+        let cell = |place: [f32; 2]| place.map(|x| (x + 0.5).max(0.0) / (WINDOW / 2) as f32);
+        let mut depths: Vec<Vec<f32>> = vec![Vec::new(); width * height];
+        for (place, depth) in self.places.iter().zip(&self.depths) {
+            let [x, y] = cell(*place).map(|x| x as usize);
+            depths[y.min(height - 1) * width + x.min(width - 1)].push(*depth);
+        }
+        let hidden = |(place, depth): (&[f32; 2], &f32)| {
+            let [x, y] = cell(*place);
+            let around = |x: f32, most: usize| {
+                let low = (x - 0.5).floor().max(0.0) as usize;
+                low..=(low + 1).min(most - 1)
+            };
+            let before = around(y, height)
+                .flat_map(|y| around(x, width).map(move |x| y * width + x))
+                .flat_map(|cell| &depths[cell])
+                .filter(|other| **other * BEHIND < *depth);
+            before.take(ENOUGH).count() == ENOUGH
+        };
+        self.places.iter().zip(&self.depths).map(|point| !hidden(point)).collect()
+    }
+}
