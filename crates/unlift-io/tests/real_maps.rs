@@ -181,12 +181,13 @@ fn what_is_said_about_a_real_map_comes_true() {
             eprintln!("{name}: said {said:.3}, was {was:.3}, {} points", bin.n);
             off += bin.n as f64 * (said - was).abs();
             points += bin.n as f64;
-            // Never much more than comes true (by 0.01); in the middle, where few points are, less is said (by 0.08, and by
-            // 0.07 near 0.86).
-            let most = if said > 0.8 { 0.08 } else { 0.11 };
+            // Never much more than comes true (measured: by 0.01); less is said in the middle, where few points are (by
+            // 0.082), and near 0.86 (by 0.071).
+            let most = if said > 0.8 { 0.075 } else { 0.09 };
             let off = was - said;
-            assert!((-0.03..=most).contains(&off), "{name}: said {said:.3}, was {was:.3}");
+            assert!((-0.02..=most).contains(&off), "{name}: said {said:.3}, was {was:.3}");
         }
-        assert!(off / points <= 0.04, "{name}: off by {:.3} in the mean", off / points);
+        // Measured: 0.035 and 0.032.
+        assert!(off / points <= 0.037, "{name}: off by {:.3} in the mean", off / points);
     }
 }
