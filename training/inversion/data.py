@@ -19,14 +19,13 @@ from raster import raster
 CROP = 256
 
 
-def prepare(out: pathlib.Path, folders: list[pathlib.Path], sizes: list[float]):
+def prepare(out: pathlib.Path, folders: list[pathlib.Path], sizes: list[float], most: int | None):
     for folder in folders:
         with open(folder / "SOURCES.csv", newline="") as file:
             rows = list(csv.DictReader(file))
         for size in sizes:
-            for row in rows:
-                if row["split"] not in ("train", "val"):
-                    continue
+            of_split = {split: [row for row in rows if row["split"] == split][:most] for split in ("train", "val")}
+            for row in of_split["train"] + of_split["val"]:
                 to = out / f"{row['split']}-{size:g}" / f"{folder.name}-{row['file']}"
                 to.parent.mkdir(parents=True, exist_ok=True)
                 with Image.open(folder / row["file"]) as photo:
@@ -113,6 +112,7 @@ class Batches:
 
     def batch(self, step: int) -> tuple[torch.Tensor, torch.Tensor]:
         """Feature images (b, columns + 3, 64, 64) and pictures (b, 3, 128, 128)."""
+        assert len(self.photos) >= self.size, f"{len(self.photos)} photos, and {self.size} in a batch"
         per_epoch = len(self.photos) // self.size
         epoch, at = divmod(step, per_epoch)
         order = numpy.random.default_rng([self.seed, epoch]).permutation(len(self.photos))
@@ -140,8 +140,9 @@ def main():
     parser.add_argument("out", type=pathlib.Path)
     parser.add_argument("folders", type=pathlib.Path, nargs="+")
     parser.add_argument("--sizes", default="1,0.7")
+    parser.add_argument("--most", type=int, help="photos per folder, split and size")
     options = parser.parse_args()
-    prepare(options.out, options.folders, [float(size) for size in options.sizes.split(",")])
+    prepare(options.out, options.folders, [float(size) for size in options.sizes.split(",")], options.most)
 
 
 if __name__ == "__main__":

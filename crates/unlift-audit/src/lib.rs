@@ -40,6 +40,7 @@ mod error;
 mod gate;
 mod given;
 pub mod images;
+pub mod inversion;
 mod lengths;
 pub mod maps;
 mod memory;

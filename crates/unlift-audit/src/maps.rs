@@ -1,6 +1,7 @@
 //! One audit from a prepared map to the files in its folder: what `audit map` and `demo` share.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use unlift::audit::{Cell, NotAudited, Observer, Plan, REFERENCE, Row, run, run_released};
@@ -12,12 +13,14 @@ use unlift_io::atomic::OutputSet;
 use unlift_io::hash::hash_files;
 use unlift_io::read;
 use unlift_report::document::{Document, GateResult, Input};
+use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::{ErrorCdf, RenderOptions, render, text_table};
 
 use crate::Error;
 use crate::clouds::Clouds;
 use crate::document::{self, Provenance, ordered};
 use crate::gate::{Candidate, Gate};
+use crate::inversion::MapInversion;
 use crate::lengths::check_scale;
 use crate::outputs::{PAGE, commit_audit};
 use crate::prepare::{Preparation, Prepared, prepare};
@@ -52,6 +55,8 @@ pub struct Job<'a> {
     pub write_clouds: bool,
     /// Figures only.
     pub share_safe: bool,
+    /// Makes pictures of what comes back; the plan measures with it, too.
+    pub inversion: Option<Arc<MapInversion>>,
     /// Hears how it goes.
     pub progress: &'a dyn Progress,
     /// The command line, for the record.
@@ -104,6 +109,7 @@ impl<'a> Job<'a> {
             unit_in_map_units: prepared.unit_in_map_units,
             write_clouds: false,
             share_safe: false,
+            inversion: None,
             progress: &Quiet,
             command: None,
             started,
@@ -111,6 +117,8 @@ impl<'a> Job<'a> {
     }
 }
 
+/// Photos at most that are shown beside pictures of what came back.
+const SHEETS: usize = 3;
 /// Neighbors of every point in a default audit of a map.
 const USUAL_K: usize = 50;
 
@@ -191,6 +199,13 @@ pub fn perform(job: Job<'_>, mut out: OutputSet) -> Result<Finished, Error> {
         drawn: drawn.iter().map(|solver| solver.name()).collect(),
         clouds: job.write_clouds.then(|| (Clouds::new(job.unit_in_map_units), &mut out)),
         thresholds: job.plan.thresholds.iter().map(|t| t.value).collect(),
+        inversion: job.inversion.clone(),
+        sheets: match (&job.inversion, job.share_safe) {
+            (Some(inversion), false) => {
+                vec![Sheet::default(); inversion.n_photos().min(SHEETS)]
+            }
+            _ => Vec::new(),
+        },
         failed: None,
     };
     let of_file = |error| {
@@ -205,7 +220,7 @@ pub fn perform(job: Job<'_>, mut out: OutputSet) -> Result<Finished, Error> {
         }
     };
     if let Some(error) = watcher.failed {
-        return Err(error.into());
+        return Err(error);
     }
     let gates = gate_results(&job.gates, &job.plan, &outcome.rows, &outcome.not_audited)?;
     let options = document::options(&job.plan, job.options);
@@ -221,8 +236,12 @@ pub fn perform(job: Job<'_>, mut out: OutputSet) -> Result<Finished, Error> {
     let shown = if job.share_safe { document.share_safe() } else { document };
     let curves = curves_of(watcher.curves, &outcome.rows);
     let scene = watcher.pictures.map(|p| p.into_scene(&job.cameras, job.up));
-    let options =
-        RenderOptions { share_safe: job.share_safe, error_cdf: curves, ..RenderOptions::default() };
+    let options = RenderOptions {
+        share_safe: job.share_safe,
+        error_cdf: curves,
+        inversions: watcher.sheets,
+        ..RenderOptions::default()
+    };
     let page = render(&shown, scene.as_ref(), &options)?;
     let json = shown.to_json()?;
     commit_audit(out, &page, &json, job.share_safe)?;
@@ -306,7 +325,10 @@ struct Watcher<'a> {
     drawn: Vec<&'static str>,
     clouds: Option<(Clouds, &'a mut OutputSet)>,
     thresholds: Vec<f64>,
-    failed: Option<unlift_io::Error>,
+    inversion: Option<Arc<MapInversion>>,
+    /// What the first cameras see.
+    sheets: Vec<Sheet>,
+    failed: Option<Error>,
 }
 
 /// The solvers whose points are drawn: what joint recovery starts from is not, beside what it ends with.
@@ -357,7 +379,12 @@ impl Observer for Watcher<'_> {
             pictures.add(cell);
         }
         if let (Some((clouds, out)), None) = (&mut self.clouds, &self.failed) {
-            self.failed = clouds.write(out, cell, most).err();
+            self.failed = clouds.write(out, cell, most).err().map(Error::from);
+        }
+        if let (Some(inversion), true, None) =
+            (&self.inversion, self.drawn.contains(&cell.row.solver), &self.failed)
+        {
+            self.failed = inversion.add(cell, &mut self.sheets).err().map(Error::from);
         }
     }
 }

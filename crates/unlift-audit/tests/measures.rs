@@ -5,9 +5,11 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use unlift::audit::{Cell, Measure, Plan};
+use unlift::audit::{Cell, Counts, Image, Measure, Plan, Silent, run_images};
+use unlift::geometry::frame::Bounds;
 use unlift::recover::Solver;
-use unlift::{Error, Unit};
+use unlift::truth::Original;
+use unlift::{Error, PointSet, Unit};
 use unlift_audit::{Error as AuditError, Finished, Job, Preparation, Quiet, Shown};
 use unlift_audit::{maps, open_audit};
 use unlift_io::atomic::Rules;
@@ -79,4 +81,53 @@ fn a_measure_that_is_no_number_is_refused() {
     let expected = "results[0].metrics[\"thirds\"]: expected a finite number, found NaN";
     assert!(error.ends_with(expected) && error.lines().count() == 1, "{error}");
     assert!(!place.path().join("audit/audit.json").exists());
+}
+
+/// The points of an image, of those whose names do not begin with `none`.
+#[derive(Debug)]
+struct Size(Counts);
+
+impl Measure<2> for Size {
+    fn counts(&self) -> Counts {
+        self.0
+    }
+
+    fn measure(&self, cell: &Cell<'_, 2>) -> Result<Vec<(String, f64)>, Error> {
+        let named = cell.name.expect("one of many").starts_with("none");
+        let n = cell.original.len() as f64;
+        Ok(if named { Vec::new() } else { vec![("size".to_owned(), n)] })
+    }
+}
+
+/// The figure over images of these names and numbers of points.
+fn size(counts: Counts, images: &[(&str, usize)]) -> Option<f64> {
+    let usual = Plan::<2>::new(Unit::Pixel);
+    let plan = Plan {
+        schemes: usual.schemes.iter().filter(|s| s.name() == "cp2d").cloned().collect(),
+        inlier_ratios: vec![1.0],
+        k: 5,
+        solvers: vec![Solver::Consensus],
+        measures: vec![Arc::new(Size(counts))],
+        ..usual
+    };
+    let images = images.iter().map(|&(name, n)| {
+        let place = |at: usize| [(at * 37 % 101) as f64, (at * 53 % 89) as f64];
+        let points = PointSet::try_new((0..n).map(place).collect(), Unit::Pixel)?;
+        let bounds = Bounds::try_new([-0.5; 2], [127.5; 2])?;
+        let original = Original::within(points, bounds)?;
+        Ok::<_, Error>(Image { name: name.to_owned(), original, descriptors: None })
+    });
+    let outcome = run_images(images, &plan, &mut Silent).unwrap();
+    outcome.rows[0].metrics.get("size").copied()
+}
+
+#[test]
+fn a_mean_over_images_counts_points_or_images() {
+    let images = [("a", 40), ("b", 80)];
+    assert_eq!(size(Counts::Points, &images), Some((40.0 * 40.0 + 80.0 * 80.0) / 120.0));
+    assert_eq!(size(Counts::Images, &images), Some(60.0));
+    // A mean over points must be one over all of them; of images those count that have the figure.
+    let images = [("a", 40), ("none", 80)];
+    assert_eq!(size(Counts::Points, &images), None);
+    assert_eq!(size(Counts::Images, &images), Some(40.0));
 }

@@ -349,6 +349,7 @@ fn help_is_part_of_the_interface() {
         "evaluate",
         "bench recover",
         "features",
+        "invert",
         "metrics",
         "schemes",
         "models",

@@ -57,6 +57,24 @@ impl ColorImage {
         [self.pixels[at], self.pixels[at + 1], self.pixels[at + 2]]
     }
 
+    /// The image at half its size, every pixel the mean of four; an odd last row or column is left out.
+    ///
+    /// # Errors
+    /// When a side has less than two pixels.
+    pub fn halved(&self) -> Result<Self, Error> {
+        let (width, height) = (self.width / 2, self.height / 2);
+        let mut pixels = Vec::with_capacity(3 * width * height);
+        for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (2 * y, 2 * x))) {
+            let corners =
+                [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)].map(|(x, y)| self.pixel(x, y));
+            pixels.extend((0..3).map(|color| {
+                let sum: u32 = corners.iter().map(|corner| u32::from(corner[color])).sum();
+                ((sum + 2) / 4) as u8
+            }));
+        }
+        Self::try_new(width, height, pixels)
+    }
+
     /// Where the middle of pixel `place` of `small`, this image shrunk, is in pixels of this image.
     pub(crate) fn unshrunk<T: Into<f64>>(&self, small: &Self, place: [T; 2]) -> [f32; 2] {
         let scales = [(self.width, small.width), (self.height, small.height)];
@@ -108,5 +126,14 @@ mod tests {
         assert_eq!(image.unshrunk(&small, [0.0, 0.0])[0], 0.5);
         assert_eq!(image.unshrunk(&image, [7.25, 3.0]), [7.25, 3.0]);
         assert_eq!(image.fitted(1).unwrap().height(), 1);
+    }
+
+    #[test]
+    fn halving_takes_means_of_four() {
+        let image = ColorImage::try_new(3, 2, (0..18).map(|at| 10 * at).collect()).unwrap();
+        let small = image.halved().unwrap();
+        assert_eq!((small.width(), small.height()), (1, 1));
+        assert_eq!(small.pixel(0, 0), [60, 70, 80]);
+        assert!(small.halved().is_err());
     }
 }

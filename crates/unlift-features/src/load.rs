@@ -39,6 +39,17 @@ pub fn read_color(path: &Path) -> Result<ColorImage, Error> {
     ColorImage::try_new(width, height, photo.into_rgb8().into_raw())
 }
 
+/// The same as it is stored, not turned: as COLMAP and most other programs see it.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_color_as_stored(path: &Path) -> Result<ColorImage, Error> {
+    let (bytes, name) = bytes_of(path)?;
+    let (photo, _) = decoded(&bytes, &name)?;
+    let (width, height) = (photo.width() as usize, photo.height() as usize);
+    ColorImage::try_new(width, height, photo.into_rgb8().into_raw())
+}
+
 /// The bytes of a file, and how it is called in errors.
 pub(crate) fn bytes_of(path: &Path) -> Result<(Vec<u8>, String), Error> {
     let name = path.display().to_string();
@@ -60,6 +71,13 @@ pub fn decode(bytes: &[u8], name: &str) -> Result<GrayImage, Error> {
 /// # Errors
 /// As [`read`].
 pub(crate) fn upright(bytes: &[u8], name: &str) -> Result<DynamicImage, Error> {
+    let (mut photo, orientation) = decoded(bytes, name)?;
+    photo.apply_orientation(orientation);
+    Ok(photo)
+}
+
+/// The photo as it is stored, and how it is to be turned.
+fn decoded(bytes: &[u8], name: &str) -> Result<(DynamicImage, Orientation), Error> {
     // One line, whatever the name holds.
     let wrong = |expected: &str, found: String| {
         Error::new(name.escape_debug().to_string(), expected, found.escape_debug().to_string())
@@ -82,9 +100,7 @@ pub(crate) fn upright(bytes: &[u8], name: &str) -> Result<DynamicImage, Error> {
         return Err(wrong("at most 268435456 pixels", found));
     }
     let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
-    let mut photo = DynamicImage::from_decoder(decoder).map_err(broken)?;
-    photo.apply_orientation(orientation);
-    Ok(photo)
+    Ok((DynamicImage::from_decoder(decoder).map_err(broken)?, orientation))
 }
 
 /// Gray values as COLMAP makes them: rounded to bytes, weights of Rec. 709, transparency ignored.

@@ -1,11 +1,14 @@
-//! Small pictures of photos, for reports.
+//! Small pictures of photos and other images, for reports.
 
+use std::io::Cursor;
 use std::path::Path;
 
 use ::image::codecs::jpeg::JpegEncoder;
 use ::image::imageops::FilterType;
+use ::image::{ImageError, ImageFormat, Rgb, RgbImage};
 use unlift::Error;
 
+use crate::color::ColorImage;
 use crate::load;
 
 /// Quality of the JPEG, of 100: good enough to recognize, small enough to embed.
@@ -23,9 +26,39 @@ pub fn jpeg(path: &Path, longest: u32) -> Result<Vec<u8>, Error> {
         true => photo.resize(longest, longest, FilterType::Triangle),
         false => photo,
     };
-    let mut small = Vec::new();
-    let encoded =
-        photo.to_rgb8().write_with_encoder(JpegEncoder::new_with_quality(&mut small, QUALITY));
-    encoded.map_err(|error| Error::new(name, "a photo that can be shrunk", error.to_string()))?;
-    Ok(small)
+    encoded(&photo.to_rgb8())
+        .map_err(|error| Error::new(name, "a photo that can be shrunk", error.to_string()))
+}
+
+/// An image, shrunk so that no side exceeds `longest` pixels, as the bytes of a JPEG.
+///
+/// # Errors
+/// When a side still has more than 65,535 pixels.
+pub fn jpeg_of(image: &ColorImage, longest: usize) -> Result<Vec<u8>, Error> {
+    let small = image.fitted(longest);
+    encoded(&buffer(small.as_ref().unwrap_or(image)))
+        .map_err(|error| Error::new("picture", "at most 65535 pixels a side", error.to_string()))
+}
+
+/// An image as the bytes of a PNG.
+///
+/// # Errors
+/// Only without memory.
+pub fn png_of(image: &ColorImage) -> Result<Vec<u8>, Error> {
+    let mut bytes = Cursor::new(Vec::new());
+    buffer(image)
+        .write_to(&mut bytes, ImageFormat::Png)
+        .map_err(|error| Error::new("picture", "one that fits a PNG", error.to_string()))?;
+    Ok(bytes.into_inner())
+}
+
+fn buffer(image: &ColorImage) -> RgbImage {
+    let (width, height) = (image.width() as u32, image.height() as u32);
+    RgbImage::from_fn(width, height, |x, y| Rgb(image.pixel(x as usize, y as usize)))
+}
+
+fn encoded(image: &RgbImage) -> Result<Vec<u8>, ImageError> {
+    let mut bytes = Vec::new();
+    image.write_with_encoder(JpegEncoder::new_with_quality(&mut bytes, QUALITY))?;
+    Ok(bytes)
 }

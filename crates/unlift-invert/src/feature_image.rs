@@ -45,13 +45,24 @@ impl Points<'_> {
         let place = self.places[at].map(|x| x + 0.5);
         let inside = (0..2).all(|c| place[c] >= 0.0 && place[c] < size[c] as f32);
         // Comparisons are false for what is not a number.
-        if !inside || !(self.weights[at] > 0.0) {
+        let trusted = self.weights[at] > 0.0;
+        if !inside || !trusted {
             return None;
         }
         let place = place.map(|x| x / CELL as f32);
         let cell = place.map(|x| x as usize);
         Some((cell, [0, 1].map(|c| 2.0 * (place[c] - cell[c] as f32) - 1.0)))
     }
+}
+
+/// Refuses sizes that no picture has, as files may claim any.
+pub(crate) fn check_size([width, height]: [usize; 2]) -> Result<(), Error> {
+    let sides = 2..=1 << 24;
+    if sides.contains(&width) && sides.contains(&height) && width * height <= 1 << 28 {
+        return Ok(());
+    }
+    let found = format!("{width} x {height}");
+    Err(Error::new("image size", "at least 2 x 2 and at most 268435456 pixels", found))
 }
 
 /// The feature image `(1, columns + 3, height, width)` of points in an image of `size` (width, height) pixels, in cells
@@ -62,9 +73,10 @@ impl Points<'_> {
 /// known. Zero where no point is.
 ///
 /// # Errors
-/// When the columns of `points` differ in length.
+/// When the columns of `points` differ in length, or a side has less than 2 pixels or the image more than 2^28.
 pub fn feature_image(points: &Points<'_>, size: [usize; 2]) -> Result<Tensor, Error> {
     points.check()?;
+    check_size(size)?;
     let columns = points.descriptors.dim();
     let [width, height] = size.map(|side| side.div_ceil(CELL));
     let plane = width * height;
@@ -76,7 +88,8 @@ pub fn feature_image(points: &Points<'_>, size: [usize; 2]) -> Result<Tensor, Er
         let Some((cell, inside)) = points.cell(at, size) else { continue };
         let (cell, mut weight) = (cell[1] * width + cell[0], points.weights[at]);
         if let Some(depths) = points.depths {
-            if !(depths[at] < nearest[cell]) {
+            let nearer = depths[at] < nearest[cell];
+            if !nearer {
                 continue;
             }
             nearest[cell] = depths[at];

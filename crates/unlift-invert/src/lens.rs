@@ -2,10 +2,12 @@
 //!
 //! Source: COLMAP's documentation ("Camera Models") and the papers it names; no model's inverse is needed here.
 
+use std::f64::consts::{FRAC_PI_2, PI};
+
 use unlift::Error;
 
-/// An angle, small beside any that matters.
-const TURN: f64 = 1e-5;
+/// Angles that are tried for the one at which a model folds: 0.03 degrees apart.
+const TRIED: usize = 6000;
 
 /// What a camera model does to directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,10 +30,51 @@ enum Kind {
     Equirectangular,
 }
 
+impl Kind {
+    /// Up to which angle from the axis places lie the further out the larger the angle.
+    fn most(&self) -> f64 {
+        let all = match self {
+            Self::Perspective { .. } | Self::Fov(_) | Self::Division(_) => FRAC_PI_2,
+            _ => PI,
+        };
+        let mut last = 0.0;
+        for at in 1..TRIED {
+            let angle = all * at as f64 / TRIED as f64;
+            let place = match self.radial(angle) {
+                Some(place) if place > last => place,
+                _ => return all * (at - 1) as f64 / TRIED as f64,
+            };
+            last = place;
+        }
+        all
+    }
+
+    /// How far out the radial terms alone lead; `None` beyond a pole.
+    fn radial(&self, angle: f64) -> Option<f64> {
+        Some(match self {
+            Self::Perspective { k, .. } => {
+                let r2 = libm::tan(angle) * libm::tan(angle);
+                let below = 1.0 + r2 * (k[3] + r2 * (k[4] + r2 * k[5]));
+                if below <= 0.0 {
+                    return None;
+                }
+                let above = 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[2]));
+                libm::tan(angle) * above / below
+            }
+            Self::Fisheye { k } | Self::RadTan { k, .. } => angle * polynomial(k, angle * angle),
+            Self::ThinPrism { k, .. } => angle * polynomial(k, angle * angle),
+            // These have no polynomial; where they end, `bent` knows.
+            Self::Fov(_) | Self::Division(_) | Self::Unified(..) | Self::Equirectangular => angle,
+        })
+    }
+}
+
 /// A camera's lens and sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lens {
     kind: Kind,
+    /// Up to which angle from the axis the model leads outward: beyond, its polynomial folds back.
+    most: f64,
     focal: [f64; 2],
     center: [f64; 2],
 }
@@ -81,10 +124,11 @@ impl Lens {
             "EUCM" => (false, 2, Kind::Unified(f(4), f(5))),
             "EQUIRECTANGULAR" => {
                 let [width, height] = [f(0), f(1)];
-                let focal = [width / std::f64::consts::TAU, height / std::f64::consts::PI];
+                let focal = [width / std::f64::consts::TAU, height / PI];
                 let center = [width / 2.0, height / 2.0];
                 check(model, params, 2)?;
-                return Ok(Self { kind: Kind::Equirectangular, focal, center });
+                let (kind, most) = (Kind::Equirectangular, PI);
+                return Ok(Self { kind, most, focal, center });
             }
             other => {
                 let found = other.escape_debug().to_string();
@@ -94,7 +138,7 @@ impl Lens {
         let first = if single { 1 } else { 2 };
         check(model, params, first + 2 + n)?;
         let focal = [f(0), if single { f(0) } else { f(1) }];
-        Ok(Self { kind, focal, center: [f(first), f(first + 1)] })
+        Ok(Self { most: kind.most(), kind, focal, center: [f(first), f(first + 1)] })
     }
 
     /// Where a point at `x` (right, down, ahead of the camera) is seen, in pixels with the middle of the first pixel
@@ -105,18 +149,11 @@ impl Lens {
         if x[2] <= 0.0 && !wide {
             return None;
         }
-        let place = self.bent(x)?;
-        // Polynomials fold far outside of the image: there a turn away from the axis would lead inward.
         let radius = libm::sqrt(x[0] * x[0] + x[1] * x[1]);
-        if radius > 0.0 && self.kind != Kind::Equirectangular {
-            let out = [x[0] / radius, x[1] / radius];
-            let turned = [radius + TURN * x[2], x[2] - TURN * radius];
-            let further = self.bent([turned[0] * out[0], turned[0] * out[1], turned[1]])?;
-            let moved = (further[0] - place[0]) * out[0] + (further[1] - place[1]) * out[1];
-            if moved <= 0.0 {
-                return None;
-            }
+        if libm::atan2(radius, x[2]) > self.most {
+            return None;
         }
+        let place = self.bent(x)?;
         let on = |c: usize| self.focal[c] * place[c] + self.center[c] - 0.5;
         let place = [on(0), on(1)];
         place.iter().all(|x| x.is_finite()).then_some(place)

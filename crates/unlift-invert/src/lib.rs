@@ -1,7 +1,7 @@
 //! Pictures from keypoints and descriptors, and how much of the photo they show (Sec. 4.3 and 6 of the paper).
 //!
 //! ```text
-//! places, descriptors, weights ──> feature image ──> network ──> picture ──> metrics, Detector
+//! places, descriptors, weights ──> feature image ──> Inverter ──> picture ──> metrics, Detector
 //! points of a map, a camera ──> projection ──┘                    photo ──┘
 //! ```
 //!
@@ -11,6 +11,7 @@
 mod compared;
 mod detect;
 mod feature_image;
+mod inverter;
 mod lens;
 mod lpips;
 mod projection;
@@ -20,6 +21,7 @@ mod ssim;
 pub use compared::{Metrics, check_sizes};
 pub use detect::{CLASSES, Detection, Detector};
 pub use feature_image::{CELL, Points, feature_image};
+pub use inverter::Inverter;
 pub use lens::Lens;
 pub use lpips::Lpips;
 pub use projection::{Projection, View};

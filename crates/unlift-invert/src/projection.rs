@@ -3,6 +3,7 @@
 use unlift::Error;
 
 use crate::Lens;
+use crate::feature_image::check_size;
 
 /// A camera somewhere in the world.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,8 +40,9 @@ impl View {
     /// The points that fall into the image, hidden or not. Positions that are `None` or not finite are left out.
     ///
     /// # Errors
-    /// When there are more points than 32 bits count.
+    /// When there are more points than 32 bits count, or no feature image is as large as the camera's.
     pub fn project(&self, points: &[Option<[f64; 3]>]) -> Result<Projection, Error> {
+        check_size(self.size)?;
         u32::try_from(points.len()).map_err(|_| {
             Error::new("points", "at most 4294967295 of them", points.len().to_string())
         })?;
@@ -62,6 +64,17 @@ impl View {
 }
 
 impl Projection {
+    /// Those of the points for which `keep` says so of their row here.
+    #[must_use]
+    pub fn only(&self, keep: impl Fn(usize) -> bool) -> Self {
+        let kept: Vec<usize> = (0..self.points.len()).filter(|&at| keep(at)).collect();
+        Self {
+            points: kept.iter().map(|&at| self.points[at]).collect(),
+            places: kept.iter().map(|&at| self.places[at]).collect(),
+            depths: kept.iter().map(|&at| self.depths[at]).collect(),
+        }
+    }
+
     /// Which points nothing lies before: a point is hidden where several others of the window around it, 16 pixels
     /// wide, are clearly nearer. Sparse points hide little, so some hidden ones pass.
     pub fn visible(&self, size: [usize; 2]) -> Vec<bool> {

@@ -6,9 +6,11 @@ use unlift_invert::Lens;
 const POINTS: [[f64; 3]; 5] =
     [[0.0, 0.0, 2.0], [0.3, -0.2, 1.5], [-0.7, 0.4, 1.1], [1.2, 0.9, 1.4], [-0.1, -1.1, 1.6]];
 
+type Seen = (&'static str, &'static [f64], [[f64; 2]; 5]);
+
 /// Model, parameters, and `pycolmap.Camera.img_from_cam` of each point: the middle of the first pixel at (0.5, 0.5).
 #[rustfmt::skip]
-const SEEN: [(&str, &[f64], [[f64; 2]; 5]); 18] = [
+const SEEN: [Seen; 18] = [
     ("SIMPLE_PINHOLE", &[500.0, 320.0, 240.0], [[320.0, 240.0], [420.0, 173.333333], [1.818182, 421.818182], [748.571429, 561.428571], [288.75, -103.75]]),
     ("PINHOLE", &[500.0, 510.0, 320.0, 240.0], [[320.0, 240.0], [420.0, 172.0], [1.818182, 425.454545], [748.571429, 567.857143], [288.75, -110.625]]),
     ("SIMPLE_RADIAL", &[500.0, 320.0, 240.0, -0.05], [[320.0, 240.0], [419.711111, 173.525926], [10.364388, 416.934636], [723.972303, 542.979227], [289.494629, -95.559082]]),
@@ -50,6 +52,12 @@ fn what_a_lens_cannot_see_is_not_seen() {
     let folding = Lens::try_new("SIMPLE_RADIAL", &[500.0, 320.0, 240.0, -0.25]).unwrap();
     assert!(folding.project([1.1, 0.0, 1.0]).is_some());
     assert_eq!(folding.project([1.2, 0.0, 1.0]), None);
+    // This one folds at a radius of 1 and rises again from 1.41; that one has a pole at 1.83.
+    let rising = Lens::try_new("RADIAL", &[500.0, 320.0, 240.0, -0.5, 0.1]).unwrap();
+    assert!(rising.project([0.9, 0.0, 1.0]).is_some());
+    assert_eq!(rising.project([1.5, 0.0, 1.0]), None);
+    let pole = [500.0, 500.0, 320.0, 240.0, 0.0, 0.0, 0.0, 0.0, 0.0, -0.3, 0.0, 0.0];
+    assert_eq!(Lens::try_new("FULL_OPENCV", &pole).unwrap().project([8.0, 0.0, 1.0]), None);
     // A fisheye sees a bit behind itself.
     let wide = Lens::try_new("SIMPLE_FISHEYE", &[200.0, 320.0, 240.0]).unwrap();
     assert!(wide.project([1.0, 0.0, -0.1]).is_some());

@@ -53,7 +53,7 @@ pub fn entry(name: &str) -> Result<&'static Entry, Error> {
 
 /// All models, by name.
 pub const MODELS: &[Entry] =
-    &[ALIKED_N16ROT, LPIPS_SQUEEZE, NEIGHBORS_SIFT, SUPERPOINT, YOLOX_NANO];
+    &[ALIKED_N16ROT, INVERTER_SIFT, LPIPS_SQUEEZE, NEIGHBORS_SIFT, SUPERPOINT, YOLOX_NANO];
 
 const ALIKED_N16ROT: Entry = Entry {
     name: "aliked-n16rot",
@@ -76,6 +76,17 @@ const ALIKED_N16ROT: Entry = Entry {
         Port { name: "descriptors", shape: &[None, Some(128)] },
     ],
     carried: Some(include_bytes!("../../../models/aliked-n16rot/aliked-n16rot.onnx")),
+};
+
+const INVERTER_SIFT: Entry = Entry {
+    name: "inverter-sift",
+    purpose: "pictures from keypoints or points of a map and their SIFT descriptors",
+    licence: "MIT OR Apache-2.0",
+    owner: "https://github.com/unlift/unlift",
+    sha256: Some("11f2bbd98ee87de04dbc439818197da5eefc28856a35d69ef8d19873d97b71d4"),
+    inputs: &[Port { name: "features", shape: &[Some(1), Some(131), None, None] }],
+    outputs: &[Port { name: "picture", shape: &[Some(1), Some(3), None, None] }],
+    carried: Some(include_bytes!("../../../models/inverter-sift/inverter-sift.onnx")),
 };
 
 const LPIPS_SQUEEZE: Entry = Entry {

@@ -58,9 +58,14 @@ pub(crate) enum Basis {
 
 /// The basis of a row; `None` where it is no attack.
 pub(crate) fn basis(row: &Row) -> Option<Basis> {
-    match row.neighbors.as_str() {
-        _ if row.solver == REFERENCE => None,
-        _ if !has_neighborhoods(row) => Some(Basis::Released),
+    basis_of(&row.neighbors, &row.solver)
+}
+
+/// The same of neighborhoods and a solver by their names.
+pub(crate) fn basis_of(neighbors: &str, solver: &str) -> Option<Basis> {
+    match neighbors {
+        _ if solver == REFERENCE => None,
+        _ if !looks_at_neighbors(solver) => Some(Basis::Released),
         "oracle" => Some(Basis::Oracle),
         "file" => Some(Basis::Given),
         _ => Some(Basis::Released),
@@ -69,7 +74,17 @@ pub(crate) fn basis(row: &Row) -> Option<Basis> {
 
 /// Whether the attack looked at neighborhoods at all.
 pub(crate) fn has_neighborhoods(row: &Row) -> bool {
-    !WITHOUT_NEIGHBORS.contains(&row.solver.as_str())
+    looks_at_neighbors(&row.solver)
+}
+
+/// Whether a solver looks at neighborhoods.
+pub(crate) fn looks_at_neighbors(solver: &str) -> bool {
+    !WITHOUT_NEIGHBORS.contains(&solver)
+}
+
+/// What an attack had to go on: its neighborhoods, or `records alone (tomography)`.
+pub(crate) fn without_solver(given: &Given, solver: &str) -> String {
+    if looks_at_neighbors(solver) { given.label() } else { records_alone(Some(solver)) }
 }
 
 /// Whether the row's neighborhoods were made at a requested ratio; the ratio of others is measured.

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::document::{Document, ImageCounts, LengthUnit};
 use crate::gates::{Gates, gates};
+use crate::inversions::{Lead, Sheet, lead, sheets};
 use crate::options::RenderOptions;
 use crate::page_data::page_data;
 use crate::scene::{Scene3d, encode};
@@ -15,11 +16,12 @@ use crate::verdict::Verdict;
 use crate::{Error, attack, paper, pictures, tables, verdict, words};
 
 /// The template and its parts, by the names they include each other with.
-const TEMPLATES: [(&str, &str); 7] = [
+const TEMPLATES: [(&str, &str); 8] = [
     ("report.html", include_str!("../template/report.html")),
     ("gates.html", include_str!("../template/gates.html")),
     ("verdict.html", include_str!("../template/verdict.html")),
     ("figures.html", include_str!("../template/figures.html")),
+    ("inversions.html", include_str!("../template/inversions.html")),
     ("pictures.html", include_str!("../template/pictures.html")),
     ("tables.html", include_str!("../template/tables.html")),
     ("notes.html", include_str!("../template/notes.html")),
@@ -77,6 +79,8 @@ pub fn render(
     let loss_list =
         [Some(tables::losses(&document)), tables::choices(&document), tables::trials(&document)];
 
+    let shown = if options.share_safe { &[] } else { options.inversions.as_slice() };
+    let (drawn, sheets_left_out) = sheets(shown);
     let page = Page {
         style: STYLE,
         bundle: BUNDLE,
@@ -84,6 +88,9 @@ pub fn render(
         data: script_text(&data),
         blocks: &blocks,
         pictures: pictures.len(),
+        lead: lead(&document, shown),
+        sheets: drawn,
+        sheets_left_out,
         scene: encoded.as_ref().map(|scene| SceneWords {
             n_points: words::thousands(scene.n_points),
             n_drawn: words::thousands(scene.n_drawn as u64),
@@ -146,6 +153,12 @@ struct Page<'a> {
     scene: Option<SceneWords>,
     /// Images that are drawn.
     pictures: usize,
+    /// What the pictures say, and three of them.
+    lead: Option<Lead>,
+    /// Pictures made of what came back.
+    sheets: Vec<Sheet>,
+    /// How many of them would make the page too large.
+    sheets_left_out: usize,
     share_safe: bool,
     subject: Subject,
     verdict: Verdict,

@@ -36,6 +36,7 @@ mod error;
 mod gates;
 mod html;
 mod images;
+pub mod inversions;
 mod lead;
 mod options;
 mod page_data;

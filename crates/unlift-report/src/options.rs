@@ -2,6 +2,7 @@
 
 #[cfg(doc)]
 use crate::document::Document;
+use crate::inversions::Inversion;
 use crate::pictures::Picture;
 
 /// How to draw the page.
@@ -13,6 +14,8 @@ pub struct RenderOptions {
     pub error_cdf: Vec<ErrorCdf>,
     /// Audits of images: those to be drawn, at most [`MOST_PICTURES`](crate::pictures::MOST_PICTURES).
     pub pictures: Vec<Picture>,
+    /// Pictures that a network made of what came back.
+    pub inversions: Vec<Inversion>,
 }
 
 /// The error curve of one row of the results.

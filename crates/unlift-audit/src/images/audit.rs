@@ -11,7 +11,6 @@ use unlift::neighbors::{Overlap, Similarity, Source};
 use unlift_io::atomic::OutputSet;
 use unlift_io::hash::{hash_file, hash_files};
 use unlift_report::document::{ImageCounts, ImageFigures, Input};
-use unlift_report::pictures::Picture;
 use unlift_report::{RenderOptions, render};
 
 use super::FeatureSource;
@@ -20,6 +19,7 @@ use super::stream::{Needs, Stream, Tally, lacking};
 use crate::Error;
 use crate::document::{self, Found, Provenance};
 use crate::gate::Gate;
+use crate::inversion::Inversion;
 use crate::maps::{Finished, check_gates, curve_errors, curves_of, gate_results};
 use crate::outputs::{PAGE, commit_audit};
 use crate::progress::Progress;
@@ -51,6 +51,8 @@ pub struct ImagesJob<'a> {
     pub out: PathBuf,
     /// Figures only.
     pub share_safe: bool,
+    /// Makes pictures of what comes back; the plan measures with it, too.
+    pub inversion: Option<Arc<Inversion>>,
     /// Hears how it goes.
     pub progress: &'a dyn Progress,
     /// The command line, for the record.
@@ -82,13 +84,25 @@ pub fn perform(job: ImagesJob<'_>, out: OutputSet) -> Result<(Option<Finished>, 
     let needs = Needs::of_plan(&job.plan);
     let images = Stream::new(of, &job.chosen, needs, &tally, steps);
     let outcome = run_images(images, &job.plan, &mut watcher)?;
+    for error in job.inversion.iter().flat_map(|inversion| inversion.failed()) {
+        steps.say(&format!("note: not painted: {error}"));
+    }
+    let painted = || outcome.rows.iter().any(|row| row.metrics.contains_key("ssim"));
+    if job.inversion.is_some() && !outcome.rows.is_empty() && !painted() {
+        return Err(Error::request(
+            "--invert: expected photos of the images, found none that can be used",
+        ));
+    }
     let Watcher { figures, errors, curves, .. } = watcher;
     let tally = tally.into_inner();
     let used = Used { used: tally.used.len(), unusable: tally.unusable };
     if used.used == 0 {
         return Ok((None, used));
     }
-    let pictures = if job.share_safe { Vec::new() } else { draw(&job, &tally, &figures)? };
+    let Album { pictures, inversions, .. } = match job.share_safe {
+        true => Album::default(),
+        false => draw(&job, &tally, &figures)?,
+    };
     let gates = gate_results(&job.gates, &job.plan, &outcome.rows, &[])?;
     let provenance = Provenance {
         input: input(&job, &tally, &outcome)?,
@@ -106,6 +120,7 @@ pub fn perform(job: ImagesJob<'_>, out: OutputSet) -> Result<(Option<Finished>, 
         share_safe: job.share_safe,
         error_cdf: curves_of(curves.iter().map(|curve| curve.shares(&errors)).collect(), rows),
         pictures,
+        inversions,
     };
     let page = render(&document, None, &options)?;
     let json = document.to_json()?;
@@ -141,11 +156,7 @@ fn input(job: &ImagesJob<'_>, tally: &Tally, outcome: &Outcome) -> Result<Input,
 /// Audits the images to be drawn once more, by the first solver and seed: an image's randomness comes from
 /// its name, so what is drawn is what was counted, and no picture had to be kept in between. What a server
 /// sees that has no oracle is drawn as well, whether or not it was asked for.
-fn draw(
-    job: &ImagesJob<'_>,
-    tally: &Tally,
-    figures: &[ImageFigures],
-) -> Result<Vec<Picture>, Error> {
+fn draw(job: &ImagesJob<'_>, tally: &Tally, figures: &[ImageFigures]) -> Result<Album, Error> {
     let wanted: Vec<(usize, &str)> = match &job.show {
         Some(show) => {
             let usable = show.iter().filter(|at| tally.used.contains(at));
@@ -162,12 +173,13 @@ fn draw(
     (plan.repeats, plan.reference) = (1, false);
     plan.neighbors.extend(without_oracle(job, &numbers));
     let needs = Needs::of_plan(&plan);
-    let mut album = Album::default();
+    // The album looks for itself.
+    plan.measures.clear();
+    let mut album = Album::new(job.inversion.clone());
     let again = RefCell::new(Tally::default());
     let images = Stream::new((job.source, job.path), &numbers, needs, &again, job.progress);
     run_images(images, &plan, &mut album)?;
-    let mut pictures = album.pictures;
-    for picture in &mut pictures {
+    for picture in &mut album.pictures {
         let at = numbers.iter().position(|&at| job.source.names()[at] == picture.name);
         let Some(at) = at else { continue };
         picture.note = wanted[at].1.to_owned();
@@ -181,7 +193,7 @@ fn draw(
             Err(error) => job.progress.say(&format!("note: {error}")),
         }
     }
-    Ok(pictures)
+    Ok(album)
 }
 
 /// What needs no training and the plan lacks, where all images `numbers` have what it takes.

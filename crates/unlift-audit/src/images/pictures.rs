@@ -1,39 +1,74 @@
 //! What the report draws of chosen images, collected while these are audited once more.
 
+use std::sync::Arc;
+
 use unlift::audit::{Cell, Observer, Row, Watcher};
 use unlift::released::{Obfuscation, Released};
+use unlift_report::inversions::Inversion as Inverted;
 use unlift_report::pictures::{
     GRAPH_NEIGHBORS, Given, Graph, Marks, Picture, RecoveredView, ReleasedView,
 };
 
+use crate::inversion::Inversion;
+
 /// Collects pictures of all images that pass by, in their order.
 #[derive(Default)]
 pub struct Album {
+    inverter: Option<Arc<Inversion>>,
     /// Finished pictures.
     pub pictures: Vec<Picture>,
+    /// What a network painted of these images.
+    pub inversions: Vec<Inverted>,
+}
+
+impl Album {
+    /// With paintings, if there is an inverter.
+    pub fn new(inverter: Option<Arc<Inversion>>) -> Self {
+        Self { inverter, ..Self::default() }
+    }
 }
 
 impl Watcher for Album {
     type OfImage = Page;
 
     fn begin(&mut self) -> Page {
-        Page::default()
+        let inverter = self.inverter.clone();
+        Page { inverter, picture: Picture::default(), painted: Inverted::default() }
     }
 
-    fn image(&mut self, name: &str, _: &[Row], Page(picture): Page) {
+    fn image(&mut self, name: &str, _: &[Row], page: Page) {
+        let Page { picture, painted, .. } = page;
         if !picture.keypoints.is_empty() {
             self.pictures.push(Picture { name: name.to_owned(), ..picture });
+        }
+        if !painted.views.is_empty() {
+            self.inversions.push(Inverted { name: name.to_owned(), ..painted });
         }
     }
 }
 
 /// The picture of an image at work.
-#[derive(Default)]
-pub struct Page(Picture);
+pub struct Page {
+    inverter: Option<Arc<Inversion>>,
+    picture: Picture,
+    painted: Inverted,
+}
+
+fn given(row: &Row) -> Given {
+    Given {
+        neighbors: row.neighbors.clone(),
+        oracle_noise: row.oracle_noise.map(str::to_owned),
+        inlier_ratio: row.inlier_ratio,
+    }
+}
 
 impl Observer<2> for Page {
     fn cell(&mut self, cell: &Cell<'_, 2>) {
-        let picture = &mut self.0;
+        if let Some(inverter) = self.inverter.clone() {
+            // What fails here failed when it was measured, and was told.
+            let _ = inverter.add(cell, &mut self.painted);
+        }
+        let picture = &mut self.picture;
         let truth = cell.original.reveal().positions();
         if picture.keypoints.is_empty() {
             picture.keypoints = truth.iter().map(narrow).collect();
@@ -51,11 +86,7 @@ impl Observer<2> for Page {
         {
             picture.released.push(ReleasedView { scheme: scheme.clone(), marks });
         }
-        let given = Given {
-            neighbors: cell.row.neighbors.clone(),
-            oracle_noise: cell.row.oracle_noise.map(str::to_owned),
-            inlier_ratio: cell.row.inlier_ratio,
-        };
+        let given = given(cell.row);
         let first = picture.released.first().is_some_and(|view| view.scheme == *scheme);
         if first && picture.graphs.iter().all(|graph| graph.given != given) {
             let neighbors = slot_of.iter().map(|slot| slot.map_or(Vec::new(), |s| best(cell, s)));

@@ -63,7 +63,8 @@ impl Needs {
             NeighborsBy::Source(source) => Self::of(source).sources,
             NeighborsBy::Oracle | NeighborsBy::Given(_) => Vec::new(),
         });
-        Self { sources: own.collect(), whatever: false }
+        // Measures may look at them, where there are any.
+        Self { sources: own.collect(), whatever: !plan.measures.is_empty() }
     }
 
     /// Nothing, and descriptors are handed on where there are any.

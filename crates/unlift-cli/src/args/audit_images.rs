@@ -80,9 +80,13 @@ pub struct AuditImagesArgs {
     /// Draw this image in the report; repeatable [default: the least, the median and the most recovered]
     #[arg(long, value_name = "NAME", help_heading = "Result", conflicts_with = "share_safe")]
     pub show: Vec<String>,
-    /// Folder of the photos to draw, when PATH is a file
-    #[arg(long, value_name = "DIR", help_heading = "Result", conflicts_with = "share_safe")]
+    /// Folder of the photos, when PATH is a file: to draw, and to compare with (--invert)
+    #[arg(long, value_name = "DIR", help_heading = "Result")]
     pub photos: Option<PathBuf>,
+    /// Paint what came back and compare with the photos: rows get ssim, psnr and lpips, and the
+    /// report the pictures (SIFT)
+    #[arg(long, help_heading = "Result")]
+    pub invert: bool,
     #[command(flatten)]
     pub result: ResultArgs,
     #[command(flatten)]

@@ -1,5 +1,6 @@
 //! Arguments of `unlift audit map`.
 
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -56,6 +57,16 @@ pub struct AuditMapArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold,
           help_heading = "Result")]
     pub thresholds: Vec<Threshold>,
+    /// Paint what came back as the map's cameras see it, and compare with their photos: rows get ssim,
+    /// psnr and lpips, and the report the pictures (SIFT descriptors of a COLMAP model)
+    #[arg(long, help_heading = "Result", requires = "photos")]
+    pub invert: bool,
+    /// Folder of the photos of the map
+    #[arg(long, value_name = "DIR", help_heading = "Result", requires = "invert")]
+    pub photos: Option<PathBuf>,
+    /// Photos to compare with at most, evenly spaced over their names
+    #[arg(long, value_name = "N", default_value = "12", help_heading = "Result")]
+    pub max_photos: NonZeroUsize,
     /// Also write original, obfuscated and recovered clouds (PLY, OBJ)
     #[arg(long, help_heading = "Result", conflicts_with = "share_safe")]
     pub write_clouds: bool,

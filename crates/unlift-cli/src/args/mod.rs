@@ -8,6 +8,7 @@ mod bench;
 mod demo;
 mod evaluate;
 mod features;
+mod invert;
 mod map;
 mod metrics;
 mod models;
@@ -27,6 +28,7 @@ pub use bench::BenchRecoverArgs;
 pub use demo::DemoArgs;
 pub use evaluate::EvaluateArgs;
 pub use features::FeaturesArgs;
+pub use invert::InvertArgs;
 pub use map::MapArgs;
 pub use metrics::MetricsArgs;
 pub use models::ModelsArgs;
@@ -100,6 +102,8 @@ pub enum Command {
     Bench(BenchCommand),
     /// Keypoints and descriptors of photos, or of a file of features, as hloc stores them
     Features(FeaturesArgs),
+    /// Paint keypoints, or what came back of images or a map, as somebody would who has the descriptors
+    Invert(InvertArgs),
     /// How alike pictures are: SSIM, PSNR, LPIPS
     Metrics(MetricsArgs),
     /// List the schemes: rule, what stays hidden, source, stated patents

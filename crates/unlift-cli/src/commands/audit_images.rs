@@ -1,16 +1,19 @@
 //! `unlift audit images`: keypoints of images in, one honest answer out.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 use serde_json::{Map, json};
-use unlift::audit::{NeighborsBy, Plan};
+use unlift::audit::{Measure, NeighborsBy, Plan};
 use unlift::descriptors::Values;
+use unlift::neighbors::{Overlap, Source};
 use unlift::obfuscate::SchemeOptions;
 use unlift::{Descriptors, Unit};
 use unlift_audit::images::FeatureSource;
 use unlift_audit::images::audit::{ImagesJob, perform};
 use unlift_audit::images::stream::Needs;
+use unlift_audit::inversion::Inversion;
 use unlift_audit::{Shown, open_audit};
 use unlift_features::Extraction;
 use unlift_io::atomic::Rules;
@@ -24,7 +27,7 @@ use crate::args::AuditImagesArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
 use crate::progress::{Progress, Stderr};
-use crate::values::{NeighborSource, distinct};
+use crate::values::{FeatureType, NeighborSource, distinct};
 
 /// The threshold that speaks for an audit, in pixels, or the nearest one asked for.
 const HEADLINE_PX: f64 = 10.0;
@@ -32,7 +35,9 @@ const HEADLINE_PX: f64 = 10.0;
 /// Audits images.
 pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
     let started = Instant::now();
-    let plan = plan(args)?;
+    let mut plan = plan(args)?;
+    let inversion = inversion(args)?;
+    plan.measures.extend(inversion.iter().map(|one| Arc::clone(one) as Arc<dyn Measure<2>>));
     let inputs = [args.path.as_path()].into_iter().chain(args.photos.as_deref());
     let rules = Rules::new(inputs, args.result.force);
     let shown = if args.result.share_safe { Shown::Figures } else { Shown::Points };
@@ -48,7 +53,7 @@ pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
             eprintln!("unlift: note: {note}");
         }
         let chosen = chosen(source.names().len(), args.max_images.map(|n| n.get()));
-        check_descriptors(&source, &chosen, &plan)?;
+        check_descriptors(&source, &chosen, &plan, inversion.is_some())?;
         let progress = Progress::new(args.run.quiet);
         let job = ImagesJob {
             source: &source,
@@ -61,6 +66,7 @@ pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
             photos: args.photos.clone(),
             out: args.result.out.clone(),
             share_safe: args.result.share_safe,
+            inversion,
             progress: &progress,
             command: Some(command_line()),
             started,
@@ -136,6 +142,24 @@ fn extraction(args: &AuditImagesArgs, plan: &Plan<2>) -> anyhow::Result<Extracti
     Ok(extraction)
 }
 
+/// What paints pictures, if that was asked for.
+fn inversion(args: &AuditImagesArgs) -> anyhow::Result<Option<Arc<Inversion>>> {
+    if !args.invert {
+        return Ok(None);
+    }
+    let photos = match (&args.photos, args.path.is_dir()) {
+        (Some(photos), _) => photos,
+        (None, true) => &args.path,
+        (None, false) => {
+            return Err(usage("--invert: expected --photos, as PATH is no folder of photos"));
+        }
+    };
+    if args.features.is_some_and(|kind| kind != FeatureType::Sift) {
+        return Err(usage("--invert: expected --features sift, which the network knows"));
+    }
+    Ok(Some(Arc::new(Inversion::new(photos)?)))
+}
+
 /// Numbers of at most `most` images, evenly spaced over all `n`: the middles of as many equal parts.
 fn chosen(n: usize, most: Option<usize>) -> Vec<usize> {
     let most = most.unwrap_or(n).min(n);
@@ -148,15 +172,25 @@ fn check_descriptors(
     source: &FeatureSource,
     chosen: &[usize],
     plan: &Plan<2>,
+    invert: bool,
 ) -> anyhow::Result<()> {
     // Extracted features always have them.
-    if matches!(source, FeatureSource::Folder(_)) || !Needs::of_plan(plan).descriptors() {
+    let wanted = invert || Needs::of_plan(plan).descriptors();
+    if matches!(source, FeatureSource::Folder(_)) || !wanted {
         return Ok(());
     }
     let found = chosen.iter().filter_map(|&at| source.get(at).ok());
     let Some(first) = found.into_iter().find(|image| !image.keypoints.is_empty()) else {
         return Ok(());
     };
+    if invert {
+        let Some(descriptors) = &first.descriptors else {
+            return Err(usage("--invert: expected descriptors, found none"));
+        };
+        if let Err(error) = Source::<2>::takes(&Overlap, descriptors) {
+            return Err(usage(format!("--invert: {error}")));
+        }
+    }
     for source in plan.own_sources() {
         match &first.descriptors {
             Some(descriptors) => check_fit(source, descriptors)?,
@@ -216,6 +250,9 @@ fn more_options(args: &AuditImagesArgs) -> Map<String, serde_json::Value> {
     }
     if let Some(most) = args.max_images {
         options.insert("max_images".into(), json!(most.get()));
+    }
+    if args.invert {
+        options.insert("invert".into(), json!(true));
     }
     if !args.show.is_empty() {
         options.insert("show".into(), json!(args.show));

@@ -1,12 +1,15 @@
 //! `unlift audit map`: a map in, one honest answer out.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
 use indexmap::IndexMap;
 use serde_json::{Map, Value, json};
-use unlift::audit::Plan;
+use unlift::audit::{Measure, Plan};
+use unlift::neighbors::{Overlap, Source};
 use unlift::obfuscate::SchemeOptions;
+use unlift_audit::inversion::MapInversion;
 use unlift_audit::maps::perform;
 use unlift_audit::{Job, Prepared, Shown, check_thresholds, open_audit};
 use unlift_io::atomic::Rules;
@@ -37,8 +40,12 @@ pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
         }
         let progress = Progress::new(args.run.quiet);
         let (path, result) = (&args.path, &args.result);
+        let inversion = inversion(&args, &prepared, &input, &progress)?;
+        let mut plan = plan(&args, &prepared, &input)?;
+        plan.measures.extend(inversion.iter().map(|one| Arc::clone(one) as Arc<dyn Measure<3>>));
         let mut job = Job {
-            plan: plan(&args, &prepared, &input)?,
+            plan,
+            inversion,
             options: with_attack(more_options(&args), &args.attack),
             gates: result.gate.clone(),
             write_clouds: args.write_clouds,
@@ -52,6 +59,28 @@ pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
     })?;
     print(&if args.result.json { summary(&finished)? } else { finished.text() })?;
     Ok(if finished.passed() { Outcome::Done } else { Outcome::GateFailed })
+}
+
+/// What paints pictures, if that was asked for.
+fn inversion(
+    args: &AuditMapArgs,
+    prepared: &Prepared,
+    input: &read::Input,
+    progress: &Progress,
+) -> anyhow::Result<Option<Arc<MapInversion>>> {
+    let (true, Some(photos)) = (args.invert, &args.photos) else { return Ok(None) };
+    let Some(model) = &input.model else {
+        return Err(usage("--invert: expected a COLMAP model with cameras, found only points"));
+    };
+    let Some(descriptors) = &prepared.descriptors else {
+        return Err(usage("--invert: expected descriptors (--descriptors FILE), found none"));
+    };
+    if let Err(error) = Source::<3>::takes(&Overlap, descriptors) {
+        return Err(usage(format!("--invert: {error}")));
+    }
+    let scale = 1.0 / prepared.unit_in_map_units;
+    let most = args.max_photos.get();
+    Ok(Some(Arc::new(MapInversion::open(model, photos, scale, most, progress)?)))
 }
 
 /// What a user should know who audits a part of a map: its figures are too small for the whole.
@@ -126,6 +155,10 @@ fn more_options(args: &AuditMapArgs) -> Map<String, Value> {
     let mut options = Map::new();
     if let Some(most) = args.map.max_points {
         options.insert("max_points".into(), json!(most.get()));
+    }
+    if args.invert {
+        options.insert("invert".into(), json!(true));
+        options.insert("max_photos".into(), json!(args.max_photos.get()));
     }
     if let Some(filter) = args.map.outlier_filter {
         let value = json!({ "neighbors": filter.neighbors, "std_ratio": filter.std_ratio });

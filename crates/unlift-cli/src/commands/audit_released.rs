@@ -56,6 +56,7 @@ pub fn run(args: &AuditReleasedArgs) -> anyhow::Result<Outcome> {
             out: args.result.out.clone(),
             unit_in_map_units: 1.0,
             write_clouds: args.write_clouds,
+            inversion: None,
             share_safe: args.result.share_safe,
             progress: &progress,
             command: Some(command_line()),

@@ -53,6 +53,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
             out: args.out.clone(),
             unit_in_map_units: 1.0,
             write_clouds: false,
+            inversion: None,
             share_safe: false,
             progress: &progress,
             command: Some(command_line()),

@@ -1,11 +1,11 @@
 //! `unlift metrics`: how alike pictures are.
 
 use std::collections::BTreeMap;
-use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use serde_json::{Value, json};
+use unlift_features::ColorImage;
 use unlift_features::load::read_color;
 use unlift_invert::{Lpips, Metrics};
 
@@ -17,10 +17,20 @@ use crate::output::{print, table};
 pub fn run(args: &MetricsArgs) -> anyhow::Result<Outcome> {
     let lpips = Lpips::try_new()?;
     let compare = |a: &Path, b: &Path| -> anyhow::Result<Metrics> {
-        let (first, second) = (read_color(a)?, read_color(b)?);
+        let (mut first, mut second) = (read_color(a)?, read_color(b)?);
+        let half = |image: &ColorImage| (image.width() / 2, image.height() / 2);
+        // Pictures of `unlift invert` have half the size of their photos.
+        if half(&first) == (second.width(), second.height()) {
+            first = first.halved()?;
+        } else if half(&second) == (first.width(), first.height()) {
+            second = second.halved()?;
+        }
         Metrics::of(&first, &second, &lpips)
             .with_context(|| format!("{} and {}", a.display(), b.display()))
     };
+    for path in [&args.a, &args.b] {
+        path.metadata().map_err(|error| unlift_io::Error::read(path, error))?;
+    }
     if args.a.is_dir() != args.b.is_dir() {
         return Err(usage(format!(
             "{} and {}: expected two pictures or two folders, found one of each",
@@ -47,7 +57,7 @@ pub fn run(args: &MetricsArgs) -> anyhow::Result<Outcome> {
     let mut rows = Vec::new();
     for (name, path) in &ours {
         let Some(other) = theirs.get(name) else { continue };
-        rows.push((name.to_string_lossy().into_owned(), compare(path, other)?));
+        rows.push((name.clone(), compare(path, other)?));
     }
     if rows.is_empty() {
         let expected = format!("pictures of the same names as in {}", args.b.display());
@@ -76,20 +86,25 @@ pub fn run(args: &MetricsArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// The files of a folder by their names without extensions.
-fn pictures(folder: &Path) -> anyhow::Result<BTreeMap<OsString, PathBuf>> {
+/// The pictures of a folder by their names without what tells their kind: `a.jpg.png`, as `unlift invert` writes, is `a`.
+fn pictures(folder: &Path) -> anyhow::Result<BTreeMap<String, PathBuf>> {
     let read = |error| unlift_io::Error::read(folder, error);
     let mut found = BTreeMap::new();
     for entry in folder.read_dir().map_err(read)? {
         let path = entry.map_err(read)?.path();
-        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
-        let is_picture = ["jpg", "jpeg", "png", "webp"].iter().any(|known| extension == *known);
-        if let (true, Some(stem)) = (is_picture && path.is_file(), path.file_stem()) {
-            let stem = stem.to_owned();
-            if let Some(other) = found.insert(stem, path.clone()) {
-                let (expected, found) = ("one picture of a name", other.display().to_string());
-                return Err(unlift_io::Error::new(&path, "", expected, found).into());
-            }
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let mut bare = name.as_str();
+        while let Some((stem, kind)) = bare.rsplit_once('.')
+            && ["jpg", "jpeg", "png", "webp"].iter().any(|known| kind.eq_ignore_ascii_case(known))
+        {
+            bare = stem;
+        }
+        if bare.len() == name.len() || !path.is_file() {
+            continue;
+        }
+        if let Some(other) = found.insert(bare.to_owned(), path.clone()) {
+            let (expected, found) = ("one picture of a name", other.display().to_string());
+            return Err(unlift_io::Error::new(&path, "", expected, found).into());
         }
     }
     Ok(found)

@@ -10,6 +10,7 @@ mod evaluate;
 mod extraction;
 mod features;
 mod image_stages;
+mod invert;
 mod metrics;
 mod models;
 mod neighbors;
@@ -38,6 +39,7 @@ pub fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Bench(BenchCommand::Recover(args)) => bench::recovery(&args),
         Command::Features(args) => features::run(&args),
+        Command::Invert(args) => invert::run(&args),
         Command::Metrics(args) => metrics::run(&args),
         Command::Schemes => schemes::run(),
         Command::Models(args) => models::run(&args),

@@ -23,6 +23,13 @@ pub fn write(root: &Path) {
     fs::write(model.join("images.bin"), images(&seen)).unwrap();
     fs::write(model.join("points3D.bin"), points3d(&points, &seen)).unwrap();
     write_database(&root.join("database.db"), &points, &seen);
+    fs::create_dir_all(root.join("images/room")).unwrap();
+    for image in 0..N_IMAGES {
+        let shade = |x: u32, y: u32| image::Rgb([x as u8, y as u8, 40 * image as u8]);
+        image::RgbImage::from_fn(640, 480, shade)
+            .save(root.join("images").join(name(image)))
+            .unwrap();
+    }
 }
 
 fn name(image: usize) -> String {

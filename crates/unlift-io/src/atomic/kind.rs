@@ -22,12 +22,26 @@ pub enum Kind {
     Cloud,
     /// HDF5 with `FEATURES_MARK` behind the superblock.
     Features,
+    /// A PNG whose first chunk of text names unlift, as [`marked_picture`] has it.
+    Picture,
 }
 
 /// The comment in clouds.
 pub(crate) const CLOUD_COMMENT: &str = "unlift";
 /// Between the superblock and the first array of features: no structure of HDF5 refers to it.
 pub(crate) const FEATURES_MARK: &[u8; 32] = b"unlift features, format 1\0\0\0\0\0\0\0";
+/// A chunk of a PNG: its length, the text "Software: unlift", its checksum.
+const PICTURE_MARK: &[u8; 27] = b"\0\0\0\x0ftEXtSoftware\0unlift\xfe\xc8\xcb\xd5";
+/// Signature and first chunk of a PNG, behind which others may stand.
+const PNG_HEAD: usize = 33;
+
+/// The bytes of a PNG, known as one of ours.
+#[must_use]
+pub fn marked_picture(png: &[u8]) -> Vec<u8> {
+    let (head, rest) = png.split_at(PNG_HEAD.min(png.len()));
+    [head, PICTURE_MARK, rest].concat()
+}
+
 /// In the head of a page.
 const PAGE_MARK: &str = "<meta name=\"generator\" content=\"unlift\">";
 /// The head of a page ends before its style.
@@ -45,6 +59,8 @@ impl Kind {
             Self::Features => start(path, 128).is_some_and(|head| {
                 head.starts_with(b"\x89HDF\r\n\x1a\n") && head.get(96..) == Some(&FEATURES_MARK[..])
             }),
+            Self::Picture => start(path, PNG_HEAD + PICTURE_MARK.len())
+                .is_some_and(|head| head.get(PNG_HEAD..) == Some(&PICTURE_MARK[..])),
         }
     }
 }
@@ -57,6 +73,7 @@ impl fmt::Display for Kind {
             Self::Stage(kind) => kind.fmt(f),
             Self::Cloud => f.write_str("a cloud"),
             Self::Features => f.write_str("features"),
+            Self::Picture => f.write_str("a picture"),
         }
     }
 }

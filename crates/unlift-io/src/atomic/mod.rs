@@ -18,8 +18,8 @@ use std::path::{Path, PathBuf};
 use crate::Error;
 
 pub use file::OutputFile;
-pub use kind::Kind;
 pub(crate) use kind::{CLOUD_COMMENT, FEATURES_MARK};
+pub use kind::{Kind, marked_picture};
 pub use partial::{abandon, sweep};
 pub use rules::Rules;
 pub use set::OutputSet;

@@ -143,15 +143,8 @@ fn colmap_model(model: &Path, extension: &str) -> Result<Input, Error> {
     let cameras = cameras.map(|path| colmap::read_cameras(&path)).transpose()?;
     if let Some(path) = images {
         let images = colmap::read_images(&path)?;
-        for image in &images {
-            let id = image.camera_id;
-            if let Some(cameras) = &cameras
-                && cameras.binary_search_by_key(&id, |c| c.id).is_err()
-            {
-                let place = format!("image {}", image.id);
-                let expected = format!("the id of a camera in cameras.{extension}");
-                return Err(Error::new(path, place, expected, id.to_string()));
-            }
+        if let Some(cameras) = &cameras {
+            images.iter().try_for_each(|image| colmap::check_camera(&path, image, cameras))?;
         }
         input.cameras = images.iter().map(|image| image.center).collect();
         input.up = mean_direction(images.iter().map(colmap::Image::up));

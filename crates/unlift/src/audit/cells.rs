@@ -7,7 +7,7 @@ use super::clock::RowSeconds;
 use super::lists::Lists;
 use super::measure::{measure, unmeasured};
 use super::not_audited::NotAudited;
-use super::observer::{Cell, Observer};
+use super::observer::{Cell, Counts, Observer};
 use super::plan::Plan;
 use super::records_alone::records_alone;
 use super::row::{Alone, Row};
@@ -63,6 +63,8 @@ pub(super) struct Finished<'a> {
     pub(super) baseline: &'a Accuracy,
     /// Per slot the weight that makes distinct places count once.
     pub(super) weights: &'a [f64],
+    /// Names of the metrics that are about an image as a whole.
+    pub(super) whole: &'a [String],
     /// Entries of all lists.
     pub(super) n_listed: usize,
     pub(super) seconds: RowSeconds,
@@ -192,17 +194,23 @@ pub(super) fn attack<const D: usize>(
             }
             let bare = row.clone();
             let cell = Cell {
+                name: owned.name,
                 row: &bare,
                 repeat,
                 original,
+                descriptors: owned.descriptors,
                 secret,
                 released: &hidden.0,
                 lists: &made.lists,
                 recovered: &recovered,
                 accuracy: &accuracy,
             };
+            let mut whole = Vec::new();
             for measure in &plan.measures {
                 let measured = clock.time(|s| &mut s.evaluate, || measure.measure(&cell))?;
+                if measure.counts() == Counts::Images {
+                    whole.extend(measured.iter().map(|(name, _)| name.clone()));
+                }
                 row.metrics.extend(measured);
             }
             observer.cell(&Cell { row: &row, ..cell });
@@ -211,6 +219,7 @@ pub(super) fn attack<const D: usize>(
                 accuracy: &accuracy,
                 baseline: &baseline,
                 weights: &weights,
+                whole: &whole,
                 n_listed: made.lists.records().len(),
                 seconds: RowSeconds { neighbors: making, recover: took },
             };
@@ -225,7 +234,7 @@ pub(super) fn attack<const D: usize>(
         each(
             observer,
             None,
-            Some(Finished { row, accuracy, baseline, weights, n_listed: 0, seconds }),
+            Some(Finished { row, accuracy, baseline, weights, whole: &[], n_listed: 0, seconds }),
         );
     }
     Ok(missing)

@@ -28,7 +28,7 @@ pub use clock::{RowSeconds, Seconds};
 pub use images::{Image, Watcher, run_images};
 pub use measure::measure;
 pub use not_audited::NotAudited;
-pub use observer::{Cell, Measure, Observer, Silent};
+pub use observer::{Cell, Counts, Measure, Observer, Silent};
 pub use plan::{NeighborsBy, Plan, PointNeighbors, Variant};
 pub use released::{run_released, scheme_called};
 pub use row::{Alone, Distinct, PERCENTILES, Repeats, Row};

@@ -3,22 +3,26 @@
 use std::fmt::Debug;
 
 use super::row::Row;
-use crate::Error;
 use crate::evaluate::Accuracy;
 use crate::neighbors::Neighborhoods;
 use crate::recover::Recovered;
 use crate::released::Released;
 use crate::truth::{Original, Secret};
+use crate::{Descriptors, Error};
 
 /// Everything known about one row of one repeat, for whoever writes clouds, draws pictures or measures more.
 #[derive(Clone, Copy)]
 pub struct Cell<'a, const D: usize = 3> {
+    /// The name of the image, if it is one of many.
+    pub name: Option<&'a str>,
     /// The row of this repeat.
     pub row: &'a Row,
     /// Which repeat, from 0.
     pub repeat: u32,
     /// The truth.
     pub original: &'a Original<D>,
+    /// Descriptors of the originals, one row each, where they are at hand.
+    pub descriptors: Option<&'a Descriptors>,
     /// The secret of this obfuscation, its slots counted as the rows of `recovered` are.
     pub secret: &'a Secret,
     /// What the attacker saw.
@@ -55,9 +59,24 @@ pub struct Silent;
 
 impl<const D: usize> Observer<D> for Silent {}
 
+/// What counts once in the mean of a figure over many images.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Counts {
+    /// Every point, so that an image counts by how many it has.
+    Points,
+    /// Every image, of those that have the figure: it is about an image as a whole.
+    Images,
+}
+
 /// Something to be measured of every row beside errors: anybody may write one.
 pub trait Measure<const D: usize>: Debug + Send + Sync {
-    /// Figures by name. The same names for every cell: a figure that some repeats or images lack is left out.
+    /// What counts once in a mean over images.
+    fn counts(&self) -> Counts {
+        Counts::Points
+    }
+
+    /// Figures by name. The same names for every cell: a figure that some repeats lack is left out, and one that counts
+    /// points and some images lack.
     ///
     /// # Errors
     /// When it cannot be measured.

@@ -10,6 +10,15 @@ use crate::evaluate::Accuracy;
 /// Bits of the mantissa of an `f32` that are left out of an error's bin: bins are 0.05 % wide.
 const DROPPED_BITS: u32 = 12;
 
+/// A figure times what counts once, and of how many of these it is known.
+#[derive(Clone, Copy, Debug, Default)]
+struct Figure {
+    sum: f64,
+    known: usize,
+    /// Whether images count once, not points.
+    of_images: bool,
+}
+
 /// Sums over images; no share is rounded before the end.
 #[derive(Debug)]
 pub(super) struct Pool {
@@ -25,8 +34,7 @@ pub(super) struct Pool {
     n_places: f64,
     places_within: Vec<f64>,
     blind_places_within: Vec<f64>,
-    /// Figures times slots, and in how many slots they are known.
-    metrics: BTreeMap<String, (f64, usize)>,
+    metrics: BTreeMap<String, Figure>,
     /// Deltas times slots.
     delta: f64,
     /// True entries of lists, and all.
@@ -67,7 +75,7 @@ impl Pool {
 
     /// Adds the row of one image.
     pub(super) fn add(&mut self, finished: &Finished<'_>, thresholds: &[Threshold]) {
-        let Finished { row, accuracy, baseline, weights, n_listed, .. } = finished;
+        let Finished { row, accuracy, baseline, weights, whole, n_listed, .. } = finished;
         let n = accuracy.n_points();
         self.n_points += n;
         for (at, threshold) in thresholds.iter().enumerate() {
@@ -83,8 +91,12 @@ impl Pool {
             *self.axis.get_or_insert(0.0) += percent * n as f64;
         }
         for (name, value) in &row.metrics {
-            let sum = self.metrics.entry(name.clone()).or_insert((0.0, 0));
-            *sum = (sum.0 + value * n as f64, sum.1 + n);
+            let of_images = whole.contains(name);
+            let count = if of_images { 1 } else { n };
+            let figure = self.metrics.entry(name.clone()).or_default();
+            figure.sum += value * count as f64;
+            figure.known += count;
+            figure.of_images = of_images;
         }
         self.n_places += weights.iter().sum::<f64>();
         self.delta += row.delta * n as f64;
@@ -124,8 +136,10 @@ impl Pool {
             *self.axis.get_or_insert(0.0) += more;
         }
         for (name, more) in &more.metrics {
-            let sum = self.metrics.entry(name.clone()).or_insert((0.0, 0));
-            *sum = (sum.0 + more.0, sum.1 + more.1);
+            let figure = self.metrics.entry(name.clone()).or_default();
+            figure.sum += more.sum;
+            figure.known += more.known;
+            figure.of_images = more.of_images;
         }
         self.n_places += more.n_places;
         self.delta += more.delta;
@@ -164,8 +178,8 @@ impl Pool {
             metrics: self
                 .metrics
                 .iter()
-                .filter(|(_, (_, known))| *known == self.n_points)
-                .map(|(name, (sum, known))| (name.clone(), sum / (*known).max(1) as f64))
+                .filter(|(_, figure)| figure.of_images || figure.known == self.n_points)
+                .map(|(name, figure)| (name.clone(), figure.sum / figure.known.max(1) as f64))
                 .collect(),
             error_percentiles: PERCENTILES
                 .map(|p| self.errors.percentile(p, self.n_points))

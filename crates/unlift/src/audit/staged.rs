@@ -82,6 +82,7 @@ impl Pooled {
             accuracy: &accuracy,
             baseline,
             weights: &weights,
+            whole: &[],
             n_listed: 0,
             seconds: RowSeconds::default(),
         };

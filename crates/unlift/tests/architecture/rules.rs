@@ -99,10 +99,22 @@ pub const CRATES: &[(&str, &[&str])] = &[
     ("unlift-features", &["unlift", "unlift-nn"]),
     ("unlift-report", &[]),
     ("unlift-testkit", &["unlift"]),
-    ("unlift-audit", &["unlift", "unlift-io", "unlift-nn", "unlift-features", "unlift-report"]),
+    ("unlift-invert", &["unlift", "unlift-nn", "unlift-features"]),
+    (
+        "unlift-audit",
+        &["unlift", "unlift-io", "unlift-nn", "unlift-features", "unlift-invert", "unlift-report"],
+    ),
     (
         "unlift-cli",
-        &["unlift", "unlift-audit", "unlift-io", "unlift-nn", "unlift-features", "unlift-report"],
+        &[
+            "unlift",
+            "unlift-audit",
+            "unlift-io",
+            "unlift-nn",
+            "unlift-features",
+            "unlift-invert",
+            "unlift-report",
+        ],
     ),
 ];
 

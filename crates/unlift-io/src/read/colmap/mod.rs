@@ -44,6 +44,32 @@ pub fn read_images(path: &Path) -> Result<Vec<Image>, Error> {
     Ok(images)
 }
 
+/// Reads the cameras and images of the model in the folder `model`, in the form that [`super::open`] reads.
+///
+/// # Errors
+/// As [`read_cameras`] and [`read_images`]; when an image names a camera that is not there.
+pub fn read_views(model: &Path) -> Result<(Vec<Camera>, Vec<Image>), Error> {
+    let extension = if model.join("points3D.bin").is_file() { "bin" } else { "txt" };
+    let cameras = read_cameras(&model.join(format!("cameras.{extension}")))?;
+    let path = model.join(format!("images.{extension}"));
+    let images = read_images(&path)?;
+    for image in &images {
+        check_camera(&path, image, &cameras)?;
+    }
+    Ok((cameras, images))
+}
+
+/// Refuses an image whose camera is not among `cameras`, which are by ascending id.
+pub(super) fn check_camera(path: &Path, image: &Image, cameras: &[Camera]) -> Result<(), Error> {
+    let id = image.camera_id;
+    if cameras.binary_search_by_key(&id, |camera| camera.id).is_ok() {
+        return Ok(());
+    }
+    let extension = if is_text(path) { "txt" } else { "bin" };
+    let expected = format!("the id of a camera in cameras.{extension}");
+    Err(Error::new(path, format!("image {}", image.id), expected, id.to_string()))
+}
+
 /// Reads `points3D.bin` or `points3D.txt`, by ascending id; the tracks only `with_tracks`.
 ///
 /// # Errors

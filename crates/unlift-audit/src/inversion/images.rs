@@ -1,0 +1,126 @@
+//! Pictures of images: of recovered keypoints.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use unlift::Error;
+use unlift::audit::{Cell, Counts, Measure};
+use unlift_features::load::read_color;
+use unlift_features::preview::jpeg_of;
+use unlift_report::inversions::Inversion as Sheet;
+
+use super::{Painter, SHOWN, Truth, figures, likeness, originals, shown, size};
+
+/// Photos that are kept for cells to come; fewer images are at work.
+const KEPT: usize = 64;
+
+/// Makes pictures of images and compares them with the photos.
+pub struct Inversion {
+    painter: Painter,
+    /// Folder of the photos, by the names of the images.
+    photos: PathBuf,
+    known: Mutex<BTreeMap<String, Arc<Truth>>>,
+    failed: Mutex<BTreeMap<String, Error>>,
+}
+
+impl fmt::Debug for Inversion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Inversion").field("photos", &self.photos).finish_non_exhaustive()
+    }
+}
+
+impl Inversion {
+    /// Of images whose photos are in `photos`.
+    ///
+    /// # Errors
+    /// When a model is missing.
+    pub fn new(photos: &Path) -> Result<Self, Error> {
+        let (painter, photos) = (Painter::try_new()?, photos.to_owned());
+        Ok(Self { painter, photos, known: Mutex::default(), failed: Mutex::default() })
+    }
+
+    /// Why images have no pictures, by their names.
+    pub fn failed(&self) -> Vec<Error> {
+        lock(&self.failed).values().cloned().collect()
+    }
+
+    /// Adds the picture of `cell` to those of its image.
+    ///
+    /// # Errors
+    /// As those that [`failed`](Self::failed) tells.
+    pub fn add(&self, cell: &Cell<'_, 2>, sheet: &mut Sheet) -> Result<(), Error> {
+        let truth = self.truth(cell)?;
+        if sheet.photo.is_empty() {
+            sheet.photo = jpeg_of(&truth.photo, SHOWN)?;
+            sheet.baseline = (jpeg_of(&truth.picture, SHOWN)?, likeness(&truth.baseline));
+        }
+        let picture = self.painter.image(cell.released, cell.recovered)?;
+        let metrics = self.painter.compare(&picture, &truth.photo)?;
+        sheet.views.push(shown(cell.row, &picture, &metrics)?);
+        Ok(())
+    }
+
+    /// The photo of the image of `cell`, and the picture of its true keypoints.
+    fn truth(&self, cell: &Cell<'_, 2>) -> Result<Arc<Truth>, Error> {
+        let name = cell.name.unwrap_or_default();
+        if let Some(known) = lock(&self.known).get(name) {
+            return Ok(Arc::clone(known));
+        }
+        let (path, size) = (self.photos.join(name), size(cell.released)?);
+        let photo = read_color(&path)?;
+        if [photo.width(), photo.height()] != size {
+            let [expected, found] = [size, [photo.width(), photo.height()]]
+                .map(|[width, height]| format!("{width} x {height} pixels"));
+            let path = path.display().to_string().escape_debug().to_string();
+            return Err(Error::new(path, format!("a photo of {expected}"), found));
+        }
+        let photo = photo.halved()?;
+        let descriptors = originals(cell.descriptors)?;
+        let places: Vec<[f32; 2]> = cell
+            .original
+            .reveal()
+            .positions()
+            .iter()
+            .map(|place| place.map(|x| x as f32))
+            .collect();
+        let picture = self.painter.keypoints(&places, descriptors, size)?;
+        let baseline = self.painter.compare(&picture, &photo)?;
+        let truth = Arc::new(Truth { photo, picture, baseline });
+        let mut known = lock(&self.known);
+        if known.len() >= KEPT {
+            known.clear();
+        }
+        known.insert(name.to_owned(), Arc::clone(&truth));
+        Ok(truth)
+    }
+}
+
+impl Measure<2> for Inversion {
+    fn counts(&self) -> Counts {
+        Counts::Images
+    }
+
+    /// Nothing of an image whose photo cannot be used, which [`failed`](Inversion::failed) tells: other images go on.
+    fn measure(&self, cell: &Cell<'_, 2>) -> Result<Vec<(String, f64)>, Error> {
+        let name = cell.name.unwrap_or_default();
+        let truth = match self.truth(cell) {
+            Ok(truth) => truth,
+            Err(error) => {
+                let error = error.within(&format!("image {}", name.escape_debug()));
+                lock(&self.failed).entry(name.to_owned()).or_insert(error);
+                return Ok(Vec::new());
+            }
+        };
+        let found = self
+            .painter
+            .compare(&self.painter.image(cell.released, cell.recovered)?, &truth.photo)?;
+        Ok(figures(found, truth.baseline))
+    }
+}
+
+/// What stands in these maps is whole whatever happened to who held them.
+fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
+}

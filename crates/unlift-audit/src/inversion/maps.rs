@@ -1,0 +1,190 @@
+//! Pictures of a map: of recovered points, seen by the cameras of its photos.
+
+use std::fmt;
+use std::path::Path;
+use std::sync::OnceLock;
+
+use rayon::prelude::*;
+use unlift::Error;
+use unlift::audit::{Cell, Measure};
+use unlift_features::ColorImage;
+use unlift_features::load::read_color_as_stored;
+use unlift_features::preview::jpeg_of;
+use unlift_invert::{Lens, Metrics, View};
+use unlift_io::read::colmap;
+use unlift_report::inversions::Inversion as Sheet;
+
+use super::{Painter, SHOWN, figures, likeness, shown};
+use crate::progress::Progress;
+
+/// Sides of a picture that metrics can be taken of.
+const LEAST_SIDE: usize = 16;
+
+/// One camera of the map that took a photo.
+struct Seen {
+    name: String,
+    view: View,
+    /// At half its size.
+    photo: ColorImage,
+    truth: OnceLock<Result<(ColorImage, Metrics), Error>>,
+}
+
+/// Makes pictures of a map and compares them with the photos.
+pub struct MapInversion {
+    painter: Painter,
+    seen: Vec<Seen>,
+}
+
+impl fmt::Debug for MapInversion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("MapInversion").field("photos", &self.seen.len()).finish_non_exhaustive()
+    }
+}
+
+impl MapInversion {
+    /// Of the COLMAP model in `model`, whose lengths are multiplied by `scale` in the audit, by at most `most` of its
+    /// images that have a photo in `photos`, evenly spaced over their names.
+    ///
+    /// A camera that no lens is known for and a photo that cannot be used are told; the others are taken.
+    ///
+    /// # Errors
+    /// When there is not one, a file of the model cannot be read, or a network is missing.
+    pub fn open(
+        model: &Path,
+        photos: &Path,
+        scale: f64,
+        most: usize,
+        progress: &dyn Progress,
+    ) -> Result<Self, crate::Error> {
+        let (cameras, mut images) = colmap::read_views(model)?;
+        images.sort_by(|a, b| a.name.cmp(&b.name));
+        let with_photo = |image: &colmap::Image| {
+            let path = photos.join(String::from_utf8_lossy(&image.name).as_ref());
+            path.is_file().then_some(path)
+        };
+        let with_photo: Vec<_> =
+            images.iter().filter_map(|image| Some((image, with_photo(image)?))).collect();
+        let (n, most) = (with_photo.len(), most.min(with_photo.len()));
+        let mut seen = Vec::new();
+        for (image, path) in (0..most).map(|at| &with_photo[(2 * at + 1) * n / (2 * most)]) {
+            let camera = cameras.iter().find(|camera| camera.id == image.camera_id);
+            let made = camera.ok_or_else(|| {
+                let id = image.camera_id.to_string();
+                Error::new(path.display().to_string(), "a camera of the model", id)
+            });
+            match made.and_then(|camera| one(camera, image, path, scale)) {
+                Ok(one) => seen.push(one),
+                Err(error) => progress.say(&format!("note: not painted: {error}")),
+            }
+        }
+        if seen.is_empty() {
+            let expected = format!("photos of the images in {}", model.display());
+            return Err(unlift_io::Error::new(photos, "", expected, "none").into());
+        }
+        Ok(Self { painter: Painter::try_new()?, seen })
+    }
+
+    /// How many photos there are.
+    pub fn n_photos(&self) -> usize {
+        self.seen.len()
+    }
+
+    /// Adds the pictures of `cell` by the first cameras, one per sheet.
+    ///
+    /// # Errors
+    /// When a picture cannot be made.
+    pub fn add(&self, cell: &Cell<'_>, sheets: &mut [Sheet]) -> Result<(), Error> {
+        for (seen, sheet) in self.seen.iter().zip(sheets) {
+            let (painted, baseline) = self.truth(seen, cell)?;
+            if sheet.photo.is_empty() {
+                sheet.name.clone_from(&seen.name);
+                sheet.photo = jpeg_of(&seen.photo, SHOWN)?;
+                sheet.baseline = (jpeg_of(painted, SHOWN)?, likeness(baseline));
+            }
+            let picture = self.painter.map(&seen.view, cell.released, cell.recovered)?;
+            let metrics = self.painter.compare(&picture, &seen.photo)?;
+            sheet.views.push(shown(cell.row, &picture, &metrics)?);
+        }
+        Ok(())
+    }
+
+    /// What the true points paint.
+    fn truth<'a>(
+        &'a self,
+        seen: &'a Seen,
+        cell: &Cell<'_>,
+    ) -> Result<&'a (ColorImage, Metrics), Error> {
+        let make = || {
+            let originals = cell.original.reveal().positions();
+            let positions: Vec<Option<[f64; 3]>> = originals.iter().copied().map(Some).collect();
+            let descriptors = super::originals(cell.descriptors)?;
+            let picture = self.painter.seen(&seen.view, &positions, descriptors, |_, _| 1.0)?;
+            let baseline = self.painter.compare(&picture, &seen.photo)?;
+            Ok((picture, baseline))
+        };
+        seen.truth.get_or_init(make).as_ref().map_err(Error::clone)
+    }
+}
+
+impl Measure<3> for MapInversion {
+    /// Means over the photos.
+    fn measure(&self, cell: &Cell<'_>) -> Result<Vec<(String, f64)>, Error> {
+        let of_one = |seen: &Seen| {
+            let found = self.painter.compare(
+                &self.painter.map(&seen.view, cell.released, cell.recovered)?,
+                &seen.photo,
+            )?;
+            Ok(figures(found, self.truth(seen, cell)?.1))
+        };
+        let all: Vec<Vec<(String, f64)>> =
+            self.seen.par_iter().map(of_one).collect::<Result<_, Error>>()?;
+        let mut mean = all[0].clone();
+        for (at, (_, value)) in mean.iter_mut().enumerate() {
+            *value = all.iter().map(|figures| figures[at].1).sum::<f64>() / all.len() as f64;
+        }
+        Ok(mean)
+    }
+}
+
+fn one(
+    camera: &colmap::Camera,
+    image: &colmap::Image,
+    path: &Path,
+    scale: f64,
+) -> Result<Seen, Error> {
+    let of_photo =
+        |error: Error| error.within(&path.display().to_string().escape_debug().to_string());
+    // COLMAP does not turn photos.
+    let photo = read_color_as_stored(path)?;
+    let size = [camera.width_px, camera.height_px].map(|side| side as usize);
+    if [photo.width(), photo.height()] != size {
+        let expected = format!("a photo of {} x {} pixels, as its camera", size[0], size[1]);
+        let found = format!("{} x {}", photo.width(), photo.height());
+        return Err(of_photo(Error::new("size", expected, found)));
+    }
+    let photo = photo.halved()?;
+    if photo.width().min(photo.height()) < LEAST_SIDE {
+        let found = format!("{} x {} pixels", size[0], size[1]);
+        let expected = format!("at least {0} x {0} pixels", 2 * LEAST_SIDE);
+        return Err(of_photo(Error::new("size", expected, found)));
+    }
+    Ok(Seen {
+        name: String::from_utf8_lossy(&image.name).into_owned(),
+        view: view(camera, image, scale).map_err(of_photo)?,
+        photo,
+        truth: OnceLock::new(),
+    })
+}
+
+/// What an image of a COLMAP model sees, in units of which one of the model has `scale`.
+///
+/// # Errors
+/// When the camera is none that COLMAP knows.
+pub fn view(camera: &colmap::Camera, image: &colmap::Image, scale: f64) -> Result<View, Error> {
+    Ok(View {
+        center: image.center.map(|x| x * scale),
+        rotation: image.rotation,
+        lens: Lens::try_new(camera.model.name, &camera.params)?,
+        size: [camera.width_px, camera.height_px].map(|side| side as usize),
+    })
+}

@@ -1,0 +1,193 @@
+//! `unlift invert`: pictures of keypoints, of what came back of them, or of a map that came back.
+
+use std::fs;
+use std::path::{Component, Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+use unlift_audit::images::FeatureSource;
+use unlift_audit::inversion::{Painter, view};
+use unlift_features::{ColorImage, Extraction, preview};
+use unlift_io::Error;
+use unlift_io::atomic::{Access, Kind, Rules, marked_picture, write_file};
+use unlift_io::read::colmap;
+use unlift_io::stage::{
+    ImageFile, Kind as Stage, declared_kind, has_images, read_recovered, read_released,
+};
+
+use super::common::{same_map, with_threads};
+use crate::args::InvertArgs;
+use crate::exit::{Outcome, usage};
+use crate::output::print;
+
+/// Images at work per thread.
+const AT_WORK: usize = 2;
+
+/// Paints.
+pub fn run(args: &InvertArgs) -> anyhow::Result<Outcome> {
+    with_threads(args.threads, || {
+        let painter = Painter::try_new()?;
+        let inputs = [Some(&args.path), args.recovered.as_ref(), args.cameras.as_ref()];
+        let rules = Rules::new(inputs.into_iter().flatten().map(PathBuf::as_path), args.force);
+        let to = Target { args, rules, painted: AtomicUsize::new(0) };
+        let unusable = match (&args.recovered, declared_kind(&args.path)) {
+            (Some(recovered), _) if has_images(&args.path)? => images(&to, &painter, recovered)?,
+            (Some(recovered), _) => map(&to, &painter, recovered)?,
+            (None, Some(Stage::Released)) => {
+                return Err(usage("--recovered: expected what came back of PATH, found none"));
+            }
+            (None, _) => keypoints(&to, &painter)?,
+        };
+        let (painted, out) = (to.painted.into_inner(), args.out.display());
+        print(&format!("{painted} pictures, in {out}\n"))?;
+        if unusable > 0 {
+            let expected = format!("{} images that can be painted", painted + unusable);
+            return Err(Error::new(&args.path, "", expected, painted.to_string()).into());
+        }
+        Ok(Outcome::Done)
+    })
+}
+
+/// Where pictures go.
+struct Target<'a> {
+    args: &'a InvertArgs,
+    rules: Rules,
+    painted: AtomicUsize,
+}
+
+impl Target<'_> {
+    /// The file of the picture of image `name`, which may lie in folders of its own.
+    fn file(&self, name: &str) -> anyhow::Result<PathBuf> {
+        let relative = Path::new(name);
+        let within = relative.components().all(|part| matches!(part, Component::Normal(_)));
+        if !within || name.is_empty() {
+            let (expected, found) = ("a name within a folder", format!("{name:?}"));
+            return Err(Error::new(&self.args.path, "image", expected, found).into());
+        }
+        // Behind the whole name: `a.jpg` and `a.png` may be two images.
+        let mut file = self.args.out.join(relative).into_os_string();
+        file.push(".png");
+        let file = PathBuf::from(file);
+        if let Some(folder) = file.parent() {
+            fs::create_dir_all(folder).map_err(|error| Error::write(folder, error))?;
+        }
+        Ok(self.rules.check(&file, Kind::Picture)?)
+    }
+
+    fn write(&self, file: &Path, picture: &ColorImage) -> anyhow::Result<()> {
+        let bytes = marked_picture(&preview::png_of(picture)?);
+        write_file(file, Access::Private, |out| std::io::Write::write_all(out, &bytes))?;
+        self.painted.fetch_add(1, Ordering::Relaxed);
+        Ok(())
+    }
+
+    /// Numbers of the images to paint, of `n`.
+    fn chosen(&self, n: usize) -> Vec<usize> {
+        let most = self.args.max_images.map_or(n, |most| most.get().min(n));
+        (0..most).map(|at| ((2 * at + 1) * n) / (2 * most)).collect()
+    }
+}
+
+/// Paints what there is of every image, some at a time; what cannot be painted gets a line. Returns how many these are.
+fn each<T: Sync>(
+    to: &Target<'_>,
+    images: &[T],
+    paint: impl Fn(&T) -> anyhow::Result<(String, ColorImage)> + Sync,
+) -> anyhow::Result<usize> {
+    let one = |image: &T| -> anyhow::Result<()> {
+        let (name, picture) = paint(image)?;
+        to.write(&to.file(&name)?, &picture)
+    };
+    let results: Vec<_> = images.par_iter().with_max_len(1).map(one).collect();
+    let failed: Vec<_> = results.into_iter().filter_map(Result::err).collect();
+    failed.iter().for_each(|error| eprintln!("{}", crate::exit::line(error)));
+    Ok(failed.len())
+}
+
+/// The keypoints of photos or of a file, as they are.
+fn keypoints(to: &Target<'_>, painter: &Painter) -> anyhow::Result<usize> {
+    let path = &to.args.path;
+    let source = FeatureSource::open(path, &Extraction::default())?;
+    let chosen = to.chosen(source.names().len());
+    each(to, &chosen, |&at| {
+        let image = source.get(at)?;
+        let place = || format!("image {}", image.name.escape_debug());
+        let wrong = |expected: &str| Error::new(path, place(), expected, "none");
+        let descriptors = image.descriptors.as_ref().ok_or_else(|| wrong("descriptors"))?;
+        let size = image.size.ok_or_else(|| wrong("a size in pixels"))?.map(|side| side as usize);
+        let places: Vec<[f32; 2]> =
+            image.keypoints.iter().map(|place| place.map(|x| x as f32)).collect();
+        let picture = painter.keypoints(&places, descriptors, size);
+        let picture = picture.map_err(|error| Error::core(path, error.within(&place())))?;
+        Ok((image.name, picture))
+    })
+}
+
+/// What came back of released images.
+fn images(to: &Target<'_>, painter: &Painter, recovered: &Path) -> anyhow::Result<usize> {
+    let path = &to.args.path;
+    let mut released = ImageFile::open(path, Stage::Released)?;
+    let mut found = ImageFile::open(recovered, Stage::Recovered)?;
+    let (mut unusable, mut at_work) = (0, Vec::new());
+    let paint = |at_work: &mut Vec<_>| {
+        let n = each(to, at_work, |(name, released, recovered)| {
+            let picture = painter.image(released, recovered);
+            let place =
+                |error: unlift::Error| Error::core(path, error.within(&format!("image {name}")));
+            Ok((String::clone(name), picture.map_err(place)?))
+        });
+        at_work.clear();
+        n
+    };
+    let mut left = to.args.max_images.map_or(usize::MAX, |most| most.get());
+    while let Some(rows) = released.next_image()?.filter(|_| left > 0) {
+        left -= 1;
+        let name = rows.name().to_owned();
+        let image = rows.released()?;
+        let came_back = found.expect(&name, path)?.recovered()?;
+        same_map(recovered, came_back.about().map, path, Some(image.fingerprint()))?;
+        at_work.push((name, image, came_back));
+        if at_work.len() >= AT_WORK * rayon::current_num_threads() {
+            unusable += paint(&mut at_work)?;
+        }
+    }
+    if left > 0 {
+        found.expect_end(path)?;
+    }
+    Ok(unusable + paint(&mut at_work)?)
+}
+
+/// What came back of a released map, by the cameras of a model.
+fn map(to: &Target<'_>, painter: &Painter, recovered: &Path) -> anyhow::Result<usize> {
+    let (args, path) = (to.args, &to.args.path);
+    let Some(model) = &args.cameras else {
+        return Err(usage(
+            "--cameras: expected a COLMAP model whose cameras see the map, found none",
+        ));
+    };
+    let scale = args.scale.unwrap_or(1.0);
+    let released = read_released::<3>(path)?;
+    let came_back = read_recovered::<3>(recovered)?;
+    same_map(recovered, came_back.about().map, path, Some(released.fingerprint()))?;
+    let (cameras, mut images) = colmap::read_views(model)?;
+    images.sort_by(|a, b| a.name.cmp(&b.name));
+    let chosen = to.chosen(images.len());
+    each(to, &chosen, |&at| {
+        let image = &images[at];
+        let name = String::from_utf8_lossy(&image.name).into_owned();
+        let of_image = |error: unlift::Error| {
+            Error::core(model, error.within(&format!("image {}", name.escape_debug())))
+        };
+        let camera = cameras.iter().find(|camera| camera.id == image.camera_id);
+        let camera = camera.ok_or_else(|| {
+            of_image(unlift::Error::new("camera", "one of the model", image.camera_id.to_string()))
+        })?;
+        let view = view(camera, image, scale).map_err(of_image)?;
+        if !painter.sees(&view, &came_back).map_err(of_image)? {
+            let error = unlift::Error::new("recovered points", "some before the camera", "none");
+            return Err(of_image(error).into());
+        }
+        let picture = painter.map(&view, &released, &came_back).map_err(of_image)?;
+        Ok((name, picture))
+    })
+}

@@ -1,0 +1,70 @@
+"""The tables of pictures in docs/benchmarks.md: what came back, painted, beside the photos.
+
+Used by make_benchmarks.py; standard library only.
+"""
+import csv, json, pathlib, subprocess, tempfile
+
+METRICS = ["ssim", "psnr", "lpips"]
+RATIOS = ["1.0", "0.5", "0.3", "0.2", "0.1"]
+FLAT, SOLID = ["lines2d", "cp2d", "dcl2d"], ["olc", "ppl", "ray", "plane", "cp"]
+
+
+def audit(program, *options):
+    with tempfile.TemporaryDirectory() as out:
+        ratios = ["--inlier-ratios", ",".join(RATIOS), "--neighbors", "oracle", "--neighbors", "overlap", "--neighbors", "learned"]
+        command = [program, "audit", *options, *ratios, "--invert", "--solver", "joint", "--quiet", "--share-safe", "--out", f"{out}/audit"]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        return json.loads(pathlib.Path(out, "audit/audit.json").read_text())
+
+
+def told(metrics, of=""):
+    ssim, psnr, lpips = (metrics[name + of] for name in METRICS)
+    return f"{ssim:.3f} / {psnr:.1f} / {lpips:.3f}"
+
+
+def published(shared, dim):
+    """The paper's SSIM on 7-Scenes, SIFT: {(scheme, ratio): value}, the baseline under the scheme `none`."""
+    table = {}
+    with open(shared / "paper/tables/perceptual.csv") as lines:
+        for row in csv.DictReader(lines):
+            if (row["dataset"], row["dim"], row["feature"], row["metric"]) == ("7-scenes", dim, "sift", "ssim"):
+                ratio = row["inlier_ratio"]
+                table[row["scheme"], ratio if ratio == "baseline" else float(ratio)] = row["value"]
+    return table
+
+
+def table(document, schemes, paper):
+    rows = {}
+    for row in document["results"]:
+        key = row["inlier_ratio"] if row["neighbors"] == "oracle" else row["neighbors"]
+        rows[key, row["scheme"]] = row["metrics"]
+    yield "| In | " + " | ".join(schemes) + " |"
+    yield "|" + " --- |" * (len(schemes) + 1)
+    base = [told(rows[1.0, scheme], "_baseline") for scheme in schemes]
+    known = paper.get(("none", "baseline"))
+    yield "| true points | " + " | ".join(f"{text} [{known}]" if known else text for text in base) + " |"
+    for key in [*map(float, RATIOS), "learned", "overlap"]:
+        cells = []
+        for scheme in schemes:
+            known = paper.get((scheme, key))
+            cells.append(told(rows[key, scheme]) + (f" [{known}]" if known else ""))
+        yield f"| {key if isinstance(key, float) else f'`{key}`'} | " + " | ".join(cells) + " |"
+    run = document["run"]
+    yield ""
+    yield (f"Cost: {run['seconds']['total']:.0f} s, {run['threads']} threads, peak {run['peak_memory_bytes'] / 2**20:.0f} MiB.")
+    yield ""
+
+
+def tables(program, shared):
+    """All lines of the section."""
+    data = shared / "data"
+    yield from ["SSIM / PSNR in dB / LPIPS, means over photos, at half their size; in brackets the paper's SSIM on 7-Scenes (another network, full size).", ""]
+    for name, photos in (("RedKitchen, 40 photos", "redkitchen"), ("Castle, 11 photos", "castle")):
+        yield from [f"### {name}, keypoints", ""]
+        paper = published(shared, "2") if photos == "redkitchen" else {}
+        yield from table(audit(program, "images", data / photos / "images"), FLAT, paper)
+        yield from [f"### {name}, the map as its cameras see it", ""]
+        paper = published(shared, "3") if photos == "redkitchen" else {}
+        scale = ["--scale", "1"] if photos == "redkitchen" else []
+        yield from table(audit(program, "map", data / photos / "model", "--descriptors", data / photos / "descriptors.bin", *scale,
+                               "--photos", data / photos / "images", "--max-photos", "40", "--schemes", ",".join(SOLID), "--no-records-alone"), SOLID, paper)
