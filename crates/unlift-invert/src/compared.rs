@@ -3,7 +3,9 @@
 use unlift::Error;
 use unlift_features::ColorImage;
 
-use crate::{Lpips, psnr, ssim};
+use crate::lpips::Lpips;
+use crate::psnr::psnr;
+use crate::ssim::ssim;
 
 /// What the metrics say of a picture and its photo.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,21 +26,4 @@ impl Metrics {
     pub fn of(a: &ColorImage, b: &ColorImage, lpips: &Lpips) -> Result<Self, Error> {
         Ok(Self { ssim: ssim(a, b)?, psnr: psnr(a, b)?, lpips: lpips.distance(a, b)? })
     }
-}
-
-/// Whether two pictures have the same size, of at least `least` pixels a side.
-///
-/// # Errors
-/// One line with both sizes.
-pub fn check_sizes(a: &ColorImage, b: &ColorImage, least: usize) -> Result<(), Error> {
-    let size = |image: &ColorImage| format!("{} x {}", image.width(), image.height());
-    if (a.width(), a.height()) != (b.width(), b.height()) {
-        let expected = format!("another picture of {} pixels", size(a));
-        return Err(Error::new("pictures", expected, format!("one of {}", size(b))));
-    }
-    if a.width().min(a.height()) < least {
-        let expected = format!("pictures of at least {least} x {least} pixels");
-        return Err(Error::new("pictures", expected, size(a)));
-    }
-    Ok(())
 }

@@ -16,9 +16,10 @@ mod lens;
 mod lpips;
 mod projection;
 mod psnr;
+mod sizes;
 mod ssim;
 
-pub use compared::{Metrics, check_sizes};
+pub use compared::Metrics;
 pub use detect::{CLASSES, Detection, Detector};
 pub use feature_image::{CELL, Points, feature_image};
 pub use inverter::Inverter;

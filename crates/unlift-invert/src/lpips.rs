@@ -7,7 +7,7 @@ use unlift::Error;
 use unlift_features::ColorImage;
 use unlift_nn::{Network, Tensor};
 
-use crate::check_sizes;
+use crate::sizes::check_sizes;
 
 /// Name of the model.
 const MODEL: &str = "lpips-squeeze";

@@ -2,8 +2,8 @@
 
 use unlift::Error;
 
-use crate::Lens;
 use crate::feature_image::check_size;
+use crate::lens::Lens;
 
 /// A camera somewhere in the world.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,7 +3,7 @@
 use unlift::Error;
 use unlift_features::ColorImage;
 
-use crate::check_sizes;
+use crate::sizes::check_sizes;
 
 /// `10 log10(255^2 / MSE)` in dB, the mean over all pixels and colors; infinite for equal pictures.
 ///

@@ -6,7 +6,7 @@
 use unlift::Error;
 use unlift_features::ColorImage;
 
-use crate::check_sizes;
+use crate::sizes::check_sizes;
 
 /// Side of a window.
 const WINDOW: usize = 7;
