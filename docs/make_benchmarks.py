@@ -12,7 +12,7 @@ or parts of them, named after the folder; each tells on stderr how long it took 
     alone       1 min    attacks on the records alone
     large       5 min    the cost of 700,000 points
     images      5 min    keypoints of photos
-    pictures    8 min    what came back, painted
+    pictures    5 min    what came back, painted
 
 `± s` is the standard deviation over seeds, where it exceeds 0.5. Needs the scenes (SHARED/data) and the paper's tables (SHARED/paper/tables);
 standard library only. Everything between the begin and end markers of the two files is replaced.
