@@ -7,10 +7,6 @@ from safetensors.torch import load_file
 from torch.nn import functional
 
 
-def gray(x: torch.Tensor) -> torch.Tensor:
-    return (x * x.new_tensor([0.299, 0.587, 0.114])[:, None, None]).sum(1, keepdim=True)
-
-
 def ssim(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
     """Mean over pixels and channels, `(b,)`: uniform windows of 7 x 7 as scikit-image has them by default."""
 

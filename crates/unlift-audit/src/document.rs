@@ -7,6 +7,7 @@ use serde_json::{Map, Value, json};
 use unlift::Unit;
 use unlift::audit::{self, NeighborsBy, NotAudited, Plan, Row, Threshold};
 use unlift::recover::Delta;
+use unlift_report::Given;
 use unlift_report::document as report;
 
 /// What an outcome does not know about itself.
@@ -138,6 +139,15 @@ pub fn image(
         name: Some(name.to_owned()),
         n_points: n_points as u64,
         rows: rows.iter().map(figures).collect(),
+    }
+}
+
+/// The neighborhoods of a row, as the page tells them apart.
+pub(crate) fn given(row: &Row) -> Given {
+    Given {
+        neighbors: row.neighbors.clone(),
+        oracle_noise: row.oracle_noise.map(str::to_owned),
+        inlier_ratio: row.inlier_ratio,
     }
 }
 

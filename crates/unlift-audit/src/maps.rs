@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use unlift::audit::{Cell, NotAudited, Observer, Plan, REFERENCE, Row, run, run_released};
+use unlift::audit::{Cell, Observer, Plan, Row, run, run_released};
 use unlift::recover::Solver;
 use unlift::released::Released;
 use unlift::truth::{Original, Secret};
@@ -12,14 +12,14 @@ use unlift::{Descriptors, Unit};
 use unlift_io::atomic::OutputSet;
 use unlift_io::hash::hash_files;
 use unlift_io::read;
-use unlift_report::document::{Document, GateResult, Input};
+use unlift_report::document::{Document, Input};
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::{ErrorCdf, RenderOptions, render, text_table};
 
 use crate::Error;
 use crate::clouds::Clouds;
 use crate::document::{self, Provenance, ordered};
-use crate::gate::{Candidate, Gate};
+use crate::gate::{Gate, check_gates, gate_results};
 use crate::inversion::MapInversion;
 use crate::lengths::check_scale;
 use crate::outputs::{PAGE, commit_audit};
@@ -223,7 +223,11 @@ pub fn perform(job: Job<'_>, mut out: OutputSet) -> Result<Finished, Error> {
         return Err(error);
     }
     let gates = gate_results(&job.gates, &job.plan, &outcome.rows, &outcome.not_audited)?;
-    let options = document::options(&job.plan, job.options);
+    let mut options = job.options;
+    if let Some(inversion) = &job.inversion {
+        options.insert("inverter_sha256".into(), inversion.sha256().into());
+    }
+    let options = document::options(&job.plan, options);
     let provenance =
         Provenance { input: job.input, options, gates, command: job.command, started: job.started };
     let found = document::Found {
@@ -246,73 +250,6 @@ pub fn perform(job: Job<'_>, mut out: OutputSet) -> Result<Finished, Error> {
     let json = shown.to_json()?;
     commit_audit(out, &page, &json, job.share_safe)?;
     Ok(Finished { document: shown, report: job.out.join(PAGE) })
-}
-
-/// Rows as gates see them.
-fn candidates<'a, const D: usize>(plan: &Plan<D>, rows: &'a [Row]) -> Vec<Candidate<'a>> {
-    let mut candidates = Vec::new();
-    // The reference is no attack.
-    for row in rows.iter().filter(|row| row.solver != REFERENCE) {
-        for (at, threshold) in plan.thresholds.iter().enumerate() {
-            candidates.push(Candidate {
-                scheme: &row.scheme,
-                solver: row.solver,
-                source: &row.neighbors,
-                inlier_ratio: row.oracle_noise.is_some().then_some(row.inlier_ratio),
-                threshold: threshold.value,
-                recovered_percent: row.recovered_percent[at],
-                baseline_percent: row.baseline_percent(at),
-            });
-        }
-    }
-    candidates
-}
-
-/// A gate about no row is told before the audit runs, not after.
-pub fn check_gates<const D: usize>(gates: &[Gate], plan: &Plan<D>) -> Result<(), Error> {
-    let lacking = |gate: &Gate| gate.not_in(plan).map(|part| (gate.typed.clone(), part));
-    match gates.iter().find_map(lacking) {
-        None => Ok(()),
-        Some((gate, (expected, found))) => {
-            let (part, names) = expected.split_once(": ").unwrap_or(("row", &expected));
-            let error = format!("--gate {gate}: {part}: expected {names}, found {found}");
-            Err(match part {
-                "threshold" => {
-                    Error::request(error).advise("--scale and --thresholds, which change them")
-                }
-                _ => Error::request(error),
-            })
-        }
-    }
-}
-
-/// How every gate ended. One that is about something that could not be audited does not hold.
-pub fn gate_results<const D: usize>(
-    gates: &[Gate],
-    plan: &Plan<D>,
-    rows: &[Row],
-    not_audited: &[NotAudited],
-) -> Result<Vec<GateResult>, Error> {
-    let rows = candidates(plan, rows);
-    let result = |gate: &Gate| {
-        let found_percent = gate.worst(rows.iter().copied());
-        let reason = not_audited.iter().find(|missing| gate.misses(missing)).map(|missing| {
-            let with = missing.neighbors.as_ref().map(|name| format!(" with neighbors by {name}"));
-            let (scheme, with) = (&missing.scheme, with.unwrap_or_default());
-            format!("{scheme}{with} was not audited: {}", missing.reason)
-        });
-        // A gate that is about no row must never count as held.
-        if found_percent.is_none() && reason.is_none() {
-            return Err(Error::request(format!(
-                "--gate {}: expected a row, found none",
-                gate.typed
-            )));
-        }
-        let passed = reason.is_none() && found_percent.is_some_and(|found| gate.passes(found));
-        let (gate, bound_percent) = (gate.typed.clone(), gate.bound_percent);
-        Ok(GateResult { gate, found_percent, bound_percent, passed, reason })
-    };
-    gates.iter().map(result).collect()
 }
 
 /// Shows progress and keeps what the report draws.

@@ -3,10 +3,11 @@
 use unlift::audit::{Cell, Plan};
 use unlift::released::{Obfuscation, Released};
 use unlift::truth::Original;
-use unlift_report::Given;
 use unlift_report::scene::{
     ObfuscationView, Scene3d, SceneBox, Shapes, View, points_within_budget, subsample,
 };
+
+use crate::document::given;
 
 /// Points and shapes kept while an audit runs.
 pub struct Pictures {
@@ -63,11 +64,7 @@ impl Pictures {
         });
         self.scene.views.push(View {
             scheme: cell.row.scheme.to_owned(),
-            given: Given {
-                neighbors: cell.row.neighbors.clone(),
-                oracle_noise: cell.row.oracle_noise.map(str::to_owned),
-                inlier_ratio: cell.row.inlier_ratio,
-            },
+            given: given(cell.row),
             solver: cell.row.solver.to_owned(),
             recovered: recovered.collect(),
         });

@@ -52,6 +52,11 @@ fn a_photo_that_is_missing_is_told_and_the_others_go_on() {
     let note = "note: not painted: image b/c.jpg: some/b/c.jpg: expected a JPEG";
     assert!(stderr.contains(note), "{stderr}");
     assert!(document(&place, "audit")["results"][0]["metrics"]["ssim"].is_f64());
+
+    fs::create_dir(place.path("none")).unwrap();
+    let line = format!("audit images features.h5 --photos none --invert {CHEAP} --out x");
+    let (_, stderr) = place.ends(&line, 3);
+    assert_eq!(stderr, "unlift: none: expected photos of the images in features.h5, found none\n");
 }
 
 #[test]

@@ -7,16 +7,13 @@ use unlift_nn::{Network, Tensor};
 
 use crate::feature_image::{Points, feature_image};
 
-/// The models, by how many columns a descriptor has and what it is called.
+/// Name of the model.
 const SIFT: &str = "inverter-sift";
-/// Columns of a SIFT descriptor.
-const SIFT_COLUMNS: usize = 128;
 
 /// A network that was trained to make pictures of points and their descriptors.
 #[derive(Debug)]
 pub struct Inverter {
     network: Network,
-    columns: usize,
 }
 
 impl Inverter {
@@ -25,7 +22,7 @@ impl Inverter {
     /// # Errors
     /// When a file of the model that is to be taken in place of the one carried cannot be.
     pub fn sift() -> Result<Self, Error> {
-        Ok(Self { network: Network::load(SIFT)?, columns: SIFT_COLUMNS })
+        Ok(Self { network: Network::load(SIFT)? })
     }
 
     /// SHA-256 of the model, in hexadecimal.
@@ -39,12 +36,7 @@ impl Inverter {
     /// When the columns of `points` differ in length, their descriptors are not of the kind that the network knows, or
     /// a side has less than 2 pixels or the image more than 2^28.
     pub fn invert(&self, points: &Points<'_>, size: [usize; 2]) -> Result<ColorImage, Error> {
-        let columns = points.descriptors.dim();
-        if columns != self.columns {
-            let expected = format!("{} columns, as this network knows them", self.columns);
-            return Err(Error::new("descriptors", expected, columns.to_string()));
-        }
-        // Other features may have as many columns.
+        // What overlaps patches and what was trained on SIFT read the same descriptors.
         Source::<2>::takes(&Overlap, points.descriptors)?;
         let features = feature_image(points, size)?;
         let [picture] = self.network.run(vec![("features", features)], ["picture"])?;

@@ -144,11 +144,6 @@ impl Lens {
     /// Where a point at `x` (right, down, ahead of the camera) is seen, in pixels with the middle of the first pixel
     /// at (0, 0); `None` where the lens does not see it: behind the camera, or where the model folds back.
     pub fn project(&self, x: [f64; 3]) -> Option<[f64; 2]> {
-        let wide =
-            !matches!(self.kind, Kind::Perspective { .. } | Kind::Fov(_) | Kind::Division(_));
-        if x[2] <= 0.0 && !wide {
-            return None;
-        }
         let radius = libm::sqrt(x[0] * x[0] + x[1] * x[1]);
         if libm::atan2(radius, x[2]) > self.most {
             return None;

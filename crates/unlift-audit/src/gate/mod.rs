@@ -13,10 +13,13 @@
 //! number after the scheme is the threshold.
 
 mod parse;
+mod results;
 #[cfg(test)]
 mod tests;
 
 use unlift::audit::{NotAudited, Plan};
+
+pub(crate) use results::{check_gates, gate_results};
 
 /// A bound on a figure of an audit.
 #[derive(Clone, Debug, PartialEq)]

@@ -18,9 +18,9 @@ use super::pictures::Album;
 use super::stream::{Needs, Stream, Tally, lacking};
 use crate::Error;
 use crate::document::{self, Found, Provenance};
-use crate::gate::Gate;
+use crate::gate::{Gate, check_gates, gate_results};
 use crate::inversion::Inversion;
-use crate::maps::{Finished, check_gates, curve_errors, curves_of, gate_results};
+use crate::maps::{Finished, curve_errors, curves_of};
 use crate::outputs::{PAGE, commit_audit};
 use crate::progress::Progress;
 
@@ -87,12 +87,6 @@ pub fn perform(job: ImagesJob<'_>, out: OutputSet) -> Result<(Option<Finished>, 
     for error in job.inversion.iter().flat_map(|inversion| inversion.failed()) {
         steps.say(&format!("note: not painted: {error}"));
     }
-    let painted = || outcome.rows.iter().any(|row| row.metrics.contains_key("ssim"));
-    if job.inversion.is_some() && !outcome.rows.is_empty() && !painted() {
-        return Err(Error::request(
-            "--invert: expected photos of the images, found none that can be used",
-        ));
-    }
     let Watcher { figures, errors, curves, .. } = watcher;
     let tally = tally.into_inner();
     let used = Used { used: tally.used.len(), unusable: tally.unusable };
@@ -104,9 +98,13 @@ pub fn perform(job: ImagesJob<'_>, out: OutputSet) -> Result<(Option<Finished>, 
         false => draw(&job, &tally, &figures)?,
     };
     let gates = gate_results(&job.gates, &job.plan, &outcome.rows, &[])?;
+    let mut options = job.options.clone();
+    if let Some(inversion) = &job.inversion {
+        options.insert("inverter_sha256".into(), inversion.sha256().into());
+    }
     let provenance = Provenance {
         input: input(&job, &tally, &outcome)?,
-        options: document::options(&job.plan, job.options),
+        options: document::options(&job.plan, options),
         gates,
         command: job.command.clone(),
         started: job.started,

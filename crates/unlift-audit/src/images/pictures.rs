@@ -6,9 +6,10 @@ use unlift::audit::{Cell, Observer, Row, Watcher};
 use unlift::released::{Obfuscation, Released};
 use unlift_report::inversions::Inversion as Inverted;
 use unlift_report::pictures::{
-    GRAPH_NEIGHBORS, Given, Graph, Marks, Picture, RecoveredView, ReleasedView,
+    GRAPH_NEIGHBORS, Graph, Marks, Picture, RecoveredView, ReleasedView,
 };
 
+use crate::document::given;
 use crate::inversion::Inversion;
 
 /// Collects pictures of all images that pass by, in their order.
@@ -52,14 +53,6 @@ pub struct Page {
     inverter: Option<Arc<Inversion>>,
     picture: Picture,
     painted: Inverted,
-}
-
-fn given(row: &Row) -> Given {
-    Given {
-        neighbors: row.neighbors.clone(),
-        oracle_noise: row.oracle_noise.map(str::to_owned),
-        inlier_ratio: row.inlier_ratio,
-    }
 }
 
 impl Observer<2> for Page {

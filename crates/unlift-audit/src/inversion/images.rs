@@ -7,11 +7,24 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use unlift::Error;
 use unlift::audit::{Cell, Counts, Measure};
+use unlift_features::ColorImage;
 use unlift_features::load::read_color;
 use unlift_features::preview::jpeg_of;
+use unlift_invert::Detection;
 use unlift_report::inversions::Inversion as Sheet;
 
-use super::{Painter, SHOWN, Truth, figures, likeness, originals, shown, size};
+use super::{Judged, Painter, SHOWN, figures, likeness, needed, shown, size};
+
+/// A photo at the size of its pictures, and how well the true points paint it.
+struct Truth {
+    /// At half its size.
+    photo: ColorImage,
+    objects: Vec<Detection>,
+    /// The picture of the true points.
+    picture: ColorImage,
+    /// No attack on positions can be expected to do better.
+    baseline: Judged,
+}
 
 /// Photos that are kept for cells to come; fewer images are at work.
 const KEPT: usize = 64;
@@ -41,6 +54,11 @@ impl Inversion {
         Ok(Self { painter, photos, known: Mutex::default(), failed: Mutex::default() })
     }
 
+    /// SHA-256 of the network that paints, in hexadecimal.
+    pub fn sha256(&self) -> &str {
+        self.painter.sha256()
+    }
+
     /// Why images have no pictures, by their names.
     pub fn failed(&self) -> Vec<Error> {
         lock(&self.failed).values().cloned().collect()
@@ -57,8 +75,8 @@ impl Inversion {
             sheet.baseline = (jpeg_of(&truth.picture, SHOWN)?, likeness(&truth.baseline));
         }
         let picture = self.painter.image(cell.released, cell.recovered)?;
-        let metrics = self.painter.compare(&picture, &truth.photo)?;
-        sheet.views.push(shown(cell.row, &picture, &metrics)?);
+        let judged = self.painter.judge(&picture, &truth.photo, &truth.objects)?;
+        sheet.views.push(shown(cell.row, &picture, &judged)?);
         Ok(())
     }
 
@@ -77,7 +95,7 @@ impl Inversion {
             return Err(Error::new(path, format!("a photo of {expected}"), found));
         }
         let photo = photo.halved()?;
-        let descriptors = originals(cell.descriptors)?;
+        let descriptors = needed(cell.descriptors)?;
         let places: Vec<[f32; 2]> = cell
             .original
             .reveal()
@@ -86,8 +104,9 @@ impl Inversion {
             .map(|place| place.map(|x| x as f32))
             .collect();
         let picture = self.painter.keypoints(&places, descriptors, size)?;
-        let baseline = self.painter.compare(&picture, &photo)?;
-        let truth = Arc::new(Truth { photo, picture, baseline });
+        let objects = self.painter.objects(&photo)?;
+        let baseline = self.painter.judge(&picture, &photo, &objects)?;
+        let truth = Arc::new(Truth { photo, objects, picture, baseline });
         let mut known = lock(&self.known);
         if known.len() >= KEPT {
             known.clear();
@@ -113,10 +132,9 @@ impl Measure<2> for Inversion {
                 return Ok(Vec::new());
             }
         };
-        let found = self
-            .painter
-            .compare(&self.painter.image(cell.released, cell.recovered)?, &truth.photo)?;
-        Ok(figures(found, truth.baseline))
+        let picture = self.painter.image(cell.released, cell.recovered)?;
+        let found = self.painter.judge(&picture, &truth.photo, &truth.objects)?;
+        Ok(figures(&found, &truth.baseline))
     }
 }
 

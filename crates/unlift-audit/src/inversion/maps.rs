@@ -1,5 +1,6 @@
 //! Pictures of a map: of recovered points, seen by the cameras of its photos.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -10,11 +11,11 @@ use unlift::audit::{Cell, Measure};
 use unlift_features::ColorImage;
 use unlift_features::load::read_color_as_stored;
 use unlift_features::preview::jpeg_of;
-use unlift_invert::{Lens, Metrics, View};
+use unlift_invert::{Detection, Lens, View};
 use unlift_io::read::colmap;
 use unlift_report::inversions::Inversion as Sheet;
 
-use super::{Painter, SHOWN, figures, likeness, shown};
+use super::{Judged, Painter, SHOWN, figures, likeness, needed, shown};
 use crate::progress::Progress;
 
 /// Sides of a picture that metrics can be taken of.
@@ -26,7 +27,9 @@ struct Seen {
     view: View,
     /// At half its size.
     photo: ColorImage,
-    truth: OnceLock<Result<(ColorImage, Metrics), Error>>,
+    objects: Vec<Detection>,
+    /// What the true points paint.
+    truth: OnceLock<Result<(ColorImage, Judged), Error>>,
 }
 
 /// Makes pictures of a map and compares them with the photos.
@@ -56,6 +59,7 @@ impl MapInversion {
         most: usize,
         progress: &dyn Progress,
     ) -> Result<Self, crate::Error> {
+        let painter = Painter::try_new()?;
         let (cameras, mut images) = colmap::read_views(model)?;
         images.sort_by(|a, b| a.name.cmp(&b.name));
         let with_photo = |image: &colmap::Image| {
@@ -65,6 +69,10 @@ impl MapInversion {
         let with_photo: Vec<_> =
             images.iter().filter_map(|image| Some((image, with_photo(image)?))).collect();
         let (n, most) = (with_photo.len(), most.min(with_photo.len()));
+        if n < images.len() {
+            let found = format!("{n} of {} images of the model have a photo", images.len());
+            progress.say(&format!("note: {}: {found}", photos.display()));
+        }
         let mut seen = Vec::new();
         for (image, path) in (0..most).map(|at| &with_photo[(2 * at + 1) * n / (2 * most)]) {
             let camera = cameras.iter().find(|camera| camera.id == image.camera_id);
@@ -72,7 +80,7 @@ impl MapInversion {
                 let id = image.camera_id.to_string();
                 Error::new(path.display().to_string(), "a camera of the model", id)
             });
-            match made.and_then(|camera| one(camera, image, path, scale)) {
+            match made.and_then(|camera| one(&painter, (camera, image), path, scale)) {
                 Ok(one) => seen.push(one),
                 Err(error) => progress.say(&format!("note: not painted: {error}")),
             }
@@ -81,7 +89,12 @@ impl MapInversion {
             let expected = format!("photos of the images in {}", model.display());
             return Err(unlift_io::Error::new(photos, "", expected, "none").into());
         }
-        Ok(Self { painter: Painter::try_new()?, seen })
+        Ok(Self { painter, seen })
+    }
+
+    /// SHA-256 of the network that paints, in hexadecimal.
+    pub fn sha256(&self) -> &str {
+        self.painter.sha256()
     }
 
     /// How many photos there are.
@@ -102,8 +115,8 @@ impl MapInversion {
                 sheet.baseline = (jpeg_of(painted, SHOWN)?, likeness(baseline));
             }
             let picture = self.painter.map(&seen.view, cell.released, cell.recovered)?;
-            let metrics = self.painter.compare(&picture, &seen.photo)?;
-            sheet.views.push(shown(cell.row, &picture, &metrics)?);
+            let judged = self.painter.judge(&picture, &seen.photo, &seen.objects)?;
+            sheet.views.push(shown(cell.row, &picture, &judged)?);
         }
         Ok(())
     }
@@ -113,13 +126,13 @@ impl MapInversion {
         &'a self,
         seen: &'a Seen,
         cell: &Cell<'_>,
-    ) -> Result<&'a (ColorImage, Metrics), Error> {
+    ) -> Result<&'a (ColorImage, Judged), Error> {
         let make = || {
             let originals = cell.original.reveal().positions();
             let positions: Vec<Option<[f64; 3]>> = originals.iter().copied().map(Some).collect();
-            let descriptors = super::originals(cell.descriptors)?;
+            let descriptors = needed(cell.descriptors)?;
             let picture = self.painter.seen(&seen.view, &positions, descriptors, |_, _| 1.0)?;
-            let baseline = self.painter.compare(&picture, &seen.photo)?;
+            let baseline = self.painter.judge(&picture, &seen.photo, &seen.objects)?;
             Ok((picture, baseline))
         };
         seen.truth.get_or_init(make).as_ref().map_err(Error::clone)
@@ -127,28 +140,27 @@ impl MapInversion {
 }
 
 impl Measure<3> for MapInversion {
-    /// Means over the photos.
+    /// Means over the photos that have the figure: not every photo has objects.
     fn measure(&self, cell: &Cell<'_>) -> Result<Vec<(String, f64)>, Error> {
         let of_one = |seen: &Seen| {
-            let found = self.painter.compare(
-                &self.painter.map(&seen.view, cell.released, cell.recovered)?,
-                &seen.photo,
-            )?;
-            Ok(figures(found, self.truth(seen, cell)?.1))
+            let picture = self.painter.map(&seen.view, cell.released, cell.recovered)?;
+            let found = self.painter.judge(&picture, &seen.photo, &seen.objects)?;
+            Ok(figures(&found, &self.truth(seen, cell)?.1))
         };
         let all: Vec<Vec<(String, f64)>> =
             self.seen.par_iter().map(of_one).collect::<Result<_, Error>>()?;
-        let mut mean = all[0].clone();
-        for (at, (_, value)) in mean.iter_mut().enumerate() {
-            *value = all.iter().map(|figures| figures[at].1).sum::<f64>() / all.len() as f64;
+        let mut sums = BTreeMap::new();
+        for (name, value) in all.into_iter().flatten() {
+            let (sum, n) = sums.entry(name).or_insert((0.0, 0_u32));
+            (*sum, *n) = (*sum + value, *n + 1);
         }
-        Ok(mean)
+        Ok(sums.into_iter().map(|(name, (sum, n))| (name, sum / f64::from(n))).collect())
     }
 }
 
 fn one(
-    camera: &colmap::Camera,
-    image: &colmap::Image,
+    painter: &Painter,
+    (camera, image): (&colmap::Camera, &colmap::Image),
     path: &Path,
     scale: f64,
 ) -> Result<Seen, Error> {
@@ -171,6 +183,7 @@ fn one(
     Ok(Seen {
         name: String::from_utf8_lossy(&image.name).into_owned(),
         view: view(camera, image, scale).map_err(of_photo)?,
+        objects: painter.objects(&photo)?,
         photo,
         truth: OnceLock::new(),
     })

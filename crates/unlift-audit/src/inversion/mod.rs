@@ -5,14 +5,16 @@ mod maps;
 
 use std::borrow::Cow;
 
+use unlift::audit::Row;
 use unlift::recover::Recovered;
 use unlift::released::Released;
 use unlift::{Descriptors, Error, RowOrder};
 use unlift_features::ColorImage;
 use unlift_features::preview::jpeg_of;
-use unlift_invert::{Inverter, Lpips, Metrics, Points, Projection, View};
-use unlift_report::Given;
+use unlift_invert::{Detection, Detector, Inverter, Lpips, Metrics, Points, Projection, View};
 use unlift_report::inversions::{InvertedView, Likeness};
+
+use crate::document::given;
 
 pub use images::Inversion;
 pub use maps::{MapInversion, view};
@@ -27,6 +29,11 @@ const BASELINE: &str = "_baseline";
 /// Equal pictures have no finite ratio of signal to noise.
 const MOST_DB: f64 = 100.0;
 
+/// How sure the detector must be of an object.
+const SURE: f32 = 0.3;
+/// How much two boxes of a class must overlap to be the same object.
+const SAME: f32 = 0.5;
+
 /// Within how many pixels a keypoint must lie for its descriptor to paint the right thing.
 const NEAR_PX: f64 = 10.0;
 /// The same for a point of a map, of its distance from the camera: about 15 of 640 pixels.
@@ -36,6 +43,15 @@ const NEAR: f64 = 0.03;
 pub struct Painter {
     inverter: Inverter,
     lpips: Lpips,
+    detector: Detector,
+}
+
+/// What a picture shows of its photo.
+#[derive(Clone, Copy, Debug)]
+struct Judged {
+    metrics: Metrics,
+    /// The share of the photo's objects that are found in the picture, where the photo has any.
+    objects_found: Option<f64>,
 }
 
 impl Painter {
@@ -44,7 +60,8 @@ impl Painter {
     /// # Errors
     /// When a file that is to be taken in place of one of them cannot be.
     pub fn try_new() -> Result<Self, Error> {
-        Ok(Self { inverter: Inverter::sift()?, lpips: Lpips::try_new()? })
+        let (inverter, lpips) = (Inverter::sift()?, Lpips::try_new()?);
+        Ok(Self { inverter, lpips, detector: Detector::try_new()? })
     }
 
     /// The picture of keypoints `(n, 2)` in an image of `size` (width, height) pixels.
@@ -115,76 +132,73 @@ impl Painter {
         descriptors: &Descriptors,
         weight: impl Fn(usize, f32) -> f32,
     ) -> Result<ColorImage, Error> {
-        let all = view.project(positions)?;
-        // Whoever distrusts a point does not let it hide others.
-        let trusted = |at: usize| weight(all.points[at] as usize, all.depths[at]) > 0.0;
-        let projection = all.only(trusted);
-        let visible = projection.visible(view.size);
+        let (projection, weights) = in_sight(view, positions, weight)?;
         let Projection { points, places, depths } = &projection;
-        let weights: Vec<f32> = (points.iter().zip(depths).zip(visible))
-            .map(|((&slot, &depth), seen)| if seen { weight(slot as usize, depth) } else { 0.0 })
-            .collect();
         let descriptors = &descriptors.select(points);
         let points = Points { places, descriptors, weights: &weights, depths: Some(depths) };
         self.inverter.invert(&points, view.size)
     }
 
-    fn compare(&self, picture: &ColorImage, photo: &ColorImage) -> Result<Metrics, Error> {
-        Metrics::of(picture, photo, &self.lpips)
+    /// SHA-256 of the network that paints, in hexadecimal.
+    fn sha256(&self) -> &str {
+        self.inverter.sha256()
+    }
+
+    /// The objects in a photo.
+    fn objects(&self, photo: &ColorImage) -> Result<Vec<Detection>, Error> {
+        self.detector.find(photo, SURE)
+    }
+
+    /// What `picture` shows of a photo with these objects.
+    fn judge(
+        &self,
+        picture: &ColorImage,
+        photo: &ColorImage,
+        objects: &[Detection],
+    ) -> Result<Judged, Error> {
+        let metrics = Metrics::of(picture, photo, &self.lpips)?;
+        if objects.is_empty() {
+            return Ok(Judged { metrics, objects_found: None });
+        }
+        let seen = self.objects(picture)?;
+        let again = |object: &&Detection| {
+            seen.iter().any(|one| one.class == object.class && one.overlap(object) >= SAME)
+        };
+        let share = objects.iter().filter(again).count() as f64 / objects.len() as f64;
+        Ok(Judged { metrics, objects_found: Some(share) })
     }
 }
 
-/// A photo at the size of its pictures, and how well the true points paint it.
-#[derive(Debug)]
-struct Truth {
-    /// The photo, at half its size.
-    photo: ColorImage,
-    /// The picture of the true points.
-    picture: ColorImage,
-    /// How alike the two are: no attack on positions can be expected to do better.
-    baseline: Metrics,
-}
-
 /// Named figures of a picture, and of that of the true points.
-fn figures(found: Metrics, baseline: Metrics) -> Vec<(String, f64)> {
-    let named = |(metrics, of): (Metrics, &str)| {
-        let Metrics { ssim, psnr, lpips } = metrics;
-        [("ssim", ssim), ("psnr", psnr.min(MOST_DB)), ("lpips", lpips)]
-            .map(|(name, value)| (format!("{name}{of}"), value))
+fn figures(found: &Judged, baseline: &Judged) -> Vec<(String, f64)> {
+    let named = |(judged, of): (&Judged, &str)| {
+        let Metrics { ssim, psnr, lpips } = judged.metrics;
+        let figures = [("ssim", ssim), ("psnr", psnr.min(MOST_DB)), ("lpips", lpips)];
+        let objects = judged.objects_found.map(|share| ("objects_found", share));
+        let all = figures.into_iter().chain(objects);
+        all.map(|(name, value)| (format!("{name}{of}"), value)).collect::<Vec<_>>()
     };
     [(found, ""), (baseline, BASELINE)].into_iter().flat_map(named).collect()
 }
 
 /// A picture of what came back, for the page.
-fn shown(
-    row: &unlift::audit::Row,
-    picture: &ColorImage,
-    metrics: &Metrics,
-) -> Result<InvertedView, Error> {
+fn shown(row: &Row, picture: &ColorImage, judged: &Judged) -> Result<InvertedView, Error> {
     Ok(InvertedView {
         scheme: row.scheme.clone(),
-        given: Given {
-            neighbors: row.neighbors.clone(),
-            oracle_noise: row.oracle_noise.map(str::to_owned),
-            inlier_ratio: row.inlier_ratio,
-        },
+        given: given(row),
         solver: row.solver.to_owned(),
-        likeness: likeness(metrics),
+        likeness: likeness(judged),
         picture: jpeg_of(picture, SHOWN)?,
     })
 }
 
-fn likeness(metrics: &Metrics) -> Likeness {
-    Likeness { ssim: metrics.ssim, lpips: metrics.lpips }
+fn likeness(judged: &Judged) -> Likeness {
+    Likeness { ssim: judged.metrics.ssim, lpips: judged.metrics.lpips }
 }
 
-/// The descriptors of the true points.
-fn originals(descriptors: Option<&Descriptors>) -> Result<&Descriptors, Error> {
+/// Descriptors, which nothing can be painted without.
+fn needed(descriptors: Option<&Descriptors>) -> Result<&Descriptors, Error> {
     descriptors.ok_or_else(|| Error::new("pictures", "descriptors", "none"))
-}
-
-fn descriptors<const D: usize>(released: &Released<D>) -> Result<&Descriptors, Error> {
-    released.descriptors().ok_or_else(|| Error::new("pictures", "descriptors", "none"))
 }
 
 /// The descriptors of recovered points, in their order. Lists that an attacker makes from descriptors are counted as
@@ -193,12 +207,29 @@ fn assigned<'a, const D: usize>(
     released: &'a Released<D>,
     recovered: &Recovered<D>,
 ) -> Result<Cow<'a, Descriptors>, Error> {
-    let descriptors = descriptors(released)?;
+    let descriptors = needed(released.descriptors())?;
     let own = recovered.about().order == RowOrder::DescriptorRows;
     Ok(match recovered.descriptor_row().filter(|_| !own) {
         Some(rows) => Cow::Owned(descriptors.select(rows)),
         None => Cow::Borrowed(descriptors),
     })
+}
+
+/// The points that are trusted and fall into a view's image, and their weights: 0 for those behind others. Whoever
+/// distrusts a point does not let it hide others.
+fn in_sight(
+    view: &View,
+    positions: &[Option<[f64; 3]>],
+    weight: impl Fn(usize, f32) -> f32,
+) -> Result<(Projection, Vec<f32>), Error> {
+    let all = view.project(positions)?;
+    let of = |at: usize| weight(all.points[at] as usize, all.depths[at]);
+    let kept = all.only(|at| of(at) > 0.0);
+    let visible = kept.visible(view.size);
+    let weights = (kept.points.iter().zip(&kept.depths).zip(visible))
+        .map(|((&slot, &depth), seen)| if seen { weight(slot as usize, depth) } else { 0.0 })
+        .collect();
+    Ok((kept, weights))
 }
 
 /// Width and height of a released image in pixels.
@@ -216,5 +247,62 @@ fn weight<const D: usize>(recovered: &Recovered<D>, slot: usize, near: f64) -> f
         Some(sure) => sure as f32,
         None if recovered.position(slot).is_some() => 1.0,
         None => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use unlift::descriptors::Values;
+    use unlift::recover::{Estimate, Status};
+    use unlift::released::{Lines, Obfuscation};
+    use unlift::{About, Unit};
+    use unlift_invert::Lens;
+
+    use super::*;
+
+    fn view() -> View {
+        View {
+            center: [0.0; 3],
+            rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            lens: Lens::try_new("SIMPLE_PINHOLE", &[100.0, 32.0, 32.0]).unwrap(),
+            size: [64, 64],
+        }
+    }
+
+    #[test]
+    fn points_that_nobody_trusts_hide_nothing() {
+        // Three points before a fourth.
+        let positions = [1.0, 1.1, 1.2, 2.0].map(|depth| Some([0.0, 0.0, depth]));
+        let weights = |distrusted: f32| {
+            let of = |slot: usize, _: f32| if slot < 3 { distrusted } else { 0.9 };
+            in_sight(&view(), &positions, of).unwrap()
+        };
+        assert_eq!(weights(0.5).1, [0.5, 0.5, 0.5, 0.0]);
+        let (kept, weights) = weights(0.0);
+        assert_eq!((kept.points, weights), (vec![3], vec![0.9]));
+    }
+
+    #[test]
+    fn lists_counted_by_descriptors_leave_nothing_to_guess() {
+        let lines = Lines::through(&[[0.0; 2]], &[[1.0, 0.0]]).unwrap();
+        let bytes = (0..256).map(|at| (at / 128) as u8 + 1).collect();
+        let descriptors = Descriptors::try_new(Values::U8(bytes), 128).unwrap();
+        let released = Released::<2>::try_new(
+            Obfuscation::Lines(lines),
+            2,
+            [0.0; 2],
+            Unit::Pixel,
+            Some(descriptors.clone()),
+        )
+        .unwrap();
+        let lost = Estimate::lost(Status::NoSupport);
+        let recovered = |order: RowOrder| {
+            Recovered::try_new(&[lost, lost], false, Some(vec![1, 0]), [0.0; 2], Unit::Pixel, 1.0)
+                .unwrap()
+                .with_about(About { order, ..About::default() })
+        };
+        let of = |order| assigned(&released, &recovered(order)).unwrap().into_owned();
+        assert_eq!(of(RowOrder::Slots), descriptors.select(&[1, 0]));
+        assert_eq!(of(RowOrder::DescriptorRows), descriptors);
     }
 }

@@ -53,6 +53,7 @@ pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
             eprintln!("unlift: note: {note}");
         }
         let chosen = chosen(source.names().len(), args.max_images.map(|n| n.get()));
+        check_photos(args, &source, &chosen)?;
         check_descriptors(&source, &chosen, &plan, inversion.is_some())?;
         let progress = Progress::new(args.run.quiet);
         let job = ImagesJob {
@@ -140,6 +141,20 @@ fn extraction(args: &AuditImagesArgs, plan: &Plan<2>) -> anyhow::Result<Extracti
         plan.own_sources().try_for_each(|source| check_fit(source, &learned))?;
     }
     Ok(extraction)
+}
+
+/// Whether there is any photo to compare with.
+fn check_photos(
+    args: &AuditImagesArgs,
+    source: &FeatureSource,
+    chosen: &[usize],
+) -> anyhow::Result<()> {
+    let (true, Some(photos)) = (args.invert, &args.photos) else { return Ok(()) };
+    if chosen.iter().any(|&at| photos.join(&source.names()[at]).is_file()) {
+        return Ok(());
+    }
+    let expected = format!("photos of the images in {}", args.path.display());
+    Err(Error::new(photos, "", expected, "none").into())
 }
 
 /// What paints pictures, if that was asked for.
