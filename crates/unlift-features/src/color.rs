@@ -1,8 +1,10 @@
 //! What learned extractors read: colors, row by row.
 
-use image::{ImageBuffer, Rgb};
+use image::buffer::ConvertBuffer;
+use image::{GrayImage as Luma, ImageBuffer, Rgb};
 use unlift::Error;
 
+use crate::GrayImage;
 use crate::fit::fitted;
 
 /// A color image.
@@ -55,6 +57,17 @@ impl ColorImage {
     pub fn pixel(&self, x: usize, y: usize) -> [u8; 3] {
         let at = 3 * (y * self.width + x);
         [self.pixels[at], self.pixels[at + 1], self.pixels[at + 2]]
+    }
+
+    /// Without its colors, as [`read`](crate::load::read) would give it.
+    ///
+    /// # Errors
+    /// Never: the image is as large as it says.
+    pub fn gray(&self) -> Result<GrayImage, Error> {
+        let (width, height) = (self.width as u32, self.height as u32);
+        let pixels = ImageBuffer::<Rgb<u8>, &[u8]>::from_raw(width, height, &self.pixels);
+        let luma: Option<Luma> = pixels.map(|pixels| pixels.convert());
+        GrayImage::from_bytes(self.width, self.height, luma.unwrap_or_default().as_raw())
     }
 
     /// The image at half its size, every pixel the mean of four; an odd last row or column is left out.

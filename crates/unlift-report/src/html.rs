@@ -29,12 +29,13 @@ const TEMPLATES: [(&str, &str); 8] = [
 const STYLE: [&str; 2] =
     [include_str!("../template/style.css"), include_str!("../template/figures.css")];
 const BUNDLE: &str = include_str!("../web/vendor/bundle.min.js");
-const SCRIPTS: [&str; 6] = [
+const SCRIPTS: [&str; 7] = [
     include_str!("../web/choices.js"),
     include_str!("../web/charts.js"),
     include_str!("../web/figures.js"),
     include_str!("../web/scene.js"),
     include_str!("../web/pictures.js"),
+    include_str!("../web/wipe.js"),
     include_str!("../web/report.js"),
 ];
 
@@ -73,6 +74,7 @@ pub fn render(
         Some(tables::baselines(&document)),
         tables::distinct(&document),
         tables::metrics(&document),
+        tables::objects(&document),
         Some(tables::errors(&document)),
         Some(tables::break_even(&document)).filter(|table| !table.rows.is_empty()),
     ];
@@ -146,7 +148,7 @@ pub fn render(
 struct Page<'a> {
     style: [&'static str; 2],
     bundle: &'static str,
-    scripts: [&'static str; 6],
+    scripts: [&'static str; 7],
     /// JSON for the script; free of `<`.
     data: String,
     blocks: &'a [String],

@@ -15,10 +15,32 @@ pub struct Inversion {
     pub name: String,
     /// The photo.
     pub photo: Vec<u8>,
-    /// The picture of the true keypoints, and how alike it is to the photo.
-    pub baseline: (Vec<u8>, Likeness),
+    /// What a detector finds in the photo.
+    pub objects: Vec<Object>,
+    /// The picture of the true keypoints.
+    pub baseline: Painted,
     /// Pictures of what came back.
     pub views: Vec<InvertedView>,
+}
+
+/// A picture that a network made.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Painted {
+    /// The picture.
+    pub jpeg: Vec<u8>,
+    /// How alike it is to the photo.
+    pub likeness: Likeness,
+    /// What a detector finds in it.
+    pub objects: Vec<Object>,
+}
+
+/// An everyday object that a detector found in a picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Object {
+    /// What it is: `chair`.
+    pub class: String,
+    /// Left, top, right and bottom as shares of the picture's sides; may reach beyond it.
+    pub sides: [f32; 4],
 }
 
 /// How alike a picture is to the photo.
@@ -46,9 +68,7 @@ pub struct InvertedView {
     /// The solver's name.
     pub solver: String,
     /// The picture.
-    pub picture: Vec<u8>,
-    /// How alike it is to the photo.
-    pub likeness: Likeness,
+    pub painted: Painted,
 }
 
 /// All pictures of one photo, as the page shows them.
@@ -56,8 +76,19 @@ pub struct InvertedView {
 pub(crate) struct Sheet {
     name: String,
     photo: String,
+    boxes: Vec<Boxed>,
     baseline: Shown,
     rows: Vec<SheetRow>,
+}
+
+/// Where an object is drawn, in per cent of the picture.
+#[derive(Debug, Serialize)]
+struct Boxed {
+    class: String,
+    left: f32,
+    top: f32,
+    width: f32,
+    height: f32,
 }
 
 #[derive(Debug, Serialize)]
@@ -74,6 +105,7 @@ struct Shown {
     /// Whether an attacker can make it today, without an oracle.
     today: bool,
     source: String,
+    boxes: Vec<Boxed>,
 }
 
 /// Bytes of the page that all of them may take.
@@ -168,14 +200,13 @@ pub(crate) fn lead(document: &Document, inversions: &[Inversion]) -> Option<Lead
             "{who}, a network paints {amount} of what {scheme} hides (SSIM {ssim:.2}, {baseline:.2} without)."
         ),
         photo: source(&sheet.photo),
-        baseline: source(&sheet.baseline.0),
-        recovered: source(&view.picture),
+        baseline: source(&sheet.baseline.jpeg),
+        recovered: source(&view.painted.jpeg),
         label: format!("{scheme}, {}", label(view)),
     })
 }
 
 fn sheet(inversion: &Inversion) -> Sheet {
-    let (picture, likeness) = &inversion.baseline;
     let mut rows: Vec<SheetRow> = Vec::new();
     let several = inversion.views.iter().any(|view| view.solver != inversion.views[0].solver);
     for view in &inversion.views {
@@ -184,9 +215,8 @@ fn sheet(inversion: &Inversion) -> Sheet {
                 true => label(view),
                 false => attack::without_solver(&view.given, &view.solver),
             },
-            said: view.likeness.said(),
             today: attack::basis_of(&view.given.neighbors, &view.solver) == Some(Basis::Released),
-            source: source(&view.picture),
+            ..Shown::of(&view.painted)
         };
         match rows.iter_mut().find(|row| row.scheme == view.scheme) {
             Some(row) => row.pictures.push(shown),
@@ -196,14 +226,35 @@ fn sheet(inversion: &Inversion) -> Sheet {
     Sheet {
         name: inversion.name.clone(),
         photo: source(&inversion.photo),
+        boxes: boxes(&inversion.objects),
         baseline: Shown {
             label: "without protection".to_owned(),
-            said: likeness.said(),
-            today: false,
-            source: source(picture),
+            ..Shown::of(&inversion.baseline)
         },
         rows,
     }
+}
+
+impl Shown {
+    fn of(painted: &Painted) -> Self {
+        Self {
+            label: String::new(),
+            said: painted.likeness.said(),
+            today: false,
+            source: source(&painted.jpeg),
+            boxes: boxes(&painted.objects),
+        }
+    }
+}
+
+/// What lies within the picture.
+fn boxes(objects: &[Object]) -> Vec<Boxed> {
+    let of = |object: &Object| {
+        let [left, top, right, bottom] = object.sides.map(|side| 100.0 * side.clamp(0.0, 1.0));
+        let class = object.class.clone();
+        Boxed { class, left, top, width: right - left, height: bottom - top }
+    };
+    objects.iter().map(of).collect()
 }
 
 /// The whole attack: neighborhoods and solver.
@@ -227,8 +278,8 @@ mod tests {
     fn view(scheme: &str, neighbors: &str, inlier_ratio: f64, bytes: usize) -> InvertedView {
         let given = Given { neighbors: neighbors.into(), oracle_noise: None, inlier_ratio };
         let solver = "joint".to_owned();
-        let likeness = Likeness { ssim: 0.4, lpips: 0.3 };
-        InvertedView { scheme: scheme.into(), given, solver, picture: vec![7; bytes], likeness }
+        let painted = Painted { jpeg: vec![7; bytes], ..Painted::default() };
+        InvertedView { scheme: scheme.into(), given, solver, painted }
     }
 
     #[test]

@@ -4,7 +4,7 @@ mod sample;
 
 use sha2::{Digest, Sha256};
 use unlift_report::document::{Document, Row};
-use unlift_report::inversions::{Inversion, InvertedView, Likeness};
+use unlift_report::inversions::{Inversion, InvertedView, Object, Painted};
 use unlift_report::{Given, RenderOptions, Scene3d, render, text_table};
 
 fn page(document: &Document, scene: Option<&Scene3d>, share_safe: bool) -> String {
@@ -376,12 +376,18 @@ fn pictures_lead_with_what_comes_back_today_and_by_the_attack_that_is_shown() {
             inlier_ratio: row.inlier_ratio,
         },
         solver: row.solver.clone(),
-        picture: vec![1],
-        likeness: Likeness { ssim: 0.4, lpips: 0.3 },
+        painted: Painted {
+            jpeg: vec![1],
+            objects: vec![Object { class: "chair".into(), sides: [0.25, -0.5, 0.75, 0.5] }],
+            ..Painted::default()
+        },
     };
     for row in &mut document.results {
         row.metrics.insert("ssim".into(), 0.48);
         row.metrics.insert("ssim_baseline".into(), 0.5);
+        row.metrics.insert("objects_found".into(), 0.2);
+        row.metrics.insert("objects_found_of_tv".into(), 0.25);
+        row.metrics.insert("objects_found_of_tv_baseline".into(), 0.75);
     }
     // Rows of the images are not asked here, and are as many as results or none.
     document.images.iter_mut().for_each(|image| image.rows.clear());
@@ -396,6 +402,10 @@ fn pictures_lead_with_what_comes_back_today_and_by_the_attack_that_is_shown() {
     assert!(found.contains("With 50 % of the neighbors known, a network paints as good a picture"));
     assert!(!found.contains("class=\"today\""));
     assert!(!page(&document, &rows, true).contains("a network paints"));
+    let frame = "style=\"left:25.0%;top:0.0%;width:50.0%;height:50.0%\"><b>chair</b>";
+    assert!(found.contains(frame), "{found}");
+    assert!(found.contains("<th class=\"figure\">tv, %</th>") || found.contains("tv, %"));
+    assert!(found.contains("<td>75.0</td>") && found.contains("<td>25.0</td>"));
     // A solver that is not painted does not speak for one that is.
     document.results[0].metrics["ssim"] = 0.9;
     document.results[0].solver = "other".into();

@@ -2,7 +2,7 @@
 "use strict";
 
 (() => {
-  const { STRONGEST, Chain, fieldsOf, element, distinct, single, check, overview, multiples, errors, reliability, chartCount, SceneView, ramp, drawPicture } = window.Unlift;
+  const { STRONGEST, Chain, fieldsOf, element, distinct, single, check, overview, multiples, errors, reliability, chartCount, SceneView, ramp, drawPicture, wipe } = window.Unlift;
   const root = document.documentElement;
   const data = JSON.parse(document.getElementById("data").textContent);
   const rows = data.rows.map((row, index) => ({ ...row, index }));
@@ -111,6 +111,7 @@
     [judged.length, () => chart(at("reliability-controls"), at("chart-reliability"), judged, reliability)],
     [data.scene, scene],
     [data.pictures.length, pictures],
+    ...[...document.querySelectorAll(".sheet")].map((sheet) => [sheet.querySelectorAll(".shot").length > 1, () => wipe(sheet)]),
   ];
   root.dataset.script = "1";
   for (const [wanted, part] of parts) {

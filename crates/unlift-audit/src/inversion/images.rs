@@ -13,7 +13,7 @@ use unlift_features::preview::jpeg_of;
 use unlift_invert::Detection;
 use unlift_report::inversions::Inversion as Sheet;
 
-use super::{Judged, Painter, SHOWN, figures, likeness, needed, shown, size};
+use super::{Judged, Painter, SHOWN, boxed, figures, needed, painted, shown, size};
 
 /// A photo at the size of its pictures, and how well the true points paint it.
 struct Truth {
@@ -72,7 +72,8 @@ impl Inversion {
         let truth = self.truth(cell)?;
         if sheet.photo.is_empty() {
             sheet.photo = jpeg_of(&truth.photo, SHOWN)?;
-            sheet.baseline = (jpeg_of(&truth.picture, SHOWN)?, likeness(&truth.baseline));
+            sheet.objects = boxed(&truth.objects, &truth.photo);
+            sheet.baseline = painted(&truth.picture, &truth.baseline)?;
         }
         let picture = self.painter.image(cell.released, cell.recovered)?;
         let judged = self.painter.judge(&picture, &truth.photo, &truth.objects)?;

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use rayon::prelude::*;
 use unlift::Error;
-use unlift::audit::{Cell, Measure};
+use unlift::audit::{Cell, Measure, Row};
 use unlift_features::ColorImage;
 use unlift_features::load::read_color_as_stored;
 use unlift_features::preview::jpeg_of;
@@ -15,7 +15,7 @@ use unlift_invert::{Detection, Lens, View};
 use unlift_io::read::colmap;
 use unlift_report::inversions::Inversion as Sheet;
 
-use super::{Judged, Painter, SHOWN, figures, likeness, needed, shown};
+use super::{Judged, Painter, SHOWN, boxed, figures, needed, painted, shown};
 use crate::progress::Progress;
 
 /// Sides of a picture that metrics can be taken of.
@@ -29,13 +29,18 @@ struct Seen {
     photo: ColorImage,
     objects: Vec<Detection>,
     /// What the true points paint.
-    truth: OnceLock<Result<(ColorImage, Judged), Error>>,
+    truth: OnceLock<Result<Picture, Error>>,
 }
+
+/// A picture, and what it shows of its photo.
+type Picture = (ColorImage, Judged);
 
 /// Makes pictures of a map and compares them with the photos.
 pub struct MapInversion {
     painter: Painter,
     seen: Vec<Seen>,
+    /// The cell that was measured last and its pictures, one per photo: whoever draws it next need not paint again.
+    last: Mutex<Option<(Row, u32, Vec<Picture>)>>,
 }
 
 impl fmt::Debug for MapInversion {
@@ -89,7 +94,20 @@ impl MapInversion {
             let expected = format!("photos of the images in {}", model.display());
             return Err(unlift_io::Error::new(photos, "", expected, "none").into());
         }
-        Ok(Self { painter, seen })
+        Ok(Self { painter, seen, last: Mutex::default() })
+    }
+
+    /// Of photos at hand: name, camera in the unit of the audit, pixels.
+    ///
+    /// # Errors
+    /// When a photo has not the size of its camera or is too small, or a network is missing.
+    pub fn of(photos: impl IntoIterator<Item = (String, View, ColorImage)>) -> Result<Self, Error> {
+        let painter = Painter::try_new()?;
+        let seen = photos.into_iter().map(|(name, view, photo)| {
+            seen(&painter, name.clone(), view, &photo).map_err(|error| error.within(&name))
+        });
+        let seen = seen.collect::<Result<_, Error>>()?;
+        Ok(Self { painter, seen, last: Mutex::default() })
     }
 
     /// SHA-256 of the network that paints, in hexadecimal.
@@ -107,26 +125,40 @@ impl MapInversion {
     /// # Errors
     /// When a picture cannot be made.
     pub fn add(&self, cell: &Cell<'_>, sheets: &mut [Sheet]) -> Result<(), Error> {
-        for (seen, sheet) in self.seen.iter().zip(sheets) {
-            let (painted, baseline) = self.truth(seen, cell)?;
+        let last = self.last.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let pictures = match last {
+            Some((row, repeat, pictures))
+                if repeat == cell.repeat && row.is_same_cell(cell.row) =>
+            {
+                pictures
+            }
+            _ => self.pictures(cell, sheets.len())?,
+        };
+        for ((seen, sheet), (picture, judged)) in self.seen.iter().zip(sheets).zip(pictures) {
+            let (painted_of_truth, baseline) = self.truth(seen, cell)?;
             if sheet.photo.is_empty() {
                 sheet.name.clone_from(&seen.name);
                 sheet.photo = jpeg_of(&seen.photo, SHOWN)?;
-                sheet.baseline = (jpeg_of(painted, SHOWN)?, likeness(baseline));
+                sheet.objects = boxed(&seen.objects, &seen.photo);
+                sheet.baseline = painted(painted_of_truth, baseline)?;
             }
-            let picture = self.painter.map(&seen.view, cell.released, cell.recovered)?;
-            let judged = self.painter.judge(&picture, &seen.photo, &seen.objects)?;
             sheet.views.push(shown(cell.row, &picture, &judged)?);
         }
         Ok(())
     }
 
+    /// The pictures of `cell` by the first `n` cameras.
+    fn pictures(&self, cell: &Cell<'_>, n: usize) -> Result<Vec<Picture>, Error> {
+        let of_one = |seen: &Seen| {
+            let picture = self.painter.map(&seen.view, cell.released, cell.recovered)?;
+            let judged = self.painter.judge(&picture, &seen.photo, &seen.objects)?;
+            Ok((picture, judged))
+        };
+        self.seen.par_iter().take(n).map(of_one).collect()
+    }
+
     /// What the true points paint.
-    fn truth<'a>(
-        &'a self,
-        seen: &'a Seen,
-        cell: &Cell<'_>,
-    ) -> Result<&'a (ColorImage, Judged), Error> {
+    fn truth<'a>(&'a self, seen: &'a Seen, cell: &Cell<'_>) -> Result<&'a Picture, Error> {
         let make = || {
             let originals = cell.original.reveal().positions();
             let positions: Vec<Option<[f64; 3]>> = originals.iter().copied().map(Some).collect();
@@ -142,18 +174,18 @@ impl MapInversion {
 impl Measure<3> for MapInversion {
     /// Means over the photos that have the figure: not every photo has objects.
     fn measure(&self, cell: &Cell<'_>) -> Result<Vec<(String, f64)>, Error> {
-        let of_one = |seen: &Seen| {
-            let picture = self.painter.map(&seen.view, cell.released, cell.recovered)?;
-            let found = self.painter.judge(&picture, &seen.photo, &seen.objects)?;
-            Ok(figures(&found, &self.truth(seen, cell)?.1))
-        };
-        let all: Vec<Vec<(String, f64)>> =
-            self.seen.par_iter().map(of_one).collect::<Result<_, Error>>()?;
+        let pictures = self.pictures(cell, self.seen.len())?;
+        let mut all = Vec::new();
+        for (seen, (_, judged)) in self.seen.iter().zip(&pictures) {
+            all.extend(figures(judged, &self.truth(seen, cell)?.1));
+        }
         let mut sums = BTreeMap::new();
-        for (name, value) in all.into_iter().flatten() {
+        for (name, value) in all {
             let (sum, n) = sums.entry(name).or_insert((0.0, 0_u32));
             (*sum, *n) = (*sum + value, *n + 1);
         }
+        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        *last = Some((cell.row.clone(), cell.repeat, pictures));
         Ok(sums.into_iter().map(|(name, (sum, n))| (name, sum / f64::from(n))).collect())
     }
 }
@@ -164,29 +196,29 @@ fn one(
     path: &Path,
     scale: f64,
 ) -> Result<Seen, Error> {
-    let of_photo =
-        |error: Error| error.within(&path.display().to_string().escape_debug().to_string());
     // COLMAP does not turn photos.
     let photo = read_color_as_stored(path)?;
-    let size = [camera.width_px, camera.height_px].map(|side| side as usize);
-    if [photo.width(), photo.height()] != size {
-        let expected = format!("a photo of {} x {} pixels, as its camera", size[0], size[1]);
+    let name = String::from_utf8_lossy(&image.name).into_owned();
+    view(camera, image, scale)
+        .and_then(|view| seen(painter, name, view, &photo))
+        .map_err(|error| error.within(&path.display().to_string().escape_debug().to_string()))
+}
+
+/// A photo as it is needed to compare pictures with it.
+fn seen(painter: &Painter, name: String, view: View, photo: &ColorImage) -> Result<Seen, Error> {
+    let [width, height] = view.size;
+    if [photo.width(), photo.height()] != view.size {
+        let expected = format!("a photo of {width} x {height} pixels, as its camera");
         let found = format!("{} x {}", photo.width(), photo.height());
-        return Err(of_photo(Error::new("size", expected, found)));
+        return Err(Error::new("size", expected, found));
+    }
+    if width.min(height) < 2 * LEAST_SIDE {
+        let expected = format!("at least {0} x {0} pixels", 2 * LEAST_SIDE);
+        return Err(Error::new("size", expected, format!("{width} x {height} pixels")));
     }
     let photo = photo.halved()?;
-    if photo.width().min(photo.height()) < LEAST_SIDE {
-        let found = format!("{} x {} pixels", size[0], size[1]);
-        let expected = format!("at least {0} x {0} pixels", 2 * LEAST_SIDE);
-        return Err(of_photo(Error::new("size", expected, found)));
-    }
-    Ok(Seen {
-        name: String::from_utf8_lossy(&image.name).into_owned(),
-        view: view(camera, image, scale).map_err(of_photo)?,
-        objects: painter.objects(&photo)?,
-        photo,
-        truth: OnceLock::new(),
-    })
+    let objects = painter.objects(&photo)?;
+    Ok(Seen { name, view, photo, objects, truth: OnceLock::new() })
 }
 
 /// What an image of a COLMAP model sees, in units of which one of the model has `scale`.

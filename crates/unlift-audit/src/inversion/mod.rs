@@ -11,8 +11,10 @@ use unlift::released::Released;
 use unlift::{Descriptors, Error, RowOrder};
 use unlift_features::ColorImage;
 use unlift_features::preview::jpeg_of;
-use unlift_invert::{Detection, Detector, Inverter, Lpips, Metrics, Points, Projection, View};
-use unlift_report::inversions::{InvertedView, Likeness};
+use unlift_invert::{
+    CLASSES, Detection, Detector, Inverter, Lpips, Metrics, Points, Projection, View,
+};
+use unlift_report::inversions::{InvertedView, Likeness, Object, Painted};
 
 use crate::document::given;
 
@@ -29,6 +31,8 @@ const BASELINE: &str = "_baseline";
 /// Equal pictures have no finite ratio of signal to noise.
 const MOST_DB: f64 = 100.0;
 
+/// The share of a photo's objects that are found in a picture.
+const OBJECTS: &str = "objects_found";
 /// How sure the detector must be of an object.
 const SURE: f32 = 0.3;
 /// How much two boxes of a class must overlap to be the same object.
@@ -47,11 +51,13 @@ pub struct Painter {
 }
 
 /// What a picture shows of its photo.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Judged {
     metrics: Metrics,
-    /// The share of the photo's objects that are found in the picture, where the photo has any.
-    objects_found: Option<f64>,
+    /// What the detector sees in it.
+    objects: Vec<Detection>,
+    /// For every object of the photo its class, and whether it is found in the picture.
+    found: Vec<(usize, bool)>,
 }
 
 impl Painter {
@@ -157,15 +163,30 @@ impl Painter {
         objects: &[Detection],
     ) -> Result<Judged, Error> {
         let metrics = Metrics::of(picture, photo, &self.lpips)?;
-        if objects.is_empty() {
-            return Ok(Judged { metrics, objects_found: None });
-        }
         let seen = self.objects(picture)?;
-        let again = |object: &&Detection| {
+        let again = |object: &Detection| {
             seen.iter().any(|one| one.class == object.class && one.overlap(object) >= SAME)
         };
-        let share = objects.iter().filter(again).count() as f64 / objects.len() as f64;
-        Ok(Judged { metrics, objects_found: Some(share) })
+        let found = objects.iter().map(|object| (object.class, again(object))).collect();
+        Ok(Judged { metrics, objects: seen, found })
+    }
+}
+
+impl Judged {
+    /// The share of the photo's objects that are found in the picture, where the photo has any; then by class.
+    fn objects_found(&self) -> Vec<(String, f64)> {
+        let share = |of: &dyn Fn(usize) -> bool| {
+            let of = self.found.iter().filter(|(class, _)| of(*class));
+            let (n, found) = (of.clone().count(), of.filter(|(_, found)| *found).count());
+            found as f64 / n as f64
+        };
+        let mut classes: Vec<usize> = self.found.iter().map(|(class, _)| *class).collect();
+        classes.sort_unstable();
+        classes.dedup();
+        let all = (!classes.is_empty()).then(|| (OBJECTS.to_owned(), share(&|_| true)));
+        let name = |class: usize| format!("{OBJECTS}_of_{}", CLASSES[class].replace(' ', "_"));
+        let each = classes.iter().map(|&class| (name(class), share(&|other| other == class)));
+        all.into_iter().chain(each).collect()
     }
 }
 
@@ -174,9 +195,9 @@ fn figures(found: &Judged, baseline: &Judged) -> Vec<(String, f64)> {
     let named = |(judged, of): (&Judged, &str)| {
         let Metrics { ssim, psnr, lpips } = judged.metrics;
         let figures = [("ssim", ssim), ("psnr", psnr.min(MOST_DB)), ("lpips", lpips)];
-        let objects = judged.objects_found.map(|share| ("objects_found", share));
-        let all = figures.into_iter().chain(objects);
-        all.map(|(name, value)| (format!("{name}{of}"), value)).collect::<Vec<_>>()
+        let figures = figures.map(|(name, value)| (name.to_owned(), value)).into_iter();
+        let all = figures.chain(judged.objects_found());
+        all.map(|(name, value)| (name + of, value)).collect::<Vec<_>>()
     };
     [(found, ""), (baseline, BASELINE)].into_iter().flat_map(named).collect()
 }
@@ -187,13 +208,28 @@ fn shown(row: &Row, picture: &ColorImage, judged: &Judged) -> Result<InvertedVie
         scheme: row.scheme.clone(),
         given: given(row),
         solver: row.solver.to_owned(),
-        likeness: likeness(judged),
-        picture: jpeg_of(picture, SHOWN)?,
+        painted: painted(picture, judged)?,
     })
 }
 
-fn likeness(judged: &Judged) -> Likeness {
-    Likeness { ssim: judged.metrics.ssim, lpips: judged.metrics.lpips }
+/// A picture and what is said about it, for the page.
+fn painted(picture: &ColorImage, judged: &Judged) -> Result<Painted, Error> {
+    Ok(Painted {
+        jpeg: jpeg_of(picture, SHOWN)?,
+        likeness: Likeness { ssim: judged.metrics.ssim, lpips: judged.metrics.lpips },
+        objects: boxed(&judged.objects, picture),
+    })
+}
+
+/// Where objects are in a picture.
+fn boxed(objects: &[Detection], picture: &ColorImage) -> Vec<Object> {
+    let size = [picture.width(), picture.height()].map(|side| side as f32);
+    let share = |object: &Detection| std::array::from_fn(|at| object.sides[at] / size[at % 2]);
+    let boxed = |object: &Detection| Object {
+        class: CLASSES[object.class].to_owned(),
+        sides: share(object),
+    };
+    objects.iter().map(boxed).collect()
 }
 
 /// Descriptors, which nothing can be painted without.

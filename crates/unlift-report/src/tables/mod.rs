@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::document::{Bound, Document, LengthUnit, Row};
 use crate::{attack, words};
 
-pub(crate) use details::{choices, losses, metrics, times, trials};
+pub(crate) use details::{choices, losses, metrics, objects, times, trials};
 
 /// A table of text.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -2,7 +2,8 @@
 //! `y` into the room); those in the room stand around their middle.
 
 use super::objects;
-use super::surfaces::{Faces, Outline, Place, Scene, Texture};
+use super::surfaces::{Faces, Place, Scene};
+use super::texture::{Outline, Texture};
 use crate::seed::Draws;
 
 /// A board shelf, 1.8 to 2.1 m high, filled with books and boxes.

@@ -12,6 +12,7 @@ mod room;
 mod sampling;
 mod shapes;
 mod surfaces;
+mod texture;
 mod tiled;
 mod views;
 
@@ -19,6 +20,7 @@ use surfaces::rotate;
 
 pub use sampling::{COINCIDENT_SHARE, OUTLIER_SHARE};
 pub use shapes::{Shape, keypoints, shape};
+pub use texture::{Material, Sheet};
 pub use tiled::tiled;
 pub use views::Camera;
 
@@ -36,6 +38,8 @@ pub struct Room {
     pub points: Vec<[f64; 3]>,
     /// The photos, in the order of the walk.
     pub cameras: Vec<Camera>,
+    /// All that can be seen.
+    pub sheets: Vec<Sheet>,
 }
 
 /// The room of `seed`, with `n_points` points. Every seed is another room: size (about 5 x 4 x 2.6
@@ -61,7 +65,8 @@ pub fn room(seed: u64, n_points: usize) -> Room {
         camera.center = in_frame(camera.center);
         camera.look = rotate(yaw, camera.look);
     }
-    Room { points, cameras }
+    let sheets = scene.surfaces.iter().map(|surface| surface.in_frame(middle, yaw)).collect();
+    Room { points, cameras, sheets }
 }
 
 #[cfg(test)]

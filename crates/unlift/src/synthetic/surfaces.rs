@@ -1,5 +1,7 @@
 //! What a scene is made of: textured surfaces to sample, and boxes that hide what is behind them.
 
+use super::texture::{Outline, Surface, Texture};
+
 /// Cosine and sine of a turn about `z`.
 pub(super) type Turn = [f64; 2];
 
@@ -35,102 +37,8 @@ pub(super) fn norm(a: [f64; 3]) -> f64 {
     dot(a, a).sqrt()
 }
 
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-/// How many points a surface attracts, in relative numbers: what a feature detector finds there.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Texture {
-    /// Points per square meter, everywhere.
-    pub(super) even: f64,
-    /// Points per meter of outline.
-    pub(super) outline: f64,
-    /// Patches (stains, prints, knots) per square meter.
-    pub(super) patches: f64,
-    /// Points per patch.
-    pub(super) per_patch: f64,
-    /// Standard deviation of a patch, in meters.
-    pub(super) patch_radius: f64,
-}
-
-impl Texture {
-    const fn new(even: f64, outline: f64, patches: f64, per_patch: f64, patch_radius: f64) -> Self {
-        Self { even, outline, patches, per_patch, patch_radius }
-    }
-
-    /// Painted walls and ceilings.
-    pub(super) const PAINT: Self = Self::new(1.5, 2.5, 0.4, 16.0, 0.03);
-    /// Smooth furniture: mostly its edges are seen.
-    pub(super) const SMOOTH: Self = Self::new(10.0, 18.0, 1.5, 22.0, 0.025);
-    /// Grained wood.
-    pub(super) const WOOD: Self = Self::new(22.0, 24.0, 7.0, 36.0, 0.03);
-    /// Floor boards.
-    pub(super) const FLOOR: Self = Self::new(5.0, 3.0, 1.5, 24.0, 0.04);
-    /// Upholstery.
-    pub(super) const FABRIC: Self = Self::new(45.0, 14.0, 8.0, 50.0, 0.035);
-    /// Woven patterns: rugs, cushions.
-    pub(super) const PATTERN: Self = Self::new(150.0, 50.0, 26.0, 80.0, 0.035);
-    /// Printed things: spines, covers, pictures, packages.
-    pub(super) const PRINT: Self = Self::new(2_100.0, 70.0, 150.0, 26.0, 0.016);
-    /// Leaves.
-    pub(super) const LEAVES: Self = Self::new(2_000.0, 150.0, 0.0, 0.0, 0.02);
-    /// Glass and screens: next to nothing but the frame.
-    pub(super) const GLASS: Self = Self::new(6.0, 60.0, 0.0, 0.0, 0.02);
-}
-
-/// The outline of a flat surface within its parallelogram.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Outline {
-    /// The whole parallelogram.
-    Full,
-    /// The ellipse that touches the middle of each edge.
-    Ellipse,
-}
-
-/// A flat surface that is seen from the side of its normal, `u x v`.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Surface {
-    pub(super) corner: [f64; 3],
-    pub(super) u: [f64; 3],
-    pub(super) v: [f64; 3],
-    pub(super) outline: Outline,
-    pub(super) texture: Texture,
-}
-
-impl Surface {
-    /// The point at `(s, t)`, both 0 to 1.
-    pub(super) fn at(&self, s: f64, t: f64) -> [f64; 3] {
-        add(self.corner, add(scale(self.u, s), scale(self.v, t)))
-    }
-
-    /// Whether `(s, t)` lies on the surface.
-    pub(super) fn holds(&self, s: f64, t: f64) -> bool {
-        let within = (0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t);
-        match self.outline {
-            Outline::Full => within,
-            Outline::Ellipse => {
-                let (x, y) = (2.0 * s - 1.0, 2.0 * t - 1.0);
-                x * x + y * y <= 1.0
-            }
-        }
-    }
-
-    /// The unit normal.
-    pub(super) fn normal(&self) -> [f64; 3] {
-        let n = cross(self.u, self.v);
-        scale(n, 1.0 / norm(n))
-    }
-
-    /// Square meters.
-    pub(super) fn area(&self) -> f64 {
-        let full = norm(cross(self.u, self.v));
-        match self.outline {
-            Outline::Full => full,
-            // pi / 4, of which three digits are enough for a density.
-            Outline::Ellipse => 0.785 * full,
-        }
-    }
 }
 
 /// Where a piece stands: its own axes are right along a wall (x), into the room (y) and up (z).
@@ -207,12 +115,19 @@ pub(super) struct Scene {
     pub(super) size: [f64; 3],
     pub(super) surfaces: Vec<Surface>,
     blockers: Vec<Blocker>,
+    n_pieces: u32,
+    n_parts: u32,
 }
 
 impl Scene {
     /// An empty scene.
     pub(super) fn new(size: [f64; 3]) -> Self {
-        Self { size, surfaces: Vec::new(), blockers: Vec::new() }
+        Self { size, surfaces: Vec::new(), blockers: Vec::new(), n_pieces: 0, n_parts: 0 }
+    }
+
+    /// What is added from here on belongs together and has one finish.
+    pub(super) fn begin_piece(&mut self) {
+        self.n_pieces += 1;
     }
 
     /// Whether something stands between a camera and a surface point.
@@ -245,12 +160,26 @@ impl Scene {
         outline: Outline,
         texture: Texture,
     ) {
+        self.n_parts += 1;
+        self.face(place, [corner, u, v], outline, texture);
+    }
+
+    /// Adds a surface of the part at hand.
+    fn face(
+        &mut self,
+        place: &Place,
+        [corner, u, v]: [[f64; 3]; 3],
+        outline: Outline,
+        texture: Texture,
+    ) {
         self.surfaces.push(Surface {
             corner: place.point(corner),
             u: place.direction(u),
             v: place.direction(v),
             outline,
             texture,
+            piece: self.n_pieces,
+            part: self.n_parts,
         });
     }
 
@@ -279,15 +208,17 @@ impl Scene {
         let [w, d, h] = sub(high, low);
         let (x, y, z) = ([w, 0.0, 0.0], [0.0, d, 0.0], [0.0, 0.0, h]);
         let (right, front, top) = (add(low, x), add(low, y), add(low, z));
-        self.sheet(place, front, z, x, texture);
-        self.sheet(place, top, x, y, texture);
+        self.n_parts += 1;
+        let mut add = |sides| self.face(place, sides, Outline::Full, texture);
+        add([front, z, x]);
+        add([top, x, y]);
         if faces != Faces::FrontAndTop {
-            self.sheet(place, low, x, z, texture);
-            self.sheet(place, low, z, y, texture);
-            self.sheet(place, right, y, z, texture);
+            add([low, x, z]);
+            add([low, z, y]);
+            add([right, y, z]);
         }
         if faces == Faces::All {
-            self.sheet(place, low, y, x, texture);
+            add([low, y, x]);
         }
     }
 
@@ -311,6 +242,7 @@ impl Scene {
         }
         // The seams between the twelve sides are no edges that a detector would find.
         let side = Texture { outline: texture.outline / 8.0, ..texture };
+        self.n_parts += 1;
         for pair in on_circle.windows(2) {
             let foot = |p: [f64; 2]| add(middle, [radius * p[0], radius * p[1], 0.0]);
             let lean = [
@@ -319,11 +251,11 @@ impl Scene {
                 height,
             ];
             let u = sub(foot(pair[1]), foot(pair[0]));
-            self.sheet(place, foot(pair[0]), u, lean, side);
+            self.face(place, [foot(pair[0]), u, lean], Outline::Full, side);
         }
         let corner = add(middle, [-top_radius, -top_radius, height]);
         let (u, v) = ([2.0 * top_radius, 0.0, 0.0], [0.0, 2.0 * top_radius, 0.0]);
-        self.outlined(place, corner, u, v, Outline::Ellipse, texture);
+        self.face(place, [corner, u, v], Outline::Ellipse, texture);
         // The box inside the tube hides enough.
         let inner = 0.7 * radius.max(top_radius);
         self.blockers.push(Blocker {

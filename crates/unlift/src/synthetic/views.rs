@@ -1,7 +1,8 @@
 //! Who sees what: a walk of handheld cameras, and the views of a surface point.
 
 use super::purpose::{Purpose, draws};
-use super::surfaces::{Scene, Surface, dot, norm, scale, sub};
+use super::surfaces::{Scene, dot, norm, scale, sub};
+use super::texture::Surface;
 
 /// Where a photo was taken, in meters.
 #[derive(Clone, Copy, Debug, PartialEq)]

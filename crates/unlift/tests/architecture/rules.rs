@@ -100,6 +100,7 @@ pub const CRATES: &[(&str, &[&str])] = &[
     ("unlift-report", &[]),
     ("unlift-testkit", &["unlift"]),
     ("unlift-invert", &["unlift", "unlift-nn", "unlift-features"]),
+    ("unlift-demo", &["unlift", "unlift-features", "unlift-invert"]),
     (
         "unlift-audit",
         &["unlift", "unlift-io", "unlift-nn", "unlift-features", "unlift-invert", "unlift-report"],
@@ -109,6 +110,7 @@ pub const CRATES: &[(&str, &[&str])] = &[
         &[
             "unlift",
             "unlift-audit",
+            "unlift-demo",
             "unlift-io",
             "unlift-nn",
             "unlift-features",

@@ -1,0 +1,200 @@
+//! Which surface is seen in which pixel.
+
+use unlift::synthetic::Sheet;
+
+use crate::pinhole::Pinhole;
+use crate::space::{add, cross, dot, scale, sub};
+
+/// Nothing is seen nearer than this, in meters.
+const NEAREST: f64 = 0.02;
+
+/// No sheet.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// What every pixel of a photo shows.
+pub(crate) struct Seen {
+    /// `(height, width)`, row-major: the sheet, or [`NONE`].
+    pub(crate) sheets: Vec<u32>,
+    /// How far ahead of the camera it is there, in meters; infinite without a sheet.
+    pub(crate) depths: Vec<f32>,
+    pub(crate) size: [usize; 2],
+}
+
+impl Seen {
+    /// What is at a place in pixels, the corner of the photo at (0, 0).
+    pub(crate) fn at(&self, place: [f64; 2]) -> (u32, f32) {
+        let [x, y] = [0, 1].map(|c| (place[c].max(0.0) as usize).min(self.size[c] - 1));
+        let at = y * self.size[0] + x;
+        (self.sheets[at], self.depths[at])
+    }
+}
+
+/// A sheet as a camera sees it.
+pub(crate) struct Facing {
+    corner: [f64; 3],
+    normal: [f64; 3],
+    /// Gives the first coordinate of a point relative to the corner.
+    along_u: [f64; 3],
+    along_v: [f64; 3],
+    u: [f64; 3],
+    v: [f64; 3],
+    round: bool,
+}
+
+impl Facing {
+    pub(crate) fn new(camera: &Pinhole, sheet: &Sheet) -> Self {
+        let corner = camera.turned(sub(sheet.corner, camera.center));
+        let [u, v] = [sheet.u, sheet.v].map(|side| camera.turned(side));
+        let normal = cross(u, v);
+        let (of_u, of_v) = (cross(v, normal), cross(normal, u));
+        Self {
+            corner,
+            normal,
+            along_u: scale(of_u, 1.0 / dot(u, of_u)),
+            along_v: scale(of_v, 1.0 / dot(v, of_v)),
+            u,
+            v,
+            round: sheet.round,
+        }
+    }
+
+    /// Whether the camera is on its visible side.
+    fn is_front(&self) -> bool {
+        dot(self.normal, self.corner) < 0.0
+    }
+
+    /// How far along `ray` the sheet's plane is, and where on the sheet (both 0 to 1 on it).
+    pub(crate) fn hit(&self, ray: [f64; 3]) -> (f64, [f64; 2]) {
+        let far = dot(self.normal, self.corner) / dot(self.normal, ray);
+        let from_corner = sub(scale(ray, far), self.corner);
+        (far, [dot(from_corner, self.along_u), dot(from_corner, self.along_v)])
+    }
+
+    fn holds(&self, [s, t]: [f64; 2]) -> bool {
+        let within = (0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t);
+        let (x, y) = (2.0 * s - 1.0, 2.0 * t - 1.0);
+        within && (!self.round || x * x + y * y <= 1.0)
+    }
+
+    /// First and last column and row that it may reach, if any.
+    fn bounds(&self, camera: &Pinhole) -> Option<[(usize, usize); 2]> {
+        let corners = [
+            self.corner,
+            add(self.corner, self.u),
+            add(self.corner, add(self.u, self.v)),
+            add(self.corner, self.v),
+        ];
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        let mut reach = |p: [f64; 3]| {
+            for c in 0..2 {
+                let at = p[c] / p[2] * camera.focal + 0.5 * camera.size[c] as f64;
+                low[c] = low[c].min(at);
+                high[c] = high[c].max(at);
+            }
+        };
+        for (at, &corner) in corners.iter().enumerate() {
+            let next = corners[(at + 1) % 4];
+            if corner[2] >= NEAREST {
+                reach(corner);
+            }
+            if (corner[2] >= NEAREST) != (next[2] >= NEAREST) {
+                let share = (NEAREST - corner[2]) / (next[2] - corner[2]);
+                reach(add(corner, scale(sub(next, corner), share)));
+            }
+        }
+        let of = |c: usize| {
+            let last = camera.size[c] as f64 - 1.0;
+            let (low, high) = ((low[c] - 0.5).max(0.0), (high[c] + 0.5).min(last));
+            (low <= high).then_some((low as usize, high as usize))
+        };
+        Some([of(0)?, of(1)?])
+    }
+}
+
+/// What `camera` sees of `sheets`.
+pub(crate) fn seen(camera: &Pinhole, sheets: &[Sheet]) -> Seen {
+    drawn(camera, sheets, Facing::is_front)
+}
+
+/// What lies before `camera`: light does not pass from behind either.
+pub(crate) fn in_the_way(camera: &Pinhole, sheets: &[Sheet]) -> Seen {
+    drawn(camera, sheets, |_| true)
+}
+
+fn drawn(camera: &Pinhole, sheets: &[Sheet], shown: impl Fn(&Facing) -> bool) -> Seen {
+    let [width, height] = camera.size;
+    let mut seen = Seen {
+        sheets: vec![NONE; width * height],
+        depths: vec![f32::INFINITY; width * height],
+        size: camera.size,
+    };
+    for (index, sheet) in sheets.iter().enumerate() {
+        let facing = Facing::new(camera, sheet);
+        if !shown(&facing) {
+            continue;
+        }
+        let Some([columns, rows]) = facing.bounds(camera) else { continue };
+        for y in rows.0..=rows.1 {
+            for x in columns.0..=columns.1 {
+                let ray = camera.ray([x as f64 + 0.5, y as f64 + 0.5]);
+                let (far, on) = facing.hit(ray);
+                let at = y * width + x;
+                if far >= NEAREST && far < f64::from(seen.depths[at]) && facing.holds(on) {
+                    seen.depths[at] = far as f32;
+                    seen.sheets[at] = index as u32;
+                }
+            }
+        }
+    }
+    seen
+}
+
+#[cfg(test)]
+mod tests {
+    use unlift::synthetic::{Camera, Material};
+
+    use super::*;
+
+    fn sheet(x: f64, side: f64) -> Sheet {
+        // Across the way, seen by somebody who looks along x.
+        let corner = [x, 0.5 * side, -0.5 * side];
+        let (u, v) = ([0.0, 0.0, side], [0.0, -side, 0.0]);
+        Sheet { corner, u, v, round: false, material: Material::Paint, piece: 0, part: 0 }
+    }
+
+    fn camera() -> Pinhole {
+        let camera = Camera { center: [0.0; 3], look: [1.0, 0.0, 0.0] };
+        Pinhole::handheld(&camera, [100, 80])
+    }
+
+    #[test]
+    fn the_nearest_front_is_seen() {
+        // A wall, a tile before it, and the back of a tile before that.
+        let mut back = sheet(1.0, 0.2);
+        (back.u, back.v) = (back.v, back.u);
+        let sheets = [sheet(4.0, 20.0), sheet(2.0, 0.4), back];
+        let all = seen(&camera(), &sheets);
+        assert!(all.sheets.iter().all(|&sheet| sheet == 0 || sheet == 1));
+        assert_eq!(all.at([50.0, 40.0]), (1, 2.0));
+        assert_eq!(all.at([5.0, 5.0]), (0, 4.0));
+        // 0.4 m at 2 m, 85 pixels of focal length: 17 x 17 pixels.
+        assert_eq!(all.sheets.iter().filter(|&&sheet| sheet == 1).count(), 17 * 17);
+        assert_eq!(in_the_way(&camera(), &sheets).at([50.0, 40.0]).0, 2);
+    }
+
+    #[test]
+    fn what_is_beside_and_behind_is_clipped() {
+        // The floor, which reaches from far behind the camera to far ahead.
+        let floor = Sheet {
+            corner: [-5.0, -5.0, -1.0],
+            u: [10.0, 0.0, 0.0],
+            v: [0.0, 10.0, 0.0],
+            ..sheet(0.0, 1.0)
+        };
+        let all = seen(&camera(), &[floor, sheet(-1.0, 1.0)]);
+        // The lower part of the photo, below the line that is 5 m away: 40 + 85 / 5.
+        assert_eq!(all.at([50.0, 56.5]).0, NONE);
+        assert_eq!(all.at([50.0, 57.5]).0, 0);
+        assert!(all.sheets.iter().all(|&sheet| sheet == 0 || sheet == NONE));
+    }
+}
