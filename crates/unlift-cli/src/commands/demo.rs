@@ -6,6 +6,7 @@ use std::time::Instant;
 use serde_json::{Map, json};
 use unlift::audit::{Measure, NeighborsBy, Plan};
 use unlift::neighbors::Overlap;
+use unlift::recover::Solver;
 use unlift::truth::Original;
 use unlift::{PointSet, Unit};
 use unlift_audit::inversion::MapInversion;
@@ -55,6 +56,8 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
             up: Some([0.0, 0.0, 1.0]),
             plan: Plan {
                 neighbors: vec![NeighborsBy::Oracle, NeighborsBy::Source(Arc::new(Overlap))],
+                // What it starts from would be painted, too.
+                solvers: vec![Solver::Joint],
                 measures: vec![Arc::clone(&inversion) as Arc<dyn Measure<3>>],
                 ..usual
             },
