@@ -55,6 +55,24 @@ def table(document, schemes, paper):
     yield ""
 
 
+def recall(document, schemes):
+    """Objects that the detector finds again, in per cent, by class."""
+    results = document["results"]
+    start, end = "objects_found_of_", "_baseline"
+    classes = sorted({key[len(start):-len(end)] for row in results for key in row["metrics"] if key.startswith(start) and key.endswith(end)})
+    names = ["objects_found", *(start + one for one in classes)]
+    yield "| found again, % | " + " | ".join(["all", *(one.replace("_", " ") for one in classes)]) + " |"
+    yield "|" + " --- |" * (len(names) + 1)
+    cells = lambda row, of="": " | ".join(f"{100 * row['metrics'][name + of]:.0f}" for name in names)
+    yield f"| true points | {cells(results[0], end)} |"
+    for scheme in schemes:
+        for row in results:
+            if row["scheme"] == scheme and (row["neighbors"] != "oracle" or row["inlier_ratio"] == 1.0):
+                given = "1.0" if row["neighbors"] == "oracle" else f"`{row['neighbors']}`"
+                yield f"| {scheme}, {given} | {cells(row)} |"
+    yield ""
+
+
 def tables(program, shared):
     """All lines of the section."""
     data = shared / "data"
@@ -62,9 +80,13 @@ def tables(program, shared):
     for name, photos in (("RedKitchen, 40 photos", "redkitchen"),):
         yield from [f"### {name}, keypoints", ""]
         paper = published(shared, "2") if photos == "redkitchen" else {}
-        yield from table(audit(program, "images", data / photos / "images"), FLAT, paper)
+        document = audit(program, "images", data / photos / "images")
+        yield from table(document, FLAT, paper)
+        yield from recall(document, FLAT)
         yield from [f"### {name}, the map as its cameras see it", ""]
         paper = published(shared, "3") if photos == "redkitchen" else {}
         scale = ["--scale", "1"] if photos == "redkitchen" else []
-        yield from table(audit(program, "map", data / photos / "model", "--descriptors", data / photos / "descriptors.bin", *scale,
-                               "--photos", data / photos / "images", "--max-photos", "40", "--schemes", ",".join(SOLID), "--no-records-alone"), SOLID, paper)
+        document = audit(program, "map", data / photos / "model", "--descriptors", data / photos / "descriptors.bin", *scale,
+                               "--photos", data / photos / "images", "--max-photos", "40", "--schemes", ",".join(SOLID), "--no-records-alone")
+        yield from table(document, SOLID, paper)
+        yield from recall(document, SOLID)

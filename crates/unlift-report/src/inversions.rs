@@ -109,7 +109,7 @@ struct Shown {
 }
 
 /// Bytes of the page that all of them may take.
-const BUDGET_BYTES: usize = 3_500_000;
+const BUDGET_BYTES: usize = 2_500_000;
 
 /// The sheets of `inversions`, in their order, and how many pictures are left out as they would make the page too large:
 /// those of the last photos, then of every scheme those in the middle.
