@@ -14,6 +14,7 @@ mod shapes;
 mod surfaces;
 mod texture;
 mod tiled;
+mod vectors;
 mod views;
 
 use surfaces::rotate;

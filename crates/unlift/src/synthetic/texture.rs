@@ -1,6 +1,6 @@
 //! What surfaces are like: what they are made of, what a feature detector finds on them, and their outline.
 
-use super::surfaces::{Turn, add, cross, norm, rotate, scale, sub};
+use super::vectors::{Turn, add, cross, norm, rotate, scale, sub};
 
 /// What something is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
