@@ -6,6 +6,7 @@
 //!
 //! Only `+ - * /` and `sqrt` make the photos, so a seed gives the same bytes on every platform.
 
+mod color;
 mod light;
 mod map;
 mod material;

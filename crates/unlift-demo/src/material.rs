@@ -2,12 +2,10 @@
 
 use unlift::synthetic::{Material, Sheet};
 
+use crate::color::{Color, mixed, one_of, toned, within};
 use crate::noise::{hashed, of_cell, rough, smooth, unit};
 use crate::prints::print;
 use crate::space::norm;
-
-/// Red, green and blue, the share of the light that comes back.
-pub(crate) type Color = [f64; 3];
 
 /// How a place looks.
 pub(crate) struct Shade {
@@ -47,24 +45,6 @@ pub(crate) fn shade(sheet: &Sheet, index: u32, on: [f64; 2]) -> Shade {
         Material::Glass => return Shade { color: outside(on, own), glows: true },
     };
     Shade { color, glows: false }
-}
-
-/// One of several, by a hash.
-pub(crate) fn one_of(colors: &[Color], parts: [u64; 3]) -> Color {
-    colors[(hashed(parts) % colors.len() as u64) as usize]
-}
-
-pub(crate) fn toned(color: Color, tone: f64) -> Color {
-    color.map(|c| c * tone)
-}
-
-pub(crate) fn mixed(a: Color, b: Color, share: f64) -> Color {
-    std::array::from_fn(|c| a[c] * (1.0 - share) + b[c] * share)
-}
-
-/// How far into a band around 0 a value is, with soft sides: 1 in the middle, 0 outside.
-pub(crate) fn within(x: f64, half: f64, soft: f64) -> f64 {
-    ((half - x.abs()) / soft + 0.5).clamp(0.0, 1.0)
 }
 
 /// Paint with stains, dents and nail holes.

@@ -1,6 +1,6 @@
 //! Printed things: spines, covers, posters, packages.
 
-use crate::material::{Color, mixed, one_of, toned, within};
+use crate::color::{Color, mixed, one_of, toned, within};
 use crate::noise::{of_cell, rough, unit};
 
 const INKS: [Color; 10] = [
