@@ -15,9 +15,11 @@ mod photo;
 mod pinhole;
 mod prints;
 mod raster;
-mod space;
+
+use std::collections::BTreeSet;
 
 use rayon::prelude::*;
+use unlift::synthetic::vectors::{add, scale};
 use unlift::synthetic::{self, Sheet};
 use unlift::{Descriptors, Error};
 use unlift_features::{ColorImage, Sift};
@@ -49,8 +51,13 @@ pub struct Photo {
     pub image: ColorImage,
 }
 
+/// The part of a photo, 32 pixels wide, that a coordinate lies in.
+fn part(x: f32) -> i32 {
+    (x / 32.0).floor() as i32
+}
+
 impl Mapped {
-    /// `n` photos that show much: of every `n`-th part of the walk the one with the most points in it.
+    /// `n` photos that show much: of every `n`-th part of the walk the one with points in most of its parts.
     ///
     /// # Errors
     /// Never, unless this crate is wrong.
@@ -58,7 +65,9 @@ impl Mapped {
         let points: Vec<_> = self.points.iter().copied().map(Some).collect();
         let shown = |photo: &Photo| {
             let all = photo.view.project(&points)?;
-            Ok(all.visible(photo.view.size).into_iter().filter(|seen| *seen).count())
+            let seen = all.places.iter().zip(all.visible(photo.view.size));
+            let parts = seen.filter(|(_, seen)| *seen).map(|(place, _)| place.map(part));
+            Ok(parts.collect::<BTreeSet<_>>().len())
         };
         let shown = self.photos.iter().map(shown).collect::<Result<Vec<_>, Error>>()?;
         let of_part = |part: usize| {
@@ -107,15 +116,15 @@ fn mapped(seed: u64, size: [usize; 2], wanted: impl Fn(usize) -> bool) -> Result
 
 /// The middle of a sheet.
 fn middle(sheet: &Sheet) -> [f64; 3] {
-    let half = space::scale(space::add(sheet.u, sheet.v), 0.5);
-    space::add(sheet.corner, half)
+    let half = scale(add(sheet.u, sheet.v), 0.5);
+    add(sheet.corner, half)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::raster::{Facing, NONE};
-    use crate::space::{norm, sub};
+    use unlift::synthetic::vectors::{norm, sub};
 
     fn few() -> Mapped {
         mapped(3, [320, 240], |at| at < 12 && at % 3 < 2).unwrap()
@@ -150,7 +159,7 @@ mod tests {
             if depth < f64::from(before) * 1.02 {
                 let ray = camera.ray(place);
                 let (far, _) = Facing::new(&camera, &room.sheets[sheet as usize]).hit(ray);
-                let hit = camera.in_world(crate::space::scale(ray, far));
+                let hit = camera.in_world(unlift::synthetic::vectors::scale(ray, far));
                 let apart = norm(sub(hit, sub(point, camera.center)));
                 (n, near) = (n + 1, near + usize::from(apart < 0.02 * depth));
             }

@@ -5,7 +5,7 @@ use unlift::synthetic::{Material, Sheet};
 use crate::middle;
 use crate::pinhole::Pinhole;
 use crate::raster::{Seen, in_the_way};
-use crate::space::{add, cross, dot, norm, scale, sub, unit};
+use unlift::synthetic::vectors::{add, cross, dot, norm, scale, sub, unit};
 
 /// Pixels a side of what a lamp sees of one of the six directions.
 const SIDE: usize = 384;

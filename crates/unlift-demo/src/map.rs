@@ -7,7 +7,7 @@ use unlift_features::Features;
 
 use crate::pinhole::Pinhole;
 use crate::raster::{Facing, NONE, Seen};
-use crate::space::{add, dot, norm, scale, sub, unit};
+use unlift::synthetic::vectors::{add, dot, norm, scale, sub, unit};
 
 /// Values of a descriptor, and its length.
 const COLUMNS: usize = 128;
@@ -214,7 +214,8 @@ fn seen_from(cameras: &[Pinhole], photos: &[Sighted], track: &[Keypoint]) -> Opt
 
 /// Cramer's rule.
 fn solved(rows: [[f64; 3]; 3], right: [f64; 3]) -> Option<[f64; 3]> {
-    let det = |rows: [[f64; 3]; 3]| dot(rows[0], crate::space::cross(rows[1], rows[2]));
+    let det =
+        |rows: [[f64; 3]; 3]| dot(rows[0], unlift::synthetic::vectors::cross(rows[1], rows[2]));
     let whole = det(rows);
     (whole > 0.0).then(|| {
         std::array::from_fn(|c| {

@@ -5,7 +5,7 @@ use unlift::synthetic::{Material, Sheet};
 use crate::color::{Color, mixed, one_of, toned, within};
 use crate::noise::{hashed, of_cell, rough, smooth, unit};
 use crate::prints::print;
-use crate::space::norm;
+use unlift::synthetic::vectors::norm;
 
 /// How a place looks.
 pub(crate) struct Shade {

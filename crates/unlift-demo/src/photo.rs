@@ -9,7 +9,7 @@ use crate::material::{Shade, shade};
 use crate::noise::unit as random;
 use crate::pinhole::Pinhole;
 use crate::raster::{Facing, NONE, seen};
-use crate::space::{add, cross, scale, unit};
+use unlift::synthetic::vectors::{add, cross, scale, unit};
 
 /// Looks per pixel and side.
 const FINER: usize = 2;

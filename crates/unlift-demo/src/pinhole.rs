@@ -4,7 +4,7 @@ use unlift::Error;
 use unlift::synthetic::Camera;
 use unlift_invert::{Lens, View};
 
-use crate::space::{cross, dot, sub, unit};
+use unlift::synthetic::vectors::{cross, dot, sub, unit};
 
 /// Focal length of a photo in widths: 60 degrees from left to right, as a phone's video.
 const FOCAL: f64 = 0.85;

@@ -3,7 +3,7 @@
 use unlift::synthetic::Sheet;
 
 use crate::pinhole::Pinhole;
-use crate::space::{add, cross, dot, scale, sub};
+use unlift::synthetic::vectors::{add, cross, dot, scale, sub};
 
 /// Nothing is seen nearer than this, in meters.
 const NEAREST: f64 = 0.02;

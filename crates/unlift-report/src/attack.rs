@@ -16,7 +16,7 @@ pub struct Given {
 
 impl Given {
     /// The neighborhoods of a row.
-    pub(crate) fn of(row: &Row) -> Self {
+    pub fn of(row: &Row) -> Self {
         Self {
             neighbors: row.neighbors.clone(),
             oracle_noise: row.oracle_noise.clone(),

@@ -89,11 +89,7 @@ pub fn scene(document: &Document, n: usize) -> Scene3d {
         });
         View {
             scheme: row.scheme.clone(),
-            given: Given {
-                neighbors: row.neighbors.clone(),
-                oracle_noise: row.oracle_noise.clone(),
-                inlier_ratio: row.inlier_ratio,
-            },
+            given: Given::of(row),
             solver: row.solver.clone(),
             recovered: recovered.collect(),
         }

@@ -14,10 +14,10 @@ mod shapes;
 mod surfaces;
 mod texture;
 mod tiled;
-mod vectors;
+pub mod vectors;
 mod views;
 
-use surfaces::rotate;
+use vectors::rotate;
 
 pub use sampling::{COINCIDENT_SHARE, OUTLIER_SHARE};
 pub use shapes::{Shape, keypoints, shape};
@@ -56,7 +56,7 @@ pub fn room(seed: u64, n_points: usize) -> Room {
     let mut points = sampling::points(seed, n_points, &scene, &cameras);
 
     let middle = [0.5 * scene.size[0], 0.5 * scene.size[1], 0.0];
-    let yaw = surfaces::turn(HALF_YAW_TANGENT);
+    let yaw = vectors::turn(HALF_YAW_TANGENT);
     let in_frame =
         |p: [f64; 3]| rotate(yaw, [p[0] - middle[0], p[1] - middle[1], p[2] - middle[2]]);
     for point in &mut points {
@@ -77,7 +77,7 @@ mod tests {
 
     /// Points in the room's own axes, from its middle.
     fn along_walls(room: &Room) -> Vec<[f64; 3]> {
-        let [cos, sin] = surfaces::turn(HALF_YAW_TANGENT);
+        let [cos, sin] = vectors::turn(HALF_YAW_TANGENT);
         room.points.iter().map(|&p| rotate([cos, -sin], p)).collect()
     }
 

@@ -1,7 +1,8 @@
 //! Small things that stand on furniture, each around the middle of its foot.
 
-use super::surfaces::{Faces, Place, Scene, turn};
+use super::surfaces::{Faces, Place, Scene};
 use super::texture::Texture;
+use super::vectors::turn;
 use crate::seed::Draws;
 
 /// Puts up to `count` random things on the rectangle from `low` to `high` (at `z = 0` of `place`),

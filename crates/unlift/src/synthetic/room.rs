@@ -2,8 +2,9 @@
 
 use super::furniture as piece;
 use super::purpose::{Purpose, draws};
-use super::surfaces::{Faces, Place, Scene, turn};
+use super::surfaces::{Faces, Place, Scene};
 use super::texture::Texture;
+use super::vectors::turn;
 use crate::seed::Draws;
 
 /// Free space kept at the ends of a short wall, where the long walls' furniture stands.

@@ -1,7 +1,8 @@
 //! Points on the surfaces as structure from motion finds them, with its noise and its mistakes.
 
 use super::purpose::{Purpose, draws};
-use super::surfaces::{Scene, add, norm, scale, sub};
+use super::surfaces::Scene;
+use super::vectors::{add, norm, scale, sub};
 use super::views::{Camera, MANY_VIEWS, Track, track};
 use crate::seed::Draws;
 

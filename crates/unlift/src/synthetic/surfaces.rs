@@ -1,7 +1,7 @@
 //! What a scene is made of: textured surfaces to sample, and boxes that hide what is behind them.
 
 use super::texture::{Outline, Surface, Texture};
-pub(super) use super::vectors::{Turn, add, dot, norm, rotate, scale, sub, turn};
+use super::vectors::{Turn, add, norm, rotate, scale, sub, turn};
 
 /// Where a piece stands: its own axes are right along a wall (x), into the room (y) and up (z).
 #[derive(Clone, Copy, Debug)]
@@ -231,6 +231,7 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::synthetic::vectors::dot;
 
     const HERE: Place = Place { origin: [0.0; 3], turn: [1.0, 0.0] };
 

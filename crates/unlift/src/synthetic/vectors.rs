@@ -1,4 +1,4 @@
-//! Vectors of three, and turns about `z`.
+//! Vectors of three, and turns about `z`, by exact arithmetic and square roots alone.
 
 /// Cosine and sine of a turn about `z`.
 pub(super) type Turn = [f64; 2];
@@ -15,26 +15,37 @@ pub(super) fn rotate([cos, sin]: Turn, v: [f64; 3]) -> [f64; 3] {
     [cos * v[0] - sin * v[1], sin * v[0] + cos * v[1], v[2]]
 }
 
-pub(super) fn add(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+/// a + b.
+pub fn add(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|c| a[c] + b[c])
 }
 
-pub(super) fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+/// a - b.
+pub fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|c| a[c] - b[c])
 }
 
-pub(super) fn scale(a: [f64; 3], s: f64) -> [f64; 3] {
+/// s a.
+pub fn scale(a: [f64; 3], s: f64) -> [f64; 3] {
     a.map(|x| x * s)
 }
 
-pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+/// The dot product.
+pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-pub(super) fn norm(a: [f64; 3]) -> f64 {
+/// The length.
+pub fn norm(a: [f64; 3]) -> f64 {
     dot(a, a).sqrt()
 }
 
-pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+/// a x b.
+pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// `a` at length 1.
+pub fn unit(a: [f64; 3]) -> [f64; 3] {
+    scale(a, 1.0 / norm(a))
 }

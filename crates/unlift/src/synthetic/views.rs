@@ -1,8 +1,9 @@
 //! Who sees what: a walk of handheld cameras, and the views of a surface point.
 
 use super::purpose::{Purpose, draws};
-use super::surfaces::{Scene, dot, norm, scale, sub};
+use super::surfaces::Scene;
 use super::texture::Surface;
+use super::vectors::{dot, norm, scale, sub};
 
 /// Where a photo was taken, in meters.
 #[derive(Clone, Copy, Debug, PartialEq)]
