@@ -157,8 +157,8 @@ mod tests {
 
     fn sheet(x: f64, side: f64) -> Sheet {
         // Across the way, seen by somebody who looks along x.
-        let corner = [x, 0.5 * side, -0.5 * side];
-        let (u, v) = ([0.0, 0.0, side], [0.0, -side, 0.0]);
+        let corner = [x, -0.5 * side, -0.5 * side];
+        let (u, v) = ([0.0, 0.0, side], [0.0, side, 0.0]);
         Sheet { corner, u, v, round: false, material: Material::Paint, piece: 0, part: 0 }
     }
 
@@ -172,13 +172,13 @@ mod tests {
         // A wall, a tile before it, and the back of a tile before that.
         let mut back = sheet(1.0, 0.2);
         (back.u, back.v) = (back.v, back.u);
-        let sheets = [sheet(4.0, 20.0), sheet(2.0, 0.4), back];
+        let sheets = [sheet(4.0, 20.0), sheet(2.0, 0.42), back];
         let all = seen(&camera(), &sheets);
         assert!(all.sheets.iter().all(|&sheet| sheet == 0 || sheet == 1));
         assert_eq!(all.at([50.0, 40.0]), (1, 2.0));
         assert_eq!(all.at([5.0, 5.0]), (0, 4.0));
-        // 0.4 m at 2 m, 85 pixels of focal length: 17 x 17 pixels.
-        assert_eq!(all.sheets.iter().filter(|&&sheet| sheet == 1).count(), 17 * 17);
+        // 0.42 m at 2 m, 85 pixels of focal length: 17.85 pixels around the middle of the photo.
+        assert_eq!(all.sheets.iter().filter(|&&sheet| sheet == 1).count(), 18 * 18);
         assert_eq!(in_the_way(&camera(), &sheets).at([50.0, 40.0]).0, 2);
     }
 
