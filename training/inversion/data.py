@@ -1,7 +1,8 @@
 """Photos and their features, in batches of crops with what recovery would have made of the points.
 
-`data.py prepare OUT PHOTOS.. [--sizes 1,0.7]` writes `OUT/SPLIT-SIZE/` with the photos of the folders' SOURCES.csv at
-these sizes; `unlift features OUT/SPLIT-SIZE --out OUT/SPLIT-SIZE.h5` then extracts what is trained on.
+`data.py prepare OUT PHOTOS.. [--sizes 1,0.7,soft]` writes `OUT/SPLIT-SIZE/` with the photos of the folders' SOURCES.csv at
+these sizes, `soft` as a cheap video camera would have taken them; `unlift features OUT/SPLIT-SIZE --out
+OUT/SPLIT-SIZE.h5` then extracts what is trained on.
 """
 
 import argparse
@@ -12,26 +13,42 @@ import pathlib
 import h5py
 import numpy
 import torch
-from PIL import Image
+from PIL import Image, ImageFilter
 
 from raster import raster
 
-CROP = 256
+
+def soft(photo: Image.Image, random: numpy.random.Generator) -> Image.Image:
+    """Out of focus, lighter or darker, of another contrast, noisy. Without such photos a network believes that what is
+    blurred is dark, since of photos that people keep the dark ones are."""
+    blurred = photo.filter(ImageFilter.GaussianBlur(random.uniform(0.4, 2.0)))
+    light = (numpy.asarray(blurred, numpy.float32) / 255) ** numpy.exp(random.uniform(-0.6, 0.5))
+    light = random.uniform(0.75, 1.1) * (light - 0.5) + 0.5 + random.uniform(-0.08, 0.1)
+    # Grain as large as a pixel or two, as it is after a camera's own smoothing.
+    noise = Image.fromarray(random.normal(128, 40, light.shape).clip(0, 255).astype(numpy.uint8))
+    noise = numpy.asarray(noise.filter(ImageFilter.GaussianBlur(random.uniform(0.3, 1.0))), numpy.float32) - 128
+    light = 255 * light + random.uniform(0, 0.12) * noise
+    return Image.fromarray(light.clip(0, 255).round().astype(numpy.uint8))
 
 
-def prepare(out: pathlib.Path, folders: list[pathlib.Path], sizes: list[float], most: int | None):
+def prepare(out: pathlib.Path, folders: list[pathlib.Path], sizes: list[str], most: int | None):
     for folder in folders:
         with open(folder / "SOURCES.csv", newline="") as file:
             rows = list(csv.DictReader(file))
         for size in sizes:
             of_split = {split: [row for row in rows if row["split"] == split][:most] for split in ("train", "val")}
             for row in of_split["train"] + of_split["val"]:
-                to = out / f"{row['split']}-{size:g}" / f"{folder.name}-{row['file']}"
+                to = out / f"{row['split']}-{size}" / f"{folder.name}-{row['file']}"
                 to.parent.mkdir(parents=True, exist_ok=True)
                 with Image.open(folder / row["file"]) as photo:
                     photo = photo.convert("RGB")
-                    sides = [round(side * size) for side in photo.size]
-                    photo.resize(sides, Image.Resampling.LANCZOS).save(to, quality=92)
+                    if size == "soft":
+                        random = numpy.random.default_rng(list(f"{folder.name}/{row['file']}".encode()))
+                        photo = soft(photo, random)
+                    else:
+                        sides = [round(side * float(size)) for side in photo.size]
+                        photo = photo.resize(sides, Image.Resampling.LANCZOS)
+                    photo.save(to, quality=92)
 
 
 def mirror() -> numpy.ndarray:
@@ -106,12 +123,12 @@ def shrunk(pixels: numpy.ndarray) -> numpy.ndarray:
 class Batches:
     """Batch `step` is a function of the seed and the step alone, so that a run goes on where it stopped."""
 
-    def __init__(self, photos: list[Photo], size: int, seed: int, plain: bool):
-        self.photos, self.size, self.seed, self.plain = photos, size, seed, plain
+    def __init__(self, photos: list[Photo], size: int, crop: int, seed: int, plain: bool):
+        self.photos, self.size, self.crop, self.seed, self.plain = photos, size, crop, seed, plain
         self.mirror = mirror()
 
     def batch(self, step: int) -> tuple[torch.Tensor, torch.Tensor]:
-        """Feature images (b, columns + 3, 64, 64) and pictures (b, 3, 128, 128)."""
+        """Feature images (b, columns + 3, crop / 4, crop / 4) and pictures (b, 3, crop / 2, crop / 2)."""
         assert len(self.photos) >= self.size, f"{len(self.photos)} photos, and {self.size} in a batch"
         per_epoch = len(self.photos) // self.size
         epoch, at = divmod(step, per_epoch)
@@ -123,15 +140,16 @@ class Batches:
 
     def _crop(self, photo: Photo, random: numpy.random.Generator) -> tuple[numpy.ndarray, numpy.ndarray]:
         places, descriptors, weights = worn(photo, random, self.plain)
+        crop = self.crop
         high, wide = photo.pixels.shape[:2]
-        x, y = (random.integers(0, max(1, side - CROP + 1)) for side in (wide, high))
-        pixels = photo.pixels[y : y + CROP, x : x + CROP]
-        pixels = numpy.pad(pixels, [(0, CROP - pixels.shape[0]), (0, CROP - pixels.shape[1]), (0, 0)], "reflect")
+        x, y = (random.integers(0, max(1, side - crop + 1)) for side in (wide, high))
+        pixels = photo.pixels[y : y + crop, x : x + crop]
+        pixels = numpy.pad(pixels, [(0, crop - pixels.shape[0]), (0, crop - pixels.shape[1]), (0, 0)], "reflect")
         places = places - numpy.array([x, y], numpy.float32)
         if descriptors.shape[1] == len(self.mirror) and random.random() < 0.5:
             pixels, descriptors = pixels[:, ::-1], descriptors[:, self.mirror]
-            places = numpy.stack([CROP - places[:, 0], places[:, 1]], 1)
-        return raster(places, descriptors, weights, (CROP, CROP)), shrunk(pixels)
+            places = numpy.stack([crop - places[:, 0], places[:, 1]], 1)
+        return raster(places, descriptors, weights, (crop, crop)), shrunk(pixels)
 
 
 def main():
@@ -139,10 +157,10 @@ def main():
     parser.add_argument("what", choices=["prepare"])
     parser.add_argument("out", type=pathlib.Path)
     parser.add_argument("folders", type=pathlib.Path, nargs="+")
-    parser.add_argument("--sizes", default="1,0.7")
+    parser.add_argument("--sizes", default="1,0.7", help="of 1; or soft")
     parser.add_argument("--most", type=int, help="photos per folder, split and size")
     options = parser.parse_args()
-    prepare(options.out, options.folders, [float(size) for size in options.sizes.split(",")], options.most)
+    prepare(options.out, options.folders, options.sizes.split(","), options.most)
 
 
 if __name__ == "__main__":

@@ -34,6 +34,7 @@ def parsed():
     parser.add_argument("--images", type=int, default=16, help="photos of it that are used")
     parser.add_argument("--every", type=float, default=10.0, help="minutes between validations")
     parser.add_argument("--batch", type=int, default=2, help="crops per step")
+    parser.add_argument("--crop", type=int, default=256, help="its sides in pixels of the photo, a multiple of 4")
     parser.add_argument("--warm-up", type=int, default=100, help="steps over which rates rise")
     parser.add_argument("--rate", type=float, default=1e-3, help="of AdamW")
     parser.add_argument("--losses", default="0.5,0.8,0.3", help="weights of L1, LPIPS and 1 - SSIM")
@@ -129,7 +130,7 @@ def main():
     torch.set_num_threads(1)
     options.out.mkdir(parents=True, exist_ok=True)
     run = Run(options)
-    batches = data.Batches([photo for folder in options.data for photo in data.photos(folder)], options.batch, options.seed, options.plain)
+    batches = data.Batches([photo for folder in options.data for photo in data.photos(folder)], options.batch, options.crop, options.seed, options.plain)
     judged = data.photos(options.validate, options.images) if options.validate else []
     fresh = run.step == 0
     with open(options.out / "curve.csv", "a" if not fresh else "w", newline="") as file:

@@ -1,8 +1,8 @@
 //! Hashes of input files, so that a result names exactly what it came from.
 
 use crate::Error;
+use crate::input;
 use sha2::{Digest, Sha256};
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use std::path::Path;
 /// When the file cannot be read.
 pub fn hash_file(path: &Path) -> Result<String, Error> {
     let failed = |source| Error::read(path, source);
-    let mut file = File::open(path).map_err(failed)?;
+    let (mut file, _) = input::open(path)?;
     let mut hasher = Sha256::new();
     let mut piece = vec![0; 1 << 16];
     loop {

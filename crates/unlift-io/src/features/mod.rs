@@ -30,7 +30,7 @@ use std::io::Read;
 use std::path::Path;
 
 use crate::error::Error;
-use crate::read::bytes::open_file;
+use crate::input;
 use crate::read::lines::quoted;
 
 pub use hloc::decode;
@@ -56,7 +56,7 @@ impl FeatureSource {
     /// # Errors
     /// When the file cannot be read, is neither, is cut off, or lists no image.
     pub fn open(path: &Path) -> Result<Self, Error> {
-        let (file, len) = open_file(path)?;
+        let (file, len) = input::open(path)?;
         let mut start = Vec::new();
         file_start(&file, &mut start).map_err(|e| Error::read(path, e))?;
         let kind = match start.first_chunk() {

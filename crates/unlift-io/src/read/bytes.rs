@@ -5,19 +5,7 @@ use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Place};
-
-/// Opens `path` for reading.
-///
-/// # Errors
-/// When it is missing, a folder, or may not be read.
-pub(crate) fn open_file(path: &Path) -> Result<(File, u64), Error> {
-    let file = File::open(path).map_err(|e| Error::read(path, e))?;
-    let metadata = file.metadata().map_err(|e| Error::read(path, e))?;
-    if metadata.is_dir() {
-        return Err(Error::new(path, "", "a file", "a folder"));
-    }
-    Ok((file, metadata.len()))
-}
+use crate::input;
 
 /// A little-endian reader that knows where it is and how much is left.
 ///
@@ -42,7 +30,7 @@ enum Part {
 impl Bytes {
     /// A reader at the start of `path`.
     pub fn open(path: &Path) -> Result<Self, Error> {
-        let (file, len) = open_file(path)?;
+        let (file, len) = input::open(path)?;
         Ok(Self::continuing(path, BufReader::new(file), 0, len))
     }
 

@@ -9,7 +9,8 @@ use unlift::Descriptors;
 use unlift::descriptors::Values;
 
 use crate::error::Error;
-use crate::read::bytes::{Bytes, open_file};
+use crate::input;
+use crate::read::bytes::Bytes;
 use crate::read::lines::quoted;
 use crate::read::scalar::Scalar;
 use crate::read::{Input, database, npy};
@@ -34,7 +35,7 @@ const HDF5: &[u8; 8] = b"\x89HDF\r\n\x1a\n";
 /// error names the first), or holds dummies (all zero, or every row the same).
 pub fn descriptors(path: &Path, input: &Input) -> Result<Descriptors, Error> {
     let mut magic = [0; 8];
-    let (mut file, len) = open_file(path)?;
+    let (mut file, len) = input::open(path)?;
     if len >= 8 {
         File::read_exact(&mut file, &mut magic).map_err(|e| Error::read(path, e))?;
     }

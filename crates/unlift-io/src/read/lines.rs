@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Place};
-use crate::read::bytes::open_file;
+use crate::input;
 
 /// Lines of a text file, counted from 1, as bytes: names need not be UTF-8.
 pub(crate) struct Lines {
@@ -18,7 +18,7 @@ pub(crate) struct Lines {
 impl Lines {
     /// A reader at the start of `path`.
     pub fn open(path: &Path) -> Result<Self, Error> {
-        let (file, _) = open_file(path)?;
+        let (file, _) = input::open(path)?;
         Ok(Self::continuing(path, BufReader::new(file), 0))
     }
 

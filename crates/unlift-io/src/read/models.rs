@@ -1,10 +1,11 @@
 //! Which COLMAP model of a folder is read: where programs put them, and the largest of several.
 
-use std::fs::{self, File};
+use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use crate::error::Error;
+use crate::input;
 
 /// Where models lie, each in itself or in numbered folders inside: COLMAP's `sparse`, hloc's `models`
 /// (the best one stands in the folder itself), nerfstudio's `colmap/sparse`.
@@ -102,7 +103,7 @@ impl Candidate {
     fn n_points(&self) -> Result<u64, Error> {
         let path = self.points();
         let wrong = |error| Error::read(&path, error);
-        let file = BufReader::new(File::open(&path).map_err(wrong)?);
+        let file = BufReader::new(input::open(&path)?.0);
         if self.extension == "bin" {
             let mut count = Vec::new();
             file.take(8).read_to_end(&mut count).map_err(wrong)?;

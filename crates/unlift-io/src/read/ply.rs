@@ -4,7 +4,8 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 use crate::error::{Error, Place};
-use crate::read::bytes::{Bytes, open_file};
+use crate::input;
+use crate::read::bytes::Bytes;
 use crate::read::lines::{Lines, number, quoted, words};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,7 +97,7 @@ struct Header {
 /// When the file cannot be read, is malformed, has lists in or (if binary) before its vertices,
 /// declares more or fewer vertices than it holds, or has a coordinate that is not finite.
 pub fn read(path: &Path) -> Result<(Vec<[f64; 3]>, &'static str), Error> {
-    let (file, len) = open_file(path)?;
+    let (file, len) = input::open(path)?;
     let mut reader = BufReader::new(file);
     let header = header(path, &mut reader)?;
     match header.encoding {

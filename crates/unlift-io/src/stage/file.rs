@@ -3,6 +3,7 @@
 use super::guard::without_panic;
 use super::header::KEY;
 use crate::Error;
+use crate::input;
 use arrow_array::RecordBatch;
 use arrow_schema::SchemaRef;
 use parquet::arrow::ProjectionMask;
@@ -13,7 +14,7 @@ use parquet::arrow::arrow_reader::{
 use parquet::basic::Compression;
 use parquet::errors::ParquetError;
 use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
 /// Rows decoded at a time: with 128-byte descriptors a megabyte, with 4096 floats 128.
@@ -35,23 +36,18 @@ pub(super) struct ParquetFile<'a> {
 impl<'a> ParquetFile<'a> {
     /// Opens `path` and reads its footer.
     pub(super) fn open(path: &'a Path) -> Result<Self, Error> {
-        let failed = |source| Error::read(path, source);
-        let mut file = File::open(path).map_err(failed)?;
-        let found = file.metadata().map_err(failed)?;
-        if found.is_dir() {
-            return Err(failed(io::ErrorKind::IsADirectory.into()));
-        }
-        check_magic(path, &mut file, found.len())?;
+        let (mut file, n_bytes) = input::open(path)?;
+        check_magic(path, &mut file, n_bytes)?;
         // The Arrow schema that Arrow writers embed is left aside: the Parquet schema says all that
         // counts, and then large, fixed-size and dictionary columns need no code of their own.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
         let parquet = guarded(path, || ArrowReaderMetadata::load(&file, options))?;
         let footer = parquet.metadata().file_metadata();
-        let most = (i32::MAX as u64).min(found.len().saturating_mul(ROWS_PER_BYTE));
+        let most = (i32::MAX as u64).min(n_bytes.saturating_mul(ROWS_PER_BYTE));
         let n_rows = match u64::try_from(footer.num_rows()) {
             Ok(n_rows) if n_rows <= most => n_rows,
             _ => {
-                let expected = format!("at most {most} rows in {} bytes", found.len());
+                let expected = format!("at most {most} rows in {} bytes", n_bytes);
                 return Err(Error::new(path, "", expected, footer.num_rows().to_string()));
             }
         };

@@ -1,0 +1,119 @@
+//! What is read, and how much memory it may take: regular files only, and no more than a budget that
+//! the size of the file sets, whatever the file declares.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+use crate::error::{Error, Place};
+
+/// Opens `path` for reading; with its length in bytes.
+///
+/// # Errors
+/// When it is missing, may not be read, or is a folder, a pipe, a socket or a device: these have no
+/// length that bounds what is read, and may never end or never begin.
+pub fn open(path: &Path) -> Result<(File, u64), Error> {
+    let failed = |source| Error::read(path, source);
+    // Before it is opened, since opening a pipe that nobody writes to waits for ever.
+    regular(path, &fs::metadata(path).map_err(failed)?)?;
+    let file = File::open(path).map_err(failed)?;
+    let metadata = file.metadata().map_err(failed)?;
+    regular(path, &metadata)?;
+    Ok((file, metadata.len()))
+}
+
+fn regular(path: &Path, metadata: &fs::Metadata) -> Result<(), Error> {
+    if metadata.is_file() {
+        return Ok(());
+    }
+    let found = if metadata.is_dir() { "a folder" } else { "a pipe, a socket or a device" };
+    Err(Error::new(path, "", "a file", found))
+}
+
+/// Every input may take as much, however small it is: formats repeat and compress.
+const LEAST: u64 = 256 << 20;
+/// Bytes in memory per byte of the file: values are widened by up to eight times, and real features
+/// and lists hardly compress.
+const MULTIPLE: u64 = 64;
+
+static LIMIT: AtomicU64 = AtomicU64::new(u64::MAX);
+
+/// Sets the most memory in bytes that any one input may take from now on, in this process.
+pub fn limit_memory(bytes: u64) {
+    LIMIT.store(bytes, Relaxed);
+}
+
+/// How much memory what is decoded of one file may take at a time: 64 times its size, but at least
+/// 256 MiB, and never more than [`limit_memory`] allows.
+#[derive(Clone, Debug)]
+pub struct Budget {
+    path: PathBuf,
+    len: u64,
+    most: u64,
+}
+
+impl Budget {
+    /// The budget of the file `path` of `len` bytes.
+    pub fn new(path: &Path, len: u64) -> Self {
+        let most = len.saturating_mul(MULTIPLE).max(LEAST).min(LIMIT.load(Relaxed));
+        Self { path: path.to_owned(), len, most }
+    }
+
+    /// Bytes that fit.
+    pub fn most(&self) -> u64 {
+        self.most
+    }
+
+    /// Whether `bytes` fit, which what stands at `place` is about to take.
+    ///
+    /// # Errors
+    /// When they do not.
+    pub fn admit(&self, place: impl Into<Place>, bytes: u64) -> Result<(), Error> {
+        if bytes <= self.most {
+            return Ok(());
+        }
+        let expected =
+            format!("at most {} in memory of a file of {}", size(self.most), size(self.len));
+        Err(Error::new(&self.path, place, expected, size(bytes)))
+    }
+}
+
+/// `1.5 GiB`, `300 KiB`, `17 bytes`.
+pub fn size(bytes: u64) -> String {
+    let units = [("GiB", 1u64 << 30), ("MiB", 1 << 20), ("KiB", 1 << 10)];
+    match units.iter().find(|(_, unit)| bytes >= *unit) {
+        Some((name, unit)) => {
+            let tenths = (bytes as f64 / *unit as f64 * 10.0).round() / 10.0;
+            format!("{tenths} {name}")
+        }
+        None => format!("{bytes} bytes"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_files_have_a_least_budget_and_large_ones_a_multiple() {
+        let path = Path::new("a.h5");
+        assert_eq!(Budget::new(path, 266_000).most(), LEAST);
+        assert_eq!(Budget::new(path, 1 << 30).most(), 64 << 30);
+        let error = Budget::new(path, 266_000).admit("array x", 4 << 30).unwrap_err();
+        let expected =
+            "a.h5: array x: expected at most 256 MiB in memory of a file of 259.8 KiB, found 4 GiB";
+        assert_eq!(error.to_string(), expected);
+    }
+
+    #[test]
+    fn only_regular_files_are_opened() {
+        let folder = tempfile::tempdir().unwrap();
+        let line = |path: &Path| open(path).unwrap_err().to_string();
+        assert!(line(folder.path()).ends_with("expected a file, found a folder"));
+        #[cfg(unix)]
+        assert_eq!(
+            line(Path::new("/dev/zero")),
+            "/dev/zero: expected a file, found a pipe, a socket or a device"
+        );
+    }
+}
