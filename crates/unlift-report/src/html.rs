@@ -73,6 +73,7 @@ pub fn render(
         Some(tables::recovered(&document)),
         Some(tables::baselines(&document)),
         tables::distinct(&document),
+        tables::likeness(&document),
         tables::metrics(&document),
         tables::objects(&document),
         Some(tables::errors(&document)),

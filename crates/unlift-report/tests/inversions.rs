@@ -42,6 +42,9 @@ fn pictures_lead_with_what_comes_back_today_and_by_the_attack_that_is_shown() {
     let frame = "style=\"left:25.0%;top:0.0%;width:50.0%;height:50.0%\"><b>chair</b>";
     assert!(found.contains(frame), "{found}");
     assert!(found.contains("tv, %"), "{found}");
+    // The paper's figures of the same cell stand beside ours.
+    assert!(found.contains("<td>0.480</td><td>0.020</td><td>0.62</td>"), "{found}");
+    assert!(!found.contains("ssim_baseline"));
     assert!(found.contains("<td>75.0</td>") && found.contains("<td>25.0</td>"));
     // A solver that is not painted does not speak for one that is.
     document.results[0].metrics["ssim"] = 0.9;

@@ -1,6 +1,6 @@
 //! Beside the main figures: points lost, choices that recovery made, trials and times.
 
-use super::{Class, NONE, Table, column, key_cells, key_columns, points};
+use super::{Class, NONE, Table, column, key_cells, key_columns, pictures, points};
 use crate::document::{ByReason, Document, Row};
 use crate::words;
 
@@ -79,45 +79,11 @@ pub(crate) fn choices(document: &Document) -> Option<Table> {
     (table.columns.len() > n_keys).then_some(table)
 }
 
-/// What the names of metrics begin with that are about a class of objects.
-const OF_CLASS: &str = "objects_found_of_";
-/// What they end with when they are about pictures of the true points.
-const BASELINE: &str = "_baseline";
-
-/// The share of the photos' objects that is found again in the pictures, a column per class; `None` when no row has any.
-pub(crate) fn objects(document: &Document) -> Option<Table> {
-    let mut classes: Vec<&str> = Vec::new();
-    for name in document.results.iter().flat_map(|row| row.metrics.keys()) {
-        let class = name.strip_prefix(OF_CLASS).filter(|class| !class.ends_with(BASELINE));
-        classes.extend(class.filter(|class| !classes.contains(class)));
-    }
-    classes.sort_unstable();
-    let share = |row: &Row, class: &str, end: &str| {
-        let value = row.metrics.get(&format!("{OF_CLASS}{class}{end}"));
-        value.map_or(NONE.into(), |value| words::percent(100.0 * value))
-    };
-    let first = document.results.iter().find(|row| row.metrics.contains_key("objects_found"))?;
-    let mut rows =
-        vec![vec!["without protection".to_owned(), NONE.into(), NONE.into(), NONE.into()]];
-    rows[0].extend(classes.iter().map(|class| share(first, class, BASELINE)));
-    rows.extend(document.results.iter().map(|row| {
-        let shares = classes.iter().map(|class| share(row, class, ""));
-        key_cells(row).into_iter().chain(shares).collect()
-    }));
-    let mut columns = key_columns();
-    let names = classes.iter().map(|class| format!("{}, %", class.replace('_', " ")));
-    columns.extend(names.map(|name| column(name, Class::Figure)));
-    let caption = "Everyday objects that a detector finds again, in the same place, of those that it finds in the photos; means over \
-                   the photos that show one.";
-    let table = Table { id: "objects", caption: caption.into(), columns, rows, notes: Vec::new() };
-    (!classes.is_empty()).then_some(table)
-}
-
 /// Metrics, a column each; `None` when no row has any.
 pub(crate) fn metrics(document: &Document) -> Option<Table> {
     let mut names: Vec<&String> = Vec::new();
     for name in document.results.iter().flat_map(|row| row.metrics.keys()) {
-        if !name.starts_with(OF_CLASS) && !names.contains(&name) {
+        if !pictures::shown(name) && !names.contains(&name) {
             names.push(name);
         }
     }

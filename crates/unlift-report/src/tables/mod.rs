@@ -1,13 +1,15 @@
 //! The figures as tables of text: what the page shows without script.
 
 mod details;
+mod pictures;
 
 use serde::Serialize;
 
 use crate::document::{Bound, Document, LengthUnit, Row};
 use crate::{attack, words};
 
-pub(crate) use details::{choices, losses, metrics, objects, times, trials};
+pub(crate) use details::{choices, losses, metrics, times, trials};
+pub(crate) use pictures::{likeness, objects};
 
 /// A table of text.
 #[derive(Debug, Clone, PartialEq, Serialize)]
