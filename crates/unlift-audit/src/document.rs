@@ -16,6 +16,8 @@ pub struct Provenance {
     pub input: report::Input,
     /// Options for the record.
     pub options: Map<String, Value>,
+    /// What whoever reads the figures must know.
+    pub notes: Vec<String>,
     /// Gates and what they found.
     pub gates: Vec<report::GateResult>,
     /// The command line, if there was one.
@@ -97,6 +99,7 @@ pub fn document<const D: usize>(
         seed: plan.seed,
         results: outcome.rows.iter().map(|r| row(r, &plan.thresholds)).collect(),
         not_audited: not_audited(plan, outcome.not_audited),
+        notes: provenance.notes,
         break_even: outcome.break_even.iter().map(break_even).collect(),
         gates: provenance.gates,
         images: Vec::new(),

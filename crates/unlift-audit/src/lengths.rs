@@ -48,7 +48,7 @@ fn across(points: &[[f64; 3]]) -> f64 {
 /// What a map in meters can be across: from a grain of dust to beyond the orbit of the moon.
 const ACROSS_M: [f64; 2] = [1e-6, 1e9];
 /// Where even neighboring points are this many times the largest threshold apart, no attack could hit.
-const HOPELESS: f64 = 1000.0;
+const HOPELESS: f64 = 100.0;
 /// The same for what is possible but unusual.
 const UNUSUAL: f64 = 10.0;
 
@@ -202,8 +202,8 @@ mod tests {
 
     #[test]
     fn points_too_far_apart_for_any_threshold_are_refused() {
-        let error = told(10_000.0).unwrap_err();
-        assert!(error.contains("expected neighboring points less than 1000 times"), "{error}");
+        let error = told(1_000.0).unwrap_err();
+        assert!(error.contains("expected neighboring points less than 100 times"), "{error}");
         let note = told(100.0).unwrap().unwrap();
         assert!(note.ends_with("is --scale right?"), "{note}");
     }

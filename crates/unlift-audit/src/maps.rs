@@ -45,6 +45,8 @@ pub struct Job<'a> {
     pub input: Input,
     /// Options for the record, beside those in the plan.
     pub options: serde_json::Map<String, serde_json::Value>,
+    /// What whoever reads the figures must know; told to `progress` as well.
+    pub notes: Vec<String>,
     /// Bounds to hold.
     pub gates: Vec<Gate>,
     /// Folder to write.
@@ -104,6 +106,7 @@ impl<'a> Job<'a> {
                 images: None,
             },
             options: serde_json::Map::new(),
+            notes: Vec::new(),
             gates: Vec::new(),
             out: out.to_owned(),
             unit_in_map_units: prepared.unit_in_map_units,
@@ -190,6 +193,9 @@ impl Finished {
 /// Runs the job and writes its files, all or none.
 pub fn perform(job: Job<'_>, mut out: OutputSet) -> Result<Finished, Error> {
     check_gates(&job.gates, &job.plan)?;
+    for note in &job.notes {
+        job.progress.say(&format!("note: {note}"));
+    }
     let drawn = drawn(&job.plan);
     let n_views = job.plan.schemes.len() * job.plan.variants().len() * drawn.len();
     let mut watcher = Watcher {
@@ -229,7 +235,7 @@ pub fn perform(job: Job<'_>, mut out: OutputSet) -> Result<Finished, Error> {
     }
     let options = document::options(&job.plan, options);
     let provenance =
-        Provenance { input: job.input, options, gates, command: job.command, started: job.started };
+        Provenance { input: job.input, options, notes: job.notes, gates, command: job.command, started: job.started };
     let found = document::Found {
         rows: &outcome.rows,
         not_audited: &outcome.not_audited,

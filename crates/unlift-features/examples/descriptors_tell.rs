@@ -124,5 +124,5 @@ fn cosines(released: &Released<2>) -> Result<Neighborhoods, unlift::Error> {
     let offsets = (0..=n).map(|at| (at * K) as u64).collect();
     let lists = Neighborhoods::try_new(offsets, records, None, n, 1)?;
     let map = Some(released.fingerprint());
-    Ok(lists.with_about(About { map, order: RowOrder::DescriptorRows }))
+    Ok(lists.with_about(About { map, order: RowOrder::DescriptorRows, ..About::default() }))
 }

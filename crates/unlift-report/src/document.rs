@@ -44,6 +44,10 @@ pub struct Document {
     /// of such a scheme is known: it must never read as a small one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub not_audited: Vec<NotAudited>,
+    /// What whoever reads the figures must know of how they came to be: only a part of the map, unusual lengths, lists
+    /// that name nobody.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
     /// The smallest inlier ratio at which half of the points come back, per scheme, noise and solver.
     pub break_even: Vec<BreakEven>,
     /// The user's gates and how they ended; empty when none was given.

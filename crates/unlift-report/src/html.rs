@@ -126,6 +126,7 @@ pub fn render(
                 (&one.scheme, source, &one.reason)
             })
             .collect(),
+        notes: &document.notes,
         document: &document,
         attribution: paper::ATTRIBUTION,
     };
@@ -184,6 +185,8 @@ struct Page<'a> {
     memory: Option<String>,
     /// (scheme, source, reason) of what could not be audited.
     not_audited: Vec<(&'a String, Option<String>, &'a String)>,
+    /// What whoever reads the figures must know.
+    notes: &'a [String],
     document: &'a Document,
     attribution: &'static str,
 }

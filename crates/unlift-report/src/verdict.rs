@@ -107,38 +107,40 @@ fn card(document: &Document, scheme: &str) -> Option<Card> {
     let typed = &tables::headline_threshold(document)?;
     let alone = records_alone(document, scheme, typed);
     let blind = |row: &Row| row.blind_percent.get(typed).copied().unwrap_or(0.0);
-    let floor = |row: &Row| alone.map_or(0.0, |(percent, _)| percent).max(blind(row));
-    let of = |basis| strongest(document, scheme, basis);
-    let found = |basis, row: &Row| Finding {
-        basis,
-        when: when(basis, row),
-        recovered: share(row, typed),
-        at_least: words::at_least(share(row, typed)),
-        amount: quantity::amount(share(row, typed)),
-        by: attack::name(row),
-        floor: floor(row),
-    };
-    let mut findings: Vec<Finding> = [Basis::Released, Basis::Given, Basis::Oracle]
-        .into_iter()
-        .filter_map(|basis| Some(found(basis, of(basis)?)))
-        .collect();
-    let any = document.results.iter().find(|row| row.scheme == scheme)?;
-    if let Some((percent, by)) = alone {
-        // Records alone are released as well: today's attack is the stronger of both.
-        let today = Finding {
-            basis: Basis::Released,
-            when: when(Basis::Released, any),
-            recovered: percent,
-            at_least: words::at_least(percent),
-            amount: quantity::amount(percent),
-            by: attack::records_alone(by),
-            floor: floor(any),
-        };
-        match findings.iter_mut().find(|finding| finding.basis == Basis::Released) {
-            Some(other) if other.recovered >= percent => {}
-            Some(other) => *other = today,
-            None => findings.insert(0, today),
+    // What needs no neighborhoods: whoever has more need not use it.
+    let without = |row: &Row| {
+        let guess = (blind(row), "a blind guess".to_owned());
+        match alone {
+            Some((percent, by)) if percent >= guess.0 => (percent, attack::records_alone(by)),
+            _ => guess,
         }
+    };
+    let found = |basis, row: &Row, own: Option<f64>| {
+        let (floor, by) = without(row);
+        let (recovered, by) = match own {
+            Some(own) if own >= floor => (own, attack::name(row)),
+            _ => (floor, by),
+        };
+        Finding {
+            basis,
+            when: when(basis, row),
+            recovered,
+            at_least: words::at_least(recovered),
+            amount: quantity::amount(recovered),
+            by,
+            floor,
+        }
+    };
+    let of = |basis| {
+        let row = strongest(document, scheme, basis)?;
+        Some(found(basis, row, Some(share(row, typed))))
+    };
+    let any = document.results.iter().find(|row| row.scheme == scheme)?;
+    let mut findings: Vec<Finding> =
+        [Basis::Released, Basis::Given, Basis::Oracle].into_iter().filter_map(of).collect();
+    // Records alone are released as well.
+    if alone.is_some() && findings.iter().all(|finding| finding.basis != Basis::Released) {
+        findings.insert(0, found(Basis::Released, any, None));
     }
     if findings.is_empty() {
         return None;

@@ -34,9 +34,9 @@
   }
 
   /** A chart over all schemes: neighborhoods and solver are chosen, what is drawn are the rows that fit. */
-  function chart(form, node, items, draw) {
+  function chart(form, node, items, draw, first = data.first_given) {
     const redraw = (chosen) => draw(node, data, chosen.items);
-    const chain = new Chain(form, [fields.given, fields.solver], { given: data.first_given }, redraw);
+    const chain = new Chain(form, [fields.given, fields.solver], { given: first }, redraw);
     chain.of(items);
     redraws.push(() => redraw(chain));
   }
@@ -105,10 +105,13 @@
   }
 
   const judged = rows.filter((row) => row.reliability.length || row.unknown);
+  // A chart without a curve reads as one without an error: it begins with what has one, if there is any.
+  const told = judged.filter((row) => row.reliability.length);
+  const firstTold = (told.find((row) => row.given === data.first_given) ?? told[0])?.given ?? data.first_given;
   const parts = [
     [rows.length, curves],
     [rows.length, () => chart(at("error-controls"), at("chart-errors"), rows, errors)],
-    [judged.length, () => chart(at("reliability-controls"), at("chart-reliability"), judged, reliability)],
+    [judged.length, () => chart(at("reliability-controls"), at("chart-reliability"), judged, reliability, firstTold)],
     [data.scene, scene],
     [data.pictures.length, pictures],
     ...[...document.querySelectorAll(".sheet")].map((sheet) => [sheet.querySelectorAll(".shot").length > 1, () => wipe(sheet)]),

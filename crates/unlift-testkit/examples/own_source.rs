@@ -57,7 +57,11 @@ impl Source<3> for Brightness {
             offsets.push(records.len() as u64);
         }
         // Rows are descriptor rows; with one point a record these are the slots.
-        let about = About { map: Some(released.fingerprint()), order: RowOrder::DescriptorRows };
+        let about = About {
+            map: Some(released.fingerprint()),
+            order: RowOrder::DescriptorRows,
+            ..About::default()
+        };
         Ok(Neighborhoods::try_new(offsets, records, None, n, 1)?.with_about(about))
     }
 }

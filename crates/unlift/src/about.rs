@@ -81,6 +81,26 @@ impl RowOrder {
     }
 }
 
+/// Who made lists, as far as that tells how they err.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ListsBy {
+    /// The oracle: true neighbors, and wrong ones that were drawn.
+    Oracle,
+    /// Anybody else, or a file that does not say.
+    #[default]
+    Unstated,
+}
+
+impl ListsBy {
+    /// The name used in files; `None` for what is not stated.
+    pub fn name(self) -> Option<&'static str> {
+        match self {
+            Self::Oracle => Some("oracle"),
+            Self::Unstated => None,
+        }
+    }
+}
+
 /// What rows of lists, or of positions made from them, are about.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct About {
@@ -88,6 +108,8 @@ pub struct About {
     pub map: Option<Fingerprint>,
     /// What rows are counted by.
     pub order: RowOrder,
+    /// Who made the lists.
+    pub lists_by: ListsBy,
 }
 
 #[cfg(test)]

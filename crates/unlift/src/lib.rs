@@ -65,7 +65,7 @@ pub mod simd;
 pub mod synthetic;
 pub mod truth;
 
-pub use about::{About, Fingerprint, RowOrder};
+pub use about::{About, Fingerprint, ListsBy, RowOrder};
 pub use descriptors::Descriptors;
 pub use error::Error;
 pub use ids::{OriginalId, RecordId};

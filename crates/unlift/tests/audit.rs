@@ -63,7 +63,7 @@ fn by_hand(original: &Original<3>, name: &str, solver: Solver, plan: &Plan<3>) -
         obfuscate(&*scheme, original, None, &Key::from_seed(plan.seed)).unwrap();
     let (n, slots) = (released.n_records(), released.slots_per_record());
     let none = Neighborhoods::try_new(vec![0; n * slots + 1], Vec::new(), None, n, slots).unwrap();
-    let none = none.with_about(About { map: None, order: RowOrder::Either });
+    let none = none.with_about(About { map: None, order: RowOrder::Either, ..About::default() });
     let options = RecoverOptions { solver, ..RecoverOptions::default() };
     let recovered = recover(&released, &none, &options).unwrap();
     let accuracy = evaluate(&recovered, original, &secret).unwrap();

@@ -7,7 +7,8 @@
 //! `ppl@0.5:0.10<=20` fails when more than 20 % of the points come back within 0.10 under `ppl` at
 //! inlier ratio 0.5. `SCHEME` may be `all`; without `@RATIO` every ratio counts, without a solver or a source
 //! of neighborhoods every one; every noise model and K always counts: the largest figure decides, which is
-//! that of the strongest attack. `:gain` bounds what neighborhoods add to an attacker without them (the larger of
+//! that of the strongest attack. Without a solver and a source, attacks that need no neighborhoods count as well (a blind
+//! guess, the records alone): they are in anybody's hands. `:gain` bounds what neighborhoods add to an attacker without them (the larger of
 //! a blind guess and what the records alone give), in percentage points. Numbers are compared as
 //! numbers, so `0.1` finds the threshold `0.10`. No name of a solver or a source is a number, so the first
 //! number after the scheme is the threshold.
@@ -132,6 +133,9 @@ impl Gate {
             .into_iter()
             .filter(|c| self.covers(c))
             .map(|c| match self.figure {
+                Figure::Recovered if self.solver.is_none() && self.source.is_none() => {
+                    worse(c.recovered_percent, c.baseline_percent)
+                }
                 Figure::Recovered => c.recovered_percent,
                 Figure::Gain => c.recovered_percent - c.baseline_percent,
             })

@@ -103,6 +103,7 @@ pub fn perform(job: ImagesJob<'_>, out: OutputSet) -> Result<(Option<Finished>, 
         options.insert("inverter_sha256".into(), inversion.sha256().into());
     }
     let provenance = Provenance {
+        notes: Vec::new(),
         input: input(&job, &tally, &outcome)?,
         options: document::options(&job.plan, options),
         gates,

@@ -35,17 +35,17 @@ pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
     let out = open_audit(&args.result.out, rules(&args), shown, &Stderr)?;
     let finished = with_threads(args.run.threads, || {
         let (input, prepared) = open_map(&args.path, &args.map, args.run.quiet)?;
-        if let Some(note) = thinned(&args, &prepared, input.positions.len()) {
-            eprintln!("unlift: note: {note}");
-        }
         let progress = Progress::new(args.run.quiet);
         let (path, result) = (&args.path, &args.result);
         let inversion = inversion(&args, &prepared, &input, &progress)?;
-        let mut plan = plan(&args, &prepared, &input)?;
+        let mut notes: Vec<String> =
+            thinned(&args, &prepared, input.positions.len()).into_iter().collect();
+        let mut plan = plan(&args, &prepared, &input, &mut notes)?;
         plan.measures.extend(inversion.iter().map(|one| Arc::clone(one) as Arc<dyn Measure<3>>));
         let mut job = Job {
             plan,
             inversion,
+            notes,
             options: with_attack(more_options(&args), &args.attack),
             gates: result.gate.clone(),
             write_clouds: args.write_clouds,
@@ -104,7 +104,12 @@ fn rules(args: &AuditMapArgs) -> Rules {
     Rules::new(inputs.chain(lists), args.result.force)
 }
 
-fn plan(args: &AuditMapArgs, prepared: &Prepared, input: &read::Input) -> anyhow::Result<Plan<3>> {
+fn plan(
+    args: &AuditMapArgs,
+    prepared: &Prepared,
+    input: &read::Input,
+    notes: &mut Vec<String>,
+) -> anyhow::Result<Plan<3>> {
     let k = usize::from(args.map.k);
     let unit = prepared.original.reveal().unit();
     let usual = Plan::new(unit).for_map(prepared.original.len(), k);
@@ -115,9 +120,7 @@ fn plan(args: &AuditMapArgs, prepared: &Prepared, input: &read::Input) -> anyhow
     let thresholds = thresholds(&args.thresholds, &usual)?;
     let points = prepared.original.reveal();
     let typed = !args.thresholds.is_empty();
-    if let Some(note) = check_thresholds(points.positions(), points.unit(), &thresholds, typed)? {
-        eprintln!("unlift: note: {note}");
-    }
+    notes.extend(check_thresholds(points.positions(), points.unit(), &thresholds, typed)?);
     let asked = (&*args.neighbors, &args.attack);
     let descriptors = prepared.descriptors.as_ref();
     let lacking = |text: String| {

@@ -40,13 +40,16 @@ pub fn run(args: &AuditReleasedArgs) -> anyhow::Result<Outcome> {
         let name = name(args)?;
         let (prepared, hidden) = open(args)?;
         let progress = Progress::new(args.run.quiet);
+        let mut notes = Vec::new();
+        let plan = plan(args, &name, &prepared, &hidden.0, &mut notes)?;
         let job = Job {
             original: &prepared.original,
             descriptors: None,
             hidden: Some(&hidden),
             cameras: Vec::new(),
             up: None,
-            plan: plan(args, &name, &prepared, &hidden.0)?,
+            plan,
+            notes,
             input: provenance(args, &prepared)?,
             options: with_attack(
                 Map::from_iter([("released".to_owned(), json!(true))]),
@@ -155,14 +158,13 @@ fn plan(
     name: &str,
     prepared: &Prepared,
     released: &Released<3>,
+    notes: &mut Vec<String>,
 ) -> anyhow::Result<Plan<3>> {
     let (k, points) = (usize::from(args.k), prepared.original.reveal());
     let usual = Plan::new(points.unit()).for_map(prepared.original.len(), k);
     let thresholds = thresholds(&args.thresholds, &usual)?;
     let typed = !args.thresholds.is_empty();
-    if let Some(note) = check_thresholds(points.positions(), points.unit(), &thresholds, typed)? {
-        eprintln!("unlift: note: {note}");
-    }
+    notes.extend(check_thresholds(points.positions(), points.unit(), &thresholds, typed)?);
     let asked = (&*args.neighbors, &args.attack);
     let lacking = |text: String| usage(format!("{text} in the released map, found none"));
     Ok(Plan {

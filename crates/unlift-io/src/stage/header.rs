@@ -184,7 +184,12 @@ impl<'a> Meta<'a> {
                 self.wrong("rows_by", format!("one of {}", names.join(", ")))
             })?,
         };
-        Ok(About { map: self.fingerprint()?, order })
+        let lists_by = match self.object.get("lists_by") {
+            None => ListsBy::Unstated,
+            Some(value) if value.as_str() == ListsBy::Oracle.name() => ListsBy::Oracle,
+            Some(_) => return Err(self.wrong("lists_by", "oracle, or no such key")),
+        };
+        Ok(About { map: self.fingerprint()?, order, lists_by })
     }
 
     /// A text, if the key is there and is one.
@@ -282,10 +287,11 @@ pub(super) fn insert_fingerprint(meta: &mut Map<String, Value>, map: Option<Fing
     meta.extend(map.map(|map| ("fingerprint".to_owned(), json!(map.to_string()))));
 }
 
-/// Adds the released map, and what rows are counted by, where they are known.
+/// Adds the released map, what rows are counted by, and who made the lists, where they are known.
 pub(super) fn insert_about(meta: &mut Map<String, Value>, about: About) {
     insert_fingerprint(meta, about.map);
     meta.extend(about.order.name().map(|name| ("rows_by".to_owned(), json!(name))));
+    meta.extend(about.lists_by.name().map(|name| ("lists_by".to_owned(), json!(name))));
 }
 
 /// `meta` as text. Keys are written in alphabetical order whatever map `serde_json` is built with,

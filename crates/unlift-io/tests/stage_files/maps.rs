@@ -105,7 +105,11 @@ fn about(seed: u64) -> About {
     let mut orders = RowOrder::STATED.to_vec();
     orders.push(RowOrder::Unstated);
     let map = (!seed.is_multiple_of(3)).then_some(Fingerprint([seed as u8; 16]));
-    About { map, order: orders[seed as usize % 4] }
+    About {
+        map,
+        order: orders[seed as usize % 4],
+        lists_by: [ListsBy::Oracle, ListsBy::Unstated][seed as usize % 2],
+    }
 }
 
 /// Recovered points, a fifth of them lost; axis and descriptor rows for every second seed.

@@ -93,6 +93,7 @@ pub fn document(metric: bool) -> Document {
         seed: 0,
         results,
         not_audited: Vec::new(),
+        notes: Vec::new(),
         break_even,
         gates: vec![gate("ppl@0.5:0.10<=20", 89.1, 20.0), gate("plane@0.1:0.10<=20", 11.8, 20.0)],
         images: Vec::new(),

@@ -51,7 +51,8 @@ pub struct BreakEven {
 pub const STRONGEST: &str = "strongest";
 
 /// Break-even ratios within the headline threshold, for every scheme and noise model with oracle rows: of the
-/// strongest attack at every ratio where there are several, then of every solver.
+/// strongest attack at every ratio where there are several, then of every solver. Attacks without neighborhoods (a blind
+/// guess, the records alone) are among them: whoever knows neighbors need not use them.
 pub fn break_even<const D: usize>(plan: &Plan<D>, rows: &[Row]) -> Vec<BreakEven> {
     let mut result = Vec::new();
     let solvers: Vec<&'static str> = plan.solvers.iter().map(|solver| solver.name()).collect();
@@ -59,8 +60,10 @@ pub fn break_even<const D: usize>(plan: &Plan<D>, rows: &[Row]) -> Vec<BreakEven
         for noise in &plan.oracle_noise {
             let (scheme, oracle_noise) = (scheme.name(), noise.name());
             let of = |row: &&Row| row.scheme == scheme && row.oracle_noise == Some(oracle_noise);
-            let mut push = |solver: &'static str, rows: &[&Row]| {
-                if let Some((inlier_ratio, bound)) = crossing(&curve(rows, plan.headline)) {
+            let by_rows = |row: &Row| row.recovered_percent[plan.headline];
+            let by_any = |row: &Row| by_rows(row).max(row.baseline_percent(plan.headline));
+            let mut push = |solver: &'static str, rows: &[&Row], share: &dyn Fn(&Row) -> f64| {
+                if let Some((inlier_ratio, bound)) = crossing(&curve(rows, share)) {
                     let threshold = plan.thresholds[plan.headline].label.clone();
                     let scheme = scheme.to_owned();
                     let found =
@@ -69,12 +72,12 @@ pub fn break_even<const D: usize>(plan: &Plan<D>, rows: &[Row]) -> Vec<BreakEven
                 }
             };
             let all: Vec<&Row> = rows.iter().filter(of).collect();
-            if solvers.len() > 1 {
-                push(STRONGEST, &all);
+            if solvers.len() > 1 || all.iter().any(|row| by_any(row) > by_rows(row)) {
+                push(STRONGEST, &all, &by_any);
             }
             for &solver in &solvers {
                 let of_solver = |row: &&Row| row.solver == solver;
-                push(solver, &all.iter().copied().filter(of_solver).collect::<Vec<_>>());
+                push(solver, &all.iter().copied().filter(of_solver).collect::<Vec<_>>(), &by_rows);
             }
         }
     }
@@ -82,9 +85,9 @@ pub fn break_even<const D: usize>(plan: &Plan<D>, rows: &[Row]) -> Vec<BreakEven
 }
 
 /// (ratio, largest share at it) of `rows`, falling in ratio.
-fn curve(rows: &[&Row], headline: usize) -> Vec<(f64, f64)> {
+fn curve(rows: &[&Row], share: &dyn Fn(&Row) -> f64) -> Vec<(f64, f64)> {
     let mut curve: Vec<(f64, f64)> =
-        rows.iter().map(|row| (row.inlier_ratio, row.recovered_percent[headline])).collect();
+        rows.iter().map(|row| (row.inlier_ratio, share(row))).collect();
     // Of one ratio the largest share first, which stays.
     curve.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(b.1.total_cmp(&a.1)));
     curve.dedup_by(|later, kept| later.0 == kept.0);

@@ -123,7 +123,7 @@ impl<'a, const D: usize> Lists<'a, D> {
         let lists =
             Neighborhoods::try_new(vec![0; n_slots + 1], Vec::new(), None, n_records, slots)?;
         let map = Some(self.released.fingerprint());
-        let lists = lists.with_about(About { map, order: RowOrder::Slots });
+        let lists = lists.with_about(About { map, order: RowOrder::Slots, ..About::default() });
         let (k, ratio_at_k) = match variant.by {
             // Nothing listed, nothing right: over images, whose figures are means, one more point that counts.
             NeighborsBy::Source(source) => (source.k(self.released), Some(0.0)),

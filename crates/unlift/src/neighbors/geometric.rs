@@ -129,7 +129,11 @@ pub(crate) fn geometric_by<const D: usize>(
     let n_records = released.n_records();
     let slots = released.slots_per_record();
     let lists = Neighborhoods::try_new(offsets, records, Some(scores), n_records, slots)?;
-    Ok(lists.with_about(About { map: Some(released.fingerprint()), order: RowOrder::Either }))
+    Ok(lists.with_about(About {
+        map: Some(released.fingerprint()),
+        order: RowOrder::Either,
+        ..About::default()
+    }))
 }
 
 /// Whether records of this kind tell anything by themselves.

@@ -54,7 +54,11 @@ impl<'a> Rows<'a> {
         }
         let slots_per_record = released.slots_per_record();
         let records = records_of(&slots, slots_per_record);
-        let about = About { map: Some(released.fingerprint()), order: RowOrder::DescriptorRows };
+        let about = About {
+            map: Some(released.fingerprint()),
+            order: RowOrder::DescriptorRows,
+            ..About::default()
+        };
         Ok(Self { descriptors, slots, records, n_records, slots_per_record, about })
     }
 

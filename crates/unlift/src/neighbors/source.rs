@@ -85,7 +85,7 @@ pub fn of_what_there_is<const D: usize>(
     let (offsets, slots) = (vec![0; n_slots + 1], released.slots_per_record());
     let lists = Neighborhoods::try_new(offsets, Vec::new(), None, n_records, slots)?;
     let map = Some(released.fingerprint());
-    Ok(lists.with_about(About { map, order: RowOrder::DescriptorRows }))
+    Ok(lists.with_about(About { map, order: RowOrder::DescriptorRows, ..About::default() }))
 }
 
 /// The error of a source that needs descriptors and has none.

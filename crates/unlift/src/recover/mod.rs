@@ -159,6 +159,7 @@ pub(crate) fn recover_at<const D: usize>(
     let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
     let (origin, unit) = (released.origin(), released.unit());
     let delta = placement::delta(peaks);
-    let about = About { map: Some(released.fingerprint()), order: RowOrder::Either };
+    let about =
+        About { map: Some(released.fingerprint()), order: RowOrder::Either, ..About::default() };
     Ok(Recovered::try_new(&estimates, with_axis, None, origin, unit, delta)?.with_about(about))
 }

@@ -112,7 +112,7 @@ pub fn lists_of(rows: &[Vec<u32>], n_records: usize, slots_per_record: usize) ->
         offsets.push(records.len() as u64);
     }
     let lists = Neighborhoods::try_new(offsets, records, None, n_records, slots_per_record);
-    lists.unwrap().with_about(About { map: None, order: RowOrder::Slots })
+    lists.unwrap().with_about(About { map: None, order: RowOrder::Slots, ..About::default() })
 }
 
 /// Uniformly random lists of `k` records: neighborhoods that tell nothing.

@@ -59,5 +59,5 @@ pub fn from_points(
     }
     let n_records = secret.n_slots() / slots_per_record;
     let lists = Neighborhoods::try_new(rows, records, kept_scores, n_records, slots_per_record)?;
-    Ok(lists.with_about(About { map: secret.map(), order: RowOrder::Slots }))
+    Ok(lists.with_about(About { map: secret.map(), order: RowOrder::Slots, ..About::default() }))
 }

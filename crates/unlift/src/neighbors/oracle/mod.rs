@@ -95,7 +95,11 @@ impl TrueNeighbors {
         let offsets = (0..=n_slots as u64).map(|slot| slot * self.k as u64).collect();
         let (n_records, slots) = (self.n_records, self.slots_per_record);
         let lists = Neighborhoods::try_new(offsets, records, None, n_records, slots)?;
-        Ok(lists.with_about(About { map: self.map, order: RowOrder::Slots }))
+        Ok(lists.with_about(About {
+            map: self.map,
+            order: RowOrder::Slots,
+            lists_by: ListsBy::Oracle,
+        }))
     }
 
     /// [`lists`](Self::lists) with uniformly random outliers.

@@ -12,6 +12,9 @@ pub(super) mod seen;
 
 use rayon::prelude::*;
 
+use crate::ListsBy;
+use crate::geometry::flatness::flatness;
+use crate::geometry::vector::widen;
 use crate::neighbors::Neighborhoods;
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::Graph;
@@ -41,18 +44,28 @@ pub(super) fn not_asked<const D: usize>(options: &RecoverOptions) -> Option<Unkn
 
 /// Why the model says nothing that comes true about maps recovered from `lists`, if so.
 ///
-/// On smaller maps, and with lists that sources rank, a tenth to nine tenths of those called 90 % sure were right.
-pub(super) fn unknown(lists: &Neighborhoods) -> Option<Unknown> {
+/// On smaller and on flat maps, and with lists that sources make, a tenth to nine tenths of those called 90 % sure were right.
+pub(super) fn unknown<const D: usize>(
+    lists: &Neighborhoods,
+    estimates: &[Estimate<D>],
+) -> Option<Unknown> {
     let n_slots = lists.n_slots() as f64;
     let mean = lists.records().len() as f64 / n_slots.max(1.0);
     if lists.scores().is_some() {
         Some(Unknown::RankedLists)
+    } else if lists.about().lists_by != ListsBy::Oracle {
+        Some(Unknown::GivenLists)
     } else if mean > MOST_LISTED * n_slots {
         Some(Unknown::SmallMap)
     } else {
-        None
+        let found = estimates.iter().filter(|one| one.status == Status::Ok);
+        let places: Vec<[f64; D]> = found.map(|one| widen(&one.position)).collect();
+        (flatness(&places) <= FLAT).then_some(Unknown::Flat)
     }
 }
+
+/// A map is flat whose smallest extent is at most this share of its largest one.
+const FLAT: f64 = 0.01;
 
 /// Looks around the estimates of joint recovery.
 pub(super) fn look<const D: usize>(

@@ -13,6 +13,10 @@ pub enum Unknown {
     OtherSolver,
     /// The lists have scores, as sources that rank give them: nothing was fitted on how those err.
     RankedLists,
+    /// Nobody says that the oracle made the lists: others err in ways on which nothing was fitted.
+    GivenLists,
+    /// What came back is flat or thin: records cross everywhere in a plane, and every crossing looks like a point.
+    Flat,
     /// Lists have more entries per hidden point than in any map that the model was fitted on.
     SmallMap,
 }
@@ -28,6 +32,8 @@ impl Unknown {
             }
             Self::OtherSolver => "nothing was fitted for solvers other than joint",
             Self::RankedLists => "nothing was fitted on how lists err that a source ranked",
+            Self::GivenLists => "nothing was fitted on how lists err that the oracle did not make",
+            Self::Flat => "nothing was fitted on flat or thin maps, where records cross everywhere",
             Self::SmallMap => {
                 "lists have more entries than a hundredth of all points, more than in any map that it was fitted on"
             }
