@@ -234,8 +234,14 @@ pub fn perform(job: Job<'_>, mut out: OutputSet) -> Result<Finished, Error> {
         options.insert("inverter_sha256".into(), inversion.sha256().into());
     }
     let options = document::options(&job.plan, options);
-    let provenance =
-        Provenance { input: job.input, options, notes: job.notes, gates, command: job.command, started: job.started };
+    let provenance = Provenance {
+        input: job.input,
+        options,
+        notes: job.notes,
+        gates,
+        command: job.command,
+        started: job.started,
+    };
     let found = document::Found {
         rows: &outcome.rows,
         not_audited: &outcome.not_audited,

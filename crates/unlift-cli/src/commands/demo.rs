@@ -71,6 +71,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
                 images: None,
             },
             options,
+            notes: Vec::new(),
             gates: Vec::new(),
             out: args.out.clone(),
             unit_in_map_units: 1.0,

@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 use std::fmt;
 use std::path::Path;
 use unlift::geometry::frame::Bounds;
-use unlift::{About, Fingerprint, RowOrder, Unit};
+use unlift::{About, Fingerprint, ListsBy, RowOrder, Unit};
 
 /// The Parquet key-value metadata key that holds the JSON object.
 pub(super) const KEY: &str = "unlift";

@@ -6,7 +6,9 @@ use unlift::recover::{Estimate, Recovered, Status};
 use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
 use unlift::seed::{Draws, Stage};
 use unlift::truth::{DropReason, Dropped, Original, Secret};
-use unlift::{About, Descriptors, Fingerprint, OriginalId, PointSet, RecordId, RowOrder, Unit};
+use unlift::{
+    About, Descriptors, Fingerprint, ListsBy, OriginalId, PointSet, RecordId, RowOrder, Unit,
+};
 
 pub fn draws(seed: u64) -> Draws {
     Draws::new(seed, Stage::Synthetic, 0)

@@ -1,7 +1,7 @@
 //! Beside the main figures: points lost, choices that recovery made, trials and times.
 
 use super::{Class, NONE, Table, column, key_cells, key_columns, pictures, points};
-use crate::document::{ByReason, Document, Row};
+use crate::document::{ByReason, Document};
 use crate::words;
 
 /// Points lost and not released, by reason.

@@ -17,7 +17,7 @@ use super::Neighborhoods;
 use crate::geometry::knn::Knn;
 use crate::seed::{Draws, Stage};
 use crate::truth::{Original, Secret};
-use crate::{About, Error, Fingerprint, RecordId, RowOrder};
+use crate::{About, Error, Fingerprint, ListsBy, RecordId, RowOrder};
 
 /// The true neighborhoods of every slot: the first K records met by going outward from its
 /// original in order of (distance, original id). Never the slot's own, each once (a paired line may
