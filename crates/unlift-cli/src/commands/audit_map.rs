@@ -22,6 +22,7 @@ use crate::args::AuditMapArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
 use crate::progress::{Progress, Stderr};
+use crate::stderr;
 use crate::values::{NeighborSource, all_schemes, distinct};
 
 /// Audits a map.
@@ -36,7 +37,7 @@ pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
     let finished = with_threads(args.run.threads, || {
         let (input, prepared) = open_map(&args.path, &args.map, args.run.quiet)?;
         if let Some(note) = thinned(&args, &prepared, input.positions.len()) {
-            eprintln!("unlift: note: {note}");
+            stderr::note(note);
         }
         let progress = Progress::new(args.run.quiet);
         let (path, result) = (&args.path, &args.result);
@@ -116,7 +117,7 @@ fn plan(args: &AuditMapArgs, prepared: &Prepared, input: &read::Input) -> anyhow
     let points = prepared.original.reveal();
     let typed = !args.thresholds.is_empty();
     if let Some(note) = check_thresholds(points.positions(), points.unit(), &thresholds, typed)? {
-        eprintln!("unlift: note: {note}");
+        stderr::note(note);
     }
     let asked = (&*args.neighbors, &args.attack);
     let descriptors = prepared.descriptors.as_ref();

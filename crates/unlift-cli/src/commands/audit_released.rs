@@ -20,6 +20,7 @@ use crate::args::AuditReleasedArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
 use crate::progress::{Progress, Stderr};
+use crate::stderr;
 use crate::values::{self, NeighborSource};
 
 /// What a scheme is called that nobody named.
@@ -161,7 +162,7 @@ fn plan(
     let thresholds = thresholds(&args.thresholds, &usual)?;
     let typed = !args.thresholds.is_empty();
     if let Some(note) = check_thresholds(points.positions(), points.unit(), &thresholds, typed)? {
-        eprintln!("unlift: note: {note}");
+        stderr::note(note);
     }
     let asked = (&*args.neighbors, &args.attack);
     let lacking = |text: String| usage(format!("{text} in the released map, found none"));
