@@ -8,7 +8,7 @@ use unlift::audit::{Cell, Observer, Plan, Row, run, run_released};
 use unlift::recover::Solver;
 use unlift::released::Released;
 use unlift::truth::{Original, Secret};
-use unlift::{Descriptors, Unit};
+use unlift::{Descriptors, OneLine, Unit};
 use unlift_io::atomic::OutputSet;
 use unlift_io::hash::hash_files;
 use unlift_io::read;
@@ -185,7 +185,7 @@ impl Finished {
             let found: Vec<String> = found.into_iter().chain(gate.reason.clone()).collect();
             text.push_str(&format!("gate {}: {word}, {}\n", gate.gate, found.join("; ")));
         }
-        text.push_str(&format!("\nreport: {}\n", self.report.display()));
+        text.push_str(&format!("\nreport: {}\n", OneLine(self.report.display())));
         text
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use unlift_io::atomic::{Access, Kind, OutputSet, Rules, sweep};
+use unlift_io::atomic::{Access, Kind, OutputFile, OutputSet, Rules, sweep};
 
 use crate::clouds;
 use crate::{Error, Progress};
@@ -17,10 +17,15 @@ pub fn refused(error: unlift_io::Error) -> Error {
     Error::request(format!("--out: {error}"))
 }
 
-/// Whether the one file `path` may be written, asked before the work and after it; where it will stand, links
+/// Whether the one file `path` may and can be written, asked before the work and after it; where it will stand, links
 /// followed. What dead runs left unfinished beside it is cleared away.
+///
+/// One rule for every command, as [`open_audit`] has it for folders: a place where nothing can be written is an error of
+/// the command line, a disk that fails later is none.
 pub fn check_file(path: &Path, kind: Kind, rules: &Rules) -> Result<PathBuf, Error> {
     let target = rules.check(path, kind).map_err(refused)?;
+    // Begun and given up: permissions alone do not say it.
+    drop(OutputFile::create(path, Access::Private).map_err(refused)?);
     let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty());
     sweep(folder.unwrap_or(Path::new(".")));
     Ok(target)

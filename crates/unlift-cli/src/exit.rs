@@ -3,6 +3,12 @@
 use std::fmt;
 use std::process::ExitCode;
 
+use unlift::{OneLine, is_obeyed};
+
+use crate::args::Cli;
+use crate::output::printed;
+use crate::stderr::tell;
+
 /// How a command ended that did its work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
@@ -14,7 +20,9 @@ pub enum Outcome {
 
 /// Exit code of a wrong command line; clap uses the same.
 const USAGE: u8 = 2;
-/// Exit code of files that cannot be read, written or used; of many images, a single one.
+/// Exit code of files that cannot be read, written or used; of many images, a single one. Also that of results that
+/// stdout does not take. A place that nothing can be written to is found before the work, and one of the command line:
+/// see [`unlift_audit::check_file`].
 const BAD_INPUT: u8 = 3;
 
 /// The command line asks for something that cannot be done (exit code 2).
@@ -54,35 +62,51 @@ pub fn advise(error: impl Into<anyhow::Error>, advice: impl Into<String>) -> any
     Advised { error: error.into(), advice: advice.into() }.into()
 }
 
+/// Prints help, or what is wrong with the command line, and returns the exit code.
+pub fn told(told: clap::Error) -> ExitCode {
+    // It quotes what was typed: the same is said of words without what a terminal obeys.
+    let words = std::env::args_os().map(|word| OneLine(word.display()).to_string());
+    let told = Cli::read(words).err().unwrap_or(told);
+    let text = told.render().to_string();
+    if !told.use_stderr() {
+        // Help: a result, in colors where clap has them.
+        return finish(printed(told.print()).map(|()| Outcome::Done));
+    }
+    if text.chars().any(|c| c != '\n' && is_obeyed(c)) {
+        text.lines().for_each(tell);
+    } else {
+        // As any message, it may be lost.
+        let _ = told.print();
+    }
+    ExitCode::from(USAGE)
+}
+
 /// Prints what is left to say and returns the exit code.
 pub fn finish(result: anyhow::Result<Outcome>) -> ExitCode {
     match result {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::GateFailed) => ExitCode::FAILURE,
         Err(error) => {
-            eprint!("{}", text(&error));
+            lines(&error).iter().for_each(tell);
             ExitCode::from(code(&error))
         }
     }
 }
 
 /// The lines on stderr.
-fn text(error: &anyhow::Error) -> String {
-    let line = line(error);
+fn lines(error: &anyhow::Error) -> Vec<String> {
     let of_audit = |error: &anyhow::Error| {
         let error = error.downcast_ref::<unlift_audit::Error>();
         error.and_then(|error| error.advice().map(str::to_owned))
     };
     let advised = error.downcast_ref::<Advised>().map(|advised| advised.advice.clone());
-    match advised.or_else(|| of_audit(error)) {
-        Some(advice) => format!("{line}\n  try: {advice}\n"),
-        None => format!("{line}\n"),
-    }
+    let advice = advised.or_else(|| of_audit(error)).map(|advice| format!("  try: {advice}"));
+    [line(error)].into_iter().chain(advice).collect()
 }
 
-/// One line per error: a newline in a file name must not fake a second one.
+/// An error as `stderr::tell` takes it.
 pub fn line(error: &anyhow::Error) -> String {
-    format!("unlift: {}", format!("{error:#}").replace(['\n', '\r'], " "))
+    format!("unlift: {error:#}")
 }
 
 fn code(error: &anyhow::Error) -> u8 {
@@ -104,14 +128,14 @@ mod tests {
     fn advice_keeps_the_code_and_adds_a_line() {
         let error = advise(usage("--k: expected at most 10, found 50"), "--k 10");
         assert_eq!(code(&error), USAGE);
-        assert_eq!(text(&error), "unlift: --k: expected at most 10, found 50\n  try: --k 10\n");
+        assert_eq!(lines(&error), ["unlift: --k: expected at most 10, found 50", "  try: --k 10"]);
     }
 
     #[test]
-    fn everything_else_is_bad_input_on_one_line() {
+    fn everything_else_is_bad_input() {
         let error = unlift::Error::new("points", "51", "3");
-        let error = Err::<(), _>(error).context("a\nb.ply").unwrap_err();
+        let error = Err::<(), _>(error).context("a.ply").unwrap_err();
         assert_eq!(code(&error), BAD_INPUT);
-        assert_eq!(text(&error), "unlift: a b.ply: points: expected 51, found 3\n");
+        assert_eq!(lines(&error), ["unlift: a.ply: points: expected 51, found 3"]);
     }
 }

@@ -7,13 +7,15 @@ mod interrupt;
 mod output;
 mod pace;
 mod progress;
+mod stderr;
 mod values;
 
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    // Usage errors end here, with exit code 2.
-    let cli = args::Cli::read(std::env::args_os()).unwrap_or_else(|error| error.exit());
     interrupt::watch();
-    exit::finish(commands::run(cli.command))
+    match args::Cli::read(std::env::args_os()) {
+        Ok(cli) => exit::finish(commands::run(cli.command)),
+        Err(told) => exit::told(told),
+    }
 }

@@ -2,28 +2,53 @@
 
 use std::io::{self, Write};
 
-/// Prints `text`. A reader that closes the pipe early (`| head`) ends the output, not the program.
+use unlift::{OneLine, is_obeyed};
+
+/// Prints `text`, lines or JSON. A reader that closes the pipe early (`| head`) ends the output, not the program.
 ///
 /// # Errors
 /// When stdout cannot be written for another reason.
 pub fn print(text: &str) -> anyhow::Result<()> {
+    let text = harmless(text);
     let mut stdout = io::stdout().lock();
-    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error.into()),
+    printed(stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()))
+}
+
+/// What became of something printed.
+pub fn printed(result: io::Result<()>) -> anyhow::Result<()> {
+    match result {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(unlift_io::Error::write("stdout", error).into())
+        }
         _ => Ok(()),
     }
+}
+
+/// The same without what a terminal obeys but for ends of lines, as JSON escapes it: within its texts, where alone such
+/// characters stand, that changes no value.
+fn harmless(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c != '\n' && is_obeyed(c) {
+            true => out.push_str(&format!("\\u{:04x}", u32::from(c))),
+            false => out.push(c),
+        }
+    }
+    out
 }
 
 /// Rows of text with columns as wide as their widest cell, two spaces apart; the first column is
 /// left-aligned, as are those in `left`.
 pub fn table(rows: &[Vec<String>], left: &[usize]) -> String {
+    let shown = |row: &Vec<String>| row.iter().map(|cell| OneLine(cell).to_string()).collect();
+    let rows: Vec<Vec<String>> = rows.iter().map(shown).collect();
     let n_columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |c: usize| {
         rows.iter().filter_map(|row| row.get(c)).map(|s| s.chars().count()).max().unwrap_or(0)
     };
     let widths: Vec<usize> = (0..n_columns).map(width).collect();
     let mut text = String::new();
-    for row in rows {
+    for row in &rows {
         let mut line = String::new();
         for (c, cell) in row.iter().enumerate() {
             if c > 0 {
@@ -68,6 +93,20 @@ mod tests {
         let row = |cells: [&str; 3]| cells.map(str::to_owned).to_vec();
         let rows = [row(["scheme", "10 cm", "note"]), row(["ppl+", "9.5", "x"])];
         assert_eq!(table(&rows, &[2]), "scheme  10 cm  note\nppl+      9.5  x\n");
+    }
+
+    #[test]
+    fn names_are_cells_of_one_line() {
+        let rows = [vec!["a\n\x1b]0;x\x07".to_owned(), "1".to_owned()]];
+        assert_eq!(table(&rows, &[]), "a\\n\\u{1b}]0;x\\u{7}  1\n");
+    }
+
+    #[test]
+    fn json_says_the_same_without_what_a_terminal_obeys() {
+        let value = serde_json::json!({ "\u{9b}2J": ["\u{202e}\n\x7f", "ü"] });
+        let text = harmless(&format!("{value:#}\n"));
+        assert!(text.chars().all(|c| c == '\n' || !is_obeyed(c)) && text.contains('ü'), "{text}");
+        assert_eq!(serde_json::from_str::<serde_json::Value>(&text).unwrap(), value);
     }
 
     #[test]

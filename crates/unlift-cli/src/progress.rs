@@ -6,8 +6,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use unlift::OneLine;
 
 use crate::pace::Pace;
+use crate::stderr::tell;
 
 /// Shorter work shows nothing.
 const PATIENCE: Duration = Duration::from_secs(1);
@@ -118,7 +120,7 @@ impl unlift_audit::Progress for Progress {
     }
 
     fn say(&self, line: &str) {
-        self.0.say(&one_line(line));
+        self.0.say(&format!("unlift: {line}"));
     }
 }
 
@@ -128,19 +130,14 @@ pub struct Stderr;
 
 impl unlift_audit::Progress for Stderr {
     fn say(&self, line: &str) {
-        eprintln!("{}", one_line(line));
+        tell(format_args!("unlift: {line}"));
     }
 }
 
 impl unlift_audit::Progress for Spinner {
     fn say(&self, line: &str) {
-        Self::say(self, &one_line(line));
+        Self::say(self, &format!("unlift: {line}"));
     }
-}
-
-/// A line of this program: a newline in a file name must not fake a second one.
-fn one_line(text: &str) -> String {
-    format!("unlift: {}", text.replace(['\n', '\r'], " "))
 }
 
 impl Drop for Progress {
@@ -157,7 +154,7 @@ impl Steps {
 
     /// Prints a line on stderr without tearing the bar.
     pub fn say(&self, line: &str) {
-        self.bar.suspend(|| eprintln!("{line}"));
+        self.bar.suspend(|| tell(line));
     }
 
     fn tell(&self, what: &str, step: impl FnOnce(&mut Pace, Duration)) {
@@ -170,7 +167,7 @@ impl Steps {
             Shown::Lines(last) => {
                 if now.saturating_sub(*last) >= LINES {
                     *last = now;
-                    eprintln!("unlift: {}: {what}", pace.status(now));
+                    tell(format_args!("unlift: {}: {what}", pace.status(now)));
                 }
             }
             Shown::Bar(_) => {
@@ -178,7 +175,7 @@ impl Steps {
                 drop(state);
                 self.bar.set_length((pace.total() as f64 * PARTS) as u64);
                 if !what.is_empty() {
-                    self.bar.set_message(what.to_owned());
+                    self.bar.set_message(OneLine(what).to_string());
                 }
                 self.bar.set_position((pace.done() * PARTS) as u64);
             }
@@ -211,7 +208,7 @@ impl Spinner {
 
     /// Prints a line on stderr without tearing it.
     pub fn say(&self, line: &str) {
-        self.0.suspend(|| eprintln!("{line}"));
+        self.0.suspend(|| tell(line));
     }
 }
 

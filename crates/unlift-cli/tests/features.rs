@@ -174,6 +174,40 @@ fn a_run_that_was_interrupted_goes_on_and_gives_the_same_bytes() {
     assert_eq!(left(&place), ["again.h5", "photos", "whole.h5"]);
 }
 
+#[cfg(unix)]
+#[test]
+fn a_part_that_has_changed_is_made_again() {
+    let place = photos();
+    place.ends("features photos --out whole.h5", 0);
+    let whole = fs::read(place.path("whole.h5")).unwrap();
+    // Room for each part and not for all of them, in blocks of 512 bytes: the parts are left.
+    let blocks = whole.len() / 512 * 2 / 3;
+    let line = "exec \"$0\" features photos --out again.h5 --quiet";
+    let stopped = Command::new("sh")
+        .args(["-c", &format!("ulimit -f {blocks}; {line}"), env!("CARGO_BIN_EXE_unlift")])
+        .current_dir(place.path(""))
+        .output()
+        .expect("a shell");
+    assert_eq!(
+        String::from_utf8_lossy(&stopped.stderr),
+        "unlift: again.h5: expected space to write, found a limit on the size of files\n"
+    );
+    assert_eq!(left(&place), ["again.h5.parts", "photos", "whole.h5"]);
+    let parts = fs::read_dir(place.path("again.h5.parts")).unwrap();
+    let mut parts: Vec<_> = parts.map(|entry| entry.unwrap().path()).collect();
+    parts.sort();
+    assert_eq!(parts.len(), 3);
+    // Somewhere among the descriptors, where every value is one.
+    let mut bytes = fs::read(&parts[1]).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle..middle + 60].iter_mut().for_each(|byte| *byte ^= 1);
+    fs::write(&parts[1], bytes).unwrap();
+    let (stdout, _) = place.ends("features photos --out again.h5", 0);
+    assert!(stdout.contains(" (2 images of an earlier run), "), "{stdout}");
+    assert_eq!(fs::read(place.path("again.h5")).unwrap(), whole);
+    assert_eq!(left(&place), ["again.h5", "photos", "whole.h5"]);
+}
+
 #[test]
 fn features_of_a_file_are_copied() {
     let place = photos();

@@ -200,6 +200,9 @@ fn what_shows_points_is_for_its_owner_alone() {
     place.ends("recover hidden/released.parquet --neighbors lists.parquet --out back.parquet", 0);
     place.ends(&format!("audit map room.csv {QUICK} --write-clouds --out a"), 0);
     place.ends(&format!("audit map room.csv {QUICK} --share-safe --out b"), 0);
+    fs::create_dir(place.path("photos")).unwrap();
+    common::photo(0).save(place.path("photos/p.png")).unwrap();
+    place.ends("invert photos --out pictures/new", 0);
     let mode = |name: &str| fs::metadata(place.path(name)).unwrap().permissions().mode() & 0o777;
     let usual = mode("room.csv");
     assert_ne!(usual, 0o600, "the test needs a mask that lets others read");
@@ -215,6 +218,9 @@ fn what_shows_points_is_for_its_owner_alone() {
         ("a/clouds", 0o700),
         ("a/clouds/original.ply", 0o600),
         ("a/clouds/olc-recovered-1-joint.ply", 0o600),
+        ("pictures", 0o700),
+        ("pictures/new", 0o700),
+        ("pictures/new/p.png.png", 0o600),
         ("b/audit.json", usual),
         ("b/report.html", usual),
     ] {

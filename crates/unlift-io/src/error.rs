@@ -4,6 +4,10 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use unlift::OneLine;
+
+use crate::unfinished::place_of;
+
 /// Where in a file something is wrong.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
@@ -79,9 +83,9 @@ impl Error {
         Self { path: path.into(), kind: Kind::Read(source) }
     }
 
-    /// `path` could not be written.
+    /// `path` could not be written; what is built apart is named by the place it is for.
     pub fn write(path: impl Into<PathBuf>, source: io::Error) -> Self {
-        Self { path: path.into(), kind: Kind::Write(source) }
+        Self { path: place_of(path.into()), kind: Kind::Write(source) }
     }
 
     /// The library refused values that came from `path`.
@@ -104,6 +108,12 @@ impl Error {
         Self { kind, ..self }
     }
 
+    /// The same error about another file: the one that a user knows of.
+    #[must_use]
+    pub fn at(self, path: impl Into<PathBuf>) -> Self {
+        Self { path: path.into(), ..self }
+    }
+
     /// The file or folder the error is about.
     pub fn path(&self) -> &Path {
         &self.path
@@ -112,7 +122,7 @@ impl Error {
 
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        OneLine(&self.path.to_string_lossy()).fmt(f)?;
+        OneLine(self.path.display()).fmt(f)?;
         match &self.kind {
             Kind::Content { place, expected, found } => {
                 match place {
@@ -132,18 +142,27 @@ impl fmt::Display for Error {
                 io::ErrorKind::PermissionDenied => {
                     write!(f, ": expected a readable file, found no permission to read")
                 }
-                _ => write!(f, ": cannot read: {}", OneLine(&source.to_string())),
+                _ => write!(f, ": cannot read: {}", OneLine(source)),
             },
             Kind::Write(source) => match source.kind() {
                 io::ErrorKind::PermissionDenied => {
                     write!(f, ": expected a writable place, found no permission to write")
                 }
+                io::ErrorKind::ReadOnlyFilesystem => {
+                    write!(f, ": expected a writable place, found a read-only file system")
+                }
                 io::ErrorKind::StorageFull => {
                     write!(f, ": expected space to write, found a full disk")
                 }
-                _ => write!(f, ": cannot write: {}", OneLine(&source.to_string())),
+                io::ErrorKind::QuotaExceeded => {
+                    write!(f, ": expected space to write, found a used-up quota")
+                }
+                io::ErrorKind::FileTooLarge => {
+                    write!(f, ": expected space to write, found a limit on the size of files")
+                }
+                _ => write!(f, ": cannot write: {}", OneLine(source)),
             },
-            Kind::Core(source) => write!(f, ": {}", OneLine(&source.to_string())),
+            Kind::Core(source) => write!(f, ": {}", OneLine(source)),
         }
     }
 }
@@ -152,22 +171,6 @@ impl std::error::Error for Error {
     // The text above already holds the cause, so that a caller who prints the chain does not print it twice.
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         None
-    }
-}
-
-/// Text with its control characters escaped.
-struct OneLine<'a>(&'a str);
-
-impl fmt::Display for OneLine<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for c in self.0.chars() {
-            if c.is_control() {
-                write!(f, "{}", c.escape_default())?;
-            } else {
-                write!(f, "{c}")?;
-            }
-        }
-        Ok(())
     }
 }
 
@@ -193,6 +196,14 @@ mod tests {
             (
                 Error::read("a.ply", io(io::ErrorKind::NotFound)),
                 "a.ply: expected a file or folder, found nothing",
+            ),
+            (
+                Error::write("out", io(io::ErrorKind::FileTooLarge)),
+                "out: expected space to write, found a limit on the size of files",
+            ),
+            (
+                Error::new("a\u{202e}b", "c\u{9b}", "d", "e\u{2028}"),
+                "a\\u{202e}b: c\\u{9b}: expected d, found e\\u{2028}",
             ),
             (Error::read("a\nb", io(io::ErrorKind::Other)), "a\\nb: cannot read: other\\ntext"),
             (Error::write("out", io(io::ErrorKind::Other)), "out: cannot write: other\\ntext"),

@@ -40,5 +40,6 @@ pub mod hash;
 pub mod input;
 pub mod read;
 pub mod stage;
+mod unfinished;
 
 pub use error::{Error, Place};

@@ -2,9 +2,11 @@
 
 use std::fmt;
 
+use crate::line::OneLine;
+
 /// An argument or a set of columns that breaks a stated invariant.
 ///
-/// Prints as one line: `what: expected ..., found ...`. Files have their own error, with path and
+/// Prints as one line: `what: expected ..., found ...`, whatever they hold ([`OneLine`]). Files have their own error, with path and
 /// place, in the crate that reads them; a point that cannot be recovered is a
 /// [`Status`](crate::recover::Status), not an error.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -48,7 +50,8 @@ impl Error {
 
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: expected {}, found {}", self.what, self.expected, self.found)
+        let [what, expected, found] = [&self.what, &self.expected, &self.found].map(OneLine);
+        write!(f, "{what}: expected {expected}, found {found}")
     }
 }
 

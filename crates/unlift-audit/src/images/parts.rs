@@ -1,5 +1,6 @@
 //! Finished images of a run that may be interrupted, each in a file of its own.
 
+use std::collections::HashMap;
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -8,56 +9,61 @@ use std::time::UNIX_EPOCH;
 use unlift_io::Error;
 use unlift_io::atomic::{Access, sweep, write_file};
 use unlift_io::features::{FeatureWriter, ImageFeatures, decode, encode};
-use unlift_io::hash::hash_bytes;
+use unlift_io::hash::{hash_bytes, hash_file};
 
 use super::folder::Folder;
 
 /// Changes when the same photo and options may give other features.
 const VERSION: &str = concat!("unlift ", env!("CARGO_PKG_VERSION"), " features 1");
 const ENDING: &str = ".part.h5";
-/// Letters of a part's name.
-const HASH: usize = 32;
-const JOINED: &str = "joined.h5";
-
-/// Writes a part, whole or not at all.
-///
-/// # Errors
-/// When the disk fails.
-pub fn write_part(part: &Path, image: &ImageFeatures) -> Result<(), Error> {
-    let bytes = encode(image, part)?;
-    write_file(part, Access::Usual, |out| out.write_all(&bytes))
-}
+/// Letters of a key, and of a hash of content.
+const KEY: usize = 32;
+const HASH: usize = 64;
 
 /// The folder `FILE.parts` beside an output `FILE`.
 ///
-/// A part's name is a hash of all that its content depends on: the program's version, the options, and the
-/// photo's name, length and time of change. So a part is either right or not found.
+/// A part's name is a key and the SHA-256 of its content. The key is a hash of all that the content depends on: the
+/// program's version, the options, and the photo's name, length and time of change. So a part is either right or none.
 pub struct Parts {
+    target: PathBuf,
     folder: PathBuf,
     options: String,
+    /// What earlier runs left, by key: hashes of the content.
+    earlier: HashMap<String, Vec<String>>,
 }
+
+/// A photo's key.
+pub struct Key(String);
 
 impl Parts {
     /// The parts of the output `target` with these features; the folder of parts is made if it is not there.
     ///
     /// # Errors
-    /// When it cannot be made.
+    /// When it cannot be made or read.
     pub fn open(target: &Path, features: &Folder) -> Result<Self, Error> {
         let mut folder = target.as_os_str().to_owned();
         folder.push(".parts");
         let folder = PathBuf::from(folder);
         if !folder.is_dir() {
-            fs::create_dir(&folder).map_err(|source| Error::write(&folder, source))?;
+            fs::create_dir(&folder).map_err(|source| Error::write(target, source))?;
         }
         sweep(&folder);
-        Ok(Self { folder, options: features.settings() })
+        let mut earlier: HashMap<String, Vec<String>> = HashMap::new();
+        for entry in fs::read_dir(&folder).map_err(|source| Error::read(&folder, source))?.flatten()
+        {
+            if let Some((key, Some(hash))) = of_name(&entry.file_name().to_string_lossy()) {
+                earlier.entry(key.to_owned()).or_default().push(hash.to_owned());
+            }
+        }
+        let target = target.to_owned();
+        Ok(Self { target, folder, options: features.settings(), earlier })
     }
 
-    /// Where the part of the photo `name` at `photo` is, or will be.
+    /// The key of the photo `name` at `photo`.
     ///
     /// # Errors
     /// When the photo is gone.
-    pub fn path(&self, name: &str, photo: &Path) -> Result<PathBuf, Error> {
+    pub fn key(&self, name: &str, photo: &Path) -> Result<Key, Error> {
         let metadata = fs::metadata(photo).map_err(|source| Error::read(photo, source))?;
         let changed =
             metadata.modified().ok().and_then(|time| time.duration_since(UNIX_EPOCH).ok());
@@ -65,48 +71,75 @@ impl Parts {
         let length = metadata.len();
         let key = format!("{VERSION}\n{}\n{length} {changed}\n{name}", self.options);
         let hash = hash_bytes(key.as_bytes());
-        Ok(self.folder.join(format!("{}{ENDING}", &hash[..HASH])))
+        Ok(Key(hash[..KEY].to_owned()))
     }
 
-    /// Joins the parts of these images, in this order, to the file `target`, which appears whole; then
+    /// The part that an earlier run made, if its content still is what its name says. One that has changed is not
+    /// taken up, and goes away with the others.
+    pub fn earlier(&self, key: &Key) -> Option<PathBuf> {
+        let hashes = self.earlier.get(&key.0)?;
+        let parts = hashes.iter().map(|hash| (self.path(key, hash), hash));
+        let mut whole =
+            parts.filter(|(path, hash)| hash_file(path).is_ok_and(|found| found == **hash));
+        whole.next().map(|(path, _)| path)
+    }
+
+    /// Writes a part, whole or not at all; where it is.
+    ///
+    /// # Errors
+    /// When the disk fails.
+    pub fn write(&self, key: &Key, image: &ImageFeatures) -> Result<PathBuf, Error> {
+        let bytes = encode(image, &self.target)?;
+        let part = self.path(key, &hash_bytes(&bytes));
+        write_file(&part, Access::Usual, |out| out.write_all(&bytes))
+            .map_err(|error| error.at(&self.target))?;
+        Ok(part)
+    }
+
+    fn path(&self, key: &Key, hash: &str) -> PathBuf {
+        self.folder.join(format!("{}-{hash}{ENDING}", key.0))
+    }
+
+    /// Joins the parts of these images, in this order, to the output, which appears whole; then
     /// removes all parts.
     ///
     /// # Errors
-    /// When a part or the target fails; the parts stay then.
+    /// When a part or the output fails; the parts stay then.
     pub fn join(
         self,
         images: &[(&str, PathBuf)],
-        target: &Path,
         mut joined: impl FnMut(usize, &ImageFeatures),
     ) -> Result<(), Error> {
-        // Among the parts, so that what a killed run leaves is cleared away with them.
-        let whole = self.folder.join(JOINED);
-        let mut writer = FeatureWriter::create(&whole)?;
+        let mut writer = FeatureWriter::create(&self.target)?;
         for (at, (name, part)) in images.iter().enumerate() {
             let image = decode(part, name)?;
             writer.append(&image)?;
             joined(at, &image);
         }
         writer.finish()?;
-        fs::rename(&whole, target).map_err(|source| Error::write(target, source))?;
         self.remove();
         Ok(())
     }
 
-    /// Removes all parts, those of earlier options too, and the folder if nothing else is in it.
+    /// Removes all parts, those of earlier options and versions too, and the folder if nothing else is in it.
     pub fn remove(self) {
         // What cannot be removed is in nobody's way: the output is there.
         let Ok(entries) = fs::read_dir(&self.folder) else { return };
         for entry in entries.flatten() {
-            let name = entry.file_name();
-            let name = name.to_string_lossy();
-            let is_part = name.strip_suffix(ENDING).is_some_and(|hash| {
-                hash.len() == HASH && hash.bytes().all(|byte| byte.is_ascii_hexdigit())
-            });
-            if is_part || name == JOINED {
+            if of_name(&entry.file_name().to_string_lossy()).is_some() {
                 let _ = fs::remove_file(entry.path());
             }
         }
         let _ = fs::remove_dir(&self.folder);
     }
+}
+
+/// The key in the name of a part, and the hash of its content, which those of the first version lack.
+fn of_name(name: &str) -> Option<(&str, Option<&str>)> {
+    let is_hash =
+        |text: &str, n| text.len() == n && text.bytes().all(|byte| byte.is_ascii_hexdigit());
+    let name = name.strip_suffix(ENDING)?;
+    let (key, hash) = name.split_once('-').map_or((name, None), |(key, hash)| (key, Some(hash)));
+    let is_part = is_hash(key, KEY) && hash.is_none_or(|hash| is_hash(hash, HASH));
+    is_part.then_some((key, hash))
 }

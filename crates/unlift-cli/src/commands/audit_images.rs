@@ -27,6 +27,7 @@ use crate::args::AuditImagesArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
 use crate::progress::{Progress, Stderr};
+use crate::stderr;
 use crate::values::{FeatureType, NeighborSource, distinct};
 
 /// The threshold that speaks for an audit, in pixels, or the nearest one asked for.
@@ -50,7 +51,7 @@ pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
                 if map { advise(error, "unlift audit map, as this is a map") } else { error }
             })?;
         if let Some(note) = source.passed_over() {
-            eprintln!("unlift: note: {note}");
+            stderr::note(note);
         }
         let chosen = chosen(source.names().len(), args.max_images.map(|n| n.get()));
         check_photos(args, &source, &chosen)?;

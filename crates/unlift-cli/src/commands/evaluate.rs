@@ -17,6 +17,7 @@ use super::image_stages::{Evaluated, evaluate_all};
 use crate::args::EvaluateArgs;
 use crate::exit::Outcome;
 use crate::output::{print, table};
+use crate::stderr;
 
 /// Compares recovered points with the truth.
 pub fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
@@ -63,7 +64,7 @@ fn told(
     notes: &[&str],
 ) -> anyhow::Result<Outcome> {
     for note in notes {
-        eprintln!("unlift: note: {}: {note}", args.recovered.display());
+        stderr::note(format_args!("{}: {note}", args.recovered.display()));
     }
     print(&if args.json {
         format!("{:#}\n", as_json(row, thresholds)?)

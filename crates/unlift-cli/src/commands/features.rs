@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use unlift::OneLine;
 use unlift_features::Extraction;
 use unlift_features::batch::in_order;
 use unlift_io::Error;
@@ -15,7 +16,7 @@ use crate::exit::{Outcome, line, usage};
 use crate::output::print;
 use crate::progress::Progress;
 use unlift_audit::check_file;
-use unlift_audit::images::parts::{Parts, write_part};
+use unlift_audit::images::parts::Parts;
 use unlift_audit::images::{FeatureSource, Folder, is_photo};
 
 /// What was done, and what could not be.
@@ -46,9 +47,9 @@ pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
         }
         match &source {
             FeatureSource::Folder(folder) => {
-                extract(folder, &target, &mut tally, &mut progress)?;
+                extract(folder, (args, &rules, &target), &mut tally, &mut progress)?;
             }
-            FeatureSource::File(_) => copy(&source, args, &mut tally, &mut progress)?,
+            FeatureSource::File(_) => copy(&source, (args, &rules), &mut tally, &mut progress)?,
         }
         Ok(tally)
     })?;
@@ -59,7 +60,7 @@ pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
             n => format!(" ({n} images of an earlier run)"),
         };
         let (images, features) = (tally.images, tally.features);
-        let out = args.out.display();
+        let out = OneLine(args.out.display());
         print(&format!("{images} images, {features} features{resumed}, in {out}\n"))?;
     }
     if tally.failed > 0 {
@@ -107,7 +108,7 @@ enum Done {
 /// Features of photos: each into a part, then all parts into the file.
 fn extract(
     folder: &Folder,
-    target: &Path,
+    (args, rules, target): (&FeaturesArgs, &Rules, &Path),
     tally: &mut Tally,
     progress: &mut Progress,
 ) -> anyhow::Result<()> {
@@ -115,12 +116,11 @@ fn extract(
     let names = folder.names();
     let all: Vec<usize> = (0..names.len()).collect();
     let extract = |at: usize| -> anyhow::Result<Done> {
-        let part = parts.path(&names[at], folder.path(at))?;
-        if part.is_file() {
+        let key = parts.key(&names[at], folder.path(at))?;
+        if let Some(part) = parts.earlier(&key) {
             return Ok(Done::Earlier(part));
         }
-        write_part(&part, &folder.get(at)?).map_err(Fatal)?;
-        Ok(Done::Now(part))
+        Ok(Done::Now(parts.write(&key, &folder.get(at)?).map_err(Fatal)?))
     };
     progress.show(0, names.len(), "");
     let steps = progress.steps();
@@ -151,10 +151,12 @@ fn extract(
         parts.remove();
         return Ok(());
     }
+    // What came to stand there meanwhile stays.
+    check_file(&args.out, Kind::Features, rules)?;
     tally.images = finished.len();
     // Far faster than what was done before: it has a pace of its own.
     let joining = progress.again();
-    parts.join(&finished, target, |at, image| {
+    parts.join(&finished, |at, image| {
         tally.features += image.keypoints.len();
         joining.show(at + 1, finished.len(), "joining");
     })?;
@@ -176,7 +178,7 @@ impl std::error::Error for Fatal {}
 /// Features of a file, written anew.
 fn copy(
     source: &FeatureSource,
-    args: &FeaturesArgs,
+    (args, rules): (&FeaturesArgs, &Rules),
     tally: &mut Tally,
     progress: &mut Progress,
 ) -> anyhow::Result<()> {
@@ -209,6 +211,7 @@ fn copy(
         Ok(())
     })?;
     if tally.images > 0 {
+        check_file(&args.out, Kind::Features, rules)?;
         writer.finish()?;
     }
     Ok(())

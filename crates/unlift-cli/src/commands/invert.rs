@@ -1,15 +1,16 @@
 //! `unlift invert`: pictures of keypoints, of what came back of them, or of a map that came back.
 
-use std::fs;
 use std::path::{Component, Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
+use unlift::OneLine;
 use unlift_audit::images::FeatureSource;
 use unlift_audit::inversion::{Painter, view};
+use unlift_audit::refused;
 use unlift_features::{ColorImage, Extraction, preview};
 use unlift_io::Error;
-use unlift_io::atomic::{Access, Kind, Rules, marked_picture, write_file};
+use unlift_io::atomic::{Access, Kind, OutputSet, Rules, make_folders, marked_picture, write_file};
 use unlift_io::read::colmap;
 use unlift_io::stage::{
     ImageFile, Kind as Stage, declared_kind, has_images, read_recovered, read_released,
@@ -17,8 +18,9 @@ use unlift_io::stage::{
 
 use super::common::{same_map, with_threads};
 use crate::args::InvertArgs;
-use crate::exit::{Outcome, usage};
+use crate::exit::{Outcome, line, usage};
 use crate::output::print;
+use crate::stderr;
 
 /// Images at work per thread.
 const AT_WORK: usize = 2;
@@ -29,6 +31,8 @@ pub fn run(args: &InvertArgs) -> anyhow::Result<Outcome> {
         let painter = Painter::try_new()?;
         let inputs = [Some(&args.path), args.recovered.as_ref(), args.cameras.as_ref()];
         let rules = Rules::new(inputs.into_iter().flatten().map(PathBuf::as_path), args.force);
+        // Begun and given up: whether anything can be written there.
+        drop(OutputSet::create(&args.out, rules.clone(), Access::Private, &[]).map_err(refused)?);
         let to = Target { args, rules, painted: AtomicUsize::new(0) };
         let unusable = match (&args.recovered, declared_kind(&args.path)) {
             (Some(recovered), _) if has_images(&args.path)? => images(&to, &painter, recovered)?,
@@ -38,7 +42,7 @@ pub fn run(args: &InvertArgs) -> anyhow::Result<Outcome> {
             }
             (None, _) => keypoints(&to, &painter)?,
         };
-        let (painted, out) = (to.painted.into_inner(), args.out.display());
+        let (painted, out) = (to.painted.into_inner(), OneLine(args.out.display()));
         print(&format!("{painted} pictures, in {out}\n"))?;
         if unusable > 0 {
             let expected = format!("{} images that can be painted", painted + unusable);
@@ -69,7 +73,7 @@ impl Target<'_> {
         file.push(".png");
         let file = PathBuf::from(file);
         if let Some(folder) = file.parent() {
-            fs::create_dir_all(folder).map_err(|error| Error::write(folder, error))?;
+            make_folders(folder, Access::Private)?;
         }
         Ok(self.rules.check(&file, Kind::Picture)?)
     }
@@ -100,7 +104,7 @@ fn each<T: Sync>(
     };
     let results: Vec<_> = images.par_iter().with_max_len(1).map(one).collect();
     let failed: Vec<_> = results.into_iter().filter_map(Result::err).collect();
-    failed.iter().for_each(|error| eprintln!("{}", crate::exit::line(error)));
+    failed.iter().for_each(|error| stderr::tell(line(error)));
     Ok(failed.len())
 }
 

@@ -12,6 +12,7 @@ use unlift_invert::{Lpips, Metrics};
 use crate::args::MetricsArgs;
 use crate::exit::{Outcome, usage};
 use crate::output::{print, table};
+use crate::stderr;
 
 /// Compares two pictures, or those of two folders.
 pub fn run(args: &MetricsArgs) -> anyhow::Result<Outcome> {
@@ -51,7 +52,8 @@ pub fn run(args: &MetricsArgs) -> anyhow::Result<Outcome> {
     let (ours, theirs) = (pictures(&args.a)?, pictures(&args.b)?);
     for (these, those, other) in [(&ours, &theirs, &args.b), (&theirs, &ours, &args.a)] {
         for (_, path) in these.iter().filter(|(name, _)| !those.contains_key(*name)) {
-            eprintln!("unlift: {}: no picture of this name in {}", path.display(), other.display());
+            let (path, other) = (path.display(), other.display());
+            stderr::tell(format_args!("unlift: {path}: no picture of this name in {other}"));
         }
     }
     let mut rows = Vec::new();

@@ -1,6 +1,7 @@
 //! `unlift models`: which networks there are, and whether their files are here.
 
 use serde_json::json;
+use unlift::OneLine;
 use unlift_nn::{Entry, Folders, MODELS, Place};
 
 use crate::args::ModelsArgs;
@@ -41,7 +42,7 @@ pub fn run(args: &ModelsArgs) -> anyhow::Result<Outcome> {
 fn here(place: Option<&Place>, folders: &Folders, entry: &Entry) -> String {
     match place {
         Some(Place::Carried) => "in the program".to_owned(),
-        Some(Place::File(path)) => path.display().to_string(),
-        None => format!("no: {}", folders.missing(entry)),
+        Some(Place::File(path)) => OneLine(path.display()).to_string(),
+        None => format!("no: {}", OneLine(folders.missing(entry))),
     }
 }

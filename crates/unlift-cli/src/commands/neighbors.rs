@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use unlift::Error;
 use unlift::neighbors::oracle::{Outliers, TrueNeighbors, search};
 use unlift::neighbors::{Needs, Source};
 use unlift::released::Released;
+use unlift::{Error, OneLine};
 use unlift_io::atomic::{Kind, Rules};
 use unlift_io::stage::{Kind as Stage, has_images, read_released, read_truth, write_neighborhoods};
 
@@ -15,6 +15,7 @@ use crate::args::{FindArgs, OracleArgs};
 use crate::exit::{Outcome, advise, usage};
 use crate::output::print;
 use crate::progress::Spinner;
+use crate::stderr;
 use unlift_audit::check_file;
 
 /// Makes neighborhoods at one inlier ratio.
@@ -26,7 +27,7 @@ pub fn oracle(args: &OracleArgs) -> anyhow::Result<Outcome> {
     check_file(&args.out, kind, &rules)?;
     let k = usize::from(args.k);
     let listed = |n: usize| {
-        let out = args.out.display();
+        let out = OneLine(args.out.display());
         print(&format!(
             "{n} neighborhoods of {k} at inlier ratio {}, in {out}\n",
             args.inlier_ratio
@@ -93,7 +94,7 @@ pub fn find(args: &FindArgs) -> anyhow::Result<Outcome> {
     check_own(&*source, &released)
         .map_err(|error| advise(unlift_io::Error::core(&args.released, error.0), error.1))?;
     if let Some(note) = source.note(released.n_slots()) {
-        eprintln!("unlift: note: {note}");
+        stderr::note(note);
     }
     let alive = Spinner::new("finding neighbors");
     let lists = with_threads(args.threads, || {
@@ -107,7 +108,7 @@ pub fn find(args: &FindArgs) -> anyhow::Result<Outcome> {
 }
 
 fn listed(n: usize, k: usize, args: &FindArgs) -> anyhow::Result<Outcome> {
-    let (name, out) = (args.source.name(), args.out.display());
+    let (name, out) = (args.source.name(), OneLine(args.out.display()));
     print(&format!("{n} neighborhoods of up to {k} by {name}, in {out}\n"))?;
     Ok(Outcome::Done)
 }

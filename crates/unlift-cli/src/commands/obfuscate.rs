@@ -1,8 +1,8 @@
 //! `unlift obfuscate`: a map, or features of images, in; a released file and a truth file out.
 
-use unlift::Unit;
 use unlift::obfuscate::{SchemeOptions, obfuscate};
 use unlift::seed::Key;
+use unlift::{OneLine, Unit};
 use unlift_io::atomic::{Access, Kind, OutputSet, Rules};
 use unlift_io::stage::{Kind as Stage, write_released, write_truth};
 
@@ -11,6 +11,7 @@ use super::image_stages::hide;
 use crate::args::ObfuscateArgs;
 use crate::exit::{Outcome, usage};
 use crate::output::print;
+use crate::stderr;
 use unlift_audit::refused;
 
 /// What an integer seed is worth.
@@ -41,7 +42,7 @@ pub fn run(args: &ObfuscateArgs) -> anyhow::Result<Outcome> {
         released.n_slots(),
         released.n_records(),
         secret.dropped().len(),
-        args.out.display()
+        OneLine(args.out.display())
     ))?;
     Ok(Outcome::Done)
 }
@@ -50,7 +51,7 @@ pub fn run(args: &ObfuscateArgs) -> anyhow::Result<Outcome> {
 fn key(args: &ObfuscateArgs) -> anyhow::Result<Key> {
     Ok(match args.map.seed {
         Some(seed) => {
-            eprintln!("{GUESSABLE}");
+            stderr::tell(GUESSABLE);
             Key::from_seed(seed)
         }
         None => Key::fresh()?,
@@ -81,7 +82,7 @@ fn images(args: &ObfuscateArgs, mut out: OutputSet) -> anyhow::Result<Outcome> {
         counts.slots,
         counts.images,
         counts.points,
-        args.out.display()
+        OneLine(args.out.display())
     ))?;
     match counts.unusable {
         0 => Ok(Outcome::Done),

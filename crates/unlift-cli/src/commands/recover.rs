@@ -2,9 +2,9 @@
 
 use std::collections::HashSet;
 
-use unlift::RowOrder;
 use unlift::neighbors::Neighborhoods;
 use unlift::recover::{RecoverOptions, Status, recover};
+use unlift::{OneLine, RowOrder};
 use unlift_io::atomic::{Kind, Rules};
 use unlift_io::stage::{
     Kind as Stage, has_images, read_neighborhoods, read_released, write_recovered,
@@ -16,6 +16,7 @@ use crate::args::RecoverArgs;
 use crate::exit::Outcome;
 use crate::output::print;
 use crate::progress::Spinner;
+use crate::stderr;
 use unlift_audit::check_file;
 
 /// What a user should know about lists that somebody else wrote.
@@ -63,7 +64,7 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
     let of = &args.released;
     same_map(&args.neighbors, lists.about().map, of, Some(released.fingerprint()))?;
     for note in notes(&lists, slots) {
-        eprintln!("unlift: note: {}: {note}", args.neighbors.display());
+        stderr::note(format_args!("{}: {note}", args.neighbors.display()));
     }
     let alive = Spinner::new("recovering");
     let recovered = with_threads(args.threads, || {
@@ -79,7 +80,7 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
         recovered.n_slots(),
         recovered.delta(),
         recovered.unit().name(),
-        args.out.display()
+        OneLine(args.out.display())
     ))?;
     Ok(Outcome::Done)
 }
@@ -93,7 +94,7 @@ fn images(args: &RecoverArgs, options: &RecoverOptions, rules: &Rules) -> anyhow
         for note in notes(lists, slots) {
             let what = note.split(|c: char| c.is_ascii_digit()).next_back().unwrap_or_default();
             if told.insert(what.to_owned()) {
-                eprintln!("unlift: note: {}: {note}", args.neighbors.display());
+                stderr::note(format_args!("{}: {note}", args.neighbors.display()));
             }
         }
     };
@@ -108,7 +109,7 @@ fn images(args: &RecoverArgs, options: &RecoverOptions, rules: &Rules) -> anyhow
         counts.points,
         counts.slots,
         counts.images,
-        args.out.display()
+        OneLine(args.out.display())
     ))?;
     Ok(Outcome::Done)
 }

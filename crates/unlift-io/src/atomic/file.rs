@@ -10,7 +10,7 @@ use crate::Error;
 
 /// A file that is built in a temporary sibling and takes its place on [`commit`](Self::commit).
 ///
-/// The bytes go to a temporary file in the same folder, which is flushed to disk and renamed. A
+/// The bytes go to a temporary file in the same folder, which is flushed to disk and renamed, as is the name then. A
 /// symbolic link is followed: the file it names is replaced, not the link. Dropped without a commit,
 /// it leaves no trace.
 #[derive(Debug)]
@@ -40,7 +40,7 @@ impl OutputFile {
     /// # Errors
     /// As [`create`](Self::create).
     pub fn check(path: &Path) -> Result<PathBuf, Error> {
-        let target = resolved(path).map_err(|source| Error::write(path, source))?;
+        let target = resolved(path)?;
         match fs::metadata(&target) {
             Ok(found) if found.is_dir() => return Err(Error::new(path, "", "a file", "a folder")),
             // Renaming over a device or a pipe would replace it in the system.
@@ -105,6 +105,18 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let error = write_file(folder.path(), Access::Usual, |_| Ok(())).unwrap_err();
         assert!(error.to_string().ends_with(": expected a file, found a folder"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_to_nothing_is_named_with_where_it_leads() {
+        let folder = tempfile::tempdir().unwrap();
+        let link = folder.path().join("link.bin");
+        std::os::unix::fs::symlink("gone/x.bin", &link).unwrap();
+        let error = write_file(&link, Access::Usual, |_| Ok(())).unwrap_err().to_string();
+        let found = "link.bin: expected a file, a folder, or nothing, found a link to gone/x.bin, \
+                     which is not there";
+        assert!(error.ends_with(found), "{error}");
     }
 
     #[cfg(unix)]

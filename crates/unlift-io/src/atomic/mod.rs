@@ -10,6 +10,7 @@ mod kind;
 mod partial;
 mod rules;
 mod set;
+mod swap;
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter};
@@ -20,7 +21,7 @@ use crate::Error;
 pub use file::OutputFile;
 pub(crate) use kind::{CLOUD_COMMENT, FEATURES_MARK};
 pub use kind::{Kind, marked_picture};
-pub use partial::{abandon, sweep};
+pub use partial::{abandon, make_folders, sweep};
 pub use rules::Rules;
 pub use set::OutputSet;
 
@@ -51,12 +52,25 @@ pub fn write_file(
 }
 
 /// Where a symbolic link points, or the path itself.
-fn resolved(path: &Path) -> io::Result<PathBuf> {
+fn resolved(path: &Path) -> Result<PathBuf, Error> {
     let named = path.file_name().is_some();
-    if path.is_symlink() || (!named && path.exists()) {
-        fs::canonicalize(path)
-    } else {
-        Ok(path.to_owned())
+    if !path.is_symlink() && (named || !path.exists()) {
+        return Ok(path.to_owned());
+    }
+    fs::canonicalize(path).map_err(|source| match fs::read_link(path) {
+        Ok(to) if source.kind() == io::ErrorKind::NotFound => {
+            let found = format!("a link to {}, which is not there", to.display());
+            Error::new(path, "", "a file, a folder, or nothing", found)
+        }
+        _ => Error::write(path, source),
+    })
+}
+
+/// Makes the names in `folder` last through a loss of power, where folders can be flushed: the file is in its place
+/// either way.
+fn flush_names(folder: &Path) {
+    if cfg!(unix) {
+        let _ = File::open(folder).and_then(|folder| folder.sync_all());
     }
 }
 

@@ -1,4 +1,4 @@
-//! What an unfinished output is called, and how it goes away: by its owner, on a signal, or by a later run.
+//! How an unfinished output goes away: by its owner, on a signal, or by a later run.
 //!
 //! A partial file or folder is `.NAME.unlift-xxxxxx.partial` beside its place. The process that makes it keeps a
 //! lock on it (`flock`), which the system takes back when that process ends in any way: so a later run can tell
@@ -9,16 +9,16 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::{Access, parent_of};
+use super::{Access, flush_names, parent_of};
+use crate::Error;
+use crate::unfinished::{RANDOM, around, is_partial_name};
 
 /// What this process is building, and the folders that it made for it, in order. Whoever makes, renames or removes
 /// one holds the lock, so that [`abandon`] meets nothing half done.
 static LIVE: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-const SIGN: &str = ".unlift-";
-const ENDING: &str = ".partial";
-/// Random letters in a name.
-const RANDOM: usize = 6;
+/// A file in every partial folder, the first one: what has it is ours, with all that is in it.
+const MARK: &str = ".unlift-unfinished";
 
 fn live() -> MutexGuard<'static, Vec<PathBuf>> {
     // A list of paths is in order whatever panicked.
@@ -37,9 +37,11 @@ pub fn abandon() {
     std::mem::forget(live);
 }
 
-/// Files and folders of ours, or a folder that was made for an output: that one only when it is empty.
+/// Files and folders of ours, or a folder that was made for an output: that one only when it is empty, and nothing that
+/// has come to stand in its place.
 fn remove(path: &Path) {
-    if is_partial_name(path) && path.is_dir() {
+    let is_ours = is_partial_name(path);
+    if is_ours && path.join(MARK).is_file() {
         // Another thread may be writing in it.
         for _ in 0..10 {
             if fs::remove_dir_all(path).is_ok() {
@@ -48,29 +50,22 @@ fn remove(path: &Path) {
         }
     } else if path.is_dir() {
         let _ = fs::remove_dir(path);
-    } else {
+    } else if is_ours {
         let _ = fs::remove_file(path);
     }
 }
 
-fn is_partial_name(path: &Path) -> bool {
-    let Some(name) = path.file_name().and_then(|name| name.to_str()) else { return false };
-    let random = name.strip_suffix(ENDING).and_then(|name| name.rsplit_once(SIGN));
-    name.starts_with('.')
-        && random.is_some_and(|(_, random)| {
-            random.len() == RANDOM && random.bytes().all(|byte| byte.is_ascii_alphanumeric())
-        })
-}
-
 /// Removes what dead processes left unfinished in `folder`; what a living one works on stays.
 ///
-/// By name and by lock: a file of any other name is none of ours. What cannot be removed is in nobody's way.
+/// By name and by lock, a folder that is not empty also by the mark in it: anything else is none of ours. What cannot be
+/// removed is in nobody's way.
 pub fn sweep(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for entry in entries.flatten() {
         let path = entry.path();
-        let is_link = entry.file_type().is_ok_and(|kind| kind.is_symlink());
-        if !is_link && is_partial_name(&path) && is_dead(&path) {
+        // Neither links, which lead elsewhere, nor pipes, which would be waited for.
+        let may_be = entry.file_type().is_ok_and(|kind| kind.is_file() || kind.is_dir());
+        if may_be && is_partial_name(&path) && is_dead(&path) {
             remove(&path);
         }
     }
@@ -114,7 +109,15 @@ impl Partial {
     pub fn folder(folder: &Path) -> io::Result<Self> {
         let made = make(folder, Path::new("output"), |path| {
             make_folder(path, Access::Private)?;
-            Ok((File::open(path).ok(), ()))
+            let locked = File::open(path).ok();
+            match File::create_new(path.join(MARK)) {
+                Err(error) if path.exists() => {
+                    let _ = fs::remove_dir(path);
+                    Err(error)
+                }
+                // Made; or another process swept the folder away at this moment, and `make` begins anew.
+                _ => Ok((locked, ())),
+            }
         });
         made.map(|(partial, ())| partial)
     }
@@ -130,6 +133,8 @@ impl Partial {
         fs::rename(&self.path, target)?;
         live.retain(|path| *path != self.path);
         self.path.clear();
+        drop(live);
+        flush_names(parent_of(target));
         Ok(())
     }
 }
@@ -151,14 +156,15 @@ fn make<T>(
     mut new: impl FnMut(&Path) -> io::Result<(Option<File>, T)>,
 ) -> io::Result<(Partial, T)> {
     let name = target.file_name().unwrap_or_default().to_string_lossy();
-    // File names end at 255 bytes, and this one is longer.
-    let prefix = format!(".{}{SIGN}", name.chars().take(40).collect::<String>());
+    let (prefix, suffix) = around(&name);
     let mut builder = tempfile::Builder::new();
-    builder.prefix(&prefix).suffix(ENDING).rand_bytes(RANDOM);
+    builder.prefix(&prefix).suffix(suffix).rand_bytes(RANDOM);
     let mut live = live();
     loop {
         let ((file, made), path) = builder.make_in(folder, &mut new)?.into_parts();
         let path = path.keep().map_err(|refused| refused.error)?;
+        // As the user wrote it, for errors; tempfile makes it absolute.
+        let path = path.file_name().map_or(path.clone(), |name| folder.join(name));
         // Where there are no locks nothing is swept.
         let locked = file.filter(|file| file.lock().is_ok());
         // Between being made and being locked it looks dead, and may have been swept.
@@ -213,6 +219,7 @@ impl MadeFolders {
     pub fn keep(mut self) {
         let kept = std::mem::take(&mut self.0);
         live().retain(|path| !kept.contains(path));
+        kept.iter().for_each(|path| flush_names(parent_of(path)));
     }
 }
 
@@ -225,6 +232,16 @@ impl Drop for MadeFolders {
         }
         live.retain(|path| !self.0.contains(path));
     }
+}
+
+/// Makes `folder` and its missing parents for outputs of their own, to stay.
+///
+/// # Errors
+/// When one cannot be made.
+pub fn make_folders(folder: &Path, access: Access) -> Result<(), Error> {
+    let made = MadeFolders::make(folder, access).map_err(|source| Error::write(folder, source))?;
+    made.keep();
+    Ok(())
 }
 
 /// Runs `step` so that [`abandon`] comes before or after it.
@@ -255,8 +272,11 @@ mod tests {
             fs::write(at(name), "mine").unwrap();
         }
         fs::write(at(".a.bin.unlift-abcdef.partial"), "of a dead process").unwrap();
+        // Killed in the middle, and right after the first step.
         fs::create_dir(at(".output.unlift-ABC123.partial")).unwrap();
+        fs::write(at(".output.unlift-ABC123.partial").join(MARK), "").unwrap();
         fs::write(at(".output.unlift-ABC123.partial/truth"), "of a dead process").unwrap();
+        fs::create_dir(at(".output.unlift-ABC124.partial")).unwrap();
         sweep(folder.path());
         let name = |of: &Partial| of.path().file_name().unwrap().to_str().unwrap().to_owned();
         let mut kept: Vec<String> = others.map(str::to_owned).to_vec();
@@ -267,6 +287,38 @@ mod tests {
         assert_eq!(entries(folder.path()).len(), others.len());
     }
 
+    #[test]
+    fn a_folder_without_our_mark_is_somebodys() {
+        let folder = tempfile::tempdir().unwrap();
+        let planted = folder.path().join(".output.unlift-ABC123.partial");
+        fs::create_dir(&planted).unwrap();
+        fs::write(planted.join("thesis.txt"), "mine").unwrap();
+        sweep(folder.path());
+        assert_eq!(fs::read(planted.join("thesis.txt")).unwrap(), b"mine");
+    }
+
+    #[test]
+    fn what_has_replaced_a_folder_of_ours_is_somebodys() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("out");
+        let made = MadeFolders::make(&out, Access::Usual).unwrap();
+        fs::remove_dir(&out).unwrap();
+        fs::write(&out, "mine").unwrap();
+        remove(&out);
+        drop(made);
+        assert_eq!(fs::read(&out).unwrap(), b"mine");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_of_our_name_is_neither_waited_for_nor_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join(".a.bin.unlift-abcdef.partial");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        sweep(folder.path());
+        assert!(fs::symlink_metadata(&pipe).is_ok());
+    }
+
     #[cfg(unix)]
     #[test]
     fn links_to_folders_are_not_followed() {
@@ -274,6 +326,7 @@ mod tests {
         let precious = folder.path().join("precious");
         fs::create_dir(&precious).unwrap();
         fs::write(precious.join("a"), "mine").unwrap();
+        fs::write(precious.join(MARK), "").unwrap();
         let link = folder.path().join(".output.unlift-ABC123.partial");
         std::os::unix::fs::symlink(&precious, link).unwrap();
         sweep(folder.path());

@@ -1,10 +1,12 @@
 //! Several outputs in one folder that may hold anything else.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::partial::{MadeFolders, Partial, sweep, undisturbed};
-use super::{Access, Kind, Rules, resolved};
+use super::swap::Swapped;
+use super::{Access, Kind, Rules, flush_names, parent_of, resolved};
 use crate::Error;
 
 /// Files of a folder that are built apart and take their places together on [`commit`](Self::commit).
@@ -38,7 +40,7 @@ impl OutputSet {
         first: &[(&str, Kind)],
     ) -> Result<Self, Error> {
         let failed = |source| Error::write(path, source);
-        let target = resolved(path).map_err(failed)?;
+        let target = resolved(path)?;
         if target.exists() && !target.is_dir() {
             return Err(Error::new(path, "", "a folder, or nothing", "a file"));
         }
@@ -93,36 +95,43 @@ impl OutputSet {
         }
         let earlier = self.staging.path().join("earlier");
         fs::create_dir(&earlier).map_err(failed)?;
-        undisturbed(|| self.exchange(&earlier)).map_err(failed)?;
+        undisturbed(|| self.exchange(&earlier))?;
+        let folders: BTreeSet<PathBuf> = self
+            .files
+            .iter()
+            .map(|(name, _)| parent_of(&self.target.join(name)).to_owned())
+            .collect();
+        folders.iter().for_each(|folder| flush_names(folder));
         for made in self.made.drain(..) {
             made.keep();
         }
         Ok(())
     }
 
-    /// Renames all files; the earlier ones get second names in `earlier` meanwhile.
-    fn exchange(&self, earlier: &Path) -> std::io::Result<()> {
-        let kept = |at: usize| earlier.join(at.to_string());
-        let mut done: Vec<(PathBuf, bool)> = Vec::new();
-        for (at, (name, _)) in self.files.iter().enumerate() {
-            let place = resolved(&self.target.join(name))?;
-            let is_new = !place.exists();
-            // A second name, not a move: at no time is there nothing at the place.
-            let _ = fs::hard_link(&place, kept(at));
-            let Err(error) = fs::rename(self.staging.path().join(name), &place) else {
-                done.push((place, is_new));
-                continue;
-            };
-            for (before, (place, is_new)) in done.iter().enumerate() {
-                // Best effort: the error that is told is the first one.
-                let _ = match is_new {
-                    true => fs::remove_file(place),
-                    false => fs::rename(kept(before), place),
-                };
+    /// Puts all files in their places, or none of them; the earlier ones are kept meanwhile, some in `earlier`.
+    fn exchange(&self, earlier: &Path) -> Result<(), Error> {
+        let mut done = Vec::new();
+        for at in 0..self.files.len() {
+            if let Err(error) = self.put(at, &earlier.join(at.to_string()), &mut done) {
+                done.into_iter().rev().for_each(Swapped::undo);
+                return Err(error);
             }
-            return Err(error);
         }
         Ok(())
+    }
+
+    fn put(&self, at: usize, kept: &Path, done: &mut Vec<Swapped>) -> Result<(), Error> {
+        let (name, kind) = &self.files[at];
+        let place = resolved(&self.target.join(name))?;
+        let swapped = Swapped::put(&self.staging.path().join(name), place, kept);
+        let swapped = swapped.map_err(|source| Error::write(self.path.join(name), source))?;
+        // What was checked may have been another file.
+        let checked = swapped.earlier().map(|earlier| self.rules.check(earlier, *kind));
+        done.push(swapped);
+        match checked {
+            Some(Err(error)) => Err(error.at(self.path.join(name))),
+            _ => Ok(()),
+        }
     }
 }
 

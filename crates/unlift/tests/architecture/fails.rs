@@ -175,6 +175,16 @@ fn unsafe_code_is_found() {
 }
 
 #[test]
+fn printing_that_panics_is_found() {
+    for name in ["print", "println", "eprint", "eprintln"] {
+        let code = format!("fn f() {{ {name}!(\"x\") }}");
+        assert_eq!(forbidden_prints(&source("commands/demo.rs", &code)).len(), 1, "{name}");
+    }
+    let ours = "fn f() { print(\"x\")?; progress.print(); write!(f, \"x\") }";
+    assert!(forbidden_prints(&source("output.rs", ours)).is_empty());
+}
+
+#[test]
 fn a_forgotten_scheme_is_found() {
     let module = "pub const SCHEMES: &[Entry] = &[\n    olc::ENTRY,\n    cp::ENTRY,\n];";
     assert!(unregistered(&["mod.rs", "pairs.rs", "cp.rs", "olc.rs"], module).is_empty());

@@ -100,6 +100,14 @@ fn only_simd_is_unsafe() {
 }
 
 #[test]
+fn nothing_prints_but_by_the_one_place() {
+    for &(name, _) in CRATES {
+        let found: Vec<String> = sources_of(name).iter().flat_map(forbidden_prints).collect();
+        assert!(found.is_empty(), "\n{name}: {}", found.join("\n"));
+    }
+}
+
+#[test]
 fn every_scheme_file_is_registered() {
     let folder = Path::new(CORE).join("src/obfuscate");
     let names: Vec<String> = fs::read_dir(&folder)

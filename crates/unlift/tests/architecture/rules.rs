@@ -5,11 +5,22 @@ use std::collections::BTreeSet;
 use crate::rust::{Source, internal_paths, paths, tokens};
 
 /// What every module may import.
-const VOCABULARY: &[&str] =
-    &["error", "ids", "seed", "points", "descriptors", "geometry", "simd", "about", "compiled"];
+const VOCABULARY: &[&str] = &[
+    "error",
+    "line",
+    "ids",
+    "seed",
+    "points",
+    "descriptors",
+    "geometry",
+    "simd",
+    "about",
+    "compiled",
+];
 /// What the root exports: vocabulary under shorter names.
 const ROOT_NAMES: &[&str] = &[
     "Error",
+    "OneLine",
     "OriginalId",
     "RecordId",
     "PointSet",
@@ -24,6 +35,7 @@ const ROOT_NAMES: &[&str] = &[
 /// module needs a row here, and a reason.
 const ARROWS: &[(&str, &[&str])] = &[
     ("error", &[]),
+    ("line", &[]),
     ("ids", &[]),
     ("about", &[]),
     // Chooses between functions, whatever they do.
@@ -190,6 +202,15 @@ pub fn forbidden_state(source: &Source) -> Vec<String> {
 /// `unsafe` outside the one file that may.
 pub fn forbidden_unsafe(source: &Source) -> Vec<String> {
     if source.path == "simd.rs" { Vec::new() } else { complain(source, &["unsafe"]) }
+}
+
+/// Macros that panic where nobody hears them, and print names as they are: the command line has one place each for what
+/// goes to stdout and stderr.
+pub fn forbidden_prints(source: &Source) -> Vec<String> {
+    let macros = ["print", "println", "eprint", "eprintln", "dbg"];
+    let tokens = tokens(&source.code);
+    let calls = tokens.windows(2).filter(|two| two[1] == "!" && macros.contains(&&*two[0]));
+    calls.map(|two| format!("{}: `{}!`", source.path, two[0])).collect()
 }
 
 fn complain(source: &Source, words: &[&str]) -> Vec<String> {

@@ -1,0 +1,19 @@
+//! Messages on stderr: one line each, and lost where nobody can hear them.
+
+use std::fmt::Display;
+use std::io::{self, Write};
+
+use unlift::OneLine;
+
+/// Tells `line`, whatever text of others is in it. Where stderr cannot be written (a full disk, a closed pipe) the line
+/// is lost and the work goes on: its result is elsewhere.
+pub fn tell(line: impl Display) {
+    // In one piece: other threads tell lines, too.
+    let line = format!("{}\n", OneLine(line));
+    let _ = io::stderr().lock().write_all(line.as_bytes());
+}
+
+/// Tells what a user should know about a result.
+pub fn note(text: impl Display) {
+    tell(format_args!("unlift: note: {text}"));
+}
