@@ -22,7 +22,6 @@ use crate::args::AuditMapArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
 use crate::progress::{Progress, Stderr};
-use crate::stderr;
 use crate::values::{NeighborSource, all_schemes, distinct};
 
 /// Audits a map.

@@ -20,7 +20,6 @@ use crate::args::AuditReleasedArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
 use crate::progress::{Progress, Stderr};
-use crate::stderr;
 use crate::values::{self, NeighborSource};
 
 /// What a scheme is called that nobody named.
