@@ -36,6 +36,7 @@ pub mod clouds;
 mod database;
 mod error;
 pub mod features;
+mod guard;
 pub mod hash;
 pub mod input;
 pub mod read;

@@ -10,25 +10,20 @@ use super::image::ImageFeatures;
 use crate::error::Error;
 
 /// An open file of features.
-pub(super) struct Hloc {
-    store: FeatureStore,
-    names: Vec<String>,
-}
+pub(super) struct Hloc(FeatureStore);
 
 impl Hloc {
     /// Opens `path` and lists its images.
     pub fn open(path: &Path) -> Result<Self, Error> {
-        let store = FeatureStore::open(path)?;
-        let names = store.groups()?;
-        Ok(Self { store, names })
+        Ok(Self(FeatureStore::open(path)?))
     }
 
     pub fn names(&self) -> &[String] {
-        &self.names
+        self.0.paths()
     }
 
     pub fn get(&self, at: usize) -> Result<ImageFeatures, Error> {
-        image(&self.store, &self.names[at])
+        image(&self.0, at)
     }
 }
 
@@ -38,8 +33,8 @@ impl Hloc {
 /// When `path` cannot be read, is cut off, or does not hold exactly the image `name`.
 pub fn decode(path: &Path, name: &str) -> Result<ImageFeatures, Error> {
     let store = FeatureStore::open(path)?;
-    match &store.groups()?[..] {
-        [only] if only == name => image(&store, name),
+    match store.paths() {
+        [only] if only == name => image(&store, 0),
         other => {
             let found = format!("{} images", other.len());
             Err(Error::new(path, "", format!("the image {name} alone"), found))
@@ -47,10 +42,11 @@ pub fn decode(path: &Path, name: &str) -> Result<ImageFeatures, Error> {
     }
 }
 
-fn image(store: &FeatureStore, name: &str) -> Result<ImageFeatures, Error> {
-    let present = store.names(name)?;
+fn image(store: &FeatureStore, at: usize) -> Result<ImageFeatures, Error> {
+    let name = &store.paths()[at][..];
+    let present = store.names(at)?;
     let has = |array: &str| present.iter().any(|name| name == array);
-    let optional = |array: &str| has(array).then(|| store.array(name, array)).transpose();
+    let optional = |array: &str| has(array).then(|| store.array(at, array)).transpose();
     let Some(places) = optional("keypoints")? else {
         let found = format!("only {}", present.join(", "));
         return Err(store.error(name, "", "an array keypoints", found));
@@ -78,7 +74,7 @@ fn image(store: &FeatureStore, name: &str) -> Result<ImageFeatures, Error> {
         scores: per_keypoint("scores")?,
         scales: per_keypoint("scales")?,
         orientations_deg: per_keypoint("oris")?,
-        uncertainty_px: store.number(name, "keypoints", "uncertainty")?,
+        uncertainty_px: store.number(at, "keypoints", "uncertainty")?,
         keypoints,
         photo: None,
     })

@@ -1,8 +1,8 @@
 //! A Parquet file: opened, checked, and decoded batch by batch.
 
-use super::guard::without_panic;
 use super::header::KEY;
 use crate::Error;
+use crate::guard::without_panic;
 use crate::input;
 use arrow_array::RecordBatch;
 use arrow_schema::SchemaRef;

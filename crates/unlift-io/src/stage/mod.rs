@@ -10,7 +10,6 @@
 
 mod column;
 mod file;
-mod guard;
 mod header;
 mod image_writer;
 mod images;

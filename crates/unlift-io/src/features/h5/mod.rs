@@ -1,11 +1,14 @@
 //! Arrays by path in an HDF5 file: all that the rest of the crate knows of HDF5.
 //!
-//! Reading is a library's work ([`FeatureStore`], the only file that names it). Writing is our own
+//! Reading is a library's work ([`FeatureStore`], which with `source` alone names it). Writing is our own
 //! ([`Writer`]): a feature file is larger than memory, and the library's writer either holds it whole or
 //! rewrites a folder's list of names at every addition, which is quadratic in images.
 
+#[cfg(test)]
+mod hostile;
 mod messages;
 mod read;
+mod source;
 mod tree;
 mod write;
 

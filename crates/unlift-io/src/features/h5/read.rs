@@ -1,95 +1,168 @@
-//! Reading HDF5: the one place that names the library which does it.
+//! Reading HDF5: with `source`, the one place that names the library which does it.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use half::f16;
-use hdf5_pure::{AttrValue, DType, Datatype, DatatypeByteOrder, File, Group};
+use hdf5_pure::{AttrValue, DType, Dataset, Datatype, DatatypeByteOrder, File, Group};
 
+use super::source::{self, Bounded};
 use super::{Array, Numbers, shape_text};
 use crate::error::Error;
+use crate::guard::without_panic;
+use crate::input::{Budget, size};
 use crate::read::lines::quoted;
 
 /// Values of one array at most: a header can claim any size in a few bytes.
 const MOST_VALUES: u64 = 1 << 28;
-/// Groups of a file at most, and how deep they nest: links may lead in circles.
-const MOST_GROUPS: usize = 1 << 24;
+/// How deep groups nest: links may lead in circles.
 const DEEPEST: usize = 64;
+/// What the library and we hold of a group beside its path, of a chunk beside its bytes, and of a value
+/// once it is read: at least, in bytes.
+const PER_GROUP: u64 = 256;
+const PER_CHUNK: u64 = 128;
+const PER_VALUE: u64 = 8;
 
 /// An open HDF5 file: groups that hold arrays, and the arrays. Reads one array at a time.
 pub(crate) struct FeatureStore {
     path: PathBuf,
-    file: File,
+    len: u64,
+    budget: Budget,
+    /// Sorted by their bytes.
+    paths: Vec<String>,
+    /// Held open: by its path, a group would be looked for in all the names of the groups above it.
+    groups: Vec<Group>,
 }
 
 impl FeatureStore {
-    /// Opens `path`.
+    /// Opens `path` and finds its groups.
     ///
     /// # Errors
-    /// When it cannot be read, is no HDF5 file, or is cut off.
+    /// When it cannot be read, is no HDF5 file, is cut off, or its groups link in circles.
     pub fn open(path: &Path) -> Result<Self, Error> {
-        let file = File::open_streaming(path).map_err(|error| match error {
-            hdf5_pure::Error::Io(source) => Error::read(path, source),
-            other => Error::new(path, "", "a whole HDF5 file", other.to_string()),
+        let (source, len) = Bounded::open(path)?;
+        let budget = Budget::new(path, len);
+        let store = Self { path: path.to_owned(), len, budget, paths: vec![], groups: vec![] };
+        let mut groups = store.step("", "", || {
+            let file = File::from_source(source).map_err(|error| match error {
+                hdf5_pure::Error::Io(source) => Error::read(path, source),
+                other => Error::new(path, "", "a whole HDF5 file", other.to_string()),
+            })?;
+            let whole = file.superblock().eof_address;
+            if whole > len {
+                let expected = format!("a whole HDF5 file of {whole} bytes");
+                return Err(Error::new(path, "", expected, format!("{len} bytes")));
+            }
+            store.list(file.root())
         })?;
-        let (whole, len) = (file.superblock().eof_address, file.file_size());
-        if whole > len {
-            let expected = format!("a whole HDF5 file of {whole} bytes");
-            return Err(Error::new(path, "", expected, format!("{len} bytes")));
-        }
-        Ok(Self { path: path.to_owned(), file })
+        groups.sort_unstable_by(|(a, _), (b, _)| a.cmp(b));
+        let (paths, groups) = groups.into_iter().unzip();
+        Ok(Self { paths, groups, ..store })
     }
 
-    /// Paths of all groups that hold arrays directly, sorted by their bytes.
-    pub fn groups(&self) -> Result<Vec<String>, Error> {
+    /// All groups that hold arrays directly, with their paths.
+    fn list(&self, root: Group) -> Result<Vec<(String, Group)>, Error> {
         let mut found = Vec::new();
-        let mut waiting = vec![(String::new(), self.file.root(), 0)];
-        let mut seen = 0;
+        let mut waiting = vec![(String::new(), root, 0)];
+        // Whether a group holds arrays and whether it holds groups, by the address of its header.
+        let mut seen: HashMap<u64, [bool; 2]> = HashMap::new();
+        let mut memory = 0;
         while let Some((path, group, depth)) = waiting.pop() {
-            seen += 1;
-            if depth > DEEPEST || seen > MOST_GROUPS {
-                let place = format!("group {}", quoted(path.as_bytes()));
+            let place = || format!("group {}", quoted(path.as_bytes()));
+            if depth > DEEPEST {
                 let expected = format!("groups nested at most {DEEPEST} deep");
-                return Err(Error::new(&self.path, place, expected, "deeper ones, or a circle"));
+                return Err(Error::new(&self.path, place(), expected, "deeper ones, or a circle"));
             }
+            // The library keeps the path of a group, too.
+            memory += PER_GROUP + 2 * path.len() as u64;
+            self.budget.admit("list of groups", memory)?;
             let refuse = |error| self.refuse(&path, "", error);
-            if !path.is_empty() && !group.datasets().map_err(refuse)?.is_empty() {
-                found.push(path.clone());
-            }
-            for name in group.groups().map_err(refuse)? {
-                let inside = group.group(&name).map_err(refuse)?;
-                let path = if path.is_empty() { name } else { format!("{path}/{name}") };
-                waiting.push((path, inside, depth + 1));
+            // The group of no name is the group itself: its header is read, and nothing else.
+            let (itself, address) = source::first_read(|| group.group(""));
+            itself.map_err(refuse)?;
+            let [arrays, _] = match address.and_then(|address| seen.get(&address)) {
+                // An image under a second name is one more image; groups in it would be as many
+                // paths as there are ways to them.
+                Some([_, true]) => {
+                    let expected = "groups that one link leads to";
+                    return Err(Error::new(
+                        &self.path,
+                        place(),
+                        expected,
+                        "a second link, or a circle",
+                    ));
+                }
+                Some(&known) => known,
+                None => {
+                    let arrays = !path.is_empty() && !group.datasets().map_err(refuse)?.is_empty();
+                    let inside = group.iter_groups().map_err(refuse)?;
+                    let holds = [arrays, inside.len() > 0];
+                    for (name, inside) in inside {
+                        let path = if path.is_empty() { name } else { format!("{path}/{name}") };
+                        memory += PER_GROUP + 2 * path.len() as u64;
+                        self.budget.admit("list of groups", memory)?;
+                        waiting.push((path, inside, depth + 1));
+                    }
+                    seen.extend(address.map(|address| (address, holds)));
+                    holds
+                }
+            };
+            if arrays {
+                found.push((path, group));
             }
         }
-        found.sort_unstable();
         Ok(found)
     }
 
-    fn group(&self, path: &str) -> Result<Group, Error> {
-        self.file.group(path).map_err(|error| self.refuse(path, "", error))
+    /// Runs `step` about the array `name` of `path`: it reads no more than the size of the file allows,
+    /// and a panic of the library is an error.
+    fn step<T>(
+        &self,
+        path: &str,
+        name: &str,
+        step: impl FnOnce() -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        let panicked = || Err(self.error(path, name, "readable HDF5", "damaged data"));
+        source::bounded(self.len, || without_panic(step).unwrap_or_else(panicked))
     }
 
-    /// Names of the arrays of the group `path`, sorted.
-    pub fn names(&self, path: &str) -> Result<Vec<String>, Error> {
-        let names = self.group(path)?.datasets();
-        let mut names = names.map_err(|error| self.refuse(path, "", error))?;
+    /// Paths of all groups that hold arrays directly, sorted by their bytes.
+    pub fn paths(&self) -> &[String] {
+        &self.paths
+    }
+
+    /// Names of the arrays of the group `at` of [`paths`](Self::paths), sorted.
+    pub fn names(&self, at: usize) -> Result<Vec<String>, Error> {
+        let path = &self.paths[at];
+        let mut names = self.step(path, "", || {
+            self.groups[at].datasets().map_err(|error| self.refuse(path, "", error))
+        })?;
         names.sort_unstable();
         Ok(names)
     }
 
-    /// The array `name` of the group `path`: floats of 16, 32 or 64 bits, or integers.
+    /// The array `name` of the group `at`: floats of 16, 32 or 64 bits, or integers.
     ///
     /// # Errors
-    /// When it is cut off, not an array of numbers, or larger than 2^28 values.
-    pub fn array(&self, path: &str, name: &str) -> Result<Array, Error> {
+    /// When it is cut off, not an array of numbers, larger than 2^28 values, or more than a file of this
+    /// size may take.
+    pub fn array(&self, at: usize, name: &str) -> Result<Array, Error> {
+        self.step(&self.paths[at], name, || self.read(at, name))
+    }
+
+    fn read(&self, at: usize, name: &str) -> Result<Array, Error> {
+        let path = &self.paths[at];
         let refuse = |error| self.refuse(path, name, error);
-        let dataset = self.group(path)?.dataset(name).map_err(refuse)?;
+        let dataset = self.groups[at].dataset(name).map_err(refuse)?;
         let shape = dataset.shape().map_err(refuse)?;
         let values = shape.iter().try_fold(1u64, |n, &side| n.checked_mul(side));
         let Some(count) = values.filter(|&n| n <= MOST_VALUES) else {
             let expected = format!("at most {MOST_VALUES} values");
             return Err(self.error(path, name, expected, shape_text(&shape)));
         };
+        if count > 0 {
+            self.admit(at, name, &dataset, &shape)?;
+        }
         let datatype = dataset.datatype().map_err(refuse)?;
         let values = match dataset.dtype().map_err(refuse)? {
             // Nothing is stored, so there is nothing to read.
@@ -123,15 +196,50 @@ impl FeatureStore {
         Ok(Array { shape, values })
     }
 
-    /// The attribute `key` of that array, if it is a number.
-    pub fn number(&self, path: &str, name: &str, key: &str) -> Result<Option<f64>, Error> {
+    /// Whether the array and what decodes it fit: it may be compressed, or not be stored at all.
+    fn admit(&self, at: usize, name: &str, dataset: &Dataset, shape: &[u64]) -> Result<(), Error> {
+        let path = &self.paths[at];
         let refuse = |error| self.refuse(path, name, error);
-        let dataset = self.group(path)?.dataset(name).map_err(refuse)?;
-        let attributes = dataset.attrs().map_err(refuse)?;
-        Ok(attributes.get(key).and_then(AttrValue::as_f64))
+        let product = |sides: &[u64], each: u64| {
+            sides.iter().fold(each, |product, &side| product.saturating_mul(side))
+        };
+        let element = dataset.element_size().map_err(refuse)?;
+        let place = self.place(path, name);
+        self.budget.admit(&*place, product(shape, element.max(PER_VALUE)))?;
+        let Some(chunk) = dataset.chunk_shape().map_err(refuse)? else { return Ok(()) };
+        if chunk.len() != shape.len() || chunk.contains(&0) {
+            return Err(self.error(path, name, "chunks of the same rank", shape_text(&chunk)));
+        }
+        let sides = shape.iter().zip(&chunk).map(|(&side, &chunk)| side.div_ceil(chunk));
+        let most = product(&sides.collect::<Vec<_>>(), 1);
+        // Every chunk is decoded, and the last ones stand over the edge.
+        let each = product(&chunk, element).saturating_add(PER_CHUNK);
+        self.budget.admit(&*place, most.saturating_mul(each))?;
+        let stored = dataset.chunks().map_err(refuse)?.len() as u64;
+        if stored > most {
+            let expected = format!("at most {most} chunks");
+            return Err(self.error(path, name, expected, stored.to_string()));
+        }
+        Ok(())
+    }
+
+    /// The attribute `key` of that array, if it is a number.
+    pub fn number(&self, at: usize, name: &str, key: &str) -> Result<Option<f64>, Error> {
+        let path = &self.paths[at];
+        self.step(path, name, || {
+            let refuse = |error| self.refuse(path, name, error);
+            let dataset = self.groups[at].dataset(name).map_err(refuse)?;
+            let attributes = dataset.attrs().map_err(refuse)?;
+            Ok(attributes.get(key).and_then(AttrValue::as_f64))
+        })
     }
 
     fn refuse(&self, path: &str, name: &str, error: hdf5_pure::Error) -> Error {
+        if source::is_spent() {
+            let most = size(source::most(self.len));
+            let expected = format!("at most {most} to read in a file of {}", size(self.len));
+            return self.error(path, name, expected, "the same parts again and again");
+        }
         self.error(path, name, "readable HDF5", error.to_string())
     }
 
@@ -143,12 +251,15 @@ impl FeatureStore {
         expected: impl Into<String>,
         found: impl Into<String>,
     ) -> Error {
-        let place = match (path, name) {
+        Error::new(&self.path, self.place(path, name), expected, found)
+    }
+
+    fn place(&self, path: &str, name: &str) -> String {
+        match (path, name) {
             ("", _) => String::new(),
             (_, "") => format!("image {}", quoted(path.as_bytes())),
             _ => format!("image {}, {name}", quoted(path.as_bytes())),
-        };
-        Error::new(&self.path, place, expected, found)
+        }
     }
 }
 

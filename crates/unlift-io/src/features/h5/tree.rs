@@ -84,7 +84,8 @@ pub(super) fn names(entries: &[Entry<'_>], start: u64) -> (Vec<u8>, [u64; 2]) {
 
 const NODE_BYTES: usize = 24 + (4 * NODE as usize + 1) * 8;
 
-fn node(level: u8, children: &[(u64, u64)], lower: u64, siblings: [u64; 2]) -> Vec<u8> {
+/// A node over `children`: their addresses and their last names.
+pub(super) fn node(level: u8, children: &[(u64, u64)], lower: u64, siblings: [u64; 2]) -> Vec<u8> {
     let mut bytes = b"TREE\0".to_vec();
     bytes.push(level);
     bytes.extend((children.len() as u16).to_le_bytes());

@@ -10,6 +10,18 @@ use crate::atomic::FEATURES_MARK;
 
 const SUPERBLOCK_BYTES: u64 = 96;
 
+/// The first bytes of a file of `len` bytes, whose root group has its header, tree and heap there.
+pub(super) fn superblock(len: u64, header: u64, group: [u64; 2]) -> Vec<u8> {
+    let mut bytes = b"\x89HDF\r\n\x1a\n\0\0\0\0\0\x08\x08\0".to_vec();
+    bytes.extend(tree::LEAF.to_le_bytes());
+    bytes.extend(tree::NODE.to_le_bytes());
+    bytes.extend([0; 4]);
+    let addresses = [0, UNDEFINED, len, UNDEFINED];
+    bytes.extend(addresses.iter().flat_map(|at| at.to_le_bytes()));
+    bytes.extend(Entry { name: "", header, group: Some(group) }.bytes(0));
+    bytes
+}
+
 /// A member of a group.
 enum Member {
     /// The address of its header.
@@ -90,15 +102,8 @@ impl Writer {
     pub fn finish(mut self, out: &mut (impl Write + Seek)) -> io::Result<()> {
         let root = std::mem::take(&mut self.root);
         let (header, group) = self.group(out, &root)?;
-        let mut bytes = b"\x89HDF\r\n\x1a\n\0\0\0\0\0\x08\x08\0".to_vec();
-        bytes.extend(tree::LEAF.to_le_bytes());
-        bytes.extend(tree::NODE.to_le_bytes());
-        bytes.extend([0; 4]);
-        let addresses = [0, UNDEFINED, self.at, UNDEFINED];
-        bytes.extend(addresses.iter().flat_map(|at| at.to_le_bytes()));
-        bytes.extend(Entry { name: "", header, group: Some(group) }.bytes(0));
         out.seek(SeekFrom::Start(0))?;
-        out.write_all(&bytes)
+        out.write_all(&superblock(self.at, header, group))
     }
 
     /// Writes a group after its members; the addresses of its header and of its names.

@@ -11,9 +11,9 @@ thread_local! {
 /// Runs `step`; `None` when it panics, which is then silent.
 ///
 /// The `parquet` crate checks what it reads, but not all of it: with single bytes of a page or the
-/// footer changed, a handful of its assertions still fail (59.3). Panics of other threads, and of
-/// this one outside `step`, are reported as ever.
-pub(super) fn without_panic<T>(step: impl FnOnce() -> T) -> Option<T> {
+/// footer changed, a handful of its assertions still fail (59.3). `hdf5-pure` is held to the same.
+/// Panics of other threads, and of this one outside `step`, are reported as ever.
+pub(crate) fn without_panic<T>(step: impl FnOnce() -> T) -> Option<T> {
     static QUIET: Once = Once::new();
     QUIET.call_once(|| {
         let report = take_hook();

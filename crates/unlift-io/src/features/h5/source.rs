@@ -1,0 +1,156 @@
+//! The bytes of an HDF5 file, and how many of them may be read in one step.
+//!
+//! A list of names is a tree whose nodes may be the same ones again and again, a chunk may be listed a
+//! million times: what the library does is bounded by what it reads, and that is bounded here.
+
+use std::cell::Cell;
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+
+use hdf5_pure::{FormatError, Source};
+
+use crate::error::Error;
+use crate::input;
+
+/// Small reads are served from pages: a header is read in a dozen pieces.
+const PAGE: u64 = 8 << 10;
+const PAGES: u64 = 64;
+/// What a read costs beside its bytes.
+const READ: u64 = 64;
+/// Every step may read as much, however small the file is, and else so many times its length.
+const LEAST: u64 = 256 << 20;
+const MULTIPLE: u64 = 64;
+
+thread_local! {
+    // The library reads in the thread that asks.
+    static LEFT: Cell<u64> = const { Cell::new(0) };
+    static FIRST: Cell<Option<u64>> = const { Cell::new(None) };
+    static LONGEST_NAME: Cell<u64> = const { Cell::new(0) };
+}
+
+/// A file that is read at any place, by many threads.
+pub(super) struct Bounded {
+    pages: Mutex<Pages>,
+    len: u64,
+}
+
+struct Pages {
+    file: File,
+    /// The number of a page and its bytes, at the place that the number modulo [`PAGES`] gives.
+    held: Vec<(u64, Vec<u8>)>,
+}
+
+impl Bounded {
+    /// Opens the regular file `path`; with its length.
+    pub fn open(path: &Path) -> Result<(Self, u64), Error> {
+        let (file, len) = input::open(path)?;
+        let held = (0..PAGES).map(|_| (u64::MAX, Vec::new())).collect();
+        Ok((Self { pages: Mutex::new(Pages { file, held }), len }, len))
+    }
+}
+
+/// Runs `step`, which may read a number of bytes that `len`, the length of the file, sets.
+pub(super) fn bounded<T>(len: u64, step: impl FnOnce() -> T) -> T {
+    let outer = LEFT.replace(most(len));
+    let result = step();
+    LEFT.set(outer);
+    result
+}
+
+/// Bytes that one step may read.
+pub(super) fn most(len: u64) -> u64 {
+    len.saturating_mul(MULTIPLE).max(LEAST)
+}
+
+/// Whether this step has read all that it may.
+pub(super) fn is_spent() -> bool {
+    LEFT.get() == 0
+}
+
+/// The result of `step` and where it read first.
+pub(super) fn first_read<T>(step: impl FnOnce() -> T) -> (T, Option<u64>) {
+    FIRST.set(None);
+    let result = step();
+    (result, FIRST.get())
+}
+
+#[cfg(test)]
+thread_local! {
+    /// What all reads of this thread have cost.
+    pub(super) static READ_SO_FAR: Cell<u64> = const { Cell::new(0) };
+}
+
+fn charge(bytes: u64) -> Result<(), FormatError> {
+    #[cfg(test)]
+    READ_SO_FAR.set(READ_SO_FAR.get() + bytes);
+    let left = LEFT.get().saturating_sub(bytes);
+    LEFT.set(left);
+    if left == 0 {
+        return Err(FormatError::Source("too much is read".to_owned()));
+    }
+    Ok(())
+}
+
+impl Source for Bounded {
+    fn len(&self) -> u64 {
+        self.len
+    }
+
+    fn read_at(&self, offset: u64, buf: &mut [u8]) -> Result<(), FormatError> {
+        charge(READ + buf.len() as u64)?;
+        if FIRST.get().is_none() {
+            FIRST.set(Some(offset));
+        }
+        let mut pages = self.pages.lock().unwrap_or_else(PoisonError::into_inner);
+        pages.read(offset, buf).map_err(|error| FormatError::Source(error.to_string()))
+    }
+
+    fn read_metadata_at(&self, offset: u64, len: usize) -> Result<Vec<u8>, FormatError> {
+        let bytes = self.read_exact_at(offset, len)?;
+        // Entries of a list of names (40 bytes each) may all have the same name, however long, and each
+        // becomes a text of its own: they cost what the heap read before them may make of them.
+        if bytes.starts_with(b"SNOD") {
+            charge(len as u64 / 40 * LONGEST_NAME.get())?;
+        } else if !bytes.starts_with(b"TREE") {
+            let names = bytes.split(|&byte| byte == 0).map(<[u8]>::len);
+            LONGEST_NAME.set(names.max().unwrap_or(0) as u64);
+        }
+        Ok(bytes)
+    }
+}
+
+impl Pages {
+    fn read(&mut self, mut offset: u64, mut buf: &mut [u8]) -> io::Result<()> {
+        if buf.len() as u64 > PAGE {
+            self.file.seek(SeekFrom::Start(offset))?;
+            return self.file.read_exact(buf);
+        }
+        while !buf.is_empty() {
+            let bytes = self.page(offset / PAGE)?;
+            let there = bytes.get((offset % PAGE) as usize..).unwrap_or_default();
+            let n = there.len().min(buf.len());
+            if n == 0 {
+                return Err(io::ErrorKind::UnexpectedEof.into());
+            }
+            let (now, later) = buf.split_at_mut(n);
+            now.copy_from_slice(&there[..n]);
+            (buf, offset) = (later, offset + n as u64);
+        }
+        Ok(())
+    }
+
+    fn page(&mut self, number: u64) -> io::Result<&[u8]> {
+        let (held, bytes) = &mut self.held[(number % PAGES) as usize];
+        if *held != number {
+            // Nothing is held if reading fails.
+            *held = u64::MAX;
+            bytes.clear();
+            self.file.seek(SeekFrom::Start(number * PAGE))?;
+            (&mut self.file).take(PAGE).read_to_end(bytes)?;
+            *held = number;
+        }
+        Ok(bytes)
+    }
+}
