@@ -6,10 +6,15 @@ use std::collections::HashMap;
 use std::ffi::OsString;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-use rusqlite::{Connection, OpenFlags, OptionalExtension};
+use rusqlite::config::DbConfig;
+use rusqlite::limits::Limit;
+use rusqlite::{Connection, ErrorCode, OpenFlags, OptionalExtension};
 
 use crate::error::Error;
+use crate::input::{self, Budget};
 use crate::read::lines::quoted;
 
 /// How one image's descriptors are stored.
@@ -28,6 +33,14 @@ pub(crate) struct Rows {
     pub data: Vec<u8>,
 }
 
+/// What is read of a database.
+const TABLES: [&str; 4] = ["images", "cameras", "keypoints", "descriptors"];
+/// Steps of SQLite between two looks at how many there were.
+const STEPS_AT_A_TIME: u64 = 1000;
+/// Steps of one query: so many, and as many for every byte of the file. A row takes ten or so.
+const LEAST_STEPS: u64 = 1_000_000;
+const STEPS_PER_BYTE: u64 = 4;
+
 /// An open database: image ids by name, and whether descriptors have a type.
 pub(crate) struct Database {
     path: PathBuf,
@@ -35,23 +48,30 @@ pub(crate) struct Database {
     image_ids: HashMap<Vec<u8>, i64>,
     /// Since COLMAP 4 a column says which extractor wrote a row.
     has_type: bool,
+    /// Steps that the query which runs has taken.
+    steps: Arc<AtomicU64>,
 }
 
 impl Database {
     /// Opens `path` for reading.
+    ///
+    /// # Errors
+    /// When it is no regular file or no database, or when what it calls a table is a view or a program.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI;
-        let connection =
+        let (_, len) = input::open(path)?;
+        let budget = Budget::new(path, len);
+        let mut connection =
             Connection::open_with_flags(uri(path), flags).map_err(|e| refuse(path, "", &e))?;
-        let image_ids = (|| {
-            let mut statement = connection.prepare("SELECT image_id, name FROM images")?;
-            let rows = statement
-                .query_map([], |row| Ok((row.get_ref(1)?.as_bytes()?.to_vec(), row.get(0)?)))?;
-            rows.collect::<rusqlite::Result<HashMap<_, _>>>()
-        })()
-        .map_err(|e| refuse(path, "table images", &e))?;
+        let steps = Arc::new(AtomicU64::new(0));
+        confine(&mut connection, &budget, len, &steps).map_err(|e| refuse(path, "", &e))?;
+        for table in TABLES {
+            check_table(&connection, path, table)?;
+        }
+        steps.store(0, Relaxed);
+        let image_ids = image_ids(&connection, path, &budget)?;
         let has_type = connection.prepare("SELECT type FROM descriptors LIMIT 0").is_ok();
-        Ok(Self { path: path.to_owned(), connection, image_ids, has_type })
+        Ok(Self { path: path.to_owned(), connection, image_ids, has_type, steps })
     }
 
     /// The file, for errors.
@@ -93,6 +113,7 @@ impl Database {
         let of_keypoints = table == "keypoints";
         let kind = if self.has_type && !of_keypoints { "type" } else { "0" };
         let query = format!("SELECT rows, cols, data, {kind} FROM {table} WHERE image_id = ?");
+        self.steps.store(0, Relaxed);
         let found = self
             .connection
             .prepare(&query)
@@ -136,6 +157,7 @@ impl Database {
         let query = "SELECT cameras.width, cameras.height FROM images JOIN cameras \
                      ON images.camera_id = cameras.camera_id WHERE image_id = ?";
         let image_id = self.image_id(name)?;
+        self.steps.store(0, Relaxed);
         let found = self
             .connection
             .prepare(query)
@@ -153,7 +175,76 @@ impl Database {
 }
 
 fn refuse(path: &Path, place: &str, error: &rusqlite::Error) -> Error {
-    Error::new(path, place, "a COLMAP database", error.to_string())
+    let found = match error.sqlite_error_code() {
+        Some(ErrorCode::OperationInterrupted) => "a query without end".to_owned(),
+        _ => error.to_string(),
+    };
+    Error::new(path, place, "a COLMAP database", found)
+}
+
+/// A database may hold programs (views, triggers, computed columns): none is trusted, no value is larger
+/// than the budget, and every query ends after a number of steps that the length of the file sets.
+fn confine(
+    connection: &mut Connection,
+    budget: &Budget,
+    len: u64,
+    steps: &Arc<AtomicU64>,
+) -> rusqlite::Result<()> {
+    let settings = [
+        (DbConfig::SQLITE_DBCONFIG_DEFENSIVE, true),
+        (DbConfig::SQLITE_DBCONFIG_TRUSTED_SCHEMA, false),
+        (DbConfig::SQLITE_DBCONFIG_ENABLE_TRIGGER, false),
+        (DbConfig::SQLITE_DBCONFIG_ENABLE_VIEW, false),
+    ];
+    for (setting, value) in settings {
+        connection.set_db_config(setting, value)?;
+    }
+    let most = i32::try_from(budget.most()).unwrap_or(i32::MAX);
+    connection.set_limit(Limit::SQLITE_LIMIT_LENGTH, most)?;
+    connection.set_limit(Limit::SQLITE_LIMIT_ATTACHED, 0)?;
+    let (steps, most) =
+        (steps.clone(), LEAST_STEPS.saturating_add(len.saturating_mul(STEPS_PER_BYTE)));
+    let is_over = move || steps.fetch_add(STEPS_AT_A_TIME, Relaxed) > most;
+    connection.progress_handler(STEPS_AT_A_TIME as i32, Some(is_over))
+}
+
+/// Whether what is called `table` is one, if there is such a thing.
+fn check_table(connection: &Connection, path: &Path, table: &str) -> Result<(), Error> {
+    let query = "SELECT type, rootpage FROM sqlite_master WHERE name = ? COLLATE NOCASE \
+                 AND type IN ('table', 'view')";
+    let place = format!("table {table}");
+    let found: Option<(String, i64)> = connection
+        .prepare(query)
+        .and_then(|mut statement| {
+            statement.query_row([table], |row| Ok((row.get(0)?, row.get(1)?))).optional()
+        })
+        .map_err(|e| refuse(path, &place, &e))?;
+    match found {
+        Some((kind, _)) if kind == "view" => Err(Error::new(path, place, "a table", "a view")),
+        // The rows of these are made by a module of SQLite.
+        Some((_, 0)) => Err(Error::new(path, place, "a table", "a virtual table")),
+        _ => Ok(()),
+    }
+}
+
+fn image_ids(
+    connection: &Connection,
+    path: &Path,
+    budget: &Budget,
+) -> Result<HashMap<Vec<u8>, i64>, Error> {
+    let failed = |e: rusqlite::Error| refuse(path, "table images", &e);
+    let mut statement = connection.prepare("SELECT image_id, name FROM images").map_err(failed)?;
+    let mut rows = statement.query([]).map_err(failed)?;
+    let (mut image_ids, mut bytes) = (HashMap::new(), 0);
+    while let Some(row) = rows.next().map_err(failed)? {
+        let name = row.get_ref(1).map_err(failed)?;
+        let name = name.as_bytes().map_err(|e| failed(e.into()))?;
+        // A column may be computed, and then its names are stored nowhere.
+        bytes += 64 + name.len() as u64;
+        budget.admit("table images", bytes)?;
+        image_ids.insert(name.to_vec(), row.get(0).map_err(failed)?);
+    }
+    Ok(image_ids)
 }
 
 /// The URI of a database that is read and never written, not even its journal.
@@ -185,4 +276,29 @@ fn uri(path: &Path) -> OsString {
         uri.push_str("?immutable=1");
     }
     uri.into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_query_without_end_is_ended() {
+        let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
+        let database = Database::open(&data.join("project/database.db")).unwrap();
+        let count = |most: i64| {
+            let query = format!(
+                "WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c LIMIT {most}) \
+                 SELECT count(*) FROM c"
+            );
+            database.steps.store(0, Relaxed);
+            database.connection.query_row(&query, [], |row| row.get::<_, i64>(0))
+        };
+        assert_eq!(count(1000).unwrap(), 1000);
+        let error = refuse(Path::new("f"), "", &count(i64::MAX).unwrap_err());
+        let line = "f: expected a COLMAP database, found a query without end";
+        assert_eq!(error.to_string(), line);
+        // Counted for every query on its own.
+        assert!((0..300).all(|_| count(1000).is_ok()));
+    }
 }

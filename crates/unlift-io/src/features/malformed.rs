@@ -150,6 +150,19 @@ fn every_malformed_database_is_refused_with_its_line() {
         ("dummies", "UPDATE descriptors SET data = zeroblob(1024)",
             "f: image \"i2.jpg\": expected real descriptors, found only zeros (dummies)"),
         ("without features", "UPDATE keypoints SET rows = 0, cols = 0, data = x''; UPDATE descriptors SET rows = 0, cols = 0, data = NULL", "good"),
+        ("a view that never ends", "DROP TABLE keypoints; CREATE VIEW keypoints AS WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c) \
+            SELECT x AS image_id, 1 AS rows, 2 AS cols, zeroblob(8) AS data FROM c",
+            "f: table keypoints: expected a table, found a view"),
+        ("a view of images", "PRAGMA foreign_keys=0; ALTER TABLE images RENAME TO i; CREATE VIEW Images AS SELECT * FROM i",
+            "f: table images: expected a table, found a view"),
+        ("a virtual table", "DROP TABLE descriptors; CREATE VIRTUAL TABLE descriptors USING fts3(rows, cols, data)",
+            "f: table descriptors: expected a table, found a virtual table"),
+        ("blobs that are computed", "DROP TABLE keypoints; CREATE TABLE keypoints (image_id, rows, cols, data AS (zeroblob(900000000))); \
+            INSERT INTO keypoints SELECT image_id, 112500000, 2 FROM images",
+            "f: table keypoints: expected a COLMAP database, found string or blob too big"),
+        ("names that are computed", "PRAGMA foreign_keys=0; DROP TABLE images; CREATE TABLE images (image_id, camera_id, name AS (printf('%.100000000c%d', 'x', image_id))); \
+            INSERT INTO images VALUES (1, 1), (2, 1), (3, 1)",
+            "f: table images: expected at most 256 MiB in memory of a file of 19 KiB, found 286.1 MiB"),
         ("without a camera", "PRAGMA foreign_keys=0; DELETE FROM cameras", "good"),
     ];
     for (what, statement, expected) in rows {
