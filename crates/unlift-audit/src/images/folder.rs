@@ -1,6 +1,6 @@
 //! A folder of photos: which there are, and the features of one.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -17,6 +17,9 @@ const OTHER_ENDINGS: [&str; 24] = [
     "arw", "avif", "bmp", "cr2", "cr3", "dng", "exr", "gif", "hdr", "heic", "heif", "j2k", "jp2",
     "jxl", "nef", "orf", "pbm", "pgm", "ppm", "raf", "rw2", "tga", "tif", "tiff",
 ];
+
+/// How deep folders may nest: photos lie in dates and rooms, not in hundreds of folders.
+const DEEPEST: usize = 64;
 
 /// Whether a file of this name in a folder of photos is taken for one.
 pub fn is_photo(path: &Path) -> bool {
@@ -35,14 +38,15 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Lists the photos in `root` and in folders inside it. Names that begin with a dot are passed over.
+    /// Lists the photos in `root` and in folders inside it, each folder once: under its own name, or
+    /// under the first link that leads to it. Names that begin with a dot are passed over.
     ///
     /// # Errors
     /// When the folder cannot be read or holds no photo, an option is out of range, or a model is missing.
     pub fn open(root: &Path, extraction: &Extraction) -> Result<Self, crate::Error> {
         let extractor = Extractor::try_new(extraction)?;
         let mut found = Found::default();
-        found.visit(root, "", &mut Vec::new());
+        found.visit(root);
         if found.photos.is_empty() {
             return Err(match found.refused.pop() {
                 Some(refused) => refused,
@@ -164,21 +168,35 @@ impl Found {
         (!others.is_empty()).then(|| others.join(", "))
     }
 
-    /// Adds what is in `folder`, whose name is `prefix`; `above` are the folders it is in.
-    fn visit(&mut self, folder: &Path, prefix: &str, above: &mut Vec<PathBuf>) {
-        // A link to a folder further up would never end.
-        let Ok(real) = fs::canonicalize(folder) else { return };
-        if above.contains(&real) {
-            return;
+    /// Adds what is in `root` and in the folders inside it.
+    fn visit(&mut self, root: &Path) {
+        let mut seen = HashSet::new();
+        let mut waiting = Waiting::default();
+        waiting.folders.push((String::new(), root.to_owned()));
+        while let Some((name, folder)) = waiting.next() {
+            // Folders that link to each other have more paths than can be walked.
+            let Ok(real) = fs::canonicalize(&folder) else { continue };
+            if !seen.insert(real) {
+                continue;
+            }
+            if name.split('/').count() > DEEPEST {
+                let expected = format!("folders nested at most {DEEPEST} deep");
+                self.refused.push(Error::new(&folder, "", expected, "a deeper one"));
+                continue;
+            }
+            self.list(&name, &folder, &mut waiting);
         }
+    }
+
+    /// Adds what is in `folder`, whose name is `prefix`; folders in it are left `waiting`.
+    fn list(&mut self, prefix: &str, folder: &Path, waiting: &mut Waiting) {
         let entries = match fs::read_dir(folder) {
             Ok(entries) => entries,
             Err(source) => return self.refused.push(Error::read(folder, source)),
         };
-        above.push(real);
         for entry in entries {
-            let path = match entry {
-                Ok(entry) => entry.path(),
+            let (path, is_link) = match entry {
+                Ok(entry) => (entry.path(), entry.file_type().is_ok_and(|kind| kind.is_symlink())),
                 Err(source) => {
                     self.refused.push(Error::read(folder, source));
                     continue;
@@ -192,7 +210,8 @@ impl Found {
                 "" => name.to_owned(),
                 _ => format!("{prefix}/{name}"),
             });
-            let is_folder = path.is_dir();
+            let kind = fs::metadata(&path).map(|metadata| metadata.file_type());
+            let is_folder = kind.as_ref().is_ok_and(fs::FileType::is_dir);
             let ending = path.extension().unwrap_or_default().to_string_lossy();
             let ending = ending.to_ascii_lowercase();
             let is_photo = ENDINGS.contains(&&*ending);
@@ -200,7 +219,13 @@ impl Found {
                 *self.others.entry(ending).or_default() += 1;
             }
             match name {
-                Some(name) if is_folder => self.visit(&path, &name, above),
+                Some(name) if is_folder && is_link => _ = waiting.links.insert((name, path)),
+                Some(name) if is_folder => waiting.folders.push((name, path)),
+                // Opening a pipe that nobody writes to waits for ever.
+                Some(_) if is_photo && kind.as_ref().is_ok_and(|kind| !kind.is_file()) => {
+                    let found = "a pipe, a socket or a device";
+                    self.refused.push(Error::new(&path, "", "a file", found));
+                }
                 Some(name) if is_photo => self.photos.push((name, path)),
                 None if is_folder || is_photo => {
                     let found = "bytes that are no text";
@@ -209,6 +234,91 @@ impl Found {
                 _ => {}
             }
         }
-        above.pop();
+    }
+}
+
+/// Names and paths of folders that are still to be listed.
+#[derive(Default)]
+struct Waiting {
+    folders: Vec<(String, PathBuf)>,
+    /// After all folders, so that photos have the names of the folders that they are in; sorted, so
+    /// that the order in which a disk lists them decides nothing.
+    links: BTreeSet<(String, PathBuf)>,
+}
+
+impl Waiting {
+    fn next(&mut self) -> Option<(String, PathBuf)> {
+        self.folders.pop().or_else(|| self.links.pop_first())
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use std::os::unix::fs::symlink;
+    use std::os::unix::net::UnixListener;
+
+    use super::*;
+
+    fn found(root: &Path) -> (Vec<String>, Vec<String>) {
+        let mut found = Found::default();
+        found.visit(root);
+        let mut names: Vec<String> = found.photos.into_iter().map(|(name, _)| name).collect();
+        names.sort_unstable();
+        let line = |error: &Error| {
+            let line = error.to_string();
+            let root = root.to_str().unwrap();
+            line.strip_prefix(root).expect("errors begin with the path").to_owned()
+        };
+        (names, found.refused.iter().map(line).collect())
+    }
+
+    #[test]
+    fn folders_that_link_to_each_other_are_listed_once() {
+        let (dir, outside) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        // Twelve folders with links to all of them: 12! paths.
+        for at in 0..12 {
+            let folder = dir.path().join(format!("f{at:02}"));
+            fs::create_dir(&folder).unwrap();
+            fs::write(folder.join("a.jpg"), "").unwrap();
+            for to in 0..12 {
+                symlink(dir.path().join(format!("f{to:02}")), folder.join(format!("a{to}")))
+                    .unwrap();
+            }
+        }
+        fs::write(outside.path().join("b.jpg"), "").unwrap();
+        symlink(outside.path(), dir.path().join("link")).unwrap();
+        symlink(outside.path().join("b.jpg"), dir.path().join("c.jpg")).unwrap();
+        let mut expected: Vec<String> = (0..12).map(|at| format!("f{at:02}/a.jpg")).collect();
+        expected.splice(0..0, ["c.jpg".to_owned()]);
+        expected.push("link/b.jpg".to_owned());
+        assert_eq!(found(dir.path()), (expected, Vec::new()));
+    }
+
+    #[test]
+    fn folders_nest_as_deep_as_is_stated() {
+        let dir = tempfile::tempdir().unwrap();
+        let name = |depth| vec!["f"; depth].join("/");
+        fs::create_dir_all(dir.path().join(name(1500))).unwrap();
+        for depth in [DEEPEST, DEEPEST + 1] {
+            fs::write(dir.path().join(name(depth)).join("a.jpg"), "").unwrap();
+        }
+        let line = "expected folders nested at most 64 deep, found a deeper one";
+        let expected = format!("/{}: {line}", name(DEEPEST + 1));
+        let photo = format!("{}/a.jpg", name(DEEPEST));
+        assert_eq!(found(dir.path()), (vec![photo], vec![expected]));
+    }
+
+    #[test]
+    fn what_is_no_file_is_not_taken_for_a_photo() {
+        let dir = tempfile::tempdir().unwrap();
+        fs::write(dir.path().join("a.jpg"), "").unwrap();
+        let _socket = UnixListener::bind(dir.path().join("b.jpg")).unwrap();
+        symlink("/dev/zero", dir.path().join("c.png")).unwrap();
+        let _other = UnixListener::bind(dir.path().join("d")).unwrap();
+        let (names, mut refused) = found(dir.path());
+        refused.sort_unstable();
+        assert_eq!(names, ["a.jpg"]);
+        let line = "expected a file, found a pipe, a socket or a device";
+        assert_eq!(refused, [format!("/b.jpg: {line}"), format!("/c.png: {line}")]);
     }
 }
