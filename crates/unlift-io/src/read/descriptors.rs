@@ -96,14 +96,16 @@ fn binary(path: &Path, input: &Input) -> Result<Descriptors, Error> {
             Err(Error::new(path, format!("point {id}"), "a descriptor", found))
         }
     };
+    // Of more points than rows, one has none: the file alone says how many values there can be.
+    let n_values = input.ids.len().min(n as usize) * dim;
     let values = if scalar == Scalar::U8 {
-        let mut values = Vec::with_capacity(input.ids.len() * dim);
+        let mut values = Vec::with_capacity(n_values);
         for id in &input.ids {
             values.extend_from_slice(row(id)?);
         }
         Values::U8(values)
     } else {
-        let mut values = Vec::with_capacity(input.ids.len() * dim);
+        let mut values = Vec::with_capacity(n_values);
         for id in &input.ids {
             for (at, stored) in row(id)?.chunks_exact(scalar.size()).enumerate() {
                 let value = scalar.read(stored);

@@ -1,11 +1,15 @@
 //! Text files, a line at a time.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Place};
 use crate::input;
+
+/// Bytes of a line at most: as many as a point takes that a million photos show. A file of one endless
+/// line is not read to its end.
+pub(crate) const LONGEST_LINE: u64 = 16 << 20;
 
 /// Lines of a text file, counted from 1, as bytes: names need not be UTF-8.
 pub(crate) struct Lines {
@@ -30,16 +34,21 @@ impl Lines {
     /// Reads the next line, whatever it holds; false at the end of the file.
     ///
     /// # Errors
-    /// When the line holds a zero byte: the file is not text.
+    /// When the line holds a zero byte: the file is not text; when it is longer than [`LONGEST_LINE`].
     pub fn advance(&mut self) -> Result<bool, Error> {
         self.line.clear();
-        let read = self.reader.read_until(b'\n', &mut self.line);
+        let mut limited = self.reader.by_ref().take(LONGEST_LINE + 1);
+        let read = limited.read_until(b'\n', &mut self.line);
         if read.map_err(|e| Error::read(&self.path, e))? == 0 {
             return Ok(false);
         }
         self.number += 1;
         if self.line.contains(&0) {
             return Err(self.error("text", "binary data"));
+        }
+        if self.line.len() as u64 > LONGEST_LINE {
+            let expected = format!("a line of at most {}", input::size(LONGEST_LINE));
+            return Err(self.error(expected, "a longer one"));
         }
         if self.number == 1 && self.line.starts_with(b"\xef\xbb\xbf") {
             self.line.drain(..3);

@@ -1,7 +1,7 @@
 //! Which COLMAP model of a folder is read: where programs put them, and the largest of several.
 
 use std::fs;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use crate::error::Error;
@@ -110,13 +110,29 @@ impl Candidate {
             // A file that is cut off counts as empty; if it is read after all, its reader tells.
             return Ok(count.try_into().map_or(0, u64::from_le_bytes));
         }
-        let mut n = 0;
-        for line in file.split(b'\n') {
-            let line = line.map_err(wrong)?;
-            let line = line.trim_ascii();
-            n += u64::from(!line.is_empty() && !line.starts_with(b"#"));
+        n_lines(file).map_err(wrong)
+    }
+}
+
+/// Lines that are neither blank nor a comment, none of which is held in memory.
+fn n_lines(mut file: impl BufRead) -> io::Result<u64> {
+    let mut n = 0;
+    let mut is_start = true;
+    loop {
+        let part = file.fill_buf()?;
+        if part.is_empty() {
+            return Ok(n);
         }
-        Ok(n)
+        for &byte in part {
+            if byte == b'\n' {
+                is_start = true;
+            } else if is_start && !byte.is_ascii_whitespace() {
+                n += u64::from(byte != b'#');
+                is_start = false;
+            }
+        }
+        let length = part.len();
+        file.consume(length);
     }
 }
 

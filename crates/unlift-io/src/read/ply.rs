@@ -228,7 +228,7 @@ fn ascii(
     let vertex = &header.elements[header.vertex];
     let n_properties = vertex.properties.len();
     // A value takes a digit and a separator; the last one of the file only the digit.
-    let most = (len - header.n_bytes + 1) / (2 * n_properties as u64);
+    let most = (len.saturating_sub(header.n_bytes) + 1) / (2 * n_properties as u64);
     if vertex.count > most {
         let expected = format!("at most {most} vertices (by the size of the file)");
         return Err(Error::new(path, "header", expected, vertex.count.to_string()));

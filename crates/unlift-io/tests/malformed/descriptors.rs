@@ -156,3 +156,15 @@ fn descriptors_need_a_database_or_a_model_that_fit() {
         "project/database.db: expected a COLMAP model, whose tracks lead to a database, found npy points"
     );
 }
+
+/// No rows of any length fill no bytes: the dimension alone must not ask for memory, here 17 TB.
+#[test]
+fn a_dimension_without_rows_takes_no_memory() {
+    let dir = tempfile::tempdir().unwrap();
+    let header = patched(fixture("project/descriptors.bin")[..24].to_vec(), 8, &[0; 8]);
+    let path = dir.path().join("d");
+    fs::write(&path, patched(header, 16, &[255, 255, 255, 255, 3])).unwrap();
+    let input = read::Input { ids: (0..1000).collect(), ..read::Input::default() };
+    let error = read::descriptors(&path, &input).unwrap_err();
+    assert_eq!(shown(dir.path(), &error), "d: point 0: expected a descriptor, found none among 0");
+}

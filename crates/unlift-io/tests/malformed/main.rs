@@ -117,3 +117,47 @@ fn a_file_that_may_not_be_read_is_refused() {
         "a.csv: expected a readable file, found no permission to read"
     );
 }
+
+/// A pipe that nobody writes to, and a device that never ends: refused before they are opened.
+#[cfg(unix)]
+#[test]
+fn what_is_no_regular_file_is_refused() {
+    use std::os::unix::fs::symlink;
+    let dir = tempfile::tempdir().unwrap();
+    let refused = ": expected a file, found a pipe, a socket or a device";
+    let names = ["a.csv", "a.xyz", "a.txt", "a.ply", "a.npy", "points3D.bin", "points3D.txt"];
+    for name in names {
+        let link = dir.path().join(name);
+        symlink("/dev/zero", &link).unwrap();
+        let error = read::open(&link).unwrap_err();
+        assert_eq!(shown(dir.path(), &error), format!("{name}{refused}"));
+    }
+    let map = read::open(&fixtures().join("cloud.ply")).unwrap();
+    let place = |name: &str| dir.path().join(name);
+    let error = read::descriptors(&place("a.npy"), &map).unwrap_err();
+    assert_eq!(shown(dir.path(), &error), format!("a.npy{refused}"));
+    symlink("/dev/zero", place("a.parquet")).unwrap();
+    let error = unlift_io::stage::peek(&place("a.parquet")).unwrap_err();
+    assert_eq!(shown(dir.path(), &error), format!("a.parquet{refused}"));
+
+    let pipe = place("pipe.ply");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+    if !made.is_ok_and(|status| status.success()) {
+        eprintln!("skipped: there is no mkfifo here");
+        return;
+    }
+    let line = format!("pipe.ply{refused}");
+    assert_eq!(shown(dir.path(), &read::open(&pipe).unwrap_err()), line);
+    assert_eq!(shown(dir.path(), &read::descriptors(&pipe, &map).unwrap_err()), line);
+    assert_eq!(shown(dir.path(), &unlift_io::stage::peek(&pipe).unwrap_err()), line);
+}
+
+/// A file of one line: refused after 16 MiB of it, not after all of it.
+#[test]
+fn a_line_without_end_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.csv");
+    fs::write(&path, vec![b'1'; (16 << 20) + 1]).unwrap();
+    let line = "a.csv:1: expected a line of at most 16 MiB, found a longer one";
+    assert_eq!(shown(dir.path(), &read::open(&path).unwrap_err()), line);
+}
