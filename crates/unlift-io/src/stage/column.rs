@@ -149,18 +149,20 @@ impl<'a> Batch<'a> {
     ) -> Result<Vec<Option<u32>>, Error> {
         let column = self.column(name);
         if column.data_type().is_floating() {
-            let values = floats(column).into_iter().enumerate();
-            let whole = values.map(|(row, x)| match column.is_valid(row) && !x.is_nan() {
-                false => Ok(None),
-                true if x >= 0.0 && x < below as f64 && x.trunc() == x => Ok(Some(x as u32)),
-                true => Err(self.wrong(name, row, whole_below(below), x.to_string())),
+            let values = floats(column);
+            let whole = (0..self.len()).map(|row| (row, values(row))).map(|(row, x)| {
+                match column.is_valid(row) && !x.is_nan() {
+                    false => Ok(None),
+                    true if x >= 0.0 && x < below as f64 && x.trunc() == x => Ok(Some(x as u32)),
+                    true => Err(self.wrong(name, row, whole_below(below), x.to_string())),
+                }
             });
             return whole.collect();
         }
-        let values = integers(column).into_iter().enumerate();
-        let checked = values.map(|(row, x)| match column.is_valid(row) {
+        let values = integers(column);
+        let checked = (0..self.len()).map(|row| match column.is_valid(row) {
             false => Ok(None),
-            true => self.in_range(name, row, x, below).map(Some),
+            true => self.in_range(name, row, values(row), below).map(Some),
         });
         checked.collect()
     }
@@ -183,13 +185,10 @@ impl<'a> Batch<'a> {
         let lists = self.lists(name)?;
         let values = integers(&lists.values);
         for row in 0..self.len() {
-            let list = &values[lists.range(row)];
-            if list.len() as u64 > most {
-                let expected = format!("at most {most} values");
-                return Err(self.wrong(name, row, expected, list.len().to_string()));
-            }
-            for &x in list {
-                to.push(self.in_range(name, row, x, below)?);
+            let range = lists.range(row);
+            self.at_most(name, row, range.len(), most)?;
+            for at in range {
+                to.push(self.in_range(name, row, values(at), below)?);
             }
             offsets.push(to.len() as u64);
         }
@@ -197,23 +196,33 @@ impl<'a> Batch<'a> {
     }
 
     /// Lists of finite floats: values appended to `to`, and returned the length of each list. Null is an empty list.
-    pub(super) fn float_lists(&self, name: &str, to: &mut Vec<f32>) -> Result<Vec<usize>, Error> {
+    /// Lists longer than `most` are refused before they are copied.
+    pub(super) fn float_lists(
+        &self,
+        name: &str,
+        most: u64,
+        to: &mut Vec<f32>,
+    ) -> Result<Vec<usize>, Error> {
         let lists = self.lists(name)?;
-        let values = match lists.values.data_type().is_floating() {
+        let values: Values<'_, f64> = match lists.values.data_type().is_floating() {
             true => floats(&lists.values),
-            false => integers(&lists.values).into_iter().map(|x| x as f64).collect(),
+            false => {
+                let values = integers(&lists.values);
+                Box::new(move |at| values(at) as f64)
+            }
         };
         let mut lengths = Vec::with_capacity(self.len());
         for row in 0..self.len() {
-            let list = &values[lists.range(row)];
-            for &x in list {
+            let range = lists.range(row);
+            self.at_most(name, row, range.len(), most)?;
+            lengths.push(range.len());
+            for x in range.map(&values) {
                 if !(x as f32).is_finite() {
                     let expected = "finite numbers in the range of f32";
                     return Err(self.wrong(name, row, expected, x.to_string()));
                 }
                 to.push(x as f32);
             }
-            lengths.push(list.len());
         }
         Ok(lengths)
     }
@@ -227,12 +236,14 @@ impl<'a> Batch<'a> {
     fn widened(&self, name: &str) -> Result<Vec<f64>, Error> {
         let column = self.column(name);
         if column.data_type().is_floating() {
-            return Ok(floats(column));
+            return Ok((0..self.len()).map(floats(column)).collect());
         }
-        let values = integers(column).into_iter().enumerate();
-        let exact = values.map(|(row, x)| match x as f64 as i128 == x {
-            true => Ok(x as f64),
-            false => Err(self.wrong(name, row, "a number that a double holds", x.to_string())),
+        let values = integers(column);
+        let exact = (0..self.len()).map(|row| (row, values(row))).map(|(row, x)| {
+            match x as f64 as i128 == x {
+                true => Ok(x as f64),
+                false => Err(self.wrong(name, row, "a number that a double holds", x.to_string())),
+            }
         });
         exact.collect()
     }
@@ -256,6 +267,13 @@ impl<'a> Batch<'a> {
             return Ok(x as u32);
         }
         Err(self.wrong(name, row, whole_below(below), x.to_string()))
+    }
+
+    fn at_most(&self, name: &str, row: usize, length: usize, most: u64) -> Result<(), Error> {
+        if length as u64 <= most {
+            return Ok(());
+        }
+        Err(self.wrong(name, row, format!("at most {most} values"), length.to_string()))
     }
 
     fn lists(&self, name: &str) -> Result<Lists, Error> {
@@ -299,17 +317,21 @@ fn whole_below(below: u64) -> String {
     format!("a whole number below {below}")
 }
 
+/// Values by their place in an array: widened as they are asked for, since all of them would take
+/// sixteen times the memory of bytes.
+type Values<'a, T> = Box<dyn Fn(usize) -> T + 'a>;
+
 /// The values of an array of integers; what stands at nulls has no meaning.
-fn integers(array: &ArrayRef) -> Vec<i128> {
+fn integers(array: &ArrayRef) -> Values<'_, i128> {
     macro_rules! widened {
         ($($variant:ident => $of:ty),*) => {
             match array.data_type() {
                 $(DataType::$variant => {
                     let values = array.as_primitive::<$of>().values();
-                    values.iter().map(|&x| i128::from(x)).collect()
+                    Box::new(move |at| i128::from(values[at]))
                 })*
                 // Nothing but nulls.
-                DataType::Null => vec![0; array.len()],
+                DataType::Null => Box::new(|_| 0),
                 other => unreachable!("{other} was checked to be integers"),
             }
         };
@@ -321,13 +343,13 @@ fn integers(array: &ArrayRef) -> Vec<i128> {
 }
 
 /// The values of an array of floats; what stands at nulls has no meaning.
-fn floats(array: &ArrayRef) -> Vec<f64> {
+fn floats(array: &ArrayRef) -> Values<'_, f64> {
     macro_rules! widened {
         ($($variant:ident => $of:ty),*) => {
             match array.data_type() {
                 $(DataType::$variant => {
                     let values = array.as_primitive::<$of>().values();
-                    values.iter().map(|&x| f64::from(x)).collect()
+                    Box::new(move |at| f64::from(values[at]))
                 })*
                 other => unreachable!("{other} was checked to be floats"),
             }

@@ -1,9 +1,11 @@
 //! A Parquet file: opened, checked, and decoded batch by batch.
 
+use super::footer;
 use super::header::KEY;
+use super::pages;
 use crate::Error;
 use crate::guard::without_panic;
-use crate::input;
+use crate::input::{self, Budget};
 use arrow_array::RecordBatch;
 use arrow_schema::SchemaRef;
 use parquet::arrow::ProjectionMask;
@@ -29,6 +31,7 @@ const ROWS_PER_BYTE: u64 = 1000;
 pub(super) struct ParquetFile<'a> {
     path: &'a Path,
     file: File,
+    n_bytes: u64,
     parquet: ArrowReaderMetadata,
     n_rows: u64,
 }
@@ -38,20 +41,29 @@ impl<'a> ParquetFile<'a> {
     pub(super) fn open(path: &'a Path) -> Result<Self, Error> {
         let (mut file, n_bytes) = input::open(path)?;
         check_magic(path, &mut file, n_bytes)?;
+        footer::check(path, &mut file, n_bytes)?;
         // The Arrow schema that Arrow writers embed is left aside: the Parquet schema says all that
         // counts, and then large, fixed-size and dictionary columns need no code of their own.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
         let parquet = guarded(path, || ArrowReaderMetadata::load(&file, options))?;
         let footer = parquet.metadata().file_metadata();
         let most = (i32::MAX as u64).min(n_bytes.saturating_mul(ROWS_PER_BYTE));
+        let groups = parquet.metadata().row_groups().iter().map(|group| group.num_rows());
+        // Each is checked: negative ones could make the right sum.
+        let in_groups = groups.fold(Some(0_u64), |sum, n| sum?.checked_add(u64::try_from(n).ok()?));
         let n_rows = match u64::try_from(footer.num_rows()) {
-            Ok(n_rows) if n_rows <= most => n_rows,
+            Ok(n_rows) if n_rows <= most && in_groups == Some(n_rows) => n_rows,
+            Ok(n_rows) if n_rows <= most => {
+                let expected = format!("row groups of {n_rows} rows, as its footer says");
+                let found = in_groups.map_or("others".to_owned(), |n| n.to_string());
+                return Err(Error::new(path, "", expected, found));
+            }
             _ => {
                 let expected = format!("at most {most} rows in {} bytes", n_bytes);
                 return Err(Error::new(path, "", expected, footer.num_rows().to_string()));
             }
         };
-        Ok(Self { path, file, parquet, n_rows })
+        Ok(Self { path, file, n_bytes, parquet, n_rows })
     }
 
     /// Number of rows, as the footer declares it.
@@ -88,12 +100,20 @@ impl<'a> ParquetFile<'a> {
             self.check_codec(self.schema().field(root).name())?;
         }
         let file = self.file.try_clone();
-        let file = file.map_err(|source| Error::read(self.path, source))?;
+        let mut file = file.map_err(|source| Error::read(self.path, source))?;
+        let budget = Budget::new(self.path, self.n_bytes);
+        let metadata = self.parquet.metadata();
+        let longest = pages::check(self.path, &mut file, self.n_bytes, metadata, &roots, &budget)?;
+        // Many rows may have the same long text, which a file stores once.
+        let batch_rows = budget
+            .most()
+            .checked_div(longest)
+            .map_or(BATCH_ROWS, |rows| rows.clamp(1, BATCH_ROWS as u64) as usize);
         let reader = guarded(self.path, || {
             let builder =
                 ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.parquet.clone());
             let mask = ProjectionMask::roots(builder.parquet_schema(), roots);
-            builder.with_projection(mask).with_batch_size(BATCH_ROWS).build()
+            builder.with_projection(mask).with_batch_size(batch_rows).build()
         })?;
         Ok(Batches { path: self.path, reader, decoded: 0, n_rows: self.n_rows })
     }

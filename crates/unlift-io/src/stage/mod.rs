@@ -10,15 +10,18 @@
 
 mod column;
 mod file;
+mod footer;
 mod header;
 mod image_writer;
 mod images;
 mod neighborhoods;
 mod order;
+mod pages;
 mod peek;
 mod recovered;
 mod released;
 mod table;
+mod thrift;
 mod truth;
 mod write;
 

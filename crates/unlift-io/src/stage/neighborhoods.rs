@@ -193,7 +193,8 @@ impl Lists {
                     n_unscored += batch.len();
                     return Ok(());
                 }
-                let lengths = batch.float_lists("scores", &mut scores)?;
+                // Compared with the lists below: those are short.
+                let lengths = batch.float_lists("scores", u64::MAX, &mut scores)?;
                 for (row, (length, w)) in
                     lengths.iter().zip(offsets[first..].windows(2)).enumerate()
                 {

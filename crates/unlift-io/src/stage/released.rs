@@ -368,7 +368,7 @@ impl DescriptorRows {
             (Self::U8(values), lengths)
         } else {
             let mut values = Vec::new();
-            let lengths: Vec<usize> = batch.float_lists(name, &mut values)?;
+            let lengths: Vec<usize> = batch.float_lists(name, MOST_VALUES, &mut values)?;
             (Self::F32(values), lengths)
         };
         for (row, &length) in lengths.iter().enumerate() {

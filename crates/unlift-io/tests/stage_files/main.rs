@@ -2,6 +2,7 @@
 
 mod damaged;
 mod document;
+mod hostile;
 mod lenient;
 mod malformed;
 mod malformed_lists;

@@ -1,0 +1,125 @@
+//! The footer of a Parquet file, looked through before the `parquet` crate builds a schema of it: that
+//! descends as deep, and asks for as much memory, as the footer says.
+
+use super::thrift::{Field, Kind, Walk, Wrong};
+use crate::Error;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::Path;
+
+/// Columns in columns at most: a list of numbers has three levels.
+const DEEPEST: usize = 32;
+/// Elements of a schema at most: two for a column, four for one of lists.
+const MOST_ELEMENTS: u64 = 1 << 16;
+/// As many row groups as Parquet can number.
+const MOST_GROUPS: u64 = 1 << 15;
+/// What ends the file: the length of the footer, and `PAR1`.
+const TAIL: u64 = 8;
+
+/// Checks the footer of the Parquet file `path` of `n_bytes` bytes.
+///
+/// # Errors
+/// When it does not lie in the file, is malformed, or its schema is deeper or larger than any table's.
+pub(super) fn check(path: &Path, file: &mut File, n_bytes: u64) -> Result<(), Error> {
+    let failed = |source| Error::read(path, source);
+    let mut tail = [0; TAIL as usize];
+    file.seek(SeekFrom::End(-(TAIL as i64))).map_err(failed)?;
+    file.read_exact(&mut tail).map_err(failed)?;
+    let length = u64::from(u32::from_le_bytes([tail[0], tail[1], tail[2], tail[3]]));
+    let most = n_bytes.saturating_sub(TAIL);
+    if length > most {
+        let expected = format!("at most {most} bytes, by the size of the file");
+        return Err(Error::new(path, "footer", expected, length.to_string()));
+    }
+    file.seek(SeekFrom::Start(most - length)).map_err(failed)?;
+    let mut footer = vec![0; length as usize];
+    file.read_exact(&mut footer).map_err(failed)?;
+    let wrong = |wrong: Wrong| Error::new(path, "footer", "metadata of Parquet", wrong.found());
+    walk(&footer).map_err(wrong)
+}
+
+/// Walks `FileMetaData` of the Parquet format.
+fn walk(footer: &[u8]) -> Result<(), Wrong> {
+    Walk::new(footer).fields(|walk, field| match field.id {
+        2 => {
+            let n = structs(walk, field, MOST_ELEMENTS, "elements of the schema")?;
+            schema(walk, n)?;
+            Ok(true)
+        }
+        4 => {
+            let n = structs(walk, field, MOST_GROUPS, "row groups")?;
+            for _ in 0..n {
+                walk.fields(|walk, field| match field.id {
+                    1 => {
+                        let n = structs(walk, field, MOST_ELEMENTS, "columns of a row group")?;
+                        (0..n).try_for_each(|_| column(walk))?;
+                        Ok(true)
+                    }
+                    _ => Ok(false),
+                })?;
+            }
+            Ok(true)
+        }
+        _ => Ok(false),
+    })
+}
+
+/// Begins a list of at most `most` structs; how many there are.
+fn structs(walk: &mut Walk<'_>, field: Field, most: u64, what: &str) -> Result<u64, Wrong> {
+    field.expect(Kind::List)?;
+    let (kind, n) = walk.list()?;
+    if n > most {
+        return Err(Wrong::Content(format!("{n} {what}, more than {most}")));
+    }
+    if n > 0 && kind != Kind::Struct {
+        return Err(Wrong::Content(format!("{what} of type {kind:?}")));
+    }
+    Ok(n)
+}
+
+/// A column of a row group has a few dozen bytes: what has fewer stands for the memory of many.
+fn column(walk: &mut Walk<'_>) -> Result<(), Wrong> {
+    const LEAST: usize = 16;
+    let before = walk.remaining();
+    walk.fields(|_, _| Ok(false))?;
+    if before - walk.remaining() < LEAST {
+        return Err(Wrong::Content("a column of a row group without content".to_owned()));
+    }
+    Ok(())
+}
+
+/// The schema is a tree of `n` elements, each before those in it.
+fn schema(walk: &mut Walk<'_>, n: u64) -> Result<(), Wrong> {
+    // How many elements are still to come in each of those that the next one lies in.
+    let mut open: Vec<u64> = Vec::new();
+    for at in 0..n {
+        let mut children = 0;
+        walk.fields(|walk, field| {
+            if field.id != 5 {
+                return Ok(false);
+            }
+            field.expect(Kind::Integer)?;
+            children = walk.integer()?;
+            Ok(true)
+        })?;
+        if let Some(left) = open.last_mut() {
+            *left -= 1;
+        }
+        let left = n - at - 1;
+        match u64::try_from(children) {
+            Ok(0) => {}
+            Ok(children) if children <= left => open.push(children),
+            _ => {
+                let found = format!("an element of {children} where {left} follow in the schema");
+                return Err(Wrong::Content(found));
+            }
+        }
+        if open.len() > DEEPEST {
+            return Err(Wrong::Content(format!("columns nested more than {DEEPEST} deep")));
+        }
+        while open.last() == Some(&0) {
+            open.pop();
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,214 @@
+//! What the columns of a Parquet file declare that they hold, checked before they are decoded: counts
+//! and sizes in the footer and before each page, against the file and the memory that it may take.
+
+use super::thrift::{Kind, Walk, Wrong};
+use crate::Error;
+use crate::input::Budget;
+use parquet::basic::Type;
+use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData};
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::Path;
+
+/// Bytes of a repetition and a definition level in memory.
+const LEVELS: u64 = 4;
+/// How texts may be encoded: as they are, or by number. What else there is for them declares its counts
+/// within compressed data.
+const OF_TEXT: [i64; 3] = [0, 2, 8];
+
+/// Checks the columns at `roots` of `file`, of `n_bytes` bytes; the most bytes that one text of theirs can have.
+///
+/// # Errors
+/// When they do not lie in the file, declare more values or bytes than the budget allows, or their
+/// pages are not what the footer says.
+pub(super) fn check(
+    path: &Path,
+    file: &mut File,
+    n_bytes: u64,
+    metadata: &ParquetMetaData,
+    roots: &[usize],
+    budget: &Budget,
+) -> Result<u64, Error> {
+    let schema = metadata.file_metadata().schema_descr();
+    let mut longest = 0;
+    for leaf in 0..schema.num_columns() {
+        let root = schema.get_column_root_idx(leaf);
+        if !roots.contains(&root) {
+            continue;
+        }
+        let place = format!("column {}", schema.get_column_root(leaf).name());
+        let mut column = Column { path, place, budget, n_values: 0, n_bytes: 0, longest: 0 };
+        for group in metadata.row_groups() {
+            // The crate has checked that a row group has every column of the schema.
+            if let Some(chunk) = group.columns().get(leaf) {
+                column.chunk(file, n_bytes, chunk)?;
+            }
+        }
+        if schema.column(leaf).physical_type() == Type::BYTE_ARRAY {
+            longest = longest.max(column.longest);
+        }
+    }
+    Ok(longest)
+}
+
+/// A column, through all row groups.
+struct Column<'a> {
+    path: &'a Path,
+    place: String,
+    budget: &'a Budget,
+    n_values: u64,
+    /// Of its pages, as they are before compression.
+    n_bytes: u64,
+    /// Bytes of its largest page.
+    longest: u64,
+}
+
+/// What stands before a page.
+#[derive(Default)]
+struct Header {
+    is_dictionary: bool,
+    /// Bytes before compression.
+    whole: i64,
+    /// Bytes in the file.
+    stored: i64,
+    n_values: i64,
+    encoding: i64,
+}
+
+impl Column<'_> {
+    fn wrong(&self, expected: impl Into<String>, found: impl ToString) -> Error {
+        Error::new(self.path, self.place.clone(), expected, found.to_string())
+    }
+
+    fn chunk(
+        &mut self,
+        file: &mut File,
+        n_bytes: u64,
+        chunk: &ColumnChunkMetaData,
+    ) -> Result<(), Error> {
+        let descriptor = chunk.column_descr();
+        let width = match descriptor.physical_type() {
+            Type::BOOLEAN => 1,
+            Type::INT32 | Type::FLOAT | Type::BYTE_ARRAY => 4,
+            Type::INT64 | Type::DOUBLE => 8,
+            Type::INT96 => 12,
+            Type::FIXED_LEN_BYTE_ARRAY => u64::try_from(descriptor.type_length()).unwrap_or(0),
+        };
+        let Ok(n_values) = u64::try_from(chunk.num_values()) else {
+            return Err(self.wrong("a number of values", chunk.num_values()));
+        };
+        self.n_values = self.n_values.saturating_add(n_values);
+        let memory = self.n_values.saturating_mul(width + LEVELS);
+        self.budget.admit(self.place.as_str(), memory)?;
+
+        let start = chunk.dictionary_page_offset().unwrap_or(chunk.data_page_offset());
+        let (Ok(mut at), Ok(length)) =
+            (u64::try_from(start), u64::try_from(chunk.compressed_size()))
+        else {
+            let found = format!("{} bytes from byte {start}", chunk.compressed_size());
+            return Err(self.wrong("a part of the file", found));
+        };
+        let end = at.saturating_add(length);
+        if end > n_bytes {
+            let expected = format!("values within the {n_bytes} bytes of the file");
+            return Err(self.wrong(expected, format!("{length} bytes from byte {at}")));
+        }
+        let mut left = n_values;
+        // A page of nothing but its header takes a few bytes, so that there is an end.
+        while at < end {
+            let (header, length) = self.header(file, at, end)?;
+            at += length;
+            let (Ok(whole), Ok(stored), Ok(n)) = (
+                u64::try_from(header.whole),
+                u64::try_from(header.stored),
+                u64::try_from(header.n_values),
+            ) else {
+                return Err(self.wrong("pages with sizes", format!("one without at byte {at}")));
+            };
+            if stored > end - at {
+                let expected = format!("a page of at most {} bytes at byte {at}", end - at);
+                return Err(self.wrong(expected, stored));
+            }
+            self.longest = self.longest.max(whole);
+            self.n_bytes = self.n_bytes.saturating_add(whole);
+            self.budget.admit(self.place.as_str(), self.n_bytes)?;
+            // Every value of a dictionary has a byte of its own.
+            let most = if header.is_dictionary { whole } else { left };
+            if n > most {
+                let expected =
+                    format!("at most {most} values in the page that ends at byte {}", at + stored);
+                return Err(self.wrong(expected, n));
+            }
+            if !header.is_dictionary {
+                left -= n;
+            }
+            if descriptor.physical_type() == Type::BYTE_ARRAY && !OF_TEXT.contains(&header.encoding)
+            {
+                let found = format!("encoding {} of Parquet", header.encoding);
+                return Err(self.wrong("text as it is, or by a dictionary", found));
+            }
+            at += stored;
+        }
+        Ok(())
+    }
+
+    /// The header at byte `at` of a column that ends at `end`, and how long it is.
+    fn header(&self, file: &mut File, at: u64, end: u64) -> Result<(Header, u64), Error> {
+        // Most are shorter; some repeat the least and the largest value.
+        let mut length = 256;
+        loop {
+            let most = end - at;
+            let mut bytes = vec![0; most.min(length) as usize];
+            let read = file.seek(SeekFrom::Start(at)).and_then(|_| file.read_exact(&mut bytes));
+            read.map_err(|source| Error::read(self.path, source))?;
+            let mut walk = Walk::new(&bytes);
+            match page(&mut walk) {
+                Ok(header) => return Ok((header, (bytes.len() - walk.remaining()) as u64)),
+                Err(Wrong::End) if length < most => length *= 16,
+                Err(wrong) => {
+                    let expected = format!("the header of a page at byte {at}");
+                    return Err(self.wrong(expected, wrong.found()));
+                }
+            }
+        }
+    }
+}
+
+/// Walks `PageHeader` of the Parquet format.
+fn page(walk: &mut Walk<'_>) -> Result<Header, Wrong> {
+    let mut header = Header { whole: -1, stored: -1, ..Header::default() };
+    walk.fields(|walk, field| {
+        match field.id {
+            1..=3 => {
+                field.expect(Kind::Integer)?;
+                let value = walk.integer()?;
+                match field.id {
+                    1 => {}
+                    2 => header.whole = value,
+                    _ => header.stored = value,
+                }
+            }
+            // Data, a dictionary, data of the second version.
+            5 | 7 | 8 => {
+                field.expect(Kind::Struct)?;
+                header.is_dictionary = field.id == 7;
+                let encoding = if field.id == 8 { 4 } else { 2 };
+                walk.fields(|walk, field| {
+                    if field.id != 1 && field.id != encoding {
+                        return Ok(false);
+                    }
+                    field.expect(Kind::Integer)?;
+                    let value = walk.integer()?;
+                    match field.id {
+                        1 => header.n_values = value,
+                        _ => header.encoding = value,
+                    }
+                    Ok(true)
+                })?;
+            }
+            _ => return Ok(false),
+        }
+        Ok(true)
+    })?;
+    Ok(header)
+}
