@@ -4,7 +4,7 @@ use std::io::Cursor;
 use std::path::Path;
 
 use ::image::metadata::Orientation;
-use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use unlift::Error;
 
 use crate::color::ColorImage;
@@ -14,6 +14,16 @@ use crate::image::GrayImage;
 const KINDS: &str = "a JPEG, PNG or WebP image";
 /// Pixels of a photo at most: 16384 x 16384. A header can claim any size in a few bytes.
 const MOST_PIXELS: u64 = 1 << 28;
+/// Pixels per byte of the file at most: what is beyond was cut off, or is one color all over, and no photo.
+/// In a JPEG every block of 8 x 8 pixels takes a bit; decoders fill in those that are not there.
+const JPEG_PIXELS_PER_BYTE: u64 = 512;
+/// The compression of PNG makes at most 1032 bytes of one. That of WebP knows no bound, but photos take a
+/// hundred times as much.
+const OTHER_PIXELS_PER_BYTE: u64 = 1032;
+/// A photo may have as many pixels, 4096 x 4096, whatever its bytes: black frames exist.
+const FREE_PIXELS: u64 = 1 << 24;
+/// Bytes that a decoder may take for a pixel: four channels of 16 bits.
+const PIXEL_BYTES: u64 = 8;
 
 /// Reads the photo at `path`, turned upright as its EXIF orientation says, as gray values.
 ///
@@ -21,8 +31,8 @@ const MOST_PIXELS: u64 = 1 << 28;
 /// photo are in pixels of the upright one.
 ///
 /// # Errors
-/// One line with the path: no such file, neither JPEG nor PNG nor WebP, cut off, or larger than
-/// 2^28 pixels.
+/// One line with the path: no such file, neither JPEG nor PNG nor WebP, cut off, larger than
+/// 2^28 pixels, or larger than so few bytes can describe.
 pub fn read(path: &Path) -> Result<GrayImage, Error> {
     let (bytes, name) = bytes_of(path)?;
     decode(&bytes, &name)
@@ -53,7 +63,7 @@ pub fn read_color_as_stored(path: &Path) -> Result<ColorImage, Error> {
 /// The bytes of a file, and how it is called in errors.
 pub(crate) fn bytes_of(path: &Path) -> Result<(Vec<u8>, String), Error> {
     let name = path.display().to_string();
-    let bytes = std::fs::read(path)
+    let bytes = unlift_nn::file::bytes(path)
         .map_err(|error| Error::new(name.escape_debug().to_string(), KINDS, error.to_string()))?;
     Ok((bytes, name))
 }
@@ -92,15 +102,31 @@ fn decoded(bytes: &[u8], name: &str) -> Result<(DynamicImage, Orientation), Erro
     }
     let whole = format!("a whole {kind} image");
     let broken = |error: ::image::ImageError| wrong(&whole, error.to_string());
-    let mut decoder =
-        ImageReader::with_format(Cursor::new(bytes), format).into_decoder().map_err(broken)?;
+    let most = most_pixels(format, bytes.len() as u64);
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+    let mut limits = Limits::no_limits();
+    limits.max_alloc = Some(most * PIXEL_BYTES);
+    reader.limits(limits);
+    let mut decoder = reader.into_decoder().map_err(broken)?;
     let (width, height) = decoder.dimensions();
-    if u64::from(width) * u64::from(height) > MOST_PIXELS {
-        let found = format!("{width} x {height}");
-        return Err(wrong("at most 268435456 pixels", found));
+    let found = u64::from(width) * u64::from(height);
+    if found > most {
+        let of =
+            if found > MOST_PIXELS { String::new() } else { format!(" in {} bytes", bytes.len()) };
+        let most = if found > MOST_PIXELS { MOST_PIXELS } else { most };
+        return Err(wrong(&format!("at most {most} pixels{of}"), format!("{width} x {height}")));
     }
     let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
     Ok((DynamicImage::from_decoder(decoder).map_err(broken)?, orientation))
+}
+
+/// Pixels that a photo of `n_bytes` bytes can have.
+fn most_pixels(format: ImageFormat, n_bytes: u64) -> u64 {
+    let per_byte = match format {
+        ImageFormat::Jpeg => JPEG_PIXELS_PER_BYTE,
+        _ => OTHER_PIXELS_PER_BYTE,
+    };
+    n_bytes.saturating_mul(per_byte).clamp(FREE_PIXELS, MOST_PIXELS)
 }
 
 /// Gray values as COLMAP makes them: rounded to bytes, weights of Rec. 709, transparency ignored.

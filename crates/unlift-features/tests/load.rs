@@ -121,6 +121,31 @@ fn a_header_that_claims_too_much_is_refused_before_memory_is_taken() {
     );
 }
 
+/// Decoders fill in what a JPEG lacks: 2^28 gray pixels of 700 bytes, for seconds.
+#[test]
+fn a_header_that_claims_more_than_its_bytes_can_hold_is_refused() {
+    let mut jpeg = encode(&DynamicImage::from(colors(8, 8)), ImageFormat::Jpeg);
+    let frame = jpeg.windows(2).position(|pair| pair == [0xff, 0xc0]).unwrap();
+    // Height and width.
+    jpeg[frame + 5..frame + 9].copy_from_slice(&[0x40, 0, 0x40, 0]);
+    let expected =
+        format!("a: expected at most 16777216 pixels in {} bytes, found 16384 x 16384", jpeg.len());
+    assert_eq!(text(&jpeg, "a"), expected);
+    // One color all over is allowed as far as cameras go, in every format.
+    for format in [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::WebP] {
+        let black = encode(&DynamicImage::new_luma8(2048, 1024).into_rgb8().into(), format);
+        assert_eq!(decode(&black, "black").unwrap().width(), 2048);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_device_is_no_photo() {
+    let error = read(&PathBuf::from("/dev/zero")).unwrap_err().to_string();
+    let found = "expected a JPEG, PNG or WebP image, found a pipe, a socket or a device";
+    assert_eq!(error, format!("/dev/zero: {found}"));
+}
+
 #[test]
 fn files_are_read_by_content_and_missing_ones_named() {
     let folder = tempfile::tempdir().unwrap();

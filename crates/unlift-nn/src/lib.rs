@@ -19,6 +19,7 @@
 //! # Ok::<(), unlift::Error>(())
 //! ```
 
+pub mod file;
 mod folders;
 mod learned;
 mod network;

@@ -65,7 +65,7 @@ impl Network {
     /// As [`load`](Self::load), and when the file cannot be read.
     pub fn read(path: &Path, entry: &Entry) -> Result<Self, Error> {
         let place = path.display().to_string().escape_debug().to_string();
-        let bytes = std::fs::read(path)
+        let bytes = crate::file::bytes(path)
             .map_err(|error| Error::new(place.clone(), "a model in ONNX", error.to_string()))?;
         Self::from_bytes(Cow::Owned(bytes), &place, entry)
     }
