@@ -15,7 +15,12 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     interrupt::watch();
     match args::Cli::read(std::env::args_os()) {
-        Ok(cli) => exit::finish(commands::run(cli.command)),
+        Ok(cli) => {
+            if let Some(bytes) = cli.memory_limit {
+                unlift_io::input::limit_memory(bytes);
+            }
+            exit::finish(commands::run(cli.command))
+        }
         Err(told) => exit::told(told),
     }
 }

@@ -59,6 +59,28 @@ pub fn score(text: &str) -> Result<f32, String> {
     }
 }
 
+/// Bytes: a whole number, and a unit of 1000 (kB, MB, GB) or 1024 (KiB, MiB, GiB).
+pub fn size(text: &str) -> Result<u64, String> {
+    const UNITS: [(&str, u64); 8] = [
+        ("", 1),
+        ("B", 1),
+        ("KB", 1000),
+        ("MB", 1_000_000),
+        ("GB", 1_000_000_000),
+        ("KIB", 1 << 10),
+        ("MIB", 1 << 20),
+        ("GIB", 1 << 30),
+    ];
+    let trimmed = text.trim();
+    let end = trimmed.find(|c: char| !c.is_ascii_digit()).unwrap_or(trimmed.len());
+    let (number, unit) = trimmed.split_at(end);
+    let unit = unit.trim().to_ascii_uppercase();
+    let unit = UNITS.into_iter().find(|(name, _)| *name == unit);
+    let bytes = unit.and_then(|(_, bytes)| number.parse::<u64>().ok()?.checked_mul(bytes));
+    let wrong = || format!("expected a size above 0 like 2GB or 512MiB, found {text}");
+    bytes.filter(|bytes| *bytes > 0).ok_or_else(wrong)
+}
+
 /// A scheme by its name, be it for maps or for images.
 pub fn any_scheme(text: &str) -> Result<&'static Entry, String> {
     unlift::obfuscate::scheme(text).map_err(|error| expected(&error))
@@ -225,6 +247,24 @@ pub fn distinct<T>(items: Vec<T>, same: impl Fn(&T, &T) -> bool) -> Vec<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sizes_have_units_of_1000_or_1024() {
+        let table = [
+            ("17", 17),
+            ("2GB", 2_000_000_000),
+            ("512 MiB", 512 << 20),
+            ("3kb", 3000),
+            ("1GiB", 1 << 30),
+        ];
+        for (text, bytes) in table {
+            assert_eq!(size(text), Ok(bytes), "{text}");
+        }
+        for text in ["", "0", "GB", "-1", "1.5GB", "2 TB", "99999999999GiB"] {
+            let expected = format!("expected a size above 0 like 2GB or 512MiB, found {text}");
+            assert_eq!(size(text), Err(expected));
+        }
+    }
 
     #[test]
     fn thresholds_keep_how_they_were_typed() {

@@ -20,6 +20,8 @@ use std::ffi::OsString;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
+use crate::values;
+
 pub use audit::AttackArgs;
 pub use audit_images::AuditImagesArgs;
 pub use audit_map::AuditMapArgs;
@@ -53,6 +55,9 @@ Exit codes: 0 done, 1 a gate failed, 2 usage, 3 bad input.
 Recovered points are as private as the original map."
 )]
 pub struct Cli {
+    /// Most memory that decoding one input may take [default: 64 times its size, at least 256 MiB]
+    #[arg(long, value_name = "SIZE", global = true, value_parser = values::size)]
+    pub memory_limit: Option<u64>,
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
@@ -201,6 +206,14 @@ mod tests {
         assert_eq!(filter(&["--outlier-filter"]), Some(usual));
         let strict = OutlierFilter { neighbors: 8, std_ratio: 1.5 };
         assert_eq!(filter(&["--outlier-filter=8,1.5"]), Some(strict));
+    }
+
+    #[test]
+    fn the_memory_limit_may_stand_before_or_after_the_command() {
+        let read = |line: [&str; 4]| Cli::read(line).unwrap().memory_limit;
+        assert_eq!(read(["unlift", "--memory-limit", "2GB", "schemes"]), Some(2_000_000_000));
+        assert_eq!(read(["unlift", "schemes", "--memory-limit", "512MiB"]), Some(512 << 20));
+        assert_eq!(Cli::read(["unlift", "schemes"]).unwrap().memory_limit, None);
     }
 
     #[test]
