@@ -48,9 +48,9 @@ impl<'a> ParquetFile<'a> {
         let parquet = guarded(path, || ArrowReaderMetadata::load(&file, options))?;
         let footer = parquet.metadata().file_metadata();
         let most = (i32::MAX as u64).min(n_bytes.saturating_mul(ROWS_PER_BYTE));
-        let groups = parquet.metadata().row_groups().iter().map(|group| group.num_rows());
+        let mut groups = parquet.metadata().row_groups().iter().map(|group| group.num_rows());
         // Each is checked: negative ones could make the right sum.
-        let in_groups = groups.fold(Some(0_u64), |sum, n| sum?.checked_add(u64::try_from(n).ok()?));
+        let in_groups = groups.try_fold(0_u64, |sum, n| sum.checked_add(u64::try_from(n).ok()?));
         let n_rows = match u64::try_from(footer.num_rows()) {
             Ok(n_rows) if n_rows <= most && in_groups == Some(n_rows) => n_rows,
             Ok(n_rows) if n_rows <= most => {
