@@ -201,7 +201,7 @@ def confidence_table(rows, solver):
             row = by_key[scheme, ratio]
             correct = row.get("sure_correct_percent")
             sure = row["sure_percent"]
-            cells.append("not known" if sure is None else f"{sure:.0f} / " + ("-" if correct is None else f"{correct:.1f}"))
+            cells.append("not known" if sure is None else f"{sure:.{0 if sure >= 1 or sure == 0 else 1}f} / " + ("-" if correct is None else f"{correct:.1f}"))
         yield f"| {ratio} | " + " | ".join(cells) + " |"
 
 

@@ -220,6 +220,11 @@ fn a_thinned_map_is_told() {
     let (_, stderr) = place.ends(&format!("{audit} --max-points 200"), 0);
     let note = "unlift: note: --max-points: 200 of 400 points are audited";
     assert!(stderr.contains(note), "{stderr}");
+    // Whoever reads only the page or the JSON file is told as well.
+    for file in ["audit.json", "report.html"] {
+        let written = std::fs::read_to_string(place.path("unlift-audit").join(file)).unwrap();
+        assert!(written.contains(&note["unlift: note: ".len()..]), "{file}");
+    }
     let (_, stderr) = place.ends(&format!("{audit} --max-points 400"), 0);
     assert!(!stderr.contains("--max-points"), "{stderr}");
 }

@@ -374,3 +374,25 @@ fn rows_of_an_image_are_those_of_the_results() {
     let text = document.to_json().expect("an image without keypoints has no rows");
     assert_eq!(Document::from_json(&text).expect("the same").images, document.images);
 }
+
+/// Of a flat map "at least 25 %" came back today, beside a blind guess that got 96.
+#[test]
+fn a_guess_that_gets_more_than_every_attack_is_the_verdict() {
+    let mut document = sample::document(true);
+    for row in document.results.iter_mut().filter(|row| row.scheme == "ray-voxel") {
+        row.blind_percent.values_mut().for_each(|percent| *percent = 96.0);
+    }
+    let said = verdict(&document);
+    assert!(said.contains("96 % almost all by a blind guess"), "{said}");
+}
+
+#[test]
+fn what_a_reader_must_know_stands_beside_the_verdict() {
+    let mut document = sample::document(true);
+    document.notes.push("--max-points: 200 of 400 points are audited <b>".to_owned());
+    let page = page(&document, None, true);
+    let said = "<strong>Mind:</strong> --max-points: 200 of 400 points are audited &lt;b&gt;.";
+    assert!(page.contains(said));
+    let read: Document = serde_json::from_str(&document.to_json().unwrap()).unwrap();
+    assert_eq!(read.notes, document.notes);
+}

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use unlift::audit::{NeighborsBy, Outcome, Plan, Row, Silent, run};
+use unlift::audit::{Bound, NeighborsBy, Outcome, Plan, Row, Silent, run};
 use unlift::evaluate::evaluate;
 use unlift::neighbors::{Geometric, Neighborhoods};
 use unlift::obfuscate::{SchemeOptions, obfuscate, scheme};
@@ -202,4 +202,28 @@ fn a_map_too_small_for_wrong_neighbors_loses_these_rows_alone() {
     assert!(outcome.rows.iter().all(|row| row.inlier_ratio == 1.0) && outcome.rows.len() == 2);
     let [missing] = outcome.not_audited.as_slice() else { panic!("{:?}", outcome.not_audited) };
     assert_eq!((missing.inlier_ratio, missing.oracle_noise), (Some(0.1), Some("uniform")));
+}
+
+/// On a flat map a blind guess within a meter beat every list: its break-even read "above".
+#[test]
+fn what_needs_no_neighborhoods_counts_in_break_even() {
+    let mut plan = plan(&["ray", "cp"]);
+    (plan.records_alone, plan.inlier_ratios) = (false, vec![0.5, 0.1]);
+    plan.solvers = vec![Solver::Joint];
+    let mut rows = audit(&room(600), &plan).rows;
+    for row in &mut rows {
+        (row.recovered_percent[0], row.blind_percent[0]) = (25.0, 96.0);
+    }
+    let found = unlift::audit::break_even(&plan, &rows);
+    for scheme in ["ray", "cp"] {
+        let of = |solver: &str| {
+            let mut found = found.iter();
+            found.find(|b| b.scheme == scheme && b.solver == solver).unwrap()
+        };
+        assert_eq!(
+            (of("strongest").inlier_ratio, of("strongest").bound),
+            (0.1, Bound::BelowTested)
+        );
+        assert_eq!((of("joint").inlier_ratio, of("joint").bound), (0.5, Bound::AboveTested));
+    }
 }

@@ -158,3 +158,14 @@ fn each_wrong_part_is_named() {
     );
     assert_eq!(message("ppl:joint:x<=20"), "threshold: expected a number above 0, found x");
 }
+
+/// `olc` by `similarity` gave 58.6 % where the records alone gave 66.6: a gate of 60 held.
+#[test]
+fn what_needs_no_neighborhoods_counts_unless_an_attack_is_named() {
+    let candidate = Candidate { baseline_percent: 66.6, ..row("olc", 0.5, 58.6) };
+    let worst = |text: &str| Gate::parse(text).unwrap().worst([candidate]);
+    assert_eq!(worst("olc:0.10<=60"), Some(66.6));
+    assert_eq!(worst("all@0.5:0.10<=60"), Some(66.6));
+    assert_eq!(worst("olc:joint:0.10<=60"), Some(58.6));
+    assert_eq!(worst("olc:oracle:0.10<=60"), Some(58.6));
+}

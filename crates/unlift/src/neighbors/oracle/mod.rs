@@ -47,7 +47,11 @@ impl TrueNeighbors {
         let n_slots = secret.n_slots();
         let n_records = n_slots / slots_per_record;
         if k == 0 || n_records < k + 1 {
-            let expected = format!("between 1 and {} (other records)", n_records.saturating_sub(1));
+            let others = n_records.saturating_sub(1);
+            let expected = match others {
+                0 => "more than one record".to_owned(),
+                _ => format!("between 1 and {others} (other records)"),
+            };
             return Err(Error::new("k", expected, k.to_string()));
         }
         let mut records = vec![RecordId(0); n_slots * k];
