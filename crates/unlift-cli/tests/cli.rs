@@ -286,7 +286,9 @@ fn every_noise_model_has_rows_and_break_even_ratios_of_its_own() {
         }
     }
     let points = audit["break_even"].as_array().expect("ratios");
-    let noises: Vec<&str> = points.iter().filter_map(|p| p["oracle_noise"].as_str()).collect();
+    // A blind guess may be the strongest, with a ratio of its own.
+    let by_joint = points.iter().filter(|point| point["solver"] == "joint");
+    let noises: Vec<&str> = by_joint.filter_map(|p| p["oracle_noise"].as_str()).collect();
     assert_eq!(noises, ["uniform", "near", "clustered", "uniform", "near", "clustered"]);
     let page = std::fs::read_to_string(place.path().join("audit/report.html")).expect("a report");
     assert!(page.contains("oracle (clustered), 30 % right"));

@@ -83,7 +83,7 @@ const INVERTER_SIFT: Entry = Entry {
     purpose: "pictures from keypoints or points of a map and their SIFT descriptors",
     licence: "MIT OR Apache-2.0",
     owner: "https://github.com/unlift/unlift",
-    sha256: Some("0bd0b3079a3a294484bbd1d501fd1bd27bba43df800c7a6b63df158a26141c94"),
+    sha256: Some("a7c0124cf6b1b5c90323086b544d539bd4030135d66ddc5f344d437a006428f5"),
     inputs: &[Port { name: "features", shape: &[Some(1), Some(131), None, None] }],
     outputs: &[Port { name: "picture", shape: &[Some(1), Some(3), None, None] }],
     carried: Some(include_bytes!("../../../models/inverter-sift/inverter-sift.onnx")),

@@ -72,7 +72,8 @@ pub fn break_even<const D: usize>(plan: &Plan<D>, rows: &[Row]) -> Vec<BreakEven
                 }
             };
             let all: Vec<&Row> = rows.iter().filter(of).collect();
-            if solvers.len() > 1 || all.iter().any(|row| by_any(row) > by_rows(row)) {
+            let differs = crossing(&curve(&all, &by_any)) != crossing(&curve(&all, &by_rows));
+            if solvers.len() > 1 || differs {
                 push(STRONGEST, &all, &by_any);
             }
             for &solver in &solvers {

@@ -1,6 +1,7 @@
 //! From originals and a scheme to what is released, and the secret: what every scheme needs to be free of truth.
 
 use super::scheme::Scheme;
+use super::size;
 use crate::geometry::frame::rounded_origin;
 use crate::geometry::vector::sub;
 use crate::released::Released;
@@ -12,7 +13,7 @@ use crate::{Descriptors, Error};
 /// row per original. All chance comes from `key`: [`Key::fresh`] for a map that is released.
 ///
 /// # Errors
-/// When rows disagree, or the scheme cannot hide these points.
+/// When rows disagree, the scheme cannot hide these points, or their numbers are too small, too large or too coarse.
 pub fn obfuscate<const D: usize>(
     scheme: &dyn Scheme<D>,
     original: &Original<D>,
@@ -26,6 +27,7 @@ pub fn obfuscate<const D: usize>(
         let expected = format!("{} rows, one per point", points.len());
         return Err(Error::new("descriptors", expected, descriptors.len().to_string()));
     }
+    size::check(points.positions())?;
     // The middle of known bounds tells nothing about the points.
     let bounds = original.bounds();
     let origin = match &bounds {

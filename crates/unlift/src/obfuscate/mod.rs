@@ -6,6 +6,7 @@
 mod hide;
 mod pairs;
 mod scheme;
+mod size;
 
 pub mod cp;
 pub mod cp2d;

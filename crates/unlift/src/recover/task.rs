@@ -1,6 +1,6 @@
 //! One map to be recovered: records and lists in the form that solvers read, with what was learned of them.
 
-use std::ops::{Range, RangeInclusive};
+use std::ops::Range;
 
 use super::baselines::density::published;
 use super::baselines::ransac::Ransac;
@@ -295,7 +295,6 @@ fn listed<'a, const D: usize>(
         Some(chance) => Family::with_chance(released, chance)?,
         None => Family::learn(released, lists),
     };
-    check_extent(family.extent())?;
     // Joint recovery also asks who lists whom, from the first pass on.
     let graph = matches!(options.solver, Solver::Joint | Solver::JointStart)
         .then(|| Graph::new(lists, released.slots_per_record()));
@@ -312,20 +311,6 @@ fn listed<'a, const D: usize>(
         }
     };
     Ok((Records::Listed { family, graph, both_ways }, delta))
-}
-
-/// How large a map may be, in its own unit: single floats hold the cubes of its lengths, and of a thousandth of them.
-const EXTENTS: RangeInclusive<f64> = 1e-10..=1e12;
-
-/// Refuses maps whose volumes no float holds: next to nothing would come back of them, and that is no protection.
-fn check_extent(extent: f64) -> Result<(), Error> {
-    // What coincides has no extent but rounding.
-    if extent < f64::from(f32::MIN_POSITIVE) || EXTENTS.contains(&extent) {
-        return Ok(());
-    }
-    let (least, most) = (EXTENTS.start(), EXTENTS.end());
-    let expected = format!("a size between {least:e} and {most:e} units (another unit, or scale)");
-    Err(Error::new("map", expected, format!("{extent:.1e}")))
 }
 
 /// Refuses lists that are not of this map.

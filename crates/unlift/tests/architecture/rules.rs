@@ -28,6 +28,7 @@ const ROOT_NAMES: &[&str] = &[
     "Descriptors",
     "About",
     "Fingerprint",
+    "ListsBy",
     "RowOrder",
 ];
 
@@ -136,7 +137,7 @@ pub const CRATES: &[(&str, &[&str])] = &[
 pub const MOST_LINES: usize = 400;
 
 /// Files of `obfuscate/` that are not schemes.
-pub const NO_SCHEMES: &[&str] = &["mod", "pairs", "scheme", "hide"];
+pub const NO_SCHEMES: &[&str] = &["mod", "pairs", "scheme", "hide", "size"];
 
 /// Imports of `source` that no row of [`ARROWS`] allows.
 pub fn forbidden_arrows(source: &Source) -> Vec<String> {

@@ -1,0 +1,74 @@
+//! Whether the numbers of a map can be worked with at all.
+
+use crate::Error;
+use crate::geometry::vector::quantile;
+
+/// How large a map may be, in its own unit: single floats, in which records are released, hold the cubes of its lengths, and
+/// of a thousandth of them.
+const SIZES: std::ops::RangeInclusive<f64> = 1e-10..=1e12;
+/// Steps at least between neighboring doubles across a map.
+const STEPS: f64 = 1e4;
+
+/// Refuses maps whose numbers are too small, too large or too coarse: next to nothing would come back of them, and that is no
+/// protection.
+pub(super) fn check<const D: usize>(points: &[[f64; D]]) -> Result<(), Error> {
+    let (mut size, mut step) = (0.0f64, 0.0f64);
+    for axis in 0..D {
+        let mut values: Vec<f64> = points.iter().map(|p| p[axis]).collect();
+        if values.is_empty() {
+            return Ok(());
+        }
+        values.sort_unstable_by(f64::total_cmp);
+        // A few outliers make no map large.
+        size = size.max(quantile(&values, 0.95) - quantile(&values, 0.05));
+        step = step.max(quantile(&values, 0.5).abs() * f64::EPSILON);
+    }
+    // Points that all coincide have no size, whatever rounding makes of it.
+    if size <= 4.0 * step {
+        return Ok(());
+    }
+    if !SIZES.contains(&size) {
+        let (least, most) = (SIZES.start(), SIZES.end());
+        let expected =
+            format!("a size between {least:e} and {most:e} units (another unit, or scale)");
+        return Err(Error::new("map", expected, format!("{size:.1e}")));
+    }
+    if size < STEPS * step {
+        let expected = "coordinates nearer to the origin: doubles there are too coarse for a map";
+        return Err(Error::new(
+            "map",
+            expected,
+            format!("steps of {step:.1e} in a size of {size:.1e}"),
+        ));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(from: f64, step: f64) -> Vec<[f64; 3]> {
+        (0..100).map(|i| [from + step * f64::from(i), from, 0.0]).collect()
+    }
+
+    #[test]
+    fn usual_maps_and_points_in_one_place_pass() {
+        for (from, step) in
+            [(0.0, 0.1), (5e6, 0.01), (0.0, 1e-9), (-1e9, 1.0), (1e15, 0.0), (0.0, 1e9)]
+        {
+            assert_eq!(check(&line(from, step)), Ok(()), "{from} {step}");
+        }
+        let mut far = line(0.0, 0.1);
+        far.push([1e30; 3]);
+        assert_eq!(check(&far), Ok(()));
+        assert_eq!(check::<2>(&[]), Ok(()));
+    }
+
+    #[test]
+    fn numbers_that_cannot_be_worked_with_are_refused() {
+        for (from, step) in [(0.0, 1e-14), (0.0, 1e11), (1e15, 0.1)] {
+            assert!(check(&line(from, step)).is_err(), "{from} {step}");
+        }
+    }
+}
