@@ -127,7 +127,6 @@ fn without_name(row: &Row) -> Row {
         k: 0,
         solver: "",
         distinct: None,
-        sure_unknown: None,
         // Of the lists alone, as their ratio and K.
         metrics: Default::default(),
         ..row.clone()

@@ -16,7 +16,10 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 use unlift::Unit;
-use unlift::recover::{Confidence, Estimate, Recovered, Status};
+use unlift::recover::{Confidence, Estimate, Recovered, Status, Unknown};
+
+/// Why it is not known how sure the attacker is.
+const WHY_UNKNOWN: &str = "confidence_unknown";
 
 /// Writes recovered points, one row per slot; positions in the map's frame (the origin is added).
 ///
@@ -53,6 +56,8 @@ pub(super) fn written<'a, const D: usize>(
     meta.insert("unit".into(), json!(recovered.unit().name()));
     meta.insert("delta".into(), json!(recovered.delta()));
     insert_about(&mut meta, recovered.about());
+    let unknown = recovered.confidence_unknown().filter(|&why| why != Unknown::NotGiven);
+    meta.extend(unknown.map(|why| (WHY_UNKNOWN.to_owned(), json!(why.name()))));
     let mut fields = vec![field("slot", UInt32)];
     fields.extend(coordinate_names::<D>("").map(|name| Field::new(name, Float64, true)));
     fields.push(field("status", Utf8));
@@ -147,6 +152,13 @@ pub(super) fn recovered_of<const D: usize>(
     let (mut slots, mut rows): (Vec<u32>, Vec<u32>) = (Vec::new(), Vec::new());
     let mut confidence: Vec<Confidence> = Vec::new();
     let with_confidence = table.has("found") && table.has("error_scale");
+    let why_unknown = match meta.optional_text(WHY_UNKNOWN)? {
+        None => Unknown::NotGiven,
+        Some(name) => Unknown::from_name(&name).ok_or_else(|| {
+            let names = Unknown::ALL.map(Unknown::name);
+            meta.wrong(WHY_UNKNOWN, format!("one of {}", names.join(", ")))
+        })?,
+    };
     let n_slots = table.n_rows();
     table.read(&columns, |batch| {
         if table.has("slot") {
@@ -177,7 +189,7 @@ pub(super) fn recovered_of<const D: usize>(
     Recovered::try_new(&estimates, with_axis, rows, origin, unit, delta)
         .and_then(|recovered| match with_confidence {
             true => recovered.with_confidence(confidence),
-            false => Ok(recovered),
+            false => Ok(recovered.without_confidence(why_unknown)),
         })
         .map(|recovered| recovered.with_about(about))
         .map_err(|source| table.refused(source))

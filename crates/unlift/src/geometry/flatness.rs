@@ -4,9 +4,38 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::vector::{dot, quantile};
 
+/// Share of the points that say how thick a map is; the rest may lie anywhere.
+const KEPT: f64 = 0.9;
+/// How often the thinnest direction is looked for again among the points that are kept.
+const STEPS: usize = 8;
+
 /// The smallest extent of `points` as a share of the largest one: 0 on a plane or a line, 1 in a ball. Extents are those of
-/// the middle nine tenths along the axes of the scatter, so that a few outliers make no map thick. Of fewer than two places 0.
+/// the middle nine tenths along the axes of the scatter of the nine tenths that are nearest to the best plane (least
+/// trimmed squares, by concentration steps: Rousseeuw and Van Driessen 1999), so that outliers make no map thick. Of fewer
+/// than two places 0.
 pub fn flatness<const D: usize>(points: &[[f64; D]]) -> f64 {
+    let mut kept: Vec<[f64; D]> = points.to_vec();
+    let mut flattest = 1.0;
+    for _ in 0..STEPS {
+        let Some(axes) = axes(&kept) else { return 0.0 };
+        let extents = axes.map(|axis| extent(&kept, &axis));
+        let (thinnest, least) = extremum(&extents, |a, b| a < b);
+        let (_, most) = extremum(&extents, |a, b| a > b);
+        if most <= 0.0 || least <= 0.0 {
+            return 0.0;
+        }
+        let flat = least / most;
+        if flat >= flattest {
+            break;
+        }
+        flattest = flat;
+        kept = nearest_to_plane(points, &kept, &axes[thinnest]);
+    }
+    flattest
+}
+
+/// Axes of the scatter around the mean, or nothing where lengths are too large for it.
+fn axes<const D: usize>(points: &[[f64; D]]) -> Option<[[f64; D]; D]> {
     let n = points.len() as f64;
     let mean: [f64; D] = std::array::from_fn(|c| points.iter().map(|p| p[c]).sum::<f64>() / n);
     let mut scatter = DMatrix::<f64>::zeros(D, D);
@@ -16,19 +45,45 @@ pub fn flatness<const D: usize>(points: &[[f64; D]]) -> f64 {
         }
     }
     if !scatter.iter().all(|x| x.is_finite()) {
-        return 0.0;
+        return None;
     }
     // A tolerance of 0 is not always reached, and whether it is depends on rounding.
-    let Some(eigen) = SymmetricEigen::try_new(scatter, f64::EPSILON, 100) else { return 0.0 };
-    let extent = |axis: usize| {
-        let axis: [f64; D] = std::array::from_fn(|c| eigen.eigenvectors[(c, axis)]);
-        let mut along: Vec<f64> = points.iter().map(|p| dot(p, &axis)).collect();
-        along.sort_unstable_by(f64::total_cmp);
-        if along.is_empty() { 0.0 } else { quantile(&along, 0.95) - quantile(&along, 0.05) }
+    let eigen = SymmetricEigen::try_new(scatter, f64::EPSILON, 100)?;
+    Some(std::array::from_fn(|axis| std::array::from_fn(|c| eigen.eigenvectors[(c, axis)])))
+}
+
+/// From the 5th to the 95th percent of `points` along `axis`.
+fn extent<const D: usize>(points: &[[f64; D]], axis: &[f64; D]) -> f64 {
+    let along = sorted_along(points, axis);
+    if along.is_empty() { 0.0 } else { quantile(&along, 0.95) - quantile(&along, 0.05) }
+}
+
+fn sorted_along<const D: usize>(points: &[[f64; D]], axis: &[f64; D]) -> Vec<f64> {
+    let mut along: Vec<f64> = points.iter().map(|p| dot(p, axis)).collect();
+    along.sort_unstable_by(f64::total_cmp);
+    along
+}
+
+/// The [`KEPT`] of `points` that are nearest to the plane across `axis` through the middle of `kept`, in their order.
+fn nearest_to_plane<const D: usize>(
+    points: &[[f64; D]],
+    kept: &[[f64; D]],
+    axis: &[f64; D],
+) -> Vec<[f64; D]> {
+    let middle = quantile(&sorted_along(kept, axis), 0.5);
+    let away = |p: &[f64; D]| (dot(p, axis) - middle).abs();
+    let mut all: Vec<f64> = points.iter().map(away).collect();
+    all.sort_unstable_by(f64::total_cmp);
+    let limit = quantile(&all, KEPT);
+    points.iter().filter(|p| away(p) <= limit).copied().collect()
+}
+
+/// The first of `values` that no other one is `before`, and which it is.
+fn extremum(values: &[f64], before: impl Fn(f64, f64) -> bool) -> (usize, f64) {
+    let better = |best: (usize, f64), one: (usize, &f64)| {
+        if before(*one.1, best.1) { (one.0, *one.1) } else { best }
     };
-    let extents: [f64; D] = std::array::from_fn(extent);
-    let most = extents.into_iter().fold(0.0, f64::max);
-    if most > 0.0 { extents.into_iter().fold(most, f64::min) / most } else { 0.0 }
+    values.iter().enumerate().skip(1).fold((0, values[0]), better)
 }
 
 #[cfg(test)]
@@ -43,10 +98,11 @@ mod tests {
         let mut tilted: Vec<[f64; 3]> =
             (0..500).map(|_| (unit(), unit())).map(|(a, b)| [2.0 * a, -a - b, b]).collect();
         assert!(flatness(&tilted) < 1e-9);
-        tilted.extend((0..5).map(|_| std::array::from_fn(|_| unit())));
-        assert!(flatness(&tilted) < 0.1);
+        let outliers = (0..40).map(|_| std::array::from_fn(|_| 6.0 * unit() - 3.0));
+        tilted.extend(outliers);
+        assert!(flatness(&tilted) < 1e-6, "{}", flatness(&tilted));
         let cube: Vec<[f64; 3]> = (0..500).map(|_| std::array::from_fn(|_| unit())).collect();
-        assert!(flatness(&cube) > 0.8);
+        assert!(flatness(&cube) > 0.7, "{}", flatness(&cube));
         let line: Vec<[f64; 3]> = (0..500).map(|_| [unit(); 3]).collect();
         assert!(flatness(&line) < 1e-9);
         assert_eq!(flatness::<3>(&[]), 0.0);

@@ -183,7 +183,7 @@ impl<'a, const D: usize> Task<'a, D> {
         };
         let solved = Solved { estimates, unsettled, delta: self.delta as f32 };
         let seen = confidence::look(family, graph, self.released, &solved);
-        let recovered = match confidence::unknown(self.lists, estimates) {
+        let recovered = match confidence::unknown(self.released, self.lists, estimates) {
             Some(unknown) => recovered.without_confidence(unknown),
             None => recovered.with_confidence(confidence::of(estimates, &seen))?,
         };
@@ -217,7 +217,11 @@ impl<'a, const D: usize> Task<'a, D> {
                     (Solver::Ransac, _) => {
                         Box::new(Ransac { family, lists, delta, seed, trials: &self.trials })
                     }
-                    _ => Box::new(start),
+                    (Solver::Consensus | Solver::JointStart, _) | (Solver::Joint, None) => {
+                        Box::new(start)
+                    }
+                    // Their records are read alone, without lists.
+                    (Solver::Density | Solver::Tomography, _) => Box::new(start),
                 }
             }
         }

@@ -5,17 +5,15 @@
 //! place was found and a scale of its error. Its constants come from synthetic rooms
 //! (`examples/fit_confidence.rs`), never from a real map. Cues are ratios: a scaled map has the same.
 
+mod applies;
 mod constants;
 mod cues;
 pub(super) mod model;
 pub(super) mod seen;
 
+pub(super) use applies::unknown;
 use rayon::prelude::*;
 
-use crate::ListsBy;
-use crate::geometry::flatness::flatness;
-use crate::geometry::vector::widen;
-use crate::neighbors::Neighborhoods;
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::Graph;
 use crate::recover::map::pieces::{CandidatePieces, LinePieces, PlanePieces};
@@ -29,43 +27,19 @@ use constants::{CENTER, MODELS, SPREAD};
 use model::{Model, N_TERMS, centered, terms};
 use seen::{Cues, Seen, Solved};
 
-/// A list has at most as many entries as this share of all hidden points in the maps that the model was fitted on.
-const MOST_LISTED: f64 = 0.01;
-
 /// Why nobody looks how sure the attacker is, if `options` or the kind of map say so.
 pub(super) fn not_asked<const D: usize>(options: &RecoverOptions) -> Option<Unknown> {
     match options.solver {
         Solver::Joint if !options.confidence => Some(Unknown::NotAsked),
         Solver::Joint if !Settings::of_dimension::<D>().confidence => Some(Unknown::OfImages),
         Solver::Joint => None,
-        _ => Some(Unknown::OtherSolver),
+        Solver::JointStart
+        | Solver::Consensus
+        | Solver::Ransac
+        | Solver::Density
+        | Solver::Tomography => Some(Unknown::OtherSolver),
     }
 }
-
-/// Why the model says nothing that comes true about maps recovered from `lists`, if so.
-///
-/// On smaller and on flat maps, and with lists that sources make, a tenth to nine tenths of those called 90 % sure were right.
-pub(super) fn unknown<const D: usize>(
-    lists: &Neighborhoods,
-    estimates: &[Estimate<D>],
-) -> Option<Unknown> {
-    let n_slots = lists.n_slots() as f64;
-    let mean = lists.records().len() as f64 / n_slots.max(1.0);
-    if lists.scores().is_some() {
-        Some(Unknown::RankedLists)
-    } else if lists.about().lists_by != ListsBy::Oracle {
-        Some(Unknown::GivenLists)
-    } else if mean > MOST_LISTED * n_slots {
-        Some(Unknown::SmallMap)
-    } else {
-        let found = estimates.iter().filter(|one| one.status == Status::Ok);
-        let places: Vec<[f64; D]> = found.map(|one| widen(&one.position)).collect();
-        (flatness(&places) <= FLAT).then_some(Unknown::Flat)
-    }
-}
-
-/// A map is flat whose smallest extent is at most this share of its largest one.
-const FLAT: f64 = 0.01;
 
 /// Looks around the estimates of joint recovery.
 pub(super) fn look<const D: usize>(

@@ -42,7 +42,7 @@ impl<'a, const D: usize> Solve<'a, D> for Ransac<'a, D> {
         let Self { family, lists, delta, seed, .. } = *self;
         let axes = match family {
             Family::Candidates { rows, .. } => axis_vote::vote(rows, lists),
-            _ => Vec::new(),
+            Family::Lines { .. } | Family::Planes { .. } => Vec::new(),
         };
         let slots = Slots::Range(slots);
         solve_chunks(lists.n_slots(), slots, Scratch::default, |scratch, first, out| {
