@@ -62,6 +62,9 @@ fn main() -> Result<(), Error> {
         inlier_ratios: vec![0.5, 0.1],
         ..Plan::new(Unit::Meter)
     };
+    // As the command line does: on small maps by more solvers, of which the strongest is the answer.
+    let k = plan.k;
+    let plan = plan.for_map(3_000, k);
     println!("scheme   right  within 0.10 and 0.25 m, by the strongest attack");
     let outcome = run(&room, None, &plan, &mut Silent)?;
     for scheme in &plan.schemes {

@@ -5,7 +5,8 @@
 //! of percent between `joint` and `consensus` (at each threshold) and the least share of points called
 //! 90 % sure that are right, over every scheme, noise model, inlier ratio and source; at the end, in how many of all cells
 //! either is the case. Names: `maps` (`room`, `line`, ... or `redkitchen`, `castle`, each `:POINTS`; `image:KEYPOINTS`), `schemes`,
-//! `ratios`, `noise`, `sources`, `seeds`, `k`; `cells=1` prints every cell. The real maps are
+//! `ratios`, `noise`, `sources`, `seeds`, `k`; `cells=1` prints every cell; `solver=NAME` compares another one
+//! with consensus. The real maps are
 //! looked for beside the repository and left out, with a line, where they are not.
 
 use std::path::PathBuf;
@@ -69,6 +70,7 @@ struct Suite {
     seeds: u32,
     k: usize,
     cells: bool,
+    solver: Solver,
 }
 
 impl Suite {
@@ -91,6 +93,7 @@ impl Suite {
             seeds: if quick { 1 } else { 2 },
             k: 50,
             cells: false,
+            solver: Solver::Joint,
         };
         for argument in std::env::args().skip(1) {
             let Some((name, list)) = argument.split_once('=') else { continue };
@@ -107,8 +110,11 @@ impl Suite {
                 "seeds" => suite.seeds = number(list),
                 "k" => suite.k = number(list),
                 "cells" => suite.cells = list == "1",
+                "solver" => {
+                    suite.solver = Solver::from_name(list).unwrap_or_else(|e| panic!("{e}"));
+                }
                 _ => panic!(
-                    "expected maps, schemes, ratios, noise, sources, seeds, k or cells, found {name}"
+                    "expected maps, schemes, ratios, noise, sources, seeds, k, cells or solver, found {name}"
                 ),
             }
         }
@@ -134,7 +140,7 @@ impl Suite {
             oracle_noise: self.noise.clone(),
             inlier_ratios: self.ratios.clone(),
             k: if of_images { 20 } else { self.k },
-            solvers: vec![Solver::Joint, Solver::Consensus],
+            solvers: vec![self.solver, Solver::Consensus],
             thresholds,
             repeats: self.seeds,
             records_alone: false,
@@ -154,7 +160,7 @@ fn main() {
         "map",
         "source",
         "worst",
-        "joint less consensus, in",
+        format!("{} less consensus, in", suite.solver.name()),
         "mean",
         "least right of sure",
         "right",
@@ -175,7 +181,7 @@ fn main() {
     totals.print();
 }
 
-/// Joint recovery beside consensus, cell by cell.
+/// A solver, `joint` unless another one is asked for, beside consensus, cell by cell.
 fn table(suite: &Suite, map: &str, source: &str, rows: &[Row], totals: &mut Totals) {
     let cell = |row: &Row| {
         let noise = row.oracle_noise.unwrap_or("");
@@ -225,8 +231,9 @@ fn table(suite: &Suite, map: &str, source: &str, rows: &[Row], totals: &mut Tota
                 of.join("/")
             };
             println!(
-                "    {map:<20} {source:<10} {:<24} joint {} delta {:.3} sure {} | consensus {} delta {:.3} sure {}",
+                "    {map:<20} {source:<10} {:<24} {} {} delta {:.3} sure {} | consensus {} delta {:.3} sure {}",
                 cell(joint),
+                joint.solver,
                 percent(joint),
                 joint.delta,
                 sure(joint),

@@ -144,7 +144,10 @@ fn images_with_few_keypoints_are_attacked() {
         let outcome = run(&[image_of("few", keypoints(3, n, 0))], &plan);
         assert_eq!(outcome.n_too_small, usize::from(n <= plan.k));
         for row in &outcome.rows {
-            let what = format!("{n}: {} by {} at {}", row.scheme, row.neighbors, row.inlier_ratio);
+            let what = format!(
+                "{n}: {} by {}, {} at {}",
+                row.scheme, row.neighbors, row.solver, row.inlier_ratio
+            );
             assert!(row.k == plan.k || row.neighbors != "oracle", "{what}");
             // Of four keypoints with wrong neighbors all may be lost.
             let sure = n > 4 && row.inlier_ratio >= 0.5 && row.solver != "ransac";

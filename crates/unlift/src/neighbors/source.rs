@@ -31,7 +31,8 @@ pub trait Source<const D: usize>: Debug + Send + Sync {
     fn k(&self, released: &Released<D>) -> usize;
 
     /// Lists of at most `k` records for every slot, by descriptor row where slots of a record are told apart by
-    /// descriptors ([`RowOrder`](crate::RowOrder)). Scores, where there are some, are higher for likelier
+    /// descriptors ([`RowOrder`](crate::RowOrder)); a source that looks at records alone says
+    /// [`RowOrder::Either`]. Scores, where there are some, are higher for likelier
     /// neighbors; recovery learns what they are worth. All chance comes from `seed`, the attacker's.
     ///
     /// # Errors

@@ -25,7 +25,7 @@ pub enum Solver {
 }
 
 impl Solver {
-    /// Every solver.
+    /// Every solver, in the order of help texts.
     pub const ALL: [Solver; 6] = [
         Self::Joint,
         Self::JointStart,
@@ -39,6 +39,14 @@ impl Solver {
     /// two slots of a paired line apart, and take no delta.
     pub const FROM_LISTS: [Solver; 4] =
         [Self::Joint, Self::JointStart, Self::Consensus, Self::Ransac];
+
+    /// Whether it is one of [`FROM_LISTS`](Self::FROM_LISTS).
+    pub fn reads_lists(self) -> bool {
+        match self {
+            Self::Joint | Self::JointStart | Self::Consensus | Self::Ransac => true,
+            Self::Density | Self::Tomography => false,
+        }
+    }
 
     /// The name users know it by.
     pub fn name(self) -> &'static str {
@@ -118,5 +126,32 @@ impl RecoverOptions {
             }
             Delta::Fixed(_) | Delta::Auto => Ok(()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Solver;
+
+    /// The next of all solvers: a new one does not compile here until it has a place.
+    fn next(solver: Solver) -> Option<Solver> {
+        match solver {
+            Solver::Joint => Some(Solver::JointStart),
+            Solver::JointStart => Some(Solver::Consensus),
+            Solver::Consensus => Some(Solver::Ransac),
+            Solver::Ransac => Some(Solver::Density),
+            Solver::Density => Some(Solver::Tomography),
+            Solver::Tomography => None,
+        }
+    }
+
+    /// What is in no list is run by no law.
+    #[test]
+    fn lists_hold_every_solver() {
+        let all: Vec<Solver> =
+            std::iter::successors(Some(Solver::Joint), |&one| next(one)).collect();
+        assert_eq!(all, Solver::ALL);
+        let from_lists: Vec<Solver> = all.into_iter().filter(|one| one.reads_lists()).collect();
+        assert_eq!(from_lists, Solver::FROM_LISTS);
     }
 }

@@ -1,6 +1,18 @@
 //! What every solver does: estimates of a range of slots, and rounds that go on from them.
 //!
-//! A solver is a file or a folder beside this one that implements [`Solve`]; `task` makes it.
+//! A solver is a file or a folder beside this one that implements [`Solve`]; `task` makes it. What it is given, by the example
+//! of `consensus` (which also says in `on_planes` how little a solver may be):
+//!
+//! - `Family`: the records as rows, by kind. Slot `s` lies on record `s / slots_per_record`; places are about the released
+//!   origin, in f32.
+//! - Lists of records per slot (`map::lists`). Of paired lines the slot's own record and its twin may be listed;
+//!   `may_vote_for` says who counts.
+//! - `delta`, the distance up to which a record supports a place, learned before (by consensus) whether it is used or not.
+//! - `map::chunks::solve_chunks` runs over slots on all threads, the same bytes on any number of them.
+//!
+//! What comes out is moved afterwards to where rules of the scheme allow it to be (`exact`), unless the solver is a baseline
+//! that stays as published (`Task::is_settled`). Rays of which each center's points are known do not meet
+//! (`Family::has_regions`): on images only a slot's neighbors of the same center say anything.
 
 use std::ops::Range;
 

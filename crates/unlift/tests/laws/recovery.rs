@@ -105,7 +105,8 @@ fn exact_limit<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
             let off = norm(&std::array::from_fn::<f64, D, _>(|c| found[c] - local[c]));
             assert!(
                 off <= tolerance,
-                "{name}, {options:?}: slot {slot} is {off} off at {sine}, {delta}"
+                "{name}, {options:?}: slot {slot}, whose neighbors all lie where it does, is {off} away from there: at most {tolerance} \
+                 (sine of the best crossing {sine}, delta {delta})"
             );
         }
         // Coincident points share a voxel or region, hence a center: these rays never fix them, and the law says nothing

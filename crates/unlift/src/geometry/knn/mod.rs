@@ -18,7 +18,8 @@ use rayon::prelude::*;
 
 impl<const D: usize> Knn<'_, D> {
     /// Calls `of(row, its k nearest, entry)` for every row, with `entries` in spatial order: several
-    /// times faster than one query after the other.
+    /// times faster than one query after the other. The nearest are other rows, never the row itself, as (squared
+    /// distance, row), nearest first.
     ///
     /// # Panics
     /// When there is not one entry per row.
@@ -41,7 +42,7 @@ impl<const D: usize> Knn<'_, D> {
         });
     }
 
-    /// `of(row, its k nearest)` for every row, in the order of rows.
+    /// `of(row, its k nearest)` for every row, in the order of rows; the nearest as [`each`](Self::each) gives them.
     pub fn per_row<T: Clone + Send>(
         &self,
         k: usize,
