@@ -20,6 +20,7 @@ mod degenerate;
 mod density;
 mod exact;
 mod gauge;
+mod leaks;
 mod maps;
 mod noise;
 mod parts;

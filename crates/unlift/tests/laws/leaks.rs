@@ -1,0 +1,173 @@
+//! Released columns that must tell nothing of the truth, by statistics over many keys: the order of records, of slots and of
+//! list entries, choices drawn at random, the last bits of rounded numbers.
+
+use unlift::geometry::frame::Bounds;
+use unlift::obfuscate::Entry;
+use unlift::released::Obfuscation;
+
+use crate::maps::*;
+
+const KEYS: u64 = 60;
+const POINTS: usize = 150;
+/// Deviations of the mean over all keys that chance does not reach: 3 in 10 million, of some hundred statistics.
+const MOST: f64 = 5.0;
+
+/// A pair of columns and how they go together, over many keys.
+#[derive(Default)]
+struct Together(Vec<(String, f64, usize)>);
+
+impl Together {
+    /// Adds the correlation of `told` with `truth`, in its deviations by chance: 1 / sqrt(n - 1), whatever the values are.
+    fn add(&mut self, what: String, told: &[f64], truth: &[f64]) {
+        let Some(deviations) = correlation(told, truth) else { return };
+        match self.0.iter_mut().find(|(name, ..)| *name == what) {
+            Some((_, sum, n)) => (*sum, *n) = (*sum + deviations, *n + 1),
+            None => self.0.push((what, deviations, 1)),
+        }
+    }
+
+    /// The columns that go together more than by chance.
+    fn telling(&self) -> Vec<(&str, f64)> {
+        let of_mean =
+            |(name, sum, n): &'_ (String, f64, usize)| (name.clone(), sum / (*n as f64).sqrt());
+        let found = self.0.iter().filter(|one| of_mean(one).1.abs() > MOST);
+        found.map(|one| (one.0.as_str(), of_mean(one).1)).collect()
+    }
+}
+
+/// `None` where a column is constant.
+fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
+    let n = a.len() as f64;
+    let centered = |values: &[f64]| -> Vec<f64> {
+        let mean = values.iter().sum::<f64>() / n;
+        values.iter().map(|x| x - mean).collect()
+    };
+    let (a, b) = (centered(a), centered(b));
+    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+    let scale = (product(&a, &a) * product(&b, &b)).sqrt();
+    (scale > 1e-12 * n).then(|| product(&a, &b) / scale * (n - 1.0).sqrt())
+}
+
+/// The last bit of a released number.
+fn last_bit(x: f32) -> f64 {
+    f64::from(x.to_bits() & 1)
+}
+
+/// What is released of a record that is drawn at random or a remnant of rounding, by name.
+fn drawn<const D: usize>(scheme: &str, records: &Obfuscation<D>, at: usize) -> Vec<(String, f64)> {
+    let bits = |what: &'static str, row: &[f32; D]| -> Vec<(String, f64)> {
+        (0..D).map(|c| (format!("last bit of {what} {c}"), last_bit(row[c]))).collect()
+    };
+    match records {
+        Obfuscation::Lines(lines) => {
+            [bits("foot", &lines.foot()[at]), bits("direction", &lines.direction()[at])].concat()
+        }
+        Obfuscation::Rays(rays) => {
+            let mut told = bits("direction", &rays.direction()[at]);
+            // Elsewhere the place decides which center it is.
+            if scheme == "ray" {
+                told.push(("center".to_owned(), f64::from(rays.center()[at])));
+            }
+            told
+        }
+        Obfuscation::AxisPlanes(planes) => vec![
+            ("axis".to_owned(), f64::from(planes.axis()[at])),
+            ("last bit of offset".to_owned(), last_bit(planes.offset()[at])),
+        ],
+        Obfuscation::AxisCandidates(points) => bits("position", &points.position()[at]),
+    }
+}
+
+fn columns_tell_nothing<const D: usize>(name: &str, scheme: &Entry) {
+    let mut together = Together::default();
+    for key in 0..KEYS {
+        // Other points with every key: last bits of points are what they are.
+        let points = room::<D>(key, POINTS);
+        let hidden = hide(scheme, &points, 1_000 + key);
+        let per = hidden.released.slots_per_record();
+        // The truth of a record is that of its first slot.
+        let slots: Vec<usize> =
+            (0..hidden.released.n_records()).map(|record| record * per).collect();
+        let original = |slot: &usize| f64::from(hidden.secret.hidden()[*slot].0);
+        let truth = |c: Option<usize>| -> Vec<f64> {
+            slots.iter().map(|slot| c.map_or(original(slot), |c| hidden.local(*slot)[c])).collect()
+        };
+        let truths: Vec<(String, Vec<f64>)> = (0..=D)
+            .map(|c| match c.checked_sub(1) {
+                None => ("row of the file".to_owned(), truth(None)),
+                Some(c) => (format!("coordinate {c}"), truth(Some(c))),
+            })
+            .collect();
+        let records = hidden.released.obfuscation();
+        let mut told = vec![("order of records".to_owned(), Vec::new())];
+        for record in 0..slots.len() {
+            told[0].1.push(record as f64);
+            for (at, (what, value)) in drawn(name, records, record).into_iter().enumerate() {
+                if record == 0 {
+                    told.push((what, Vec::new()));
+                }
+                told[at + 1].1.push(value);
+            }
+        }
+        for (what, told) in &told {
+            for (of, truth) in &truths {
+                together.add(format!("{what}, {of}"), told, truth);
+            }
+        }
+        if per == 2 {
+            // Which of a record's two points comes first: told by nothing that orders points.
+            let first: Vec<f64> = slots
+                .iter()
+                .map(|&slot| if original(&slot) < original(&(slot + 1)) { 1.0 } else { -1.0 })
+                .collect();
+            let along: Vec<f64> = slots
+                .iter()
+                .map(|&slot| (hidden.local(slot)[0] - hidden.local(slot + 1)[0]).signum())
+                .collect();
+            let alternating: Vec<f64> = (0..slots.len()).map(|at| (at % 2) as f64).collect();
+            for (what, signs) in [("row", &first), ("x", &along)] {
+                let mean = signs.iter().sum::<f64>() / (signs.len() as f64).sqrt();
+                together.0.push((format!("order of slots by {what}, key {key}"), mean, 1));
+                together.add(format!("order of slots by {what}, record"), &alternating, signs);
+            }
+        }
+        let (mut place, mut right, near) = (Vec::new(), Vec::new(), hidden.near(10));
+        let lists = near.at_inlier_ratio(0.5, key).unwrap();
+        let true_lists = near.at_inlier_ratio(1.0, key).unwrap();
+        for slot in 0..lists.n_slots() {
+            for (at, record) in lists.of(slot).iter().enumerate() {
+                place.push(at as f64);
+                right.push(f64::from(true_lists.of(slot).contains(record)));
+            }
+        }
+        together.add("place in a list, right".to_owned(), &place, &right);
+    }
+    assert!(together.0.len() > 2 * D, "{name}");
+    assert!(together.telling().is_empty(), "{name} ({D}D) tells {:?}", together.telling());
+}
+
+#[test]
+fn released_columns_tell_nothing_of_the_truth() {
+    over_schemes!(columns_tell_nothing);
+}
+
+/// What the law above would say of a scheme that forgot to shuffle, or rounded toward its point.
+#[test]
+fn what_tells_is_found() {
+    let points = room::<3>(8, POINTS);
+    let column = |c: usize| -> Vec<f64> { points.iter().map(|p| p[c]).collect() };
+    let box_of = Bounds::quantiles(&points, 0.0).unwrap();
+    let middle = (box_of.low[0] + box_of.high[0]) / 2.0;
+    // One in four records has a bit that says on which side its point lies.
+    let bit = |at: usize| {
+        if at % 4 == 0 { f64::from(points[at][0] > middle) } else { (at / 4 % 2) as f64 }
+    };
+    let bits: Vec<f64> = (0..POINTS).map(bit).collect();
+    let rows: Vec<f64> = (0..POINTS).map(|at| at as f64).collect();
+    let mut together = Together::default();
+    for _ in 0..KEYS {
+        together.add("bit".to_owned(), &bits, &column(0));
+        together.add("order".to_owned(), &rows, &rows);
+    }
+    assert_eq!(together.telling().len(), 2, "{:?}", together.telling());
+}
