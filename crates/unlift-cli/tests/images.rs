@@ -101,6 +101,11 @@ fn a_file_without_photos_has_frames_and_chosen_images_are_shown() {
     assert!(page.contains("\"label\":\"overlap, ") && page.contains("\"label\":\"similarity, "));
     let rows = json(&place, "a/audit.json")["results"].clone();
     assert!(rows.as_array().unwrap().iter().all(|row| row["neighbors"] == "oracle"));
+    // Of SIFT `descriptors` is another name of `overlap`: drawn once.
+    let asked = format!("audit images f.h5 {QUICK} --neighbors descriptors --show b.png --out c");
+    place.ends(&asked, 0);
+    let page = fs::read_to_string(place.path("c/report.html")).unwrap();
+    assert!(page.contains("\"label\":\"descriptors, ") && !page.contains("\"label\":\"overlap, "));
     without_descriptors(&place.path("f.h5"), &place.path("bare.h5"));
     place.ends(&format!("audit images bare.h5 {QUICK} --show b.png --out b"), 0);
     let page = fs::read_to_string(place.path("b/report.html")).unwrap();

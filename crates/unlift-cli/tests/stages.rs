@@ -77,7 +77,7 @@ fn the_stages_print_the_row_of_the_audit() {
                 let recover = "recover hidden/released.parquet --neighbors hidden-lists --seed 7";
                 place.ends(&format!("{recover} --out hidden-back"), 0);
             }
-            let mut staged = place.json("evaluate hidden-back --truth hidden/truth.parquet --json");
+            let staged = place.json("evaluate hidden-back --truth hidden/truth.parquet --json");
             let rows = audit["results"].as_array().expect("rows");
             // The strongest attack of a source may have rows of other solvers beside it.
             let row = rows.iter().find(|r| r["neighbors"] == source && r["solver"] == "joint");
@@ -121,7 +121,7 @@ fn the_stages_of_images_print_the_row_of_the_audit() {
             ends(&format!("{recover} --threads 2 --out back"));
             let bytes = |name: &str| std::fs::read(place.path(name)).unwrap();
             assert!(bytes("one") == bytes("back"), "{scheme}");
-            let mut staged = json("evaluate back --truth hidden/truth.parquet --json");
+            let staged = json("evaluate back --truth hidden/truth.parquet --json");
             let mut row = row.clone();
             for name in ["scheme", "neighbors", "oracle_noise", "inlier_ratio", "k", "solver"] {
                 assert!(remove(&mut row, name).is_some(), "{name}");

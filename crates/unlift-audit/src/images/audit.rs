@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use serde_json::{Map, Value};
 use unlift::audit::{self, Cell, NeighborsBy, Observer, Outcome, Plan, Row, run_images};
-use unlift::neighbors::{Overlap, Similarity, Source};
+use unlift::neighbors::{ByDescriptors, Overlap, Similarity, Source};
 use unlift_io::atomic::OutputSet;
 use unlift_io::hash::{hash_file, hash_files};
 use unlift_report::document::{ImageCounts, ImageFigures, Input};
@@ -198,17 +198,23 @@ fn draw(job: &ImagesJob<'_>, tally: &Tally, figures: &[ImageFigures]) -> Result<
 /// What needs no training and the plan lacks, where all images `numbers` have what it takes.
 fn without_oracle(job: &ImagesJob<'_>, numbers: &[usize]) -> Vec<NeighborsBy<2>> {
     let untrained: [Arc<dyn Source<2>>; 2] = [Arc::new(Similarity), Arc::new(Overlap)];
-    let missing = untrained.into_iter().filter(|source| {
+    let fits = |source: &Arc<dyn Source<2>>| {
         let needs = Needs::of(source);
-        let fits = |&at: &usize| match job.source {
+        let of_image = |&at: &usize| match job.source {
             // What was extracted as SIFT is what every source takes.
             FeatureSource::Folder(folder) if folder.extraction().is_sift() => true,
             _ => job.source.get(at).is_ok_and(|image| lacking(&image, &needs).is_none()),
         };
-        let asked = job.plan.own_sources().any(|own| own.name() == source.name());
-        needs.descriptors() && !asked && numbers.iter().all(fits)
-    });
-    missing.map(NeighborsBy::Source).collect()
+        needs.descriptors() && numbers.iter().all(of_image)
+    };
+    let mut fitting: Vec<_> = untrained.into_iter().filter(fits).collect();
+    let asked: Vec<&str> = job.plan.own_sources().map(|own| own.name()).collect();
+    if asked.contains(&Source::<2>::name(&ByDescriptors)) {
+        // It is the last of these under another name.
+        fitting.pop();
+    }
+    fitting.retain(|source| !asked.contains(&source.name()));
+    fitting.into_iter().map(NeighborsBy::Source).collect()
 }
 
 /// Positions in `figures` of the images of which least, about half and most came back, by the mean over
