@@ -118,5 +118,6 @@ def tables(program, shared):
     for place, known in (("RedKitchen, 40 photos", superpoint), ("Castle, 11 photos", nothing)):
         for kept, options in ALIKED.items():
             images = data / place.split(",")[0].lower() / "images"
-            found = audit(program, images, "--solver", "joint", "--features", "aliked", *options, "--neighbors", "similarity")
-            yield from without_oracle(f"{place}, ALIKED, {kept}", found, known, ["similarity"], "SuperPoint")
+            found = audit(program, images, "--solver", "joint", "--features", "aliked", *options,
+                          "--neighbors", "learned", "--neighbors", "similarity")
+            yield from without_oracle(f"{place}, ALIKED, {kept}", found, known, ["learned", "similarity"], "SuperPoint")

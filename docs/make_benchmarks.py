@@ -290,7 +290,7 @@ def own():
         "RedKitchen, within 10 / 25 cm (in parentheses the share of listed records among the true 50 nearest):", "",
         *own_sources("redkitchen", *KITCHEN), "", "Castle, within 1.0 / 2.5:", "", *own_sources("castle"), "",
         "RedKitchen with ALIKED (9,972 points, half floats), within 10 / 25 cm:", "",
-        *own_sources("redkitchen-aliked", *KITCHEN, sources=["similarity", "geometric"]), "",
+        *own_sources("redkitchen-aliked", *KITCHEN, sources=["learned", "similarity", "geometric"]), "",
         "### Descriptors give the map away", "",
         "Keypoints of photos: the share of the first 20 listed that are among the 20 nearest. RedKitchen, 40 photos:", "",
         *tell("redkitchen"), "", "Castle, 11 photos:", "", *tell("castle"), ""])

@@ -53,7 +53,9 @@ class Shard:
     def __init__(self, folder: pathlib.Path):
         self.folder = folder
         places = numpy.fromfile(folder / "places.f32", "<f4")
-        descriptors = numpy.memmap(folder / "descriptors.u8", "u1", "r")
+        sift = folder / "descriptors.u8"
+        self.is_sift = sift.exists()
+        descriptors = numpy.memmap(sift, "u1", "r") if self.is_sift else numpy.memmap(folder / "descriptors.f32", "<f4", "r")
         self.crops = numpy.fromfile(folder / "photos.u32", "<u4").size
         self.n = places.size // 2 // self.crops
         self.places = places.reshape(self.crops, self.n, 2)
@@ -66,7 +68,8 @@ class Shard:
 
     def read(self, rows: numpy.ndarray) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         """Descriptors of unit length, pair scores in standard deviations, what is wanted of every row."""
-        descriptors = torch.from_numpy(self.descriptors[rows]).float() / 512
+        # Squares of the counts of SIFT sum to 512 x 512; learned descriptors have length 1.
+        descriptors = torch.from_numpy(self.descriptors[rows]).float() / (512 if self.is_sift else 1)
         pairs = torch.from_numpy(self.pairs[rows]).float() * (1 / STEPS)
         return descriptors, pairs, wanted(torch.from_numpy(self.places[rows]), torch.from_numpy(self.reaches[rows]))
 
@@ -107,7 +110,7 @@ class Batches:
         shard, rows = self.batches[at]
         descriptors, pairs, target = self.shards[shard].read(rows)
         mirrored = numpy.random.default_rng([self.seed, epoch, at]).random(len(rows)) < 0.5
-        if descriptors.shape[-1] == len(self.mirror) and mirrored.any():
+        if self.shards[shard].is_sift and mirrored.any():
             mirrored = torch.from_numpy(mirrored)
             descriptors[mirrored] = descriptors[mirrored][..., self.mirror]
         return descriptors, pairs, target

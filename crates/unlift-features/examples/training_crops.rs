@@ -1,11 +1,12 @@
-//! Makes what networks of neighborhoods are trained on, from photos: `training_crops OUT LIST [--seed N]
-//! [--sizes 128,256,384] [--share 1.0] [--max-image-size 3200] [--whole N]`.
+//! Makes what networks of neighborhoods are trained on, from photos: `training_crops OUT LIST [--type sift|aliked|superpoint]
+//! [--seed N] [--sizes 128,256,384] [--share 1.0] [--max-image-size N] [--whole N]`.
 //!
 //! LIST names a photo per line. A crop is `n` keypoints of one photo, near each other; OUT gets a folder per `n` with
-//! files that go on from crop to crop, little-endian: `descriptors.u8` `(crops, n, 128)`, `places.f32` `(crops, n, 2)`
-//! in pixels, `pairs.i16` `(crops, 3, n, n)` (`neighbors::dense`, in 1/1024) and `photos.u32` `(crops,)`, the line of
-//! LIST. `--share` is how many of a photo's keypoints stand in its crops, on average. `--whole N`: one crop per photo,
-//! the N keypoints nearest the middle, or all; a folder per photo, named by its line.
+//! files that go on from crop to crop, little-endian: `descriptors.u8` `(crops, n, dim)` of SIFT, `descriptors.f32` of
+//! others, `places.f32` `(crops, n, 2)` in pixels, `pairs.i16` `(crops, reaches, n, n)` (`neighbors::dense`, in 1/1024; of
+//! others than SIFT in deviations of the whole photo, as their descriptors see much of it) and `photos.u32` `(crops,)`, the
+//! line of LIST. `--share` is how many of a photo's keypoints stand in its crops, on average. `--whole N`: one crop per
+//! photo, the N keypoints nearest the middle, or all; a folder per photo, named by its line.
 
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -13,11 +14,14 @@ use std::fs::{File, OpenOptions, create_dir_all};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
+use unlift::Descriptors;
 use unlift::descriptors::Values;
-use unlift::neighbors::dense;
+use unlift::neighbors::{dense_among, usual};
 use unlift::seed::{Draws, Stage};
 use unlift_features::batch::in_order;
-use unlift_features::{Features, Sift, SiftOptions, load};
+use unlift_features::{
+    AlikedOptions, Extraction, Extractor, Found, SiftOptions, SuperPointOptions,
+};
 
 /// Steps of a pair score per standard deviation.
 const STEPS: f32 = 1024.0;
@@ -29,16 +33,24 @@ struct Options {
     whole: Option<usize>,
 }
 
+/// The features of a photo.
+struct Features {
+    places: Vec<[f32; 2]>,
+    descriptors: Descriptors,
+    /// Of others than SIFT: what each scores with all others of the photo.
+    usual: Option<Vec<(f64, f64)>>,
+}
+
 struct Crop {
     photo: u32,
     places: Vec<[f32; 2]>,
-    descriptors: Vec<u8>,
+    descriptors: Descriptors,
     pairs: Vec<f32>,
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut options = Options { seed: 0, sizes: vec![128, 256, 384], share: 1.0, whole: None };
-    let (mut sift, mut paths) = (SiftOptions::default(), Vec::new());
+    let (mut kind, mut max_image_size, mut paths) = ("sift".to_owned(), None, Vec::new());
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().ok_or(format!("{argument}: expected a value"));
@@ -48,7 +60,8 @@ fn main() -> Result<(), Box<dyn Error>> {
                 options.sizes = value()?.split(',').map(str::parse).collect::<Result<_, _>>()?;
             }
             "--share" => options.share = value()?.parse()?,
-            "--max-image-size" => sift.max_image_size = value()?.parse()?,
+            "--type" => kind = value()?,
+            "--max-image-size" => max_image_size = Some(value()?.parse()?),
             "--whole" => options.whole = Some(value()?.parse()?),
             _ => paths.push(PathBuf::from(argument)),
         }
@@ -56,19 +69,22 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [out, list] = paths.as_slice() else { return Err("expected OUT and LIST".into()) };
     let photos = std::fs::read_to_string(list)?;
     let photos: Vec<(u32, &str)> = (0..).zip(photos.lines()).collect();
-    let sift = Sift::try_new(sift)?;
+    let extractor = Extractor::try_new(&extraction(&kind, max_image_size)?)?;
     let mut folders = BTreeMap::new();
     let mut n_keypoints = 0;
-    let crops = |&(photo, path): &(u32, &str)| -> Result<Vec<Crop>, unlift::Error> {
-        let features = sift.extract(&load::read(Path::new(path))?);
-        chosen(&features, photo, &options).iter().map(|rows| crop(&features, photo, rows)).collect()
+    let crops = |&(photo, path): &(u32, &str)| -> Result<Vec<Crop>, Box<dyn Error + Send + Sync>> {
+        let Some(features) = features(extractor.read(Path::new(path))?.found)? else {
+            return Ok(Vec::new());
+        };
+        let rows = chosen(&features, photo, &options);
+        Ok(rows.iter().map(|rows| crop(&features, photo, rows)).collect::<Result<_, _>>()?)
     };
     in_order(&photos, crops, |_, crops| -> Result<(), Box<dyn Error>> {
-        for crop in crops? {
+        for crop in crops.map_err(|error| error.to_string())? {
             let n = crop.places.len();
             let name = options.whole.map_or(n.to_string(), |_| format!("{:04}", crop.photo));
             if !folders.contains_key(&name) {
-                folders.insert(name.clone(), Folder::new(&out.join(&name))?);
+                folders.insert(name.clone(), Folder::new(&out.join(&name), &crop)?);
             }
             folders.get_mut(&name).ok_or("no folder")?.add(&crop)?;
             n_keypoints += n;
@@ -82,17 +98,50 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
+fn extraction(kind: &str, max_image_size: Option<usize>) -> Result<Extraction, String> {
+    let mut extraction = match kind {
+        "sift" => Extraction::Sift(SiftOptions::default()),
+        "aliked" => Extraction::Aliked(AlikedOptions { min_score: 0.0, ..Default::default() }),
+        "superpoint" => Extraction::SuperPoint(SuperPointOptions::default()),
+        _ => return Err(format!("--type: expected sift, aliked or superpoint, found {kind:?}")),
+    };
+    let of_kind = match &mut extraction {
+        Extraction::Sift(options) => &mut options.max_image_size,
+        Extraction::Aliked(options) => &mut options.max_image_size,
+        Extraction::SuperPoint(options) => &mut options.max_image_size,
+    };
+    *of_kind = max_image_size.unwrap_or(*of_kind);
+    Ok(extraction)
+}
+
+/// What was found in a photo, if it is enough to have neighbors.
+fn features(found: Found) -> Result<Option<Features>, unlift::Error> {
+    let (places, values, dim): (Vec<[f32; 2]>, _, _) = match found {
+        Found::Sift(found) => {
+            let places = found.keypoints.iter().map(|keypoint| [keypoint.x, keypoint.y]).collect();
+            (places, Values::U8(found.descriptors.concat()), 128)
+        }
+        Found::Learned(found) => (found.keypoints, Values::F32(found.descriptors), found.dim),
+    };
+    if places.len() < 64 {
+        return Ok(None);
+    }
+    let descriptors = Descriptors::try_new(values, dim)?;
+    let is_sift = matches!(descriptors.values(), Values::U8(_));
+    let usual = if is_sift { None } else { Some(usual(&descriptors)?) };
+    Ok(Some(Features { places, descriptors, usual }))
+}
+
 /// The rows of each crop of a photo.
 fn chosen(features: &Features, photo: u32, options: &Options) -> Vec<Vec<u32>> {
-    let n = features.keypoints.len();
+    let n = features.places.len();
     if let Some(most) = options.whole {
-        let extent = |of: fn(&unlift_features::Keypoint) -> f32| {
-            let values = features.keypoints.iter().map(of);
+        let extent = |axis: usize| {
+            let values = features.places.iter().map(|place| place[axis]);
             values.fold((f32::MAX, f32::MIN), |(low, high), x| (low.min(x), high.max(x)))
         };
-        let (x, y) = (extent(|k| k.x), extent(|k| k.y));
-        let middle = [(x.0 + x.1) / 2.0, (y.0 + y.1) / 2.0];
-        return if n < 64 { Vec::new() } else { vec![nearest(features, middle, 1.0, most.min(n))] };
+        let middle = [0, 1].map(extent).map(|(low, high)| (low + high) / 2.0);
+        return vec![nearest(features, middle, 1.0, most.min(n))];
     }
     let mut draws = Draws::new(options.seed, Stage::Subset, u64::from(photo));
     let mut crops = Vec::new();
@@ -100,9 +149,9 @@ fn chosen(features: &Features, photo: u32, options: &Options) -> Vec<Vec<u32>> {
     for &size in options.sizes.iter().filter(|&&size| size <= n) {
         let wanted = options.share * n as f64 / size as f64 / options.sizes.len() as f64;
         for _ in 0..(wanted + draws.unit()).floor() as usize {
-            let anchor = features.keypoints[draws.below(n as u64) as usize];
+            let anchor = features.places[draws.below(n as u64) as usize];
             let stretch = libm::exp(draws.between(-0.7, 0.7)) as f32;
-            crops.push(nearest(features, [anchor.x, anchor.y], stretch, size));
+            crops.push(nearest(features, anchor, stretch, size));
         }
     }
     crops
@@ -112,22 +161,23 @@ fn chosen(features: &Features, photo: u32, options: &Options) -> Vec<Vec<u32>> {
 /// stretched.
 fn nearest(features: &Features, place: [f32; 2], stretch: f32, most: usize) -> Vec<u32> {
     let distance = |row: &u32| {
-        let keypoint = features.keypoints[*row as usize];
-        (keypoint.x - place[0]).abs().max((keypoint.y - place[1]).abs() * stretch)
+        let [x, y] = features.places[*row as usize];
+        (x - place[0]).abs().max((y - place[1]).abs() * stretch)
     };
-    let mut rows: Vec<u32> = (0..features.keypoints.len() as u32).collect();
+    let mut rows: Vec<u32> = (0..features.places.len() as u32).collect();
     rows.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
     rows.truncate(most);
     rows
 }
 
 fn crop(features: &Features, photo: u32, rows: &[u32]) -> Result<Crop, unlift::Error> {
-    let place = |&row: &u32| features.keypoints[row as usize];
-    let places = rows.iter().map(|row| [place(row).x, place(row).y]).collect();
-    let descriptors: Vec<u8> =
-        rows.iter().flat_map(|&row| features.descriptors[row as usize]).collect();
-    let matrix = unlift::Descriptors::try_new(Values::U8(descriptors.clone()), 128)?;
-    Ok(Crop { photo, places, descriptors, pairs: dense(&matrix)?.into_scores() })
+    let of_rows =
+        |all: &Vec<(f64, f64)>| -> Vec<_> { rows.iter().map(|&row| all[row as usize]).collect() };
+    let usual = features.usual.as_ref().map(of_rows);
+    let descriptors = features.descriptors.select(rows);
+    let pairs = dense_among(&descriptors, usual.as_deref())?.into_scores();
+    let places = rows.iter().map(|&row| features.places[row as usize]).collect();
+    Ok(Crop { photo, places, descriptors, pairs })
 }
 
 /// Files of crops of one size.
@@ -136,20 +186,31 @@ struct Folder {
 }
 
 impl Folder {
-    fn new(path: &Path) -> std::io::Result<Self> {
+    fn new(path: &Path, first: &Crop) -> std::io::Result<Self> {
         create_dir_all(path)?;
         let open = |name: &str| {
             let file = OpenOptions::new().create(true).append(true).open(path.join(name))?;
             Ok::<_, std::io::Error>(BufWriter::new(file))
         };
+        let descriptors = match first.descriptors.values() {
+            Values::U8(_) => "descriptors.u8",
+            Values::F32(_) => "descriptors.f32",
+        };
         let files =
-            [open("descriptors.u8")?, open("places.f32")?, open("pairs.i16")?, open("photos.u32")?];
+            [open(descriptors)?, open("places.f32")?, open("pairs.i16")?, open("photos.u32")?];
         Ok(Self { files })
     }
 
     fn add(&mut self, crop: &Crop) -> std::io::Result<()> {
         let [descriptors, places, pairs, photos] = &mut self.files;
-        descriptors.write_all(&crop.descriptors)?;
+        match crop.descriptors.values() {
+            Values::U8(values) => descriptors.write_all(values)?,
+            Values::F32(values) => {
+                for value in values {
+                    descriptors.write_all(&value.to_le_bytes())?;
+                }
+            }
+        }
         for value in crop.places.iter().flatten() {
             places.write_all(&value.to_le_bytes())?;
         }

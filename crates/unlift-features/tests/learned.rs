@@ -5,32 +5,38 @@ use std::path::Path;
 use unlift::descriptors::Values;
 use unlift::geometry::frame::Bounds;
 use unlift::neighbors::oracle::{self, TrueNeighbors};
-use unlift::neighbors::{Overlap, Source};
+use unlift::neighbors::{Overlap, Similarity, Source};
 use unlift::obfuscate::lines2d::Lines2d;
 use unlift::obfuscate::obfuscate;
 use unlift::seed::Key;
 use unlift::truth::Original;
 use unlift::{Descriptors, PointSet, Unit};
-use unlift_features::{Sift, load};
+use unlift_features::{AlikedOptions, Extraction, Extractor, Found};
 use unlift_nn::Learned;
 
 const K: usize = 20;
 
-#[test]
-fn the_network_names_more_neighbors_than_patches_do() {
+/// The share of right entries among the first K of every list, by `learned` and by `other`; `None` where the photo is not here.
+fn ratios(extraction: &Extraction, other: &dyn Source<2>) -> Option<[f64; 2]> {
     let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
     let photo = shared.join("data/redkitchen/images/frame-000500.color.jpg");
     if !photo.is_file() {
         eprintln!("{} is not here: skipped", photo.display());
-        return;
+        return None;
     }
-    let image = load::read(&photo).unwrap();
-    let features = Sift::default().extract(&image);
-    let places = features.keypoints.iter().map(|k| [k.x, k.y].map(|x| f64::from(x) - 0.5));
-    let points = PointSet::try_new(places.collect(), Unit::Pixel).unwrap();
-    let high = [image.width(), image.height()].map(|side| side as f64 - 0.5);
+    let photo = Extractor::try_new(extraction).unwrap().read(&photo).unwrap();
+    let (places, values, dim) = match photo.found {
+        Found::Sift(found) => {
+            let places: Vec<_> = found.keypoints.iter().map(|k| [k.x - 0.5, k.y - 0.5]).collect();
+            (places, Values::U8(found.descriptors.concat()), 128)
+        }
+        Found::Learned(found) => (found.keypoints, Values::F32(found.descriptors), found.dim),
+    };
+    let points = places.iter().map(|place| place.map(f64::from)).collect();
+    let points = PointSet::try_new(points, Unit::Pixel).unwrap();
+    let high = photo.size.map(|side| side as f64 - 0.5);
     let original = Original::within(points, Bounds::try_new([-0.5; 2], high).unwrap()).unwrap();
-    let descriptors = Descriptors::try_new(Values::U8(features.descriptors.concat()), 128).unwrap();
+    let descriptors = Descriptors::try_new(values, dim).unwrap();
     let key = Key::from_seed(1);
     let (released, secret) = obfuscate(&Lines2d, &original, Some(&descriptors), &key).unwrap();
     let search = oracle::search(&original).unwrap();
@@ -38,7 +44,18 @@ fn the_network_names_more_neighbors_than_patches_do() {
     let ratio = |source: &dyn Source<2>| {
         near.measured_inlier_ratio(&source.lists(&released, K, 0).unwrap())
     };
-    let (learned, overlap) = (ratio(&Learned::default()), ratio(&Overlap));
-    eprintln!("learned {learned:.3}, overlap {overlap:.3}");
+    Some([ratio(&Learned::default()), ratio(other)])
+}
+
+#[test]
+fn the_network_names_more_neighbors_than_patches_do() {
+    let Some([learned, overlap]) = ratios(&Extraction::default(), &Overlap) else { return };
     assert!(learned > overlap + 0.03, "learned {learned:.3}, overlap {overlap:.3}");
+}
+
+#[test]
+fn the_network_names_more_neighbors_than_likeness_does() {
+    let aliked = Extraction::Aliked(AlikedOptions { min_score: 0.02, ..Default::default() });
+    let Some([learned, similarity]) = ratios(&aliked, &Similarity) else { return };
+    assert!(learned > similarity + 0.2, "learned {learned:.3}, similarity {similarity:.3}");
 }

@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use unlift::descriptors::Values;
 use unlift::neighbors::sources::SourceEntry;
 use unlift::neighbors::{
-    Needs, Neighborhoods, Overlap, Part, REACHES, Source, dense_among, scored,
+    Needs, Neighborhoods, Overlap, Part, Similarity, Source, dense_among, scored,
 };
 use unlift::released::Released;
 use unlift::{Descriptors, Error};
@@ -13,19 +13,20 @@ use unlift::{Descriptors, Error};
 use crate::network::Network;
 use crate::tensor::Tensor;
 
-/// The model that is used unless another one is given.
-const MODEL: &str = "neighbors-sift";
-
 /// Sources that need a network, as users choose them: beside [`unlift::neighbors::sources::SOURCES`].
 pub const SOURCES: &[SourceEntry] = &[SourceEntry {
     name: "learned",
-    summary: "records that a network, trained on photos, takes for near ones; SIFT descriptors",
+    summary: "records that a network, trained on photos, takes for near ones; SIFT or ALIKED descriptors",
     in_2d: Some(|| Arc::new(Learned::default())),
     in_3d: Some(|| Arc::new(Learned::default())),
 }];
 
-/// The `k` records that a network finds nearest by their SIFT descriptors, or that a short walk over such records
-/// reaches: [`scored`] by what `training/neighbors` trains. It is fed how well patches overlap, too.
+/// The `k` records that a network finds nearest by their descriptors, or that a short walk over such records
+/// reaches: [`scored`] by what `training/neighbors` trains. It is fed what is known without training, too: how well
+/// patches overlap (SIFT), how alike descriptors are (learned ones).
+///
+/// Which network follows from the descriptors: SIFT, floats of 128 values that are not SIFT (taken for ALIKED's) or of
+/// 256 (SuperPoint's, whose network users train for themselves). Of others `similarity` says all there is.
 ///
 /// Source: Sec. 5 and supplement E, where positions are not known either; pair scores, the loss and the walk are ours.
 #[derive(Clone, Debug, Default)]
@@ -33,18 +34,61 @@ pub struct Learned {
     network: Option<Arc<Network>>,
 }
 
+/// What a standard deviation of a learned descriptor's cosines counts beside the network's scores. The network tells who is
+/// among the nearest twenty, and not who is the nearest, which likeness does tell (docs/decisions/sources.md).
+const LIKENESS: f32 = 0.2;
+
+/// Descriptors that there is a network for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Sift,
+    Aliked,
+    SuperPoint,
+}
+
+impl Kind {
+    fn of(descriptors: &Descriptors) -> Result<Self, Error> {
+        let is_sift = Source::<2>::takes(&Overlap, descriptors).is_ok();
+        let floats = matches!(descriptors.values(), Values::F32(_));
+        match (is_sift, floats, descriptors.dim()) {
+            (true, ..) => Ok(Self::Sift),
+            (false, true, 128) => Ok(Self::Aliked),
+            (false, true, 256) => Ok(Self::SuperPoint),
+            (false, _, dim) => {
+                let expected = "descriptors of SIFT (128 values, none negative), ALIKED (128 floats) or SuperPoint (256 floats)";
+                let found = format!("{dim} {}", if floats { "floats" } else { "bytes" });
+                Err(Error::new("learned", expected, found))
+            }
+        }
+    }
+
+    fn model(self) -> &'static str {
+        match self {
+            Self::Sift => "neighbors-sift",
+            Self::Aliked => "neighbors-aliked",
+            Self::SuperPoint => "neighbors-superpoint",
+        }
+    }
+
+    /// The network for such descriptors, loaded once.
+    fn network(self) -> Result<&'static Network, Error> {
+        static LOADED: [OnceLock<Result<Network, Error>>; 3] = [const { OnceLock::new() }; 3];
+        let loaded = LOADED[self as usize].get_or_init(|| Network::load(self.model()));
+        loaded.as_ref().map_err(Error::clone)
+    }
+}
+
 impl Learned {
-    /// With another network than the one that the program carries: inputs `descriptors` (n, 128) of unit length and
-    /// `pairs` (3, n, n) of [`dense_among`], output `scores` (n, n).
+    /// With another network than the one that the program carries: inputs `descriptors` (n, dim) of unit length and
+    /// `pairs` (reaches, n, n) of [`dense_among`], output `scores` (n, n).
     pub fn with(network: Arc<Network>) -> Self {
         Self { network: Some(network) }
     }
 
-    fn network(&self) -> Result<&Network, Error> {
-        static CARRIED: OnceLock<Result<Network, Error>> = OnceLock::new();
+    fn network(&self, descriptors: &Descriptors) -> Result<&Network, Error> {
         match &self.network {
             Some(network) => Ok(network),
-            None => CARRIED.get_or_init(|| Network::load(MODEL)).as_ref().map_err(Error::clone),
+            None => Kind::of(descriptors)?.network(),
         }
     }
 }
@@ -58,35 +102,45 @@ impl<const D: usize> Source<D> for Learned {
         Needs::Descriptors
     }
 
-    fn k(&self, _: &Released<D>) -> usize {
-        // As of `overlap`: of an image's fewer keypoints only the first of a ranking are near.
-        if D == 2 { 10 } else { 35 }
+    fn k(&self, released: &Released<D>) -> usize {
+        // Of an image's fewer keypoints only the first of a ranking are near; of learned descriptors the first are mostly right.
+        match released.descriptors().map(Kind::of) {
+            Some(Ok(Kind::Sift)) | None => Source::<D>::k(&Overlap, released),
+            Some(_) if D == 2 => 7,
+            Some(_) => Source::<D>::k(&Similarity, released),
+        }
     }
 
     fn lists(&self, released: &Released<D>, k: usize, _: u64) -> Result<Neighborhoods, Error> {
-        let network = self.network()?;
+        // A map without descriptors has no lists, which is said there.
+        let network = released.descriptors().map(|descriptors| self.network(descriptors));
+        let network = network.transpose()?;
         scored(released, k, &|part| scores(network, part))
     }
 
     fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {
-        Source::<D>::takes(&Overlap, descriptors)?;
-        self.network().map(|_| ())
+        self.network(descriptors).map(|_| ())
     }
 
     fn note(&self, n_slots: usize) -> Option<String> {
-        // Sets are made of what `overlap` finds.
+        // Sets are made of what is found without training.
         Source::<D>::note(&Overlap, n_slots)
     }
 }
 
-fn scores(network: &Network, part: &Part) -> Result<Vec<f32>, Error> {
+fn scores(network: Option<&Network>, part: &Part) -> Result<Vec<f32>, Error> {
     let set = &part.descriptors;
+    let network = network.ok_or_else(|| Error::new("learned", "descriptors", "none"))?;
     let n = set.len();
     let descriptors = Tensor::try_new(&[n, set.dim()], of_unit_length(set))?;
-    let pairs =
-        Tensor::try_new(&[REACHES, n, n], dense_among(set, part.usual.as_deref())?.into_scores())?;
+    let dense = dense_among(set, part.usual.as_deref())?;
+    let (reaches, pairs) = (dense.reaches(), dense.into_scores());
+    let likeness = if reaches == 1 { pairs.clone() } else { Vec::new() };
+    let pairs = Tensor::try_new(&[reaches, n, n], pairs)?;
     let [scores] = network.run(vec![("descriptors", descriptors), ("pairs", pairs)], ["scores"])?;
-    Ok(scores.into_values())
+    let mut scores = scores.into_values();
+    scores.iter_mut().zip(likeness).for_each(|(score, alike)| *score += LIKENESS * alike);
+    Ok(scores)
 }
 
 fn of_unit_length(descriptors: &Descriptors) -> Vec<f32> {

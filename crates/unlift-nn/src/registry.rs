@@ -52,8 +52,16 @@ pub fn entry(name: &str) -> Result<&'static Entry, Error> {
 }
 
 /// All models, by name.
-pub const MODELS: &[Entry] =
-    &[ALIKED_N16ROT, INVERTER_SIFT, LPIPS_SQUEEZE, NEIGHBORS_SIFT, SUPERPOINT, YOLOX_NANO];
+pub const MODELS: &[Entry] = &[
+    ALIKED_N16ROT,
+    INVERTER_SIFT,
+    LPIPS_SQUEEZE,
+    NEIGHBORS_ALIKED,
+    NEIGHBORS_SIFT,
+    NEIGHBORS_SUPERPOINT,
+    SUPERPOINT,
+    YOLOX_NANO,
+];
 
 const ALIKED_N16ROT: Entry = Entry {
     name: "aliked-n16rot",
@@ -103,6 +111,20 @@ const LPIPS_SQUEEZE: Entry = Entry {
     carried: Some(include_bytes!("../../../models/lpips-squeeze/lpips-squeeze.onnx")),
 };
 
+const NEIGHBORS_ALIKED: Entry = Entry {
+    name: "neighbors-aliked",
+    purpose: "near points by their ALIKED descriptors (the source `learned`)",
+    licence: "MIT OR Apache-2.0",
+    owner: "https://github.com/unlift/unlift",
+    sha256: Some("af102cee72965b6bd486c5fbbcb573dd593b0dd54a56b04083e728ce7292c661"),
+    inputs: &[
+        Port { name: "descriptors", shape: &[None, Some(128)] },
+        Port { name: "pairs", shape: &[Some(1), None, None] },
+    ],
+    outputs: &[Port { name: "scores", shape: &[None, None] }],
+    carried: Some(include_bytes!("../../../models/neighbors-aliked/neighbors-aliked.onnx")),
+};
+
 const NEIGHBORS_SIFT: Entry = Entry {
     name: "neighbors-sift",
     purpose: "near points by their SIFT descriptors (the source `learned`)",
@@ -115,6 +137,22 @@ const NEIGHBORS_SIFT: Entry = Entry {
     ],
     outputs: &[Port { name: "scores", shape: &[None, None] }],
     carried: Some(include_bytes!("../../../models/neighbors-sift/neighbors-sift.onnx")),
+};
+
+const NEIGHBORS_SUPERPOINT: Entry = Entry {
+    name: "neighbors-superpoint",
+    purpose: "near points by their SuperPoint descriptors (the source `learned`), trained by those who have SuperPoint: \
+              training/neighbors",
+    licence: "yours",
+    owner: "training/neighbors/README.md of https://github.com/unlift/unlift",
+    // Whoever trains it knows what they trained.
+    sha256: None,
+    inputs: &[
+        Port { name: "descriptors", shape: &[None, Some(256)] },
+        Port { name: "pairs", shape: &[Some(1), None, None] },
+    ],
+    outputs: &[Port { name: "scores", shape: &[None, None] }],
+    carried: None,
 };
 
 const SUPERPOINT: Entry = Entry {

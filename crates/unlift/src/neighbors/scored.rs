@@ -2,8 +2,8 @@
 //!
 //! A map of a few thousand points is one set. A larger one is cut into sets of points that may be near each other by
 //! what is known without training; every point is well inside several sets, and what these say of a pair is averaged.
-//! Two short walks follow, one over the pairs that score best, one over those that are best without training: what the
-//! two get wrong is not the same.
+//! Of SIFT two short walks follow, one over the pairs that score best, one over those that are best without training: what
+//! the two get wrong is not the same. Learned descriptors see so far that their scores are the ranking.
 
 use rayon::prelude::*;
 
@@ -13,7 +13,7 @@ use super::compare::{MOST_ROWS, search};
 use super::overlap::{self, Patches};
 use super::rows::Rows;
 use super::sets::{self, Set};
-use super::similarity::{self, Cosine};
+use super::similarity::Cosine;
 use super::walk::{self, CANDIDATES};
 use crate::released::Released;
 use crate::{Descriptors, Error};
@@ -31,8 +31,8 @@ type Ranked = Vec<(f32, u32)>;
 pub struct Part {
     /// One row per point.
     pub descriptors: Descriptors,
-    /// Where there are more points than these: mean and deviation of how well the patch of each overlaps patches from
-    /// everywhere ([`dense_among`](super::dense_among)); of others than SIFT, of its cosines.
+    /// Where there are more points than these: mean and deviation of how alike each is to those from everywhere
+    /// ([`dense_among`](super::dense_among)).
     pub usual: Option<Vec<(f64, f64)>>,
 }
 
@@ -40,9 +40,9 @@ pub struct Part {
 /// column's point is among the nearest of a row's, up to a constant per row. All finite; what stands between the points of one record is not read.
 pub type Scores<'a> = dyn Fn(&Part) -> Result<Vec<f32>, Error> + Sync + 'a;
 
-/// The `k` records that two short walks reach most likely: one over records that `scores` finds near each slot, one as
-/// that of [`overlap`](super::overlap()) or, of others than SIFT, of learned ones by [`similarity`](super::similarity()). Scores: log of
-/// the (discounted) probability to be reached, mean of both.
+/// The `k` records that `scores` finds nearest each slot: of SIFT those that two short walks reach most likely, one over
+/// these records, one as that of [`overlap`](super::overlap()). Scores: log of the probability that a record is among the
+/// nearest, or of the (discounted) one to be reached, mean of both ends or walks.
 ///
 /// # Errors
 /// Those of `scores`; when the map has no descriptors, or fewer than `k` other records.
@@ -54,9 +54,10 @@ pub fn scored<const D: usize>(
     let mut rows = Rows::new(released, k)?;
     let enough = rows.enough_for(k);
     let kept = enough.max(CANDIDATES);
-    let (found, how) = match Patches::of(rows.descriptors) {
-        Ok(patches) => (search(&patches, &mut rows, kept, MOST_ROWS)?, overlap::WALK),
-        Err(_) => (search(&Cosine { counts: true }, &mut rows, kept, MOST_ROWS)?, similarity::WALK),
+    let patches = Patches::of(rows.descriptors).ok();
+    let found = match &patches {
+        Some(patches) => search(patches, &mut rows, kept, MOST_ROWS)?,
+        None => search(&Cosine { counts: true }, &mut rows, kept, MOST_ROWS)?,
     };
     let untrained = walk::standardized(&found);
     let n = rows.len();
@@ -84,9 +85,14 @@ pub fn scored<const D: usize>(
         }
     }
     let ranked: Vec<Ranked> = ranked.into_par_iter().map(merged).collect();
-    let walked = |ranked: &[_], how| walk::walk(ranked, &rows.records, REACHED * enough, how);
-    let (by_scores, free) = (walked(&both_ways(ranked), overlap::WALK), walked(&untrained, how));
-    rows.lists(&mixed(&by_scores, &free, enough), k)
+    let mut ranked = both_ways(ranked);
+    if patches.is_none() {
+        // Who is scored best is right more often than whom a walk reaches.
+        ranked.iter_mut().for_each(|row| row.truncate(enough));
+        return rows.lists(&ranked, k);
+    }
+    let walked = |ranked: &[_]| walk::walk(ranked, &rows.records, REACHED * enough, overlap::WALK);
+    rows.lists(&mixed(&walked(&ranked), &walked(&untrained), enough), k)
 }
 
 /// The `most` rows that either of two walks reaches, with the mean of their probabilities.

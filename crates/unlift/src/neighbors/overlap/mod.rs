@@ -4,11 +4,9 @@
 //! best hypothesis counts. A short walk over the best matches reaches neighbors whose patches do not
 //! overlap. Nothing is trained.
 
-mod dense;
 mod hypotheses;
 mod patches;
 
-pub use dense::{Dense, REACHES, dense, dense_among};
 pub use patches::{Patches, check};
 
 use super::Neighborhoods;
@@ -18,6 +16,9 @@ use super::source::{Needs, Source};
 use super::walk::{self, Walk};
 use crate::released::Released;
 use crate::{Descriptors, Error};
+
+/// How far the best hypothesis shifts: not at all, by one cell, by more.
+pub const REACHES: usize = 3;
 
 /// Patches of near points need not overlap: neighbors are some steps apart.
 pub const WALK: Walk = Walk { steps: 5, decay: 0.7 };

@@ -1,0 +1,249 @@
+//! Scores of all pairs of a few descriptors: what a network is fed.
+
+use rayon::prelude::*;
+
+use super::compare::Likeness;
+use super::overlap::{Patches, REACHES};
+use super::similarity::Cosine;
+use crate::simd::BLOCK;
+use crate::{Descriptors, Error};
+
+/// Descriptors at most: matrices of all pairs take 800 MB.
+const MOST: usize = 1 << 13;
+
+/// Scores of all pairs of `n` descriptors.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dense {
+    n: usize,
+    scores: Vec<f32>,
+}
+
+impl Dense {
+    /// Number of descriptors.
+    pub fn n(&self) -> usize {
+        self.n
+    }
+
+    /// Scores of a pair: [`REACHES`] of SIFT, 1 of others.
+    pub fn reaches(&self) -> usize {
+        self.scores.len() / (self.n * self.n)
+    }
+
+    /// `(reaches, n, n)`: the best score of each reach in standard deviations above what the rows of the pair score
+    /// with others by the best of all reaches, mean of both rows. Symmetric; 0 between a descriptor and itself.
+    pub fn scores(&self) -> &[f32] {
+        &self.scores
+    }
+
+    /// The same, handed over.
+    pub fn into_scores(self) -> Vec<f32> {
+        self.scores
+    }
+}
+
+/// How alike every two of `descriptors` are: of SIFT how well their patches overlap, by reach, of others their cosine.
+///
+/// The largest of a pair's [`REACHES`] scores is what [`overlap`](super::overlap()) starts its walk from; which one is
+/// the largest says how far the patches lie apart. Deviations are those among the given descriptors: a part of an image
+/// has others than the whole.
+///
+/// # Errors
+/// When there are fewer than two descriptors or more than 8,192.
+pub fn dense(descriptors: &Descriptors) -> Result<Dense, Error> {
+    dense_among(descriptors, None)
+}
+
+/// The same for descriptors that are a part of something larger: `usual` has mean and deviation of what each of them
+/// scores with those from everywhere. A part of look-alikes would take its own likeness for usual.
+///
+/// # Errors
+/// As [`dense`], and when `usual` has not as many entries as there are descriptors.
+pub fn dense_among(
+    descriptors: &Descriptors,
+    usual: Option<&[(f64, f64)]>,
+) -> Result<Dense, Error> {
+    let n = descriptors.len();
+    check(n)?;
+    if let Some(usual) = usual.filter(|usual| usual.len() != n) {
+        let expected = format!("{n} means and deviations");
+        return Err(Error::new("dense scores", expected, usual.len().to_string()));
+    }
+    let mut scores = raw(descriptors);
+    match usual {
+        Some(usual) => standardize(&mut scores, usual),
+        None => {
+            let usual = within(&scores, n);
+            standardize(&mut scores, &usual);
+        }
+    }
+    Ok(Dense { n, scores })
+}
+
+/// `(reaches, n, n)`, as they are compared.
+fn raw(descriptors: &Descriptors) -> Vec<f32> {
+    match Patches::of(descriptors) {
+        Ok(patches) => {
+            let best = |reach: usize, a: &_, b: &_, found: &mut [f32]| {
+                patches.best(a, b, |shift| shift.min(REACHES - 1) == reach, found);
+            };
+            all_pairs(&patches, descriptors, REACHES, best)
+        }
+        Err(_) => {
+            let cosine = Cosine { counts: true };
+            all_pairs(&cosine, descriptors, 1, |_, a, b, found| cosine.scores(a, b, found))
+        }
+    }
+}
+
+/// Mean and deviation of what each of `descriptors` scores with all others: what [`dense_among`] takes of a part of them.
+///
+/// # Errors
+/// As [`dense`].
+pub fn usual(descriptors: &Descriptors) -> Result<Vec<(f64, f64)>, Error> {
+    check(descriptors.len())?;
+    Ok(within(&raw(descriptors), descriptors.len()))
+}
+
+fn check(n: usize) -> Result<(), Error> {
+    if (2..=MOST).contains(&n) {
+        return Ok(());
+    }
+    Err(Error::new("dense scores", format!("2 to {MOST} descriptors"), n.to_string()))
+}
+
+/// `(reaches, n, n)`, symmetric: what `score` says of two blocks, `(BLOCK, BLOCK)`, at each reach.
+fn all_pairs<L: Likeness>(
+    likeness: &L,
+    descriptors: &Descriptors,
+    reaches: usize,
+    score: impl Fn(usize, &L::Block, &L::Block, &mut [f32]) + Sync,
+) -> Vec<f32> {
+    let n = descriptors.len();
+    let slots: Vec<u32> = (0..n as u32).collect();
+    let blocks: Vec<_> =
+        slots.par_chunks(BLOCK).map(|slots| likeness.block(descriptors, slots)).collect();
+    let mut scores = vec![0.0f32; reaches * n * n];
+    for (reach, scores) in scores.chunks_exact_mut(n * n).enumerate() {
+        let scratch = || vec![0.0f32; BLOCK * BLOCK];
+        let stripes = scores.par_chunks_mut(BLOCK * n).enumerate().with_max_len(1);
+        stripes.for_each_init(scratch, |found, (a, stripe)| {
+            for (b, block) in blocks.iter().enumerate().skip(a) {
+                score(reach, &blocks[a], block, found);
+                let columns = b * BLOCK..n.min((b + 1) * BLOCK);
+                for (row, found) in stripe.chunks_exact_mut(n).zip(found.chunks_exact(BLOCK)) {
+                    row[columns.clone()].copy_from_slice(&found[..columns.len()]);
+                }
+            }
+        });
+        for row in 1..n {
+            for column in 0..row {
+                scores[row * n + column] = scores[column * n + row];
+            }
+        }
+    }
+    scores
+}
+
+/// Mean and deviation of what every row scores with the others, by the best of all reaches.
+fn within(scores: &[f32], n: usize) -> Vec<(f64, f64)> {
+    let reaches = scores.len() / (n * n);
+    (0..n)
+        .into_par_iter()
+        .map(|row| {
+            let (mut sum, mut squares) = (0.0f64, 0.0f64);
+            for column in (0..n).filter(|&column| column != row) {
+                let of = |reach: usize| scores[(reach * n + row) * n + column];
+                let best = f64::from((0..reaches).map(of).fold(f32::NEG_INFINITY, f32::max));
+                sum += best;
+                squares += best * best;
+            }
+            let others = (n - 1) as f64;
+            let mean = sum / others;
+            (mean, (squares / others - mean * mean).max(0.0).sqrt())
+        })
+        .collect()
+}
+
+fn standardize(scores: &mut [f32], usual: &[(f64, f64)]) {
+    let n = usual.len();
+    scores.par_chunks_mut(n).enumerate().for_each(|(at, line)| {
+        let row = at % n;
+        let (mean, deviation) = usual[row];
+        for (column, score) in line.iter_mut().enumerate() {
+            let (other_mean, other_deviation) = usual[column];
+            // A blank descriptor is like none: no deviation.
+            let own = (f64::from(*score) - mean) / deviation.max(1e-9);
+            let others = (f64::from(*score) - other_mean) / other_deviation.max(1e-9);
+            *score = if column == row { 0.0 } else { ((own + others) / 2.0) as f32 };
+        }
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::descriptors::Values;
+    use crate::seed::{Draws, Stage};
+
+    fn patches(n: usize) -> Vec<[u8; 128]> {
+        let mut draws = Draws::new(3, Stage::Synthetic, 0);
+        (0..n).map(|_| std::array::from_fn(|_| draws.below(60) as u8)).collect()
+    }
+
+    fn scores(patches: &[[u8; 128]]) -> Dense {
+        dense(&Descriptors::try_new(Values::U8(patches.concat()), 128).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn a_shifted_copy_is_found_at_its_reach() {
+        let mut all = patches(200);
+        // Patch 150 shows what patch 3 shows, a cell to the right; the cells that come in are new.
+        for row in 0..4 {
+            for column in 0..3 {
+                let (from, to) = ((4 * row + column + 1) * 8, (4 * row + column) * 8);
+                let cell: [u8; 8] = all[3][from..from + 8].try_into().unwrap();
+                all[150][to..to + 8].copy_from_slice(&cell);
+            }
+        }
+        let found = scores(&all);
+        let of = |reach: usize, i: usize, j: usize| found.scores()[(reach * 200 + i) * 200 + j];
+        assert!(of(1, 3, 150) > of(0, 3, 150) + 2.0 && of(1, 3, 150) > of(2, 3, 150) + 2.0);
+        let best = (0..200).max_by(|&a, &b| of(1, 3, a).total_cmp(&of(1, 3, b)));
+        assert_eq!(best, Some(150));
+        for (i, j) in [(3, 150), (0, 199), (17, 17)] {
+            assert_eq!(of(2, i, j), of(2, j, i));
+        }
+        assert_eq!(of(0, 17, 17), 0.0);
+    }
+
+    #[test]
+    fn one_patch_has_no_pairs() {
+        let one = Descriptors::try_new(Values::U8(patches(1).concat()), 128).unwrap();
+        let message = dense(&one).unwrap_err().to_string();
+        assert_eq!(message, "dense scores: expected 2 to 8192 descriptors, found 1");
+    }
+
+    #[test]
+    fn others_than_sift_are_compared_by_cosine() {
+        let mut draws = Draws::new(4, Stage::Synthetic, 0);
+        let mut values: Vec<f32> = (0..40 * 16).map(|_| draws.between(-1.0, 1.0) as f32).collect();
+        let copied: Vec<f32> = values[..16].iter().map(|x| 3.0 * x).collect();
+        values[7 * 16..8 * 16].copy_from_slice(&copied);
+        let all = Descriptors::try_new(Values::F32(values), 16).unwrap();
+        let found = dense(&all).unwrap();
+        assert_eq!((found.n(), found.reaches()), (40, 1));
+        let of = |i: usize, j: usize| found.scores()[i * 40 + j];
+        let best = (1..40).max_by(|&a, &b| of(0, a).total_cmp(&of(0, b)));
+        assert_eq!(best, Some(7));
+        assert_eq!(of(0, 7), of(7, 0));
+        assert_eq!(of(9, 9), 0.0);
+        // In deviations: of every row the mean of its own part of the scores is 0, so that of all is.
+        let mean = found.scores().iter().sum::<f32>() / 1600.0;
+        assert!(mean.abs() < 1e-4, "{mean}");
+        // Twice the deviation, half the score.
+        let narrow = dense_among(&all, Some(&[(0.0, 1.0); 40])).unwrap();
+        let wide = dense_among(&all, Some(&[(0.0, 2.0); 40])).unwrap();
+        assert_eq!(narrow.scores()[7], 2.0 * wide.scores()[7]);
+        assert!((narrow.scores()[7] - 1.0).abs() < 1e-6);
+    }
+}
