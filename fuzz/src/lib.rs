@@ -9,8 +9,11 @@ mod records;
 pub use files::{descriptors, document, features, model_folder, network, photo, points, stages};
 pub use records::recovery;
 
+/// What is done with an input.
+pub type Target = fn(&[u8]);
+
 /// A target by its name.
-pub const TARGETS: &[(&str, fn(&[u8]))] = &[
+pub const TARGETS: &[(&str, Target)] = &[
     ("points", points),
     ("model_folder", model_folder),
     ("descriptors", descriptors),

@@ -10,7 +10,7 @@ use super::bytes::Bytes;
 /// Records, lists and options; two bytes say which dimension, family and solver.
 pub fn recovery(bytes: &[u8]) {
     let mut bytes = Bytes(bytes);
-    if bytes.byte() % 4 == 0 { of::<2>(&mut bytes) } else { of::<3>(&mut bytes) }
+    if bytes.byte().is_multiple_of(4) { of::<2>(&mut bytes) } else { of::<3>(&mut bytes) }
 }
 
 fn of<const D: usize>(bytes: &mut Bytes<'_>) {
@@ -25,7 +25,7 @@ fn of<const D: usize>(bytes: &mut Bytes<'_>) {
     let options = RecoverOptions {
         solver: Solver::ALL[usize::from(solver) % Solver::ALL.len()],
         delta,
-        exact_constraints: bytes.byte() % 2 == 0,
+        exact_constraints: bytes.byte().is_multiple_of(2),
         ..RecoverOptions::default()
     };
     let Ok(recovered) = recover(&released, &lists, &options) else { return };
@@ -87,7 +87,7 @@ fn lists<const D: usize>(
         0 => None,
         _ => Some(records.iter().map(|_| bytes.number() as f32).collect()),
     };
-    let lists_by = if bytes.byte() % 2 == 0 { ListsBy::Oracle } else { ListsBy::Unstated };
+    let lists_by = if bytes.byte().is_multiple_of(2) { ListsBy::Oracle } else { ListsBy::Unstated };
     let lists = Neighborhoods::try_new(offsets, records, scores, n, slots)?;
     Ok(lists.with_about(About { lists_by, ..About::default() }))
 }

@@ -209,3 +209,14 @@ fn real_features_make_the_round_trip() {
         assert_eq!(all(&copy), images);
     }
 }
+
+/// Found by a fuzzer: 4 GiB were asked for before anything was read.
+#[test]
+fn chunks_beyond_the_end_of_the_file_are_refused() {
+    let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus/features");
+    let source = FeatureSource::open(&corpus.join("found-chunk-of-4-gib")).unwrap();
+    let refused = (0..source.names().len()).filter_map(|at| source.get(at).err());
+    let lines: Vec<String> = refused.map(|error| error.to_string()).collect();
+    let expected = "expected chunks within the 13504 bytes of the file, found one that ends at ";
+    assert!(lines.iter().any(|line| line.contains(expected)), "{lines:?}");
+}

@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn others_than_sift_are_walked_by_their_cosines() {
+    fn scores_alone_decide_the_lists_of_others_than_sift() {
         let sift = released(300);
         let Values::U8(bytes) = sift.descriptors().unwrap().values() else { panic!("bytes") };
         let signed = bytes.iter().map(|&byte| f32::from(byte) - 60.0).collect();
@@ -263,9 +263,9 @@ mod tests {
             Unit::Meter,
             Some(descriptors),
         );
-        let flat = |part: &Part| Ok(vec![0.0; part.descriptors.len() * part.descriptors.len()]);
-        let right = right(&scored(&map.unwrap(), 10, &flat).unwrap(), 300, 10);
-        assert!(right > 0.4, "{right}");
+        let lists = scored(&map.unwrap(), 10, &opposite).unwrap();
+        let right = right(&lists, 300, 10);
+        assert!(right < 0.15, "{right}");
     }
 
     #[test]

@@ -160,7 +160,7 @@ fn what_tells_is_found() {
     let middle = (box_of.low[0] + box_of.high[0]) / 2.0;
     // One in four records has a bit that says on which side its point lies.
     let bit = |at: usize| {
-        if at % 4 == 0 { f64::from(points[at][0] > middle) } else { (at / 4 % 2) as f64 }
+        if at.is_multiple_of(4) { f64::from(points[at][0] > middle) } else { (at / 4 % 2) as f64 }
     };
     let bits: Vec<f64> = (0..POINTS).map(bit).collect();
     let rows: Vec<f64> = (0..POINTS).map(|at| at as f64).collect();

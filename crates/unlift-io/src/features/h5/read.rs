@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use half::f16;
-use hdf5_pure::{AttrValue, DType, Dataset, Datatype, DatatypeByteOrder, File, Group};
+use hdf5_pure::{AttrValue, Chunk, DType, Dataset, Datatype, DatatypeByteOrder, File, Group};
 
 use super::source::{self, Bounded};
 use super::{Array, Numbers, shape_text};
@@ -215,10 +215,16 @@ impl FeatureStore {
         // Every chunk is decoded, and the last ones stand over the edge.
         let each = product(&chunk, element).saturating_add(PER_CHUNK);
         self.budget.admit(&*place, most.saturating_mul(each))?;
-        let stored = dataset.chunks().map_err(refuse)?.len() as u64;
-        if stored > most {
+        let stored = dataset.chunks().map_err(refuse)?;
+        if stored.len() as u64 > most {
             let expected = format!("at most {most} chunks");
-            return Err(self.error(path, name, expected, stored.to_string()));
+            return Err(self.error(path, name, expected, stored.len().to_string()));
+        }
+        // Memory is taken for what an index declares before it is read.
+        let end = |chunk: &Chunk| chunk.address.saturating_add(chunk.storage_size);
+        if let Some(end) = stored.iter().map(end).find(|&end| end > self.len) {
+            let expected = format!("chunks within the {} bytes of the file", self.len);
+            return Err(self.error(path, name, expected, format!("one that ends at {end}")));
         }
         Ok(())
     }
