@@ -102,7 +102,9 @@ fn a_file_without_photos_has_frames_and_chosen_images_are_shown() {
     let rows = json(&place, "a/audit.json")["results"].clone();
     assert!(rows.as_array().unwrap().iter().all(|row| row["neighbors"] == "oracle"));
     // Of SIFT `descriptors` is another name of `overlap`: drawn once.
-    let asked = format!("audit images f.h5 {QUICK} --neighbors descriptors --show b.png --out c");
+    let asked = format!(
+        "audit images f.h5 {QUICK} --neighbors oracle --neighbors descriptors --show b.png --out c"
+    );
     place.ends(&asked, 0);
     let page = fs::read_to_string(place.path("c/report.html")).unwrap();
     assert!(page.contains("\"label\":\"descriptors, ") && !page.contains("\"label\":\"overlap, "));
