@@ -1,7 +1,8 @@
 """Inlier ratios of whole images: `evaluate.py FOLDER [--weights FILE] [--images N] [--out CSV]`.
 
 FOLDER as `training_crops --whole` writes it. Rows: raw similarity, the pair scores as they are, the network's, each
-plain and after the walk.
+plain and after the walk. Of learned descriptors also what `learned` ranks by: the mean of both ends of a pair with some
+deviations of the cosine beside the scores.
 """
 
 import argparse
@@ -17,6 +18,7 @@ from model import Network
 from weights import load
 
 AT = (1, 5, 10, 20, 50)
+LIKENESS = (0.0, 0.15, 0.2, 0.3)
 
 
 def ranked(network: Network | None, shard: data.Shard) -> dict[str, torch.Tensor]:
@@ -28,7 +30,16 @@ def ranked(network: Network | None, shard: data.Shard) -> dict[str, torch.Tensor
     if network is not None:
         with torch.inference_mode():
             scores["network"] = network(descriptors, pairs)
+        if network.shape.reaches == 1:
+            for weight in LIKENESS:
+                scores[f"both ends + {weight}"] = both_ends(scores["network"] + weight * best)
     return scores
+
+
+def both_ends(scores: torch.Tensor) -> torch.Tensor:
+    """The mean of a pair's log probabilities in its two rows."""
+    logs = torch.log_softmax(ranking.without_self(scores), -1)
+    return (logs + logs.T) / 2
 
 
 def measure(network: Network | None, folder: pathlib.Path, images: int | None, null: bool) -> dict[str, list[float]]:

@@ -1,5 +1,5 @@
 //! Whose code is in the program: licences that go with MIT OR Apache-2.0, one registry, no crate twice that need not be.
-//! Advisories change while code does not: `cargo audit` or `cargo deny check advisories`, where there is a network.
+//! A test, so that it runs wherever the others do, without a program that has to be compiled first. Advisories change while code does not: `cargo audit` or `cargo deny check advisories`, where there is a network.
 
 use std::collections::BTreeMap;
 use std::process::Command;

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 use unlift::Descriptors;
 use unlift::descriptors::Values;
-use unlift::neighbors::{dense_among, usual};
+use unlift::neighbors::{dense, usual};
 use unlift::seed::{Draws, Stage};
 use unlift_features::batch::in_order;
 use unlift_features::{
@@ -175,7 +175,7 @@ fn crop(features: &Features, photo: u32, rows: &[u32]) -> Result<Crop, unlift::E
         |all: &Vec<(f64, f64)>| -> Vec<_> { rows.iter().map(|&row| all[row as usize]).collect() };
     let usual = features.usual.as_ref().map(of_rows);
     let descriptors = features.descriptors.select(rows);
-    let pairs = dense_among(&descriptors, usual.as_deref())?.into_scores();
+    let pairs = dense(&descriptors, usual.as_deref())?.into_scores();
     let places = rows.iter().map(|&row| features.places[row as usize]).collect();
     Ok(Crop { photo, places, descriptors, pairs })
 }

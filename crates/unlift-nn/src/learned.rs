@@ -4,9 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use unlift::descriptors::Values;
 use unlift::neighbors::sources::SourceEntry;
-use unlift::neighbors::{
-    Needs, Neighborhoods, Overlap, Part, Similarity, Source, dense_among, scored,
-};
+use unlift::neighbors::{Needs, Neighborhoods, Overlap, Part, Similarity, Source, dense, scored};
 use unlift::released::Released;
 use unlift::{Descriptors, Error};
 
@@ -79,8 +77,8 @@ impl Kind {
 }
 
 impl Learned {
-    /// With another network than the one that the program carries: inputs `descriptors` (n, dim) of unit length and
-    /// `pairs` (reaches, n, n) of [`dense_among`], output `scores` (n, n).
+    /// With another network than the one that descriptors decide: inputs `descriptors` (n, dim) of unit length and
+    /// `pairs` (reaches, n, n) of [`dense`], output `scores` (n, n).
     pub fn with(network: Arc<Network>) -> Self {
         Self { network: Some(network) }
     }
@@ -112,10 +110,7 @@ impl<const D: usize> Source<D> for Learned {
     }
 
     fn lists(&self, released: &Released<D>, k: usize, _: u64) -> Result<Neighborhoods, Error> {
-        // A map without descriptors has no lists, which is said there.
-        let network = released.descriptors().map(|descriptors| self.network(descriptors));
-        let network = network.transpose()?;
-        scored(released, k, &|part| scores(network, part))
+        scored(released, k, &|part| scores(self.network(&part.descriptors)?, part))
     }
 
     fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {
@@ -128,13 +123,12 @@ impl<const D: usize> Source<D> for Learned {
     }
 }
 
-fn scores(network: Option<&Network>, part: &Part) -> Result<Vec<f32>, Error> {
+fn scores(network: &Network, part: &Part) -> Result<Vec<f32>, Error> {
     let set = &part.descriptors;
-    let network = network.ok_or_else(|| Error::new("learned", "descriptors", "none"))?;
     let n = set.len();
     let descriptors = Tensor::try_new(&[n, set.dim()], of_unit_length(set))?;
-    let dense = dense_among(set, part.usual.as_deref())?;
-    let (reaches, pairs) = (dense.reaches(), dense.into_scores());
+    let pairs = dense(set, part.usual.as_deref())?;
+    let (reaches, pairs) = (pairs.reaches(), pairs.into_scores());
     let likeness = if reaches == 1 { pairs.clone() } else { Vec::new() };
     let pairs = Tensor::try_new(&[reaches, n, n], pairs)?;
     let [scores] = network.run(vec![("descriptors", descriptors), ("pairs", pairs)], ["scores"])?;

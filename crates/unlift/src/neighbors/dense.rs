@@ -44,24 +44,13 @@ impl Dense {
 /// How alike every two of `descriptors` are: of SIFT how well their patches overlap, by reach, of others their cosine.
 ///
 /// The largest of a pair's [`REACHES`] scores is what [`overlap`](super::overlap()) starts its walk from; which one is
-/// the largest says how far the patches lie apart. Deviations are those among the given descriptors: a part of an image
-/// has others than the whole.
+/// the largest says how far the patches lie apart. Deviations are those among the given descriptors, unless they are a part of
+/// something larger, which has others: then `usual` has mean and deviation of what each of them scores with those from
+/// everywhere ([`usual`](usual())). A part of look-alikes would take its own likeness for usual.
 ///
 /// # Errors
-/// When there are fewer than two descriptors or more than 8,192.
-pub fn dense(descriptors: &Descriptors) -> Result<Dense, Error> {
-    dense_among(descriptors, None)
-}
-
-/// The same for descriptors that are a part of something larger: `usual` has mean and deviation of what each of them
-/// scores with those from everywhere. A part of look-alikes would take its own likeness for usual.
-///
-/// # Errors
-/// As [`dense`], and when `usual` has not as many entries as there are descriptors.
-pub fn dense_among(
-    descriptors: &Descriptors,
-    usual: Option<&[(f64, f64)]>,
-) -> Result<Dense, Error> {
+/// When there are fewer than two descriptors or more than 8,192, or `usual` has not as many entries.
+pub fn dense(descriptors: &Descriptors, usual: Option<&[(f64, f64)]>) -> Result<Dense, Error> {
     let n = descriptors.len();
     check(n)?;
     if let Some(usual) = usual.filter(|usual| usual.len() != n) {
@@ -95,7 +84,7 @@ fn raw(descriptors: &Descriptors) -> Vec<f32> {
     }
 }
 
-/// Mean and deviation of what each of `descriptors` scores with all others: what [`dense_among`] takes of a part of them.
+/// Mean and deviation of what each of `descriptors` scores with all others: what [`dense`] takes of a part of them.
 ///
 /// # Errors
 /// As [`dense`].
@@ -191,7 +180,7 @@ mod tests {
     }
 
     fn scores(patches: &[[u8; 128]]) -> Dense {
-        dense(&Descriptors::try_new(Values::U8(patches.concat()), 128).unwrap()).unwrap()
+        dense(&Descriptors::try_new(Values::U8(patches.concat()), 128).unwrap(), None).unwrap()
     }
 
     #[test]
@@ -219,7 +208,7 @@ mod tests {
     #[test]
     fn one_patch_has_no_pairs() {
         let one = Descriptors::try_new(Values::U8(patches(1).concat()), 128).unwrap();
-        let message = dense(&one).unwrap_err().to_string();
+        let message = dense(&one, None).unwrap_err().to_string();
         assert_eq!(message, "dense scores: expected 2 to 8192 descriptors, found 1");
     }
 
@@ -230,7 +219,7 @@ mod tests {
         let copied: Vec<f32> = values[..16].iter().map(|x| 3.0 * x).collect();
         values[7 * 16..8 * 16].copy_from_slice(&copied);
         let all = Descriptors::try_new(Values::F32(values), 16).unwrap();
-        let found = dense(&all).unwrap();
+        let found = dense(&all, None).unwrap();
         assert_eq!((found.n(), found.reaches()), (40, 1));
         let of = |i: usize, j: usize| found.scores()[i * 40 + j];
         let best = (1..40).max_by(|&a, &b| of(0, a).total_cmp(&of(0, b)));
@@ -241,8 +230,8 @@ mod tests {
         let mean = found.scores().iter().sum::<f32>() / 1600.0;
         assert!(mean.abs() < 1e-4, "{mean}");
         // Twice the deviation, half the score.
-        let narrow = dense_among(&all, Some(&[(0.0, 1.0); 40])).unwrap();
-        let wide = dense_among(&all, Some(&[(0.0, 2.0); 40])).unwrap();
+        let narrow = dense(&all, Some(&[(0.0, 1.0); 40])).unwrap();
+        let wide = dense(&all, Some(&[(0.0, 2.0); 40])).unwrap();
         assert_eq!(narrow.scores()[7], 2.0 * wide.scores()[7]);
         assert!((narrow.scores()[7] - 1.0).abs() < 1e-6);
     }

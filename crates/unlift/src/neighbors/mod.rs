@@ -22,7 +22,7 @@ mod tiles;
 mod walk;
 
 pub use by_descriptors::ByDescriptors;
-pub use dense::{Dense, dense, dense_among, usual};
+pub use dense::{Dense, dense, usual};
 pub(crate) use geometric::geometric_by;
 pub use geometric::{Geometric, geometric};
 pub use neighborhoods::Neighborhoods;

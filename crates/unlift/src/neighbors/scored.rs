@@ -32,7 +32,7 @@ pub struct Part {
     /// One row per point.
     pub descriptors: Descriptors,
     /// Where there are more points than these: mean and deviation of how alike each is to those from everywhere
-    /// ([`dense_among`](super::dense_among)).
+    /// ([`dense`](super::dense())).
     pub usual: Option<Vec<(f64, f64)>>,
 }
 

@@ -5,14 +5,14 @@
 //!
 //! - `Family`: the records as rows, by kind. Slot `s` lies on record `s / slots_per_record`; places are about the released
 //!   origin, in f32.
-//! - Lists of records per slot (`map::lists`). Of paired lines the slot's own record and its twin may be listed;
+//! - Lists of records per slot (`map::lists`), never the slot's own. Rays of one center meet in it whatever they hide:
 //!   `may_vote_for` says who counts.
 //! - `delta`, the distance up to which a record supports a place, learned before (by consensus) whether it is used or not.
 //! - `map::chunks::solve_chunks` runs over slots on all threads, the same bytes on any number of them.
 //!
 //! What comes out is moved afterwards to where rules of the scheme allow it to be (`exact`), unless the solver is a baseline
-//! that stays as published (`Task::is_settled`). Rays of which each center's points are known do not meet
-//! (`Family::has_regions`): on images only a slot's neighbors of the same center say anything.
+//! that stays as published (`Task::is_settled`). Where it is known which points are whose center's (`Family::has_regions`,
+//! `dcl2d`), rays of two centers meet nowhere that both points may lie: `consensus::anchors` looks at bearings instead.
 
 use std::ops::Range;
 

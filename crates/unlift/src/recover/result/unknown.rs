@@ -83,8 +83,9 @@ mod tests {
 
     #[test]
     fn names_are_read_back() {
-        for why in Unknown::ALL {
+        for (at, why) in Unknown::ALL.into_iter().enumerate() {
             assert_eq!(Unknown::from_name(why.name()), Some(why));
+            assert_eq!(why as usize, at, "in the order of the type, none left out");
         }
         assert_eq!(Unknown::from_name("unknown"), None);
     }
