@@ -9,7 +9,7 @@ const KEPT: f64 = 0.9;
 /// How often the thinnest direction is looked for again among the points that are kept.
 const STEPS: usize = 8;
 
-/// The smallest extent of `points` as a share of the largest one: 0 on a plane or a line, 1 in a ball. Extents are those of
+/// The smallest extent of `points` as a share of the largest one: 0 on a plane or a line, near 1 in a ball. Extents are those of
 /// the middle nine tenths along the axes of the scatter of the nine tenths that are nearest to the best plane (least
 /// trimmed squares, by concentration steps: Rousseeuw and Van Driessen 1999), so that outliers make no map thick. Of fewer
 /// than two places 0.
@@ -94,7 +94,8 @@ mod tests {
         tilted.extend(outliers);
         assert!(flatness(&tilted) < 1e-6, "{}", flatness(&tilted));
         let cube: Vec<[f64; 3]> = (0..500).map(|_| std::array::from_fn(|_| unit())).collect();
-        assert!(flatness(&cube) > 0.8, "{}", flatness(&cube));
+        // A tenth is cut off where it is thinnest: 0.72, without it 0.9.
+        assert!(flatness(&cube) > 0.7, "{}", flatness(&cube));
         let line: Vec<[f64; 3]> = (0..500).map(|_| [unit(); 3]).collect();
         assert!(flatness(&line) < 1e-9);
         assert_eq!(flatness::<3>(&[]), 0.0);
