@@ -68,12 +68,38 @@ fn what_cannot_be_painted_is_a_usage_error() {
         complaint("audit images features.h5 --invert --out x"),
         "unlift: --invert: expected --photos, as PATH is no folder of photos\n"
     );
-    assert_eq!(
-        complaint("audit images photos --features aliked --invert --out x"),
-        "unlift: --invert: expected --features sift, which the network knows\n"
-    );
     assert!(complaint("audit map features.h5 --invert --out x").contains("--photos"));
     assert!(!place.path("x").exists());
+}
+
+#[test]
+fn a_network_of_ones_own_paints_what_the_program_has_none_for() {
+    let place = place();
+    let missing = "inverter-aliked.onnx: expected in ";
+    for line in
+        ["audit images photos --features aliked --invert", "invert photos --features aliked"]
+    {
+        let (_, stderr) = place.ends(&format!("{line} --out x"), 3);
+        assert!(stderr.contains(missing) && stderr.contains("training/inversion"), "{stderr}");
+    }
+    // As many columns, whatever it makes of them.
+    let models = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models");
+    let own = format!("--inverter {models}/inverter-sift/inverter-sift.onnx");
+    place.ends(
+        &format!("audit images photos --features aliked --invert {own} {CHEAP} --out own"),
+        0,
+    );
+    let document = document(&place, "own");
+    assert!(document["results"][0]["metrics"]["ssim"].is_f64(), "{document}");
+    assert_eq!(document["options"]["inverter_sha256"].as_str().unwrap().len(), 64, "{document}");
+    let (stdout, _) = place.ends(&format!("invert photos {own} --out pictures"), 0);
+    assert_eq!(stdout, "3 pictures, in pictures\n");
+
+    let other =
+        format!("invert photos --inverter {models}/lpips-squeeze/lpips-squeeze.onnx --out y");
+    let (_, stderr) = place.ends(&other, 3);
+    assert!(stderr.contains("expected an input features of shape (1, 131, any, any)"), "{stderr}");
+    assert!(!place.path("x").exists() && !place.path("y").exists());
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use unlift::Error;
+use unlift_nn::DescriptorKind;
 
 use crate::color::ColorImage;
 use crate::learned::{Aliked, AlikedOptions, LearnedFeatures, SuperPoint, SuperPointOptions};
@@ -35,9 +36,13 @@ impl Default for Extraction {
 }
 
 impl Extraction {
-    /// Whether descriptors are SIFT's, which say what is where in a patch.
-    pub fn is_sift(&self) -> bool {
-        matches!(self, Self::Sift(_))
+    /// Of which kind the descriptors are.
+    pub fn kind(&self) -> DescriptorKind {
+        match self {
+            Self::Sift(_) => DescriptorKind::Sift,
+            Self::Aliked(_) => DescriptorKind::Aliked,
+            Self::SuperPoint(_) => DescriptorKind::SuperPoint,
+        }
     }
 
     fn max_image_size(&self) -> usize {

@@ -1,28 +1,38 @@
 //! From feature images to pictures.
 
-use unlift::Error;
-use unlift::neighbors::{Overlap, Source};
+use std::path::Path;
+
+use unlift::{Descriptors, Error};
 use unlift_features::ColorImage;
-use unlift_nn::{Network, Tensor};
+use unlift_nn::{DescriptorKind, Entry, Network, Tensor, entry};
 
 use crate::feature_image::{Points, feature_image};
-
-/// Name of the model.
-const SIFT: &str = "inverter-sift";
 
 /// A network that was trained to make pictures of points and their descriptors.
 #[derive(Debug)]
 pub struct Inverter {
+    kind: DescriptorKind,
     network: Network,
 }
 
 impl Inverter {
-    /// The inverter of SIFT descriptors, as `unlift features` and COLMAP make them.
+    /// The inverter of descriptors of `kind`.
     ///
     /// # Errors
-    /// When a file of the model that is to be taken in place of the one carried cannot be.
-    pub fn sift() -> Result<Self, Error> {
-        Ok(Self { network: Network::load(SIFT)? })
+    /// When the program carries none and there is none among the models of its user, or a file of the model cannot be
+    /// used.
+    pub fn of(kind: DescriptorKind) -> Result<Self, Error> {
+        Ok(Self { kind, network: Network::load(model(kind))? })
+    }
+
+    /// The inverter of descriptors of `kind` in a file, as `training/inversion` exports them: input `features`
+    /// `(1, columns + 3, h, w)`, which is a [`feature_image`], output `picture` `(1, 3, 2 h, 2 w)`.
+    ///
+    /// # Errors
+    /// When the file cannot be read, or has other inputs and outputs.
+    pub fn read(path: &Path, kind: DescriptorKind) -> Result<Self, Error> {
+        let entry = Entry { sha256: None, ..*entry(model(kind))? };
+        Ok(Self { kind, network: Network::read(path, &entry)? })
     }
 
     /// SHA-256 of the model, in hexadecimal.
@@ -36,11 +46,32 @@ impl Inverter {
     /// When the columns of `points` differ in length, their descriptors are not of the kind that the network knows, or
     /// a side has less than 2 pixels or the image more than 2^28.
     pub fn invert(&self, points: &Points<'_>, size: [usize; 2]) -> Result<ColorImage, Error> {
-        // What overlaps patches and what was trained on SIFT read the same descriptors.
-        Source::<2>::takes(&Overlap, points.descriptors)?;
+        self.takes(points.descriptors)?;
         let features = feature_image(points, size)?;
         let [picture] = self.network.run(vec![("features", features)], ["picture"])?;
         color_image(&picture, size.map(|side| side / 2))
+    }
+
+    /// Whether `descriptors` are of the kind that the network knows.
+    fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {
+        let found = match descriptors.is_empty() {
+            true => return Ok(()),
+            false => DescriptorKind::of(descriptors, "pictures")?,
+        };
+        if found == self.kind {
+            return Ok(());
+        }
+        let expected = format!("descriptors as the network knows them ({:?})", self.kind);
+        Err(Error::new("pictures", expected, format!("{found:?}")))
+    }
+}
+
+/// The model that paints descriptors of `kind`.
+fn model(kind: DescriptorKind) -> &'static str {
+    match kind {
+        DescriptorKind::Sift => "inverter-sift",
+        DescriptorKind::Aliked => "inverter-aliked",
+        DescriptorKind::SuperPoint => "inverter-superpoint",
     }
 }
 

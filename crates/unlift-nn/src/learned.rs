@@ -8,12 +8,15 @@ use unlift::neighbors::{Needs, Neighborhoods, Overlap, Part, Similarity, Source,
 use unlift::released::Released;
 use unlift::{Descriptors, Error};
 
+use crate::kind::DescriptorKind;
 use crate::network::Network;
 use crate::tensor::Tensor;
 
+const NAME: &str = "learned";
+
 /// Sources that need a network, as users choose them: beside [`unlift::neighbors::sources::SOURCES`].
 pub const SOURCES: &[SourceEntry] = &[SourceEntry {
-    name: "learned",
+    name: NAME,
     summary: "records that a network, trained on photos, takes for near ones; SIFT or ALIKED descriptors",
     in_2d: Some(|| Arc::new(Learned::default())),
     in_3d: Some(|| Arc::new(Learned::default())),
@@ -36,44 +39,21 @@ pub struct Learned {
 /// among the nearest twenty, and not who is the nearest, which likeness does tell (docs/decisions/sources.md).
 const LIKENESS: f32 = 0.2;
 
-/// Descriptors that there is a network for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    Sift,
-    Aliked,
-    SuperPoint,
+/// The model that scores pairs of such descriptors.
+fn model(kind: DescriptorKind) -> &'static str {
+    match kind {
+        DescriptorKind::Sift => "neighbors-sift",
+        DescriptorKind::Aliked => "neighbors-aliked",
+        DescriptorKind::SuperPoint => "neighbors-superpoint",
+    }
 }
 
-impl Kind {
-    fn of(descriptors: &Descriptors) -> Result<Self, Error> {
-        let is_sift = Source::<2>::takes(&Overlap, descriptors).is_ok();
-        let floats = matches!(descriptors.values(), Values::F32(_));
-        match (is_sift, floats, descriptors.dim()) {
-            (true, ..) => Ok(Self::Sift),
-            (false, true, 128) => Ok(Self::Aliked),
-            (false, true, 256) => Ok(Self::SuperPoint),
-            (false, _, dim) => {
-                let expected = "descriptors of SIFT (128 values, none negative), ALIKED (128 floats) or SuperPoint (256 floats)";
-                let found = format!("{dim} {}", if floats { "floats" } else { "bytes" });
-                Err(Error::new("learned", expected, found))
-            }
-        }
-    }
-
-    fn model(self) -> &'static str {
-        match self {
-            Self::Sift => "neighbors-sift",
-            Self::Aliked => "neighbors-aliked",
-            Self::SuperPoint => "neighbors-superpoint",
-        }
-    }
-
-    /// The network for such descriptors, loaded once.
-    fn network(self) -> Result<&'static Network, Error> {
-        static LOADED: [OnceLock<Result<Network, Error>>; 3] = [const { OnceLock::new() }; 3];
-        let loaded = LOADED[self as usize].get_or_init(|| Network::load(self.model()));
-        loaded.as_ref().map_err(Error::clone)
-    }
+/// The network for such descriptors, loaded once.
+fn network(kind: DescriptorKind) -> Result<&'static Network, Error> {
+    static LOADED: [OnceLock<Result<Network, Error>>; DescriptorKind::ALL.len()] =
+        [const { OnceLock::new() }; DescriptorKind::ALL.len()];
+    let loaded = LOADED[kind as usize].get_or_init(|| Network::load(model(kind)));
+    loaded.as_ref().map_err(Error::clone)
 }
 
 impl Learned {
@@ -86,14 +66,14 @@ impl Learned {
     fn network(&self, descriptors: &Descriptors) -> Result<&Network, Error> {
         match &self.network {
             Some(network) => Ok(network),
-            None => Kind::of(descriptors)?.network(),
+            None => network(DescriptorKind::of(descriptors, NAME)?),
         }
     }
 }
 
 impl<const D: usize> Source<D> for Learned {
     fn name(&self) -> &str {
-        "learned"
+        NAME
     }
 
     fn needs(&self) -> Needs {
@@ -102,8 +82,8 @@ impl<const D: usize> Source<D> for Learned {
 
     fn k(&self, released: &Released<D>) -> usize {
         // Of an image's fewer keypoints only the first of a ranking are near; of learned descriptors the first are mostly right.
-        match released.descriptors().map(Kind::of) {
-            Some(Ok(Kind::Sift)) | None => Source::<D>::k(&Overlap, released),
+        match released.descriptors().map(|some| DescriptorKind::of(some, NAME)) {
+            Some(Ok(DescriptorKind::Sift)) | None => Source::<D>::k(&Overlap, released),
             Some(_) if D == 2 => 7,
             Some(_) => Source::<D>::k(&Similarity, released),
         }

@@ -21,12 +21,14 @@
 
 pub mod file;
 mod folders;
+mod kind;
 mod learned;
 mod network;
 mod registry;
 mod tensor;
 
 pub use folders::{Folders, Place, VARIABLE};
+pub use kind::DescriptorKind;
 pub use learned::{Learned, SOURCES};
 pub use network::Network;
 pub use registry::{Entry, MODELS, Port, entry};

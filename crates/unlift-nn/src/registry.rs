@@ -54,7 +54,9 @@ pub fn entry(name: &str) -> Result<&'static Entry, Error> {
 /// All models, by name.
 pub const MODELS: &[Entry] = &[
     ALIKED_N16ROT,
+    INVERTER_ALIKED,
     INVERTER_SIFT,
+    INVERTER_SUPERPOINT,
     LPIPS_SQUEEZE,
     NEIGHBORS_ALIKED,
     NEIGHBORS_SIFT,
@@ -84,6 +86,27 @@ const ALIKED_N16ROT: Entry = Entry {
         Port { name: "descriptors", shape: &[None, Some(128)] },
     ],
     carried: Some(include_bytes!("../../../models/aliked-n16rot/aliked-n16rot.onnx")),
+};
+
+const INVERTER_ALIKED: Entry = Entry {
+    name: "inverter-aliked",
+    purpose: "pictures from keypoints or points of a map and their ALIKED descriptors, trained by yourself: \
+              training/inversion",
+    licence: "yours",
+    owner: "training/inversion/README.md of https://github.com/unlift/unlift",
+    // Whoever trains it knows what they trained.
+    sha256: None,
+    inputs: &[Port { name: "features", shape: &[Some(1), Some(131), None, None] }],
+    outputs: &[Port { name: "picture", shape: &[Some(1), Some(3), None, None] }],
+    carried: None,
+};
+
+const INVERTER_SUPERPOINT: Entry = Entry {
+    name: "inverter-superpoint",
+    purpose: "pictures from keypoints or points of a map and their SuperPoint descriptors, trained by those who have \
+              SuperPoint: training/inversion",
+    inputs: &[Port { name: "features", shape: &[Some(1), Some(259), None, None] }],
+    ..INVERTER_ALIKED
 };
 
 const INVERTER_SIFT: Entry = Entry {

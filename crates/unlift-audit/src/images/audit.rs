@@ -10,6 +10,7 @@ use unlift::audit::{self, Cell, NeighborsBy, Observer, Outcome, Plan, Row, run_i
 use unlift::neighbors::{ByDescriptors, Overlap, Similarity, Source};
 use unlift_io::atomic::OutputSet;
 use unlift_io::hash::{hash_file, hash_files};
+use unlift_nn::DescriptorKind;
 use unlift_report::document::{ImageCounts, ImageFigures, Input};
 use unlift_report::{RenderOptions, render};
 
@@ -202,7 +203,9 @@ fn without_oracle(job: &ImagesJob<'_>, numbers: &[usize]) -> Vec<NeighborsBy<2>>
         let needs = Needs::of(source);
         let of_image = |&at: &usize| match job.source {
             // What was extracted as SIFT is what every source takes.
-            FeatureSource::Folder(folder) if folder.extraction().is_sift() => true,
+            FeatureSource::Folder(folder) if folder.extraction().kind() == DescriptorKind::Sift => {
+                true
+            }
             _ => job.source.get(at).is_ok_and(|image| lacking(&image, &needs).is_none()),
         };
         needs.descriptors() && numbers.iter().all(of_image)

@@ -46,12 +46,9 @@ impl fmt::Debug for Inversion {
 
 impl Inversion {
     /// Of images whose photos are in `photos`.
-    ///
-    /// # Errors
-    /// When a model is missing.
-    pub fn new(photos: &Path) -> Result<Self, Error> {
-        let (painter, photos) = (Painter::try_new()?, photos.to_owned());
-        Ok(Self { painter, photos, known: Mutex::default(), failed: Mutex::default() })
+    pub fn new(painter: Painter, photos: &Path) -> Self {
+        let photos = photos.to_owned();
+        Self { painter, photos, known: Mutex::default(), failed: Mutex::default() }
     }
 
     /// SHA-256 of the network that paints, in hexadecimal.

@@ -56,15 +56,15 @@ impl MapInversion {
     /// A camera that no lens is known for and a photo that cannot be used are told; the others are taken.
     ///
     /// # Errors
-    /// When there is not one, a file of the model cannot be read, or a network is missing.
+    /// When there is not one, or a file of the model cannot be read.
     pub fn open(
+        painter: Painter,
         model: &Path,
         photos: &Path,
         scale: f64,
         most: usize,
         progress: &dyn Progress,
     ) -> Result<Self, crate::Error> {
-        let painter = Painter::try_new()?;
         let (cameras, mut images) = colmap::read_views(model)?;
         images.sort_by(|a, b| a.name.cmp(&b.name));
         let with_photo = |image: &colmap::Image| {
@@ -100,9 +100,11 @@ impl MapInversion {
     /// Of photos at hand: name, camera in the unit of the audit, pixels.
     ///
     /// # Errors
-    /// When a photo has not the size of its camera or is too small, or a network is missing.
-    pub fn of(photos: impl IntoIterator<Item = (String, View, ColorImage)>) -> Result<Self, Error> {
-        let painter = Painter::try_new()?;
+    /// When a photo has not the size of its camera or is too small.
+    pub fn of(
+        painter: Painter,
+        photos: impl IntoIterator<Item = (String, View, ColorImage)>,
+    ) -> Result<Self, Error> {
         let seen = photos.into_iter().map(|(name, view, photo)| {
             seen(&painter, name.clone(), view, &photo).map_err(|error| error.within(&name))
         });

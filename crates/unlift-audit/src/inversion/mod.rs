@@ -61,19 +61,18 @@ struct Judged {
 }
 
 impl Painter {
-    /// With the networks that the program carries.
+    /// With the network that paints, and those that judge.
     ///
     /// # Errors
-    /// When a file that is to be taken in place of one of them cannot be.
-    pub fn try_new() -> Result<Self, Error> {
-        let (inverter, lpips) = (Inverter::sift()?, Lpips::try_new()?);
-        Ok(Self { inverter, lpips, detector: Detector::try_new()? })
+    /// When a file that is to be taken in place of one that the program carries cannot be.
+    pub fn try_new(inverter: Inverter) -> Result<Self, Error> {
+        Ok(Self { inverter, lpips: Lpips::try_new()?, detector: Detector::try_new()? })
     }
 
     /// The picture of keypoints `(n, 2)` in an image of `size` (width, height) pixels.
     ///
     /// # Errors
-    /// When there is not one SIFT descriptor per keypoint.
+    /// When there is not one descriptor per keypoint, of the kind that the network knows.
     pub fn keypoints(
         &self,
         places: &[[f32; 2]],
@@ -88,7 +87,7 @@ impl Painter {
     /// much as the attacker trusts it.
     ///
     /// # Errors
-    /// When the size of the image or descriptors were not released, or these are not SIFT's.
+    /// When the size of the image or descriptors were not released, or the network does not know these.
     pub fn image(
         &self,
         released: &Released<2>,
@@ -106,7 +105,7 @@ impl Painter {
     /// The picture of what came back of a map, as `view` sees it.
     ///
     /// # Errors
-    /// When descriptors were not released, or are not SIFT's.
+    /// When descriptors were not released, or the network does not know them.
     pub fn map(
         &self,
         view: &View,

@@ -84,9 +84,13 @@ pub struct AuditImagesArgs {
     #[arg(long, value_name = "DIR", help_heading = "Result")]
     pub photos: Option<PathBuf>,
     /// Paint what came back and compare with the photos: rows get ssim, psnr and lpips, and the
-    /// report the pictures (SIFT)
+    /// report the pictures
     #[arg(long, help_heading = "Result")]
     pub invert: bool,
+    /// Paint with this network in place of the one known for the descriptors: ONNX, as
+    /// training/inversion exports it
+    #[arg(long, value_name = "FILE", help_heading = "Result", requires = "invert")]
+    pub inverter: Option<PathBuf>,
     #[command(flatten)]
     pub result: ResultArgs,
     #[command(flatten)]

@@ -58,9 +58,13 @@ pub struct AuditMapArgs {
           help_heading = "Result")]
     pub thresholds: Vec<Threshold>,
     /// Paint what came back as the map's cameras see it, and compare with their photos: rows get ssim,
-    /// psnr and lpips, and the report the pictures (SIFT descriptors of a COLMAP model)
+    /// psnr and lpips, and the report the pictures (of a COLMAP model with descriptors)
     #[arg(long, help_heading = "Result", requires = "photos")]
     pub invert: bool,
+    /// Paint with this network in place of the one known for the descriptors: ONNX, as
+    /// training/inversion exports it
+    #[arg(long, value_name = "FILE", help_heading = "Result", requires = "invert")]
+    pub inverter: Option<PathBuf>,
     /// Folder of the photos of the map
     #[arg(long, value_name = "DIR", help_heading = "Result", requires = "invert")]
     pub photos: Option<PathBuf>,

@@ -5,12 +5,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::values;
+use crate::values::{self, FeatureType};
 
 /// Options of `invert`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-One PNG per image, of half its size, under the image's name with .png behind. SIFT only.
+One PNG per image, of half its size, under the image's name with .png behind. Networks: see
+unlift models.
 
 Examples:
   unlift invert photos --out pictures                                     of the keypoints themselves
@@ -22,6 +23,10 @@ pub struct InvertArgs {
     /// (released.parquet)
     #[arg(value_name = "PATH")]
     pub path: PathBuf,
+    /// Which features of photos: sift, aliked, or superpoint, whose weights you supply (see unlift
+    /// models) [default: sift]
+    #[arg(long, value_name = "TYPE", value_parser = values::feature_type)]
+    pub features: Option<FeatureType>,
     /// What came back of the released images or map
     #[arg(long, value_name = "FILE")]
     pub recovered: Option<PathBuf>,
@@ -31,6 +36,10 @@ pub struct InvertArgs {
     /// Units of the released map per unit of that model: the --scale it was obfuscated with
     #[arg(long, value_name = "SCALE", value_parser = values::positive, requires = "cameras")]
     pub scale: Option<f64>,
+    /// Paint with this network in place of the one known for the descriptors: ONNX, as
+    /// training/inversion exports it
+    #[arg(long, value_name = "FILE")]
+    pub inverter: Option<PathBuf>,
     /// Paint at most this many images, evenly spaced over their names; of released images the first ones
     #[arg(long, value_name = "N")]
     pub max_images: Option<NonZeroUsize>,

@@ -7,7 +7,6 @@ use std::time::Instant;
 use serde_json::{Map, json};
 use unlift::audit::{Measure, NeighborsBy, Plan};
 use unlift::descriptors::Values;
-use unlift::neighbors::{Overlap, Source};
 use unlift::obfuscate::SchemeOptions;
 use unlift::{Descriptors, Unit};
 use unlift_audit::images::FeatureSource;
@@ -18,17 +17,19 @@ use unlift_audit::{Shown, open_audit};
 use unlift_features::Extraction;
 use unlift_io::atomic::Rules;
 use unlift_io::{Error, read};
+use unlift_nn::DescriptorKind;
 use unlift_report::pictures::MOST_PICTURES;
 
 use super::common::with_threads;
 use super::extraction::Typed;
+use super::painter::{kind, painter};
 use super::plan::{attack, check_about, check_fit, own, solvers, summary, thresholds, with_attack};
 use crate::args::AuditImagesArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
 use crate::progress::{Progress, Stderr};
 use crate::stderr;
-use crate::values::{FeatureType, NeighborSource, distinct};
+use crate::values::{NeighborSource, distinct};
 
 /// The threshold that speaks for an audit, in pixels, or the nearest one asked for.
 const HEADLINE_PX: f64 = 10.0;
@@ -37,25 +38,36 @@ const HEADLINE_PX: f64 = 10.0;
 pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
     let started = Instant::now();
     let mut plan = plan(args)?;
-    let inversion = inversion(args)?;
-    plan.measures.extend(inversion.iter().map(|one| Arc::clone(one) as Arc<dyn Measure<2>>));
+    let painted = painted(args)?;
     let inputs = [args.path.as_path()].into_iter().chain(args.photos.as_deref());
     let rules = Rules::new(inputs, args.result.force);
     let shown = if args.result.share_safe { Shown::Figures } else { Shown::Points };
     let out = open_audit(&args.result.out, rules, shown, &Stderr)?;
     let (finished, used) = with_threads(args.run.threads, || {
-        let source =
-            FeatureSource::open(&args.path, &extraction(args, &plan)?).map_err(|error| {
-                let map = read::is_project(&args.path);
-                let error = anyhow::Error::from(error);
-                if map { advise(error, "unlift audit map, as this is a map") } else { error }
-            })?;
+        let extraction = extraction(args, &plan)?;
+        let source = FeatureSource::open(&args.path, &extraction).map_err(|error| {
+            let map = read::is_project(&args.path);
+            let error = anyhow::Error::from(error);
+            if map { advise(error, "unlift audit map, as this is a map") } else { error }
+        })?;
         if let Some(note) = source.passed_over() {
             stderr::note(note);
         }
         let chosen = chosen(source.names().len(), args.max_images.map(|n| n.get()));
         check_photos(args, &source, &chosen)?;
-        check_descriptors(&source, &chosen, &plan, inversion.is_some())?;
+        let first = check_descriptors(&source, &chosen, &plan, args.invert)?;
+        let inversion = match painted {
+            Some(photos) => {
+                let kind = match source {
+                    FeatureSource::Folder(_) => extraction.kind(),
+                    FeatureSource::File(_) => kind("--invert", first.as_ref())?,
+                };
+                let painter = painter(kind, args.inverter.as_deref())?;
+                Some(Arc::new(Inversion::new(painter, photos)))
+            }
+            None => None,
+        };
+        plan.measures.extend(inversion.iter().map(|one| Arc::clone(one) as Arc<dyn Measure<2>>));
         let progress = Progress::new(args.run.quiet);
         let job = ImagesJob {
             source: &source,
@@ -135,7 +147,7 @@ fn extraction(args: &AuditImagesArgs, plan: &Plan<2>) -> anyhow::Result<Extracti
         ..Typed::default()
     };
     let extraction = typed.extraction(&args.path)?;
-    if !extraction.is_sift() && args.path.is_dir() {
+    if extraction.kind() != DescriptorKind::Sift && args.path.is_dir() {
         // Any two rows of floats that are not all alike.
         let rows = (0..2 * 128).map(|at| if at < 128 { 0.1 } else { -0.1 }).collect();
         let learned = Descriptors::try_new(Values::F32(rows), 128)?;
@@ -158,22 +170,14 @@ fn check_photos(
     Err(Error::new(photos, "", expected, "none").into())
 }
 
-/// What paints pictures, if that was asked for.
-fn inversion(args: &AuditImagesArgs) -> anyhow::Result<Option<Arc<Inversion>>> {
-    if !args.invert {
-        return Ok(None);
+/// The folder of photos that pictures are compared with, if they were asked for.
+fn painted(args: &AuditImagesArgs) -> anyhow::Result<Option<&Path>> {
+    match (&args.photos, args.path.is_dir()) {
+        _ if !args.invert => Ok(None),
+        (Some(photos), _) => Ok(Some(photos)),
+        (None, true) => Ok(Some(&args.path)),
+        (None, false) => Err(usage("--invert: expected --photos, as PATH is no folder of photos")),
     }
-    let photos = match (&args.photos, args.path.is_dir()) {
-        (Some(photos), _) => photos,
-        (None, true) => &args.path,
-        (None, false) => {
-            return Err(usage("--invert: expected --photos, as PATH is no folder of photos"));
-        }
-    };
-    if args.features.is_some_and(|kind| kind != FeatureType::Sift) {
-        return Err(usage("--invert: expected --features sift, which the network knows"));
-    }
-    Ok(Some(Arc::new(Inversion::new(photos)?)))
 }
 
 /// Numbers of at most `most` images, evenly spaced over all `n`: the middles of as many equal parts.
@@ -183,29 +187,24 @@ fn chosen(n: usize, most: Option<usize>) -> Vec<usize> {
 }
 
 /// Asks the first image with keypoints whether it has what the sources need: one line in place of one per
-/// image. What is wrong with single images is told when they are read.
+/// image. What is wrong with single images is told when they are read. Returns its descriptors, if they were looked at.
 fn check_descriptors(
     source: &FeatureSource,
     chosen: &[usize],
     plan: &Plan<2>,
     invert: bool,
-) -> anyhow::Result<()> {
+) -> anyhow::Result<Option<Descriptors>> {
     // Extracted features always have them.
     let wanted = invert || Needs::of_plan(plan).descriptors();
     if matches!(source, FeatureSource::Folder(_)) || !wanted {
-        return Ok(());
+        return Ok(None);
     }
     let found = chosen.iter().filter_map(|&at| source.get(at).ok());
     let Some(first) = found.into_iter().find(|image| !image.keypoints.is_empty()) else {
-        return Ok(());
+        return Ok(None);
     };
     if invert {
-        let Some(descriptors) = &first.descriptors else {
-            return Err(usage("--invert: expected descriptors, found none"));
-        };
-        if let Err(error) = Source::<2>::takes(&Overlap, descriptors) {
-            return Err(usage(format!("--invert: {error}")));
-        }
+        kind("--invert", first.descriptors.as_ref())?;
     }
     for source in plan.own_sources() {
         match &first.descriptors {
@@ -217,7 +216,7 @@ fn check_descriptors(
             None => {}
         }
     }
-    Ok(())
+    Ok(first.descriptors)
 }
 
 /// Numbers of the images to draw, if they were named.

@@ -7,7 +7,6 @@ use std::time::Instant;
 use indexmap::IndexMap;
 use serde_json::{Map, Value, json};
 use unlift::audit::{Measure, Plan};
-use unlift::neighbors::{Overlap, Source};
 use unlift::obfuscate::SchemeOptions;
 use unlift_audit::inversion::MapInversion;
 use unlift_audit::maps::perform;
@@ -17,6 +16,7 @@ use unlift_io::hash::hash_file;
 use unlift_io::read;
 
 use super::common::{open_map, with_threads};
+use super::painter::{kind, painter};
 use super::plan::{attack, neighbors, solvers, summary, thresholds, with_attack};
 use crate::args::AuditMapArgs;
 use crate::exit::{Outcome, advise, usage};
@@ -75,12 +75,10 @@ fn inversion(
     let Some(descriptors) = &prepared.descriptors else {
         return Err(usage("--invert: expected descriptors (--descriptors FILE), found none"));
     };
-    if let Err(error) = Source::<3>::takes(&Overlap, descriptors) {
-        return Err(usage(format!("--invert: {error}")));
-    }
+    let painter = painter(kind("--invert", Some(descriptors))?, args.inverter.as_deref())?;
     let scale = 1.0 / prepared.unit_in_map_units;
     let most = args.max_photos.get();
-    Ok(Some(Arc::new(MapInversion::open(model, photos, scale, most, progress)?)))
+    Ok(Some(Arc::new(MapInversion::open(painter, model, photos, scale, most, progress)?)))
 }
 
 /// What a user should know who audits a part of a map: its figures are too small for the whole.

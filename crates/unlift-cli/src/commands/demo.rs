@@ -14,9 +14,11 @@ use unlift_audit::maps::perform;
 use unlift_audit::{Job, Shown, open_audit};
 use unlift_io::atomic::Rules;
 use unlift_io::hash::hash_positions;
+use unlift_nn::DescriptorKind;
 use unlift_report::document::Input;
 
 use super::common::with_threads;
+use super::painter::painter;
 use crate::args::DemoArgs;
 use crate::exit::Outcome;
 use crate::output::{command_line, print};
@@ -42,7 +44,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
         let painted = room.telling(N_PAINTED)?.into_iter();
         let painted =
             painted.map(|photo| (photo.name.clone(), photo.view.clone(), photo.image.clone()));
-        let inversion = Arc::new(MapInversion::of(painted)?);
+        let inversion = Arc::new(MapInversion::of(painter(DescriptorKind::Sift, None)?, painted)?);
         let sha256 = hash_positions(&room.points);
         let original = Original::new(PointSet::try_new(room.points, Unit::Meter)?);
         let usual = Plan::new(Unit::Meter).for_map(original.len(), 50);

@@ -8,15 +8,18 @@ use unlift::OneLine;
 use unlift_audit::images::FeatureSource;
 use unlift_audit::inversion::{Painter, view};
 use unlift_audit::refused;
-use unlift_features::{ColorImage, Extraction, preview};
+use unlift_features::{ColorImage, preview};
 use unlift_io::Error;
 use unlift_io::atomic::{Access, Kind, OutputSet, Rules, make_folders, marked_picture, write_file};
 use unlift_io::read::colmap;
 use unlift_io::stage::{
     ImageFile, Kind as Stage, declared_kind, has_images, read_recovered, read_released,
 };
+use unlift_nn::DescriptorKind;
 
 use super::common::{same_map, with_threads};
+use super::extraction::Typed;
+use super::painter::{kind, painter};
 use crate::args::InvertArgs;
 use crate::exit::{Outcome, line, usage};
 use crate::output::print;
@@ -28,19 +31,18 @@ const AT_WORK: usize = 2;
 /// Paints.
 pub fn run(args: &InvertArgs) -> anyhow::Result<Outcome> {
     with_threads(args.threads, || {
-        let painter = Painter::try_new()?;
         let inputs = [Some(&args.path), args.recovered.as_ref(), args.cameras.as_ref()];
         let rules = Rules::new(inputs.into_iter().flatten().map(PathBuf::as_path), args.force);
         // Begun and given up: whether anything can be written there.
         drop(OutputSet::create(&args.out, rules.clone(), Access::Private, &[]).map_err(refused)?);
         let to = Target { args, rules, painted: AtomicUsize::new(0) };
         let unusable = match (&args.recovered, declared_kind(&args.path)) {
-            (Some(recovered), _) if has_images(&args.path)? => images(&to, &painter, recovered)?,
-            (Some(recovered), _) => map(&to, &painter, recovered)?,
+            (Some(recovered), _) if has_images(&args.path)? => images(&to, recovered)?,
+            (Some(recovered), _) => map(&to, recovered)?,
             (None, Some(Stage::Released)) => {
                 return Err(usage("--recovered: expected what came back of PATH, found none"));
             }
-            (None, _) => keypoints(&to, &painter)?,
+            (None, _) => keypoints(&to)?,
         };
         let (painted, out) = (to.painted.into_inner(), OneLine(args.out.display()));
         print(&format!("{painted} pictures, in {out}\n"))?;
@@ -60,6 +62,10 @@ struct Target<'a> {
 }
 
 impl Target<'_> {
+    fn painter(&self, kind: DescriptorKind) -> anyhow::Result<Painter> {
+        painter(kind, self.args.inverter.as_deref())
+    }
+
     /// The file of the picture of image `name`, which may lie in folders of its own.
     fn file(&self, name: &str) -> anyhow::Result<PathBuf> {
         let relative = Path::new(name);
@@ -109,10 +115,22 @@ fn each<T: Sync>(
 }
 
 /// The keypoints of photos or of a file, as they are.
-fn keypoints(to: &Target<'_>, painter: &Painter) -> anyhow::Result<usize> {
+fn keypoints(to: &Target<'_>) -> anyhow::Result<usize> {
     let path = &to.args.path;
-    let source = FeatureSource::open(path, &Extraction::default())?;
+    let typed = Typed { option: "--features", kind: to.args.features, ..Typed::default() };
+    let extraction = typed.extraction(path)?;
+    let source = FeatureSource::open(path, &extraction)?;
     let chosen = to.chosen(source.names().len());
+    let kind = match &source {
+        FeatureSource::Folder(_) => extraction.kind(),
+        FeatureSource::File(_) => {
+            // What is wrong with single images is told when they are painted.
+            let read = chosen.iter().filter_map(|&at| source.get(at).ok());
+            let first = read.into_iter().find(|image| !image.keypoints.is_empty());
+            kind("PATH", first.and_then(|image| image.descriptors).as_ref())?
+        }
+    };
+    let painter = &to.painter(kind)?;
     each(to, &chosen, |&at| {
         let image = source.get(at)?;
         let place = || format!("image {}", image.name.escape_debug());
@@ -127,9 +145,22 @@ fn keypoints(to: &Target<'_>, painter: &Painter) -> anyhow::Result<usize> {
     })
 }
 
+/// The descriptors of the first released image that has any.
+fn kind_of_images(path: &Path) -> anyhow::Result<DescriptorKind> {
+    let mut released = ImageFile::open(path, Stage::Released)?;
+    while let Some(rows) = released.next_image()? {
+        let image = rows.released()?;
+        if image.n_slots() > 0 {
+            return kind("PATH", image.descriptors());
+        }
+    }
+    kind("PATH", None)
+}
+
 /// What came back of released images.
-fn images(to: &Target<'_>, painter: &Painter, recovered: &Path) -> anyhow::Result<usize> {
+fn images(to: &Target<'_>, recovered: &Path) -> anyhow::Result<usize> {
     let path = &to.args.path;
+    let painter = &to.painter(kind_of_images(path)?)?;
     let mut released = ImageFile::open(path, Stage::Released)?;
     let mut found = ImageFile::open(recovered, Stage::Recovered)?;
     let (mut unusable, mut at_work) = (0, Vec::new());
@@ -162,7 +193,7 @@ fn images(to: &Target<'_>, painter: &Painter, recovered: &Path) -> anyhow::Resul
 }
 
 /// What came back of a released map, by the cameras of a model.
-fn map(to: &Target<'_>, painter: &Painter, recovered: &Path) -> anyhow::Result<usize> {
+fn map(to: &Target<'_>, recovered: &Path) -> anyhow::Result<usize> {
     let (args, path) = (to.args, &to.args.path);
     let Some(model) = &args.cameras else {
         return Err(usage(
@@ -171,6 +202,7 @@ fn map(to: &Target<'_>, painter: &Painter, recovered: &Path) -> anyhow::Result<u
     };
     let scale = args.scale.unwrap_or(1.0);
     let released = read_released::<3>(path)?;
+    let painter = to.painter(kind("PATH", released.descriptors())?)?;
     let came_back = read_recovered::<3>(recovered)?;
     same_map(recovered, came_back.about().map, path, Some(released.fingerprint()))?;
     let (cameras, mut images) = colmap::read_views(model)?;

@@ -15,6 +15,7 @@ mod metrics;
 mod models;
 mod neighbors;
 mod obfuscate;
+mod painter;
 mod plan;
 mod recover;
 mod schemes;

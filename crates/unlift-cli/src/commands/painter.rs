@@ -1,0 +1,27 @@
+//! What paints: the network for the descriptors at hand, or the one that its user names.
+
+use std::path::Path;
+
+use unlift::Descriptors;
+use unlift_audit::inversion::Painter;
+use unlift_invert::Inverter;
+use unlift_nn::DescriptorKind;
+
+use crate::exit::usage;
+
+/// The kind of descriptors that pictures shall be made from, which `option` asks for.
+pub fn kind(option: &str, descriptors: Option<&Descriptors>) -> anyhow::Result<DescriptorKind> {
+    let Some(descriptors) = descriptors else {
+        return Err(usage(format!("{option}: expected descriptors, found none")));
+    };
+    DescriptorKind::of(descriptors, option).map_err(|error| usage(error.to_string()))
+}
+
+/// What paints descriptors of `kind`: the network in the file `own`, or the one that is known for them.
+pub fn painter(kind: DescriptorKind, own: Option<&Path>) -> anyhow::Result<Painter> {
+    let inverter = match own {
+        Some(path) => Inverter::read(path, kind),
+        None => Inverter::of(kind),
+    };
+    Ok(Painter::try_new(inverter?)?)
+}
