@@ -27,6 +27,7 @@ mod parts;
 mod pins;
 mod records;
 mod recovery;
+mod released_again;
 mod secrets;
 mod shares;
 mod start;
