@@ -26,6 +26,7 @@ mod learned;
 mod network;
 mod registry;
 mod tensor;
+mod wire;
 
 pub use folders::{Folders, Place, VARIABLE};
 pub use kind::DescriptorKind;

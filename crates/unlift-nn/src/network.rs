@@ -14,6 +14,7 @@ use unlift::Error;
 use crate::folders::{Folders, Place};
 use crate::registry::{Entry, Port, entry};
 use crate::tensor::Tensor;
+use crate::wire;
 
 /// A model that is loaded. Shared by threads: [`run`](Self::run) may be called from many at once.
 pub struct Network {
@@ -78,6 +79,7 @@ impl Network {
         {
             return Err(Error::new(place, format!("SHA-256 {expected}"), sha256));
         }
+        wire::check(&bytes).map_err(|found| Error::new(place, "a model in ONNX", found))?;
         let model = aside(|| {
             let mut options = ModelOptions::with_all_ops();
             // Twice the memory of the weights, a tenth of the time.

@@ -8,6 +8,7 @@
 mod file;
 mod kind;
 mod partial;
+mod removal;
 mod rules;
 mod set;
 mod swap;

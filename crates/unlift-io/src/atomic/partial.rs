@@ -9,6 +9,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use super::removal::remove_marked;
 use super::{Access, flush_names, parent_of};
 use crate::Error;
 use crate::unfinished::{RANDOM, around, is_partial_name};
@@ -17,8 +18,8 @@ use crate::unfinished::{RANDOM, around, is_partial_name};
 /// one holds the lock, so that [`abandon`] meets nothing half done.
 static LIVE: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// A file in every partial folder, the first one: what has it is ours, with all that is in it.
-const MARK: &str = ".unlift-unfinished";
+/// A file in every partial folder, the first one and the last: what has it is ours, with all that is in it.
+pub(super) const MARK: &str = ".unlift-unfinished";
 
 fn live() -> MutexGuard<'static, Vec<PathBuf>> {
     // A list of paths is in order whatever panicked.
@@ -44,7 +45,7 @@ fn remove(path: &Path) {
     if is_ours && path.join(MARK).is_file() {
         // Another thread may be writing in it.
         for _ in 0..10 {
-            if fs::remove_dir_all(path).is_ok() {
+            if remove_marked(path).is_ok() {
                 return;
             }
         }
@@ -65,21 +66,25 @@ pub fn sweep(folder: &Path) {
         let path = entry.path();
         // Neither links, which lead elsewhere, nor pipes, which would be waited for.
         let may_be = entry.file_type().is_ok_and(|kind| kind.is_file() || kind.is_dir());
-        if may_be && is_partial_name(&path) && is_dead(&path) {
+        // The lock is held until it is gone: whoever has just made it, and not locked it yet, waits and begins anew.
+        if may_be
+            && is_partial_name(&path)
+            && let Some(_locked) = lock_of_dead(&path)
+        {
             remove(&path);
         }
     }
 }
 
 #[cfg(unix)]
-fn is_dead(path: &Path) -> bool {
-    File::open(path).is_ok_and(|file| file.try_lock().is_ok())
+fn lock_of_dead(path: &Path) -> Option<File> {
+    File::open(path).ok().filter(|file| file.try_lock().is_ok())
 }
 
 /// Folders cannot be locked everywhere: nothing is swept.
 #[cfg(not(unix))]
-fn is_dead(_: &Path) -> bool {
-    false
+fn lock_of_dead(_: &Path) -> Option<File> {
+    None
 }
 
 /// A file or folder that is gone when dropped, unless it was put in its place.

@@ -1,8 +1,11 @@
 //! Several outputs in one folder that may hold anything else.
 
 use std::collections::BTreeSet;
-use std::fs;
+use std::fs::{self, File, TryLockError};
+use std::io;
 use std::path::{Path, PathBuf};
+use std::thread;
+use std::time::{Duration, Instant};
 
 use super::partial::{MadeFolders, Partial, sweep, undisturbed};
 use super::swap::Swapped;
@@ -50,9 +53,7 @@ impl OutputSet {
                 rules.check(&place, *kind)?;
             }
         }
-        let made = MadeFolders::make(&target, access).map_err(failed)?;
-        sweep(&target);
-        let staging = Partial::folder(&target).map_err(failed)?;
+        let (made, staging) = begin(&target, access).map_err(failed)?;
         let path = path.to_owned();
         Ok(Self { path, target, rules, access, files: Vec::new(), staging, made: vec![made] })
     }
@@ -95,7 +96,10 @@ impl OutputSet {
         }
         let earlier = self.staging.path().join("earlier");
         fs::create_dir(&earlier).map_err(failed)?;
+        // Files of two runs are not mixed.
+        let alone = Alone::wait_in(&self.target);
         undisturbed(|| self.exchange(&earlier))?;
+        drop(alone);
         let folders: BTreeSet<PathBuf> = self
             .files
             .iter()
@@ -131,6 +135,45 @@ impl OutputSet {
         match checked {
             Some(Err(error)) => Err(error.at(self.path.join(name))),
             _ => Ok(()),
+        }
+    }
+}
+
+/// The folder, made where it is missing and swept, and one in it to build in.
+fn begin(target: &Path, access: Access) -> io::Result<(MadeFolders, Partial)> {
+    let mut tries = 0;
+    loop {
+        let begun = MadeFolders::make(target, access).and_then(|made| {
+            sweep(target);
+            Ok((made, Partial::folder(target)?))
+        });
+        tries += 1;
+        match begun {
+            // Another run that gives up removes the folder that it had made, if it is still empty.
+            Err(error) if error.kind() == io::ErrorKind::NotFound && tries < 10 => {}
+            begun => return begun,
+        }
+    }
+}
+
+/// Holds a lock (`flock`) on a folder, for the moment in which files take their places there.
+struct Alone(#[expect(dead_code, reason = "held")] Option<File>);
+
+impl Alone {
+    /// Waits for other runs that are at it, which takes no time that anybody notices. Where folders cannot be locked, or a lock
+    /// is held for seconds, as by `flock(1)` around a command, it goes on without.
+    fn wait_in(folder: &Path) -> Self {
+        const PATIENCE: Duration = Duration::from_secs(5);
+        let started = Instant::now();
+        let Ok(file) = File::open(folder) else { return Self(None) };
+        loop {
+            match file.try_lock() {
+                Ok(()) => return Self(Some(file)),
+                Err(TryLockError::WouldBlock) if started.elapsed() < PATIENCE => {
+                    thread::sleep(Duration::from_millis(1));
+                }
+                Err(_) => return Self(None),
+            }
         }
     }
 }

@@ -1,0 +1,103 @@
+//! A folder of ours goes away: its mark last, so that what is killed on the way is known by a later run.
+
+use std::io;
+use std::path::Path;
+
+/// Removes the folder `path` with all that is in it. Links are removed, not followed, whoever puts them there meanwhile.
+pub(super) fn remove_marked(path: &Path) -> io::Result<()> {
+    system::remove_marked(path)
+}
+
+#[cfg(target_os = "linux")]
+mod system {
+    use std::ffi::CString;
+    use std::fs;
+    use std::io;
+    use std::os::fd::OwnedFd;
+    use std::path::Path;
+
+    use rustix::fs::{AtFlags, CWD, Dir, Mode, OFlags, openat, unlinkat};
+    use rustix::io::Errno;
+
+    use super::super::partial::MARK;
+
+    pub fn remove_marked(path: &Path) -> io::Result<()> {
+        let folder = openat(CWD, path, FOLDER, Mode::empty())?;
+        empty(&folder, MARK.as_bytes())?;
+        match unlinkat(&folder, MARK, AtFlags::empty()) {
+            // An earlier try came so far.
+            Ok(()) | Err(Errno::NOENT) => fs::remove_dir(path),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    const FOLDER: OFlags =
+        OFlags::DIRECTORY.union(OFlags::NOFOLLOW).union(OFlags::RDONLY).union(OFlags::CLOEXEC);
+
+    /// Removes what is in a folder, but for `kept`.
+    fn empty(folder: &OwnedFd, kept: &[u8]) -> Result<(), Errno> {
+        // Listed first, so that no more files are open than folders lie in each other.
+        let names = Dir::read_from(folder)?.map(|entry| Ok(entry?.file_name().to_owned()));
+        let names: Vec<CString> = names.collect::<Result<_, Errno>>()?;
+        for name in names {
+            if ![b".".as_slice(), b"..", kept].contains(&name.as_bytes()) {
+                remove(folder, &name)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn remove(folder: &OwnedFd, name: &CString) -> Result<(), Errno> {
+        match unlinkat(folder, name, AtFlags::empty()) {
+            Err(Errno::ISDIR | Errno::PERM) => {}
+            done => return done,
+        }
+        match unlinkat(folder, name, AtFlags::REMOVEDIR) {
+            Err(Errno::NOTEMPTY | Errno::EXIST) => {}
+            done => return done,
+        }
+        empty(&openat(folder, name, FOLDER, Mode::empty())?, b"")?;
+        unlinkat(folder, name, AtFlags::REMOVEDIR)
+    }
+}
+
+/// Without the order: elsewhere nothing is removed so, by paths within an open folder.
+#[cfg(not(target_os = "linux"))]
+mod system {
+    pub use std::fs::remove_dir_all as remove_marked;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::entries;
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn all_that_is_in_it_goes_and_links_are_not_followed() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir_all(at("ours/a/b")).unwrap();
+        for name in ["mine", "ours/.unlift-unfinished", "ours/x", "ours/a/b/y"] {
+            fs::write(at(name), "").unwrap();
+        }
+        #[cfg(unix)]
+        std::os::unix::fs::symlink(folder.path(), at("ours/a/link")).unwrap();
+        remove_marked(&at("ours")).unwrap();
+        assert_eq!(entries(folder.path()), ["mine"]);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn what_cannot_be_removed_keeps_its_mark() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        // A link to a folder is none of ours.
+        fs::create_dir(at("precious")).unwrap();
+        fs::write(at("precious/.unlift-unfinished"), "").unwrap();
+        symlink(at("precious"), at("link")).unwrap();
+        assert!(remove_marked(&at("link")).is_err());
+        assert_eq!(entries(&at("precious")), [".unlift-unfinished"]);
+    }
+}
