@@ -55,7 +55,7 @@ pub use error::Error;
 pub use gate::{Candidate, Figure, Gate};
 pub use given::by_point;
 pub use lengths::{Extent, check_scale, check_thresholds};
-pub use maps::{Finished, Job};
+pub use maps::{Audited, Finished, Job};
 pub use memory::peak_bytes;
 pub use outputs::{FIGURES, PAGE, Shown, check_file, open_audit, refused};
 pub use prepare::{OutlierFilter, Preparation, Prepared, prepare};

@@ -14,6 +14,7 @@ use unlift_io::hash::hash_files;
 use unlift_io::read;
 use unlift_report::document::{Document, Input};
 use unlift_report::inversions::Inversion as Sheet;
+use unlift_report::scene::Scene3d;
 use unlift_report::{ErrorCdf, RenderOptions, render, text_table};
 
 use crate::Error;
@@ -65,6 +66,16 @@ pub struct Job<'a> {
     pub command: Option<String>,
     /// When the command began.
     pub started: Instant,
+}
+
+/// What an audit found, before it is written.
+#[derive(Clone, Debug)]
+pub struct Audited {
+    /// The figures.
+    pub document: Document,
+    scene: Option<Scene3d>,
+    curves: Vec<ErrorCdf>,
+    sheets: Vec<Sheet>,
 }
 
 /// What an audit left behind.
@@ -192,6 +203,15 @@ impl Finished {
 
 /// Runs the job and writes its files, all or none.
 pub fn perform(job: Job<'_>, mut out: OutputSet) -> Result<Finished, Error> {
+    let (folder, share_safe) = (job.out.clone(), job.share_safe);
+    find(job, Some(&mut out))?.write(out, &folder, share_safe)
+}
+
+/// Runs the job: what it found, of which nothing is written but clouds, if these are asked for and `out` is there.
+///
+/// # Errors
+/// When the plan does not fit the map, a gate or cloud cannot be made, or `progress` says stop.
+pub fn find(job: Job<'_>, out: Option<&mut OutputSet>) -> Result<Audited, Error> {
     check_gates(&job.gates, &job.plan)?;
     for note in &job.notes {
         job.progress.say(&format!("note: {note}"));
@@ -203,7 +223,9 @@ pub fn perform(job: Job<'_>, mut out: OutputSet) -> Result<Finished, Error> {
         pictures: (!job.share_safe).then(|| Pictures::new(job.original, &job.plan, n_views)),
         curves: Vec::new(),
         drawn: drawn.iter().map(|solver| solver.name()).collect(),
-        clouds: job.write_clouds.then(|| (Clouds::new(job.unit_in_map_units), &mut out)),
+        clouds: out
+            .filter(|_| job.write_clouds)
+            .map(|out| (Clouds::new(job.unit_in_map_units), out)),
         thresholds: job.plan.thresholds.iter().map(|t| t.value).collect(),
         inversion: job.inversion.clone(),
         sheets: match (&job.inversion, job.share_safe) {
@@ -249,19 +271,41 @@ pub fn perform(job: Job<'_>, mut out: OutputSet) -> Result<Finished, Error> {
         seconds: &outcome.seconds,
     };
     let document = document::document(&job.plan, &found, provenance);
-    let shown = if job.share_safe { document.share_safe() } else { document };
-    let curves = curves_of(watcher.curves, &outcome.rows);
     let scene = watcher.pictures.map(|p| p.into_scene(&job.cameras, job.up));
-    let options = RenderOptions {
-        share_safe: job.share_safe,
-        error_cdf: curves,
-        inversions: watcher.sheets,
-        ..RenderOptions::default()
-    };
-    let page = render(&shown, scene.as_ref(), &options)?;
-    let json = shown.to_json()?;
-    commit_audit(out, &page, &json, job.share_safe)?;
-    Ok(Finished { document: shown, report: job.out.join(PAGE) })
+    let curves = curves_of(watcher.curves, &outcome.rows);
+    Ok(Audited { document, scene, curves, sheets: watcher.sheets })
+}
+
+impl Audited {
+    /// The page, self-contained.
+    ///
+    /// # Errors
+    /// When it cannot be rendered.
+    pub fn page(&self, share_safe: bool) -> Result<String, Error> {
+        let options = RenderOptions {
+            share_safe,
+            error_cdf: self.curves.clone(),
+            inversions: self.sheets.clone(),
+            ..RenderOptions::default()
+        };
+        Ok(render(&self.document, self.scene.as_ref(), &options)?)
+    }
+
+    /// Writes page and figures into the folder that `out` was opened for, both or none; `share_safe`: figures only.
+    ///
+    /// # Errors
+    /// When they cannot be written.
+    pub fn write(
+        &self,
+        out: OutputSet,
+        folder: &Path,
+        share_safe: bool,
+    ) -> Result<Finished, Error> {
+        let page = self.page(share_safe)?;
+        let document = if share_safe { self.document.share_safe() } else { self.document.clone() };
+        commit_audit(out, &page, &document.to_json()?, share_safe)?;
+        Ok(Finished { document, report: folder.join(PAGE) })
+    }
 }
 
 /// Shows progress and keeps what the report draws.

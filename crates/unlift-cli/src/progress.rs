@@ -197,7 +197,10 @@ impl Spinner {
         let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed}");
         let bar = ProgressBar::new_spinner().with_message(what);
         bar.set_style(style.expect("the template is ours"));
-        bar.enable_steady_tick(PATIENCE / 8);
+        // A thread of its own, which nobody needs where it is hidden.
+        if !bar.is_hidden() {
+            bar.enable_steady_tick(PATIENCE / 8);
+        }
         Self(bar)
     }
 

@@ -1,8 +1,8 @@
 //! Finished images of a run that may be interrupted, each in a file of its own.
 
 use std::collections::HashMap;
-use std::fs;
-use std::io::Write;
+use std::fs::{self, File, TryLockError};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
@@ -30,6 +30,8 @@ pub struct Parts {
     options: String,
     /// What earlier runs left, by key: hashes of the content.
     earlier: HashMap<String, Vec<String>>,
+    /// Holds the lock on the folder.
+    _locked: Option<File>,
 }
 
 /// A photo's key.
@@ -39,14 +41,18 @@ impl Parts {
     /// The parts of the output `target` with these features; the folder of parts is made if it is not there.
     ///
     /// # Errors
-    /// When it cannot be made or read.
+    /// When it cannot be made or read, or another run is at work in it: the first to be done would remove the parts of
+    /// the other.
     pub fn open(target: &Path, features: &Folder) -> Result<Self, Error> {
         let mut folder = target.as_os_str().to_owned();
         folder.push(".parts");
         let folder = PathBuf::from(folder);
-        if !folder.is_dir() {
-            fs::create_dir(&folder).map_err(|source| Error::write(target, source))?;
-        }
+        let locked = locked(&folder).map_err(|source| match source.kind() {
+            io::ErrorKind::WouldBlock => {
+                Error::new(target, "", "one run at a time", "another run at work")
+            }
+            _ => Error::write(target, source),
+        })?;
         sweep(&folder);
         let mut earlier: HashMap<String, Vec<String>> = HashMap::new();
         for entry in fs::read_dir(&folder).map_err(|source| Error::read(&folder, source))?.flatten()
@@ -56,7 +62,7 @@ impl Parts {
             }
         }
         let target = target.to_owned();
-        Ok(Self { target, folder, options: features.settings(), earlier })
+        Ok(Self { target, folder, options: features.settings(), earlier, _locked: locked })
     }
 
     /// The key of the photo `name` at `photo`.
@@ -132,6 +138,46 @@ impl Parts {
         }
         let _ = fs::remove_dir(&self.folder);
     }
+}
+
+/// Makes the folder of parts if it is not there and locks it, where folders can be locked. The system takes the lock back when
+/// the process ends in any way.
+fn locked(folder: &Path) -> io::Result<Option<File>> {
+    loop {
+        match fs::create_dir(folder) {
+            Err(error) if error.kind() != io::ErrorKind::AlreadyExists || !folder.is_dir() => {
+                return Err(error);
+            }
+            _ => {}
+        }
+        let file = match File::open(folder) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+            Err(_) => return Ok(None),
+            Ok(file) => file,
+        };
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Err(io::ErrorKind::WouldBlock.into()),
+            Err(TryLockError::Error(_)) => return Ok(None),
+        }
+        // Another run may have removed it, being done, before it was locked here.
+        if is_at(&file, folder) {
+            return Ok(Some(file));
+        }
+    }
+}
+
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let identity = |found: fs::Metadata| (found.dev(), found.ino());
+    let found = [file.metadata(), fs::metadata(path)].map(|found| found.ok().map(identity));
+    found[0] == found[1]
+}
+
+#[cfg(not(unix))]
+fn is_at(_: &File, path: &Path) -> bool {
+    path.is_dir()
 }
 
 /// The key in the name of a part, and the hash of its content, which those of the first version lack.

@@ -15,9 +15,9 @@ use crate::args::FeaturesArgs;
 use crate::exit::{Outcome, line, usage};
 use crate::output::print;
 use crate::progress::Progress;
-use unlift_audit::check_file;
 use unlift_audit::images::parts::Parts;
 use unlift_audit::images::{FeatureSource, Folder, is_photo};
+use unlift_audit::{check_file, refused};
 
 /// What was done, and what could not be.
 #[derive(Default)]
@@ -112,7 +112,7 @@ fn extract(
     tally: &mut Tally,
     progress: &mut Progress,
 ) -> anyhow::Result<()> {
-    let parts = Parts::open(target, folder)?;
+    let parts = Parts::open(target, folder).map_err(refused)?;
     let names = folder.names();
     let all: Vec<usize> = (0..names.len()).collect();
     let extract = |at: usize| -> anyhow::Result<Done> {

@@ -1,7 +1,9 @@
 //! `unlift invert`: pictures of keypoints, of what came back of them, or of a map that came back.
 
+use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 use unlift::OneLine;
@@ -10,7 +12,9 @@ use unlift_audit::inversion::{Painter, view};
 use unlift_audit::refused;
 use unlift_features::{ColorImage, preview};
 use unlift_io::Error;
-use unlift_io::atomic::{Access, Kind, OutputSet, Rules, make_folders, marked_picture, write_file};
+use unlift_io::atomic::{
+    Access, Kind, OutputSet, Rules, make_folders, marked_picture, sweep, write_file,
+};
 use unlift_io::read::colmap;
 use unlift_io::stage::{
     ImageFile, Kind as Stage, declared_kind, has_images, read_recovered, read_released,
@@ -35,7 +39,7 @@ pub fn run(args: &InvertArgs) -> anyhow::Result<Outcome> {
         let rules = Rules::new(inputs.into_iter().flatten().map(PathBuf::as_path), args.force);
         // Begun and given up: whether anything can be written there.
         drop(OutputSet::create(&args.out, rules.clone(), Access::Private, &[]).map_err(refused)?);
-        let to = Target { args, rules, painted: AtomicUsize::new(0) };
+        let to = Target { args, rules, painted: AtomicUsize::new(0), swept: Mutex::default() };
         let unusable = match (&args.recovered, declared_kind(&args.path)) {
             (Some(recovered), _) if has_images(&args.path)? => images(&to, recovered)?,
             (Some(recovered), _) => map(&to, recovered)?,
@@ -59,6 +63,8 @@ struct Target<'a> {
     args: &'a InvertArgs,
     rules: Rules,
     painted: AtomicUsize,
+    /// Folders from which the rests of dead runs are gone.
+    swept: Mutex<BTreeSet<PathBuf>>,
 }
 
 impl Target<'_> {
@@ -80,6 +86,10 @@ impl Target<'_> {
         let file = PathBuf::from(file);
         if let Some(folder) = file.parent() {
             make_folders(folder, Access::Private)?;
+            let mut swept = self.swept.lock().unwrap_or_else(PoisonError::into_inner);
+            if swept.insert(folder.to_owned()) {
+                sweep(folder);
+            }
         }
         Ok(self.rules.check(&file, Kind::Picture)?)
     }
