@@ -154,6 +154,24 @@ pub(crate) fn given(row: &Row) -> Given {
     }
 }
 
+/// What is not known of a row where points came from files: its name.
+const UNKNOWN: [&str; 6] = ["scheme", "neighbors", "oracle_noise", "inlier_ratio", "k", "solver"];
+
+/// A row as `evaluate` tells it, rounded as it is written: without its name.
+///
+/// # Errors
+/// When a figure cannot be written (a bug).
+pub fn evaluated(found: &Row, thresholds: &[Threshold]) -> Result<Value, serde_json::Error> {
+    let mut value = unlift_report::rounded(&row(found, thresholds))?;
+    if let Some(fields) = value.as_object_mut() {
+        fields.retain(|name, _| !UNKNOWN.contains(&name.as_str()));
+        if found.blind_percent.is_empty() {
+            fields.retain(|name, _| !name.starts_with("blind_"));
+        }
+    }
+    Ok(value)
+}
+
 /// A row as it is written.
 pub fn row(row: &Row, thresholds: &[Threshold]) -> report::Row {
     let by_threshold = |percents: &[f64]| by_threshold(thresholds, percents);

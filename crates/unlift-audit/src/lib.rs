@@ -50,7 +50,7 @@ mod progress;
 mod scene;
 pub mod sources;
 
-pub use document::{ordered, row};
+pub use document::{evaluated, ordered, row};
 pub use error::Error;
 pub use gate::{Candidate, Figure, Gate};
 pub use given::by_point;

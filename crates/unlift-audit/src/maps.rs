@@ -236,9 +236,9 @@ pub fn find(job: Job<'_>, out: Option<&mut OutputSet>) -> Result<Audited, Error>
         },
         failed: None,
     };
-    let of_file = |error| {
-        let file = job.input.path.clone().unwrap_or_default();
-        Error::from(unlift_io::Error::core(file, error))
+    let of_file = |error| match &job.input.path {
+        Some(file) => Error::from(unlift_io::Error::core(file, error)),
+        None => Error::from(error),
     };
     let outcome = match job.hidden {
         None => run(job.original, job.descriptors, &job.plan, &mut watcher)

@@ -2,15 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::Value;
-
 use unlift::audit::{Plan, Row, Threshold, measure};
 use unlift::evaluate::{blind, nearer_to_own};
 use unlift::released::Released;
 use unlift::truth::Secret;
 use unlift::{About, RowOrder, Unit};
+use unlift_audit::evaluated;
 use unlift_io::stage::{has_images, read_recovered_in, read_released, read_truth};
-use unlift_report::rounded;
 
 use super::common::{RELEASED, expect_slots, same_map};
 use super::image_stages::{Evaluated, evaluate_all};
@@ -67,7 +65,7 @@ fn told(
         stderr::note(format_args!("{}: {note}", args.recovered.display()));
     }
     print(&if args.json {
-        format!("{:#}\n", as_json(row, thresholds)?)
+        format!("{:#}\n", evaluated(row, thresholds)?)
     } else {
         as_table(row, thresholds)
     })?;
@@ -119,21 +117,6 @@ fn notes(about: About, slots_per_record: usize) -> Vec<&'static str> {
         );
     }
     notes
-}
-
-/// What the files do not say of a row of `audit.json`: its name.
-const UNKNOWN: [&str; 6] = ["scheme", "neighbors", "oracle_noise", "inlier_ratio", "k", "solver"];
-
-/// The row as it stands in `audit.json`, without what the files do not say.
-fn as_json(row: &Row, thresholds: &[Threshold]) -> anyhow::Result<Value> {
-    let mut value = rounded(&unlift_audit::row(row, thresholds))?;
-    if let Some(fields) = value.as_object_mut() {
-        fields.retain(|name, _| !UNKNOWN.contains(&name.as_str()));
-        if row.blind_percent.is_empty() {
-            fields.retain(|name, _| !name.starts_with("blind_"));
-        }
-    }
-    Ok(value)
 }
 
 /// A share that is not zero never reads as zero.

@@ -1,0 +1,124 @@
+"""What an audit found: tables, plots, and the page in a notebook."""
+
+from __future__ import annotations
+
+import html
+import os
+import pathlib
+from typing import Any
+
+from ._unlift import Report as _Report
+from ._unlift import Rows
+
+#: Height of the page in a notebook, in pixels.
+HEIGHT = 720
+
+
+class Table:
+    """The rows of an audit, one column per figure, as Arrow: `polars.DataFrame(table)`, `pyarrow.table(table)`, DuckDB."""
+
+    def __init__(self, rows: Rows) -> None:
+        self._rows = rows
+
+    @property
+    def columns(self) -> list[str]:
+        """Names: as in `audit.json`, with a dot before what stands within (`recovered_percent.0.10`)."""
+        return self._rows.columns
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __getitem__(self, column: str) -> list[Any]:
+        return self._rows[column]
+
+    def __arrow_c_stream__(self, requested_schema: object | None = None) -> object:
+        return self._rows.__arrow_c_stream__(requested_schema)
+
+    def to_dict(self) -> dict[str, list[Any]]:
+        """Column by column."""
+        return {column: self._rows[column] for column in self.columns}
+
+    def to_pandas(self) -> Any:
+        """A pandas DataFrame."""
+        import pandas  # type: ignore[import-untyped,unused-ignore]
+
+        return pandas.DataFrame(self.to_dict())
+
+    def __repr__(self) -> str:
+        return repr(self._rows).replace("Rows", "Table")
+
+
+class Report:
+    """What an audit found: figures, and a page that shows them."""
+
+    def __init__(self, found: _Report) -> None:
+        self._found = found
+
+    @property
+    def rows(self) -> Table:
+        """One row per scheme, source, inlier ratio and solver."""
+        return Table(self._found.rows)
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """All figures, as `audit.json` has them."""
+        return self._found.document
+
+    @property
+    def passed(self) -> bool:
+        """Whether every gate held."""
+        return self._found.passed
+
+    def json(self, *, share_safe: bool = False) -> str:
+        """The text of `audit.json`; `share_safe`: without paths and names."""
+        return self._found.json(share_safe=share_safe)
+
+    def html(self, *, share_safe: bool = False) -> str:
+        """The page, one self-contained file; `share_safe`: figures only."""
+        return self._found.html(share_safe=share_safe)
+
+    def save(
+        self, out: str | os.PathLike[str], *, share_safe: bool = False, force: bool = False
+    ) -> pathlib.Path:
+        """Writes `report.html` and `audit.json` into the folder `out`, both or none; returns the path of the page.
+
+        share_safe: figures only, no points. force: also over files that unlift did not write.
+        """
+        return self._found.save(os.fspath(out), share_safe=share_safe, force=force)
+
+    def plot(self, threshold: str | None = None, ax: Any = None) -> Any:
+        """Draws how much comes back over the inlier ratio, a curve per scheme, of the strongest solver; returns the axes.
+
+        threshold: one of those of the audit, as written; the first without it. Needs matplotlib.
+        """
+        import matplotlib.pyplot
+
+        rows = self.document["results"]
+        threshold = threshold or next(iter(rows[0]["recovered_percent"]))
+        ax = ax or matplotlib.pyplot.gca()
+        for scheme in dict.fromkeys(row["scheme"] for row in rows):
+            best: dict[float, float] = {}
+            for row in rows:
+                if row["scheme"] == scheme and row["neighbors"] == "oracle":
+                    ratio, share = row["inlier_ratio"], row["recovered_percent"][threshold]
+                    best[ratio] = max(best.get(ratio, 0.0), share)
+            if best:
+                ax.plot(*zip(*sorted(best.items())), marker="o", label=scheme)
+        for row in rows:
+            if row["neighbors"] != "oracle":
+                ax.plot(row["inlier_ratio"], row["recovered_percent"][threshold], "x", color="black")
+                ax.annotate(f"{row['scheme']}, {row['neighbors']}", (row["inlier_ratio"], row["recovered_percent"][threshold]))
+        ax.set(xlabel="inlier ratio", ylabel=f"recovered within {threshold} {rows[0]['unit']} (%)", ylim=(0, 100))
+        ax.legend()
+        return ax
+
+    def __str__(self) -> str:
+        return str(self._found)
+
+    def __repr__(self) -> str:
+        return repr(self._found)
+
+    def _repr_html_(self) -> str:
+        page = html.escape(self.html(), quote=True)
+        style = f"width: 100%; height: {HEIGHT}px; border: 1px solid #ccc"
+        return f'<iframe srcdoc="{page}" style="{style}"></iframe>'

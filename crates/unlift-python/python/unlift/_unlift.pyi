@@ -1,0 +1,265 @@
+"""The native part of unlift. Compared with what is there by `mypy.stubtest`."""
+
+import os
+import pathlib
+from collections.abc import Callable
+from typing import Any, final
+
+import numpy as np
+import numpy.typing as npt
+from typing_extensions import disjoint_base
+
+_Path = str | os.PathLike[str]
+
+__all__ = [
+    "SCHEMES",
+    "SOLVERS",
+    "SOURCES",
+    "Candidates",
+    "Hidden",
+    "Lines",
+    "Map",
+    "Neighborhoods",
+    "Planes",
+    "Rays",
+    "Records",
+    "Recovered",
+    "Released",
+    "Report",
+    "Rows",
+    "Truth",
+    "UnliftError",
+    "__version__",
+    "audit",
+    "check_scheme",
+    "check_source",
+    "evaluate",
+    "find",
+    "obfuscate",
+    "oracle",
+    "read",
+    "recover",
+]
+
+__version__: str
+SCHEMES: list[str]
+SOURCES: list[str]
+SOLVERS: list[str]
+
+class UnliftError(ValueError):
+    """What is wrong with an argument, a file or a map, in one line: what, what was expected, what was found."""
+
+@final
+class Map:
+    def __new__(
+        cls,
+        positions: npt.ArrayLike,
+        descriptors: npt.ArrayLike | None = None,
+        *,
+        scale: float | None = None,
+        k: int = 50,
+        max_points: int | None = None,
+        outlier_filter: tuple[int, float] | None = None,
+        seed: int = 0,
+    ) -> Map: ...
+    def __len__(self) -> int: ...
+    @property
+    def positions(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def descriptors(self) -> npt.NDArray[np.uint8] | npt.NDArray[np.float32] | None: ...
+    @property
+    def unit(self) -> str: ...
+    @property
+    def unit_in_map_units(self) -> float: ...
+    @property
+    def rows(self) -> npt.NDArray[np.uint32]: ...
+
+def read(
+    path: _Path,
+    *,
+    descriptors: _Path | None = None,
+    scale: float | None = None,
+    k: int = 50,
+    max_points: int | None = None,
+    outlier_filter: tuple[int, float] | None = None,
+    seed: int = 0,
+) -> Map: ...
+
+@disjoint_base
+class Records:
+    def __len__(self) -> int: ...
+
+@final
+class Lines(Records):
+    def __new__(
+        cls, points: npt.ArrayLike, directions: npt.ArrayLike, *, hidden: npt.ArrayLike | None = None
+    ) -> Lines: ...
+
+@final
+class Rays(Records):
+    def __new__(
+        cls,
+        centers: npt.ArrayLike,
+        center: npt.ArrayLike,
+        directions: npt.ArrayLike,
+        *,
+        hidden: npt.ArrayLike | None = None,
+    ) -> Rays: ...
+
+@final
+class Planes(Records):
+    def __new__(
+        cls, axis: npt.ArrayLike, offset: npt.ArrayLike, *, hidden: npt.ArrayLike | None = None
+    ) -> Planes: ...
+
+@final
+class Candidates(Records):
+    def __new__(
+        cls,
+        positions: npt.ArrayLike,
+        swapped_axis: npt.ArrayLike,
+        *,
+        hidden: npt.ArrayLike | None = None,
+    ) -> Candidates: ...
+
+@final
+class Released:
+    @staticmethod
+    def read(path: _Path) -> Released: ...
+    def save(self, path: _Path) -> None: ...
+    def __len__(self) -> int: ...
+    @property
+    def family(self) -> str: ...
+    @property
+    def unit(self) -> str: ...
+    @property
+    def slots_per_record(self) -> int: ...
+    @property
+    def n_slots(self) -> int: ...
+    @property
+    def origin(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def fingerprint(self) -> str: ...
+    @property
+    def descriptors(self) -> npt.NDArray[np.uint8] | npt.NDArray[np.float32] | None: ...
+    @property
+    def columns(self) -> dict[str, npt.NDArray[Any]]: ...
+
+@final
+class Truth:
+    @staticmethod
+    def read(path: _Path) -> Truth: ...
+    def save(self, path: _Path) -> None: ...
+    @property
+    def positions(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def hidden(self) -> npt.NDArray[np.uint32]: ...
+    @property
+    def dropped(self) -> dict[str, int]: ...
+
+@final
+class Hidden:
+    @property
+    def released(self) -> Released: ...
+    @property
+    def truth(self) -> Truth: ...
+
+def obfuscate(
+    map: Map, scheme: str | Callable[..., Records], *, seed: int | None = None
+) -> Hidden: ...
+
+@final
+class Neighborhoods:
+    def __new__(
+        cls,
+        released: Released | Hidden,
+        records: npt.ArrayLike,
+        scores: npt.ArrayLike | None = None,
+        *,
+        needs: str = "descriptors",
+    ) -> Neighborhoods: ...
+    @staticmethod
+    def read(path: _Path, released: Released | Hidden) -> Neighborhoods: ...
+    def save(self, path: _Path) -> None: ...
+    def __len__(self) -> int: ...
+    @property
+    def records(self) -> npt.NDArray[np.uint32]: ...
+    @property
+    def offsets(self) -> npt.NDArray[np.uint64]: ...
+    @property
+    def scores(self) -> npt.NDArray[np.float32] | None: ...
+
+def find(
+    released: Released | Hidden,
+    source: str,
+    *,
+    k: int | None = None,
+    seed: int = 0,
+    threads: int | None = None,
+) -> Neighborhoods: ...
+def oracle(
+    hidden: Hidden, inlier_ratio: float, *, k: int = 50, noise: str = "uniform", seed: int = 0
+) -> Neighborhoods: ...
+
+@final
+class Recovered:
+    @staticmethod
+    def read(path: _Path) -> Recovered: ...
+    def save(self, path: _Path) -> None: ...
+    def __len__(self) -> int: ...
+    @property
+    def positions(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def status(self) -> list[str]: ...
+    @property
+    def support(self) -> npt.NDArray[np.uint16]: ...
+    @property
+    def delta(self) -> float: ...
+    @property
+    def unit(self) -> str: ...
+    @property
+    def confidence_unknown(self) -> str | None: ...
+    def probability_within(self, threshold: float) -> npt.NDArray[np.float64] | None: ...
+
+def recover(
+    released: Released | Hidden,
+    lists: Neighborhoods,
+    *,
+    solver: str = "joint",
+    delta: float | None = None,
+    seed: int = 0,
+    exact_constraints: bool = True,
+    threads: int | None = None,
+) -> Recovered: ...
+def evaluate(
+    recovered: Recovered, truth: Truth | Hidden, *, thresholds: list[float | str] | None = None
+) -> dict[str, Any]: ...
+
+@final
+class Rows:
+    def __len__(self) -> int: ...
+    @property
+    def columns(self) -> list[str]: ...
+    def __getitem__(self, name: str, /) -> list[Any]: ...
+    def __arrow_c_stream__(self, requested_schema: object | None = None) -> object: ...
+
+@final
+class Report:
+    @property
+    def rows(self) -> Rows: ...
+    @property
+    def document(self) -> dict[str, Any]: ...
+    @property
+    def passed(self) -> bool: ...
+    def json(self, *, share_safe: bool = False) -> str: ...
+    def html(self, *, share_safe: bool = False) -> str: ...
+    def save(self, out: _Path, *, share_safe: bool = False, force: bool = False) -> pathlib.Path: ...
+
+def audit(
+    map: Map, asked: dict[str, Any], tell: Callable[[int, int, str], object] | None
+) -> Report: ...
+def check_scheme(scheme: Callable[..., Records]) -> None:
+    """Whether a scheme hides every point, on its record, by its key alone."""
+
+def check_source(source: Callable[..., Any], released: Released | Hidden) -> None:
+    """Whether a source gives every hidden point of `released` a list, of records of this map, by its seed alone."""

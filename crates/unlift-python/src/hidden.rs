@@ -1,0 +1,271 @@
+//! Hidden maps: what is released, and the truth beside it.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use unlift::obfuscate::{Scheme, SchemeOptions, obfuscate as hide, scheme};
+use unlift::released::{self, Obfuscation};
+use unlift::seed::Key;
+use unlift::truth::{Original, Secret};
+use unlift_audit::Prepared;
+use unlift_io::stage::{read_released, read_truth, write_released, write_truth};
+
+use crate::arrays::{to_array, to_descriptors, to_rows};
+use crate::errors::raised;
+use crate::map::Map;
+use crate::own::{OwnScheme, Raised};
+
+/// All that an attacker sees of a map.
+#[pyclass(frozen, module = "unlift")]
+#[derive(Clone)]
+pub struct Released(pub Arc<released::Released<3>>);
+
+impl Released {
+    pub fn of(released: released::Released<3>) -> Self {
+        Self(Arc::new(released))
+    }
+}
+
+#[pymethods]
+impl Released {
+    /// Reads a released map (Parquet).
+    #[staticmethod]
+    fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        py.detach(|| read_released::<3>(&path)).map(Self::of).map_err(raised)
+    }
+
+    /// Writes it (Parquet), as `unlift obfuscate` does.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        py.detach(|| write_released(&path, &self.0)).map_err(raised)
+    }
+
+    fn __len__(&self) -> usize {
+        self.0.n_records()
+    }
+
+    fn __repr__(&self) -> String {
+        let (n, family) = (self.0.n_records(), self.0.obfuscation().family());
+        format!("<unlift.Released: {n} {family} hiding {} points>", self.0.n_slots())
+    }
+
+    /// What records are: "lines", "rays", "axis_planes" or "axis_candidates".
+    #[getter]
+    fn family(&self) -> &'static str {
+        self.0.obfuscation().family()
+    }
+
+    /// The unit of lengths.
+    #[getter]
+    fn unit(&self) -> &'static str {
+        self.0.unit().name()
+    }
+
+    /// Hidden points per record.
+    #[getter]
+    fn slots_per_record(&self) -> usize {
+        self.0.slots_per_record()
+    }
+
+    /// Number of hidden points.
+    #[getter]
+    fn n_slots(&self) -> usize {
+        self.0.n_slots()
+    }
+
+    /// The point `(3,)` that records are stored about.
+    #[getter]
+    fn origin<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        to_array(py, self.0.origin().to_vec()).into_any()
+    }
+
+    /// What tells this map from others, in hexadecimal.
+    #[getter]
+    fn fingerprint(&self) -> String {
+        self.0.fingerprint().to_string()
+    }
+
+    /// Descriptors `(n_slots, dim)`, or None.
+    #[getter]
+    fn descriptors<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        self.0.descriptors().map(|rows| to_descriptors(py, rows)).transpose()
+    }
+
+    /// The columns of the records by name, about `origin`: of lines foot and direction `(n, 3)`; of rays centers `(m, 3)`,
+    /// center `(n,)` and direction `(n, 3)`; of planes axis and offset `(n,)`; of candidates position `(n, 3)`.
+    #[getter]
+    fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let columns = PyDict::new(py);
+        match self.0.obfuscation() {
+            Obfuscation::Lines(lines) => {
+                columns.set_item("foot", to_rows(py, lines.foot().to_vec())?)?;
+                columns.set_item("direction", to_rows(py, lines.direction().to_vec())?)?;
+            }
+            Obfuscation::Rays(rays) => {
+                columns.set_item("centers", to_rows(py, rays.centers().to_vec())?)?;
+                columns.set_item("center", to_array(py, rays.center().to_vec()))?;
+                columns.set_item("direction", to_rows(py, rays.direction().to_vec())?)?;
+            }
+            Obfuscation::AxisPlanes(planes) => {
+                columns.set_item("axis", to_array(py, planes.axis().to_vec()))?;
+                columns.set_item("offset", to_array(py, planes.offset().to_vec()))?;
+            }
+            Obfuscation::AxisCandidates(points) => {
+                columns.set_item("position", to_rows(py, points.position().to_vec())?)?;
+            }
+        }
+        Ok(columns)
+    }
+}
+
+/// What only the owner of a map has: its points, and which record hides which.
+#[pyclass(frozen, module = "unlift")]
+#[derive(Clone)]
+pub struct Truth {
+    of: Whose,
+    pub secret: Arc<Secret>,
+}
+
+/// Points of a map that is at hand, or of a file.
+#[derive(Clone)]
+enum Whose {
+    Map(Arc<Prepared>),
+    File(Arc<Original<3>>),
+}
+
+impl Truth {
+    pub fn original(&self) -> &Original<3> {
+        match &self.of {
+            Whose::Map(prepared) => &prepared.original,
+            Whose::File(original) => original,
+        }
+    }
+}
+
+#[pymethods]
+impl Truth {
+    /// Reads a truth (Parquet).
+    #[staticmethod]
+    fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let (original, secret) = py.detach(|| read_truth::<3>(&path)).map_err(raised)?;
+        Ok(Self { of: Whose::File(Arc::new(original)), secret: Arc::new(secret) })
+    }
+
+    /// Writes it (Parquet), as `unlift obfuscate` does: keep it to yourself.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        py.detach(|| write_truth(&path, self.original(), &self.secret)).map_err(raised)
+    }
+
+    /// The points `(n, 3)`.
+    #[getter]
+    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(to_rows(py, self.original().reveal().positions().to_vec())?.into_any())
+    }
+
+    /// Which point each slot hides `(n_slots,)`.
+    #[getter]
+    fn hidden<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        to_array(py, self.secret.hidden().iter().map(|id| id.0).collect()).into_any()
+    }
+
+    /// How many points are in no record, by reason.
+    #[getter]
+    fn dropped<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let counts = PyDict::new(py);
+        for dropped in self.secret.dropped() {
+            let name = dropped.reason.name();
+            let n: usize = counts.get_item(name)?.map_or(Ok(0), |n| n.extract())?;
+            counts.set_item(name, n + 1)?;
+        }
+        Ok(counts)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<unlift.Truth: {} points>", self.secret.n_slots())
+    }
+}
+
+/// A map that is hidden: `released` for the attacker, `truth` for its owner.
+#[pyclass(frozen, module = "unlift", get_all)]
+pub struct Hidden {
+    released: Released,
+    truth: Truth,
+}
+
+impl Hidden {
+    pub fn parts(&self) -> (&Released, &Truth) {
+        (&self.released, &self.truth)
+    }
+}
+
+#[pymethods]
+impl Hidden {
+    fn __repr__(&self) -> String {
+        format!(
+            "<unlift.Hidden: {} points in {}>",
+            self.released.0.n_slots(),
+            self.released.__repr__()
+        )
+    }
+}
+
+/// The released map in `given`: a Released, or a Hidden, whose truth is not looked at.
+pub fn released_of(given: &Bound<'_, PyAny>) -> PyResult<Released> {
+    if let Ok(hidden) = given.cast::<Hidden>() {
+        return Ok(hidden.get().released.clone());
+    }
+    let released = given.cast::<Released>();
+    released.map(|released| released.get().clone()).map_err(|_| {
+        let found = given.get_type().to_string();
+        crate::errors::wrong("released", "a Released or a Hidden", found)
+    })
+}
+
+/// The truth in `given`: a Truth, or a Hidden.
+pub fn truth_of(given: &Bound<'_, PyAny>) -> PyResult<Truth> {
+    if let Ok(hidden) = given.cast::<Hidden>() {
+        return Ok(hidden.get().truth.clone());
+    }
+    given.cast::<Truth>().map(|truth| truth.get().clone()).map_err(|_| {
+        let found = given.get_type().to_string();
+        crate::errors::wrong("truth", "a Truth or a Hidden", found)
+    })
+}
+
+/// The scheme in `given`, a name or a function.
+pub fn scheme_of(
+    given: &Bound<'_, PyAny>,
+    options: &SchemeOptions,
+    raised_by: &Raised,
+) -> PyResult<Arc<dyn Scheme<3>>> {
+    let Ok(name) = given.extract::<String>() else {
+        return Ok(Arc::new(OwnScheme::new(given, raised_by)?));
+    };
+    let entry = scheme(&name).map_err(raised)?;
+    entry
+        .of_dimension::<3>(options)
+        .ok_or_else(|| crate::errors::wrong("scheme", "one that is defined on maps", name))
+}
+
+/// Hides a map by a scheme, a name or a function. Without a seed under a fresh key, for maps that are released; a seed
+/// repeats experiments, and whoever guesses it undoes the hiding.
+#[pyfunction]
+#[pyo3(signature = (map, scheme, *, seed=None))]
+pub fn obfuscate(
+    py: Python<'_>,
+    map: &Map,
+    scheme: &Bound<'_, PyAny>,
+    seed: Option<u64>,
+) -> PyResult<Hidden> {
+    let by = Raised::default();
+    let unit = map.prepared.original.reveal().unit();
+    let scheme = scheme_of(scheme, &SchemeOptions::usual(unit), &by)?;
+    let key = seed.map_or_else(Key::fresh, |seed| Ok(Key::from_seed(seed))).map_err(raised)?;
+    let prepared = Arc::clone(&map.prepared);
+    let hidden =
+        py.detach(|| hide(&*scheme, &prepared.original, prepared.descriptors.as_ref(), &key));
+    let (released, secret) = hidden.map_err(|error| by.as_cause_of(py, raised(error)))?;
+    let truth = Truth { of: Whose::Map(prepared), secret: Arc::new(secret) };
+    Ok(Hidden { released: Released::of(released), truth })
+}

@@ -1,0 +1,68 @@
+//! The native part of the Python package `unlift`: the same words as the library and the command line.
+//!
+//! ```text
+//! arrays, paths ──> Map ──> obfuscate ──> Hidden { Released, Truth }
+//!                    │          Released ──> neighbors ──> Neighborhoods ──> recover ──> Recovered ──> evaluate
+//!                    └──> audit (schemes and sources may be functions) ──> Report
+//! ```
+//!
+//! Work runs on threads of its own, without the interpreter's lock, and ends when the user interrupts.
+
+mod arrays;
+mod audit;
+mod errors;
+mod hidden;
+mod laws;
+mod lists;
+mod map;
+mod own;
+mod plan;
+mod records;
+mod recovered;
+mod report;
+mod rows;
+mod work;
+
+use pyo3::prelude::*;
+
+/// What `unlift` (the package) is made of.
+#[pymodule]
+mod _unlift {
+    use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use super::audit::audit;
+    #[pymodule_export]
+    use super::hidden::{Hidden, Released, Truth, obfuscate};
+    #[pymodule_export]
+    use super::laws::{check_scheme, check_source};
+    #[pymodule_export]
+    use super::lists::{Neighborhoods, find, oracle};
+    #[pymodule_export]
+    use super::map::{Map, read};
+    #[pymodule_export]
+    use super::records::{Candidates, Lines, Planes, Rays, Records};
+    #[pymodule_export]
+    use super::recovered::{Recovered, evaluate, recover};
+    #[pymodule_export]
+    use super::report::Report;
+    #[pymodule_export]
+    use super::rows::Rows;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        super::names(module)
+    }
+}
+
+/// Version, and the names that arguments take.
+fn names(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    let schemes = unlift::obfuscate::SCHEMES.iter().filter(|entry| entry.in_3d.is_some());
+    let sources = unlift_audit::sources::all();
+    let sources = sources.iter().filter(|entry| entry.in_3d.is_some());
+    module.add("UnliftError", module.py().get_type::<errors::UnliftError>())?;
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("SCHEMES", schemes.map(|entry| entry.name).collect::<Vec<_>>())?;
+    module.add("SOURCES", sources.map(|entry| entry.name).collect::<Vec<_>>())?;
+    module.add("SOLVERS", unlift::recover::Solver::ALL.map(unlift::recover::Solver::name).to_vec())
+}

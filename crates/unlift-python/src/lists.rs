@@ -1,0 +1,199 @@
+//! Lists of near records: of an oracle, of a source, of one's own.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use pyo3::prelude::*;
+use pyo3::types::PyTuple;
+use unlift::neighbors::oracle::{Noise, Outliers, TrueNeighbors, search};
+use unlift::neighbors::{self, Needs};
+use unlift::released;
+use unlift::{About, RecordId, RowOrder};
+use unlift_audit::sources;
+use unlift_io::stage::{read_neighborhoods, write_neighborhoods};
+
+use crate::arrays::{indices, numbers, to_array, told};
+use crate::errors::{raised, wrong};
+use crate::hidden::{Hidden, Released, released_of};
+use crate::work;
+
+/// For every hidden point the records that are taken for near ones, likeliest first.
+#[pyclass(frozen, module = "unlift")]
+pub struct Neighborhoods(pub Arc<neighbors::Neighborhoods>);
+
+#[pymethods]
+impl Neighborhoods {
+    /// Of an array `(n_slots, k)` of records of `released`, padded by -1, with scores of the same shape if there are some.
+    #[new]
+    #[pyo3(signature = (released, records, scores=None, *, needs="descriptors"))]
+    fn new(
+        released: &Bound<'_, PyAny>,
+        records: &Bound<'_, PyAny>,
+        scores: Option<&Bound<'_, PyAny>>,
+        needs: &str,
+    ) -> PyResult<Self> {
+        let needs = match needs {
+            "descriptors" => Needs::Descriptors,
+            "nothing" => Needs::Nothing,
+            other => return Err(wrong("needs", "descriptors or nothing", other)),
+        };
+        let released = released_of(released)?;
+        Ok(Self(Arc::new(lists_of(&released.0, records, scores, usize::MAX, needs)?)))
+    }
+
+    /// Reads lists of `released` (Parquet).
+    #[staticmethod]
+    fn read(py: Python<'_>, path: PathBuf, released: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let Released(of) = released_of(released)?;
+        let lists = py.detach(|| read_neighborhoods(&path, of.n_records(), of.slots_per_record()));
+        Ok(Self(Arc::new(lists.map_err(raised)?)))
+    }
+
+    /// Writes them (Parquet), as `unlift neighbors` does.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        py.detach(|| write_neighborhoods(&path, &self.0)).map_err(raised)
+    }
+
+    /// Number of lists.
+    fn __len__(&self) -> usize {
+        self.0.n_slots()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<unlift.Neighborhoods: {} lists of up to {}>", self.0.n_slots(), self.0.longest())
+    }
+
+    /// All lists, one after the other: record numbers.
+    #[getter]
+    fn records<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        to_array(py, self.0.records().iter().map(|record| record.0).collect()).into_any()
+    }
+
+    /// Where each list starts in `records`; one more entry than there are lists.
+    #[getter]
+    fn offsets<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        to_array(py, self.0.offsets().to_vec()).into_any()
+    }
+
+    /// A score per entry, higher for likelier ones, or None.
+    #[getter]
+    fn scores<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyAny>> {
+        self.0.scores().map(|scores| to_array(py, scores.to_vec()).into_any())
+    }
+}
+
+/// Lists of `released` in an array `(n_slots, k)`, padded by -1; at most `k` each.
+fn lists_of(
+    released: &released::Released<3>,
+    records: &Bound<'_, PyAny>,
+    scores: Option<&Bound<'_, PyAny>>,
+    k: usize,
+    needs: Needs,
+) -> PyResult<neighbors::Neighborhoods> {
+    let (n, n_slots) = (released.n_records(), released.n_slots());
+    // One more than there are records, so that -1 becomes 0.
+    let shifted = records.call_method1("__add__", (1,))?;
+    let (rows, shape) = indices("records", &shifted, &[2], n as u64 + 1)?;
+    if shape[0] != n_slots {
+        let expected = format!("an array of shape ({n_slots}, k), one row per hidden point");
+        return Err(wrong("records", expected, told(&shape)));
+    }
+    let columns = shape[1];
+    let scores = match scores {
+        None => None,
+        Some(scores) => {
+            let shape: Vec<usize> = scores.getattr("shape")?.extract()?;
+            if shape != [n_slots, columns] {
+                let expected = format!("the shape of the records, {}", told(&[n_slots, columns]));
+                return Err(wrong("scores", expected, told(&shape)));
+            }
+            Some(numbers("scores", &scores.call_method0("ravel")?)?)
+        }
+    };
+    let (mut offsets, mut kept) = (vec![0], Vec::new());
+    let mut kept_scores = scores.as_ref().map(|_| Vec::new());
+    for slot in 0..n_slots {
+        let row = slot * columns..(slot + 1) * columns;
+        for at in row.filter(|&at| rows[at] > 0).take(k) {
+            kept.push(RecordId(rows[at] - 1));
+            if let (Some(kept), Some(scores)) = (&mut kept_scores, &scores) {
+                kept.push(scores[at] as f32);
+            }
+        }
+        offsets.push(kept.len() as u64);
+    }
+    let lists = neighbors::Neighborhoods::try_new(
+        offsets,
+        kept,
+        kept_scores,
+        n,
+        released.slots_per_record(),
+    );
+    let order = match needs {
+        Needs::Nothing => RowOrder::Either,
+        _ => RowOrder::DescriptorRows,
+    };
+    let map = Some(released.fingerprint());
+    Ok(lists.map_err(raised)?.with_about(About { map, order, ..About::default() }))
+}
+
+/// Lists as a function returned them: Neighborhoods, an array of records, or records and scores.
+pub fn returned(
+    given: &Bound<'_, PyAny>,
+    released: &released::Released<3>,
+    k: usize,
+    needs: Needs,
+) -> PyResult<neighbors::Neighborhoods> {
+    if let Ok(lists) = given.cast::<Neighborhoods>() {
+        return Ok((*lists.get().0).clone());
+    }
+    if let Ok(both) = given.cast::<PyTuple>() {
+        let (records, scores): (Bound<'_, PyAny>, Bound<'_, PyAny>) = both.extract()?;
+        return lists_of(released, &records, Some(&scores), k, needs);
+    }
+    lists_of(released, given, None, k, needs)
+}
+
+/// Lists by a source of the attacker's own, as `unlift neighbors find` makes them.
+#[pyfunction]
+#[pyo3(signature = (released, source, *, k=None, seed=0, threads=None))]
+pub fn find(
+    py: Python<'_>,
+    released: &Bound<'_, PyAny>,
+    source: &str,
+    k: Option<usize>,
+    seed: u64,
+    threads: Option<usize>,
+) -> PyResult<Neighborhoods> {
+    let Released(released) = released_of(released)?;
+    let named = sources::named(source).map_err(raised)?;
+    let named = if let Some(k) = k { named.with_k(k) } else { named };
+    let source = named.of_dimension::<3>().map_err(raised)?;
+    source.supports(&released).map_err(raised)?;
+    let lists = work::run(py, threads, None, move || {
+        source.lists(&released, source.k(&released), seed).map_err(|error| error.to_string())
+    })?;
+    Ok(Neighborhoods(Arc::new(lists)))
+}
+
+/// Lists by an oracle who knows the truth: `inlier_ratio` of each are among the `k` true neighbors.
+#[pyfunction]
+#[pyo3(signature = (hidden, inlier_ratio, *, k=50, noise="uniform", seed=0))]
+pub fn oracle(
+    py: Python<'_>,
+    hidden: &Hidden,
+    inlier_ratio: f64,
+    k: usize,
+    noise: &str,
+    seed: u64,
+) -> PyResult<Neighborhoods> {
+    let noise = Noise::from_name(noise).map_err(raised)?;
+    let (released, truth) = hidden.parts();
+    let lists = py.detach(|| {
+        let knn = search(truth.original())?;
+        let near = TrueNeighbors::new(&knn, &truth.secret, released.0.slots_per_record(), k)?;
+        let outliers = Outliers::new(noise, &near, &knn, &truth.secret, seed)?;
+        near.lists(inlier_ratio, &outliers, seed)
+    });
+    Ok(Neighborhoods(Arc::new(lists.map_err(raised)?)))
+}

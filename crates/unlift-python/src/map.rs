@@ -1,0 +1,168 @@
+//! Maps: read from files, or made of arrays.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use pyo3::prelude::*;
+use unlift_audit::{OutlierFilter, Preparation, Prepared, Quiet, check_scale, maps, prepare};
+use unlift_io::hash::{hash_files, hash_positions};
+use unlift_report::document::Input;
+
+use crate::arrays::{descriptors, to_array, to_descriptors, to_rows, with_rows};
+use crate::errors::{raised, wrong};
+
+/// Points to audit, with descriptors where there are some: in meters with a scale, else in the usual distance to the K-th
+/// neighbor.
+#[pyclass(frozen, module = "unlift")]
+pub struct Map {
+    pub prepared: Arc<Prepared>,
+    /// What the record says of where it came from.
+    pub input: Input,
+    /// Camera centers in the unit of the map.
+    pub cameras: Vec<[f64; 3]>,
+    pub up: Option<[f64; 3]>,
+    /// What a user should know.
+    pub notes: Vec<String>,
+}
+
+/// What is done with points before anything else.
+fn preparation(
+    scale: Option<f64>,
+    k: usize,
+    max_points: Option<usize>,
+    outlier_filter: Option<(usize, f64)>,
+    seed: u64,
+) -> PyResult<Preparation> {
+    if let Some(scale) = scale.filter(|scale| !(scale.is_finite() && *scale > 0.0)) {
+        return Err(wrong("scale", "a number above 0", scale));
+    }
+    if k == 0 {
+        return Err(wrong("k", "at least 1", k));
+    }
+    let outlier_filter =
+        outlier_filter.map(|(neighbors, std_ratio)| OutlierFilter { neighbors, std_ratio });
+    Ok(Preparation { scale, k, outlier_filter, max_points, seed })
+}
+
+#[pymethods]
+impl Map {
+    #[new]
+    #[pyo3(signature = (positions, descriptors=None, *, scale=None, k=50, max_points=None, outlier_filter=None, seed=0))]
+    fn new(
+        positions: &Bound<'_, PyAny>,
+        descriptors: Option<&Bound<'_, PyAny>>,
+        scale: Option<f64>,
+        k: usize,
+        max_points: Option<usize>,
+        outlier_filter: Option<(usize, f64)>,
+        seed: u64,
+    ) -> PyResult<Self> {
+        let preparation = preparation(scale, k, max_points, outlier_filter, seed)?;
+        let given = descriptors.map(|given| self::descriptors("descriptors", given)).transpose()?;
+        with_rows("positions", positions, |rows| {
+            if let Some(given) = given.as_ref().filter(|given| given.len() != rows.len()) {
+                let expected = format!("{} rows, one per point", rows.len());
+                return Err(wrong("descriptors", expected, given.len()));
+            }
+            check_scale(rows, scale).map_err(raised)?;
+            let prepared = prepare(rows, given.as_ref(), &preparation).map_err(raised)?;
+            let input = Input {
+                path: None,
+                sha256: Some(hash_positions(rows)),
+                n_points: prepared.original.len() as u64,
+                scale_m_per_unit: scale,
+                unit_in_map_units: Some(prepared.unit_in_map_units),
+                other_sha256: Default::default(),
+                images: None,
+            };
+            let (cameras, notes) = (Vec::new(), Vec::new());
+            Ok(Self { prepared: Arc::new(prepared), input, cameras, up: None, notes })
+        })
+    }
+
+    fn __len__(&self) -> usize {
+        self.prepared.original.len()
+    }
+
+    fn __repr__(&self) -> String {
+        let points = self.prepared.original.reveal();
+        let descriptors = match &self.prepared.descriptors {
+            Some(descriptors) => format!("descriptors of {} values", descriptors.dim()),
+            None => "no descriptors".to_owned(),
+        };
+        format!("<unlift.Map: {} points in {}, {descriptors}>", points.len(), points.unit().name())
+    }
+
+    /// Positions `(n, 3)` in `unit`.
+    #[getter]
+    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(to_rows(py, self.prepared.original.reveal().positions().to_vec())?.into_any())
+    }
+
+    /// Descriptors `(n, dim)`, or None.
+    #[getter]
+    fn descriptors<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        self.prepared.descriptors.as_ref().map(|rows| to_descriptors(py, rows)).transpose()
+    }
+
+    /// The unit of lengths: "m", or "kth_neighbor".
+    #[getter]
+    fn unit(&self) -> &'static str {
+        self.prepared.original.reveal().unit().name()
+    }
+
+    /// Length of `unit` in the units that the points were given in.
+    #[getter]
+    fn unit_in_map_units(&self) -> f64 {
+        self.prepared.unit_in_map_units
+    }
+
+    /// Which of the points that were given are left, ascending `(n,)`.
+    #[getter]
+    fn rows<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        to_array(py, self.prepared.rows.clone()).into_any()
+    }
+}
+
+/// Reads a map: a COLMAP model or project, PLY, NPY or a table.
+#[pyfunction]
+#[pyo3(signature = (path, *, descriptors=None, scale=None, k=50, max_points=None, outlier_filter=None, seed=0))]
+#[allow(clippy::too_many_arguments)]
+pub fn read(
+    py: Python<'_>,
+    path: PathBuf,
+    descriptors: Option<PathBuf>,
+    scale: Option<f64>,
+    k: usize,
+    max_points: Option<usize>,
+    outlier_filter: Option<(usize, f64)>,
+    seed: u64,
+) -> PyResult<Map> {
+    let preparation = preparation(scale, k, max_points, outlier_filter, seed)?;
+    py.detach(|| {
+        let (input, prepared) =
+            maps::open(&path, descriptors.as_deref(), &preparation, &Quiet).map_err(raised)?;
+        let sha256 = Some(hash_files(&input.files).map_err(raised)?);
+        let unit = prepared.unit_in_map_units;
+        let mut other_sha256 = unlift_audit::ordered([]);
+        if let Some(file) = &descriptors {
+            let hash = unlift_io::hash::hash_file(file).map_err(raised)?;
+            other_sha256.insert("descriptors".to_owned(), hash);
+        }
+        Ok(Map {
+            input: Input {
+                path: Some(path.display().to_string()),
+                sha256,
+                n_points: prepared.original.len() as u64,
+                scale_m_per_unit: scale,
+                unit_in_map_units: Some(unit),
+                other_sha256,
+                images: None,
+            },
+            cameras: input.cameras.iter().map(|center| center.map(|x| x / unit)).collect(),
+            up: input.up,
+            notes: input.skipped,
+            prepared: Arc::new(prepared),
+        })
+    })
+}

@@ -1,0 +1,153 @@
+//! Recovery and its figures.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use unlift::audit::{Plan, measure};
+use unlift::evaluate::blind;
+use unlift::recover::{RecoverOptions, Recovered as Found, Solver, recover as solve};
+use unlift_io::stage::{read_recovered, write_recovered};
+
+use crate::arrays::{to_array, to_rows};
+use crate::errors::{raised, wrong};
+use crate::hidden::{Hidden, Released, released_of, truth_of};
+use crate::lists::Neighborhoods;
+use crate::plan::{delta, thresholds};
+use crate::report::as_python;
+use crate::work;
+
+/// What came back of a map: a position for every hidden point, or the reason why there is none.
+#[pyclass(frozen, module = "unlift")]
+pub struct Recovered(pub Arc<Found<3>>);
+
+#[pymethods]
+impl Recovered {
+    /// Reads recovered points (Parquet).
+    #[staticmethod]
+    fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let found = py.detach(|| read_recovered::<3>(&path)).map_err(raised)?;
+        Ok(Self(Arc::new(found)))
+    }
+
+    /// Writes them (Parquet), as `unlift recover` does.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        py.detach(|| write_recovered(&path, &self.0)).map_err(raised)
+    }
+
+    fn __len__(&self) -> usize {
+        self.0.n_slots()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<unlift.Recovered: {} points in {}>", self.0.n_slots(), self.0.unit().name())
+    }
+
+    /// Positions `(n_slots, 3)`, NaN where nothing was recovered.
+    #[getter]
+    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let n = self.0.n_slots();
+        let rows = (0..n).map(|slot| self.0.position(slot).unwrap_or([f64::NAN; 3])).collect();
+        Ok(to_rows(py, rows)?.into_any())
+    }
+
+    /// "ok", or why nothing was recovered, for each.
+    #[getter]
+    fn status(&self) -> Vec<&'static str> {
+        self.0.status().iter().map(|status| status.name()).collect()
+    }
+
+    /// Listed records that agree, for each `(n_slots,)`.
+    #[getter]
+    fn support<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        to_array(py, self.0.support().to_vec()).into_any()
+    }
+
+    /// The distance up to which a record agrees.
+    #[getter]
+    fn delta(&self) -> f64 {
+        self.0.delta()
+    }
+
+    /// The unit of lengths.
+    #[getter]
+    fn unit(&self) -> &'static str {
+        self.0.unit().name()
+    }
+
+    /// How likely each lies within `threshold` of the truth `(n_slots,)`, by the attacker's own reckoning; None where that is
+    /// not known.
+    fn probability_within<'py>(
+        &self,
+        py: Python<'py>,
+        threshold: f64,
+    ) -> Option<Bound<'py, PyAny>> {
+        self.0.confidence()?;
+        let of = |slot| self.0.probability_within(slot, threshold).unwrap_or(0.0);
+        Some(to_array(py, (0..self.0.n_slots()).map(of).collect()).into_any())
+    }
+
+    /// Why certainty is not known, or None.
+    #[getter]
+    fn confidence_unknown(&self) -> Option<&'static str> {
+        self.0.confidence_unknown().map(|unknown| unknown.reason())
+    }
+}
+
+/// Recovers the points of a released map from lists of near records: no truth is looked at.
+#[pyfunction]
+#[pyo3(signature = (released, lists, *, solver="joint", delta=None, seed=0, exact_constraints=true, threads=None))]
+#[allow(clippy::too_many_arguments)]
+pub fn recover(
+    py: Python<'_>,
+    released: &Bound<'_, PyAny>,
+    lists: &Neighborhoods,
+    solver: &str,
+    delta: Option<f64>,
+    seed: u64,
+    exact_constraints: bool,
+    threads: Option<usize>,
+) -> PyResult<Recovered> {
+    let Released(released) = released_of(released)?;
+    let options = RecoverOptions {
+        solver: Solver::from_name(solver).map_err(raised)?,
+        delta: self::delta(delta)?,
+        seed,
+        exact_constraints,
+        ..RecoverOptions::default()
+    };
+    let fingerprint = Some(released.fingerprint());
+    if lists.0.about().map.is_some_and(|map| Some(map) != fingerprint) {
+        return Err(wrong("lists", "lists of this released map", "those of another"));
+    }
+    let lists = Arc::clone(&lists.0);
+    let found = work::run(py, threads, None, move || {
+        solve(&released, &lists, &options).map_err(|error| error.to_string())
+    })?;
+    Ok(Recovered(Arc::new(found)))
+}
+
+/// The figures of what came back, as a row of an audit has them: a dict. With a Hidden also those of a blind guess.
+#[pyfunction]
+#[pyo3(signature = (recovered, truth, *, thresholds=None))]
+pub fn evaluate<'py>(
+    py: Python<'py>,
+    recovered: &Recovered,
+    truth: &Bound<'py, PyAny>,
+    thresholds: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let released = truth.cast::<Hidden>().ok().map(|hidden| hidden.get().parts().0.clone());
+    let truth = truth_of(truth)?;
+    let original = truth.original();
+    let usual = Plan::<3>::new(original.reveal().unit()).thresholds;
+    let thresholds = self::thresholds(thresholds, &usual)?;
+    let row = py.detach(|| {
+        let baseline = released.map(|released| blind(&released.0, original, &truth.secret));
+        let of = (&recovered.0, original, &truth.secret);
+        measure(of.0, of.1, of.2, baseline.as_ref(), &thresholds)
+    });
+    let (row, _) = row.map_err(raised)?;
+    let figures = unlift_audit::evaluated(&row, &thresholds).map_err(raised)?;
+    Ok(as_python(py, &figures)?.cast_into::<PyDict>()?)
+}

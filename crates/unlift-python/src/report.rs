@@ -1,0 +1,112 @@
+//! What an audit found, for Python.
+
+use std::path::PathBuf;
+
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+use serde_json::Value;
+use unlift_audit::{Audited, Quiet, Shown, open_audit};
+use unlift_io::atomic::Rules;
+
+use crate::errors::raised;
+use crate::rows::Rows;
+
+/// What an audit found: figures, and a page that shows them.
+#[pyclass(frozen, module = "unlift")]
+pub struct Report(Audited);
+
+impl Report {
+    pub fn of(found: Audited) -> Self {
+        Self(found)
+    }
+
+    fn value(&self, share_safe: bool) -> PyResult<Value> {
+        let text = self.json(share_safe)?;
+        serde_json::from_str(&text).map_err(raised)
+    }
+}
+
+#[pymethods]
+impl Report {
+    /// One row per scheme, source, inlier ratio and solver.
+    #[getter]
+    fn rows(&self) -> PyResult<Rows> {
+        Ok(Rows::of(self.value(false)?["results"].as_array().map_or(&[][..], Vec::as_slice)))
+    }
+
+    /// All figures, as `audit.json` has them: a dict.
+    #[getter]
+    fn document<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        as_python(py, &self.value(false)?)
+    }
+
+    /// Whether every gate held.
+    #[getter]
+    fn passed(&self) -> bool {
+        self.0.document.gates.iter().all(|gate| gate.passed)
+    }
+
+    /// The text of `audit.json`.
+    #[pyo3(signature = (*, share_safe=false))]
+    fn json(&self, share_safe: bool) -> PyResult<String> {
+        let document = &self.0.document;
+        let text = if share_safe { document.share_safe().to_json() } else { document.to_json() };
+        text.map_err(raised)
+    }
+
+    /// The page, one self-contained HTML file.
+    #[pyo3(signature = (*, share_safe=false))]
+    fn html(&self, py: Python<'_>, share_safe: bool) -> PyResult<String> {
+        py.detach(|| self.0.page(share_safe)).map_err(raised)
+    }
+
+    /// Writes `report.html` and `audit.json` into the folder `out`, both or none; `share_safe`: figures only. What is there
+    /// and not an audit's stays, unless `force`.
+    #[pyo3(signature = (out, *, share_safe=false, force=false))]
+    fn save(
+        &self,
+        py: Python<'_>,
+        out: PathBuf,
+        share_safe: bool,
+        force: bool,
+    ) -> PyResult<PathBuf> {
+        py.detach(|| {
+            let shown = if share_safe { Shown::Figures } else { Shown::Points };
+            let files = open_audit(&out, Rules::new([], force), shown, &Quiet).map_err(raised)?;
+            Ok(self.0.write(files, &out, share_safe).map_err(raised)?.report)
+        })
+    }
+
+    /// The table that the command line prints.
+    fn __str__(&self) -> String {
+        unlift_report::text_table(&self.0.document)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<unlift.Report: {} rows>", self.0.document.results.len())
+    }
+}
+
+/// A value of JSON as Python has it.
+pub fn as_python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
+    Ok(match value {
+        Value::Null => py.None().into_bound(py),
+        Value::Bool(value) => value.into_pyobject(py)?.to_owned().into_any(),
+        Value::Number(number) => match number.as_i64() {
+            Some(whole) => whole.into_pyobject(py)?.into_any(),
+            None => number.as_f64().unwrap_or(f64::NAN).into_pyobject(py)?.into_any(),
+        },
+        Value::String(text) => text.into_pyobject(py)?.into_any(),
+        Value::Array(values) => {
+            let values = values.iter().map(|value| as_python(py, value));
+            PyList::new(py, values.collect::<PyResult<Vec<_>>>()?)?.into_any()
+        }
+        Value::Object(fields) => {
+            let dict = PyDict::new(py);
+            for (name, value) in fields {
+                dict.set_item(name, as_python(py, value)?)?;
+            }
+            dict.into_any()
+        }
+    })
+}

@@ -1,0 +1,81 @@
+//! Work without the interpreter's lock, which ends for the user when the user interrupts it.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::Duration;
+
+use pyo3::prelude::*;
+use unlift_audit::Progress;
+
+use crate::errors::raised;
+
+/// How often the interpreter is asked whether the user has interrupted.
+const ASKED: Duration = Duration::from_millis(50);
+
+/// Runs `work` on `threads` threads (all cores without a number) and waits for it. An interrupt ends the wait at once; the work
+/// ends where `stop` is asked about, and of work that never asks the result is thrown away.
+pub fn run<T: Send + 'static>(
+    py: Python<'_>,
+    threads: Option<usize>,
+    stop: Option<Arc<AtomicBool>>,
+    work: impl FnOnce() -> Result<T, String> + Send + 'static,
+) -> PyResult<T> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
+    let pool = pool.map_err(raised)?;
+    let slot = Arc::new((Mutex::new(None), Condvar::new()));
+    let done = Arc::clone(&slot);
+    std::thread::spawn(move || {
+        let result = catch_unwind(AssertUnwindSafe(|| pool.install(work)));
+        let result = result.unwrap_or_else(|panic| Err(told(&*panic)));
+        *done.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(result);
+        done.1.notify_all();
+    });
+    loop {
+        let result = py.detach(|| {
+            let waiting = slot.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let waited = slot.1.wait_timeout_while(waiting, ASKED, |result| result.is_none());
+            waited.unwrap_or_else(PoisonError::into_inner).0.take()
+        });
+        if let Some(result) = result {
+            return result.map_err(raised);
+        }
+        if let Err(interrupt) = py.check_signals() {
+            if let Some(stop) = &stop {
+                stop.store(true, Ordering::Relaxed);
+            }
+            return Err(interrupt);
+        }
+    }
+}
+
+/// What a panic says.
+pub fn told(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<String>().cloned();
+    text.or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).to_owned()))
+        .unwrap_or_else(|| "a panic".to_owned())
+}
+
+/// Tells a function in Python how an audit goes, and whether it shall go on.
+pub struct Heard {
+    pub tell: Option<Py<PyAny>>,
+    pub stop: Arc<AtomicBool>,
+    /// What the function raised.
+    pub failed: Mutex<Option<PyErr>>,
+}
+
+impl Progress for Heard {
+    fn show(&self, done: usize, total: usize, what: &str) {
+        let Some(tell) = &self.tell else { return };
+        let told = Python::attach(|py| tell.call1(py, (done, total, what)).map(drop));
+        if let Err(error) = told {
+            self.failed.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+            self.stop.store(true, Ordering::Relaxed);
+        }
+    }
+
+    fn goes_on(&self) -> bool {
+        !self.stop.load(Ordering::Relaxed)
+    }
+}

@@ -1,0 +1,208 @@
+"""Audits: the same figures as the command line, schemes and sources that are functions, interrupts."""
+
+import json
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import unlift
+
+PROGRAM = os.environ.get("UNLIFT_PROGRAM") or shutil.which("unlift")
+SHARED = pathlib.Path(__file__).parents[4] / "shared" / "data" / "redkitchen"
+
+
+@pytest.fixture
+def points():
+    random = np.random.default_rng(7)
+    flat = random.uniform(0, 4, (600, 2))
+    return np.column_stack([flat, 0.3 * np.sin(flat[:, 0] * 2) + 1.0])
+
+
+@pytest.fixture
+def small(points):
+    return unlift.Map(points, scale=1.0)
+
+
+def cheap(map, schemes, **more):
+    options = {"inlier_ratios": [0.5], "solvers": ["consensus"], "k": 20} | more
+    return unlift.audit(map, schemes, **options)
+
+
+def figures(document):
+    """What does not depend on when and where it was computed."""
+    keep = ["schema", "seed", "options", "results", "not_audited", "break_even", "gates"]
+    return json.dumps({key: document.get(key) for key in keep}, sort_keys=True)
+
+
+@pytest.mark.skipif(PROGRAM is None, reason="the command line is not here (UNLIFT_PROGRAM)")
+def test_figures_are_those_of_the_command_line(points, tmp_path):
+    np.save(tmp_path / "points.npy", points)
+    line = "audit map points.npy --scale 1 --schemes olc,cp --inlier-ratios 0.5 --k 20 --gate all:0.10<=1 --quiet --out cli"
+    done = subprocess.run([PROGRAM, *line.split()], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 1, done.stderr
+    report = unlift.audit(
+        unlift.Map(points, scale=1.0, k=20), ["olc", "cp"], inlier_ratios=[0.5], k=20, gates=["all:0.10<=1"]
+    )
+    assert not report.passed
+    cli = json.loads((tmp_path / "cli" / "audit.json").read_text())
+    assert figures(report.document) == figures(cli)
+    # From the file, with its path and hash.
+    read = unlift.audit(
+        unlift.read(tmp_path / "points.npy", scale=1.0, k=20), ["olc", "cp"], inlier_ratios=[0.5], k=20, gates=["all:0.10<=1"]
+    )
+    assert read.document["input"]["sha256"] == cli["input"]["sha256"]
+    assert figures(read.document) == figures(cli)
+
+
+@pytest.mark.skipif(PROGRAM is None or not SHARED.exists(), reason="the command line or the scene is not here")
+def test_a_real_scene_from_arrays_gives_the_same_rows(tmp_path):
+    model = tmp_path / "model"
+    line = [PROGRAM, "audit", "map", SHARED / "model", "--descriptors", SHARED / "descriptors.bin", "--scale", "1", "--max-points", "5000"]
+    line += "--schemes ppl --neighbors overlap --solver consensus --quiet --out".split() + [tmp_path / "cli"]
+    subprocess.run(line, check=True, capture_output=True)
+    cli = json.loads((tmp_path / "cli" / "audit.json").read_text())
+    whole = unlift.read(SHARED / "model", descriptors=SHARED / "descriptors.bin", scale=1.0)
+    arrays = unlift.Map(whole.positions, whole.descriptors, scale=1.0, max_points=5000)
+    report = unlift.audit(arrays, ["ppl"], ["overlap"], solvers=["consensus"])
+    assert json.dumps(report.document["results"]) == json.dumps(cli["results"])
+    assert not model.exists()
+
+
+def test_a_scheme_is_a_function(small):
+    @unlift.scheme
+    def level(points, random):
+        angle = random.uniform(0, 2 * np.pi, len(points))
+        return unlift.Lines(points, np.stack([np.cos(angle), np.sin(angle), 0 * angle], 1))
+
+    unlift.testing.check_scheme(level)
+    report = cheap(small, ["olc", level])
+    rows = report.rows
+    assert rows["scheme"] == ["olc", "level"]
+    assert rows["recovered_percent.0.25"][1] > rows["blind_percent.0.25"][1]
+    assert figures(cheap(small, ["olc", level]).document) == figures(report.document)
+    assert "level" in report.html()
+
+
+@pytest.mark.parametrize("family", ["pairs", "rays", "planes", "candidates"])
+def test_every_family_of_records_can_be_returned(small, family):
+    def pairs(points, random):
+        order = random.permutation(len(points) // 2 * 2).reshape(-1, 2)
+        a, b = points[order[:, 0]], points[order[:, 1]]
+        return unlift.Lines(a, b - a, hidden=order)
+
+    def rays(points, random):
+        centers = np.array([[-9.0, 0.0, 0.0], [9.0, 0.0, 0.0]])
+        center = random.integers(0, 2, len(points))
+        return unlift.Rays(centers, center, points - centers[center])
+
+    def planes(points, random):
+        axis = random.integers(0, 3, len(points))
+        return unlift.Planes(axis, np.take_along_axis(points, axis[:, None], 1)[:, 0])
+
+    def candidates(points, random):
+        other = points[np.roll(random.permutation(len(points)), 1)]
+        axis = random.integers(0, 3, len(points))
+        swapped = points.copy()
+        swapped[np.arange(len(points)), axis] = other[np.arange(len(points)), axis]
+        return unlift.Candidates(swapped, axis)
+
+    function = locals()[family]
+    row = cheap(small, [function]).document["results"][0]
+    assert row["scheme"] == family
+    assert row["n_points"] == 600
+    assert row["recovered_percent"]["0.25"] > 10
+
+
+def test_a_source_is_a_function(small, points):
+    @unlift.source(needs="nothing", k=10)
+    def meeting(released):
+        # Lines whose feet are near each other: next to nothing, but a list.
+        foot = released.columns["foot"]
+        apart = np.linalg.norm(foot[:, None] - foot[None], axis=2)
+        near = np.argsort(apart, axis=1)[:, 1:11]
+        return near, -np.take_along_axis(apart, near, 1)
+
+    hidden = unlift.obfuscate(small, "olc", seed=1)
+    unlift.testing.check_source(meeting, hidden)
+    report = cheap(small, ["olc"], neighbors=[meeting], inlier_ratios=None)
+    row = report.document["results"][0]
+    assert row["neighbors"] == "meeting" and row["k"] == 10
+    lists = unlift.Neighborhoods(hidden, meeting(hidden.released)[0], needs="nothing")
+    assert len(lists) == 600 and unlift.recover(hidden, lists).positions.shape == (600, 3)
+
+
+def test_what_a_function_raises_is_the_cause(small):
+    def broken(points):
+        raise KeyError("mine")
+
+    with pytest.raises(unlift.UnliftError, match="broken") as error:
+        cheap(small, [broken])
+    assert isinstance(error.value.__cause__, KeyError)
+
+    def wrong(points):
+        return points
+
+    with pytest.raises(unlift.UnliftError, match="expected Lines, Rays, Planes or Candidates"):
+        cheap(small, [wrong])
+    with pytest.raises(unlift.UnliftError, match="schemes: expected a name or a function, found 7"):
+        cheap(small, [7])
+
+    def elsewhere(points):
+        return unlift.Lines(points + 1.0, np.tile([0.0, 0.0, 1.0], (len(points), 1)))
+
+    with pytest.raises(AssertionError, match="elsewhere"):
+        unlift.testing.check_scheme(elsewhere)
+
+
+def test_progress_is_told_and_may_stop(small):
+    told = []
+    cheap(small, ["olc", "cp"], progress=lambda done, total, what: told.append((done, total, what)))
+    assert told[-1][0] == told[-1][1] == 2 or told[-1][1] == 2
+    assert all(isinstance(what, str) for _, _, what in told)
+
+    def stop(done, total, what):
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        cheap(small, ["olc", "cp"], progress=stop)
+
+
+def test_an_interrupt_ends_the_wait_within_a_second():
+    points = np.random.default_rng(1).uniform(0, 9, (60_000, 3))
+    large = unlift.Map(points, scale=1.0)
+    started = time.monotonic()
+    timer = threading.Timer(1.0, lambda: os.kill(os.getpid(), signal.SIGINT))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        unlift.audit(large)
+    assert time.monotonic() - started < 30
+
+
+def test_reports_are_saved_and_tables_read_by_others(small, tmp_path):
+    report = cheap(small, ["olc", "plane"])
+    page = report.save(tmp_path / "out")
+    assert page.name == "report.html" and "<html" in page.read_text()
+    assert json.loads((tmp_path / "out" / "audit.json").read_text())["results"] == report.document["results"]
+    safe = report.save(tmp_path / "safe", share_safe=True)
+    assert len(safe.read_text()) < len(page.read_text())
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "report.html").write_text("mine")
+    with pytest.raises(unlift.UnliftError, match="report.html"):
+        report.save(tmp_path / "mine")
+    assert (tmp_path / "mine" / "report.html").read_text() == "mine"
+    assert report._repr_html_().startswith("<iframe srcdoc=")
+    assert "olc" in str(report)
+
+    pyarrow = pytest.importorskip("pyarrow")
+    table = pyarrow.table(report.rows)
+    assert table.column("scheme").to_pylist() == ["olc", "plane"]
+    assert table.schema.field("n_points").type == pyarrow.int64()
+    assert table.column("recovered_percent.0.10").to_pylist() == report.rows["recovered_percent.0.10"]
+    assert len(report.rows) == 2 and set(report.rows.to_dict()) == set(table.column_names)

@@ -1,0 +1,34 @@
+"""What the documentation shows runs."""
+
+import doctest
+import importlib
+import pathlib
+import re
+
+import numpy as np
+import pytest
+
+import unlift
+
+README = pathlib.Path(__file__).parents[1] / "README.md"
+
+
+@pytest.mark.parametrize("name", ["unlift", "unlift.neighbors", "unlift.testing", "unlift._plugins"])
+def test_examples_of_modules(name):
+    found = doctest.testmod(importlib.import_module(name))
+    assert found.attempted > 0 and found.failed == 0
+
+
+def test_the_readme(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    points = np.random.default_rng(1).uniform(0, 3, (300, 3))
+    np.save("PROJECT.npy", points)
+    # A small map and few rows: the same lines, in seconds.
+    usual = unlift.audit
+    monkeypatch.setattr(unlift, "audit", lambda m, **more: usual(m, **(more | {"solvers": ["consensus"], "inlier_ratios": [0.5]})))
+    blocks = re.findall(r"```python\n(.*?)```", README.read_text(), re.S)
+    assert len(blocks) == 3
+    names = {}
+    for block in blocks:
+        exec(block.replace('"PROJECT"', '"PROJECT.npy"'), names)
+    assert (tmp_path / "out" / "report.html").exists() and (tmp_path / "is-mine-safe" / "audit.json").exists()
