@@ -7,6 +7,7 @@ mod descriptors;
 pub(crate) mod lines;
 mod models;
 mod npy;
+mod others;
 mod ply;
 mod scalar;
 mod table;
@@ -50,7 +51,8 @@ fn mean_direction(directions: impl Iterator<Item = [f64; 3]>) -> Option<[f64; 3]
 }
 
 /// Reads the map at `path`: a COLMAP model folder or a project folder that holds one (of several, the
-/// one with the most points; `skipped` says which), or a point cloud as `.ply`, `.csv`, `.xyz`, `.txt` or `.npy`.
+/// one with the most points; `skipped` says which), a map of OpenSfM, nerfstudio, Bundler or VisualSFM (NVM), or a point
+/// cloud as `.ply`, `.csv`, `.xyz`, `.txt` or `.npy`.
 ///
 /// # Errors
 /// When nothing readable is there, a file is malformed, a coordinate is not finite, or there is no point.
@@ -64,9 +66,21 @@ pub fn open(path: &Path) -> Result<Input, Error> {
     Ok(input)
 }
 
-/// Whether `path` is a folder in which [`open`] finds a COLMAP model.
+/// Whether `path` is a folder in which [`open`] finds a map.
 pub fn is_project(path: &Path) -> bool {
-    path.is_dir() && matches!(Model::find(path), Ok(Some(_)))
+    path.is_dir() && (matches!(Model::find(path), Ok(Some(_))) || others::in_folder(path).is_some())
+}
+
+const EXPECTED: &str = "a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt or .npy file";
+
+/// What makes a point cloud that is read of a file that is not.
+fn converter(extension: &str) -> &'static str {
+    match extension {
+        "las" | "laz" => " (pdal translate IN.las OUT.ply makes one that is read)",
+        "pcd" => " (pcl_pcd2ply IN.pcd OUT.ply makes one that is read)",
+        "e57" => " (pdal translate IN.e57 OUT.ply makes one that is read)",
+        _ => "",
+    }
 }
 
 fn file(path: &Path) -> Result<Input, Error> {
@@ -82,12 +96,14 @@ fn file(path: &Path) -> Result<Input, Error> {
         (_, "csv" | "xyz" | "txt") => (table::read(path)?, "table"),
         (_, "npy") => (npy::positions(path)?, "npy"),
         (_, other) => {
-            let expected = "a COLMAP folder or a .ply, .csv, .xyz, .txt or .npy file";
+            if let Some(found) = others::file(path) {
+                return found;
+            }
             let found = match other {
                 "" => "a file without extension".to_owned(),
-                other => format!("a .{other} file"),
+                other => format!("a .{other} file{}", converter(other)),
             };
-            return Err(Error::new(path, "", expected, found));
+            return Err(Error::new(path, "", EXPECTED, found));
         }
     };
     Ok(Input {
@@ -114,7 +130,10 @@ fn colmap_points(path: &Path) -> Result<Input, Error> {
 
 fn folder(path: &Path) -> Result<Input, Error> {
     let Some(model) = Model::find(path)? else {
-        return Err(Error::new(path, "", models::EXPECTED, "none"));
+        return match others::in_folder(path).and_then(|file| others::file(&file)) {
+            Some(found) => found,
+            None => Err(Error::new(path, "", models::EXPECTED, "none")),
+        };
     };
     let mut input = colmap_model(&model.folder, model.extension)?;
     input.format = if model.extension == "bin" { "COLMAP binary" } else { "COLMAP text" };

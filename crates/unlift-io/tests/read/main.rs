@@ -3,6 +3,7 @@
 mod clouds;
 mod descriptors;
 mod models;
+mod others;
 mod places;
 
 use std::fs;

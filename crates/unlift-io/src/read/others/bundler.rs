@@ -1,0 +1,76 @@
+//! Bundler's `bundle.out`: a line with counts, five lines per camera, three per point.
+
+use std::path::Path;
+
+use super::{Found, UPWARD, camera};
+use crate::error::Error;
+use crate::read::lines::{Lines, number, quoted, words};
+
+/// Exactly `N` numbers in the current line.
+fn numbers<const N: usize>(lines: &Lines, what: &str) -> Result<[f64; N], Error> {
+    let mut values = [0.0; N];
+    let mut words = words(lines.line());
+    for (at, value) in values.iter_mut().enumerate() {
+        let word = words.next();
+        let word =
+            word.ok_or_else(|| lines.error(format!("{N} numbers of {what}"), at.to_string()))?;
+        *value =
+            number(word).ok_or_else(|| lines.error(format!("a number of {what}"), quoted(word)))?;
+    }
+    Ok(values)
+}
+
+fn next(lines: &mut Lines, what: &str) -> Result<(), Error> {
+    if lines.advance_to_data()? { Ok(()) } else { Err(lines.end_error(what)) }
+}
+
+/// Reads points and cameras; cameras that were not placed are noted.
+///
+/// # Errors
+/// When the file is not one of Bundler, or a coordinate is not finite.
+pub fn read(path: &Path) -> Result<Found, Error> {
+    let mut lines = Lines::open(path)?;
+    next(&mut lines, "numbers of cameras and points")?;
+    let counts = words(lines.line()).map(number::<u64>).collect::<Option<Vec<_>>>();
+    let Some([n_cameras, n_points]) = counts.as_deref() else {
+        let found = quoted(lines.line());
+        return Err(lines.error("numbers of cameras and points, as Bundler writes them", found));
+    };
+    let (mut found, mut unplaced) = (Found::default(), 0);
+    for at in 0..*n_cameras {
+        let what = format!("camera {at}");
+        next(&mut lines, &what)?;
+        let [focal, ..] = numbers::<3>(&lines, &what)?;
+        let mut rotation = [[0.0; 3]; 3];
+        for row in &mut rotation {
+            next(&mut lines, &what)?;
+            *row = numbers(&lines, &what)?;
+        }
+        next(&mut lines, &what)?;
+        let translation = numbers(&lines, &what)?;
+        // A focal length of zero marks photos that were not registered.
+        match camera(&rotation, &translation, UPWARD).filter(|_| focal != 0.0) {
+            Some((center, up)) => {
+                found.cameras.push(center);
+                found.up.push(up);
+            }
+            None => unplaced += 1,
+        }
+    }
+    for at in 0..*n_points {
+        let what = format!("point {at}");
+        next(&mut lines, &what)?;
+        let position = numbers::<3>(&lines, &what)?;
+        if position.iter().any(|x| !x.is_finite()) {
+            let expected = format!("finite coordinates of {what}");
+            return Err(lines.error(expected, format!("{position:?}")));
+        }
+        found.positions.push(position);
+        next(&mut lines, &format!("the color of {what}"))?;
+        next(&mut lines, &format!("the views of {what}"))?;
+    }
+    if unplaced > 0 {
+        found.notes.push(format!("{unplaced} of {n_cameras} cameras have no place"));
+    }
+    Ok(found)
+}

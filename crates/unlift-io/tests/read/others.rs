@@ -1,0 +1,207 @@
+//! Maps of other programs: two cameras that look at three points, in each of their forms.
+
+use std::fs;
+use std::path::Path;
+
+use unlift_io::read::{self, Input};
+
+/// The first camera stands at (0, 0, -5) and looks along z; the second has turned a quarter about what it looks along, at (1, 2, -5).
+const CENTERS: [[f64; 3]; 2] = [[0.0, 0.0, -5.0], [1.0, 2.0, -5.0]];
+const POINTS: [[f64; 3]; 3] = [[0.5, -1.25, 3.0], [1e3, 2.0, -0.0625], [0.1, 0.2, 0.3]];
+
+/// `x_cam = R x + t` with y down: `R` row by row, and `t = -R c`.
+const ROTATIONS: [[[f64; 3]; 3]; 2] = [
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+    [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
+];
+/// What is up in the photos: -y of the camera.
+const UP: [[f64; 3]; 2] = [[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0]];
+
+fn translation(at: usize) -> [f64; 3] {
+    ROTATIONS[at].map(|row| -(0..3).map(|c| row[c] * CENTERS[at][c]).sum::<f64>())
+}
+
+fn words(values: &[f64]) -> String {
+    values.iter().map(f64::to_string).collect::<Vec<_>>().join(" ")
+}
+
+fn array(values: &[f64]) -> String {
+    format!("[{}]", values.iter().map(f64::to_string).collect::<Vec<_>>().join(", "))
+}
+
+fn bundler() -> String {
+    let mut text = "# Bundle file v0.3\n3 3\n".to_owned();
+    for at in 0..2 {
+        text += "500 0.01 0\n";
+        // Bundler's cameras look along -z, and y is up.
+        let flipped = [1.0, -1.0, -1.0];
+        for (row, sign) in ROTATIONS[at].iter().zip(flipped) {
+            text += &format!("{}\n", words(&row.map(|x| sign * x)));
+        }
+        let t = translation(at);
+        text += &format!("{}\n", words(&[t[0], -t[1], -t[2]]));
+    }
+    // One that was not registered.
+    text += "0 0 0\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n";
+    for point in POINTS {
+        text += &format!("{}\n255 0 7\n2 0 11 1.5 -2.5 1 12 3.5 4.5\n", words(&point));
+    }
+    text
+}
+
+fn nvm() -> String {
+    let half = 0.5_f64.sqrt();
+    let quaternions = [[1.0, 0.0, 0.0, 0.0], [half, 0.0, 0.0, half]];
+    let mut text = "NVM_V3 \n\n2\n".to_owned();
+    for at in 0..2 {
+        let (q, c) = (words(&quaternions[at]), words(&CENTERS[at]));
+        text += &format!("photo{at}.jpg\t500 {q} {c} 0.1 0\n");
+    }
+    text += "\n3\n";
+    for point in POINTS {
+        text += &format!("{} 255 0 7 2 0 11 1.5 -2.5 1 12 3.5 4.5\n", words(&point));
+    }
+    text + "\n\n0\n\n#the last part of NVM file points to the PLY files\n0\n"
+}
+
+fn opensfm(points: &[[f64; 3]]) -> String {
+    // A quarter turn about z, as axis times angle.
+    let vectors = [[0.0; 3], [0.0, 0.0, std::f64::consts::FRAC_PI_2]];
+    let shots: Vec<String> = (0..2)
+        .map(|at| {
+            let (r, t) = (array(&vectors[at]), array(&translation(at)));
+            format!(r#""{at}.jpg": {{"rotation": {r}, "translation": {t}, "camera": "v2", "gps": null}}"#)
+        })
+        .collect();
+    let points: Vec<String> = points
+        .iter()
+        .enumerate()
+        .map(|(at, point)| {
+            format!(r#""{}": {{"color": [1, 2, 3], "coordinates": {}}}"#, 90 - at, array(point))
+        })
+        .collect();
+    format!(
+        r#"{{"cameras": {{"v2": {{"k1": 0.0}}}}, "shots": {{{}}}, "points": {{{}}}}}"#,
+        shots.join(", "),
+        points.join(", ")
+    )
+}
+
+fn nerfstudio(cloud: &str) -> String {
+    let frames: Vec<String> = (0..2)
+        .map(|at| {
+            // To the world, of a camera whose y is up and that looks along -z: columns of the rotation, two of them turned.
+            let r = &ROTATIONS[at];
+            let row = |c: usize| array(&[r[0][c], -r[1][c], -r[2][c], CENTERS[at][c]]);
+            let rows = [row(0), row(1), row(2), array(&[0.0, 0.0, 0.0, 1.0])];
+            format!(r#"{{"file_path": "{at}.png", "transform_matrix": [{}]}}"#, rows.join(", "))
+        })
+        .collect();
+    format!(r#"{{"w": 640, "frames": [{}], "ply_file_path": {cloud}}}"#, frames.join(", "))
+}
+
+fn ply() -> String {
+    let rows: Vec<String> = POINTS.iter().map(|point| words(point)).collect();
+    format!(
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\nend_header\n{}\n",
+        rows.join("\n")
+    )
+}
+
+fn same(input: &Input, format: &str) {
+    assert_eq!((input.format, &input.positions[..]), (format, &POINTS[..]));
+    assert_eq!(input.ids, [0, 1, 2]);
+    assert_eq!(input.cameras.len(), 2);
+    for (found, expected) in input.cameras.iter().zip(CENTERS) {
+        assert!(
+            found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12),
+            "{format}: {found:?}"
+        );
+    }
+    let mean: [f64; 3] = std::array::from_fn(|c| (UP[0][c] + UP[1][c]) / 2.0_f64.sqrt());
+    let up = input.up.unwrap();
+    assert!(up.iter().zip(mean).all(|(a, b)| (a - b).abs() < 1e-12), "{format}: {up:?}");
+}
+
+#[test]
+fn every_form_gives_the_same_points_and_cameras() {
+    let folder = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(&path, text).unwrap();
+        path
+    };
+    let input = read::open(&put("bundler/bundle.out", &bundler())).unwrap();
+    same(&input, "Bundler");
+    assert_eq!(input.skipped, ["1 of 3 cameras have no place"]);
+    let input = read::open(&put("scene.nvm", &nvm())).unwrap();
+    same(&input, "NVM");
+    assert!(input.skipped.is_empty());
+    let several = format!("[{}, {}]", opensfm(&POINTS[..1]), opensfm(&POINTS));
+    let input = read::open(&put("sfm/reconstruction.json", &several)).unwrap();
+    same(&input, "OpenSfM");
+    assert_eq!(input.skipped, ["read, the largest of 2 reconstructions (3 points)"]);
+    put("nerf/sparse_pc.ply", &ply());
+    let input = read::open(&put("nerf/transforms.json", &nerfstudio("\"sparse_pc.ply\""))).unwrap();
+    same(&input, "nerfstudio");
+    assert_eq!(input.files.len(), 2);
+    // Given as folders.
+    for (name, format) in [("bundler", "Bundler"), ("sfm", "OpenSfM"), ("nerf", "nerfstudio")] {
+        assert!(read::is_project(&folder.path().join(name)));
+        same(&read::open(&folder.path().join(name)).unwrap(), format);
+    }
+}
+
+#[test]
+fn what_is_wrong_is_told_with_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let line = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        fs::write(&path, text).unwrap();
+        let error = read::open(&path).unwrap_err().to_string();
+        error.replace(&format!("{}/", folder.path().display()), "")
+    };
+    assert_eq!(
+        line("a.out", "what else is called so\n"),
+        "a.out:1: expected numbers of cameras and points, as Bundler writes them, found \"what else is called so\""
+    );
+    let cut: String = bundler().lines().take(16).collect::<Vec<_>>().join("\n");
+    assert_eq!(line("b.out", &cut), "b.out:17: expected camera 2, found end of file");
+    let endless = "1 18446744073709551615\n1 0 0\n1 0 0\n0 1 0\n0 0 1\n0 0 0\n";
+    assert_eq!(line("c.out", endless), "c.out:7: expected point 0, found end of file");
+    assert_eq!(line("d.out", "0 1\n1 nan 2\n0 0 0\n0\n").matches("finite").count(), 1);
+    assert!(line("a.nvm", "NVM_V2\n").starts_with("a.nvm:1: expected NVM_V3"));
+    let cut = nvm().replace(" 0.1 0\n", "\n").replace("1 0 0 0 0 0 -5", "1 0 0 0 0 0");
+    assert!(
+        line("b.nvm", &cut).contains("camera 0: name, focal length, quaternion and center, found")
+    );
+    assert!(
+        line("c.nvm", &nvm().replace("1000 2", "inf 2")).contains("finite coordinates of point 1")
+    );
+    assert_eq!(
+        line("a.json", "{}"),
+        "a.json:1: expected a map in JSON, found invalid type: map, expected a list of reconstructions, as OpenSfM writes it"
+    );
+    let text = format!("[{}]", opensfm(&POINTS).replace("[0.1, 0.2, 0.3]", "[0.1, 0.2]"));
+    assert!(line("b.json", &text).contains("invalid length 2, expected an array of length 3"));
+    assert!(line("c.json", "[").contains("EOF while parsing"));
+    let deep = format!("[{{\"x\": {}1{}}}]", "[".repeat(500), "]".repeat(500));
+    // What is not asked for is passed over, however deep it is.
+    assert!(line("d.json", &deep).contains("expected at least one point, found none"));
+    let text = nerfstudio("\"../elsewhere.ply\"");
+    assert_eq!(
+        line("transforms.json", &text),
+        "transforms.json: ply_file_path: expected a path within the folder, found ../elsewhere.ply"
+    );
+    assert!(
+        line("transforms.json", &nerfstudio("null"))
+            .contains("a point cloud beside the cameras, found none")
+    );
+    assert!(line("transforms.json", &nerfstudio("\"none.ply\"")).contains("none.ply: expected"));
+    assert!(
+        line("a.laz", "LASF")
+            .contains("found a .laz file (pdal translate IN.las OUT.ply makes one")
+    );
+    assert!(read::open(Path::new("no such folder")).is_err());
+}
