@@ -1,0 +1,50 @@
+"""What pages get when the guide is built: the help texts of the program, so that they cannot drift."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+import re
+import subprocess
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+MARK = "<!-- the help of every command -->"
+
+
+def program() -> str | None:
+    """The program of this working tree, or the one that UNLIFT_PROGRAM names."""
+    places = [os.environ.get("UNLIFT_PROGRAM"), ROOT / "target/debug/unlift", ROOT / "target/release/unlift"]
+    return next((str(place) for place in places if place and os.access(place, os.X_OK)), None)
+
+
+def help_of(binary: str, *command: str) -> str:
+    run = subprocess.run([binary, *command, "--help"], check=True, capture_output=True, text=True)
+    return run.stdout.rstrip()
+
+
+def sections(binary: str, *command: str) -> list[str]:
+    """A heading and the help of a command, then those of its subcommands."""
+    text = help_of(binary, *command)
+    name = " ".join(("unlift", *command))
+    found = [f"## {name}\n\n```text\n{text}\n```\n"]
+    listed = re.search(r"^Commands:\n((?:  .*\n)+)", text, re.MULTILINE)
+    for line in listed.group(1).splitlines() if listed else []:
+        sub = re.match(r"  ([a-z-]+) ", line)
+        if sub and sub.group(1) != "help":
+            found += sections(binary, *command, sub.group(1))
+    return found
+
+
+def on_page_markdown(markdown: str, **_: object) -> str:
+    if MARK not in markdown:
+        return markdown
+    binary = program()
+    if binary is None:
+        return markdown.replace(MARK, "This copy of the guide was built without the program: ask `unlift COMMAND --help`.")
+    return markdown.replace(MARK, "\n".join(sections(binary)))
+
+
+def on_page_content(html: str, **_: object) -> str:
+    """A figure and its percent sign stay on one line."""
+    parts = re.split(r"(<pre>.*?</pre>)", html, flags=re.DOTALL)
+    return "".join(part if part.startswith("<pre>") else re.sub(r"(\d) %", r"\1&nbsp;%", part) for part in parts)
