@@ -57,6 +57,6 @@ pub use given::by_point;
 pub use lengths::{Extent, check_scale, check_thresholds};
 pub use maps::{Audited, Finished, Job};
 pub use memory::peak_bytes;
-pub use outputs::{FIGURES, PAGE, Shown, check_file, open_audit, refused};
+pub use outputs::{FIGURES, PAGE, Shown, check_file, check_file_of, open_audit, refused};
 pub use prepare::{OutlierFilter, Preparation, Prepared, prepare};
 pub use progress::{Progress, Quiet};

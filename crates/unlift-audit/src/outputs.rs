@@ -23,6 +23,17 @@ pub fn refused(error: unlift_io::Error) -> Error {
 /// One rule for every command, as [`open_audit`] has it for folders: a place where nothing can be written is an error of
 /// the command line, a disk that fails later is none.
 pub fn check_file(path: &Path, kind: Kind, rules: &Rules) -> Result<PathBuf, Error> {
+    check_file_of("--out", path, kind, rules)
+}
+
+/// The same of the file that another option names.
+pub fn check_file_of(
+    option: &str,
+    path: &Path,
+    kind: Kind,
+    rules: &Rules,
+) -> Result<PathBuf, Error> {
+    let refused = |error: unlift_io::Error| Error::request(format!("{option}: {error}"));
     let target = rules.check(path, kind).map_err(refused)?;
     // Begun and given up: permissions alone do not say it.
     drop(OutputFile::create(path, Access::Private).map_err(refused)?);

@@ -23,6 +23,9 @@ pub(crate) struct GateWords {
     pub word: &'static str,
     /// "88.7 % came back, at most 20 % may".
     pub said: String,
+    /// "at most 20 % may come back".
+    #[serde(skip)]
+    pub allowed: String,
 }
 
 /// The gates of `document`; `None` without any.
@@ -42,12 +45,20 @@ pub(crate) fn gates(document: &Document) -> Option<Gates> {
     Some(Gates { summary, passed: failed == 0, gates })
 }
 
-fn in_words(gate: &GateResult) -> GateWords {
+/// That images could not be used, which no gate speaks of: the figures are of fewer than were asked for.
+pub(crate) fn unusable(document: &Document) -> Option<String> {
+    let images = document.input.images.as_ref().filter(|images| images.unusable > 0)?;
+    let (unusable, found) = (images.unusable, images.used + images.unusable);
+    Some(format!("{unusable} of {found} images could not be used, and are in no figure"))
+}
+
+pub(crate) fn in_words(gate: &GateResult) -> GateWords {
     let bound = words::significant(gate.bound_percent, 4);
-    let (unit, verb) = match gate.gate.contains(":gain") {
-        true => (" percentage points", ("were gained", "may be")),
-        false => (" %", ("came back", "may")),
+    let (unit, verb, whole) = match gate.gate.contains(":gain") {
+        true => (" percentage points", ("were gained", "may be"), "may be gained"),
+        false => (" %", ("came back", "may"), "may come back"),
     };
+    let allowed = format!("at most {bound}{unit} {whole}");
     let found = gate.found_percent.map(|found| {
         let found = beside(found, gate.bound_percent);
         format!("{found}{unit} {}, at most {bound}{unit} {}", verb.0, verb.1)
@@ -55,7 +66,7 @@ fn in_words(gate: &GateResult) -> GateWords {
     let found = found.unwrap_or_else(|| format!("not known; at most {bound}{unit} {}", verb.1));
     let word = if gate.passed { "PASS" } else { "FAIL" };
     let said: Vec<String> = [found].into_iter().chain(gate.reason.clone()).collect();
-    GateWords { gate: gate.gate.clone(), passed: gate.passed, word, said: said.join("; ") }
+    GateWords { gate: gate.gate.clone(), passed: gate.passed, word, said: said.join("; "), allowed }
 }
 
 /// `found` with one decimal, or as many more as it takes to stand on its side of `bound`: 20.04 must not
@@ -78,6 +89,14 @@ mod tests {
             "gate": text, "found_percent": found_percent, "bound_percent": bound_percent, "passed": passed
         }))
         .expect("a gate")
+    }
+
+    #[test]
+    fn what_a_gate_allows_is_a_sentence_of_its_own() {
+        let allowed = |text| in_words(&gate(text, 1.0, 20.0)).allowed;
+        assert_eq!(allowed("all:0.10<=20"), "at most 20 % may come back");
+        let gain = "at most 20 percentage points may be gained";
+        assert_eq!(allowed("all:0.10:gain<=20"), gain);
     }
 
     #[test]

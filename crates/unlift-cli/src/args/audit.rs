@@ -46,6 +46,12 @@ pub struct ResultArgs {
     /// Fail (exit code 1) when more than this comes back; repeatable, see below
     #[arg(long, value_name = "GATE", value_parser = Gate::parse)]
     pub gate: Vec<Gate>,
+    /// Also write how the gates ended as JUnit XML, as GitLab, Jenkins and others show it
+    #[arg(long, value_name = "FILE", requires = "gate")]
+    pub junit: Option<PathBuf>,
+    /// Also write the gates that failed as SARIF 2.1.0, as GitHub shows it
+    #[arg(long, value_name = "FILE", requires = "gate")]
+    pub sarif: Option<PathBuf>,
     /// Folder for report.html and audit.json (and clouds); whatever else is in it stays
     #[arg(long, value_name = "DIR", default_value = "unlift-audit")]
     pub out: PathBuf,

@@ -23,6 +23,7 @@ Examples:
   unlift audit map PROJECT --neighbors lists-by-point.parquet --solver joint,ransac
   unlift audit map PROJECT --descriptors PROJECT/database.db --neighbors oracle --neighbors overlap
   unlift audit map PROJECT --share-safe --json
+  unlift audit map PROJECT --scale 1 --gate 'all@0.5:0.10<=20' --junit gates.xml --sarif gates.sarif
 
 Gates: SCHEME[:SOLVER][:SOURCE][@RATIO]:THRESHOLD[:gain]<=PERCENT. SCHEME may be all; without @RATIO
 every ratio counts, without a solver or a source of neighborhoods every one; every noise model

@@ -22,7 +22,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::values;
 
-pub use audit::AttackArgs;
+pub use audit::{AttackArgs, ResultArgs};
 pub use audit_images::AuditImagesArgs;
 pub use audit_map::AuditMapArgs;
 pub use audit_released::AuditReleasedArgs;

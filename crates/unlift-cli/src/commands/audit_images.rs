@@ -10,10 +10,10 @@ use unlift::descriptors::Values;
 use unlift::obfuscate::SchemeOptions;
 use unlift::{Descriptors, Unit};
 use unlift_audit::images::FeatureSource;
-use unlift_audit::images::audit::{ImagesJob, perform};
+use unlift_audit::images::audit::{ImagesJob, Used, perform};
 use unlift_audit::images::stream::Needs;
 use unlift_audit::inversion::Inversion;
-use unlift_audit::{Shown, open_audit};
+use unlift_audit::{Finished, Shown, open_audit};
 use unlift_features::Extraction;
 use unlift_io::atomic::Rules;
 use unlift_io::{Error, read};
@@ -22,6 +22,7 @@ use unlift_report::pictures::MOST_PICTURES;
 
 use super::common::with_threads;
 use super::extraction::Typed;
+use super::gate_files::GateFiles;
 use super::painter::{kind, painter};
 use super::plan::{attack, check_about, check_fit, own, solvers, summary, thresholds, with_attack};
 use crate::args::AuditImagesArgs;
@@ -36,12 +37,33 @@ const HEADLINE_PX: f64 = 10.0;
 
 /// Audits images.
 pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
+    let (finished, used) = audit(args)?;
+    if let Some(finished) = &finished {
+        print(&if args.result.json { summary(finished)? } else { finished.text() })?;
+    }
+    all_used(args, &used)?;
+    let passed = finished.is_none_or(|finished| finished.passed());
+    Ok(if passed { Outcome::Done } else { Outcome::GateFailed })
+}
+
+/// Whether every image could be used: the figures are of fewer than asked for else, and no gate decides.
+pub fn all_used(args: &AuditImagesArgs, used: &Used) -> anyhow::Result<()> {
+    if used.unusable == 0 {
+        return Ok(());
+    }
+    let expected = format!("{} images that can be used", used.used + used.unusable);
+    Err(Error::new(&args.path, "", expected, used.used.to_string()).into())
+}
+
+/// The audit and its files; no figures without an image that can be used.
+pub fn audit(args: &AuditImagesArgs) -> anyhow::Result<(Option<Finished>, Used)> {
     let started = Instant::now();
     let mut plan = plan(args)?;
     let painted = painted(args)?;
     let inputs = [args.path.as_path()].into_iter().chain(args.photos.as_deref());
     let rules = Rules::new(inputs, args.result.force);
     let shown = if args.result.share_safe { Shown::Figures } else { Shown::Points };
+    let gate_files = GateFiles::check(&args.result, &rules)?;
     let out = open_audit(&args.result.out, rules, shown, &Stderr)?;
     let (finished, used) = with_threads(args.run.threads, || {
         let extraction = extraction(args, &plan)?;
@@ -88,15 +110,9 @@ pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
         Ok(perform(job, out)?)
     })?;
     if let Some(finished) = &finished {
-        print(&if args.result.json { summary(finished)? } else { finished.text() })?;
+        gate_files.write(&finished.document)?;
     }
-    if used.unusable > 0 {
-        // The figures are of fewer images than asked for: no gate decides then.
-        let expected = format!("{} images that can be used", used.used + used.unusable);
-        return Err(Error::new(&args.path, "", expected, used.used.to_string()).into());
-    }
-    let passed = finished.is_none_or(|finished| finished.passed());
-    Ok(if passed { Outcome::Done } else { Outcome::GateFailed })
+    Ok((finished, used))
 }
 
 fn plan(args: &AuditImagesArgs) -> anyhow::Result<Plan<2>> {

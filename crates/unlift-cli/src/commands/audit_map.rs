@@ -10,12 +10,13 @@ use unlift::audit::{Measure, Plan};
 use unlift::obfuscate::SchemeOptions;
 use unlift_audit::inversion::MapInversion;
 use unlift_audit::maps::perform;
-use unlift_audit::{Job, Prepared, Shown, check_thresholds, open_audit};
+use unlift_audit::{Finished, Job, Prepared, Shown, check_thresholds, open_audit};
 use unlift_io::atomic::Rules;
 use unlift_io::hash::hash_file;
 use unlift_io::read;
 
 use super::common::{open_map, with_threads};
+use super::gate_files::GateFiles;
 use super::painter::{kind, painter};
 use super::plan::{attack, neighbors, solvers, summary, thresholds, with_attack};
 use crate::args::AuditMapArgs;
@@ -26,27 +27,36 @@ use crate::values::{NeighborSource, all_schemes, distinct};
 
 /// Audits a map.
 pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
+    let json = args.result.json;
+    let finished = audit(&args)?;
+    print(&if json { summary(&finished)? } else { finished.text() })?;
+    Ok(if finished.passed() { Outcome::Done } else { Outcome::GateFailed })
+}
+
+/// The audit and its files.
+pub fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
     let started = Instant::now();
     let shown = match (args.result.share_safe, args.write_clouds) {
         (true, _) => Shown::Figures,
         (false, true) => Shown::Clouds,
         (false, false) => Shown::Points,
     };
-    let out = open_audit(&args.result.out, rules(&args), shown, &Stderr)?;
+    let gate_files = GateFiles::check(&args.result, &rules(args))?;
+    let out = open_audit(&args.result.out, rules(args), shown, &Stderr)?;
     let finished = with_threads(args.run.threads, || {
         let (input, prepared) = open_map(&args.path, &args.map, args.run.quiet)?;
         let progress = Progress::new(args.run.quiet);
         let (path, result) = (&args.path, &args.result);
-        let inversion = inversion(&args, &prepared, &input, &progress)?;
+        let inversion = inversion(args, &prepared, &input, &progress)?;
         let mut notes: Vec<String> =
-            thinned(&args, &prepared, input.positions.len()).into_iter().collect();
-        let mut plan = plan(&args, &prepared, &input, &mut notes)?;
+            thinned(args, &prepared, input.positions.len()).into_iter().collect();
+        let mut plan = plan(args, &prepared, &input, &mut notes)?;
         plan.measures.extend(inversion.iter().map(|one| Arc::clone(one) as Arc<dyn Measure<3>>));
         let mut job = Job {
             plan,
             inversion,
             notes,
-            options: with_attack(more_options(&args), &args.attack),
+            options: with_attack(more_options(args), &args.attack),
             gates: result.gate.clone(),
             write_clouds: args.write_clouds,
             share_safe: result.share_safe,
@@ -54,11 +64,11 @@ pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
             command: Some(command_line()),
             ..Job::new(path, &input, &prepared, &result.out, started)?
         };
-        job.input.other_sha256 = others(&args)?;
+        job.input.other_sha256 = others(args)?;
         Ok(perform(job, out)?)
     })?;
-    print(&if args.result.json { summary(&finished)? } else { finished.text() })?;
-    Ok(if finished.passed() { Outcome::Done } else { Outcome::GateFailed })
+    gate_files.write(&finished.document)?;
+    Ok(finished)
 }
 
 /// What paints pictures, if that was asked for.

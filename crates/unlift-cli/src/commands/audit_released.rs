@@ -7,7 +7,7 @@ use unlift::audit::{Plan, scheme_called};
 use unlift::released::Released;
 use unlift::truth::Secret;
 use unlift_audit::maps::perform;
-use unlift_audit::{Job, Prepared, Shown, check_thresholds, open_audit, ordered};
+use unlift_audit::{Finished, Job, Prepared, Shown, check_thresholds, open_audit, ordered};
 use unlift_io::atomic::Rules;
 use unlift_io::hash::{hash_file, hash_files};
 use unlift_io::read::{self, Input as Points};
@@ -15,6 +15,7 @@ use unlift_io::stage::{has_images, read_released, read_truth, scheme_name};
 use unlift_report::document::Input;
 
 use super::common::{expect_slots, same_map, with_threads};
+use super::gate_files::GateFiles;
 use super::plan::{attack, neighbors, solvers, summary, thresholds, with_attack};
 use crate::args::AuditReleasedArgs;
 use crate::exit::{Outcome, advise, usage};
@@ -27,6 +28,13 @@ const UNNAMED: &str = "released";
 
 /// Audits a map that is hidden already.
 pub fn run(args: &AuditReleasedArgs) -> anyhow::Result<Outcome> {
+    let finished = audit(args)?;
+    print(&if args.result.json { summary(&finished)? } else { finished.text() })?;
+    Ok(if finished.passed() { Outcome::Done } else { Outcome::GateFailed })
+}
+
+/// The audit and its files.
+pub fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
     let started = Instant::now();
     let shown = match (args.result.share_safe, args.write_clouds) {
         (true, _) => Shown::Figures,
@@ -35,7 +43,9 @@ pub fn run(args: &AuditReleasedArgs) -> anyhow::Result<Outcome> {
     };
     let inputs = [args.released.as_path(), &args.truth].into_iter();
     let inputs = inputs.chain(args.descriptors.as_deref()).chain(lists(args));
-    let out = open_audit(&args.result.out, Rules::new(inputs, args.result.force), shown, &Stderr)?;
+    let rules = Rules::new(inputs, args.result.force);
+    let gate_files = GateFiles::check(&args.result, &rules)?;
+    let out = open_audit(&args.result.out, rules, shown, &Stderr)?;
     let finished = with_threads(args.run.threads, || {
         let name = name(args)?;
         let (prepared, hidden) = open(args)?;
@@ -67,8 +77,8 @@ pub fn run(args: &AuditReleasedArgs) -> anyhow::Result<Outcome> {
         };
         Ok(perform(job, out)?)
     })?;
-    print(&if args.result.json { summary(&finished)? } else { finished.text() })?;
-    Ok(if finished.passed() { Outcome::Done } else { Outcome::GateFailed })
+    gate_files.write(&finished.document)?;
+    Ok(finished)
 }
 
 /// Files of lists.

@@ -9,6 +9,7 @@ mod demo;
 mod evaluate;
 mod extraction;
 mod features;
+mod gate_files;
 mod image_stages;
 mod invert;
 mod metrics;

@@ -24,8 +24,22 @@ pub enum Kind {
     Features,
     /// A PNG whose first chunk of text names unlift, as [`marked_picture`] has it.
     Picture,
+    /// JUnit XML whose root is named unlift.
+    Junit,
+    /// SARIF whose first run is by unlift.
+    Sarif,
+    /// A table of figures: CSV with [`TABLE_COLUMNS`] first, or LaTeX or Markdown with a comment that names unlift first.
+    Table,
+    /// An SVG whose comment in the first line names unlift.
+    Curves,
 }
 
+/// The columns that a CSV table of ours begins with.
+pub const TABLE_COLUMNS: &str = "scheme,neighbors,oracle_noise,inlier_ratio,";
+/// First words of files of text, by kind.
+const JUNIT_MARK: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"unlift\"";
+const TABLE_MARKS: [&str; 3] = [TABLE_COLUMNS, "% unlift ", "<!-- unlift "];
+const CURVES_MARK: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?><!-- unlift ";
 /// The comment in clouds.
 pub(crate) const CLOUD_COMMENT: &str = "unlift";
 /// Between the superblock and the first array of features: no structure of HDF5 refers to it.
@@ -51,7 +65,9 @@ impl Kind {
     /// Whether the file at `path` is one of this kind. What cannot be read is none.
     pub fn is_at(self, path: &Path) -> bool {
         match self {
-            Self::AuditJson => is_audit(path),
+            Self::AuditJson => {
+                is_json(path, |audit| audit["unlift"].is_string() && audit["schema"].is_u64())
+            }
             Self::Page => start(path, PAGE_HEAD)
                 .is_some_and(|head| String::from_utf8_lossy(&head).contains(PAGE_MARK)),
             Self::Stage(kind) => stage::declared_kind(path) == Some(kind),
@@ -61,6 +77,12 @@ impl Kind {
             }),
             Self::Picture => start(path, PNG_HEAD + PICTURE_MARK.len())
                 .is_some_and(|head| head.get(PNG_HEAD..) == Some(&PICTURE_MARK[..])),
+            Self::Junit => begins(path, &[JUNIT_MARK]),
+            Self::Sarif => is_json(path, |log| {
+                log["version"].is_string() && log["runs"][0]["tool"]["driver"]["name"] == "unlift"
+            }),
+            Self::Table => begins(path, &TABLE_MARKS),
+            Self::Curves => begins(path, &[CURVES_MARK]),
         }
     }
 }
@@ -74,6 +96,10 @@ impl fmt::Display for Kind {
             Self::Cloud => f.write_str("a cloud"),
             Self::Features => f.write_str("features"),
             Self::Picture => f.write_str("a picture"),
+            Self::Junit => f.write_str("gates as JUnit XML"),
+            Self::Sarif => f.write_str("gates as SARIF"),
+            Self::Table => f.write_str("a table"),
+            Self::Curves => f.write_str("curves"),
         }
     }
 }
@@ -85,10 +111,17 @@ fn start(path: &Path, n: usize) -> Option<Vec<u8>> {
     Some(head)
 }
 
-fn is_audit(path: &Path) -> bool {
+/// Whether a text begins with one of `marks`.
+fn begins(path: &Path, marks: &[&str]) -> bool {
+    let most = marks.iter().map(|mark| mark.len()).max().unwrap_or(0);
+    let head = start(path, most);
+    head.is_some_and(|head| marks.iter().any(|mark| head.starts_with(mark.as_bytes())))
+}
+
+fn is_json(path: &Path, holds: impl FnOnce(Value) -> bool) -> bool {
     let Ok(file) = File::open(path) else { return false };
     let parsed: Result<Value, _> = serde_json::from_reader(BufReader::new(file));
-    parsed.is_ok_and(|value| value["unlift"].is_string() && value["schema"].is_u64())
+    parsed.is_ok_and(holds)
 }
 
 fn is_cloud(head: &[u8]) -> bool {
@@ -118,8 +151,12 @@ mod tests {
             Kind::Stage(stage::Kind::Truth),
             Kind::Cloud,
             Kind::Features,
+            Kind::Junit,
+            Kind::Sarif,
+            Kind::Table,
+            Kind::Curves,
         ];
-        let of_others: [&[u8]; 9] = [
+        let of_others: [&[u8]; 13] = [
             b"",
             b"{}",
             // What `npm audit --json` writes, in short.
@@ -130,6 +167,10 @@ mod tests {
             b"# Blender\nv 0 0 0\n",
             b"\x89HDF\r\n\x1a\n",
             b"PAR1PAR1",
+            b"<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"nextest-run\">",
+            br#"{"version": "2.1.0", "runs": [{"tool": {"driver": {"name": "other"}}}]}"#,
+            b"scheme,price\n",
+            b"<?xml version=\"1.0\" encoding=\"UTF-8\"?><!-- Inkscape -->",
         ];
         for content in of_others {
             fs::write(&path, content).unwrap();
@@ -150,6 +191,13 @@ mod tests {
             kind.is_at(&path)
         };
         assert!(is(Kind::AuditJson, br#"{"unlift": "0.1.0", "schema": 1, "results": []}"#));
+        assert!(is(Kind::Junit, format!("{JUNIT_MARK} tests=\"1\">").as_bytes()));
+        let sarif = br#"{"version": "2.1.0", "runs": [{"tool": {"driver": {"name": "unlift"}}}]}"#;
+        assert!(is(Kind::Sarif, sarif));
+        for mark in TABLE_MARKS {
+            assert!(is(Kind::Table, format!("{mark}k\n").as_bytes()));
+        }
+        assert!(is(Kind::Curves, format!("{CURVES_MARK}curves -->\n<svg>").as_bytes()));
         assert!(is(Kind::Page, format!("<!doctype html>\n<head>{PAGE_MARK}").as_bytes()));
         let points = [[1.0, 2.0, 3.0]];
         crate::clouds::write_points(&path, &points, None).unwrap();

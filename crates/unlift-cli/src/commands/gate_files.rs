@@ -1,0 +1,74 @@
+//! `--junit` and `--sarif`: gates as services that build software show them.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use unlift_audit::{FIGURES, PAGE, check_file_of};
+use unlift_io::atomic::{Access, Kind, Rules, write_file};
+use unlift_report::document::Document;
+use unlift_report::{junit, sarif};
+
+use crate::args::ResultArgs;
+use crate::exit::usage;
+
+/// A file of gates that was asked for.
+struct GateFile {
+    option: &'static str,
+    path: PathBuf,
+    kind: Kind,
+    text: fn(&Document) -> String,
+}
+
+/// The files of gates of an audit: checked before the work, written after it.
+pub struct GateFiles {
+    files: Vec<GateFile>,
+    rules: Rules,
+}
+
+impl GateFiles {
+    /// Those that `result` asks for, if they can be written, and over nothing else of the same run.
+    pub fn check(result: &ResultArgs, rules: &Rules) -> anyhow::Result<Self> {
+        let asked: [(_, &Option<PathBuf>, _, fn(&Document) -> String); 2] = [
+            ("--junit", &result.junit, Kind::Junit, junit),
+            ("--sarif", &result.sarif, Kind::Sarif, sarif),
+        ];
+        let mut taken: Vec<(&str, PathBuf)> =
+            [PAGE, FIGURES].map(|name| ("--out", place_of(&result.out.join(name)))).to_vec();
+        let mut files = Vec::new();
+        for (option, path, kind, text) in asked {
+            let Some(path) = path else { continue };
+            let target = place_of(&check_file_of(option, path, kind, rules)?);
+            if let Some((other, _)) = taken.iter().find(|(_, other)| *other == target) {
+                let path = path.display();
+                return Err(usage(format!(
+                    "{option}: {path}: expected a file of its own, found one of {other}"
+                )));
+            }
+            taken.push((option, target));
+            files.push(GateFile { option, path: path.clone(), kind, text });
+        }
+        Ok(Self { files, rules: rules.clone() })
+    }
+
+    /// Writes them, each whole or not at all. They are made to be shown: whoever may see a build may read them.
+    pub fn write(&self, document: &Document) -> anyhow::Result<()> {
+        for GateFile { option, path, kind, text } in &self.files {
+            check_file_of(option, path, *kind, &self.rules)?;
+            let text = text(document);
+            write_file(path, Access::Usual, |w| w.write_all(text.as_bytes()))?;
+        }
+        Ok(())
+    }
+}
+
+/// A path by which two names of one place are equal, also where no file stands yet.
+fn place_of(path: &Path) -> PathBuf {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    match (folder.canonicalize(), path.file_name()) {
+        (Ok(folder), Some(name)) => folder.join(name),
+        _ => path.to_owned(),
+    }
+}

@@ -1,0 +1,112 @@
+//! Gates as SARIF 2.1.0, as GitHub shows alerts: a rule per gate, a result per gate that did not hold.
+
+use serde_json::{Value, json};
+
+use crate::document::Document;
+use crate::gates::{self, GateWords};
+
+/// Where results point to in a document that names no map: the file that holds the figures.
+const UNNAMED: &str = "audit.json";
+const REPOSITORY: &str = env!("CARGO_PKG_REPOSITORY");
+
+/// The gates of `document` as a SARIF log of one run.
+///
+/// Ends with a line break.
+pub fn sarif(document: &Document) -> String {
+    let mut gates: Vec<GateWords> = Vec::new();
+    for gate in document.gates.iter().map(gates::in_words) {
+        // A rule has one place in the list, however often its gate was typed.
+        if gates.iter().all(|known| known.gate != gate.gate) {
+            gates.push(gate);
+        }
+    }
+    let path = document.input.path.as_deref();
+    let uri = path.map_or_else(|| UNNAMED.to_owned(), uri);
+    let unusable = gates::unusable(document);
+    let mut invocation = json!({ "executionSuccessful": unusable.is_none() });
+    if let Some(said) = unusable {
+        let notification = json!({ "level": "error", "message": { "text": said } });
+        invocation["toolExecutionNotifications"] = json!([notification]);
+    }
+    let failed = gates.iter().enumerate().filter(|(_, gate)| !gate.passed);
+    let mut run = json!({
+        "tool": { "driver": {
+            "name": "unlift",
+            "version": document.unlift,
+            "informationUri": REPOSITORY,
+            "rules": gates.iter().map(rule).collect::<Vec<_>>(),
+        }},
+        "invocations": [invocation],
+        "results": failed.map(|(at, gate)| result(at, gate, &uri)).collect::<Vec<_>>(),
+    });
+    if path.is_some() {
+        // Two audits of one commit replace each other's alerts unless each has a category; the slash ends it.
+        run["automationDetails"] = json!({ "id": format!("unlift/{uri}/") });
+    }
+    let log = json!({
+        "$schema": "https://json.schemastore.org/sarif-2.1.0.json",
+        "version": "2.1.0",
+        "runs": [run],
+    });
+    format!("{log:#}\n")
+}
+
+fn rule(gate: &GateWords) -> Value {
+    json!({
+        "id": gate.gate,
+        "shortDescription": { "text": format!("{}: {}", gate.gate, gate.allowed) },
+        "help": { "text": "report.html of the audit says what came back, and by which attack." },
+        "defaultConfiguration": { "level": "error" },
+        "properties": { "tags": ["privacy"] },
+    })
+}
+
+fn result(rule: usize, gate: &GateWords, uri: &str) -> Value {
+    json!({
+        "ruleId": gate.gate,
+        "ruleIndex": rule,
+        "level": "error",
+        "message": { "text": format!("{}: {}", gate.gate, gate.said) },
+        // A map has no lines; GitHub takes no result without one.
+        "locations": [{ "physicalLocation": {
+            "artifactLocation": { "uri": uri },
+            "region": { "startLine": 1 },
+        }}],
+    })
+}
+
+/// A path as a reference of RFC 3986: what is absolute as `file:`, what is relative as it stands.
+fn uri(path: &str) -> String {
+    let path = match std::path::MAIN_SEPARATOR {
+        '\\' => path.replace('\\', "/"),
+        _ => path.to_owned(),
+    };
+    let mut out = String::new();
+    let drive = path.as_bytes().get(1) == Some(&b':') && cfg!(windows);
+    if path.starts_with('/') || drive {
+        out.push_str(if drive { "file:///" } else { "file://" });
+    }
+    for &byte in path.as_bytes() {
+        match byte {
+            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'.' | b'_' | b'~' | b'/' => {
+                out.push(char::from(byte));
+            }
+            // A colon, too, as what stands before the first one would be a scheme.
+            _ => out.push_str(&format!("%{byte:02X}")),
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn paths_become_references() {
+        assert_eq!(uri("maps/room 1.ply"), "maps/room%201.ply");
+        assert_eq!(uri("/maps/ü"), "file:///maps/%C3%BC");
+        assert_eq!(uri("a:b\\c"), "a%3Ab%5Cc");
+    }
+}
