@@ -14,7 +14,7 @@ MARK = "<!-- the help of every command -->"
 def program() -> str | None:
     """The program of this working tree, or the one that UNLIFT_PROGRAM names."""
     places = [os.environ.get("UNLIFT_PROGRAM"), ROOT / "target/debug/unlift", ROOT / "target/release/unlift"]
-    return next((str(place) for place in places if place and os.access(place, os.X_OK)), None)
+    return next((os.path.abspath(place) for place in places if place and os.access(place, os.X_OK)), None)
 
 
 def help_of(binary: str, *command: str) -> str:
