@@ -349,6 +349,7 @@ fn help_is_part_of_the_interface() {
         "neighbors find",
         "recover",
         "evaluate",
+        "table",
         "bench recover",
         "features",
         "invert",

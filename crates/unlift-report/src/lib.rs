@@ -33,6 +33,7 @@ mod check;
 mod choices;
 pub mod document;
 mod error;
+pub mod export;
 mod gates;
 mod html;
 mod images;

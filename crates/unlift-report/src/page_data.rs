@@ -9,7 +9,7 @@ use crate::options::RenderOptions;
 use crate::paper::{PublishedCurve, published_2d, published_3d};
 use crate::pictures::{EncodedPicture, first_choice};
 use crate::scene::Encoded;
-use crate::tables;
+use crate::{tables, verdict};
 
 #[derive(Debug, Serialize)]
 pub(crate) struct PageData<'a> {
@@ -71,21 +71,9 @@ struct PublishedData {
     points: Vec<(f64, f64)>,
 }
 
-/// Whether `row` is the first of those that recover most of its scheme from its neighborhoods.
+/// Whether `row` is the one that recovers most of its scheme from its neighborhoods.
 fn is_strongest(document: &Document, row: &Row, typed: &str) -> bool {
-    let share = |row: &Row| row.recovered_percent.get(typed).copied().unwrap_or(-1.0);
-    let given = Given::of(row);
-    let rivals = document.results.iter().filter(|other| {
-        other.scheme == row.scheme
-            && attack::basis(other).is_some()
-            && Given::of(other).same_choice(&given)
-    });
-    let mut best: Option<&Row> = None;
-    for rival in rivals {
-        if best.is_none_or(|best| share(rival) > share(best)) {
-            best = Some(rival);
-        }
-    }
+    let best = verdict::strongest_given(document, &row.scheme, &Given::of(row), typed);
     best.is_some_and(|best| std::ptr::eq(best, row))
 }
 

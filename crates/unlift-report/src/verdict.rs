@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::attack::{self, Basis};
+use crate::attack::{self, Basis, Given};
 use crate::cards::{Card, Finding, Refusal};
 use crate::document::{Bound, BreakEven, Document, Row};
 use crate::{lead, quantity, tables, words};
@@ -68,6 +68,26 @@ pub(crate) fn strongest<'a>(document: &'a Document, scheme: &str, basis: Basis) 
     rows.filter(|row| attack::basis(row) == Some(basis)).min_by(|a, b| {
         away(a).total_cmp(&away(b)).then(share(b, &typed).total_cmp(&share(a, &typed)))
     })
+}
+
+/// The row that recovers most of `scheme` within `typed` from these neighborhoods; of equal ones the first.
+pub(crate) fn strongest_given<'a>(
+    document: &'a Document,
+    scheme: &str,
+    given: &Given,
+    typed: &str,
+) -> Option<&'a Row> {
+    let share = |row: &Row| row.recovered_percent.get(typed).copied().unwrap_or(-1.0);
+    let mut best: Option<&Row> = None;
+    for row in &document.results {
+        let is_rival = row.scheme == scheme
+            && attack::basis(row).is_some()
+            && Given::of(row).same_choice(given);
+        if is_rival && best.is_none_or(|best| share(row) > share(best)) {
+            best = Some(row);
+        }
+    }
+    best
 }
 
 /// The strongest row of every source of `scheme` but the oracle, most recovered first, then the oracle's.

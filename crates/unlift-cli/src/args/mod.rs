@@ -15,6 +15,7 @@ mod models;
 mod neighbors;
 mod obfuscate;
 mod recover;
+mod table;
 
 use std::ffi::OsString;
 
@@ -37,6 +38,7 @@ pub use models::ModelsArgs;
 pub use neighbors::{FindArgs, NeighborsCommand, OracleArgs};
 pub use obfuscate::ObfuscateArgs;
 pub use recover::RecoverArgs;
+pub use table::TableArgs;
 
 /// How much of a privacy-preserving ("obfuscated") SfM map or image comes back?
 #[derive(Debug, Parser)]
@@ -102,6 +104,8 @@ pub enum Command {
     Recover(RecoverArgs),
     /// Compare recovered points with the truth
     Evaluate(EvaluateArgs),
+    /// The figures of an audit as a table for a paper, and as curves
+    Table(TableArgs),
     /// Measure speed and memory
     #[command(subcommand)]
     Bench(BenchCommand),

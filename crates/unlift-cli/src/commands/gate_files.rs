@@ -62,7 +62,7 @@ impl GateFiles {
 }
 
 /// A path by which two names of one place are equal, also where no file stands yet.
-fn place_of(path: &Path) -> PathBuf {
+pub fn place_of(path: &Path) -> PathBuf {
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),

@@ -6,6 +6,7 @@ mod audit_released;
 mod bench;
 mod common;
 mod demo;
+mod documents;
 mod evaluate;
 mod extraction;
 mod features;
@@ -20,6 +21,7 @@ mod painter;
 mod plan;
 mod recover;
 mod schemes;
+mod table;
 
 use crate::args::{AuditCommand, BenchCommand, Command, NeighborsCommand};
 use crate::exit::Outcome;
@@ -39,6 +41,7 @@ pub fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Neighbors(NeighborsCommand::Find(args)) => neighbors::find(&args),
         Command::Recover(args) => recover::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
+        Command::Table(args) => table::run(&args),
         Command::Bench(BenchCommand::Recover(args)) => bench::recovery(&args),
         Command::Features(args) => features::run(&args),
         Command::Invert(args) => invert::run(&args),

@@ -28,14 +28,14 @@ pub enum Kind {
     Junit,
     /// SARIF whose first run is by unlift.
     Sarif,
-    /// A table of figures: CSV with [`TABLE_COLUMNS`] first, or LaTeX or Markdown with a comment that names unlift first.
+    /// A table of figures: CSV with `TABLE_COLUMNS` first, or LaTeX or Markdown with a comment that names unlift first.
     Table,
     /// An SVG whose comment in the first line names unlift.
     Curves,
 }
 
 /// The columns that a CSV table of ours begins with.
-pub const TABLE_COLUMNS: &str = "scheme,neighbors,oracle_noise,inlier_ratio,";
+const TABLE_COLUMNS: &str = "scheme,neighbors,oracle_noise,inlier_ratio,";
 /// First words of files of text, by kind.
 const JUNIT_MARK: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"unlift\"";
 const TABLE_MARKS: [&str; 3] = [TABLE_COLUMNS, "% unlift ", "<!-- unlift "];

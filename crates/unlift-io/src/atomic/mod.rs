@@ -21,7 +21,7 @@ use crate::Error;
 
 pub use file::OutputFile;
 pub(crate) use kind::{CLOUD_COMMENT, FEATURES_MARK};
-pub use kind::{Kind, TABLE_COLUMNS, marked_picture};
+pub use kind::{Kind, marked_picture};
 pub use partial::{abandon, make_folders, sweep};
 pub use rules::Rules;
 pub use set::OutputSet;

@@ -1,0 +1,120 @@
+//! Every row of `results` as CSV (RFC 4180): what a script or a spreadsheet works on.
+
+use crate::document::{ByThreshold, Document, Row};
+
+/// All rows, with a column per figure and one per threshold of `within` where a figure has several. What is not known is empty.
+pub(super) fn csv(document: &Document, within: &[String]) -> String {
+    let rows = &document.results;
+    let mut names: Vec<&String> = Vec::new();
+    let mut percentiles: Vec<&String> = Vec::new();
+    for row in rows {
+        names.extend(row.metrics.keys().filter(|name| !names.contains(name)).collect::<Vec<_>>());
+        let new = row.error_percentiles.keys().filter(|key| !percentiles.contains(key));
+        percentiles.extend(new.collect::<Vec<_>>());
+    }
+    // The program knows its tables by the first four.
+    let mut heads: Vec<String> = [
+        "scheme",
+        "neighbors",
+        "oracle_noise",
+        "inlier_ratio",
+        "k",
+        "solver",
+        "delta",
+        "unit",
+        "n_points",
+        "n_lost",
+        "n_dropped",
+    ]
+    .map(str::to_owned)
+    .to_vec();
+    for figure in ["recovered_percent", "recovered_std", "blind_percent", "records_alone_percent"] {
+        heads.extend(within.iter().map(|typed| format!("{figure}_within_{typed}")));
+    }
+    heads.extend(ALWAYS.map(|(name, _)| name.to_owned()));
+    heads.extend(percentiles.iter().map(|percentile| format!("error_percentile_{percentile}")));
+    heads.extend(names.iter().map(|name| format!("metric_{name}")));
+    heads.push("repeats".to_owned());
+    let mut text = line(&heads);
+    for row in rows {
+        text.push_str(&line(&cells(row, within, &percentiles, &names)));
+    }
+    text
+}
+
+type Figure = fn(&Row) -> Option<f64>;
+
+/// Figures that every row may have one of.
+const ALWAYS: [(&str, Figure); 7] = [
+    ("axis_accuracy_percent", |row| row.axis_accuracy_percent),
+    ("exact_percent", |row| row.exact_percent),
+    ("assignment_accuracy_percent", |row| row.assignment_accuracy_percent),
+    ("sure_percent", |row| row.sure_percent),
+    ("sure_correct_percent", |row| row.sure_correct_percent),
+    ("median_error", |row| row.median_error),
+    ("blind_median_error", |row| row.blind_median_error),
+];
+
+fn cells(
+    row: &Row,
+    within: &[String],
+    percentiles: &[&String],
+    metrics: &[&String],
+) -> Vec<String> {
+    let number = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
+    let unit = serde_json::to_value(row.unit).ok();
+    let unit = unit.as_ref().and_then(|unit| unit.as_str()).unwrap_or_default().to_owned();
+    let mut cells = vec![
+        row.scheme.clone(),
+        row.neighbors.clone(),
+        row.oracle_noise.clone().unwrap_or_default(),
+        row.inlier_ratio.to_string(),
+        row.k.to_string(),
+        row.solver.clone(),
+        number(row.delta),
+        unit,
+        row.n_points.to_string(),
+        row.n_lost.to_string(),
+        row.dropped.values().sum::<u64>().to_string(),
+    ];
+    let spread = row.std.as_ref().map(|std| &std.recovered_percent);
+    let by_threshold: [Option<&ByThreshold>; 4] = [
+        Some(&row.recovered_percent),
+        spread,
+        Some(&row.blind_percent),
+        row.records_alone_percent.as_ref(),
+    ];
+    for shares in by_threshold {
+        let share = |typed| number(shares.and_then(|shares| shares.get(typed).copied()));
+        cells.extend(within.iter().map(share));
+    }
+    cells.extend(ALWAYS.map(|(_, figure)| number(figure(row))));
+    let percentile = |key: &&String| number(row.error_percentiles.get(*key).copied().flatten());
+    cells.extend(percentiles.iter().map(percentile));
+    cells.extend(metrics.iter().map(|name| number(row.metrics.get(*name).copied())));
+    cells.push(row.repeats.to_string());
+    cells
+}
+
+fn line(cells: &[String]) -> String {
+    let cells: Vec<String> = cells.iter().map(|cell| quoted(cell)).collect();
+    cells.join(",") + "\n"
+}
+
+fn quoted(cell: &str) -> String {
+    match cell.contains([',', '"', '\n', '\r']) {
+        true => format!("\"{}\"", cell.replace('"', "\"\"")),
+        false => cell.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_with_marks_of_the_format_are_quoted() {
+        let cells = ["a,b", "say \"c\"", "plain"].map(str::to_owned);
+        assert_eq!(line(&cells), "\"a,b\",\"say \"\"c\"\"\",plain\n");
+    }
+}

@@ -1,0 +1,105 @@
+//! The table of a paper, before it is set: a row per scheme, a column per kind of neighborhoods.
+
+use crate::attack;
+use crate::choices::{Choices, GivenChoice};
+use crate::document::Document;
+use crate::tables::{self, percent_cell};
+use crate::{verdict, words};
+
+/// Cells of text, in no markup.
+pub(super) struct Grid {
+    /// What the cells are, in a sentence.
+    pub caption: String,
+    /// One more than there are columns of figures: the first is of schemes.
+    pub heads: Vec<String>,
+    pub rows: Vec<Vec<String>>,
+}
+
+/// Stands where an audit was asked for a figure and has none: it must not read as a small one.
+const NOT_AUDITED: &str = "not audited";
+
+/// The strongest attack per scheme and neighborhoods, and the two baselines; a cell has a figure per threshold of `within`.
+pub(super) fn grid(document: &Document, within: &[String]) -> Grid {
+    let choices = Choices::of(document);
+    let givens: Vec<&GivenChoice> =
+        choices.givens.iter().filter(|given| given.group != "reference").collect();
+    let all = tables::thresholds(document);
+    let joined = |cell: &dyn Fn(&str) -> String| {
+        within.iter().map(|typed| cell(typed)).collect::<Vec<_>>().join(" / ")
+    };
+    let baseline = |shares: &[Option<f64>]| {
+        joined(&|typed| {
+            let at = all.iter().position(|known| known == typed);
+            percent_cell(at.and_then(|at| shares.get(at)?.as_ref()), None)
+        })
+    };
+    let any_alone = choices.schemes.iter().any(|scheme| scheme.alone.iter().any(Option::is_some));
+    let mut heads = vec!["scheme".to_owned()];
+    heads.extend(givens.iter().map(|given| head(given)));
+    heads.push("blind".to_owned());
+    if any_alone {
+        heads.push("records alone".to_owned());
+    }
+    let mut rows = Vec::new();
+    for scheme in &choices.schemes {
+        let cell = |given: &&GivenChoice| {
+            let row =
+                |typed: &str| verdict::strongest_given(document, &scheme.name, &given.given, typed);
+            if within.first().is_none_or(|typed| row(typed).is_none()) {
+                let refused = document.not_audited.iter().any(|refused| {
+                    refused.scheme == scheme.name
+                        && refused.neighbors.as_deref() == Some(&given.given.neighbors)
+                });
+                return if refused { NOT_AUDITED.to_owned() } else { percent_cell(None, None) };
+            }
+            joined(&|typed| {
+                let row = row(typed);
+                let spread = row.and_then(|row| row.std.as_ref()?.recovered_percent.get(typed));
+                percent_cell(row.and_then(|row| row.recovered_percent.get(typed)), spread)
+            })
+        };
+        let mut cells = vec![scheme.name.clone()];
+        cells.extend(givens.iter().map(cell));
+        cells.push(baseline(&scheme.blind));
+        if any_alone {
+            cells.push(baseline(&scheme.alone));
+        }
+        rows.push(cells);
+    }
+    for refused in document.not_audited.iter().filter(|refused| refused.neighbors.is_none()) {
+        let mut cells = vec![NOT_AUDITED.to_owned(); heads.len()];
+        cells[0].clone_from(&refused.scheme);
+        rows.push(cells);
+    }
+    Grid { caption: caption(document, within), heads, rows }
+}
+
+fn caption(document: &Document, within: &[String]) -> String {
+    let row = document.results.first();
+    let points = row.map_or("points", |row| words::points(row.unit));
+    let within: Vec<String> =
+        within.iter().map(|typed| tables::threshold_text(document, typed)).collect();
+    let mut text = format!(
+        "Percent of the {points} recovered within {}, by the strongest attack tried. Columns: the share of listed \
+         neighbors that are right (oracle), or who lists them; blind is a guess without neighborhoods.",
+        within.join(" / ")
+    );
+    let repeats = document.results.iter().map(|row| row.repeats).max().unwrap_or(1);
+    if repeats > 1 {
+        text.push_str(&format!(" Means over {repeats} seeds."));
+    }
+    if within.iter().any(|text| text.ends_with('×')) {
+        text.push_str(&format!(" × is times {}.", words::USUAL_DISTANCE));
+    }
+    text
+}
+
+/// `0.5`, `0.5 (near)`, `overlap`: as short as a column of a paper.
+fn head(choice: &GivenChoice) -> String {
+    let given = &choice.given;
+    match given.oracle_noise.as_deref() {
+        _ if !attack::is_oracle(&given.neighbors) => choice.source.clone(),
+        None | Some("uniform") => format!("{:?}", given.inlier_ratio),
+        Some(noise) => format!("{:?} ({noise})", given.inlier_ratio),
+    }
+}

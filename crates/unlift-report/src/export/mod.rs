@@ -1,0 +1,40 @@
+//! Figures for papers and for other programs: tables as CSV, LaTeX and Markdown, curves as SVG.
+
+mod csv;
+mod curves;
+mod grid;
+mod typeset;
+
+use crate::document::Document;
+use crate::tables;
+
+pub use curves::curves;
+
+/// How a table is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TableFormat {
+    /// Every row of `results`, a column per figure.
+    Csv,
+    /// Rows of schemes, columns of neighborhoods, by the strongest attack; for the package booktabs.
+    Latex,
+    /// The same as a table of GitHub's Markdown.
+    Markdown,
+}
+
+/// The thresholds of a document, as typed, in their order.
+pub fn thresholds(document: &Document) -> Vec<String> {
+    tables::thresholds(document)
+}
+
+/// The figures of `document` as a table, of the threshold `only` (as typed) or of all. Ends with a line break.
+pub fn table(document: &Document, format: TableFormat, only: Option<&str>) -> String {
+    let within: Vec<String> = match only {
+        Some(typed) => vec![typed.to_owned()],
+        None => tables::thresholds(document),
+    };
+    match format {
+        TableFormat::Csv => csv::csv(document, &within),
+        TableFormat::Latex => typeset::latex(document, &grid::grid(document, &within)),
+        TableFormat::Markdown => typeset::markdown(document, &grid::grid(document, &within)),
+    }
+}
