@@ -186,6 +186,14 @@ pub fn threshold(text: &str) -> Result<Threshold, String> {
     Threshold::parse(text).map_err(|_| format!("expected a number above 0, found {text}"))
 }
 
+/// A tolerance in percentage points.
+pub fn points(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if (0.0..=100.0).contains(&value) => Ok(value),
+        _ => Err(format!("expected a number of percentage points from 0 to 100, found {text}")),
+    }
+}
+
 /// `auto`, or a length.
 pub fn delta(text: &str) -> Result<Delta, String> {
     if text.trim() == "auto" {

@@ -350,6 +350,7 @@ fn help_is_part_of_the_interface() {
         "recover",
         "evaluate",
         "table",
+        "compare",
         "bench recover",
         "features",
         "invert",

@@ -31,6 +31,7 @@ mod attack;
 mod cards;
 mod check;
 mod choices;
+pub mod compare;
 pub mod document;
 mod error;
 pub mod export;

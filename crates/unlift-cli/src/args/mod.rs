@@ -5,6 +5,7 @@ mod audit_images;
 mod audit_map;
 mod audit_released;
 mod bench;
+mod compare;
 mod demo;
 mod evaluate;
 mod features;
@@ -28,6 +29,7 @@ pub use audit_images::AuditImagesArgs;
 pub use audit_map::AuditMapArgs;
 pub use audit_released::AuditReleasedArgs;
 pub use bench::BenchRecoverArgs;
+pub use compare::CompareArgs;
 pub use demo::DemoArgs;
 pub use evaluate::EvaluateArgs;
 pub use features::FeaturesArgs;
@@ -106,6 +108,8 @@ pub enum Command {
     Evaluate(EvaluateArgs),
     /// The figures of an audit as a table for a paper, and as curves
     Table(TableArgs),
+    /// Two audits side by side: what leaks more
+    Compare(CompareArgs),
     /// Measure speed and memory
     #[command(subcommand)]
     Bench(BenchCommand),

@@ -5,6 +5,7 @@ mod audit_map;
 mod audit_released;
 mod bench;
 mod common;
+mod compare;
 mod demo;
 mod documents;
 mod evaluate;
@@ -42,6 +43,7 @@ pub fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Recover(args) => recover::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Table(args) => table::run(&args),
+        Command::Compare(args) => compare::run(&args),
         Command::Bench(BenchCommand::Recover(args)) => bench::recovery(&args),
         Command::Features(args) => features::run(&args),
         Command::Invert(args) => invert::run(&args),

@@ -1,0 +1,93 @@
+//! `unlift compare`: two audits side by side.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use unlift::OneLine;
+use unlift_audit::refused;
+use unlift_io::Error;
+use unlift_io::atomic::{Access, Kind, OutputSet, Rules, write_file};
+use unlift_report::compare::{Change, Comparison, Unmatched, compare, page};
+
+use super::documents::read_document;
+use crate::args::CompareArgs;
+use crate::exit::Outcome;
+use crate::output::{print, table};
+
+/// The page.
+const PAGE: &str = "compare.html";
+
+/// Compares two audits.
+pub fn run(args: &CompareArgs) -> anyhow::Result<Outcome> {
+    let (old, new) = (read_document(&args.old)?, read_document(&args.new)?);
+    // As an audit that names nothing is read by anybody, so may its comparison be.
+    let named = old.input.path.is_some() || new.input.path.is_some();
+    let access = if named { Access::Private } else { Access::Usual };
+    let out = match &args.out {
+        Some(out) => {
+            let rules = Rules::new([args.old.as_path(), args.new.as_path()], args.force);
+            let files = OutputSet::create(out, rules, access, &[(PAGE, Kind::Page)]);
+            Some((out, files.map_err(refused)?))
+        }
+        None => None,
+    };
+    let comparison = compare(&old, &new, args.tolerance).map_err(|wrong| {
+        let expected = format!("{}, as in {}", wrong.expected, args.old.display());
+        Error::new(&args.new, wrong.place, expected, wrong.found)
+    })?;
+    let mut written = None;
+    if let Some((out, mut files)) = out {
+        let text = page(&comparison, &old, &new)?;
+        let staged = files.stage(PAGE, Kind::Page)?;
+        write_file(&staged, access, |w| w.write_all(text.as_bytes()))?;
+        files.commit()?;
+        written = Some(out.join(PAGE));
+    }
+    print(&match args.json {
+        true => serde_json::to_string_pretty(&comparison)? + "\n",
+        false => text(&comparison, written),
+    })?;
+    Ok(if comparison.passed { Outcome::Done } else { Outcome::GateFailed })
+}
+
+/// What differs, and what that comes to.
+fn text(comparison: &Comparison, written: Option<PathBuf>) -> String {
+    let mut text = String::new();
+    let changed = [(&comparison.more, "leaks more"), (&comparison.less, "leaks less")];
+    if changed.iter().any(|(changes, _)| !changes.is_empty()) {
+        let heads = ["scheme", "attack", "within", "old", "new", "points", ""];
+        let mut rows = vec![heads.map(str::to_owned).to_vec()];
+        for (changes, word) in changed {
+            rows.extend(changes.iter().map(|change| cells(change, word)));
+        }
+        text.push_str(&table(&rows, &[1, 6]));
+    }
+    for (rows, which) in [(&comparison.only_old, "old"), (&comparison.only_new, "new")] {
+        for Unmatched { scheme, attack } in rows {
+            let said = format!("only in the {which} audit: {scheme}: {attack}");
+            text.push_str(&format!("{}\n", OneLine(said)));
+        }
+    }
+    for lost in &comparison.lost {
+        let by = lost.neighbors.as_ref().map(|by| format!(" by {by}")).unwrap_or_default();
+        let said = format!("OUT OF VIEW: {}{by}: {}", lost.scheme, lost.reason);
+        text.push_str(&format!("{}\n", OneLine(said)));
+    }
+    text.push_str(&format!("{}\n", comparison.summary()));
+    if let Some(page) = written {
+        text.push_str(&format!("\npage: {}\n", OneLine(page.display())));
+    }
+    text
+}
+
+fn cells(change: &Change, word: &str) -> Vec<String> {
+    vec![
+        change.scheme.clone(),
+        change.attack.clone(),
+        change.threshold.clone(),
+        format!("{:.1} %", change.old_percent),
+        format!("{:.1} %", change.new_percent),
+        format!("{:+.1}", change.points),
+        word.to_owned(),
+    ]
+}

@@ -1,0 +1,294 @@
+//! Two audits side by side: what leaks more, what leaks less, and what only one of them knows.
+
+mod page;
+
+use serde::Serialize;
+
+use crate::attack;
+use crate::document::{Document, LengthUnit, Row};
+use crate::{tables, words};
+
+pub use page::page;
+
+/// Two figures of one attack, scheme and threshold.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Change {
+    /// The scheme's user-facing name.
+    pub scheme: String,
+    /// The attack: `oracle, 50 % right, K = 50, joint`, `blind guess` or `records alone`.
+    pub attack: String,
+    /// The threshold as typed in the new audit.
+    pub threshold: String,
+    /// Percent that came back in the old audit.
+    pub old_percent: f64,
+    /// Percent that comes back in the new one.
+    pub new_percent: f64,
+    /// How much more, in percentage points.
+    pub points: f64,
+}
+
+/// A row that has its like in one audit only.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Unmatched {
+    /// The scheme's user-facing name.
+    pub scheme: String,
+    /// The attack, as [`Change::attack`].
+    pub attack: String,
+}
+
+/// What the old audit speaks of and the new one does not: no figure says that it leaks no more.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Lost {
+    /// The scheme's user-facing name.
+    pub scheme: String,
+    /// The source of neighborhoods, where not the whole scheme is lost.
+    pub neighbors: Option<String>,
+    /// Why, in plain words.
+    pub reason: String,
+}
+
+/// What two audits say beside each other.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// Percentage points up to which a figure counts as the same.
+    pub tolerance_points: f64,
+    /// Whether nothing leaks more and nothing is lost.
+    pub passed: bool,
+    /// What leaks more, most first.
+    pub more: Vec<Change>,
+    /// What leaks less, most first.
+    pub less: Vec<Change>,
+    /// What is the same up to the tolerance, in the order of the new audit.
+    pub same: Vec<Change>,
+    /// What cannot be compared any more.
+    pub lost: Vec<Lost>,
+    /// Rows of the old audit alone.
+    pub only_old: Vec<Unmatched>,
+    /// Rows of the new audit alone.
+    pub only_new: Vec<Unmatched>,
+}
+
+/// Why two audits cannot be compared: what was expected, as in the old one, and what the new one has.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Incomparable {
+    /// `unit`, `thresholds` or `results`.
+    pub place: &'static str,
+    /// What the old audit has.
+    pub expected: String,
+    /// What the new one has.
+    pub found: String,
+}
+
+/// Compares the figures of two audits. Rows are the same by scheme, source, noise, inlier ratio as requested (a measured one is a
+/// result), K and solver; a blind guess and the records alone are compared per scheme.
+///
+/// # Errors
+/// When their units or thresholds differ, or no row of one has its like in the other.
+pub fn compare(
+    old: &Document,
+    new: &Document,
+    tolerance_points: f64,
+) -> Result<Comparison, Incomparable> {
+    let within = common_thresholds(old, new)?;
+    let mut changes = Vec::new();
+    let mut only_new = Vec::new();
+    let mut taken = vec![false; old.results.len()];
+    for row in &new.results {
+        let like =
+            (0..old.results.len()).find(|&at| !taken[at] && same_attack(&old.results[at], row));
+        let Some(at) = like else {
+            only_new.push(unmatched(row));
+            continue;
+        };
+        taken[at] = true;
+        let shares = |row: &Row, typed: &str| row.recovered_percent.get(typed).copied();
+        changes.extend(within.iter().filter_map(|(was, is)| {
+            let shares = (shares(&old.results[at], was)?, shares(row, is)?);
+            Some(change(&row.scheme, attack_of(row), is, shares))
+        }));
+    }
+    if changes.is_empty() {
+        return Err(Incomparable {
+            place: "results",
+            expected: "an attack of the same scheme, source, ratio, k and solver".to_owned(),
+            found: format!("none among {}", new.results.len()),
+        });
+    }
+    let mut schemes: Vec<&str> = Vec::new();
+    for row in &new.results {
+        if !schemes.contains(&row.scheme.as_str()) {
+            schemes.push(&row.scheme);
+        }
+    }
+    for scheme in schemes {
+        changes.extend(baselines(old, new, scheme, &within));
+    }
+    let unseen = old.results.iter().zip(&taken).filter(|(_, taken)| !**taken);
+    let only_old: Vec<Unmatched> = unseen.map(|(row, _)| unmatched(row)).collect();
+    let lost = lost(old, new, &taken);
+    // Sums of decimals must not fail a build by the last bit.
+    let beyond = tolerance_points + 1e-9;
+    let (mut more, rest): (Vec<_>, Vec<_>) =
+        changes.into_iter().partition(|change| change.points > beyond);
+    let (mut less, same): (Vec<_>, Vec<_>) =
+        rest.into_iter().partition(|change| change.points < -beyond);
+    more.sort_by(|a, b| b.points.total_cmp(&a.points));
+    less.sort_by(|a, b| a.points.total_cmp(&b.points));
+    let passed = more.is_empty() && lost.is_empty();
+    Ok(Comparison { tolerance_points, passed, more, less, same, lost, only_old, only_new })
+}
+
+/// The thresholds of both, as typed in each: equal as numbers.
+fn common_thresholds(
+    old: &Document,
+    new: &Document,
+) -> Result<Vec<(String, String)>, Incomparable> {
+    let unit = |document: &Document| document.results.first().map(|row| unit_name(row.unit));
+    if let (Some(was), Some(is)) = (unit(old), unit(new))
+        && was != is
+    {
+        return Err(Incomparable { place: "unit", expected: was.into(), found: is.into() });
+    }
+    let (was, is) = (tables::thresholds(old), tables::thresholds(new));
+    let equal = |a: &str, b: &str| match (a.parse::<f64>(), b.parse::<f64>()) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => a == b,
+    };
+    let pairs: Vec<(String, String)> = was
+        .iter()
+        .filter_map(|a| Some((a.clone(), is.iter().find(|b| equal(a, b))?.clone())))
+        .collect();
+    if pairs.len() != was.len() || pairs.len() != is.len() {
+        let said = |typed: &[String]| match typed {
+            [] => "none".to_owned(),
+            typed => typed.join(", "),
+        };
+        return Err(Incomparable { place: "thresholds", expected: said(&was), found: said(&is) });
+    }
+    Ok(pairs)
+}
+
+fn unit_name(unit: LengthUnit) -> &'static str {
+    match unit {
+        LengthUnit::Meter => "m",
+        LengthUnit::KthNeighbor => "kth_neighbor",
+        LengthUnit::Pixel => "px",
+    }
+}
+
+fn same_attack(a: &Row, b: &Row) -> bool {
+    let noise = |row: &Row| row.oracle_noise.clone().unwrap_or_else(|| "uniform".to_owned());
+    a.scheme == b.scheme
+        && a.neighbors == b.neighbors
+        && (!attack::is_oracle(&a.neighbors)
+            || (a.inlier_ratio == b.inlier_ratio && noise(a) == noise(b)))
+        && a.k == b.k
+        && a.solver == b.solver
+}
+
+/// The attack without its measured ratio, which differs between two audits that are the same otherwise.
+fn attack_of(row: &Row) -> String {
+    let source = attack::source(&row.neighbors, row.oracle_noise.as_deref());
+    let right = match attack::is_oracle(&row.neighbors) {
+        true => format!(", {} % right", words::ratio_percent(row.inlier_ratio)),
+        false => String::new(),
+    };
+    format!("{source}{right}, K = {}, {}", row.k, row.solver)
+}
+
+fn unmatched(row: &Row) -> Unmatched {
+    Unmatched { scheme: row.scheme.clone(), attack: attack_of(row) }
+}
+
+fn change(scheme: &str, attack: String, typed: &str, (was, is): (f64, f64)) -> Change {
+    Change {
+        scheme: scheme.to_owned(),
+        attack,
+        threshold: typed.to_owned(),
+        old_percent: was,
+        new_percent: is,
+        points: is - was,
+    }
+}
+
+/// What comes back of `scheme` without neighborhoods: the largest figure of its rows, in both audits.
+fn baselines(
+    old: &Document,
+    new: &Document,
+    scheme: &str,
+    within: &[(String, String)],
+) -> Vec<Change> {
+    type Figure = fn(&Row, &str) -> Option<f64>;
+    let figures: [(&str, Figure); 2] = [
+        ("blind guess", |row, typed| row.blind_percent.get(typed).copied()),
+        ("records alone", |row, typed| row.records_alone_percent.as_ref()?.get(typed).copied()),
+    ];
+    let mut changes = Vec::new();
+    for (name, figure) in figures {
+        for (was, is) in within {
+            let largest = |document: &Document, typed: &str| {
+                let rows = document.results.iter().filter(|row| row.scheme == scheme);
+                rows.filter_map(|row| figure(row, typed)).max_by(f64::total_cmp)
+            };
+            if let (Some(old), Some(new)) = (largest(old, was), largest(new, is)) {
+                changes.push(change(scheme, name.to_owned(), is, (old, new)));
+            }
+        }
+    }
+    changes
+}
+
+/// Schemes of the old audit of which no row has its like in the new one, and sources that were audited and are not any more.
+fn lost(old: &Document, new: &Document, taken: &[bool]) -> Vec<Lost> {
+    let mut lost: Vec<Lost> = Vec::new();
+    for row in &old.results {
+        let (scheme, source) = (&row.scheme, &row.neighbors);
+        let mut rows = old.results.iter().zip(taken).filter(|(other, _)| other.scheme == *scheme);
+        let refused = |whole: bool| {
+            new.not_audited.iter().find(|refused| {
+                refused.scheme == *scheme
+                    && match &refused.neighbors {
+                        None => whole,
+                        Some(by) => !whole && by == source,
+                    }
+            })
+        };
+        let (neighbors, reason) = if rows.all(|(_, taken)| !taken) {
+            let there = new.results.iter().any(|other| other.scheme == *scheme);
+            let reason = match refused(true) {
+                Some(refused) => format!("not audited: {}", refused.reason),
+                None if there => "no attack of the old audit is in the new one".to_owned(),
+                None => "no row in the new audit".to_owned(),
+            };
+            (None, reason)
+        } else if let Some(refused) = refused(false) {
+            (Some(source.clone()), format!("not audited: {}", refused.reason))
+        } else {
+            continue;
+        };
+        let one = Lost { scheme: scheme.clone(), neighbors, reason };
+        if !lost.contains(&one) {
+            lost.push(one);
+        }
+    }
+    lost
+}
+
+impl Comparison {
+    /// What it comes to, in one line.
+    pub fn summary(&self) -> String {
+        let count = self.more.len() + self.less.len() + self.same.len();
+        let point = if self.tolerance_points == 1.0 { "point" } else { "points" };
+        let mut text = format!(
+            "{count} figures compared, tolerance {} {point}: {} leak more, {} less, {} as before",
+            self.tolerance_points,
+            self.more.len(),
+            self.less.len(),
+            self.same.len()
+        );
+        if !self.lost.is_empty() {
+            text.push_str(&format!("; {} cannot be compared any more", self.lost.len()));
+        }
+        text
+    }
+}
