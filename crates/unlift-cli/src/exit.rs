@@ -19,7 +19,7 @@ pub enum Outcome {
 }
 
 /// Exit code of a wrong command line; clap uses the same.
-const USAGE: u8 = 2;
+pub const USAGE: u8 = 2;
 /// Exit code of files that cannot be read, written or used; of many images, a single one. Also that of results that
 /// stdout does not take. A place that nothing can be written to is found before the work, and one of the command line:
 /// see [`unlift_audit::check_file`].
@@ -94,7 +94,7 @@ pub fn finish(result: anyhow::Result<Outcome>) -> ExitCode {
 }
 
 /// The lines on stderr.
-fn lines(error: &anyhow::Error) -> Vec<String> {
+pub fn lines(error: &anyhow::Error) -> Vec<String> {
     let of_audit = |error: &anyhow::Error| {
         let error = error.downcast_ref::<unlift_audit::Error>();
         error.and_then(|error| error.advice().map(str::to_owned))
@@ -109,7 +109,8 @@ pub fn line(error: &anyhow::Error) -> String {
     format!("unlift: {error:#}")
 }
 
-fn code(error: &anyhow::Error) -> u8 {
+/// The exit code of an error.
+pub fn code(error: &anyhow::Error) -> u8 {
     if let Some(advised) = error.downcast_ref::<Advised>() {
         return code(&advised.error);
     }

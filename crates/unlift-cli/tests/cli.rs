@@ -344,6 +344,7 @@ fn help_is_part_of_the_interface() {
         "audit map",
         "audit images",
         "audit released",
+        "check",
         "obfuscate",
         "neighbors oracle",
         "neighbors find",

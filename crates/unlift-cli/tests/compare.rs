@@ -67,7 +67,10 @@ fn what_leaks_more_than_the_tolerance_fails() {
     let page = fs::read_to_string(place.path("c/compare.html")).unwrap();
     assert!(page.contains("FAIL") && page.contains("<td>41.5</td><td>+1.5</td>"), "{page}");
     assert!(page.contains("Private.") && page.contains("room.csv"), "it names the map");
-    assert!(!page.contains("<script") && !page.contains("src=") && !page.contains("https:"), "alone");
+    assert!(
+        !page.contains("<script") && !page.contains("src=") && !page.contains("https:"),
+        "alone"
+    );
 
     place.ends("compare old.json new.json --tolerance 1.5", 0);
     let (text, _) = place.ends("compare new.json old.json", 0);

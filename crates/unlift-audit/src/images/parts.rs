@@ -140,8 +140,8 @@ impl Parts {
     }
 }
 
-/// Makes the folder of parts if it is not there and locks it, where folders can be locked. The system takes the lock back when
-/// the process ends in any way.
+/// Makes the folder of parts if it is not there and locks it, where folders can be locked. The system takes the lock
+/// back when the process ends in any way.
 fn locked(folder: &Path) -> io::Result<Option<File>> {
     loop {
         match fs::create_dir(folder) {

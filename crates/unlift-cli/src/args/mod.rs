@@ -5,9 +5,12 @@ mod audit_images;
 mod audit_map;
 mod audit_released;
 mod bench;
+mod check;
 mod compare;
 mod demo;
 mod evaluate;
+#[cfg(test)]
+mod examples;
 mod features;
 mod invert;
 mod map;
@@ -29,6 +32,7 @@ pub use audit_images::AuditImagesArgs;
 pub use audit_map::AuditMapArgs;
 pub use audit_released::AuditReleasedArgs;
 pub use bench::BenchRecoverArgs;
+pub use check::CheckArgs;
 pub use compare::CompareArgs;
 pub use demo::DemoArgs;
 pub use evaluate::EvaluateArgs;
@@ -53,6 +57,7 @@ Examples:
   unlift demo                                  audit a made-up room, no data needed
   unlift audit map PROJECT/sparse/0 --scale 1  audit a COLMAP map that is in meters
   unlift audit images photos                   audit the keypoints of photos
+  unlift check                                 the audits of unlift.toml, for a build
   unlift schemes                               what can be audited
 
 Exit codes: 0 done, 1 a gate failed, 2 usage, 3 bad input.
@@ -97,6 +102,8 @@ pub enum Command {
     /// Audit what you have
     #[command(subcommand)]
     Audit(AuditCommand),
+    /// The audits of a configuration, unlift.toml: a build needs one word
+    Check(CheckArgs),
     /// Hide the points of a map, or the keypoints of images, by one scheme: a released file and a truth file
     Obfuscate(ObfuscateArgs),
     /// Make neighborhoods

@@ -3,6 +3,7 @@
 use std::num::NonZeroUsize;
 use std::path::Path;
 
+use anyhow::anyhow;
 use unlift::Fingerprint;
 use unlift::released::Released;
 use unlift::truth::Secret;
@@ -17,13 +18,15 @@ pub const RELEASED: &str = "released.parquet";
 /// What only the owner has.
 pub const TRUTH: &str = "truth.parquet";
 
-/// Runs `work` on `threads` threads (all cores without a number); never changes a result.
+/// Runs `work` on `threads` threads (all cores without a number); never changes a result. Without a pool of its own
+/// work would panic where the system refuses threads.
 pub fn with_threads<T: Send>(
     threads: Option<NonZeroUsize>,
     work: impl FnOnce() -> anyhow::Result<T> + Send,
 ) -> anyhow::Result<T> {
     let n = threads.map_or(0, NonZeroUsize::get);
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build()?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build();
+    let pool = pool.map_err(|error| anyhow!("cannot start threads: {error}"))?;
     pool.install(work)
 }
 

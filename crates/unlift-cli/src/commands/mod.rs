@@ -4,6 +4,7 @@ mod audit_images;
 mod audit_map;
 mod audit_released;
 mod bench;
+mod check;
 mod common;
 mod compare;
 mod demo;
@@ -24,6 +25,8 @@ mod recover;
 mod schemes;
 mod table;
 
+use common::with_threads;
+
 use crate::args::{AuditCommand, BenchCommand, Command, NeighborsCommand};
 use crate::exit::Outcome;
 
@@ -37,17 +40,20 @@ pub fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Audit(AuditCommand::Map(args)) => audit_map::run(*args),
         Command::Audit(AuditCommand::Images(args)) => audit_images::run(&args),
         Command::Audit(AuditCommand::Released(args)) => audit_released::run(&args),
-        Command::Obfuscate(args) => obfuscate::run(&args),
-        Command::Neighbors(NeighborsCommand::Oracle(args)) => neighbors::oracle(&args),
+        Command::Check(args) => check::run(&args),
+        Command::Obfuscate(args) => with_threads(None, || obfuscate::run(&args)),
+        Command::Neighbors(NeighborsCommand::Oracle(args)) => {
+            with_threads(None, || neighbors::oracle(&args))
+        }
         Command::Neighbors(NeighborsCommand::Find(args)) => neighbors::find(&args),
         Command::Recover(args) => recover::run(&args),
-        Command::Evaluate(args) => evaluate::run(&args),
+        Command::Evaluate(args) => with_threads(None, || evaluate::run(&args)),
         Command::Table(args) => table::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Bench(BenchCommand::Recover(args)) => bench::recovery(&args),
         Command::Features(args) => features::run(&args),
         Command::Invert(args) => invert::run(&args),
-        Command::Metrics(args) => metrics::run(&args),
+        Command::Metrics(args) => with_threads(None, || metrics::run(&args)),
         Command::Schemes => schemes::run(),
         Command::Models(args) => models::run(&args),
     }

@@ -66,7 +66,8 @@ pub fn sweep(folder: &Path) {
         let path = entry.path();
         // Neither links, which lead elsewhere, nor pipes, which would be waited for.
         let may_be = entry.file_type().is_ok_and(|kind| kind.is_file() || kind.is_dir());
-        // The lock is held until it is gone: whoever has just made it, and not locked it yet, waits and begins anew.
+        // The lock is held until it is gone: whoever has just made it, and not locked it yet, waits and begins
+        // anew.
         if may_be
             && is_partial_name(&path)
             && let Some(_locked) = lock_of_dead(&path)

@@ -3,7 +3,8 @@
 use std::io;
 use std::path::Path;
 
-/// Removes the folder `path` with all that is in it. Links are removed, not followed, whoever puts them there meanwhile.
+/// Removes the folder `path` with all that is in it. Links are removed, not followed, whoever puts them there
+/// meanwhile.
 pub(super) fn remove_marked(path: &Path) -> io::Result<()> {
     system::remove_marked(path)
 }
@@ -13,7 +14,7 @@ mod system {
     use std::ffi::CString;
     use std::fs;
     use std::io;
-    use std::os::fd::OwnedFd;
+    use std::os::fd::BorrowedFd;
     use std::path::Path;
 
     use rustix::fs::{AtFlags, CWD, Dir, Mode, OFlags, openat, unlinkat};
@@ -22,9 +23,9 @@ mod system {
     use super::super::partial::MARK;
 
     pub fn remove_marked(path: &Path) -> io::Result<()> {
-        let folder = openat(CWD, path, FOLDER, Mode::empty())?;
-        empty(&folder, MARK.as_bytes())?;
-        match unlinkat(&folder, MARK, AtFlags::empty()) {
+        let mut folder = Dir::new(openat(CWD, path, FOLDER, Mode::empty())?)?;
+        empty(&mut folder, MARK.as_bytes())?;
+        match unlinkat(folder.fd()?, MARK, AtFlags::empty()) {
             // An earlier try came so far.
             Ok(()) | Err(Errno::NOENT) => fs::remove_dir(path),
             Err(error) => Err(error.into()),
@@ -34,20 +35,20 @@ mod system {
     const FOLDER: OFlags =
         OFlags::DIRECTORY.union(OFlags::NOFOLLOW).union(OFlags::RDONLY).union(OFlags::CLOEXEC);
 
-    /// Removes what is in a folder, but for `kept`.
-    fn empty(folder: &OwnedFd, kept: &[u8]) -> Result<(), Errno> {
-        // Listed first, so that no more files are open than folders lie in each other.
-        let names = Dir::read_from(folder)?.map(|entry| Ok(entry?.file_name().to_owned()));
+    /// Removes what is in a folder, but for `kept`. No more files are open than folders lie in each other: this may be
+    /// what a run does that has come to its limit.
+    fn empty(folder: &mut Dir, kept: &[u8]) -> Result<(), Errno> {
+        let names = folder.by_ref().map(|entry| Ok(entry?.file_name().to_owned()));
         let names: Vec<CString> = names.collect::<Result<_, Errno>>()?;
         for name in names {
             if ![b".".as_slice(), b"..", kept].contains(&name.as_bytes()) {
-                remove(folder, &name)?;
+                remove(folder.fd()?, &name)?;
             }
         }
         Ok(())
     }
 
-    fn remove(folder: &OwnedFd, name: &CString) -> Result<(), Errno> {
+    fn remove(folder: BorrowedFd<'_>, name: &CString) -> Result<(), Errno> {
         match unlinkat(folder, name, AtFlags::empty()) {
             Err(Errno::ISDIR | Errno::PERM) => {}
             done => return done,
@@ -56,7 +57,7 @@ mod system {
             Err(Errno::NOTEMPTY | Errno::EXIST) => {}
             done => return done,
         }
-        empty(&openat(folder, name, FOLDER, Mode::empty())?, b"")?;
+        empty(&mut Dir::new(openat(folder, name, FOLDER, Mode::empty())?)?, b"")?;
         unlinkat(folder, name, AtFlags::REMOVEDIR)
     }
 }

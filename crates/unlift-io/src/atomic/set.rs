@@ -160,8 +160,8 @@ fn begin(target: &Path, access: Access) -> io::Result<(MadeFolders, Partial)> {
 struct Alone(#[expect(dead_code, reason = "held")] Option<File>);
 
 impl Alone {
-    /// Waits for other runs that are at it, which takes no time that anybody notices. Where folders cannot be locked, or a lock
-    /// is held for seconds, as by `flock(1)` around a command, it goes on without.
+    /// Waits for other runs that are at it, which takes no time that anybody notices. Where folders cannot be locked,
+    /// or a lock is held for seconds, as by `flock(1)` around a command, it goes on without.
     fn wait_in(folder: &Path) -> Self {
         const PATIENCE: Duration = Duration::from_secs(5);
         let started = Instant::now();

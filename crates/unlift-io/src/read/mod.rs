@@ -97,7 +97,7 @@ fn file(path: &Path) -> Result<Input, Error> {
         (_, "npy") => (npy::positions(path)?, "npy"),
         (_, other) => {
             if let Some(found) = others::file(path) {
-                return found;
+                return found.map(|(format, found)| of_another_program(path, format, found));
             }
             let found = match other {
                 "" => "a file without extension".to_owned(),
@@ -115,6 +115,19 @@ fn file(path: &Path) -> Result<Input, Error> {
     })
 }
 
+fn of_another_program(path: &Path, format: &'static str, found: others::Found) -> Input {
+    Input {
+        ids: (0..found.positions.len() as u64).collect(),
+        positions: found.positions,
+        cameras: found.cameras,
+        up: mean_direction(found.up.into_iter()),
+        files: std::iter::once(path.to_owned()).chain(found.more).collect(),
+        format,
+        skipped: found.notes,
+        ..Input::default()
+    }
+}
+
 /// `points3D` given by itself.
 fn colmap_points(path: &Path) -> Result<Input, Error> {
     let points = colmap::read_points(path, false)?;
@@ -130,8 +143,8 @@ fn colmap_points(path: &Path) -> Result<Input, Error> {
 
 fn folder(path: &Path) -> Result<Input, Error> {
     let Some(model) = Model::find(path)? else {
-        return match others::in_folder(path).and_then(|file| others::file(&file)) {
-            Some(found) => found,
+        return match others::in_folder(path) {
+            Some(other) => file(&other),
             None => Err(Error::new(path, "", models::EXPECTED, "none")),
         };
     };

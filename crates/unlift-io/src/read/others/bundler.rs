@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Found, UPWARD, camera};
+use super::found::{Found, UPWARD, camera};
 use crate::error::Error;
 use crate::read::lines::{Lines, number, quoted, words};
 

@@ -4,7 +4,8 @@ use std::path::{Component, Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::{Found, json};
+use super::found::Found;
+use super::json;
 use crate::error::Error;
 use crate::read::ply;
 

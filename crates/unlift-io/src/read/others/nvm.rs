@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{DOWNWARD, Found, camera};
+use super::found::{DOWNWARD, Found, camera};
 use crate::error::Error;
 use crate::read::lines::{Lines, number, quoted, words};
 

@@ -6,7 +6,8 @@ use std::path::Path;
 use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, de};
 
-use super::{DOWNWARD, Found, camera, json};
+use super::found::{DOWNWARD, Found, camera};
+use super::json;
 use crate::error::Error;
 
 #[derive(Deserialize)]

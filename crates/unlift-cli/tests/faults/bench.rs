@@ -1,0 +1,249 @@
+//! A place with small inputs for every command, and runs of them in a folder of their own.
+
+use std::collections::{BTreeSet, HashMap};
+use std::fs;
+use std::io::Read;
+use std::os::unix::process::ExitStatusExt;
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use crate::commands::{Case, Writes};
+use crate::common::{Place, photo};
+use crate::full;
+use crate::tree::{Tree, differing};
+
+const POINTS: usize = 1500;
+/// Nothing here takes as long, on the busiest machine: it hangs.
+const PATIENCE: Duration = Duration::from_secs(3600);
+
+/// Inputs in `in`; `work`, where commands run, has what they write and nothing else.
+pub struct Bench {
+    place: Place,
+    inputs: &'static Tree,
+}
+
+static NONE: Tree = Tree::new();
+/// Made once for all tests.
+static INPUTS: OnceLock<Tree> = OnceLock::new();
+/// Found out once for all tests, by the names of cases.
+static KNOWN: Mutex<Option<HashMap<&str, Arc<Known>>>> = Mutex::new(None);
+
+/// What runs of a case leave that nothing disturbs.
+pub struct Known {
+    /// The output.
+    pub new: Tree,
+    /// That of the earlier run.
+    pub old: Tree,
+    /// How long the first one takes.
+    pub took: Duration,
+}
+
+/// How a run ended.
+#[derive(Debug)]
+pub struct Ended {
+    pub code: Option<i32>,
+    pub signal: Option<i32>,
+    pub stderr: String,
+}
+
+impl Bench {
+    pub fn new() -> Self {
+        let place = Place::with_photos(&[]);
+        fs::create_dir(place.path("work")).unwrap();
+        let bench = Self { place, inputs: INPUTS.get_or_init(inputs) };
+        bench.restore_inputs();
+        bench
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.place.path(name)
+    }
+
+    /// What a case leaves when nothing disturbs it; a slow one is run by the full version alone.
+    pub fn known(&self, case: &'static Case) -> Arc<Known> {
+        // What was found out before another test failed is as true as before.
+        let mut all = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+        let all = all.get_or_insert_default();
+        if let Some(known) = all.get(case.name) {
+            return Arc::clone(known);
+        }
+        let of = |line: &str| {
+            self.begin(None);
+            let started = Instant::now();
+            self.succeeds(line);
+            (self.tree(), started.elapsed())
+        };
+        let (old, took) = of(&case.earlier());
+        let known = match case.is_slow && !full() {
+            true => Known { new: Tree::default(), old, took },
+            false => {
+                let (new, took) = of(&case.line());
+                Known { new, old, took }
+            }
+        };
+        let are_two = known.new != known.old;
+        assert_eq!(are_two, case.writes != Writes::Nothing, "{}: two variants", case.name);
+        let known = Arc::new(known);
+        all.insert(case.name, Arc::clone(&known));
+        known
+    }
+
+    /// Empties the folder of outputs, or puts there what an earlier run left.
+    pub fn begin(&self, earlier: Option<&Tree>) {
+        fs::remove_dir_all(self.path("work")).unwrap();
+        fs::create_dir(self.path("work")).unwrap();
+        if let Some(earlier) = earlier {
+            earlier.put(&self.path("work"));
+        }
+    }
+
+    /// The inputs as they were, whatever has become of them.
+    pub fn restore_inputs(&self) {
+        let _ = fs::remove_dir_all(self.path("in"));
+        self.inputs.put(&self.path("in"));
+    }
+
+    pub fn inputs_are_whole(&self) -> bool {
+        Tree::of(&self.path("in")) == *self.inputs
+    }
+
+    /// What is in the folder of outputs, of a run that has settled.
+    pub fn tree(&self) -> Tree {
+        Tree::of(&self.path("work")).settled()
+    }
+
+    /// Begins a run, in a shell that does `before` first if there is something.
+    pub fn start(&self, before: Option<&str>, line: &str) -> Child {
+        let program = env!("CARGO_BIN_EXE_unlift");
+        let mut command = match before {
+            None => Command::new(program),
+            Some(before) => {
+                let mut shell = Command::new("sh");
+                // A kernel's dump of a program that aborts is none of its outputs.
+                shell.args(["-c", &format!("ulimit -c 0; {before}"), program]);
+                shell
+            }
+        };
+        command
+            .args(line.split_whitespace())
+            .current_dir(self.path("work"))
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program starts")
+    }
+
+    /// Runs a line to its end.
+    pub fn run(&self, before: Option<&str>, line: &str) -> Ended {
+        finish(self.start(before, line), line)
+    }
+
+    /// Runs a line that must work.
+    pub fn succeeds(&self, line: &str) -> Ended {
+        let ended = self.run(None, line);
+        assert_eq!(ended.code, Some(0), "{line}: {ended:?}");
+        ended
+    }
+
+    /// What a dead run may have left wherever this one builds something.
+    fn plant(&self, case: &Case, output: &Tree) {
+        let files = output.names().filter(|name| !name.ends_with('/'));
+        let folders: BTreeSet<&str> = files
+            .map(|name| match case.writes {
+                Writes::Each => name.rsplit_once('/'),
+                // What belongs together is built in one folder.
+                Writes::Nothing | Writes::Whole => name.split_once('/'),
+            })
+            .map(|parts| parts.map_or("", |(folder, _)| folder))
+            .collect();
+        for folder in folders {
+            let folder = self.path("work").join(folder);
+            fs::create_dir_all(&folder).unwrap();
+            fs::write(folder.join(".x.unlift-0aZ9xy.partial"), "half").unwrap();
+        }
+    }
+
+    /// The next run of a case works, leaves the same as one that nothing disturbed, and no rest of an earlier one.
+    /// After a slow one that is its quick variant, at the same place.
+    pub fn goes_on(&self, case: &'static Case, what: &str) {
+        let known = self.known(case);
+        let (line, expected) = match case.is_slow {
+            true => (case.earlier(), &known.old),
+            false => (case.line(), &known.new),
+        };
+        self.plant(case, expected);
+        let ended = self.run(None, &line);
+        let left = self.tree();
+        let is_whole = ended.code == Some(0) && left == *expected;
+        assert!(is_whole, "{}, after {what}: {ended:?}, {}", case.name, differing(&left, expected));
+    }
+}
+
+/// Waits for the end of a run.
+pub fn finish(mut child: Child, line: &str) -> Ended {
+    let started = Instant::now();
+    let status = loop {
+        if let Some(status) = child.try_wait().expect("a state") {
+            break status;
+        }
+        if started.elapsed() > PATIENCE {
+            child.kill().expect("it can be killed");
+            panic!("{line}: it hangs");
+        }
+        sleep(Duration::from_micros(300));
+    };
+    let mut stderr = Vec::new();
+    child.stderr.take().expect("a pipe").read_to_end(&mut stderr).expect("what was said");
+    let stderr = String::from_utf8_lossy(&stderr).into_owned();
+    Ended { code: status.code(), signal: status.signal(), stderr }
+}
+
+/// Maps, photos, features, and what the stages make of them, each twice.
+fn inputs() -> Tree {
+    let bench = Bench { place: Place::with_photos(&[]), inputs: &NONE };
+    let place = &bench.place;
+    let points = |seed| unlift::synthetic::room(seed, POINTS).points;
+    fs::create_dir(place.path("in")).unwrap();
+    fs::create_dir(place.path("work")).unwrap();
+    place.write_points("in/room.csv", &points(1));
+    place.write_points("in/other.csv", &points(2));
+    for which in [1, 2] {
+        for (at, name) in ["a.png", "b/c.jpg", "d.webp"].into_iter().enumerate() {
+            let path = place.path(&format!("in/photos{which}")).join(name);
+            fs::create_dir_all(path.parent().expect("a folder")).unwrap();
+            photo(at as u32 + 5 * which).save(path).unwrap();
+        }
+    }
+    for which in [1, 2] {
+        let (hidden, images) = (format!("../in/hidden{which}"), format!("../in/images{which}"));
+        let features = format!("../in/features{which}.h5");
+        for line in [
+            format!("features ../in/photos{which} --out {features}"),
+            format!("obfuscate {features} --scheme cp2d --k 8 --seed {which} --out {images}"),
+            format!("obfuscate ../in/room.csv --scheme ppl --k 10 --seed {which} --out {hidden}"),
+            format!(
+                "neighbors oracle {hidden}/truth.parquet --inlier-ratio 1 --k 10 \
+                 --out {hidden}/lists.parquet"
+            ),
+            format!(
+                "neighbors oracle {images}/truth.parquet --inlier-ratio 1 --k 8 \
+                 --out {images}/lists.parquet"
+            ),
+            format!(
+                "recover {hidden}/released.parquet --neighbors {hidden}/lists.parquet \
+                 --out {hidden}/back.parquet"
+            ),
+            format!(
+                "recover {images}/released.parquet --neighbors {images}/lists.parquet \
+                 --out {images}/back.parquet"
+            ),
+        ] {
+            bench.succeeds(&line);
+        }
+    }
+    Tree::of(&bench.path("in"))
+}
