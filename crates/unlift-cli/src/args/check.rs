@@ -7,9 +7,9 @@ use clap::Args;
 /// Options of `check`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-A configuration has a table per audit, [[map]], [[images]] or [[released]], with the path and any long
-options of unlift audit map, images or released; lists are arrays or text with commas. Paths are
-relative to the configuration.
+A configuration has a table per audit, [[map]], [[images]] or [[released]], with a path and any long
+options of unlift audit map, images or released (but --json); lists are arrays or text with commas.
+Paths are relative to the configuration.
 
   [[map]]
   path = \"maps/office\"
@@ -26,8 +26,8 @@ Examples:
   unlift check
   unlift check ci/unlift.toml --quiet
 
-Exit codes: 0 done, 1 a gate failed, 2 usage, be it in the configuration, 3 bad input. Of several audits
-the largest.")]
+Exit codes: 0 done, 1 a gate failed, 2 usage, be it in the configuration, 3 bad input; of several
+audits the largest.")]
 pub struct CheckArgs {
     /// A configuration
     #[arg(value_name = "CONFIG", default_value = "unlift.toml")]

@@ -11,12 +11,12 @@ use crate::values;
 /// Options of `table`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-csv has every row of audit.json and a column per figure. latex (for the package booktabs) and markdown
-have a row per scheme and a column per share of right neighbors (oracle) and per source, with the
-strongest attack tried, and the baselines beside them; several thresholds stand in one cell.
+csv has every row of audit.json and a column per figure. latex (for the package booktabs) and
+markdown have a row per scheme and a column per share of right neighbors (oracle) and per source,
+with the strongest attack tried, and the baselines beside them; several thresholds stand in one cell.
 
-Curves are percent recovered over the share of right neighbors, of the strongest attack per scheme. For
-PDF, convert them: rsvg-convert -f pdf -o curves.pdf curves.svg, or Inkscape.
+Curves are percent recovered over the share of right neighbors, of the strongest attack per scheme.
+For PDF, convert them: rsvg-convert -f pdf -o curves.pdf curves.svg, or Inkscape.
 
 Examples:
   unlift table unlift-audit/audit.json --format markdown

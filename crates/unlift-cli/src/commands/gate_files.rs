@@ -28,8 +28,8 @@ pub struct GateFiles {
 impl GateFiles {
     /// Those that `result` asks for, if they can be written, and over nothing else of the same run.
     pub fn check(result: &ResultArgs, rules: &Rules) -> anyhow::Result<Self> {
-        let asked: [(_, &Option<PathBuf>, _, fn(&Document) -> String); 2] = [
-            ("--junit", &result.junit, Kind::Junit, junit),
+        let asked = [
+            ("--junit", &result.junit, Kind::Junit, junit as fn(&Document) -> String),
             ("--sarif", &result.sarif, Kind::Sarif, sarif),
         ];
         let mut taken: Vec<(&str, PathBuf)> =

@@ -31,11 +31,11 @@ fn array(values: &[f64]) -> String {
 
 fn bundler() -> String {
     let mut text = "# Bundle file v0.3\n3 3\n".to_owned();
-    for at in 0..2 {
+    for (at, rotation) in ROTATIONS.iter().enumerate() {
         text += "500 0.01 0\n";
         // Bundler's cameras look along -z, and y is up.
         let flipped = [1.0, -1.0, -1.0];
-        for (row, sign) in ROTATIONS[at].iter().zip(flipped) {
+        for (row, sign) in rotation.iter().zip(flipped) {
             text += &format!("{}\n", words(&row.map(|x| sign * x)));
         }
         let t = translation(at);
