@@ -164,7 +164,10 @@ fn models_are_listed_with_where_they_are() {
     ];
     assert_eq!(names, carried);
     assert!(there.iter().all(|model| model["carried"] == true));
-    let ([_, superpoint], aliked) = (&missing[..], there[0]) else { panic!("{missing:?}") };
+    let names: Vec<&str> = missing.iter().filter_map(|model| model["name"].as_str()).collect();
+    let yours = ["inverter-aliked", "inverter-superpoint", "neighbors-superpoint", "superpoint"];
+    assert_eq!(names, yours);
+    let ([.., superpoint], aliked) = (&missing[..], there[0]) else { panic!("{missing:?}") };
     assert_eq!(aliked["sha256"].as_str().map(str::len), Some(64));
     assert_eq!((&superpoint["here"], &superpoint["sha256"]), (&Value::Bool(false), &Value::Null));
 }
