@@ -10,9 +10,9 @@ use crate::values;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Figures are compared by scheme, source of neighborhoods, noise, inlier ratio (of the oracle; of
-others it is a result), K, solver and threshold, and the baselines by scheme and threshold. Rows that
-only one audit has are told. A scheme or source that the new audit has nothing to compare of fails
-as well: nothing says that it leaks no more.
+others it is a result), K, solver and threshold, and the baselines by scheme and threshold. Rows
+that only one audit has are told. A scheme or source that the new audit has nothing to compare of
+fails as well: nothing says that it leaks no more.
 
 Audits in other units or with other thresholds are refused (exit code 3).
 
