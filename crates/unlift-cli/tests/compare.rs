@@ -137,6 +137,18 @@ fn what_is_out_of_view_fails_and_what_only_one_has_is_told() {
     assert!(text.contains("only in the old audit: olc: oracle, 100 % right"), "{text}");
     let (text, _) = place.ends("compare ratios.json a/audit.json", 0);
     assert!(text.contains("only in the new audit: olc: oracle, 100 % right"), "{text}");
+    // A baseline that was left out (`--no-records-alone`).
+    changed(&place, "blind.json", |document| {
+        for row in rows(document).iter_mut().filter(|row| row["scheme"] == "olc") {
+            let row = row.as_object_mut().unwrap();
+            row.remove("records_alone_percent");
+            row.remove("records_alone_by");
+        }
+    });
+    let (text, _) = place.ends("compare a/audit.json blind.json", 0);
+    assert!(text.starts_with("only in the old audit: olc: records alone\n18 figures"), "{text}");
+    let (text, _) = place.ends("compare blind.json a/audit.json", 0);
+    assert!(text.starts_with("only in the new audit: olc: records alone\n18 figures"), "{text}");
     // A measured ratio is a result: the attack is the same.
     changed(&place, "measured.json", |document| {
         for row in rows(document).iter_mut().filter(|row| row["neighbors"] == "geometric") {

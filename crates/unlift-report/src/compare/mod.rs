@@ -79,6 +79,9 @@ pub struct Incomparable {
     pub found: String,
 }
 
+/// What the second baseline is called.
+const RECORDS_ALONE: &str = "records alone";
+
 /// Compares the figures of two audits. Rows are the same by scheme, source, noise, inlier ratio as requested (a measured one is a
 /// result), K and solver; a blind guess and the records alone are compared per scheme.
 ///
@@ -120,11 +123,24 @@ pub fn compare(
             schemes.push(&row.scheme);
         }
     }
-    for scheme in schemes {
+    for scheme in &schemes {
         changes.extend(baselines(old, new, scheme, &within));
     }
     let unseen = old.results.iter().zip(&taken).filter(|(_, taken)| !**taken);
-    let only_old: Vec<Unmatched> = unseen.map(|(row, _)| unmatched(row)).collect();
+    let mut only_old: Vec<Unmatched> = unseen.map(|(row, _)| unmatched(row)).collect();
+    for scheme in schemes {
+        let alone = |document: &Document| {
+            let mut rows = document.results.iter().filter(|row| row.scheme == scheme);
+            rows.any(|row| row.records_alone_percent.is_some())
+        };
+        let one = || Unmatched { scheme: scheme.to_owned(), attack: RECORDS_ALONE.to_owned() };
+        let there = old.results.iter().any(|row| row.scheme == scheme);
+        match (alone(old), alone(new)) {
+            (true, false) => only_old.push(one()),
+            (false, true) if there => only_new.push(one()),
+            _ => {}
+        }
+    }
     let lost = lost(old, new, &taken);
     // Sums of decimals must not fail a build by the last bit.
     let beyond = tolerance_points + 1e-9;
@@ -221,7 +237,7 @@ fn baselines(
     type Figure = fn(&Row, &str) -> Option<f64>;
     let figures: [(&str, Figure); 2] = [
         ("blind guess", |row, typed| row.blind_percent.get(typed).copied()),
-        ("records alone", |row, typed| row.records_alone_percent.as_ref()?.get(typed).copied()),
+        (RECORDS_ALONE, |row, typed| row.records_alone_percent.as_ref()?.get(typed).copied()),
     ];
     let mut changes = Vec::new();
     for (name, figure) in figures {
