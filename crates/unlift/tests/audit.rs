@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use unlift::audit::{Bound, NeighborsBy, Outcome, Plan, Row, Silent, run};
 use unlift::evaluate::evaluate;
+use unlift::geometry::frame::Bounds;
 use unlift::neighbors::{Geometric, Neighborhoods};
-use unlift::obfuscate::{SchemeOptions, obfuscate, scheme};
+use unlift::obfuscate::{Lifted, Scheme, SchemeOptions, obfuscate, scheme};
 use unlift::recover::{RecoverOptions, Solver, Unknown, recover};
-use unlift::seed::Key;
+use unlift::seed::{Key, Stage};
 use unlift::truth::Original;
-use unlift::{About, PointSet, RowOrder, Unit, synthetic};
+use unlift::{About, Error, PointSet, RowOrder, Unit, synthetic};
 
 fn original(points: Vec<[f64; 3]>) -> Original<3> {
     Original::new(PointSet::try_new(points, Unit::Meter).unwrap())
@@ -229,4 +230,40 @@ fn what_needs_no_neighborhoods_counts_in_break_even() {
         );
         assert_eq!((of("joint").inlier_ratio, of("joint").bound), (0.5, Bound::AboveTested));
     }
+}
+
+/// `olc`, with a mistake: it says that its records hide points in another order than they do.
+#[derive(Debug)]
+struct Mistaken;
+
+impl Scheme<3> for Mistaken {
+    fn name(&self) -> &str {
+        "mistaken"
+    }
+
+    fn lift(
+        &self,
+        points: &[[f64; 3]],
+        bounds: Option<&Bounds<3>>,
+        key: &Key,
+    ) -> Result<Lifted<3>, Error> {
+        let options = SchemeOptions::usual(Unit::Meter);
+        let olc = scheme("olc")?.of_dimension::<3>(&options).unwrap();
+        let mut lifted = olc.lift(points, bounds, key)?;
+        key.draws(Stage::Scheme, 1).shuffle(&mut lifted.hidden);
+        Ok(lifted)
+    }
+}
+
+/// Next to nothing came back of it, and a gate held.
+#[test]
+fn a_scheme_whose_records_are_not_where_its_points_are_has_no_row() {
+    let (room, mut plan) = (room(900), plan(&["olc"]));
+    plan.records_alone = false;
+    plan.schemes.push(Arc::new(Mistaken));
+    let outcome = audit(&room, &plan);
+    assert!(outcome.rows.iter().all(|row| row.scheme == "olc"));
+    let [missing] = &outcome.not_audited[..] else { panic!("{:?}", outcome.not_audited) };
+    assert_eq!(missing.scheme, "mistaken");
+    assert!(missing.reason.contains("points nearer to their own records"), "{}", missing.reason);
 }

@@ -11,7 +11,7 @@ use super::observer::{Cell, Counts, Observer};
 use super::plan::Plan;
 use super::records_alone::records_alone;
 use super::row::{Alone, Row};
-use crate::evaluate::{Accuracy, blind, distinct_weights, joined, reference};
+use crate::evaluate::{Accuracy, belongs, blind, distinct_weights, joined, reference};
 use crate::geometry::knn::Knn;
 use crate::neighbors::oracle::Noise;
 use crate::obfuscate::{Scheme, obfuscate};
@@ -85,7 +85,12 @@ pub(super) fn cells<const D: usize>(
     if let Some(hidden) = owned.hidden {
         return attack(owned, run, hidden, clock, observer, each);
     }
-    let hide = || obfuscate(scheme, owned.original, owned.descriptors, key);
+    let hide = || {
+        let hidden = obfuscate(scheme, owned.original, owned.descriptors, key)?;
+        // Of a scheme with a mistake next to nothing comes back.
+        belongs(owned.original, &hidden.0, &hidden.1)?;
+        Ok(hidden)
+    };
     match clock.time(|s| &mut s.obfuscate, hide) {
         Ok(hidden) => attack(owned, run, &hidden, clock, observer, each),
         Err(error) if !owned.is_one_of_many() => Ok(vec![NotAudited::scheme(run.scheme, &error)]),

@@ -89,9 +89,21 @@ fn nearer_to_own_record<const D: usize>(
         let record = slot / slots;
         let other = (record + n_records.div_ceil(2)) % n_records;
         let away = |record: usize| to_record(released.obfuscation(), record, &point);
-        away(record) < away(other)
+        // Points that coincide are as near to each other's records, but for rounding.
+        away(record) <= away(other) + rounding(released.obfuscation(), record, &point)
     };
     ((0..n).filter(is_nearer).count(), n)
+}
+
+/// How far from its record, held in `f32`, a point can be for that reason alone.
+fn rounding<const D: usize>(obfuscation: &Obfuscation<D>, record: usize, point: &[f64; D]) -> f64 {
+    let held = match obfuscation {
+        Obfuscation::Lines(_) | Obfuscation::AxisPlanes(_) => [0.0; D],
+        Obfuscation::Rays(rays) => rays.centers()[usize::from(rays.center()[record])],
+        Obfuscation::AxisCandidates(candidates) => candidates.position()[record],
+    };
+    let size = |v: &[f64; D]| dot(v, v).sqrt();
+    8.0 * f64::from(f32::EPSILON) * (size(point) + size(&held.map(f64::from)))
 }
 
 /// The distance from `point`, about the released origin, to a record.
