@@ -6,12 +6,12 @@ use unlift::audit::PointNeighbors;
 use unlift::geometry::vector::distance;
 use unlift_io::stage::read_point_neighborhoods;
 
+use crate::Error;
 use crate::prepare::Prepared;
-use crate::{Error, Progress};
 
 /// Lists by row of the file, for the rows that were kept.
 ///
-/// `n_read` rows were read from the file of the map. What speaks against the lists is told to `progress`.
+/// `n_read` rows were read from the file of the map. What speaks against the lists is added to `notes`.
 ///
 /// # Errors
 /// When the file cannot be read, or has another number of rows.
@@ -19,7 +19,7 @@ pub fn by_point(
     path: &Path,
     prepared: &Prepared,
     n_read: usize,
-    progress: &dyn Progress,
+    notes: &mut Vec<String>,
 ) -> Result<PointNeighbors, Error> {
     let lists = read_point_neighborhoods(path, n_read)?;
     let mut kept_as = vec![None; n_read];
@@ -40,9 +40,7 @@ pub fn by_point(
         }
         offsets.push(neighbors.len() as u64);
     }
-    for note in doubts(&offsets, &neighbors, prepared) {
-        progress.say(&format!("note: {}: {note}", path.display()));
-    }
+    notes.extend(doubts(&offsets, &neighbors, prepared));
     // Which file it was stands in the hashes; a file called oracle must not pass for one.
     let name = "file".to_owned();
     Ok(PointNeighbors { name, offsets, neighbors, scores })
@@ -55,7 +53,9 @@ fn doubts(offsets: &[u64], neighbors: &[u32], prepared: &Prepared) -> Vec<String
     let empty = offsets.windows(2).filter(|w| w[0] == w[1]).count();
     if empty > 0 {
         let n = points.len();
-        doubts.push(format!("{empty} of {n} points have no neighbors in it: they count as lost"));
+        doubts.push(format!(
+            "lists: {empty} of {n} points have no neighbors in the file, and count as lost"
+        ));
     }
     let (mut nearer, mut n) = (0usize, 0usize);
     for (point, w) in offsets.windows(2).enumerate() {
@@ -70,8 +70,8 @@ fn doubts(offsets: &[u64], neighbors: &[u32], prepared: &Prepared) -> Vec<String
     // Of strangers half are nearer; two standard deviations on top.
     if n > 0 && nearer as f64 <= 0.5 * n as f64 + (n as f64).sqrt() {
         doubts.push(format!(
-            "the neighbors in it are no nearer than any points ({nearer} of {n}): of another map, or in another order \
-             of rows?"
+            "lists: the neighbors in the file are no nearer than any points ({nearer} of {n}): of another map, or in \
+             another order of rows?"
         ));
     }
     doubts
@@ -93,6 +93,7 @@ mod tests {
             descriptors: None,
             unit_in_map_units: 1.0,
             rows: (0..n as u32).collect(),
+            notes: Vec::new(),
         };
         let offsets: Vec<u64> = (0..=n).map(|point| (point * length) as u64).collect();
         let row = |point: usize| (1..=length).map(move |step| (point * factor + step) % n);
@@ -105,8 +106,11 @@ mod tests {
         assert!(doubts_about(1, 5).is_empty());
         let of_another = doubts_about(77, 5);
         assert_eq!(of_another.len(), 1);
-        assert!(of_another[0].starts_with("the neighbors in it are no nearer than any points"));
+        assert!(of_another[0].starts_with("lists: the neighbors in the file are no nearer than"));
         let empty = doubts_about(1, 0);
-        assert_eq!(empty, ["200 of 200 points have no neighbors in it: they count as lost"]);
+        assert_eq!(
+            empty,
+            ["lists: 200 of 200 points have no neighbors in the file, and count as lost"]
+        );
     }
 }

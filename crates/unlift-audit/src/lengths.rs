@@ -1,12 +1,13 @@
 //! Whether a declared scale and thresholds fit a map: where every point counts as recovered wherever it
 //! is put, or none could ever, a figure says nothing, and 0 % would look like protection.
 
-use unlift::Unit;
 use unlift::audit::Threshold;
 use unlift::geometry::knn::Knn;
 use unlift::geometry::vector::median;
+use unlift::{PointSet, Unit};
 
 use crate::Error;
+use crate::gate::Gate;
 
 /// How far apart the points of a map lie.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -146,8 +147,27 @@ pub fn check_thresholds(
     Ok(None)
 }
 
+/// Checks the threshold of every gate: a bound that no attack could ever break says nothing.
+///
+/// # Errors
+/// When even neighboring points are too far apart for one.
+pub(crate) fn check_lengths_of_gates(points: &PointSet<3>, gates: &[Gate]) -> Result<(), Error> {
+    let by_size = |a: &&Gate, b: &&Gate| a.threshold.total_cmp(&b.threshold);
+    let Some(gate) = gates.iter().min_by(by_size) else { return Ok(()) };
+    let nearest = Extent::of(points.positions())?.nearest;
+    if nearest < HOPELESS * gate.threshold {
+        return Ok(());
+    }
+    Err(Error::request(format!(
+        "--gate {}: expected neighboring points less than {HOPELESS} times its threshold apart, found {} times: no \
+         attack could come near",
+        gate.typed,
+        short(nearest / gate.threshold)
+    )))
+}
+
 /// Three digits, and an exponent where there would be many zeros.
-fn short(length: f64) -> String {
+pub(crate) fn short(length: f64) -> String {
     if (1e-3..1e6).contains(&length) || length == 0.0 {
         let digits = (2 - length.max(1e-3).log10().floor() as i32).clamp(0, 6) as usize;
         return format!("{length:.digits$}");

@@ -36,6 +36,7 @@
 
 mod clouds;
 mod document;
+mod doubts;
 mod error;
 mod gate;
 mod given;

@@ -20,9 +20,10 @@ use unlift_report::{ErrorCdf, RenderOptions, render, text_table};
 use crate::Error;
 use crate::clouds::Clouds;
 use crate::document::{self, Provenance, ordered};
+use crate::doubts::doubts;
 use crate::gate::{Gate, check_gates, gate_results};
 use crate::inversion::MapInversion;
-use crate::lengths::check_scale;
+use crate::lengths::{check_lengths_of_gates, check_scale};
 use crate::outputs::{PAGE, commit_audit};
 use crate::prepare::{Preparation, Prepared, prepare};
 use crate::progress::{Progress, Quiet};
@@ -117,7 +118,7 @@ impl<'a> Job<'a> {
                 images: None,
             },
             options: serde_json::Map::new(),
-            notes: Vec::new(),
+            notes: prepared.notes.clone(),
             gates: Vec::new(),
             out: out.to_owned(),
             unit_in_map_units: prepared.unit_in_map_units,
@@ -158,27 +159,24 @@ pub fn open(
     }
     check_scale(&input.positions, preparation.scale)?;
     let rows = descriptors.map(|file| read::descriptors(file, &input)).transpose()?;
-    if let Some(n) = rows.as_ref().map(n_zero).filter(|&n| n > 0) {
-        let (file, of) = (descriptors.unwrap_or(path).display(), input.positions.len());
-        let what = "descriptors are all zero, and tell an attacker nothing";
-        progress.say(&format!("note: {file}: {n} of {of} {what}"));
-    }
-    let prepared = prepare(&input.positions, rows.as_ref(), preparation).map_err(|error| {
+    let mut prepared = prepare(&input.positions, rows.as_ref(), preparation).map_err(|error| {
         let few = error.what() == "points" && input.positions.len() > 2;
         let error = Error::from(unlift_io::Error::core(path, error));
         if few { error.advise("a smaller --k, or more points") } else { error }
     })?;
+    prepared.notes.extend(prepared.descriptors.as_ref().and_then(zeros));
     Ok((input, prepared))
 }
 
-/// How many descriptors are all zero: as some exporters mark points without one.
-fn n_zero(descriptors: &Descriptors) -> usize {
+/// What to say of descriptors that are all zero: as some exporters mark points without one.
+pub fn zeros(descriptors: &Descriptors) -> Option<String> {
     let mut row = vec![0.0; descriptors.dim()];
     let mut zero = |at: &usize| {
         descriptors.read_row(*at, &mut row);
         row.iter().all(|&value| value == 0.0)
     };
-    (0..descriptors.len()).filter(|at| zero(at)).count()
+    let (n, of) = ((0..descriptors.len()).filter(|at| zero(at)).count(), descriptors.len());
+    (n > 0).then(|| format!("{n} of {of} descriptors are all zero, and tell an attacker nothing"))
 }
 
 impl Finished {
@@ -213,6 +211,7 @@ pub fn perform(job: Job<'_>, mut out: OutputSet) -> Result<Finished, Error> {
 /// When the plan does not fit the map, a gate or cloud cannot be made, or `progress` says stop.
 pub fn find(job: Job<'_>, out: Option<&mut OutputSet>) -> Result<Audited, Error> {
     check_gates(&job.gates, &job.plan)?;
+    check_lengths_of_gates(job.original.reveal(), &job.gates)?;
     for note in &job.notes {
         job.progress.say(&format!("note: {note}"));
     }
@@ -250,7 +249,12 @@ pub fn find(job: Job<'_>, out: Option<&mut OutputSet>) -> Result<Audited, Error>
     if let Some(error) = watcher.failed {
         return Err(error);
     }
-    let gates = gate_results(&job.gates, &job.plan, &outcome.rows, &outcome.not_audited)?;
+    let doubts = doubts(job.original, job.hidden, &job.plan, &outcome.rows).map_err(of_file)?;
+    for note in &doubts.notes {
+        job.progress.say(&format!("note: {note}"));
+    }
+    let (rows, missing) = (&outcome.rows, &outcome.not_audited);
+    let gates = gate_results(&job.gates, &job.plan, rows, missing, &doubts.of_rows)?;
     let mut options = job.options;
     if let Some(inversion) = &job.inversion {
         options.insert("inverter_sha256".into(), inversion.sha256().into());
@@ -259,7 +263,7 @@ pub fn find(job: Job<'_>, out: Option<&mut OutputSet>) -> Result<Audited, Error>
     let provenance = Provenance {
         input: job.input,
         options,
-        notes: job.notes,
+        notes: job.notes.into_iter().chain(doubts.notes).collect(),
         gates,
         command: job.command,
         started: job.started,

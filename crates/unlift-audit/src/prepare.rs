@@ -47,6 +47,8 @@ pub struct Prepared {
     pub unit_in_map_units: f64,
     /// Which rows of the file were kept, ascending.
     pub rows: Vec<u32>,
+    /// What whoever reads figures of them must know; no paths, as these are told in share-safe documents, too.
+    pub notes: Vec<String>,
 }
 
 /// Filters, thins out and scales `positions` (and `descriptors` with them).
@@ -58,13 +60,24 @@ pub fn prepare(
     descriptors: Option<&Descriptors>,
     preparation: &Preparation,
 ) -> Result<Prepared, Error> {
-    let mut rows: Vec<u32> = (0..positions.len() as u32).collect();
+    let (n_read, mut notes) = (positions.len(), Vec::new());
+    let mut rows: Vec<u32> = (0..n_read as u32).collect();
     if let Some(filter) = preparation.outlier_filter {
         rows = without_outliers(positions, filter)?;
+        let n = n_read - rows.len();
+        if n > 0 {
+            notes.push(format!(
+                "--outlier-filter: {n} of {n_read} points are left out, as if never mapped"
+            ));
+        }
     }
     if let Some(most) = preparation.max_points
         && rows.len() > most
     {
+        notes.push(format!(
+            "--max-points: {most} of {n_read} points are audited, and neighbors are farther apart: of the whole map \
+             more comes back"
+        ));
         Draws::new(preparation.seed, Stage::Subset, 0).shuffle(&mut rows);
         rows.truncate(most);
         rows.sort_unstable();
@@ -84,7 +97,8 @@ pub fn prepare(
     };
     let points = PointSet::try_new(kept, unit)?.scaled(factor, unit)?;
     let descriptors = descriptors.map(|all| all.select(&rows));
-    Ok(Prepared { original: Original::new(points), descriptors, unit_in_map_units, rows })
+    let original = Original::new(points);
+    Ok(Prepared { original, descriptors, unit_in_map_units, rows, notes })
 }
 
 /// The median over all points of the distance to the `k`-th nearest other point.
@@ -170,6 +184,10 @@ mod tests {
         let prepared =
             prepare(&points, None, &Preparation { outlier_filter: filter, ..PLAIN }).unwrap();
         assert_eq!(prepared.rows, (0..30).collect::<Vec<u32>>());
+        assert_eq!(
+            prepared.notes,
+            ["--outlier-filter: 1 of 31 points are left out, as if never mapped"]
+        );
         let prepared =
             prepare(&points, None, &Preparation { max_points: Some(10), ..PLAIN }).unwrap();
         assert_eq!(prepared.rows.len(), 10);

@@ -75,7 +75,9 @@ impl Map {
                 other_sha256: Default::default(),
                 images: None,
             };
-            let (cameras, notes) = (Vec::new(), Vec::new());
+            let zeros = prepared.descriptors.as_ref().and_then(maps::zeros);
+            let (cameras, notes) =
+                (Vec::new(), prepared.notes.iter().cloned().chain(zeros).collect());
             Ok(Self { prepared: Arc::new(prepared), input, cameras, up: None, notes })
         })
     }
@@ -161,7 +163,7 @@ pub fn read(
             },
             cameras: input.cameras.iter().map(|center| center.map(|x| x / unit)).collect(),
             up: input.up,
-            notes: input.skipped,
+            notes: input.skipped.into_iter().chain(prepared.notes.iter().cloned()).collect(),
             prepared: Arc::new(prepared),
         })
     })

@@ -98,7 +98,7 @@ pub fn perform(job: ImagesJob<'_>, out: OutputSet) -> Result<(Option<Finished>, 
         true => Album::default(),
         false => draw(&job, &tally, &figures)?,
     };
-    let gates = gate_results(&job.gates, &job.plan, &outcome.rows, &[])?;
+    let gates = gate_results(&job.gates, &job.plan, &outcome.rows, &[], &[])?;
     let mut options = job.options.clone();
     if let Some(inversion) = &job.inversion {
         options.insert("inverter_sha256".into(), inversion.sha256().into());

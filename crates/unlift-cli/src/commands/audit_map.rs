@@ -48,8 +48,7 @@ pub fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
         let progress = Progress::new(args.run.quiet);
         let (path, result) = (&args.path, &args.result);
         let inversion = inversion(args, &prepared, &input, &progress)?;
-        let mut notes: Vec<String> =
-            thinned(args, &prepared, input.positions.len()).into_iter().collect();
+        let mut notes = prepared.notes.clone();
         let mut plan = plan(args, &prepared, &input, &mut notes)?;
         plan.measures.extend(inversion.iter().map(|one| Arc::clone(one) as Arc<dyn Measure<3>>));
         let mut job = Job {
@@ -91,17 +90,6 @@ fn inversion(
     Ok(Some(Arc::new(MapInversion::open(painter, model, photos, scale, most, progress)?)))
 }
 
-/// What a user should know who audits a part of a map: its figures are too small for the whole.
-fn thinned(args: &AuditMapArgs, prepared: &Prepared, n_read: usize) -> Option<String> {
-    let (most, n) = (args.map.max_points?.get(), prepared.rows.len());
-    (n == most && n < n_read).then(|| {
-        format!(
-            "--max-points: {n} of {n_read} points are audited, and neighbors are farther apart: of the whole map \
-             more comes back"
-        )
-    })
-}
-
 /// What must not be written over.
 fn rules(args: &AuditMapArgs) -> Rules {
     let lists = args.neighbors.iter().filter_map(|source| match source {
@@ -139,7 +127,12 @@ fn plan(
         }
     };
     Ok(Plan {
-        neighbors: neighbors(asked, (prepared, descriptors), lacking, input.positions.len())?,
+        neighbors: neighbors(
+            asked,
+            (prepared, descriptors),
+            lacking,
+            (input.positions.len(), notes),
+        )?,
         schemes,
         k,
         solvers: solvers(&args.solvers.solver, &usual),

@@ -6,7 +6,7 @@ use serde_json::{Map, json};
 use unlift::audit::{Plan, scheme_called};
 use unlift::released::Released;
 use unlift::truth::Secret;
-use unlift_audit::maps::perform;
+use unlift_audit::maps::{self, perform};
 use unlift_audit::{Finished, Job, Prepared, Shown, check_thresholds, open_audit, ordered};
 use unlift_io::atomic::Rules;
 use unlift_io::hash::{hash_file, hash_files};
@@ -50,7 +50,7 @@ pub fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
         let name = name(args)?;
         let (prepared, hidden) = open(args)?;
         let progress = Progress::new(args.run.quiet);
-        let mut notes = Vec::new();
+        let mut notes = prepared.notes.clone();
         let plan = plan(args, &name, &prepared, &hidden.0, &mut notes)?;
         let job = Job {
             original: &prepared.original,
@@ -118,7 +118,8 @@ fn open(args: &AuditReleasedArgs) -> anyhow::Result<(Prepared, (Released<3>, Sec
     let secret = secret.of_map(Some(released.fingerprint()), slots);
     let secret = secret.map_err(|error| unlift_io::Error::core(&args.truth, error))?;
     let rows = (0..original.len() as u32).collect();
-    let prepared = Prepared { original, descriptors: None, unit_in_map_units: 1.0, rows };
+    let notes = released.descriptors().and_then(maps::zeros).into_iter().collect();
+    let prepared = Prepared { original, descriptors: None, unit_in_map_units: 1.0, rows, notes };
     Ok((prepared, (released, secret)))
 }
 
@@ -178,7 +179,12 @@ fn plan(
     let asked = (&*args.neighbors, &args.attack);
     let lacking = |text: String| usage(format!("{text} in the released map, found none"));
     Ok(Plan {
-        neighbors: neighbors(asked, (prepared, released.descriptors()), lacking, points.len())?,
+        neighbors: neighbors(
+            asked,
+            (prepared, released.descriptors()),
+            lacking,
+            (points.len(), notes),
+        )?,
         schemes: vec![scheme_called(name)],
         k,
         solvers: solvers(&args.solvers.solver, &usual),

@@ -11,8 +11,9 @@ use super::image_stages::hide;
 use crate::args::ObfuscateArgs;
 use crate::exit::{Outcome, usage};
 use crate::output::print;
+use crate::progress::Stderr;
 use crate::stderr;
-use unlift_audit::refused;
+use unlift_audit::{Progress as _, refused};
 
 /// What an integer seed is worth.
 const GUESSABLE: &str = "unlift: note: --seed repeats experiments; whoever guesses the number undoes the hiding: \
@@ -30,6 +31,9 @@ pub fn run(args: &ObfuscateArgs) -> anyhow::Result<Outcome> {
         return images(args, out);
     };
     let (_, prepared) = open_map(&args.path, &args.map, false)?;
+    for note in &prepared.notes {
+        Stderr.say(&format!("note: {note}"));
+    }
     let descriptors = prepared.descriptors.as_ref();
     let key = key(args)?;
     let hidden = obfuscate(&*scheme, &prepared.original, descriptors, &key);

@@ -9,9 +9,8 @@ use unlift::recover::Solver;
 
 use crate::args::AttackArgs;
 use crate::exit::{advise, usage};
-use crate::progress::Stderr;
 use crate::values::{NeighborSource, distinct};
-use unlift_audit::{Finished, Prepared, Progress as _, by_point};
+use unlift_audit::{Finished, Prepared, by_point};
 
 /// `usual` with what was asked for.
 pub fn attack<const D: usize>(args: &AttackArgs, usual: Plan<D>) -> Plan<D> {
@@ -70,19 +69,20 @@ pub fn own<const D: usize>(named: Named, args: &AttackArgs) -> anyhow::Result<Ne
 }
 
 /// The sources of an audit of a map: every one once, each with what it needs, and no option that would be about none of
-/// them. `n_read` points were read from the file; `lacking` makes the error of a source without descriptors.
+/// them. `n_read` points were read from the file; what a user should know is added to `notes`; `lacking` makes the error of
+/// a source without descriptors.
 pub fn neighbors(
     (asked, args): (&[NeighborSource], &AttackArgs),
     (prepared, descriptors): (&Prepared, Option<&Descriptors>),
     lacking: impl Fn(String) -> anyhow::Error,
-    n_read: usize,
+    (n_read, notes): (usize, &mut Vec<String>),
 ) -> anyhow::Result<Vec<NeighborsBy<3>>> {
     let mut sources = Vec::new();
     for source in distinct(asked.to_vec(), |a, b| a == b) {
         sources.push(match source {
             NeighborSource::Oracle => NeighborsBy::Oracle,
             NeighborSource::File(path) => {
-                NeighborsBy::Given(by_point(&path, prepared, n_read, &Stderr)?)
+                NeighborsBy::Given(by_point(&path, prepared, n_read, notes)?)
             }
             NeighborSource::Own(named) => {
                 let by = own(named, args)?;
@@ -97,9 +97,7 @@ pub fn neighbors(
                         }
                         None => {}
                     }
-                    if let Some(note) = source.note(prepared.original.len()) {
-                        Stderr.say(&format!("note: {note}"));
-                    }
+                    notes.extend(source.note(prepared.original.len()));
                 }
                 by
             }

@@ -95,6 +95,23 @@ fn nearer_to_own_record<const D: usize>(
     ((0..n).filter(is_nearer).count(), n)
 }
 
+/// How far every hidden point lies from its own record, in the unit of the map: next to nothing, if the truth is that of the
+/// released map. Points farther away than a threshold cannot come back within it, whatever the scheme protects.
+pub fn away_from_own<const D: usize>(
+    released: &Released<D>,
+    original: &Original<D>,
+    secret: &Secret,
+) -> Vec<f64> {
+    let (points, origin) = (original.reveal().positions(), released.origin());
+    let slots = released.slots_per_record();
+    let n = secret.n_slots().min(released.n_slots());
+    let away = |slot: usize| {
+        let point = sub(&points[secret.hidden()[slot].index()], &origin);
+        to_record(released.obfuscation(), slot / slots, &point)
+    };
+    (0..n).map(away).collect()
+}
+
 /// How far from its record, held in `f32`, a point can be for that reason alone.
 fn rounding<const D: usize>(obfuscation: &Obfuscation<D>, record: usize, point: &[f64; D]) -> f64 {
     let held = match obfuscation {

@@ -1,0 +1,143 @@
+//! Figures that may be too small: the attack was not at its best, or the truth is not that of the map. Next to nothing
+//! coming back reads as protection, so that each is said beside the verdict and lets no gate hold.
+
+use unlift::Unit;
+use unlift::audit::{Plan, REFERENCE, Row};
+use unlift::evaluate::away_from_own;
+use unlift::geometry::knn::Knn;
+use unlift::released::Released;
+use unlift::truth::{Original, Secret};
+
+use crate::lengths::short;
+
+/// The attack chooses a delta of 0.2 to 2 times the distance to the K-th neighbor on maps of any shape. Beyond these times the
+/// quartiles of that distance it has not found how far apart neighbors are.
+const NARROW: f64 = 0.1;
+const WIDE: f64 = 4.0;
+/// Points whose neighbors are looked at: enough for quartiles.
+const SAMPLE: usize = 2000;
+/// Points that may lie farther from their own records than the smallest threshold: some mistake of a few is nobody's
+/// protection.
+const STRAY: f64 = 0.01;
+/// The usual distance to the K-th neighbor in units of itself, whatever the K that the unit was made with.
+const UNIT: [f64; 2] = [0.2, 5.0];
+/// Lists that hold a larger share of the map than this are said to be long.
+const LONG: f64 = 0.1;
+
+/// What speaks against the figures of an audit of a map.
+#[derive(Debug, Default)]
+pub(crate) struct Doubts {
+    /// Per row, why its figures may be too small.
+    pub(crate) of_rows: Vec<Option<String>>,
+    /// What to say once.
+    pub(crate) notes: Vec<String>,
+}
+
+/// Looks at the figures `rows` of a map; `hidden` is what was released of it, where that was given and not made here.
+pub(crate) fn doubts(
+    original: &Original<3>,
+    hidden: Option<&(Released<3>, Secret)>,
+    plan: &Plan<3>,
+    rows: &[Row],
+) -> Result<Doubts, unlift::Error> {
+    let Spread { low, middle, high } = Spread::of(original.reveal().positions(), plan.k)?;
+    let unit = original.reveal().unit();
+    let strangers = hidden.and_then(|hidden| not_its_own(original, hidden, plan));
+    let mistaken = hidden.and_then(|_| mistaken_unit(unit, plan.k, middle));
+    let of_map = strangers.or(mistaken);
+    let mut found = Doubts::default();
+    found.notes.extend(of_map.clone());
+    let share = plan.k as f64 / original.len().max(1) as f64;
+    if plan.asks_oracle() && share > LONG {
+        found.notes.push(format!(
+            "K = {} is {:.0} % of the map's points: of so long lists less comes back than of shorter ones (--k)",
+            plan.k,
+            100.0 * share
+        ));
+    }
+    for row in rows {
+        let is_usual = (NARROW * low..=WIDE * high).contains(&row.delta);
+        let of_delta = (row.solver != REFERENCE && row.delta > 0.0 && !is_usual).then(|| {
+            format!(
+                "{}: delta, {}, is far from how far apart neighbors are, {} to {}, so that less may have come back than \
+                 could (try --delta, --outlier-filter, or parts of the map by themselves)",
+                row.scheme,
+                in_unit(row.delta, unit),
+                short(low),
+                in_unit(high, unit)
+            )
+        });
+        // One line per scheme will do.
+        let start = format!("{}: delta", row.scheme);
+        if let Some(doubt) = &of_delta
+            && !found.notes.iter().any(|note| note.starts_with(&start))
+        {
+            found.notes.push(doubt.clone());
+        }
+        found.of_rows.push(of_map.clone().or(of_delta));
+    }
+    Ok(found)
+}
+
+/// Quartiles of the distance to the K-th neighbor.
+struct Spread {
+    low: f64,
+    middle: f64,
+    high: f64,
+}
+
+impl Spread {
+    fn of(points: &[[f64; 3]], k: usize) -> Result<Self, unlift::Error> {
+        let knn = Knn::new(points)?;
+        let mut found = Vec::new();
+        let mut kth = |row: usize| {
+            knn.nearest(row, k, &mut found);
+            found.last().map_or(0.0, |last| last.0.sqrt())
+        };
+        let every = points.len().div_ceil(SAMPLE).max(1);
+        let mut distances: Vec<f64> = (0..points.len()).step_by(every).map(&mut kth).collect();
+        distances.sort_unstable_by(f64::total_cmp);
+        let last = distances.len().saturating_sub(1);
+        let at = |rank: usize| distances.get(rank).copied().unwrap_or(0.0);
+        Ok(Self { low: at(last / 4), middle: at(last / 2), high: at(last - last / 4) })
+    }
+}
+
+/// What to say of a truth whose points are not where the released records are.
+fn not_its_own(
+    original: &Original<3>,
+    (released, secret): &(Released<3>, Secret),
+    plan: &Plan<3>,
+) -> Option<String> {
+    let least = plan.thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min);
+    let away = away_from_own(released, original, secret);
+    let (n, of) = (away.iter().filter(|&&away| away >= least).count(), away.len());
+    (n as f64 > STRAY * of as f64).then(|| {
+        let unit = original.reveal().unit();
+        format!(
+            "truth: {n} of {of} points are {} or more away from their own records, where no attack could find them: is it \
+             that of this map, in its frame, scale and order?",
+            in_unit(least, unit)
+        )
+    })
+}
+
+/// What to say of lengths that are not in the unit that a file states.
+fn mistaken_unit(unit: Unit, k: usize, middle: f64) -> Option<String> {
+    let is_usual = (UNIT[0]..=UNIT[1]).contains(&middle);
+    (unit == Unit::KthNeighbor && !is_usual).then(|| {
+        format!(
+            "unit: expected a usual distance to neighbor {k} of about 1, as lengths are said to be in multiples of it, found \
+             {}: thresholds mean something else than they say",
+            short(middle)
+        )
+    })
+}
+
+fn in_unit(length: f64, unit: Unit) -> String {
+    match unit {
+        Unit::Meter => format!("{} m", short(length)),
+        Unit::Pixel => format!("{} px", short(length)),
+        Unit::KthNeighbor => short(length),
+    }
+}
