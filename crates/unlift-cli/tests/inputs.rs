@@ -102,7 +102,7 @@ fn similarity_takes_descriptors_of_any_kind_and_overlap_those_of_sift() {
     let (_, stderr) = place.ends(&format!("{hide} partial.npy --out hidden2"), 0);
     assert_eq!(
         stderr,
-        "unlift: note: partial.npy: 2 of 700 descriptors are all zero, and tell an attacker nothing\n"
+        "unlift: note: 2 of 700 descriptors are all zero, and tell an attacker nothing\n"
     );
     let find = "neighbors find hidden/released.parquet --out lists.parquet --source";
     place.ends(&format!("{find} similarity"), 0);

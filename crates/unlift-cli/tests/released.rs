@@ -167,7 +167,7 @@ fn lists_of_a_file_are_those_of_an_audit_of_the_map() {
     write_lists(&place, "few.parquet", &points, 300, 10);
     let released = "audit released hidden/released.parquet --truth hidden/truth.parquet --k 10";
     let (_, stderr) = place.ends(&format!("{released} --neighbors few.parquet --out few"), 0);
-    assert!(stderr.contains("few.parquet: 100 of 400 points have no neighbors in it"), "{stderr}");
+    assert!(stderr.contains("note: lists: 100 of 400 points have no neighbors"), "{stderr}");
     // Lists of another map name points that this one lacks.
     let more = unlift::synthetic::room(1, 401).points;
     write_lists(&place, "other.parquet", &more, 401, 10);

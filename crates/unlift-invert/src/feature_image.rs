@@ -55,14 +55,17 @@ impl Points<'_> {
     }
 }
 
+/// As many pixels as a photo may have: a network holds a gigabyte for so many.
+const MOST_PIXELS: usize = 1 << 24;
+
 /// Refuses sizes that no picture has, as files may claim any.
 pub(crate) fn check_size([width, height]: [usize; 2]) -> Result<(), Error> {
     let sides = 2..=1 << 24;
-    if sides.contains(&width) && sides.contains(&height) && width * height <= 1 << 28 {
+    if sides.contains(&width) && sides.contains(&height) && width * height <= MOST_PIXELS {
         return Ok(());
     }
     let found = format!("{width} x {height}");
-    Err(Error::new("image size", "at least 2 x 2 and at most 268435456 pixels", found))
+    Err(Error::new("image size", "at least 2 x 2 and at most 16777216 pixels", found))
 }
 
 /// The feature image `(1, columns + 3, height, width)` of points in an image of `size` (width, height) pixels, in cells
@@ -73,7 +76,7 @@ pub(crate) fn check_size([width, height]: [usize; 2]) -> Result<(), Error> {
 /// known. Zero where no point is.
 ///
 /// # Errors
-/// When the columns of `points` differ in length, or a side has less than 2 pixels or the image more than 2^28.
+/// When the columns of `points` differ in length, or a side has less than 2 pixels or the image more than 2^24.
 pub fn feature_image(points: &Points<'_>, size: [usize; 2]) -> Result<Tensor, Error> {
     points.check()?;
     check_size(size)?;

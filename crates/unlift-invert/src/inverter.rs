@@ -44,7 +44,7 @@ impl Inverter {
     ///
     /// # Errors
     /// When the columns of `points` differ in length, their descriptors are not of the kind that the network knows, or
-    /// a side has less than 2 pixels or the image more than 2^28.
+    /// a side has less than 2 pixels or the image more than 2^24.
     pub fn invert(&self, points: &Points<'_>, size: [usize; 2]) -> Result<ColorImage, Error> {
         self.takes(points.descriptors)?;
         let features = feature_image(points, size)?;

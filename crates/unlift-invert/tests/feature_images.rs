@@ -125,3 +125,16 @@ fn points_nowhere_are_left_out() {
     let error = image(&columns, true).unwrap_err().to_string();
     assert_eq!(error, "weights: expected 150, one per point, found 149");
 }
+
+/// A camera may claim any size: memory goes with it.
+#[test]
+fn sizes_that_no_photo_has_are_refused() {
+    let (columns, _) = columns();
+    let Columns { places, descriptors, weights, depths } = &columns;
+    let points = Points { places, descriptors, weights, depths: Some(depths) };
+    for size in [[1, 22], [30, 0], [16_384, 16_384], [usize::MAX, 2], [1 << 23, 3]] {
+        let error = feature_image(&points, size).unwrap_err();
+        assert_eq!(error.expected(), "at least 2 x 2 and at most 16777216 pixels", "{size:?}");
+    }
+    feature_image(&points, [4096, 4096]).unwrap();
+}

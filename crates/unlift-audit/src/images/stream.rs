@@ -32,6 +32,8 @@ pub struct Tally {
     pub n_points: usize,
     /// Images that could not be used.
     pub unusable: usize,
+    /// Images that are declared to be much larger than where their keypoints are.
+    pub wide: usize,
 }
 
 impl Tally {
@@ -112,7 +114,10 @@ impl<'a> Stream<'a> {
         let read: Vec<_> = numbers.par_iter().with_max_len(1).map(read).collect();
         for (at, image) in read {
             match image {
-                Ok(image) => self.ready.push_back((at, image)),
+                Ok(image) => {
+                    self.tally.borrow_mut().wide += usize::from(is_wide(&image.original));
+                    self.ready.push_back((at, image));
+                }
                 Err(error) => {
                     self.tally.borrow_mut().unusable += 1;
                     self.steps.say(&error.to_string());
@@ -164,6 +169,21 @@ fn image(
     // Nobody asks for them otherwise, and they are most of an image.
     let descriptors = features.descriptors.filter(|_| needs.descriptors() || needs.whatever);
     Ok(Image { name: features.name, original, descriptors })
+}
+
+/// Keypoints that say where an image ends.
+const TELLING: usize = 30;
+
+/// Whether keypoints fill less than a quarter of the image: its size is that of another, or in other units.
+fn is_wide(original: &Original<2>) -> bool {
+    let places = original.reveal().positions();
+    let (Some(declared), Some(filled)) = (original.bounds(), Bounds::quantiles(places, 0.01))
+    else {
+        return false;
+    };
+    let area =
+        |bounds: &Bounds<2>| -> f64 { (0..2).map(|c| bounds.high[c] - bounds.low[c]).product() };
+    places.len() >= TELLING && area(&filled) < 0.25 * area(&declared)
 }
 
 /// What was expected of these features, and found; `None` where they have what is needed. An image

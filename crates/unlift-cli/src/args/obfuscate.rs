@@ -16,7 +16,8 @@ Examples:
 
 Writes hidden/released.parquet (what an attacker sees) and hidden/truth.parquet (keep it private).
 What is drawn comes from a fresh 256-bit key that is kept nowhere. With --seed it comes from that
-number, for experiments only: whoever guesses it undoes the order of the records, and cp entirely.")]
+number, for experiments only: whoever guesses it undoes the order of the records, and cp entirely.
+Release a map once: of two releases with descriptors, records of the same point meet in it.")]
 pub struct ObfuscateArgs {
     /// A COLMAP model or project folder, or a .ply, .csv, .xyz, .txt or .npy file; of images hloc's features.h5, a
     /// COLMAP database.db, or a folder of photos

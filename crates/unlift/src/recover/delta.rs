@@ -7,12 +7,13 @@
 //! number of places tried, uneven density and the noise of the null sample are in both.
 
 use super::consensus;
+use super::map::chance_field::trimmed;
 use super::map::chunks::{CHUNK, Slots};
 use super::map::family::Family;
 use super::map::lists::Lists;
 use super::map::settings::Settings;
 use crate::neighbors::Neighborhoods;
-use crate::released::Released;
+use crate::released::{Obfuscation, Released};
 use crate::seed::{Draws, Stage};
 
 /// The least delta tried within known bounds, as a share of the spacing of points. A fifth of the keypoints of an image have a
@@ -70,10 +71,19 @@ pub(super) fn learn<const D: usize>(
     choose(family, used, prefer, (least, share), seed).unwrap_or(1.0)
 }
 
-/// How far apart points would be if they were spread evenly over known bounds; 0 without bounds.
+/// How far apart points would be if they were spread evenly over known bounds; 0 without bounds. Bounds may be declared much
+/// larger than where points are, whose coordinates candidates publish.
 fn spacing<const D: usize>(released: &Released<D>) -> f64 {
     let Some(bounds) = released.bounds() else { return 0.0 };
-    let volume: f64 = (0..D).map(|c| bounds.high[c] - bounds.low[c]).product();
+    let mut sides: [f64; D] = std::array::from_fn(|c| bounds.high[c] - bounds.low[c]);
+    if let Obfuscation::AxisCandidates(candidates) = released.obfuscation() {
+        for (c, side) in sides.iter_mut().enumerate() {
+            let mut column: Vec<f32> = candidates.position().iter().map(|row| row[c]).collect();
+            let (low, high) = trimmed(&mut column);
+            *side = side.min(f64::from(high - low));
+        }
+    }
+    let volume: f64 = sides.iter().product();
     libm::pow(volume / released.n_slots().max(1) as f64, 1.0 / D as f64)
 }
 

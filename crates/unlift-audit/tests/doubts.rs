@@ -1,0 +1,164 @@
+//! Audits that would hold their gates because the attack was not at its best, or the truth was that of something else.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use unlift::audit::{Plan, Threshold};
+use unlift::obfuscate::{SchemeOptions, obfuscate, scheme};
+use unlift::recover::{Delta, Solver};
+use unlift::released::Released;
+use unlift::seed::Key;
+use unlift::truth::{Original, Secret};
+use unlift::{PointSet, Unit};
+use unlift_audit::{Audited, Error, Gate, Job, Preparation, Prepared, Quiet, maps, prepare};
+use unlift_report::document::Input;
+
+const N: usize = 1500;
+
+fn room() -> Vec<[f64; 3]> {
+    unlift::synthetic::room(1, N).points
+}
+
+fn prepared(points: &[[f64; 3]]) -> Prepared {
+    let preparation = Preparation { scale: Some(1.0), k: 20, ..Preparation::default() };
+    prepare(points, None, &preparation).expect("points")
+}
+
+fn plan(names: &[&str]) -> Plan<3> {
+    let usual = Plan::new(Unit::Meter);
+    let is_asked = |name: &str| names.contains(&name);
+    Plan {
+        schemes: usual.schemes.iter().filter(|s| is_asked(s.name())).cloned().collect(),
+        inlier_ratios: vec![0.5],
+        k: 20,
+        solvers: vec![Solver::Joint],
+        records_alone: false,
+        ..usual
+    }
+}
+
+/// An audit of `prepared`, or of what is `hidden` of it, by `plan` with one gate.
+fn audit(
+    prepared: &Prepared,
+    hidden: Option<&(Released<3>, Secret)>,
+    plan: Plan<3>,
+    gate: &str,
+) -> Result<Audited, Error> {
+    let job = Job {
+        original: &prepared.original,
+        descriptors: None,
+        hidden,
+        cameras: Vec::new(),
+        up: None,
+        plan,
+        input: Input {
+            path: None,
+            sha256: None,
+            n_points: prepared.original.len() as u64,
+            scale_m_per_unit: Some(1.0),
+            unit_in_map_units: Some(1.0),
+            other_sha256: Default::default(),
+            images: None,
+        },
+        options: Default::default(),
+        notes: prepared.notes.clone(),
+        gates: vec![Gate::parse(gate).expect("a gate")],
+        out: PathBuf::from(Path::new("none")),
+        unit_in_map_units: 1.0,
+        write_clouds: false,
+        share_safe: false,
+        inversion: None,
+        progress: &Quiet,
+        command: None,
+        started: Instant::now(),
+    };
+    maps::find(job, None)
+}
+
+/// Why the one gate of an audit does not hold, which is said beside the verdict, too.
+fn reason(found: &Audited) -> &str {
+    let [gate] = &found.document.gates[..] else { panic!("{:?}", found.document.gates) };
+    assert!(!gate.passed && gate.found_percent <= Some(gate.bound_percent), "{gate:?}");
+    let reason = gate.reason.as_deref().expect("a reason");
+    assert!(found.document.notes.iter().any(|note| note == reason), "{:?}", found.document.notes);
+    reason
+}
+
+#[test]
+fn usual_maps_are_not_doubted() {
+    let all = ["olc", "ppl", "ppl+", "ray", "plane", "cp"];
+    let found = audit(&prepared(&room()), None, plan(&all), "all:0.25<=100").expect("an audit");
+    assert_eq!(found.document.notes, Vec::<String>::new());
+    assert!(found.document.gates[0].passed);
+}
+
+/// One of two centers lies by the far point: its ray alone could tell where the others' points are.
+#[test]
+fn a_far_point_is_no_protection() {
+    let mut points = room();
+    points[5] = [1e4, -1e4, 3e3];
+    let found = audit(&prepared(&points), None, plan(&["ray"]), "ray:0.10<=20").expect("an audit");
+    assert!(reason(&found).starts_with("ray: delta, "), "{}", reason(&found));
+}
+
+#[test]
+fn two_parts_far_apart_are_no_protection() {
+    let mut points = room();
+    points.iter_mut().step_by(2).for_each(|point| point[0] += 1e4);
+    let gate = "plane:0.10<=20";
+    let found = audit(&prepared(&points), None, plan(&["plane"]), gate).expect("an audit");
+    assert!(reason(&found).starts_with("plane: delta, "), "{}", reason(&found));
+}
+
+#[test]
+fn a_delta_of_nothing_is_no_protection() {
+    let plan = Plan { delta: Delta::Fixed(1e-6), ..plan(&["olc"]) };
+    let found = audit(&prepared(&room()), None, plan, "olc:0.10<=50").expect("an audit");
+    assert!(reason(&found).contains("1.0e-6 m, is far from"), "{}", reason(&found));
+}
+
+#[test]
+fn a_gate_that_no_attack_could_break_is_refused() {
+    let thresholds = ["1e-6", "0.25"].map(|label| Threshold::parse(label).expect("a threshold"));
+    let plan = Plan { thresholds: thresholds.to_vec(), ..plan(&["olc"]) };
+    let error = audit(&prepared(&room()), None, plan, "olc:1e-6<=1").err().expect("an error");
+    let error = error.to_string();
+    assert!(error.starts_with("--gate olc:1e-6<=1: expected neighboring points less"), "{error}");
+}
+
+/// The truth of a map that was scaled since: its points are nearer to their own records than to others, but not near.
+#[test]
+fn a_truth_in_another_scale_is_no_protection() {
+    let prepared_truth = prepared(&room());
+    let options = SchemeOptions::usual(Unit::Meter);
+    let olc = scheme("olc").expect("olc").of_dimension::<3>(&options).expect("in 3D");
+    let hide = |original| obfuscate(&*olc, original, None, &Key::from_seed(1)).expect("hidden");
+    let right = hide(&prepared_truth.original);
+    let found = audit(&prepared_truth, Some(&right), plan(&["olc"]), "olc:0.10<=100");
+    assert!(found.expect("an audit").document.gates[0].passed);
+    let scaled = room().iter().map(|point| point.map(|x| 1.3 * x)).collect();
+    let scaled = Original::new(PointSet::try_new(scaled, Unit::Meter).expect("points"));
+    let wrong = hide(&scaled);
+    let found = audit(&prepared_truth, Some(&wrong), plan(&["olc"]), "olc:0.10<=20");
+    let found = found.expect("an audit");
+    let told = format!("of {N} points are 0.100 m or more away from their own records");
+    assert!(reason(&found).contains(&told), "{}", reason(&found));
+}
+
+/// Lengths in millimeters are said to be in multiples of the distance to the K-th neighbor.
+#[test]
+fn a_unit_that_is_only_stated_is_no_protection() {
+    let points = room().iter().map(|point| point.map(|x| 1000.0 * x)).collect();
+    let points = PointSet::try_new(points, Unit::KthNeighbor).expect("points");
+    let original = Original::new(points);
+    let rows = (0..N as u32).collect();
+    let prepared =
+        Prepared { original, descriptors: None, unit_in_map_units: 1.0, rows, notes: Vec::new() };
+    let options = SchemeOptions::usual(Unit::KthNeighbor);
+    let olc = scheme("olc").expect("olc").of_dimension::<3>(&options).expect("in 3D");
+    let hidden = obfuscate(&*olc, &prepared.original, None, &Key::from_seed(1)).expect("hidden");
+    let plan =
+        Plan { thresholds: vec![Threshold::parse("2.5").expect("a threshold")], ..plan(&["olc"]) };
+    let found = audit(&prepared, Some(&hidden), plan, "olc:2.5<=20").expect("an audit");
+    assert!(reason(&found).starts_with("unit: expected a usual distance"), "{}", reason(&found));
+}
