@@ -42,6 +42,10 @@ pub fn text_table(document: &Document) -> String {
         }
     }
     let mut text = align(&lines);
+    if thresholds.len() > 1 {
+        let others = if any_alone { "blind, records, break-even" } else { "blind, break-even" };
+        text.push_str(&format!("{others}: within {headline} {}\n", unit(document)));
+    }
     if any_alone {
         text.push_str(
             "records: what comes back from the released records alone, without neighborhoods\n",
@@ -53,7 +57,11 @@ pub fn text_table(document: &Document) -> String {
     for refused in &document.not_audited {
         let by = refused.neighbors.as_ref().map(|source| format!(" by {source}"));
         let (scheme, by) = (&refused.scheme, by.unwrap_or_default());
-        text.push_str(&format!("not audited: {scheme}{by}: {}\n", refused.reason));
+        // A source's own reasons begin with its name.
+        let own = refused.neighbors.as_ref().map(|source| format!("{source}: "));
+        let reason = own.and_then(|own| refused.reason.strip_prefix(&own));
+        let reason = reason.unwrap_or(&refused.reason);
+        text.push_str(&format!("not audited: {scheme}{by}: {reason}\n"));
     }
     text
 }
@@ -83,6 +91,13 @@ fn break_even(document: &Document, row: &Row, typed: &str) -> String {
             && noise(&point.oracle_noise) == noise(&row.oracle_noise)
             && point.threshold == typed
     });
+    // Of one ratio there is no curve.
+    let of_scheme = document.results.iter().filter(|other| other.scheme == row.scheme);
+    let is_other =
+        |other: &Row| other.oracle_noise.is_some() && other.inlier_ratio != row.inlier_ratio;
+    if !of_scheme.into_iter().any(is_other) {
+        return "-".to_owned();
+    }
     match points.next().map(|p| (p.bound, p.inlier_ratio.map(words::ratio_percent))) {
         Some((Bound::Interpolated, Some(ratio))) => format!("{ratio} %"),
         Some((Bound::BelowTested, Some(ratio))) => format!("<= {ratio} %"),

@@ -66,7 +66,7 @@ pub struct AuditImagesArgs {
     pub solver: Vec<Solver>,
     /// Where neighborhoods come from, repeatable: oracle (made from the keypoints themselves), or what
     /// an attacker makes from the released descriptors: descriptors (the best that they allow without training),
-    /// similarity, overlap (SIFT), learned (a network; SIFT)
+    /// similarity, overlap (SIFT), learned (a network; SIFT or ALIKED)
     #[arg(long, value_name = "oracle|SOURCE", value_parser = values::image_source,
           default_value = "oracle", help_heading = "Attack")]
     pub neighbors: Vec<NeighborSource>,

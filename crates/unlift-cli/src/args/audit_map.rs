@@ -34,7 +34,8 @@ a scheme that could not be applied to the map fails.
 
 Exit codes: 0 done, 1 a gate failed, 2 usage, 3 bad input.")]
 pub struct AuditMapArgs {
-    /// A COLMAP model or project folder, or a .ply, .csv, .xyz, .txt or .npy file
+    /// A COLMAP model or project folder, one of OpenSfM or nerfstudio, or a .ply, .csv, .xyz, .txt, .npy, .out (Bundler) or
+    /// .nvm file
     #[arg(value_name = "PATH")]
     pub path: PathBuf,
     #[command(flatten)]
@@ -47,7 +48,7 @@ pub struct AuditMapArgs {
     pub solvers: SolverArgs,
     /// Where neighborhoods come from, repeatable: oracle (made from the map itself); what an attacker
     /// makes from the released map: descriptors (the best that they allow without training), similarity, overlap (SIFT),
-    /// learned (a network; SIFT), geometric (no descriptors); or a file
+    /// learned (a network; SIFT or ALIKED), geometric (no descriptors); or a file
     #[arg(long, value_name = "oracle|SOURCE|FILE", value_parser = values::neighbor_source,
           default_value = "oracle", help_heading = "Attack")]
     pub neighbors: Vec<NeighborSource>,

@@ -48,7 +48,7 @@ pub struct AuditReleasedArgs {
     pub solvers: SolverArgs,
     /// Where neighborhoods come from, repeatable: oracle (made from the truth); what an attacker makes
     /// from the released map: descriptors (the best that they allow without training), similarity, overlap (SIFT),
-    /// learned (a network; SIFT), geometric (no descriptors); or a file of lists by original
+    /// learned (a network; SIFT or ALIKED), geometric (no descriptors); or a file of lists by original
     #[arg(long, value_name = "oracle|SOURCE|FILE", value_parser = values::neighbor_source,
           default_value = "oracle", help_heading = "Attack")]
     pub neighbors: Vec<NeighborSource>,

@@ -25,7 +25,7 @@ pub struct MapArgs {
     #[arg(long, value_name = "NEIGHBORS,RATIO", value_parser = values::outlier_filter,
           num_args = 0..=1, require_equals = true, default_missing_value = "20,2.0")]
     pub outlier_filter: Option<OutlierFilter>,
-    /// True neighbors per point
+    /// True neighbors per point; without --scale also what lengths are measured in: the usual distance to this one
     #[arg(long, value_name = "K", default_value = "50",
           value_parser = clap::value_parser!(u16).range(1..))]
     pub k: u16,

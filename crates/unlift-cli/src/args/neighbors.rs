@@ -25,7 +25,7 @@ pub enum NeighborsCommand {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Sources: descriptors (the best that they allow without training: overlap or similarity), similarity (any descriptors),
-overlap (SIFT), learned (a network; SIFT), geometric (no descriptors).
+overlap (SIFT), learned (a network; SIFT or ALIKED), geometric (no descriptors).
 
 Examples:
   unlift neighbors find hidden/released.parquet --source overlap --out lists.parquet
@@ -34,7 +34,7 @@ pub struct FindArgs {
     /// A released map
     #[arg(value_name = "OBFUSCATED")]
     pub released: PathBuf,
-    /// How
+    /// Where the lists come from, see below
     #[arg(long, value_name = "SOURCE", value_parser = values::own_source)]
     pub source: Named,
     /// Records per list [default: the source's own choice]

@@ -19,7 +19,7 @@ What is drawn comes from a fresh 256-bit key that is kept nowhere. With --seed i
 number, for experiments only: whoever guesses it undoes the order of the records, and cp entirely.
 Release a map once: of two releases with descriptors, records of the same point meet in it.")]
 pub struct ObfuscateArgs {
-    /// A COLMAP model or project folder, or a .ply, .csv, .xyz, .txt or .npy file; of images hloc's features.h5, a
+    /// A map as audit map reads it: a COLMAP model or project folder, a .ply, .csv or .npy file; of images hloc's features.h5, a
     /// COLMAP database.db, or a folder of photos
     #[arg(value_name = "PATH")]
     pub path: PathBuf,

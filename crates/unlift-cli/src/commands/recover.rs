@@ -76,7 +76,7 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
     drop(alive);
     let n = recovered.status().iter().filter(|&&status| status == Status::Ok).count();
     print(&format!(
-        "{n} of {} points recovered with delta {:.4} {}, in {}\n",
+        "{n} of {} points have a position, with delta {:.4} {}, in {}\n",
         recovered.n_slots(),
         recovered.delta(),
         recovered.unit().name(),
@@ -105,7 +105,7 @@ fn images(args: &RecoverArgs, options: &RecoverOptions, rules: &Rules) -> anyhow
     })?;
     drop(alive);
     print(&format!(
-        "{} of {} keypoints of {} images recovered, in {}\n",
+        "{} of {} keypoints of {} images have a position, in {}\n",
         counts.points,
         counts.slots,
         counts.images,
