@@ -133,6 +133,20 @@ impl Partial {
         &self.path
     }
 
+    /// Makes the folders that the file `name` within needs. Never the partial folder itself, nor those around it: what an
+    /// interrupt has just removed must not come back.
+    pub fn make_within(&self, name: &Path) -> io::Result<()> {
+        let mut folder = self.path.clone();
+        for part in name.parent().into_iter().flat_map(Path::components) {
+            folder.push(part);
+            match fs::create_dir(&folder) {
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+                made => made?,
+            }
+        }
+        Ok(())
+    }
+
     /// Renames it to `target`.
     pub fn persist(mut self, target: &Path) -> io::Result<()> {
         let mut live = live();
@@ -291,6 +305,18 @@ mod tests {
         assert_eq!(entries(folder.path()), kept);
         drop((living, busy));
         assert_eq!(entries(folder.path()).len(), others.len());
+    }
+
+    #[test]
+    fn what_was_removed_does_not_come_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let partial = Partial::folder(folder.path()).unwrap();
+        partial.make_within(Path::new("a/b/file")).unwrap();
+        partial.make_within(Path::new("a/b/other")).unwrap();
+        assert_eq!(entries(&partial.path().join("a")), ["b"]);
+        remove(partial.path());
+        assert!(partial.make_within(Path::new("a/b/file")).is_err());
+        assert_eq!(entries(folder.path()), [""; 0]);
     }
 
     #[test]

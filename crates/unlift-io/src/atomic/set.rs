@@ -65,9 +65,7 @@ impl OutputSet {
     pub fn stage(&mut self, name: &str, kind: Kind) -> Result<PathBuf, Error> {
         self.check(Path::new(name), kind)?;
         let staged = self.staging.path().join(name);
-        if let Some(folder) = staged.parent() {
-            fs::create_dir_all(folder).map_err(|source| Error::write(&self.path, source))?;
-        }
+        self.staging.make_within(Path::new(name)).map_err(|e| Error::write(&self.path, e))?;
         self.files.push((PathBuf::from(name), kind));
         Ok(staged)
     }
