@@ -1,6 +1,6 @@
 //! Hidden maps: what is released, and the truth beside it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use pyo3::prelude::*;
@@ -10,10 +10,11 @@ use unlift::released::{self, Obfuscation};
 use unlift::seed::Key;
 use unlift::truth::{Original, Secret};
 use unlift_audit::Prepared;
-use unlift_io::stage::{read_released, read_truth, write_released, write_truth};
+use unlift_io::stage::{Kind, read_released, read_truth, write_released, write_truth};
 
 use crate::arrays::{to_array, to_descriptors, to_rows};
 use crate::errors::raised;
+use crate::files::save;
 use crate::map::Map;
 use crate::own::{OwnScheme, Raised};
 
@@ -36,9 +37,10 @@ impl Released {
         py.detach(|| read_released::<3>(&path)).map(Self::of).map_err(raised)
     }
 
-    /// Writes it (Parquet), as `unlift obfuscate` does.
-    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        py.detach(|| write_released(&path, &self.0)).map_err(raised)
+    /// Writes it (Parquet), as `unlift obfuscate` does. What is there and no released map stays, unless `force`.
+    #[pyo3(signature = (path, *, force=false))]
+    fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
+        save(py, (path, force), Kind::Released, |path| write_released(path, &self.0))
     }
 
     fn __len__(&self) -> usize {
@@ -152,9 +154,11 @@ impl Truth {
         Ok(Self { of: Whose::File(Arc::new(original)), secret: Arc::new(secret) })
     }
 
-    /// Writes it (Parquet), as `unlift obfuscate` does: keep it to yourself.
-    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        py.detach(|| write_truth(&path, self.original(), &self.secret)).map_err(raised)
+    /// Writes it (Parquet), as `unlift obfuscate` does, for your eyes only. What is there and no truth stays, unless `force`.
+    #[pyo3(signature = (path, *, force=false))]
+    fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
+        let write = |path: &Path| write_truth(path, self.original(), &self.secret);
+        save(py, (path, force), Kind::Truth, write)
     }
 
     /// The points `(n, 3)`.

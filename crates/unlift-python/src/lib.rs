@@ -11,6 +11,7 @@
 mod arrays;
 mod audit;
 mod errors;
+mod files;
 mod hidden;
 mod laws;
 mod lists;

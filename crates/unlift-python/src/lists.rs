@@ -10,10 +10,11 @@ use unlift::neighbors::{self, Needs};
 use unlift::released;
 use unlift::{About, RecordId, RowOrder};
 use unlift_audit::sources;
-use unlift_io::stage::{read_neighborhoods, write_neighborhoods};
+use unlift_io::stage::{Kind, read_neighborhoods, write_neighborhoods};
 
 use crate::arrays::{indices, numbers, to_array, told};
 use crate::errors::{raised, wrong};
+use crate::files::save;
 use crate::hidden::{Hidden, Released, released_of};
 use crate::work;
 
@@ -49,9 +50,10 @@ impl Neighborhoods {
         Ok(Self(Arc::new(lists.map_err(raised)?)))
     }
 
-    /// Writes them (Parquet), as `unlift neighbors` does.
-    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        py.detach(|| write_neighborhoods(&path, &self.0)).map_err(raised)
+    /// Writes them (Parquet), as `unlift neighbors` does. What is there and no lists stays, unless `force`.
+    #[pyo3(signature = (path, *, force=false))]
+    fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
+        save(py, (path, force), Kind::Neighborhoods, |path| write_neighborhoods(path, &self.0))
     }
 
     /// Number of lists.

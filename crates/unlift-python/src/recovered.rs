@@ -8,10 +8,11 @@ use pyo3::types::PyDict;
 use unlift::audit::{Plan, measure};
 use unlift::evaluate::blind;
 use unlift::recover::{RecoverOptions, Recovered as Found, Solver, recover as solve};
-use unlift_io::stage::{read_recovered, write_recovered};
+use unlift_io::stage::{Kind, read_recovered, write_recovered};
 
 use crate::arrays::{to_array, to_rows};
 use crate::errors::{raised, wrong};
+use crate::files::save;
 use crate::hidden::{Hidden, Released, released_of, truth_of};
 use crate::lists::Neighborhoods;
 use crate::plan::{delta, thresholds};
@@ -31,9 +32,10 @@ impl Recovered {
         Ok(Self(Arc::new(found)))
     }
 
-    /// Writes them (Parquet), as `unlift recover` does.
-    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        py.detach(|| write_recovered(&path, &self.0)).map_err(raised)
+    /// Writes them (Parquet), as `unlift recover` does. What is there and no recovered points stays, unless `force`.
+    #[pyo3(signature = (path, *, force=false))]
+    fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
+        save(py, (path, force), Kind::Recovered, |path| write_recovered(path, &self.0))
     }
 
     fn __len__(&self) -> usize {
