@@ -12,7 +12,7 @@ use unlift::{About, RecordId, RowOrder};
 use unlift_audit::sources;
 use unlift_io::stage::{Kind, read_neighborhoods, write_neighborhoods};
 
-use crate::arrays::{indices, numbers, to_array, told};
+use crate::arrays::{numbers, to_array, told, whole};
 use crate::errors::{raised, wrong};
 use crate::files::save;
 use crate::hidden::{Hidden, Released, released_of};
@@ -93,31 +93,25 @@ fn lists_of(
     needs: Needs,
 ) -> PyResult<neighbors::Neighborhoods> {
     let (n, n_slots) = (released.n_records(), released.n_slots());
-    // One more than there are records, so that -1 becomes 0.
-    let shifted = records.call_method1("__add__", (1,))?;
-    let (rows, shape) = indices("records", &shifted, &[2], n as u64 + 1)?;
+    let (rows, shape) = whole("records", records, &[2], -1..=n as i64 - 1)?;
     if shape[0] != n_slots {
         let expected = format!("an array of shape ({n_slots}, k), one row per hidden point");
         return Err(wrong("records", expected, told(&shape)));
     }
-    let columns = shape[1];
-    let scores = match scores {
-        None => None,
-        Some(scores) => {
-            let shape: Vec<usize> = scores.getattr("shape")?.extract()?;
-            if shape != [n_slots, columns] {
-                let expected = format!("the shape of the records, {}", told(&[n_slots, columns]));
-                return Err(wrong("scores", expected, told(&shape)));
-            }
-            Some(numbers("scores", &scores.call_method0("ravel")?)?)
+    let scores = match scores.map(|scores| numbers("scores", scores)).transpose()? {
+        Some((_, found)) if found != shape => {
+            let expected = format!("the shape of the records, {}", told(&shape));
+            return Err(wrong("scores", expected, told(&found)));
         }
+        scores => scores.map(|(values, _)| values),
     };
+    let columns = shape[1];
     let (mut offsets, mut kept) = (vec![0], Vec::new());
     let mut kept_scores = scores.as_ref().map(|_| Vec::new());
     for slot in 0..n_slots {
         let row = slot * columns..(slot + 1) * columns;
-        for at in row.filter(|&at| rows[at] > 0).take(k) {
-            kept.push(RecordId(rows[at] - 1));
+        for at in row.filter(|&at| rows[at] >= 0).take(k) {
+            kept.push(RecordId(rows[at] as u32));
             if let (Some(kept), Some(scores)) = (&mut kept_scores, &scores) {
                 kept.push(scores[at] as f32);
             }

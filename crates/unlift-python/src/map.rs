@@ -8,7 +8,7 @@ use unlift_audit::{OutlierFilter, Preparation, Prepared, Quiet, check_scale, map
 use unlift_io::hash::{hash_files, hash_positions};
 use unlift_report::document::Input;
 
-use crate::arrays::{descriptors, to_array, to_descriptors, to_rows, with_rows};
+use crate::arrays::{descriptors, rows, to_array, to_descriptors, to_rows};
 use crate::errors::{raised, wrong};
 
 /// Points to audit, with descriptors where there are some: in meters with a scale, else in the usual distance to the K-th
@@ -59,7 +59,8 @@ impl Map {
     ) -> PyResult<Self> {
         let preparation = preparation(scale, k, max_points, outlier_filter, seed)?;
         let given = descriptors.map(|given| self::descriptors("descriptors", given)).transpose()?;
-        with_rows("positions", positions, |rows| {
+        let rows = &rows("positions", positions)?[..];
+        {
             if let Some(given) = given.as_ref().filter(|given| given.len() != rows.len()) {
                 let expected = format!("{} rows, one per point", rows.len());
                 return Err(wrong("descriptors", expected, given.len()));
@@ -79,7 +80,7 @@ impl Map {
             let (cameras, notes) =
                 (Vec::new(), prepared.notes.iter().cloned().chain(zeros).collect());
             Ok(Self { prepared: Arc::new(prepared), input, cameras, up: None, notes })
-        })
+        }
     }
 
     fn __len__(&self) -> usize {

@@ -1,0 +1,65 @@
+"""Arguments that are taken as they are meant, or refused in one line."""
+
+import numpy as np
+import pytest
+
+import unlift
+
+
+@pytest.fixture(scope="module")
+def points():
+    return np.random.default_rng(7).uniform(0, 4, (400, 3))
+
+
+@pytest.fixture(scope="module")
+def hidden(points):
+    return unlift.obfuscate(unlift.Map(points, scale=1.0), "olc", seed=1)
+
+
+@pytest.mark.parametrize("dtype", ["u1", "i1", "u2", "u4", "i8", "u8"])
+def test_records_are_those_of_the_array_in_every_kind_of_number(points, dtype):
+    # As many records as the kind can name.
+    n = min(256, int(np.iinfo(dtype).max) + 1)
+    some = unlift.obfuscate(unlift.Map(points[:n], scale=1.0), "olc", seed=1)
+    rows = ((np.arange(n)[:, None] + [1, 2, 3]) % n).astype(dtype)
+    lists = unlift.Neighborhoods(some, rows, np.tile([3, 2, 1], (n, 1)))
+    assert rows.max() == n - 1
+    # Lists are kept in the order of records.
+    np.testing.assert_array_equal(lists.records, np.sort(rows, 1).ravel())
+    np.testing.assert_array_equal(lists.offsets, 3 * np.arange(n + 1))
+    # Rows of numbers are arrays, too.
+    assert unlift.Neighborhoods(some, rows.tolist(), [[3.0, 2.0, 1.0]] * n).scores[:3].tolist() == [3, 2, 1]
+    if dtype[0] == "i":
+        rows[:, 1] = -1
+        np.testing.assert_array_equal(unlift.Neighborhoods(some, rows).records, np.sort(rows[:, [0, 2]], 1).ravel())
+
+
+def masked(points):
+    return np.ma.masked_array(points, mask=points > 3.9)
+
+
+def lacking(points):
+    points = points.copy()
+    points[17, 1] = np.nan
+    return points
+
+
+@pytest.mark.parametrize(
+    "wrong, said",
+    [
+        (lambda p, h: unlift.Neighborhoods(h, np.full((400, 2), 2**64 - 1, "u8")), "records: expected numbers from -1 to 399, found 18446744073709551615"),
+        (lambda p, h: unlift.Neighborhoods(h, np.full((400, 1), 400)), "records: expected numbers from -1 to 399, found 400"),
+        (lambda p, h: unlift.Neighborhoods(h, [[1], [2, 3]]), "records: expected an array of whole numbers, found setting an array"),
+        (lambda p, h: unlift.Neighborhoods(h, np.zeros((400, 2), int), [1.0]), r"scores: expected the shape of the records, \(400, 2\), found \(1,\)"),
+        (lambda p, h: unlift.Map([[1, 2, 3], [1]]), "positions: expected an array of numbers, found setting an array"),
+        (lambda p, h: unlift.Map(masked(p), scale=1.0), "positions: expected an array of numbers without a mask .*, found a masked array"),
+        (lambda p, h: unlift.Map(p, masked(p.astype("f4")), scale=1.0), "descriptors: .* found a masked array"),
+        (lambda p, h: unlift.Lines(masked(p), p), "points: .* found a masked array"),
+        (lambda p, h: unlift.Map(lacking(p), scale=1.0), "point 17: expected finite coordinates"),
+        (lambda p, h: unlift.Map(lacking(p), scale=1.0, outlier_filter=(20, 2.0)), "point 17: expected finite coordinates"),
+    ],
+)
+def test_what_is_wrong_is_said_in_a_line(points, hidden, wrong, said):
+    with pytest.raises(unlift.UnliftError, match=said) as error:
+        wrong(points, hidden)
+    assert "\n" not in str(error.value)
