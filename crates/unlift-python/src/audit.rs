@@ -1,7 +1,6 @@
 //! The audit: a map in, a report out.
 
 use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
@@ -25,14 +24,14 @@ pub fn audit(
     tell: Option<Py<PyAny>>,
 ) -> PyResult<Report> {
     let (started, by) = (Instant::now(), Raised::default());
-    let (plan, notes) = asked.plan(&map.prepared, &by)?;
+    let (plan, notes) = asked.plan(py, &map.prepared, &by)?;
     let gates = asked.gates.iter().map(|text| Gate::parse(text));
     let gates = gates.collect::<Result<Vec<_>, _>>().map_err(raised)?;
     let mut options = serde_json::Map::new();
     if let Some(k) = asked.source_k {
         options.insert("source_k".to_owned(), k.into());
     }
-    let stop = Arc::new(AtomicBool::new(false));
+    let stop = by.stop();
     let heard = Heard { tell, stop: Arc::clone(&stop), failed: Mutex::new(None) };
     let heard = Arc::new(heard);
     let progress = Arc::clone(&heard);
@@ -60,7 +59,7 @@ pub fn audit(
             command: None,
             started,
         };
-        find(job, None).map_err(|error| error.to_string())
+        find(job, None)
     });
     if let Some(error) = heard.failed.lock().unwrap_or_else(PoisonError::into_inner).take() {
         return Err(error);

@@ -17,6 +17,7 @@ use crate::errors::raised;
 use crate::files::save;
 use crate::map::Map;
 use crate::own::{OwnScheme, Raised};
+use crate::work;
 
 /// All that an attacker sees of a map.
 #[pyclass(frozen, module = "unlift")]
@@ -267,9 +268,11 @@ pub fn obfuscate(
     let scheme = scheme_of(scheme, &SchemeOptions::usual(unit), &by)?;
     let key = seed.map_or_else(Key::fresh, |seed| Ok(Key::from_seed(seed))).map_err(raised)?;
     let prepared = Arc::clone(&map.prepared);
-    let hidden =
-        py.detach(|| hide(&*scheme, &prepared.original, prepared.descriptors.as_ref(), &key));
-    let (released, secret) = hidden.map_err(|error| by.as_cause_of(py, raised(error)))?;
-    let truth = Truth { of: Whose::Map(prepared), secret: Arc::new(secret) };
+    let hidden = work::run(py, None, Some(by.stop()), move || {
+        let (original, descriptors) = (&prepared.original, prepared.descriptors.as_ref());
+        hide(&*scheme, original, descriptors, &key)
+    });
+    let (released, secret) = hidden.map_err(|error| by.as_cause_of(py, error))?;
+    let truth = Truth { of: Whose::Map(Arc::clone(&map.prepared)), secret: Arc::new(secret) };
     Ok(Hidden { released: Released::of(released), truth })
 }

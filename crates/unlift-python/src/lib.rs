@@ -10,6 +10,7 @@
 
 mod arrays;
 mod audit;
+mod calls;
 mod errors;
 mod files;
 mod hidden;
@@ -52,6 +53,7 @@ mod _unlift {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        super::calls::register(module)?;
         super::names(module)
     }
 }

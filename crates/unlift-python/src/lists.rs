@@ -2,10 +2,12 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use unlift::neighbors::oracle::{Noise, Outliers, TrueNeighbors, search};
+use unlift::neighbors::sources::Named;
 use unlift::neighbors::{self, Needs};
 use unlift::released;
 use unlift::{About, RecordId, RowOrder};
@@ -150,6 +152,24 @@ pub fn returned(
     lists_of(released, given, None, k, needs)
 }
 
+/// The process that has used networks, whose threads a forked child lacks; 0 before.
+static NETWORKS_OF: AtomicU32 = AtomicU32::new(0);
+
+/// The source called `name`, with lists of `k` if that is given.
+pub fn named(name: &str, k: Option<usize>) -> PyResult<Named> {
+    let named = sources::named(name).map_err(raised)?;
+    if named.name() == "learned" {
+        let own = std::process::id();
+        let earlier = NETWORKS_OF.compare_exchange(0, own, Ordering::Relaxed, Ordering::Relaxed);
+        if earlier.is_err_and(|earlier| earlier != own) {
+            // It would wait for them.
+            let expected = "a process whose parent has not used it (get_context(\"spawn\"))";
+            return Err(wrong("learned", expected, "a forked child"));
+        }
+    }
+    Ok(if let Some(k) = k { named.with_k(k) } else { named })
+}
+
 /// Lists by a source of the attacker's own, as `unlift neighbors find` makes them.
 #[pyfunction]
 #[pyo3(signature = (released, source, *, k=None, seed=0, threads=None))]
@@ -162,12 +182,10 @@ pub fn find(
     threads: Option<usize>,
 ) -> PyResult<Neighborhoods> {
     let Released(released) = released_of(released)?;
-    let named = sources::named(source).map_err(raised)?;
-    let named = if let Some(k) = k { named.with_k(k) } else { named };
-    let source = named.of_dimension::<3>().map_err(raised)?;
-    source.supports(&released).map_err(raised)?;
+    let source = named(source, k)?.of_dimension::<3>().map_err(raised)?;
     let lists = work::run(py, threads, None, move || {
-        source.lists(&released, source.k(&released), seed).map_err(|error| error.to_string())
+        source.supports(&released)?;
+        source.lists(&released, source.k(&released), seed)
     })?;
     Ok(Neighborhoods(Arc::new(lists)))
 }
@@ -185,11 +203,12 @@ pub fn oracle(
 ) -> PyResult<Neighborhoods> {
     let noise = Noise::from_name(noise).map_err(raised)?;
     let (released, truth) = hidden.parts();
-    let lists = py.detach(|| {
+    let (slots_per_record, truth) = (released.0.slots_per_record(), truth.clone());
+    let lists = work::run(py, None, None, move || {
         let knn = search(truth.original())?;
-        let near = TrueNeighbors::new(&knn, &truth.secret, released.0.slots_per_record(), k)?;
+        let near = TrueNeighbors::new(&knn, &truth.secret, slots_per_record, k)?;
         let outliers = Outliers::new(noise, &near, &knn, &truth.secret, seed)?;
         near.lists(inlier_ratio, &outliers, seed)
-    });
-    Ok(Neighborhoods(Arc::new(lists.map_err(raised)?)))
+    })?;
+    Ok(Neighborhoods(Arc::new(lists)))
 }

@@ -1,15 +1,19 @@
 //! From arguments to a plan: the usual one, with what was asked for.
 
+use std::sync::Arc;
+
 use pyo3::prelude::*;
 use unlift::audit::{NeighborsBy, Plan, Threshold};
 use unlift::neighbors::oracle::Noise;
 use unlift::obfuscate::SchemeOptions;
 use unlift::recover::{Delta, Solver};
-use unlift_audit::{Prepared, check_thresholds, sources};
+use unlift_audit::{Prepared, check_thresholds};
 
 use crate::errors::{raised, wrong};
 use crate::hidden::scheme_of;
+use crate::lists;
 use crate::own::{OwnSource, Raised};
+use crate::work;
 
 /// What an audit was asked for; `None` is as usual.
 #[derive(FromPyObject)]
@@ -50,13 +54,15 @@ pub struct Asked<'py> {
 
 impl Asked<'_> {
     /// The plan for `prepared`, and what a user should know about it.
-    pub fn plan(&self, prepared: &Prepared, by: &Raised) -> PyResult<(Plan<3>, Vec<String>)> {
+    pub fn plan(
+        &self,
+        py: Python<'_>,
+        prepared: &Arc<Prepared>,
+        by: &Raised,
+    ) -> PyResult<(Plan<3>, Vec<String>)> {
         let points = prepared.original.reveal();
         let usual = Plan::<3>::new(points.unit()).for_map(points.len(), self.k);
         let thresholds = thresholds(self.thresholds.as_ref(), &usual.thresholds)?;
-        let typed = self.thresholds.is_some();
-        let note = check_thresholds(points.positions(), points.unit(), &thresholds, typed);
-        let mut notes: Vec<String> = note.map_err(raised)?.into_iter().collect();
         let options = SchemeOptions::usual(points.unit());
         let schemes = match &self.schemes {
             Some(schemes) => schemes
@@ -67,12 +73,6 @@ impl Asked<'_> {
         };
         let neighbors = self.neighbors.iter().map(|source| self.source(source, by));
         let neighbors = neighbors.collect::<PyResult<Vec<_>>>()?;
-        for source in neighbors.iter().filter_map(NeighborsBy::source) {
-            if let Some(descriptors) = &prepared.descriptors {
-                source.takes(descriptors).map_err(raised)?;
-            }
-            notes.extend(source.note(points.len()));
-        }
         let noise = self
             .oracle_noise
             .as_ref()
@@ -97,19 +97,31 @@ impl Asked<'_> {
             ..usual
         };
         plan.check(points.len(), prepared.descriptors.is_some()).map_err(raised)?;
-        Ok((plan, notes))
+        let (prepared, typed) = (Arc::clone(prepared), self.thresholds.is_some());
+        work::run(py, self.threads, None, move || {
+            let points = prepared.original.reveal();
+            let (positions, unit) = (points.positions(), points.unit());
+            let note = check_thresholds(positions, unit, &plan.thresholds, typed)?;
+            let mut notes: Vec<String> = note.into_iter().collect();
+            for source in plan.neighbors.iter().filter_map(NeighborsBy::source) {
+                if let Some(descriptors) = &prepared.descriptors {
+                    source.takes(descriptors)?;
+                }
+                notes.extend(source.note(points.len()));
+            }
+            Ok::<_, unlift_audit::Error>((plan, notes))
+        })
     }
 
     /// A source of neighborhoods, a name or a function.
     fn source(&self, given: &Bound<'_, PyAny>, by: &Raised) -> PyResult<NeighborsBy<3>> {
         let Ok(name) = given.extract::<String>() else {
-            return Ok(NeighborsBy::Source(std::sync::Arc::new(OwnSource::new(given, by)?)));
+            return Ok(NeighborsBy::Source(Arc::new(OwnSource::new(given, by)?)));
         };
         if name == "oracle" {
             return Ok(NeighborsBy::Oracle);
         }
-        let named = sources::named(&name).map_err(raised)?;
-        let named = if let Some(k) = self.source_k { named.with_k(k) } else { named };
+        let named = lists::named(&name, self.source_k)?;
         Ok(NeighborsBy::Source(named.of_dimension().map_err(raised)?))
     }
 }

@@ -34,6 +34,10 @@ def test_records_are_those_of_the_array_in_every_kind_of_number(points, dtype):
         np.testing.assert_array_equal(unlift.Neighborhoods(some, rows).records, np.sort(rows[:, [0, 2]], 1).ravel())
 
 
+def broken(points):
+    return unlift.Lines(points + 1.0, np.tile([0.0, 0.0, 1.0], (len(points), 1)))
+
+
 def masked(points):
     return np.ma.masked_array(points, mask=points > 3.9)
 
@@ -63,3 +67,32 @@ def test_what_is_wrong_is_said_in_a_line(points, hidden, wrong, said):
     with pytest.raises(unlift.UnliftError, match=said) as error:
         wrong(points, hidden)
     assert "\n" not in str(error.value)
+
+
+def test_a_broken_law_is_told_by_its_exception_alone(capfd):
+    sizes = set()
+
+    @unlift.scheme
+    def level(points, random):
+        sizes.add(len(points))
+        if len(points) < 2:
+            raise ValueError("too few")
+        return unlift.Lines(points, np.column_stack([random.normal(size=(len(points), 2)), np.zeros(len(points))]))
+
+    unlift.testing.check_scheme(level)
+    assert sizes == {0, 1, 2, 3, 7, 120, 200, 300, 301, 600, 700}
+    with pytest.raises(AssertionError, match="broken") as error:
+        unlift.testing.check_scheme(broken)
+    assert error.value.__cause__ is None
+    assert capfd.readouterr().err == ""
+
+    @unlift.scheme
+    def refuses(points):
+        if len(points) < 600:
+            raise ValueError(f"not of {len(points)}")
+        return level(points)
+
+    # What the exception tells of, not what was rightly refused before.
+    with pytest.raises(AssertionError, match="not of 200") as error:
+        unlift.testing.check_scheme(refuses)
+    assert str(error.value.__cause__) == "not of 200"
