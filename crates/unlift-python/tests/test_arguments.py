@@ -38,6 +38,10 @@ def broken(points):
     return unlift.Lines(points + 1.0, np.tile([0.0, 0.0, 1.0], (len(points), 1)))
 
 
+def shuffled(points, random):
+    return unlift.Lines(random.permutation(points), random.normal(size=points.shape))
+
+
 def masked(points):
     return np.ma.masked_array(points, mask=points > 3.9)
 
@@ -61,6 +65,7 @@ def lacking(points):
         (lambda p, h: unlift.Lines(masked(p), p), "points: .* found a masked array"),
         (lambda p, h: unlift.Map(lacking(p), scale=1.0), "point 17: expected finite coordinates"),
         (lambda p, h: unlift.Map(lacking(p), scale=1.0, outlier_filter=(20, 2.0)), "point 17: expected finite coordinates"),
+        (lambda p, h: unlift.obfuscate(unlift.Map(p, scale=1.0), shuffled, seed=1), "shuffled: truth: expected points nearer to their own records"),
     ],
 )
 def test_what_is_wrong_is_said_in_a_line(points, hidden, wrong, said):
