@@ -20,10 +20,11 @@ use crate::work::{self, Heard};
 pub fn audit(
     py: Python<'_>,
     map: &Map,
-    asked: Asked<'_>,
+    asked: &Bound<'_, PyAny>,
     tell: Option<Py<PyAny>>,
 ) -> PyResult<Report> {
     let (started, by) = (Instant::now(), Raised::default());
+    let asked = asked.extract::<Asked<'_>>().map_err(|error| of_argument(py, error))?;
     let (plan, notes) = asked.plan(py, &map.prepared, &by)?;
     let gates = asked.gates.iter().map(|text| Gate::parse(text));
     let gates = gates.collect::<Result<Vec<_>, _>>().map_err(raised)?;
@@ -65,4 +66,16 @@ pub fn audit(
         return Err(error);
     }
     found.map(Report::of).map_err(|error| by.as_cause_of(py, error))
+}
+
+/// An error about an item of the dict, as Python tells it of an argument.
+fn of_argument(py: Python<'_>, error: PyErr) -> PyErr {
+    let text = error.value(py).to_string();
+    match (text.rsplit_once('.'), error.cause(py)) {
+        (Some((_, name)), Some(cause)) => {
+            let text = format!("argument '{name}': {}", cause.value(py));
+            PyErr::from_type(cause.get_type(py), text)
+        }
+        _ => error,
+    }
 }

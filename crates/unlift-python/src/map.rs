@@ -42,6 +42,13 @@ fn preparation(
     }
     let outlier_filter =
         outlier_filter.map(|(neighbors, std_ratio)| OutlierFilter { neighbors, std_ratio });
+    let is_usable = |filter: &OutlierFilter| {
+        filter.neighbors > 0 && filter.std_ratio.is_finite() && filter.std_ratio > 0.0
+    };
+    if let Some(filter) = outlier_filter.filter(|filter| !is_usable(filter)) {
+        let found = format!("({}, {})", filter.neighbors, filter.std_ratio);
+        return Err(wrong("outlier_filter", "(neighbors, ratio), both above 0", found));
+    }
     Ok(Preparation { scale, k, outlier_filter, max_points, seed })
 }
 

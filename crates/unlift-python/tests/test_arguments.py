@@ -16,6 +16,11 @@ def hidden(points):
     return unlift.obfuscate(unlift.Map(points, scale=1.0), "olc", seed=1)
 
 
+def cheap(points, schemes=("olc",), *more, **options):
+    options = {"inlier_ratios": [0.5], "solvers": ["consensus"], "k": 20} | options
+    return unlift.audit(unlift.Map(points, scale=1.0), schemes, *more, **options)
+
+
 @pytest.mark.parametrize("dtype", ["u1", "i1", "u2", "u4", "i8", "u8"])
 def test_records_are_those_of_the_array_in_every_kind_of_number(points, dtype):
     # As many records as the kind can name.
@@ -52,6 +57,16 @@ def lacking(points):
     return points
 
 
+@unlift.scheme(name="olc")
+def ours(points):
+    return unlift.Lines(points, points)
+
+
+def twice(points):
+    lists = unlift.source(lambda released: released, name="near")
+    return cheap(points, ["olc"], [lists, unlift.source(lambda released: 0, name="near")])
+
+
 @pytest.mark.parametrize(
     "wrong, said",
     [
@@ -65,6 +80,14 @@ def lacking(points):
         (lambda p, h: unlift.Lines(masked(p), p), "points: .* found a masked array"),
         (lambda p, h: unlift.Map(lacking(p), scale=1.0), "point 17: expected finite coordinates"),
         (lambda p, h: unlift.Map(lacking(p), scale=1.0, outlier_filter=(20, 2.0)), "point 17: expected finite coordinates"),
+        (lambda p, h: unlift.Map(p, scale=1.0, outlier_filter=(20, -1.0)), r"outlier_filter: expected \(neighbors, ratio\), both above 0, found \(20, -1\)"),
+        (lambda p, h: unlift.Map(p, scale=1.0, outlier_filter=(20, float("nan"))), r"outlier_filter: .* found \(20, NaN\)"),
+        (lambda p, h: unlift.Map(p, scale=1.0, outlier_filter=(20, float("inf"))), r"outlier_filter: .* found \(20, inf\)"),
+        (lambda p, h: unlift.Map(p, scale=1.0, outlier_filter=(0, 2.0)), r"outlier_filter: .* found \(0, 2\)"),
+        (lambda p, h: cheap(p, thresholds=[0.1, "0.10"]), "thresholds: expected each once, found 0.10 again"),
+        (lambda p, h: cheap(p, thresholds=[]), "thresholds: expected at least one, found none"),
+        (lambda p, h: cheap(p, [ours]), "schemes: expected functions with a name that unlift does not use, found olc"),
+        (lambda p, h: twice(p), "neighbors: expected each name once, found near"),
         (lambda p, h: unlift.obfuscate(unlift.Map(p, scale=1.0), shuffled, seed=1), "shuffled: truth: expected points nearer to their own records"),
     ],
 )
@@ -72,6 +95,20 @@ def test_what_is_wrong_is_said_in_a_line(points, hidden, wrong, said):
     with pytest.raises(unlift.UnliftError, match=said) as error:
         wrong(points, hidden)
     assert "\n" not in str(error.value)
+
+
+def test_what_python_refuses_it_refuses_as_ever(points):
+    with pytest.raises(OverflowError, match="argument 'k': can't convert negative int to unsigned"):
+        cheap(points, k=-1)
+    with pytest.raises(TypeError, match="argument 'seed': 'str' object"):
+        cheap(points, seed="one")
+
+
+def test_choices_count_once_as_on_the_command_line(points):
+    rows = cheap(
+        points, ["olc"], ["oracle", "oracle"], inlier_ratios=[0.5, 0.5], oracle_noise=["near", "near"], solvers=["consensus"] * 2
+    ).rows
+    assert len(rows) == 1
 
 
 def test_a_broken_law_is_told_by_its_exception_alone(capfd):
