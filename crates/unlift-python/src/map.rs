@@ -22,7 +22,9 @@ pub struct Map {
     /// Camera centers in the unit of the map.
     pub cameras: Vec<[f64; 3]>,
     pub up: Option<[f64; 3]>,
-    /// What a user should know.
+    /// What was not read of its files; may name them.
+    skipped: Vec<String>,
+    /// What whoever reads figures of it must know; no paths, as it is told in share-safe reports, too.
     pub notes: Vec<String>,
 }
 
@@ -88,9 +90,16 @@ impl Map {
             };
             let zeros = prepared.descriptors.as_ref().and_then(maps::zeros);
             let notes = prepared.notes.iter().cloned().chain(zeros).collect();
-            let cameras = Vec::new();
+            let (cameras, skipped) = (Vec::new(), Vec::new());
             let prepared = Arc::new(prepared);
-            Ok::<_, unlift_audit::Error>(Self { prepared, input, cameras, up: None, notes })
+            Ok::<_, unlift_audit::Error>(Self {
+                prepared,
+                input,
+                cameras,
+                up: None,
+                skipped,
+                notes,
+            })
         })
     }
 
@@ -129,6 +138,12 @@ impl Map {
     #[getter]
     fn unit_in_map_units(&self) -> f64 {
         self.prepared.unit_in_map_units
+    }
+
+    /// What you should know of how it was read and made ready; a report has those that matter for its figures.
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.skipped.iter().chain(&self.notes).cloned().collect()
     }
 
     /// Which of the points that were given are left, ascending `(n,)`.
@@ -173,7 +188,8 @@ pub fn read(
             },
             cameras: input.cameras.iter().map(|center| center.map(|x| x / unit)).collect(),
             up: input.up,
-            notes: input.skipped.into_iter().chain(prepared.notes.iter().cloned()).collect(),
+            skipped: input.skipped,
+            notes: prepared.notes.clone(),
             prepared: Arc::new(prepared),
         })
     })
