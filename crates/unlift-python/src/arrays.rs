@@ -1,67 +1,118 @@
 //! NumPy arrays in and out: shapes and kinds checked, and no copy where the layout allows it.
 
+use std::fmt::Display;
+use std::ops::RangeInclusive;
+
 use numpy::{Element, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use unlift::Descriptors;
 use unlift::descriptors::Values;
+use unlift::{Descriptors, OneLine};
 
 use crate::errors::{raised, wrong};
 
-/// What `given` is as an array of `T`, contiguous; its own memory where it is one already. `kinds` are NumPy's letters of what is
-/// taken, `what` their name.
-fn contiguous<'py, T: Element>(
+/// Numbers of any kind: NumPy's letters of what is taken, and their name.
+const NUMBERS: (&str, &str) = ("fiu", "numbers");
+/// Whole numbers.
+const WHOLE: (&str, &str) = ("iu", "whole numbers");
+/// Values of descriptors.
+const DESCRIPTORS: (&str, &str) = ("fiu", "uint8 or floats");
+
+/// What `given` is as an array of `kinds`; its own memory where it is one already.
+fn array<'py>(
     name: &str,
     given: &Bound<'py, PyAny>,
     (kinds, what): (&str, &str),
-) -> PyResult<Bound<'py, PyArrayDyn<T>>> {
-    let py = given.py();
-    let numpy = py.import("numpy")?;
-    let array = numpy.call_method1("asarray", (given,))?;
+) -> PyResult<Bound<'py, PyAny>> {
+    let numpy = given.py().import("numpy")?;
+    // What stands behind a mask would pass for a value.
+    if given.is_instance(&numpy.getattr("ma")?.getattr("MaskedArray")?)? {
+        let expected = format!("an array of {what} without a mask (`.filled(..)` makes one)");
+        return Err(wrong(name, expected, "a masked array"));
+    }
+    let array = numpy.call_method1("asarray", (given,)).map_err(|error| {
+        let py = given.py();
+        // NumPy's own errors about rows of different lengths; neither an interrupt nor a lack of memory.
+        match error.is_instance_of::<PyValueError>(py) || error.is_instance_of::<PyTypeError>(py) {
+            true => wrong(name, format!("an array of {what}"), OneLine(error.value(py))),
+            false => error,
+        }
+    })?;
     let dtype = array.getattr("dtype")?;
     let kind: String = dtype.getattr("kind")?.extract()?;
     if !kinds.contains(&kind) {
         return Err(wrong(name, format!("an array of {what}"), format!("one of {dtype}")));
     }
-    let options = PyDict::new(py);
-    options.set_item("dtype", T::get_dtype(py))?;
-    let array = numpy.call_method("ascontiguousarray", (array,), Some(&options))?;
-    array.cast_into().map_err(|error| raised(error.to_string()))
+    Ok(array)
 }
 
-/// Numbers of any kind.
-const NUMBERS: (&str, &str) = ("fiu", "numbers");
-/// Whole numbers.
-const WHOLE: (&str, &str) = ("iu", "whole numbers");
-
-/// Calls `then` with the rows of an array `(n, 3)`.
-pub fn with_rows<T>(
-    name: &str,
-    given: &Bound<'_, PyAny>,
-    then: impl FnOnce(&[[f64; 3]]) -> PyResult<T>,
-) -> PyResult<T> {
-    let array = contiguous::<f64>(name, given, NUMBERS)?;
-    match array.shape() {
-        [_, 3] => {}
-        shape => return Err(wrong(name, "an array of shape (n, 3)", told(shape))),
-    }
-    let array = array.readonly();
-    let values = array.as_slice()?;
-    then(values.as_chunks::<3>().0)
+/// `array` as one of `T`, contiguous; its own memory where it is one already.
+fn contiguous<'py, T: Element>(array: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<T>>> {
+    let py = array.py();
+    let options = PyDict::new(py);
+    options.set_item("dtype", T::get_dtype(py))?;
+    let made = py.import("numpy")?.call_method("ascontiguousarray", (array,), Some(&options))?;
+    made.cast_into().map_err(|error| raised(error.to_string()))
 }
 
 /// The rows of an array `(n, 3)`.
 pub fn rows(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; 3]>> {
-    with_rows(name, given, |rows| Ok(rows.to_vec()))
+    let array = contiguous::<f64>(&array(name, given, NUMBERS)?)?;
+    match array.shape() {
+        [_, 3] => Ok(array.readonly().as_slice()?.as_chunks::<3>().0.to_vec()),
+        shape => Err(wrong(name, "an array of shape (n, 3)", told(shape))),
+    }
+}
+
+/// The numbers of an array, and its shape.
+pub fn numbers(name: &str, given: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Vec<usize>)> {
+    let array = contiguous::<f64>(&array(name, given, NUMBERS)?)?;
+    Ok((array.readonly().as_slice()?.to_vec(), array.shape().to_vec()))
 }
 
 /// The numbers of an array `(n,)`.
-pub fn numbers(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
-    let array = contiguous::<f64>(name, given, NUMBERS)?;
-    match array.shape() {
-        [_] => Ok(array.readonly().as_slice()?.to_vec()),
-        shape => Err(wrong(name, "an array of shape (n,)", told(shape))),
+pub fn column(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    match numbers(name, given)? {
+        (values, shape) if shape.len() == 1 => Ok(values),
+        (_, shape) => Err(wrong(name, "an array of shape (n,)", told(&shape))),
     }
+}
+
+/// Whole numbers in `range`, of an array with one of `dims` axes, and its shape.
+pub fn whole(
+    name: &str,
+    given: &Bound<'_, PyAny>,
+    dims: &[usize],
+    range: RangeInclusive<i64>,
+) -> PyResult<(Vec<i64>, Vec<usize>)> {
+    let array = array(name, given, WHOLE)?;
+    let unsigned = array.getattr("dtype")?.getattr("kind")?.extract::<String>()? == "u";
+    // Each in the widest of its kind: the largest of uint64 would pass for -1 among int64.
+    match unsigned {
+        true => within(name, &contiguous::<u64>(&array)?, dims, range),
+        false => within(name, &contiguous::<i64>(&array)?, dims, range),
+    }
+}
+
+fn within<T: Element + Copy + Display + TryInto<i64>>(
+    name: &str,
+    array: &Bound<'_, PyArrayDyn<T>>,
+    dims: &[usize],
+    range: RangeInclusive<i64>,
+) -> PyResult<(Vec<i64>, Vec<usize>)> {
+    let shape = array.shape().to_vec();
+    if !dims.contains(&shape.len()) {
+        let axes: Vec<String> = dims.iter().map(usize::to_string).collect();
+        let expected = format!("an array of {} axes", axes.join(" or "));
+        return Err(wrong(name, expected, told(&shape)));
+    }
+    let one = |&value: &T| match value.try_into() {
+        Ok(index) if range.contains(&index) => Ok(index),
+        _ => Err(wrong(name, format!("numbers from {} to {}", range.start(), range.end()), value)),
+    };
+    let values = array.readonly().as_slice()?.iter().map(one).collect::<PyResult<_>>()?;
+    Ok((values, shape))
 }
 
 /// Whole numbers from 0 below `most`, of an array with one of `dims` axes, and its shape.
@@ -69,38 +120,25 @@ pub fn indices(
     name: &str,
     given: &Bound<'_, PyAny>,
     dims: &[usize],
-    most: u64,
+    most: u32,
 ) -> PyResult<(Vec<u32>, Vec<usize>)> {
-    let array = contiguous::<i64>(name, given, WHOLE)?;
-    let shape = array.shape().to_vec();
-    if !dims.contains(&shape.len()) {
-        let axes: Vec<String> = dims.iter().map(usize::to_string).collect();
-        let expected = format!("an array of {} axes", axes.join(" or "));
-        return Err(wrong(name, expected, told(&shape)));
-    }
-    let one = |&value: &i64| match u64::try_from(value) {
-        Ok(index) if index < most => Ok(index as u32),
-        _ => Err(wrong(name, format!("numbers from 0 to {}", most.saturating_sub(1)), value)),
-    };
-    let values = array.readonly().as_slice()?.iter().map(one).collect::<PyResult<_>>()?;
-    Ok((values, shape))
+    let (values, shape) = whole(name, given, dims, 0..=i64::from(most) - 1)?;
+    Ok((values.into_iter().map(|value| value as u32).collect(), shape))
 }
 
 /// Descriptors `(n, dim)`: bytes, or floats.
 pub fn descriptors(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Descriptors> {
-    let numpy = given.py().import("numpy")?;
-    let array = numpy.call_method1("asarray", (given,))?;
+    let array = array(name, given, DESCRIPTORS)?;
     let dtype: String = array.getattr("dtype")?.getattr("name")?.extract()?;
-    let bytes = dtype == "uint8";
-    if !bytes && !dtype.starts_with("float") {
-        return Err(wrong(name, "an array of uint8 or floats", format!("one of {dtype}")));
-    }
-    let (values, shape) = if bytes {
-        let array = contiguous::<u8>(name, &array, WHOLE)?;
+    let (values, shape) = if dtype == "uint8" {
+        let array = contiguous::<u8>(&array)?;
         (Values::U8(array.readonly().as_slice()?.to_vec()), array.shape().to_vec())
-    } else {
-        let array = contiguous::<f32>(name, &array, NUMBERS)?;
+    } else if dtype.starts_with("float") {
+        let array = contiguous::<f32>(&array)?;
         (Values::F32(array.readonly().as_slice()?.to_vec()), array.shape().to_vec())
+    } else {
+        let (_, what) = DESCRIPTORS;
+        return Err(wrong(name, format!("an array of {what}"), format!("one of {dtype}")));
     };
     let [_, dim] = shape[..] else {
         return Err(wrong(name, "an array of shape (n, dim)", told(&shape)));

@@ -1,7 +1,6 @@
 //! The audit: a map in, a report out.
 
 use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
@@ -21,18 +20,19 @@ use crate::work::{self, Heard};
 pub fn audit(
     py: Python<'_>,
     map: &Map,
-    asked: Asked<'_>,
+    asked: &Bound<'_, PyAny>,
     tell: Option<Py<PyAny>>,
 ) -> PyResult<Report> {
     let (started, by) = (Instant::now(), Raised::default());
-    let (plan, notes) = asked.plan(&map.prepared, &by)?;
+    let asked = asked.extract::<Asked<'_>>().map_err(|error| of_argument(py, error))?;
+    let (plan, notes) = asked.plan(py, &map.prepared, &by)?;
     let gates = asked.gates.iter().map(|text| Gate::parse(text));
     let gates = gates.collect::<Result<Vec<_>, _>>().map_err(raised)?;
     let mut options = serde_json::Map::new();
     if let Some(k) = asked.source_k {
         options.insert("source_k".to_owned(), k.into());
     }
-    let stop = Arc::new(AtomicBool::new(false));
+    let stop = by.stop();
     let heard = Heard { tell, stop: Arc::clone(&stop), failed: Mutex::new(None) };
     let heard = Arc::new(heard);
     let progress = Arc::clone(&heard);
@@ -60,10 +60,22 @@ pub fn audit(
             command: None,
             started,
         };
-        find(job, None).map_err(|error| error.to_string())
+        find(job, None)
     });
     if let Some(error) = heard.failed.lock().unwrap_or_else(PoisonError::into_inner).take() {
         return Err(error);
     }
     found.map(Report::of).map_err(|error| by.as_cause_of(py, error))
+}
+
+/// An error about an item of the dict, as Python tells it of an argument.
+fn of_argument(py: Python<'_>, error: PyErr) -> PyErr {
+    let text = error.value(py).to_string();
+    match (text.rsplit_once('.'), error.cause(py)) {
+        (Some((_, name)), Some(cause)) => {
+            let text = format!("argument '{name}': {}", cause.value(py));
+            PyErr::from_type(cause.get_type(py), text)
+        }
+        _ => error,
+    }
 }

@@ -1,21 +1,24 @@
 //! Hidden maps: what is released, and the truth beside it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use unlift::evaluate::belongs;
 use unlift::obfuscate::{Scheme, SchemeOptions, obfuscate as hide, scheme};
 use unlift::released::{self, Obfuscation};
 use unlift::seed::Key;
 use unlift::truth::{Original, Secret};
 use unlift_audit::Prepared;
-use unlift_io::stage::{read_released, read_truth, write_released, write_truth};
+use unlift_io::stage::{Kind, read_released, read_truth, write_released, write_truth};
 
 use crate::arrays::{to_array, to_descriptors, to_rows};
 use crate::errors::raised;
+use crate::files::save;
 use crate::map::Map;
 use crate::own::{OwnScheme, Raised};
+use crate::work;
 
 /// All that an attacker sees of a map.
 #[pyclass(frozen, module = "unlift")]
@@ -36,9 +39,10 @@ impl Released {
         py.detach(|| read_released::<3>(&path)).map(Self::of).map_err(raised)
     }
 
-    /// Writes it (Parquet), as `unlift obfuscate` does.
-    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        py.detach(|| write_released(&path, &self.0)).map_err(raised)
+    /// Writes it (Parquet), as `unlift obfuscate` does. What is there and no released map stays, unless `force`.
+    #[pyo3(signature = (path, *, force=false))]
+    fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
+        save(py, (path, force), Kind::Released, |path| write_released(path, &self.0))
     }
 
     fn __len__(&self) -> usize {
@@ -152,9 +156,11 @@ impl Truth {
         Ok(Self { of: Whose::File(Arc::new(original)), secret: Arc::new(secret) })
     }
 
-    /// Writes it (Parquet), as `unlift obfuscate` does: keep it to yourself.
-    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        py.detach(|| write_truth(&path, self.original(), &self.secret)).map_err(raised)
+    /// Writes it (Parquet), as `unlift obfuscate` does, for your eyes only. What is there and no truth stays, unless `force`.
+    #[pyo3(signature = (path, *, force=false))]
+    fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
+        let write = |path: &Path| write_truth(path, self.original(), &self.secret);
+        save(py, (path, force), Kind::Truth, write)
     }
 
     /// The points `(n, 3)`.
@@ -260,12 +266,20 @@ pub fn obfuscate(
 ) -> PyResult<Hidden> {
     let by = Raised::default();
     let unit = map.prepared.original.reveal().unit();
+    let is_own = scheme.extract::<String>().is_err();
     let scheme = scheme_of(scheme, &SchemeOptions::usual(unit), &by)?;
     let key = seed.map_or_else(Key::fresh, |seed| Ok(Key::from_seed(seed))).map_err(raised)?;
     let prepared = Arc::clone(&map.prepared);
-    let hidden =
-        py.detach(|| hide(&*scheme, &prepared.original, prepared.descriptors.as_ref(), &key));
-    let (released, secret) = hidden.map_err(|error| by.as_cause_of(py, raised(error)))?;
-    let truth = Truth { of: Whose::Map(prepared), secret: Arc::new(secret) };
+    let hidden = work::run(py, None, Some(by.stop()), move || {
+        let (original, descriptors) = (&prepared.original, prepared.descriptors.as_ref());
+        let (released, secret) = hide(&*scheme, original, descriptors, &key)?;
+        if is_own {
+            // As an audit asks: of a scheme with a mistake next to nothing comes back.
+            belongs(original, &released, &secret).map_err(|error| error.within(scheme.name()))?;
+        }
+        Ok::<_, unlift::Error>((released, secret))
+    });
+    let (released, secret) = hidden.map_err(|error| by.as_cause_of(py, error))?;
+    let truth = Truth { of: Whose::Map(Arc::clone(&map.prepared)), secret: Arc::new(secret) };
     Ok(Hidden { released: Released::of(released), truth })
 }

@@ -10,7 +10,9 @@
 
 mod arrays;
 mod audit;
+mod calls;
 mod errors;
+mod files;
 mod hidden;
 mod laws;
 mod lists;
@@ -51,6 +53,7 @@ mod _unlift {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        super::calls::register(module)?;
         super::names(module)
     }
 }

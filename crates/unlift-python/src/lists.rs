@@ -2,18 +2,21 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use unlift::neighbors::oracle::{Noise, Outliers, TrueNeighbors, search};
+use unlift::neighbors::sources::Named;
 use unlift::neighbors::{self, Needs};
 use unlift::released;
 use unlift::{About, RecordId, RowOrder};
 use unlift_audit::sources;
-use unlift_io::stage::{read_neighborhoods, write_neighborhoods};
+use unlift_io::stage::{Kind, read_neighborhoods, write_neighborhoods};
 
-use crate::arrays::{indices, numbers, to_array, told};
+use crate::arrays::{numbers, to_array, told, whole};
 use crate::errors::{raised, wrong};
+use crate::files::save;
 use crate::hidden::{Hidden, Released, released_of};
 use crate::work;
 
@@ -49,9 +52,10 @@ impl Neighborhoods {
         Ok(Self(Arc::new(lists.map_err(raised)?)))
     }
 
-    /// Writes them (Parquet), as `unlift neighbors` does.
-    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        py.detach(|| write_neighborhoods(&path, &self.0)).map_err(raised)
+    /// Writes them (Parquet), as `unlift neighbors` does. What is there and no lists stays, unless `force`.
+    #[pyo3(signature = (path, *, force=false))]
+    fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
+        save(py, (path, force), Kind::Neighborhoods, |path| write_neighborhoods(path, &self.0))
     }
 
     /// Number of lists.
@@ -91,31 +95,25 @@ fn lists_of(
     needs: Needs,
 ) -> PyResult<neighbors::Neighborhoods> {
     let (n, n_slots) = (released.n_records(), released.n_slots());
-    // One more than there are records, so that -1 becomes 0.
-    let shifted = records.call_method1("__add__", (1,))?;
-    let (rows, shape) = indices("records", &shifted, &[2], n as u64 + 1)?;
+    let (rows, shape) = whole("records", records, &[2], -1..=n as i64 - 1)?;
     if shape[0] != n_slots {
         let expected = format!("an array of shape ({n_slots}, k), one row per hidden point");
         return Err(wrong("records", expected, told(&shape)));
     }
-    let columns = shape[1];
-    let scores = match scores {
-        None => None,
-        Some(scores) => {
-            let shape: Vec<usize> = scores.getattr("shape")?.extract()?;
-            if shape != [n_slots, columns] {
-                let expected = format!("the shape of the records, {}", told(&[n_slots, columns]));
-                return Err(wrong("scores", expected, told(&shape)));
-            }
-            Some(numbers("scores", &scores.call_method0("ravel")?)?)
+    let scores = match scores.map(|scores| numbers("scores", scores)).transpose()? {
+        Some((_, found)) if found != shape => {
+            let expected = format!("the shape of the records, {}", told(&shape));
+            return Err(wrong("scores", expected, told(&found)));
         }
+        scores => scores.map(|(values, _)| values),
     };
+    let columns = shape[1];
     let (mut offsets, mut kept) = (vec![0], Vec::new());
     let mut kept_scores = scores.as_ref().map(|_| Vec::new());
     for slot in 0..n_slots {
         let row = slot * columns..(slot + 1) * columns;
-        for at in row.filter(|&at| rows[at] > 0).take(k) {
-            kept.push(RecordId(rows[at] - 1));
+        for at in row.filter(|&at| rows[at] >= 0).take(k) {
+            kept.push(RecordId(rows[at] as u32));
             if let (Some(kept), Some(scores)) = (&mut kept_scores, &scores) {
                 kept.push(scores[at] as f32);
             }
@@ -154,6 +152,24 @@ pub fn returned(
     lists_of(released, given, None, k, needs)
 }
 
+/// The process that has used networks, whose threads a forked child lacks; 0 before.
+static NETWORKS_OF: AtomicU32 = AtomicU32::new(0);
+
+/// The source called `name`, with lists of `k` if that is given.
+pub fn named(name: &str, k: Option<usize>) -> PyResult<Named> {
+    let named = sources::named(name).map_err(raised)?;
+    if named.name() == "learned" {
+        let own = std::process::id();
+        let earlier = NETWORKS_OF.compare_exchange(0, own, Ordering::Relaxed, Ordering::Relaxed);
+        if earlier.is_err_and(|earlier| earlier != own) {
+            // It would wait for them.
+            let expected = "a process whose parent has not used it (get_context(\"spawn\"))";
+            return Err(wrong("learned", expected, "a forked child"));
+        }
+    }
+    Ok(if let Some(k) = k { named.with_k(k) } else { named })
+}
+
 /// Lists by a source of the attacker's own, as `unlift neighbors find` makes them.
 #[pyfunction]
 #[pyo3(signature = (released, source, *, k=None, seed=0, threads=None))]
@@ -166,12 +182,10 @@ pub fn find(
     threads: Option<usize>,
 ) -> PyResult<Neighborhoods> {
     let Released(released) = released_of(released)?;
-    let named = sources::named(source).map_err(raised)?;
-    let named = if let Some(k) = k { named.with_k(k) } else { named };
-    let source = named.of_dimension::<3>().map_err(raised)?;
-    source.supports(&released).map_err(raised)?;
+    let source = named(source, k)?.of_dimension::<3>().map_err(raised)?;
     let lists = work::run(py, threads, None, move || {
-        source.lists(&released, source.k(&released), seed).map_err(|error| error.to_string())
+        source.supports(&released)?;
+        source.lists(&released, source.k(&released), seed)
     })?;
     Ok(Neighborhoods(Arc::new(lists)))
 }
@@ -189,11 +203,12 @@ pub fn oracle(
 ) -> PyResult<Neighborhoods> {
     let noise = Noise::from_name(noise).map_err(raised)?;
     let (released, truth) = hidden.parts();
-    let lists = py.detach(|| {
+    let (slots_per_record, truth) = (released.0.slots_per_record(), truth.clone());
+    let lists = work::run(py, None, None, move || {
         let knn = search(truth.original())?;
-        let near = TrueNeighbors::new(&knn, &truth.secret, released.0.slots_per_record(), k)?;
+        let near = TrueNeighbors::new(&knn, &truth.secret, slots_per_record, k)?;
         let outliers = Outliers::new(noise, &near, &knn, &truth.secret, seed)?;
         near.lists(inlier_ratio, &outliers, seed)
-    });
-    Ok(Neighborhoods(Arc::new(lists.map_err(raised)?)))
+    })?;
+    Ok(Neighborhoods(Arc::new(lists)))
 }

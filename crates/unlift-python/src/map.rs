@@ -5,11 +5,12 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use unlift_audit::{OutlierFilter, Preparation, Prepared, Quiet, check_scale, maps, prepare};
-use unlift_io::hash::{hash_files, hash_positions};
+use unlift_io::hash::{hash_file, hash_files, hash_positions};
 use unlift_report::document::Input;
 
-use crate::arrays::{descriptors, to_array, to_descriptors, to_rows, with_rows};
-use crate::errors::{raised, wrong};
+use crate::arrays::{descriptors, rows, to_array, to_descriptors, to_rows};
+use crate::errors::wrong;
+use crate::work;
 
 /// Points to audit, with descriptors where there are some: in meters with a scale, else in the usual distance to the K-th
 /// neighbor.
@@ -21,7 +22,9 @@ pub struct Map {
     /// Camera centers in the unit of the map.
     pub cameras: Vec<[f64; 3]>,
     pub up: Option<[f64; 3]>,
-    /// What a user should know.
+    /// What was not read of its files; may name them.
+    skipped: Vec<String>,
+    /// What whoever reads figures of it must know; no paths, as it is told in share-safe reports, too.
     pub notes: Vec<String>,
 }
 
@@ -41,6 +44,13 @@ fn preparation(
     }
     let outlier_filter =
         outlier_filter.map(|(neighbors, std_ratio)| OutlierFilter { neighbors, std_ratio });
+    let is_usable = |filter: &OutlierFilter| {
+        filter.neighbors > 0 && filter.std_ratio.is_finite() && filter.std_ratio > 0.0
+    };
+    if let Some(filter) = outlier_filter.filter(|filter| !is_usable(filter)) {
+        let found = format!("({}, {})", filter.neighbors, filter.std_ratio);
+        return Err(wrong("outlier_filter", "(neighbors, ratio), both above 0", found));
+    }
     Ok(Preparation { scale, k, outlier_filter, max_points, seed })
 }
 
@@ -48,7 +58,9 @@ fn preparation(
 impl Map {
     #[new]
     #[pyo3(signature = (positions, descriptors=None, *, scale=None, k=50, max_points=None, outlier_filter=None, seed=0))]
+    #[allow(clippy::too_many_arguments)]
     fn new(
+        py: Python<'_>,
         positions: &Bound<'_, PyAny>,
         descriptors: Option<&Bound<'_, PyAny>>,
         scale: Option<f64>,
@@ -59,16 +71,17 @@ impl Map {
     ) -> PyResult<Self> {
         let preparation = preparation(scale, k, max_points, outlier_filter, seed)?;
         let given = descriptors.map(|given| self::descriptors("descriptors", given)).transpose()?;
-        with_rows("positions", positions, |rows| {
-            if let Some(given) = given.as_ref().filter(|given| given.len() != rows.len()) {
-                let expected = format!("{} rows, one per point", rows.len());
-                return Err(wrong("descriptors", expected, given.len()));
-            }
-            check_scale(rows, scale).map_err(raised)?;
-            let prepared = prepare(rows, given.as_ref(), &preparation).map_err(raised)?;
+        let rows = rows("positions", positions)?;
+        if let Some(given) = given.as_ref().filter(|given| given.len() != rows.len()) {
+            let expected = format!("{} rows, one per point", rows.len());
+            return Err(wrong("descriptors", expected, given.len()));
+        }
+        work::run(py, None, None, move || {
+            check_scale(&rows, scale)?;
+            let prepared = prepare(&rows, given.as_ref(), &preparation)?;
             let input = Input {
                 path: None,
-                sha256: Some(hash_positions(rows)),
+                sha256: Some(hash_positions(&rows)),
                 n_points: prepared.original.len() as u64,
                 scale_m_per_unit: scale,
                 unit_in_map_units: Some(prepared.unit_in_map_units),
@@ -76,9 +89,17 @@ impl Map {
                 images: None,
             };
             let zeros = prepared.descriptors.as_ref().and_then(maps::zeros);
-            let (cameras, notes) =
-                (Vec::new(), prepared.notes.iter().cloned().chain(zeros).collect());
-            Ok(Self { prepared: Arc::new(prepared), input, cameras, up: None, notes })
+            let notes = prepared.notes.iter().cloned().chain(zeros).collect();
+            let (cameras, skipped) = (Vec::new(), Vec::new());
+            let prepared = Arc::new(prepared);
+            Ok::<_, unlift_audit::Error>(Self {
+                prepared,
+                input,
+                cameras,
+                up: None,
+                skipped,
+                notes,
+            })
         })
     }
 
@@ -119,6 +140,12 @@ impl Map {
         self.prepared.unit_in_map_units
     }
 
+    /// What you should know of how it was read and made ready; a report has those that matter for its figures.
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.skipped.iter().chain(&self.notes).cloned().collect()
+    }
+
     /// Which of the points that were given are left, ascending `(n,)`.
     #[getter]
     fn rows<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
@@ -141,17 +168,15 @@ pub fn read(
     seed: u64,
 ) -> PyResult<Map> {
     let preparation = preparation(scale, k, max_points, outlier_filter, seed)?;
-    py.detach(|| {
-        let (input, prepared) =
-            maps::open(&path, descriptors.as_deref(), &preparation, &Quiet).map_err(raised)?;
-        let sha256 = Some(hash_files(&input.files).map_err(raised)?);
+    work::run(py, None, None, move || {
+        let (input, prepared) = maps::open(&path, descriptors.as_deref(), &preparation, &Quiet)?;
+        let sha256 = Some(hash_files(&input.files)?);
         let unit = prepared.unit_in_map_units;
         let mut other_sha256 = unlift_audit::ordered([]);
         if let Some(file) = &descriptors {
-            let hash = unlift_io::hash::hash_file(file).map_err(raised)?;
-            other_sha256.insert("descriptors".to_owned(), hash);
+            other_sha256.insert("descriptors".to_owned(), hash_file(file)?);
         }
-        Ok(Map {
+        Ok::<_, unlift_audit::Error>(Map {
             input: Input {
                 path: Some(path.display().to_string()),
                 sha256,
@@ -163,7 +188,8 @@ pub fn read(
             },
             cameras: input.cameras.iter().map(|center| center.map(|x| x / unit)).collect(),
             up: input.up,
-            notes: input.skipped.into_iter().chain(prepared.notes.iter().cloned()).collect(),
+            skipped: input.skipped,
+            notes: prepared.notes.clone(),
             prepared: Arc::new(prepared),
         })
     })

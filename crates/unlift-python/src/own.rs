@@ -1,5 +1,6 @@
 //! Schemes and sources that are functions in Python.
 
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use pyo3::prelude::*;
@@ -12,28 +13,46 @@ use unlift::seed::{Key, Stage};
 use unlift::{Error, OneLine};
 
 use crate::arrays::to_rows;
+use crate::calls;
 use crate::errors::wrong;
 use crate::hidden::Released as PyReleased;
 use crate::lists;
 use crate::records::hiding;
 
-/// The exception that ended a function of the user's, which is the cause of what the user sees.
+/// What ended functions of the user's, one of which is the cause of what the user sees; and whether none is to be called any more.
 #[derive(Clone, Debug, Default)]
-pub struct Raised(Arc<Mutex<Option<PyErr>>>);
+pub struct Raised {
+    /// Exceptions, each with the line that tells it.
+    errors: Arc<Mutex<Vec<(String, PyErr)>>>,
+    stop: Arc<AtomicBool>,
+}
 
 impl Raised {
+    /// Set where no function is to be called any more: the user has interrupted.
+    pub fn stop(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.stop)
+    }
+
     /// Keeps `error`, and says it in a line.
     fn keep(&self, py: Python<'_>, name: &str, error: PyErr) -> Error {
         let told = OneLine(error.to_string()).to_string();
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        kept.get_or_insert_with(|| error.clone_ref(py));
+        let mut errors = self.errors.lock().unwrap_or_else(PoisonError::into_inner);
+        // Once for all points that a function is called with.
+        if errors.iter().all(|(line, _)| *line != told) {
+            errors.push((told.clone(), error.clone_ref(py)));
+        }
         Error::new(name, "records or lists", told)
     }
 
-    /// `error` with the exception that it came from.
+    /// `error` with the exception that it came from, if it tells of one.
     pub fn as_cause_of(&self, py: Python<'_>, error: PyErr) -> PyErr {
-        let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner).take();
-        error.set_cause(py, kept);
+        let text = error.value(py).to_string();
+        let errors = self.errors.lock().unwrap_or_else(PoisonError::into_inner);
+        let told = errors.iter().filter(|(line, _)| text.contains(line.as_str()));
+        // Of two lines of which one begins with the other, the longer one.
+        if let Some((_, cause)) = told.max_by_key(|(line, _)| line.len()) {
+            error.set_cause(py, Some(cause.clone_ref(py)));
+        }
         error
     }
 }
@@ -63,6 +82,15 @@ impl Function {
         let parameters = inspect.call_method1("signature", (function,))?.getattr("parameters")?;
         let (call, raised) = (function.clone().unbind(), raised.clone());
         Ok(Self { name, call, takes_random: parameters.len()? > 1, raised })
+    }
+
+    /// What `make` makes of a call, an error where it raises, or where no function is called any more.
+    fn made<T>(&self, make: impl FnOnce(Python<'_>) -> PyResult<T>) -> Result<T, Error> {
+        let Self { name, raised, .. } = self;
+        let made = calls::attached(&raised.stop, |py| {
+            make(py).map_err(|error| raised.keep(py, name, error))
+        });
+        made.unwrap_or_else(|| Err(Error::new(name, "records or lists", "an interrupt")))
     }
 
     /// What it returns for `given`; with a generator of these words of seed, if it takes one.
@@ -98,18 +126,15 @@ impl Scheme<3> for OwnScheme {
         _: Option<&Bounds<3>>,
         key: &Key,
     ) -> Result<Lifted<3>, Error> {
-        let Function { name, raised, .. } = &self.0;
+        let name = &self.0.name;
         let mut draws = key.draws(Stage::Scheme, 0);
         let seed = [(); 4].map(|()| draws.bits());
-        let hiding = Python::attach(|py| {
-            let made = (|| {
-                let returned = self.0.call(to_rows(py, points.to_vec())?.into_any(), seed)?;
-                hiding(&returned).ok_or_else(|| {
-                    let found = returned.get_type().to_string();
-                    wrong(name, "Lines, Rays, Planes or Candidates", found)
-                })
-            })();
-            made.map_err(|error| raised.keep(py, name, error))
+        let hiding = self.0.made(|py| {
+            let returned = self.0.call(to_rows(py, points.to_vec())?.into_any(), seed)?;
+            hiding(&returned).ok_or_else(|| {
+                let found = returned.get_type().to_string();
+                wrong(name, "Lines, Rays, Planes or Candidates", found)
+            })
         })?;
         hiding.lifted(points.len(), name)
     }
@@ -160,14 +185,10 @@ impl Source<3> for OwnSource {
     }
 
     fn lists(&self, released: &Released<3>, k: usize, seed: u64) -> Result<Neighborhoods, Error> {
-        let Function { name, raised, .. } = &self.function;
-        Python::attach(|py| {
-            let made = (|| {
-                let shown = Bound::new(py, PyReleased::of(released.clone()))?.into_any();
-                let returned = self.function.call(shown, [seed, 0, 0, 0])?;
-                lists::returned(&returned, released, k, self.needs)
-            })();
-            made.map_err(|error| raised.keep(py, name, error))
+        self.function.made(|py| {
+            let shown = Bound::new(py, PyReleased::of(released.clone()))?.into_any();
+            let returned = self.function.call(shown, [seed, 0, 0, 0])?;
+            lists::returned(&returned, released, k, self.needs)
         })
     }
 }

@@ -1,15 +1,19 @@
 //! From arguments to a plan: the usual one, with what was asked for.
 
+use std::sync::Arc;
+
 use pyo3::prelude::*;
 use unlift::audit::{NeighborsBy, Plan, Threshold};
 use unlift::neighbors::oracle::Noise;
-use unlift::obfuscate::SchemeOptions;
+use unlift::obfuscate::{SCHEMES, SchemeOptions};
 use unlift::recover::{Delta, Solver};
 use unlift_audit::{Prepared, check_thresholds, sources};
 
 use crate::errors::{raised, wrong};
 use crate::hidden::scheme_of;
+use crate::lists;
 use crate::own::{OwnSource, Raised};
+use crate::work;
 
 /// What an audit was asked for; `None` is as usual.
 #[derive(FromPyObject)]
@@ -50,68 +54,122 @@ pub struct Asked<'py> {
 
 impl Asked<'_> {
     /// The plan for `prepared`, and what a user should know about it.
-    pub fn plan(&self, prepared: &Prepared, by: &Raised) -> PyResult<(Plan<3>, Vec<String>)> {
+    pub fn plan(
+        &self,
+        py: Python<'_>,
+        prepared: &Arc<Prepared>,
+        by: &Raised,
+    ) -> PyResult<(Plan<3>, Vec<String>)> {
         let points = prepared.original.reveal();
         let usual = Plan::<3>::new(points.unit()).for_map(points.len(), self.k);
-        let thresholds = thresholds(self.thresholds.as_ref(), &usual.thresholds)?;
-        let typed = self.thresholds.is_some();
-        let note = check_thresholds(points.positions(), points.unit(), &thresholds, typed);
-        let mut notes: Vec<String> = note.map_err(raised)?.into_iter().collect();
         let options = SchemeOptions::usual(points.unit());
         let schemes = match &self.schemes {
             Some(schemes) => schemes
                 .iter()
-                .map(|scheme| scheme_of(scheme, &options, by))
+                .map(|given| {
+                    let scheme = scheme_of(given, &options, by)?;
+                    let taken = SCHEMES.iter().any(|entry| entry.name == scheme.name());
+                    of_its_own("schemes", given, scheme.name(), taken)?;
+                    Ok(scheme)
+                })
                 .collect::<PyResult<_>>()?,
             None => usual.schemes.clone(),
         };
-        let neighbors = self.neighbors.iter().map(|source| self.source(source, by));
-        let neighbors = neighbors.collect::<PyResult<Vec<_>>>()?;
-        for source in neighbors.iter().filter_map(NeighborsBy::source) {
-            if let Some(descriptors) = &prepared.descriptors {
-                source.takes(descriptors).map_err(raised)?;
-            }
-            notes.extend(source.note(points.len()));
-        }
-        let noise = self
-            .oracle_noise
-            .as_ref()
-            .map(|names| names.iter().map(|name| Noise::from_name(name)).collect::<Result<_, _>>());
-        let solvers = self.solvers.as_ref().map(|names| {
-            names.iter().map(|name| Solver::from_name(name)).collect::<Result<_, _>>()
-        });
+        let noise = self.oracle_noise.as_deref().map(|names| named(names, Noise::from_name));
+        let solvers = self.solvers.as_deref().map(|names| named(names, Solver::from_name));
         let plan = Plan {
             schemes,
-            neighbors,
-            inlier_ratios: self.inlier_ratios.clone().unwrap_or(usual.inlier_ratios),
-            oracle_noise: noise.transpose().map_err(raised)?.unwrap_or(usual.oracle_noise),
-            solvers: solvers.transpose().map_err(raised)?.unwrap_or(usual.solvers),
+            neighbors: self.sources(by)?,
+            inlier_ratios: self.inlier_ratios.clone().map_or(usual.inlier_ratios, distinct),
+            oracle_noise: noise.transpose()?.unwrap_or(usual.oracle_noise),
+            solvers: solvers.transpose()?.unwrap_or(usual.solvers),
             k: self.k,
             delta: delta(self.delta)?,
             exact_constraints: self.exact_constraints,
             records_alone: self.records_alone,
             reference: self.reference,
-            thresholds,
+            thresholds: thresholds(self.thresholds.as_ref(), &usual.thresholds)?,
             seed: self.seed,
             repeats: self.repeats,
             ..usual
         };
         plan.check(points.len(), prepared.descriptors.is_some()).map_err(raised)?;
-        Ok((plan, notes))
+        let (prepared, typed) = (Arc::clone(prepared), self.thresholds.is_some());
+        work::run(py, self.threads, None, move || {
+            let points = prepared.original.reveal();
+            let (positions, unit) = (points.positions(), points.unit());
+            let note = check_thresholds(positions, unit, &plan.thresholds, typed)?;
+            let mut notes: Vec<String> = note.into_iter().collect();
+            for source in plan.neighbors.iter().filter_map(NeighborsBy::source) {
+                if let Some(descriptors) = &prepared.descriptors {
+                    source.takes(descriptors)?;
+                }
+                notes.extend(source.note(points.len()));
+            }
+            Ok::<_, unlift_audit::Error>((plan, notes))
+        })
+    }
+
+    /// Sources of neighborhoods, each name once.
+    fn sources(&self, by: &Raised) -> PyResult<Vec<NeighborsBy<3>>> {
+        let mut sources: Vec<NeighborsBy<3>> = Vec::new();
+        for given in &self.neighbors {
+            let source = self.source(given, by)?;
+            let ours = ["oracle", "file"].into_iter();
+            let mut ours = ours.chain(sources::all().into_iter().map(|entry| entry.name));
+            of_its_own("neighbors", given, source.name(), ours.any(|name| name == source.name()))?;
+            let is_again = sources.iter().any(|other| other.name() == source.name());
+            match (is_again, given.extract::<String>()) {
+                (false, _) => sources.push(source),
+                // As on the command line.
+                (true, Ok(_)) => {}
+                (true, Err(_)) => {
+                    return Err(wrong("neighbors", "each name once", source.name()));
+                }
+            }
+        }
+        Ok(sources)
     }
 
     /// A source of neighborhoods, a name or a function.
     fn source(&self, given: &Bound<'_, PyAny>, by: &Raised) -> PyResult<NeighborsBy<3>> {
         let Ok(name) = given.extract::<String>() else {
-            return Ok(NeighborsBy::Source(std::sync::Arc::new(OwnSource::new(given, by)?)));
+            return Ok(NeighborsBy::Source(Arc::new(OwnSource::new(given, by)?)));
         };
         if name == "oracle" {
             return Ok(NeighborsBy::Oracle);
         }
-        let named = sources::named(&name).map_err(raised)?;
-        let named = if let Some(k) = self.source_k { named.with_k(k) } else { named };
+        let named = lists::named(&name, self.source_k)?;
         Ok(NeighborsBy::Source(named.of_dimension().map_err(raised)?))
     }
+}
+
+/// Refuses a function under a name of ours: a report would say of it what is so of ours.
+fn of_its_own(what: &str, given: &Bound<'_, PyAny>, name: &str, taken: bool) -> PyResult<()> {
+    match taken && given.extract::<String>().is_err() {
+        true => Err(wrong(what, "functions with a name that unlift does not use", name)),
+        false => Ok(()),
+    }
+}
+
+/// What `names` stand for, each once.
+fn named<T: PartialEq>(
+    names: &[String],
+    of: impl Fn(&str) -> Result<T, unlift::Error>,
+) -> PyResult<Vec<T>> {
+    let all = names.iter().map(|name| of(name)).collect::<Result<_, _>>();
+    all.map(distinct).map_err(raised)
+}
+
+/// `items` without those that repeat an earlier one, as on the command line: an audit has one row per combination.
+fn distinct<T: PartialEq>(items: Vec<T>) -> Vec<T> {
+    let mut kept = Vec::with_capacity(items.len());
+    for item in items {
+        if !kept.contains(&item) {
+            kept.push(item);
+        }
+    }
+    kept
 }
 
 /// Thresholds as they were written, texts or numbers; else the usual ones.
@@ -124,7 +182,16 @@ pub fn thresholds(
         let text = threshold?.str()?.to_string();
         Threshold::parse(&text).map_err(|_| wrong("thresholds", "numbers above 0", text))
     };
-    given.try_iter()?.map(one).collect()
+    let thresholds = given.try_iter()?.map(one).collect::<PyResult<Vec<_>>>()?;
+    for (at, threshold) in thresholds.iter().enumerate() {
+        if thresholds[..at].iter().any(|other| other.value == threshold.value) {
+            return Err(wrong("thresholds", "each once", format!("{} again", threshold.label)));
+        }
+    }
+    if thresholds.is_empty() {
+        return Err(wrong("thresholds", "at least one", "none"));
+    }
+    Ok(thresholds)
 }
 
 /// The distance that decides support, or the attack's own choice.

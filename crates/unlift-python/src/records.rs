@@ -9,7 +9,7 @@ use unlift::released::{
 use unlift::truth::{DropReason, Dropped};
 use unlift::{Error, OriginalId};
 
-use crate::arrays::{indices, numbers, rows, told};
+use crate::arrays::{column, indices, rows, told};
 use crate::errors::{raised, wrong};
 
 /// Records, and which points they hide; `None` is one each, in order.
@@ -27,7 +27,7 @@ impl Hiding {
         let n = obfuscation.len();
         let (mut slots_per_record, mut rows) = (1, None);
         if let Some(hidden) = hidden {
-            let (of, shape) = indices("hidden", hidden, &[1, 2], u64::from(u32::MAX))?;
+            let (of, shape) = indices("hidden", hidden, &[1, 2], u32::MAX)?;
             slots_per_record = shape.get(1).copied().unwrap_or(1);
             let most = if matches!(obfuscation, Obfuscation::Lines(_)) { 2 } else { 1 };
             if shape[0] != n || !(1..=most).contains(&slots_per_record) {
@@ -134,7 +134,7 @@ impl Rays {
         hidden: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyClassInitializer<Self>> {
         let centers = rows("centers", centers)?;
-        let (center, _) = indices("center", center, &[1], (centers.len() as u64).min(255))?;
+        let (center, _) = indices("center", center, &[1], centers.len().min(255) as u32)?;
         let center = center.iter().map(|&at| at as u8).collect();
         let rays = RayRecords::try_new(&centers, center, &rows("directions", directions)?);
         Ok(of(Hiding::of(Obfuscation::Rays(rays.map_err(raised)?), hidden)?, Self))
@@ -156,7 +156,7 @@ impl Planes {
     ) -> PyResult<PyClassInitializer<Self>> {
         let (axis, _) = indices("axis", axis, &[1], 3)?;
         let axis = axis.iter().map(|&at| at as u8).collect();
-        let planes = AxisPlanes::try_new(axis, &numbers("offset", offset)?).map_err(raised)?;
+        let planes = AxisPlanes::try_new(axis, &column("offset", offset)?).map_err(raised)?;
         Ok(of(Hiding::of(Obfuscation::AxisPlanes(planes), hidden)?, Self))
     }
 }

@@ -8,10 +8,11 @@ use pyo3::types::PyDict;
 use unlift::audit::{Plan, measure};
 use unlift::evaluate::blind;
 use unlift::recover::{RecoverOptions, Recovered as Found, Solver, recover as solve};
-use unlift_io::stage::{read_recovered, write_recovered};
+use unlift_io::stage::{Kind, read_recovered, write_recovered};
 
 use crate::arrays::{to_array, to_rows};
 use crate::errors::{raised, wrong};
+use crate::files::save;
 use crate::hidden::{Hidden, Released, released_of, truth_of};
 use crate::lists::Neighborhoods;
 use crate::plan::{delta, thresholds};
@@ -31,9 +32,10 @@ impl Recovered {
         Ok(Self(Arc::new(found)))
     }
 
-    /// Writes them (Parquet), as `unlift recover` does.
-    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        py.detach(|| write_recovered(&path, &self.0)).map_err(raised)
+    /// Writes them (Parquet), as `unlift recover` does. What is there and no recovered points stays, unless `force`.
+    #[pyo3(signature = (path, *, force=false))]
+    fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
+        save(py, (path, force), Kind::Recovered, |path| write_recovered(path, &self.0))
     }
 
     fn __len__(&self) -> usize {
@@ -122,9 +124,7 @@ pub fn recover(
         return Err(wrong("lists", "lists of this released map", "those of another"));
     }
     let lists = Arc::clone(&lists.0);
-    let found = work::run(py, threads, None, move || {
-        solve(&released, &lists, &options).map_err(|error| error.to_string())
-    })?;
+    let found = work::run(py, threads, None, move || solve(&released, &lists, &options))?;
     Ok(Recovered(Arc::new(found)))
 }
 
@@ -139,15 +139,14 @@ pub fn evaluate<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let released = truth.cast::<Hidden>().ok().map(|hidden| hidden.get().parts().0.clone());
     let truth = truth_of(truth)?;
-    let original = truth.original();
-    let usual = Plan::<3>::new(original.reveal().unit()).thresholds;
+    let usual = Plan::<3>::new(truth.original().reveal().unit()).thresholds;
     let thresholds = self::thresholds(thresholds, &usual)?;
-    let row = py.detach(|| {
-        let baseline = released.map(|released| blind(&released.0, original, &truth.secret));
-        let of = (&recovered.0, original, &truth.secret);
-        measure(of.0, of.1, of.2, baseline.as_ref(), &thresholds)
-    });
-    let (row, _) = row.map_err(raised)?;
+    let (recovered, asked) = (Arc::clone(&recovered.0), thresholds.clone());
+    let (row, _) = work::run(py, None, None, move || {
+        let (original, secret) = (truth.original(), &truth.secret);
+        let baseline = released.map(|released| blind(&released.0, original, secret));
+        measure(&recovered, original, secret, baseline.as_ref(), &asked)
+    })?;
     let figures = unlift_audit::evaluated(&row, &thresholds).map_err(raised)?;
     Ok(as_python(py, &figures)?.cast_into::<PyDict>()?)
 }

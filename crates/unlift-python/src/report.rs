@@ -9,6 +9,7 @@ use unlift_audit::{Audited, Quiet, Shown, open_audit};
 use unlift_io::atomic::Rules;
 
 use crate::errors::raised;
+use crate::files::refused;
 use crate::rows::Rows;
 
 /// What an audit found: figures, and a page that shows them.
@@ -72,7 +73,7 @@ impl Report {
     ) -> PyResult<PathBuf> {
         py.detach(|| {
             let shown = if share_safe { Shown::Figures } else { Shown::Points };
-            let files = open_audit(&out, Rules::new([], force), shown, &Quiet).map_err(raised)?;
+            let files = open_audit(&out, Rules::new([], force), shown, &Quiet).map_err(refused)?;
             Ok(self.0.write(files, &out, share_safe).map_err(raised)?.report)
         })
     }

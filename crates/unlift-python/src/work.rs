@@ -1,6 +1,10 @@
 //! Work without the interpreter's lock, which ends for the user when the user interrupts it.
+//!
+//! All that computes runs here, on threads that end with it: the threads of rayon's own pool, which lasts, a forked child would
+//! wait for and not have.
 
 use std::any::Any;
+use std::fmt::Display;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
@@ -9,6 +13,7 @@ use std::time::Duration;
 use pyo3::prelude::*;
 use unlift_audit::Progress;
 
+use crate::calls;
 use crate::errors::raised;
 
 /// How often the interpreter is asked whether the user has interrupted.
@@ -16,22 +21,24 @@ const ASKED: Duration = Duration::from_millis(50);
 
 /// Runs `work` on `threads` threads (all cores without a number) and waits for it. An interrupt ends the wait at once; the work
 /// ends where `stop` is asked about, and of work that never asks the result is thrown away.
-pub fn run<T: Send + 'static>(
+pub fn run<T: Send + 'static, E: Display>(
     py: Python<'_>,
     threads: Option<usize>,
     stop: Option<Arc<AtomicBool>>,
-    work: impl FnOnce() -> Result<T, String> + Send + 'static,
+    work: impl FnOnce() -> Result<T, E> + Send + 'static,
 ) -> PyResult<T> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
     let pool = pool.map_err(raised)?;
     let slot = Arc::new((Mutex::new(None), Condvar::new()));
     let done = Arc::clone(&slot);
-    std::thread::spawn(move || {
+    let begun = std::thread::Builder::new().spawn(move || {
+        let work = || work().map_err(|error| error.to_string());
         let result = catch_unwind(AssertUnwindSafe(|| pool.install(work)));
         let result = result.unwrap_or_else(|panic| Err(told(&*panic)));
         *done.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(result);
         done.1.notify_all();
     });
+    begun.map_err(raised)?;
     loop {
         let result = py.detach(|| {
             let waiting = slot.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -43,7 +50,9 @@ pub fn run<T: Send + 'static>(
         }
         if let Err(interrupt) = py.check_signals() {
             if let Some(stop) = &stop {
-                stop.store(true, Ordering::Relaxed);
+                stop.store(true, Ordering::SeqCst);
+                // Best effort: a function that runs on takes time that the user wants back.
+                let _ = calls::interrupt(py, Some(stop));
             }
             return Err(interrupt);
         }
@@ -68,14 +77,14 @@ pub struct Heard {
 impl Progress for Heard {
     fn show(&self, done: usize, total: usize, what: &str) {
         let Some(tell) = &self.tell else { return };
-        let told = Python::attach(|py| tell.call1(py, (done, total, what)).map(drop));
-        if let Err(error) = told {
+        let told = calls::attached(&self.stop, |py| tell.call1(py, (done, total, what)).map(drop));
+        if let Some(Err(error)) = told {
             self.failed.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
             self.stop.store(true, Ordering::Relaxed);
         }
     }
 
     fn goes_on(&self) -> bool {
-        !self.stop.load(Ordering::Relaxed)
+        !self.stop.load(Ordering::Relaxed) && !calls::ending()
     }
 }

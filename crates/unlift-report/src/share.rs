@@ -11,9 +11,19 @@ const WITHHELD: &str = "(withheld)";
 const NAMING_OPTIONS: [&str; 8] =
     ["descriptors", "input", "map", "model", "out", "path", "photos", "show"];
 
+/// Schemes and sources of unlift's. What others say of why they failed may be anything: a line of their data, a path.
+const SCHEMES: [&str; 10] =
+    ["olc", "ppl", "ppl+", "ray", "ray-voxel", "plane", "cp", "lines2d", "cp2d", "dcl2d"];
+const SOURCES: [&str; 7] =
+    ["oracle", "file", "similarity", "overlap", "descriptors", "geometric", "learned"];
+/// What stands in place of what they say.
+const OWN_FAILED: &str = "its own function failed";
+/// Before the reason in that of a gate.
+const NOT_AUDITED: &str = " was not audited";
+
 impl Document {
-    /// A copy without paths, names, hashes of inputs (which confirm a guess of them) and the command line: figures and
-    /// plain options only.
+    /// A copy without paths, names, hashes of inputs (which confirm a guess of them), the command line and what schemes and
+    /// sources of others say of why they failed: figures and plain options only.
     pub fn share_safe(&self) -> Self {
         let mut safe = self.clone();
         safe.input.path = None;
@@ -26,7 +36,31 @@ impl Document {
         for (name, value) in &mut safe.options {
             withhold(name, value);
         }
+        for missing in &mut safe.not_audited {
+            let source = missing.neighbors.as_deref();
+            let is_ours = SCHEMES.contains(&&*missing.scheme)
+                && source.is_none_or(|source| SOURCES.contains(&source));
+            if !is_ours {
+                missing.reason = OWN_FAILED.to_owned();
+            }
+            without_places(&mut missing.reason);
+        }
+        for reason in safe.gates.iter_mut().filter_map(|gate| gate.reason.as_mut()) {
+            // It stands with what was not audited, if it may.
+            if let Some((what, _)) = reason.split_once(NOT_AUDITED) {
+                *reason = format!("{what}{NOT_AUDITED}");
+            }
+            without_places(reason);
+        }
+        safe.notes.iter_mut().for_each(without_places);
         safe
+    }
+}
+
+/// Withholds a text that may name a file: where its path ends nobody can tell.
+fn without_places(text: &mut String) {
+    if text.contains(['/', '\\']) {
+        *text = WITHHELD.to_owned();
     }
 }
 

@@ -70,7 +70,7 @@ class Report:
         return self._found.passed
 
     def json(self, *, share_safe: bool = False) -> str:
-        """The text of `audit.json`; `share_safe`: without paths and names."""
+        """The text of `audit.json`; `share_safe`: without paths, names, and what functions of yours raised."""
         return self._found.json(share_safe=share_safe)
 
     def html(self, *, share_safe: bool = False) -> str:
@@ -118,7 +118,17 @@ class Report:
     def __repr__(self) -> str:
         return repr(self._found)
 
+    def show(self) -> Any:
+        """The whole page, points too, for a notebook: what shows them is saved with it. Needs IPython."""
+        from IPython.display import HTML  # type: ignore[import-not-found,unused-ignore]
+
+        return HTML(_frame(self.html()))
+
     def _repr_html_(self) -> str:
-        page = html.escape(self.html(), quote=True)
-        style = f"width: 100%; height: {HEIGHT}px; border: 1px solid #ccc"
-        return f'<iframe srcdoc="{page}" style="{style}"></iframe>'
+        """The page as a notebook shows and saves it: figures only, as notebooks are shared. `show` has the points, too."""
+        return _frame(self.html(share_safe=True))
+
+
+def _frame(page: str) -> str:
+    style = f"width: 100%; height: {HEIGHT}px; border: 1px solid #ccc"
+    return f'<iframe srcdoc="{html.escape(page, quote=True)}" style="{style}"></iframe>'

@@ -1,0 +1,140 @@
+"""Arguments that are taken as they are meant, or refused in one line."""
+
+import numpy as np
+import pytest
+
+import unlift
+
+
+@pytest.fixture(scope="module")
+def points():
+    return np.random.default_rng(7).uniform(0, 4, (400, 3))
+
+
+@pytest.fixture(scope="module")
+def hidden(points):
+    return unlift.obfuscate(unlift.Map(points, scale=1.0), "olc", seed=1)
+
+
+def cheap(points, schemes=("olc",), *more, **options):
+    options = {"inlier_ratios": [0.5], "solvers": ["consensus"], "k": 20} | options
+    return unlift.audit(unlift.Map(points, scale=1.0), schemes, *more, **options)
+
+
+@pytest.mark.parametrize("dtype", ["u1", "i1", "u2", "u4", "i8", "u8"])
+def test_records_are_those_of_the_array_in_every_kind_of_number(points, dtype):
+    # As many records as the kind can name.
+    n = min(256, int(np.iinfo(dtype).max) + 1)
+    some = unlift.obfuscate(unlift.Map(points[:n], scale=1.0), "olc", seed=1)
+    rows = ((np.arange(n)[:, None] + [1, 2, 3]) % n).astype(dtype)
+    lists = unlift.Neighborhoods(some, rows, np.tile([3, 2, 1], (n, 1)))
+    assert rows.max() == n - 1
+    # Lists are kept in the order of records.
+    np.testing.assert_array_equal(lists.records, np.sort(rows, 1).ravel())
+    np.testing.assert_array_equal(lists.offsets, 3 * np.arange(n + 1))
+    # Rows of numbers are arrays, too.
+    assert unlift.Neighborhoods(some, rows.tolist(), [[3.0, 2.0, 1.0]] * n).scores[:3].tolist() == [3, 2, 1]
+    if dtype[0] == "i":
+        rows[:, 1] = -1
+        np.testing.assert_array_equal(unlift.Neighborhoods(some, rows).records, np.sort(rows[:, [0, 2]], 1).ravel())
+
+
+def broken(points):
+    return unlift.Lines(points + 1.0, np.tile([0.0, 0.0, 1.0], (len(points), 1)))
+
+
+def shuffled(points, random):
+    return unlift.Lines(random.permutation(points), random.normal(size=points.shape))
+
+
+def masked(points):
+    return np.ma.masked_array(points, mask=points > 3.9)
+
+
+def lacking(points):
+    points = points.copy()
+    points[17, 1] = np.nan
+    return points
+
+
+@unlift.scheme(name="olc")
+def ours(points):
+    return unlift.Lines(points, points)
+
+
+def twice(points):
+    lists = unlift.source(lambda released: released, name="near")
+    return cheap(points, ["olc"], [lists, unlift.source(lambda released: 0, name="near")])
+
+
+@pytest.mark.parametrize(
+    "wrong, said",
+    [
+        (lambda p, h: unlift.Neighborhoods(h, np.full((400, 2), 2**64 - 1, "u8")), "records: expected numbers from -1 to 399, found 18446744073709551615"),
+        (lambda p, h: unlift.Neighborhoods(h, np.full((400, 1), 400)), "records: expected numbers from -1 to 399, found 400"),
+        (lambda p, h: unlift.Neighborhoods(h, [[1], [2, 3]]), "records: expected an array of whole numbers, found setting an array"),
+        (lambda p, h: unlift.Neighborhoods(h, np.zeros((400, 2), int), [1.0]), r"scores: expected the shape of the records, \(400, 2\), found \(1,\)"),
+        (lambda p, h: unlift.Map([[1, 2, 3], [1]]), "positions: expected an array of numbers, found setting an array"),
+        (lambda p, h: unlift.Map(masked(p), scale=1.0), "positions: expected an array of numbers without a mask .*, found a masked array"),
+        (lambda p, h: unlift.Map(p, masked(p.astype("f4")), scale=1.0), "descriptors: .* found a masked array"),
+        (lambda p, h: unlift.Lines(masked(p), p), "points: .* found a masked array"),
+        (lambda p, h: unlift.Map(lacking(p), scale=1.0), "point 17: expected finite coordinates"),
+        (lambda p, h: unlift.Map(lacking(p), scale=1.0, outlier_filter=(20, 2.0)), "point 17: expected finite coordinates"),
+        (lambda p, h: unlift.Map(p, scale=1.0, outlier_filter=(20, -1.0)), r"outlier_filter: expected \(neighbors, ratio\), both above 0, found \(20, -1\)"),
+        (lambda p, h: unlift.Map(p, scale=1.0, outlier_filter=(20, float("nan"))), r"outlier_filter: .* found \(20, NaN\)"),
+        (lambda p, h: unlift.Map(p, scale=1.0, outlier_filter=(20, float("inf"))), r"outlier_filter: .* found \(20, inf\)"),
+        (lambda p, h: unlift.Map(p, scale=1.0, outlier_filter=(0, 2.0)), r"outlier_filter: .* found \(0, 2\)"),
+        (lambda p, h: cheap(p, thresholds=[0.1, "0.10"]), "thresholds: expected each once, found 0.10 again"),
+        (lambda p, h: cheap(p, thresholds=[]), "thresholds: expected at least one, found none"),
+        (lambda p, h: cheap(p, [ours]), "schemes: expected functions with a name that unlift does not use, found olc"),
+        (lambda p, h: twice(p), "neighbors: expected each name once, found near"),
+        (lambda p, h: unlift.obfuscate(unlift.Map(p, scale=1.0), shuffled, seed=1), "shuffled: truth: expected points nearer to their own records"),
+    ],
+)
+def test_what_is_wrong_is_said_in_a_line(points, hidden, wrong, said):
+    with pytest.raises(unlift.UnliftError, match=said) as error:
+        wrong(points, hidden)
+    assert "\n" not in str(error.value)
+
+
+def test_what_python_refuses_it_refuses_as_ever(points):
+    with pytest.raises(OverflowError, match="argument 'k': can't convert negative int to unsigned"):
+        cheap(points, k=-1)
+    with pytest.raises(TypeError, match="argument 'seed': 'str' object"):
+        cheap(points, seed="one")
+
+
+def test_choices_count_once_as_on_the_command_line(points):
+    rows = cheap(
+        points, ["olc"], ["oracle", "oracle"], inlier_ratios=[0.5, 0.5], oracle_noise=["near", "near"], solvers=["consensus"] * 2
+    ).rows
+    assert len(rows) == 1
+
+
+def test_a_broken_law_is_told_by_its_exception_alone(capfd):
+    sizes = set()
+
+    @unlift.scheme
+    def level(points, random):
+        sizes.add(len(points))
+        if len(points) < 2:
+            raise ValueError("too few")
+        return unlift.Lines(points, np.column_stack([random.normal(size=(len(points), 2)), np.zeros(len(points))]))
+
+    unlift.testing.check_scheme(level)
+    assert sizes == {0, 1, 2, 3, 7, 120, 200, 300, 301, 600, 700}
+    with pytest.raises(AssertionError, match="broken") as error:
+        unlift.testing.check_scheme(broken)
+    assert error.value.__cause__ is None
+    assert capfd.readouterr().err == ""
+
+    @unlift.scheme
+    def refuses(points):
+        if len(points) < 600:
+            raise ValueError(f"not of {len(points)}")
+        return level(points)
+
+    # What the exception tells of, not what was rightly refused before.
+    with pytest.raises(AssertionError, match="not of 200") as error:
+        unlift.testing.check_scheme(refuses)
+    assert str(error.value.__cause__) == "not of 200"

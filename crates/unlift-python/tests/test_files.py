@@ -1,0 +1,57 @@
+"""Files that are saved: nothing of others is lost, and the truth is its owner's alone."""
+
+import os
+import stat
+
+import numpy as np
+import pytest
+
+import unlift
+
+
+@pytest.fixture(scope="module")
+def parts():
+    """What can be saved, and its class, by name."""
+    points = np.random.default_rng(7).uniform(0, 4, (300, 3))
+    hidden = unlift.obfuscate(unlift.Map(points, scale=1.0), "olc", seed=1)
+    lists = unlift.neighbors.oracle(hidden, 0.7, k=20)
+    back = unlift.recover(hidden, lists, solver="consensus")
+    return {"released": hidden.released, "truth": hidden.truth, "lists": lists, "recovered": back}
+
+
+@pytest.mark.parametrize("name", ["released", "truth", "lists", "recovered"])
+def test_what_is_not_of_its_kind_stays(parts, name, tmp_path):
+    part, path = parts[name], tmp_path / "x.parquet"
+    path.write_text("mine")
+    with pytest.raises(unlift.UnliftError, match=r"x.parquet: expected nothing, or .* \(else force=True\), found another file"):
+        part.save(path)
+    assert path.read_text() == "mine"
+    other = parts["truth" if name == "lists" else "lists"]
+    other.save(path, force=True)
+    kept = path.read_bytes()
+    with pytest.raises(unlift.UnliftError, match="found another file"):
+        part.save(path)
+    assert path.read_bytes() == kept
+    part.save(path, force=True)
+    # Its own kind is replaced unasked.
+    part.save(path)
+    with pytest.raises(unlift.UnliftError, match="expected a file, found a folder"):
+        part.save(tmp_path, force=True)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["x.parquet"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="modes are those of Unix")
+def test_the_truth_is_for_its_owner_alone(parts, tmp_path):
+    path = tmp_path / "t.parquet"
+    parts["lists"].save(path)
+    path.chmod(0o666)
+    parts["truth"].save(path, force=True)
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+
+
+def test_a_report_names_the_way_out_as_python_has_it(tmp_path):
+    points = np.random.default_rng(7).uniform(0, 4, (300, 3))
+    report = unlift.audit(unlift.Map(points, scale=1.0), ["olc"], inlier_ratios=[0.5], solvers=["consensus"])
+    (tmp_path / "report.html").write_text("mine")
+    with pytest.raises(unlift.UnliftError, match=r"^out: .*\(else force=True\)"):
+        report.save(tmp_path)

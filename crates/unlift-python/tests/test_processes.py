@@ -1,0 +1,207 @@
+"""Processes: forked children compute, and an interrupt ends the interpreter without a crash."""
+
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+# Everything that computes.
+USE = """
+import os
+import numpy as np, unlift
+
+def use():
+    points = np.random.default_rng(1).uniform(0, 4, (3000, 3))
+    waves = np.sin(points @ np.random.default_rng(8).uniform(-2, 2, (3, 128)))
+    path = f"{PATH}.{os.getpid()}.npy"
+    np.save(path, points)
+    unlift.read(path, scale=1.0, outlier_filter=(20, 2.0))
+    m = unlift.Map(points, (60 + 55 * waves).astype(np.uint8))
+    hidden = unlift.obfuscate(m, "ppl", seed=1)
+    lists = unlift.neighbors.oracle(hidden, 0.5, k=20)
+    for find in [unlift.neighbors.overlap, unlift.neighbors.similarity, unlift.neighbors.geometric]:
+        find(hidden)
+    back = unlift.recover(hidden, lists, solver="consensus")
+    found = unlift.evaluate(back, hidden)
+    for part, more in [(hidden.released, []), (hidden.truth, []), (lists, [hidden]), (back, [])]:
+        part.save(f"{path}.parquet", force=True)
+        type(part).read(f"{path}.parquet", *more)
+
+    @unlift.scheme
+    def upright(points):
+        return unlift.Lines(points, np.tile([0.0, 0.0, 1.0], (len(points), 1)))
+
+    unlift.testing.check_scheme(upright)
+    report = unlift.audit(m, ["olc", upright], inlier_ratios=[0.5], solvers=["consensus"], thresholds=[0.5])
+    report.save(f"{path}.out")
+    return found["recovered_percent"], report.rows["recovered_percent.0.5"], len(report.html()) > 0
+"""
+
+
+def python(tmp_path, code, *arguments, **options):
+    script = tmp_path / "script.py"
+    script.write_text(f"PATH = {str(tmp_path / 'points')!r}\n" + code)
+    return subprocess.Popen(
+        [sys.executable, str(script), *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options
+    )
+
+
+def ended(process, seconds):
+    """What it said; a process that hangs is killed, and fails the test."""
+    try:
+        out, err = process.communicate(timeout=seconds)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.communicate()
+        pytest.fail("it hangs")
+    return out, err
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
+def test_a_forked_child_computes_what_its_parent_does(tmp_path):
+    code = USE + """
+import multiprocessing
+first = use()
+with multiprocessing.get_context("fork").Pool(2) as pool:
+    found = [pool.apply_async(use) for _ in range(2)]
+    print([one.get(timeout=60) == first for one in found])
+"""
+    process = python(tmp_path, code)
+    out, err = ended(process, 150)
+    assert out == "[True, True]\n" and process.returncode == 0, err
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
+def test_a_forked_child_is_told_of_networks_that_its_parent_used(tmp_path):
+    code = """
+import multiprocessing
+import numpy as np, unlift
+
+def learned():
+    points = np.random.default_rng(1).uniform(0, 4, (300, 3))
+    sift = np.random.default_rng(2).integers(0, 90, (300, 128)).astype(np.uint8)
+    return len(unlift.neighbors.learned(unlift.obfuscate(unlift.Map(points, sift, scale=1.0), "olc")))
+
+fork = multiprocessing.get_context("fork")
+with fork.Pool(1) as pool:
+    print(pool.apply_async(learned).get(timeout=60))
+print(learned())
+with fork.Pool(1) as pool:
+    try:
+        pool.apply_async(learned).get(timeout=60)
+    except unlift.UnliftError as error:
+        print(error)
+"""
+    out, err = ended(python(tmp_path, code), 150)
+    expected = 'learned: expected a process whose parent has not used it (get_context("spawn")), found a forked child'
+    assert out == f"300\n300\n{expected}\n", err
+
+
+@pytest.mark.skipif(not pathlib.Path("/proc/self/task").exists(), reason="nothing tells the threads")
+def test_no_thread_is_left_behind(tmp_path):
+    code = USE + """
+import time
+before = len(os.listdir("/proc/self/task"))
+use()
+until = time.monotonic() + 20
+while len(os.listdir("/proc/self/task")) > before and time.monotonic() < until:
+    time.sleep(0.05)
+print(len(os.listdir("/proc/self/task")) - before)
+"""
+    out, err = ended(python(tmp_path, code), 150)
+    assert out == "0\n", err
+
+
+SLOW = """
+import sys, time
+import numpy as np, unlift
+
+def slow(points):
+    print("called", flush=True)
+    {body}
+
+m = unlift.Map(np.random.default_rng(1).uniform(0, 4, (300, 3)), scale=1.0)
+if sys.argv[1] == "audit":
+    unlift.audit(m, [slow, "olc"])
+elif sys.argv[1] == "obfuscate":
+    unlift.obfuscate(m, slow)
+else:
+    unlift.testing.check_scheme(slow)
+"""
+
+
+@pytest.mark.parametrize("what", ["audit", "obfuscate", "check_scheme"])
+@pytest.mark.parametrize("body", ["while True: pass", "time.sleep(2)"])
+def test_an_interrupt_in_a_function_ends_the_process_in_order(tmp_path, what, body):
+    process = python(tmp_path, SLOW.format(body=body), what)
+    assert process.stdout.readline() == "called\n"
+    started = time.monotonic()
+    time.sleep(0.2)
+    process.send_signal(signal.SIGINT)
+    out, err = ended(process, 60)
+    assert err.rstrip().endswith("KeyboardInterrupt") and "FATAL" not in err and "panicked" not in err, err
+    # As Python itself ends: by the signal.
+    assert process.returncode == -signal.SIGINT and time.monotonic() - started < 8
+    assert out == "", "no function is called again"
+
+
+def test_an_interrupt_ends_the_function_of_a_session_that_goes_on(tmp_path):
+    code = """
+import time
+import numpy as np, unlift
+
+n = 0
+
+def slow(points):
+    global n
+    print("called", flush=True)
+    while True:
+        n += 1
+
+try:
+    unlift.audit(unlift.Map(np.random.default_rng(1).uniform(0, 4, (300, 3)), scale=1.0), [slow, "olc"])
+except KeyboardInterrupt:
+    time.sleep(1)
+    before = n
+    time.sleep(0.5)
+    print(n == before, flush=True)
+"""
+    process = python(tmp_path, code)
+    assert process.stdout.readline() == "called\n"
+    process.send_signal(signal.SIGINT)
+    out, err = ended(process, 60)
+    assert out == "True\n" and process.returncode == 0, err
+
+
+def test_a_second_interrupt_waits_for_no_function(tmp_path):
+    process = python(tmp_path, SLOW.format(body="time.sleep(30)"), "audit")
+    assert process.stdout.readline() == "called\n"
+    started = time.monotonic()
+    for _ in range(2):
+        time.sleep(0.5)
+        process.send_signal(signal.SIGINT)
+    _, err = ended(process, 60)
+    assert "KeyboardInterrupt" in err and process.returncode == -signal.SIGINT and time.monotonic() - started < 5, err
+
+
+def test_an_interrupt_ends_obfuscate(tmp_path):
+    code = """
+import time
+import numpy as np, unlift
+m = unlift.Map(np.random.default_rng(1).uniform(0, 4, (1_500_000, 3)), scale=1.0)
+print("ready", flush=True)
+unlift.obfuscate(m, "ppl+", seed=1)
+print("done", flush=True)
+"""
+    process = python(tmp_path, code)
+    assert process.stdout.readline() == "ready\n"
+    started = time.monotonic()
+    time.sleep(0.3)
+    process.send_signal(signal.SIGINT)
+    out, err = ended(process, 120)
+    assert "KeyboardInterrupt" in err and out == "", err
+    assert time.monotonic() - started < 5
