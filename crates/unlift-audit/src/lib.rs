@@ -57,7 +57,7 @@ pub use gate::{Candidate, Figure, Gate};
 pub use given::by_point;
 pub use lengths::{Extent, check_scale, check_thresholds};
 pub use maps::{Audited, Finished, Job};
-pub use memory::peak_bytes;
+pub use memory::{peak_bytes, total_bytes};
 pub use outputs::{FIGURES, PAGE, Shown, check_file, check_file_of, open_audit, refused};
 pub use prepare::{OutlierFilter, Preparation, Prepared, prepare};
 pub use progress::{Progress, Quiet};

@@ -1,12 +1,18 @@
-//! How much memory the program has used.
+//! How much memory the program has used, and how much there is.
 
 /// Peak resident memory of this process in bytes, where the system tells it (Linux).
 pub fn peak_bytes() -> Option<u64> {
-    high_water_mark(&std::fs::read_to_string("/proc/self/status").ok()?)
+    kibibytes(&std::fs::read_to_string("/proc/self/status").ok()?, "VmHWM:")
 }
 
-fn high_water_mark(status: &str) -> Option<u64> {
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+/// Memory of this machine in bytes, where the system tells it (Linux).
+pub fn total_bytes() -> Option<u64> {
+    kibibytes(&std::fs::read_to_string("/proc/meminfo").ok()?, "MemTotal:")
+}
+
+/// The number after `name`, which counts kibibytes, in bytes.
+fn kibibytes(text: &str, name: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
     let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     kibibytes.checked_mul(1024)
 }
@@ -16,9 +22,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_high_water_mark_is_read_in_kibibytes() {
+    fn memory_is_told_in_kibibytes() {
         let status = "Name:\tunlift\nVmPeak:\t  9 kB\nVmHWM:\t    2048 kB\nVmRSS:\t 1 kB\n";
-        assert_eq!(high_water_mark(status), Some(2048 * 1024));
-        assert_eq!(high_water_mark("VmHWM:\t many\n"), None);
+        assert_eq!(kibibytes(status, "VmHWM:"), Some(2048 * 1024));
+        assert_eq!(kibibytes("VmHWM:\t many\n", "VmHWM:"), None);
     }
 }

@@ -121,7 +121,7 @@ fn a_delta_of_nothing_is_no_protection() {
 fn a_gate_that_no_attack_could_break_is_refused() {
     let thresholds = ["1e-6", "0.25"].map(|label| Threshold::parse(label).expect("a threshold"));
     let plan = Plan { thresholds: thresholds.to_vec(), ..plan(&["olc"]) };
-    let error = audit(&prepared(&room()), None, plan, "olc:1e-6<=1").err().expect("an error");
+    let error = audit(&prepared(&room()), None, plan, "olc:1e-6<=1").expect_err("an error");
     let error = error.to_string();
     assert!(error.starts_with("--gate olc:1e-6<=1: expected neighboring points less"), "{error}");
 }

@@ -358,6 +358,9 @@ fn help_is_part_of_the_interface() {
         "metrics",
         "schemes",
         "models",
+        "doctor",
+        "completions",
+        "man",
     ] {
         let text = place.stdout(&format!("{command} --help"), 0);
         let name = if command.is_empty() { "unlift" } else { command }.replace(' ', "-");

@@ -8,6 +8,7 @@ mod bench;
 mod check;
 mod compare;
 mod demo;
+mod doctor;
 mod evaluate;
 #[cfg(test)]
 mod examples;
@@ -19,6 +20,7 @@ mod models;
 mod neighbors;
 mod obfuscate;
 mod recover;
+mod shell;
 mod table;
 
 use std::ffi::OsString;
@@ -35,6 +37,7 @@ pub use bench::BenchRecoverArgs;
 pub use check::CheckArgs;
 pub use compare::CompareArgs;
 pub use demo::DemoArgs;
+pub use doctor::DoctorArgs;
 pub use evaluate::EvaluateArgs;
 pub use features::FeaturesArgs;
 pub use invert::InvertArgs;
@@ -44,13 +47,14 @@ pub use models::ModelsArgs;
 pub use neighbors::{FindArgs, NeighborsCommand, OracleArgs};
 pub use obfuscate::ObfuscateArgs;
 pub use recover::RecoverArgs;
+pub use shell::{CompletionsArgs, ManArgs};
 pub use table::TableArgs;
 
 /// How much of a privacy-preserving ("obfuscated") SfM map or image comes back?
 #[derive(Debug, Parser)]
 #[command(
     name = "unlift",
-    version,
+    version = env!("UNLIFT_VERSION"),
     term_width = 100,
     after_help = "\
 Examples:
@@ -73,6 +77,11 @@ pub struct Cli {
 }
 
 impl Cli {
+    /// All commands and options, as they are read.
+    pub fn definition() -> clap::Command {
+        numbers_may_be_negative(Self::command())
+    }
+
     /// Reads a command line, the name of the program first.
     ///
     /// # Errors
@@ -80,7 +89,7 @@ impl Cli {
     pub fn read(
         line: impl IntoIterator<Item = impl Into<OsString> + Clone>,
     ) -> Result<Self, clap::Error> {
-        let matches = numbers_may_be_negative(Self::command()).try_get_matches_from(line)?;
+        let matches = Self::definition().try_get_matches_from(line)?;
         Self::from_arg_matches(&matches)
     }
 }
@@ -130,6 +139,12 @@ pub enum Command {
     Schemes,
     /// List the networks that can be used: purpose, licence, hash, owner, and whether they are here
     Models(ModelsArgs),
+    /// What this machine and this program have: version, instructions, threads, memory, models
+    Doctor(DoctorArgs),
+    /// Print what completes command lines of unlift in a shell
+    Completions(CompletionsArgs),
+    /// Print the manual page of unlift, or of one of its commands
+    Man(ManArgs),
 }
 
 /// What can be audited.

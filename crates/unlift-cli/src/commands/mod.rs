@@ -8,6 +8,7 @@ mod check;
 mod common;
 mod compare;
 mod demo;
+mod doctor;
 mod documents;
 mod evaluate;
 mod extraction;
@@ -23,6 +24,7 @@ mod painter;
 mod plan;
 mod recover;
 mod schemes;
+mod shell;
 mod table;
 
 use common::with_threads;
@@ -56,5 +58,8 @@ pub fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Metrics(args) => with_threads(None, || metrics::run(&args)),
         Command::Schemes => schemes::run(),
         Command::Models(args) => models::run(&args),
+        Command::Doctor(args) => doctor::run(&args),
+        Command::Completions(args) => shell::completions(&args),
+        Command::Man(args) => shell::man(&args),
     }
 }

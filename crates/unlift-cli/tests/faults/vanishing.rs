@@ -110,6 +110,12 @@ fn try_one(bench: &Bench, case: &'static Case, input: &str, fate: Fate, share: f
     if !is_same && is_audit && figures.contains(&left.figures()) {
         return 5;
     }
+    // A photo that went away while others were painted: they are in the rows, it is named.
+    let named =
+        format!("note: not painted: image {}", input.split_once('/').map_or(input, |x| x.1));
+    if is_audit && case.name.contains("--invert") && ended.stderr.contains(&named) {
+        return 4;
+    }
     let differ = [differing(&left, &known.new), differing(&left, &expected)];
     assert!(is_same, "{what}: {ended:?}, new and changed: {differ:?}; after that: {stderr}");
     2
