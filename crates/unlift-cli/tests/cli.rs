@@ -350,6 +350,7 @@ fn help_is_part_of_the_interface() {
         "neighbors find",
         "recover",
         "evaluate",
+        "export",
         "table",
         "compare",
         "bench recover",

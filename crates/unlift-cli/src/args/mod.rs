@@ -12,6 +12,7 @@ mod doctor;
 mod evaluate;
 #[cfg(test)]
 mod examples;
+mod export;
 mod features;
 mod invert;
 mod map;
@@ -39,6 +40,7 @@ pub use compare::CompareArgs;
 pub use demo::DemoArgs;
 pub use doctor::DoctorArgs;
 pub use evaluate::EvaluateArgs;
+pub use export::ExportArgs;
 pub use features::FeaturesArgs;
 pub use invert::InvertArgs;
 pub use map::MapArgs;
@@ -122,6 +124,8 @@ pub enum Command {
     Recover(RecoverArgs),
     /// Compare recovered points with the truth
     Evaluate(EvaluateArgs),
+    /// Released, recovered or true points as other programs read them: PLY, OBJ, a COLMAP model
+    Export(ExportArgs),
     /// The figures of an audit as a table for a paper, and as curves
     Table(TableArgs),
     /// Two audits side by side: what leaks more

@@ -11,6 +11,7 @@ mod demo;
 mod doctor;
 mod documents;
 mod evaluate;
+mod export;
 mod extraction;
 mod features;
 mod gate_files;
@@ -50,6 +51,7 @@ pub fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Neighbors(NeighborsCommand::Find(args)) => neighbors::find(&args),
         Command::Recover(args) => recover::run(&args),
         Command::Evaluate(args) => with_threads(None, || evaluate::run(&args)),
+        Command::Export(args) => export::run(&args),
         Command::Table(args) => table::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Bench(BenchCommand::Recover(args)) => bench::recovery(&args),

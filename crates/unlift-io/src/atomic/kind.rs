@@ -20,6 +20,8 @@ pub enum Kind {
     Stage(stage::Kind),
     /// A PLY or OBJ file with the comment `CLOUD_COMMENT` in its second line at the latest.
     Cloud,
+    /// A file of a COLMAP model in text whose first line is `MODEL_MARK`.
+    Model,
     /// HDF5 with `FEATURES_MARK` behind the superblock.
     Features,
     /// A PNG whose first chunk of text names unlift, as [`marked_picture`] has it.
@@ -42,6 +44,8 @@ const TABLE_MARKS: [&str; 3] = [TABLE_COLUMNS, "% unlift ", "<!-- unlift "];
 const CURVES_MARK: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?><!-- unlift ";
 /// The comment in clouds.
 pub(crate) const CLOUD_COMMENT: &str = "unlift";
+/// The first line of the files of a model.
+pub(crate) const MODEL_MARK: &str = "# unlift model";
 /// Between the superblock and the first array of features: no structure of HDF5 refers to it.
 pub(crate) const FEATURES_MARK: &[u8; 32] = b"unlift features, format 1\0\0\0\0\0\0\0";
 /// A chunk of a PNG: its length, the text "Software: unlift", its checksum.
@@ -72,6 +76,7 @@ impl Kind {
                 .is_some_and(|head| String::from_utf8_lossy(&head).contains(PAGE_MARK)),
             Self::Stage(kind) => stage::declared_kind(path) == Some(kind),
             Self::Cloud => start(path, 256).is_some_and(|head| is_cloud(&head)),
+            Self::Model => begins(path, &[MODEL_MARK]),
             Self::Features => start(path, 128).is_some_and(|head| {
                 head.starts_with(b"\x89HDF\r\n\x1a\n") && head.get(96..) == Some(&FEATURES_MARK[..])
             }),
@@ -94,6 +99,7 @@ impl fmt::Display for Kind {
             Self::Page => f.write_str("a report"),
             Self::Stage(kind) => kind.fmt(f),
             Self::Cloud => f.write_str("a cloud"),
+            Self::Model => f.write_str("a model"),
             Self::Features => f.write_str("features"),
             Self::Picture => f.write_str("a picture"),
             Self::Junit => f.write_str("gates as JUnit XML"),

@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 use crate::Error;
 
 pub use file::OutputFile;
-pub(crate) use kind::{CLOUD_COMMENT, FEATURES_MARK};
+pub(crate) use kind::{CLOUD_COMMENT, FEATURES_MARK, MODEL_MARK};
 pub use kind::{Kind, marked_picture};
 pub use partial::{abandon, make_folders, sweep};
 pub use rules::Rules;

@@ -1,10 +1,12 @@
-//! Pictures of points and lines for any viewer: PLY clouds colored by error, OBJ lines in a box.
+//! Points and lines for any viewer: PLY clouds colored by error, OBJ lines in a box, COLMAP models.
 
+mod colmap;
 mod color;
 mod obj;
 mod ply;
 mod segments;
 
+pub use colmap::{write_cameras, write_images, write_model_points};
 pub use color::error_color;
 pub use obj::write_lines;
 pub use ply::{write_points, write_recovered};

@@ -40,7 +40,7 @@ class Table:
 
     def to_pandas(self) -> Any:
         """A pandas DataFrame."""
-        import pandas  # type: ignore[import-untyped,unused-ignore]
+        import pandas  # type: ignore[import-not-found,import-untyped,unused-ignore]
 
         return pandas.DataFrame(self.to_dict())
 
@@ -91,7 +91,7 @@ class Report:
 
         threshold: one of those of the audit, as written; the first without it. Needs matplotlib.
         """
-        import matplotlib.pyplot
+        import matplotlib.pyplot  # type: ignore[import-not-found,import-untyped,unused-ignore]
 
         rows = self.document["results"]
         threshold = threshold or next(iter(rows[0]["recovered_percent"]))

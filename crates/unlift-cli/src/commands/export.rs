@@ -1,0 +1,183 @@
+//! `unlift export`: stage files of maps as other programs read them.
+
+use std::path::Path;
+
+use unlift::geometry::frame::Bounds;
+use unlift::released::{Obfuscation, Released};
+use unlift::{OneLine, Unit};
+use unlift_audit::{check_file, refused};
+use unlift_io::atomic::{Access, Kind, OutputSet, Rules};
+use unlift_io::clouds::{
+    Segment, record_segments, write_cameras, write_images, write_lines, write_model_points,
+    write_points,
+};
+use unlift_io::read::{self, colmap};
+use unlift_io::stage::{Kind as Stage, peek, read_recovered, read_released, read_truth};
+
+use crate::args::ExportArgs;
+use crate::exit::{Outcome, advise, usage};
+use crate::output::print;
+
+/// What a stage file shows.
+enum Shown {
+    /// A row per slot or original; of those that were lost none.
+    Points(Vec<Option<[f64; 3]>>),
+    Segments(Vec<Segment<3>>),
+}
+
+/// Writes a stage file in another form.
+pub fn run(args: &ExportArgs) -> anyhow::Result<Outcome> {
+    let inputs = [Some(args.path.as_path()), args.cameras.as_deref()];
+    let rules = Rules::new(inputs.into_iter().flatten(), args.force);
+    let ending = args.out.extension().map(|ending| ending.to_ascii_lowercase());
+    let ending = ending.as_ref().and_then(|ending| ending.to_str());
+    if args.cameras.is_some() && matches!(ending, Some("ply" | "obj")) {
+        let found = OneLine(args.out.display());
+        return Err(usage(format!("--cameras: expected a folder as --out, found {found}")));
+    }
+    let n = match ending {
+        Some("ply" | "obj") => {
+            check_file(&args.out, Kind::Cloud, &rules)?;
+            let shown = scaled(args, read(&args.path)?)?;
+            cloud(args, ending, &shown)?
+        }
+        _ => model(args, rules)?,
+    };
+    print(&format!("{n}, in {}\n", OneLine(args.out.display())))?;
+    Ok(Outcome::Done)
+}
+
+/// Writes a PLY or OBJ file: what was written, and how much of it.
+fn cloud(args: &ExportArgs, ending: Option<&str>, shown: &Shown) -> anyhow::Result<String> {
+    let wrong = |expected: &str, found: &str, way_out: &str| {
+        Err(advise(unlift_io::Error::new(&args.path, "", expected, found), way_out))
+    };
+    match (ending, shown) {
+        (Some("ply"), Shown::Points(points)) => {
+            let points: Vec<[f64; 3]> = points.iter().flatten().copied().collect();
+            write_points(&args.out, &points, None)?;
+            Ok(format!("{} points", points.len()))
+        }
+        (Some("obj"), Shown::Segments(segments)) => {
+            write_lines(&args.out, segments)?;
+            Ok(format!("{} segments", segments.len()))
+        }
+        (_, Shown::Points(_)) => {
+            wrong("lines or rays, as --out is .obj", "points", "--out NAME.ply")
+        }
+        (_, Shown::Segments(_)) => {
+            wrong("points, as --out is .ply", "lines or rays", "--out NAME.obj")
+        }
+    }
+}
+
+/// Writes a COLMAP model.
+fn model(args: &ExportArgs, rules: Rules) -> anyhow::Result<String> {
+    let names = ["cameras.txt", "images.txt", "points3D.txt"];
+    let first = names.map(|name| (name, Kind::Model));
+    let mut out = OutputSet::create(&args.out, rules, Access::Private, &first).map_err(refused)?;
+    let Shown::Points(points) = scaled(args, read(&args.path)?)? else {
+        let error = unlift_io::Error::new(&args.path, "", "points, for a model", "lines or rays");
+        return Err(advise(error, "--out NAME.obj"));
+    };
+    let (cameras, images) = match &args.cameras {
+        None => (Vec::new(), Vec::new()),
+        Some(project) => match read::open(project)?.model {
+            Some(folder) => colmap::read_views(&folder)?,
+            None => {
+                let expected = "a COLMAP model with cameras";
+                return Err(unlift_io::Error::new(project, "", expected, "only points").into());
+            }
+        },
+    };
+    let [cameras_txt, images_txt, points_txt] = names.map(|name| out.stage(name, Kind::Model));
+    write_cameras(&cameras_txt?, &cameras)?;
+    write_images(&images_txt?, &images)?;
+    write_model_points(&points_txt?, &points)?;
+    out.commit()?;
+    let n = points.iter().flatten().count();
+    Ok(format!("a model of {n} points, {} cameras and {} images", cameras.len(), images.len()))
+}
+
+/// What the file at `path` shows, and the unit of its lengths.
+fn read(path: &Path) -> anyhow::Result<(Shown, Unit)> {
+    let header = peek(path)?;
+    let wrong = |found: &str| {
+        let expected = "a released, recovered or truth file of a map";
+        Err(unlift_io::Error::new(path, "", expected, found).into())
+    };
+    if header.dimension == Some(2) {
+        return wrong("one of images");
+    }
+    match header.kind {
+        Stage::Released => {
+            let released = read_released::<3>(path)?;
+            let origin = released.origin();
+            let unit = released.unit();
+            match released.obfuscation() {
+                Obfuscation::Lines(_) | Obfuscation::Rays(_) => {
+                    let within = surroundings(&released);
+                    let segments = record_segments(&released, &within.low, &within.high);
+                    Ok((Shown::Segments(segments), unit))
+                }
+                Obfuscation::AxisCandidates(candidates) => {
+                    let place =
+                        |p: &[f32; 3]| Some(std::array::from_fn(|c| f64::from(p[c]) + origin[c]));
+                    Ok((Shown::Points(candidates.position().iter().map(place).collect()), unit))
+                }
+                Obfuscation::AxisPlanes(_) => wrong("planes, which have no end"),
+            }
+        }
+        Stage::Recovered => {
+            let recovered = read_recovered::<3>(path)?;
+            let points = (0..recovered.n_slots()).map(|slot| recovered.position(slot)).collect();
+            Ok((Shown::Points(points), recovered.unit()))
+        }
+        Stage::Truth => {
+            let (original, _) = read_truth::<3>(path)?;
+            let points = original.reveal();
+            let places = points.positions().iter().copied().map(Some).collect();
+            Ok((Shown::Points(places), points.unit()))
+        }
+        Stage::Neighborhoods | Stage::PointNeighborhoods => wrong("neighborhoods"),
+    }
+}
+
+/// In the units of the map, where its scale is given.
+fn scaled(args: &ExportArgs, (mut shown, unit): (Shown, Unit)) -> anyhow::Result<Shown> {
+    let Some(scale) = args.scale else { return Ok(shown) };
+    if unit != Unit::Meter {
+        let expected = "a file in meters (obfuscate --scale)";
+        let path = args.path.display();
+        return Err(usage(format!(
+            "--scale: expected {expected}, found {path} in {}",
+            unit.name()
+        )));
+    }
+    let points = match &mut shown {
+        Shown::Points(points) => points.iter_mut().flatten().collect::<Vec<_>>(),
+        Shown::Segments(segments) => segments.iter_mut().flatten().collect(),
+    };
+    for point in points {
+        *point = point.map(|x| x / scale);
+    }
+    Ok(shown)
+}
+
+/// A box that holds most of what lines and rays hide, from the records alone: around the feet of lines, around the centers of
+/// rays.
+fn surroundings(released: &Released<3>) -> Bounds<3> {
+    let (near, share) = match released.obfuscation() {
+        Obfuscation::Rays(rays) => (rays.centers().to_vec(), 3.0),
+        Obfuscation::Lines(lines) => (lines.foot().to_vec(), 0.5),
+        Obfuscation::AxisPlanes(_) | Obfuscation::AxisCandidates(_) => (Vec::new(), 0.0),
+    };
+    let origin = released.origin();
+    let places: Vec<[f64; 3]> =
+        near.iter().map(|p| std::array::from_fn(|c| f64::from(p[c]) + origin[c])).collect();
+    let bounds = Bounds::quantiles(&places, if share > 1.0 { 0.0 } else { 0.01 });
+    let Bounds { low, high } = bounds.unwrap_or(Bounds { low: origin, high: origin });
+    let widest = (0..3).map(|c| high[c] - low[c]).fold(0.0, f64::max);
+    let more = if widest > 0.0 { share * widest } else { 1.0 };
+    Bounds { low: low.map(|x| x - more), high: high.map(|x| x + more) }
+}

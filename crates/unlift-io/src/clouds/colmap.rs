@@ -1,0 +1,192 @@
+//! Points, cameras and images as a COLMAP model in text: `cameras.txt`, `images.txt`, `points3D.txt`.
+//!
+//! Source: COLMAP's documentation, "Output Format". Nothing is said of observations: recovered points were seen by nobody.
+
+use std::io::Write;
+use std::path::Path;
+
+use crate::Error;
+use crate::atomic::{self, Access, MODEL_MARK};
+use crate::read::colmap::{Camera, Image};
+
+/// Writes `cameras.txt`.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_cameras(path: &Path, cameras: &[Camera]) -> Result<(), Error> {
+    atomic::write_file(path, Access::Private, |w| {
+        writeln!(w, "{MODEL_MARK}\n# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]")?;
+        for camera in cameras {
+            let Camera { id, model, width_px, height_px, params } = camera;
+            write!(w, "{id} {} {width_px} {height_px}", model.name)?;
+            for value in params {
+                write!(w, " {value}")?;
+            }
+            writeln!(w)?;
+        }
+        Ok(())
+    })
+}
+
+/// Writes `images.txt`: poses and names, and no 2D points.
+///
+/// # Errors
+/// When a name holds what a line of text cannot, or the file cannot be written.
+pub fn write_images(path: &Path, images: &[Image]) -> Result<(), Error> {
+    let is_one_word = |name: &[u8]| !name.is_empty() && name.iter().all(|&byte| byte > b' ');
+    if let Some(image) = images.iter().find(|image| !is_one_word(&image.name)) {
+        let found = String::from_utf8_lossy(&image.name).escape_debug().to_string();
+        let place = format!("image {}", image.id);
+        return Err(Error::new(path, place, "a name without spaces", format!("\"{found}\"")));
+    }
+    atomic::write_file(path, Access::Private, |w| {
+        writeln!(w, "{MODEL_MARK}\n# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME")?;
+        for image in images {
+            let [qw, qx, qy, qz] = quaternion(&image.rotation);
+            let [tx, ty, tz] = image.rotation.map(|row| -dot(&row, &image.center));
+            write!(w, "{} {qw} {qx} {qy} {qz} {tx} {ty} {tz} {} ", image.id, image.camera_id)?;
+            w.write_all(&image.name)?;
+            // The line of 2D points is there and empty.
+            writeln!(w, "\n")?;
+        }
+        Ok(())
+    })
+}
+
+/// Writes `points3D.txt`: those of `points` `(n, 3)` that have a position, with their row as the id, gray.
+///
+/// # Errors
+/// When a coordinate is not finite, or the file cannot be written.
+pub fn write_model_points(path: &Path, points: &[Option<[f64; 3]>]) -> Result<(), Error> {
+    let infinite = |point: &[f64; 3]| point.iter().any(|x| !x.is_finite());
+    if let Some(row) = points.iter().position(|point| point.as_ref().is_some_and(infinite)) {
+        let found = format!("{:?}", points[row].unwrap_or_default());
+        return Err(Error::new(path, format!("point {row}"), "finite coordinates", found));
+    }
+    atomic::write_file(path, Access::Private, |w| {
+        writeln!(w, "{MODEL_MARK}\n# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]")?;
+        for (row, point) in points.iter().enumerate() {
+            if let Some([x, y, z]) = point {
+                // COLMAP counts from 1.
+                writeln!(w, "{} {x} {y} {z} 128 128 128 0", row + 1)?;
+            }
+        }
+        Ok(())
+    })
+}
+
+fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// The unit quaternion (w, x, y, z) of a rotation, `w` not negative.
+fn quaternion(r: &[[f64; 3]; 3]) -> [f64; 4] {
+    // Four times the square of each component; the largest one divides.
+    let squares = [
+        1.0 + r[0][0] + r[1][1] + r[2][2],
+        1.0 + r[0][0] - r[1][1] - r[2][2],
+        1.0 - r[0][0] + r[1][1] - r[2][2],
+        1.0 - r[0][0] - r[1][1] + r[2][2],
+    ];
+    let sums = |i: usize, j: usize| match (i.min(j), i.max(j)) {
+        (0, 1) => r[2][1] - r[1][2],
+        (0, 2) => r[0][2] - r[2][0],
+        (0, 3) => r[1][0] - r[0][1],
+        (1, 2) => r[1][0] + r[0][1],
+        (1, 3) => r[0][2] + r[2][0],
+        _ => r[2][1] + r[1][2],
+    };
+    let most = (0..4).fold(0, |best, i| if squares[i] > squares[best] { i } else { best });
+    let root = squares[most].sqrt();
+    let q: [f64; 4] = std::array::from_fn(|i| match i == most {
+        true => 0.5 * root,
+        false => 0.5 * sums(most, i) / root,
+    });
+    let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let sign = if q[0] < 0.0 { -1.0 } else { 1.0 };
+    q.map(|x| sign * x / norm)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::read::colmap::{CameraModel, read_points, read_views};
+
+    /// About each axis and in between, also by half turns.
+    fn rotations() -> Vec<[[f64; 3]; 3]> {
+        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.6, -0.48, 0.64]];
+        let angles = [0.0, 0.3, 1.9, std::f64::consts::PI, 4.5];
+        let turned = |axis: [f64; 3], angle: f64| {
+            let (s, c) = angle.sin_cos();
+            let [x, y, z] = axis;
+            let cross = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
+            std::array::from_fn(|i| {
+                std::array::from_fn(|j| {
+                    let same = if i == j { c } else { 0.0 };
+                    same + s * cross[i][j] + (1.0 - c) * axis[i] * axis[j]
+                })
+            })
+        };
+        axes.iter().flat_map(|&axis| angles.map(|angle| turned(axis, angle))).collect()
+    }
+
+    #[test]
+    fn a_model_is_read_as_it_was_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let cameras = vec![Camera {
+            id: 3,
+            model: CameraModel::from_name(b"SIMPLE_RADIAL").unwrap(),
+            width_px: 640,
+            height_px: 480,
+            params: vec![525.25, 320.0, 240.0, -0.01],
+        }];
+        let images: Vec<Image> = rotations()
+            .iter()
+            .enumerate()
+            .map(|(at, &rotation)| Image {
+                id: at as u32 + 1,
+                name: format!("seq/{at}.png").into_bytes(),
+                camera_id: 3,
+                center: [1.5 * at as f64, -2.0, 0.25],
+                rotation,
+                n_points2d: 0,
+            })
+            .collect();
+        let points = [Some([1.0, 2.5, -1e-7]), None, Some([1e6, 0.1, 3.0])];
+        write_cameras(&at("cameras.txt"), &cameras).unwrap();
+        write_images(&at("images.txt"), &images).unwrap();
+        write_model_points(&at("points3D.txt"), &points).unwrap();
+        let (read_cameras, read_images) = read_views(folder.path()).unwrap();
+        assert_eq!(read_cameras, cameras);
+        assert_eq!(read_images.len(), images.len());
+        for (read, written) in read_images.iter().zip(&images) {
+            assert_eq!((read.id, &read.name), (written.id, &written.name));
+            let near = |a: f64, b: f64| (a - b).abs() < 1e-9 * (1.0 + b.abs());
+            assert!((0..3).all(|c| near(read.center[c], written.center[c])), "{read:?}");
+            let (a, b) = (read.rotation.as_flattened(), written.rotation.as_flattened());
+            assert!(a.iter().zip(b).all(|(&a, &b)| near(a, b)), "{read:?} {written:?}");
+        }
+        let read = read_points(&at("points3D.txt"), false).unwrap();
+        assert_eq!(read.ids, [1, 3]);
+        assert_eq!(read.positions, [[1.0, 2.5, -1e-7], [1e6, 0.1, 3.0]]);
+    }
+
+    #[test]
+    fn names_that_a_line_cannot_hold_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let image = |name: &[u8]| Image {
+            id: 7,
+            name: name.to_vec(),
+            camera_id: 1,
+            center: [0.0; 3],
+            rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            n_points2d: 0,
+        };
+        for name in [&b"a b.png"[..], b"", b"a\n9 1 0 0 0 0 0 0 1 b"] {
+            let error = write_images(&folder.path().join("images.txt"), &[image(name)]);
+            let error = error.unwrap_err().to_string();
+            assert!(error.contains("image 7: expected a name without spaces"), "{error}");
+        }
+    }
+}
