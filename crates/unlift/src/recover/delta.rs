@@ -21,6 +21,8 @@ use crate::seed::{Draws, Stage};
 /// the evidence of a few slots grows without end as delta shrinks. But the neighbors that a list names
 /// are farther apart than that.
 const LEAST_DELTA: f64 = 0.25;
+/// Bounds are those of something else if a side is so many times as long as the part of it that is filled.
+const TOO_LARGE: f64 = 1.5;
 /// Delta for rays from anchors, as a share of the spacing of points: anchors say nothing at one delta rather than at another.
 const ANCHOR_DELTA: f64 = 1.75;
 /// Halvings of the extent that the coarse ladder spans: down to 1 / 16,384 of it.
@@ -80,7 +82,10 @@ fn spacing<const D: usize>(released: &Released<D>) -> f64 {
         for (c, side) in sides.iter_mut().enumerate() {
             let mut column: Vec<f32> = candidates.position().iter().map(|row| row[c]).collect();
             let (low, high) = trimmed(&mut column);
-            *side = side.min(f64::from(high - low));
+            let filled = f64::from(high - low);
+            if *side > TOO_LARGE * filled {
+                *side = filled;
+            }
         }
     }
     let volume: f64 = sides.iter().product();
