@@ -10,10 +10,11 @@ use unlift::truth::{Original, Secret};
 
 use crate::lengths::short;
 
-/// The attack chooses a delta of 0.2 to 2 times the distance to the K-th neighbor on maps of any shape. Beyond these times the
-/// quartiles of that distance it has not found how far apart neighbors are.
-const NARROW: f64 = 0.1;
-const WIDE: f64 = 4.0;
+/// On RedKitchen and Castle delta is 0.1 (`density`) to 4.8 times (`consensus`, noise that is near) the median distance to the
+/// K-th neighbor, whatever scheme, solver, source and noise. Beyond these times the quartiles of that distance the attack has not
+/// found how far apart neighbors are.
+const NARROW: f64 = 0.05;
+const WIDE: f64 = 8.0;
 /// Points whose neighbors are looked at: enough for quartiles.
 const SAMPLE: usize = 2000;
 /// Points that may lie farther from their own records than the smallest threshold: some mistake of a few is nobody's
@@ -21,8 +22,7 @@ const SAMPLE: usize = 2000;
 const STRAY: f64 = 0.01;
 /// The usual distance to the K-th neighbor in units of itself, whatever the K that the unit was made with.
 const UNIT: [f64; 2] = [0.2, 5.0];
-/// Lists that hold a larger share of the map than this are said to be long: of 800 points of a room, `olc`, 66 % come back within
-/// 25 cm with K = 50 and 86 % with K = 10, half of the entries right.
+/// Lists that hold a larger share of the map than this are said to be long (`tests/doubts.rs` has how much that costs).
 const LONG: f64 = 0.05;
 /// Lists that cannot be shorter.
 const SHORT: usize = 5;

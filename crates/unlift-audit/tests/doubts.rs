@@ -92,6 +92,21 @@ fn usual_maps_are_not_doubted() {
     assert!(found.document.gates[0].passed);
 }
 
+/// Whoever attacks with long lists of a small map gets less back than could come, and is told.
+#[test]
+fn lists_that_are_long_for_a_map_are_said() {
+    let points = prepared(&unlift::synthetic::room(1, 800).points);
+    let within = |k: usize| {
+        let found = audit(&points, None, Plan { k, ..plan(&["olc"]) }, "olc:0.25<=100");
+        let document = found.expect("an audit").document;
+        (document.results[0].recovered_percent["0.25"], document.notes)
+    };
+    let ((long, said), (short, nothing)) = (within(50), within(10));
+    assert!(short > long + 10.0, "{long} {short}");
+    assert!(said[0].starts_with("K = 50 is 6 % of the map's points"), "{said:?}");
+    assert!(nothing.is_empty(), "{nothing:?}");
+}
+
 /// One of two centers lies by the far point: its ray alone could tell where the others' points are.
 #[test]
 fn a_far_point_is_no_protection() {

@@ -8,7 +8,7 @@ use std::path::Path;
 use common::{Place, photo};
 use image::RgbImage;
 use serde_json::Value;
-use unlift_io::features::{FeatureSource, FeatureWriter};
+use unlift_io::features::{FeatureSource, FeatureWriter, ImageFeatures};
 
 const QUICK: &str = "--k 10 --inlier-ratios 1,0.5";
 
@@ -20,16 +20,21 @@ fn json(place: &Place, file: &str) -> Value {
     serde_json::from_str(&fs::read_to_string(place.path(file)).expect("a file")).expect("JSON")
 }
 
-/// The features of `from` once more, without their descriptors.
-fn without_descriptors(from: &Path, to: &Path) {
+/// The features of `from` once more, each image as `change` leaves it.
+fn changed(from: &Path, to: &Path, change: impl Fn(&mut ImageFeatures)) {
     let source = FeatureSource::open(from).unwrap();
     let mut writer = FeatureWriter::create(to).unwrap();
     for at in 0..source.names().len() {
         let mut image = source.get(at).unwrap();
-        image.descriptors = None;
+        change(&mut image);
         writer.append(&image).unwrap();
     }
     writer.finish().unwrap();
+}
+
+/// The same without their descriptors.
+fn without_descriptors(from: &Path, to: &Path) {
+    changed(from, to, |image| image.descriptors = None);
 }
 
 #[test]
@@ -229,17 +234,12 @@ fn what_cannot_be_audited_is_one_line() {
 fn learned_descriptors_are_no_sift() {
     let place = photos();
     place.ends("features photos --out f.h5", 0);
-    let source = FeatureSource::open(&place.path("f.h5")).unwrap();
-    let mut writer = FeatureWriter::create(&place.path("floats.h5")).unwrap();
-    for at in 0..source.names().len() {
-        let mut image = source.get(at).unwrap();
+    changed(&place.path("f.h5"), &place.path("floats.h5"), |image| {
         let n = image.keypoints.len();
         let values = (0..64 * n).map(|i| (i as f32 * 0.37).sin()).collect();
         let values = unlift::descriptors::Values::F32(values);
         image.descriptors = Some(unlift::Descriptors::try_new(values, 64).unwrap());
-        writer.append(&image).unwrap();
-    }
-    writer.finish().unwrap();
+    });
     let (_, stderr) = place.ends("audit images floats.h5 --neighbors overlap", 2);
     assert_eq!(
         stderr,
@@ -248,4 +248,33 @@ fn learned_descriptors_are_no_sift() {
          try: --neighbors similarity, which takes descriptors of any kind\n"
     );
     place.ends("audit images floats.h5 --k 10 --neighbors similarity --out a", 0);
+}
+
+/// Schemes and attacks take the declared size for the true one: with twice the sides a third comes back of `dcl2d`.
+#[test]
+fn a_declared_size_that_is_too_large_lets_no_gate_hold() {
+    let place = photos();
+    place.ends("features photos --out f.h5", 0);
+    let gate = format!("{QUICK} --schemes dcl2d,cp2d --gate all:25<=100 --share-safe");
+    place.ends(&format!("audit images f.h5 {gate} --out right"), 0);
+    let right = json(&place, "right/audit.json");
+    assert!(right["notes"].is_null(), "{}", right["notes"]);
+    for (factor, name) in [(2, "twice"), (10, "ten")] {
+        changed(&place.path("f.h5"), &place.path("wide.h5"), |image| {
+            image.size = image.size.map(|size| size.map(|side| factor * side));
+        });
+        place.ends(&format!("audit images wide.h5 {gate} --out {name}"), 1);
+        let wide = json(&place, &format!("{name}/audit.json"));
+        let reason = wide["gates"][0]["reason"].as_str().expect("a reason");
+        assert!(reason.starts_with("sizes: keypoints fill"), "{reason}");
+        assert_eq!(wide["notes"][0], reason);
+        // What publishes coordinates is attacked by these.
+        let of = |document: &Value| {
+            let rows = document["results"].as_array().expect("rows").iter();
+            let found = rows.filter(|row| row["scheme"] == "cp2d" && row["solver"] == "joint");
+            found.map(|row| row["recovered_percent"]["25"].as_f64().unwrap()).sum::<f64>()
+        };
+        assert!((of(&wide) - of(&right)).abs() < 5.0, "{} {}", of(&wide), of(&right));
+        fs::remove_file(place.path("wide.h5")).unwrap();
+    }
 }

@@ -1,4 +1,4 @@
-//! NumPy arrays in and out: shapes and kinds checked, and no copy where the layout allows it.
+//! NumPy arrays in and out: shapes and kinds checked, one copy in, as the work outlives the call, and none out.
 
 use std::fmt::Display;
 use std::ops::RangeInclusive;

@@ -5,10 +5,7 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use unlift::evaluate::belongs;
-use unlift::obfuscate::{Scheme, SchemeOptions, obfuscate as hide, scheme};
 use unlift::released::{self, Obfuscation};
-use unlift::seed::Key;
 use unlift::truth::{Original, Secret};
 use unlift_audit::Prepared;
 use unlift_io::stage::{Kind, read_released, read_truth, write_released, write_truth};
@@ -16,9 +13,6 @@ use unlift_io::stage::{Kind, read_released, read_truth, write_released, write_tr
 use crate::arrays::{to_array, to_descriptors, to_rows};
 use crate::errors::raised;
 use crate::files::save;
-use crate::map::Map;
-use crate::own::{OwnScheme, Raised};
-use crate::work;
 
 /// All that an attacker sees of a map.
 #[pyclass(frozen, module = "unlift")]
@@ -139,6 +133,11 @@ enum Whose {
 }
 
 impl Truth {
+    /// The truth of a map that is at hand.
+    pub fn of(prepared: Arc<Prepared>, secret: Secret) -> Self {
+        Self { of: Whose::Map(prepared), secret: Arc::new(secret) }
+    }
+
     pub fn original(&self) -> &Original<3> {
         match &self.of {
             Whose::Map(prepared) => &prepared.original,
@@ -200,6 +199,10 @@ pub struct Hidden {
 }
 
 impl Hidden {
+    pub fn of(released: Released, truth: Truth) -> Self {
+        Self { released, truth }
+    }
+
     pub fn parts(&self) -> (&Released, &Truth) {
         (&self.released, &self.truth)
     }
@@ -237,49 +240,4 @@ pub fn truth_of(given: &Bound<'_, PyAny>) -> PyResult<Truth> {
         let found = given.get_type().to_string();
         crate::errors::wrong("truth", "a Truth or a Hidden", found)
     })
-}
-
-/// The scheme in `given`, a name or a function.
-pub fn scheme_of(
-    given: &Bound<'_, PyAny>,
-    options: &SchemeOptions,
-    raised_by: &Raised,
-) -> PyResult<Arc<dyn Scheme<3>>> {
-    let Ok(name) = given.extract::<String>() else {
-        return Ok(Arc::new(OwnScheme::new(given, raised_by)?));
-    };
-    let entry = scheme(&name).map_err(raised)?;
-    entry
-        .of_dimension::<3>(options)
-        .ok_or_else(|| crate::errors::wrong("scheme", "one that is defined on maps", name))
-}
-
-/// Hides a map by a scheme, a name or a function. Without a seed under a fresh key, for maps that are released; a seed
-/// repeats experiments, and whoever guesses it undoes the hiding.
-#[pyfunction]
-#[pyo3(signature = (map, scheme, *, seed=None))]
-pub fn obfuscate(
-    py: Python<'_>,
-    map: &Map,
-    scheme: &Bound<'_, PyAny>,
-    seed: Option<u64>,
-) -> PyResult<Hidden> {
-    let by = Raised::default();
-    let unit = map.prepared.original.reveal().unit();
-    let is_own = scheme.extract::<String>().is_err();
-    let scheme = scheme_of(scheme, &SchemeOptions::usual(unit), &by)?;
-    let key = seed.map_or_else(Key::fresh, |seed| Ok(Key::from_seed(seed))).map_err(raised)?;
-    let prepared = Arc::clone(&map.prepared);
-    let hidden = work::run(py, None, Some(by.stop()), move || {
-        let (original, descriptors) = (&prepared.original, prepared.descriptors.as_ref());
-        let (released, secret) = hide(&*scheme, original, descriptors, &key)?;
-        if is_own {
-            // As an audit asks: of a scheme with a mistake next to nothing comes back.
-            belongs(original, &released, &secret).map_err(|error| error.within(scheme.name()))?;
-        }
-        Ok::<_, unlift::Error>((released, secret))
-    });
-    let (released, secret) = hidden.map_err(|error| by.as_cause_of(py, error))?;
-    let truth = Truth { of: Whose::Map(Arc::clone(&map.prepared)), secret: Arc::new(secret) };
-    Ok(Hidden { released: Released::of(released), truth })
 }

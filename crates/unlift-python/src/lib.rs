@@ -14,9 +14,11 @@ mod calls;
 mod errors;
 mod files;
 mod hidden;
+mod json;
 mod laws;
 mod lists;
 mod map;
+mod obfuscate;
 mod own;
 mod plan;
 mod records;
@@ -35,13 +37,15 @@ mod _unlift {
     #[pymodule_export]
     use super::audit::audit;
     #[pymodule_export]
-    use super::hidden::{Hidden, Released, Truth, obfuscate};
+    use super::hidden::{Hidden, Released, Truth};
     #[pymodule_export]
     use super::laws::{check_scheme, check_source};
     #[pymodule_export]
     use super::lists::{Neighborhoods, find, oracle};
     #[pymodule_export]
     use super::map::{Map, read};
+    #[pymodule_export]
+    use super::obfuscate::obfuscate;
     #[pymodule_export]
     use super::records::{Candidates, Lines, Planes, Rays, Records};
     #[pymodule_export]

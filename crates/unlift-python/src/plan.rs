@@ -10,8 +10,8 @@ use unlift::recover::{Delta, Solver};
 use unlift_audit::{Prepared, check_thresholds, sources};
 
 use crate::errors::{raised, wrong};
-use crate::hidden::scheme_of;
 use crate::lists;
+use crate::obfuscate::scheme_of;
 use crate::own::{OwnSource, Raised};
 use crate::work;
 

@@ -14,9 +14,9 @@ use crate::arrays::{to_array, to_rows};
 use crate::errors::{raised, wrong};
 use crate::files::save;
 use crate::hidden::{Hidden, Released, released_of, truth_of};
+use crate::json::as_python;
 use crate::lists::Neighborhoods;
 use crate::plan::{delta, thresholds};
-use crate::report::as_python;
 use crate::work;
 
 /// What came back of a map: a position for every hidden point, or the reason why there is none.

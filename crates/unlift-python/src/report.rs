@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
 use serde_json::Value;
 use unlift_audit::{Audited, Quiet, Shown, open_audit};
 use unlift_io::atomic::Rules;
 
 use crate::errors::raised;
 use crate::files::refused;
+use crate::json::as_python;
 use crate::rows::Rows;
 
 /// What an audit found: figures, and a page that shows them.
@@ -86,28 +86,4 @@ impl Report {
     fn __repr__(&self) -> String {
         format!("<unlift.Report: {} rows>", self.0.document.results.len())
     }
-}
-
-/// A value of JSON as Python has it.
-pub fn as_python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
-    Ok(match value {
-        Value::Null => py.None().into_bound(py),
-        Value::Bool(value) => value.into_pyobject(py)?.to_owned().into_any(),
-        Value::Number(number) => match number.as_i64() {
-            Some(whole) => whole.into_pyobject(py)?.into_any(),
-            None => number.as_f64().unwrap_or(f64::NAN).into_pyobject(py)?.into_any(),
-        },
-        Value::String(text) => text.into_pyobject(py)?.into_any(),
-        Value::Array(values) => {
-            let values = values.iter().map(|value| as_python(py, value));
-            PyList::new(py, values.collect::<PyResult<Vec<_>>>()?)?.into_any()
-        }
-        Value::Object(fields) => {
-            let dict = PyDict::new(py);
-            for (name, value) in fields {
-                dict.set_item(name, as_python(py, value)?)?;
-            }
-            dict.into_any()
-        }
-    })
 }

@@ -12,7 +12,7 @@ use pyo3::types::PyCapsule;
 use serde_json::Value;
 
 use crate::errors::raised;
-use crate::report::as_python;
+use crate::json::as_python;
 
 /// The rows of an audit, one column per figure: names as in `audit.json`, with a dot before what stands within
 /// (`recovered_percent.0.10`).

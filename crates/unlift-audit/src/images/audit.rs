@@ -98,23 +98,18 @@ pub fn perform(job: ImagesJob<'_>, out: OutputSet) -> Result<(Option<Finished>, 
         true => Album::default(),
         false => draw(&job, &tally, &figures)?,
     };
-    let gates = gate_results(&job.gates, &job.plan, &outcome.rows, &[], &[])?;
+    let doubt = tally.doubt();
+    if let Some(doubt) = &doubt {
+        steps.say(&format!("note: {doubt}"));
+    }
+    let doubts = vec![doubt.clone(); outcome.rows.len()];
+    let gates = gate_results(&job.gates, &job.plan, &outcome.rows, &[], &doubts)?;
     let mut options = job.options.clone();
     if let Some(inversion) = &job.inversion {
         options.insert("inverter_sha256".into(), inversion.sha256().into());
     }
-    let wide = (tally.wide > 0).then(|| {
-        format!(
-            "in {} of {} images keypoints fill less than a quarter of the declared size: if that is not theirs, more comes \
-             back",
-            tally.wide, used.used
-        )
-    });
-    if let Some(note) = &wide {
-        steps.say(&format!("note: {note}"));
-    }
     let provenance = Provenance {
-        notes: wide.into_iter().collect(),
+        notes: doubt.into_iter().collect(),
         input: input(&job, &tally, &outcome)?,
         options: document::options(&job.plan, options),
         gates,

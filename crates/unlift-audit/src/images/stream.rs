@@ -32,11 +32,48 @@ pub struct Tally {
     pub n_points: usize,
     /// Images that could not be used.
     pub unusable: usize,
-    /// Images that are declared to be much larger than where their keypoints are.
-    pub wide: usize,
+    /// The part of the declared sizes that keypoints of any image fill, as a box in `[0, 1]`.
+    filled: Option<Bounds<2>>,
 }
 
+/// Keypoints that say where an image ends.
+const TELLING: usize = 30;
+/// Keypoints fill more of the declared sizes than this share, unless the sizes are others.
+const FILLED: f64 = 0.5;
+
 impl Tally {
+    fn fill(&mut self, original: &Original<2>) {
+        let places = original.reveal().positions();
+        let (Some(declared), Some(box_of)) = (
+            original.bounds(),
+            Bounds::quantiles(places, 0.01).filter(|_| places.len() >= TELLING),
+        ) else {
+            return;
+        };
+        let share = |c: usize, x: f64| (x - declared.low[c]) / (declared.high[c] - declared.low[c]);
+        let of = |x: &[f64; 2]| [share(0, x[0]), share(1, x[1])];
+        let (low, high) = (of(&box_of.low), of(&box_of.high));
+        let all = self.filled.get_or_insert(Bounds { low, high });
+        for c in 0..2 {
+            all.low[c] = all.low[c].min(low[c]);
+            all.high[c] = all.high[c].max(high[c]);
+        }
+    }
+
+    /// Why figures may be too small: images are declared to be larger than where keypoints of any of them are. Schemes and
+    /// attacks take the declared size for the true one.
+    pub fn doubt(&self) -> Option<String> {
+        let Bounds { low, high } = self.filled.as_ref()?;
+        let share = (high[0] - low[0]) * (high[1] - low[1]);
+        (share < FILLED).then(|| {
+            format!(
+                "sizes: keypoints fill {:.0} % of the declared size of the images: if that is not theirs, more may come \
+                 back",
+                100.0 * share
+            )
+        })
+    }
+
     /// The keypoints of the image that was handed out first and not taken yet.
     pub fn take(&mut self) -> usize {
         self.sizes.pop_front().unwrap_or(0)
@@ -115,7 +152,7 @@ impl<'a> Stream<'a> {
         for (at, image) in read {
             match image {
                 Ok(image) => {
-                    self.tally.borrow_mut().wide += usize::from(is_wide(&image.original));
+                    self.tally.borrow_mut().fill(&image.original);
                     self.ready.push_back((at, image));
                 }
                 Err(error) => {
@@ -169,21 +206,6 @@ fn image(
     // Nobody asks for them otherwise, and they are most of an image.
     let descriptors = features.descriptors.filter(|_| needs.descriptors() || needs.whatever);
     Ok(Image { name: features.name, original, descriptors })
-}
-
-/// Keypoints that say where an image ends.
-const TELLING: usize = 30;
-
-/// Whether keypoints fill less than a quarter of the image: its size is that of another, or in other units.
-fn is_wide(original: &Original<2>) -> bool {
-    let places = original.reveal().positions();
-    let (Some(declared), Some(filled)) = (original.bounds(), Bounds::quantiles(places, 0.01))
-    else {
-        return false;
-    };
-    let area =
-        |bounds: &Bounds<2>| -> f64 { (0..2).map(|c| bounds.high[c] - bounds.low[c]).product() };
-    places.len() >= TELLING && area(&filled) < 0.25 * area(&declared)
 }
 
 /// What was expected of these features, and found; `None` where they have what is needed. An image

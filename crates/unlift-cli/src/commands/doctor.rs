@@ -1,9 +1,6 @@
 //! `unlift doctor`: what this machine and this program have.
 
-use std::path::PathBuf;
-
 use serde_json::json;
-use unlift::OneLine;
 use unlift::simd::instructions;
 use unlift_audit::total_bytes;
 use unlift_nn::{Folders, MODELS};
@@ -26,7 +23,7 @@ pub fn run(args: &DoctorArgs) -> anyhow::Result<Outcome> {
     }
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let memory = total_bytes();
-    let browser = BROWSERS.into_iter().find(|name| on_path(name).is_some());
+    let browser = BROWSERS.into_iter().find(|name| is_on_path(name));
     let (system, machine) = (std::env::consts::OS, std::env::consts::ARCH);
     let build = if cfg!(debug_assertions) { "debug" } else { "release" };
     let version = env!("UNLIFT_VERSION");
@@ -72,13 +69,11 @@ pub fn run(args: &DoctorArgs) -> anyhow::Result<Outcome> {
             here.join(", "),
         )
     };
-    // Versions of others' systems may hold anything.
-    let lines: Vec<String> = text.lines().map(|line| OneLine(line).to_string()).collect();
-    print(&(lines.join("\n") + "\n"))?;
+    print(&text)?;
     Ok(Outcome::Done)
 }
 
-fn on_path(name: &str) -> Option<PathBuf> {
-    let folders = std::env::var_os("PATH")?;
-    std::env::split_paths(&folders).map(|folder| folder.join(name)).find(|path| path.is_file())
+fn is_on_path(name: &str) -> bool {
+    let folders = std::env::var_os("PATH").unwrap_or_default();
+    std::env::split_paths(&folders).any(|folder| folder.join(name).is_file())
 }

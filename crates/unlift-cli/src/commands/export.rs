@@ -164,20 +164,21 @@ fn scaled(args: &ExportArgs, (mut shown, unit): (Shown, Unit)) -> anyhow::Result
     Ok(shown)
 }
 
-/// A box that holds most of what lines and rays hide, from the records alone: around the feet of lines, around the centers of
-/// rays.
+/// A box that holds most of what lines and rays hide, from the records alone: the feet of lines, but for a hundredth on either
+/// side, and half as much around them; the centers of rays, and three times as much.
 fn surroundings(released: &Released<3>) -> Bounds<3> {
-    let (near, share) = match released.obfuscation() {
-        Obfuscation::Rays(rays) => (rays.centers().to_vec(), 3.0),
-        Obfuscation::Lines(lines) => (lines.foot().to_vec(), 0.5),
-        Obfuscation::AxisPlanes(_) | Obfuscation::AxisCandidates(_) => (Vec::new(), 0.0),
+    let (places, left_out, around) = match released.obfuscation() {
+        Obfuscation::Lines(lines) => (lines.foot(), 0.01, 0.5),
+        Obfuscation::Rays(rays) => (rays.centers(), 0.0, 3.0),
+        Obfuscation::AxisPlanes(_) | Obfuscation::AxisCandidates(_) => (&[][..], 0.0, 0.0),
     };
     let origin = released.origin();
-    let places: Vec<[f64; 3]> =
-        near.iter().map(|p| std::array::from_fn(|c| f64::from(p[c]) + origin[c])).collect();
-    let bounds = Bounds::quantiles(&places, if share > 1.0 { 0.0 } else { 0.01 });
+    let place = |p: &[f32; 3]| std::array::from_fn(|c| f64::from(p[c]) + origin[c]);
+    let places: Vec<[f64; 3]> = places.iter().map(place).collect();
+    let bounds = Bounds::quantiles(&places, left_out);
     let Bounds { low, high } = bounds.unwrap_or(Bounds { low: origin, high: origin });
     let widest = (0..3).map(|c| high[c] - low[c]).fold(0.0, f64::max);
-    let more = if widest > 0.0 { share * widest } else { 1.0 };
+    // Of a single place nothing is known; a unit is better than nothing.
+    let more = if widest > 0.0 { around * widest } else { 1.0 };
     Bounds { low: low.map(|x| x - more), high: high.map(|x| x + more) }
 }

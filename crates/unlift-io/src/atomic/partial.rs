@@ -9,7 +9,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::removal::remove_marked;
+use super::removal::{MARK, remove_marked};
 use super::{Access, flush_names, parent_of};
 use crate::Error;
 use crate::unfinished::{RANDOM, around, is_partial_name};
@@ -17,9 +17,6 @@ use crate::unfinished::{RANDOM, around, is_partial_name};
 /// What this process is building, and the folders that it made for it, in order. Whoever makes, renames or removes
 /// one holds the lock, so that [`abandon`] meets nothing half done.
 static LIVE: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
-
-/// A file in every partial folder, the first one and the last: what has it is ours, with all that is in it.
-pub(super) const MARK: &str = ".unlift-unfinished";
 
 fn live() -> MutexGuard<'static, Vec<PathBuf>> {
     // A list of paths is in order whatever panicked.

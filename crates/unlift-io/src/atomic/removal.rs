@@ -3,6 +3,9 @@
 use std::io;
 use std::path::Path;
 
+/// A file in every partial folder, the first one and the last: what has it is ours, with all that is in it.
+pub(super) const MARK: &str = ".unlift-unfinished";
+
 /// Removes the folder `path` with all that is in it. Links are removed, not followed, whoever puts them there
 /// meanwhile.
 pub(super) fn remove_marked(path: &Path) -> io::Result<()> {
@@ -20,7 +23,7 @@ mod system {
     use rustix::fs::{AtFlags, CWD, Dir, Mode, OFlags, openat, unlinkat};
     use rustix::io::Errno;
 
-    use super::super::partial::MARK;
+    use super::MARK;
 
     pub fn remove_marked(path: &Path) -> io::Result<()> {
         let mut folder = Dir::new(openat(CWD, path, FOLDER, Mode::empty())?)?;

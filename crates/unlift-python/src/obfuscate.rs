@@ -1,0 +1,59 @@
+//! Hiding a map: by a scheme of unlift's, or of one's own.
+
+use std::sync::Arc;
+
+use pyo3::prelude::*;
+use unlift::evaluate::belongs;
+use unlift::obfuscate::{Scheme, SchemeOptions, obfuscate as hide, scheme};
+use unlift::seed::Key;
+
+use crate::errors::{raised, wrong};
+use crate::hidden::{Hidden, Released, Truth};
+use crate::map::Map;
+use crate::own::{OwnScheme, Raised};
+use crate::work;
+
+/// The scheme in `given`, a name or a function.
+pub fn scheme_of(
+    given: &Bound<'_, PyAny>,
+    options: &SchemeOptions,
+    raised_by: &Raised,
+) -> PyResult<Arc<dyn Scheme<3>>> {
+    let Ok(name) = given.extract::<String>() else {
+        return Ok(Arc::new(OwnScheme::new(given, raised_by)?));
+    };
+    let entry = scheme(&name).map_err(raised)?;
+    entry
+        .of_dimension::<3>(options)
+        .ok_or_else(|| wrong("scheme", "one that is defined on maps", name))
+}
+
+/// Hides a map by a scheme, a name or a function. Without a seed under a fresh key, for maps that are released; a seed
+/// repeats experiments, and whoever guesses it undoes the hiding.
+#[pyfunction]
+#[pyo3(signature = (map, scheme, *, seed=None))]
+pub fn obfuscate(
+    py: Python<'_>,
+    map: &Map,
+    scheme: &Bound<'_, PyAny>,
+    seed: Option<u64>,
+) -> PyResult<Hidden> {
+    let by = Raised::default();
+    let unit = map.prepared.original.reveal().unit();
+    let is_own = scheme.extract::<String>().is_err();
+    let scheme = scheme_of(scheme, &SchemeOptions::usual(unit), &by)?;
+    let key = seed.map_or_else(Key::fresh, |seed| Ok(Key::from_seed(seed))).map_err(raised)?;
+    let prepared = Arc::clone(&map.prepared);
+    let hidden = work::run(py, None, Some(by.stop()), move || {
+        let (original, descriptors) = (&prepared.original, prepared.descriptors.as_ref());
+        let (released, secret) = hide(&*scheme, original, descriptors, &key)?;
+        if is_own {
+            // As an audit asks: of a scheme with a mistake next to nothing comes back.
+            belongs(original, &released, &secret).map_err(|error| error.within(scheme.name()))?;
+        }
+        Ok::<_, unlift::Error>((released, secret))
+    });
+    let (released, secret) = hidden.map_err(|error| by.as_cause_of(py, error))?;
+    let truth = Truth::of(Arc::clone(&map.prepared), secret);
+    Ok(Hidden::of(Released::of(released), truth))
+}
