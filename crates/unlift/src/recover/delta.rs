@@ -25,8 +25,12 @@ const LEAST_DELTA: f64 = 0.25;
 const TOO_LARGE: f64 = 1.5;
 /// Delta for rays from anchors, as a share of the spacing of points: anchors say nothing at one delta rather than at another.
 const ANCHOR_DELTA: f64 = 1.75;
-/// Halvings of the extent that the coarse ladder spans: down to 1 / 16,384 of it.
+/// Halvings of the extent that the coarse ladder spans: down to 1 / 16,384 of it,
 const HALVINGS: u32 = 14;
+/// but so many below the first that is not too wide: a center far from all points makes the extent of rays as large as one likes.
+const HALVINGS_NOT_TOO_WIDE: u32 = 5;
+/// An extent is halved no more often than leaves something of it in 32 bits.
+const MOST_HALVINGS: u32 = 100;
 /// Where a random record agrees with a typical place this often, its agreement tells nothing, and the
 /// density of records within delta is no longer that of the place.
 const TOO_WIDE: f32 = 0.04;
@@ -157,13 +161,15 @@ fn choose<const D: usize>(
     };
     // From large to small; once well below the maximum, smaller deltas only lose more neighbors.
     let (mut coarse, mut most) = (extent, f64::NEG_INFINITY);
-    for step in 1..=HALVINGS {
-        let delta = extent / f64::from(1u32 << step);
+    let halved = |step: u32| extent * libm::exp2(-f64::from(step));
+    let is_too_wide = |&step: &u32| family.typical_chance(halved(step) as f32) > too_wide;
+    let first = (1..MOST_HALVINGS).find(|step| !is_too_wide(step));
+    for step in
+        first.into_iter().flat_map(|first| first..=HALVINGS.max(first + HALVINGS_NOT_TOO_WIDE))
+    {
+        let delta = halved(step);
         if delta < least || family.typical_chance(delta as f32) < too_narrow {
             break;
-        }
-        if family.typical_chance(delta as f32) > too_wide {
-            continue;
         }
         let value = value(delta);
         if value > most {

@@ -195,7 +195,7 @@ pub(crate) struct PlanePieces<'a, const D: usize> {
 
 impl<'a, const D: usize> PlanePieces<'a, D> {
     pub(crate) fn new(planes: &'a AxisPlanes<D>, sorted: &SortedPlanes, delta: f32) -> Self {
-        let chance = sorted.typical_chance(planes, delta);
+        let chance = sorted.typical_chance(delta);
         Self { planes, chance }
     }
 }

@@ -1,7 +1,7 @@
 //! Axis planes: the free coordinates separate, each is the densest window of offsets.
 
 use super::evidence::evidence;
-use super::extent::interquartile_range;
+use super::extent::range_of_half;
 use super::lanes::ln;
 use crate::RecordId;
 use crate::released::AxisPlanes;
@@ -10,6 +10,8 @@ use crate::released::AxisPlanes;
 #[derive(Clone, Debug)]
 pub(crate) struct SortedPlanes {
     by_axis: Vec<Vec<u32>>,
+    /// The largest range that holds half of the offsets of an axis.
+    range: f64,
 }
 
 impl SortedPlanes {
@@ -20,28 +22,24 @@ impl SortedPlanes {
             by_axis[usize::from(axis)].push(record as u32);
         }
         let offset = |record: u32| planes.offset()[record as usize];
+        let mut range = 0.0;
         for order in &mut by_axis {
             order.sort_unstable_by(|&a, &b| offset(a).total_cmp(&offset(b)).then(a.cmp(&b)));
+            let offsets: Vec<f32> = order.iter().map(|&record| offset(record)).collect();
+            range = f64::max(range, range_of_half(&offsets));
         }
-        Self { by_axis }
+        Self { by_axis, range }
     }
 
-    /// The largest interquartile range of offsets over the axes.
-    pub(crate) fn interquartile_range<const D: usize>(&self, planes: &AxisPlanes<D>) -> f64 {
-        let range = |order: &Vec<u32>| {
-            let offsets: Vec<f32> = order.iter().map(|&r| planes.offset()[r as usize]).collect();
-            interquartile_range(&offsets)
-        };
-        self.by_axis.iter().map(range).fold(0.0, f64::max)
+    /// The largest range that holds half of the offsets of an axis.
+    pub(crate) fn range(&self) -> f64 {
+        self.range
     }
-}
 
-impl SortedPlanes {
     /// How likely a random plane of any axis passes within `delta` of a typical place.
-    pub(crate) fn typical_chance<const D: usize>(&self, planes: &AxisPlanes<D>, delta: f32) -> f32 {
-        // Half of the planes of an axis lie within the interquartile range.
-        let range = self.interquartile_range(planes).max(f64::from(f32::MIN_POSITIVE));
-        (f64::from(delta) / range).min(0.5) as f32
+    pub(crate) fn typical_chance(&self, delta: f32) -> f32 {
+        // Half of the planes of an axis lie within it.
+        (f64::from(delta) / self.range.max(f64::from(f32::MIN_POSITIVE))).min(0.5) as f32
     }
 }
 
