@@ -20,7 +20,7 @@ import sys
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-from . import neighbors, testing
+from . import neighbors, testing, viewer
 from ._plugins import scheme, source
 from ._report import Report, Table
 from ._unlift import (
@@ -75,6 +75,7 @@ __all__ = [
     "scheme",
     "source",
     "testing",
+    "viewer",
 ]
 
 
