@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use unlift::audit::{Cell, Observer, Plan, Row, run, run_released};
-use unlift::recover::Solver;
+use unlift::audit::{Cell, Observer, Plan, Recovery, Row, run, run_released};
+use unlift::recover::{Recovered, Solver};
 use unlift::released::Released;
 use unlift::truth::{Original, Secret};
 use unlift::{Descriptors, OneLine, Unit};
@@ -23,6 +23,7 @@ use crate::document::{self, Provenance, ordered};
 use crate::doubts::doubts;
 use crate::gate::{Gate, check_gates, gate_results};
 use crate::inversion::MapInversion;
+use crate::journal::Journal;
 use crate::lengths::{check_lengths_of_gates, check_scale};
 use crate::outputs::{PAGE, commit_audit};
 use crate::prepare::{Preparation, Prepared, prepare};
@@ -61,6 +62,8 @@ pub struct Job<'a> {
     pub share_safe: bool,
     /// Makes pictures of what comes back; the plan measures with it, too.
     pub inversion: Option<Arc<MapInversion>>,
+    /// Keeps what was recovered until all is done, and goes on from what is kept there; [`perform`] clears it then.
+    pub journal: Option<Journal<'a>>,
     /// Hears how it goes.
     pub progress: &'a dyn Progress,
     /// The command line, for the record.
@@ -125,6 +128,7 @@ impl<'a> Job<'a> {
             write_clouds: false,
             share_safe: false,
             inversion: None,
+            journal: None,
             progress: &Quiet,
             command: None,
             started,
@@ -200,16 +204,31 @@ impl Finished {
 }
 
 /// Runs the job and writes its files, all or none.
-pub fn perform(job: Job<'_>, mut out: OutputSet) -> Result<Finished, Error> {
+pub fn perform(mut job: Job<'_>, mut out: OutputSet) -> Result<Finished, Error> {
     let (folder, share_safe) = (job.out.clone(), job.share_safe);
-    find(job, Some(&mut out))?.write(out, &folder, share_safe)
+    let mut journal = job.journal.take();
+    let finished =
+        find_with(job, journal.as_mut(), Some(&mut out))?.write(out, &folder, share_safe)?;
+    if let Some(journal) = journal {
+        journal.finish();
+    }
+    Ok(finished)
 }
 
 /// Runs the job: what it found, of which nothing is written but clouds, if these are asked for and `out` is there.
 ///
 /// # Errors
 /// When the plan does not fit the map, a gate or cloud cannot be made, or `progress` says stop.
-pub fn find(job: Job<'_>, out: Option<&mut OutputSet>) -> Result<Audited, Error> {
+pub fn find(mut job: Job<'_>, out: Option<&mut OutputSet>) -> Result<Audited, Error> {
+    let mut journal = job.journal.take();
+    find_with(job, journal.as_mut(), out)
+}
+
+fn find_with(
+    job: Job<'_>,
+    journal: Option<&mut Journal<'_>>,
+    out: Option<&mut OutputSet>,
+) -> Result<Audited, Error> {
     check_gates(&job.gates, &job.plan)?;
     check_lengths_of_gates(job.original.reveal(), &job.gates)?;
     for note in &job.notes {
@@ -218,6 +237,7 @@ pub fn find(job: Job<'_>, out: Option<&mut OutputSet>) -> Result<Audited, Error>
     let drawn = drawn(&job.plan);
     let n_views = job.plan.schemes.len() * job.plan.variants().len() * drawn.len();
     let mut watcher = Watcher {
+        journal,
         progress: job.progress,
         pictures: (!job.share_safe).then(|| Pictures::new(job.original, &job.plan, n_views)),
         curves: Vec::new(),
@@ -313,7 +333,8 @@ impl Audited {
 }
 
 /// Shows progress and keeps what the report draws.
-struct Watcher<'a> {
+struct Watcher<'a, 'j> {
+    journal: Option<&'a mut Journal<'j>>,
     progress: &'a dyn Progress,
     pictures: Option<Pictures>,
     /// The error curve of every cell.
@@ -355,7 +376,17 @@ pub fn curve_errors(largest_threshold: f64) -> impl Iterator<Item = f64> {
     (0..=CURVE_POINTS).map(move |step| largest_threshold * 10f64.powf(exponent(step)))
 }
 
-impl Observer for Watcher<'_> {
+impl Observer for Watcher<'_, '_> {
+    fn recall(&mut self, recovery: &Recovery<'_>) -> Option<Recovered<3>> {
+        self.journal.as_mut()?.recall(recovery)
+    }
+
+    fn keep(&mut self, recovery: &Recovery<'_>, recovered: &Recovered<3>) {
+        if let Some(journal) = &mut self.journal {
+            journal.keep(recovery, recovered);
+        }
+    }
+
     fn progress(&mut self, done: usize, total: usize, what: &str) {
         self.progress.show(done, total, what);
     }

@@ -68,6 +68,7 @@ fn audit(
         write_clouds: false,
         share_safe: false,
         inversion: None,
+        journal: None,
         progress: &Quiet,
         command: None,
         started: Instant::now(),

@@ -56,6 +56,7 @@ pub fn audit(
             write_clouds: false,
             share_safe: false,
             inversion: None,
+            journal: None,
             progress: &*progress,
             command: None,
             started,

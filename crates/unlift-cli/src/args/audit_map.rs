@@ -76,6 +76,10 @@ pub struct AuditMapArgs {
     /// Also write original, obfuscated and recovered clouds (PLY, OBJ)
     #[arg(long, help_heading = "Result", conflicts_with = "share_safe")]
     pub write_clouds: bool,
+    /// Keep what was recovered in this folder until the audit is done, and go on from there if it was
+    /// interrupted: the same options, the same figures. As private as the map
+    #[arg(long, value_name = "DIR", help_heading = "Run")]
+    pub journal: Option<PathBuf>,
     #[command(flatten)]
     pub result: ResultArgs,
     #[command(flatten)]

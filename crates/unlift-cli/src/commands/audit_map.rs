@@ -10,7 +10,7 @@ use unlift::audit::{Measure, Plan};
 use unlift::obfuscate::SchemeOptions;
 use unlift_audit::inversion::MapInversion;
 use unlift_audit::maps::perform;
-use unlift_audit::{Finished, Job, Prepared, Shown, check_thresholds, open_audit};
+use unlift_audit::{Finished, Job, Journal, Prepared, Shown, check_thresholds, open_audit};
 use unlift_io::atomic::Rules;
 use unlift_io::hash::hash_file;
 use unlift_io::read;
@@ -54,6 +54,7 @@ pub fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
         let mut job = Job {
             plan,
             inversion,
+            journal: journal(args, &progress)?,
             notes,
             options: with_attack(more_options(args), &args.attack),
             gates: result.gate.clone(),
@@ -68,6 +69,13 @@ pub fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
     })?;
     gate_files.write(&finished.document)?;
     Ok(finished)
+}
+
+/// What was recovered before, if it was to be kept: by this very program.
+fn journal<'a>(args: &AuditMapArgs, progress: &'a Progress) -> anyhow::Result<Option<Journal<'a>>> {
+    let Some(folder) = &args.journal else { return Ok(None) };
+    let program = hash_file(&std::env::current_exe()?)?;
+    Ok(Some(Journal::open(folder, program, progress)?))
 }
 
 /// What paints pictures, if that was asked for.

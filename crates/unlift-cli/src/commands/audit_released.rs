@@ -70,6 +70,7 @@ pub fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
             unit_in_map_units: 1.0,
             write_clouds: args.write_clouds,
             inversion: None,
+            journal: None,
             share_safe: args.result.share_safe,
             progress: &progress,
             command: Some(command_line()),

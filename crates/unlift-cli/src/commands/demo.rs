@@ -79,6 +79,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
             unit_in_map_units: 1.0,
             write_clouds: false,
             inversion: Some(inversion),
+            journal: None,
             share_safe: false,
             progress: &progress,
             command: Some(command_line()),

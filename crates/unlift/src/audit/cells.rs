@@ -11,11 +11,11 @@ use super::observer::{Cell, Counts, Observer};
 use super::plan::Plan;
 use super::records_alone::records_alone;
 use super::row::{Alone, Row};
+use super::solved::Solved;
 use crate::evaluate::{Accuracy, belongs, blind, distinct_weights, joined, reference};
 use crate::geometry::knn::Knn;
 use crate::neighbors::oracle::Noise;
 use crate::obfuscate::{Scheme, obfuscate};
-use crate::recover::{RecoverOptions, Solver, recover, recover_with_start};
 use crate::released::Released;
 use crate::seed::Key;
 use crate::truth::{Original, Secret};
@@ -147,34 +147,14 @@ pub(super) fn attack<const D: usize>(
             made => made.map_err(of_scheme)?,
         };
         let making = started.elapsed().as_secs_f64();
-        let mut start = None;
+        let mut solved = Solved::new(plan, (&hidden.0, &made.lists), attacker);
         for (at, &solver) in plan.solvers.iter().enumerate() {
             if !observer.goes_on() {
                 return Err(Error::new("audit", "to go on", "a request to stop"));
             }
             let what = format!("{scheme} at {:.2} {source}, {}", made.ratio, solver.name());
             each(observer, Some(what), None);
-            let options = RecoverOptions {
-                solver,
-                delta: plan.delta,
-                seed: attacker,
-                exact_constraints: plan.exact_constraints,
-                ..RecoverOptions::default()
-            };
-            let started = Instant::now();
-            let is_start = |solver: &Solver| *solver == Solver::JointStart;
-            let (recovered, took) = match start.take_if(|_| is_start(&solver)) {
-                Some(kept) => (kept, 0.0),
-                None if solver == Solver::Joint && plan.solvers[at..].iter().any(is_start) => {
-                    let (joint, first) = recover_with_start(&hidden.0, &made.lists, &options)?;
-                    start = Some(first);
-                    (joint, started.elapsed().as_secs_f64())
-                }
-                None => {
-                    let recovered = recover(&hidden.0, &made.lists, &options)?;
-                    (recovered, started.elapsed().as_secs_f64())
-                }
-            };
+            let (recovered, took) = solved.by(at, observer)?;
             // Lists are made once for all solvers: the first one's row has the time.
             let making = if at == 0 { making } else { 0.0 };
             clock.seconds.recover += took;

@@ -19,6 +19,7 @@ mod records_alone;
 mod released;
 mod row;
 mod run;
+mod solved;
 pub mod staged;
 mod threshold;
 
@@ -28,7 +29,7 @@ pub use clock::{RowSeconds, Seconds};
 pub use images::{Image, Watcher, run_images};
 pub use measure::measure;
 pub use not_audited::NotAudited;
-pub use observer::{Cell, Counts, Measure, Observer, Silent};
+pub use observer::{Cell, Counts, Measure, Observer, Recovery, Silent};
 pub use plan::{NeighborsBy, Plan, PointNeighbors, Variant};
 pub use released::{run_released, scheme_called};
 pub use row::{Alone, Distinct, PERCENTILES, Repeats, Row};

@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use super::row::Row;
 use crate::evaluate::Accuracy;
 use crate::neighbors::Neighborhoods;
-use crate::recover::Recovered;
+use crate::recover::{RecoverOptions, Recovered};
 use crate::released::Released;
 use crate::truth::{Original, Secret};
 use crate::{Descriptors, Error};
@@ -35,6 +35,17 @@ pub struct Cell<'a, const D: usize = 3> {
     pub accuracy: &'a Accuracy,
 }
 
+/// Everything that recovered points follow from.
+#[derive(Clone, Copy, Debug)]
+pub struct Recovery<'a, const D: usize = 3> {
+    /// What the attacker sees.
+    pub released: &'a Released<D>,
+    /// Its lists.
+    pub lists: &'a Neighborhoods,
+    /// How it works.
+    pub options: &'a RecoverOptions,
+}
+
 /// Hears how an audit goes.
 pub trait Observer<const D: usize = 3> {
     /// `done` of `total` cells are finished; `what` comes next.
@@ -50,6 +61,17 @@ pub trait Observer<const D: usize = 3> {
     /// One cell is finished.
     fn cell(&mut self, cell: &Cell<'_, D>) {
         let _ = cell;
+    }
+
+    /// What was recovered of the same before, bit for bit; `None` has it done now, and [kept](Self::keep).
+    fn recall(&mut self, recovery: &Recovery<'_, D>) -> Option<Recovered<D>> {
+        let _ = recovery;
+        None
+    }
+
+    /// What was recovered now.
+    fn keep(&mut self, recovery: &Recovery<'_, D>, recovered: &Recovered<D>) {
+        let _ = (recovery, recovered);
     }
 }
 

@@ -1,0 +1,81 @@
+//! What the solvers of a plan recover from the same lists: done now, or recalled.
+
+use std::time::Instant;
+
+use super::observer::{Observer, Recovery};
+use super::plan::Plan;
+use crate::Error;
+use crate::neighbors::Neighborhoods;
+use crate::recover::{RecoverOptions, Recovered, Solver, recover, recover_with_start};
+use crate::released::Released;
+
+/// A released map and lists, on which a plan's solvers are run in order.
+pub(super) struct Solved<'a, const D: usize> {
+    plan: &'a Plan<D>,
+    released: &'a Released<D>,
+    lists: &'a Neighborhoods,
+    seed: u64,
+    /// The pass that joint recovery started from, for the solver that is this pass.
+    start: Option<Recovered<D>>,
+}
+
+impl<'a, const D: usize> Solved<'a, D> {
+    pub(super) fn new(
+        plan: &'a Plan<D>,
+        (released, lists): (&'a Released<D>, &'a Neighborhoods),
+        seed: u64,
+    ) -> Self {
+        Self { plan, released, lists, seed, start: None }
+    }
+
+    /// What the solver numbered `at` recovers, and in how many seconds.
+    ///
+    /// # Errors
+    /// As [`recover`].
+    pub(super) fn by(
+        &mut self,
+        at: usize,
+        observer: &mut dyn Observer<D>,
+    ) -> Result<(Recovered<D>, f64), Error> {
+        let (solver, started) = (self.plan.solvers[at], Instant::now());
+        let options = self.options(solver);
+        let recovery = self.recovery(&options);
+        let is_start = |solver: &Solver| *solver == Solver::JointStart;
+        if let Some(kept) = self.start.take_if(|_| is_start(&solver)) {
+            return Ok((kept, 0.0));
+        }
+        let recovered = match observer.recall(&recovery) {
+            Some(recalled) => recalled,
+            None if solver == Solver::Joint && self.plan.solvers[at..].iter().any(is_start) => {
+                let (joint, start) = recover_with_start(self.released, self.lists, &options)?;
+                observer.keep(&recovery, &joint);
+                observer.keep(&self.recovery(&self.options(Solver::JointStart)), &start);
+                self.start = Some(start);
+                joint
+            }
+            None => {
+                let recovered = recover(self.released, self.lists, &options)?;
+                observer.keep(&recovery, &recovered);
+                recovered
+            }
+        };
+        Ok((recovered, started.elapsed().as_secs_f64()))
+    }
+
+    fn options(&self, solver: Solver) -> RecoverOptions {
+        RecoverOptions {
+            solver,
+            delta: self.plan.delta,
+            seed: self.seed,
+            exact_constraints: self.plan.exact_constraints,
+            ..RecoverOptions::default()
+        }
+    }
+
+    fn recovery<'b>(&self, options: &'b RecoverOptions) -> Recovery<'b, D>
+    where
+        'a: 'b,
+    {
+        Recovery { released: self.released, lists: self.lists, options }
+    }
+}
