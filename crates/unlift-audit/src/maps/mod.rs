@@ -1,11 +1,12 @@
 //! One audit from a prepared map to the files in its folder: what `audit map` and `demo` share.
 
+mod watcher;
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use unlift::audit::{Cell, Observer, Plan, Recovery, Row, run, run_released};
-use unlift::recover::{Recovered, Solver};
+use unlift::audit::{Plan, run, run_released};
 use unlift::released::Released;
 use unlift::truth::{Original, Secret};
 use unlift::{Descriptors, OneLine, Unit};
@@ -18,7 +19,6 @@ use unlift_report::scene::Scene3d;
 use unlift_report::{ErrorCdf, RenderOptions, render, text_table};
 
 use crate::Error;
-use crate::clouds::Clouds;
 use crate::document::{self, Provenance, ordered};
 use crate::doubts::doubts;
 use crate::gate::{Gate, check_gates, gate_results};
@@ -28,7 +28,8 @@ use crate::lengths::{check_lengths_of_gates, check_scale};
 use crate::outputs::{PAGE, commit_audit};
 use crate::prepare::{Preparation, Prepared, prepare};
 use crate::progress::{Progress, Quiet};
-use crate::scene::Pictures;
+use watcher::Watcher;
+pub use watcher::{curve_errors, curves_of};
 
 /// Everything an audit needs.
 pub struct Job<'a> {
@@ -136,8 +137,6 @@ impl<'a> Job<'a> {
     }
 }
 
-/// Photos at most that are shown beside pictures of what came back.
-const SHEETS: usize = 3;
 /// Neighbors of every point in a default audit of a map.
 const USUAL_K: usize = 50;
 
@@ -234,27 +233,7 @@ fn find_with(
     for note in &job.notes {
         job.progress.say(&format!("note: {note}"));
     }
-    let drawn = drawn(&job.plan);
-    let n_views = job.plan.schemes.len() * job.plan.variants().len() * drawn.len();
-    let mut watcher = Watcher {
-        journal,
-        progress: job.progress,
-        pictures: (!job.share_safe).then(|| Pictures::new(job.original, &job.plan, n_views)),
-        curves: Vec::new(),
-        drawn: drawn.iter().map(|solver| solver.name()).collect(),
-        clouds: out
-            .filter(|_| job.write_clouds)
-            .map(|out| (Clouds::new(job.unit_in_map_units), out)),
-        thresholds: job.plan.thresholds.iter().map(|t| t.value).collect(),
-        inversion: job.inversion.clone(),
-        sheets: match (&job.inversion, job.share_safe) {
-            (Some(inversion), false) => {
-                vec![Sheet::default(); inversion.n_photos().min(SHEETS)]
-            }
-            _ => Vec::new(),
-        },
-        failed: None,
-    };
+    let mut watcher = Watcher::new(&job, journal, out);
     let of_file = |error| match &job.input.path {
         Some(file) => Error::from(unlift_io::Error::core(file, error)),
         None => Error::from(error),
@@ -329,103 +308,5 @@ impl Audited {
         let document = if share_safe { self.document.share_safe() } else { self.document.clone() };
         commit_audit(out, &page, &document.to_json()?, share_safe)?;
         Ok(Finished { document, report: folder.join(PAGE) })
-    }
-}
-
-/// Shows progress and keeps what the report draws.
-struct Watcher<'a, 'j> {
-    journal: Option<&'a mut Journal<'j>>,
-    progress: &'a dyn Progress,
-    pictures: Option<Pictures>,
-    /// The error curve of every cell.
-    curves: Vec<(Row, Vec<(f64, f64)>)>,
-    /// Names of the solvers whose points are drawn.
-    drawn: Vec<&'static str>,
-    clouds: Option<(Clouds, &'a mut OutputSet)>,
-    thresholds: Vec<f64>,
-    inversion: Option<Arc<MapInversion>>,
-    /// What the first cameras see.
-    sheets: Vec<Sheet>,
-    failed: Option<Error>,
-}
-
-/// The solvers whose points are drawn: what joint recovery starts from is not, beside what it ends with.
-fn drawn<const D: usize>(plan: &Plan<D>) -> Vec<Solver> {
-    let is_drawn =
-        |solver: &Solver| *solver != Solver::JointStart || !plan.solvers.contains(&Solver::Joint);
-    plan.solvers.iter().copied().filter(is_drawn).collect()
-}
-
-/// The curve of every row of `rows` that has one, by its cell.
-pub fn curves_of(cells: Vec<(Row, Vec<(f64, f64)>)>, rows: &[Row]) -> Vec<ErrorCdf> {
-    let curve = |(cell, points): (Row, Vec<(f64, f64)>)| {
-        // A cell that failed under another seed has no row.
-        let row = rows.iter().position(|row| row.is_same_cell(&cell))?;
-        Some(ErrorCdf { row, points })
-    };
-    cells.into_iter().filter_map(curve).collect()
-}
-
-/// Points of an error curve.
-const CURVE_POINTS: i32 = 80;
-
-/// The errors of an error curve: from a hundredth of the largest threshold to ten times it, evenly on a
-/// logarithmic axis.
-pub fn curve_errors(largest_threshold: f64) -> impl Iterator<Item = f64> {
-    let exponent = |step: i32| -2.0 + 3.0 * f64::from(step) / f64::from(CURVE_POINTS);
-    (0..=CURVE_POINTS).map(move |step| largest_threshold * 10f64.powf(exponent(step)))
-}
-
-impl Observer for Watcher<'_, '_> {
-    fn recall(&mut self, recovery: &Recovery<'_>) -> Option<Recovered<3>> {
-        self.journal.as_mut()?.recall(recovery)
-    }
-
-    fn keep(&mut self, recovery: &Recovery<'_>, recovered: &Recovered<3>) {
-        if let Some(journal) = &mut self.journal {
-            journal.keep(recovery, recovered);
-        }
-    }
-
-    fn progress(&mut self, done: usize, total: usize, what: &str) {
-        self.progress.show(done, total, what);
-    }
-
-    fn goes_on(&self) -> bool {
-        self.progress.goes_on()
-    }
-
-    fn cell(&mut self, cell: &Cell<'_>) {
-        if cell.repeat > 0 {
-            return;
-        }
-        let most = self.thresholds.iter().copied().fold(0.0, f64::max);
-        let points = curve_errors(most).map(|at| (at, cell.accuracy.percent_within(at))).collect();
-        self.curves.push((cell.row.clone(), points));
-        if let (Some(pictures), true) = (&mut self.pictures, self.drawn.contains(&cell.row.solver))
-        {
-            pictures.add(cell);
-        }
-        if let (Some((clouds, out)), None) = (&mut self.clouds, &self.failed) {
-            self.failed = clouds.write(out, cell, most).err().map(Error::from);
-        }
-        if let (Some(inversion), true, None) =
-            (&self.inversion, self.drawn.contains(&cell.row.solver), &self.failed)
-        {
-            self.failed = inversion.add(cell, &mut self.sheets).err().map(Error::from);
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_joint_starts_from_is_drawn_only_by_itself() {
-        let mut plan = Plan::<3>::new(unlift::Unit::Meter);
-        assert_eq!(drawn(&plan), [Solver::Joint]);
-        plan.solvers = vec![Solver::JointStart, Solver::Ransac];
-        assert_eq!(drawn(&plan), plan.solvers);
     }
 }

@@ -1,0 +1,148 @@
+//! Hears of every cell of an audit, and keeps what its page draws.
+
+use std::sync::Arc;
+
+use unlift::audit::{Cell, Observer, Plan, Recovery, Row};
+use unlift::recover::{Recovered, Solver};
+use unlift_io::atomic::OutputSet;
+use unlift_report::ErrorCdf;
+use unlift_report::inversions::Inversion as Sheet;
+
+use super::Job;
+use crate::Error;
+use crate::clouds::Clouds;
+use crate::inversion::MapInversion;
+use crate::journal::Journal;
+use crate::progress::Progress;
+use crate::scene::Pictures;
+
+/// Photos at most that are shown beside pictures of what came back.
+const SHEETS: usize = 3;
+
+/// Shows progress and keeps what the report draws.
+pub(super) struct Watcher<'a, 'j> {
+    journal: Option<&'a mut Journal<'j>>,
+    progress: &'a dyn Progress,
+    pub(super) pictures: Option<Pictures>,
+    /// The error curve of every cell.
+    pub(super) curves: Vec<(Row, Vec<(f64, f64)>)>,
+    /// Names of the solvers whose points are drawn.
+    drawn: Vec<&'static str>,
+    clouds: Option<(Clouds, &'a mut OutputSet)>,
+    thresholds: Vec<f64>,
+    inversion: Option<Arc<MapInversion>>,
+    /// What the first cameras see.
+    pub(super) sheets: Vec<Sheet>,
+    pub(super) failed: Option<Error>,
+}
+
+impl<'a, 'j> Watcher<'a, 'j> {
+    pub(super) fn new(
+        job: &Job<'a>,
+        journal: Option<&'a mut Journal<'j>>,
+        out: Option<&'a mut OutputSet>,
+    ) -> Self {
+        let drawn = drawn(&job.plan);
+        let n_views = job.plan.schemes.len() * job.plan.variants().len() * drawn.len();
+        Self {
+            journal,
+            progress: job.progress,
+            pictures: (!job.share_safe).then(|| Pictures::new(job.original, &job.plan, n_views)),
+            curves: Vec::new(),
+            drawn: drawn.iter().map(|solver| solver.name()).collect(),
+            clouds: out
+                .filter(|_| job.write_clouds)
+                .map(|out| (Clouds::new(job.unit_in_map_units), out)),
+            thresholds: job.plan.thresholds.iter().map(|t| t.value).collect(),
+            inversion: job.inversion.clone(),
+            sheets: match (&job.inversion, job.share_safe) {
+                (Some(inversion), false) => {
+                    vec![Sheet::default(); inversion.n_photos().min(SHEETS)]
+                }
+                _ => Vec::new(),
+            },
+            failed: None,
+        }
+    }
+}
+
+/// The solvers whose points are drawn: what joint recovery starts from is not, beside what it ends with.
+fn drawn<const D: usize>(plan: &Plan<D>) -> Vec<Solver> {
+    let is_drawn =
+        |solver: &Solver| *solver != Solver::JointStart || !plan.solvers.contains(&Solver::Joint);
+    plan.solvers.iter().copied().filter(is_drawn).collect()
+}
+
+/// The curve of every row of `rows` that has one, by its cell.
+pub fn curves_of(cells: Vec<(Row, Vec<(f64, f64)>)>, rows: &[Row]) -> Vec<ErrorCdf> {
+    let curve = |(cell, points): (Row, Vec<(f64, f64)>)| {
+        // A cell that failed under another seed has no row.
+        let row = rows.iter().position(|row| row.is_same_cell(&cell))?;
+        Some(ErrorCdf { row, points })
+    };
+    cells.into_iter().filter_map(curve).collect()
+}
+
+/// Points of an error curve.
+const CURVE_POINTS: i32 = 80;
+
+/// The errors of an error curve: from a hundredth of the largest threshold to ten times it, evenly on a
+/// logarithmic axis.
+pub fn curve_errors(largest_threshold: f64) -> impl Iterator<Item = f64> {
+    let exponent = |step: i32| -2.0 + 3.0 * f64::from(step) / f64::from(CURVE_POINTS);
+    (0..=CURVE_POINTS).map(move |step| largest_threshold * 10f64.powf(exponent(step)))
+}
+
+impl Observer for Watcher<'_, '_> {
+    fn recall(&mut self, recovery: &Recovery<'_>) -> Option<Recovered<3>> {
+        self.journal.as_mut()?.recall(recovery)
+    }
+
+    fn keep(&mut self, recovery: &Recovery<'_>, recovered: &Recovered<3>) {
+        if let Some(journal) = &mut self.journal {
+            journal.keep(recovery, recovered);
+        }
+    }
+
+    fn progress(&mut self, done: usize, total: usize, what: &str) {
+        self.progress.show(done, total, what);
+    }
+
+    fn goes_on(&self) -> bool {
+        self.progress.goes_on()
+    }
+
+    fn cell(&mut self, cell: &Cell<'_>) {
+        if cell.repeat > 0 {
+            return;
+        }
+        let most = self.thresholds.iter().copied().fold(0.0, f64::max);
+        let points = curve_errors(most).map(|at| (at, cell.accuracy.percent_within(at))).collect();
+        self.curves.push((cell.row.clone(), points));
+        if let (Some(pictures), true) = (&mut self.pictures, self.drawn.contains(&cell.row.solver))
+        {
+            pictures.add(cell);
+        }
+        if let (Some((clouds, out)), None) = (&mut self.clouds, &self.failed) {
+            self.failed = clouds.write(out, cell, most).err().map(Error::from);
+        }
+        if let (Some(inversion), true, None) =
+            (&self.inversion, self.drawn.contains(&cell.row.solver), &self.failed)
+        {
+            self.failed = inversion.add(cell, &mut self.sheets).err().map(Error::from);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_joint_starts_from_is_drawn_only_by_itself() {
+        let mut plan = Plan::<3>::new(unlift::Unit::Meter);
+        assert_eq!(drawn(&plan), [Solver::Joint]);
+        plan.solvers = vec![Solver::JointStart, Solver::Ransac];
+        assert_eq!(drawn(&plan), plan.solvers);
+    }
+}
