@@ -19,6 +19,7 @@ use unlift_report::scene::Scene3d;
 use unlift_report::{ErrorCdf, RenderOptions, render, text_table};
 
 use crate::Error;
+use crate::clouds::Clouds;
 use crate::document::{self, Provenance, ordered};
 use crate::doubts::doubts;
 use crate::gate::{Gate, check_gates, gate_results};
@@ -28,7 +29,8 @@ use crate::lengths::{check_lengths_of_gates, check_scale};
 use crate::outputs::{PAGE, commit_audit};
 use crate::prepare::{Preparation, Prepared, prepare};
 use crate::progress::{Progress, Quiet};
-use watcher::Watcher;
+use crate::scene::Pictures;
+use watcher::{Watcher, drawn};
 pub use watcher::{curve_errors, curves_of};
 
 /// Everything an audit needs.
@@ -137,6 +139,8 @@ impl<'a> Job<'a> {
     }
 }
 
+/// Photos at most that are shown beside pictures of what came back.
+const SHEETS: usize = 3;
 /// Neighbors of every point in a default audit of a map.
 const USUAL_K: usize = 50;
 
@@ -233,7 +237,7 @@ fn find_with(
     for note in &job.notes {
         job.progress.say(&format!("note: {note}"));
     }
-    let mut watcher = Watcher::new(&job, journal, out);
+    let mut watcher = watcher(&job, journal, out);
     let of_file = |error| match &job.input.path {
         Some(file) => Error::from(unlift_io::Error::core(file, error)),
         None => Error::from(error),
@@ -277,6 +281,35 @@ fn find_with(
     let scene = watcher.pictures.map(|p| p.into_scene(&job.cameras, job.up));
     let curves = curves_of(watcher.curves, &outcome.rows);
     Ok(Audited { document, scene, curves, sheets: watcher.sheets })
+}
+
+/// What hears of the cells of `job`.
+fn watcher<'a, 'j>(
+    job: &Job<'a>,
+    journal: Option<&'a mut Journal<'j>>,
+    out: Option<&'a mut OutputSet>,
+) -> Watcher<'a, 'j> {
+    let drawn = drawn(&job.plan);
+    let n_views = job.plan.schemes.len() * job.plan.variants().len() * drawn.len();
+    Watcher {
+        journal,
+        progress: job.progress,
+        pictures: (!job.share_safe).then(|| Pictures::new(job.original, &job.plan, n_views)),
+        curves: Vec::new(),
+        drawn: drawn.iter().map(|solver| solver.name()).collect(),
+        clouds: out
+            .filter(|_| job.write_clouds)
+            .map(|out| (Clouds::new(job.unit_in_map_units), out)),
+        thresholds: job.plan.thresholds.iter().map(|t| t.value).collect(),
+        inversion: job.inversion.clone(),
+        sheets: match (&job.inversion, job.share_safe) {
+            (Some(inversion), false) => {
+                vec![Sheet::default(); inversion.n_photos().min(SHEETS)]
+            }
+            _ => Vec::new(),
+        },
+        failed: None,
+    }
 }
 
 impl Audited {

@@ -8,7 +8,6 @@ use unlift_io::atomic::OutputSet;
 use unlift_report::ErrorCdf;
 use unlift_report::inversions::Inversion as Sheet;
 
-use super::Job;
 use crate::Error;
 use crate::clouds::Clouds;
 use crate::inversion::MapInversion;
@@ -16,58 +15,25 @@ use crate::journal::Journal;
 use crate::progress::Progress;
 use crate::scene::Pictures;
 
-/// Photos at most that are shown beside pictures of what came back.
-const SHEETS: usize = 3;
-
 /// Shows progress and keeps what the report draws.
 pub(super) struct Watcher<'a, 'j> {
-    journal: Option<&'a mut Journal<'j>>,
-    progress: &'a dyn Progress,
+    pub(super) journal: Option<&'a mut Journal<'j>>,
+    pub(super) progress: &'a dyn Progress,
     pub(super) pictures: Option<Pictures>,
     /// The error curve of every cell.
     pub(super) curves: Vec<(Row, Vec<(f64, f64)>)>,
     /// Names of the solvers whose points are drawn.
-    drawn: Vec<&'static str>,
-    clouds: Option<(Clouds, &'a mut OutputSet)>,
-    thresholds: Vec<f64>,
-    inversion: Option<Arc<MapInversion>>,
+    pub(super) drawn: Vec<&'static str>,
+    pub(super) clouds: Option<(Clouds, &'a mut OutputSet)>,
+    pub(super) thresholds: Vec<f64>,
+    pub(super) inversion: Option<Arc<MapInversion>>,
     /// What the first cameras see.
     pub(super) sheets: Vec<Sheet>,
     pub(super) failed: Option<Error>,
 }
 
-impl<'a, 'j> Watcher<'a, 'j> {
-    pub(super) fn new(
-        job: &Job<'a>,
-        journal: Option<&'a mut Journal<'j>>,
-        out: Option<&'a mut OutputSet>,
-    ) -> Self {
-        let drawn = drawn(&job.plan);
-        let n_views = job.plan.schemes.len() * job.plan.variants().len() * drawn.len();
-        Self {
-            journal,
-            progress: job.progress,
-            pictures: (!job.share_safe).then(|| Pictures::new(job.original, &job.plan, n_views)),
-            curves: Vec::new(),
-            drawn: drawn.iter().map(|solver| solver.name()).collect(),
-            clouds: out
-                .filter(|_| job.write_clouds)
-                .map(|out| (Clouds::new(job.unit_in_map_units), out)),
-            thresholds: job.plan.thresholds.iter().map(|t| t.value).collect(),
-            inversion: job.inversion.clone(),
-            sheets: match (&job.inversion, job.share_safe) {
-                (Some(inversion), false) => {
-                    vec![Sheet::default(); inversion.n_photos().min(SHEETS)]
-                }
-                _ => Vec::new(),
-            },
-            failed: None,
-        }
-    }
-}
-
 /// The solvers whose points are drawn: what joint recovery starts from is not, beside what it ends with.
-fn drawn<const D: usize>(plan: &Plan<D>) -> Vec<Solver> {
+pub(super) fn drawn<const D: usize>(plan: &Plan<D>) -> Vec<Solver> {
     let is_drawn =
         |solver: &Solver| *solver != Solver::JointStart || !plan.solvers.contains(&Solver::Joint);
     plan.solvers.iter().copied().filter(is_drawn).collect()
