@@ -20,7 +20,7 @@ import sys
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-from . import neighbors, testing, viewer
+from . import fleet, neighbors, testing, viewer
 from ._plugins import scheme, source
 from ._report import Report, Table
 from ._unlift import (
@@ -68,6 +68,7 @@ __all__ = [
     "__version__",
     "audit",
     "evaluate",
+    "fleet",
     "neighbors",
     "obfuscate",
     "read",

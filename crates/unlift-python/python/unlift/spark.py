@@ -1,0 +1,39 @@
+"""The same on Apache Spark: DataFrames in, DataFrames out (`pip install 'unlift[spark]'`).
+
+    tasks = spark.createDataFrame([("maps/office", 1.0), ("maps/lab", 1.0)], "path string, scale double")
+    rows = unlift.spark.audit_maps(tasks.repartition(8), schemes=["olc", "ppl"], inlier_ratios=[0.5])
+    rows.where("recovered_percent['0.10'] > 20").show()
+
+Every executor needs this package. A task that is lost with its executor is run again by Spark, to the same rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from . import fleet
+
+if TYPE_CHECKING:
+    import pyarrow as _pa  # type: ignore[import-untyped,unused-ignore]
+    from pyspark.sql import DataFrame as _DataFrame  # type: ignore[import-not-found,unused-ignore]
+
+__all__ = ["audit_maps"]
+
+#: The schema of rows, as Spark writes it.
+_ROWS = ", ".join(f"{name} {of}" for name, of in fleet.ROWS.items())
+
+
+def audit_maps(maps: _DataFrame, **options: Any) -> _DataFrame:
+    """`unlift.fleet.audit_maps` on every partition of `maps`: columns `path`, and perhaps `scale` and `descriptors`.
+
+    options: those of `unlift.audit`; `threads` is 1 unless it is said, as Spark runs a task per core.
+    """
+    options = {"threads": 1, **options}
+
+    def of_partition(batches: Iterator[_pa.RecordBatch]) -> Iterator[_pa.RecordBatch]:
+        from unlift import fleet as here
+
+        return here.audit_maps(batches, **options)
+
+    return maps.mapInArrow(of_partition, _ROWS)

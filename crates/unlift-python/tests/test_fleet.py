@@ -1,0 +1,60 @@
+"""Many maps at once, as engines run them."""
+
+import pathlib
+
+import numpy as np
+import pytest
+
+import unlift
+
+pa = pytest.importorskip("pyarrow")
+OPTIONS = {"schemes": ["olc", "plane"], "inlier_ratios": [0.5, 0.3], "solvers": ["consensus"], "k": 20}
+
+
+def maps(folder: pathlib.Path, n: int = 3) -> list[str]:
+    paths = []
+    for at in range(n):
+        path = folder / f"map{at}.npy"
+        np.save(path, np.random.default_rng(at).uniform(0, 4, (200 + 50 * at, 3)))
+        paths.append(str(path))
+    return paths
+
+
+def rows(tasks: "pa.Table", batch: int = 2, **options) -> "pa.Table":
+    found = list(unlift.fleet.audit_maps(tasks.to_batches(max_chunksize=batch), **{**OPTIONS, **options}))
+    assert all(one.schema == unlift.fleet.schema() for one in found)
+    return pa.Table.from_batches(found)
+
+
+def test_rows_are_those_of_single_audits(tmp_path: pathlib.Path):
+    paths = maps(tmp_path)
+    found = rows(pa.table({"path": paths, "scale": [1.0, 1.0, None]})).to_pylist()
+    assert [row["item"] for row in found] == [path for path in paths for _ in range(4)]
+    for at, path in enumerate(paths):
+        scale = 1.0 if at < 2 else None
+        document = unlift.audit(unlift.read(path, scale=scale), **OPTIONS).document
+        for row, alone in zip(found[4 * at :], document["results"], strict=False):
+            for name in ("scheme", "inlier_ratio", "solver", "n_points", "delta", "unit", "median_error", "k"):
+                assert row[name] == alone[name], name
+            assert dict(row["recovered_percent"]) == alone["recovered_percent"]
+            assert dict(row["blind_percent"]) == alone["blind_percent"]
+            assert row["error"] is None
+
+
+def test_batches_change_nothing(tmp_path: pathlib.Path):
+    tasks = pa.table({"path": maps(tmp_path), "scale": [1.0] * 3})
+    assert rows(tasks, 1).equals(rows(tasks, 3, threads=1))
+
+
+def test_a_map_that_cannot_be_read_is_one_row(tmp_path: pathlib.Path):
+    (tmp_path / "broken.npy").write_bytes(b"no map")
+    paths = [*maps(tmp_path, 1), str(tmp_path / "missing.ply"), str(tmp_path / "broken.npy"), None]
+    found = rows(pa.table({"path": paths})).to_pylist()
+    assert [row["error"] is None for row in found] == [True] * 4 + [False] * 3
+    assert found[4]["error"].endswith("missing.ply: expected a file or folder, found nothing")
+    assert found[6]["error"] == "path: expected a file or folder, found null"
+
+
+def test_a_table_without_paths_is_refused():
+    with pytest.raises(unlift.UnliftError, match="expected a column path, found name"):
+        list(unlift.fleet.audit_maps(pa.table({"name": ["a"]}).to_batches()))
