@@ -5,14 +5,17 @@ Used by make_benchmarks.py; standard library only.
 import csv, json, pathlib, subprocess, tempfile
 
 METRICS = ["ssim", "psnr", "lpips"]
-RATIOS = ["1.0", "0.3"]
-FLAT, SOLID = ["lines2d", "cp2d", "dcl2d"], ["olc", "ppl", "cp"]
+RATIOS = ["1.0", "0.5", "0.3"]
+SOURCES = ["overlap", "learned"]
+FLAT, SOLID = ["lines2d", "cp2d", "dcl2d"], ["olc", "ppl", "ray", "plane", "cp"]
+SCENES = [("RedKitchen, 40 photos", "redkitchen", ["--scale", "1"]), ("Castle, 11 photos", "castle", [])]
 
 
 def audit(program, *options):
     with tempfile.TemporaryDirectory() as out:
-        ratios = ["--inlier-ratios", ",".join(RATIOS), "--neighbors", "oracle", "--neighbors", "overlap"]
-        command = [program, "audit", *options, *ratios, "--invert", "--solver", "joint", "--quiet", "--share-safe", "--out", f"{out}/audit"]
+        ratios = ["--inlier-ratios", ",".join(RATIOS), "--neighbors", "oracle"]
+        sources = [option for name in SOURCES for option in ("--neighbors", name)]
+        command = [program, "audit", *options, *ratios, *sources, "--invert", "--solver", "joint", "--quiet", "--share-safe", "--out", f"{out}/audit"]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         return json.loads(pathlib.Path(out, "audit/audit.json").read_text())
 
@@ -43,7 +46,7 @@ def table(document, schemes, paper):
     base = [told(rows[1.0, scheme], "_baseline") for scheme in schemes]
     known = paper.get(("none", "baseline"))
     yield "| true points | " + " | ".join(f"{text} [{known}]" if known else text for text in base) + " |"
-    for key in [*map(float, RATIOS), "overlap"]:
+    for key in [*map(float, RATIOS), *SOURCES]:
         cells = []
         for scheme in schemes:
             known = paper.get((scheme, key))
@@ -60,6 +63,8 @@ def recall(document, schemes):
     results = document["results"]
     start, end = "objects_found_of_", "_baseline"
     classes = sorted({key[len(start):-len(end)] for row in results for key in row["metrics"] if key.startswith(start) and key.endswith(end)})
+    if not classes:
+        return
     names = ["objects_found", *(start + one for one in classes)]
     yield "| found again, % | " + " | ".join(["all", *(one.replace("_", " ") for one in classes)]) + " |"
     yield "|" + " --- |" * (len(names) + 1)
@@ -77,7 +82,7 @@ def tables(program, shared):
     """All lines of the section."""
     data = shared / "data"
     yield from ["SSIM / PSNR in dB / LPIPS, means over photos, at half their size; in brackets the paper's SSIM on 7-Scenes (another network, full size).", ""]
-    for name, photos in (("RedKitchen, 40 photos", "redkitchen"),):
+    for name, photos, scale in SCENES:
         yield from [f"### {name}, keypoints", ""]
         paper = published(shared, "2") if photos == "redkitchen" else {}
         document = audit(program, "images", data / photos / "images")
@@ -85,7 +90,6 @@ def tables(program, shared):
         yield from recall(document, FLAT)
         yield from [f"### {name}, the map as its cameras see it", ""]
         paper = published(shared, "3") if photos == "redkitchen" else {}
-        scale = ["--scale", "1"] if photos == "redkitchen" else []
         document = audit(program, "map", data / photos / "model", "--descriptors", data / photos / "descriptors.bin", *scale,
                                "--photos", data / photos / "images", "--max-photos", "40", "--schemes", ",".join(SOLID), "--no-records-alone")
         yield from table(document, SOLID, paper)

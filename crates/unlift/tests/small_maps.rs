@@ -6,7 +6,7 @@
 use unlift::audit::{Plan, Silent, run};
 use unlift::geometry::knn::Knn;
 use unlift::geometry::vector::median;
-use unlift::recover::Solver;
+use unlift::recover::{Delta, Solver};
 use unlift::synthetic::{Shape, shape};
 use unlift::truth::Original;
 use unlift::{PointSet, Unit};
@@ -48,6 +48,30 @@ fn joint_recovery_keeps_what_its_first_pass_found() {
                 "{of:?} {name} at {ratio}: joint {joint:?}, consensus {consensus:?}"
             );
         }
+    }
+}
+
+/// What comes back by `cp` with the delta that the attack chooses, and with a given one: percent within 0.25 m.
+fn cp(points: &[[f64; 3]], k: usize, delta: Delta) -> f64 {
+    let original = Original::new(PointSet::try_new(points.to_vec(), Unit::Meter).unwrap());
+    let mut plan = Plan { k, delta, records_alone: false, ..Plan::new(Unit::Meter) };
+    plan.schemes.retain(|scheme| scheme.name() == "cp");
+    (plan.inlier_ratios, plan.solvers) = (vec![0.3], vec![Solver::Joint]);
+    run(&original, None, &plan, &mut Silent).unwrap().rows[0].recovered_percent[1]
+}
+
+/// Exchanged coordinates agree exactly with those of their partners, at any delta: of a few hundred points luck chose a
+/// tenth of the right one, and in a flat map, all of which a record's lines cross, a wide one was out of question.
+#[test]
+fn deltas_of_exchanged_coordinates_do_not_collapse() {
+    let room = shape(Shape::Room, 3, 800);
+    let flat: Vec<[f64; 3]> = shape(Shape::Cube, 1, 2_000)
+        .into_iter()
+        .map(|[x, y, z]| [6.0 * x, 5.0 * y, 0.05 * z])
+        .collect();
+    for (points, right) in [(room, 0.35), (flat, 0.2)] {
+        let (chosen, best) = (cp(&points, 10, Delta::Auto), cp(&points, 10, Delta::Fixed(right)));
+        assert!(chosen > best - 10.0, "{chosen} {best}");
     }
 }
 

@@ -45,13 +45,14 @@ impl<const D: usize> Model<D> {
     /// the center `group` of rays; of other records any group will do. `None` where chance is no field: of planes, whose
     /// offsets are counted, and of attacks on the records alone.
     pub fn chance(&self, group: usize, x: &[f32; D]) -> Option<f32> {
-        let tube = tube(D, self.delta as f32);
+        let delta = self.delta as f32;
+        let tube = tube(D, delta);
         match self.chance.as_ref()? {
             Chance::Lines(fields) => {
                 fields.get(group).or(fields.first()).map(|field| field.at(x, tube))
             }
             Chance::Planes => None,
-            Chance::Candidates(field) => Some(field.at(x, tube)),
+            Chance::Candidates(field) => Some(field.at(x, &field.tubes(delta))),
         }
     }
 

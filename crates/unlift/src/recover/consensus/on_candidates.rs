@@ -3,7 +3,7 @@
 use super::refit::refit;
 use crate::RecordId;
 use crate::recover::map::candidate_rows::CandidateColumns;
-use crate::recover::map::chance_field::{CandidateField, tube};
+use crate::recover::map::chance_field::CandidateField;
 use crate::recover::map::chunks::{Slots, solve_chunks};
 use crate::recover::map::lists::Lists;
 use crate::recover::map::sections::{Intervals, Sections};
@@ -18,8 +18,8 @@ pub(super) fn solve<const D: usize>(
     delta: f32,
     slots: Slots<'_>,
 ) -> Vec<Estimate<D>> {
-    let tube = tube(D, delta);
-    let problem = Problem { rows, chance, lists, delta2: delta * delta, tube };
+    let tubes = chance.tubes(delta);
+    let problem = Problem { rows, chance, lists, delta2: delta * delta, tubes };
     solve_chunks(lists.n_slots(), slots, Scratch::default, |scratch, first, out| {
         dispatch(Chunk { problem: &problem, first, out, scratch });
     })
@@ -30,7 +30,7 @@ struct Problem<'a, const D: usize> {
     chance: &'a CandidateField<D>,
     lists: Lists<'a>,
     delta2: f32,
-    tube: f32,
+    tubes: [f32; D],
 }
 
 #[derive(Default)]
@@ -69,7 +69,7 @@ fn solve_slot<const D: usize>(
     slot: usize,
     scratch: &mut Scratch<D>,
 ) -> Estimate<D> {
-    let Problem { rows, chance, lists, delta2, tube } = problem;
+    let Problem { rows, chance, lists, delta2, tubes } = problem;
     let own = &rows[slot];
     let listed = lists.of(slot, &mut scratch.buffer);
     if listed.len() < 2 {
@@ -82,7 +82,7 @@ fn solve_slot<const D: usize>(
         scratch.listed.sections(own, axis, *delta2, &mut scratch.sections);
         scratch.intervals.fill(&scratch.sections, *delta2, f32::NEG_INFINITY, f32::INFINITY);
         let Some(peak) = scratch.intervals.best_start(listed.len(), |t, cells, chances| {
-            chance.add_along((own, axis), t, *tube, (cells, chances));
+            chance.add_along((own, axis), t, tubes, (cells, chances));
         }) else {
             continue;
         };

@@ -91,6 +91,11 @@ impl<const D: usize> Grid<D> {
         Ok(Self { low, cell, per_length: 1.0 / cell, dims, last, values })
     }
 
+    /// How long the sides of the box are, in whole cells.
+    pub(crate) fn sides(&self) -> [f32; D] {
+        self.dims.map(|n| n as f32 * self.cell)
+    }
+
     /// The edge of a cell.
     pub(crate) fn cell(&self) -> f32 {
         self.cell

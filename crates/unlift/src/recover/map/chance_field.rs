@@ -285,14 +285,58 @@ impl<const D: usize> CandidateField<D> {
     }
 
     /// The density at a typical place.
-    pub(crate) fn typical(&self) -> f32 {
+    fn typical(&self) -> f32 {
         self.along.iter().map(ChanceField::typical).sum()
+    }
+
+    /// How likely a random record agrees with a place where records are, within `delta`.
+    pub(crate) fn typical_chance(&self, delta: f32) -> f32 {
+        let tubes = self.tubes(delta);
+        if tubes.iter().all(|&one| one == tubes[0]) {
+            return self.typical() * tubes[0];
+        }
+        self.along.iter().zip(&tubes).map(|(field, tube)| field.typical() * tube).sum()
+    }
+
+    /// Where the box of the map is thinner than a ball that holds a `share` of it: the radius about a place within which so
+    /// many points are, if they fill the box evenly; `None` of other boxes.
+    pub(crate) fn radius_if_flat(&self, share: f64) -> Option<f64> {
+        // Each field lacks the extent along its own axis.
+        let side = |c: usize| f64::from(self.along[(c + 1) % D].grid.sides()[c]);
+        let mut sides: [f64; D] = std::array::from_fn(side);
+        sides.sort_unstable_by(f64::total_cmp);
+        let [thin, .., long] = sides[..] else { return None };
+        let volume: f64 = sides.iter().product();
+        let ball = libm::cbrt(0.75 / std::f64::consts::PI * share * volume);
+        let disc = (share * volume / thin / std::f64::consts::PI).sqrt();
+        match sides[..] {
+            [_, middle, _] if 2.0 * ball > thin && 2.0 * disc <= middle => Some(disc),
+            [_, _, _] if 2.0 * ball > thin => Some(0.5 * share * long),
+            _ => None,
+        }
+    }
+
+    /// Volume per length of what is within `delta` of a line along each axis: of a map that is flat no more of it than lies
+    /// in its box.
+    pub(crate) fn tubes(&self, delta: f32) -> [f32; D] {
+        std::array::from_fn(|axis| {
+            let sides = self.along[axis].grid.sides();
+            let across = |c: &usize| *c != axis;
+            let whole = tube(D, delta);
+            let is_cut = |c: usize| 2.0 * delta > sides[c];
+            if !(0..D).filter(across).any(is_cut) {
+                return whole;
+            }
+            let share = (0..D).filter(across).map(|c| (sides[c] / (2.0 * delta)).min(1.0));
+            whole * share.product::<f32>()
+        })
     }
 
     /// The chance that any of a random record's lines passes through a tube about `x`.
     #[inline(always)]
-    pub(crate) fn at(&self, x: &[f32; D], tube: f32) -> f32 {
-        self.along.iter().map(|field| field.at(x, tube)).sum::<f32>().min(MOST_CHANCE)
+    pub(crate) fn at(&self, x: &[f32; D], tubes: &[f32; D]) -> f32 {
+        let along = self.along.iter().zip(tubes);
+        along.map(|(field, &tube)| field.at(x, tube)).sum::<f32>().min(MOST_CHANCE)
     }
 
     /// Adds the same, however large, at each `t` of the line through `own` along `axis` to `chance`, with room for
@@ -302,12 +346,12 @@ impl<const D: usize> CandidateField<D> {
         &self,
         (own, axis): (&[f32; D], usize),
         t: &[f32],
-        tube: f32,
+        tubes: &[f32; D],
         (cells, chance): (&mut [u32], &mut [f32]),
     ) {
         let through = std::array::from_fn(|c| if c == axis { 0.0 } else { own[c] });
         let direction = std::array::from_fn(|c| if c == axis { 1.0 } else { 0.0 });
-        for field in &self.along {
+        for (field, &tube) in self.along.iter().zip(tubes) {
             field.add_along((&through, &direction), t, tube, (&mut *cells, &mut *chance));
         }
     }

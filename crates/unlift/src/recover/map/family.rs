@@ -110,6 +110,14 @@ impl<'a, const D: usize> Family<'a, D> {
         }
     }
 
+    /// Of candidates in a flat map: the radius about a place within which a `share` of the points are.
+    pub(crate) fn radius_if_flat(&self, share: f64) -> Option<f64> {
+        match self {
+            Self::Candidates { chance, .. } => chance.radius_if_flat(share),
+            Self::Lines { .. } | Self::Planes { .. } => None,
+        }
+    }
+
     /// How likely a random record agrees with a place where records are, at `delta`.
     pub(crate) fn typical_chance(&self, delta: f32) -> f32 {
         match self {
@@ -117,7 +125,7 @@ impl<'a, const D: usize> Family<'a, D> {
                 chance.iter().map(ChanceField::typical).fold(0.0, f32::max) * tube(D, delta)
             }
             Self::Planes { sorted, .. } => sorted.typical_chance(delta),
-            Self::Candidates { chance, .. } => chance.typical() * tube(D, delta),
+            Self::Candidates { chance, .. } => chance.typical_chance(delta),
         }
     }
 

@@ -254,12 +254,12 @@ impl<const D: usize> Pieces<D> for PlanePieces<'_, D> {
 pub(crate) struct CandidatePieces<'a, const D: usize> {
     rows: &'a [[f32; D]],
     chance: &'a CandidateField<D>,
-    tube: f32,
+    tubes: [f32; D],
 }
 
 impl<'a, const D: usize> CandidatePieces<'a, D> {
     pub(crate) fn new(rows: &'a [[f32; D]], chance: &'a CandidateField<D>, delta: f32) -> Self {
-        Self { rows, chance, tube: tube(D, delta) }
+        Self { rows, chance, tubes: chance.tubes(delta) }
     }
 }
 
@@ -302,6 +302,6 @@ impl<const D: usize> Pieces<D> for CandidatePieces<'_, D> {
 
     #[inline(always)]
     fn record_chance(&self, _: usize, x: &[f32; D]) -> f32 {
-        self.chance.at(x, self.tube)
+        self.chance.at(x, &self.tubes)
     }
 }
