@@ -106,7 +106,7 @@ fn images_in_memory_have_the_figures_of_a_file() {
 fn a_mistake_in_memory_ends_the_audit_in_a_line() {
     let line = |wrong: fn(ImageFeatures) -> ImageFeatures| {
         let images = in_memory(move |at| Ok(if at == 1 { wrong(image(at)) } else { image(at) }));
-        find(job(&images, Path::new("images"))).err().expect("an error").to_string()
+        find(job(&images, Path::new("images"))).expect_err("an error").to_string()
     };
     assert_eq!(
         line(|image| ImageFeatures { size: None, ..image }),
@@ -118,6 +118,6 @@ fn a_mistake_in_memory_ends_the_audit_in_a_line() {
     });
     assert!(outside.starts_with("images: image b.jpg") && outside.contains("700"), "{outside}");
     let images = in_memory(|_| Err(Error::request("images: gone")));
-    let gone = find(job(&images, Path::new("images"))).err().expect("an error");
+    let gone = find(job(&images, Path::new("images"))).expect_err("an error");
     assert!(gone.is_request() && gone.to_string() == "images: gone");
 }
