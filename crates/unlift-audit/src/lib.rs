@@ -34,6 +34,7 @@
 //!
 //! Schemes, sources of neighborhoods and measures of the plan may be anybody's; see `unlift`.
 
+mod audited;
 mod clouds;
 mod document;
 mod doubts;
@@ -52,13 +53,14 @@ mod progress;
 mod scene;
 pub mod sources;
 
+pub use audited::{Audited, Finished};
 pub use document::{evaluated, ordered, row};
 pub use error::Error;
 pub use gate::{Candidate, Figure, Gate};
 pub use given::by_point;
 pub use journal::Journal;
 pub use lengths::{Extent, check_scale, check_thresholds};
-pub use maps::{Audited, Finished, Job};
+pub use maps::Job;
 pub use memory::{peak_bytes, total_bytes};
 pub use outputs::{FIGURES, PAGE, Shown, check_file, check_file_of, open_audit, refused};
 pub use prepare::{OutlierFilter, Preparation, Prepared, prepare};

@@ -8,6 +8,7 @@ use unlift::neighbors::sources::Named;
 use unlift::obfuscate::{Entry, SCHEMES};
 use unlift::recover::{Delta, Solver};
 use unlift_audit::{OutlierFilter, sources};
+use unlift_nn::DescriptorKind;
 
 /// Where neighborhoods come from.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,35 +21,9 @@ pub enum NeighborSource {
     File(PathBuf),
 }
 
-/// Which features are extracted from photos.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FeatureType {
-    /// SIFT.
-    Sift,
-    /// ALIKED.
-    Aliked,
-    /// SuperPoint.
-    SuperPoint,
-}
-
-impl FeatureType {
-    const ALL: [Self; 3] = [Self::Sift, Self::Aliked, Self::SuperPoint];
-
-    /// As users type it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Sift => "sift",
-            Self::Aliked => "aliked",
-            Self::SuperPoint => "superpoint",
-        }
-    }
-}
-
 /// Features by their name.
-pub fn feature_type(text: &str) -> Result<FeatureType, String> {
-    let names = || FeatureType::ALL.map(FeatureType::name).join(", ");
-    let found = FeatureType::ALL.into_iter().find(|kind| kind.name() == text);
-    found.ok_or_else(|| format!("expected one of {}, found {text}", names()))
+pub fn feature_type(text: &str) -> Result<DescriptorKind, String> {
+    DescriptorKind::from_name(text).map_err(|error| expected(&error))
 }
 
 /// A score from 0 to below 1.

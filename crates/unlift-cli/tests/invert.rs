@@ -83,7 +83,7 @@ fn a_network_of_ones_own_paints_what_the_program_has_none_for() {
         assert!(stderr.contains(missing) && stderr.contains("training/inversion"), "{stderr}");
     }
     // As many columns, whatever it makes of them.
-    let models = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models");
+    let models = concat!(env!("CARGO_MANIFEST_DIR"), "/../unlift-nn/models");
     let own = format!("--inverter {models}/inverter-sift/inverter-sift.onnx");
     place.ends(
         &format!("audit images photos --features aliked --invert {own} {CHEAP} --out own"),

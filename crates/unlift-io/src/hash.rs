@@ -1,10 +1,13 @@
 //! Hashes of input files, so that a result names exactly what it came from.
 
 use crate::Error;
+use crate::features::ImageFeatures;
 use crate::input;
 use sha2::{Digest, Sha256};
 use std::io::Read;
 use std::path::Path;
+use unlift::Descriptors;
+use unlift::descriptors::Values;
 
 /// The SHA-256 of one file's content, as 64 hexadecimal digits; read in pieces.
 ///
@@ -44,12 +47,37 @@ pub fn hash_files<P: AsRef<Path>>(paths: &[P]) -> Result<String, Error> {
         let name = path.file_name().unwrap_or_default();
         lines.push((name.to_string_lossy().into_owned(), hash_file(path)?));
     }
-    lines.sort();
+    Ok(hash_list(lines))
+}
+
+/// The same of what is no file, from its names and hashes.
+pub fn hash_list(mut named: Vec<(String, String)>) -> String {
+    named.sort();
     let mut hasher = Sha256::new();
-    for (name, hash) in lines {
+    for (name, hash) in named {
         hasher.update(format!("{hash}  {name}\n"));
     }
-    Ok(hex(hasher))
+    hex(hasher)
+}
+
+/// SHA-256 of features in memory, as far as an audit looks at them: width and height as little-endian `u32` (0 where they are
+/// not known), the coordinates of keypoints in order as `f64`, and the values of descriptors row by row, bytes or `f32`.
+pub fn hash_features(features: &ImageFeatures) -> String {
+    let mut hasher = Sha256::new();
+    for side in features.size.unwrap_or([0; 2]) {
+        hasher.update(side.to_le_bytes());
+    }
+    for coordinate in features.keypoints.as_flattened() {
+        hasher.update(coordinate.to_le_bytes());
+    }
+    match features.descriptors.as_ref().map(Descriptors::values) {
+        Some(Values::U8(bytes)) => hasher.update(bytes),
+        Some(Values::F32(values)) => {
+            values.iter().for_each(|value| hasher.update(value.to_le_bytes()))
+        }
+        None => {}
+    }
+    hex(hasher)
 }
 
 /// SHA-256 of positions made in memory: their coordinates in order, as little-endian `f64`.
@@ -120,6 +148,23 @@ mod tests {
         fs::write(&a, "abc").unwrap();
         fs::write(&b, "abc").unwrap();
         assert_ne!(hash_files(&[&a]).unwrap(), hash_files(&[&b]).unwrap());
+    }
+
+    #[test]
+    fn features_hash_by_all_that_an_audit_looks_at() {
+        let features = ImageFeatures {
+            size: Some([640, 480]),
+            keypoints: vec![[1.0, 2.0], [3.0, 4.0]],
+            descriptors: Descriptors::try_new(Values::U8(vec![1, 2, 3, 4]), 2).ok(),
+            ..ImageFeatures::default()
+        };
+        // struct.pack("<2I4d4B", 640, 480, 1, 2, 3, 4, 1, 2, 3, 4)
+        let expected = "0cbcd3b3d08473d8346a9e417d3f454810addd97a50bda7eefc101eaf4f9f67d";
+        assert_eq!(hash_features(&features), expected);
+        let named = ImageFeatures { name: "a.jpg".to_owned(), ..features.clone() };
+        assert_eq!(hash_features(&named), expected);
+        let other = ImageFeatures { size: Some([480, 640]), ..features };
+        assert_ne!(hash_features(&other), expected);
     }
 
     #[test]

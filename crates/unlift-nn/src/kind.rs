@@ -38,6 +38,26 @@ impl DescriptorKind {
         }
     }
 
+    /// The kind that users call `name`: "sift", "aliked" or "superpoint".
+    ///
+    /// # Errors
+    /// When there is none; the message lists all.
+    pub fn from_name(name: &str) -> Result<Self, Error> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name).ok_or_else(|| {
+            let names = Self::ALL.map(Self::name).join(", ");
+            Error::new("features", format!("one of {names}"), name)
+        })
+    }
+
+    /// As users write it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sift => "sift",
+            Self::Aliked => "aliked",
+            Self::SuperPoint => "superpoint",
+        }
+    }
+
     /// How many values one has.
     pub fn dim(self) -> usize {
         match self {
@@ -69,6 +89,7 @@ mod tests {
         );
         for kind in DescriptorKind::ALL {
             assert_eq!(DescriptorKind::ALL[kind as usize], kind);
+            assert_eq!(DescriptorKind::from_name(kind.name()), Ok(kind));
         }
     }
 }

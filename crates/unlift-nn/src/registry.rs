@@ -85,7 +85,7 @@ const ALIKED_N16ROT: Entry = Entry {
         Port { name: "offsets", shape: &[None, Some(2), Some(16)] },
         Port { name: "descriptors", shape: &[None, Some(128)] },
     ],
-    carried: Some(include_bytes!("../../../models/aliked-n16rot/aliked-n16rot.onnx")),
+    carried: Some(include_bytes!("../models/aliked-n16rot/aliked-n16rot.onnx")),
 };
 
 const INVERTER_ALIKED: Entry = Entry {
@@ -117,7 +117,7 @@ const INVERTER_SIFT: Entry = Entry {
     sha256: Some("a7c0124cf6b1b5c90323086b544d539bd4030135d66ddc5f344d437a006428f5"),
     inputs: &[Port { name: "features", shape: &[Some(1), Some(131), None, None] }],
     outputs: &[Port { name: "picture", shape: &[Some(1), Some(3), None, None] }],
-    carried: Some(include_bytes!("../../../models/inverter-sift/inverter-sift.onnx")),
+    carried: Some(include_bytes!("../models/inverter-sift/inverter-sift.onnx")),
 };
 
 const LPIPS_SQUEEZE: Entry = Entry {
@@ -131,7 +131,7 @@ const LPIPS_SQUEEZE: Entry = Entry {
         Port { name: "b", shape: &[Some(1), Some(3), None, None] },
     ],
     outputs: &[Port { name: "distance", shape: &[Some(1)] }],
-    carried: Some(include_bytes!("../../../models/lpips-squeeze/lpips-squeeze.onnx")),
+    carried: Some(include_bytes!("../models/lpips-squeeze/lpips-squeeze.onnx")),
 };
 
 const NEIGHBORS_ALIKED: Entry = Entry {
@@ -145,7 +145,7 @@ const NEIGHBORS_ALIKED: Entry = Entry {
         Port { name: "pairs", shape: &[Some(1), None, None] },
     ],
     outputs: &[Port { name: "scores", shape: &[None, None] }],
-    carried: Some(include_bytes!("../../../models/neighbors-aliked/neighbors-aliked.onnx")),
+    carried: Some(include_bytes!("../models/neighbors-aliked/neighbors-aliked.onnx")),
 };
 
 const NEIGHBORS_SIFT: Entry = Entry {
@@ -159,7 +159,7 @@ const NEIGHBORS_SIFT: Entry = Entry {
         Port { name: "pairs", shape: &[Some(3), None, None] },
     ],
     outputs: &[Port { name: "scores", shape: &[None, None] }],
-    carried: Some(include_bytes!("../../../models/neighbors-sift/neighbors-sift.onnx")),
+    carried: Some(include_bytes!("../models/neighbors-sift/neighbors-sift.onnx")),
 };
 
 const NEIGHBORS_SUPERPOINT: Entry = Entry {
@@ -202,5 +202,5 @@ const YOLOX_NANO: Entry = Entry {
     sha256: Some("695e750a5d5754bb5a8d5325643b59282191a7e7a564e435a415fd3c578eab14"),
     inputs: &[Port { name: "images", shape: &[Some(1), Some(3), Some(416), Some(416)] }],
     outputs: &[Port { name: "output", shape: &[Some(1), Some(3549), Some(85)] }],
-    carried: Some(include_bytes!("../../../models/yolox-nano/yolox-nano.onnx")),
+    carried: Some(include_bytes!("../models/yolox-nano/yolox-nano.onnx")),
 };

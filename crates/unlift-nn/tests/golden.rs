@@ -13,7 +13,7 @@ const STRIDE: usize = 37;
 const TOLERANCE: f32 = 1e-4;
 
 fn folder(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("models").join(name)
 }
 
 fn tensor(file: &SafeTensors, name: &str) -> Tensor {

@@ -56,13 +56,21 @@ fn contiguous<'py, T: Element>(array: &Bound<'py, PyAny>) -> PyResult<Bound<'py,
     made.cast_into().map_err(|error| raised(error.to_string()))
 }
 
-/// The rows of an array `(n, 3)`.
-pub fn rows(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; 3]>> {
+/// The rows of an array `(n, D)`.
+pub fn rows<const D: usize>(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; D]>> {
     let array = contiguous::<f64>(&array(name, given, NUMBERS)?)?;
     match array.shape() {
-        [_, 3] => Ok(array.readonly().as_slice()?.as_chunks::<3>().0.to_vec()),
-        shape => Err(wrong(name, "an array of shape (n, 3)", told(shape))),
+        [_, columns] if *columns == D => {
+            Ok(array.readonly().as_slice()?.as_chunks::<D>().0.to_vec())
+        }
+        shape => Err(wrong(name, format!("an array of shape (n, {D})"), told(shape))),
     }
+}
+
+/// Whether an array has rows of two numbers.
+pub fn is_of_pairs(name: &str, given: &Bound<'_, PyAny>) -> PyResult<bool> {
+    let shape: Vec<usize> = array(name, given, NUMBERS)?.getattr("shape")?.extract()?;
+    Ok(matches!(shape[..], [_, 2]))
 }
 
 /// The numbers of an array, and its shape.
@@ -143,7 +151,11 @@ pub fn descriptors(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Descriptors
     let [_, dim] = shape[..] else {
         return Err(wrong(name, "an array of shape (n, dim)", told(&shape)));
     };
-    Descriptors::try_new(values, dim).map_err(raised)
+    Descriptors::try_new(values, dim).map_err(|error| match error.what() {
+        "descriptors" => wrong(name, error.expected(), error.found()),
+        // It says which one of them.
+        _ => raised(error.within(name)),
+    })
 }
 
 /// `(3, 4)`, as NumPy writes it.

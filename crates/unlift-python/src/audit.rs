@@ -1,7 +1,7 @@
-//! The audit: a map in, a report out.
+//! The audit of a map: a map in, a report out.
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::time::Instant;
 
 use pyo3::prelude::*;
@@ -9,11 +9,12 @@ use unlift_audit::maps::find;
 use unlift_audit::{Gate, Job};
 
 use crate::errors::raised;
+use crate::heard::Heard;
 use crate::map::Map;
 use crate::own::Raised;
 use crate::plan::Asked;
 use crate::report::Report;
-use crate::work::{self, Heard};
+use crate::work;
 
 /// Audits `map` as `asked` says, a dict of all options; `tell` hears of every cell: done, total, what comes next.
 #[pyfunction]
@@ -24,17 +25,15 @@ pub fn audit(
     tell: Option<Py<PyAny>>,
 ) -> PyResult<Report> {
     let (started, by) = (Instant::now(), Raised::default());
-    let asked = asked.extract::<Asked<'_>>().map_err(|error| of_argument(py, error))?;
+    let asked = asked_of::<Asked<'_>>(asked)?;
     let (plan, notes) = asked.plan(py, &map.prepared, &by)?;
-    let gates = asked.gates.iter().map(|text| Gate::parse(text));
-    let gates = gates.collect::<Result<Vec<_>, _>>().map_err(raised)?;
+    let gates = gates_of(&asked.gates)?;
     let mut options = serde_json::Map::new();
     if let Some(k) = asked.source_k {
         options.insert("source_k".to_owned(), k.into());
     }
     let stop = by.stop();
-    let heard = Heard { tell, stop: Arc::clone(&stop), failed: Mutex::new(None) };
-    let heard = Arc::new(heard);
+    let heard = Arc::new(Heard::new(tell, Arc::clone(&stop)));
     let progress = Arc::clone(&heard);
     let (prepared, input) = (Arc::clone(&map.prepared), map.input.clone());
     let (cameras, up) = (map.cameras.clone(), map.up);
@@ -63,10 +62,23 @@ pub fn audit(
         };
         find(job, None)
     });
-    if let Some(error) = heard.failed.lock().unwrap_or_else(PoisonError::into_inner).take() {
+    if let Some(error) = heard.failed() {
         return Err(error);
     }
     found.map(Report::of).map_err(|error| by.as_cause_of(py, error))
+}
+
+/// Options in the dict `asked`.
+pub fn asked_of<'py, T>(asked: &Bound<'py, PyAny>) -> PyResult<T>
+where
+    T: for<'a> FromPyObject<'a, 'py, Error = PyErr>,
+{
+    asked.extract::<T>().map_err(|error| of_argument(asked.py(), error))
+}
+
+/// Gates as they were written.
+pub fn gates_of(texts: &[String]) -> PyResult<Vec<Gate>> {
+    texts.iter().map(|text| Gate::parse(text)).collect::<Result<_, _>>().map_err(raised)
 }
 
 /// An error about an item of the dict, as Python tells it of an argument.

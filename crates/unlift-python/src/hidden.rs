@@ -11,17 +11,34 @@ use unlift_audit::Prepared;
 use unlift_io::stage::{Kind, read_released, read_truth, write_released, write_truth};
 
 use crate::arrays::{to_array, to_descriptors, to_rows};
-use crate::errors::raised;
+use crate::either::{Either, of_either};
+use crate::errors::{raised, wrong};
 use crate::files::save;
 
-/// All that an attacker sees of a map.
+/// All that an attacker sees of a map, or of an image.
 #[pyclass(frozen, module = "unlift")]
 #[derive(Clone)]
-pub struct Released(pub Arc<released::Released<3>>);
+pub struct Released(pub Either<Arc<released::Released<2>>, Arc<released::Released<3>>>);
+
+impl From<released::Released<2>> for Released {
+    fn from(of_image: released::Released<2>) -> Self {
+        Self(Either::Image(Arc::new(of_image)))
+    }
+}
+
+impl From<released::Released<3>> for Released {
+    fn from(of_map: released::Released<3>) -> Self {
+        Self(Either::Map(Arc::new(of_map)))
+    }
+}
 
 impl Released {
-    pub fn of(released: released::Released<3>) -> Self {
-        Self(Arc::new(released))
+    /// That of a map.
+    pub fn of_map(self) -> PyResult<Arc<released::Released<3>>> {
+        match self.0 {
+            Either::Map(of_map) => Ok(of_map),
+            Either::Image(_) => Err(wrong("released", "that of a map", "that of an image")),
+        }
     }
 }
 
@@ -30,91 +47,114 @@ impl Released {
     /// Reads a released map (Parquet).
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        py.detach(|| read_released::<3>(&path)).map(Self::of).map_err(raised)
+        py.detach(|| read_released::<3>(&path)).map(Self::from).map_err(raised)
     }
 
     /// Writes it (Parquet), as `unlift obfuscate` does. What is there and no released map stays, unless `force`.
     #[pyo3(signature = (path, *, force=false))]
     fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
-        save(py, (path, force), Kind::Released, |path| write_released(path, &self.0))
+        save(
+            py,
+            (path, force),
+            Kind::Released,
+            |path| of_either!(&self.0, released => write_released(path, released)),
+        )
     }
 
     fn __len__(&self) -> usize {
-        self.0.n_records()
+        of_either!(&self.0, released => released.n_records())
     }
 
     fn __repr__(&self) -> String {
-        let (n, family) = (self.0.n_records(), self.0.obfuscation().family());
-        format!("<unlift.Released: {n} {family} hiding {} points>", self.0.n_slots())
+        let (n, family) = (self.__len__(), self.family());
+        format!("<unlift.Released: {n} {family} hiding {} points>", self.n_slots())
     }
 
     /// What records are: "lines", "rays", "axis_planes" or "axis_candidates".
     #[getter]
     fn family(&self) -> &'static str {
-        self.0.obfuscation().family()
+        of_either!(&self.0, released => released.obfuscation().family())
     }
 
     /// The unit of lengths.
     #[getter]
     fn unit(&self) -> &'static str {
-        self.0.unit().name()
+        of_either!(&self.0, released => released.unit().name())
     }
 
     /// Hidden points per record.
     #[getter]
     fn slots_per_record(&self) -> usize {
-        self.0.slots_per_record()
+        of_either!(&self.0, released => released.slots_per_record())
     }
 
     /// Number of hidden points.
     #[getter]
     fn n_slots(&self) -> usize {
-        self.0.n_slots()
+        of_either!(&self.0, released => released.n_slots())
     }
 
-    /// The point `(3,)` that records are stored about.
+    /// The point `(3,)` that records are stored about; of an image its middle `(2,)`.
     #[getter]
     fn origin<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        to_array(py, self.0.origin().to_vec()).into_any()
+        of_either!(&self.0, released => to_array(py, released.origin().to_vec()).into_any())
+    }
+
+    /// The outermost corners of an image `(2, 2)`, lowest first, in pixels; None of a map.
+    #[getter]
+    fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let Either::Image(of_image) = &self.0 else { return Ok(None) };
+        let corners = of_image.bounds().map(|bounds| vec![bounds.low, bounds.high]);
+        corners.map(|corners| Ok(to_rows(py, corners)?.into_any())).transpose()
     }
 
     /// What tells this map from others, in hexadecimal.
     #[getter]
     fn fingerprint(&self) -> String {
-        self.0.fingerprint().to_string()
+        of_either!(&self.0, released => released.fingerprint().to_string())
     }
 
     /// Descriptors `(n_slots, dim)`, or None.
     #[getter]
     fn descriptors<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        self.0.descriptors().map(|rows| to_descriptors(py, rows)).transpose()
+        let rows = of_either!(&self.0, released => released.descriptors());
+        rows.map(|rows| to_descriptors(py, rows)).transpose()
     }
 
     /// The columns of the records by name, about `origin`: of lines foot and direction `(n, 3)`; of rays centers `(m, 3)`,
-    /// center `(n,)` and direction `(n, 3)`; of planes axis and offset `(n,)`; of candidates position `(n, 3)`.
+    /// center `(n,)` and direction `(n, 3)`; of planes axis and offset `(n,)`; of candidates position `(n, 3)`; of an image
+    /// all `(n, 2)`.
     #[getter]
     fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let columns = PyDict::new(py);
-        match self.0.obfuscation() {
-            Obfuscation::Lines(lines) => {
-                columns.set_item("foot", to_rows(py, lines.foot().to_vec())?)?;
-                columns.set_item("direction", to_rows(py, lines.direction().to_vec())?)?;
-            }
-            Obfuscation::Rays(rays) => {
-                columns.set_item("centers", to_rows(py, rays.centers().to_vec())?)?;
-                columns.set_item("center", to_array(py, rays.center().to_vec()))?;
-                columns.set_item("direction", to_rows(py, rays.direction().to_vec())?)?;
-            }
-            Obfuscation::AxisPlanes(planes) => {
-                columns.set_item("axis", to_array(py, planes.axis().to_vec()))?;
-                columns.set_item("offset", to_array(py, planes.offset().to_vec()))?;
-            }
-            Obfuscation::AxisCandidates(points) => {
-                columns.set_item("position", to_rows(py, points.position().to_vec())?)?;
-            }
-        }
-        Ok(columns)
+        of_either!(&self.0, released => columns(py, released.obfuscation()))
     }
+}
+
+/// The columns of records by name.
+fn columns<'py, const D: usize>(
+    py: Python<'py>,
+    records: &Obfuscation<D>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let columns = PyDict::new(py);
+    match records {
+        Obfuscation::Lines(lines) => {
+            columns.set_item("foot", to_rows(py, lines.foot().to_vec())?)?;
+            columns.set_item("direction", to_rows(py, lines.direction().to_vec())?)?;
+        }
+        Obfuscation::Rays(rays) => {
+            columns.set_item("centers", to_rows(py, rays.centers().to_vec())?)?;
+            columns.set_item("center", to_array(py, rays.center().to_vec()))?;
+            columns.set_item("direction", to_rows(py, rays.direction().to_vec())?)?;
+        }
+        Obfuscation::AxisPlanes(planes) => {
+            columns.set_item("axis", to_array(py, planes.axis().to_vec()))?;
+            columns.set_item("offset", to_array(py, planes.offset().to_vec()))?;
+        }
+        Obfuscation::AxisCandidates(points) => {
+            columns.set_item("position", to_rows(py, points.position().to_vec())?)?;
+        }
+    }
+    Ok(columns)
 }
 
 /// What only the owner of a map has: its points, and which record hides which.
@@ -213,7 +253,7 @@ impl Hidden {
     fn __repr__(&self) -> String {
         format!(
             "<unlift.Hidden: {} points in {}>",
-            self.released.0.n_slots(),
+            self.released.n_slots(),
             self.released.__repr__()
         )
     }
@@ -227,7 +267,7 @@ pub fn released_of(given: &Bound<'_, PyAny>) -> PyResult<Released> {
     let released = given.cast::<Released>();
     released.map(|released| released.get().clone()).map_err(|_| {
         let found = given.get_type().to_string();
-        crate::errors::wrong("released", "a Released or a Hidden", found)
+        wrong("released", "a Released or a Hidden", found)
     })
 }
 
@@ -238,6 +278,6 @@ pub fn truth_of(given: &Bound<'_, PyAny>) -> PyResult<Truth> {
     }
     given.cast::<Truth>().map(|truth| truth.get().clone()).map_err(|_| {
         let found = given.get_type().to_string();
-        crate::errors::wrong("truth", "a Truth or a Hidden", found)
+        wrong("truth", "a Truth or a Hidden", found)
     })
 }

@@ -7,7 +7,7 @@ use std::sync::Once;
 use pyo3::exceptions::PyAssertionError;
 use pyo3::prelude::*;
 
-use crate::hidden::{Released, released_of};
+use crate::hidden::released_of;
 use crate::own::{OwnScheme, OwnSource, Raised};
 use crate::work::{self, told};
 
@@ -43,12 +43,16 @@ fn kept(py: Python<'_>, by: &Raised, laws: impl FnOnce() + Send + 'static) -> Py
 /// Whether a scheme hides every point, on its record, by its key alone, and in an order that tells nothing.
 ///
 /// It is called with 0, 1, 2, 3, 7, 120, 200, 300, 301, 600 and 700 points: of a made-up room, at random, many in one place. By an
-/// exception it refuses points, which it may but for 200, 600 and 700 of a room.
+/// exception it refuses points, which it may but for 200, 600 and 700 of a room. With `images` with keypoints `(n, 2)` in their place.
 #[pyfunction]
-pub fn check_scheme(py: Python<'_>, scheme: &Bound<'_, PyAny>) -> PyResult<()> {
+#[pyo3(signature = (scheme, *, images=false))]
+pub fn check_scheme(py: Python<'_>, scheme: &Bound<'_, PyAny>, images: bool) -> PyResult<()> {
     let by = Raised::default();
     let scheme = OwnScheme::new(scheme, &by)?;
-    kept(py, &by, move || unlift_testkit::scheme_laws::<3>(&scheme))
+    kept(py, &by, move || match images {
+        true => unlift_testkit::scheme_laws::<2>(&scheme),
+        false => unlift_testkit::scheme_laws::<3>(&scheme),
+    })
 }
 
 /// Whether a source gives every hidden point of `released` a list, of records of this map, by its seed alone.
@@ -60,7 +64,7 @@ pub fn check_source(
     source: &Bound<'_, PyAny>,
     released: &Bound<'_, PyAny>,
 ) -> PyResult<()> {
-    let (by, Released(released)) = (Raised::default(), released_of(released)?);
+    let (by, released) = (Raised::default(), released_of(released)?.of_map()?);
     let source = OwnSource::new(source, &by)?;
     kept(py, &by, move || unlift_testkit::source_laws::<3>(&source, &released))
 }

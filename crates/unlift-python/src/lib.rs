@@ -4,16 +4,21 @@
 //! arrays, paths ──> Map ──> obfuscate ──> Hidden { Released, Truth }
 //!                    │          Released ──> neighbors ──> Neighborhoods ──> recover ──> Recovered ──> evaluate
 //!                    └──> audit (schemes and sources may be functions) ──> Report
+//! arrays by name, paths ──> audit_images (as above) ────────────────────────┘
 //! ```
 //!
 //! Work runs on threads of its own, without the interpreter's lock, and ends when the user interrupts.
 
 mod arrays;
 mod audit;
+mod audit_images;
 mod calls;
+mod either;
 mod errors;
 mod files;
+mod heard;
 mod hidden;
+mod images;
 mod json;
 mod laws;
 mod lists;
@@ -36,6 +41,8 @@ mod _unlift {
 
     #[pymodule_export]
     use super::audit::audit;
+    #[pymodule_export]
+    use super::audit_images::audit_images;
     #[pymodule_export]
     use super::hidden::{Hidden, Released, Truth};
     #[pymodule_export]
@@ -64,9 +71,16 @@ mod _unlift {
 
 /// Version, and the names that arguments take.
 fn names(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    let schemes = unlift::obfuscate::SCHEMES.iter().filter(|entry| entry.in_3d.is_some());
-    let sources = unlift_audit::sources::all();
-    let sources = sources.iter().filter(|entry| entry.in_3d.is_some());
+    let (all_schemes, all_sources) = (unlift::obfuscate::SCHEMES, unlift_audit::sources::all());
+    let schemes = all_schemes.iter().filter(|entry| entry.in_2d.is_some());
+    module.add("IMAGE_SCHEMES", schemes.map(|entry| entry.name).collect::<Vec<_>>())?;
+    let sources = all_sources.iter().filter(|entry| entry.in_2d.is_some());
+    module.add("IMAGE_SOURCES", sources.map(|entry| entry.name).collect::<Vec<_>>())?;
+    let solvers = unlift::recover::Solver::FROM_LISTS.iter().copied();
+    let solvers = solvers.map(unlift::recover::Solver::name).collect::<Vec<_>>();
+    module.add("IMAGE_SOLVERS", solvers)?;
+    let schemes = all_schemes.iter().filter(|entry| entry.in_3d.is_some());
+    let sources = all_sources.iter().filter(|entry| entry.in_3d.is_some());
     module.add("UnliftError", module.py().get_type::<errors::UnliftError>())?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add("SCHEMES", schemes.map(|entry| entry.name).collect::<Vec<_>>())?;

@@ -15,9 +15,10 @@ use unlift_audit::sources;
 use unlift_io::stage::{Kind, read_neighborhoods, write_neighborhoods};
 
 use crate::arrays::{numbers, to_array, told, whole};
+use crate::either::of_either;
 use crate::errors::{raised, wrong};
 use crate::files::save;
-use crate::hidden::{Hidden, Released, released_of};
+use crate::hidden::{Hidden, released_of};
 use crate::work;
 
 /// For every hidden point the records that are taken for near ones, likeliest first.
@@ -40,14 +41,16 @@ impl Neighborhoods {
             "nothing" => Needs::Nothing,
             other => return Err(wrong("needs", "descriptors or nothing", other)),
         };
-        let released = released_of(released)?;
-        Ok(Self(Arc::new(lists_of(&released.0, records, scores, usize::MAX, needs)?)))
+        let lists = of_either!(&released_of(released)?.0, released => {
+            lists_of(released, records, scores, usize::MAX, needs)
+        });
+        Ok(Self(Arc::new(lists?)))
     }
 
     /// Reads lists of `released` (Parquet).
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf, released: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let Released(of) = released_of(released)?;
+        let of = released_of(released)?.of_map()?;
         let lists = py.detach(|| read_neighborhoods(&path, of.n_records(), of.slots_per_record()));
         Ok(Self(Arc::new(lists.map_err(raised)?)))
     }
@@ -87,8 +90,8 @@ impl Neighborhoods {
 }
 
 /// Lists of `released` in an array `(n_slots, k)`, padded by -1; at most `k` each.
-fn lists_of(
-    released: &released::Released<3>,
+fn lists_of<const D: usize>(
+    released: &released::Released<D>,
     records: &Bound<'_, PyAny>,
     scores: Option<&Bound<'_, PyAny>>,
     k: usize,
@@ -136,9 +139,9 @@ fn lists_of(
 }
 
 /// Lists as a function returned them: Neighborhoods, an array of records, or records and scores.
-pub fn returned(
+pub fn returned<const D: usize>(
     given: &Bound<'_, PyAny>,
-    released: &released::Released<3>,
+    released: &released::Released<D>,
     k: usize,
     needs: Needs,
 ) -> PyResult<neighbors::Neighborhoods> {
@@ -181,7 +184,7 @@ pub fn find(
     seed: u64,
     threads: Option<usize>,
 ) -> PyResult<Neighborhoods> {
-    let Released(released) = released_of(released)?;
+    let released = released_of(released)?.of_map()?;
     let source = named(source, k)?.of_dimension::<3>().map_err(raised)?;
     let lists = work::run(py, threads, None, move || {
         source.supports(&released)?;
@@ -203,7 +206,8 @@ pub fn oracle(
 ) -> PyResult<Neighborhoods> {
     let noise = Noise::from_name(noise).map_err(raised)?;
     let (released, truth) = hidden.parts();
-    let (slots_per_record, truth) = (released.0.slots_per_record(), truth.clone());
+    let slots_per_record = released.clone().of_map()?.slots_per_record();
+    let truth = truth.clone();
     let lists = work::run(py, None, None, move || {
         let knn = search(truth.original())?;
         let near = TrueNeighbors::new(&knn, &truth.secret, slots_per_record, k)?;

@@ -14,18 +14,21 @@ use crate::own::{OwnScheme, Raised};
 use crate::work;
 
 /// The scheme in `given`, a name or a function.
-pub fn scheme_of(
+pub fn scheme_of<const D: usize>(
     given: &Bound<'_, PyAny>,
     options: &SchemeOptions,
     raised_by: &Raised,
-) -> PyResult<Arc<dyn Scheme<3>>> {
+) -> PyResult<Arc<dyn Scheme<D>>>
+where
+    OwnScheme: Scheme<D>,
+{
     let Ok(name) = given.extract::<String>() else {
         return Ok(Arc::new(OwnScheme::new(given, raised_by)?));
     };
     let entry = scheme(&name).map_err(raised)?;
-    entry
-        .of_dimension::<3>(options)
-        .ok_or_else(|| wrong("scheme", "one that is defined on maps", name))
+    let subjects = if D == 2 { "images" } else { "maps" };
+    let expected = format!("one that is defined on {subjects}");
+    entry.of_dimension::<D>(options).ok_or_else(|| wrong("scheme", expected, name))
 }
 
 /// Hides a map by a scheme, a name or a function. Without a seed under a fresh key, for maps that are released; a seed
@@ -41,7 +44,7 @@ pub fn obfuscate(
     let by = Raised::default();
     let unit = map.prepared.original.reveal().unit();
     let is_own = scheme.extract::<String>().is_err();
-    let scheme = scheme_of(scheme, &SchemeOptions::usual(unit), &by)?;
+    let scheme = scheme_of::<3>(scheme, &SchemeOptions::usual(unit), &by)?;
     let key = seed.map_or_else(Key::fresh, |seed| Ok(Key::from_seed(seed))).map_err(raised)?;
     let prepared = Arc::clone(&map.prepared);
     let hidden = work::run(py, None, Some(by.stop()), move || {
@@ -55,5 +58,5 @@ pub fn obfuscate(
     });
     let (released, secret) = hidden.map_err(|error| by.as_cause_of(py, error))?;
     let truth = Truth::of(Arc::clone(&map.prepared), secret);
-    Ok(Hidden::of(Released::of(released), truth))
+    Ok(Hidden::of(Released::from(released), truth))
 }

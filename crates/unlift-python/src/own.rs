@@ -17,7 +17,7 @@ use crate::calls;
 use crate::errors::wrong;
 use crate::hidden::Released as PyReleased;
 use crate::lists;
-use crate::records::hiding;
+use crate::records::{Hiding, InDimension, hiding};
 
 /// What ended functions of the user's, one of which is the cause of what the user sees; and whether none is to be called any more.
 #[derive(Clone, Debug, Default)]
@@ -34,14 +34,14 @@ impl Raised {
     }
 
     /// Keeps `error`, and says it in a line.
-    fn keep(&self, py: Python<'_>, name: &str, error: PyErr) -> Error {
+    pub fn keep(&self, py: Python<'_>, error: PyErr) -> String {
         let told = OneLine(error.to_string()).to_string();
         let mut errors = self.errors.lock().unwrap_or_else(PoisonError::into_inner);
         // Once for all points that a function is called with.
         if errors.iter().all(|(line, _)| *line != told) {
             errors.push((told.clone(), error.clone_ref(py)));
         }
-        Error::new(name, "records or lists", told)
+        told
     }
 
     /// `error` with the exception that it came from, if it tells of one.
@@ -87,10 +87,10 @@ impl Function {
     /// What `make` makes of a call, an error where it raises, or where no function is called any more.
     fn made<T>(&self, make: impl FnOnce(Python<'_>) -> PyResult<T>) -> Result<T, Error> {
         let Self { name, raised, .. } = self;
-        let made = calls::attached(&raised.stop, |py| {
-            make(py).map_err(|error| raised.keep(py, name, error))
-        });
-        made.unwrap_or_else(|| Err(Error::new(name, "records or lists", "an interrupt")))
+        let made =
+            calls::attached(&raised.stop, |py| make(py).map_err(|error| raised.keep(py, error)));
+        let made = made.unwrap_or_else(|| Err("an interrupt".to_owned()));
+        made.map_err(|found| Error::new(name, "records or lists", found))
     }
 
     /// What it returns for `given`; with a generator of these words of seed, if it takes one.
@@ -105,7 +105,7 @@ impl Function {
     }
 }
 
-/// A scheme that is a function: `points` (n, 3), and a random generator if it takes one, to records.
+/// A scheme that is a function: `points` (n, D), and a random generator if it takes one, to records.
 #[derive(Debug)]
 pub struct OwnScheme(Function);
 
@@ -115,26 +115,26 @@ impl OwnScheme {
     }
 }
 
-impl Scheme<3> for OwnScheme {
+impl<const D: usize> Scheme<D> for OwnScheme
+where
+    Hiding<D>: InDimension,
+{
     fn name(&self) -> &str {
         &self.0.name
     }
 
     fn lift(
         &self,
-        points: &[[f64; 3]],
-        _: Option<&Bounds<3>>,
+        points: &[[f64; D]],
+        _: Option<&Bounds<D>>,
         key: &Key,
-    ) -> Result<Lifted<3>, Error> {
+    ) -> Result<Lifted<D>, Error> {
         let name = &self.0.name;
         let mut draws = key.draws(Stage::Scheme, 0);
         let seed = [(); 4].map(|()| draws.bits());
         let hiding = self.0.made(|py| {
             let returned = self.0.call(to_rows(py, points.to_vec())?.into_any(), seed)?;
-            hiding(&returned).ok_or_else(|| {
-                let found = returned.get_type().to_string();
-                wrong(name, "Lines, Rays, Planes or Candidates", found)
-            })
+            hiding(&returned, name)
         })?;
         hiding.lifted(points.len(), name)
     }
@@ -171,7 +171,10 @@ impl OwnSource {
     }
 }
 
-impl Source<3> for OwnSource {
+impl<const D: usize> Source<D> for OwnSource
+where
+    PyReleased: From<Released<D>>,
+{
     fn name(&self) -> &str {
         &self.function.name
     }
@@ -180,13 +183,13 @@ impl Source<3> for OwnSource {
         self.needs
     }
 
-    fn k(&self, _: &Released<3>) -> usize {
+    fn k(&self, _: &Released<D>) -> usize {
         self.k
     }
 
-    fn lists(&self, released: &Released<3>, k: usize, seed: u64) -> Result<Neighborhoods, Error> {
+    fn lists(&self, released: &Released<D>, k: usize, seed: u64) -> Result<Neighborhoods, Error> {
         self.function.made(|py| {
-            let shown = Bound::new(py, PyReleased::of(released.clone()))?.into_any();
+            let shown = Bound::new(py, PyReleased::from(released.clone()))?.into_any();
             let returned = self.function.call(shown, [seed, 0, 0, 0])?;
             lists::returned(&returned, released, k, self.needs)
         })

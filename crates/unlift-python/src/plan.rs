@@ -3,16 +3,19 @@
 use std::sync::Arc;
 
 use pyo3::prelude::*;
+use unlift::Unit;
 use unlift::audit::{NeighborsBy, Plan, Threshold};
+use unlift::neighbors::Source;
 use unlift::neighbors::oracle::Noise;
-use unlift::obfuscate::{SCHEMES, SchemeOptions};
+use unlift::obfuscate::{SCHEMES, Scheme, SchemeOptions};
 use unlift::recover::{Delta, Solver};
+use unlift_audit::images::choice::headline;
 use unlift_audit::{Prepared, check_thresholds, sources};
 
 use crate::errors::{raised, wrong};
 use crate::lists;
 use crate::obfuscate::scheme_of;
-use crate::own::{OwnSource, Raised};
+use crate::own::{OwnScheme, OwnSource, Raised};
 use crate::work;
 
 /// What an audit was asked for; `None` is as usual.
@@ -62,37 +65,7 @@ impl Asked<'_> {
     ) -> PyResult<(Plan<3>, Vec<String>)> {
         let points = prepared.original.reveal();
         let usual = Plan::<3>::new(points.unit()).for_map(points.len(), self.k);
-        let options = SchemeOptions::usual(points.unit());
-        let schemes = match &self.schemes {
-            Some(schemes) => schemes
-                .iter()
-                .map(|given| {
-                    let scheme = scheme_of(given, &options, by)?;
-                    let taken = SCHEMES.iter().any(|entry| entry.name == scheme.name());
-                    of_its_own("schemes", given, scheme.name(), taken)?;
-                    Ok(scheme)
-                })
-                .collect::<PyResult<_>>()?,
-            None => usual.schemes.clone(),
-        };
-        let noise = self.oracle_noise.as_deref().map(|names| named(names, Noise::from_name));
-        let solvers = self.solvers.as_deref().map(|names| named(names, Solver::from_name));
-        let plan = Plan {
-            schemes,
-            neighbors: self.sources(by)?,
-            inlier_ratios: self.inlier_ratios.clone().map_or(usual.inlier_ratios, distinct),
-            oracle_noise: noise.transpose()?.unwrap_or(usual.oracle_noise),
-            solvers: solvers.transpose()?.unwrap_or(usual.solvers),
-            k: self.k,
-            delta: delta(self.delta)?,
-            exact_constraints: self.exact_constraints,
-            records_alone: self.records_alone,
-            reference: self.reference,
-            thresholds: thresholds(self.thresholds.as_ref(), &usual.thresholds)?,
-            seed: self.seed,
-            repeats: self.repeats,
-            ..usual
-        };
+        let plan = self.with(usual, points.unit(), by)?;
         plan.check(points.len(), prepared.descriptors.is_some()).map_err(raised)?;
         let (prepared, typed) = (Arc::clone(prepared), self.thresholds.is_some());
         work::run(py, self.threads, None, move || {
@@ -110,9 +83,84 @@ impl Asked<'_> {
         })
     }
 
+    /// The plan for images.
+    pub fn plan_of_images(&self, by: &Raised) -> PyResult<Plan<2>> {
+        let plan = self.with(Plan::<2>::new(Unit::Pixel), Unit::Pixel, by)?;
+        let plan = Plan { headline: headline(&plan.thresholds), ..plan };
+        plan.check_for_many().map_err(raised)?;
+        Ok(plan)
+    }
+
+    /// `usual` with what was asked for, of points in `unit`.
+    fn with<const D: usize>(&self, usual: Plan<D>, unit: Unit, by: &Raised) -> PyResult<Plan<D>>
+    where
+        OwnScheme: Scheme<D>,
+        OwnSource: Source<D>,
+    {
+        let options = SchemeOptions::usual(unit);
+        let schemes = match &self.schemes {
+            Some(schemes) => schemes
+                .iter()
+                .map(|given| {
+                    let scheme = scheme_of(given, &options, by)?;
+                    let taken = SCHEMES.iter().any(|entry| entry.name == scheme.name());
+                    of_its_own("schemes", given, scheme.name(), taken)?;
+                    Ok(scheme)
+                })
+                .collect::<PyResult<_>>()?,
+            None => usual.schemes.clone(),
+        };
+        let noise = self.oracle_noise.as_deref().map(|names| named(names, Noise::from_name));
+        let solvers = self.solvers.as_deref().map(|names| named(names, Solver::from_name));
+        let neighbors = self.sources(by)?;
+        self.check_about(&neighbors)?;
+        Ok(Plan {
+            schemes,
+            neighbors,
+            inlier_ratios: self.inlier_ratios.clone().map_or(usual.inlier_ratios, distinct),
+            oracle_noise: noise.transpose()?.unwrap_or(usual.oracle_noise),
+            solvers: solvers.transpose()?.unwrap_or(usual.solvers),
+            k: self.k,
+            delta: delta(self.delta)?,
+            exact_constraints: self.exact_constraints,
+            records_alone: self.records_alone,
+            reference: self.reference,
+            thresholds: thresholds(self.thresholds.as_ref(), &usual.thresholds)?,
+            seed: self.seed,
+            repeats: self.repeats,
+            ..usual
+        })
+    }
+
+    /// Refuses what would be about none of `sources`, as the command line does.
+    fn check_about<const D: usize>(&self, sources: &[NeighborsBy<D>]) -> PyResult<()> {
+        let about = |name: &str, expected: &str| {
+            let found: Vec<&str> = sources.iter().map(NeighborsBy::name).collect();
+            wrong(name, expected, format!("only {}", found.join(", ")))
+        };
+        let oracle = sources.iter().any(NeighborsBy::is_oracle);
+        let of_oracle = [
+            ("inlier_ratios", self.inlier_ratios.is_some()),
+            ("oracle_noise", self.oracle_noise.is_some()),
+        ];
+        if let (false, Some((name, _))) = (oracle, of_oracle.iter().find(|(_, given)| *given)) {
+            return Err(about(name, "neighbors with \"oracle\""));
+        }
+        let is_ours =
+            |given: &Bound<'_, PyAny>| given.extract::<String>().is_ok_and(|name| name != "oracle");
+        if self.source_k.is_some() && !self.neighbors.iter().any(is_ours) {
+            // A function has a length of lists of its own.
+            return Err(about("source_k", "neighbors with a source of unlift's"));
+        }
+        Ok(())
+    }
+
     /// Sources of neighborhoods, each name once.
-    fn sources(&self, by: &Raised) -> PyResult<Vec<NeighborsBy<3>>> {
-        let mut sources: Vec<NeighborsBy<3>> = Vec::new();
+    fn sources<const D: usize>(&self, by: &Raised) -> PyResult<Vec<NeighborsBy<D>>>
+    where
+        OwnSource: Source<D>,
+    {
+        let mut sources: Vec<NeighborsBy<D>> = Vec::new();
         for given in &self.neighbors {
             let source = self.source(given, by)?;
             let ours = ["oracle", "file"].into_iter();
@@ -132,7 +180,14 @@ impl Asked<'_> {
     }
 
     /// A source of neighborhoods, a name or a function.
-    fn source(&self, given: &Bound<'_, PyAny>, by: &Raised) -> PyResult<NeighborsBy<3>> {
+    fn source<const D: usize>(
+        &self,
+        given: &Bound<'_, PyAny>,
+        by: &Raised,
+    ) -> PyResult<NeighborsBy<D>>
+    where
+        OwnSource: Source<D>,
+    {
         let Ok(name) = given.extract::<String>() else {
             return Ok(NeighborsBy::Source(Arc::new(OwnSource::new(given, by)?)));
         };

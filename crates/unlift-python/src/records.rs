@@ -9,21 +9,22 @@ use unlift::released::{
 use unlift::truth::{DropReason, Dropped};
 use unlift::{Error, OriginalId};
 
-use crate::arrays::{column, indices, rows, told};
+use crate::arrays::{column, indices, is_of_pairs, rows, told};
+use crate::either::{Either, of_either};
 use crate::errors::{raised, wrong};
 
 /// Records, and which points they hide; `None` is one each, in order.
 #[derive(Clone)]
-pub struct Hiding {
-    obfuscation: Obfuscation<3>,
+pub struct Hiding<const D: usize> {
+    obfuscation: Obfuscation<D>,
     slots_per_record: usize,
     hidden: Option<Vec<u32>>,
     swapped_axis: Option<Vec<u8>>,
 }
 
-impl Hiding {
+impl<const D: usize> Hiding<D> {
     /// With the points in `hidden`, an array `(n,)`, or `(n, 2)` of lines that hide two points each.
-    fn of(obfuscation: Obfuscation<3>, hidden: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
+    fn of(obfuscation: Obfuscation<D>, hidden: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let n = obfuscation.len();
         let (mut slots_per_record, mut rows) = (1, None);
         if let Some(hidden) = hidden {
@@ -40,7 +41,7 @@ impl Hiding {
     }
 
     /// The same about `n` points: those in no record are dropped.
-    pub fn lifted(self, n: usize, name: &str) -> Result<Lifted<3>, Error> {
+    pub fn lifted(self, n: usize, name: &str) -> Result<Lifted<D>, Error> {
         let Some(hidden) = self.hidden else {
             let found = self.obfuscation.len();
             if found != n {
@@ -79,28 +80,61 @@ impl Hiding {
     }
 }
 
+/// Records of keypoints of an image, or of points of a map.
+type OfEither = Either<Hiding<2>, Hiding<3>>;
+
+/// Records in one of the two dimensions.
+pub trait InDimension: Sized {
+    /// Those of `records`, if they are in this one.
+    fn of_records(records: &Records) -> Option<&Self>;
+}
+
+impl InDimension for Hiding<2> {
+    fn of_records(records: &Records) -> Option<&Self> {
+        match &records.0 {
+            Either::Image(hiding) => Some(hiding),
+            Either::Map(_) => None,
+        }
+    }
+}
+
+impl InDimension for Hiding<3> {
+    fn of_records(records: &Records) -> Option<&Self> {
+        match &records.0 {
+            Either::Image(_) => None,
+            Either::Map(hiding) => Some(hiding),
+        }
+    }
+}
+
 /// Records that hide points, and which ones: what Lines, Rays, Planes and Candidates have in common.
 #[pyclass(frozen, subclass, module = "unlift")]
-pub struct Records(Hiding);
+pub struct Records(OfEither);
+
+impl Records {
+    fn n_and_family(&self) -> (usize, &'static str) {
+        of_either!(&self.0, one => (one.obfuscation.len(), one.obfuscation.family()))
+    }
+}
 
 #[pymethods]
 impl Records {
     fn __len__(&self) -> usize {
-        self.0.obfuscation.len()
+        self.n_and_family().0
     }
 
     fn __repr__(&self) -> String {
-        let (n, family) = (self.0.obfuscation.len(), self.0.obfuscation.family());
+        let (n, family) = self.n_and_family();
         format!("<unlift.Records: {n} {family}>")
     }
 }
 
 /// A class of records.
-fn of<T: PyClass<BaseType = Records>>(hiding: Hiding, class: T) -> PyClassInitializer<T> {
+fn of<T: PyClass<BaseType = Records>>(hiding: OfEither, class: T) -> PyClassInitializer<T> {
     PyClassInitializer::from(Records(hiding)).add_subclass(class)
 }
 
-/// Lines through `points` (n, 3) along `directions` (n, 3). With `hidden` (n, 2) each hides two points.
+/// Lines through `points` (n, 3) along `directions` (n, 3); of an image (n, 2) both. With `hidden` (n, 2) each hides two points.
 #[pyclass(frozen, extends = Records, module = "unlift")]
 pub struct Lines;
 
@@ -113,13 +147,29 @@ impl Lines {
         directions: &Bound<'_, PyAny>,
         hidden: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyClassInitializer<Self>> {
-        let (points, directions) = (rows("points", points)?, rows("directions", directions)?);
-        let lines = LineRecords::through(&points, &directions).map_err(raised)?;
-        Ok(of(Hiding::of(Obfuscation::Lines(lines), hidden)?, Self))
+        let given = (points, directions, hidden);
+        let hiding = match is_of_pairs("points", points)? {
+            true => Either::Image(lines(given)?),
+            false => Either::Map(lines(given)?),
+        };
+        Ok(of(hiding, Self))
     }
 }
 
-/// Half-lines from `centers` (m, 3), of which `center` (n,) says which, along `directions` (n, 3), from the center to the point.
+/// An array, as it was given.
+type Given<'a, 'py> = &'a Bound<'py, PyAny>;
+
+/// Lines through points, along directions, which hide points.
+fn lines<const D: usize>(
+    (points, directions, hidden): (Given<'_, '_>, Given<'_, '_>, Option<Given<'_, '_>>),
+) -> PyResult<Hiding<D>> {
+    let (points, directions) = (rows("points", points)?, rows("directions", directions)?);
+    let lines = LineRecords::through(&points, &directions).map_err(raised)?;
+    Hiding::of(Obfuscation::Lines(lines), hidden)
+}
+
+/// Half-lines from `centers` (m, 3), of which `center` (n,) says which, along `directions` (n, 3), from the center to the point;
+/// of an image centers (m, 2) and directions (n, 2).
 #[pyclass(frozen, extends = Records, module = "unlift")]
 pub struct Rays;
 
@@ -133,15 +183,32 @@ impl Rays {
         directions: &Bound<'_, PyAny>,
         hidden: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyClassInitializer<Self>> {
-        let centers = rows("centers", centers)?;
-        let (center, _) = indices("center", center, &[1], centers.len().min(255) as u32)?;
-        let center = center.iter().map(|&at| at as u8).collect();
-        let rays = RayRecords::try_new(&centers, center, &rows("directions", directions)?);
-        Ok(of(Hiding::of(Obfuscation::Rays(rays.map_err(raised)?), hidden)?, Self))
+        let given = (centers, center, directions, hidden);
+        let hiding = match is_of_pairs("centers", centers)? {
+            true => Either::Image(rays(given)?),
+            false => Either::Map(rays(given)?),
+        };
+        Ok(of(hiding, Self))
     }
 }
 
-/// Planes of which coordinate `axis` (n,), 0 to 2, is `offset` (n,).
+/// Half-lines from centers, each from one of them, along directions, which hide points.
+fn rays<const D: usize>(
+    (centers, center, directions, hidden): (
+        Given<'_, '_>,
+        Given<'_, '_>,
+        Given<'_, '_>,
+        Option<Given<'_, '_>>,
+    ),
+) -> PyResult<Hiding<D>> {
+    let centers = rows("centers", centers)?;
+    let (center, _) = indices("center", center, &[1], centers.len().min(255) as u32)?;
+    let center = center.iter().map(|&at| at as u8).collect();
+    let rays = RayRecords::try_new(&centers, center, &rows("directions", directions)?);
+    Hiding::of(Obfuscation::Rays(rays.map_err(raised)?), hidden)
+}
+
+/// Planes of which coordinate `axis` (n,), 0 to 2, is `offset` (n,). There are none of images.
 #[pyclass(frozen, extends = Records, module = "unlift")]
 pub struct Planes;
 
@@ -157,12 +224,12 @@ impl Planes {
         let (axis, _) = indices("axis", axis, &[1], 3)?;
         let axis = axis.iter().map(|&at| at as u8).collect();
         let planes = AxisPlanes::try_new(axis, &column("offset", offset)?).map_err(raised)?;
-        Ok(of(Hiding::of(Obfuscation::AxisPlanes(planes), hidden)?, Self))
+        Ok(of(Either::Map(Hiding::of(Obfuscation::AxisPlanes(planes), hidden)?), Self))
     }
 }
 
 /// Points `positions` (n, 3) of which one coordinate, `swapped_axis` (n,), 0 to 2, is another point's: the secret, which is not
-/// released.
+/// released. Of an image positions (n, 2), and coordinates 0 and 1.
 #[pyclass(frozen, extends = Records, module = "unlift")]
 pub struct Candidates;
 
@@ -175,19 +242,39 @@ impl Candidates {
         swapped_axis: &Bound<'_, PyAny>,
         hidden: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyClassInitializer<Self>> {
-        let points = AxisCandidates::try_new(&rows("positions", positions)?).map_err(raised)?;
-        let (axis, _) = indices("swapped_axis", swapped_axis, &[1], 3)?;
-        if axis.len() != points.len() {
-            let expected = format!("{} numbers, one per record", points.len());
-            return Err(wrong("swapped_axis", expected, axis.len()));
-        }
-        let swapped_axis = Some(axis.iter().map(|&at| at as u8).collect());
-        let hiding = Hiding::of(Obfuscation::AxisCandidates(points), hidden)?;
-        Ok(of(Hiding { swapped_axis, ..hiding }, Self))
+        let given = (positions, swapped_axis, hidden);
+        let hiding = match is_of_pairs("positions", positions)? {
+            true => Either::Image(candidates(given)?),
+            false => Either::Map(candidates(given)?),
+        };
+        Ok(of(hiding, Self))
     }
 }
 
-/// What a function returned, as records.
-pub fn hiding(returned: &Bound<'_, PyAny>) -> Option<Hiding> {
-    returned.cast::<Records>().ok().map(|records| records.get().0.clone())
+/// Points with a swapped coordinate, which hide points.
+fn candidates<const D: usize>(
+    (positions, swapped_axis, hidden): (Given<'_, '_>, Given<'_, '_>, Option<Given<'_, '_>>),
+) -> PyResult<Hiding<D>> {
+    let points = AxisCandidates::try_new(&rows("positions", positions)?).map_err(raised)?;
+    let (axis, _) = indices("swapped_axis", swapped_axis, &[1], D as u32)?;
+    if axis.len() != points.len() {
+        let expected = format!("{} numbers, one per record", points.len());
+        return Err(wrong("swapped_axis", expected, axis.len()));
+    }
+    let swapped_axis = Some(axis.iter().map(|&at| at as u8).collect());
+    let hiding = Hiding::of(Obfuscation::AxisCandidates(points), hidden)?;
+    Ok(Hiding { swapped_axis, ..hiding })
+}
+
+/// What a function called `name` returned, as records of points `(n, D)`.
+pub fn hiding<const D: usize>(returned: &Bound<'_, PyAny>, name: &str) -> PyResult<Hiding<D>>
+where
+    Hiding<D>: InDimension,
+{
+    let Ok(records) = returned.cast::<Records>() else {
+        let expected = "Lines, Rays, Planes or Candidates";
+        return Err(wrong(name, expected, returned.get_type()));
+    };
+    let found = || wrong(name, format!("records of points (n, {D})"), format!("(n, {})", 5 - D));
+    Hiding::of_records(records.get()).cloned().ok_or_else(found)
 }

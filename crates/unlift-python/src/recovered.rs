@@ -13,7 +13,7 @@ use unlift_io::stage::{Kind, read_recovered, write_recovered};
 use crate::arrays::{to_array, to_rows};
 use crate::errors::{raised, wrong};
 use crate::files::save;
-use crate::hidden::{Hidden, Released, released_of, truth_of};
+use crate::hidden::{Hidden, released_of, truth_of};
 use crate::json::as_python;
 use crate::lists::Neighborhoods;
 use crate::plan::{delta, thresholds};
@@ -111,7 +111,7 @@ pub fn recover(
     exact_constraints: bool,
     threads: Option<usize>,
 ) -> PyResult<Recovered> {
-    let Released(released) = released_of(released)?;
+    let released = released_of(released)?.of_map()?;
     let options = RecoverOptions {
         solver: Solver::from_name(solver).map_err(raised)?,
         delta: self::delta(delta)?,
@@ -138,13 +138,14 @@ pub fn evaluate<'py>(
     thresholds: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let released = truth.cast::<Hidden>().ok().map(|hidden| hidden.get().parts().0.clone());
+    let released = released.map(crate::hidden::Released::of_map).transpose()?;
     let truth = truth_of(truth)?;
     let usual = Plan::<3>::new(truth.original().reveal().unit()).thresholds;
     let thresholds = self::thresholds(thresholds, &usual)?;
     let (recovered, asked) = (Arc::clone(&recovered.0), thresholds.clone());
     let (row, _) = work::run(py, None, None, move || {
         let (original, secret) = (truth.original(), &truth.secret);
-        let baseline = released.map(|released| blind(&released.0, original, secret));
+        let baseline = released.map(|released| blind(&released, original, secret));
         measure(&recovered, original, secret, baseline.as_ref(), &asked)
     })?;
     let figures = unlift_audit::evaluated(&row, &thresholds).map_err(raised)?;

@@ -41,10 +41,13 @@ impl Report {
         as_python(py, &self.value(false)?)
     }
 
-    /// Whether every gate held.
+    /// Whether every gate held, and every image could be used.
     #[getter]
     fn passed(&self) -> bool {
-        self.0.document.gates.iter().all(|gate| gate.passed)
+        let document = &self.0.document;
+        // Figures of fewer images than asked for decide no gate.
+        let all_used = document.input.images.as_ref().is_none_or(|images| images.unusable == 0);
+        all_used && document.gates.iter().all(|gate| gate.passed)
     }
 
     /// The text of `audit.json`.

@@ -11,7 +11,6 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
 use pyo3::prelude::*;
-use unlift_audit::Progress;
 
 use crate::calls;
 use crate::errors::raised;
@@ -64,27 +63,4 @@ pub fn told(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<String>().cloned();
     text.or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).to_owned()))
         .unwrap_or_else(|| "a panic".to_owned())
-}
-
-/// Tells a function in Python how an audit goes, and whether it shall go on.
-pub struct Heard {
-    pub tell: Option<Py<PyAny>>,
-    pub stop: Arc<AtomicBool>,
-    /// What the function raised.
-    pub failed: Mutex<Option<PyErr>>,
-}
-
-impl Progress for Heard {
-    fn show(&self, done: usize, total: usize, what: &str) {
-        let Some(tell) = &self.tell else { return };
-        let told = calls::attached(&self.stop, |py| tell.call1(py, (done, total, what)).map(drop));
-        if let Some(Err(error)) = told {
-            self.failed.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
-            self.stop.store(true, Ordering::Relaxed);
-        }
-    }
-
-    fn goes_on(&self) -> bool {
-        !self.stop.load(Ordering::Relaxed) && !calls::ending()
-    }
 }

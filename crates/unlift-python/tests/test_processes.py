@@ -205,3 +205,70 @@ print("done", flush=True)
     out, err = ended(process, 120)
     assert "KeyboardInterrupt" in err and out == "", err
     assert time.monotonic() - started < 5
+
+
+IMAGES = """
+import numpy as np, unlift
+
+def image(at):
+    keypoints = np.random.default_rng(at).uniform(0, [1599, 1199], (4000, 2))
+    return {"keypoints": keypoints, "width": 1600, "height": 1200}
+"""
+
+
+def test_an_interrupt_ends_an_audit_of_images_within_a_second(tmp_path):
+    code = IMAGES + """
+images = {f"{at:03}": image(at) for at in range(200)}
+unlift.audit_images(images, progress=lambda done, total, what: print(done, flush=True))
+"""
+    process = python(tmp_path, code)
+    assert process.stdout.readline() == "0\n"
+    time.sleep(0.5)
+    started = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    # The interpreter ends when the wait does.
+    process.stdout.read()
+    assert time.monotonic() - started < 5
+    _, err = ended(process, 60)
+    assert err.rstrip().endswith("KeyboardInterrupt") and "panicked" not in err, err
+    assert process.returncode == -signal.SIGINT
+
+
+def test_an_interrupt_ends_the_function_that_looks_up_images(tmp_path):
+    code = IMAGES + """
+class Slow:
+    def keys(self):
+        return ["a", "b"]
+
+    def __getitem__(self, name):
+        print("asked", flush=True)
+        while True:
+            pass
+
+unlift.audit_images(Slow())
+"""
+    process = python(tmp_path, code)
+    assert process.stdout.readline() == "asked\n"
+    started = time.monotonic()
+    time.sleep(0.2)
+    process.send_signal(signal.SIGINT)
+    _, err = ended(process, 60)
+    assert err.rstrip().endswith("KeyboardInterrupt") and "panicked" not in err, err
+    assert process.returncode == -signal.SIGINT and time.monotonic() - started < 8
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
+def test_a_forked_child_audits_images_as_its_parent_does(tmp_path):
+    code = IMAGES + """
+import multiprocessing
+
+def use():
+    images = {"a": image(1), "b": image(2)}
+    return unlift.audit_images(images, "lines2d", inlier_ratios=[0.5], solvers="consensus").rows["recovered_percent.5"]
+
+first = use()
+with multiprocessing.get_context("fork").Pool(1) as pool:
+    print(pool.apply_async(use).get(timeout=60) == first)
+"""
+    out, err = ended(python(tmp_path, code), 150)
+    assert out == "True\n", err

@@ -1,7 +1,11 @@
-//! Features of images from wherever they are: a folder of photos, hloc's HDF5, a COLMAP database.
+//! Features of images from wherever they are: a folder of photos, hloc's HDF5, a COLMAP database, memory.
 
 pub mod audit;
+pub mod choice;
+mod drawn;
+pub mod extraction;
 mod folder;
+mod in_memory;
 pub mod parts;
 mod pictures;
 pub mod stream;
@@ -14,6 +18,7 @@ use unlift_io::features::{self, ImageFeatures};
 use crate::Error;
 
 pub use folder::{Folder, is_photo};
+pub use in_memory::InMemory;
 
 /// Images by name, one at a time. Shared by threads; memory grows by names only.
 ///
@@ -24,6 +29,8 @@ pub enum FeatureSource {
     Folder(Folder),
     /// A file.
     File(features::FeatureSource),
+    /// What the caller has, or makes.
+    InMemory(InMemory),
 }
 
 impl FeatureSource {
@@ -44,6 +51,7 @@ impl FeatureSource {
         match self {
             Self::Folder(folder) => folder.names(),
             Self::File(file) => file.names(),
+            Self::InMemory(images) => images.names(),
         }
     }
 
@@ -51,7 +59,7 @@ impl FeatureSource {
     pub fn refused(&self) -> &[unlift_io::Error] {
         match self {
             Self::Folder(folder) => folder.refused(),
-            Self::File(_) => &[],
+            Self::File(_) | Self::InMemory(_) => &[],
         }
     }
 
@@ -59,7 +67,7 @@ impl FeatureSource {
     pub fn passed_over(&self) -> Option<&str> {
         match self {
             Self::Folder(folder) => folder.passed_over(),
-            Self::File(_) => None,
+            Self::File(_) | Self::InMemory(_) => None,
         }
     }
 
@@ -71,6 +79,14 @@ impl FeatureSource {
         match self {
             Self::Folder(folder) => folder.get(at),
             Self::File(file) => Ok(file.get(at)?),
+            Self::InMemory(images) => images.get(at),
         }
+    }
+
+    /// The first of `chosen` that can be read and has keypoints: what it has and lacks is asked before the work, which tells of
+    /// the others.
+    pub fn first(&self, chosen: &[usize]) -> Option<ImageFeatures> {
+        let mut read = chosen.iter().filter_map(|&at| self.get(at).ok());
+        read.find(|image| !image.keypoints.is_empty())
     }
 }

@@ -11,33 +11,34 @@ use unlift_report::pictures::{
 
 use crate::document::given;
 use crate::inversion::Inversion;
+use crate::progress::Progress;
 
 /// Collects pictures of all images that pass by, in their order.
-#[derive(Default)]
-pub struct Album {
+pub struct Album<'a> {
     inverter: Option<Arc<Inversion>>,
+    steps: &'a dyn Progress,
     /// Finished pictures.
     pub pictures: Vec<Picture>,
     /// What a network painted of these images.
     pub inversions: Vec<Inverted>,
 }
 
-impl Album {
-    /// With paintings, if there is an inverter.
-    pub fn new(inverter: Option<Arc<Inversion>>) -> Self {
-        Self { inverter, ..Self::default() }
+impl<'a> Album<'a> {
+    /// With paintings, if there is an inverter; while `steps` says that it goes on.
+    pub fn new(inverter: Option<Arc<Inversion>>, steps: &'a dyn Progress) -> Self {
+        Self { inverter, steps, pictures: Vec::new(), inversions: Vec::new() }
     }
 }
 
-impl Watcher for Album {
-    type OfImage = Page;
+impl<'a> Watcher for Album<'a> {
+    type OfImage = Page<'a>;
 
-    fn begin(&mut self) -> Page {
-        let inverter = self.inverter.clone();
-        Page { inverter, picture: Picture::default(), painted: Inverted::default() }
+    fn begin(&mut self) -> Page<'a> {
+        let (inverter, steps) = (self.inverter.clone(), self.steps);
+        Page { inverter, steps, picture: Picture::default(), painted: Inverted::default() }
     }
 
-    fn image(&mut self, name: &str, _: &[Row], page: Page) {
+    fn image(&mut self, name: &str, _: &[Row], page: Page<'a>) {
         let Page { picture, painted, .. } = page;
         if !picture.keypoints.is_empty() {
             self.pictures.push(Picture { name: name.to_owned(), ..picture });
@@ -49,13 +50,18 @@ impl Watcher for Album {
 }
 
 /// The picture of an image at work.
-pub struct Page {
+pub struct Page<'a> {
     inverter: Option<Arc<Inversion>>,
+    steps: &'a dyn Progress,
     picture: Picture,
     painted: Inverted,
 }
 
-impl Observer<2> for Page {
+impl Observer<2> for Page<'_> {
+    fn goes_on(&self) -> bool {
+        self.steps.goes_on()
+    }
+
     fn cell(&mut self, cell: &Cell<'_, 2>) {
         if let Some(inverter) = self.inverter.clone() {
             // What fails here failed when it was measured, and was told.

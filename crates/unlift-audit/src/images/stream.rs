@@ -1,4 +1,4 @@
-//! Images for an audit: one after the other, the next ones read in parallel, broken ones told and left out.
+//! Images for an audit: one after the other, the next ones read in parallel, broken ones of files told and left out.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -14,6 +14,7 @@ use unlift::truth::Original;
 use unlift::{PointSet, Unit};
 use unlift_io::Error;
 use unlift_io::features::ImageFeatures;
+use unlift_io::hash::hash_features;
 
 use super::FeatureSource;
 use crate::progress::Progress;
@@ -30,6 +31,8 @@ pub struct Tally {
     pub used: Vec<usize>,
     /// Keypoints of all of them.
     pub n_points: usize,
+    /// Hashes of the same, of images in memory.
+    pub hashes: Vec<String>,
     /// Images that could not be used.
     pub unusable: usize,
     /// The part of the declared sizes that keypoints of any image fill, as a box in `[0, 1]`.
@@ -117,6 +120,9 @@ impl Needs {
     }
 }
 
+/// An image, and its hash where it is one in memory.
+type Ready = (Image, Option<String>);
+
 /// The images `chosen` of a source. Memory depends on the number of threads, not on that of images.
 pub struct Stream<'a> {
     source: &'a FeatureSource,
@@ -124,7 +130,7 @@ pub struct Stream<'a> {
     chosen: &'a [usize],
     needs: Needs,
     next: usize,
-    ready: VecDeque<(usize, Image)>,
+    ready: VecDeque<(usize, Result<Ready, crate::Error>)>,
     tally: &'a RefCell<Tally>,
     steps: &'a dyn Progress,
 }
@@ -147,14 +153,17 @@ impl<'a> Stream<'a> {
         let numbers = &self.chosen[self.next..self.chosen.len().min(self.next + n)];
         self.next += numbers.len();
         let (source, path, needs) = (self.source, self.path, &self.needs);
+        let in_memory = matches!(source, FeatureSource::InMemory(_));
         let read = |&at: &usize| (at, image(source, path, at, needs));
         let read: Vec<_> = numbers.par_iter().with_max_len(1).map(read).collect();
         for (at, image) in read {
             match image {
                 Ok(image) => {
-                    self.tally.borrow_mut().fill(&image.original);
-                    self.ready.push_back((at, image));
+                    self.tally.borrow_mut().fill(&image.0.original);
+                    self.ready.push_back((at, Ok(image)));
                 }
+                // A mistake of the caller's, who is there to mend it.
+                Err(error) if in_memory => self.ready.push_back((at, Err(error))),
                 Err(error) => {
                     self.tally.borrow_mut().unusable += 1;
                     self.steps.say(&error.to_string());
@@ -172,9 +181,14 @@ impl Iterator for Stream<'_> {
         while self.ready.is_empty() && self.next < self.chosen.len() {
             self.read_ahead();
         }
-        let (at, image) = self.ready.pop_front()?;
+        let (at, ready) = self.ready.pop_front()?;
+        let (image, sha256) = match ready {
+            Ok(ready) => ready,
+            Err(error) => return Some(Err(error)),
+        };
         let mut tally = self.tally.borrow_mut();
         tally.used.push(at);
+        tally.hashes.extend(sha256);
         tally.n_points += image.original.len();
         tally.sizes.push_back(image.original.len());
         Some(Ok(image))
@@ -186,8 +200,10 @@ fn image(
     path: &Path,
     at: usize,
     needs: &Needs,
-) -> Result<Image, crate::Error> {
+) -> Result<Ready, crate::Error> {
     let features = source.get(at)?;
+    let in_memory = matches!(source, FeatureSource::InMemory(_));
+    let sha256 = in_memory.then(|| hash_features(&features));
     let wrong = |expected: &str, found: &str| {
         Error::new(path, format!("image {}", features.name.escape_debug()), expected, found)
     };
@@ -205,7 +221,7 @@ fn image(
     let original = Original::within(points, bounds).map_err(of_image)?;
     // Nobody asks for them otherwise, and they are most of an image.
     let descriptors = features.descriptors.filter(|_| needs.descriptors() || needs.whatever);
-    Ok(Image { name: features.name, original, descriptors })
+    Ok((Image { name: features.name, original, descriptors }, sha256))
 }
 
 /// What was expected of these features, and found; `None` where they have what is needed. An image

@@ -9,16 +9,16 @@ use std::time::Instant;
 use unlift::audit::{Plan, run, run_released};
 use unlift::released::Released;
 use unlift::truth::{Original, Secret};
-use unlift::{Descriptors, OneLine, Unit};
+use unlift::{Descriptors, Unit};
 use unlift_io::atomic::OutputSet;
 use unlift_io::hash::hash_files;
 use unlift_io::read;
-use unlift_report::document::{Document, Input};
+use unlift_report::RenderOptions;
+use unlift_report::document::Input;
 use unlift_report::inversions::Inversion as Sheet;
-use unlift_report::scene::Scene3d;
-use unlift_report::{ErrorCdf, RenderOptions, render, text_table};
 
 use crate::Error;
+use crate::audited::{Audited, Finished};
 use crate::clouds::Clouds;
 use crate::document::{self, Provenance, ordered};
 use crate::doubts::doubts;
@@ -26,7 +26,6 @@ use crate::gate::{Gate, check_gates, gate_results};
 use crate::inversion::MapInversion;
 use crate::journal::Journal;
 use crate::lengths::{check_lengths_of_gates, check_scale};
-use crate::outputs::{PAGE, commit_audit};
 use crate::prepare::{Preparation, Prepared, prepare};
 use crate::progress::{Progress, Quiet};
 use crate::scene::Pictures;
@@ -73,24 +72,6 @@ pub struct Job<'a> {
     pub command: Option<String>,
     /// When the command began.
     pub started: Instant,
-}
-
-/// What an audit found, before it is written.
-#[derive(Clone, Debug)]
-pub struct Audited {
-    /// The figures.
-    pub document: Document,
-    scene: Option<Scene3d>,
-    curves: Vec<ErrorCdf>,
-    sheets: Vec<Sheet>,
-}
-
-/// What an audit left behind.
-pub struct Finished {
-    /// The figures, as written.
-    pub document: Document,
-    /// Where the report is.
-    pub report: PathBuf,
 }
 
 impl<'a> Job<'a> {
@@ -186,26 +167,6 @@ pub fn zeros(descriptors: &Descriptors) -> Option<String> {
     (n > 0).then(|| format!("{n} of {of} descriptors are all zero, and tell an attacker nothing"))
 }
 
-impl Finished {
-    /// Whether every gate held.
-    pub fn passed(&self) -> bool {
-        self.document.gates.iter().all(|gate| gate.passed)
-    }
-
-    /// The short table, the gates that failed, and where the report is.
-    pub fn text(&self) -> String {
-        let mut text = text_table(&self.document);
-        for gate in &self.document.gates {
-            let word = if gate.passed { "held" } else { "FAILED" };
-            let found = gate.found_percent.map(|found| format!("found {found:.1} %"));
-            let found: Vec<String> = found.into_iter().chain(gate.reason.clone()).collect();
-            text.push_str(&format!("gate {}: {word}, {}\n", gate.gate, found.join("; ")));
-        }
-        text.push_str(&format!("\nreport: {}\n", OneLine(self.report.display())));
-        text
-    }
-}
-
 /// Runs the job and writes its files, all or none.
 pub fn perform(mut job: Job<'_>, mut out: OutputSet) -> Result<Finished, Error> {
     let (folder, share_safe) = (job.out.clone(), job.share_safe);
@@ -279,8 +240,12 @@ fn find_with(
     };
     let document = document::document(&job.plan, &found, provenance);
     let scene = watcher.pictures.map(|p| p.into_scene(&job.cameras, job.up));
-    let curves = curves_of(watcher.curves, &outcome.rows);
-    Ok(Audited { document, scene, curves, sheets: watcher.sheets })
+    let drawn = RenderOptions {
+        error_cdf: curves_of(watcher.curves, &outcome.rows),
+        inversions: watcher.sheets,
+        ..RenderOptions::default()
+    };
+    Ok(Audited { document, scene, drawn })
 }
 
 /// What hears of the cells of `job`.
@@ -309,37 +274,5 @@ fn watcher<'a, 'j>(
             _ => Vec::new(),
         },
         failed: None,
-    }
-}
-
-impl Audited {
-    /// The page, self-contained.
-    ///
-    /// # Errors
-    /// When it cannot be rendered.
-    pub fn page(&self, share_safe: bool) -> Result<String, Error> {
-        let options = RenderOptions {
-            share_safe,
-            error_cdf: self.curves.clone(),
-            inversions: self.sheets.clone(),
-            ..RenderOptions::default()
-        };
-        Ok(render(&self.document, self.scene.as_ref(), &options)?)
-    }
-
-    /// Writes page and figures into the folder that `out` was opened for, both or none; `share_safe`: figures only.
-    ///
-    /// # Errors
-    /// When they cannot be written.
-    pub fn write(
-        &self,
-        out: OutputSet,
-        folder: &Path,
-        share_safe: bool,
-    ) -> Result<Finished, Error> {
-        let page = self.page(share_safe)?;
-        let document = if share_safe { self.document.share_safe() } else { self.document.clone() };
-        commit_audit(out, &page, &document.to_json()?, share_safe)?;
-        Ok(Finished { document, report: folder.join(PAGE) })
     }
 }

@@ -7,9 +7,10 @@ use clap::Args;
 use unlift::audit::Threshold;
 use unlift::obfuscate::Entry;
 use unlift::recover::Solver;
+use unlift_nn::DescriptorKind;
 
 use crate::args::audit::{AttackArgs, ResultArgs, RunArgs};
-use crate::values::{self, FeatureType, NeighborSource};
+use crate::values::{self, NeighborSource};
 
 /// Options of `audit images`.
 #[derive(Debug, Args)]
@@ -36,7 +37,7 @@ pub struct AuditImagesArgs {
     /// Which features of photos: sift, aliked, or superpoint, whose weights you supply (see unlift
     /// models) [default: sift]
     #[arg(long, value_name = "TYPE", value_parser = values::feature_type, help_heading = "Input")]
-    pub features: Option<FeatureType>,
+    pub features: Option<DescriptorKind>,
     /// Features wanted per photo; sift: coarse ones first, and the last scale is kept whole, others:
     /// the best [default: 8192, aliked 2048, superpoint 4096]
     #[arg(long, value_name = "N", help_heading = "Input")]

@@ -4,8 +4,9 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::Args;
+use unlift_nn::DescriptorKind;
 
-use crate::values::{self, FeatureType};
+use crate::values;
 
 /// Options of `features`.
 #[derive(Debug, Args)]
@@ -38,7 +39,7 @@ pub struct FeaturesArgs {
     /// Which features: sift, aliked, or superpoint, whose weights you supply (see unlift
     /// models) [default: sift]
     #[arg(long = "type", value_name = "TYPE", value_parser = values::feature_type)]
-    pub kind: Option<FeatureType>,
+    pub kind: Option<DescriptorKind>,
     /// Features wanted per photo; sift: coarse ones first, and the last scale is kept whole, others:
     /// the best [default: 8192, aliked 2048, superpoint 4096]
     #[arg(long, value_name = "N")]

@@ -4,8 +4,9 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::Args;
+use unlift_nn::DescriptorKind;
 
-use crate::values::{self, FeatureType};
+use crate::values;
 
 /// Options of `invert`.
 #[derive(Debug, Args)]
@@ -26,7 +27,7 @@ pub struct InvertArgs {
     /// Which features of photos: sift, aliked, or superpoint, whose weights you supply (see unlift
     /// models) [default: sift]
     #[arg(long, value_name = "TYPE", value_parser = values::feature_type)]
-    pub features: Option<FeatureType>,
+    pub features: Option<DescriptorKind>,
     /// What came back of the released images or map
     #[arg(long, value_name = "FILE")]
     pub recovered: Option<PathBuf>,

@@ -6,22 +6,20 @@ use std::time::Instant;
 
 use serde_json::{Map, json};
 use unlift::audit::{Measure, NeighborsBy, Plan};
-use unlift::descriptors::Values;
 use unlift::obfuscate::SchemeOptions;
 use unlift::{Descriptors, Unit};
 use unlift_audit::images::FeatureSource;
 use unlift_audit::images::audit::{ImagesJob, Used, perform};
+use unlift_audit::images::choice;
+use unlift_audit::images::extraction::{Wanted, sample};
 use unlift_audit::images::stream::Needs;
 use unlift_audit::inversion::Inversion;
 use unlift_audit::{Finished, Shown, open_audit};
 use unlift_features::Extraction;
 use unlift_io::atomic::Rules;
 use unlift_io::{Error, read};
-use unlift_nn::DescriptorKind;
-use unlift_report::pictures::MOST_PICTURES;
 
 use super::common::with_threads;
-use super::extraction::Typed;
 use super::gate_files::GateFiles;
 use super::painter::{kind, painter};
 use super::plan::{attack, check_about, check_fit, own, solvers, summary, thresholds, with_attack};
@@ -31,9 +29,6 @@ use crate::output::{command_line, print};
 use crate::progress::{Progress, Stderr};
 use crate::stderr;
 use crate::values::{NeighborSource, distinct};
-
-/// The threshold that speaks for an audit, in pixels, or the nearest one asked for.
-const HEADLINE_PX: f64 = 10.0;
 
 /// Audits images.
 pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
@@ -75,14 +70,15 @@ pub fn audit(args: &AuditImagesArgs) -> anyhow::Result<(Option<Finished>, Used)>
         if let Some(note) = source.passed_over() {
             stderr::note(note);
         }
-        let chosen = chosen(source.names().len(), args.max_images.map(|n| n.get()));
+        let names = source.names();
+        let chosen = choice::evenly(names.len(), args.max_images.map(|n| n.get()));
         check_photos(args, &source, &chosen)?;
         let first = check_descriptors(&source, &chosen, &plan, args.invert)?;
         let inversion = match painted {
             Some(photos) => {
                 let kind = match source {
                     FeatureSource::Folder(_) => extraction.kind(),
-                    FeatureSource::File(_) => kind("--invert", first.as_ref())?,
+                    _ => kind("--invert", first.as_ref())?,
                 };
                 let painter = painter(kind, args.inverter.as_deref())?;
                 Some(Arc::new(Inversion::new(painter, photos)))
@@ -91,10 +87,17 @@ pub fn audit(args: &AuditImagesArgs) -> anyhow::Result<(Option<Finished>, Used)>
         };
         plan.measures.extend(inversion.iter().map(|one| Arc::clone(one) as Arc<dyn Measure<2>>));
         let progress = Progress::new(args.run.quiet);
+        let show = match args.show.as_slice() {
+            [] => None,
+            wanted => {
+                let place = args.path.display().to_string();
+                Some(choice::shown(wanted, names, &chosen, &place)?)
+            }
+        };
         let job = ImagesJob {
             source: &source,
             path: &args.path,
-            show: show(args, &source, &chosen)?,
+            show,
             chosen,
             plan,
             options: with_attack(more_options(args), &args.attack),
@@ -134,8 +137,7 @@ fn plan(args: &AuditImagesArgs) -> anyhow::Result<Plan<2>> {
         }
     };
     let thresholds = thresholds(&args.thresholds, &usual)?;
-    let away = |at: &usize| (thresholds[*at].value / HEADLINE_PX).ln().abs();
-    let headline = (0..thresholds.len()).min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0);
+    let headline = choice::headline(&thresholds);
     let plan = Plan {
         neighbors: sources,
         schemes,
@@ -155,19 +157,16 @@ fn extraction(args: &AuditImagesArgs, plan: &Plan<2>) -> anyhow::Result<Extracti
     if args.photos.is_some() && args.path.is_dir() {
         return Err(usage("--photos: expected with a file of features, found a folder of photos"));
     }
-    let typed = Typed {
+    let wanted = Wanted {
         option: "--features",
         kind: args.features,
         max_features: args.max_features,
         min_score: args.min_score,
-        ..Typed::default()
+        ..Wanted::default()
     };
-    let extraction = typed.extraction(&args.path)?;
-    if extraction.kind() != DescriptorKind::Sift && args.path.is_dir() {
-        // Any two rows of floats that are not all alike.
-        let rows = (0..2 * 128).map(|at| if at < 128 { 0.1 } else { -0.1 }).collect();
-        let learned = Descriptors::try_new(Values::F32(rows), 128)?;
-        plan.own_sources().try_for_each(|source| check_fit(source, &learned))?;
+    let extraction = wanted.extraction(&args.path)?;
+    if let (true, Some(rows)) = (args.path.is_dir(), sample(&extraction)) {
+        plan.own_sources().try_for_each(|source| check_fit(source, &rows))?;
     }
     Ok(extraction)
 }
@@ -196,12 +195,6 @@ fn painted(args: &AuditImagesArgs) -> anyhow::Result<Option<&Path>> {
     }
 }
 
-/// Numbers of at most `most` images, evenly spaced over all `n`: the middles of as many equal parts.
-fn chosen(n: usize, most: Option<usize>) -> Vec<usize> {
-    let most = most.unwrap_or(n).min(n);
-    (0..most).map(|at| ((2 * at + 1) * n) / (2 * most)).collect()
-}
-
 /// Asks the first image with keypoints whether it has what the sources need: one line in place of one per
 /// image. What is wrong with single images is told when they are read. Returns its descriptors, if they were looked at.
 fn check_descriptors(
@@ -215,10 +208,7 @@ fn check_descriptors(
     if matches!(source, FeatureSource::Folder(_)) || !wanted {
         return Ok(None);
     }
-    let found = chosen.iter().filter_map(|&at| source.get(at).ok());
-    let Some(first) = found.into_iter().find(|image| !image.keypoints.is_empty()) else {
-        return Ok(None);
-    };
+    let Some(first) = source.first(chosen) else { return Ok(None) };
     if invert {
         kind("--invert", first.descriptors.as_ref())?;
     }
@@ -233,38 +223,6 @@ fn check_descriptors(
         }
     }
     Ok(first.descriptors)
-}
-
-/// Numbers of the images to draw, if they were named.
-fn show(
-    args: &AuditImagesArgs,
-    source: &FeatureSource,
-    chosen: &[usize],
-) -> anyhow::Result<Option<Vec<usize>>> {
-    if args.show.is_empty() {
-        return Ok(None);
-    }
-    let names = distinct(args.show.clone(), |a, b| a == b);
-    if names.len() > MOST_PICTURES {
-        let n = names.len();
-        return Err(usage(format!("--show: expected at most {MOST_PICTURES} images, found {n}")));
-    }
-    let mut numbers = Vec::with_capacity(names.len());
-    for name in &names {
-        let at = source.names().binary_search_by(|other| other.as_bytes().cmp(name.as_bytes()));
-        match at {
-            Ok(at) if chosen.contains(&at) => numbers.push(at),
-            Ok(_) => {
-                let expected = "an image that --max-images leaves in";
-                return Err(usage(format!("--show: expected {expected}, found {name}")));
-            }
-            Err(_) => {
-                let place = Path::new(&args.path).display();
-                return Err(usage(format!("--show: expected an image of {place}, found {name}")));
-            }
-        }
-    }
-    Ok(Some(numbers))
 }
 
 /// Options that change the images, not the plan.
@@ -289,17 +247,4 @@ fn more_options(args: &AuditImagesArgs) -> Map<String, serde_json::Value> {
         options.insert("show".into(), json!(args.show));
     }
     options
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn images_are_evenly_spaced_and_all_without_a_limit() {
-        assert_eq!(chosen(4, None), [0, 1, 2, 3]);
-        assert_eq!(chosen(10, Some(3)), [1, 5, 8]);
-        assert_eq!(chosen(3, Some(9)), [0, 1, 2]);
-        assert_eq!(chosen(0, Some(2)), [0; 0]);
-    }
 }

@@ -10,11 +10,11 @@ use unlift_io::atomic::{Kind, Rules};
 use unlift_io::features::{FeatureWriter, ImageFeatures};
 
 use super::common::with_threads;
-use super::extraction::Typed;
 use crate::args::FeaturesArgs;
 use crate::exit::{Outcome, line, usage};
 use crate::output::print;
 use crate::progress::Progress;
+use unlift_audit::images::extraction::Wanted;
 use unlift_audit::images::parts::Parts;
 use unlift_audit::images::{FeatureSource, Folder, is_photo};
 use unlift_audit::{check_file, refused};
@@ -49,7 +49,7 @@ pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
             FeatureSource::Folder(folder) => {
                 extract(folder, (args, &rules, &target), &mut tally, &mut progress)?;
             }
-            FeatureSource::File(_) => copy(&source, (args, &rules), &mut tally, &mut progress)?,
+            _ => copy(&source, (args, &rules), &mut tally, &mut progress)?,
         }
         Ok(tally)
     })?;
@@ -88,7 +88,7 @@ fn check_no_photo(images: &Path, target: &Path) -> anyhow::Result<()> {
 
 /// The options of the extractor.
 fn extraction(args: &FeaturesArgs) -> anyhow::Result<Extraction> {
-    let typed = Typed {
+    let wanted = Wanted {
         option: "--type",
         kind: args.kind,
         max_features: args.max_features,
@@ -96,7 +96,7 @@ fn extraction(args: &FeaturesArgs) -> anyhow::Result<Extraction> {
         max_image_size: args.max_image_size,
         first_octave: args.first_octave,
     };
-    typed.extraction(&args.images)
+    Ok(wanted.extraction(&args.images)?)
 }
 
 /// What became of one photo.

@@ -8,6 +8,7 @@ use std::sync::{Mutex, PoisonError};
 use rayon::prelude::*;
 use unlift::OneLine;
 use unlift_audit::images::FeatureSource;
+use unlift_audit::images::extraction::Wanted;
 use unlift_audit::inversion::{Painter, view};
 use unlift_audit::refused;
 use unlift_features::{ColorImage, preview};
@@ -22,7 +23,6 @@ use unlift_io::stage::{
 use unlift_nn::DescriptorKind;
 
 use super::common::{same_map, with_threads};
-use super::extraction::Typed;
 use super::painter::{kind, painter};
 use crate::args::InvertArgs;
 use crate::exit::{Outcome, line, usage};
@@ -127,18 +127,14 @@ fn each<T: Sync>(
 /// The keypoints of photos or of a file, as they are.
 fn keypoints(to: &Target<'_>) -> anyhow::Result<usize> {
     let path = &to.args.path;
-    let typed = Typed { option: "--features", kind: to.args.features, ..Typed::default() };
-    let extraction = typed.extraction(path)?;
+    let wanted = Wanted { option: "--features", kind: to.args.features, ..Wanted::default() };
+    let extraction = wanted.extraction(path)?;
     let source = FeatureSource::open(path, &extraction)?;
     let chosen = to.chosen(source.names().len());
     let kind = match &source {
         FeatureSource::Folder(_) => extraction.kind(),
-        FeatureSource::File(_) => {
-            // What is wrong with single images is told when they are painted.
-            let read = chosen.iter().filter_map(|&at| source.get(at).ok());
-            let first = read.into_iter().find(|image| !image.keypoints.is_empty());
-            kind("PATH", first.and_then(|image| image.descriptors).as_ref())?
-        }
+        // What is wrong with single images is told when they are painted.
+        _ => kind("PATH", source.first(&chosen).and_then(|image| image.descriptors).as_ref())?,
     };
     let painter = &to.painter(kind)?;
     each(to, &chosen, |&at| {

@@ -12,7 +12,6 @@ mod doctor;
 mod documents;
 mod evaluate;
 mod export;
-mod extraction;
 mod features;
 mod gate_files;
 mod image_stages;

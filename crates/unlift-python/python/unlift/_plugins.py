@@ -15,7 +15,8 @@ def scheme(function: F) -> F: ...
 def scheme(function: None = None, *, name: str | None = None) -> Callable[[F], F]: ...
 def scheme(function: Any = None, *, name: str | None = None) -> Any:
     """Names a function as a scheme: of points `(n, 3)`, and a `numpy.random.Generator` if it takes two arguments, to Lines,
-    Rays, Planes or Candidates. All chance must come from that generator.
+    Rays, Planes or Candidates. All chance must come from that generator. Of images it is a function of keypoints `(n, 2)` in
+    pixels from the middle of the image, to records of two columns.
 
     >>> @scheme(name="upright")
     ... def lines(points):
@@ -47,7 +48,7 @@ def source(
     needs: Literal["descriptors", "nothing"] = "descriptors",
     k: int = 50,
 ) -> Any:
-    """Names a function as a source of neighborhoods: of a Released, and a `numpy.random.Generator` if it takes two arguments, to
+    """Names a function as a source of neighborhoods: of a Released (of a map or an image), and a `numpy.random.Generator` if it takes two arguments, to
     an array `(n_slots, k)` of records, likeliest first, padded by -1; or to this and scores; or to Neighborhoods.
 
     needs: "nothing" if it looks at records alone. Otherwise row i is about descriptor row i.

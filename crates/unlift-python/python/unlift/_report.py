@@ -66,7 +66,7 @@ class Report:
 
     @property
     def passed(self) -> bool:
-        """Whether every gate held."""
+        """Whether every gate held, and every image could be used."""
         return self._found.passed
 
     def json(self, *, share_safe: bool = False) -> str:

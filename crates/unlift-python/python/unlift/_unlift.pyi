@@ -12,6 +12,9 @@ from typing_extensions import disjoint_base
 _Path = str | os.PathLike[str]
 
 __all__ = [
+    "IMAGE_SCHEMES",
+    "IMAGE_SOLVERS",
+    "IMAGE_SOURCES",
     "SCHEMES",
     "SOLVERS",
     "SOURCES",
@@ -31,6 +34,7 @@ __all__ = [
     "UnliftError",
     "__version__",
     "audit",
+    "audit_images",
     "check_scheme",
     "check_source",
     "evaluate",
@@ -42,6 +46,9 @@ __all__ = [
 ]
 
 __version__: str
+IMAGE_SCHEMES: list[str]
+IMAGE_SOURCES: list[str]
+IMAGE_SOLVERS: list[str]
 SCHEMES: list[str]
 SOURCES: list[str]
 SOLVERS: list[str]
@@ -140,6 +147,8 @@ class Released:
     def n_slots(self) -> int: ...
     @property
     def origin(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def bounds(self) -> npt.NDArray[np.float64] | None: ...
     @property
     def fingerprint(self) -> str: ...
     @property
@@ -260,11 +269,15 @@ class Report:
 def audit(
     map: Map, asked: dict[str, Any], tell: Callable[[int, int, str], object] | None
 ) -> Report: ...
-def check_scheme(scheme: Callable[..., Records]) -> None:
+def audit_images(
+    images: Any, asked: dict[str, Any], tell: Callable[[int, int, str], object] | None
+) -> tuple[Report, list[str]]: ...
+def check_scheme(scheme: Callable[..., Records], *, images: bool = False) -> None:
     """Whether a scheme hides every point, on its record, by its key alone, and in an order that tells nothing.
 
     It is called with 0, 1, 2, 3, 7, 120, 200, 300, 301, 600 and 700 points: of a made-up room, at random, many in one place. By
-    an exception it refuses points, which it may but for 200, 600 and 700 of a room.
+    an exception it refuses points, which it may but for 200, 600 and 700 of a room. With `images` with keypoints `(n, 2)` in
+    their place.
     """
 
 def check_source(source: Callable[..., Any], released: Released | Hidden) -> None:

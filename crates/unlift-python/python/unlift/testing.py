@@ -1,7 +1,7 @@
 """The laws that every scheme and source keeps, for your tests: a broken one is an AssertionError that says which.
 
 A scheme is called with 0 to 700 points: of a made-up room, at random, many in one place. By an exception it refuses points, which
-it may but for 200, 600 and 700 of a room.
+it may but for 200, 600 and 700 of a room. With `images=True` with keypoints `(n, 2)` in their place.
 
 >>> import numpy, unlift
 >>> @unlift.scheme

@@ -1,0 +1,76 @@
+//! What an audit found, of a map or of images, before it is written and after.
+
+use std::path::{Path, PathBuf};
+
+use unlift::OneLine;
+use unlift_io::atomic::OutputSet;
+use unlift_report::scene::Scene3d;
+use unlift_report::{Document, RenderOptions, render, text_table};
+
+use crate::Error;
+use crate::outputs::{PAGE, commit_audit};
+
+/// What an audit found, before it is written.
+#[derive(Clone, Debug)]
+pub struct Audited {
+    /// The figures.
+    pub document: Document,
+    pub(crate) scene: Option<Scene3d>,
+    /// What the page draws beside: curves and pictures.
+    pub(crate) drawn: RenderOptions,
+}
+
+/// What an audit left behind.
+pub struct Finished {
+    /// The figures, as written.
+    pub document: Document,
+    /// Where the report is.
+    pub report: PathBuf,
+}
+
+impl Audited {
+    /// The page, self-contained.
+    ///
+    /// # Errors
+    /// When it cannot be rendered.
+    pub fn page(&self, share_safe: bool) -> Result<String, Error> {
+        let options = RenderOptions { share_safe, ..self.drawn.clone() };
+        Ok(render(&self.document, self.scene.as_ref(), &options)?)
+    }
+
+    /// Writes page and figures into the folder that `out` was opened for, both or none; `share_safe`: figures only.
+    ///
+    /// # Errors
+    /// When they cannot be written.
+    pub fn write(
+        &self,
+        out: OutputSet,
+        folder: &Path,
+        share_safe: bool,
+    ) -> Result<Finished, Error> {
+        let page = self.page(share_safe)?;
+        let document = if share_safe { self.document.share_safe() } else { self.document.clone() };
+        commit_audit(out, &page, &document.to_json()?, share_safe)?;
+        Ok(Finished { document, report: folder.join(PAGE) })
+    }
+}
+
+impl Finished {
+    /// Whether every gate held.
+    pub fn passed(&self) -> bool {
+        self.document.gates.iter().all(|gate| gate.passed)
+    }
+
+    /// The short table, the gates that failed, and where the report is.
+    pub fn text(&self) -> String {
+        let mut text = text_table(&self.document);
+        for gate in &self.document.gates {
+            let word = if gate.passed { "held" } else { "FAILED" };
+            let found = gate.found_percent.map(|found| format!("found {found:.1} %"));
+            let found: Vec<String> = found.into_iter().chain(gate.reason.clone()).collect();
+            text.push_str(&format!("gate {}: {word}, {}\n", gate.gate, found.join("; ")));
+        }
+        text.push_str(&format!("\nreport: {}\n", OneLine(self.report.display())));
+        text
+    }
+}

@@ -1,0 +1,129 @@
+//! Which images a report draws, and what it draws of them.
+
+use std::cell::RefCell;
+use std::sync::Arc;
+
+use unlift::audit::{NeighborsBy, Plan, run_images};
+use unlift::neighbors::{ByDescriptors, Overlap, Similarity, Source};
+use unlift_nn::DescriptorKind;
+use unlift_report::document::ImageFigures;
+use unlift_report::inversions::Inversion as Inverted;
+use unlift_report::pictures::Picture;
+
+use super::FeatureSource;
+use super::audit::ImagesJob;
+use super::pictures::Album;
+use super::stream::{Needs, Stream, Tally, lacking};
+use crate::Error;
+
+/// Longest side of an embedded photo in pixels.
+const PREVIEW: u32 = 640;
+/// The inlier ratio by which images are compared, or the nearest one tested.
+const USUAL_RATIO: f64 = 0.5;
+
+/// Audits the images to be drawn once more, by the first solver and seed: an image's randomness comes from
+/// its name, so what is drawn is what was counted, and no picture had to be kept in between. What a server
+/// sees that has no oracle is drawn as well, whether or not it was asked for.
+///
+/// # Errors
+/// When an image cannot be audited once more.
+pub fn drawn(
+    job: &ImagesJob<'_>,
+    tally: &Tally,
+    figures: &[ImageFigures],
+) -> Result<(Vec<Picture>, Vec<Inverted>), Error> {
+    let wanted: Vec<(usize, &str)> = match &job.show {
+        Some(show) => {
+            let usable = show.iter().filter(|at| tally.used.contains(at));
+            usable.map(|&at| (at, "")).collect()
+        }
+        None => telling(&job.plan, figures)
+            .into_iter()
+            .map(|(at, note)| (tally.used[at], note))
+            .collect(),
+    };
+    let numbers: Vec<usize> = wanted.iter().map(|(at, _)| *at).collect();
+    let mut plan = job.plan.clone();
+    plan.solvers.truncate(1);
+    (plan.repeats, plan.reference) = (1, false);
+    plan.neighbors.extend(without_oracle(job, &numbers));
+    let needs = Needs::of_plan(&plan);
+    // The album looks for itself.
+    plan.measures.clear();
+    let mut album = Album::new(job.inversion.clone(), job.progress);
+    let again = RefCell::new(Tally::default());
+    let images = Stream::new((job.source, job.path), &numbers, needs, &again, job.progress);
+    run_images(images, &plan, &mut album)?;
+    for picture in &mut album.pictures {
+        let at = numbers.iter().position(|&at| job.source.names()[at] == picture.name);
+        let Some(at) = at else { continue };
+        picture.note = wanted[at].1.to_owned();
+        let photo = match (job.source, &job.photos) {
+            (FeatureSource::Folder(folder), _) => folder.path(numbers[at]).to_owned(),
+            (_, Some(photos)) => photos.join(&picture.name),
+            (_, None) => continue,
+        };
+        match unlift_features::preview::jpeg(&photo, PREVIEW) {
+            Ok(jpeg) => picture.photo = Some(jpeg),
+            Err(error) => job.progress.say(&format!("note: {error}")),
+        }
+    }
+    Ok((album.pictures, album.inversions))
+}
+
+/// What needs no training and the plan lacks, where all images `numbers` have what it takes.
+fn without_oracle(job: &ImagesJob<'_>, numbers: &[usize]) -> Vec<NeighborsBy<2>> {
+    let untrained: [Arc<dyn Source<2>>; 2] = [Arc::new(Similarity), Arc::new(Overlap)];
+    let fits = |source: &Arc<dyn Source<2>>| {
+        let needs = Needs::of(source);
+        let of_image = |&at: &usize| match job.source {
+            // What was extracted as SIFT is what every source takes.
+            FeatureSource::Folder(folder) if folder.extraction().kind() == DescriptorKind::Sift => {
+                true
+            }
+            _ => job.source.get(at).is_ok_and(|image| lacking(&image, &needs).is_none()),
+        };
+        needs.descriptors() && numbers.iter().all(of_image)
+    };
+    let mut fitting: Vec<_> = untrained.into_iter().filter(fits).collect();
+    let asked: Vec<&str> = job.plan.own_sources().map(|own| own.name()).collect();
+    if asked.contains(&Source::<2>::name(&ByDescriptors)) {
+        // It is the last of these under another name.
+        fitting.pop();
+    }
+    fitting.retain(|source| !asked.contains(&source.name()));
+    fitting.into_iter().map(NeighborsBy::Source).collect()
+}
+
+/// Positions in `figures` of the images of which least, about half and most came back, by the mean over
+/// schemes within the headline threshold; fewer when there are fewer.
+fn telling(plan: &Plan<2>, figures: &[ImageFigures]) -> Vec<(usize, &'static str)> {
+    let label = &plan.thresholds[plan.headline].label;
+    let away = |ratio: &f64| (ratio - USUAL_RATIO).abs();
+    let per_scheme = plan.rows_per_scheme();
+    let variants = plan.variants();
+    // The first solver's row of the variant nearest to the usual ratio; an own source has no ratio yet.
+    let at = (0..variants.len())
+        .min_by(|&a, &b| {
+            let of = |at: usize| variants[at].inlier_ratio.as_ref().map_or(f64::INFINITY, away);
+            of(a).total_cmp(&of(b))
+        })
+        .unwrap_or(0);
+    let score = |image: &ImageFigures| -> Option<f64> {
+        let enough = image.n_points as usize > plan.k;
+        let rows = image.rows.iter().skip(at * plan.solvers.len()).step_by(per_scheme);
+        let shares = rows.map(|row| row.recovered_percent.get(label).copied().unwrap_or(0.0));
+        (enough && !image.rows.is_empty()).then(|| shares.sum())
+    };
+    let mut scored: Vec<(f64, usize)> =
+        figures.iter().enumerate().filter_map(|(at, image)| Some((score(image)?, at))).collect();
+    scored.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let n = scored.len();
+    let at = |place: usize| scored[place].1;
+    match n {
+        0 => Vec::new(),
+        1 => vec![(at(0), "")],
+        2 => vec![(at(1), "most recovered"), (at(0), "least recovered")],
+        _ => vec![(at(n / 2), "median"), (at(n - 1), "most recovered"), (at(0), "least recovered")],
+    }
+}

@@ -1,0 +1,123 @@
+//! Images in memory: the figures of the same features in a file, what is looked at when, and mistakes in a line.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+use unlift::audit::Plan;
+use unlift::descriptors::Values;
+use unlift::recover::Solver;
+use unlift::{Descriptors, Unit};
+use unlift_audit::images::audit::{ImagesJob, Used, find, perform};
+use unlift_audit::images::{FeatureSource, InMemory};
+use unlift_audit::{Audited, Error, Quiet, Shown, open_audit};
+use unlift_io::atomic::Rules;
+use unlift_io::features::{FeatureWriter, ImageFeatures};
+
+const NAMES: [&str; 5] = ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "e.jpg"];
+
+/// Keypoints on a grid that leans, and bytes that change along it.
+fn image(at: usize) -> ImageFeatures {
+    let n = 60 + 10 * at;
+    let place = |i: usize| [(31 * i % 600) as f64 + 0.25 * at as f64, (17 * i % 440) as f64];
+    let bytes = (0..128 * n).map(|i| ((i * i + 7 * at) % 90) as u8).collect();
+    ImageFeatures {
+        name: NAMES[at].to_owned(),
+        size: Some([640, 480]),
+        keypoints: (0..n).map(place).collect(),
+        descriptors: Some(Descriptors::try_new(Values::U8(bytes), 128).expect("descriptors")),
+        ..ImageFeatures::default()
+    }
+}
+
+fn job<'a>(source: &'a FeatureSource, path: &'a Path) -> ImagesJob<'a> {
+    let usual = Plan::new(Unit::Pixel);
+    ImagesJob {
+        source,
+        path,
+        chosen: (0..source.names().len()).collect(),
+        plan: Plan { inlier_ratios: vec![0.5], k: 10, solvers: vec![Solver::Consensus], ..usual },
+        options: serde_json::Map::new(),
+        gates: Vec::new(),
+        show: None,
+        photos: None,
+        out: PathBuf::new(),
+        share_safe: false,
+        inversion: None,
+        progress: &Quiet,
+        command: None,
+        started: Instant::now(),
+    }
+}
+
+fn in_memory(
+    get: impl Fn(usize) -> Result<ImageFeatures, Error> + Send + Sync + 'static,
+) -> FeatureSource {
+    let names = NAMES.map(str::to_owned).to_vec();
+    FeatureSource::InMemory(InMemory::try_new(names, get).expect("images"))
+}
+
+fn found((found, used): (Option<Audited>, Used)) -> Audited {
+    assert_eq!((used.used, used.unusable), (NAMES.len(), 0));
+    found.expect("figures")
+}
+
+#[test]
+fn images_in_memory_have_the_figures_of_a_file() {
+    let place = tempfile::tempdir().expect("a temporary folder");
+    let path = place.path().join("features.h5");
+    let mut writer = FeatureWriter::create(&path).expect("a file");
+    (0..NAMES.len()).for_each(|at| writer.append(&image(at)).expect("an image"));
+    writer.finish().expect("a file");
+    let file = FeatureSource::File(unlift_io::features::FeatureSource::open(&path).expect("it"));
+    let of_file = found(find(job(&file, &path)).expect("an audit"));
+
+    let asked = Arc::new(AtomicUsize::new(0));
+    let counted = Arc::clone(&asked);
+    let memory = in_memory(move |at| {
+        counted.fetch_add(1, Ordering::Relaxed);
+        Ok(image(at))
+    });
+    let of_memory = found(find(job(&memory, Path::new("images"))).expect("an audit"));
+    assert_eq!(of_memory.document.results, of_file.document.results);
+    assert_eq!(of_memory.document.images, of_file.document.images);
+    assert!(!of_file.document.results.is_empty());
+    let input = |audited: &Audited| audited.document.input.clone();
+    assert_eq!(input(&of_memory).path, None);
+    assert_ne!(input(&of_memory).sha256, input(&of_file).sha256);
+    // Three are drawn, of which one looks whether sources that nobody asked for would fit.
+    assert_eq!(asked.load(Ordering::Relaxed), NAMES.len() + 3 + 2 * 3);
+
+    // What is found and then written is what is written at once.
+    let out = place.path().join("audit");
+    let files = open_audit(&out, Rules::new([], false), Shown::Points, &Quiet).expect("a folder");
+    let (finished, _) =
+        perform(ImagesJob { out: out.clone(), ..job(&memory, Path::new("images")) }, files)
+            .expect("an audit");
+    let page = fs::read_to_string(finished.expect("figures").report).expect("a page");
+    let pictures = |page: &str| page.matches("id=\"picture-graph\"").count();
+    assert!(pictures(&page) > 0 && pictures(&of_memory.page(false).expect("a page")) > 0);
+    assert_eq!(pictures(&of_memory.page(true).expect("a page")), 0);
+}
+
+#[test]
+fn a_mistake_in_memory_ends_the_audit_in_a_line() {
+    let line = |wrong: fn(ImageFeatures) -> ImageFeatures| {
+        let images = in_memory(move |at| Ok(if at == 1 { wrong(image(at)) } else { image(at) }));
+        find(job(&images, Path::new("images"))).expect_err("an error").to_string()
+    };
+    assert_eq!(
+        line(|image| ImageFeatures { size: None, ..image }),
+        "images: image b.jpg: expected a size in pixels, found none"
+    );
+    let outside = line(|mut image| {
+        image.keypoints[3] = [700.0, 0.0];
+        image
+    });
+    assert!(outside.starts_with("images: image b.jpg") && outside.contains("700"), "{outside}");
+    let images = in_memory(|_| Err(Error::request("images: gone")));
+    let gone = find(job(&images, Path::new("images"))).expect_err("an error");
+    assert!(gone.is_request() && gone.to_string() == "images: gone");
+}
