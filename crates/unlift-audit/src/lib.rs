@@ -46,6 +46,7 @@ mod lengths;
 pub mod maps;
 mod memory;
 mod outputs;
+pub mod paper;
 mod prepare;
 mod progress;
 mod scene;

@@ -15,6 +15,12 @@ use crate::Error;
 
 pub use folder::{Folder, is_photo};
 
+/// Numbers of at most `most` of `n` images, evenly spaced: the middles of as many equal parts.
+pub fn evenly_spaced(n: usize, most: Option<usize>) -> Vec<usize> {
+    let most = most.unwrap_or(n).min(n);
+    (0..most).map(|at| ((2 * at + 1) * n) / (2 * most)).collect()
+}
+
 /// Images by name, one at a time. Shared by threads; memory grows by names only.
 ///
 /// All images in parallel, in order and in constant memory is `in_order` of `unlift-features` over the
@@ -72,5 +78,18 @@ impl FeatureSource {
             Self::Folder(folder) => folder.get(at),
             Self::File(file) => Ok(file.get(at)?),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn images_are_evenly_spaced_and_all_without_a_limit() {
+        assert_eq!(evenly_spaced(4, None), [0, 1, 2, 3]);
+        assert_eq!(evenly_spaced(10, Some(3)), [1, 5, 8]);
+        assert_eq!(evenly_spaced(3, Some(9)), [0, 1, 2]);
+        assert_eq!(evenly_spaced(0, Some(2)), [0; 0]);
     }
 }

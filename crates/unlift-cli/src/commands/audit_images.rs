@@ -9,9 +9,9 @@ use unlift::audit::{Measure, NeighborsBy, Plan};
 use unlift::descriptors::Values;
 use unlift::obfuscate::SchemeOptions;
 use unlift::{Descriptors, Unit};
-use unlift_audit::images::FeatureSource;
 use unlift_audit::images::audit::{ImagesJob, Used, perform};
 use unlift_audit::images::stream::Needs;
+use unlift_audit::images::{FeatureSource, evenly_spaced};
 use unlift_audit::inversion::Inversion;
 use unlift_audit::{Finished, Shown, open_audit};
 use unlift_features::Extraction;
@@ -75,7 +75,7 @@ pub fn audit(args: &AuditImagesArgs) -> anyhow::Result<(Option<Finished>, Used)>
         if let Some(note) = source.passed_over() {
             stderr::note(note);
         }
-        let chosen = chosen(source.names().len(), args.max_images.map(|n| n.get()));
+        let chosen = evenly_spaced(source.names().len(), args.max_images.map(|n| n.get()));
         check_photos(args, &source, &chosen)?;
         let first = check_descriptors(&source, &chosen, &plan, args.invert)?;
         let inversion = match painted {
@@ -196,12 +196,6 @@ fn painted(args: &AuditImagesArgs) -> anyhow::Result<Option<&Path>> {
     }
 }
 
-/// Numbers of at most `most` images, evenly spaced over all `n`: the middles of as many equal parts.
-fn chosen(n: usize, most: Option<usize>) -> Vec<usize> {
-    let most = most.unwrap_or(n).min(n);
-    (0..most).map(|at| ((2 * at + 1) * n) / (2 * most)).collect()
-}
-
 /// Asks the first image with keypoints whether it has what the sources need: one line in place of one per
 /// image. What is wrong with single images is told when they are read. Returns its descriptors, if they were looked at.
 fn check_descriptors(
@@ -289,17 +283,4 @@ fn more_options(args: &AuditImagesArgs) -> Map<String, serde_json::Value> {
         options.insert("show".into(), json!(args.show));
     }
     options
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn images_are_evenly_spaced_and_all_without_a_limit() {
-        assert_eq!(chosen(4, None), [0, 1, 2, 3]);
-        assert_eq!(chosen(10, Some(3)), [1, 5, 8]);
-        assert_eq!(chosen(3, Some(9)), [0, 1, 2]);
-        assert_eq!(chosen(0, Some(2)), [0; 0]);
-    }
 }

@@ -1,13 +1,14 @@
 //! `unlift invert`: pictures of keypoints, of what came back of them, or of a map that came back.
 
 use std::collections::BTreeSet;
+use std::num::NonZeroUsize;
 use std::path::{Component, Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 use unlift::OneLine;
-use unlift_audit::images::FeatureSource;
+use unlift_audit::images::{FeatureSource, evenly_spaced};
 use unlift_audit::inversion::{Painter, view};
 use unlift_audit::refused;
 use unlift_features::{ColorImage, preview};
@@ -103,8 +104,7 @@ impl Target<'_> {
 
     /// Numbers of the images to paint, of `n`.
     fn chosen(&self, n: usize) -> Vec<usize> {
-        let most = self.args.max_images.map_or(n, |most| most.get().min(n));
-        (0..most).map(|at| ((2 * at + 1) * n) / (2 * most)).collect()
+        evenly_spaced(n, self.args.max_images.map(NonZeroUsize::get))
     }
 }
 
