@@ -48,6 +48,7 @@ mod lengths;
 pub mod maps;
 mod memory;
 mod outputs;
+pub mod paper;
 mod prepare;
 mod progress;
 mod scene;

@@ -353,6 +353,7 @@ fn help_is_part_of_the_interface() {
         "export",
         "table",
         "compare",
+        "paper",
         "bench recover",
         "features",
         "invert",

@@ -45,6 +45,7 @@ mod options;
 mod page_data;
 pub mod paper;
 pub mod pictures;
+pub mod printed;
 mod quantity;
 mod round;
 mod sarif;

@@ -20,6 +20,7 @@ mod metrics;
 mod models;
 mod neighbors;
 mod obfuscate;
+mod paper;
 mod recover;
 mod shell;
 mod table;
@@ -48,6 +49,7 @@ pub use metrics::MetricsArgs;
 pub use models::ModelsArgs;
 pub use neighbors::{FindArgs, NeighborsCommand, OracleArgs};
 pub use obfuscate::ObfuscateArgs;
+pub use paper::PaperArgs;
 pub use recover::RecoverArgs;
 pub use shell::{CompletionsArgs, ManArgs};
 pub use table::TableArgs;
@@ -130,6 +132,8 @@ pub enum Command {
     Table(TableArgs),
     /// Two audits side by side: what leaks more
     Compare(CompareArgs),
+    /// The paper's tables on its datasets, ours beside the published numbers
+    Paper(PaperArgs),
     /// Measure speed and memory
     #[command(subcommand)]
     Bench(BenchCommand),

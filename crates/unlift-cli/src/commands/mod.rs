@@ -21,6 +21,7 @@ mod models;
 mod neighbors;
 mod obfuscate;
 mod painter;
+mod paper;
 mod plan;
 mod recover;
 mod schemes;
@@ -53,6 +54,7 @@ pub fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Export(args) => export::run(&args),
         Command::Table(args) => table::run(&args),
         Command::Compare(args) => compare::run(&args),
+        Command::Paper(args) => paper::run(&args),
         Command::Bench(BenchCommand::Recover(args)) => bench::recovery(&args),
         Command::Features(args) => features::run(&args),
         Command::Invert(args) => invert::run(&args),
