@@ -1,5 +1,7 @@
 //! From a file's points to the points that are audited: filter, subset, unit.
 
+use std::borrow::Cow;
+
 use unlift::geometry::knn::Knn;
 use unlift::seed::{Draws, Stage};
 use unlift::truth::Original;
@@ -51,19 +53,21 @@ pub struct Prepared {
     pub notes: Vec<String>,
 }
 
-/// Filters, thins out and scales `positions` (and `descriptors` with them).
+/// Filters, thins out and scales `positions` (and `descriptors` with them). Positions that are handed over, all of which stay,
+/// are not copied: of a large map every copy counts, also one that is given back.
 ///
 /// # Errors
 /// When fewer than K + 1 points are left, they coincide, or a scaled coordinate is not finite.
-pub fn prepare(
-    positions: &[[f64; 3]],
+pub fn prepare<'a>(
+    positions: impl Into<Cow<'a, [[f64; 3]]>>,
     descriptors: Option<&Descriptors>,
     preparation: &Preparation,
 ) -> Result<Prepared, Error> {
+    let positions = positions.into();
     let (n_read, mut notes) = (positions.len(), Vec::new());
     let mut rows: Vec<u32> = (0..n_read as u32).collect();
     if let Some(filter) = preparation.outlier_filter {
-        rows = without_outliers(positions, filter)?;
+        rows = without_outliers(&positions, filter)?;
         let n = n_read - rows.len();
         if n > 0 {
             notes.push(format!(
@@ -87,7 +91,10 @@ pub fn prepare(
         let expected = format!("at least {} (K + 1)", k + 1);
         return Err(Error::new("points", expected, rows.len().to_string()));
     }
-    let kept: Vec<[f64; 3]> = rows.iter().map(|&row| positions[row as usize]).collect();
+    let kept: Vec<[f64; 3]> = match rows.len() == n_read {
+        true => positions.into_owned(),
+        false => rows.iter().map(|&row| positions[row as usize]).collect(),
+    };
     let (unit_in_map_units, factor, unit) = match preparation.scale {
         Some(scale) => (1.0 / scale, scale, Unit::Meter),
         None => {
@@ -95,7 +102,8 @@ pub fn prepare(
             (distance, 1.0 / distance, Unit::KthNeighbor)
         }
     };
-    let points = PointSet::try_new(kept, unit)?.scaled(factor, unit)?;
+    let points = PointSet::try_new(kept, unit)?;
+    let points = if factor == 1.0 { points } else { points.scaled(factor, unit)? };
     let descriptors = descriptors.map(|all| all.select(&rows));
     let original = Original::new(points);
     Ok(Prepared { original, descriptors, unit_in_map_units, rows, notes })
@@ -144,7 +152,7 @@ mod tests {
 
     #[test]
     fn without_a_scale_the_unit_is_the_kth_neighbor() {
-        let prepared = prepare(&line(9), None, &PLAIN).unwrap();
+        let prepared = prepare(line(9), None, &PLAIN).unwrap();
         assert_eq!(prepared.unit_in_map_units, 0.5);
         let points = prepared.original.reveal();
         assert_eq!(points.unit(), Unit::KthNeighbor);
@@ -154,7 +162,7 @@ mod tests {
     #[test]
     fn a_scale_gives_meters() {
         let scaled = Preparation { scale: Some(4.0), ..PLAIN };
-        let prepared = prepare(&line(9), None, &scaled).unwrap();
+        let prepared = prepare(line(9), None, &scaled).unwrap();
         assert_eq!(prepared.unit_in_map_units, 0.25);
         assert_eq!(prepared.original.reveal().positions()[3], [6.0, 0.0, 0.0]);
         assert_eq!(prepared.original.reveal().unit(), Unit::Meter);
@@ -162,7 +170,7 @@ mod tests {
 
     #[test]
     fn too_few_points_are_told() {
-        let error = prepare(&line(2), None, &PLAIN).unwrap_err();
+        let error = prepare(line(2), None, &PLAIN).unwrap_err();
         assert_eq!(error.to_string(), "points: expected at least 3 (K + 1), found 2");
     }
 

@@ -78,10 +78,11 @@ impl Map {
         }
         work::run(py, None, None, move || {
             check_scale(&rows, scale)?;
-            let prepared = prepare(&rows, given.as_ref(), &preparation)?;
+            let sha256 = Some(hash_positions(&rows));
+            let prepared = prepare(rows, given.as_ref(), &preparation)?;
             let input = Input {
                 path: None,
-                sha256: Some(hash_positions(&rows)),
+                sha256,
                 n_points: prepared.original.len() as u64,
                 scale_m_per_unit: scale,
                 unit_in_map_units: Some(prepared.unit_in_map_units),
