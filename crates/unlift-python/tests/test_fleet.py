@@ -58,3 +58,59 @@ def test_a_map_that_cannot_be_read_is_one_row(tmp_path: pathlib.Path):
 def test_a_table_without_paths_is_refused():
     with pytest.raises(unlift.UnliftError, match="expected a column path, found name"):
         list(unlift.fleet.audit_maps(pa.table({"name": ["a"]}).to_batches()))
+
+
+def images(n: int = 4) -> "pa.Table":
+    random = np.random.default_rng(1)
+    found = []
+    for at in range(n):
+        count = 80 + 10 * at
+        keypoints = random.uniform(0, (319, 239), (count, 2)).astype(np.float32)
+        descriptors = random.integers(0, 256, (count, 16), dtype=np.uint8)
+        found.append(
+            {
+                "name": f"{at}.jpg",
+                "keypoints": keypoints.reshape(-1).tolist(),
+                "descriptors": descriptors.tobytes(),
+                "width": 320,
+                "height": 240,
+            }
+        )
+    return pa.Table.from_pylist(found)
+
+
+OF_IMAGES = {"schemes": ["lines2d"], "neighbors": ["oracle", "similarity"], "inlier_ratios": [0.5], "k": 10}
+
+
+def test_rows_of_images_are_those_of_single_audits():
+    tasks = images()
+    found = pa.Table.from_batches(unlift.fleet.audit_images(tasks.to_batches(max_chunksize=3), **OF_IMAGES))
+    assert found.equals(pa.Table.from_batches(unlift.fleet.audit_images(tasks.to_batches(), threads=1, **OF_IMAGES)))
+    by_item: dict[str, list[dict]] = {}
+    for row in found.to_pylist():
+        by_item.setdefault(row["item"], []).append(row)
+    assert list(by_item) == [f"{at}.jpg" for at in range(4)]
+    for image in tasks.to_pylist():
+        keypoints = np.array(image["keypoints"], dtype=np.float32).reshape(-1, 2)
+        descriptors = np.frombuffer(image["descriptors"], dtype=np.uint8).reshape(len(keypoints), -1)
+        features = {"keypoints": keypoints, "descriptors": descriptors, "width": 320, "height": 240}
+        results = unlift.audit_images({image["name"]: features}, **OF_IMAGES).document["results"]
+        assert len(by_item[image["name"]]) == len(results) > 0
+        for row, alone in zip(by_item[image["name"]], results, strict=True):
+            assert (row["neighbors"], row["solver"], row["n_points"]) == (alone["neighbors"], alone["solver"], len(keypoints))
+            assert dict(row["recovered_percent"]) == alone["recovered_percent"]
+
+
+def test_an_image_that_cannot_be_used_is_one_row():
+    tasks = images(4).to_pylist()
+    tasks[1]["keypoints"] = tasks[1]["keypoints"][:-1]
+    tasks[2]["descriptors"] = tasks[2]["descriptors"][:-1]
+    tasks[3]["keypoints"][0] = float("nan")
+    found = pa.Table.from_batches(unlift.fleet.audit_images(pa.Table.from_pylist(tasks).to_batches(), **OF_IMAGES)).to_pylist()
+    errors = {row["item"]: row["error"] for row in found}
+    assert errors["0.jpg"] is None
+    assert errors["1.jpg"] == "1.jpg: keypoints: expected x and y in turns, found 179 numbers"
+    assert errors["2.jpg"] == "2.jpg: descriptors: expected a multiple of 100 values, found 1599"
+    assert errors["3.jpg"].startswith("images: image 3.jpg: point 0: ")
+    with pytest.raises(unlift.UnliftError, match="expected a column keypoints, found name"):
+        list(unlift.fleet.audit_images(pa.table({"name": ["a"]}).to_batches()))

@@ -1,10 +1,18 @@
-"""Many maps, one after another: Arrow batches in, Arrow batches out (needs `pyarrow`).
+"""Many maps or images, one after another: Arrow batches in, Arrow batches out (needs `pyarrow`).
 
 For engines that hand batches to a function: Spark (`unlift.spark`), Dask, Ray, Beam, or a pool of processes. Every row depends on its
 own item alone, so that it is the same wherever and in whatever company it is made.
 
     tasks = pyarrow.RecordBatch.from_pydict({"path": ["office", "lab"], "scale": [1.0, 1.0]})
     rows = pyarrow.Table.from_batches(unlift.fleet.audit_maps([tasks], schemes=["olc"]))
+
+Processes of one machine, without any engine:
+
+    with concurrent.futures.ProcessPoolExecutor() as pool:
+        parts = pool.map(functools.partial(audit_part, schemes=["olc"]), tasks.to_batches(max_chunksize=100))
+
+    def audit_part(batch, **options):
+        return pyarrow.Table.from_batches(unlift.fleet.audit_maps([batch], threads=1, **options))
 """
 
 from __future__ import annotations
@@ -12,12 +20,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from ._audits import Features
 from ._unlift import UnliftError
 
 if TYPE_CHECKING:
     import pyarrow as _pa  # type: ignore[import-untyped,unused-ignore]
 
-__all__ = ["ROWS", "audit_maps", "schema"]
+__all__ = ["ROWS", "audit_images", "audit_maps", "schema"]
 
 #: What rows say: name, and type as Spark writes it.
 ROWS = {
@@ -81,6 +92,55 @@ def audit_maps(batches: Iterable[_pa.RecordBatch], **options: Any) -> Iterator[_
                 yield _batch([{"item": path, "error": str(error)}])
                 continue
             yield rows_of(str(path), report.document)
+
+
+def audit_images(batches: Iterable[_pa.RecordBatch], **options: Any) -> Iterator[_pa.RecordBatch]:
+    """Audits the image of every row of `batches`: one row of figures per image, scheme, source, inlier ratio and solver.
+
+    batches: with the columns
+        `name` (string): randomness comes from it, so that no two images may share one;
+        `keypoints` (list of float): x and y in turns, in pixels, the middle of the first pixel at (0, 0);
+        `descriptors`, if it is there: binary, uint8, a row per keypoint after the other; or a list of floats in the same order;
+        `width`, `height` (integers): in pixels.
+    options: those of `unlift.audit_images`, the same for all images; nothing is drawn. `threads=1` where an engine runs a task
+        per core.
+
+    Yields a batch per image, the same rows as an audit of the image alone. An image that cannot be used has one row, whose
+    `error` says why in a line; all others go on. Raises UnliftError where a column is missing.
+    """
+    from . import audit_images as audit
+
+    for batch in batches:
+        for column in ("name", "keypoints", "width", "height"):
+            if column not in batch.schema.names:
+                found = ", ".join(batch.schema.names) or "none"
+                raise UnliftError(f"batches: expected a column {column}, found {found}")
+        for image in batch.to_pylist():
+            try:
+                report = audit({image["name"]: _features(image)}, show=[], **options)
+            except UnliftError as error:
+                yield _batch([{"item": image["name"], "error": str(error)}])
+                continue
+            yield rows_of(image["name"], report.document)
+
+
+def _features(image: dict[str, Any]) -> Features:
+    """Arrays of an image as a row holds it."""
+    name = image["name"]
+    if name is None:
+        raise UnliftError("name: expected a text, found null")
+    flat = np.asarray(image["keypoints"] or [], dtype=np.float32)
+    if len(flat) % 2:
+        raise UnliftError(f"{name}: keypoints: expected x and y in turns, found {len(flat)} numbers")
+    found: Features = {"keypoints": flat.reshape(-1, 2), "width": image["width"], "height": image["height"]}
+    rows = image.get("descriptors")
+    if rows is not None:
+        values = np.frombuffer(rows, dtype=np.uint8) if isinstance(rows, bytes) else np.asarray(rows, dtype=np.float32)
+        n = max(len(flat) // 2, 1)
+        if len(values) % n:
+            raise UnliftError(f"{name}: descriptors: expected a multiple of {n} values, found {len(values)}")
+        found["descriptors"] = values.reshape(n, -1)
+    return found
 
 
 def rows_of(item: str, document: dict[str, Any]) -> _pa.RecordBatch:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import pyarrow as _pa  # type: ignore[import-untyped,unused-ignore]
     from pyspark.sql import DataFrame as _DataFrame  # type: ignore[import-not-found,unused-ignore]
 
-__all__ = ["audit_maps"]
+__all__ = ["audit_images", "audit_maps"]
 
 #: The schema of rows, as Spark writes it.
 _ROWS = ", ".join(f"{name} {of}" for name, of in fleet.ROWS.items())
@@ -29,11 +29,25 @@ def audit_maps(maps: _DataFrame, **options: Any) -> _DataFrame:
 
     options: those of `unlift.audit`; `threads` is 1 unless it is said, as Spark runs a task per core.
     """
+    return _over(maps, "audit_maps", options)
+
+
+def audit_images(images: _DataFrame, **options: Any) -> _DataFrame:
+    """`unlift.fleet.audit_images` on every partition of `images`: columns `name`, `keypoints`, `width`, `height`, and perhaps
+    `descriptors`.
+
+    options: those of `unlift.audit_images`; `threads` is 1 unless it is said.
+    """
+    return _over(images, "audit_images", options)
+
+
+def _over(items: _DataFrame, by: str, options: dict[str, Any]) -> _DataFrame:
     options = {"threads": 1, **options}
 
     def of_partition(batches: Iterator[_pa.RecordBatch]) -> Iterator[_pa.RecordBatch]:
         from unlift import fleet as here
 
-        return here.audit_maps(batches, **options)
+        rows: Iterator[_pa.RecordBatch] = getattr(here, by)(batches, **options)
+        return rows
 
-    return maps.mapInArrow(of_partition, _ROWS)
+    return items.mapInArrow(of_partition, _ROWS)
