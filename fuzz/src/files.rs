@@ -27,8 +27,18 @@ fn file(name: &str, bytes: &[u8]) -> PathBuf {
 
 /// A point cloud; the first byte says of which kind.
 pub fn points(bytes: &[u8]) {
-    const NAMES: [&str; 7] =
-        ["p.ply", "p.csv", "p.xyz", "p.txt", "p.npy", "points3D.bin", "points3D.txt"];
+    const NAMES: [&str; 10] = [
+        "p.ply",
+        "p.csv",
+        "p.xyz",
+        "p.txt",
+        "p.npy",
+        "points3D.bin",
+        "points3D.txt",
+        "p.las",
+        "p.pcd",
+        "p.e57",
+    ];
     let mut bytes = Bytes(bytes);
     let name = NAMES[usize::from(bytes.byte()) % NAMES.len()];
     let path = file(name, bytes.0);

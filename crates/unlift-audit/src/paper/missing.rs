@@ -2,8 +2,8 @@
 
 use unlift_report::printed::{Printed, printed};
 
-use super::layouts::looked_in;
-use super::{Dataset, Part, Request, Scene};
+use super::layouts::{Dataset, Scene, looked_in};
+use super::request::{Part, Request};
 
 /// The tables of the numbers that `is_about` picks, for people: `table 1`, `tables 3, 4`.
 pub fn tables(dataset: Dataset, is_about: impl Fn(&Printed) -> bool) -> String {

@@ -10,8 +10,9 @@ use unlift_report::printed::{Measured, Points, Printed};
 
 use super::audits::Run;
 use super::compared::{Compared, OfScene};
+use super::layouts::{Dataset, Scene};
 use super::missing::{elsewhere, from_layout};
-use super::{Dataset, Request, Scene};
+use super::request::Request;
 use crate::Error;
 
 /// The numbers, those of the paper and ours.

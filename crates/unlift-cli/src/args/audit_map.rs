@@ -34,8 +34,8 @@ a scheme that could not be applied to the map fails.
 
 Exit codes: 0 done, 1 a gate failed, 2 usage, 3 bad input.")]
 pub struct AuditMapArgs {
-    /// A COLMAP model or project folder, one of OpenSfM or nerfstudio, or a .ply, .csv, .xyz, .txt, .npy, .out (Bundler) or
-    /// .nvm file
+    /// A COLMAP model or project folder, one of OpenSfM or nerfstudio, or a .ply, .csv, .xyz, .txt, .npy, .las, .pcd, .e57,
+    /// .out (Bundler) or .nvm file
     #[arg(value_name = "PATH")]
     pub path: PathBuf,
     #[command(flatten)]

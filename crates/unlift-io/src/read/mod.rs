@@ -10,6 +10,7 @@ mod npy;
 mod others;
 mod ply;
 mod scalar;
+mod scans;
 mod table;
 
 use std::path::{Path, PathBuf};
@@ -52,7 +53,7 @@ fn mean_direction(directions: impl Iterator<Item = [f64; 3]>) -> Option<[f64; 3]
 
 /// Reads the map at `path`: a COLMAP model folder or a project folder that holds one (of several, the
 /// one with the most points; `skipped` says which), a map of OpenSfM, nerfstudio, Bundler or VisualSFM (NVM), or a point
-/// cloud as `.ply`, `.csv`, `.xyz`, `.txt` or `.npy`.
+/// cloud as `.ply`, `.csv`, `.xyz`, `.txt`, `.npy`, `.las`, `.pcd` or `.e57`.
 ///
 /// # Errors
 /// When nothing readable is there, a file is malformed, a coordinate is not finite, or there is no point.
@@ -71,14 +72,13 @@ pub fn is_project(path: &Path) -> bool {
     path.is_dir() && (matches!(Model::find(path), Ok(Some(_))) || others::in_folder(path).is_some())
 }
 
-const EXPECTED: &str = "a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt or .npy file";
+const EXPECTED: &str = "a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .npy, \
+                        .las, .pcd or .e57 file";
 
 /// What makes a point cloud that is read of a file that is not.
 fn converter(extension: &str) -> &'static str {
     match extension {
-        "las" | "laz" => " (pdal translate IN.las OUT.ply makes one that is read)",
-        "pcd" => " (pcl_pcd2ply IN.pcd OUT.ply makes one that is read)",
-        "e57" => " (pdal translate IN.e57 OUT.ply makes one that is read)",
+        "laz" => " (pdal translate IN.laz OUT.las makes one that is read)",
         _ => "",
     }
 }
@@ -96,6 +96,10 @@ fn file(path: &Path) -> Result<Input, Error> {
         (_, "csv" | "xyz" | "txt") => (table::read(path)?, "table"),
         (_, "npy") => (npy::positions(path)?, "npy"),
         (_, other) => {
+            if let Some(scan) = scans::file(path, other) {
+                let scans::Scan { positions, format, notes } = scan?;
+                return Ok(Input { skipped: notes, ..alone(path, positions, format) });
+            }
             if let Some(found) = others::file(path) {
                 return found.map(|(format, found)| of_another_program(path, format, found));
             }
@@ -106,13 +110,18 @@ fn file(path: &Path) -> Result<Input, Error> {
             return Err(Error::new(path, "", EXPECTED, found));
         }
     };
-    Ok(Input {
+    Ok(alone(path, positions, format))
+}
+
+/// Points of one file, of which nothing else is known.
+fn alone(path: &Path, positions: Vec<[f64; 3]>, format: &'static str) -> Input {
+    Input {
         ids: (0..positions.len() as u64).collect(),
         positions,
         files: vec![path.to_owned()],
         format,
         ..Input::default()
-    })
+    }
 }
 
 fn of_another_program(path: &Path, format: &'static str, found: others::Found) -> Input {

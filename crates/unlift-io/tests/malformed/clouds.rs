@@ -154,13 +154,13 @@ pub fn paths() -> Vec<Row> {
             "project: expected points3D.bin or points3D.txt in it, or in sparse, model, models, colmap/sparse or a numbered folder of these, found none"),
         row("folder with a file's name", vec![("a.ply/", vec![])], "a.ply",
             "a.ply: expected points3D.bin or points3D.txt in it, or in sparse, model, models, colmap/sparse or a numbered folder of these, found none"),
-        alone("unknown extension", "a.las", "LASF",
-            "a.las: expected a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt or .npy file, found a .las file (pdal translate IN.las OUT.ply makes one that is read)"),
+        alone("unknown extension", "a.laz", "LASF",
+            "a.laz: expected a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .npy, .las, .pcd or .e57 file, found a .laz file (pdal translate IN.laz OUT.las makes one that is read)"),
         alone("no extension", "cloud", "1 2 3",
-            "cloud: expected a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt or .npy file, found a file without extension"),
+            "cloud: expected a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .npy, .las, .pcd or .e57 file, found a file without extension"),
         alone("images given by themselves", "images.bin", "",
             "images.bin: expected a file with points, found another file of a COLMAP model (give its folder)"),
         alone("a database", "database.db", "SQLite format 3",
-            "database.db: expected a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt or .npy file, found a .db file"),
+            "database.db: expected a COLMAP folder, a map of OpenSfM, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .npy, .las, .pcd or .e57 file, found a .db file"),
     ]
 }

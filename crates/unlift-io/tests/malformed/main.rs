@@ -3,6 +3,7 @@
 mod clouds;
 mod colmap;
 mod descriptors;
+mod scans;
 mod sweeps;
 
 use std::fs;
@@ -91,6 +92,9 @@ fn every_malformed_file_is_refused_with_its_line() {
         clouds::tables(),
         clouds::arrays(),
         clouds::paths(),
+        scans::las(),
+        scans::pcd(),
+        scans::e57(),
     ];
     for row in tables.into_iter().flatten() {
         let dir = tempfile::tempdir().unwrap();
@@ -125,7 +129,18 @@ fn what_is_no_regular_file_is_refused() {
     use std::os::unix::fs::symlink;
     let dir = tempfile::tempdir().unwrap();
     let refused = ": expected a file, found a pipe, a socket or a device";
-    let names = ["a.csv", "a.xyz", "a.txt", "a.ply", "a.npy", "points3D.bin", "points3D.txt"];
+    let names = [
+        "a.csv",
+        "a.xyz",
+        "a.txt",
+        "a.ply",
+        "a.npy",
+        "a.las",
+        "a.pcd",
+        "a.e57",
+        "points3D.bin",
+        "points3D.txt",
+    ];
     for name in names {
         let link = dir.path().join(name);
         symlink("/dev/zero", &link).unwrap();

@@ -5,6 +5,7 @@ mod descriptors;
 mod models;
 mod others;
 mod places;
+mod scans;
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -9,12 +9,13 @@ use unlift::audit::{Measure, NeighborsBy, Plan};
 use unlift::{Descriptors, Unit};
 use unlift_features::Extraction;
 
-use super::{Run, of_scene};
+use super::run::{Run, of_scene};
 use crate::images::audit::{ImagesJob, perform};
 use crate::images::{FeatureSource, choice};
 use crate::inversion::Inversion;
 use crate::paper::compared::OfScene;
-use crate::paper::{Part, Scene};
+use crate::paper::layouts::Scene;
+use crate::paper::request::Part;
 use crate::{Error, Progress, Shown, open_audit, sources};
 
 /// How an attacker estimates neighbors; rows each, of which the stronger counts.

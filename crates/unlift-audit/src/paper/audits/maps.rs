@@ -10,12 +10,14 @@ use unlift::audit::{Measure, Plan};
 use unlift_io::read;
 use unlift_nn::DescriptorKind;
 
-use super::{Run, of_scene};
+use super::run::{Run, of_scene};
 use crate::inversion::MapInversion;
 use crate::maps::{self, Job};
 use crate::paper::compared::OfScene;
+use crate::paper::layouts::Scene;
 use crate::paper::missing::{tables, tables_of};
-use crate::paper::{Part, Scene, scale};
+use crate::paper::request::Part;
+use crate::paper::scale;
 use crate::{Error, Preparation, Progress, Shown, open_audit};
 
 /// Photos that pictures are compared with, as in any audit of a map.

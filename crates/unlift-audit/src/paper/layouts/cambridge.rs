@@ -6,8 +6,9 @@ use std::path::Path;
 
 use unlift_io::Error;
 
+use super::poses::Poses;
+use super::scene::Scene;
 use super::text::{lines, wrong};
-use super::{Poses, Scene};
 
 /// Those of the benchmark; the paper does not say which it took.
 pub const SCENES: [&str; 5] =

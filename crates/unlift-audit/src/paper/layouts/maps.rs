@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use unlift_io::read;
 
-use super::Dataset;
+use super::dataset::Dataset;
 
 /// Folders of a scene's map inside the place of the scene; [`read::open`] finds `sparse/0` and its like by itself.
 const INSIDE: [&str; 5] = ["", "triangulated", "model_train", "sfm", "sfm_sift"];

@@ -4,8 +4,9 @@ use std::path::Path;
 
 use unlift_io::Error;
 
+use super::poses::Poses;
+use super::scene::Scene;
 use super::text::{files, lines, wrong};
-use super::{Poses, Scene};
 
 /// In the order of the paper's figures, which is that of the dataset's page.
 pub const SCENES: [&str; 7] =

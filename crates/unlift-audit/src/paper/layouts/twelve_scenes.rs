@@ -5,8 +5,9 @@ use std::path::Path;
 
 use unlift_io::Error;
 
+use super::poses::Poses;
+use super::scene::Scene;
 use super::text::{files, lines, wrong};
-use super::{Poses, Scene};
 
 /// As the dataset's archives have them.
 pub const SCENES: [&str; 12] = [

@@ -1,0 +1,81 @@
+//! What is known of each dataset: its scenes, and who publishes what.
+
+use super::{cambridge, seven_scenes, twelve_scenes};
+
+/// A dataset of the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Dataset {
+    /// 7-Scenes: Shotton et al., CVPR 2013.
+    SevenScenes,
+    /// 12-Scenes: Valentin et al., 3DV 2016.
+    TwelveScenes,
+    /// Cambridge Landmarks: Kendall et al., ICCV 2015.
+    Cambridge,
+}
+
+impl Dataset {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::SevenScenes, Self::TwelveScenes, Self::Cambridge];
+
+    /// The name that users type.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::SevenScenes => "7scenes",
+            Self::TwelveScenes => "12scenes",
+            Self::Cambridge => "cambridge",
+        }
+    }
+
+    /// The name in the published tables.
+    pub fn published(self) -> &'static str {
+        match self {
+            Self::SevenScenes => "7-scenes",
+            Self::TwelveScenes => "12-scenes",
+            Self::Cambridge => "cambridge",
+        }
+    }
+
+    /// Names of its scenes, which are those of their folders.
+    pub fn scenes(self) -> &'static [&'static str] {
+        match self {
+            Self::SevenScenes => &seven_scenes::SCENES,
+            Self::TwelveScenes => &twelve_scenes::SCENES,
+            Self::Cambridge => &cambridge::SCENES,
+        }
+    }
+
+    /// Where its owners publish photos and poses.
+    pub fn owner(self) -> &'static str {
+        match self {
+            Self::SevenScenes => {
+                "https://www.microsoft.com/en-us/research/project/rgb-d-dataset-7-scenes/"
+            }
+            Self::TwelveScenes => "http://graphics.stanford.edu/projects/reloc/",
+            Self::Cambridge => "http://mi.eng.cam.ac.uk/projects/relocalisation/",
+        }
+    }
+
+    /// Where maps of it are published, or how one is made.
+    pub fn maps(self) -> &'static str {
+        match self {
+            Self::SevenScenes => {
+                "7scenes_sfm_triangulated.zip, \
+                 https://github.com/cvg/Hierarchical-Localization/tree/master/hloc/pipelines/7Scenes"
+            }
+            Self::TwelveScenes => "none is published with it: COLMAP makes one of its photos",
+            Self::Cambridge => {
+                "CambridgeLandmarks_Colmap_Retriangulated_1024px.zip, \
+                 https://github.com/cvg/Hierarchical-Localization/tree/master/hloc/pipelines/Cambridge, \
+                 or reconstruction.nvm of the dataset itself"
+            }
+        }
+    }
+
+    /// Longest side in pixels to which the paper shrank photos, where it did.
+    pub fn shrunk_to(self) -> Option<u32> {
+        match self {
+            Self::SevenScenes | Self::TwelveScenes => None,
+            Self::Cambridge => Some(1024),
+        }
+    }
+}

@@ -1,0 +1,217 @@
+//! E57: scans of a survey, each in a frame of its own, which are brought into one.
+//!
+//! Read by the crate `e57`, which is asked for no more than what was looked at before: how long its XML is, how many points
+//! a scan has, and how many values of them may come from a byte.
+//!
+//! Source: ASTM E2807.
+
+use std::cell::Cell;
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use std::path::Path;
+use std::rc::Rc;
+
+use e57::RecordName::{
+    CartesianInvalidState, CartesianX, CartesianY, CartesianZ, SphericalAzimuth,
+    SphericalElevation, SphericalInvalidState, SphericalRange,
+};
+use e57::{E57Reader, PointCloud, RawValues, RecordDataType};
+
+use super::scan::Scan;
+use crate::error::{Error, Place};
+use crate::guard::without_panic;
+use crate::input::{self, Budget};
+
+/// Bytes of the head, and where in it the length of the XML stands.
+const HEAD: usize = 48;
+const XML_LENGTH: usize = 32;
+/// Bytes in memory per byte of XML at most: the shortest element, of four, is a node of a tree.
+const TREE: u64 = 32;
+/// Bytes that are read before a point comes out, at most. A packet, of which four fit, holds values of every field: more of
+/// them pile up only where a file is damaged.
+const AHEAD: u64 = 1 << 18;
+/// Bytes in memory of a value, in a list that has grown.
+const VALUE: u64 = 32;
+
+/// Reads the points of all scans.
+///
+/// # Errors
+/// When the file is damaged or would take more memory than its size explains.
+pub fn read(path: &Path) -> Result<Scan, Error> {
+    let damaged = || Error::new(path, "", "an E57 file", "a damaged one");
+    without_panic(|| scans(path)).unwrap_or_else(|| Err(damaged()))
+}
+
+fn scans(path: &Path) -> Result<Scan, Error> {
+    let (mut file, len) = input::open(path)?;
+    let budget = Budget::new(path, len);
+    let mut head = [0; HEAD];
+    let complete = file.read_exact(&mut head).is_ok();
+    if !complete || &head[..8] != b"ASTM-E57" {
+        let expected = "\"ASTM-E57\", as every E57 file begins";
+        let found = if complete { "something else" } else { "end of file" };
+        return Err(Error::new(path, "header", expected, found));
+    }
+    let xml = u64::from_le_bytes(std::array::from_fn(|at| head[XML_LENGTH + at]));
+    if xml > len {
+        let expected = format!("an XML part of at most {len} bytes (by the size of the file)");
+        return Err(Error::new(path, "header", expected, xml.to_string()));
+    }
+    budget.admit("the XML part", xml.saturating_mul(TREE))?;
+    file.seek(SeekFrom::Start(0)).map_err(|source| Error::read(path, source))?;
+    let left = Rc::new(Cell::new(xml + AHEAD));
+    let source = Watched { reader: BufReader::new(file), left: Rc::clone(&left) };
+    let mut reader = E57Reader::new(source).map_err(|error| wrong(path, Place::Whole, &error))?;
+    let clouds = reader.pointclouds();
+    let n = clouds.iter().fold(0u64, |n, cloud| n.saturating_add(cloud.records));
+    budget.admit("points", n.saturating_mul(24))?;
+    let mut positions: Vec<[f64; 3]> = Vec::new();
+    let mut without = 0;
+    for (at, cloud) in clouds.iter().enumerate() {
+        let place = || Place::from(format!("scan {}", at + 1));
+        check(path, cloud, &budget, place())?;
+        let frame = Frame::of(cloud);
+        left.set(AHEAD);
+        let fields = Fields::of(cloud);
+        // As they are stored: what the crate makes of them is by functions that differ between machines.
+        let points = reader.pointcloud_raw(cloud);
+        for values in points.map_err(|error| wrong(path, place(), &error))? {
+            let values = values.map_err(|error| wrong(path, place(), &error))?;
+            left.set(AHEAD);
+            let found = fields.place(cloud, &values);
+            let found = found.map_err(|error| wrong(path, place(), &error))?;
+            match found.map(|found| frame.common(found)) {
+                Some(position) if position.iter().all(|x| x.is_finite()) => {
+                    positions.push(position)
+                }
+                _ => without += 1,
+            }
+        }
+    }
+    let mut scan = Scan::new(positions, "E57", without);
+    if clouds.len() > 1 {
+        scan.notes.push(format!("read, all {} scans, in one frame", clouds.len()));
+    }
+    Ok(scan)
+}
+
+/// Refuses a scan of which a few packets would become more than the budget, or that has values for which no byte stands:
+/// these would come without end.
+fn check(path: &Path, cloud: &PointCloud, budget: &Budget, place: Place) -> Result<(), Error> {
+    let bits = || cloud.prototype.iter().map(|record| bits(&record.data_type));
+    let Some(least) = bits().filter(|&bits| bits > 0).min() else {
+        return Err(Error::new(path, place, "points with a value that takes a bit", "none"));
+    };
+    // Of values that take no bit as many are made as of the shortest of the others.
+    let lists = 1 + bits().filter(|&bits| bits == 0).count() as u64;
+    budget.admit(place, (8 * AHEAD / least).saturating_mul(VALUE * lists))
+}
+
+/// Which values of a point say where it is, and whether they do.
+struct Fields {
+    cartesian: Option<[usize; 3]>,
+    cartesian_state: Option<usize>,
+    spherical: Option<[usize; 3]>,
+    spherical_state: Option<usize>,
+}
+
+impl Fields {
+    fn of(cloud: &PointCloud) -> Self {
+        let of = |name| cloud.prototype.iter().position(|record| record.name == name);
+        let all = |[a, b, c]: [Option<usize>; 3]| Some([a?, b?, c?]);
+        Self {
+            cartesian: all([of(CartesianX), of(CartesianY), of(CartesianZ)]),
+            cartesian_state: of(CartesianInvalidState),
+            spherical: all([of(SphericalRange), of(SphericalAzimuth), of(SphericalElevation)]),
+            spherical_state: of(SphericalInvalidState),
+        }
+    }
+
+    /// Where a point is, in the frame of its scan; `None` of a beam that nothing threw back.
+    fn place(&self, cloud: &PointCloud, values: &RawValues) -> e57::Result<Option<[f64; 3]>> {
+        let number = |at: usize| values[at].to_f64(&cloud.prototype[at].data_type);
+        let of = |fields: Option<[usize; 3]>, state: Option<usize>| -> e57::Result<_> {
+            let is_valid = state.map_or(Ok(0.0), number)? == 0.0;
+            let Some([a, b, c]) = fields.filter(|_| is_valid) else { return Ok(None) };
+            Ok(Some([number(a)?, number(b)?, number(c)?]))
+        };
+        if let Some(place) = of(self.cartesian, self.cartesian_state)? {
+            return Ok(Some(place));
+        }
+        let angles = of(self.spherical, self.spherical_state)?;
+        Ok(angles.map(|[range, azimuth, elevation]| {
+            let (flat, z) = (range * libm::cos(elevation), range * libm::sin(elevation));
+            [flat * libm::cos(azimuth), flat * libm::sin(azimuth), z]
+        }))
+    }
+}
+
+/// From the frame of a scan to that of all.
+struct Frame {
+    rotation: [[f64; 3]; 3],
+    translation: [f64; 3],
+}
+
+impl Frame {
+    fn of(cloud: &PointCloud) -> Self {
+        let Some(pose) = &cloud.transform else {
+            let rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+            return Self { rotation, translation: [0.0; 3] };
+        };
+        let (q, t) = (&pose.rotation, &pose.translation);
+        let (w, x, y, z) = (q.w, q.x, q.y, q.z);
+        let rotation = [
+            [w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+            [2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)],
+            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z],
+        ];
+        Self { rotation, translation: [t.x, t.y, t.z] }
+    }
+
+    fn common(&self, place: [f64; 3]) -> [f64; 3] {
+        std::array::from_fn(|row| {
+            let turned: f64 = self.rotation[row].iter().zip(place).map(|(r, x)| r * x).sum();
+            turned + self.translation[row]
+        })
+    }
+}
+
+/// Bits of a value in the file.
+fn bits(kind: &RecordDataType) -> u64 {
+    match kind {
+        RecordDataType::Single { .. } => 32,
+        RecordDataType::Double { .. } => 64,
+        RecordDataType::ScaledInteger { min, max, .. } | RecordDataType::Integer { min, max } => {
+            let range = i128::from(*max) - i128::from(*min);
+            u64::from(128 - range.max(0).leading_zeros())
+        }
+    }
+}
+
+/// An error of the crate, whose text has its causes.
+fn wrong(path: &Path, place: Place, error: &e57::Error) -> Error {
+    Error::new(path, place, "an E57 file", error.to_string())
+}
+
+/// A file of which no more is read than somebody said is left.
+struct Watched {
+    reader: BufReader<File>,
+    left: Rc<Cell<u64>>,
+}
+
+impl Read for Watched {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let n = self.reader.read(buffer)?;
+        match self.left.get().checked_sub(n as u64) {
+            Some(left) => self.left.set(left),
+            None => return Err(io::Error::other("no point in a long stretch of the file")),
+        }
+        Ok(n)
+    }
+}
+
+impl Seek for Watched {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.reader.seek(to)
+    }
+}

@@ -1,0 +1,64 @@
+//! LZF, by which PCD files are compressed: runs of bytes, and of bytes that stood before.
+//!
+//! By hand: it is this page, and what comes out may not be longer than was said.
+
+/// Largest control byte of a run that stands there itself.
+const LITERAL: u8 = 31;
+
+/// The `n` bytes that `packed` stands for; `None` when it stands for more, for fewer, or for what is before its start.
+pub fn unpacked(mut packed: &[u8], n: usize) -> Option<Vec<u8>> {
+    let mut out: Vec<u8> = Vec::with_capacity(n);
+    while let Some((&control, rest)) = packed.split_first() {
+        if control <= LITERAL {
+            let (run, rest) = rest.split_at_checked(usize::from(control) + 1)?;
+            if run.len() > n - out.len() {
+                return None;
+            }
+            out.extend_from_slice(run);
+            packed = rest;
+            continue;
+        }
+        // Three bits of length, of which seven says that a byte more follows.
+        let (longer, rest) = match control >> 5 {
+            7 => rest.split_first().map(|(&longer, rest)| (usize::from(longer), rest))?,
+            _ => (0, rest),
+        };
+        let (&low, rest) = rest.split_first()?;
+        let length = usize::from(control >> 5) + longer + 2;
+        let back = (usize::from(control & LITERAL) << 8) + usize::from(low) + 1;
+        let start = out.len().checked_sub(back)?;
+        if length > n - out.len() {
+            return None;
+        }
+        // Byte by byte: what is copied may have just been written.
+        for at in start..start + length {
+            out.push(out[at]);
+        }
+        packed = rest;
+    }
+    (out.len() == n).then_some(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_stand_there_or_are_copied() {
+        assert_eq!(unpacked(&[2, b'a', b'b', b'c'], 3).unwrap(), b"abc");
+        // Three from two back: what was just written.
+        assert_eq!(unpacked(&[1, b'a', b'b', 0x20, 1], 5).unwrap(), b"ababa");
+        // 7 + 3 + 2 from one back.
+        let long = unpacked(&[0, b'x', 0xe0, 3, 0], 13).unwrap();
+        assert_eq!(long, [b'x'; 13]);
+    }
+
+    #[test]
+    fn what_is_too_long_too_short_or_before_the_start_is_none() {
+        let packed = [1, b'a', b'b', 0x20, 1];
+        assert!(unpacked(&packed, 4).is_none() && unpacked(&packed, 6).is_none());
+        assert!(unpacked(&[0, b'a', 0x20, 1], 4).is_none());
+        assert!(unpacked(&[5, b'a'], 6).is_none() && unpacked(&[0, b'a', 0xe0, 3], 13).is_none());
+        assert_eq!(unpacked(&[], 0), Some(Vec::new()));
+    }
+}

@@ -1,0 +1,273 @@
+//! PCD, as the Point Cloud Library writes it: `ascii`, `binary` and `binary_compressed`.
+//!
+//! A reader of our own: the crate `pcd-rs` takes what the head declares, and knows no compressed files.
+//!
+//! Source: PCL's documentation, "The PCD (Point Cloud Data) file format", version 0.7.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+
+use super::lzf::unpacked;
+use super::scan::Scan;
+use crate::error::{Error, Place};
+use crate::input::{self, Budget};
+use crate::read::bytes::Bytes;
+use crate::read::lines::{Lines, number, quoted, words};
+
+/// One column, or several of a name.
+#[derive(Clone, Copy, Debug)]
+struct Field {
+    /// Bytes of a value.
+    size: u64,
+    /// Values in it.
+    count: u64,
+}
+
+/// A coordinate: the number of its value in a line, its byte in a row, and whether it has eight.
+#[derive(Clone, Copy, Debug, Default)]
+struct Axis {
+    value: u64,
+    byte: u64,
+    is_f64: bool,
+}
+
+#[derive(Debug)]
+struct Header {
+    axes: [Axis; 3],
+    /// Values of a point.
+    n_values: u64,
+    /// Bytes of a point.
+    stride: u64,
+    n: u64,
+    data: Vec<u8>,
+    n_lines: u64,
+    n_bytes: u64,
+}
+
+/// Reads the positions of points that have one.
+///
+/// # Errors
+/// When the file is malformed, has no `x`, `y` and `z` in floats, or is cut off.
+pub fn read(path: &Path) -> Result<Scan, Error> {
+    let (file, len) = input::open(path)?;
+    let mut reader = BufReader::new(file);
+    let header = header(path, &mut reader)?;
+    if header.n == 0 {
+        // Nothing says how much there is to read.
+        return Ok(Scan::new(Vec::new(), "PCD", 0));
+    }
+    let (all, format) = match &*header.data {
+        b"ascii" => (ascii(path, reader, &header, len)?, "PCD ascii"),
+        b"binary" => (binary(path, reader, &header, len)?, "PCD binary"),
+        _ => (compressed(path, reader, &header, len)?, "PCD compressed"),
+    };
+    let n = all.len();
+    let positions: Vec<[f64; 3]> =
+        all.into_iter().filter(|position| position.iter().all(|x| x.is_finite())).collect();
+    let without = (n - positions.len()) as u64;
+    Ok(Scan::new(positions, format, without))
+}
+
+/// The lines up to `DATA`, each a word and its values.
+fn header(path: &Path, reader: &mut BufReader<File>) -> Result<Header, Error> {
+    /// Longest header: comments are fine, a file without line ends is not read to its end.
+    const LONGEST: u64 = 1 << 20;
+    let mut limited = reader.take(LONGEST);
+    let (mut n_lines, mut n_bytes) = (0, 0);
+    let (mut names, mut sizes, mut kinds, mut counts) = (Vec::new(), Vec::new(), Vec::new(), None);
+    let (mut width, mut height, mut points) = (None, 1, None);
+    let mut line = Vec::new();
+    let data = loop {
+        line.clear();
+        let read = limited.read_until(b'\n', &mut line).map_err(|e| Error::read(path, e))?;
+        n_lines += 1;
+        n_bytes += read as u64;
+        let error = |expected: &str, found| Error::new(path, Place::Line(n_lines), expected, found);
+        if read == 0 {
+            return Err(error("a PCD header that ends with DATA", "end of file".to_owned()));
+        }
+        let words: Vec<&[u8]> = words(&line).collect();
+        let [word, values @ ..] = &words[..] else { continue };
+        let numbers =
+            || values.iter().map(|value| number::<u64>(value)).collect::<Option<Vec<_>>>();
+        let one = || match numbers().as_deref() {
+            Some([one]) => Ok(*one),
+            _ => Err(error("one number", quoted(line.trim_ascii()))),
+        };
+        match *word {
+            [b'#', ..] | b"VERSION" | b"VIEWPOINT" => {}
+            b"FIELDS" => names = values.iter().map(|name| name.to_vec()).collect(),
+            b"SIZE" => {
+                let known =
+                    numbers().filter(|sizes| sizes.iter().all(|s| [1, 2, 4, 8].contains(s)));
+                sizes = known
+                    .ok_or_else(|| error("sizes of 1, 2, 4 or 8", quoted(line.trim_ascii())))?;
+            }
+            b"TYPE" => kinds = values.iter().map(|kind| kind.to_vec()).collect(),
+            b"COUNT" => {
+                let known = numbers().ok_or_else(|| error("counts", quoted(line.trim_ascii())))?;
+                counts = Some(known);
+            }
+            b"WIDTH" => width = Some(one()?),
+            b"HEIGHT" => height = one()?,
+            b"POINTS" => points = Some(one()?),
+            b"DATA" => {
+                let known: [&[u8]; 3] = [b"ascii", b"binary", b"binary_compressed"];
+                match values {
+                    [data] if known.contains(data) => break data.to_vec(),
+                    _ => {
+                        let expected = "DATA ascii, binary or binary_compressed";
+                        return Err(error(expected, quoted(line.trim_ascii())));
+                    }
+                }
+            }
+            _ => return Err(error("a line of a PCD header", quoted(line.trim_ascii()))),
+        }
+    };
+    let refuse = |expected: &str, found: String| Error::new(path, "header", expected, found);
+    let counts = counts.unwrap_or_else(|| vec![1; names.len()]);
+    if [sizes.len(), kinds.len(), counts.len()] != [names.len(); 3] {
+        let found =
+            format!("{}, {}, {} and {}", names.len(), sizes.len(), kinds.len(), counts.len());
+        return Err(refuse("as many FIELDS as SIZE, TYPE and COUNT", found));
+    }
+    let fields = sizes.iter().zip(&counts).map(|(&size, &count)| Field { size, count });
+    let fields: Vec<Field> = fields.collect();
+    let sum = |part: &dyn Fn(&Field) -> u64, of: &[Field]| {
+        of.iter().try_fold(0u64, |sum, field| sum.checked_add(part(field)))
+    };
+    let bytes = |field: &Field| field.size.saturating_mul(field.count);
+    let (Some(n_values), Some(stride)) = (sum(&|f| f.count, &fields), sum(&bytes, &fields)) else {
+        return Err(refuse("points of a size that fits", "more".to_owned()));
+    };
+    let mut axes = [Axis::default(); 3];
+    for (axis, name) in axes.iter_mut().zip([b"x", b"y", b"z"]) {
+        let expected =
+            format!("a field {} of type F and size 4 or 8", String::from_utf8_lossy(name));
+        let at = names.iter().position(|its| its == name);
+        let at = at.ok_or_else(|| refuse(&expected, "none".to_owned()))?;
+        let field = fields[at];
+        if kinds[at] != b"F" || ![4, 8].contains(&field.size) || field.count != 1 {
+            let kind = String::from_utf8_lossy(&kinds[at]).into_owned();
+            return Err(refuse(&expected, format!("{kind} {} {}", field.size, field.count)));
+        }
+        // What all of them come to was counted above.
+        let before = &fields[..at];
+        let value = before.iter().map(|field| field.count).sum();
+        *axis = Axis { value, byte: before.iter().map(bytes).sum(), is_f64: field.size == 8 };
+    }
+    let of_width = width.and_then(|width: u64| width.checked_mul(height));
+    let n = points
+        .or(of_width)
+        .ok_or_else(|| refuse("POINTS, or WIDTH and HEIGHT", "neither".to_owned()))?;
+    Ok(Header { axes, n_values, stride, n, data, n_lines, n_bytes })
+}
+
+fn ascii(
+    path: &Path,
+    reader: BufReader<File>,
+    header: &Header,
+    len: u64,
+) -> Result<Vec<[f64; 3]>, Error> {
+    // A value takes a digit and a separator; the last one of the file only the digit.
+    let most = (len.saturating_sub(header.n_bytes) + 1) / header.n_values.saturating_mul(2);
+    if header.n > most {
+        let expected = format!("at most {most} points (by the size of the file)");
+        return Err(Error::new(path, "header", expected, header.n.to_string()));
+    }
+    let mut lines = Lines::continuing(path, reader, header.n_lines);
+    let mut positions = Vec::with_capacity(header.n as usize);
+    for at in 1..=header.n {
+        if !lines.advance_to_data()? {
+            return Err(lines.end_error(format!("point {at} of {}", header.n)));
+        }
+        let mut position = [f64::NAN; 3];
+        let mut n_words = 0;
+        for word in words(lines.line()) {
+            for (axis, value) in header.axes.iter().zip(&mut position) {
+                if axis.value == n_words {
+                    *value = number(word)
+                        .ok_or_else(|| lines.error("a number for a coordinate", quoted(word)))?;
+                }
+            }
+            n_words += 1;
+        }
+        if n_words != header.n_values {
+            let expected = format!("{} values of point {at}", header.n_values);
+            return Err(lines.error(expected, n_words.to_string()));
+        }
+        positions.push(position);
+    }
+    if lines.advance_to_data()? {
+        let expected = format!("end of file after {} points", header.n);
+        return Err(lines.error(expected, quoted(lines.line())));
+    }
+    Ok(positions)
+}
+
+fn binary(
+    path: &Path,
+    reader: BufReader<File>,
+    header: &Header,
+    len: u64,
+) -> Result<Vec<[f64; 3]>, Error> {
+    let mut bytes = Bytes::continuing(path, reader, header.n_bytes, len);
+    let (n, stride) = (header.n, header.stride);
+    if n.checked_mul(stride).is_none_or(|size| size > bytes.remaining()) {
+        let expected = format!("{n} points, {stride} bytes each");
+        return Err(bytes.error_ahead(expected, format!("{} bytes", bytes.remaining())));
+    }
+    let mut row = vec![0; stride as usize];
+    let mut positions = Vec::with_capacity(n as usize);
+    for number in 1..=n {
+        bytes.record(number);
+        bytes.fill(&mut row, "point")?;
+        positions.push(header.axes.map(|axis| coordinate(&row, axis.byte, axis.is_f64)));
+    }
+    Ok(positions)
+}
+
+/// All values of a field stand together, field by field, and the whole is compressed.
+fn compressed(
+    path: &Path,
+    reader: BufReader<File>,
+    header: &Header,
+    len: u64,
+) -> Result<Vec<[f64; 3]>, Error> {
+    let mut bytes = Bytes::continuing(path, reader, header.n_bytes, len);
+    let packed = u64::from(bytes.u32("the size of the compressed points")?);
+    let size = u64::from(bytes.u32("the size of the points")?);
+    let (n, stride) = (header.n, header.stride);
+    if n.checked_mul(stride) != Some(size) {
+        return Err(
+            bytes.error(format!("{n} points, {stride} bytes each"), format!("{size} bytes"))
+        );
+    }
+    if packed > bytes.remaining() {
+        let expected = format!("{packed} bytes of compressed points");
+        return Err(bytes.error_ahead(expected, bytes.remaining().to_string()));
+    }
+    let budget = Budget::new(path, len);
+    budget.admit("points", size.saturating_add(n.saturating_mul(24)))?;
+    let mut values = vec![0; packed as usize];
+    bytes.fill(&mut values, "compressed points")?;
+    let Some(values) = unpacked(&values, size as usize) else {
+        let expected = format!("{size} bytes when unpacked");
+        return Err(bytes.error(expected, "others, or damaged ones"));
+    };
+    let at = |axis: &Axis, point: u64| {
+        let size = if axis.is_f64 { 8 } else { 4 };
+        coordinate(&values, n * axis.byte + size * point, axis.is_f64)
+    };
+    Ok((0..n).map(|point| header.axes.each_ref().map(|axis| at(axis, point))).collect())
+}
+
+/// The float at byte `at`, which is among `bytes`.
+fn coordinate(bytes: &[u8], at: u64, is_f64: bool) -> f64 {
+    let byte = |offset: usize| bytes[at as usize + offset];
+    match is_f64 {
+        true => f64::from_le_bytes(std::array::from_fn(byte)),
+        false => f64::from(f32::from_le_bytes(std::array::from_fn(byte))),
+    }
+}
