@@ -169,6 +169,17 @@ mod tests {
     }
 
     #[test]
+    fn points_that_are_handed_over_are_not_copied() {
+        let meters = Preparation { scale: Some(1.0), ..PLAIN };
+        let points = line(9);
+        let lent = prepare(&points, None, &meters).unwrap();
+        let place = points.as_ptr();
+        let given = prepare(points, None, &meters).unwrap();
+        assert_eq!(given.original.reveal().positions().as_ptr(), place);
+        assert_eq!(given.original.reveal(), lent.original.reveal());
+    }
+
+    #[test]
     fn too_few_points_are_told() {
         let error = prepare(line(2), None, &PLAIN).unwrap_err();
         assert_eq!(error.to_string(), "points: expected at least 3 (K + 1), found 2");
