@@ -1,11 +1,8 @@
 //! One audit of images from a source of features to what it found, and to the files in its folder.
 
 use std::cell::RefCell;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::time::Instant;
+use std::path::Path;
 
-use serde_json::{Map, Value};
 use unlift::audit::{self, Cell, Observer, Outcome, Plan, Row, run_images};
 use unlift_io::atomic::OutputSet;
 use unlift_io::hash::{hash_file, hash_files, hash_list};
@@ -14,46 +11,14 @@ use unlift_report::document::{ImageCounts, ImageFigures, Input};
 
 use super::FeatureSource;
 use super::drawn::drawn;
+pub use super::job::ImagesJob;
 use super::stream::{Needs, Stream, Tally};
 use crate::Error;
 use crate::audited::{Audited, Finished};
 use crate::document::{self, Found, Provenance};
-use crate::gate::{Gate, check_gates, gate_results};
-use crate::inversion::Inversion;
+use crate::gate::{check_gates, gate_results};
 use crate::maps::{curve_errors, curves_of};
 use crate::progress::Progress;
-
-/// Everything an audit of images needs.
-pub struct ImagesJob<'a> {
-    /// Where images are.
-    pub source: &'a FeatureSource,
-    /// The same as the user named it; of images in memory what errors call them.
-    pub path: &'a Path,
-    /// Numbers of the images to be used, rising.
-    pub chosen: Vec<usize>,
-    /// What is to be done.
-    pub plan: Plan<2>,
-    /// Options for the record, beside those in the plan.
-    pub options: Map<String, Value>,
-    /// Bounds to hold.
-    pub gates: Vec<Gate>,
-    /// Numbers of the images to draw; `None` chooses.
-    pub show: Option<Vec<usize>>,
-    /// Folder of photos, where the source is a file.
-    pub photos: Option<PathBuf>,
-    /// Folder to write.
-    pub out: PathBuf,
-    /// Figures only.
-    pub share_safe: bool,
-    /// Makes pictures of what comes back; the plan measures with it, too.
-    pub inversion: Option<Arc<Inversion>>,
-    /// Hears how it goes.
-    pub progress: &'a dyn Progress,
-    /// The command line, for the record.
-    pub command: Option<String>,
-    /// When the command began.
-    pub started: Instant,
-}
 
 /// What became of the images.
 #[derive(Clone, Copy, Debug)]

@@ -11,7 +11,7 @@ use unlift_report::inversions::Inversion as Inverted;
 use unlift_report::pictures::Picture;
 
 use super::FeatureSource;
-use super::audit::ImagesJob;
+use super::job::ImagesJob;
 use super::pictures::Album;
 use super::stream::{Needs, Stream, Tally, lacking};
 use crate::Error;

@@ -6,6 +6,7 @@ mod drawn;
 pub mod extraction;
 mod folder;
 mod in_memory;
+mod job;
 pub mod parts;
 mod pictures;
 pub mod stream;
