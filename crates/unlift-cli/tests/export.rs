@@ -99,3 +99,39 @@ fn what_cannot_be_shown_is_told_and_what_is_not_ours_stays() {
         place.ends("export back.parquet --out again", 0);
     }
 }
+
+#[test]
+fn nerfstudio_gets_cameras_and_points() {
+    let place = recovered("olc");
+    let model = place.path("project/sparse/0");
+    fs::create_dir_all(&model).unwrap();
+    fs::write(model.join("cameras.txt"), "1 PINHOLE 640 480 500 500 320 240\n").unwrap();
+    fs::write(model.join("images.txt"), "1 1 0 0 0 -1 -2 3 1 a.jpg\n\n").unwrap();
+    fs::write(model.join("points3D.txt"), "1 0 0 0 0 0 0 0\n").unwrap();
+    let line =
+        "export hidden/truth.parquet --scale 0.5 --cameras project --out nerf/transforms.json";
+    for _ in 0..2 {
+        let (told, _) = place.ends(line, 0);
+        assert_eq!(told, "400 points and 1 images, in nerf/transforms.json\n");
+    }
+    let map = read::open(&place.path("nerf")).expect("a map");
+    assert_eq!((map.format, map.cameras), ("nerfstudio", vec![[1.0, 2.0, -3.0]]));
+    let room = unlift::synthetic::room(1, 400).points;
+    for (read, known) in map.positions.iter().zip(&room) {
+        assert!((0..3).all(|c| (read[c] - known[c]).abs() < 1e-9), "{read:?} {known:?}");
+    }
+    let refused = |line: &str| place.ends(&format!("export {line}"), 2).1;
+    assert_eq!(
+        refused("hidden/truth.parquet --out other.json"),
+        "unlift: --out: expected transforms.json, as nerfstudio calls it, found other.json\n"
+    );
+    assert_eq!(
+        refused("hidden/truth.parquet --out transforms.json"),
+        "unlift: --cameras: expected with --out transforms.json, found none\n"
+    );
+    // Somebody else's stays.
+    fs::write(place.path("nerf/transforms.json"), "{\"frames\": []}").unwrap();
+    assert!(
+        refused(&line["export ".len()..]).contains("expected nothing, or cameras for nerfstudio")
+    );
+}

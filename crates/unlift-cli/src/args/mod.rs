@@ -126,7 +126,7 @@ pub enum Command {
     Recover(RecoverArgs),
     /// Compare recovered points with the truth
     Evaluate(EvaluateArgs),
-    /// Released, recovered or true points as other programs read them: PLY, OBJ, a COLMAP model
+    /// Released, recovered or true points as other programs read them: PLY, OBJ, a COLMAP model, nerfstudio
     Export(ExportArgs),
     /// The figures of an audit as a table for a paper, and as curves
     Table(TableArgs),

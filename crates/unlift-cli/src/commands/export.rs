@@ -8,8 +8,8 @@ use unlift::{OneLine, Unit};
 use unlift_audit::{check_file, refused};
 use unlift_io::atomic::{Access, Kind, OutputSet, Rules};
 use unlift_io::clouds::{
-    Segment, record_segments, write_cameras, write_images, write_lines, write_model_points,
-    write_points,
+    NERFSTUDIO_CLOUD, Segment, record_segments, write_cameras, write_images, write_lines,
+    write_model_points, write_points, write_transforms,
 };
 use unlift_io::read::{self, colmap};
 use unlift_io::stage::{Kind as Stage, peek, read_recovered, read_released, read_truth};
@@ -17,6 +17,9 @@ use unlift_io::stage::{Kind as Stage, peek, read_recovered, read_released, read_
 use crate::args::ExportArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::print;
+
+/// The file of nerfstudio's cameras.
+const TRANSFORMS: &str = "transforms.json";
 
 /// What a stage file shows.
 enum Shown {
@@ -41,6 +44,7 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<Outcome> {
             let shown = scaled(args, read(&args.path)?)?;
             cloud(args, ending, &shown)?
         }
+        Some("json") => transforms(args, rules)?,
         _ => model(args, rules)?,
     };
     print(&format!("{n}, in {}\n", OneLine(args.out.display())))?;
@@ -82,13 +86,7 @@ fn model(args: &ExportArgs, rules: Rules) -> anyhow::Result<String> {
     };
     let (cameras, images) = match &args.cameras {
         None => (Vec::new(), Vec::new()),
-        Some(project) => match read::open(project)?.model {
-            Some(folder) => colmap::read_views(&folder)?,
-            None => {
-                let expected = "a COLMAP model with cameras";
-                return Err(unlift_io::Error::new(project, "", expected, "only points").into());
-            }
-        },
+        Some(project) => views(project)?,
     };
     let [cameras_txt, images_txt, points_txt] = names.map(|name| out.stage(name, Kind::Model));
     write_cameras(&cameras_txt?, &cameras)?;
@@ -97,6 +95,46 @@ fn model(args: &ExportArgs, rules: Rules) -> anyhow::Result<String> {
     out.commit()?;
     let n = points.iter().flatten().count();
     Ok(format!("a model of {n} points, {} cameras and {} images", cameras.len(), images.len()))
+}
+
+/// Writes nerfstudio's cameras, and the points beside them.
+fn transforms(args: &ExportArgs, rules: Rules) -> anyhow::Result<String> {
+    let name = args.out.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    if name != TRANSFORMS {
+        let expected = format!("expected {TRANSFORMS}, as nerfstudio calls it");
+        return Err(usage(format!("--out: {expected}, found {}", OneLine(args.out.display()))));
+    }
+    let Some(project) = &args.cameras else {
+        return Err(usage("--cameras: expected with --out transforms.json, found none"));
+    };
+    let folder = args.out.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let first = [(TRANSFORMS, Kind::Transforms), (NERFSTUDIO_CLOUD, Kind::Cloud)];
+    let folder = folder.unwrap_or(Path::new("."));
+    let mut out = OutputSet::create(folder, rules, Access::Private, &first).map_err(refused)?;
+    let Shown::Points(points) = scaled(args, read(&args.path)?)? else {
+        let found = "lines or rays";
+        let error = unlift_io::Error::new(&args.path, "", "points, for nerfstudio", found);
+        return Err(advise(error, "--out NAME.obj"));
+    };
+    let (cameras, images) = views(project)?;
+    let points: Vec<[f64; 3]> = points.into_iter().flatten().collect();
+    let [json, cloud] = first.map(|(name, kind)| out.stage(name, kind));
+    write_transforms(&json?, &cameras, &images).map_err(|error| error.at(&args.out))?;
+    // Gray: nerfstudio takes no cloud without colors.
+    write_points(&cloud?, &points, Some(&vec![[128; 3]; points.len()]))?;
+    out.commit()?;
+    Ok(format!("{} points and {} images", points.len(), images.len()))
+}
+
+/// Cameras and images of a COLMAP project.
+fn views(project: &Path) -> anyhow::Result<(Vec<colmap::Camera>, Vec<colmap::Image>)> {
+    match read::open(project)?.model {
+        Some(folder) => Ok(colmap::read_views(&folder)?),
+        None => {
+            let expected = "a COLMAP model with cameras";
+            Err(unlift_io::Error::new(project, "", expected, "only points").into())
+        }
+    }
 }
 
 /// What the file at `path` shows, and the unit of its lengths.

@@ -22,6 +22,8 @@ pub enum Kind {
     Cloud,
     /// A file of a COLMAP model in text whose first line is `MODEL_MARK`.
     Model,
+    /// nerfstudio's cameras: an object with a text `unlift` and a list `frames`.
+    Transforms,
     /// HDF5 with `FEATURES_MARK` behind the superblock.
     Features,
     /// A PNG whose first chunk of text names unlift, as [`marked_picture`] has it.
@@ -77,6 +79,9 @@ impl Kind {
             Self::Stage(kind) => stage::declared_kind(path) == Some(kind),
             Self::Cloud => start(path, 256).is_some_and(|head| is_cloud(&head)),
             Self::Model => begins(path, &[MODEL_MARK]),
+            Self::Transforms => {
+                is_json(path, |map| map["unlift"].is_string() && map["frames"].is_array())
+            }
             Self::Features => start(path, 128).is_some_and(|head| {
                 head.starts_with(b"\x89HDF\r\n\x1a\n") && head.get(96..) == Some(&FEATURES_MARK[..])
             }),
@@ -100,6 +105,7 @@ impl fmt::Display for Kind {
             Self::Stage(kind) => kind.fmt(f),
             Self::Cloud => f.write_str("a cloud"),
             Self::Model => f.write_str("a model"),
+            Self::Transforms => f.write_str("cameras for nerfstudio"),
             Self::Features => f.write_str("features"),
             Self::Picture => f.write_str("a picture"),
             Self::Junit => f.write_str("gates as JUnit XML"),
@@ -156,13 +162,15 @@ mod tests {
             Kind::Page,
             Kind::Stage(stage::Kind::Truth),
             Kind::Cloud,
+            Kind::Transforms,
             Kind::Features,
             Kind::Junit,
             Kind::Sarif,
             Kind::Table,
             Kind::Curves,
         ];
-        let of_others: [&[u8]; 13] = [
+        let of_others: [&[u8]; 14] = [
+            br#"{"frames": [], "ply_file_path": "sparse_pc.ply"}"#,
             b"",
             b"{}",
             // What `npm audit --json` writes, in short.
