@@ -91,7 +91,7 @@ def audit_maps(batches: Iterable[_pa.RecordBatch], **options: Any) -> Iterator[_
             except UnliftError as error:
                 yield _batch([{"item": path, "error": str(error)}])
                 continue
-            yield rows_of(str(path), report.document)
+            yield _rows_of(str(path), report.document)
 
 
 def audit_images(batches: Iterable[_pa.RecordBatch], **options: Any) -> Iterator[_pa.RecordBatch]:
@@ -121,7 +121,7 @@ def audit_images(batches: Iterable[_pa.RecordBatch], **options: Any) -> Iterator
             except UnliftError as error:
                 yield _batch([{"item": image["name"], "error": str(error)}])
                 continue
-            yield rows_of(image["name"], report.document)
+            yield _rows_of(image["name"], report.document)
 
 
 def _features(image: dict[str, Any]) -> Features:
@@ -143,7 +143,7 @@ def _features(image: dict[str, Any]) -> Features:
     return found
 
 
-def rows_of(item: str, document: dict[str, Any]) -> _pa.RecordBatch:
+def _rows_of(item: str, document: dict[str, Any]) -> _pa.RecordBatch:
     """The rows of one audit, under the name of its item."""
     notes = document.get("notes") or []
     rows = [{**_figures(row), "item": item, "notes": notes} for row in document["results"]]

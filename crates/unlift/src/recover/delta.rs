@@ -53,12 +53,15 @@ const BEYOND_EDGE: f64 = 2.25;
 /// where a source gives scores, at most so many times, as its wrong entries look alike.
 const BEYOND_EDGE_OF_SCORED: f64 = 2.0;
 
-/// The least chance of candidates, as a multiple of the share of all records that a list holds. Partners of exchanges agree exactly, so
-/// that evidence hardly falls as delta shrinks, and on maps of a few hundred points luck decides how far. But if points lie on
+/// A delta of candidates that is so many times below the least one is luck's. Partners of exchanges agree exactly, so that evidence
+/// hardly falls as delta shrinks, and on maps of a few hundred points or on lattices nothing says how far. Nearer to the least one it
+/// is the map's: points on a curve have neighbors within less.
+const COLLAPSED: f64 = 4.0;
+/// The chance at that least delta, as a multiple of the share of all records that a list holds: if points lie on
 /// surfaces, one line passes as near as neighbors are with a chance of that share, and a record has three.
 const LEAST_OF_CANDIDATES: f64 = 3.0;
 /// But no more than this: of a list that names a good part of all records it would be as wide as the map.
-const MOST_OF_LEAST: f32 = 0.25;
+const MOST_OF_LEAST: f64 = 0.25;
 /// Their least delta in flat maps, as a share of the radius within which a list's neighbors are.
 const LEAST_OF_FLAT: f64 = 0.5;
 
@@ -84,7 +87,8 @@ pub(super) fn learn<const D: usize>(
     let per_list = given.records().len() as f64 / given.n_slots().max(1) as f64;
     let share = per_list / released.n_records().max(1) as f64;
     let chosen = choose(family, used, prefer, (least, share), seed).unwrap_or(1.0);
-    chosen.max(least_of_candidates(family, share))
+    let least = least_of_candidates(family, share);
+    if COLLAPSED * chosen < least { least } else { chosen }
 }
 
 /// The least delta of the candidates of a map, where a list holds a `share` of all records; 0 of other families, and in images.
@@ -94,8 +98,8 @@ fn least_of_candidates<const D: usize>(family: &Family<'_, D>, share: f64) -> f6
     {
         return 0.0;
     }
-    let least = (LEAST_OF_CANDIDATES * share).min(f64::from(MOST_OF_LEAST)) as f32;
-    // Chance grows with delta: between nothing and the extent, halved until 24 bits are known.
+    let least = (LEAST_OF_CANDIDATES * share).min(MOST_OF_LEAST) as f32;
+    // Chance grows with delta: it is between nothing and the extent, more exactly so than 32 bits are.
     let (mut below, mut above) = (0.0, family.extent());
     for _ in 0..48 {
         let middle = 0.5 * (below + above);
@@ -168,9 +172,9 @@ fn choose<const D: usize>(
     // Some steps of the ladder lie between the two.
     let too_narrow = narrow.at(share).min(too_wide / 8.0);
     // In a flat map two of a record's three lines cross all of it.
-    let flat = family.radius_if_flat(share).filter(|_| settings.limits_by_share);
-    let too_wide =
-        flat.map_or(too_wide, |radius| too_wide.max(family.typical_chance(radius as f32)));
+    let too_wide = family
+        .radius_if_flat(share)
+        .map_or(too_wide, |radius| too_wide.max(family.typical_chance(radius as f32)));
     // Few points are far apart: at least one halving lies between the two limits.
     let too_wide = too_wide.max(family.typical_chance((2.0 * least) as f32));
     // The fine ladder reaches beyond the coarse one, but not where its limit is one of an image.

@@ -26,6 +26,8 @@ const CROSSINGS: usize = 1 << 12;
 const TRIM: f64 = 0.03;
 /// Every place has at least this share of the mean density: where no record was counted one vote would prove all.
 const FLOOR: f32 = 0.05;
+/// A map is flat if neighborhoods are more than so many times as wide as it is thin.
+const FLAT: f64 = 2.0;
 
 /// The density of records, per cell.
 #[derive(Clone, Debug)]
@@ -298,22 +300,16 @@ impl<const D: usize> CandidateField<D> {
         self.along.iter().zip(&tubes).map(|(field, tube)| field.typical() * tube).sum()
     }
 
-    /// Where the box of the map is thinner than a ball that holds a `share` of it: the radius about a place within which so
-    /// many points are, if they fill the box evenly; `None` of other boxes.
+    /// Where the box of the map is much thinner than its neighborhoods are wide: the radius of the disc that holds a `share` of
+    /// it; `None` of other boxes.
     pub(crate) fn radius_if_flat(&self, share: f64) -> Option<f64> {
         // Each field lacks the extent along its own axis.
         let side = |c: usize| f64::from(self.along[(c + 1) % D].grid.sides()[c]);
         let mut sides: [f64; D] = std::array::from_fn(side);
         sides.sort_unstable_by(f64::total_cmp);
-        let [thin, .., long] = sides[..] else { return None };
-        let volume: f64 = sides.iter().product();
-        let ball = libm::cbrt(0.75 / std::f64::consts::PI * share * volume);
-        let disc = (share * volume / thin / std::f64::consts::PI).sqrt();
-        match sides[..] {
-            [_, middle, _] if 2.0 * ball > thin && 2.0 * disc <= middle => Some(disc),
-            [_, _, _] if 2.0 * ball > thin => Some(0.5 * share * long),
-            _ => None,
-        }
+        let [thin, middle, long] = sides[..] else { return None };
+        let radius = (share * middle * long / std::f64::consts::PI).sqrt();
+        (FLAT * thin < radius && 2.0 * radius <= middle).then_some(radius)
     }
 
     /// Volume per length of what is within `delta` of a line along each axis: of a map that is flat no more of it than lies

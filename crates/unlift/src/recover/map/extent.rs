@@ -14,19 +14,16 @@ pub(crate) fn interquartile_range(sorted: &[f32]) -> f64 {
     f64::from(sorted[last - last / 4]) - f64::from(sorted[last / 4])
 }
 
-/// The range that holds half of sorted values: that between their quartiles, or less where they lie in parts far from
-/// one another. Four times the width of an eighth of them, about a typical value, is as much where they are spread evenly;
-/// only quartiles `FAR_APART` times as far from one another say that there are parts, so that walls do not.
-pub(crate) fn range_of_half(sorted: &[f32]) -> f64 {
-    let quartiles = interquartile_range(sorted);
+/// Whether sorted values lie in parts far from one another: four times the width of an eighth of them, about a typical
+/// value, is as much as the distance of their quartiles where they are spread evenly.
+pub(crate) fn are_in_parts(sorted: &[f32]) -> bool {
     let many = sorted.len() / 8;
     if many == 0 {
-        return quartiles;
+        return false;
     }
     let width = |at: usize| f64::from(sorted[at + many]) - f64::from(sorted[at]);
     let mut widths: Vec<f64> = (0..sorted.len() - many).map(width).collect();
-    let local = 4.0 * median(&mut widths);
-    if FAR_APART * local < quartiles { local } else { quartiles }
+    FAR_APART * 4.0 * median(&mut widths) < interquartile_range(sorted)
 }
 
 fn length<const D: usize>(v: &[f32; D]) -> f64 {

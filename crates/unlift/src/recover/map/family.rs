@@ -132,7 +132,7 @@ impl<'a, const D: usize> Family<'a, D> {
     /// A length of the order of the map's size, from the records alone; 0 for an empty map.
     ///
     /// Lines: their median distance from the place they pass nearest. Rays: the largest distance between
-    /// centers. Planes: the largest range that holds half of an axis. Candidates: the largest interquartile range over the axes.
+    /// centers. Planes and candidates: the largest interquartile range over the axes.
     pub(crate) fn extent(&self) -> f64 {
         match self {
             Self::Lines { rows, .. } => {
@@ -141,7 +141,7 @@ impl<'a, const D: usize> Family<'a, D> {
                 };
                 if first.is_ray() { ray_extent(rows) } else { line_extent(rows) }
             }
-            Self::Planes { sorted, .. } => sorted.range(),
+            Self::Planes { sorted, .. } => sorted.extent(),
             Self::Candidates { rows, .. } => (0..D)
                 .map(|axis| {
                     let mut column: Vec<f32> = rows.iter().map(|row| row[axis]).collect();

@@ -1,18 +1,30 @@
 //! Axis planes: the free coordinates separate, each is the densest window of offsets.
 
 use super::evidence::evidence;
-use super::extent::range_of_half;
+use super::extent::{are_in_parts, interquartile_range};
 use super::lanes::ln;
 use crate::RecordId;
+use crate::geometry::vector::median;
 use crate::released::AxisPlanes;
 
 /// The planes of each axis in order of their offsets.
 #[derive(Clone, Debug)]
 pub(crate) struct SortedPlanes {
-    by_axis: Vec<Vec<u32>>,
-    /// The largest range that holds half of the offsets of an axis.
-    range: f64,
+    by_axis: Vec<Sorted>,
 }
+
+/// The planes of one axis.
+#[derive(Clone, Debug)]
+struct Sorted {
+    order: Vec<u32>,
+    /// The distance between the quartiles of their offsets.
+    quartiles: f64,
+    /// Their offsets where the map is in parts along this axis, so that quartiles say little; else none.
+    in_parts: Vec<f32>,
+}
+
+/// Places at which planes are counted to learn what is typical.
+const PLACES: usize = 1 << 10;
 
 impl SortedPlanes {
     /// Sorts the planes of each axis.
@@ -22,25 +34,44 @@ impl SortedPlanes {
             by_axis[usize::from(axis)].push(record as u32);
         }
         let offset = |record: u32| planes.offset()[record as usize];
-        let mut range = 0.0;
-        for order in &mut by_axis {
+        let sorted = |mut order: Vec<u32>| {
             order.sort_unstable_by(|&a, &b| offset(a).total_cmp(&offset(b)).then(a.cmp(&b)));
-            let offsets: Vec<f32> = order.iter().map(|&record| offset(record)).collect();
-            range = f64::max(range, range_of_half(&offsets));
-        }
-        Self { by_axis, range }
+            let mut offsets: Vec<f32> = order.iter().map(|&record| offset(record)).collect();
+            let quartiles = interquartile_range(&offsets);
+            if !are_in_parts(&offsets) {
+                offsets = Vec::new();
+            }
+            Sorted { order, quartiles, in_parts: offsets }
+        };
+        Self { by_axis: by_axis.into_iter().map(sorted).collect() }
     }
 
-    /// The largest range that holds half of the offsets of an axis.
-    pub(crate) fn range(&self) -> f64 {
-        self.range
+    /// The largest interquartile range of the offsets of an axis.
+    pub(crate) fn extent(&self) -> f64 {
+        self.by_axis.iter().map(|axis| axis.quartiles).fold(0.0, f64::max)
     }
 
     /// How likely a random plane of any axis passes within `delta` of a typical place.
     pub(crate) fn typical_chance(&self, delta: f32) -> f32 {
-        // Half of the planes of an axis lie within it.
-        (f64::from(delta) / self.range.max(f64::from(f32::MIN_POSITIVE))).min(0.5) as f32
+        let of_axis = |axis: &Sorted| match axis.in_parts.is_empty() {
+            // Half of the planes lie between their quartiles.
+            true => (f64::from(delta) / axis.quartiles.max(f64::from(f32::MIN_POSITIVE))) as f32,
+            false => typical_share(&axis.in_parts, delta),
+        };
+        self.by_axis.iter().map(of_axis).fold(0.5, f32::min)
     }
+}
+
+/// The share of sorted `offsets` within `delta` of a typical one of them.
+fn typical_share(offsets: &[f32], delta: f32) -> f32 {
+    let within = |&at: &f32| {
+        let low = offsets.partition_point(|&offset| offset < at - delta);
+        let high = offsets.partition_point(|&offset| offset <= at + delta);
+        (high - low) as f64 / offsets.len() as f64
+    };
+    let every = offsets.len().div_ceil(PLACES);
+    let mut shares: Vec<f64> = offsets.iter().step_by(every).map(within).collect();
+    median(&mut shares) as f32
 }
 
 /// How likely a random plane of the same axis falls into the window that starts at each plane.
@@ -58,7 +89,7 @@ impl WindowChance {
         delta: f32,
     ) -> Self {
         let mut probability = vec![0.0; planes.len()];
-        for order in &sorted.by_axis {
+        for Sorted { order, .. } in &sorted.by_axis {
             let mut end = 0;
             for (start, &record) in order.iter().enumerate() {
                 let reach = planes.offset()[record as usize] + 2.0 * delta;
