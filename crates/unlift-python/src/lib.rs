@@ -4,6 +4,7 @@
 //! arrays, paths ──> Map ──> obfuscate ──> Hidden { Released, Truth }
 //!                    │          Released ──> neighbors ──> Neighborhoods ──> recover ──> Recovered ──> evaluate
 //!                    └──> audit (schemes and sources may be functions) ──> Report
+//!                                    Released, Neighborhoods ──prepare──> Model ──solve_part, join──> Recovered
 //! arrays by name, paths ──> audit_images (as above) ────────────────────────┘
 //! ```
 //!
@@ -25,6 +26,7 @@ mod lists;
 mod map;
 mod obfuscate;
 mod own;
+mod parts;
 mod plan;
 mod records;
 mod recovered;
@@ -53,6 +55,8 @@ mod _unlift {
     use super::map::{Map, read};
     #[pymodule_export]
     use super::obfuscate::obfuscate;
+    #[pymodule_export]
+    use super::parts::{Model, prepare};
     #[pymodule_export]
     use super::records::{Candidates, Lines, Planes, Rays, Records};
     #[pymodule_export]

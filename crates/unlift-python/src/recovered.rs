@@ -112,13 +112,7 @@ pub fn recover(
     threads: Option<usize>,
 ) -> PyResult<Recovered> {
     let released = released_of(released)?.of_map()?;
-    let options = RecoverOptions {
-        solver: Solver::from_name(solver).map_err(raised)?,
-        delta: self::delta(delta)?,
-        seed,
-        exact_constraints,
-        ..RecoverOptions::default()
-    };
+    let options = options(solver, delta, seed, exact_constraints)?;
     let fingerprint = Some(released.fingerprint());
     if lists.0.about().map.is_some_and(|map| Some(map) != fingerprint) {
         return Err(wrong("lists", "lists of this released map", "those of another"));
@@ -126,6 +120,22 @@ pub fn recover(
     let lists = Arc::clone(&lists.0);
     let found = work::run(py, threads, None, move || solve(&released, &lists, &options))?;
     Ok(Recovered(Arc::new(found)))
+}
+
+/// Options of recovery as arguments say them.
+pub fn options(
+    solver: &str,
+    delta: Option<f64>,
+    seed: u64,
+    exact_constraints: bool,
+) -> PyResult<RecoverOptions> {
+    Ok(RecoverOptions {
+        solver: Solver::from_name(solver).map_err(raised)?,
+        delta: self::delta(delta)?,
+        seed,
+        exact_constraints,
+        ..RecoverOptions::default()
+    })
 }
 
 /// The figures of what came back, as a row of an audit has them: a dict. With a Hidden also those of a blind guess.

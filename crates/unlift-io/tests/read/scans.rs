@@ -47,3 +47,21 @@ fn e57_brings_its_scans_into_one_frame() {
     same(&input, "E57", 1e-12);
     assert_eq!(input.skipped, ["1 of 4 points have no place", "read, all 2 scans, in one frame"]);
 }
+
+/// `fuzz/seeds` asks for these files: a byte that says of which kind, as the target `points` reads it, and the scan.
+#[test]
+#[ignore = "writes seeds of fuzzing into the folder UNLIFT_SEEDS"]
+fn seeds_of_fuzzing() {
+    let folder = std::path::PathBuf::from(std::env::var_os("UNLIFT_SEEDS").expect("UNLIFT_SEEDS"));
+    let put = |name: &str, kind: u8, bytes: Vec<u8>| {
+        std::fs::write(folder.join(name), [vec![kind], bytes].concat()).unwrap();
+    };
+    put("las-1.2", 7, made::las(2, 20));
+    put("las-1.4", 7, made::las(4, 25));
+    for data in ["ascii", "binary", "binary_compressed"] {
+        put(&format!("pcd-{data}"), 8, made::pcd(data));
+    }
+    let dir = tempfile::tempdir().unwrap();
+    made::e57(&dir.path().join("a.e57"));
+    put("e57", 9, std::fs::read(dir.path().join("a.e57")).unwrap());
+}

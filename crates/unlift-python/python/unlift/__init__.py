@@ -23,7 +23,7 @@ Images are keypoints in pixels, by name:
 
 from __future__ import annotations
 
-from . import fleet, neighbors, testing, viewer
+from . import fleet, neighbors, parts, testing, viewer
 from ._audits import Features, audit, audit_images
 from ._plugins import scheme, source
 from ._report import Report, Table
@@ -38,6 +38,7 @@ from ._unlift import (
     Hidden,
     Lines,
     Map,
+    Model,
     Neighborhoods,
     Planes,
     Rays,
@@ -49,6 +50,7 @@ from ._unlift import (
     __version__,
     evaluate,
     obfuscate,
+    prepare,
     read,
     recover,
 )
@@ -65,6 +67,7 @@ __all__ = [
     "Hidden",
     "Lines",
     "Map",
+    "Model",
     "Neighborhoods",
     "Planes",
     "Rays",
@@ -82,6 +85,8 @@ __all__ = [
     "fleet",
     "neighbors",
     "obfuscate",
+    "parts",
+    "prepare",
     "read",
     "recover",
     "scheme",

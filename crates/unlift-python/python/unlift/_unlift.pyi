@@ -242,6 +242,39 @@ def recover(
     exact_constraints: bool = True,
     threads: int | None = None,
 ) -> Recovered: ...
+
+@final
+class Model:
+    @staticmethod
+    def from_bytes(bytes: bytes) -> Model: ...
+    def to_bytes(self) -> bytes: ...
+    @property
+    def delta(self) -> float: ...
+    @property
+    def solver(self) -> str: ...
+    def solve_part(
+        self,
+        released: Released | Hidden,
+        first: int,
+        offsets: npt.ArrayLike,
+        records: npt.ArrayLike,
+        *,
+        threads: int | None = None,
+    ) -> dict[str, npt.NDArray[Any] | None]: ...
+    def join(
+        self, released: Released | Hidden, columns: dict[str, npt.NDArray[Any] | None]
+    ) -> Recovered: ...
+
+def prepare(
+    released: Released | Hidden,
+    lists: Neighborhoods,
+    *,
+    solver: str = "consensus",
+    delta: float | None = None,
+    seed: int = 0,
+    exact_constraints: bool = True,
+    threads: int | None = None,
+) -> Model: ...
 def evaluate(
     recovered: Recovered, truth: Truth | Hidden, *, thresholds: list[float | str] | None = None
 ) -> dict[str, Any]: ...

@@ -4,6 +4,10 @@
     rows = unlift.spark.audit_maps(tasks.repartition(8), schemes=["olc", "ppl"], inlier_ratios=[0.5])
     rows.where("recovered_percent['0.10'] > 20").show()
 
+One map whose lists are spread over the cluster:
+
+    found = unlift.spark.recover(spark.read.parquet("lists"), "released.parquet", model)
+
 Every executor needs this package. A task that is lost with its executor is run again by Spark, to the same rows.
 """
 
@@ -12,13 +16,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from . import fleet
+from . import fleet, parts
+from ._unlift import Model, Released
 
 if TYPE_CHECKING:
     import pyarrow as _pa  # type: ignore[import-untyped,unused-ignore]
     from pyspark.sql import DataFrame as _DataFrame  # type: ignore[import-not-found,unused-ignore]
 
-__all__ = ["audit_images", "audit_maps"]
+__all__ = ["audit_images", "audit_maps", "recover"]
 
 #: The schema of rows, as Spark writes it.
 _ROWS = ", ".join(f"{name} {of}" for name, of in fleet.ROWS.items())
@@ -39,6 +44,33 @@ def audit_images(images: _DataFrame, **options: Any) -> _DataFrame:
     options: those of `unlift.audit_images`; `threads` is 1 unless it is said.
     """
     return _over(images, "audit_images", options)
+
+
+def recover(lists: _DataFrame, released: str, model: Model, *, n_parts: int | None = None) -> _DataFrame:
+    """`unlift.parts.recover` on every part of `lists`: columns `slot` and `records`, in any order and partitions.
+
+    released: the file of the released map, where every executor reads it.
+    model: what `unlift.prepare` learned of it and all of its lists.
+    n_parts: how many parts; Spark's own number of shuffle partitions unless it is said. Each reads all records once.
+
+    `unlift.parts.join(found.toArrow().to_batches(), ..)` makes of the rows what `unlift.recover` gives.
+    """
+    from pyspark.sql import functions
+
+    # Of lines through two points both are solved together.
+    record = functions.floor(functions.col("slot") / Released.read(released).slots_per_record)
+    ranged = lists.repartitionByRange(record) if n_parts is None else lists.repartitionByRange(n_parts, record)
+    learned = model.to_bytes()
+
+    def of_partition(batches: Iterator[_pa.RecordBatch]) -> Iterator[_pa.RecordBatch]:
+        from unlift import Model, Released, parts
+
+        given = [batch for batch in batches if len(batch)]
+        if given:
+            yield from parts.recover(given, Released.read(released), Model.from_bytes(learned), threads=1)
+
+    columns = ", ".join(f"{name} {of}" for name, of in parts.COLUMNS.items())
+    return ranged.mapInArrow(of_partition, columns)
 
 
 def _over(items: _DataFrame, by: str, options: dict[str, Any]) -> _DataFrame:

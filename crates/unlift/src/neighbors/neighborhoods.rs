@@ -84,6 +84,33 @@ impl Neighborhoods {
         Ok(Self { offsets, records, scores, about: About::default() })
     }
 
+    /// Lists of some slots of a map, those from `first` on: as many as `offsets` has entries, less one. The lists of all others
+    /// are empty. `map` is its number of records and of slots per record.
+    ///
+    /// # Errors
+    /// As of [`try_new`](Self::try_new), and when there are not as many slots.
+    pub fn of_slots(
+        first: usize,
+        offsets: &[u64],
+        records: Vec<RecordId>,
+        scores: Option<Vec<f32>>,
+        map: (usize, usize),
+    ) -> Result<Self, Error> {
+        let (n_records, slots_per_record) = map;
+        let n_slots = n_records * slots_per_record;
+        let after = n_slots.checked_sub(first).and_then(|n| (n + 1).checked_sub(offsets.len()));
+        let Some(after) = after else {
+            let expected = format!("lists within {n_slots} slots");
+            let found = format!("{} from slot {first} on", offsets.len().saturating_sub(1));
+            return Err(Error::new("neighborhoods", expected, found));
+        };
+        let mut all = Vec::with_capacity(n_slots + 1);
+        all.resize(first, 0);
+        all.extend_from_slice(offsets);
+        all.resize(all.len() + after, records.len() as u64);
+        Self::try_new(all, records, scores, n_records, slots_per_record)
+    }
+
     /// The same lists, said to be of a released map and counted in an order.
     #[must_use]
     pub fn with_about(self, about: About) -> Self {

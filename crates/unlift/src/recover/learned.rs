@@ -4,7 +4,7 @@ use super::map::bytes::{Reader, Writer};
 use super::map::chance_field::{CandidateField, ChanceField, tube};
 use super::map::family::Chance;
 use super::options::{Delta, RecoverOptions, Solver};
-use crate::{Error, Fingerprint};
+use crate::{About, Error, Fingerprint, ListsBy, RowOrder};
 
 /// What is learned of one released map and its lists: delta, and how likely a random listed record passes near a place.
 ///
@@ -15,13 +15,17 @@ use crate::{Error, Fingerprint};
 pub struct Model<const D: usize> {
     pub(super) options: RecoverOptions,
     pub(super) map: Fingerprint,
+    /// What the rows of the lists are counted by, hence those of what comes back.
+    pub(super) about: About,
     pub(super) delta: f64,
     /// `None` for attacks on the records alone, which learn nothing that is small.
     pub(super) chance: Option<Chance<D>>,
 }
 
 /// How a model begins as bytes.
-const MAGIC: [u8; 8] = *b"unliftM1";
+const MAGIC: [u8; 8] = *b"unliftM2";
+/// An order of rows that is not stated.
+const UNSTATED: u8 = u8::MAX;
 /// Centers of rays at most: they are counted in a byte.
 const MOST_FIELDS: usize = 256;
 
@@ -68,6 +72,9 @@ impl<const D: usize> Model<D> {
         // No given delta is 0.
         to.f64(if let Delta::Fixed(delta) = delta { delta } else { 0.0 });
         to.bytes(&self.map.0);
+        let order = RowOrder::STATED.iter().position(|&order| order == self.about.order);
+        let by_oracle = self.about.lists_by == ListsBy::Oracle;
+        to.bytes(&[order.map_or(UNSTATED, |at| at as u8), u8::from(by_oracle)]);
         to.f64(self.delta);
         match &self.chance {
             None => to.bytes(&[0]),
@@ -109,6 +116,15 @@ impl<const D: usize> Model<D> {
         let options = RecoverOptions { solver, delta, seed, exact_constraints, confidence };
         options.check().map_err(|error| error.within("model"))?;
         let map = Fingerprint(from.array()?);
+        let [order, by_oracle] = from.array()?;
+        let order = match order {
+            UNSTATED => RowOrder::Unstated,
+            at => *RowOrder::STATED
+                .get(usize::from(at))
+                .ok_or_else(|| Error::new("model", "an order of rows", at.to_string()))?,
+        };
+        let lists_by = if by_oracle == 0 { ListsBy::Unstated } else { ListsBy::Oracle };
+        let about = About { map: Some(map), order, lists_by };
         let delta = from.f64()?;
         let [kind] = from.array()?;
         let chance = match kind {
@@ -125,6 +141,6 @@ impl<const D: usize> Model<D> {
             }
         };
         from.end()?;
-        Ok(Self { options, map, delta, chance })
+        Ok(Self { options, map, about, delta, chance })
     }
 }

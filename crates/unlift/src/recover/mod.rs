@@ -9,7 +9,7 @@
 //! 5. `exact`: coordinates that a rule of the scheme fixes. `confidence`: how sure the attacker is.
 //!    `pairs_of_descriptors`: whose descriptor is whose on a paired line.
 //! 6. `learned`: what is learned of a map. `task`: model, records and lists together, solved in any parts; `rounds`: joint
-//!    recovery one round at a time.
+//!    recovery one round at a time; `parts`: consensus where each part has its own lists alone.
 //!
 //! [`prepare`] learns a model, [`Task`] solves with it, and [`recover`] does both.
 
@@ -23,6 +23,7 @@ mod learned;
 mod map;
 mod options;
 mod pairs_of_descriptors;
+mod parts;
 mod placement;
 mod result;
 mod rounds;
@@ -36,6 +37,7 @@ pub use confidence::model::{N_KINDS, N_TERMS, centered, terms};
 pub use confidence::seen::{Cues, Seen};
 pub use learned::Model;
 pub use options::{Delta, RecoverOptions, Solver};
+pub use parts::Part;
 pub use result::estimate::{Estimate, Status};
 pub use result::probability::Confidence;
 pub use result::recovered::Recovered;

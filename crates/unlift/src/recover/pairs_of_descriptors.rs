@@ -1,12 +1,14 @@
 //! Which of a paired line's two descriptors belongs to which of its points (supplement B).
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::Descriptors;
 use crate::neighbors::Neighborhoods;
 use crate::released::Released;
 
-/// Per slot the released descriptor row said to belong to it; `None` unless records hide two points
+/// Per slot of `records` the released descriptor row said to belong to it; `None` unless records hide two points
 /// and have descriptors.
 ///
 /// The cheaper of the two bijections wins, where a descriptor and a neighborhood cost the sum of
@@ -15,13 +17,15 @@ use crate::released::Released;
 pub(super) fn descriptor_rows<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
+    records: Range<usize>,
 ) -> Option<Vec<u32>> {
     let descriptors = released.descriptors()?;
     if released.slots_per_record() != 2 {
         return None;
     }
-    let mut rows = vec![0u32; released.n_slots()];
-    rows.par_chunks_mut(2).enumerate().for_each(|(record, rows)| {
+    let mut rows = vec![0u32; 2 * records.len()];
+    rows.par_chunks_mut(2).enumerate().for_each(|(at, rows)| {
+        let record = records.start + at;
         let [a, b] = [2 * record, 2 * record + 1];
         let cost = |row: usize, slot: usize| affinity_cost(descriptors, row, lists, slot);
         let straight = cost(a, a) + cost(b, b);

@@ -119,7 +119,8 @@ impl<'a, const D: usize> Task<'a, D> {
             Records::Alone(_) => None,
             Records::Listed { family, .. } => Some(family.chance()),
         };
-        Model { options: self.options, map: self.map, delta: self.delta, chance }
+        let about = About { map: Some(self.map), ..self.lists.about() };
+        Model { options: self.options, about, map: self.map, delta: self.delta, chance }
     }
 
     /// Number of slots.
@@ -167,12 +168,30 @@ impl<'a, const D: usize> Task<'a, D> {
         &self,
         estimates: Vec<Estimate<D>>,
     ) -> Result<(Recovered<D>, Seen), Error> {
+        let records = 0..self.released.n_records();
+        let rows = descriptor_rows(self.released, self.lists, records);
+        self.finish_of(estimates, rows)
+    }
+
+    /// [`finish`](Self::finish), where it is known which descriptor is whose.
+    pub(super) fn finish_with(
+        &self,
+        estimates: Vec<Estimate<D>>,
+        descriptor_row: Option<Vec<u32>>,
+    ) -> Result<Recovered<D>, Error> {
+        self.finish_of(estimates, descriptor_row).map(|(recovered, _)| recovered)
+    }
+
+    fn finish_of(
+        &self,
+        estimates: Vec<Estimate<D>>,
+        descriptor_row: Option<Vec<u32>>,
+    ) -> Result<(Recovered<D>, Seen), Error> {
         self.check_estimates(&estimates)?;
         let settled = self.settled(&estimates)?;
         let unsettled = &estimates[..];
         let estimates = settled.as_deref().unwrap_or(unsettled);
-        let rows = descriptor_rows(self.released, self.lists);
-        let recovered = self.in_columns(estimates, rows)?;
+        let recovered = self.in_columns(estimates, descriptor_row)?;
         let trials = (self.options.solver == Solver::Ransac).then(|| self.trials.histogram());
         let recovered = recovered.with_trials(trials);
         if let Some(unknown) = confidence::not_asked::<D>(&self.options) {

@@ -99,6 +99,7 @@ pub const INSIDE_RECOVER: &[(&str, &[&str])] = &[
             "rounds",
         ],
     ),
+    ("parts", &["learned", "options", "pairs_of_descriptors", "result", "task"]),
 ];
 
 /// Dependencies of the core: light, and known for long.

@@ -1,7 +1,9 @@
 //! Recovery in two steps and in parts gives what it gives at once, bit for bit.
 
+use unlift::neighbors::Neighborhoods;
 use unlift::obfuscate::Entry;
 use unlift::recover::{Delta, Model, RecoverOptions, Solver, Task, prepare};
+use unlift::released::Obfuscation;
 
 use crate::maps::*;
 
@@ -42,6 +44,70 @@ fn parts_are_the_whole<const D: usize>(name: &str, scheme: &Entry) {
         assert_eq!(joined.confidence(), whole.confidence(), "{name}, {solver:?}");
         assert_eq!(joined.trials(), whole.trials(), "{name}, {solver:?}");
     }
+}
+
+/// Each part with its own lists alone: nothing of the others is there.
+fn lists_of_others_change_nothing<const D: usize>(name: &str, scheme: &Entry) {
+    let hidden = hide::<D>(scheme, &room(61, 500), 6);
+    let lists = hidden.lists(15, 0.5, 6);
+    let (released, per) = (&hidden.released, hidden.released.slots_per_record());
+    let options =
+        RecoverOptions { solver: Solver::Consensus, seed: 9, ..RecoverOptions::default() };
+    let whole = solve(released, &lists, options);
+    let bytes = prepare(released, &lists, &options).unwrap().to_bytes();
+    let model = Model::<D>::from_bytes(&bytes).unwrap();
+    let of_part = |slots: std::ops::Range<usize>| {
+        let [from, to] = [slots.start, slots.end].map(|slot| lists.offsets()[slot]);
+        let offsets: Vec<u64> =
+            lists.offsets()[slots.start..=slots.end].iter().map(|at| at - from).collect();
+        let records = lists.records()[from as usize..to as usize].to_vec();
+        let map = (released.n_records(), per);
+        let own = Neighborhoods::of_slots(slots.start, &offsets, records, None, map).unwrap();
+        model.solve_part(released, &own, slots)
+    };
+    let of_anchors =
+        matches!(released.obfuscation(), Obfuscation::Rays(rays) if rays.regions().is_some());
+    let cuts = cuts(released.n_records()).into_iter().map(|cut| per * cut.start..per * cut.end);
+    let parts: Result<Vec<_>, _> = cuts.map(of_part).collect();
+    if of_anchors {
+        assert!(parts.is_err(), "{name}");
+        return;
+    }
+    let joined = model.join(released, parts.unwrap()).unwrap();
+    assert!(recovered_bytes(&joined) == recovered_bytes(&whole), "{name}");
+    assert_eq!(
+        (joined.about(), joined.descriptor_row()),
+        (whole.about(), whole.descriptor_row()),
+        "{name}"
+    );
+    if per == 2 {
+        assert!(of_part(0..1).is_err(), "{name}");
+    }
+}
+
+#[test]
+fn lists_of_a_part_are_all_that_it_needs() {
+    over_schemes!(lists_of_others_change_nothing);
+}
+
+#[test]
+fn parts_are_of_consensus_and_all_there() {
+    let (hidden, lists) = (hidden_lines(), hidden_lines().lists(12, 0.5, 6));
+    let model = |solver| {
+        let options = RecoverOptions { solver, ..RecoverOptions::default() };
+        prepare(&hidden.released, &lists, &options).unwrap()
+    };
+    let error = model(Solver::Joint).solve_part(&hidden.released, &lists, 0..200).unwrap_err();
+    assert_eq!(error.to_string(), "solver of parts: expected consensus, found joint");
+    let model = model(Solver::Consensus);
+    let part = model.solve_part(&hidden.released, &lists, 0..150).unwrap();
+    let error = model.join(&hidden.released, [part]).unwrap_err();
+    assert_eq!(error.to_string(), "estimates: expected 200, one per slot, found 150");
+    let error = Neighborhoods::of_slots(199, &[0, 0, 0], Vec::new(), None, (200, 1)).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "neighborhoods: expected lists within 200 slots, found 2 from slot 199 on"
+    );
 }
 
 #[test]

@@ -1,0 +1,155 @@
+"""One map in parts: Arrow batches of lists in, Arrow batches of positions out (needs `pyarrow`).
+
+Where a slot is by consensus depends on all records, what was learned of the map (a `Model`) and its own list alone. So lists, which
+take most of the space, may be spread over machines, or be read one part after another; records are read by everybody.
+
+>>> import numpy as np, pyarrow, tempfile, unlift
+>>> points = np.random.default_rng(1).uniform(0, 4, (300, 3))
+>>> hidden = unlift.obfuscate(unlift.Map(points, scale=1.0), "olc", seed=1)
+>>> lists = unlift.neighbors.oracle(hidden, 0.5, k=20)
+>>> model = unlift.prepare(hidden, lists)
+>>> by_slot = unlift.parts.table(lists)
+>>> halves = [by_slot.slice(0, 150), by_slot.slice(150)]
+>>> found = [batch for half in halves for batch in unlift.parts.recover(half.to_batches(), hidden, model)]
+>>> back = unlift.parts.join(found, hidden, model)
+>>> bool((back.positions == unlift.recover(hidden, lists, solver="consensus").positions).all())
+True
+
+On Spark: `unlift.spark.recover`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ._unlift import Hidden, Model, Neighborhoods, Recovered, Released, UnliftError
+
+if TYPE_CHECKING:
+    import pyarrow as _pa  # type: ignore[import-untyped,unused-ignore]
+
+__all__ = ["COLUMNS", "join", "recover", "schema", "table"]
+
+#: What is found of a slot: name, and type as Spark writes it. `x`, `y`, `z` are about the origin of the released map, NaN where
+#: nothing was found; `status` is 0 where something was.
+COLUMNS = {
+    "slot": "bigint",
+    "x": "float",
+    "y": "float",
+    "z": "float",
+    "status": "int",
+    "support": "int",
+    "axis": "int",
+    "evidence": "float",
+    "descriptor_row": "bigint",
+}
+
+#: Slots per batch that comes out.
+_BATCH = 1 << 16
+
+
+def schema() -> _pa.Schema:
+    """The schema of what comes out."""
+    pa = _pyarrow()
+    types = {"bigint": pa.int64(), "int": pa.int32(), "float": pa.float32()}
+    return pa.schema([(name, types[of]) for name, of in COLUMNS.items()])
+
+
+def table(lists: Neighborhoods) -> _pa.Table:
+    """Lists as a table, a row per slot: `slot`, and `records`, a list of them."""
+    pa = _pyarrow()
+    records = pa.LargeListArray.from_arrays(lists.offsets.astype(np.int64), lists.records.astype(np.int64))
+    return pa.table({"slot": np.arange(len(lists), dtype=np.int64), "records": records})
+
+
+def recover(
+    batches: Iterable[_pa.RecordBatch], released: Released | Hidden, model: Model, *, threads: int | None = None
+) -> Iterator[_pa.RecordBatch]:
+    """Solves a part of the slots, those between the first and the last in `batches`, by consensus.
+
+    batches: the lists of the part, in any order, with the columns `slot` (integer) and `records` (list of integers). A slot between
+        others without a row has an empty list. All slots of a record belong to the same part.
+    model: what `unlift.prepare` learned of `released` and all of its lists.
+    threads: 1 where an engine runs a task per core.
+
+    Yields rows of `COLUMNS`, in order of slots; none for a part without rows.
+    """
+    pa = _pyarrow()
+    given = [batch for batch in batches if len(batch)]
+    if not given:
+        return
+    lists = pa.Table.from_batches(given)
+    for column in ("slot", "records"):
+        if column not in lists.schema.names:
+            raise UnliftError(f"batches: expected a column {column}, found {', '.join(lists.schema.names) or 'none'}")
+    lists = lists.select(["slot", "records"]).sort_by("slot").combine_chunks()
+    slots = lists["slot"].to_numpy()
+    if lists["slot"].null_count or slots[0] < 0 or (slots[1:] == slots[:-1]).any():
+        raise UnliftError("slot: expected numbers from 0, each once, found others")
+    per_record = (released.released if isinstance(released, Hidden) else released).slots_per_record
+    first = int(slots[0]) // per_record * per_record
+    n = (int(slots[-1]) // per_record + 1) * per_record - first
+    lengths = np.zeros(n + 1, dtype=np.int64)
+    lengths[slots - first + 1] = pa.compute.fill_null(pa.compute.list_value_length(lists["records"]), 0).to_numpy()
+    records = pa.compute.list_flatten(lists["records"])
+    if records.null_count:
+        raise UnliftError("records: expected numbers, found null")
+    found = model.solve_part(released, first, np.cumsum(lengths), records.to_numpy(), threads=threads)
+    for start in range(0, n, _BATCH):
+        yield _batch(first, found, slice(start, min(start + _BATCH, n)))
+
+
+def join(batches: Iterable[_pa.RecordBatch], released: Released | Hidden, model: Model) -> Recovered:
+    """What came back of the whole map: `unlift.recover(.., solver="consensus")`, bit for bit.
+
+    batches: what `recover` gave of all parts, in any order. A slot of which nothing was said had no list.
+    """
+    pa = _pyarrow()
+    rows = pa.Table.from_batches(list(batches), schema=schema())
+    of_map = released.released if isinstance(released, Hidden) else released
+    n = of_map.n_slots
+    slots = rows["slot"].to_numpy()
+    if len(slots) and not (0 <= slots.min() and slots.max() < n and len(np.unique(slots)) == len(slots)):
+        raise UnliftError(f"slot: expected numbers below {n}, each once, found others")
+    # Too few neighbors, but for what was found.
+    columns: dict[str, Any] = {
+        "position": np.full((n, 3), np.nan, dtype=np.float32),
+        "status": np.ones(n, dtype=np.uint8),
+        "support": np.zeros(n, dtype=np.uint16),
+        "axis": np.zeros(n, dtype=np.uint8),
+        "evidence": np.zeros(n, dtype=np.float32),
+    }
+    for at, axis in enumerate("xyz"):
+        columns["position"][slots, at] = rows[axis].to_numpy()
+    for name in ("status", "support", "axis", "evidence"):
+        columns[name][slots] = rows[name].to_numpy()
+    columns["descriptor_row"] = None
+    if of_map.descriptors is not None and of_map.slots_per_record == 2:
+        columns["descriptor_row"] = np.arange(n, dtype=np.uint32)
+        columns["descriptor_row"][slots] = rows["descriptor_row"].to_numpy()
+    return model.join(released, columns)
+
+
+def _batch(first: int, found: dict[str, Any], part: slice) -> _pa.RecordBatch:
+    pa = _pyarrow()
+    rows = found["descriptor_row"]
+    size = part.stop - part.start
+    columns = [
+        pa.array(np.arange(first + part.start, first + part.stop)),
+        *(pa.array(np.ascontiguousarray(found["position"][part, axis])) for axis in range(3)),
+        *(pa.array(found[name][part].astype(np.int32)) for name in ("status", "support", "axis")),
+        pa.array(found["evidence"][part]),
+        pa.nulls(size, pa.int64()) if rows is None else pa.array(rows[part].astype(np.int64)),
+    ]
+    return pa.RecordBatch.from_arrays(columns, schema=schema())
+
+
+def _pyarrow() -> Any:
+    try:
+        import pyarrow
+        import pyarrow.compute  # type: ignore[import-untyped,unused-ignore]
+    except ImportError as missing:
+        raise UnliftError("pyarrow: expected the package, found none (pip install pyarrow)") from missing
+    return pyarrow
