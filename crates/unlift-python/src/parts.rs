@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyType};
+use unlift::RecordId;
 use unlift::neighbors;
 use unlift::recover::{Estimate, Model as Learned, Part, Status, prepare as learn};
-use unlift::{About, RecordId};
 
 use crate::arrays::{column, indices, rows, to_array, whole};
 use crate::errors::{raised, wrong};
@@ -84,8 +84,7 @@ impl Model {
             let map = (released.n_records(), released.slots_per_record());
             let slots = first..first + offsets.len().saturating_sub(1);
             let lists = neighbors::Neighborhoods::of_slots(first, &offsets, records, None, map)?;
-            let about = About { map: Some(model.map()), ..About::default() };
-            model.solve_part(&released, &lists.with_about(about), slots)
+            model.solve_part(&released, &lists, slots)
         })?;
         columns(py, part)
     }

@@ -236,6 +236,8 @@ unlift.audit_images(images, progress=lambda done, total, what: print(done, flush
 
 def test_an_interrupt_ends_the_function_that_looks_up_images(tmp_path):
     code = IMAGES + """
+import os
+
 class Slow:
     def keys(self):
         return ["a", "b"]
