@@ -22,6 +22,7 @@ __all__ = [
     "Hidden",
     "Lines",
     "Map",
+    "Model",
     "Neighborhoods",
     "Planes",
     "Rays",
@@ -41,6 +42,7 @@ __all__ = [
     "find",
     "obfuscate",
     "oracle",
+    "prepare",
     "read",
     "recover",
 ]
