@@ -130,6 +130,15 @@ pub fn indices(
     dims: &[usize],
     most: u32,
 ) -> PyResult<(Vec<u32>, Vec<usize>)> {
+    // Lists are long: as they are, where they are of this kind.
+    if let Ok(array) = array(name, given, WHOLE)?.cast::<PyArrayDyn<u32>>()
+        && dims.contains(&array.ndim())
+        && array.is_c_contiguous()
+        && let values = array.readonly().as_slice()?.to_vec()
+        && values.iter().all(|&value| value < most)
+    {
+        return Ok((values, array.shape().to_vec()));
+    }
     let (values, shape) = whole(name, given, dims, 0..=i64::from(most) - 1)?;
     Ok((values.into_iter().map(|value| value as u32).collect(), shape))
 }

@@ -60,7 +60,10 @@ def schema() -> _pa.Schema:
 def table(lists: Neighborhoods) -> _pa.Table:
     """Lists as a table, a row per slot: `slot`, and `records`, a list of them."""
     pa = _pyarrow()
-    records = pa.LargeListArray.from_arrays(lists.offsets.astype(np.int64), lists.records.astype(np.int64))
+    records = lists.records
+    # Engines know no numbers without a sign.
+    kind = np.int32 if len(lists) < 2**31 else np.int64
+    records = pa.LargeListArray.from_arrays(lists.offsets.astype(np.int64), records.astype(kind))
     return pa.table({"slot": np.arange(len(lists), dtype=np.int64), "records": records})
 
 
@@ -84,8 +87,11 @@ def recover(
     for column in ("slot", "records"):
         if column not in lists.schema.names:
             raise UnliftError(f"batches: expected a column {column}, found {', '.join(lists.schema.names) or 'none'}")
-    lists = lists.select(["slot", "records"]).sort_by("slot").combine_chunks()
+    lists = lists.select(["slot", "records"])
     slots = lists["slot"].to_numpy()
+    if (slots[1:] < slots[:-1]).any():
+        lists = lists.sort_by("slot")
+        slots = lists["slot"].to_numpy()
     if lists["slot"].null_count or slots[0] < 0 or (slots[1:] == slots[:-1]).any():
         raise UnliftError("slot: expected numbers from 0, each once, found others")
     per_record = (released.released if isinstance(released, Hidden) else released).slots_per_record
@@ -96,7 +102,11 @@ def recover(
     records = pa.compute.list_flatten(lists["records"])
     if records.null_count:
         raise UnliftError("records: expected numbers, found null")
-    found = model.solve_part(released, first, np.cumsum(lengths), records.to_numpy(), threads=threads)
+    numbers = records.to_numpy()
+    if len(numbers) and 0 <= numbers.min() and numbers.max() < 2**32:
+        numbers = numbers.astype(np.uint32)
+    del lists, given, records
+    found = model.solve_part(released, first, np.cumsum(lengths), numbers, threads=threads)
     for start in range(0, n, _BATCH):
         yield _batch(first, found, slice(start, min(start + _BATCH, n)))
 
