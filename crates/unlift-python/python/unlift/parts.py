@@ -1,7 +1,7 @@
 """One map in parts: Arrow batches of lists in, Arrow batches of positions out (needs `pyarrow`).
 
 Where a slot is by consensus depends on all records, what was learned of the map (a `Model`) and its own list alone. So lists, which
-take most of the space, may be spread over machines, or be read one part after another; records are read by everybody.
+take most of the space, may be spread over machines; records are read by everybody. On one machine parts save no memory.
 
 >>> import numpy as np, pyarrow, tempfile, unlift
 >>> points = np.random.default_rng(1).uniform(0, 4, (300, 3))

@@ -1,4 +1,4 @@
-//! Consensus in parts, each with its own lists alone: what a cluster, or a machine with little memory, solves one after the other.
+//! Consensus in parts, each with its own lists alone: what the machines of a cluster solve.
 
 use std::ops::Range;
 
@@ -70,7 +70,8 @@ impl<const D: usize> Model<D> {
         )?;
         let lists = lists.with_about(self.about);
         let has_rows = released.slots_per_record() == 2 && released.descriptors().is_some();
-        Task::new(self, released, &lists)?.finish_with(estimates, has_rows.then_some(rows))
+        let task = Task::new(self, released, &lists)?;
+        task.finish_with(estimates, has_rows.then_some(rows)).map(|(recovered, _)| recovered)
     }
 
     /// Refuses what cannot be solved in parts.

@@ -170,19 +170,11 @@ impl<'a, const D: usize> Task<'a, D> {
     ) -> Result<(Recovered<D>, Seen), Error> {
         let records = 0..self.released.n_records();
         let rows = descriptor_rows(self.released, self.lists, records);
-        self.finish_of(estimates, rows)
+        self.finish_with(estimates, rows)
     }
 
-    /// [`finish`](Self::finish), where it is known which descriptor is whose.
+    /// The same, where it is known which descriptor is whose.
     pub(super) fn finish_with(
-        &self,
-        estimates: Vec<Estimate<D>>,
-        descriptor_row: Option<Vec<u32>>,
-    ) -> Result<Recovered<D>, Error> {
-        self.finish_of(estimates, descriptor_row).map(|(recovered, _)| recovered)
-    }
-
-    fn finish_of(
         &self,
         estimates: Vec<Estimate<D>>,
         descriptor_row: Option<Vec<u32>>,

@@ -58,9 +58,9 @@ fn fixed_by<const D: usize>(
 /// returns it within rounding.
 fn exact_limit<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     const COPIES: usize = 16;
-    // In a map of few points the delta of exchanged coordinates is not below what lines have by chance: more are told apart in
-    // a larger one.
-    let n_piles = if D == 2 { 30 } else { 90 };
+    // Piles are nearer than the delta of exchanged coordinates may be in a map of few points (85 of 480 are fixed in one of 30): there
+    // the law holds in a larger one.
+    let n_piles = if D == 3 && name == "cp" { 90 } else { 30 };
     let hidden = hide::<D>(scheme, &piles(seed, n_piles, COPIES, 0.0), seed);
     let per = hidden.released.slots_per_record();
     let pile = |slot: usize| hidden.secret.hidden()[slot].index() / COPIES;
