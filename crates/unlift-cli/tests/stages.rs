@@ -50,6 +50,10 @@ impl Stages {
         self.ends(&format!("obfuscate {map} --scheme {scheme} --seed {seed} --out {name}"), 0);
         let oracle = format!("neighbors oracle {name}/truth.parquet --k 10 --inlier-ratio 0.5");
         self.ends(&format!("{oracle} --seed {seed} --out {name}-lists"), 0);
+        let limited = format!("{oracle} --seed {seed} --memory-limit 300MB --out {name}-limited");
+        self.ends(&limited, 0);
+        let bytes = |lists: &str| std::fs::read(self.path(&format!("{name}-{lists}"))).unwrap();
+        assert!(bytes("limited") == bytes("lists"), "{scheme}");
         let recover = format!("recover {name}/released.parquet --neighbors {name}-lists");
         self.ends(&format!("{recover} --seed {seed} --out {name}-back"), 0);
     }
@@ -76,6 +80,12 @@ fn the_stages_print_the_row_of_the_audit() {
                 place.ends(&format!("{find} --seed 7 --out hidden-lists"), 0);
                 let recover = "recover hidden/released.parquet --neighbors hidden-lists --seed 7";
                 place.ends(&format!("{recover} --out hidden-back"), 0);
+                // Lists that are in files give the same bytes, and leave no file behind.
+                std::fs::create_dir_all(place.path("away")).unwrap();
+                place.ends(&format!("{recover} --memory-limit 300MB --out away/back"), 0);
+                let bytes = |name: &str| std::fs::read(place.path(name)).unwrap();
+                assert!(bytes("away/back") == bytes("hidden-back"), "{scheme}");
+                assert_eq!(std::fs::read_dir(place.path("away")).unwrap().count(), 1);
             }
             let staged = place.json("evaluate hidden-back --truth hidden/truth.parquet --json");
             let rows = audit["results"].as_array().expect("rows");

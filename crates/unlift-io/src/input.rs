@@ -43,6 +43,11 @@ pub fn limit_memory(bytes: u64) {
     LIMIT.store(bytes, Relaxed);
 }
 
+/// What [`limit_memory`] set; `None` before.
+pub fn limit() -> Option<u64> {
+    Some(LIMIT.load(Relaxed)).filter(|&bytes| bytes < u64::MAX)
+}
+
 /// How much memory what is decoded of one file may take at a time: 64 times its size, but at least
 /// 256 MiB, and never more than [`limit_memory`] allows.
 #[derive(Clone, Debug)]

@@ -11,7 +11,12 @@ use unlift::recover::Solver;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
-  unlift recover hidden/released.parquet --neighbors lists.parquet --out back.parquet")]
+  unlift recover hidden/released.parquet --neighbors lists.parquet --out back.parquet
+  unlift recover hidden/released.parquet --neighbors lists.parquet --memory-limit 2GB
+
+With --memory-limit the lists of a map, and who lists whom, are kept in files without a name beside
+the output (joint: some 18 bytes an entry) and read a window at a time, once per round: the same
+result in longer time. In memory remain the records and some 150 bytes a hidden point.")]
 pub struct RecoverArgs {
     /// A released map
     #[arg(value_name = "OBFUSCATED")]

@@ -1,13 +1,18 @@
 //! `unlift recover`: released files in, positions out; no truth needed.
 
 use std::collections::HashSet;
+use std::path::Path;
 
-use unlift::neighbors::Neighborhoods;
-use unlift::recover::{RecoverOptions, Status, recover};
-use unlift::{OneLine, RowOrder};
+use unlift::neighbors::{Neighborhoods, ShelvedLists};
+use unlift::recover::{RecoverOptions, Solver, Status, recover, recover_shelved};
+use unlift::released::Released;
+use unlift::{About, OneLine, RowOrder};
 use unlift_io::atomic::{Kind, Rules};
+use unlift_io::input::limit;
+use unlift_io::shelf::Files;
 use unlift_io::stage::{
-    Kind as Stage, has_images, read_neighborhoods, read_released, write_recovered,
+    Kind as Stage, has_images, read_neighborhoods, read_released, shelve_neighborhoods,
+    write_recovered,
 };
 
 use super::common::{same_map, with_threads};
@@ -19,13 +24,50 @@ use crate::progress::Spinner;
 use crate::stderr;
 use unlift_audit::check_file;
 
-/// What a user should know about lists that somebody else wrote.
-fn notes(lists: &Neighborhoods, slots_per_record: usize) -> Vec<String> {
+/// The lists of a map.
+enum Lists {
+    /// In memory.
+    Here(Neighborhoods),
+    /// In files beside the output, where memory is limited and the solver can do with that.
+    Away(ShelvedLists, Files),
+}
+
+impl Lists {
+    fn open(args: &RecoverArgs, released: &Released<3>) -> anyhow::Result<Self> {
+        let (path, map) = (&args.neighbors, (released.n_records(), released.slots_per_record()));
+        let limit = limit().filter(|_| matches!(args.solver, Solver::Joint | Solver::Consensus));
+        let Some(limit) = limit else {
+            return Ok(Self::Here(read_neighborhoods(path, map.0, map.1)?));
+        };
+        let folder = args.out.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let files = Files::new(folder.unwrap_or(Path::new(".")), limit);
+        let alive = Spinner::new("reading lists");
+        let lists = shelve_neighborhoods(path, map, &files)?;
+        drop(alive);
+        Ok(Self::Away(lists, files))
+    }
+
+    fn about(&self) -> About {
+        match self {
+            Self::Here(lists) => lists.about(),
+            Self::Away(lists, _) => lists.about(),
+        }
+    }
+
+    fn offsets(&self) -> &[u64] {
+        match self {
+            Self::Here(lists) => lists.offsets(),
+            Self::Away(lists, _) => lists.offsets(),
+        }
+    }
+}
+
+/// What a user should know about lists that somebody else wrote, which start at these `offsets`.
+fn notes(offsets: &[u64], about: About, slots_per_record: usize) -> Vec<String> {
     let mut notes = Vec::new();
-    let about = lists.about();
-    let empty = (0..lists.n_slots()).filter(|&slot| lists.of(slot).is_empty()).count();
+    let empty = offsets.windows(2).filter(|pair| pair[0] == pair[1]).count();
     if empty > 0 {
-        let n = lists.n_slots();
+        let n = offsets.len() - 1;
         notes.push(format!(
             "{empty} of {n} lists are empty: solvers that read lists recover nothing there"
         ));
@@ -59,16 +101,18 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
         return images(args, &options, &rules);
     }
     let released = read_released::<3>(&args.released)?;
-    let (records, slots) = (released.n_records(), released.slots_per_record());
-    let lists = read_neighborhoods(&args.neighbors, records, slots)?;
+    let lists = Lists::open(args, &released)?;
     let of = &args.released;
     same_map(&args.neighbors, lists.about().map, of, Some(released.fingerprint()))?;
-    for note in notes(&lists, slots) {
+    for note in notes(lists.offsets(), lists.about(), released.slots_per_record()) {
         stderr::note(format_args!("{}: {note}", args.neighbors.display()));
     }
     let alive = Spinner::new("recovering");
     let recovered = with_threads(args.threads, || {
-        let result = recover(&released, &lists, &options);
+        let result = match &lists {
+            Lists::Here(lists) => recover(&released, lists, &options),
+            Lists::Away(lists, files) => recover_shelved(&released, lists, &options, files),
+        };
         Ok(result.map_err(|error| unlift_io::Error::core(&args.released, error))?)
     })?;
     check_file(&args.out, kind, &rules)?;
@@ -91,7 +135,7 @@ fn images(args: &RecoverArgs, options: &RecoverOptions, rules: &Rules) -> anyhow
     // A note says of one image what is so of many.
     let mut told = HashSet::new();
     let note = |lists: &Neighborhoods, slots: usize| {
-        for note in notes(lists, slots) {
+        for note in notes(lists.offsets(), lists.about(), slots) {
             let what = note.split(|c: char| c.is_ascii_digit()).next_back().unwrap_or_default();
             if told.insert(what.to_owned()) {
                 stderr::note(format_args!("{}: {note}", args.neighbors.display()));

@@ -2,7 +2,7 @@
 
 use super::footer;
 use super::header::KEY;
-use super::pages;
+use super::pages::{self, Stay};
 use crate::Error;
 use crate::guard::without_panic;
 use crate::input::{self, Budget};
@@ -94,8 +94,8 @@ impl<'a> ParquetFile<'a> {
         })
     }
 
-    /// Starts to decode the columns at `roots`, in the order of the file.
-    pub(super) fn batches(&self, roots: Vec<usize>) -> Result<Batches<'a>, Error> {
+    /// Starts to decode the columns at `roots`, in the order of the file; what is decoded will `stay` in memory so long.
+    pub(super) fn batches(&self, roots: Vec<usize>, stay: Stay) -> Result<Batches<'a>, Error> {
         for &root in &roots {
             self.check_codec(self.schema().field(root).name())?;
         }
@@ -103,7 +103,8 @@ impl<'a> ParquetFile<'a> {
         let mut file = file.map_err(|source| Error::read(self.path, source))?;
         let budget = Budget::new(self.path, self.n_bytes);
         let metadata = self.parquet.metadata();
-        let longest = pages::check(self.path, &mut file, self.n_bytes, metadata, &roots, &budget)?;
+        let longest =
+            pages::check(self.path, &mut file, self.n_bytes, metadata, &roots, (&budget, stay))?;
         // Many rows may have the same long text, which a file stores once.
         let batch_rows = budget
             .most()

@@ -3,6 +3,7 @@
 use super::file::{Batches, ParquetFile};
 use super::header::{Kind, Meta};
 use super::neighborhoods::neighborhoods_of;
+use super::pages::Stay;
 use super::recovered::recovered_of;
 use super::released::released_of;
 use super::table::Table;
@@ -101,7 +102,7 @@ impl<'a> ImageFile<'a> {
         let fields = file.schema().fields().iter().enumerate();
         let known = fields.filter(|(_, field)| COLUMNS.contains(&field.name().as_str()));
         let roots: Vec<usize> = known.map(|(at, _)| at).collect();
-        let batches = file.batches(roots)?;
+        let batches = file.batches(roots, Stay::Whole)?;
         Ok(Self { path, whole, kind, batches, rest: None, n_taken: 0, seen: HashSet::new() })
     }
 

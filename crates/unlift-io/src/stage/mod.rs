@@ -15,6 +15,7 @@ mod header;
 mod image_writer;
 mod images;
 mod neighborhoods;
+mod neighborhoods_away;
 mod order;
 mod pages;
 mod peek;
@@ -31,6 +32,7 @@ pub use images::{ImageFile, ImageRows, has_images};
 pub use neighborhoods::{
     PointNeighborhoods, read_neighborhoods, read_point_neighborhoods, write_neighborhoods,
 };
+pub use neighborhoods_away::{shelve_neighborhoods, write_neighborhoods_as_made};
 pub use peek::{Header, declared_kind, peek};
 pub use recovered::{read_recovered, read_recovered_in, write_recovered};
 pub use released::{read_released, scheme_name, write_released};

@@ -16,10 +16,19 @@ const LEVELS: u64 = 4;
 /// within compressed data.
 const OF_TEXT: [i64; 3] = [0, 2, 8];
 
+/// How long what is decoded stays in memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stay {
+    /// Until all of it is there.
+    Whole,
+    /// Until the next rows come.
+    Rows,
+}
+
 /// Checks the columns at `roots` of `file`, of `n_bytes` bytes; the most bytes that one text of theirs can have.
 ///
 /// # Errors
-/// When they do not lie in the file, declare more values or bytes than the budget allows, or their
+/// When they do not lie in the file, declare more values or bytes than the budget allows for as long as they stay, or their
 /// pages are not what the footer says.
 pub(super) fn check(
     path: &Path,
@@ -27,7 +36,7 @@ pub(super) fn check(
     n_bytes: u64,
     metadata: &ParquetMetaData,
     roots: &[usize],
-    budget: &Budget,
+    (budget, stay): (&Budget, Stay),
 ) -> Result<u64, Error> {
     let schema = metadata.file_metadata().schema_descr();
     let mut longest = 0;
@@ -39,6 +48,9 @@ pub(super) fn check(
         let place = format!("column {}", schema.get_column_root(leaf).name());
         let mut column = Column { path, place, budget, n_values: 0, n_bytes: 0, longest: 0 };
         for group in metadata.row_groups() {
+            if stay == Stay::Rows {
+                (column.n_values, column.n_bytes) = (0, 0);
+            }
             // The crate has checked that a row group has every column of the schema.
             if let Some(chunk) = group.columns().get(leaf) {
                 column.chunk(file, n_bytes, chunk)?;

@@ -3,6 +3,7 @@
 use super::column::{Batch, Type};
 use super::file::ParquetFile;
 use super::header::{Kind, Meta};
+use super::pages::Stay;
 use crate::Error;
 use arrow_array::RecordBatch;
 use arrow_schema::SchemaRef;
@@ -153,6 +154,16 @@ impl<'a> Table<'a> {
     pub(super) fn read(
         &self,
         columns: &[(&str, Type)],
+        each: impl FnMut(&Batch<'_>) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        self.read_to(columns, Stay::Whole, each)
+    }
+
+    /// The same, where what is handed on will `stay` in memory so long.
+    pub(super) fn read_to(
+        &self,
+        columns: &[(&str, Type)],
+        stay: Stay,
         mut each: impl FnMut(&Batch<'_>) -> Result<(), Error>,
     ) -> Result<(), Error> {
         let mut roots = Vec::with_capacity(columns.len());
@@ -170,7 +181,7 @@ impl<'a> Table<'a> {
                 return Ok(());
             }
         };
-        let mut batches = file.batches(roots)?;
+        let mut batches = file.batches(roots, stay)?;
         let mut first_row = 0;
         while let Some(batch) = batches.next()? {
             each(&Batch::new(self.path, &batch, first_row))?;

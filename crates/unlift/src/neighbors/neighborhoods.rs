@@ -49,37 +49,12 @@ impl Neighborhoods {
                 let expected = format!("{} rows", records.len());
                 return Err(Error::new("neighborhood scores", expected, scores.len().to_string()));
             }
-            if let Some(at) = scores.iter().position(|x| !x.is_finite()) {
-                let what = format!("neighborhood score {at}");
-                return Err(Error::new(what, "a finite number", scores[at].to_string()));
-            }
+            check_scores(0, scores)?;
         }
         for slot in 0..n_slots {
             let range = offsets[slot] as usize..offsets[slot + 1] as usize;
             sort_row(&mut records[range.clone()], scores.as_mut().map(|s| &mut s[range.clone()]));
-            let row = &records[range];
-            let what = || format!("neighborhood of slot {slot}");
-            if let Some(pair) = row.windows(2).find(|w| w[0] == w[1]) {
-                return Err(Error::new(
-                    what(),
-                    "each record once",
-                    format!("record {} twice", pair[0].0),
-                ));
-            }
-            if let Some(last) = row.last()
-                && last.index() >= n_records
-            {
-                let expected = format!("records below {n_records}");
-                return Err(Error::new(what(), expected, last.0.to_string()));
-            }
-            let own = RecordId::from_index(slot / slots_per_record);
-            if row.binary_search(&own).is_ok() {
-                return Err(Error::new(
-                    what(),
-                    "other records",
-                    format!("its own record {}", own.0),
-                ));
-            }
+            check_row(slot, &records[range], n_records, slots_per_record)?;
         }
         Ok(Self { offsets, records, scores, about: About::default() })
     }
@@ -160,7 +135,44 @@ impl Neighborhoods {
     }
 }
 
-fn sort_row(records: &mut [RecordId], scores: Option<&mut [f32]>) {
+/// Refuses scores, those from the entry `first` on, that are no numbers.
+pub(super) fn check_scores(first: usize, scores: &[f32]) -> Result<(), Error> {
+    match scores.iter().position(|x| !x.is_finite()) {
+        Some(at) => {
+            let what = format!("neighborhood score {}", first + at);
+            Err(Error::new(what, "a finite number", scores[at].to_string()))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Refuses a sorted list that names a record twice, one that is not there, or the slot's own.
+pub(super) fn check_row(
+    slot: usize,
+    row: &[RecordId],
+    n_records: usize,
+    slots_per_record: usize,
+) -> Result<(), Error> {
+    let what = || format!("neighborhood of slot {slot}");
+    if let Some(pair) = row.windows(2).find(|w| w[0] == w[1]) {
+        let found = format!("record {} twice", pair[0].0);
+        return Err(Error::new(what(), "each record once", found));
+    }
+    if let Some(last) = row.last()
+        && last.index() >= n_records
+    {
+        let expected = format!("records below {n_records}");
+        return Err(Error::new(what(), expected, last.0.to_string()));
+    }
+    let own = RecordId::from_index(slot / slots_per_record);
+    if row.binary_search(&own).is_ok() {
+        return Err(Error::new(what(), "other records", format!("its own record {}", own.0)));
+    }
+    Ok(())
+}
+
+/// Puts a list in ascending order of records, scores with it.
+pub(super) fn sort_row(records: &mut [RecordId], scores: Option<&mut [f32]>) {
     match scores {
         None => records.sort_unstable(),
         Some(scores) => {

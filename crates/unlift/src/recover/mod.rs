@@ -8,12 +8,13 @@
 //! 4. `delta`: the distance that decides support, chosen by how well consensus then does.
 //! 5. `exact`: coordinates that a rule of the scheme fixes. `confidence`: how sure the attacker is.
 //!    `pairs_of_descriptors`: whose descriptor is whose on a paired line.
-//! 6. `learned`: what is learned of a map. `task`: model, records and lists together, solved in any parts; `rounds`: joint
+//! 6. `checks`: what goes together. `learned`: what is learned of a map. `task`: model, records and lists together, solved in any parts; `rounds`: joint
 //!    recovery one round at a time; `parts`: consensus where each part has its own lists alone.
 //!
 //! [`prepare`] learns a model, [`Task`] solves with it, and [`recover`] does both.
 
 mod baselines;
+mod checks;
 mod confidence;
 mod consensus;
 mod delta;
@@ -49,9 +50,9 @@ pub use task::Task;
 
 use crate::compiled::{no_such, which};
 use crate::density::Peaks;
-use crate::neighbors::Neighborhoods;
+use crate::neighbors::{Neighborhoods, ShelvedLists};
 use crate::released::{Obfuscation, Released};
-use crate::{About, Error, RowOrder};
+use crate::{About, Error, RowOrder, Shelf};
 use placement::Placement;
 use solve::Solve;
 
@@ -79,7 +80,22 @@ pub fn recover<const D: usize>(
     lists: &Neighborhoods,
     options: &RecoverOptions,
 ) -> Result<Recovered<D>, Error> {
-    recover_and_look(released, lists, options).map(|(recovered, _)| recovered)
+    let compiled = which(&(at_once::<2> as AtOnce<2>), &(at_once::<3> as AtOnce<3>));
+    let at_once: AtOnce<D> = compiled.ok_or_else(no_such::<D>)?;
+    at_once(released, lists, options)
+}
+
+type AtOnce<const D: usize> =
+    fn(&Released<D>, &Neighborhoods, &RecoverOptions) -> Result<Recovered<D>, Error>;
+
+fn at_once<const D: usize>(
+    released: &Released<D>,
+    lists: &Neighborhoods,
+    options: &RecoverOptions,
+) -> Result<Recovered<D>, Error> {
+    let task = Task::learn(released, lists, options)?;
+    let start = task.solve(0..task.n_slots())?;
+    task.finish(task.go_on(start)?)
 }
 
 /// [`recover`] by [`Solver::Joint`], and beside it the pass that it starts from: bit for bit what
@@ -95,6 +111,38 @@ pub fn recover_with_start<const D: usize>(
     let compiled = which(&(with_start::<2> as WithStart<2>), &(with_start::<3> as WithStart<3>));
     let with_start: WithStart<D> = compiled.ok_or_else(no_such::<D>)?;
     with_start(released, lists, options)
+}
+
+/// [`recover`] with lists that do not fit into memory: the same, bit for bit. By [`Solver::Joint`] or [`Solver::Consensus`].
+///
+/// In memory are the records, and of each slot some 150 bytes (estimates, places, what rounds keep), beside a few windows of
+/// `shelf`. Lists are read once per round, and who lists whom is put on `shelf`: ten bytes an entry, and eight more at first.
+///
+/// # Errors
+/// As there, for another solver, for rays from anchors in regions, and when files cannot be read or written.
+pub fn recover_shelved<const D: usize>(
+    released: &Released<D>,
+    lists: &ShelvedLists,
+    options: &RecoverOptions,
+    shelf: &dyn Shelf,
+) -> Result<Recovered<D>, Error> {
+    let compiled = which(&(shelved::<2> as Shelved<2>), &(shelved::<3> as Shelved<3>));
+    let shelved: Shelved<D> = compiled.ok_or_else(no_such::<D>)?;
+    shelved(released, lists, options, shelf)
+}
+
+type Shelved<const D: usize> =
+    fn(&Released<D>, &ShelvedLists, &RecoverOptions, &dyn Shelf) -> Result<Recovered<D>, Error>;
+
+fn shelved<const D: usize>(
+    released: &Released<D>,
+    lists: &ShelvedLists,
+    options: &RecoverOptions,
+    shelf: &dyn Shelf,
+) -> Result<Recovered<D>, Error> {
+    let task = Task::learn_shelved(released, (lists, shelf), options)?;
+    let start = task.solve(0..task.n_slots())?;
+    task.finish(task.go_on(start)?)
 }
 
 type WithStart<const D: usize> = fn(
@@ -157,7 +205,7 @@ pub(crate) fn recover_at<const D: usize>(
     let (n_records, slots) = (released.n_records(), released.slots_per_record());
     let none =
         Neighborhoods::try_new(vec![0; n_records * slots + 1], Vec::new(), None, n_records, slots)?;
-    let estimates = Placement::new(released, &none, peaks).solve(0..released.n_slots());
+    let estimates = Placement::new(released, &none, peaks).solve(0..released.n_slots())?;
     let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
     let (origin, unit) = (released.origin(), released.unit());
     let delta = placement::delta(peaks);

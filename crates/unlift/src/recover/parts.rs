@@ -2,7 +2,9 @@
 
 use std::ops::Range;
 
+use super::checks::check_anchors;
 use super::learned::Model;
+use super::map::lists::Listed;
 use super::options::Solver;
 use super::pairs_of_descriptors::descriptor_rows;
 use super::result::estimate::Estimate;
@@ -10,7 +12,7 @@ use super::result::recovered::Recovered;
 use super::task::Task;
 use crate::Error;
 use crate::neighbors::Neighborhoods;
-use crate::released::{Obfuscation, Released};
+use crate::released::Released;
 
 /// What came of some slots of a map, one after the other.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,7 +44,8 @@ impl<const D: usize> Model<D> {
         }
         let estimates = Task::new(self, released, lists)?.solve(slots.clone())?;
         let records = slots.start / per_record..slots.end / per_record;
-        Ok(Part { estimates, descriptor_row: descriptor_rows(released, lists, records) })
+        let descriptor_row = descriptor_rows(released, Listed::Here(lists), records)?;
+        Ok(Part { estimates, descriptor_row })
     }
 
     /// What came back of the whole map: `parts` in the order of their slots. The same as
@@ -71,7 +74,7 @@ impl<const D: usize> Model<D> {
         let lists = lists.with_about(self.about);
         let has_rows = released.slots_per_record() == 2 && released.descriptors().is_some();
         let task = Task::new(self, released, &lists)?;
-        task.finish_with(estimates, has_rows.then_some(rows)).map(|(recovered, _)| recovered)
+        task.finish_with(estimates, has_rows.then_some(rows), false).map(|(recovered, _)| recovered)
     }
 
     /// Refuses what cannot be solved in parts.
@@ -80,11 +83,6 @@ impl<const D: usize> Model<D> {
         if solver != Solver::Consensus {
             return Err(Error::new("solver of parts", Solver::Consensus.name(), solver.name()));
         }
-        match released.obfuscation() {
-            Obfuscation::Rays(rays) if rays.regions().is_some() => {
-                Err(Error::new("records of parts", "such as say nothing about others", "anchors"))
-            }
-            _ => Ok(()),
-        }
+        check_anchors(released)
     }
 }

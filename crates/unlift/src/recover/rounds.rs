@@ -15,8 +15,8 @@ use crate::Error;
 /// fn in_two_parts<'a>(mut rounds: Rounds<'a, 3>) -> Result<Vec<Estimate<3>>, Error> {
 ///     while !rounds.is_done() {
 ///         let half = rounds.n_slots() / 2;
-///         let mut moved = rounds.solve(0..half);
-///         moved.extend(rounds.solve(half..rounds.n_slots()));
+///         let mut moved = rounds.solve(0..half)?;
+///         moved.extend(rounds.solve(half..rounds.n_slots())?);
 ///         rounds.go_on(&moved)?;
 ///     }
 ///     Ok(rounds.estimates().to_vec())
@@ -40,7 +40,10 @@ impl<'a, const D: usize> Rounds<'a, D> {
     }
 
     /// Where those of `slots` go whose turn it is in this round. Nothing changes before [`go_on`](Self::go_on).
-    pub fn solve(&self, slots: Range<usize>) -> Vec<Moved<D>> {
+    ///
+    /// # Errors
+    /// When lists are on a shelf and cannot be read.
+    pub fn solve(&self, slots: Range<usize>) -> Result<Vec<Moved<D>>, Error> {
         self.0.solve(slots)
     }
 
@@ -59,8 +62,8 @@ impl<'a, const D: usize> Rounds<'a, D> {
         if let Some(slot) = open.iter().position(|&open| open) {
             return Err(Error::new("round", format!("slot {slot}"), "none"));
         }
-        self.0.go_on(moved);
-        Ok(())
+        self.0.take(moved);
+        self.0.end_round()
     }
 
     /// Where slots are believed to be after the rounds so far: per slot.
@@ -68,16 +71,19 @@ impl<'a, const D: usize> Rounds<'a, D> {
         self.0.estimates()
     }
 
-    /// All rounds that are left, each in one part.
+    /// The estimates after all rounds that are left, each in the parts that the solver likes.
     ///
     /// # Errors
-    /// Never: a whole round misses no slot.
+    /// When lists are on a shelf and cannot be read.
     pub(super) fn run(mut self) -> Result<Vec<Estimate<D>>, Error> {
         while !self.is_done() {
-            let moved = self.solve(0..self.n_slots());
-            self.0.go_on(&moved);
+            for part in self.0.parts() {
+                let moved = self.0.solve(part)?;
+                self.0.take(&moved);
+            }
+            self.0.end_round()?;
         }
-        Ok(self.estimates().to_vec())
+        Ok(self.0.into_estimates())
     }
 }
 

@@ -17,22 +17,35 @@
 use std::ops::Range;
 
 use super::result::estimate::Estimate;
+use crate::Error;
 
 /// A way to recover points from a map whose model is known.
 pub(crate) trait Solve<'a, const D: usize> {
     /// The estimates of `slots`, in order. No estimate depends on which others are asked for.
-    fn solve(&self, slots: Range<usize>) -> Vec<Estimate<D>>;
+    ///
+    /// # Errors
+    /// When lists cannot be read, which are on a shelf.
+    fn solve(&self, slots: Range<usize>) -> Result<Vec<Estimate<D>>, Error>;
 
     /// What goes on from estimates of all slots; `None` where these are the last word.
-    fn rounds(&self, _start: &[Estimate<D>]) -> Option<Box<dyn InRounds<D> + 'a>> {
-        None
+    ///
+    /// # Errors
+    /// As of [`solve`](Self::solve).
+    fn rounds(&self, _start: &[Estimate<D>]) -> Result<Option<Box<dyn InRounds<D> + 'a>>, Error> {
+        Ok(None)
     }
 }
 
 /// Recovery in rounds over a whole map, each of which may be solved in parts.
 pub(crate) trait InRounds<const D: usize> {
+    /// Slots that are best solved together, one range after the other.
+    fn parts(&self) -> Vec<Range<usize>>;
+
     /// Where the slots go whose turn it is; those of `slots` alone, in any order. None when all is done.
-    fn solve(&self, slots: Range<usize>) -> Vec<Moved<D>>;
+    ///
+    /// # Errors
+    /// When edges cannot be read, which are on a shelf.
+    fn solve(&self, slots: Range<usize>) -> Result<Vec<Moved<D>>, Error>;
 
     /// Whether there is no further round.
     fn is_done(&self) -> bool;
@@ -40,11 +53,20 @@ pub(crate) trait InRounds<const D: usize> {
     /// Whether it is the turn of `slot`.
     fn is_turn_of(&self, slot: usize) -> bool;
 
-    /// Ends the round: all slots whose turn it was have `moved`.
-    fn go_on(&mut self, moved: &[Moved<D>]);
+    /// Some slots whose turn it is have `moved`. Others that are solved in this round do not see it.
+    fn take(&mut self, moved: &[Moved<D>]);
+
+    /// Ends the round: all slots whose turn it was have moved.
+    ///
+    /// # Errors
+    /// As of [`solve`](Self::solve).
+    fn end_round(&mut self) -> Result<(), Error>;
 
     /// Where slots are believed to be.
     fn estimates(&self) -> &[Estimate<D>];
+
+    /// The same, the last time that they are asked for.
+    fn into_estimates(self: Box<Self>) -> Vec<Estimate<D>>;
 }
 
 /// Where a slot goes in one round of joint recovery.

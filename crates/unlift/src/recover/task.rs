@@ -4,12 +4,14 @@ use std::ops::Range;
 
 use super::baselines::density::published;
 use super::baselines::ransac::Ransac;
+use super::checks::{check_anchors, check_lists, check_slots};
 use super::confidence::seen::{Seen, Solved};
 use super::consensus::Consensus;
 use super::joint::Joint;
 use super::learned::Model;
 use super::map::family::Family;
 use super::map::graph::Graph;
+use super::map::lists::Listed;
 use super::options::{Delta, RecoverOptions, Solver};
 use super::pairs_of_descriptors::descriptor_rows;
 use super::placement::{self, Placement};
@@ -21,9 +23,9 @@ use super::rounds::Rounds;
 use super::solve::Solve;
 use super::{confidence, delta, exact};
 use crate::density::{Peaks, tomography};
-use crate::neighbors::Neighborhoods;
+use crate::neighbors::{Neighborhoods, ShelvedLists};
 use crate::released::{Obfuscation, Released};
-use crate::{About, Error, Fingerprint};
+use crate::{About, Error, Fingerprint, Shelf};
 
 /// A released map and its lists, ready to be solved in any parts.
 ///
@@ -47,7 +49,7 @@ use crate::{About, Error, Fingerprint};
 pub struct Task<'a, const D: usize> {
     released: &'a Released<D>,
     map: Fingerprint,
-    lists: &'a Neighborhoods,
+    lists: Listed<'a>,
     options: RecoverOptions,
     delta: f64,
     records: Records<'a, D>,
@@ -63,7 +65,7 @@ enum Records<'a, const D: usize> {
     Listed {
         family: Family<'a, D>,
         /// Who lists whom, where the solver asks.
-        graph: Option<Graph>,
+        graph: Option<Box<Graph>>,
         /// The same as lists, where records have one slot.
         both_ways: Option<Neighborhoods>,
     },
@@ -79,7 +81,8 @@ impl<'a, const D: usize> Task<'a, D> {
         released: &'a Released<D>,
         lists: &'a Neighborhoods,
     ) -> Result<Self, Error> {
-        Self::make(released, lists, &model.options, Some(model))
+        check_lists(released, lists)?;
+        Self::make(released, (Listed::Here(lists), None), &model.options, Some(model))
     }
 
     /// The same, with what the model says learned here.
@@ -88,25 +91,41 @@ impl<'a, const D: usize> Task<'a, D> {
         lists: &'a Neighborhoods,
         options: &RecoverOptions,
     ) -> Result<Self, Error> {
-        Self::make(released, lists, options, None)
+        check_lists(released, lists)?;
+        Self::make(released, (Listed::Here(lists), None), options, None)
+    }
+
+    /// The same with lists that are on a shelf, where other things may be put.
+    pub(super) fn learn_shelved(
+        released: &'a Released<D>,
+        (lists, shelf): (&'a ShelvedLists, &dyn Shelf),
+        options: &RecoverOptions,
+    ) -> Result<Self, Error> {
+        if !matches!(options.solver, Solver::Joint | Solver::Consensus) {
+            let expected = format!("{} or {}", Solver::Joint.name(), Solver::Consensus.name());
+            let what = "solver for lists that are not in memory";
+            return Err(Error::new(what, expected, options.solver.name()));
+        }
+        check_anchors(released)?;
+        check_slots(released, lists.n_slots())?;
+        Self::make(released, (Listed::Away(lists), Some(shelf)), options, None)
     }
 
     fn make(
         released: &'a Released<D>,
-        lists: &'a Neighborhoods,
+        (lists, shelf): (Listed<'a>, Option<&dyn Shelf>),
         options: &RecoverOptions,
         model: Option<&Model<D>>,
     ) -> Result<Self, Error> {
         options.check()?;
         let map = released.fingerprint();
-        check_lists(released, lists)?;
         map.expect(lists.about().map)?;
         map.expect(model.map(|model| model.map)).map_err(|error| error.within("model"))?;
         let (records, delta) = match options.solver {
             Solver::Density => at_peaks(published(released)),
             Solver::Tomography => at_peaks(tomography(released)),
             Solver::Consensus | Solver::Joint | Solver::JointStart | Solver::Ransac => {
-                listed(released, lists, options, model)?
+                listed(released, (lists, shelf), options, model)?
             }
         };
         let trials = TrialCounts::default();
@@ -141,7 +160,7 @@ impl<'a, const D: usize> Task<'a, D> {
             let expected = format!("a range of slots up to {}", self.n_slots());
             return Err(Error::new("slots", expected, format!("{slots:?}")));
         }
-        Ok(self.solver(self.options.solver).solve(slots))
+        self.solver(self.options.solver)?.solve(slots)
     }
 
     /// The rounds of joint recovery from `start`, the estimates of all slots; `None` where there are none to come: for other
@@ -151,7 +170,7 @@ impl<'a, const D: usize> Task<'a, D> {
     /// When there is not one estimate per slot.
     pub fn rounds(&self, start: &[Estimate<D>]) -> Result<Option<Rounds<'_, D>>, Error> {
         self.check_estimates(start)?;
-        Ok(self.solver(self.options.solver).rounds(start).map(Rounds::new))
+        Ok(self.solver(self.options.solver)?.rounds(start)?.map(Rounds::new))
     }
 
     /// Recovered points from the last estimates of all slots: exact constraints are met where a rule fixes coordinates, and it
@@ -160,7 +179,8 @@ impl<'a, const D: usize> Task<'a, D> {
     /// # Errors
     /// When there is not one estimate per slot.
     pub fn finish(&self, estimates: Vec<Estimate<D>>) -> Result<Recovered<D>, Error> {
-        self.finish_and_look(estimates).map(|(recovered, _)| recovered)
+        let rows = self.descriptor_rows()?;
+        self.finish_with(estimates, rows, false).map(|(recovered, _)| recovered)
     }
 
     /// [`finish`](Self::finish), with what confidence is made of.
@@ -168,16 +188,20 @@ impl<'a, const D: usize> Task<'a, D> {
         &self,
         estimates: Vec<Estimate<D>>,
     ) -> Result<(Recovered<D>, Seen), Error> {
-        let records = 0..self.released.n_records();
-        let rows = descriptor_rows(self.released, self.lists, records);
-        self.finish_with(estimates, rows)
+        let rows = self.descriptor_rows()?;
+        self.finish_with(estimates, rows, true)
     }
 
-    /// The same, where it is known which descriptor is whose.
+    fn descriptor_rows(&self) -> Result<Option<Vec<u32>>, Error> {
+        descriptor_rows(self.released, self.lists, 0..self.released.n_records())
+    }
+
+    /// The same, where it is known which descriptor is whose; what was seen is empty unless it is to be `kept`.
     pub(super) fn finish_with(
         &self,
         estimates: Vec<Estimate<D>>,
         descriptor_row: Option<Vec<u32>>,
+        kept: bool,
     ) -> Result<(Recovered<D>, Seen), Error> {
         self.check_estimates(&estimates)?;
         let settled = self.settled(&estimates)?;
@@ -192,11 +216,15 @@ impl<'a, const D: usize> Task<'a, D> {
         let Records::Listed { family, graph: Some(graph), .. } = &self.records else {
             return Ok((recovered.without_confidence(Unknown::OtherSolver), Seen::NOTHING));
         };
+        let unknown = confidence::unknown(self.released, self.lists, estimates);
+        if let (Some(unknown), false) = (unknown, kept) {
+            return Ok((recovered.without_confidence(unknown), Seen::NOTHING));
+        }
         let solved = Solved { estimates, unsettled, delta: self.delta as f32 };
-        let seen = confidence::look(family, graph, self.released, &solved);
-        let recovered = match confidence::unknown(self.released, self.lists, estimates) {
+        let (sure, seen) = confidence::look(family, graph, self.released, &solved, kept)?;
+        let recovered = match unknown {
             Some(unknown) => recovered.without_confidence(unknown),
-            None => recovered.with_confidence(confidence::of(estimates, &seen))?,
+            None => recovered.with_confidence(sure)?,
         };
         Ok((recovered, seen))
     }
@@ -213,21 +241,30 @@ impl<'a, const D: usize> Task<'a, D> {
     }
 
     /// The solver called so, over this map.
-    fn solver(&self, solver: Solver) -> Box<dyn Solve<'_, D> + '_> {
+    fn solver(&self, solver: Solver) -> Result<Box<dyn Solve<'_, D> + '_>, Error> {
         let (lists, delta, seed) = (self.lists, self.delta as f32, self.options.seed);
-        match &self.records {
-            Records::Alone(peaks) => Box::new(Placement::new(self.released, lists, peaks)),
+        // Those of the paper's loop and of attacks on records alone, which are not looked for on a shelf.
+        let here = || match lists {
+            Listed::Here(lists) => Ok(lists),
+            _ => Err(Error::new("lists", "some in memory", "others")),
+        };
+        Ok(match &self.records {
+            Records::Alone(peaks) => Box::new(Placement::new(self.released, here()?, peaks)),
             Records::Listed { family, graph, both_ways } => {
                 // Joint recovery starts from who lists whom in both directions, where a record hides one point.
-                let used = both_ways.as_ref().unwrap_or(lists);
+                let used = used(lists, graph.as_deref(), both_ways.as_ref());
                 let start = Consensus { family, lists: used, delta };
                 match (solver, graph) {
                     (Solver::Joint, Some(graph)) => {
                         Box::new(Joint { start, family, graph, delta, seed })
                     }
-                    (Solver::Ransac, _) => {
-                        Box::new(Ransac { family, lists, delta, seed, trials: &self.trials })
-                    }
+                    (Solver::Ransac, _) => Box::new(Ransac {
+                        family,
+                        lists: here()?,
+                        delta,
+                        seed,
+                        trials: &self.trials,
+                    }),
                     (Solver::Consensus | Solver::JointStart, _) | (Solver::Joint, None) => {
                         Box::new(start)
                     }
@@ -235,7 +272,7 @@ impl<'a, const D: usize> Task<'a, D> {
                     (Solver::Density | Solver::Tomography, _) => Box::new(start),
                 }
             }
-        }
+        })
     }
 
     /// Whether a rule of the scheme moves estimates. The paper's loop stays as published.
@@ -265,10 +302,10 @@ impl<'a, const D: usize> Task<'a, D> {
 
     /// Estimates after all rounds from `start`.
     pub(super) fn go_on(&self, start: Vec<Estimate<D>>) -> Result<Vec<Estimate<D>>, Error> {
-        match self.rounds(&start)? {
-            Some(rounds) => rounds.run(),
-            None => Ok(start),
-        }
+        let Some(rounds) = self.rounds(&start)? else { return Ok(start) };
+        // They have copies of their own, and maps may be large.
+        drop(start);
+        rounds.run()
     }
 
     fn in_columns(
@@ -302,43 +339,50 @@ fn at_peaks<'a, const D: usize>(peaks: Peaks) -> (Records<'a, D>, f64) {
 /// Records with their lists, and delta: learned, or as `model` says.
 fn listed<'a, const D: usize>(
     released: &'a Released<D>,
-    lists: &'a Neighborhoods,
+    (lists, shelf): (Listed<'a>, Option<&dyn Shelf>),
     options: &RecoverOptions,
     model: Option<&Model<D>>,
 ) -> Result<(Records<'a, D>, f64), Error> {
     let family = match model.and_then(|model| model.chance.clone()) {
         Some(chance) => Family::with_chance(released, chance)?,
-        None => Family::learn(released, lists),
+        None => Family::learn(released, lists)?,
     };
     // Joint recovery also asks who lists whom, from the first pass on.
-    let graph = matches!(options.solver, Solver::Joint | Solver::JointStart)
-        .then(|| Graph::new(lists, released.slots_per_record()));
-    let both_ways = match &graph {
-        Some(graph) if released.slots_per_record() == 1 => Some(graph.neighborhoods()?),
+    let slots_per_record = released.slots_per_record();
+    let graph = match (lists, shelf) {
+        _ if !matches!(options.solver, Solver::Joint | Solver::JointStart) => None,
+        (Listed::Here(lists), _) => Some(Box::new(Graph::new(lists, slots_per_record))),
+        (Listed::Away(lists), Some(shelf)) => {
+            Some(Box::new(Graph::away(lists, slots_per_record, shelf)?))
+        }
+        _ => None,
+    };
+    let both_ways = match (&graph, lists) {
+        (Some(graph), Listed::Here(_)) if slots_per_record == 1 => Some(graph.neighborhoods()?),
         _ => None,
     };
     let delta = match (model, options.delta) {
         (Some(model), _) => model.delta,
         (None, Delta::Fixed(delta)) => delta,
         (None, Delta::Auto) => {
-            let used = both_ways.as_ref().unwrap_or(lists);
-            delta::learn(released, &family, (used, lists), graph.is_some(), options.seed)
+            let used = used(lists, graph.as_deref(), both_ways.as_ref());
+            delta::learn(released, &family, (used, lists), graph.is_some(), options.seed)?
         }
     };
     Ok((Records::Listed { family, graph, both_ways }, delta))
 }
 
-/// Refuses lists that are not of this map.
-fn check_lists<const D: usize>(released: &Released<D>, lists: &Neighborhoods) -> Result<(), Error> {
-    if lists.n_slots() != released.n_slots() {
-        let expected = format!("{} rows, one per slot", released.n_slots());
-        return Err(Error::new("neighborhoods", expected, lists.n_slots().to_string()));
+/// The lists that consensus reads: as given, or those of both directions, where joint recovery has them.
+fn used<'a>(
+    lists: Listed<'a>,
+    graph: Option<&'a Graph>,
+    both_ways: Option<&'a Neighborhoods>,
+) -> Listed<'a> {
+    match (lists, graph, both_ways) {
+        (_, _, Some(both_ways)) => Listed::Here(both_ways),
+        (Listed::Away(_), Some(graph), _) if graph.slots_per_record() == 1 => {
+            Listed::Edges(graph, lists.about())
+        }
+        _ => lists,
     }
-    // Lists of another map may have as many rows.
-    let n_records = released.n_records();
-    if let Some(record) = lists.records().iter().find(|record| record.index() >= n_records) {
-        let expected = format!("records below {n_records}");
-        return Err(Error::new("neighborhoods", expected, record.0.to_string()));
-    }
-    Ok(())
 }

@@ -30,4 +30,5 @@ mod recovery;
 mod released_again;
 mod secrets;
 mod shares;
+mod shelved;
 mod start;

@@ -34,7 +34,7 @@ fn parts_are_the_whole<const D: usize>(name: &str, scheme: &Entry) {
             assert_eq!(solver, Solver::Joint, "{name}");
             while !rounds.is_done() {
                 let parts = cuts(n).into_iter().rev();
-                let moved: Vec<_> = parts.flat_map(|part| rounds.solve(part)).collect();
+                let moved: Vec<_> = parts.flat_map(|part| rounds.solve(part).unwrap()).collect();
                 rounds.go_on(&moved).unwrap();
             }
             estimates = rounds.estimates().to_vec();
@@ -128,7 +128,7 @@ fn a_round_takes_each_slot_in_its_turn() {
     let model = prepare(&hidden.released, &lists, &options).unwrap();
     let task = Task::new(&model, &hidden.released, &lists).unwrap();
     let mut rounds = task.rounds(&task.solve(0..200).unwrap()).unwrap().unwrap();
-    let mut moved = rounds.solve(0..200);
+    let mut moved = rounds.solve(0..200).unwrap();
     let error = |found: Result<(), unlift::Error>| found.unwrap_err().to_string();
     assert_eq!(
         error(rounds.go_on(&moved[1..])),
@@ -140,7 +140,7 @@ fn a_round_takes_each_slot_in_its_turn() {
     moved.pop();
     rounds.go_on(&moved).unwrap();
     // From the second sweep on every other slot holds still.
-    assert_eq!(rounds.solve(0..200).len(), 100);
+    assert_eq!(rounds.solve(0..200).unwrap().len(), 100);
 }
 
 #[test]

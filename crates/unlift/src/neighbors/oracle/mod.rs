@@ -3,12 +3,14 @@
 //! The one module of this stage that reveals: it stands for an attacker of stated quality.
 
 mod from_points;
+mod in_parts;
 mod nearness;
 mod outliers;
 
 use rayon::prelude::*;
 
 pub use from_points::from_points;
+pub use in_parts::InParts;
 pub use outliers::{Noise, Outliers};
 
 use nearness::Nearness;
@@ -28,6 +30,8 @@ pub struct TrueNeighbors {
     n_records: usize,
     slots_per_record: usize,
     map: Option<Fingerprint>,
+    /// The first slot that they are of.
+    first: usize,
     /// K records per slot, in order of nearness: never released in this order.
     records: Vec<RecordId>,
 }
@@ -46,19 +50,12 @@ impl TrueNeighbors {
     ) -> Result<Self, Error> {
         let n_slots = secret.n_slots();
         let n_records = n_slots / slots_per_record;
-        if k == 0 || n_records < k + 1 {
-            let others = n_records.saturating_sub(1);
-            let expected = match others {
-                0 => "more than one record".to_owned(),
-                _ => format!("between 1 and {others} (other records)"),
-            };
-            return Err(Error::new("k", expected, k.to_string()));
-        }
+        check_k(k, n_records)?;
         let mut records = vec![RecordId(0); n_slots * k];
-        Nearness::new(knn, secret, slots_per_record).each(k, &mut records, |_, near, row| {
+        Nearness::new(knn, secret, slots_per_record).each(k, &mut records, &|_, near, row| {
             row.copy_from_slice(near);
         });
-        Ok(Self { k, n_records, slots_per_record, map: secret.map(), records })
+        Ok(Self { k, n_records, slots_per_record, map: secret.map(), first: 0, records })
     }
 
     /// Neighborhoods of which `round(inlier_ratio * K)` entries (one at least above 0) are true neighbors, uniformly
@@ -73,6 +70,16 @@ impl TrueNeighbors {
         outliers: &Outliers,
         seed: u64,
     ) -> Result<Neighborhoods, Error> {
+        let records = self.rows(self.kept(inlier_ratio, outliers)?, outliers, seed);
+        let n_slots = self.n_records * self.slots_per_record;
+        let offsets = (0..=n_slots as u64).map(|slot| slot * self.k as u64).collect();
+        let (n_records, slots) = (self.n_records, self.slots_per_record);
+        let lists = Neighborhoods::try_new(offsets, records, None, n_records, slots)?;
+        Ok(lists.with_about(about(self.map)))
+    }
+
+    /// How many true neighbors a list keeps at an inlier ratio.
+    fn kept(&self, inlier_ratio: f64, outliers: &Outliers) -> Result<usize, Error> {
         if !(0.0..=1.0).contains(&inlier_ratio) {
             return Err(Error::new("inlier ratio", "0 to 1", inlier_ratio.to_string()));
         }
@@ -86,8 +93,14 @@ impl TrueNeighbors {
             let expected = format!("at least {wanted} records that are {}", outliers.meaning());
             return Err(Error::new(what, expected, most.to_string()));
         }
+        Ok(keep)
+    }
+
+    /// The lists of its slots end to end, each of K records in ascending order of which so many are true neighbors.
+    fn rows(&self, keep: usize, outliers: &Outliers, seed: u64) -> Vec<RecordId> {
         let mut records = vec![RecordId(0); self.records.len()];
-        records.par_chunks_mut(self.k).enumerate().for_each_init(Vec::new, |order, (slot, row)| {
+        records.par_chunks_mut(self.k).enumerate().for_each_init(Vec::new, |order, (at, row)| {
+            let slot = self.first + at;
             order.clear();
             order.extend_from_slice(self.of(slot));
             Draws::new(seed, Stage::OracleKeep, slot as u64).shuffle(order);
@@ -95,15 +108,7 @@ impl TrueNeighbors {
             outliers.fill(self, slot, seed, order, &mut row[keep..]);
             row.sort_unstable();
         });
-        let n_slots = self.n_records * self.slots_per_record;
-        let offsets = (0..=n_slots as u64).map(|slot| slot * self.k as u64).collect();
-        let (n_records, slots) = (self.n_records, self.slots_per_record);
-        let lists = Neighborhoods::try_new(offsets, records, None, n_records, slots)?;
-        Ok(lists.with_about(About {
-            map: self.map,
-            order: RowOrder::Slots,
-            lists_by: ListsBy::Oracle,
-        }))
+        records
     }
 
     /// [`lists`](Self::lists) with uniformly random outliers.
@@ -116,7 +121,8 @@ impl TrueNeighbors {
 
     /// The true neighbors of `slot`, the nearest first.
     fn of(&self, slot: usize) -> &[RecordId] {
-        &self.records[slot * self.k..(slot + 1) * self.k]
+        let at = slot - self.first;
+        &self.records[at * self.k..(at + 1) * self.k]
     }
 
     /// The record that slot `slot` sits on.
@@ -147,6 +153,24 @@ impl TrueNeighbors {
             .reduce(|| (0, 0), |a: (usize, usize), b| (a.0 + b.0, a.1 + b.1));
         if listed == 0 { 0.0 } else { hits as f64 / listed as f64 }
     }
+}
+
+/// Refuses a K of which there are not so many other records.
+fn check_k(k: usize, n_records: usize) -> Result<(), Error> {
+    if k > 0 && n_records > k {
+        return Ok(());
+    }
+    let others = n_records.saturating_sub(1);
+    let expected = match others {
+        0 => "more than one record".to_owned(),
+        _ => format!("between 1 and {others} (other records)"),
+    };
+    Err(Error::new("k", expected, k.to_string()))
+}
+
+/// Lists by the oracle of one released map.
+fn about(map: Option<Fingerprint>) -> About {
+    About { map, order: RowOrder::Slots, lists_by: ListsBy::Oracle }
 }
 
 /// A search over the originals, for [`TrueNeighbors::new`]; built once per map.

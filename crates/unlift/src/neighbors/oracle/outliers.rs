@@ -4,8 +4,7 @@
 //! of other places that look alike. Each model here is one such way to err, alone.
 
 use super::TrueNeighbors;
-use super::nearness::Nearness;
-use super::nearness::listed;
+use super::nearness::{Make, Nearness, listed};
 use crate::geometry::knn::Knn;
 use crate::seed::{Draws, Stage};
 use crate::truth::Secret;
@@ -103,23 +102,27 @@ impl Outliers {
         let nearness = Nearness::new(knn, secret, truth.slots_per_record);
         Ok(match noise {
             Noise::Uniform => Self::uniform(),
-            Noise::Near => Self::near(truth, &nearness, n_slots, seed),
+            Noise::Near => Self::near(truth, n_slots, seed, |n, rows, make| {
+                nearness.each(n, rows, make);
+            }),
             Noise::Clustered => Self::clustered(truth, knn, secret, &nearness, seed),
         })
     }
 
-    fn near<const D: usize>(
+    /// Those of [`Noise::Near`] for the slots of `truth`, so many, of which `each(n, rows, make)` makes a row of each from its n
+    /// nearest records.
+    pub(super) fn near(
         truth: &TrueNeighbors,
-        nearness: &Nearness<'_, D>,
         n_slots: usize,
         seed: u64,
+        each: impl FnOnce(usize, &mut [RecordId], &Make<'_>),
     ) -> Self {
         let first = RING.0 * truth.k;
         let end = (RING.1 * truth.k).min(truth.n_records - 1);
         let per_slot = truth.k.min(end.saturating_sub(first));
         let mut records = vec![RecordId(0); n_slots * per_slot];
         if per_slot > 0 {
-            nearness.each(end, &mut records, |slot, near, row| {
+            each(end, &mut records, &|slot, near, row| {
                 let ring = &mut near[first..];
                 let mut draws = Draws::new(seed, Stage::OracleOutliers, slot as u64);
                 for (at, entry) in row.iter_mut().enumerate() {
@@ -132,7 +135,7 @@ impl Outliers {
         Self { noise: Noise::Near, records, per_slot, ..Self::uniform() }
     }
 
-    fn clustered<const D: usize>(
+    pub(super) fn clustered<const D: usize>(
         truth: &TrueNeighbors,
         knn: &Knn<'_, D>,
         secret: &Secret,
@@ -206,7 +209,8 @@ impl Outliers {
         row: &mut [RecordId],
     ) {
         if self.noise == Noise::Near {
-            row.copy_from_slice(&self.records[slot * self.per_slot..][..row.len()]);
+            let at = slot - truth.first;
+            row.copy_from_slice(&self.records[at * self.per_slot..][..row.len()]);
             return;
         }
         let (near, own) = (truth.of(slot), truth.own(slot));

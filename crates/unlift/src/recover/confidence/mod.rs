@@ -7,13 +7,17 @@
 
 mod applies;
 mod constants;
+mod crowd;
 mod cues;
 pub(super) mod model;
 pub(super) mod seen;
 
+use std::ops::Range;
+
 pub(super) use applies::unknown;
 use rayon::prelude::*;
 
+use crate::Error;
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::Graph;
 use crate::recover::map::pieces::{CandidatePieces, LinePieces, PlanePieces};
@@ -41,36 +45,43 @@ pub(super) fn not_asked<const D: usize>(options: &RecoverOptions) -> Option<Unkn
     }
 }
 
-/// Looks around the estimates of joint recovery.
+/// How sure the attacker is of every slot of joint recovery, and the cues that say so, if they are to be `kept`.
+///
+/// # Errors
+/// When edges cannot be read, which are on a shelf.
 pub(super) fn look<const D: usize>(
     family: &Family<'_, D>,
     graph: &Graph,
     released: &Released<D>,
     solved: &Solved<'_, D>,
-) -> Seen {
-    let seen = match family {
+    kept: bool,
+) -> Result<(Vec<Confidence>, Seen), Error> {
+    let mut seen = Seen { kind: model::kind(released), ..Seen::NOTHING };
+    let mut confidence = Vec::with_capacity(solved.estimates.len());
+    let found = |slots: Range<usize>, cues: Vec<Cues>, radius: f64| {
+        seen.radius = radius;
+        let of_slot = |(estimate, cues): (&Estimate<D>, &Cues)| match estimate.status {
+            Status::Ok => judged(&MODELS[seen.kind], cues, radius as f32),
+            _ => Confidence::LOST,
+        };
+        confidence.par_extend(solved.estimates[slots].par_iter().zip(&cues).map(of_slot));
+        if kept {
+            seen.cues.extend(cues);
+        }
+    };
+    match family {
         Family::Lines { rows, slots_per_record, chance } => {
             let pieces = LinePieces::new(rows, *slots_per_record, chance, solved.delta);
-            cues::of(&pieces, graph, solved)
+            cues::of(&pieces, graph, solved, found)?;
         }
         Family::Planes { planes, sorted } => {
-            cues::of(&PlanePieces::new(planes, sorted, solved.delta), graph, solved)
+            cues::of(&PlanePieces::new(planes, sorted, solved.delta), graph, solved, found)?;
         }
         Family::Candidates { rows, chance } => {
-            cues::of(&CandidatePieces::new(rows, chance, solved.delta), graph, solved)
+            cues::of(&CandidatePieces::new(rows, chance, solved.delta), graph, solved, found)?;
         }
-    };
-    Seen { kind: model::kind(released), ..seen }
-}
-
-/// How sure the attacker is of every slot.
-pub(super) fn of<const D: usize>(estimates: &[Estimate<D>], seen: &Seen) -> Vec<Confidence> {
-    let radius = seen.radius as f32;
-    let of_slot = |(estimate, cues): (&Estimate<D>, &Cues)| match estimate.status {
-        Status::Ok => judged(&MODELS[seen.kind], cues, radius),
-        _ => Confidence::LOST,
-    };
-    estimates.par_iter().zip(&seen.cues).map(of_slot).collect()
+    }
+    Ok((confidence, seen))
 }
 
 /// What `cues` say about one slot; lengths are multiples of `radius`.

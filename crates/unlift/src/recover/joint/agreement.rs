@@ -6,7 +6,9 @@
 
 use rayon::prelude::*;
 
-use crate::recover::map::graph::{Graph, record_of};
+use crate::Error;
+use crate::recover::map::edges::record_of;
+use crate::recover::map::graph::Graph;
 use crate::recover::map::pieces::Pieces;
 use crate::recover::result::estimate::{Estimate, Status};
 
@@ -17,25 +19,37 @@ const SLOTS: usize = 1 << 12;
 /// that expected by chance.
 pub(crate) fn of<const D: usize, P: Pieces<D>>(
     pieces: &P,
-    graph: &Graph,
+    judges: &Judges,
     estimates: &[Estimate<D>],
     delta2: f32,
 ) -> f64 {
-    let every = estimates.len().div_ceil(SLOTS).max(1);
-    let slots: Vec<usize> = (0..estimates.len()).step_by(every).collect();
-    let parts: Vec<f64> = slots
-        .par_chunks(256)
-        .map(|part| {
-            part.iter().map(|&slot| of_slot(pieces, graph, slot, &estimates[slot], delta2)).sum()
-        })
-        .collect();
-    parts.iter().sum::<f64>() / slots.len().max(1) as f64
+    let of_part = |part: &[(usize, Vec<u32>)]| {
+        part.iter()
+            .map(|(slot, ends)| of_slot(pieces, (*slot, ends), &estimates[*slot], delta2))
+            .sum()
+    };
+    let parts: Vec<f64> = judges.0.par_chunks(256).map(of_part).collect();
+    parts.iter().sum::<f64>() / judges.0.len().max(1) as f64
+}
+
+/// The slots that are looked at, with the other ends of their edges.
+pub(super) struct Judges(Vec<(usize, Vec<u32>)>);
+
+impl Judges {
+    /// Slots spread evenly over `graph`.
+    ///
+    /// # Errors
+    /// When edges cannot be read.
+    pub(super) fn new(graph: &Graph) -> Result<Self, Error> {
+        let n = graph.n_slots();
+        let row = |slot: usize| Ok((slot, graph.rows(&(slot..slot + 1))?.ends().to_vec()));
+        (0..n).step_by(n.div_ceil(SLOTS).max(1)).map(row).collect::<Result<_, _>>().map(Self)
+    }
 }
 
 fn of_slot<const D: usize, P: Pieces<D>>(
     pieces: &P,
-    graph: &Graph,
-    slot: usize,
+    (slot, ends): (usize, &[u32]),
     estimate: &Estimate<D>,
     delta2: f32,
 ) -> f64 {
@@ -43,7 +57,7 @@ fn of_slot<const D: usize, P: Pieces<D>>(
         return 0.0;
     }
     let (mut near, mut all) = (0u32, 0u32);
-    for &end in graph.of(slot).0 {
+    for &end in ends {
         let record = record_of(end as usize, pieces.slots_per_record());
         if pieces.may_vote(slot, record) {
             all += 1;

@@ -5,8 +5,8 @@
 //! evidence as the right one. But those there do not list back, while at the right place as many list as are
 //! listed. So where crowds are found, one side may be ahead of the other only so far.
 
-use super::look::Look;
-use crate::recover::map::graph::{Side, side};
+use super::look::{Look, Sampled};
+use crate::recover::map::edges::{Side, side};
 use crate::recover::map::places::distance2;
 
 /// Every so many slots of the sample are looked at, as one mean of all is asked for,
@@ -28,12 +28,11 @@ pub(super) fn surplus<const D: usize>(look: &Look<'_, D>) -> f32 {
     let mut entries = 0.0;
     let mut beside = 0.0;
     let mut own = Vec::new();
-    for (&slot, random) in look.sample.rows().step_by(EVERY) {
-        let slot = slot as usize;
+    for Sampled { slot, ends, class, random } in look.sample.rows().iter().step_by(EVERY) {
+        let slot = *slot as usize;
         if !look.places.is_known(slot) {
             continue;
         }
-        let (ends, class) = look.graph.of(slot);
         own.clear();
         let edges = ends.iter().zip(class);
         own.extend(edges.filter(|(_, class)| side(**class) == Side::Forward).map(|(end, _)| *end));

@@ -8,7 +8,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use rayon::prelude::*;
 
-use crate::recover::map::graph::{Graph, either};
+use crate::recover::map::edges::either;
+use crate::recover::map::graph::EdgeRows;
 use crate::recover::map::pieces::Pieces;
 use crate::recover::map::places::{Places, distance2};
 
@@ -35,12 +36,12 @@ impl Jumps {
         *self.concerning[slot].get_mut() = 0;
     }
 
-    /// Tells whom it concerns that `slots` jumped from one place to another: whoever may lie within
+    /// Tells whom it concerns that `slots`, whose edges are given, jumped from one place to another: whoever may lie within
     /// `reach` of either. Where nothing is `ahead` a slot is looked at in any case and need not know.
     pub(super) fn tell<const D: usize, P: Pieces<D>>(
         &self,
         slots: &[u32],
-        (pieces, graph): (&P, &Graph),
+        (pieces, edges): (&P, &EdgeRows<'_>),
         (from, to): (&Places<D>, &Places<D>),
         reach: f32,
         ahead: &[f32],
@@ -53,7 +54,7 @@ impl Jumps {
         slots.par_chunks(CHUNK).for_each(|slots| {
             for slot in slots.iter().map(|&slot| slot as usize) {
                 let (from, to) = (from.of(slot), to.of(slot));
-                let (ends, class) = graph.of(slot);
+                let (ends, class) = edges.of(slot);
                 for (&end, &class) in ends.iter().zip(class) {
                     let last = end as usize + usize::from(either(class, slots_per_record));
                     let ends = end as usize..=last;

@@ -1,5 +1,6 @@
-//! What the law of neighbors is learned from: places, edges, and a sample of both.
+//! What the law of neighbors is learned from: places, and a sample of edges.
 
+use crate::Error;
 use crate::recover::map::crowding::Density;
 use crate::recover::map::graph::Graph;
 use crate::recover::map::places::Places;
@@ -15,7 +16,6 @@ const SLOTS: usize = 1 << 11;
 /// What the law is learned from.
 pub(crate) struct Look<'a, const D: usize> {
     pub(crate) places: &'a Places<D>,
-    pub(crate) graph: &'a Graph,
     pub(crate) density: &'a Density<D>,
     pub(crate) slots_per_record: usize,
     /// True neighbors are looked for within this many local widths.
@@ -28,35 +28,44 @@ pub(crate) struct Look<'a, const D: usize> {
     pub(crate) sample: &'a Sample,
 }
 
-/// The slots that are looked at, with random edges for each.
+/// The slots that are looked at, each with its edges and with random ones.
 pub(crate) struct Sample {
-    slots: Vec<u32>,
-    random: Vec<RandomEdges>,
+    rows: Vec<Sampled>,
+}
+
+/// One of them.
+pub(crate) struct Sampled {
+    pub(super) slot: u32,
+    /// The other ends of its edges, and the class of each.
+    pub(super) ends: Vec<u32>,
+    pub(super) class: Vec<u8>,
+    pub(super) random: RandomEdges,
 }
 
 impl Sample {
     /// Slots spread evenly over `graph`.
-    pub(crate) fn new(graph: &Graph, seed: u64) -> Self {
-        if graph.len() == 0 {
-            return Self { slots: Vec::new(), random: Vec::new() };
-        }
-        let every = graph.n_slots().div_ceil(SLOTS).max(1);
-        let slots: Vec<u32> = (0..graph.n_slots() as u32).step_by(every).collect();
-        let random = |&slot: &u32| {
-            let mut draws = Draws::new(seed, Stage::NullSample, u64::from(slot));
-            std::array::from_fn(|_| graph.edge(draws.below(graph.len() as u64) as usize))
-        };
-        let random = slots.iter().map(random).collect();
-        Self { slots, random }
+    ///
+    /// # Errors
+    /// When edges cannot be read.
+    pub(crate) fn new(graph: &Graph, seed: u64) -> Result<Self, Error> {
+        let n = graph.n_slots();
+        let every = n.div_ceil(SLOTS).max(1);
+        let slots = if graph.len() == 0 { 0..0 } else { 0..n };
+        let rows = slots.step_by(every).map(|slot| {
+            let mut draws = Draws::new(seed, Stage::NullSample, slot as u64);
+            let mut random = [(0, 0); RANDOM];
+            for edge in &mut random {
+                *edge = graph.edge(draws.below(graph.len() as u64))?;
+            }
+            let edges = graph.rows(&(slot..slot + 1))?;
+            let (ends, class) = edges.of(slot);
+            Ok(Sampled { slot: slot as u32, ends: ends.to_vec(), class: class.to_vec(), random })
+        });
+        Ok(Self { rows: rows.collect::<Result<_, Error>>()? })
     }
 
-    /// Slots, and random edges of each.
-    pub(super) fn columns(&self) -> (&[u32], &[RandomEdges]) {
-        (&self.slots, &self.random)
-    }
-
-    /// Slots, each with its random edges.
-    pub(super) fn rows(&self) -> impl Iterator<Item = (&u32, &RandomEdges)> {
-        self.slots.iter().zip(&self.random)
+    /// All of them.
+    pub(super) fn rows(&self) -> &[Sampled] {
+        &self.rows
     }
 }

@@ -23,6 +23,7 @@ mod sweeps;
 
 use std::ops::Range;
 
+use crate::Error;
 use crate::recover::consensus::Consensus;
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::Graph;
@@ -47,29 +48,29 @@ pub(crate) struct Joint<'a, const D: usize> {
 const LEAST_EVIDENCE: f64 = 1.5;
 
 impl<'a, const D: usize> Solve<'a, D> for Joint<'a, D> {
-    fn solve(&self, slots: Range<usize>) -> Vec<Estimate<D>> {
+    fn solve(&self, slots: Range<usize>) -> Result<Vec<Estimate<D>>, Error> {
         self.start.solve(slots)
     }
 
-    fn rounds(&self, start: &[Estimate<D>]) -> Option<Box<dyn InRounds<D> + 'a>> {
+    fn rounds(&self, start: &[Estimate<D>]) -> Result<Option<Box<dyn InRounds<D> + 'a>>, Error> {
         let Self { family, graph, delta, seed, .. } = *self;
         if family.has_regions() && mean_evidence(start) < LEAST_EVIDENCE {
-            return None;
+            return Ok(None);
         }
-        Some(match family {
+        Ok(Some(match family {
             Family::Lines { rows, slots_per_record, chance } => {
                 let pieces = LinePieces::new(rows, *slots_per_record, chance, delta);
-                Box::new(Sweeps::new(pieces, graph, start, delta, seed))
+                Box::new(Sweeps::new(pieces, graph, start, delta, seed)?)
             }
             Family::Planes { planes, sorted } => {
                 let pieces = PlanePieces::new(planes, sorted, delta);
-                Box::new(Sweeps::new(pieces, graph, start, delta, seed))
+                Box::new(Sweeps::new(pieces, graph, start, delta, seed)?)
             }
             Family::Candidates { rows, chance } => {
                 let pieces = CandidatePieces::new(rows, chance, delta);
-                Box::new(Sweeps::new(pieces, graph, start, delta, seed))
+                Box::new(Sweeps::new(pieces, graph, start, delta, seed)?)
             }
-        })
+        }))
     }
 }
 

@@ -8,8 +8,8 @@
 use rayon::prelude::*;
 
 use super::crowds;
-use super::look::{Look, RANDOM, RandomEdges};
-use crate::recover::map::graph::{CLASSES, Side, either, side};
+use super::look::{Look, RANDOM, Sampled};
+use crate::recover::map::edges::{CLASSES, Side, either, side};
 use crate::recover::map::settings::Settings;
 use crate::simd::{Kernel, dispatch};
 
@@ -65,12 +65,9 @@ impl Law {
 
     /// The law of the present places.
     pub(crate) fn learn<const D: usize>(look: &Look<'_, D>) -> Self {
-        let (slots, random) = look.sample.columns();
-        let parts: Vec<Tally> = slots
-            .par_chunks(PART)
-            .zip(random.par_chunks(PART))
-            .map(|(slots, random)| dispatch(Part { slots, random, look }))
-            .collect();
+        let rows = look.sample.rows();
+        let parts: Vec<Tally> =
+            rows.par_chunks(PART).map(|rows| dispatch(Part { rows, look })).collect();
         let mut total = Tally::default();
         parts.iter().for_each(|part| total.merge(part));
         total.law(look)
@@ -79,8 +76,7 @@ impl Law {
 
 /// Some of the slots of a sample.
 struct Part<'a, 'b, const D: usize> {
-    slots: &'a [u32],
-    random: &'a [RandomEdges],
+    rows: &'a [Sampled],
     look: &'a Look<'b, D>,
 }
 
@@ -90,9 +86,9 @@ impl<const D: usize> Kernel for Part<'_, '_, D> {
     #[inline(always)]
     fn run(self) -> Tally {
         let mut tally = Tally::default();
-        for (&slot, random) in self.slots.iter().zip(self.random) {
-            if self.look.places.is_known(slot as usize) {
-                tally.add(slot as usize, random, self.look);
+        for row in self.rows {
+            if self.look.places.is_known(row.slot as usize) {
+                tally.add(row, self.look);
             }
         }
         tally
@@ -117,8 +113,9 @@ impl Default for Tally {
 
 impl Tally {
     #[inline(always)]
-    fn add<const D: usize>(&mut self, slot: usize, random: &RandomEdges, look: &Look<'_, D>) {
-        let x = look.places.of(slot);
+    fn add<const D: usize>(&mut self, row: &Sampled, look: &Look<'_, D>) {
+        let Sampled { slot, ends, class, random } = row;
+        let x = look.places.of(*slot as usize);
         let width = look.density.width(look.density.at(&x));
         let reach = width * look.reach;
         let (reach2, scale) = (reach * reach, BINS as f32 / reach);
@@ -126,7 +123,6 @@ impl Tally {
             let (d2, _) = look.places.nearest(end, either(class, look.slots_per_record), &x);
             (d2 < reach2).then(|| ((d2.sqrt() * scale) as usize).min(BINS - 1))
         };
-        let (ends, class) = look.graph.of(slot);
         let mut n_mutual = 0;
         for (&end, &class) in ends.iter().zip(class) {
             n_mutual += usize::from(side(class) == Side::Mutual);

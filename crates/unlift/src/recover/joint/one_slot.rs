@@ -4,7 +4,8 @@ use super::near::{Columns, Ends, Odds};
 use super::neighbor_law::Law;
 use super::remake::{Directions, remade};
 use crate::recover::map::crowding::Density;
-use crate::recover::map::graph::{CLASSES, Graph, either, record_of};
+use crate::recover::map::edges::{CLASSES, either, record_of};
+use crate::recover::map::graph::EdgeRows;
 use crate::recover::map::lanes::ln;
 use crate::recover::map::pieces::{Piece, Pieces};
 use crate::recover::map::places::{Places, distance2};
@@ -13,7 +14,8 @@ use crate::recover::result::estimate::{Estimate, Status, stored_support};
 /// Everything a round reads.
 pub(crate) struct Round<'a, const D: usize, P> {
     pub(crate) pieces: &'a P,
-    pub(crate) graph: &'a Graph,
+    /// The edges of the slots that are solved.
+    pub(crate) edges: &'a EdgeRows<'a>,
     pub(crate) places: &'a Places<D>,
     pub(crate) density: &'a Density<D>,
     pub(crate) law: &'a Law,
@@ -134,7 +136,7 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
             return;
         }
         // The other slot of a record lies beside the one that is named.
-        self.graph.of(slot).0.iter().for_each(|&end| self.places.prefetch(end as usize));
+        self.edges.of(slot).0.iter().for_each(|&end| self.places.prefetch(end as usize));
     }
 
     /// The new estimate of `slot`, and how many nats its place is ahead of the best one elsewhere; the
@@ -147,7 +149,7 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         scratch: &mut Scratch<D>,
     ) -> (Estimate<D>, f32) {
         scratch.best.clear();
-        scratch.all.gather(self.graph.of(slot), self.places, self.pieces.slots_per_record());
+        scratch.all.gather(self.edges.of(slot), self.places, self.pieces.slots_per_record());
         let (reach, blind) = (TUBE * self.law.radius, BLIND * self.law.radius);
         let odds = self.odds(slot);
         for piece in 0..P::PER_SLOT {
@@ -289,7 +291,7 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
     fn by_records(&self, slot: usize, x: [[f32; D]; 2]) -> [f32; 2] {
         let slots_per_record = self.pieces.slots_per_record();
         let at = x.map(|x| (self.law_at(&x), self.pieces.record_chance(slot, &x)));
-        let (ends, class) = self.graph.of(slot);
+        let (ends, class) = self.edges.of(slot);
         let mut sums = [0.0; 2];
         for (&end, &class) in ends.iter().zip(class) {
             let record = record_of(end as usize, slots_per_record);

@@ -4,12 +4,13 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::agreement;
+use super::agreement::{self, Judges};
 use super::jumps::Jumps;
 use super::look::{Look, Sample};
 use super::neighbor_law::Law;
 use super::one_slot::{Round, Scratch, TUBE};
-use crate::recover::map::along_curve::along_curve;
+use crate::Error;
+use crate::recover::map::along_curve::along_curve_in;
 use crate::recover::map::chunks::CHUNK;
 use crate::recover::map::crowding::Density;
 use crate::recover::map::graph::Graph;
@@ -53,8 +54,12 @@ pub(super) struct Sweeps<'a, const D: usize, P> {
     /// What never changes: slots as neighbors follow each other, how often each record is listed, and the sample that the
     /// law is learned from.
     order: Vec<u32>,
+    /// Slots whose edges are read together, and how many of `order` are before the end of each.
+    windows: Vec<Range<usize>>,
+    ends: Vec<usize>,
     listed: Vec<u32>,
     sample: Sample,
+    judges: Judges,
     least_radius: f32,
     most_radius: f32,
     /// The best estimates of whole sweeps, and those of the sweep under way.
@@ -67,6 +72,8 @@ pub(super) struct Sweeps<'a, const D: usize, P> {
     /// How many nats each place is ahead of the best one elsewhere; 0 where a slot is to be looked at in any case.
     ahead: Vec<f32>,
     jumps: Jumps,
+    /// Slots that jumped in the round under way.
+    jumpers: Vec<u32>,
     sweep: usize,
     turn: usize,
     /// Slots that jumped in this sweep, in the one before, and since law and density were learned.
@@ -86,24 +93,32 @@ impl<'a, const D: usize, P: Pieces<D>> Sweeps<'a, D, P> {
         start: &[Estimate<D>],
         delta: f32,
         seed: u64,
-    ) -> Self {
+    ) -> Result<Self, Error> {
         let n = start.len();
-        let slots_per_record = pieces.slots_per_record();
-        let listed = graph.times_listed(n / slots_per_record, slots_per_record);
+        let listed = graph.times_listed()?;
         let most_radius = P::MOST_RADIUS * delta;
         let places = Places::new(start);
         let least_radius = (ROUNDING * places.farthest()).max(f32::MIN_POSITIVE);
-        let sample = Sample::new(graph, seed);
+        let sample = Sample::new(graph, seed)?;
         let limits = (least_radius, most_radius);
-        let (density, law) =
-            learned(&pieces, graph, &places, (&listed, &sample), most_radius, limits);
-        Self {
+        let (density, law) = learned(&pieces, &places, (&listed, &sample), most_radius, limits);
+        let windows = graph.windows();
+        let order = along_curve_in(&windows, &places);
+        let mut end = 0;
+        let ends = windows.iter().map(|window| {
+            end += window.len();
+            end
+        });
+        Ok(Self {
             pieces,
             graph,
             delta2: delta * delta,
-            order: along_curve(&places),
+            order,
+            ends: ends.collect(),
+            windows,
             listed,
             sample,
+            judges: Judges::new(graph)?,
             least_radius,
             most_radius,
             now: start.to_vec(),
@@ -113,6 +128,7 @@ impl<'a, const D: usize, P: Pieces<D>> Sweeps<'a, D, P> {
             law,
             ahead: vec![0.0; n],
             jumps: Jumps::new(n),
+            jumpers: Vec::new(),
             sweep: 0,
             turn: 0,
             n_jumped: 0,
@@ -121,7 +137,42 @@ impl<'a, const D: usize, P: Pieces<D>> Sweeps<'a, D, P> {
             n_jumped_since: 0,
             most: f64::NEG_INFINITY,
             done: false,
+        })
+    }
+
+    /// Where the slots of one window go that are to be moved.
+    fn solve_in(&self, window: &Range<usize>, moved: &mut [Moved<D>]) -> Result<(), Error> {
+        let odds = self.law.odds_of_slot(self.pieces.slots_per_record());
+        let round = Round {
+            pieces: &self.pieces,
+            edges: &self.graph.rows(window)?,
+            places: &self.places,
+            density: &self.density,
+            law: &self.law,
+            odds: &odds,
+            kernel: KERNEL * self.law.radius,
+            delta2: self.delta2,
+        };
+        moved.par_chunks_mut(CHUNK).for_each_init(Scratch::default, |scratch, moved| {
+            let (ahead, jumps) = (&self.ahead[..], &self.jumps);
+            dispatch(Chunk { round: &round, ahead, jumps, moved, scratch });
+        });
+        Ok(())
+    }
+
+    /// Tells whom it concerns where `jumpers` are `after` this round.
+    fn tell(&self, jumpers: &mut [u32], after: &Places<D>) -> Result<(), Error> {
+        let window_of = |slot: u32| self.windows.partition_point(|w| w.end <= slot as usize);
+        // Whoever solved parts of the round may have handed them back in any order.
+        if !jumpers.is_sorted_by_key(|&slot| window_of(slot)) {
+            jumpers.sort_by_key(|&slot| window_of(slot));
         }
+        let (places, reach) = ((&self.places, after), TUBE * self.law.radius);
+        for jumpers in jumpers.chunk_by(|&a, &b| window_of(a) == window_of(b)) {
+            let edges = self.graph.rows(&self.windows[window_of(jumpers[0])])?;
+            self.jumps.tell(jumpers, (&self.pieces, &edges), places, reach, &self.ahead);
+        }
+        Ok(())
     }
 
     /// Rounds of the sweep under way.
@@ -138,7 +189,7 @@ impl<'a, const D: usize, P: Pieces<D>> Sweeps<'a, D, P> {
             self.now.clone_from(&self.next);
             return;
         }
-        let agreement = agreement::of(&self.pieces, self.graph, &self.next, self.delta2);
+        let agreement = agreement::of(&self.pieces, &self.judges, &self.next, self.delta2);
         if agreement < (1.0 - WORSE) * self.most {
             return;
         }
@@ -161,8 +212,7 @@ impl<'a, const D: usize, P: Pieces<D>> Sweeps<'a, D, P> {
         }
         let limits = (self.least_radius, self.most_radius);
         let from = (&self.listed[..], &self.sample);
-        let (density, law) =
-            learned(&self.pieces, self.graph, &self.places, from, self.law.radius, limits);
+        let (density, law) = learned(&self.pieces, &self.places, from, self.law.radius, limits);
         if law.surplus != self.law.surplus {
             // Leads found under another rule say nothing.
             self.ahead.fill(0.0);
@@ -175,7 +225,6 @@ impl<'a, const D: usize, P: Pieces<D>> Sweeps<'a, D, P> {
 /// Density and law of `places`, with neighbors looked for as if `radius` were that of the law.
 fn learned<const D: usize, P: Pieces<D>>(
     pieces: &P,
-    graph: &Graph,
     places: &Places<D>,
     (listed, sample): (&[u32], &Sample),
     radius: f32,
@@ -184,7 +233,6 @@ fn learned<const D: usize, P: Pieces<D>>(
     let density = Density::new(places, listed, SMOOTH * radius);
     let law = Law::learn(&Look {
         places,
-        graph,
         density: &density,
         slots_per_record: pieces.slots_per_record(),
         reach: REACH * radius,
@@ -197,29 +245,29 @@ fn learned<const D: usize, P: Pieces<D>>(
 }
 
 impl<const D: usize, P: Pieces<D>> InRounds<D> for Sweeps<'_, D, P> {
-    fn solve(&self, slots: Range<usize>) -> Vec<Moved<D>> {
-        let odds = self.law.odds_of_slot(self.pieces.slots_per_record());
-        let round = Round {
-            pieces: &self.pieces,
-            graph: self.graph,
-            places: &self.places,
-            density: &self.density,
-            law: &self.law,
-            odds: &odds,
-            kernel: KERNEL * self.law.radius,
-            delta2: self.delta2,
-        };
-        let mut moved: Vec<Moved<D>> = self
-            .order
-            .iter()
-            .filter(|&&slot| self.is_turn_of(slot as usize) && slots.contains(&(slot as usize)))
-            .map(|&slot| Moved { slot, ahead: 0.0, estimate: self.next[slot as usize] })
-            .collect();
-        moved.par_chunks_mut(CHUNK).for_each_init(Scratch::default, |scratch, moved| {
-            let (ahead, jumps) = (&self.ahead[..], &self.jumps);
-            dispatch(Chunk { round: &round, ahead, jumps, moved, scratch });
-        });
-        moved
+    fn parts(&self) -> Vec<Range<usize>> {
+        self.windows.clone()
+    }
+
+    fn solve(&self, slots: Range<usize>) -> Result<Vec<Moved<D>>, Error> {
+        let mut all = Vec::new();
+        let mut start = 0;
+        for (window, &end) in self.windows.iter().zip(&self.ends) {
+            let order = &self.order[start..end];
+            start = end;
+            let is_asked = |slot: usize| self.is_turn_of(slot) && slots.contains(&slot);
+            let mut moved: Vec<Moved<D>> = order
+                .iter()
+                .filter(|&&slot| is_asked(slot as usize))
+                .map(|&slot| Moved { slot, ahead: 0.0, estimate: self.next[slot as usize] })
+                .collect();
+            if moved.is_empty() {
+                continue;
+            }
+            self.solve_in(window, &mut moved)?;
+            if all.is_empty() { all = moved } else { all.append(&mut moved) }
+        }
+        Ok(all)
     }
 
     fn is_done(&self) -> bool {
@@ -230,25 +278,26 @@ impl<const D: usize, P: Pieces<D>> InRounds<D> for Sweeps<'_, D, P> {
         !self.done && slot % self.turns() == self.turn
     }
 
-    fn go_on(&mut self, moved: &[Moved<D>]) {
+    fn take(&mut self, moved: &[Moved<D>]) {
         let radius = self.law.radius;
-        let mut jumpers = Vec::new();
         for &Moved { slot, ahead, estimate } in moved {
             let at = slot as usize;
             let has_jumped = is_jump(&self.next[at], &estimate, radius);
             if has_jumped {
-                jumpers.push(slot);
+                self.jumpers.push(slot);
             }
             // Whoever jumped is looked at again in any case.
             (self.next[at], self.ahead[at]) = (estimate, if has_jumped { 0.0 } else { ahead });
             self.jumps.forget(at);
         }
+    }
+
+    fn end_round(&mut self) -> Result<(), Error> {
+        let mut jumpers = std::mem::take(&mut self.jumpers);
         self.n_jumped += jumpers.len();
         self.n_jumped_since += jumpers.len();
         let after = Places::new(&self.next);
-        let places = (&self.places, &after);
-        let map = (&self.pieces, self.graph);
-        self.jumps.tell(&jumpers, map, places, TUBE * radius, &self.ahead);
+        self.tell(&mut jumpers, &after)?;
         self.places = after;
         self.turn += 1;
         if self.turn == self.turns() {
@@ -257,10 +306,15 @@ impl<const D: usize, P: Pieces<D>> InRounds<D> for Sweeps<'_, D, P> {
         if !self.done {
             self.learn_again();
         }
+        Ok(())
     }
 
     fn estimates(&self) -> &[Estimate<D>] {
         if self.done { &self.now } else { &self.next }
+    }
+
+    fn into_estimates(self: Box<Self>) -> Vec<Estimate<D>> {
+        if self.done { self.now } else { self.next }
     }
 }
 

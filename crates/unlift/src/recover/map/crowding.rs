@@ -1,7 +1,7 @@
 //! How dense estimates of listed records lie: the votes a place gets by chance.
 
 use super::cells::Grid;
-use super::graph::record_of;
+use super::edges::record_of;
 use super::places::Places;
 
 /// Estimates per volume, as a share of all, each counted as often as its record is listed.

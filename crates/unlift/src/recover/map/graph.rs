@@ -4,66 +4,56 @@
 //! neighbors. Whether an edge is named by one end, by the other or by both tells how likely it is true,
 //! and so do the scores of a source: edges of one class share an inlier ratio, which recovery learns.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::named_by::{Block, MOST_CLASSES, NamedBy};
+use super::edges::{record_of, score_bounds, score_class, score_step};
+use super::merge::Rows;
+use super::named_by::{Block, NamedBy};
 use crate::neighbors::Neighborhoods;
+use crate::shelf::{Kept, windows};
 use crate::{Error, RecordId};
 
 /// Reverse entries of a row at most, as a multiple of the mean list: whoever is named by everyone is
 /// named by mistake.
-const MOST_REVERSE: usize = 3;
-
-/// Which end of an edge names the other.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Side {
-    /// The slot names the neighbor.
-    Forward,
-    /// The neighbor names the slot. On a paired line it may mean the other slot, nobody knows.
-    Reverse,
-    /// Each names the other.
-    Mutual,
-}
-
-/// Classes of scores per direction.
-const SCORE_CLASSES: usize = MOST_CLASSES;
-/// Where score classes begin, as shares of all entries: finer at the top, where most neighbors are.
-const SCORE_RANKS: [f64; SCORE_CLASSES - 1] = [0.3, 0.55, 0.72, 0.84, 0.91, 0.955, 0.98];
-/// Classes of edges at most.
-pub(crate) const CLASSES: usize = 3 * SCORE_CLASSES;
-
-/// The record of a slot: one or two make a record, so a shift does for a division.
-#[inline(always)]
-pub(crate) fn record_of(slot: usize, slots_per_record: usize) -> usize {
-    slot >> (slots_per_record - 1)
-}
-
-/// Whether an edge of this class says which record it leads to, but not which of its two slots: a list
-/// names records, while the slot that a list belongs to is known.
-#[inline(always)]
-pub(crate) fn either(class: u8, slots_per_record: usize) -> bool {
-    slots_per_record == 2 && side(class) != Side::Reverse
-}
-
-/// Who names whom in an edge of this class.
-#[inline(always)]
-pub(crate) fn side(class: u8) -> Side {
-    match usize::from(class) / SCORE_CLASSES {
-        0 => Side::Forward,
-        1 => Side::Reverse,
-        _ => Side::Mutual,
-    }
-}
+pub(super) const MOST_REVERSE: usize = 3;
 
 /// Rows of edges in order of their other ends, a class beside each.
 #[derive(Debug)]
 pub(crate) struct Graph {
-    offsets: Vec<u64>,
+    pub(super) offsets: Vec<u64>,
     /// Slots; the first of a record's where it is not known which.
-    ends: Vec<u32>,
-    class: Vec<u8>,
+    pub(super) ends: Kept<u32>,
+    pub(super) class: Kept<u8>,
+    /// Edges that may be in memory at a time, where they are not all there.
+    pub(super) window: u64,
+    pub(super) slots_per_record: usize,
+}
+
+/// The edges of consecutive slots.
+#[derive(Debug)]
+pub(crate) struct EdgeRows<'a> {
+    first: usize,
+    offsets: &'a [u64],
+    ends: Cow<'a, [u32]>,
+    class: Cow<'a, [u8]>,
+}
+
+impl EdgeRows<'_> {
+    /// The other ends of the edges of `slot`, which is among them, and the class of each.
+    #[inline(always)]
+    pub(crate) fn of(&self, slot: usize) -> (&[u32], &[u8]) {
+        let (from, at) = (self.offsets[0], slot - self.first);
+        let range = (self.offsets[at] - from) as usize..(self.offsets[at + 1] - from) as usize;
+        (&self.ends[range.clone()], &self.class[range])
+    }
+
+    /// The other ends of all of them.
+    pub(crate) fn ends(&self) -> &[u32] {
+        &self.ends
+    }
 }
 
 impl Graph {
@@ -84,7 +74,9 @@ impl Graph {
                 reverse.fill(&named_by, block);
                 let add = |slot: usize| {
                     let all = reverse.of(record_of(slot - room.slots.start, slots_per_record));
-                    rows.add(lists, all, slot, slots_per_record, most, &score_class);
+                    let first = lists.offsets()[slot] as usize;
+                    let class = |at| score_class(first + at);
+                    rows.add(lists.of(slot), all, slots_per_record, most, class);
                     rows.n as u32
                 };
                 room.slots.clone().map(add).collect()
@@ -105,20 +97,45 @@ impl Graph {
         class.truncate(to);
         ends.shrink_to_fit();
         class.shrink_to_fit();
-        Self { offsets, ends, class }
+        let (ends, class) = (Kept::Here(ends), Kept::Here(class));
+        Self { offsets, ends, class, window: u64::MAX, slots_per_record }
     }
 
-    /// The other ends of the edges of `slot`, and the class of each.
-    #[inline(always)]
-    pub(crate) fn of(&self, slot: usize) -> (&[u32], &[u8]) {
-        let range = self.offsets[slot] as usize..self.offsets[slot + 1] as usize;
-        (&self.ends[range.clone()], &self.class[range])
+    /// Slots whose edges are read at a time; all, where they are in memory.
+    pub(crate) fn windows(&self) -> Vec<Range<usize>> {
+        match self.ends {
+            Kept::Here(_) => std::iter::once(0..self.n_slots()).collect(),
+            Kept::Away(_) => windows(&self.offsets, self.window, self.slots_per_record),
+        }
+    }
+
+    /// The edges of `slots`.
+    ///
+    /// # Errors
+    /// When they cannot be read.
+    pub(crate) fn rows(&self, slots: &Range<usize>) -> Result<EdgeRows<'_>, Error> {
+        let offsets = &self.offsets[slots.start..=slots.end];
+        let range = offsets[0]..offsets[slots.len()];
+        let (ends, class) = (self.ends.part(range.clone())?, self.class.part(range)?);
+        Ok(EdgeRows { first: slots.start, offsets, ends, class })
     }
 
     /// The other end and the class of the edge at `at` of all edges.
-    #[inline(always)]
-    pub(crate) fn edge(&self, at: usize) -> (u32, u8) {
-        (self.ends[at], self.class[at])
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub(crate) fn edge(&self, at: u64) -> Result<(u32, u8), Error> {
+        Ok((self.ends.one(at)?, self.class.one(at)?))
+    }
+
+    /// Where the edges of each slot start among all; one more entry than there are slots.
+    pub(crate) fn offsets(&self) -> &[u64] {
+        &self.offsets
+    }
+
+    /// Slots per record.
+    pub(crate) fn slots_per_record(&self) -> usize {
+        self.slots_per_record
     }
 
     /// Number of slots.
@@ -132,27 +149,46 @@ impl Graph {
     }
 
     /// How often each record is at the other end of an edge.
-    pub(crate) fn times_listed(&self, n_records: usize, slots_per_record: usize) -> Vec<u32> {
-        // Sums of integers: the same however threads share the work.
-        self.ends
-            .par_chunks(self.ends.len().div_ceil(rayon::current_num_threads()).max(1))
-            .map(|ends| {
-                let mut counts = vec![0; n_records];
-                ends.iter().for_each(|&end| counts[record_of(end as usize, slots_per_record)] += 1);
+    ///
+    /// # Errors
+    /// When edges cannot be read.
+    pub(crate) fn times_listed(&self) -> Result<Vec<u32>, Error> {
+        let mut all = vec![0; self.n_slots() / self.slots_per_record];
+        let count = |all: &mut [u32], ends: &[u32]| {
+            ends.iter().for_each(|&end| all[record_of(end as usize, self.slots_per_record)] += 1);
+        };
+        let windows = self.windows();
+        if let [window] = &windows[..] {
+            // Sums of integers: the same however threads share the work.
+            let rows = self.rows(window)?;
+            let part = rows.ends.len().div_ceil(rayon::current_num_threads()).max(1);
+            let counted = rows.ends.par_chunks(part).map(|ends| {
+                let mut counts = vec![0; all.len()];
+                count(&mut counts, ends);
                 counts
-            })
-            .reduce_with(|mut a, b| {
-                a.iter_mut().zip(&b).for_each(|(a, b)| *a += b);
-                a
-            })
-            .unwrap_or_else(|| vec![0; n_records])
+            });
+            return Ok(counted.reduce_with(sums).unwrap_or(all));
+        }
+        for window in windows {
+            count(&mut all, self.rows(&window)?.ends());
+        }
+        Ok(all)
     }
 
     /// The edges as neighborhoods (records with one slot each).
+    ///
+    /// # Errors
+    /// When they cannot be read.
     pub(crate) fn neighborhoods(&self) -> Result<Neighborhoods, Error> {
-        let records = self.ends.iter().map(|&end| RecordId(end)).collect();
-        Neighborhoods::try_new(self.offsets.clone(), records, None, self.offsets.len() - 1, 1)
+        let rows = self.rows(&(0..self.n_slots()))?;
+        let records = rows.ends.iter().map(|&end| RecordId(end)).collect();
+        Neighborhoods::try_new(self.offsets.clone(), records, None, self.n_slots(), 1)
     }
+}
+
+fn sums(mut a: Vec<u32>, b: Vec<u32>) -> Vec<u32> {
+    a.iter_mut().zip(&b).for_each(|(a, b)| *a += b);
+    a
 }
 
 /// Where the rows of a block of slots go.
@@ -184,84 +220,17 @@ fn split<'a>(rooms: &[Room], mut ends: &'a mut [u32], mut class: &'a mut [u8]) -
     rooms.iter().map(rows).collect()
 }
 
-/// The rows of one block, in a place that has room for all of them.
-struct Rows<'a> {
-    ends: &'a mut [u32],
-    class: &'a mut [u8],
-    n: usize,
-}
-
-impl Rows<'_> {
-    /// Merges the list of `slot` with `all` who name its record; both are in ascending order.
-    fn add(
-        &mut self,
-        lists: &Neighborhoods,
-        all: &[(u32, u8)],
-        slot: usize,
-        slots_per_record: usize,
-        most: usize,
-        score_class: &impl Fn(usize) -> u8,
-    ) {
-        let first = lists.offsets()[slot] as usize;
-        let list = lists.of(slot);
-        // Slots are in random order: every so many of them are as good as any.
-        let every = all.len().div_ceil(most).max(1);
-        let n_reverse = all.len().div_ceil(every);
-        let class = |side: Side, of_score: u8| (side as usize * SCORE_CLASSES) as u8 + of_score;
-        let own = slots_per_record as u32;
-        let room = self.n..self.n + list.len() + n_reverse;
-        let (ends, classes) = (&mut self.ends[room.clone()], &mut self.class[room]);
-        let mut to = 0;
-        let mut put = |end: u32, class: u8, stays: bool| {
-            (ends[to], classes[to]) = (end, class);
-            to += usize::from(stays);
-        };
-        // Which of two lists goes on is anyone's guess: steps are added, not branched on.
-        let (mut at, mut reverse, mut mutual) = (0, 0, u32::MAX);
-        while at < list.len() && reverse < n_reverse {
-            let (mine, (by, of_score)) = (list[at].0, all[reverse * every]);
-            // One or two slots make a record.
-            let theirs = by >> (own - 1);
-            let (is_mine, is_theirs) = (mine <= theirs, theirs <= mine);
-            let side = if is_theirs { Side::Mutual } else { Side::Forward };
-            let of_mine = class(side, score_class(first + at));
-            let of_theirs = class(Side::Reverse, of_score);
-            let end = if is_mine { mine * own } else { by };
-            // The other slot of a record that is mutual already says nothing new.
-            put(end, if is_mine { of_mine } else { of_theirs }, is_mine | (theirs != mutual));
-            mutual = if is_mine & is_theirs { theirs } else { mutual };
-            at += usize::from(is_mine);
-            reverse += usize::from(is_theirs);
-        }
-        for (at, record) in list.iter().enumerate().skip(at) {
-            put(record.0 * own, class(Side::Forward, score_class(first + at)), true);
-        }
-        for &(by, of_score) in all.iter().step_by(every).skip(reverse) {
-            put(by, class(Side::Reverse, of_score), by >> (own - 1) != mutual);
-        }
-        self.n += to;
-    }
-}
-
-/// The class of the score of each entry: equal shares of all entries, by rank of score.
+/// The class of the score of each entry.
 fn score_classes(lists: &Neighborhoods) -> impl Fn(usize) -> u8 + Sync + '_ {
-    let bounds: Vec<f32> = lists.scores().map_or_else(Vec::new, |scores| {
-        let every = scores.len().div_ceil(1 << 16).max(1);
-        let mut sample: Vec<f32> = scores.iter().step_by(every).copied().collect();
-        sample.sort_unstable_by(f32::total_cmp);
-        SCORE_RANKS
-            .iter()
-            .filter_map(|share| sample.get((share * sample.len() as f64) as usize).copied())
-            .collect()
+    let bounds = lists.scores().map_or_else(Vec::new, |scores| {
+        score_bounds(scores.iter().step_by(score_step(scores.len())).copied().collect())
     });
-    move |at| match lists.scores() {
-        Some(scores) => bounds.partition_point(|&bound| bound <= scores[at]) as u8,
-        None => 0,
-    }
+    move |at| lists.scores().map_or(0, |scores| score_class(&bounds, scores[at]))
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::edges::{SCORE_CLASSES, Side};
     use super::super::named_by::BLOCK;
     use super::*;
     use crate::seed::{Draws, Stage};
@@ -327,8 +296,9 @@ mod tests {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 let graph = pool.install(|| Graph::new(&lists, slots_per_record));
                 assert_eq!(graph.len(), expected.iter().map(Vec::len).sum::<usize>());
+                let rows = graph.rows(&(0..graph.n_slots())).unwrap();
                 for (slot, expected) in expected.iter().enumerate() {
-                    let (ends, class) = graph.of(slot);
+                    let (ends, class) = rows.of(slot);
                     let found: Vec<_> = ends.iter().copied().zip(class.iter().copied()).collect();
                     assert_eq!(&found, expected, "slot {slot}");
                 }

@@ -1,7 +1,7 @@
 //! Where a slot may lie, as flat pieces: all that joint recovery knows of a record family.
 
 use super::chance_field::{CandidateField, ChanceField, tube};
-use super::graph::record_of;
+use super::edges::record_of;
 use super::lanes::ln;
 use super::line_rows::LineRow;
 use super::plane_windows::SortedPlanes;

@@ -11,6 +11,7 @@ mod loops;
 
 use std::ops::Range;
 
+use crate::Error;
 use crate::RecordId;
 use crate::neighbors::Neighborhoods;
 use crate::recover::map::chunks::{Slots, solve_chunks};
@@ -38,26 +39,28 @@ pub(crate) struct Ransac<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Solve<'a, D> for Ransac<'a, D> {
-    fn solve(&self, slots: Range<usize>) -> Vec<Estimate<D>> {
+    fn solve(&self, slots: Range<usize>) -> Result<Vec<Estimate<D>>, Error> {
         let Self { family, lists, delta, seed, .. } = *self;
         let axes = match family {
             Family::Candidates { rows, .. } => axis_vote::vote(rows, lists),
             Family::Lines { .. } | Family::Planes { .. } => Vec::new(),
         };
         let slots = Slots::Range(slots);
-        solve_chunks(lists.n_slots(), slots, Scratch::default, |scratch, first, out| {
-            for (at, estimate) in out.iter_mut().enumerate() {
-                let slot = first + at;
-                let draws = Draws::new(seed, Stage::Ransac, slot as u64);
-                let trial = Trial { family, axes: &axes, lists, delta, slot, draws, scratch };
-                let (solved, trials) = dispatch(trial);
-                *estimate = solved;
-                // Slots that could not be tried at all are lost with a reason, not solved in no time.
-                if trials > 0 {
-                    self.trials.note(trials);
+        let estimates =
+            solve_chunks(lists.n_slots(), slots, Scratch::default, |scratch, first, out| {
+                for (at, estimate) in out.iter_mut().enumerate() {
+                    let slot = first + at;
+                    let draws = Draws::new(seed, Stage::Ransac, slot as u64);
+                    let trial = Trial { family, axes: &axes, lists, delta, slot, draws, scratch };
+                    let (solved, trials) = dispatch(trial);
+                    *estimate = solved;
+                    // Slots that could not be tried at all are lost with a reason, not solved in no time.
+                    if trials > 0 {
+                        self.trials.note(trials);
+                    }
                 }
-            }
-        })
+            });
+        Ok(estimates)
     }
 }
 

@@ -1,0 +1,47 @@
+"""The table of large maps in docs/benchmarks.md: RedKitchen tiled with jitter, lists in memory and beside it.
+
+Used by make_benchmarks.py; standard library only.
+"""
+import filecmp, os, pathlib, subprocess, tempfile, time
+
+SCHEMES = ["ppl", "plane"]
+LIMIT = "2GB"
+
+
+def spent(program, *options):
+    """Seconds, peak MiB and GB written of a run."""
+    started = time.monotonic()
+    child = subprocess.Popen([program, *map(str, options)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    _, status, usage = os.wait4(child.pid, 0)
+    child.returncode = os.waitstatus_to_exitcode(status)
+    if child.returncode:
+        raise subprocess.CalledProcessError(child.returncode, list(map(str, options)))
+    return time.monotonic() - started, usage.ru_maxrss / 1024, usage.ru_oublock * 512 / 1e9
+
+
+def told(cost, n):
+    seconds, peak, written = cost
+    return f"{seconds:.1f} s ({1e6 * seconds / n:.1f} µs a point), {peak:.0f} MiB, {written:.1f} GB"
+
+
+def tables(program, tiled, sizes=(100_000, 1_000_000, 10_000_000), in_memory=10_000_000):
+    yield "| points | scheme | lists, limited | recover, limited | recover, in memory | the same bytes |"
+    yield "| --- | --- | --- | --- | --- | --- |"
+    for n in sizes:
+        with tempfile.TemporaryDirectory(dir=os.environ.get("UNLIFT_SCALE")) as folder:
+            at = pathlib.Path(folder)
+            tiled(at / "map.npy", n)
+            for scheme in SCHEMES:
+                spent(program, "obfuscate", at / "map.npy", "--scale", 1, "--scheme", scheme, "--seed", 1, "--out", at / scheme)
+                limited, lists = ["--memory-limit", LIMIT], at / f"{scheme}-lists"
+                oracle = spent(program, "neighbors", "oracle", at / scheme / "truth.parquet", "--k", 50, "--inlier-ratio", 0.3,
+                               "--seed", 1, "--out", lists, *limited)
+                recover = ["recover", at / scheme / "released.parquet", "--neighbors", lists, "--seed", 1, "--out"]
+                away = spent(program, *recover, at / "away", "--force", *limited)
+                here, same = "not run", ""
+                if n <= in_memory:
+                    here = told(spent(program, *recover, at / "here", "--force"), n)
+                    same = "yes" if filecmp.cmp(at / "away", at / "here", shallow=False) else "NO"
+                yield f"| {n:,} | {scheme} | {told(oracle, n)} | {told(away, n)} | {here} | {same} |"
+                lists.unlink()
+    yield ""
