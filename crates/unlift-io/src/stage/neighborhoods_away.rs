@@ -20,7 +20,7 @@ use unlift::{About, RecordId, Shelf};
 /// files that do not fit into memory.
 ///
 /// # Errors
-/// As of [`read_neighborhoods`], and when a column `slot` is not in order or the shelf cannot be written.
+/// As of [`read_neighborhoods`](super::read_neighborhoods), and when a column `slot` is not in order or the shelf cannot be written.
 pub fn shelve_neighborhoods(
     path: &Path,
     map: (usize, usize),
@@ -70,7 +70,7 @@ fn all_null(table: &Table<'_>) -> Result<bool, Error> {
 }
 
 /// Writes lists of `k` records each for `n_slots` slots, which `make(slots)` makes as they are needed, end to end in ascending
-/// order: the file that [`write_neighborhoods`] writes of all of them.
+/// order: the file that [`write_neighborhoods`](super::write_neighborhoods) writes of all of them.
 ///
 /// # Errors
 /// When the file cannot be written.
