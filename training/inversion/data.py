@@ -146,7 +146,9 @@ class Batches:
         pixels = photo.pixels[y : y + crop, x : x + crop]
         pixels = numpy.pad(pixels, [(0, crop - pixels.shape[0]), (0, crop - pixels.shape[1]), (0, 0)], "reflect")
         places = places - numpy.array([x, y], numpy.float32)
-        if descriptors.shape[1] == len(self.mirror) and random.random() < 0.5:
+        # SIFT is stored as bytes. Of others of as many values, ALIKED's for one, nobody knows the mirrored ones.
+        mirrors = descriptors.dtype == numpy.uint8 and descriptors.shape[1] == len(self.mirror)
+        if mirrors and random.random() < 0.5:
             pixels, descriptors = pixels[:, ::-1], descriptors[:, self.mirror]
             places = numpy.stack([crop - places[:, 0], places[:, 1]], 1)
         return raster(places, descriptors, weights, (crop, crop)), shrunk(pixels)
