@@ -31,6 +31,10 @@ impl Shelf for Files {
         tempfile::tempfile_in(&self.folder)
     }
 
+    fn place(&self) -> String {
+        self.folder.display().to_string()
+    }
+
     fn window(&self) -> usize {
         self.window
     }

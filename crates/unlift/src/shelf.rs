@@ -17,6 +17,9 @@ pub trait Shelf: Sync {
     /// When there is none to be had.
     fn file(&self) -> io::Result<File>;
 
+    /// Where that is, for errors: whose disk is full.
+    fn place(&self) -> String;
+
     /// Bytes of one column that may be in memory at a time: what is read at once, hundreds of lists at least.
     fn window(&self) -> usize;
 }
@@ -76,6 +79,7 @@ const PIECE: usize = 1 << 20;
 #[derive(Debug)]
 pub(crate) struct Column<T> {
     file: Mutex<File>,
+    place: String,
     len: u64,
     of: PhantomData<T>,
 }
@@ -86,8 +90,8 @@ impl<T: Number> Column<T> {
     /// # Errors
     /// When there is no file to be had.
     pub(crate) fn new(shelf: &dyn Shelf) -> Result<Self, Error> {
-        let file = shelf.file().map_err(|source| failed("made", &source))?;
-        Ok(Self { file: Mutex::new(file), len: 0, of: PhantomData })
+        let file = shelf.file().map_err(|source| failed(&shelf.place(), "made", &source))?;
+        Ok(Self { file: Mutex::new(file), place: shelf.place(), len: 0, of: PhantomData })
     }
 
     /// How many numbers there are.
@@ -121,7 +125,7 @@ impl<T: Number> Column<T> {
             }
             Ok(())
         };
-        write().map_err(|source| failed("written", &source))?;
+        write().map_err(|source| failed(&self.place, "written", &source))?;
         self.len = self.len.max(at + values.len() as u64);
         Ok(())
     }
@@ -145,14 +149,14 @@ impl<T: Number> Column<T> {
             }
             Ok(())
         };
-        read().map_err(|source| failed("read", &source))?;
+        read().map_err(|source| failed(&self.place, "read", &source))?;
         Ok(values)
     }
 }
 
-fn failed(done: &str, source: &io::Error) -> Error {
+fn failed(place: &str, done: &str, source: &io::Error) -> Error {
     Error::new(
-        "file for what does not fit into memory",
+        format!("file in {place} for what does not fit into memory"),
         format!("one that can be {done}"),
         source.to_string(),
     )
@@ -226,6 +230,10 @@ pub(crate) mod tests {
             tempfile::tempfile()
         }
 
+        fn place(&self) -> String {
+            "tests".to_owned()
+        }
+
         fn window(&self) -> usize {
             self.0
         }
@@ -249,11 +257,9 @@ pub(crate) mod tests {
     fn what_is_not_there_is_an_error() {
         let column = Column::<f32>::new(&Temporary(0)).unwrap();
         let error = column.read(0..1).unwrap_err().to_string();
-        assert!(
-            error.starts_with(
-                "file for what does not fit into memory: expected one that can be read"
-            )
-        );
+        assert!(error.starts_with(
+            "file in tests for what does not fit into memory: expected one that can be read"
+        ));
     }
 
     #[test]

@@ -15,7 +15,7 @@ Example:
   unlift recover hidden/released.parquet --neighbors lists.parquet --memory-limit 2GB
 
 With --memory-limit the lists of a map, and who lists whom, are kept in files without a name beside
-the output (joint: some 18 bytes an entry) and read a window at a time, once per round: the same
+the output (joint: 22 to 27 bytes an entry) and read a window at a time, once per round: the same
 result in longer time. In memory remain the records and some 150 bytes a hidden point.")]
 pub struct RecoverArgs {
     /// A released map

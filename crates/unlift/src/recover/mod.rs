@@ -116,7 +116,8 @@ pub fn recover_with_start<const D: usize>(
 /// [`recover`] with lists that do not fit into memory: the same, bit for bit. By [`Solver::Joint`] or [`Solver::Consensus`].
 ///
 /// In memory are the records, and of each slot some 150 bytes (estimates, places, what rounds keep), beside a few windows of
-/// `shelf`. Lists are read once per round, and who lists whom is put on `shelf`: ten bytes an entry, and eight more at first.
+/// `shelf`. Lists are read once per round, and who lists whom is put on `shelf`: 10 to 15 bytes an entry (one slot per record, two), and eight more
+/// at first.
 ///
 /// # Errors
 /// As there, for another solver, for rays from anchors in regions, and when files cannot be read or written.

@@ -19,6 +19,10 @@ impl Shelf for Files {
         tempfile::tempfile()
     }
 
+    fn place(&self) -> String {
+        "tests".to_owned()
+    }
+
     fn window(&self) -> usize {
         self.0
     }
@@ -30,6 +34,10 @@ struct Full;
 impl Shelf for Full {
     fn file(&self) -> io::Result<File> {
         Err(io::Error::from(io::ErrorKind::StorageFull))
+    }
+
+    fn place(&self) -> String {
+        "tests".to_owned()
     }
 
     fn window(&self) -> usize {
@@ -103,7 +111,7 @@ fn what_cannot_be_shelved_is_one_line() {
     );
     let full = error(Solver::Joint, &Full);
     assert!(full.starts_with(
-        "file for what does not fit into memory: expected one that can be made, found "
+        "file in tests for what does not fit into memory: expected one that can be made, found "
     ));
     assert!(ShelvedLists::new(map, false, &Full).is_err());
 

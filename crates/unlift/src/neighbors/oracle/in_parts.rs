@@ -55,11 +55,6 @@ impl<'a, const D: usize> InParts<'a, D> {
         about(self.none.map)
     }
 
-    /// Records per list.
-    pub fn k(&self) -> usize {
-        self.none.k
-    }
-
     /// Number of slots.
     pub fn n_slots(&self) -> usize {
         self.none.n_records * self.none.slots_per_record

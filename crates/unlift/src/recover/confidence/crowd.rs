@@ -46,6 +46,7 @@ pub(super) struct Map {
 }
 
 /// What is asked of all crowds, which come in order of slots.
+#[derive(Default)]
 pub(super) struct Tally {
     /// Number of slots, and those that were added.
     n: usize,
@@ -66,18 +67,7 @@ const RADII: usize = 1 << 14;
 impl Tally {
     /// Of no crowd yet, out of `n`.
     pub(super) fn new(n: usize) -> Self {
-        let zero = 0.0;
-        Self {
-            n,
-            added: 0,
-            evidence: zero,
-            voting_share: zero,
-            one_sided: zero,
-            listed: zero,
-            excess: zero,
-            record_excess: zero,
-            radii: Vec::new(),
-        }
+        Self { n, ..Self::default() }
     }
 
     /// Counts those of the next slots.

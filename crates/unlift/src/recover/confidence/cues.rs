@@ -96,18 +96,15 @@ pub(super) fn of<const D: usize, P: Pieces<D>>(
     let mut held = None;
     for window in &windows {
         let look = looks(window)?;
-        let mut crowds = look.crowds(solved);
-        for (evidence, crowd) in evidence[window.clone()].iter_mut().zip(&crowds) {
-            *evidence = libm::log1pf(crowd.evidence);
+        let mut along = look.crowds(solved);
+        for (crowd, &slot) in along.iter().zip(look.order) {
+            evidence[slot as usize] = libm::log1pf(crowd.evidence);
         }
-        if let [_] = windows[..] {
-            look.ask_all(&mut crowds, Some(&evidence));
-            tally.add(&crowds);
-            held = Some(crowds);
-        } else {
-            look.ask_all(&mut crowds, None);
-            tally.add(&crowds);
-        }
+        let is_last = windows.len() == 1;
+        look.ask_all(&mut along, is_last.then_some(&evidence));
+        let crowds = look.by_slot(along);
+        tally.add(&crowds);
+        held = is_last.then_some(crowds);
     }
     let map = tally.map(delta);
     for window in windows {
@@ -115,9 +112,9 @@ pub(super) fn of<const D: usize, P: Pieces<D>>(
             Some(crowds) => crowds,
             None => {
                 let look = looks(&window)?;
-                let mut crowds = look.crowds(solved);
-                look.ask_all(&mut crowds, Some(&evidence));
-                crowds
+                let mut along = look.crowds(solved);
+                look.ask_all(&mut along, Some(&evidence));
+                look.by_slot(along)
             }
         };
         let cues = crowds.par_iter().map(|crowd| map.cues(crowd)).collect();
@@ -127,7 +124,7 @@ pub(super) fn of<const D: usize, P: Pieces<D>>(
 }
 
 impl<const D: usize, P: Pieces<D>> Look<'_, D, P> {
-    /// The crowd of each slot, in order of slots; who its members are is asked later.
+    /// The crowd of each slot, in the order in which they are looked at; who its members are is asked later.
     fn crowds(&self, solved: &Solved<'_, D>) -> Vec<Crowd> {
         let Solved { estimates, unsettled, .. } = *solved;
         let mut along = vec![Crowd::default(); self.order.len()];
@@ -148,18 +145,25 @@ impl<const D: usize, P: Pieces<D>> Look<'_, D, P> {
                 }
             }
         });
-        let mut crowds = vec![Crowd::default(); self.order.len()];
+        along
+    }
+
+    /// Asks the members of each crowd; where `evidence` is not known of all slots yet, for what needs none.
+    fn ask_all(&self, along: &mut [Crowd], evidence: Option<&Vec<f32>>) {
+        along.par_chunks_mut(PART).zip(self.order.par_chunks(PART)).for_each(|(crowds, slots)| {
+            for (crowd, &slot) in crowds.iter_mut().zip(slots) {
+                self.ask_members(slot as usize, crowd, evidence.map(Vec::as_slice));
+            }
+        });
+    }
+
+    /// The same crowds in order of slots.
+    fn by_slot(&self, along: Vec<Crowd>) -> Vec<Crowd> {
+        let mut crowds = vec![Crowd::default(); along.len()];
         for (crowd, &slot) in along.into_iter().zip(self.order) {
             crowds[slot as usize - self.first] = crowd;
         }
         crowds
-    }
-
-    /// Asks the members of each crowd; where `evidence` is not known of all slots yet, for what needs none.
-    fn ask_all(&self, crowds: &mut [Crowd], evidence: Option<&[f32]>) {
-        crowds.par_iter_mut().enumerate().with_min_len(PART).for_each(|(at, crowd)| {
-            self.ask_members(self.first + at, crowd, evidence);
-        });
     }
 
     /// Brings near what [`crowd`](Self::crowd) looks at.
