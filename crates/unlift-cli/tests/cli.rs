@@ -351,6 +351,7 @@ fn help_is_part_of_the_interface() {
         "recover",
         "evaluate",
         "export",
+        "split",
         "table",
         "compare",
         "paper",

@@ -153,6 +153,46 @@ fn the_stages_of_images_print_the_row_of_the_audit() {
 }
 
 #[test]
+fn parts_are_what_the_file_is() {
+    let stages = Stages::new();
+    for scheme in ["ppl", "ray"] {
+        stages.chain(scheme, scheme, 1);
+        let parts = |file: &str, out: &str| {
+            let line = format!("split {scheme}{file} --rows 99 --out {scheme}{out}");
+            stages.ends(&line, 0).0
+        };
+        let told = parts("-lists", "/lists");
+        assert_eq!(
+            told,
+            format!("neighborhoods of slots: 400 rows in 4 parts, in {scheme}/lists\n")
+        );
+        parts("/released.parquet", "/released");
+        parts("/truth.parquet", "/truth");
+        let bytes = |file: &str| std::fs::read(stages.path(&format!("{scheme}{file}"))).unwrap();
+        for limit in ["", "--memory-limit 300MB"] {
+            let recover = format!("recover {scheme}/released --neighbors {scheme}/lists --seed 1");
+            stages.ends(&format!("{recover} {limit} --out {scheme}/again"), 0);
+            assert!(bytes("/again") == bytes("-back"), "{scheme}");
+        }
+        parts("-back", "/back");
+        let evaluate = |back: &str, truth: &str| {
+            let released = format!("--released {scheme}/released.parquet");
+            stages.ends(&format!("evaluate {scheme}{back} --truth {scheme}{truth} {released}"), 0).0
+        };
+        assert_eq!(evaluate("/back", "/truth"), evaluate("-back", "/truth.parquet"));
+        std::fs::remove_file(stages.path(&format!("{scheme}/lists/part-000003.parquet"))).unwrap();
+        let line = format!("recover {scheme}/released --neighbors {scheme}/lists --out none");
+        let expected = "expected part-000003.parquet, as in _manifest.json, found no such file\n";
+        assert!(stages.ends(&line, 3).1.ends_with(expected));
+        // What cannot be written is told before the work.
+        let refused =
+            stages.ends(&format!("split {scheme}-lists --rows 300 --out {scheme}/truth"), 2);
+        assert!(refused.1.contains("expected a folder without other parts"), "{}", refused.1);
+        stages.ends(&format!("split {scheme}/released/_manifest.json --out {scheme}/none"), 3);
+    }
+}
+
+#[test]
 fn files_of_another_map_are_refused() {
     let place = Stages::new();
     place.chain("one", "ppl", 1);

@@ -79,3 +79,19 @@ def test_what_is_no_part_is_refused():
     found = list(unlift.parts.recover(rows.to_batches(), of, model))
     with pytest.raises(unlift.UnliftError, match="slot: expected numbers below 60, each once"):
         unlift.parts.join(found + found, of, model)
+
+
+def test_a_folder_of_parts_is_read_as_it_was_written(tmp_path: pathlib.Path):
+    import pyarrow.parquet as pq
+
+    of = hidden("ray-voxel")
+    lists = unlift.neighbors.oracle(of, 0.5, k=20)
+    rows = shuffled(unlift.parts.table(lists), 3)
+    (tmp_path / "lists").mkdir()
+    for at in range(0, len(rows), 150):
+        pq.write_table(rows.slice(at, 150), tmp_path / "lists" / f"part-{at}.parquet")
+    read = unlift.Neighborhoods.read(tmp_path / "lists", of)
+    assert (read.records == lists.records).all() and (read.offsets == lists.offsets).all()
+    (tmp_path / "lists" / "part-150.parquet").unlink()
+    with pytest.raises(unlift.UnliftError, match="expected 400 rows, one per slot"):
+        unlift.Neighborhoods.read(tmp_path / "lists", of)

@@ -107,6 +107,10 @@ def test_a_map_on_a_cluster_is_the_map_of_one_machine(spark, tmp_path: pathlib.P
     back.save(tmp_path / "parts")
     whole.save(tmp_path / "whole")
     assert (tmp_path / "parts").read_bytes() == (tmp_path / "whole").read_bytes()
+    # What Spark writes is read as it is.
+    frame.write.parquet(str(tmp_path / "lists"))
+    again = unlift.Neighborhoods.read(tmp_path / "lists", hidden)
+    assert (again.records == lists.records).all() and (again.offsets == lists.offsets).all()
 
 
 def test_an_executor_that_is_killed_changes_nothing(spark, tmp_path: pathlib.Path):

@@ -23,6 +23,7 @@ mod obfuscate;
 mod paper;
 mod recover;
 mod shell;
+mod split;
 mod table;
 
 use std::ffi::OsString;
@@ -52,6 +53,7 @@ pub use obfuscate::ObfuscateArgs;
 pub use paper::PaperArgs;
 pub use recover::RecoverArgs;
 pub use shell::{CompletionsArgs, ManArgs};
+pub use split::SplitArgs;
 pub use table::TableArgs;
 
 /// How much of a privacy-preserving ("obfuscated") SfM map or image comes back?
@@ -128,6 +130,8 @@ pub enum Command {
     Evaluate(EvaluateArgs),
     /// Released, recovered or true points as other programs read them: PLY, OBJ, a COLMAP model, nerfstudio
     Export(ExportArgs),
+    /// A stage file as a folder of parts, for engines that read many files at once
+    Split(SplitArgs),
     /// The figures of an audit as a table for a paper, and as curves
     Table(TableArgs),
     /// Two audits side by side: what leaks more

@@ -18,6 +18,8 @@ pub enum Kind {
     Page,
     /// A Parquet file whose metadata names this kind.
     Stage(stage::Kind),
+    /// What a folder of parts holds: an object with an object `unlift` and a list `parts`.
+    Manifest,
     /// A PLY or OBJ file with the comment `CLOUD_COMMENT` in its second line at the latest.
     Cloud,
     /// A file of a COLMAP model in text whose first line is `MODEL_MARK`.
@@ -77,6 +79,9 @@ impl Kind {
             Self::Page => start(path, PAGE_HEAD)
                 .is_some_and(|head| String::from_utf8_lossy(&head).contains(PAGE_MARK)),
             Self::Stage(kind) => stage::declared_kind(path) == Some(kind),
+            Self::Manifest => {
+                is_json(path, |parts| parts["unlift"].is_object() && parts["parts"].is_array())
+            }
             Self::Cloud => start(path, 256).is_some_and(|head| is_cloud(&head)),
             Self::Model => begins(path, &[MODEL_MARK]),
             Self::Transforms => {
@@ -103,6 +108,7 @@ impl fmt::Display for Kind {
             Self::AuditJson => f.write_str("an audit.json"),
             Self::Page => f.write_str("a report"),
             Self::Stage(kind) => kind.fmt(f),
+            Self::Manifest => f.write_str("a manifest of parts"),
             Self::Cloud => f.write_str("a cloud"),
             Self::Model => f.write_str("a model"),
             Self::Transforms => f.write_str("cameras for nerfstudio"),
@@ -161,6 +167,7 @@ mod tests {
             Kind::AuditJson,
             Kind::Page,
             Kind::Stage(stage::Kind::Truth),
+            Kind::Manifest,
             Kind::Cloud,
             Kind::Transforms,
             Kind::Features,

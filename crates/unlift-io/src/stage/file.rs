@@ -2,10 +2,9 @@
 
 use super::footer;
 use super::header::KEY;
-use super::pages::{self, Stay};
 use crate::Error;
 use crate::guard::without_panic;
-use crate::input::{self, Budget};
+use crate::input;
 use arrow_array::RecordBatch;
 use arrow_schema::SchemaRef;
 use parquet::arrow::ProjectionMask;
@@ -15,9 +14,10 @@ use parquet::arrow::arrow_reader::{
 };
 use parquet::basic::Compression;
 use parquet::errors::ParquetError;
+use parquet::file::metadata::ParquetMetaData;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Rows decoded at a time: with 128-byte descriptors a megabyte, with 4096 floats 128.
 const BATCH_ROWS: usize = 1 << 13;
@@ -28,17 +28,17 @@ const ROWS_PER_BYTE: u64 = 1000;
 
 /// An open Parquet file whose footer was read.
 #[derive(Debug)]
-pub(super) struct ParquetFile<'a> {
-    path: &'a Path,
+pub(super) struct ParquetFile {
+    path: PathBuf,
     file: File,
     n_bytes: u64,
     parquet: ArrowReaderMetadata,
     n_rows: u64,
 }
 
-impl<'a> ParquetFile<'a> {
+impl ParquetFile {
     /// Opens `path` and reads its footer.
-    pub(super) fn open(path: &'a Path) -> Result<Self, Error> {
+    pub(super) fn open(path: &Path) -> Result<Self, Error> {
         let (mut file, n_bytes) = input::open(path)?;
         check_magic(path, &mut file, n_bytes)?;
         footer::check(path, &mut file, n_bytes)?;
@@ -63,7 +63,7 @@ impl<'a> ParquetFile<'a> {
                 return Err(Error::new(path, "", expected, footer.num_rows().to_string()));
             }
         };
-        Ok(Self { path, file, n_bytes, parquet, n_rows })
+        Ok(Self { path: path.to_owned(), file, n_bytes, parquet, n_rows })
     }
 
     /// Number of rows, as the footer declares it.
@@ -94,33 +94,41 @@ impl<'a> ParquetFile<'a> {
         })
     }
 
-    /// Starts to decode the columns at `roots`, in the order of the file; what is decoded will `stay` in memory so long.
-    pub(super) fn batches(&self, roots: Vec<usize>, stay: Stay) -> Result<Batches<'a>, Error> {
-        for &root in &roots {
-            self.check_codec(self.schema().field(root).name())?;
-        }
-        let file = self.file.try_clone();
-        let mut file = file.map_err(|source| Error::read(self.path, source))?;
-        let budget = Budget::new(self.path, self.n_bytes);
-        let metadata = self.parquet.metadata();
-        let longest =
-            pages::check(self.path, &mut file, self.n_bytes, metadata, &roots, (&budget, stay))?;
-        // Many rows may have the same long text, which a file stores once.
-        let batch_rows = budget
-            .most()
-            .checked_div(longest)
-            .map_or(BATCH_ROWS, |rows| rows.clamp(1, BATCH_ROWS as u64) as usize);
-        let reader = guarded(self.path, || {
+    /// The file itself.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Its length.
+    pub(super) fn n_bytes(&self) -> u64 {
+        self.n_bytes
+    }
+
+    /// What its footer says.
+    pub(super) fn metadata(&self) -> &ParquetMetaData {
+        self.parquet.metadata()
+    }
+
+    /// The open file, to be read apart.
+    pub(super) fn handle(&self) -> Result<File, Error> {
+        self.file.try_clone().map_err(|source| Error::read(&self.path, source))
+    }
+
+    /// Starts to decode the columns at `roots`, in the order of the file, at most `most_rows` at a time. What they declare was
+    /// [checked](super::pages::check).
+    pub(super) fn batches(&self, roots: &[usize], most_rows: usize) -> Result<Batches, Error> {
+        let file = self.handle()?;
+        let reader = guarded(&self.path, || {
             let builder =
                 ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.parquet.clone());
-            let mask = ProjectionMask::roots(builder.parquet_schema(), roots);
-            builder.with_projection(mask).with_batch_size(batch_rows).build()
+            let mask = ProjectionMask::roots(builder.parquet_schema(), roots.iter().copied());
+            builder.with_projection(mask).with_batch_size(most_rows.clamp(1, BATCH_ROWS)).build()
         })?;
-        Ok(Batches { path: self.path, reader, decoded: 0, n_rows: self.n_rows })
+        Ok(Batches { path: self.path.clone(), reader, decoded: 0, n_rows: self.n_rows })
     }
 
     /// Refuses compression by code that this program was built without.
-    fn check_codec(&self, name: &str) -> Result<(), Error> {
+    pub(super) fn check_codec(&self, name: &str) -> Result<(), Error> {
         let groups = self.parquet.metadata().row_groups().iter();
         let chunks = groups.flat_map(|group| group.columns());
         let mut of_column = chunks.filter(|chunk| chunk.column_path().parts()[0] == name);
@@ -134,30 +142,30 @@ impl<'a> ParquetFile<'a> {
                 let codec = chunk.compression().to_string();
                 let found = codec.split('(').next().unwrap_or_default();
                 let place = format!("column {name}");
-                Err(Error::new(self.path, place, "no compression, Snappy or zstd", found))
+                Err(Error::new(&self.path, place, "no compression, Snappy or zstd", found))
             }
         }
     }
 }
 
 /// Rows as they are decoded, some thousand at a time.
-pub(super) struct Batches<'a> {
-    path: &'a Path,
+pub(super) struct Batches {
+    path: PathBuf,
     reader: ParquetRecordBatchReader,
     decoded: u64,
     n_rows: u64,
 }
 
-impl Batches<'_> {
+impl Batches {
     /// The next rows; `None` at the end, where there were as many as the footer says.
     pub(super) fn next(&mut self) -> Result<Option<RecordBatch>, Error> {
-        let batch = guarded(self.path, || self.reader.next().transpose())?;
+        let batch = guarded(&self.path, || self.reader.next().transpose())?;
         match &batch {
             Some(batch) => self.decoded += batch.num_rows() as u64,
             None if self.decoded == self.n_rows => {}
             None => {
                 let expected = format!("{} rows, as its footer says", self.n_rows);
-                return Err(Error::new(self.path, "", expected, self.decoded.to_string()));
+                return Err(Error::new(&self.path, "", expected, self.decoded.to_string()));
             }
         }
         Ok(batch)

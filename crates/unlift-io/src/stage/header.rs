@@ -98,6 +98,11 @@ impl<'a> Meta<'a> {
         Ok(Self { path: self.path, object })
     }
 
+    /// The object itself.
+    pub(super) fn into_object(self) -> Map<String, Value> {
+        self.object
+    }
+
     /// Kind of the file, if it is declared.
     pub(super) fn kind(&self) -> Result<Option<Kind>, Error> {
         if self.object.get("version").is_some_and(|version| version.as_u64() != Some(VERSION)) {

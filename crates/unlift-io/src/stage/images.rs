@@ -1,9 +1,9 @@
 //! Many images in one stage file: their rows stand together, and are read image by image.
 
-use super::file::{Batches, ParquetFile};
 use super::header::{Kind, Meta};
 use super::neighborhoods::neighborhoods_of;
 use super::pages::Stay;
+use super::parts::{Batches, Parts};
 use super::recovered::recovered_of;
 use super::released::released_of;
 use super::table::Table;
@@ -71,7 +71,7 @@ pub struct ImageFile<'a> {
     /// Whose metadata holds for all images.
     whole: Table<'a>,
     kind: Kind,
-    batches: Batches<'a>,
+    batches: Batches,
     /// Rows that were decoded and not yet taken.
     rest: Option<RecordBatch>,
     /// Rows that were taken.
@@ -98,11 +98,11 @@ impl<'a> ImageFile<'a> {
         if !whole.has(IMAGE) {
             return Err(Error::new(path, format!("column {IMAGE}"), "text", "no such column"));
         }
-        let file = ParquetFile::open(path)?;
-        let fields = file.schema().fields().iter().enumerate();
+        let parts = Parts::open(path)?;
+        let fields = parts.schema().fields().iter().enumerate();
         let known = fields.filter(|(_, field)| COLUMNS.contains(&field.name().as_str()));
         let roots: Vec<usize> = known.map(|(at, _)| at).collect();
-        let batches = file.batches(roots, Stay::Whole)?;
+        let batches = parts.batches(&roots, Stay::Whole)?;
         Ok(Self { path, whole, kind, batches, rest: None, n_taken: 0, seen: HashSet::new() })
     }
 

@@ -1,6 +1,6 @@
 //! Stage files: what passes between the commands, as Parquet tables.
 //!
-//! One file per kind, described for writers in other languages in `docs/formats.md`. A file holds
+//! One file per kind, or a folder of its parts, described for writers in other languages in `docs/formats.md`. A file holds
 //! one kind only, and released maps, neighborhoods and recovered points hold nothing of the truth:
 //! no ids, names or times of their source, so that equal values make equal bytes.
 //!
@@ -14,13 +14,16 @@ mod footer;
 mod header;
 mod image_writer;
 mod images;
+mod manifest;
 mod neighborhoods;
 mod neighborhoods_away;
 mod order;
 mod pages;
+mod parts;
 mod peek;
 mod recovered;
 mod released;
+mod split;
 mod table;
 mod thrift;
 mod truth;
@@ -36,4 +39,5 @@ pub use neighborhoods_away::{shelve_neighborhoods, write_neighborhoods_as_made};
 pub use peek::{Header, declared_kind, peek};
 pub use recovered::{read_recovered, read_recovered_in, write_recovered};
 pub use released::{read_released, scheme_name, write_released};
+pub use split::Split;
 pub use truth::{read_truth, write_truth};

@@ -1,14 +1,16 @@
 //! What the columns of a Parquet file declare that they hold, checked before they are decoded: counts
 //! and sizes in the footer and before each page, against the file and the memory that it may take.
 
+use super::file::ParquetFile;
 use super::thrift::{Kind, Walk, Wrong};
 use crate::Error;
 use crate::input::Budget;
 use parquet::basic::Type;
-use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData};
+use parquet::file::metadata::ColumnChunkMetaData;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Bytes of a repetition and a definition level in memory.
 const LEVELS: u64 = 4;
@@ -25,45 +27,57 @@ pub(super) enum Stay {
     Rows,
 }
 
-/// Checks the columns at `roots` of `file`, of `n_bytes` bytes; the most bytes that one text of theirs can have.
+/// Checks the columns at `roots` of `files`, the parts of one table; the most bytes that one text of theirs can have.
 ///
 /// # Errors
 /// When they do not lie in the file, declare more values or bytes than the budget allows for as long as they stay, or their
 /// pages are not what the footer says.
 pub(super) fn check(
-    path: &Path,
-    file: &mut File,
-    n_bytes: u64,
-    metadata: &ParquetMetaData,
-    roots: &[usize],
+    files: &[Arc<ParquetFile>],
+    roots: &[Vec<usize>],
     (budget, stay): (&Budget, Stay),
 ) -> Result<u64, Error> {
-    let schema = metadata.file_metadata().schema_descr();
     let mut longest = 0;
-    for leaf in 0..schema.num_columns() {
-        let root = schema.get_column_root_idx(leaf);
-        if !roots.contains(&root) {
-            continue;
-        }
-        let place = format!("column {}", schema.get_column_root(leaf).name());
-        let mut column = Column { path, place, budget, n_values: 0, n_bytes: 0, longest: 0 };
-        for group in metadata.row_groups() {
-            if stay == Stay::Rows {
-                (column.n_values, column.n_bytes) = (0, 0);
+    for wanted in 0..roots.first().map_or(0, Vec::len) {
+        // Values and bytes per leaf of this column, through all parts.
+        let mut so_far: Vec<(u64, u64)> = Vec::new();
+        for (file, roots) in files.iter().zip(roots) {
+            let schema = file.metadata().file_metadata().schema_descr();
+            let leaves = 0..schema.num_columns();
+            let own = leaves.filter(|&leaf| schema.get_column_root_idx(leaf) == roots[wanted]);
+            let mut handle = file.handle()?;
+            for (at, leaf) in own.enumerate() {
+                if so_far.len() <= at {
+                    so_far.push((0, 0));
+                }
+                let mut column = Column {
+                    path: file.path(),
+                    place: format!("column {}", schema.get_column_root(leaf).name()),
+                    budget,
+                    n_values: so_far[at].0,
+                    n_bytes: so_far[at].1,
+                    longest: 0,
+                };
+                for group in file.metadata().row_groups() {
+                    if stay == Stay::Rows {
+                        (column.n_values, column.n_bytes) = (0, 0);
+                    }
+                    // The crate has checked that a row group has every column of the schema.
+                    if let Some(chunk) = group.columns().get(leaf) {
+                        column.chunk(&mut handle, file.n_bytes(), chunk)?;
+                    }
+                }
+                so_far[at] = (column.n_values, column.n_bytes);
+                if schema.column(leaf).physical_type() == Type::BYTE_ARRAY {
+                    longest = longest.max(column.longest);
+                }
             }
-            // The crate has checked that a row group has every column of the schema.
-            if let Some(chunk) = group.columns().get(leaf) {
-                column.chunk(file, n_bytes, chunk)?;
-            }
-        }
-        if schema.column(leaf).physical_type() == Type::BYTE_ARRAY {
-            longest = longest.max(column.longest);
         }
     }
     Ok(longest)
 }
 
-/// A column, through all row groups.
+/// A column, through all row groups of all parts.
 struct Column<'a> {
     path: &'a Path,
     place: String,

@@ -1,9 +1,9 @@
-//! A table of one kind: from a Parquet file, or the rows of one image in it.
+//! A table of one kind: from a Parquet file or a folder of its parts, or the rows of one image in it.
 
 use super::column::{Batch, Type};
-use super::file::ParquetFile;
 use super::header::{Kind, Meta};
 use super::pages::Stay;
+use super::parts::Parts;
 use crate::Error;
 use arrow_array::RecordBatch;
 use arrow_schema::SchemaRef;
@@ -21,17 +21,17 @@ pub(super) struct Table<'a> {
 /// Where the rows of a table are.
 #[derive(Debug)]
 enum Rows<'a> {
-    File(ParquetFile<'a>),
+    Stored(Parts<'a>),
     /// In memory: those of one image, at least one batch.
     Held(Vec<RecordBatch>),
 }
 
 impl<'a> Table<'a> {
-    /// Opens `path` and reads its footer.
+    /// Opens `path`, a file or a folder of parts, and reads its footers.
     pub(super) fn open(path: &'a Path) -> Result<Self, Error> {
-        let file = ParquetFile::open(path)?;
-        let meta = Meta::parse(path, file.meta_text())?;
-        Ok(Self { path, rows: Rows::File(file), meta })
+        let parts = Parts::open(path)?;
+        let meta = Meta::parse(path, parts.meta_text())?;
+        Ok(Self { path, rows: Rows::Stored(parts), meta })
     }
 
     /// The rows of one image, which were read already.
@@ -132,7 +132,7 @@ impl<'a> Table<'a> {
     /// Number of rows.
     pub(super) fn n_rows(&self) -> u64 {
         match &self.rows {
-            Rows::File(file) => file.n_rows(),
+            Rows::Stored(parts) => parts.n_rows(),
             Rows::Held(held) => held.iter().map(|rows| rows.num_rows() as u64).sum(),
         }
     }
@@ -170,8 +170,8 @@ impl<'a> Table<'a> {
         for &(name, class) in columns {
             roots.push(self.find(name, class)?);
         }
-        let file = match &self.rows {
-            Rows::File(file) => file,
+        let parts = match &self.rows {
+            Rows::Stored(parts) => parts,
             Rows::Held(held) => {
                 let mut first_row = 0;
                 for rows in held {
@@ -181,7 +181,7 @@ impl<'a> Table<'a> {
                 return Ok(());
             }
         };
-        let mut batches = file.batches(roots, stay)?;
+        let mut batches = parts.batches(&roots, stay)?;
         let mut first_row = 0;
         while let Some(batch) = batches.next()? {
             each(&Batch::new(self.path, &batch, first_row))?;
@@ -205,14 +205,14 @@ impl<'a> Table<'a> {
 
     fn schema(&self) -> &SchemaRef {
         match &self.rows {
-            Rows::File(file) => file.schema(),
+            Rows::Stored(parts) => parts.schema(),
             Rows::Held(held) => held[0].schema_ref(),
         }
     }
 
     fn is_all_null(&self, name: &str) -> bool {
         match &self.rows {
-            Rows::File(file) => file.is_all_null(name),
+            Rows::Stored(parts) => parts.is_all_null(name),
             Rows::Held(held) => held.iter().all(|rows| {
                 let column = rows.column_by_name(name);
                 column.is_some_and(|column| column.null_count() == column.len())

@@ -24,7 +24,7 @@ use std::sync::Arc;
 const CHUNK_ROWS: usize = 1 << 14;
 
 /// Row groups end after this many rows, so that an engine can give them to many machines.
-const GROUP_ROWS: usize = 1 << 20;
+pub(super) const GROUP_ROWS: usize = 1 << 20;
 
 /// They end earlier at this many bytes: a row group is held in memory until it is whole.
 const GROUP_BYTES: usize = 256 << 20;

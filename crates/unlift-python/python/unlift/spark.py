@@ -6,7 +6,7 @@
 
 One map whose lists are spread over the cluster:
 
-    found = unlift.spark.recover(spark.read.parquet("lists"), "released.parquet", model)
+    found = unlift.spark.recover(spark.read.parquet("lists"), "released.parquet", model)    # `unlift split` makes parts of a file
 
 Every executor needs this package. A task that is lost with its executor is run again by Spark, to the same rows.
 """

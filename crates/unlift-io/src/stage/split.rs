@@ -1,0 +1,182 @@
+//! A stage file as a folder of parts, for engines that read many files at once.
+
+use super::header::{Kind, Meta};
+use super::manifest::{MANIFEST, Manifest, Part};
+use super::pages::Stay;
+use super::parts::{Batches, ENDING, Parts, names_in};
+use super::table::Table;
+use super::write::{properties, to_io, writer};
+use crate::Error;
+use crate::atomic::{self, Access, OutputSet, Rules, write_file};
+use arrow_array::RecordBatch;
+use arrow_schema::{Field, SchemaRef};
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// A stage file (or folder of parts) on its way to parts of so many rows each, the last one of fewer, and a manifest. Rows keep
+/// their order, columns their types, every part has the metadata of the whole.
+#[derive(Debug)]
+pub struct Split<'a> {
+    path: &'a Path,
+    parts: Parts<'a>,
+    kind: Kind,
+    rows: u64,
+    names: Vec<String>,
+}
+
+impl<'a> Split<'a> {
+    /// Opens `path`, for parts of `rows` rows: rounded up to an even number, so that both slots of a line through two points lie
+    /// in one part.
+    ///
+    /// # Errors
+    /// When it is no stage file, or its parts are not one.
+    pub fn open(path: &'a Path, rows: u64) -> Result<Self, Error> {
+        let kind = Table::open(path)?.kind()?;
+        let parts = Parts::open(path)?;
+        let mut names: Vec<&str> =
+            parts.schema().fields().iter().map(|f| f.name().as_str()).collect();
+        names.sort_unstable();
+        if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+            let place = format!("column {}", twice[0]);
+            return Err(Error::new(path, place, "one of this name", "two columns of this name"));
+        }
+        let rows = rows.max(1).next_multiple_of(2);
+        let n_parts = parts.n_rows().div_ceil(rows).max(1);
+        let names = (0..n_parts).map(|at| format!("part-{at:06}.{ENDING}")).collect();
+        Ok(Self { path, parts, kind, rows, names })
+    }
+
+    /// What the file and its parts hold.
+    pub fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    /// Rows of all parts.
+    pub fn n_rows(&self) -> u64 {
+        self.parts.n_rows()
+    }
+
+    /// Number of parts; one that is empty if there are no rows.
+    pub fn n_parts(&self) -> usize {
+        self.names.len()
+    }
+
+    /// Starts parts in the folder `out`.
+    ///
+    /// # Errors
+    /// When it holds parts of something else, or cannot be written.
+    pub fn outputs(&self, out: &Path, rules: Rules) -> Result<OutputSet, Error> {
+        refuse_others(out, &self.names)?;
+        let part = (self.names[0].as_str(), atomic::Kind::Stage(self.kind));
+        OutputSet::create(out, rules, self.access(), &[part, (MANIFEST, atomic::Kind::Manifest)])
+    }
+
+    /// Writes the parts and the manifest. Some thousand rows are in memory, and a row group that is written.
+    ///
+    /// # Errors
+    /// When rows cannot be read, or parts not be written. Nothing is left behind then.
+    pub fn write(self, mut outputs: OutputSet) -> Result<(), Error> {
+        let access = self.access();
+        let Self { path, parts, kind, rows, names } = self;
+        let meta_text = parts.meta_text().unwrap_or("{}").to_owned();
+        let schema = parts.schema().clone();
+        let roots: Vec<usize> = (0..schema.fields().len()).collect();
+        let mut left = Rows { batches: parts.batches(&roots, Stay::Rows)?, rest: None };
+        let mut written = Vec::with_capacity(names.len());
+        for (at, name) in (0..).zip(names) {
+            let staged = outputs.stage(&name, atomic::Kind::Stage(kind))?;
+            let n_rows = rows.min(parts.n_rows() - at * rows);
+            write_part((&staged, access), (&schema, &meta_text), &mut left, n_rows)?;
+            let found = fs::metadata(&staged).map_err(|source| Error::write(&staged, source))?;
+            written.push(Part { file: name, n_rows, n_bytes: found.len() });
+        }
+        let staged = outputs.stage(MANIFEST, atomic::Kind::Manifest)?;
+        let manifest = Manifest::new(Meta::parse(path, Some(&meta_text))?.into_object(), written);
+        write_file(&staged, access, |to| manifest.write(to))?;
+        outputs.commit()
+    }
+
+    fn access(&self) -> Access {
+        match self.kind {
+            Kind::Released => Access::Usual,
+            _ => Access::Private,
+        }
+    }
+}
+
+/// Refuses a folder with parts that would stay beside `names`.
+fn refuse_others(out: &Path, names: &[String]) -> Result<(), Error> {
+    if !out.is_dir() {
+        return Ok(());
+    }
+    let found = names_in(out)?;
+    let is_own = |name: &&PathBuf| names.binary_search_by(|own| Path::new(own).cmp(name)).is_ok();
+    match found.iter().find(|name| !is_own(name)) {
+        None => Ok(()),
+        Some(other) => {
+            let (expected, found) = ("a folder without other parts", other.display().to_string());
+            Err(Error::new(out, "", expected, found))
+        }
+    }
+}
+
+/// Rows that were not written yet.
+struct Rows {
+    batches: Batches,
+    rest: Option<RecordBatch>,
+}
+
+impl Rows {
+    /// The next ones, at most `most`; `None` at the end.
+    fn next(&mut self, most: u64) -> Result<Option<RecordBatch>, Error> {
+        let Some(batch) = (match self.rest.take() {
+            Some(rest) => Some(rest),
+            None => self.batches.next()?,
+        }) else {
+            return Ok(None);
+        };
+        let n = batch.num_rows();
+        let taken = usize::try_from(most).map_or(n, |most| most.min(n));
+        if taken < n {
+            self.rest = Some(batch.slice(taken, n - taken));
+        }
+        Ok(Some(batch.slice(0, taken)))
+    }
+}
+
+/// Writes the next `n_rows` rows as a file of its own.
+fn write_part(
+    (path, access): (&PathBuf, Access),
+    (schema, meta_text): (&SchemaRef, &str),
+    rows: &mut Rows,
+    n_rows: u64,
+) -> Result<(), Error> {
+    let fields: Vec<Field> = schema.fields().iter().map(|field| field.as_ref().clone()).collect();
+    let properties = properties(meta_text.to_owned(), &fields, super::write::GROUP_ROWS);
+    // What cannot be read is told as that, not as a file that cannot be written.
+    let mut unread = None;
+    let done = write_file(path, access, |file| {
+        let mut writer = writer(file, schema.clone(), properties).map_err(to_io)?;
+        let mut left = n_rows;
+        while left > 0 {
+            match rows.next(left) {
+                Ok(Some(batch)) => {
+                    left -= batch.num_rows() as u64;
+                    writer.write(&batch).map_err(to_io)?;
+                }
+                Ok(None) => break,
+                Err(error) => {
+                    unread = Some(error);
+                    return Err(io::Error::other("unread"));
+                }
+            }
+        }
+        writer.close().map_err(to_io)?;
+        Ok(())
+    });
+    match unread {
+        Some(error) => Err(error),
+        None => done,
+    }
+}
