@@ -180,6 +180,16 @@ fn parts_are_what_the_file_is() {
             stages.ends(&format!("evaluate {scheme}{back} --truth {scheme}{truth} {released}"), 0).0
         };
         assert_eq!(evaluate("/back", "/truth"), evaluate("-back", "/truth.parquet"));
+        let audit = |released: &str, truth: &str, out: &str| {
+            let line =
+                format!("audit released {scheme}{released} --truth {scheme}{truth} --name x");
+            let plan = format!("--k 10 --inlier-ratios 0.5 --seed 1 --json --force --out {out}");
+            let audit = stages.json(&format!("{line} {plan}"));
+            assert!(audit["input"]["sha256"].is_string());
+            audit["results"].clone()
+        };
+        let whole = audit("/released.parquet", "/truth.parquet", "whole");
+        assert_eq!(audit("/released", "/truth", "parts"), whole);
         std::fs::remove_file(stages.path(&format!("{scheme}/lists/part-000003.parquet"))).unwrap();
         let line = format!("recover {scheme}/released --neighbors {scheme}/lists --out none");
         let expected = "expected part-000003.parquet, as in _manifest.json, found no such file\n";

@@ -3,6 +3,7 @@
 use crate::Error;
 use crate::features::ImageFeatures;
 use crate::input;
+use crate::stage::part_files;
 use sha2::{Digest, Sha256};
 use std::io::Read;
 use std::path::Path;
@@ -48,6 +49,14 @@ pub fn hash_files<P: AsRef<Path>>(paths: &[P]) -> Result<String, Error> {
         lines.push((name.to_string_lossy().into_owned(), hash_file(path)?));
     }
     Ok(hash_list(lines))
+}
+
+/// The hash of a stage file; of a folder of parts, [`hash_files`] of these.
+///
+/// # Errors
+/// When a file cannot be read.
+pub fn hash_stage(path: &Path) -> Result<String, Error> {
+    if path.is_dir() { hash_files(&part_files(path)?) } else { hash_file(path) }
 }
 
 /// The same of what is no file, from its names and hashes.

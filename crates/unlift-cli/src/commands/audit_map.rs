@@ -12,7 +12,7 @@ use unlift_audit::inversion::MapInversion;
 use unlift_audit::maps::perform;
 use unlift_audit::{Finished, Job, Journal, Prepared, Shown, check_thresholds, open_audit};
 use unlift_io::atomic::Rules;
-use unlift_io::hash::hash_file;
+use unlift_io::hash::{hash_file, hash_stage};
 use unlift_io::read;
 
 use super::common::{open_map, with_threads};
@@ -158,7 +158,7 @@ fn others(args: &AuditMapArgs) -> anyhow::Result<IndexMap<String, String>> {
         NeighborSource::Oracle | NeighborSource::Own(_) => None,
     });
     let descriptors = args.map.descriptors.iter().map(|path| ("descriptors", path));
-    let hash = |(name, path): (&str, &PathBuf)| Ok((name.to_owned(), hash_file(path)?));
+    let hash = |(name, path): (&str, &PathBuf)| Ok((name.to_owned(), hash_stage(path)?));
     descriptors.chain(lists).map(hash).collect()
 }
 

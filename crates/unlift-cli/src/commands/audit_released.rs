@@ -9,9 +9,9 @@ use unlift::truth::Secret;
 use unlift_audit::maps::{self, perform};
 use unlift_audit::{Finished, Job, Prepared, Shown, check_thresholds, open_audit, ordered};
 use unlift_io::atomic::Rules;
-use unlift_io::hash::{hash_file, hash_files};
+use unlift_io::hash::{hash_file, hash_files, hash_stage};
 use unlift_io::read::{self, Input as Points};
-use unlift_io::stage::{has_images, read_released, read_truth, scheme_name};
+use unlift_io::stage::{has_images, part_files, read_released, read_truth, scheme_name};
 use unlift_report::document::Input;
 
 use super::common::{expect_slots, same_map, with_threads};
@@ -197,16 +197,16 @@ fn plan(
 }
 
 fn provenance(args: &AuditReleasedArgs, prepared: &Prepared) -> anyhow::Result<Input> {
-    let mut others = vec![("truth".to_owned(), hash_file(&args.truth)?)];
+    let mut others = vec![("truth".to_owned(), hash_stage(&args.truth)?)];
     if let Some(path) = &args.descriptors {
         others.push(("descriptors".to_owned(), hash_file(path)?));
     }
     for path in lists(args) {
-        others.push(("neighbors".to_owned(), hash_file(path)?));
+        others.push(("neighbors".to_owned(), hash_stage(path)?));
     }
     Ok(Input {
         path: Some(args.released.display().to_string()),
-        sha256: Some(hash_files(&[args.released.as_path()])?),
+        sha256: Some(hash_files(&part_files(&args.released)?)?),
         n_points: prepared.original.len() as u64,
         scale_m_per_unit: None,
         unit_in_map_units: None,

@@ -16,6 +16,7 @@ pub fn run(args: &SplitArgs) -> anyhow::Result<Outcome> {
     let outputs = split.outputs(&args.out, rules).map_err(refused)?;
     let (kind, rows, parts) = (split.kind(), split.n_rows(), split.n_parts());
     split.write(outputs)?;
-    print(&format!("{kind}: {rows} rows in {parts} parts, in {}\n", OneLine(args.out.display())))?;
+    let parts = format!("{parts} part{}", if parts == 1 { "" } else { "s" });
+    print(&format!("{kind}: {rows} rows in {parts}, in {}\n", OneLine(args.out.display())))?;
     Ok(Outcome::Done)
 }

@@ -36,6 +36,7 @@ pub use neighborhoods::{
     PointNeighborhoods, read_neighborhoods, read_point_neighborhoods, write_neighborhoods,
 };
 pub use neighborhoods_away::{shelve_neighborhoods, write_neighborhoods_as_made};
+pub use parts::part_files;
 pub use peek::{Header, declared_kind, peek};
 pub use recovered::{read_recovered, read_recovered_in, write_recovered};
 pub use released::{read_released, scheme_name, write_released};

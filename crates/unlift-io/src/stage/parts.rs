@@ -139,6 +139,17 @@ impl Batches {
     }
 }
 
+/// The files of which a stage file is made: itself or, of a folder, its parts in order.
+///
+/// # Errors
+/// When the folder cannot be read.
+pub fn part_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
+    if !path.is_dir() {
+        return Ok(vec![path.to_owned()]);
+    }
+    Ok(names_in(path)?.into_iter().map(|name| path.join(name)).collect())
+}
+
 /// The names of the parts in a folder, in order.
 pub(super) fn names_in(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     let failed = |source| Error::read(folder, source);

@@ -74,6 +74,7 @@ fn the_point_form_with_points_left_out() {
     let lists = stage::read_point_neighborhoods(&path, 6).unwrap();
     assert_eq!(lists.n_points(), 6);
     assert_eq!(lists.offsets(), [0, 2, 2, 2, 2, 2, 4]);
+    assert_eq!(lists.neighbors(), [2, 1, 4, 3]);
     assert_eq!((lists.of(0), lists.of(5), lists.of(3)), (&[2, 1][..], &[4, 3][..], &[][..]));
 }
 
