@@ -185,8 +185,9 @@ fn parts_are_what_the_file_is() {
                 format!("audit released {scheme}{released} --truth {scheme}{truth} --name x");
             let plan = format!("--k 10 --inlier-ratios 0.5 --seed 1 --json --force --out {out}");
             let audit = stages.json(&format!("{line} {plan}"));
-            assert!(audit["input"]["sha256"].is_string());
-            audit["results"].clone()
+            let rows = audit["results"].as_array().expect("rows");
+            assert!(!rows.is_empty());
+            rows.clone()
         };
         let whole = audit("/released.parquet", "/truth.parquet", "whole");
         assert_eq!(audit("/released", "/truth", "parts"), whole);
