@@ -4,9 +4,9 @@
     rows = unlift.spark.audit_maps(tasks.repartition(8), schemes=["olc", "ppl"], inlier_ratios=[0.5])
     rows.where("recovered_percent['0.10'] > 20").show()
 
-One map whose lists are spread over the cluster:
+One map whose lists are spread over the cluster (`unlift split` makes a folder of parts of a file):
 
-    found = unlift.spark.recover(spark.read.parquet("lists"), "released.parquet", model)    # `unlift split` makes parts of a file
+    found = unlift.spark.recover(spark.read.parquet("lists"), "released.parquet", model)
 
 Every executor needs this package. A task that is lost with its executor is run again by Spark, to the same rows.
 """
