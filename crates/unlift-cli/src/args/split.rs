@@ -9,8 +9,8 @@ use clap::{Args, value_parser};
 #[command(after_help = "\
 Parts are part-000000.parquet and following, in the order of the rows; _manifest.json says how many
 rows and bytes each has, and what all of them are about. Every command that reads FILE reads the
-folder as it does FILE, to the same bytes, and so does any engine that reads Parquet. A folder that
-an engine wrote is read too, with or without a manifest.
+folder as it does FILE, and so does any engine that reads Parquet. A folder that an engine wrote is
+read too, with or without a manifest.
 
 Examples:
   unlift split hidden/released.parquet --out hidden/released
