@@ -31,6 +31,7 @@ mod plan;
 mod records;
 mod recovered;
 mod report;
+mod rounds;
 mod rows;
 mod work;
 
@@ -63,6 +64,8 @@ mod _unlift {
     use super::recovered::{Recovered, evaluate, recover};
     #[pymodule_export]
     use super::report::Report;
+    #[pymodule_export]
+    use super::rounds::{Edges, Lead};
     #[pymodule_export]
     use super::rows::Rows;
 

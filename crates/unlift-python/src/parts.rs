@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyType};
 use unlift::RecordId;
 use unlift::neighbors;
-use unlift::recover::{Estimate, Model as Learned, Part, Status, prepare as learn};
+use unlift::recover::{Estimate, Model as Learned, Part, RecoverOptions, Status, prepare as learn};
 
 use crate::arrays::{column, indices, rows, to_array, whole};
 use crate::errors::{raised, wrong};
@@ -17,7 +17,7 @@ use crate::work;
 
 /// What is learned of a released map and its lists before any point is placed: small, whatever the size of the map.
 #[pyclass(frozen, module = "unlift")]
-pub struct Model(Arc<Learned<3>>);
+pub struct Model(pub(crate) Arc<Learned<3>>);
 
 /// The columns of solved slots, in order.
 const COLUMNS: [&str; 6] = ["position", "status", "support", "axis", "evidence", "descriptor_row"];
@@ -119,13 +119,16 @@ pub fn prepare(
     threads: Option<usize>,
 ) -> PyResult<Model> {
     let released = released_of(released)?.of_map()?;
+    // Nobody who has a part can say how sure it is.
     let options = options(solver, delta, seed, exact_constraints)?;
+    let options = RecoverOptions { confidence: false, ..options };
     let lists = Arc::clone(&lists.0);
     let model = work::run(py, threads, None, move || learn(&released, &lists, &options))?;
     Ok(Model(Arc::new(model)))
 }
 
-fn columns(py: Python<'_>, part: Part<3>) -> PyResult<Bound<'_, PyDict>> {
+/// Estimates as columns.
+pub(crate) fn columns(py: Python<'_>, part: Part<3>) -> PyResult<Bound<'_, PyDict>> {
     let rows = &part.estimates;
     let values = [
         to_array(py, rows.iter().flat_map(|row| row.position).collect())
@@ -144,7 +147,7 @@ fn columns(py: Python<'_>, part: Part<3>) -> PyResult<Bound<'_, PyDict>> {
 }
 
 /// The columns of `n` slots as estimates.
-fn part(columns: &Bound<'_, PyDict>, n: usize) -> PyResult<Part<3>> {
+pub(crate) fn part(columns: &Bound<'_, PyDict>, n: usize) -> PyResult<Part<3>> {
     let given = |name: &str| -> PyResult<Bound<'_, PyAny>> {
         let missing = || wrong("columns", format!("a column {name}"), "none");
         columns.get_item(name)?.ok_or_else(missing)

@@ -97,9 +97,10 @@ impl Recovered {
     }
 }
 
-/// Recovers the points of a released map from lists of near records: no truth is looked at.
+/// Recovers the points of a released map from lists of near records: no truth is looked at. Without `confidence` nobody asks how sure
+/// the attacker is.
 #[pyfunction]
-#[pyo3(signature = (released, lists, *, solver="joint", delta=None, seed=0, exact_constraints=true, threads=None))]
+#[pyo3(signature = (released, lists, *, solver="joint", delta=None, seed=0, exact_constraints=true, confidence=true, threads=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn recover(
     py: Python<'_>,
@@ -109,10 +110,12 @@ pub fn recover(
     delta: Option<f64>,
     seed: u64,
     exact_constraints: bool,
+    confidence: bool,
     threads: Option<usize>,
 ) -> PyResult<Recovered> {
     let released = released_of(released)?.of_map()?;
     let options = options(solver, delta, seed, exact_constraints)?;
+    let options = RecoverOptions { confidence, ..options };
     let fingerprint = Some(released.fingerprint());
     if lists.0.about().map.is_some_and(|map| Some(map) != fingerprint) {
         return Err(wrong("lists", "lists of this released map", "those of another"));

@@ -19,7 +19,9 @@ __all__ = [
     "SOLVERS",
     "SOURCES",
     "Candidates",
+    "Edges",
     "Hidden",
+    "Lead",
     "Lines",
     "Map",
     "Model",
@@ -242,6 +244,7 @@ def recover(
     delta: float | None = None,
     seed: int = 0,
     exact_constraints: bool = True,
+    confidence: bool = True,
     threads: int | None = None,
 ) -> Recovered: ...
 
@@ -266,6 +269,61 @@ class Model:
     def join(
         self, released: Released | Hidden, columns: dict[str, npt.NDArray[Any] | None]
     ) -> Recovered: ...
+
+@final
+class Edges:
+    def __new__(
+        cls,
+        released: Released | Hidden,
+        first: int,
+        offsets: npt.ArrayLike,
+        ends: npt.ArrayLike,
+        classes: npt.ArrayLike,
+    ) -> Edges: ...
+    @staticmethod
+    def of_lists(
+        model: Model,
+        released: Released | Hidden,
+        first: int,
+        offsets: npt.ArrayLike,
+        records: npt.ArrayLike,
+        named: npt.ArrayLike,
+        by: npt.ArrayLike,
+        *,
+        scores: npt.ArrayLike | None = None,
+        named_scores: npt.ArrayLike | None = None,
+        threads: int | None = None,
+    ) -> Edges: ...
+    def columns(self) -> dict[str, npt.NDArray[Any]]: ...
+    def start(
+        self, model: Model, released: Released | Hidden, *, threads: int | None = None
+    ) -> dict[str, npt.NDArray[Any] | None]: ...
+    def move_on(
+        self, model: Model, released: Released | Hidden, standing: bytes, *, threads: int | None = None
+    ) -> dict[str, npt.NDArray[Any]]: ...
+    def tell(
+        self, model: Model, released: Released | Hidden, news: bytes, *, threads: int | None = None
+    ) -> dict[str, npt.NDArray[Any]]: ...
+
+@final
+class Lead:
+    def __new__(
+        cls,
+        model: Model,
+        released: Released | Hidden,
+        lengths: npt.ArrayLike,
+        listed: npt.ArrayLike,
+        wanted: tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike, npt.ArrayLike],
+        start: dict[str, npt.NDArray[Any] | None],
+    ) -> Lead: ...
+    @staticmethod
+    def wanted(model: Model, lengths: npt.ArrayLike) -> npt.NDArray[np.uint32]: ...
+    @property
+    def is_done(self) -> bool: ...
+    def standing(self) -> bytes: ...
+    def moved(self, columns: dict[str, npt.NDArray[Any] | None]) -> bytes | None: ...
+    def told(self, slots: npt.ArrayLike, jumps: npt.ArrayLike) -> None: ...
+    def finish(self, descriptor_row: npt.ArrayLike | None = None) -> Recovered: ...
 
 def prepare(
     released: Released | Hidden,

@@ -58,13 +58,17 @@ def schema() -> _pa.Schema:
 
 
 def table(lists: Neighborhoods) -> _pa.Table:
-    """Lists as a table, a row per slot: `slot`, and `records`, a list of them."""
+    """Lists as a table, a row per slot: `slot`, and `records`, a list of them; beside it `scores`, if a source gave some."""
     pa = _pyarrow()
     records = lists.records
     # Engines know no numbers without a sign.
     kind = np.int32 if len(lists) < 2**31 else np.int64
-    records = pa.LargeListArray.from_arrays(lists.offsets.astype(np.int64), records.astype(kind))
-    return pa.table({"slot": np.arange(len(lists), dtype=np.int64), "records": records})
+    offsets = lists.offsets.astype(np.int64)
+    columns = {"slot": np.arange(len(lists), dtype=np.int64)}
+    columns["records"] = pa.LargeListArray.from_arrays(offsets, records.astype(kind))
+    if lists.scores is not None:
+        columns["scores"] = pa.LargeListArray.from_arrays(offsets, lists.scores)
+    return pa.table(columns)
 
 
 def recover(
@@ -118,7 +122,11 @@ def join(batches: Iterable[_pa.RecordBatch], released: Released | Hidden, model:
     """
     pa = _pyarrow()
     rows = pa.Table.from_batches(list(batches), schema=schema())
-    of_map = released.released if isinstance(released, Hidden) else released
+    return model.join(released, _columns(rows, released.released if isinstance(released, Hidden) else released))
+
+
+def _columns(rows: _pa.Table, of_map: Released) -> dict[str, Any]:
+    """Rows of `COLUMNS` in any order as columns of all slots in order."""
     n = of_map.n_slots
     slots = rows["slot"].to_numpy()
     if len(slots) and not (0 <= slots.min() and slots.max() < n and len(np.unique(slots)) == len(slots)):
@@ -139,7 +147,7 @@ def join(batches: Iterable[_pa.RecordBatch], released: Released | Hidden, model:
     if of_map.descriptors is not None and of_map.slots_per_record == 2:
         columns["descriptor_row"] = np.arange(n, dtype=np.uint32)
         columns["descriptor_row"][slots] = rows["descriptor_row"].to_numpy()
-    return model.join(released, columns)
+    return columns
 
 
 def _batch(first: int, found: dict[str, Any], part: slice) -> _pa.RecordBatch:

@@ -8,6 +8,10 @@ One map whose lists are spread over the cluster (`unlift split` makes a folder o
 
     found = unlift.spark.recover(spark.read.parquet("lists"), "released.parquet", model)
 
+By joint recovery, which comes back whole, as it looks at all slots in every round:
+
+    back = unlift.spark.recover_in_rounds(spark.read.parquet("lists"), "released.parquet", model)
+
 Every executor needs this package. A task that is lost with its executor is run again by Spark, to the same rows.
 """
 
@@ -16,17 +20,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from . import fleet, parts
-from ._unlift import Model, Released
+from . import fleet, parts, rounds
+from ._unlift import Model, Recovered, Released
 
 if TYPE_CHECKING:
     import pyarrow as _pa  # type: ignore[import-untyped,unused-ignore]
     from pyspark.sql import DataFrame as _DataFrame  # type: ignore[import-not-found,unused-ignore]
 
-__all__ = ["audit_images", "audit_maps", "recover"]
+__all__ = ["audit_images", "audit_maps", "recover", "recover_in_rounds"]
 
-#: The schema of rows, as Spark writes it.
-_ROWS = ", ".join(f"{name} {of}" for name, of in fleet.ROWS.items())
 
 
 def audit_maps(maps: _DataFrame, **options: Any) -> _DataFrame:
@@ -69,8 +71,75 @@ def recover(lists: _DataFrame, released: str, model: Model, *, n_parts: int | No
         if given:
             yield from parts.recover(given, Released.read(released), Model.from_bytes(learned), threads=1)
 
-    columns = ", ".join(f"{name} {of}" for name, of in parts.COLUMNS.items())
-    return ranged.mapInArrow(of_partition, columns)
+    return ranged.mapInArrow(of_partition, _spec(parts.COLUMNS))
+
+
+def recover_in_rounds(lists: _DataFrame, released: str, model: Model, *, n_parts: int | None = None) -> Recovered:
+    """`unlift.rounds.recover`: `unlift.recover(.., confidence=False)`, bit for bit, of lists that no machine has all of.
+
+    lists: columns `slot` and `records`, and `scores` where the model's lists have some, in any order and partitions.
+    released, n_parts: as for `recover`.
+    model: what `unlift.prepare(.., solver="joint")` learned of the map and all of its lists.
+
+    Entries of lists are shuffled once, to where the records are that they name. What comes of it stays on the disks of executors, or in the
+    checkpoint folder of the SparkContext, if it has one: then what an executor loses is not made again. A round is two jobs,
+    in which nothing is shuffled: all executors are sent where all slots are (30 to 60 bytes each), and this process what became of those
+    that moved.
+    """
+    from pyspark import StorageLevel
+    from pyspark.sql import functions
+
+    per = Released.read(released).slots_per_record
+    has_scores = "scores" in lists.columns
+    own = lists.withColumn("record", functions.floor(functions.col("slot") / per))
+    if has_scores:
+        pairs = lists.select("slot", functions.explode(functions.arrays_zip("records", "scores")).alias("entry"))
+        named = pairs.select(
+            functions.col("entry.records").cast("bigint").alias("record"),
+            functions.col("slot").alias("by"),
+            functions.col("entry.scores").alias("score"),
+        )
+    else:
+        named = lists.select(functions.col("slot").alias("by"), functions.explode("records").alias("record"))
+        named = named.withColumn("record", functions.col("record").cast("bigint"))
+    both = own.unionByName(named, allowMissingColumns=True)
+    ranged = both.repartitionByRange("record") if n_parts is None else both.repartitionByRange(n_parts, "record")
+    learned = model.to_bytes()
+
+    def of_partition(batches: Iterator[_pa.RecordBatch]) -> Iterator[_pa.RecordBatch]:
+        import pyarrow
+
+        from unlift import Model, rounds
+
+        given = [batch for batch in batches if len(batch)]
+        if not given:
+            return
+        rows = pyarrow.Table.from_batches(given)
+        is_own = rows["slot"].is_valid()
+        scores = ["scores"] if has_scores else []
+        own = rows.filter(is_own).select(["slot", "records", *scores])
+        named = rows.filter(pyarrow.compute.invert(is_own)).select(["record", "by", *(["score"] if scores else [])])
+        made = rounds.edges(own.to_batches(), named.to_batches(), released, Model.from_bytes(learned), threads=1)
+        yield from made
+
+    edges = ranged.mapInArrow(of_partition, _spec(rounds.EDGES))
+    if lists.sparkSession.sparkContext.getCheckpointDir() is None:
+        edges = edges.persist(StorageLevel.DISK_ONLY)
+    else:
+        edges = edges.checkpoint()
+
+    def over(work: rounds.Work, columns: dict[str, str]) -> list[_pa.RecordBatch]:
+        batches: list[_pa.RecordBatch] = edges.mapInArrow(work, _spec(columns)).toArrow().to_batches()
+        return batches
+
+    try:
+        return rounds.recover(over, released, model)
+    finally:
+        edges.unpersist()
+
+
+def _spec(columns: dict[str, str]) -> str:
+    return ", ".join(f"{name} {of}" for name, of in columns.items())
 
 
 def _over(items: _DataFrame, by: str, options: dict[str, Any]) -> _DataFrame:
@@ -82,4 +151,4 @@ def _over(items: _DataFrame, by: str, options: dict[str, Any]) -> _DataFrame:
         rows: Iterator[_pa.RecordBatch] = getattr(here, by)(batches, **options)
         return rows
 
-    return items.mapInArrow(of_partition, _ROWS)
+    return items.mapInArrow(of_partition, _spec(fleet.ROWS))

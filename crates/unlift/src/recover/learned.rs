@@ -2,6 +2,7 @@
 
 use super::map::bytes::{Reader, Writer};
 use super::map::chance_field::{CandidateField, ChanceField, tube};
+use super::map::edge_rule::EdgeRule;
 use super::map::family::Chance;
 use super::options::{Delta, RecoverOptions, Solver};
 use crate::{About, Error, Fingerprint, ListsBy, RowOrder};
@@ -20,10 +21,12 @@ pub struct Model<const D: usize> {
     pub(super) delta: f64,
     /// `None` for attacks on the records alone, which learn nothing that is small.
     pub(super) chance: Option<Chance<D>>,
+    /// How edges are made of lists, for joint recovery.
+    pub(super) rule: Option<EdgeRule>,
 }
 
 /// How a model begins as bytes.
-const MAGIC: [u8; 8] = *b"unliftM2";
+const MAGIC: [u8; 8] = *b"unliftM3";
 /// An order of rows that is not stated.
 const UNSTATED: u8 = u8::MAX;
 /// Centers of rays at most: they are counted in a byte.
@@ -89,6 +92,10 @@ impl<const D: usize> Model<D> {
                 field.write(&mut to);
             }
         }
+        to.bytes(&[u8::from(self.rule.is_some())]);
+        if let Some(rule) = &self.rule {
+            rule.write(&mut to);
+        }
         to.into_bytes()
     }
 
@@ -140,7 +147,9 @@ impl<const D: usize> Model<D> {
                 return Err(Error::new("model", "a kind of chance below 4", other.to_string()));
             }
         };
+        let [has_rule] = from.array()?;
+        let rule = (has_rule != 0).then(|| EdgeRule::read(&mut from)).transpose()?;
         from.end()?;
-        Ok(Self { options, map, about, delta, chance })
+        Ok(Self { options, map, about, delta, chance, rule })
     }
 }

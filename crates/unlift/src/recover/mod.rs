@@ -9,7 +9,8 @@
 //! 5. `exact`: coordinates that a rule of the scheme fixes. `confidence`: how sure the attacker is.
 //!    `pairs_of_descriptors`: whose descriptor is whose on a paired line.
 //! 6. `checks`: what goes together. `learned`: what is learned of a map. `task`: model, records and lists together, solved in any parts; `rounds`: joint
-//!    recovery one round at a time; `parts`: consensus where each part has its own lists alone.
+//!    recovery one round at a time; `parts`: consensus where each part has its own lists alone; `spread`: joint recovery where each has its own
+//!    edges alone.
 //!
 //! [`prepare`] learns a model, [`Task`] solves with it, and [`recover`] does both.
 
@@ -29,6 +30,7 @@ mod placement;
 mod result;
 mod rounds;
 mod solve;
+mod spread;
 mod task;
 
 pub(crate) use baselines::density::published;
@@ -37,6 +39,7 @@ pub use confidence::model::{N_KINDS, N_TERMS, centered, terms};
 #[doc(hidden)]
 pub use confidence::seen::{Cues, Seen};
 pub use learned::Model;
+pub use map::part_edges::{Edges, NamedBy};
 pub use options::{Delta, RecoverOptions, Solver};
 pub use parts::Part;
 pub use result::estimate::{Estimate, Status};
@@ -46,6 +49,7 @@ pub use result::trials::TrialHistogram;
 pub use result::unknown::Unknown;
 pub use rounds::Rounds;
 pub use solve::Moved;
+pub use spread::lead::{EdgesOfSlot, Lead};
 pub use task::Task;
 
 use crate::compiled::{no_such, which};

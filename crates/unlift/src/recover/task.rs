@@ -139,7 +139,11 @@ impl<'a, const D: usize> Task<'a, D> {
             Records::Listed { family, .. } => Some(family.chance()),
         };
         let about = About { map: Some(self.map), ..self.lists.about() };
-        Model { options: self.options, about, map: self.map, delta: self.delta, chance }
+        let rule = match &self.records {
+            Records::Listed { graph: Some(graph), .. } => Some(graph.rule().clone()),
+            _ => None,
+        };
+        Model { options: self.options, about, map: self.map, delta: self.delta, chance, rule }
     }
 
     /// Number of slots.
@@ -308,7 +312,8 @@ impl<'a, const D: usize> Task<'a, D> {
         rounds.run()
     }
 
-    fn in_columns(
+    /// Last estimates in columns.
+    pub(super) fn in_columns(
         &self,
         estimates: &[Estimate<D>],
         descriptor_row: Option<Vec<u32>>,

@@ -106,6 +106,23 @@ pub const INSIDE_RECOVER: &[(&str, &[&str])] = &[
         ],
     ),
     ("parts", &["checks", "learned", "map", "options", "pairs_of_descriptors", "result", "task"]),
+    (
+        "spread",
+        &[
+            "checks",
+            "consensus",
+            "exact",
+            "joint",
+            "learned",
+            "map",
+            "options",
+            "pairs_of_descriptors",
+            "parts",
+            "result",
+            "solve",
+            "task",
+        ],
+    ),
 ];
 
 /// Dependencies of the core: light, and known for long.

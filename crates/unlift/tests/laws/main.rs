@@ -31,4 +31,5 @@ mod released_again;
 mod secrets;
 mod shares;
 mod shelved;
+mod spread;
 mod start;

@@ -10,6 +10,7 @@ use crate::Error;
 use crate::recover::map::edges::record_of;
 use crate::recover::map::graph::Graph;
 use crate::recover::map::pieces::Pieces;
+use crate::recover::map::with_pieces::WithPieces;
 use crate::recover::result::estimate::{Estimate, Status};
 
 /// Slots looked at: the mean over so many is known better than the share by which it may fall.
@@ -17,7 +18,7 @@ const SLOTS: usize = 1 << 12;
 
 /// The mean number of records at the other ends of a slot's edges that pass near its estimate, less
 /// that expected by chance.
-pub(crate) fn of<const D: usize, P: Pieces<D>>(
+pub(super) fn of<const D: usize, P: Pieces<D>>(
     pieces: &P,
     judges: &Judges,
     estimates: &[Estimate<D>],
@@ -32,8 +33,23 @@ pub(crate) fn of<const D: usize, P: Pieces<D>>(
     parts.iter().sum::<f64>() / judges.0.len().max(1) as f64
 }
 
+/// [`of`] as something to be done with pieces, at a delta.
+pub(crate) struct Agree<'a, const D: usize> {
+    pub(crate) judges: &'a Judges,
+    pub(crate) estimates: &'a [Estimate<D>],
+    pub(crate) delta: f32,
+}
+
+impl<const D: usize> WithPieces<D> for Agree<'_, D> {
+    type Output = f64;
+
+    fn run<P: Pieces<D>>(self, pieces: &P) -> f64 {
+        of(pieces, self.judges, self.estimates, self.delta * self.delta)
+    }
+}
+
 /// The slots that are looked at, with the other ends of their edges.
-pub(super) struct Judges(Vec<(usize, Vec<u32>)>);
+pub(crate) struct Judges(Vec<(usize, Vec<u32>)>);
 
 impl Judges {
     /// Slots spread evenly over `graph`.
@@ -41,9 +57,19 @@ impl Judges {
     /// # Errors
     /// When edges cannot be read.
     pub(super) fn new(graph: &Graph) -> Result<Self, Error> {
-        let n = graph.n_slots();
-        let row = |slot: usize| Ok((slot, graph.rows(&(slot..slot + 1))?.ends().to_vec()));
-        (0..n).step_by(n.div_ceil(SLOTS).max(1)).map(row).collect::<Result<_, _>>().map(Self)
+        Self::of(graph.n_slots(), |slot| Ok(graph.rows(&(slot..slot + 1))?.ends().to_vec()))
+    }
+
+    /// Slots spread evenly over a map with so many, of each of which there is a row of ends.
+    ///
+    /// # Errors
+    /// When edges cannot be had.
+    pub(crate) fn of(
+        n_slots: usize,
+        mut row: impl FnMut(usize) -> Result<Vec<u32>, Error>,
+    ) -> Result<Self, Error> {
+        let slots = (0..n_slots).step_by(n_slots.div_ceil(SLOTS).max(1));
+        slots.map(|slot| Ok((slot, row(slot)?))).collect::<Result<_, _>>().map(Self)
     }
 }
 

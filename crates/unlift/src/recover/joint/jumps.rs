@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::recover::map::edges::either;
 use crate::recover::map::graph::EdgeRows;
 use crate::recover::map::pieces::Pieces;
-use crate::recover::map::places::{Places, distance2};
+use crate::recover::map::places::distance2;
 
 /// Per slot that is ahead, how many jumps concern it since it was last its turn. Sums of integers: the same however threads
 /// share the work.
@@ -36,29 +36,39 @@ impl Jumps {
         *self.concerning[slot].get_mut() = 0;
     }
 
-    /// Tells whom it concerns that `slots`, whose edges are given, jumped from one place to another: whoever may lie within
-    /// `reach` of either. Where nothing is `ahead` a slot is looked at in any case and need not know.
-    pub(super) fn tell<const D: usize, P: Pieces<D>>(
+    /// So many more jumps concern `slot`.
+    pub(super) fn add(&mut self, slot: usize, jumps: u32) {
+        *self.concerning[slot].get_mut() += jumps;
+    }
+
+    /// Those who know of jumps, with how many.
+    pub(super) fn told(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
+        let all = self.concerning.iter().map(|jumps| jumps.load(Ordering::Relaxed)).enumerate();
+        all.filter(|&(_, jumps)| jumps > 0).map(|(slot, jumps)| (slot as u32, jumps))
+    }
+
+    /// Tells whom it concerns of `jumpers`, whose edges are given, each of which is a slot that jumped from one place to another:
+    /// whoever may lie within `reach` of either. Where nothing `is_ahead` a slot is looked at in any case and need not know.
+    pub(super) fn tell<const D: usize, P: Pieces<D>, J: Sync>(
         &self,
-        slots: &[u32],
         (pieces, edges): (&P, &EdgeRows<'_>),
-        (from, to): (&Places<D>, &Places<D>),
+        jumpers: &[J],
+        jump: impl Fn(&J) -> (u32, [f32; D], [f32; D]) + Sync,
         reach: f32,
-        ahead: &[f32],
+        is_ahead: impl Fn(usize) -> bool + Sync,
     ) {
         let slots_per_record = pieces.slots_per_record();
         let concerns = |slot: usize, x: &[f32; D]| {
             let near = |piece| distance2(&pieces.piece(slot, piece).project(x), x) < reach * reach;
             (0..P::PER_SLOT).any(near)
         };
-        slots.par_chunks(CHUNK).for_each(|slots| {
-            for slot in slots.iter().map(|&slot| slot as usize) {
-                let (from, to) = (from.of(slot), to.of(slot));
-                let (ends, class) = edges.of(slot);
+        jumpers.par_chunks(CHUNK).for_each(|jumpers| {
+            for (slot, from, to) in jumpers.iter().map(&jump) {
+                let (ends, class) = edges.of(slot as usize);
                 for (&end, &class) in ends.iter().zip(class) {
                     let last = end as usize + usize::from(either(class, slots_per_record));
                     let ends = end as usize..=last;
-                    if !ahead[ends.clone()].iter().any(|&ahead| ahead > 0.0) {
+                    if !ends.clone().any(&is_ahead) {
                         continue;
                     }
                     // Both slots of a record lie on one piece.

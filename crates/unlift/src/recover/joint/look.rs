@@ -48,18 +48,35 @@ impl Sample {
     /// # Errors
     /// When edges cannot be read.
     pub(crate) fn new(graph: &Graph, seed: u64) -> Result<Self, Error> {
-        let n = graph.n_slots();
-        let every = n.div_ceil(SLOTS).max(1);
-        let slots = if graph.len() == 0 { 0..0 } else { 0..n };
+        let row = |slot: usize| {
+            let rows = graph.rows(&(slot..slot + 1))?;
+            let (ends, class) = rows.of(slot);
+            Ok((ends.to_vec(), class.to_vec()))
+        };
+        Self::of((graph.n_slots(), graph.len()), seed, row, |at| graph.edge(at))
+    }
+
+    /// Slots spread evenly over a map with so many slots and edges: of a slot there is a `row` of ends and
+    /// classes, and each of all edges, end to end, is an `edge`.
+    ///
+    /// # Errors
+    /// When edges cannot be had.
+    pub(crate) fn of(
+        (n_slots, n_edges): (usize, usize),
+        seed: u64,
+        mut row: impl FnMut(usize) -> Result<(Vec<u32>, Vec<u8>), Error>,
+        mut edge: impl FnMut(u64) -> Result<(u32, u8), Error>,
+    ) -> Result<Self, Error> {
+        let every = n_slots.div_ceil(SLOTS).max(1);
+        let slots = if n_edges == 0 { 0..0 } else { 0..n_slots };
         let rows = slots.step_by(every).map(|slot| {
             let mut draws = Draws::new(seed, Stage::NullSample, slot as u64);
             let mut random = [(0, 0); RANDOM];
-            for edge in &mut random {
-                *edge = graph.edge(draws.below(graph.len() as u64))?;
+            for one in &mut random {
+                *one = edge(draws.below(n_edges as u64))?;
             }
-            let edges = graph.rows(&(slot..slot + 1))?;
-            let (ends, class) = edges.of(slot);
-            Ok(Sampled { slot: slot as u32, ends: ends.to_vec(), class: class.to_vec(), random })
+            let (ends, class) = row(slot)?;
+            Ok(Sampled { slot: slot as u32, ends, class, random })
         });
         Ok(Self { rows: rows.collect::<Result<_, Error>>()? })
     }

@@ -11,6 +11,7 @@
 //! other was. So every other slot holds still while the rest moves.
 
 mod agreement;
+mod course;
 mod crowds;
 mod equations;
 mod jumps;
@@ -19,7 +20,9 @@ mod near;
 mod neighbor_law;
 mod one_slot;
 mod remake;
+mod standing;
 mod sweeps;
+mod wire;
 
 use std::ops::Range;
 
@@ -30,7 +33,12 @@ use crate::recover::map::graph::Graph;
 use crate::recover::map::pieces::{CandidatePieces, LinePieces, PlanePieces};
 use crate::recover::result::estimate::Estimate;
 use crate::recover::solve::{InRounds, Solve};
+pub(crate) use agreement::{Agree, Judges};
+pub(crate) use course::{Course, Digest, Kind};
+pub(crate) use look::Sample;
+pub(crate) use standing::Standing;
 use sweeps::Sweeps;
+pub(crate) use wire::News;
 
 /// Joint recovery of one map.
 pub(crate) struct Joint<'a, const D: usize> {

@@ -9,6 +9,8 @@ use rayon::prelude::*;
 
 use super::crowds;
 use super::look::{Look, RANDOM, Sampled};
+use crate::Error;
+use crate::recover::map::bytes::{Reader, Writer};
 use crate::recover::map::edges::{CLASSES, Side, either, side};
 use crate::recover::map::settings::Settings;
 use crate::simd::{Kernel, dispatch};
@@ -61,6 +63,26 @@ impl Law {
                 _ => (odds, 0.0),
             }
         })
+    }
+
+    /// Appends the law to `to`.
+    pub(super) fn write(&self, to: &mut Writer) {
+        let Self { radius, odds, share, inverse_a2, center, region, surplus } = self;
+        to.f32s(odds);
+        to.f32s(&[*radius, *share, *inverse_a2, *center, *region, *surplus]);
+    }
+
+    /// The law that [`write`](Self::write) appended.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub(super) fn read(from: &mut Reader<'_>) -> Result<Self, Error> {
+        let mut odds = [0.0; CLASSES];
+        odds.copy_from_slice(&from.f32s(CLASSES)?);
+        let mut next = || from.f32();
+        let (radius, share, inverse_a2) = (next()?, next()?, next()?);
+        let (center, region, surplus) = (next()?, next()?, next()?);
+        Ok(Self { radius, odds, share, inverse_a2, center, region, surplus })
     }
 
     /// The law of the present places.

@@ -22,6 +22,11 @@ impl Writer {
         self.u64(x.to_bits());
     }
 
+    /// Appends a whole number.
+    pub(crate) fn u32(&mut self, x: u32) {
+        self.bytes(&x.to_le_bytes());
+    }
+
     /// Appends every bit of numbers, but not how many there are.
     pub(crate) fn f32s(&mut self, numbers: &[f32]) {
         numbers.iter().for_each(|x| self.bytes(&x.to_bits().to_le_bytes()));
@@ -64,6 +69,11 @@ impl<'a> Reader<'a> {
     /// A whole number.
     pub(crate) fn u64(&mut self) -> Result<u64, Error> {
         self.array().map(u64::from_le_bytes)
+    }
+
+    /// A whole number.
+    pub(crate) fn u32(&mut self) -> Result<u32, Error> {
+        self.array().map(u32::from_le_bytes)
     }
 
     /// A whole number that counts something, at most `most`.

@@ -1,8 +1,10 @@
 //! How dense estimates of listed records lie: the votes a place gets by chance.
 
+use super::bytes::{Reader, Writer};
 use super::cells::Grid;
 use super::edges::record_of;
 use super::places::Places;
+use crate::Error;
 
 /// Estimates per volume, as a share of all, each counted as often as its record is listed.
 pub(crate) struct Density<const D: usize> {
@@ -25,8 +27,7 @@ impl<const D: usize> Density<D> {
     pub(crate) fn new(places: &Places<D>, listed: &[u32], radius: f32) -> Self {
         let n = places.len();
         let (low, high) = places.trimmed_box();
-        let most = (4 * n).max(1 << 16);
-        let mut grid = Grid::with_cell(low, high, radius * CELL, most);
+        let mut grid = Grid::with_cell(low, high, radius * CELL, most_cells(n));
         let slots_per_record = n / listed.len().max(1);
         let mut weight = 0.0f64;
         for slot in 0..n {
@@ -53,6 +54,22 @@ impl<const D: usize> Density<D> {
             false => *sample.select_nth_unstable_by(middle, f32::total_cmp).1,
         };
         Self { grid, typical }
+    }
+
+    /// Appends the density to `to`.
+    pub(crate) fn write(&self, to: &mut Writer) {
+        self.grid.write(to);
+        to.f32s(&[self.typical]);
+    }
+
+    /// The density that [`write`](Self::write) appended, of so many slots.
+    ///
+    /// # Errors
+    /// When it is none.
+    pub(crate) fn read(from: &mut Reader<'_>, n_slots: usize) -> Result<Self, Error> {
+        // Sides are rounded up to whole cells.
+        let grid = Grid::read(from, 2 * most_cells(n_slots))?;
+        Ok(Self { grid, typical: from.f32()? })
     }
 
     /// The density at `x`.
@@ -84,6 +101,11 @@ impl<const D: usize> Density<D> {
         let ratio = self.typical / density;
         if ratio > 1.0 { cube_root(ratio).min(WIDEST) } else { 1.0 }
     }
+}
+
+/// Cells at most, for so many slots.
+fn most_cells(n_slots: usize) -> usize {
+    (4 * n_slots).max(1 << 16)
 }
 
 /// Where a cell of `grid` holds less than `enough`, its value becomes that of a wider smoothing, the first of several

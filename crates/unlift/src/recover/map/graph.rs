@@ -9,16 +9,13 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::edges::{record_of, score_bounds, score_class, score_step};
+use super::edge_rule::EdgeRule;
+use super::edges::{record_of, score_step};
 use super::merge::Rows;
 use super::named_by::{Block, NamedBy};
 use crate::neighbors::Neighborhoods;
 use crate::shelf::{Kept, windows};
 use crate::{Error, RecordId};
-
-/// Reverse entries of a row at most, as a multiple of the mean list: whoever is named by everyone is
-/// named by mistake.
-pub(super) const MOST_REVERSE: usize = 3;
 
 /// Rows of edges in order of their other ends, a class beside each.
 #[derive(Debug)]
@@ -30,6 +27,8 @@ pub(crate) struct Graph {
     /// Edges that may be in memory at a time, where they are not all there.
     pub(super) window: u64,
     pub(super) slots_per_record: usize,
+    /// How they were made of lists.
+    pub(super) rule: EdgeRule,
 }
 
 /// The edges of consecutive slots.
@@ -41,7 +40,17 @@ pub(crate) struct EdgeRows<'a> {
     class: Cow<'a, [u8]>,
 }
 
-impl EdgeRows<'_> {
+impl<'a> EdgeRows<'a> {
+    /// Those of the slots from `first` on, whose edges start at `offsets` less the first of these.
+    pub(crate) fn new(
+        first: usize,
+        offsets: &'a [u64],
+        ends: Cow<'a, [u32]>,
+        class: Cow<'a, [u8]>,
+    ) -> Self {
+        Self { first, offsets, ends, class }
+    }
+
     /// The other ends of the edges of `slot`, which is among them, and the class of each.
     #[inline(always)]
     pub(crate) fn of(&self, slot: usize) -> (&[u32], &[u8]) {
@@ -60,9 +69,9 @@ impl Graph {
     /// The edges of `lists`, in both directions.
     pub(crate) fn new(lists: &Neighborhoods, slots_per_record: usize) -> Self {
         let n_slots = lists.n_slots();
-        let score_class = score_classes(lists);
+        let rule = rule_of(lists);
+        let score_class = |at| rule.class_at(lists.scores(), at);
         let named_by = NamedBy::new(lists, slots_per_record, &score_class);
-        let most = MOST_REVERSE * lists.records().len().div_ceil(n_slots.max(1)).max(1);
         let rooms = rooms(lists, &named_by, slots_per_record);
         let total = rooms.iter().map(|room| room.len).sum();
         let (mut ends, mut class) = (vec![0; total], vec![0; total]);
@@ -76,7 +85,7 @@ impl Graph {
                     let all = reverse.of(record_of(slot - room.slots.start, slots_per_record));
                     let first = lists.offsets()[slot] as usize;
                     let class = |at| score_class(first + at);
-                    rows.add(lists.of(slot), all, slots_per_record, most, class);
+                    rows.add(lists.of(slot), all, slots_per_record, rule.most, class);
                     rows.n as u32
                 };
                 room.slots.clone().map(add).collect()
@@ -98,7 +107,12 @@ impl Graph {
         ends.shrink_to_fit();
         class.shrink_to_fit();
         let (ends, class) = (Kept::Here(ends), Kept::Here(class));
-        Self { offsets, ends, class, window: u64::MAX, slots_per_record }
+        Self { offsets, ends, class, window: u64::MAX, slots_per_record, rule }
+    }
+
+    /// How the edges were made of lists.
+    pub(crate) fn rule(&self) -> &EdgeRule {
+        &self.rule
     }
 
     /// Slots whose edges are read at a time; all, where they are in memory.
@@ -220,12 +234,11 @@ fn split<'a>(rooms: &[Room], mut ends: &'a mut [u32], mut class: &'a mut [u8]) -
     rooms.iter().map(rows).collect()
 }
 
-/// The class of the score of each entry.
-fn score_classes(lists: &Neighborhoods) -> impl Fn(usize) -> u8 + Sync + '_ {
-    let bounds = lists.scores().map_or_else(Vec::new, |scores| {
-        score_bounds(scores.iter().step_by(score_step(scores.len())).copied().collect())
-    });
-    move |at| lists.scores().map_or(0, |scores| score_class(&bounds, scores[at]))
+/// How edges are made of `lists`.
+fn rule_of(lists: &Neighborhoods) -> EdgeRule {
+    let n = lists.records().len();
+    let every = |scores: &[f32]| scores.iter().step_by(score_step(n)).copied().collect();
+    EdgeRule::new(n, lists.n_slots(), lists.scores().map_or_else(Vec::new, every))
 }
 
 #[cfg(test)]
@@ -254,7 +267,8 @@ mod tests {
 
     /// The edges of each slot, found one by one.
     fn expected(lists: &Neighborhoods, slots_per_record: usize) -> Vec<Vec<(u32, u8)>> {
-        let class = score_classes(lists);
+        let rule = rule_of(lists);
+        let class = |at| rule.class_at(lists.scores(), at);
         let n_slots = lists.n_slots();
         let mut named_by = vec![Vec::new(); n_slots / slots_per_record];
         for slot in 0..n_slots {
@@ -263,7 +277,7 @@ mod tests {
                 named_by[record.index()].push((slot, class(entry)));
             }
         }
-        let most = MOST_REVERSE * lists.records().len().div_ceil(n_slots);
+        let most = 3 * lists.records().len().div_ceil(n_slots);
         let edges = |slot: usize| {
             let all = &named_by[slot / slots_per_record];
             let reverse: Vec<_> = all.iter().step_by(all.len().div_ceil(most).max(1)).collect();

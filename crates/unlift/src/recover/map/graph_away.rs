@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
-use super::edges::{score_bounds, score_class, score_step};
-use super::graph::{Graph, MOST_REVERSE};
+use super::edge_rule::EdgeRule;
+use super::edges::score_step;
+use super::graph::Graph;
 use super::merge::Rows;
 use crate::Error;
 use crate::neighbors::ShelvedLists;
@@ -30,10 +31,8 @@ impl Graph {
         slots_per_record: usize,
         shelf: &dyn Shelf,
     ) -> Result<Self, Error> {
-        let bounds = bounds_of(lists)?;
-        let named_by = NamedBy::new(lists, slots_per_record, &bounds, shelf)?;
-        let n_entries = lists.offsets()[lists.n_slots()] as usize;
-        let most = MOST_REVERSE * n_entries.div_ceil(lists.n_slots().max(1)).max(1);
+        let rule = rule_of(lists)?;
+        let named_by = NamedBy::new(lists, slots_per_record, &rule, shelf)?;
         let (mut ends, mut class) = (Column::new(shelf)?, Column::new(shelf)?);
         let mut offsets = Vec::with_capacity(lists.n_slots() + 1);
         offsets.push(0);
@@ -54,8 +53,9 @@ impl Graph {
                 for slot in part {
                     let at = (lists.offsets()[slot] - first) as usize;
                     let list = &listed[at..(lists.offsets()[slot + 1] - first) as usize];
-                    let class = |i: usize| class_at(&bounds, scores.as_deref(), at + i);
-                    rows.add(list, by.of(slot / slots_per_record), slots_per_record, most, class);
+                    let class = |i: usize| rule.class_at(scores.as_deref(), at + i);
+                    let by = by.of(slot / slots_per_record);
+                    rows.add(list, by, slots_per_record, rule.most, class);
                     offsets.push(from + rows.n as u64);
                 }
                 let n = rows.n;
@@ -65,12 +65,12 @@ impl Graph {
         }
         let (ends, class) = (Kept::Away(ends), Kept::Away(class));
         let window = (shelf.window() / EDGE) as u64;
-        Ok(Self { offsets, ends, class, window, slots_per_record })
+        Ok(Self { offsets, ends, class, window, slots_per_record, rule })
     }
 }
 
-/// Where classes of scores begin; none without scores.
-fn bounds_of(lists: &ShelvedLists) -> Result<Vec<f32>, Error> {
+/// How edges are made of `lists`.
+fn rule_of(lists: &ShelvedLists) -> Result<EdgeRule, Error> {
     let n = lists.offsets()[lists.n_slots()];
     let mut sample = Vec::new();
     if lists.has_scores() {
@@ -78,15 +78,11 @@ fn bounds_of(lists: &ShelvedLists) -> Result<Vec<f32>, Error> {
             sample.extend(lists.scores(at..at + 1)?.into_iter().flatten());
         }
     }
-    Ok(if sample.is_empty() { Vec::new() } else { score_bounds(sample) })
+    Ok(EdgeRule::new(n as usize, lists.n_slots(), sample))
 }
 
 fn scores_of(lists: &ShelvedLists, slots: &Range<usize>) -> Result<Option<Vec<f32>>, Error> {
     lists.scores(lists.offsets()[slots.start]..lists.offsets()[slots.end])
-}
-
-fn class_at(bounds: &[f32], scores: Option<&[f32]>, at: usize) -> u8 {
-    scores.map_or(0, |scores| score_class(bounds, scores[at]))
 }
 
 /// All entries by the block of the record that they name.
@@ -105,7 +101,7 @@ impl NamedBy {
     fn new(
         lists: &ShelvedLists,
         slots_per_record: usize,
-        bounds: &[f32],
+        rule: &EdgeRule,
         shelf: &dyn Shelf,
     ) -> Result<Self, Error> {
         let mut starts = vec![0; lists.n_slots() / slots_per_record + 1];
@@ -138,7 +134,7 @@ impl NamedBy {
                     let record = records[at as usize].index();
                     let block = blocks.partition_point(|block| block.end <= record);
                     let in_block = (record - blocks[block].start) as u64;
-                    let class = class_at(bounds, scores.as_deref(), at as usize);
+                    let class = rule.class_at(scores.as_deref(), at as usize);
                     let packed = (slot as u64) << RECORD_BITS | in_block;
                     waiting[block].push(packed << CLASS_BITS | u64::from(class));
                     if waiting[block].len() == TOGETHER {

@@ -1,0 +1,324 @@
+"""One map in parts by joint recovery: who lists whom is spread over machines, and nobody needs all of it (needs `pyarrow`).
+
+Every slot looks at where the records are believed to be that it lists, and those whose slots list it: its edges. They stay where they
+are. In every round one who leads says where all slots are believed to be, and each part where its slots go from there.
+
+>>> import numpy as np, pyarrow, unlift
+>>> points = np.random.default_rng(1).uniform(0, 4, (300, 3))
+>>> hidden = unlift.obfuscate(unlift.Map(points, scale=1.0), "olc", seed=1)
+>>> lists = unlift.neighbors.oracle(hidden, 0.5, k=20)
+>>> model = unlift.prepare(hidden, lists, solver="joint")
+
+Parts are lists of some slots, and all entries that name records of these:
+
+>>> by_slot = unlift.parts.table(lists)
+>>> entries = pyarrow.Table.from_batches(unlift.rounds.entries(by_slot.to_batches()))
+>>> is_first = pyarrow.compute.less(entries["record"], 150)
+>>> halves = [
+...     (by_slot.slice(0, 150), entries.filter(is_first)),
+...     (by_slot.slice(150), entries.filter(pyarrow.compute.invert(is_first))),
+... ]
+>>> parts = [
+...     list(unlift.rounds.edges(own.to_batches(), named.to_batches(), hidden, model)) for own, named in halves
+... ]
+
+`over` is all that an engine has to do: a function over the rows of each part, and all that comes of it.
+
+>>> def over(work, columns):
+...     return [batch for part in parts for batch in work(part)]
+>>> back = unlift.rounds.recover(over, hidden, model)
+>>> whole = unlift.recover(hidden, lists, confidence=False)
+>>> bool((back.positions == whole.positions).all())
+True
+
+On Spark: `unlift.spark.recover_in_rounds`.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+from collections.abc import Callable, Iterable, Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import parts
+from ._unlift import Edges, Hidden, Lead, Model, Recovered, Released, UnliftError
+from .parts import _pyarrow
+
+if TYPE_CHECKING:
+    import pyarrow as _pa  # type: ignore[import-untyped,unused-ignore]
+
+__all__ = ["EDGES", "Work", "edges", "entries", "recover"]
+
+#: Who lists whom about a slot: name, and type as Spark writes it. `ends` are slots, ascending; a class says which of the two
+#: names the other, and how high a source scores it.
+EDGES = {"slot": "bigint", "ends": "array<int>", "classes": "array<tinyint>"}
+
+_TALLY = {"kind": "int", "at": "bigint", "n": "bigint"}
+_MOVED = {name: of for name, of in parts.COLUMNS.items() if name != "descriptor_row"} | {"ahead": "float"}
+_TOLD = {"slot": "bigint", "jumps": "bigint"}
+
+#: Applies a function to the rows of each part; it gives rows with columns of these types, as Spark writes them.
+Over = Callable[["Work", dict[str, str]], "Iterable[_pa.RecordBatch]"]
+
+
+def entries(batches: Iterable[_pa.RecordBatch]) -> Iterator[_pa.RecordBatch]:
+    """Entries of lists one by one: which `record` is named, by the list of which slot (`by`), and its `score`, if lists have
+    `scores`.
+
+    batches: lists, a row per slot, with the columns `slot` and `records`, and perhaps `scores`.
+    """
+    pa = _pyarrow()
+    for batch in batches:
+        rows = batch["records"]
+        lengths = pa.compute.fill_null(pa.compute.list_value_length(rows), 0).to_numpy(zero_copy_only=False)
+        by = np.repeat(batch["slot"].to_numpy(zero_copy_only=False), lengths)
+        named = {"record": pa.compute.list_flatten(rows).cast(pa.int64()), "by": pa.array(by)}
+        if "scores" in batch.schema.names:
+            named["score"] = pa.compute.list_flatten(batch["scores"]).cast(pa.float32())
+        yield pa.RecordBatch.from_pydict(named)
+
+
+def edges(
+    lists: Iterable[_pa.RecordBatch],
+    named: Iterable[_pa.RecordBatch],
+    released: Released | Hidden | str,
+    model: Model,
+    *,
+    threads: int | None = None,
+) -> Iterator[_pa.RecordBatch]:
+    """The edges of the slots of a part.
+
+    lists: the lists of the part, in any order: columns `slot` and `records`, and `scores` where the model's lists have some. All slots of
+        a record belong to the same part.
+    named: all `entries` of any lists that name records of the part, in any order.
+    released: the map, or the path of its file.
+    model: what `unlift.prepare(.., solver="joint")` learned of it and all of its lists.
+
+    Yields rows of `EDGES`, in order of slots.
+    """
+    pa = _pyarrow()
+    of_map = _read(released)
+    own = _table(lists, "slot", "records")
+    naming = _table(named, "record", "by")
+    per = of_map.slots_per_record
+    records = [] if own is None else [own["slot"].to_numpy() // per]
+    if naming is not None:
+        records.append(naming["record"].to_numpy())
+    if not records:
+        return
+    low, high = min(int(of.min()) for of in records), max(int(of.max()) for of in records)
+    if low < 0 or high >= of_map.n_slots // per:
+        raise UnliftError(f"records: expected numbers from 0 to {of_map.n_slots // per - 1}, found {low} to {high}")
+    first, n = low * per, (high - low + 1) * per
+    offsets, columns = _rows(own, first, n, ("records", "scores"))
+    empty = np.zeros(0, dtype=np.int64)
+    given = (empty, empty) if naming is None else (naming["record"].to_numpy(), naming["by"].to_numpy())
+    named_scores = None if naming is None or "score" not in naming.schema.names else naming["score"].to_numpy()
+    if columns["scores"] is not None and named_scores is None:
+        named_scores = np.zeros(0, dtype=np.float32)
+    if named_scores is not None and columns["scores"] is None and len(columns["records"]) == 0:
+        columns["scores"] = np.zeros(0, dtype=np.float32)
+    found = Edges.of_lists(
+        model,
+        of_map,
+        first,
+        offsets,
+        columns["records"],
+        *given,
+        scores=columns["scores"],
+        named_scores=named_scores,
+        threads=threads,
+    ).columns()
+    lengths = np.diff(found["offsets"].astype(np.int64))
+    # Between records of the part may be others.
+    present = np.zeros(n // per, dtype=bool)
+    for of in records:
+        present[of - low] = True
+    kept = np.flatnonzero(present.repeat(per))
+    if len(kept) < n:
+        # Those have no lists here, and nobody names them.
+        offsets = np.concatenate([[0], np.cumsum(lengths[kept])])
+    else:
+        offsets = found["offsets"]
+    offsets = pa.array(offsets.astype(np.int32))
+    yield pa.RecordBatch.from_arrays(
+        [
+            pa.array(first + kept),
+            pa.ListArray.from_arrays(offsets, pa.array(found["ends"].astype(np.int32))),
+            pa.ListArray.from_arrays(offsets, pa.array(found["classes"].astype(np.int8))),
+        ],
+        schema=_schema(EDGES),
+    )
+
+
+def recover(over: Over, released: Released | Hidden | str, model: Model) -> Recovered:
+    """Recovers a map whose edges are spread: `unlift.recover(.., confidence=False)`, bit for bit.
+
+    over: `over(work, columns)` gives back the batches of `work(batches)` for the `edges` of every part, in any order. What it
+        gives have `columns`: names, and types as Spark writes them. `work` can be pickled if `released` is a path.
+    released: the map, or the path of its file where every machine reads it.
+    model: as for `edges`.
+
+    In memory are some 150 bytes a slot, and 60 more of what comes back in a round. Nobody can say how sure the attacker is.
+    """
+    pa = _pyarrow()
+    of_map = _read(released)
+    n, per = of_map.n_slots, of_map.slots_per_record
+
+    def all_of(step: str, columns: dict[str, str], told: Any = None) -> _pa.Table:
+        batches = list(over(Work(step, released, model, told), columns))
+        return pa.Table.from_batches(batches, schema=_schema(columns))
+
+    tally = all_of("tally", _TALLY)
+    kind, at, count = (tally[name].to_numpy() for name in _TALLY)
+    lengths, listed = np.zeros(n, dtype=np.int64), np.zeros(n // per, dtype=np.int64)
+    of_slot = kind == 0
+    if len(np.unique(at[of_slot])) != of_slot.sum():
+        raise UnliftError("edges: expected each slot once, found some twice")
+    if len(at) and not (0 <= at.min() and at[of_slot].max(initial=0) < n and at[~of_slot].max(initial=0) < n // per):
+        raise UnliftError(f"edges: expected slots below {n}, found others")
+    lengths[at[of_slot]] = count[of_slot]
+    np.add.at(listed, at[~of_slot], count[~of_slot])
+
+    wanted = all_of("pick", EDGES, Lead.wanted(model, lengths)).sort_by("slot")
+    slots = wanted["slot"].to_numpy()
+    offsets = np.zeros(len(slots) + 1, dtype=np.int64)
+    offsets[1:] = np.cumsum(pa.compute.list_value_length(wanted["ends"]).to_numpy())
+    flat = [pa.compute.list_flatten(wanted[name]).to_numpy() for name in ("ends", "classes")]
+    start = parts._columns(all_of("start", parts.COLUMNS), of_map)
+    lead = Lead(model, of_map, lengths, listed, (slots, offsets, *flat), start)
+    while not lead.is_done:
+        moved = all_of("move", _MOVED, lead.standing())
+        columns = {name: moved[name].to_numpy() for name in _MOVED if name not in "xyz"}
+        columns["position"] = np.stack([moved[axis].to_numpy() for axis in "xyz"], axis=1)
+        news = lead.moved(columns | {"descriptor_row": None})
+        told = pa.table({"slot": [], "jumps": []}, schema=_schema(_TOLD))
+        if news is not None:
+            told = all_of("tell", _TOLD, news)
+        lead.told(told["slot"].to_numpy(), told["jumps"].to_numpy())
+    return lead.finish(start["descriptor_row"])
+
+
+class Work:
+    """What is to be done with the edges of each part: called with batches of `EDGES`, gives batches."""
+
+    def __init__(self, step: str, released: Released | Hidden | str, model: Model, told: Any = None) -> None:
+        self.step, self.released, self.model, self.told = step, released, model, told
+
+    def __call__(self, batches: Iterable[_pa.RecordBatch]) -> Iterator[_pa.RecordBatch]:
+        rows = _table(batches, *EDGES)
+        if rows is not None:
+            yield from getattr(self, f"_{self.step}")(rows, _read(self.released))
+
+    def __repr__(self) -> str:
+        return f"<unlift.rounds.Work: {self.step}>"
+
+    def _tally(self, rows: _pa.Table, of_map: Released) -> Iterator[_pa.RecordBatch]:
+        pa = _pyarrow()
+        ends = pa.compute.list_flatten(rows["ends"]).to_numpy() // of_map.slots_per_record
+        records, times = np.unique(ends, return_counts=True)
+        lengths = pa.compute.list_value_length(rows["ends"]).to_numpy()
+        for kind, at, n in ((0, rows["slot"].to_numpy(), lengths), (1, records, times)):
+            columns = [np.full(len(at), kind, dtype=np.int32), at.astype(np.int64), n.astype(np.int64)]
+            yield pa.RecordBatch.from_arrays([pa.array(column) for column in columns], schema=_schema(_TALLY))
+
+    def _pick(self, rows: _pa.Table, of_map: Released) -> Iterator[_pa.RecordBatch]:
+        pa = _pyarrow()
+        is_wanted = np.isin(rows["slot"].to_numpy(), self.told)
+        yield from rows.filter(pa.array(is_wanted)).cast(_schema(EDGES)).to_batches()
+
+    def _start(self, rows: _pa.Table, of_map: Released) -> Iterator[_pa.RecordBatch]:
+        pa = _pyarrow()
+        held, first, n = _held(rows, of_map)
+        found = parts._batch(first, held.start(self.model, of_map, threads=1), slice(0, n))
+        per = of_map.slots_per_record
+        present = np.zeros(n // per, dtype=bool)
+        present[(rows["slot"].to_numpy() - first) // per] = True
+        yield found.filter(pa.array(present.repeat(per)))
+
+    def _move(self, rows: _pa.Table, of_map: Released) -> Iterator[_pa.RecordBatch]:
+        pa = _pyarrow()
+        found = _held(rows, of_map)[0].move_on(self.model, of_map, self.told, threads=1)
+        columns = {axis: np.ascontiguousarray(found["position"][:, at]) for at, axis in enumerate("xyz")}
+        columns |= {name: found[name] for name in _MOVED if name not in "xyz"}
+        schema = _schema(_MOVED)
+        arrays = [pa.array(columns[field.name].astype(field.type.to_pandas_dtype())) for field in schema]
+        yield pa.RecordBatch.from_arrays(arrays, schema=schema)
+
+    def _tell(self, rows: _pa.Table, of_map: Released) -> Iterator[_pa.RecordBatch]:
+        pa = _pyarrow()
+        found = _held(rows, of_map)[0].tell(self.model, of_map, self.told, threads=1)
+        arrays = [pa.array(found[name].astype(np.int64)) for name in _TOLD]
+        yield pa.RecordBatch.from_arrays(arrays, schema=_schema(_TOLD))
+
+
+def _held(rows: _pa.Table, of_map: Released) -> tuple[Edges, int, int]:
+    """The edges of a part, its first slot, and how many there are from there to the last."""
+    slots, per = rows["slot"].to_numpy(), of_map.slots_per_record
+    first = int(slots.min()) // per * per
+    n = (int(slots.max()) // per + 1) * per - first
+    offsets, columns = _rows(rows, first, n, ("ends", "classes"))
+    return Edges(of_map, first, offsets, columns["ends"], columns["classes"]), first, n
+
+
+def _rows(table: _pa.Table | None, first: int, n: int, names: tuple[str, str]) -> tuple[Any, dict[str, Any]]:
+    """Lists of `n` slots from `first` on: where they start, and columns end to end; None for one that is not there."""
+    pa = _pyarrow()
+    lengths = np.zeros(n + 1, dtype=np.int64)
+    if table is None:
+        return lengths, {names[0]: np.zeros(0, dtype=np.int64), names[1]: None}
+    slots = table["slot"].to_numpy()
+    if (slots[1:] < slots[:-1]).any():
+        table = table.sort_by("slot")
+        slots = table["slot"].to_numpy()
+    if slots[0] < 0 or (slots[1:] == slots[:-1]).any():
+        raise UnliftError("slot: expected numbers from 0, each once, found others")
+    columns: dict[str, Any] = {names[1]: None}
+    of_first = pa.compute.fill_null(pa.compute.list_value_length(table[names[0]]), 0).to_numpy()
+    for name in names:
+        if name not in table.schema.names:
+            continue
+        values = pa.compute.list_flatten(table[name])
+        sizes = pa.compute.fill_null(pa.compute.list_value_length(table[name]), 0).to_numpy()
+        if values.null_count or (sizes != of_first).any():
+            raise UnliftError(f"{name}: expected a number for each of {names[0]}, found others")
+        columns[name] = values.to_numpy()
+    lengths[slots - first + 1] = of_first
+    return np.cumsum(lengths), columns
+
+
+def _table(batches: Iterable[_pa.RecordBatch], *names: str) -> _pa.Table | None:
+    """Batches as a table that has these columns; None without rows."""
+    given = [batch for batch in batches if len(batch)]
+    if not given:
+        return None
+    table = _pyarrow().Table.from_batches(given)
+    for name in names:
+        if name not in table.schema.names:
+            raise UnliftError(f"batches: expected a column {name}, found {', '.join(table.schema.names) or 'none'}")
+        if table[name].null_count and name in ("slot", "record", "by"):
+            raise UnliftError(f"{name}: expected numbers, found null")
+    return table
+
+
+def _read(released: Released | Hidden | str) -> Released:
+    if isinstance(released, str):
+        told = os.stat(released)
+        return _read_once(released, told.st_mtime_ns, told.st_size)
+    return released.released if isinstance(released, Hidden) else released
+
+
+@functools.lru_cache(maxsize=1)
+def _read_once(path: str, modified: int, size: int) -> Released:
+    """Processes of engines live through many rounds of a map."""
+    return Released.read(path)
+
+
+def _schema(columns: dict[str, str]) -> _pa.Schema:
+    pa = _pyarrow()
+    types = {"bigint": pa.int64(), "int": pa.int32(), "float": pa.float32()}
+    types |= {"array<int>": pa.list_(pa.int32()), "array<tinyint>": pa.list_(pa.int8())}
+    return pa.schema([(name, types[of]) for name, of in columns.items()])

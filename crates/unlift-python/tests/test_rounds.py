@@ -1,0 +1,111 @@
+"""Joint recovery whose edges are spread is joint recovery at once, bit for bit."""
+
+import pathlib
+import pickle
+
+import numpy as np
+import pytest
+
+import unlift
+
+pa = pytest.importorskip("pyarrow")
+
+from test_parts import hidden, shuffled  # noqa: E402
+
+
+def spread(lists: unlift.Neighborhoods, of, model, cuts: list[int]) -> list[list]:
+    """The edges of parts that end at these records."""
+    per = (of.released if isinstance(of, unlift.Hidden) else of).slots_per_record
+    rows = unlift.parts.table(lists)
+    entries = pa.Table.from_batches(unlift.rounds.entries(shuffled(rows, 5).to_batches(max_chunksize=70)))
+    bounds = [0, *cuts, len(rows) // per]
+    parts = []
+    for low, high in zip(bounds, bounds[1:]):
+        own = shuffled(rows.slice(low * per, (high - low) * per), 1)
+        record = entries["record"].to_numpy()
+        named = entries.filter(pa.array((record >= low) & (record < high)))
+        made = unlift.rounds.edges(own.to_batches(max_chunksize=50), named.to_batches(), of, model)
+        parts.append(list(made))
+    return parts
+
+
+def over(parts: list[list]):
+    def run(work: unlift.rounds.Work, columns: dict[str, str]) -> list:
+        found = [batch for part in reversed(parts) for batch in pickle.loads(pickle.dumps(work))(part)]
+        assert all(batch.schema.names == list(columns) for batch in found), work
+        return found
+
+    return run
+
+
+def bytes_of(back: unlift.Recovered, folder: pathlib.Path) -> bytes:
+    back.save(folder / "back", force=True)
+    return (folder / "back").read_bytes()
+
+
+@pytest.mark.parametrize("scheme", unlift.SCHEMES)
+@pytest.mark.parametrize("scored", [False, True])
+def test_spread_edges_give_the_whole(scheme: str, scored: bool, tmp_path: pathlib.Path):
+    of = hidden(scheme)
+    of.released.save(tmp_path / "released")
+    lists = unlift.neighbors.oracle(of, 0.5, k=20)
+    if scored:
+        records = lists.records.reshape(-1, 20).astype(np.int64)
+        records[5] = -1
+        scores = np.random.default_rng(2).uniform(0, 1, records.shape)
+        lists = unlift.Neighborhoods(of, records, scores)
+    model = pickle.loads(pickle.dumps(unlift.prepare(of, lists, solver="joint", seed=2)))
+    n = of.released.n_slots // of.released.slots_per_record
+    parts = spread(lists, of, model, [n // 3, n // 3 + 1])
+    back = unlift.rounds.recover(over(parts), str(tmp_path / "released"), model)
+    whole = unlift.recover(of, lists, seed=2, confidence=False)
+    assert bytes_of(back, tmp_path) == bytes_of(whole, tmp_path)
+    assert (np.array(back.status) == "ok").any()
+
+
+def test_parts_may_have_others_between_them(tmp_path: pathlib.Path):
+    """Rows of edges of any records together, as an engine may cut its files."""
+    of = hidden("ppl")
+    lists = unlift.neighbors.oracle(of, 0.4, k=20)
+    model = unlift.prepare(of, lists, solver="joint")
+    (rows,) = spread(lists, of, model, [])
+    table = pa.Table.from_batches(rows)
+    is_third = (table["slot"].to_numpy() // 2) % 3
+    of.released.save(tmp_path / "released")
+    parts = [table.filter(pa.array(is_third == at)).to_batches() for at in range(3)]
+    back = unlift.rounds.recover(over([*parts, []]), str(tmp_path / "released"), model)
+    whole = unlift.recover(of, lists, confidence=False)
+    assert bytes_of(back, tmp_path) == bytes_of(whole, tmp_path)
+
+
+def test_what_is_no_part_of_rounds_is_refused(tmp_path: pathlib.Path):
+    of = hidden("olc", 80)
+    lists = unlift.neighbors.oracle(of, 0.5, k=10)
+    model = unlift.prepare(of, lists, solver="joint")
+    rows = unlift.parts.table(lists)
+    entries = pa.Table.from_batches(unlift.rounds.entries(rows.to_batches()))
+
+    def refused(own, named=entries, model=model) -> str:
+        with pytest.raises(unlift.UnliftError) as error:
+            list(unlift.rounds.edges(own.to_batches(), named.to_batches(), of, model))
+        return str(error.value)
+
+    assert refused(rows, model=unlift.prepare(of, lists)) == "solver of rounds: expected joint, found consensus"
+    assert refused(rows.drop_columns("records")) == "batches: expected a column records, found slot"
+    assert refused(pa.concat_tables([rows, rows])) == "slot: expected numbers from 0, each once, found others"
+    far = pa.table({"record": [80], "by": [0]})
+    assert refused(rows, far) == "records: expected numbers from 0 to 79, found 0 to 80"
+    assert "expected numbers from 0 to 79, found 80" in refused(rows, pa.table({"record": [1], "by": [80]}))
+    of.released.save(tmp_path / "released")
+    parts = spread(lists, of, model, [40])
+    twice = over([*parts, parts[0]])
+    with pytest.raises(unlift.UnliftError, match="edges: expected each slot once, found some twice"):
+        unlift.rounds.recover(twice, str(tmp_path / "released"), model)
+
+    def forgetful(work, columns):
+        found = [batch for part in parts for batch in work(part)]
+        return found[:1] if work.step == "move" else found
+
+    with pytest.raises(unlift.UnliftError, match="round: expected slot 40, found none"):
+        unlift.rounds.recover(forgetful, of, model)
+    assert list(unlift.rounds.edges([], [], of, model)) == []

@@ -1,0 +1,192 @@
+//! What a round is made of, as bytes for whoever holds a part of the edges.
+
+use super::jumps::Jumps;
+use super::neighbor_law::Law;
+use super::standing::Standing;
+use crate::Error;
+use crate::recover::map::bytes::{Reader, Writer};
+use crate::recover::map::crowding::Density;
+use crate::recover::map::graph::EdgeRows;
+use crate::recover::map::pieces::Pieces;
+use crate::recover::map::places::Places;
+use crate::recover::result::estimate::{Estimate, Status};
+
+/// How they begin.
+const STANDING: [u8; 8] = *b"unliftS1";
+const NEWS: [u8; 8] = *b"unliftJ1";
+
+impl<const D: usize> Standing<D> {
+    /// Where the round stands, some 30 bytes a slot, and as many again where the density is fine.
+    pub(crate) fn to_bytes(&self) -> Vec<u8> {
+        let mut to = Writer::default();
+        to.bytes(&STANDING);
+        to.bytes(&[D as u8, u8::from(self.done), self.turns as u8, self.turn as u8]);
+        to.u64(self.next.len() as u64);
+        for estimate in &self.next {
+            to.f32s(&estimate.position);
+            to.bytes(&estimate.support.to_le_bytes());
+            to.bytes(&[estimate.status as u8, estimate.axis]);
+            to.f32s(&[estimate.evidence]);
+        }
+        to.f32s(&self.ahead);
+        let told: Vec<(u32, u32)> = self.jumps.told().collect();
+        to.u64(told.len() as u64);
+        for (slot, jumps) in told {
+            to.u32(slot);
+            to.u32(jumps);
+        }
+        self.density.write(&mut to);
+        self.law.write(&mut to);
+        to.into_bytes()
+    }
+
+    /// What [`to_bytes`](Self::to_bytes) gave, of a map with so many slots.
+    ///
+    /// # Errors
+    /// When `bytes` are anything else.
+    pub(crate) fn from_bytes(bytes: &[u8], n_slots: usize) -> Result<Self, Error> {
+        let mut from = Reader::new(bytes);
+        let [dimensions, done, turns, turn] = head(&mut from, STANDING, n_slots)?;
+        if usize::from(dimensions) != D || turns == 0 {
+            let expected = format!("one in {D} dimensions");
+            return Err(Error::new("round", expected, dimensions.to_string()));
+        }
+        let next: Vec<Estimate<D>> =
+            (0..n_slots).map(|_| estimate(&mut from)).collect::<Result<_, _>>()?;
+        let ahead = from.f32s(n_slots)?;
+        let mut jumps = Jumps::new(n_slots);
+        for _ in 0..from.count(n_slots)? {
+            let (slot, n) = (from.u32()?, from.u32()?);
+            jumps.add(below(slot, n_slots)?, n);
+        }
+        let density = Density::read(&mut from, n_slots)?;
+        let law = Law::read(&mut from)?;
+        from.end()?;
+        let (turns, turn, done) = (turns.into(), turn.into(), done != 0);
+        let places = Places::new(&next);
+        Ok(Self { next, places, density, law, ahead, jumps, turns, turn, done })
+    }
+}
+
+/// Who jumped in a round, and what must be known to tell those whom it concerns.
+pub(crate) struct News<const D: usize> {
+    reach: f32,
+    /// Per slot whether its place is ahead of others, so that jumps are of interest.
+    is_ahead: Vec<bool>,
+    /// In order of slots.
+    jumps: Vec<(u32, [f32; D], [f32; D])>,
+}
+
+impl<const D: usize> News<D> {
+    /// That of a round that `standing` is of, whose slots are `after`wards there; `jumpers` in any order.
+    pub(crate) fn new(standing: &Standing<D>, mut jumpers: Vec<u32>, after: &Places<D>) -> Self {
+        jumpers.sort_unstable();
+        let jump = |slot: u32| (slot, standing.places.of(slot as usize), after.of(slot as usize));
+        Self {
+            reach: standing.reach(),
+            is_ahead: standing.ahead.iter().map(|&ahead| ahead > 0.0).collect(),
+            jumps: jumpers.into_iter().map(jump).collect(),
+        }
+    }
+
+    /// Whether nothing is to be told.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.jumps.is_empty() || !self.is_ahead.contains(&true)
+    }
+
+    /// The news as bytes.
+    pub(crate) fn to_bytes(&self) -> Vec<u8> {
+        let mut to = Writer::default();
+        to.bytes(&NEWS);
+        to.bytes(&[D as u8, 0, 0, 0]);
+        to.u64(self.is_ahead.len() as u64);
+        to.f32s(&[self.reach]);
+        let bits = |ahead: &[bool]| ahead.iter().rev().fold(0, |all, &is| all << 1 | u8::from(is));
+        self.is_ahead.chunks(8).for_each(|ahead| to.bytes(&[bits(ahead)]));
+        to.u64(self.jumps.len() as u64);
+        for (slot, before, after) in &self.jumps {
+            to.u32(*slot);
+            to.f32s(before);
+            to.f32s(after);
+        }
+        to.into_bytes()
+    }
+
+    /// What [`to_bytes`](Self::to_bytes) gave, of a map with so many slots.
+    ///
+    /// # Errors
+    /// When `bytes` are anything else.
+    pub(crate) fn from_bytes(bytes: &[u8], n_slots: usize) -> Result<Self, Error> {
+        let mut from = Reader::new(bytes);
+        let [dimensions, ..] = head(&mut from, NEWS, n_slots)?;
+        if usize::from(dimensions) != D {
+            let expected = format!("news in {D} dimensions");
+            return Err(Error::new("round", expected, dimensions.to_string()));
+        }
+        let reach = from.f32()?;
+        let bits = from.bytes(n_slots.div_ceil(8))?;
+        let is_ahead = (0..n_slots).map(|slot| bits[slot / 8] >> (slot % 8) & 1 == 1).collect();
+        let n = from.count(n_slots)?;
+        let mut jumps = Vec::with_capacity(n);
+        for _ in 0..n {
+            let slot = from.u32()?;
+            below(slot, n_slots)?;
+            let mut places = [[0.0; D]; 2];
+            for x in places.as_flattened_mut() {
+                *x = from.f32()?;
+            }
+            jumps.push((slot, places[0], places[1]));
+        }
+        from.end()?;
+        Ok(Self { reach, is_ahead, jumps })
+    }
+
+    /// How many jumps concern whom, of those slots whose edges are given.
+    pub(crate) fn told<P: Pieces<D>>(
+        &self,
+        pieces: &P,
+        (slots, edges): (std::ops::Range<usize>, &EdgeRows<'_>),
+    ) -> Vec<(u32, u32)> {
+        let at = |slot: usize| self.jumps.partition_point(|jump| (jump.0 as usize) < slot);
+        let jumps = Jumps::new(self.is_ahead.len());
+        let jumpers = &self.jumps[at(slots.start)..at(slots.end)];
+        let is_ahead = |slot: usize| self.is_ahead[slot];
+        jumps.tell((pieces, edges), jumpers, |jump| *jump, self.reach, is_ahead);
+        jumps.told().collect()
+    }
+}
+
+/// The first bytes: what they are, four more, and how many slots.
+fn head(from: &mut Reader<'_>, magic: [u8; 8], n_slots: usize) -> Result<[u8; 4], Error> {
+    if from.array()? != magic {
+        return Err(Error::new("round", "bytes of a round of this version", "others"));
+    }
+    let four = from.array()?;
+    match from.u64()? {
+        n if n == n_slots as u64 => Ok(four),
+        n => Err(Error::new("round", format!("one of {n_slots} slots"), n.to_string())),
+    }
+}
+
+fn estimate<const D: usize>(from: &mut Reader<'_>) -> Result<Estimate<D>, Error> {
+    let mut position = [0.0; D];
+    for x in &mut position {
+        *x = from.f32()?;
+    }
+    let support = u16::from_le_bytes(from.array()?);
+    let [status, axis] = from.array()?;
+    let status = *Status::ALL
+        .get(usize::from(status))
+        .ok_or_else(|| Error::new("round", "a status", status.to_string()))?;
+    if usize::from(axis) >= D {
+        return Err(Error::new("round", format!("an axis below {D}"), axis.to_string()));
+    }
+    Ok(Estimate { position, status, support, axis, evidence: from.f32()? })
+}
+
+fn below(slot: u32, n_slots: usize) -> Result<usize, Error> {
+    match slot as usize {
+        slot if slot < n_slots => Ok(slot),
+        slot => Err(Error::new("round", format!("slots below {n_slots}"), slot.to_string())),
+    }
+}
