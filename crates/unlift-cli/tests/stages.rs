@@ -73,7 +73,12 @@ fn the_stages_print_the_row_of_the_audit() {
             "audit map room.csv --scale 1 --k 10 --descriptors d.bin --seed 7 --schemes {scheme} \
              --inlier-ratios 0.5 --neighbors oracle --neighbors overlap --neighbors geometric --json"
         );
+        // Lists of the oracle in files beside the report: the same rows, and no file is left.
+        std::fs::create_dir_all(place.path("limited")).unwrap();
+        let limited = place.json(&format!("{audit} --memory-limit 300MB --out limited/audit"));
+        assert_eq!(std::fs::read_dir(place.path("limited")).unwrap().count(), 1);
         let audit = place.json(&audit);
+        assert_eq!(audit["results"], limited["results"], "{scheme}");
         for source in ["oracle", "overlap", "geometric"] {
             if source != "oracle" {
                 let find = format!("neighbors find hidden/released.parquet --source {source}");

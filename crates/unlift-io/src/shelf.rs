@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use unlift::Shelf;
 
@@ -23,6 +23,12 @@ impl Files {
     pub fn new(folder: impl Into<PathBuf>, limit: u64) -> Self {
         let window = (limit / PART).clamp(WINDOW.0, WINDOW.1) as usize;
         Self { folder: folder.into(), window }
+    }
+
+    /// The same in the folder that an output goes to.
+    pub fn beside(out: &Path, limit: u64) -> Self {
+        let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
+        Self::new(folder.unwrap_or(Path::new(".")), limit)
     }
 }
 

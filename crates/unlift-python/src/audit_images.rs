@@ -174,7 +174,7 @@ fn open(
     let chosen = choice::evenly(names.len(), asked.max_images.map(|most| most.get()));
     let place = path.display().to_string();
     let show = match asked.show.as_deref() {
-        None | Some([]) => None,
+        None => None,
         Some(wanted) => Some(choice::shown(wanted, names, &chosen, &place)?),
     };
     // One line in place of one per image.

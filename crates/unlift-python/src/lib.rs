@@ -65,7 +65,7 @@ mod _unlift {
     #[pymodule_export]
     use super::report::Report;
     #[pymodule_export]
-    use super::rounds::{Edges, Lead};
+    use super::rounds::{Edges, Lead, Outline, prepare_rounds};
     #[pymodule_export]
     use super::rows::Rows;
 

@@ -1,12 +1,17 @@
 //! A map solved in parts, each by whoever has its records and the lists of some slots.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyType};
 use unlift::RecordId;
 use unlift::neighbors;
-use unlift::recover::{Estimate, Model as Learned, Part, RecoverOptions, Status, prepare as learn};
+use unlift::recover::{
+    Estimate, Model as Learned, Part, RecoverOptions, Status, prepare as learn, prepare_shelved,
+};
+use unlift_io::shelf::Files;
+use unlift_io::stage::{read_neighborhoods, shelve_neighborhoods};
 
 use crate::arrays::{column, indices, rows, to_array, whole};
 use crate::errors::{raised, wrong};
@@ -104,28 +109,72 @@ impl Model {
     }
 }
 
-/// Learns what a solver must know of a released map and all of its lists.
+/// Learns what a solver must know of a released map and all of its lists, or the file of them. With a `memory_limit` (bytes) that file is
+/// read a window at a time, and what takes more is put in files of the folder for temporary ones (`TMPDIR`).
 #[pyfunction]
-#[pyo3(signature = (released, lists, *, solver="consensus", delta=None, seed=0, exact_constraints=true, threads=None))]
+#[pyo3(signature = (released, lists, *, solver="consensus", delta=None, seed=0, exact_constraints=true, memory_limit=None, threads=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn prepare(
     py: Python<'_>,
     released: &Bound<'_, PyAny>,
-    lists: &Neighborhoods,
+    lists: &Bound<'_, PyAny>,
     solver: &str,
     delta: Option<f64>,
     seed: u64,
     exact_constraints: bool,
+    memory_limit: Option<u64>,
     threads: Option<usize>,
 ) -> PyResult<Model> {
-    let released = released_of(released)?.of_map()?;
-    // Nobody who has a part can say how sure it is.
     let options = options(solver, delta, seed, exact_constraints)?;
+    // Nobody who has a part can say how sure it is.
     let options = RecoverOptions { confidence: false, ..options };
-    let lists = Arc::clone(&lists.0);
-    let model = work::run(py, threads, None, move || learn(&released, &lists, &options))?;
+    let model = with_lists(
+        py,
+        (released, lists),
+        (memory_limit, threads),
+        move |released, lists| learn(released, lists, &options),
+        move |released, lists, files| prepare_shelved(released, lists, &options, files),
+    )?;
     Ok(Model(Arc::new(model)))
 }
+
+/// Does something with a released map and its lists, which are `here` in memory or, under a limit, `away` in files.
+pub(crate) fn with_lists<T: Send + 'static>(
+    py: Python<'_>,
+    (released, lists): (&Bound<'_, PyAny>, &Bound<'_, PyAny>),
+    (memory_limit, threads): (Option<u64>, Option<usize>),
+    here: impl FnOnce(&Map, &neighbors::Neighborhoods) -> Result<T, unlift::Error> + Send + 'static,
+    away: impl FnOnce(&Map, &neighbors::ShelvedLists, &Files) -> Result<T, unlift::Error>
+    + Send
+    + 'static,
+) -> PyResult<T> {
+    let released = released_of(released)?.of_map()?;
+    if let Ok(lists) = lists.cast::<Neighborhoods>() {
+        if memory_limit.is_some() {
+            return Err(wrong("lists", "the path of a file, with memory_limit", "Neighborhoods"));
+        }
+        let lists = Arc::clone(&lists.get().0);
+        return work::run(py, threads, None, move || here(&released, &lists));
+    }
+    let Ok(path) = lists.extract::<PathBuf>() else {
+        let found = lists.get_type().name()?.to_string();
+        return Err(wrong("lists", "Neighborhoods, or the path of their file", found));
+    };
+    let map = (released.n_records(), released.slots_per_record());
+    work::run(py, threads, None, move || {
+        let done = match memory_limit {
+            None => here(&released, &read_neighborhoods(&path, map.0, map.1)?),
+            Some(limit) => {
+                let files = Files::new(std::env::temp_dir(), limit);
+                away(&released, &shelve_neighborhoods(&path, map, &files)?, &files)
+            }
+        };
+        done.map_err(|error| unlift_io::Error::core(&path, error))
+    })
+}
+
+/// What is released of a map.
+pub(crate) type Map = unlift::released::Released<3>;
 
 /// Estimates as columns.
 pub(crate) fn columns(py: Python<'_>, part: Part<3>) -> PyResult<Bound<'_, PyDict>> {

@@ -1,19 +1,22 @@
 //! Joint recovery whose edges are spread: what a part does with its own, and who leads.
 
-use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::{PyBytes, PyDict};
 use unlift::RecordId;
 use unlift::neighbors;
-use unlift::recover::{Edges as Rows, EdgesOfSlot, Lead as Leading, Moved, NamedBy};
+use unlift::recover::{
+    Edges as Rows, Lead as Leading, Moved, NamedBy, Outline as Outlined, RecoverOptions,
+    prepare_rounds as learn, prepare_rounds_shelved as learn_shelved,
+};
 
 use crate::arrays::{column, indices, to_array, whole};
 use crate::errors::{raised, wrong};
 use crate::hidden::released_of;
-use crate::parts::{Model, columns, part};
-use crate::recovered::Recovered;
+use crate::parts::{Map, Model, columns, part, with_lists};
+use crate::recovered::{Recovered, options};
 use crate::work;
 
 /// Who lists whom about some slots, one after the other.
@@ -37,7 +40,7 @@ impl Edges {
         let (ends, _) = indices("ends", ends, &[1], u32::MAX)?;
         let (classes, _) = indices("classes", classes, &[1], 256)?;
         let classes = classes.into_iter().map(|class| class as u8).collect();
-        let slots = first..first + offsets.len().saturating_sub(1);
+        let slots = first..first.saturating_add(offsets.len().saturating_sub(1));
         let edges = Rows::try_new(slots, offsets, ends, classes, map).map_err(raised)?;
         Ok(Self(Arc::new(edges)))
     }
@@ -76,7 +79,7 @@ impl Edges {
         let model = Arc::clone(&model.0);
         let edges = work::run(py, threads, None, move || {
             let map = (released.n_records(), released.slots_per_record());
-            let slots = first..first + offsets.len().saturating_sub(1);
+            let slots = first..first.saturating_add(offsets.len().saturating_sub(1));
             let lists = neighbors::Neighborhoods::of_slots(first, &offsets, records, scores, map)?;
             let named_by = NamedBy { records: &named, slots: &by, scores: named_scores.as_deref() };
             model.edges(&released, &lists, slots, named_by)
@@ -115,7 +118,7 @@ impl Edges {
         py: Python<'py>,
         model: &Model,
         released: &Bound<'_, PyAny>,
-        standing: Vec<u8>,
+        standing: PyBackedBytes,
         threads: Option<usize>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let released = released_of(released)?.of_map()?;
@@ -136,7 +139,7 @@ impl Edges {
         py: Python<'py>,
         model: &Model,
         released: &Bound<'_, PyAny>,
-        news: Vec<u8>,
+        news: PyBackedBytes,
         threads: Option<usize>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let released = released_of(released)?.of_map()?;
@@ -149,69 +152,80 @@ impl Edges {
     }
 }
 
+/// What is known of the edges of a map to whoever leads its rounds without them.
+#[pyclass(frozen, module = "unlift._unlift")]
+pub struct Outline(Vec<u8>);
+
+#[pymethods]
+impl Outline {
+    /// The outline that `to_bytes` gave.
+    #[staticmethod]
+    fn from_bytes(bytes: &[u8]) -> PyResult<Self> {
+        Outlined::from_bytes(bytes).map(|_| Self(bytes.to_vec())).map_err(raised)
+    }
+
+    /// The outline as bytes: 8 of a slot and a few million more.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, &self.0)
+    }
+}
+
+/// `prepare` for rounds whose edges are spread: the model for all, and what their lead must know of the edges.
+#[pyfunction]
+#[pyo3(signature = (released, lists, *, delta=None, seed=0, exact_constraints=true, memory_limit=None, threads=None))]
+#[allow(clippy::too_many_arguments)]
+pub fn prepare_rounds(
+    py: Python<'_>,
+    released: &Bound<'_, PyAny>,
+    lists: &Bound<'_, PyAny>,
+    delta: Option<f64>,
+    seed: u64,
+    exact_constraints: bool,
+    memory_limit: Option<u64>,
+    threads: Option<usize>,
+) -> PyResult<(Model, Outline)> {
+    let options = options("joint", delta, seed, exact_constraints)?;
+    let options = RecoverOptions { confidence: false, ..options };
+    let (model, outline) = with_lists(
+        py,
+        (released, lists),
+        (memory_limit, threads),
+        move |released, lists| learn(released, lists, &options),
+        move |released, lists, files| learn_shelved(released, lists, &options, files),
+    )?;
+    Ok((Model(Arc::new(model)), Outline(outline.to_bytes())))
+}
+
 /// Leads the rounds of a map whose edges others have.
 #[pyclass(frozen, module = "unlift._unlift")]
 pub struct Lead {
     model: Arc<unlift::recover::Model<3>>,
-    released: Py<PyAny>,
-    rounds: Arc<Mutex<Option<Leading<3>>>>,
+    released: Arc<Map>,
+    rounds: Arc<Mutex<Leading<3>>>,
 }
 
 #[pymethods]
 impl Lead {
-    /// The slots whose edges the lead must know: `lengths` are the numbers of edges of all slots.
-    #[staticmethod]
-    fn wanted<'py>(
-        py: Python<'py>,
-        model: &Model,
-        lengths: &Bound<'_, PyAny>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        let (lengths, _) = indices("lengths", lengths, &[1], u32::MAX)?;
-        let slots = Leading::wanted(&model.0, &lengths).map_err(raised)?;
-        Ok(to_array(py, slots).into_any())
-    }
-
-    /// Before the first round. `listed`: how often each record is at the other end of an edge; `slots`, `offsets`, `ends`, `classes`:
-    /// the wanted edges; `start`: columns of all slots in order.
+    /// Before the first round. `start`: columns of all slots in order; `lengths`: how many edges each has in its part.
     #[new]
-    #[allow(clippy::too_many_arguments)]
     fn new(
         py: Python<'_>,
         model: &Model,
-        released: Py<PyAny>,
-        lengths: &Bound<'_, PyAny>,
-        listed: &Bound<'_, PyAny>,
-        wanted: (Bound<'_, PyAny>, Bound<'_, PyAny>, Bound<'_, PyAny>, Bound<'_, PyAny>),
+        released: &Bound<'_, PyAny>,
+        outline: &Outline,
         start: &Bound<'_, PyDict>,
+        lengths: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
-        let of_map = released_of(released.bind(py))?.of_map()?;
+        let released = released_of(released)?.of_map()?;
         let (lengths, _) = indices("lengths", lengths, &[1], u32::MAX)?;
-        let (listed, _) = indices("listed", listed, &[1], u32::MAX)?;
-        let (slots, _) = indices("slots", &wanted.0, &[1], u32::MAX)?;
-        let offsets = starts(&wanted.1)?;
-        let (ends, _) = indices("ends", &wanted.2, &[1], u32::MAX)?;
-        let (classes, _) = indices("classes", &wanted.3, &[1], 256)?;
-        let last = offsets.last().copied().unwrap_or(0) as usize;
-        if offsets.len() != slots.len() + 1 || [ends.len(), classes.len()] != [last; 2] {
-            let expected = format!("{} rows of edges", slots.len());
-            return Err(wrong("wanted", expected, format!("{} offsets", offsets.len())));
-        }
-        let mut edges: BTreeMap<u32, EdgesOfSlot> = BTreeMap::new();
-        for (slot, row) in slots.iter().zip(offsets.windows(2)) {
-            let Some(row) = ends.get(row[0] as usize..row[1] as usize).map(|_| row) else {
-                return Err(wrong("wanted", "ascending offsets", "others"));
-            };
-            let row = row[0] as usize..row[1] as usize;
-            let class = classes[row.clone()].iter().map(|&class| class as u8).collect();
-            edges.insert(*slot, (ends[row].to_vec(), class));
-        }
-        let start = part(start, of_map.n_slots())?.estimates;
-        let model = Arc::clone(&model.0);
+        let start = part(start, released.n_slots())?.estimates;
+        let outline = Outlined::from_bytes(&outline.0).map_err(raised)?;
+        let (model, map) = (Arc::clone(&model.0), Arc::clone(&released));
         let of = Arc::clone(&model);
         let rounds = work::run(py, None, None, move || {
-            Leading::new(&of, &of_map, (&lengths, listed), &edges, &start)
+            Leading::new(&of, &map, outline, (&start, &lengths))
         })?;
-        Ok(Self { model, released, rounds: Arc::new(Mutex::new(Some(rounds))) })
+        Ok(Self { model, released, rounds: Arc::new(Mutex::new(rounds)) })
     }
 
     /// Whether all rounds are done.
@@ -263,8 +277,7 @@ impl Lead {
             return Err(wrong("jumps", format!("{} rows", slots.len()), jumps.len()));
         }
         let told: Vec<(u32, u32)> = slots.into_iter().zip(jumps).collect();
-        let released = released_of(self.released.bind(py))?.of_map()?;
-        let model = Arc::clone(&self.model);
+        let (model, released) = (Arc::clone(&self.model), Arc::clone(&self.released));
         self.with(py, move |rounds| rounds.told(&model, &released, &told))
     }
 
@@ -275,15 +288,10 @@ impl Lead {
         py: Python<'_>,
         descriptor_row: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Recovered> {
-        let released = released_of(self.released.bind(py))?.of_map()?;
         let rows = descriptor_row.map(|rows| indices("descriptor_row", rows, &[1], u32::MAX));
         let rows = rows.transpose()?.map(|(rows, _)| rows);
-        if !self.is_done(py)? {
-            return Err(wrong("rounds", "all of them", "some that are left"));
-        }
-        let rounds = self.rounds.lock().unwrap_or_else(PoisonError::into_inner).take();
-        let rounds = rounds.ok_or_else(|| raised(ended()))?;
-        let found = rounds.finish(&self.model, &released, rows).map_err(raised)?;
+        let (model, released) = (Arc::clone(&self.model), Arc::clone(&self.released));
+        let found = self.with(py, move |rounds| rounds.finish(&model, &released, rows))?;
         Ok(Recovered(Arc::new(found)))
     }
 }
@@ -297,14 +305,9 @@ impl Lead {
     ) -> PyResult<T> {
         let rounds = Arc::clone(&self.rounds);
         work::run(py, None, None, move || {
-            let mut rounds = rounds.lock().unwrap_or_else(PoisonError::into_inner);
-            rounds.as_mut().ok_or_else(ended).and_then(work)
+            work(&mut rounds.lock().unwrap_or_else(PoisonError::into_inner))
         })
     }
-}
-
-fn ended() -> unlift::Error {
-    unlift::Error::new("rounds", "some that are not finished", "finished ones")
 }
 
 /// Where rows start.

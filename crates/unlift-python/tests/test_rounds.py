@@ -54,26 +54,44 @@ def test_spread_edges_give_the_whole(scheme: str, scored: bool, tmp_path: pathli
         records[5] = -1
         scores = np.random.default_rng(2).uniform(0, 1, records.shape)
         lists = unlift.Neighborhoods(of, records, scores)
-    model = pickle.loads(pickle.dumps(unlift.prepare(of, lists, solver="joint", seed=2)))
+    model, outline = unlift.rounds.prepare(of, lists, seed=2)
+    model, outline = pickle.loads(pickle.dumps(model)), unlift.rounds.Outline.from_bytes(outline.to_bytes())
     n = of.released.n_slots // of.released.slots_per_record
     parts = spread(lists, of, model, [n // 3, n // 3 + 1])
-    back = unlift.rounds.recover(over(parts), str(tmp_path / "released"), model)
+    back = unlift.rounds.recover(over(parts), tmp_path / "released", model, outline)
     whole = unlift.recover(of, lists, seed=2, confidence=False)
     assert bytes_of(back, tmp_path) == bytes_of(whole, tmp_path)
     assert (np.array(back.status) == "ok").any()
+
+
+@pytest.mark.parametrize("scheme", ["olc", "ppl", "plane"])
+@pytest.mark.parametrize("solver", ["consensus", "joint"])
+def test_a_model_of_a_file_is_that_of_its_lists(scheme: str, solver: str, tmp_path: pathlib.Path):
+    of = hidden(scheme)
+    lists = unlift.neighbors.oracle(of, 0.5, k=20)
+    lists.save(tmp_path / "lists")
+    model = unlift.prepare(of, lists, solver=solver).to_bytes()
+    assert unlift.prepare(of, tmp_path / "lists", solver=solver).to_bytes() == model
+    assert unlift.prepare(of, str(tmp_path / "lists"), solver=solver, memory_limit=10**6).to_bytes() == model
+    learned = [unlift.rounds.prepare(of, *given) for given in ((lists,), (tmp_path / "lists",))]
+    learned.append(unlift.rounds.prepare(of, tmp_path / "lists", memory_limit=10**6))
+    assert len({outline.to_bytes() for _, outline in learned}) == 1
+    assert solver == "consensus" or {one.to_bytes() for one, _ in learned} == {model}
+    with pytest.raises(unlift.UnliftError, match="lists: expected the path of a file, with memory_limit"):
+        unlift.prepare(of, lists, solver=solver, memory_limit=10**6)
 
 
 def test_parts_may_have_others_between_them(tmp_path: pathlib.Path):
     """Rows of edges of any records together, as an engine may cut its files."""
     of = hidden("ppl")
     lists = unlift.neighbors.oracle(of, 0.4, k=20)
-    model = unlift.prepare(of, lists, solver="joint")
+    model, outline = unlift.rounds.prepare(of, lists)
     (rows,) = spread(lists, of, model, [])
     table = pa.Table.from_batches(rows)
     is_third = (table["slot"].to_numpy() // 2) % 3
     of.released.save(tmp_path / "released")
     parts = [table.filter(pa.array(is_third == at)).to_batches() for at in range(3)]
-    back = unlift.rounds.recover(over([*parts, []]), str(tmp_path / "released"), model)
+    back = unlift.rounds.recover(over([*parts, []]), str(tmp_path / "released"), model, outline)
     whole = unlift.recover(of, lists, confidence=False)
     assert bytes_of(back, tmp_path) == bytes_of(whole, tmp_path)
 
@@ -81,7 +99,7 @@ def test_parts_may_have_others_between_them(tmp_path: pathlib.Path):
 def test_what_is_no_part_of_rounds_is_refused(tmp_path: pathlib.Path):
     of = hidden("olc", 80)
     lists = unlift.neighbors.oracle(of, 0.5, k=10)
-    model = unlift.prepare(of, lists, solver="joint")
+    model, outline = unlift.rounds.prepare(of, lists)
     rows = unlift.parts.table(lists)
     entries = pa.Table.from_batches(unlift.rounds.entries(rows.to_batches()))
 
@@ -96,16 +114,34 @@ def test_what_is_no_part_of_rounds_is_refused(tmp_path: pathlib.Path):
     far = pa.table({"record": [80], "by": [0]})
     assert refused(rows, far) == "records: expected numbers from 0 to 79, found 0 to 80"
     assert "expected numbers from 0 to 79, found 80" in refused(rows, pa.table({"record": [1], "by": [80]}))
-    of.released.save(tmp_path / "released")
+    assert refused(rows, pa.concat_tables([entries, entries])).startswith("named by: record 0: expected each slot once")
     parts = spread(lists, of, model, [40])
-    twice = over([*parts, parts[0]])
-    with pytest.raises(unlift.UnliftError, match="edges: expected each slot once, found some twice"):
-        unlift.rounds.recover(twice, str(tmp_path / "released"), model)
+
+    def failing(run) -> str:
+        with pytest.raises(unlift.UnliftError) as error:
+            unlift.rounds.recover(run, of, model, outline)
+        return str(error.value)
+
+    def of_parts(parts: list[list]):
+        return lambda work, columns: [batch for part in parts for batch in work(part)]
+
+    # What is lost or comes twice is told, wherever it happens.
+    assert failing(of_parts([*parts, parts[0]])) == "slot: expected numbers below 80, each once, found others"
+    lost = failing(of_parts(parts[:1]))
+    assert lost.startswith("edges of slot 40: expected ") and lost.endswith("found 0")
+    half = spread(lists, of, model, [])
+    few = list(unlift.rounds.edges(rows.to_batches(), entries.slice(0, 700).to_batches(), of, model))
+    assert half and failing(of_parts([few])).startswith("edges of slot ")
 
     def forgetful(work, columns):
         found = [batch for part in parts for batch in work(part)]
         return found[:1] if work.step == "move" else found
 
-    with pytest.raises(unlift.UnliftError, match="round: expected slot 40, found none"):
-        unlift.rounds.recover(forgetful, of, model)
+    assert failing(forgetful) == "round: expected slot 40, found none"
     assert list(unlift.rounds.edges([], [], of, model)) == []
+    with pytest.raises(unlift.UnliftError, match="outline: expected an outline of this version"):
+        unlift.rounds.Outline.from_bytes(b"01234567")
+    with pytest.raises(unlift.UnliftError, match="lists: expected Neighborhoods, or the path of their file, found int"):
+        unlift.rounds.prepare(of, 3)
+    with pytest.raises(unlift.UnliftError, match="missing: expected a released map, found No such file"):
+        list(unlift.rounds.edges(rows.to_batches(), entries.to_batches(), tmp_path / "missing", model))

@@ -1,6 +1,7 @@
 //! Columns of numbers in files: where what does not fit into memory is put aside.
 
 use std::borrow::Cow;
+use std::fmt::Debug;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::marker::PhantomData;
@@ -10,7 +11,7 @@ use std::sync::{Mutex, PoisonError};
 use crate::{Error, RecordId};
 
 /// Where columns are put aside.
-pub trait Shelf: Sync {
+pub trait Shelf: Debug + Send + Sync {
     /// An empty file to read and write that nobody else sees, gone when it is closed.
     ///
     /// # Errors
@@ -223,6 +224,7 @@ pub(crate) mod tests {
     use super::*;
 
     /// Files among those of the system, with windows of so many bytes.
+    #[derive(Debug)]
     pub(crate) struct Temporary(pub(crate) usize);
 
     impl Shelf for Temporary {

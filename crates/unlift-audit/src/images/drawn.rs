@@ -42,6 +42,9 @@ pub fn drawn(
             .map(|(at, note)| (tally.used[at], note))
             .collect(),
     };
+    if wanted.is_empty() {
+        return Ok((Vec::new(), Vec::new()));
+    }
     let numbers: Vec<usize> = wanted.iter().map(|(at, _)| *at).collect();
     let mut plan = job.plan.clone();
     plan.solvers.truncate(1);

@@ -106,9 +106,10 @@ impl Observer<2> for Page<'_> {
 /// True places of the neighbors of `slot` that a graph shows: those with the best scores; without scores
 /// (oracle) those with the lowest record numbers, which are random.
 fn best(cell: &Cell<'_, 2>, slot: usize) -> Vec<[f32; 2]> {
-    let listed = cell.lists.of(slot);
+    let Some(lists) = cell.lists else { return Vec::new() };
+    let listed = lists.of(slot);
     let mut order: Vec<usize> = (0..listed.len()).collect();
-    if let Some(scores) = cell.lists.scores_of(slot) {
+    if let Some(scores) = lists.scores_of(slot) {
         order.sort_by(|&a, &b| scores[b].total_cmp(&scores[a]).then(a.cmp(&b)));
     }
     let truth = cell.original.reveal().positions();

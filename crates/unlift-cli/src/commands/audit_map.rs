@@ -18,7 +18,7 @@ use unlift_io::read;
 use super::common::{open_map, with_threads};
 use super::gate_files::GateFiles;
 use super::painter::{kind, painter};
-use super::plan::{attack, neighbors, solvers, summary, thresholds, with_attack};
+use super::plan::{attack, neighbors, shelf, solvers, summary, thresholds, with_attack};
 use crate::args::AuditMapArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
@@ -147,6 +147,8 @@ fn plan(
         records_alone: !args.solvers.no_records_alone,
         thresholds,
         seed: args.map.seed.unwrap_or(0),
+        // What was recovered before is told by its lists, which are then in memory.
+        shelf: if args.journal.is_none() { shelf(&args.result.out) } else { None },
         ..attack(&args.attack, usual)
     })
 }

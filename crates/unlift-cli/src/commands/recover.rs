@@ -1,10 +1,9 @@
 //! `unlift recover`: released files in, positions out; no truth needed.
 
 use std::collections::HashSet;
-use std::path::Path;
 
 use unlift::neighbors::{Neighborhoods, ShelvedLists};
-use unlift::recover::{RecoverOptions, Solver, Status, recover, recover_shelved};
+use unlift::recover::{RecoverOptions, Status, recover, recover_shelved};
 use unlift::released::Released;
 use unlift::{About, OneLine, RowOrder};
 use unlift_io::atomic::{Kind, Rules};
@@ -35,12 +34,11 @@ enum Lists {
 impl Lists {
     fn open(args: &RecoverArgs, released: &Released<3>) -> anyhow::Result<Self> {
         let (path, map) = (&args.neighbors, (released.n_records(), released.slots_per_record()));
-        let limit = limit().filter(|_| matches!(args.solver, Solver::Joint | Solver::Consensus));
+        let limit = limit().filter(|_| args.solver.reads_shelved());
         let Some(limit) = limit else {
             return Ok(Self::Here(read_neighborhoods(path, map.0, map.1)?));
         };
-        let folder = args.out.parent().filter(|folder| !folder.as_os_str().is_empty());
-        let files = Files::new(folder.unwrap_or(Path::new(".")), limit);
+        let files = Files::beside(&args.out, limit);
         let alive = Spinner::new("reading lists");
         let lists = shelve_neighborhoods(path, map, &files)?;
         drop(alive);

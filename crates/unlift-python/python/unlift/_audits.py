@@ -163,7 +163,7 @@ def audit_images(
     neighbors: "oracle", names of `IMAGE_SOURCES`, or functions (`source`).
     features, max_features, min_score: what is extracted from photos: "sift", "aliked", "superpoint"; how many; above which score.
     max_images: use at most so many, evenly spaced over their sorted names.
-    show: names of images to draw; the least, the median and the most recovered without it. photos: the folder of photos, where
+    show: names of images to draw, none where it is empty; the least, the median and the most recovered without it. photos: the folder of photos, where
         `images` is none, to draw.
     solvers: names of `IMAGE_SOLVERS`.
     thresholds: errors in pixels up to which a keypoint counts as recovered.

@@ -26,6 +26,7 @@ __all__ = [
     "Map",
     "Model",
     "Neighborhoods",
+    "Outline",
     "Planes",
     "Rays",
     "Records",
@@ -45,6 +46,7 @@ __all__ = [
     "obfuscate",
     "oracle",
     "prepare",
+    "prepare_rounds",
     "read",
     "recover",
 ]
@@ -306,18 +308,21 @@ class Edges:
     ) -> dict[str, npt.NDArray[Any]]: ...
 
 @final
+class Outline:
+    @staticmethod
+    def from_bytes(bytes: bytes) -> Outline: ...
+    def to_bytes(self) -> bytes: ...
+
+@final
 class Lead:
     def __new__(
         cls,
         model: Model,
         released: Released | Hidden,
-        lengths: npt.ArrayLike,
-        listed: npt.ArrayLike,
-        wanted: tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike, npt.ArrayLike],
+        outline: Outline,
         start: dict[str, npt.NDArray[Any] | None],
+        lengths: npt.ArrayLike,
     ) -> Lead: ...
-    @staticmethod
-    def wanted(model: Model, lengths: npt.ArrayLike) -> npt.NDArray[np.uint32]: ...
     @property
     def is_done(self) -> bool: ...
     def standing(self) -> bytes: ...
@@ -325,14 +330,25 @@ class Lead:
     def told(self, slots: npt.ArrayLike, jumps: npt.ArrayLike) -> None: ...
     def finish(self, descriptor_row: npt.ArrayLike | None = None) -> Recovered: ...
 
+def prepare_rounds(
+    released: Released | Hidden,
+    lists: Neighborhoods | _Path,
+    *,
+    delta: float | None = None,
+    seed: int = 0,
+    exact_constraints: bool = True,
+    memory_limit: int | None = None,
+    threads: int | None = None,
+) -> tuple[Model, Outline]: ...
 def prepare(
     released: Released | Hidden,
-    lists: Neighborhoods,
+    lists: Neighborhoods | _Path,
     *,
     solver: str = "consensus",
     delta: float | None = None,
     seed: int = 0,
     exact_constraints: bool = True,
+    memory_limit: int | None = None,
     threads: int | None = None,
 ) -> Model: ...
 def evaluate(

@@ -7,7 +7,7 @@ are. In every round one who leads says where all slots are believed to be, and e
 >>> points = np.random.default_rng(1).uniform(0, 4, (300, 3))
 >>> hidden = unlift.obfuscate(unlift.Map(points, scale=1.0), "olc", seed=1)
 >>> lists = unlift.neighbors.oracle(hidden, 0.5, k=20)
->>> model = unlift.prepare(hidden, lists, solver="joint")
+>>> model, outline = unlift.rounds.prepare(hidden, lists)
 
 Parts are lists of some slots, and all entries that name records of these:
 
@@ -26,7 +26,7 @@ Parts are lists of some slots, and all entries that name records of these:
 
 >>> def over(work, columns):
 ...     return [batch for part in parts for batch in work(part)]
->>> back = unlift.rounds.recover(over, hidden, model)
+>>> back = unlift.rounds.recover(over, hidden, model, outline)
 >>> whole = unlift.recover(hidden, lists, confidence=False)
 >>> bool((back.positions == whole.positions).all())
 True
@@ -44,19 +44,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import parts
-from ._unlift import Edges, Hidden, Lead, Model, Recovered, Released, UnliftError
+from ._unlift import Edges, Hidden, Lead, Model, Neighborhoods, Outline, Recovered, Released, UnliftError, prepare_rounds
 from .parts import _pyarrow
 
 if TYPE_CHECKING:
     import pyarrow as _pa  # type: ignore[import-untyped,unused-ignore]
 
-__all__ = ["EDGES", "Work", "edges", "entries", "recover"]
+__all__ = ["EDGES", "Outline", "Over", "Work", "edges", "entries", "prepare", "recover"]
 
 #: Who lists whom about a slot: name, and type as Spark writes it. `ends` are slots, ascending; a class says which of the two
 #: names the other, and how high a source scores it.
 EDGES = {"slot": "bigint", "ends": "array<int>", "classes": "array<tinyint>"}
 
-_TALLY = {"kind": "int", "at": "bigint", "n": "bigint"}
+_START = parts.COLUMNS | {"edges": "bigint"}
 _MOVED = {name: of for name, of in parts.COLUMNS.items() if name != "descriptor_row"} | {"ahead": "float"}
 _TOLD = {"slot": "bigint", "jumps": "bigint"}
 
@@ -72,6 +72,7 @@ def entries(batches: Iterable[_pa.RecordBatch]) -> Iterator[_pa.RecordBatch]:
     """
     pa = _pyarrow()
     for batch in batches:
+        _check(batch.schema.names, "slot", "records")
         rows = batch["records"]
         lengths = pa.compute.fill_null(pa.compute.list_value_length(rows), 0).to_numpy(zero_copy_only=False)
         by = np.repeat(batch["slot"].to_numpy(zero_copy_only=False), lengths)
@@ -84,7 +85,7 @@ def entries(batches: Iterable[_pa.RecordBatch]) -> Iterator[_pa.RecordBatch]:
 def edges(
     lists: Iterable[_pa.RecordBatch],
     named: Iterable[_pa.RecordBatch],
-    released: Released | Hidden | str,
+    released: Released | Hidden | str | os.PathLike[str],
     model: Model,
     *,
     threads: int | None = None,
@@ -95,7 +96,7 @@ def edges(
         a record belong to the same part.
     named: all `entries` of any lists that name records of the part, in any order.
     released: the map, or the path of its file.
-    model: what `unlift.prepare(.., solver="joint")` learned of it and all of its lists.
+    model: what `prepare` learned of it and all of its lists.
 
     Yields rows of `EDGES`, in order of slots.
     """
@@ -143,6 +144,8 @@ def edges(
         offsets = np.concatenate([[0], np.cumsum(lengths[kept])])
     else:
         offsets = found["offsets"]
+    if offsets[-1] > np.iinfo(np.int32).max:
+        raise UnliftError(f"edges: expected less than 2^31 in a part, found {offsets[-1]} (more parts have less each)")
     offsets = pa.array(offsets.astype(np.int32))
     yield pa.RecordBatch.from_arrays(
         [
@@ -154,15 +157,45 @@ def edges(
     )
 
 
-def recover(over: Over, released: Released | Hidden | str, model: Model) -> Recovered:
+def prepare(
+    released: Released | Hidden,
+    lists: Neighborhoods | str | os.PathLike[str],
+    *,
+    delta: float | None = None,
+    seed: int = 0,
+    exact_constraints: bool = True,
+    memory_limit: int | None = None,
+    threads: int | None = None,
+) -> tuple[Model, Outline]:
+    """What all machines must know of a map and its lists (the model, small), and what the one must that leads rounds (the outline:
+    8 bytes a slot, and a sample of the edges).
+
+    lists: all of them, or the path of their file. With a `memory_limit` (bytes) it is read a window at a time, and what takes more is put in
+        files of the folder for temporary ones (`TMPDIR`): some 1.5 kB a slot.
+    """
+    return prepare_rounds(
+        released,
+        lists,
+        delta=delta,
+        seed=seed,
+        exact_constraints=exact_constraints,
+        memory_limit=memory_limit,
+        threads=threads,
+    )
+
+
+def recover(
+    over: Over, released: Released | Hidden | str | os.PathLike[str], model: Model, outline: Outline
+) -> Recovered:
     """Recovers a map whose edges are spread: `unlift.recover(.., confidence=False)`, bit for bit.
 
     over: `over(work, columns)` gives back the batches of `work(batches)` for the `edges` of every part, in any order. What it
         gives have `columns`: names, and types as Spark writes them. `work` can be pickled if `released` is a path.
     released: the map, or the path of its file where every machine reads it.
-    model: as for `edges`.
+    model, outline: what `prepare` learned of the map and all of its lists. Edges that are lost on the way, or come twice, are told.
 
-    In memory are some 150 bytes a slot, and 60 more of what comes back in a round. Nobody can say how sure the attacker is.
+    In memory are some 300 bytes a slot at most, while slots come back; on every machine some 150 a task while it works, beside the records.
+    How sure the attacker is, is not asked: that takes all edges.
     """
     pa = _pyarrow()
     of_map = _read(released)
@@ -172,24 +205,13 @@ def recover(over: Over, released: Released | Hidden | str, model: Model) -> Reco
         batches = list(over(Work(step, released, model, told), columns))
         return pa.Table.from_batches(batches, schema=_schema(columns))
 
-    tally = all_of("tally", _TALLY)
-    kind, at, count = (tally[name].to_numpy() for name in _TALLY)
-    lengths, listed = np.zeros(n, dtype=np.int64), np.zeros(n // per, dtype=np.int64)
-    of_slot = kind == 0
-    if len(np.unique(at[of_slot])) != of_slot.sum():
-        raise UnliftError("edges: expected each slot once, found some twice")
-    if len(at) and not (0 <= at.min() and at[of_slot].max(initial=0) < n and at[~of_slot].max(initial=0) < n // per):
-        raise UnliftError(f"edges: expected slots below {n}, found others")
-    lengths[at[of_slot]] = count[of_slot]
-    np.add.at(listed, at[~of_slot], count[~of_slot])
-
-    wanted = all_of("pick", EDGES, Lead.wanted(model, lengths)).sort_by("slot")
-    slots = wanted["slot"].to_numpy()
-    offsets = np.zeros(len(slots) + 1, dtype=np.int64)
-    offsets[1:] = np.cumsum(pa.compute.list_value_length(wanted["ends"]).to_numpy())
-    flat = [pa.compute.list_flatten(wanted[name]).to_numpy() for name in ("ends", "classes")]
-    start = parts._columns(all_of("start", parts.COLUMNS), of_map)
-    lead = Lead(model, of_map, lengths, listed, (slots, offsets, *flat), start)
+    started = all_of("start", _START)
+    start, lengths = parts._columns(started, of_map), np.zeros(n, dtype=np.int64)
+    lengths[started["slot"].to_numpy()] = started["edges"].to_numpy()
+    del started
+    lead = Lead(model, of_map, outline, start, lengths)
+    rows = start["descriptor_row"]
+    del start
     while not lead.is_done:
         moved = all_of("move", _MOVED, lead.standing())
         columns = {name: moved[name].to_numpy() for name in _MOVED if name not in "xyz"}
@@ -199,13 +221,13 @@ def recover(over: Over, released: Released | Hidden | str, model: Model) -> Reco
         if news is not None:
             told = all_of("tell", _TOLD, news)
         lead.told(told["slot"].to_numpy(), told["jumps"].to_numpy())
-    return lead.finish(start["descriptor_row"])
+    return lead.finish(rows)
 
 
 class Work:
     """What is to be done with the edges of each part: called with batches of `EDGES`, gives batches."""
 
-    def __init__(self, step: str, released: Released | Hidden | str, model: Model, told: Any = None) -> None:
+    def __init__(self, step: str, released: Released | Hidden | str | os.PathLike[str], model: Model, told: Any = None) -> None:
         self.step, self.released, self.model, self.told = step, released, model, told
 
     def __call__(self, batches: Iterable[_pa.RecordBatch]) -> Iterator[_pa.RecordBatch]:
@@ -216,24 +238,12 @@ class Work:
     def __repr__(self) -> str:
         return f"<unlift.rounds.Work: {self.step}>"
 
-    def _tally(self, rows: _pa.Table, of_map: Released) -> Iterator[_pa.RecordBatch]:
-        pa = _pyarrow()
-        ends = pa.compute.list_flatten(rows["ends"]).to_numpy() // of_map.slots_per_record
-        records, times = np.unique(ends, return_counts=True)
-        lengths = pa.compute.list_value_length(rows["ends"]).to_numpy()
-        for kind, at, n in ((0, rows["slot"].to_numpy(), lengths), (1, records, times)):
-            columns = [np.full(len(at), kind, dtype=np.int32), at.astype(np.int64), n.astype(np.int64)]
-            yield pa.RecordBatch.from_arrays([pa.array(column) for column in columns], schema=_schema(_TALLY))
-
-    def _pick(self, rows: _pa.Table, of_map: Released) -> Iterator[_pa.RecordBatch]:
-        pa = _pyarrow()
-        is_wanted = np.isin(rows["slot"].to_numpy(), self.told)
-        yield from rows.filter(pa.array(is_wanted)).cast(_schema(EDGES)).to_batches()
-
     def _start(self, rows: _pa.Table, of_map: Released) -> Iterator[_pa.RecordBatch]:
         pa = _pyarrow()
         held, first, n = _held(rows, of_map)
         found = parts._batch(first, held.start(self.model, of_map, threads=1), slice(0, n))
+        lengths = pa.array(np.diff(held.columns()["offsets"].astype(np.int64)))
+        found = pa.RecordBatch.from_arrays([*found.columns, lengths], schema=_schema(_START))
         per = of_map.slots_per_record
         present = np.zeros(n // per, dtype=bool)
         present[(rows["slot"].to_numpy() - first) // per] = True
@@ -296,18 +306,26 @@ def _table(batches: Iterable[_pa.RecordBatch], *names: str) -> _pa.Table | None:
     if not given:
         return None
     table = _pyarrow().Table.from_batches(given)
+    _check(table.schema.names, *names)
     for name in names:
-        if name not in table.schema.names:
-            raise UnliftError(f"batches: expected a column {name}, found {', '.join(table.schema.names) or 'none'}")
         if table[name].null_count and name in ("slot", "record", "by"):
             raise UnliftError(f"{name}: expected numbers, found null")
     return table
 
 
-def _read(released: Released | Hidden | str) -> Released:
-    if isinstance(released, str):
-        told = os.stat(released)
-        return _read_once(released, told.st_mtime_ns, told.st_size)
+def _check(found: list[str], *names: str) -> None:
+    for name in names:
+        if name not in found:
+            raise UnliftError(f"batches: expected a column {name}, found {', '.join(found) or 'none'}")
+
+
+def _read(released: Released | Hidden | str | os.PathLike[str]) -> Released:
+    if isinstance(released, (str, os.PathLike)):
+        try:
+            told = os.stat(released)
+        except OSError as error:
+            raise UnliftError(f"{os.fspath(released)}: expected a released map, found {error.strerror}") from error
+        return _read_once(os.fspath(released), told.st_mtime_ns, told.st_size)
     return released.released if isinstance(released, Hidden) else released
 
 

@@ -10,7 +10,8 @@ One map whose lists are spread over the cluster (`unlift split` makes a folder o
 
 By joint recovery, which comes back whole, as it looks at all slots in every round:
 
-    back = unlift.spark.recover_in_rounds(spark.read.parquet("lists"), "released.parquet", model)
+    model, outline = unlift.rounds.prepare(released, "lists", memory_limit=2 * 10**9)
+    back = unlift.spark.recover_in_rounds(spark.read.parquet("lists"), "released.parquet", model, outline)
 
 Every executor needs this package. A task that is lost with its executor is run again by Spark, to the same rows.
 """
@@ -21,7 +22,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from . import fleet, parts, rounds
-from ._unlift import Model, Recovered, Released
+from ._unlift import Model, Outline, Recovered, Released
 
 if TYPE_CHECKING:
     import pyarrow as _pa  # type: ignore[import-untyped,unused-ignore]
@@ -74,23 +75,26 @@ def recover(lists: _DataFrame, released: str, model: Model, *, n_parts: int | No
     return ranged.mapInArrow(of_partition, _spec(parts.COLUMNS))
 
 
-def recover_in_rounds(lists: _DataFrame, released: str, model: Model, *, n_parts: int | None = None) -> Recovered:
+def recover_in_rounds(
+    lists: _DataFrame, released: str, model: Model, outline: Outline, *, n_parts: int | None = None
+) -> Recovered:
     """`unlift.rounds.recover`: `unlift.recover(.., confidence=False)`, bit for bit, of lists that no machine has all of.
 
     lists: columns `slot` and `records`, and `scores` where the model's lists have some, in any order and partitions.
     released, n_parts: as for `recover`.
-    model: what `unlift.prepare(.., solver="joint")` learned of the map and all of its lists.
+    model, outline: what `unlift.rounds.prepare` learned of the map and all of its lists.
 
     Entries of lists are shuffled once, to where the records are that they name. What comes of it stays on the disks of executors, or in the
     checkpoint folder of the SparkContext, if it has one: then what an executor loses is not made again. A round is two jobs,
-    in which nothing is shuffled: all executors are sent where all slots are (30 to 60 bytes each), and this process what became of those
-    that moved.
+    in which nothing is shuffled: all executors are sent where all slots are (30 to 50 bytes each, and some 150 in every task that works
+    with them), and this process what became of those that moved.
     """
     from pyspark import StorageLevel
     from pyspark.sql import functions
 
     per = Released.read(released).slots_per_record
     has_scores = "scores" in lists.columns
+    lists = lists.select("slot", "records", *(["scores"] if has_scores else []))
     own = lists.withColumn("record", functions.floor(functions.col("slot") / per))
     if has_scores:
         pairs = lists.select("slot", functions.explode(functions.arrays_zip("records", "scores")).alias("entry"))
@@ -133,7 +137,7 @@ def recover_in_rounds(lists: _DataFrame, released: str, model: Model, *, n_parts
         return batches
 
     try:
-        return rounds.recover(over, released, model)
+        return rounds.recover(over, released, model, outline)
     finally:
         edges.unpersist()
 

@@ -27,8 +27,8 @@ pub struct Cell<'a, const D: usize = 3> {
     pub secret: &'a Secret,
     /// What the attacker saw.
     pub released: &'a Released<D>,
-    /// The lists it was recovered from: one per slot, by descriptor row for an attacker's own sources.
-    pub lists: &'a Neighborhoods,
+    /// The lists it was recovered from, if they are in memory: one per slot, by descriptor row for an attacker's own sources.
+    pub lists: Option<&'a Neighborhoods>,
     /// What the attacker got.
     pub recovered: &'a Recovered<D>,
     /// Error per slot.
@@ -63,13 +63,13 @@ pub trait Observer<const D: usize = 3> {
         let _ = cell;
     }
 
-    /// What was recovered of the same before, bit for bit; `None` has it done now, and [kept](Self::keep).
+    /// What was recovered of the same before, bit for bit; not asked of lists that are not in memory; `None` has it done now, and [kept](Self::keep).
     fn recall(&mut self, recovery: &Recovery<'_, D>) -> Option<Recovered<D>> {
         let _ = recovery;
         None
     }
 
-    /// What was recovered now.
+    /// What was recovered now, of lists in memory.
     fn keep(&mut self, recovery: &Recovery<'_, D>, recovered: &Recovered<D>) {
         let _ = (recovery, recovered);
     }

@@ -2,18 +2,21 @@
 
 use std::time::Instant;
 
+use super::lists::Listing;
 use super::observer::{Observer, Recovery};
 use super::plan::Plan;
-use crate::Error;
-use crate::neighbors::Neighborhoods;
-use crate::recover::{RecoverOptions, Recovered, Solver, recover, recover_with_start};
+use crate::recover::{
+    RecoverOptions, Recovered, Solver, recover, recover_shelved, recover_shelved_with_start,
+    recover_with_start,
+};
 use crate::released::Released;
+use crate::{Error, Shelf};
 
 /// A released map and lists, on which a plan's solvers are run in order.
 pub(super) struct Solved<'a, const D: usize> {
     plan: &'a Plan<D>,
     released: &'a Released<D>,
-    lists: &'a Neighborhoods,
+    lists: &'a Listing,
     seed: u64,
     /// The pass that joint recovery started from, for the solver that is this pass.
     start: Option<Recovered<D>>,
@@ -22,7 +25,7 @@ pub(super) struct Solved<'a, const D: usize> {
 impl<'a, const D: usize> Solved<'a, D> {
     pub(super) fn new(
         plan: &'a Plan<D>,
-        (released, lists): (&'a Released<D>, &'a Neighborhoods),
+        (released, lists): (&'a Released<D>, &'a Listing),
         seed: u64,
     ) -> Self {
         Self { plan, released, lists, seed, start: None }
@@ -39,27 +42,63 @@ impl<'a, const D: usize> Solved<'a, D> {
     ) -> Result<(Recovered<D>, f64), Error> {
         let (solver, started) = (self.plan.solvers[at], Instant::now());
         let options = self.options(solver);
-        let recovery = self.recovery(&options);
         let is_start = |solver: &Solver| *solver == Solver::JointStart;
         if let Some(kept) = self.start.take_if(|_| is_start(&solver)) {
             return Ok((kept, 0.0));
         }
-        let recovered = match observer.recall(&recovery) {
+        let recalled = self.recovery(&options).and_then(|recovery| observer.recall(&recovery));
+        let with_start = solver == Solver::Joint && self.plan.solvers[at..].iter().any(is_start);
+        let recovered = match recalled {
             Some(recalled) => recalled,
-            None if solver == Solver::Joint && self.plan.solvers[at..].iter().any(is_start) => {
-                let (joint, start) = recover_with_start(self.released, self.lists, &options)?;
-                observer.keep(&recovery, &joint);
-                observer.keep(&self.recovery(&self.options(Solver::JointStart)), &start);
+            None if with_start => {
+                let (joint, start) = self.recover_with_start(&options)?;
+                self.keep(observer, &options, &joint);
+                self.keep(observer, &self.options(Solver::JointStart), &start);
                 self.start = Some(start);
                 joint
             }
             None => {
-                let recovered = recover(self.released, self.lists, &options)?;
-                observer.keep(&recovery, &recovered);
+                let recovered = self.recover(&options)?;
+                self.keep(observer, &options, &recovered);
                 recovered
             }
         };
         Ok((recovered, started.elapsed().as_secs_f64()))
+    }
+
+    fn recover(&self, options: &RecoverOptions) -> Result<Recovered<D>, Error> {
+        match self.lists {
+            Listing::Here(lists) => recover(self.released, lists, options),
+            Listing::Away(lists) => recover_shelved(self.released, lists, options, self.shelf()?),
+        }
+    }
+
+    fn recover_with_start(
+        &self,
+        options: &RecoverOptions,
+    ) -> Result<(Recovered<D>, Recovered<D>), Error> {
+        match self.lists {
+            Listing::Here(lists) => recover_with_start(self.released, lists, options),
+            Listing::Away(lists) => {
+                recover_shelved_with_start(self.released, lists, options, self.shelf()?)
+            }
+        }
+    }
+
+    fn shelf(&self) -> Result<&dyn Shelf, Error> {
+        self.plan.shelf().ok_or_else(|| Error::new("lists", "a shelf that they are on", "none"))
+    }
+
+    /// Has what was recovered kept, where its lists can be told from others.
+    fn keep(
+        &self,
+        observer: &mut dyn Observer<D>,
+        options: &RecoverOptions,
+        recovered: &Recovered<D>,
+    ) {
+        if let Some(recovery) = self.recovery(options) {
+            observer.keep(&recovery, recovered);
+        }
     }
 
     fn options(&self, solver: Solver) -> RecoverOptions {
@@ -72,10 +111,11 @@ impl<'a, const D: usize> Solved<'a, D> {
         }
     }
 
-    fn recovery<'b>(&self, options: &'b RecoverOptions) -> Recovery<'b, D>
+    fn recovery<'b>(&self, options: &'b RecoverOptions) -> Option<Recovery<'b, D>>
     where
         'a: 'b,
     {
-        Recovery { released: self.released, lists: self.lists, options }
+        let (released, lists) = (self.released, self.lists.here()?);
+        Some(Recovery { released, lists, options })
     }
 }

@@ -5,7 +5,7 @@ pub use super::chance::{key_of, oracle_seed};
 
 use super::cells::Finished;
 use super::clock::RowSeconds;
-use super::lists::Lists;
+use super::lists::{Listing, Lists};
 use super::measure::measure;
 use super::plan::{NeighborsBy, Plan, Variant};
 use super::pool::Pool;
@@ -36,7 +36,10 @@ pub fn oracle_lists(
     let variant = Variant { by, noise: Some(noise), inlier_ratio: Some(ratio) };
     // The attacker's seed has no part in the oracle's lists.
     let mut lists = Lists::new(&plan, &search, hidden, &hidden.1, (seed, 0));
-    lists.make_of_what_there_is(&variant).map(|made| made.lists)
+    match lists.make_of_what_there_is(&variant)?.lists {
+        Listing::Here(lists) => Ok(lists),
+        Listing::Away(_) => Err(Error::new("lists of an image", "some in memory", "others")),
+    }
 }
 
 /// A row over many images, one added after the other: that of an audit of images. Memory does not grow with their

@@ -104,7 +104,7 @@ impl<const D: usize> Model<D> {
     /// # Errors
     /// When `bytes` are anything else, or a model in another number of dimensions.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
-        let mut from = Reader::new(bytes);
+        let mut from = Reader::new("model", bytes);
         let magic: [u8; 8] = from.array()?;
         if magic != MAGIC {
             return Err(Error::new("model", "a model of this version", "other bytes"));

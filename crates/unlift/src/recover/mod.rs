@@ -38,6 +38,7 @@ pub(crate) use baselines::density::published;
 pub use confidence::model::{N_KINDS, N_TERMS, centered, terms};
 #[doc(hidden)]
 pub use confidence::seen::{Cues, Seen};
+pub use joint::Outline;
 pub use learned::Model;
 pub use map::part_edges::{Edges, NamedBy};
 pub use options::{Delta, RecoverOptions, Solver};
@@ -49,7 +50,7 @@ pub use result::trials::TrialHistogram;
 pub use result::unknown::Unknown;
 pub use rounds::Rounds;
 pub use solve::Moved;
-pub use spread::lead::{EdgesOfSlot, Lead};
+pub use spread::lead::Lead;
 pub use task::Task;
 
 use crate::compiled::{no_such, which};
@@ -70,6 +71,46 @@ pub fn prepare<const D: usize>(
     options: &RecoverOptions,
 ) -> Result<Model<D>, Error> {
     Task::learn(released, lists, options).map(|task| task.model())
+}
+
+/// [`prepare`] for rounds whose edges are spread, by [`Solver::Joint`]: beside the model what their [`Lead`] must know of the edges.
+///
+/// # Errors
+/// As of [`prepare`], and for another solver.
+pub fn prepare_rounds<const D: usize>(
+    released: &Released<D>,
+    lists: &Neighborhoods,
+    options: &RecoverOptions,
+) -> Result<(Model<D>, Outline), Error> {
+    let task = Task::learn(released, lists, options)?;
+    Ok((task.model(), task.outline()?))
+}
+
+/// [`prepare_rounds`] with lists that do not fit into memory: the same.
+///
+/// # Errors
+/// As there, for rays from anchors in regions, and when files cannot be read or written.
+pub fn prepare_rounds_shelved<const D: usize>(
+    released: &Released<D>,
+    lists: &ShelvedLists,
+    options: &RecoverOptions,
+    shelf: &dyn Shelf,
+) -> Result<(Model<D>, Outline), Error> {
+    let task = Task::learn_shelved(released, (lists, shelf), options)?;
+    Ok((task.model(), task.outline()?))
+}
+
+/// [`prepare`] with lists that do not fit into memory: the same model. By a solver that [reads them](Solver::reads_shelved).
+///
+/// # Errors
+/// As there, for another solver, for rays from anchors in regions, and when files cannot be read or written.
+pub fn prepare_shelved<const D: usize>(
+    released: &Released<D>,
+    lists: &ShelvedLists,
+    options: &RecoverOptions,
+    shelf: &dyn Shelf,
+) -> Result<Model<D>, Error> {
+    Task::learn_shelved(released, (lists, shelf), options).map(|task| task.model())
 }
 
 /// Recovers the hidden points of `released` with the help of `lists`: `R` of Eq. (3).
@@ -117,7 +158,7 @@ pub fn recover_with_start<const D: usize>(
     with_start(released, lists, options)
 }
 
-/// [`recover`] with lists that do not fit into memory: the same, bit for bit. By [`Solver::Joint`] or [`Solver::Consensus`].
+/// [`recover`] with lists that do not fit into memory: the same, bit for bit. By a solver that [reads them](Solver::reads_shelved).
 ///
 /// In memory are the records, and of each slot some 150 bytes (estimates, places, what rounds keep), beside a few windows of
 /// `shelf`. Lists are read once per round, and who lists whom is put on `shelf`: 10 to 15 bytes an entry (one slot per record, two), and eight more
@@ -150,6 +191,40 @@ fn shelved<const D: usize>(
     task.finish(task.go_on(start)?)
 }
 
+/// [`recover_with_start`] with lists that do not fit into memory: the same, bit for bit.
+///
+/// # Errors
+/// As there, and as of [`recover_shelved`].
+pub fn recover_shelved_with_start<const D: usize>(
+    released: &Released<D>,
+    lists: &ShelvedLists,
+    options: &RecoverOptions,
+    shelf: &dyn Shelf,
+) -> Result<(Recovered<D>, Recovered<D>), Error> {
+    let compiled = which(
+        &(shelved_with_start::<2> as ShelvedWithStart<2>),
+        &(shelved_with_start::<3> as ShelvedWithStart<3>),
+    );
+    let shelved: ShelvedWithStart<D> = compiled.ok_or_else(no_such::<D>)?;
+    shelved(released, lists, options, shelf)
+}
+
+type ShelvedWithStart<const D: usize> = fn(
+    &Released<D>,
+    &ShelvedLists,
+    &RecoverOptions,
+    &dyn Shelf,
+) -> Result<(Recovered<D>, Recovered<D>), Error>;
+
+fn shelved_with_start<const D: usize>(
+    released: &Released<D>,
+    lists: &ShelvedLists,
+    options: &RecoverOptions,
+    shelf: &dyn Shelf,
+) -> Result<(Recovered<D>, Recovered<D>), Error> {
+    both(&Task::learn_shelved(released, (lists, shelf), options)?, options)
+}
+
 type WithStart<const D: usize> = fn(
     &Released<D>,
     &Neighborhoods,
@@ -161,10 +236,17 @@ fn with_start<const D: usize>(
     lists: &Neighborhoods,
     options: &RecoverOptions,
 ) -> Result<(Recovered<D>, Recovered<D>), Error> {
+    both(&Task::learn(released, lists, options)?, options)
+}
+
+/// What came back, and where it started.
+fn both<const D: usize>(
+    task: &Task<'_, D>,
+    options: &RecoverOptions,
+) -> Result<(Recovered<D>, Recovered<D>), Error> {
     if options.solver != Solver::Joint {
         return Err(Error::new("solver", Solver::Joint.name(), options.solver.name()));
     }
-    let task = Task::learn(released, lists, options)?;
     let start = task.solve(0..task.n_slots())?;
     let recovered = task.finish(task.go_on(start.clone())?)?;
     let start = task.finish_start(start, &recovered)?;

@@ -7,7 +7,7 @@ use super::baselines::ransac::Ransac;
 use super::checks::{check_anchors, check_lists, check_slots};
 use super::confidence::seen::{Seen, Solved};
 use super::consensus::Consensus;
-use super::joint::Joint;
+use super::joint::{Joint, Outline};
 use super::learned::Model;
 use super::map::family::Family;
 use super::map::graph::Graph;
@@ -101,8 +101,9 @@ impl<'a, const D: usize> Task<'a, D> {
         (lists, shelf): (&'a ShelvedLists, &dyn Shelf),
         options: &RecoverOptions,
     ) -> Result<Self, Error> {
-        if !matches!(options.solver, Solver::Joint | Solver::Consensus) {
-            let expected = format!("{} or {}", Solver::Joint.name(), Solver::Consensus.name());
+        if !options.solver.reads_shelved() {
+            let can = Solver::ALL.into_iter().filter(|solver| solver.reads_shelved());
+            let expected = can.map(Solver::name).collect::<Vec<_>>().join(", ");
             let what = "solver for lists that are not in memory";
             return Err(Error::new(what, expected, options.solver.name()));
         }
@@ -312,18 +313,29 @@ impl<'a, const D: usize> Task<'a, D> {
         rounds.run()
     }
 
-    /// Last estimates in columns.
-    pub(super) fn in_columns(
+    fn in_columns(
         &self,
         estimates: &[Estimate<D>],
         descriptor_row: Option<Vec<u32>>,
     ) -> Result<Recovered<D>, Error> {
-        let released = self.released;
-        let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
-        let (origin, unit) = (released.origin(), released.unit());
         let about = About { map: Some(self.map), ..self.lists.about() };
-        Recovered::try_new(estimates, with_axis, descriptor_row, origin, unit, self.delta)
-            .map(|recovered| recovered.with_about(about))
+        in_columns(self.released, (estimates, descriptor_row), self.delta, about)
+    }
+
+    /// What is known of the edges to whoever leads rounds without them.
+    ///
+    /// # Errors
+    /// When the solver asks for no edges, or they cannot be read.
+    pub(super) fn outline(&self) -> Result<Outline, Error> {
+        match &self.records {
+            Records::Listed { graph: Some(graph), .. } => {
+                Outline::new(self.map, graph, self.options.seed)
+            }
+            _ => {
+                let solver = self.options.solver.name();
+                Err(Error::new("solver of rounds", Solver::Joint.name(), solver))
+            }
+        }
     }
 
     fn check_estimates(&self, estimates: &[Estimate<D>]) -> Result<(), Error> {
@@ -333,6 +345,19 @@ impl<'a, const D: usize> Task<'a, D> {
         let expected = format!("{}, one per slot", self.n_slots());
         Err(Error::new("estimates", expected, estimates.len().to_string()))
     }
+}
+
+/// Estimates of `released` in columns, by rows of descriptors where these are known.
+pub(super) fn in_columns<const D: usize>(
+    released: &Released<D>,
+    (estimates, descriptor_row): (&[Estimate<D>], Option<Vec<u32>>),
+    delta: f64,
+    about: About,
+) -> Result<Recovered<D>, Error> {
+    let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
+    let (origin, unit) = (released.origin(), released.unit());
+    Recovered::try_new(estimates, with_axis, descriptor_row, origin, unit, delta)
+        .map(|recovered| recovered.with_about(about))
 }
 
 /// What attacks on the records alone leave to do.

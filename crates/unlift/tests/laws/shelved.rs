@@ -6,12 +6,13 @@ use std::io;
 use unlift::Shelf;
 use unlift::neighbors::{Neighborhoods, ShelvedLists};
 use unlift::obfuscate::Entry;
-use unlift::recover::{RecoverOptions, Solver, recover_shelved};
+use unlift::recover::{RecoverOptions, Solver, prepare, prepare_shelved, recover_shelved};
 use unlift::released::Obfuscation;
 
 use crate::maps::*;
 
 /// Files of the system, with windows of so many bytes.
+#[derive(Debug)]
 struct Files(usize);
 
 impl Shelf for Files {
@@ -29,6 +30,7 @@ impl Shelf for Files {
 }
 
 /// A disk that is full.
+#[derive(Debug)]
 struct Full;
 
 impl Shelf for Full {
@@ -70,7 +72,7 @@ fn shelved_is_in_memory<const D: usize>(name: &str, scheme: &Entry) {
     let (offsets, records) = (plain.offsets().to_vec(), plain.records().to_vec());
     let scored = Neighborhoods::try_new(offsets, records, Some(scores), map.0, map.1).unwrap();
     for (lists, window) in [(&plain, 10_000), (&scored, 30_000), (&plain, 1 << 30)] {
-        for solver in [Solver::Consensus, Solver::Joint] {
+        for solver in [Solver::Consensus, Solver::Joint, Solver::JointStart] {
             let options = RecoverOptions { solver, seed: 9, ..RecoverOptions::default() };
             let shelf = Files(window);
             let away = put(lists, map, &shelf);
@@ -85,6 +87,9 @@ fn shelved_is_in_memory<const D: usize>(name: &str, scheme: &Entry) {
             assert!(recovered_bytes(&found) == recovered_bytes(&whole), "{what}");
             assert_eq!(found.confidence(), whole.confidence(), "{what}");
             assert_eq!(found.about(), whole.about(), "{what}");
+            let model = prepare_shelved(released, &away, &options, &shelf).unwrap();
+            let whole = prepare(released, lists, &options).unwrap();
+            assert!(model.to_bytes() == whole.to_bytes(), "{what}");
             let known = solver == Solver::Joint && D == 3 && lists.scores().is_none();
             assert!(!known || found.confidence().is_some(), "{what}: no confidence");
         }
@@ -107,7 +112,7 @@ fn what_cannot_be_shelved_is_one_line() {
     };
     assert_eq!(
         error(Solver::Ransac, &Full),
-        "solver for lists that are not in memory: expected joint or consensus, found ransac"
+        "solver for lists that are not in memory: expected joint, joint-start, consensus, found ransac"
     );
     let full = error(Solver::Joint, &Full);
     assert!(full.starts_with(

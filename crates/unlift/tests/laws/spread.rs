@@ -1,13 +1,13 @@
 //! Joint recovery whose edges are spread gives what it gives at once, bit for bit.
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 
 use unlift::Error;
 use unlift::neighbors::Neighborhoods;
 use unlift::obfuscate::Entry;
 use unlift::recover::{
-    Edges, EdgesOfSlot, Lead, Model, NamedBy, Part, RecoverOptions, Recovered, prepare,
+    Edges, Estimate, Lead, Model, Moved, NamedBy, Outline, Part, RecoverOptions, Recovered, Solver,
+    prepare, prepare_rounds,
 };
 use unlift::released::{Obfuscation, Released};
 
@@ -71,7 +71,7 @@ fn kept(edges: &Edges, map: (usize, usize)) -> Edges {
 fn spread<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
-    model: &Model<D>,
+    (model, outline): (&Model<D>, Outline),
 ) -> Result<Recovered<D>, Error> {
     let per = released.slots_per_record();
     let map = (released.n_records(), per);
@@ -81,25 +81,14 @@ fn spread<const D: usize>(
         let named_by = entries.named_by(lists.scores().is_some());
         parts.push(kept(&model.edges(released, &own, slots, named_by)?, map));
     }
-    let (mut lengths, mut listed, mut all) =
-        (Vec::new(), vec![0; released.n_records()], BTreeMap::new());
-    let (mut start, mut rows) = (Vec::new(), Vec::new());
+    let (mut start, mut lengths, mut rows) = (Vec::new(), Vec::new(), Vec::new());
     for edges in &parts {
-        for (at, slot) in edges.slots().enumerate() {
-            let row = edges.offsets()[at] as usize..edges.offsets()[at + 1] as usize;
-            lengths.push(row.len() as u32);
-            let row: EdgesOfSlot =
-                (edges.ends()[row.clone()].to_vec(), edges.class()[row].to_vec());
-            all.insert(slot as u32, row);
-        }
-        edges.ends().iter().for_each(|&end| listed[end as usize / per] += 1);
+        lengths.extend(edges.offsets().windows(2).map(|row| (row[1] - row[0]) as u32));
         let Part { estimates, descriptor_row } = model.start_part(released, edges)?;
         start.extend(estimates);
         rows.extend(descriptor_row.into_iter().flatten());
     }
-    let wanted = Lead::wanted(model, &lengths)?;
-    let sample = wanted.iter().map(|slot| (*slot, all[slot].clone())).collect();
-    let mut lead = Lead::new(model, released, (&lengths, listed), &sample, &start)?;
+    let mut lead = Lead::new(model, released, outline, (&start, &lengths))?;
     while !lead.is_done() {
         let standing = lead.standing();
         let mut moved = Vec::new();
@@ -137,10 +126,13 @@ fn spread_is_the_whole<const D: usize>(name: &str, scheme: &Entry) {
         matches!(released.obfuscation(), Obfuscation::Rays(rays) if rays.regions().is_some());
     for lists in [&plain, &scored] {
         let whole = solve(released, lists, options());
-        let bytes = prepare(released, lists, &options()).unwrap().to_bytes();
-        let model = Model::<D>::from_bytes(&bytes).unwrap();
-        assert_eq!(model.to_bytes(), bytes, "{name}");
-        let found = spread(released, lists, &model);
+        let (model, outline) = prepare_rounds(released, lists, &options()).unwrap();
+        assert!(model.to_bytes() == prepare(released, lists, &options()).unwrap().to_bytes());
+        let [learned, known] = [model.to_bytes(), outline.to_bytes()];
+        let model = Model::<D>::from_bytes(&learned).unwrap();
+        let outline = Outline::from_bytes(&known).unwrap();
+        assert_eq!([model.to_bytes(), outline.to_bytes()], [learned, known], "{name}");
+        let found = spread(released, lists, (&model, outline));
         if of_anchors {
             assert!(found.is_err(), "{name}");
             continue;
@@ -159,68 +151,154 @@ fn rounds_with_spread_edges_are_rounds_at_once() {
     over_schemes!(spread_is_the_whole);
 }
 
-#[test]
-fn what_is_missing_or_not_of_the_map_is_told() {
-    let olc = unlift::obfuscate::scheme("olc").unwrap();
-    let hidden = hide::<3>(olc, &room(62, 200), 6);
-    let (released, lists) = (&hidden.released, hidden.lists(12, 0.5, 6));
-    let model = prepare(released, &lists, &options()).unwrap();
-    let (own, entries) = of_part(&lists, &(0..200), 1);
-    let edges = model.edges(released, &own, 0..200, entries.named_by(false)).unwrap();
-    let error = |found: Result<Edges, Error>| found.unwrap_err().to_string();
-    assert_eq!(
-        error(model.edges(released, &own, 0..100, entries.named_by(false))),
-        format!(
-            "named by: expected records 0..100, found {}",
-            entries.records.iter().find(|&&r| r > 99).unwrap()
-        )
-    );
-    let columns = |end: u32, class: u8| {
-        Edges::try_new(5..6, vec![0, 2], vec![4, end], vec![0, class], (100, 2))
-    };
-    assert!(columns(6, 0).is_ok());
-    assert_eq!(error(columns(200, 0)), "edges: end: expected a slot below 200, found 200");
-    assert_eq!(error(columns(6, 24)), "edges: class: expected a number below 24, found 24");
-    assert!(error(columns(7, 0)).starts_with("edges: end: expected the first slot of a record"));
-    assert!(error(columns(2, 0)).starts_with("edges: ends: expected ascending slots"));
+/// A map of lines, its lists, and all of it in one part.
+struct OnePart {
+    hidden: Hidden<3>,
+    lists: Neighborhoods,
+    model: Model<3>,
+    outline: Vec<u8>,
+    edges: Edges,
+    start: Vec<Estimate<3>>,
+    lengths: Vec<u32>,
+}
 
-    let lengths: Vec<u32> =
-        edges.offsets().windows(2).map(|row| (row[1] - row[0]) as u32).collect();
-    let mut listed = vec![0; 200];
-    edges.ends().iter().for_each(|&end| listed[end as usize] += 1);
-    let row = |slot: usize| {
-        let row = edges.offsets()[slot] as usize..edges.offsets()[slot + 1] as usize;
-        (edges.ends()[row.clone()].to_vec(), edges.class()[row].to_vec())
+impl OnePart {
+    fn new() -> Self {
+        let olc = unlift::obfuscate::scheme("olc").unwrap();
+        let hidden = hide::<3>(olc, &room(62, 200), 6);
+        let lists = hidden.lists(12, 0.25, 6);
+        let (model, outline) = prepare_rounds(&hidden.released, &lists, &options()).unwrap();
+        let (own, entries) = of_part(&lists, &(0..200), 1);
+        let named_by = entries.named_by(false);
+        let edges = model.edges(&hidden.released, &own, 0..200, named_by).unwrap();
+        let start = model.start_part(&hidden.released, &edges).unwrap().estimates;
+        let lengths = edges.offsets().windows(2).map(|row| (row[1] - row[0]) as u32).collect();
+        Self { outline: outline.to_bytes(), hidden, lists, model, edges, start, lengths }
+    }
+
+    fn lead(&self, start: &[Estimate<3>], lengths: &[u32]) -> Result<Lead<3>, Error> {
+        let outline = Outline::from_bytes(&self.outline)?;
+        Lead::new(&self.model, &self.hidden.released, outline, (start, lengths))
+    }
+
+    fn moved(&self, standing: &[u8]) -> Result<Vec<Moved<3>>, Error> {
+        self.model.move_part(&self.hidden.released, &self.edges, standing)
+    }
+}
+
+fn line<T>(found: Result<T, Error>) -> String {
+    found.err().expect("an error").to_string()
+}
+
+#[test]
+fn edges_are_those_of_their_map() {
+    let one = OnePart::new();
+    let released = &one.hidden.released;
+    let (own, entries) = of_part(&one.lists, &(0..200), 1);
+    let far = entries.records.iter().find(|&&record| record > 99).unwrap();
+    assert_eq!(
+        line(one.model.edges(released, &own, 0..100, entries.named_by(false))),
+        format!("named by: expected records 0..100, found {far}")
+    );
+    let mut twice = Entries { records: entries.records.clone(), ..Entries::default() };
+    twice.slots = entries.slots.clone();
+    twice.records.push(entries.records[0]);
+    twice.slots.push(entries.slots[0]);
+    let found = line(one.model.edges(released, &own, 0..200, twice.named_by(false)));
+    assert!(found.contains("expected each slot once"), "{found}");
+    let small = hide::<3>(unlift::obfuscate::scheme("olc").unwrap(), &room(62, 100), 6);
+    let few = small.lists(12, 0.5, 6);
+    let found = line(one.model.edges(released, &few, 0..200, entries.named_by(false)));
+    assert!(found.starts_with("neighborhoods: expected 200 rows"), "{found}");
+
+    let columns = |slots: Range<usize>, end: u32, class: u8| {
+        Edges::try_new(slots, vec![0, 2], vec![4, end], vec![0, class], (100, 2))
     };
-    let mut all: BTreeMap<u32, EdgesOfSlot> =
-        (0..200).map(|slot| (slot as u32, row(slot))).collect();
-    let start = model.start_part(released, &edges).unwrap().estimates;
-    let lead = |all: &_| Lead::new(&model, released, (&lengths, listed.clone()), all, &start);
-    let mut rounds = lead(&all).unwrap();
-    let standing = rounds.standing();
-    let mut moved = model.move_part(released, &edges, &standing).unwrap();
+    let half = columns(5..6, 6, 0).unwrap();
+    assert_eq!(line(columns(5..6, 200, 0)), "edges: edge: expected a slot below 200, found 200");
+    assert_eq!(line(columns(5..6, 6, 24)), "edges: edge: expected a class below 24, found 24");
+    assert!(line(columns(5..6, 7, 0)).starts_with("edges: edge: expected the first slot of"));
+    assert!(line(columns(5..6, 2, 0)).starts_with("edges: ends: expected ascending slots"));
+    assert!(line(columns(200..201, 6, 0)).starts_with("edges: slots: expected 2 offsets within"));
+    let found = line(one.model.start_part(released, &half));
+    assert!(found.starts_with("edges: records, and slots of each: expected (200, 1)"), "{found}");
+}
+
+#[test]
+fn a_lead_is_told_what_all_parts_say() {
+    let one = OnePart::new();
+    let released = &one.hidden.released;
+    let mut lengths = one.lengths.clone();
+    lengths[7] -= 1;
+    let lost = format!("edges of slot 7: expected {}, found {}", one.lengths[7], lengths[7]);
+    assert_eq!(line(one.lead(&one.start, &lengths)), lost);
+    assert_eq!(
+        line(one.lead(&one.start[1..], &one.lengths)),
+        "start: expected 200 rows, found 199"
+    );
+    let mut start = one.start.clone();
+    start[3].axis = 3;
+    assert!(line(one.lead(&start, &one.lengths)).starts_with("estimate: expected a place"));
+
+    let mut lead = one.lead(&one.start, &one.lengths).unwrap();
+    let standing = lead.standing();
+    let mut moved = one.moved(&standing).unwrap();
     let left = moved.pop().unwrap();
     let missing = format!("round: expected slot {}, found none", left.slot);
-    assert_eq!(rounds.moved(&moved).unwrap_err().to_string(), missing);
-    assert!(rounds.told(&model, released, &[]).is_err());
+    assert_eq!(line(lead.moved(&moved)), missing);
+    assert!(lead.told(&one.model, released, &[]).is_err());
     moved.push(moved[0]);
-    assert!(rounds.moved(&moved).unwrap_err().to_string().contains("each slot in its turn"));
+    assert!(line(lead.moved(&moved)).contains("each slot in its turn"));
     moved.pop();
     moved.push(left);
-    rounds.moved(&moved).unwrap();
-    assert!(rounds.moved(&moved).is_err());
-    assert!(rounds.told(&model, released, &[(200, 1)]).is_err());
-    assert!(rounds.finish(&model, released, None).is_err());
-    all.remove(&0);
-    assert!(lead(&all).unwrap_err().to_string().starts_with("wanted: edges: offsets"));
+    lead.moved(&moved).unwrap();
+    assert!(lead.moved(&moved).is_err());
+    assert!(lead.told(&one.model, released, &[(200, 1)]).is_err());
+    assert!(lead.finish(&one.model, released, None).is_err());
 
-    let sure =
-        prepare(released, &lists, &RecoverOptions { confidence: true, ..options() }).unwrap();
-    let all = (0..200).map(|slot| (slot as u32, row(slot))).collect();
-    let error = Lead::new(&sure, released, (&lengths, listed.clone()), &all, &start).unwrap_err();
-    assert!(error.to_string().starts_with("confidence of rounds in parts"), "{error}");
-    for cut in (0..200).chain([standing.len() / 2, standing.len() - 1]) {
-        assert!(model.move_part(released, &edges, &standing[..cut]).is_err(), "{cut} bytes");
-    }
-    assert!(model.move_part(released, &edges, &[&standing[..], &[0]].concat()).is_err());
+    let options = RecoverOptions { confidence: true, ..options() };
+    let (sure, outline) = prepare_rounds(released, &one.lists, &options).unwrap();
+    let found = line(Lead::new(&sure, released, outline, (&one.start, &one.lengths)));
+    assert!(found.starts_with("confidence of rounds in parts"), "{found}");
+    let consensus = RecoverOptions { solver: Solver::Consensus, ..options };
+    let found = line(prepare_rounds(released, &one.lists, &consensus));
+    assert_eq!(found, "solver of rounds: expected joint, found consensus");
+}
+
+#[test]
+fn other_bytes_are_no_round() {
+    let one = OnePart::new();
+    let released = &one.hidden.released;
+    let mut lead = one.lead(&one.start, &one.lengths).unwrap();
+    let first = lead.standing();
+    lead.moved(&one.moved(&first).unwrap()).unwrap();
+    lead.told(&one.model, released, &[]).unwrap();
+    let standing = lead.standing();
+    let news = lead.moved(&one.moved(&standing).unwrap()).unwrap().expect("jumps");
+    let tell = |news: &[u8]| one.model.tell_part(released, &one.edges, news);
+    assert!(one.moved(&standing).is_ok() && tell(&news).is_ok());
+    let refuses = |bytes: &[u8], read: &dyn Fn(&[u8]) -> bool| {
+        assert!(!read(&[bytes, &[0]].concat()), "one byte more");
+        for cut in (0..200.min(bytes.len())).chain([bytes.len() / 2, bytes.len() - 1]) {
+            assert!(!read(&bytes[..cut]), "{cut} bytes");
+        }
+        // Whatever is in them, they are read or refused.
+        for at in (0..bytes.len()).step_by(bytes.len().div_ceil(400)) {
+            for value in [0, 1, 0x7f, 0xff] {
+                let mut changed = bytes.to_vec();
+                changed[at] = value;
+                read(&changed);
+            }
+        }
+    };
+    refuses(&standing, &|bytes| one.moved(bytes).is_ok());
+    refuses(&news, &|bytes| tell(bytes).is_ok());
+    refuses(&one.outline, &|bytes| Outline::from_bytes(bytes).is_ok());
+    // Slots that do not ascend would be looked for in the wrong part.
+    let last = news.len() - 28;
+    assert!(last > 57 + 28, "one jump alone is in order");
+    let mut swapped = news.clone();
+    swapped[last..last + 4].copy_from_slice(&0u32.to_le_bytes());
+    let found = line(tell(&swapped));
+    assert!(found.starts_with("news: expected ascending slots"), "{found}");
 }

@@ -7,6 +7,7 @@
 use rayon::prelude::*;
 
 use crate::Error;
+use crate::recover::map::bytes::{Reader, Writer};
 use crate::recover::map::edges::record_of;
 use crate::recover::map::graph::Graph;
 use crate::recover::map::pieces::Pieces;
@@ -57,19 +58,33 @@ impl Judges {
     /// # Errors
     /// When edges cannot be read.
     pub(super) fn new(graph: &Graph) -> Result<Self, Error> {
-        Self::of(graph.n_slots(), |slot| Ok(graph.rows(&(slot..slot + 1))?.ends().to_vec()))
+        let n = graph.n_slots();
+        let row = |slot: usize| Ok((slot, graph.rows(&(slot..slot + 1))?.ends().to_vec()));
+        (0..n).step_by(n.div_ceil(SLOTS).max(1)).map(row).collect::<Result<_, _>>().map(Self)
     }
 
-    /// Slots spread evenly over a map with so many, of each of which there is a row of ends.
+    /// Appends them to `to`.
+    pub(super) fn write(&self, to: &mut Writer) {
+        to.u64(self.0.len() as u64);
+        for (slot, ends) in &self.0 {
+            to.u32(*slot as u32);
+            to.u32s(ends);
+        }
+    }
+
+    /// Those that [`write`](Self::write) appended, of a map with so many slots.
     ///
     /// # Errors
-    /// When edges cannot be had.
-    pub(crate) fn of(
-        n_slots: usize,
-        mut row: impl FnMut(usize) -> Result<Vec<u32>, Error>,
-    ) -> Result<Self, Error> {
-        let slots = (0..n_slots).step_by(n_slots.div_ceil(SLOTS).max(1));
-        slots.map(|slot| Ok((slot, row(slot)?))).collect::<Result<_, _>>().map(Self)
+    /// When there are none.
+    pub(super) fn read(from: &mut Reader<'_>, n_slots: usize) -> Result<Self, Error> {
+        let n = from.count(SLOTS)?;
+        let row = |_| {
+            let slot = from.below(n_slots)? as usize;
+            let ends = from.u32s(2 * n_slots)?;
+            from.all_below(&ends, n_slots)?;
+            Ok((slot, ends))
+        };
+        (0..n).map(row).collect::<Result<_, _>>().map(Self)
     }
 }
 

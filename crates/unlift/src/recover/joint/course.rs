@@ -147,6 +147,11 @@ impl<const D: usize> Course<D> {
         (jumpers, Places::new(&self.standing.next))
     }
 
+    /// Whether the round under way is the last of its sweep.
+    pub(crate) fn ends_sweep(&self) -> bool {
+        self.standing.turn + 1 == self.standing.turns
+    }
+
     /// So many jumps concern each of these slots, whoever told them.
     pub(crate) fn tell(&mut self, concerning: &[(u32, u32)]) {
         for &(slot, jumps) in concerning {

@@ -38,7 +38,8 @@ impl Jumps {
 
     /// So many more jumps concern `slot`.
     pub(super) fn add(&mut self, slot: usize, jumps: u32) {
-        *self.concerning[slot].get_mut() += jumps;
+        let concerning = self.concerning[slot].get_mut();
+        *concerning = concerning.saturating_add(jumps);
     }
 
     /// Those who know of jumps, with how many.

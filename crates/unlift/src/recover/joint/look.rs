@@ -1,7 +1,9 @@
 //! What the law of neighbors is learned from: places, and a sample of edges.
 
 use crate::Error;
+use crate::recover::map::bytes::{Reader, Writer};
 use crate::recover::map::crowding::Density;
+use crate::recover::map::edges::check_edge;
 use crate::recover::map::graph::Graph;
 use crate::recover::map::places::Places;
 use crate::seed::{Draws, Stage};
@@ -48,37 +50,56 @@ impl Sample {
     /// # Errors
     /// When edges cannot be read.
     pub(crate) fn new(graph: &Graph, seed: u64) -> Result<Self, Error> {
-        let row = |slot: usize| {
-            let rows = graph.rows(&(slot..slot + 1))?;
-            let (ends, class) = rows.of(slot);
-            Ok((ends.to_vec(), class.to_vec()))
-        };
-        Self::of((graph.n_slots(), graph.len()), seed, row, |at| graph.edge(at))
-    }
-
-    /// Slots spread evenly over a map with so many slots and edges: of a slot there is a `row` of ends and
-    /// classes, and each of all edges, end to end, is an `edge`.
-    ///
-    /// # Errors
-    /// When edges cannot be had.
-    pub(crate) fn of(
-        (n_slots, n_edges): (usize, usize),
-        seed: u64,
-        mut row: impl FnMut(usize) -> Result<(Vec<u32>, Vec<u8>), Error>,
-        mut edge: impl FnMut(u64) -> Result<(u32, u8), Error>,
-    ) -> Result<Self, Error> {
-        let every = n_slots.div_ceil(SLOTS).max(1);
-        let slots = if n_edges == 0 { 0..0 } else { 0..n_slots };
+        let n = graph.n_slots();
+        let every = n.div_ceil(SLOTS).max(1);
+        let slots = if graph.len() == 0 { 0..0 } else { 0..n };
         let rows = slots.step_by(every).map(|slot| {
             let mut draws = Draws::new(seed, Stage::NullSample, slot as u64);
             let mut random = [(0, 0); RANDOM];
-            for one in &mut random {
-                *one = edge(draws.below(n_edges as u64))?;
+            for edge in &mut random {
+                *edge = graph.edge(draws.below(graph.len() as u64))?;
             }
-            let (ends, class) = row(slot)?;
-            Ok(Sampled { slot: slot as u32, ends, class, random })
+            let edges = graph.rows(&(slot..slot + 1))?;
+            let (ends, class) = edges.of(slot);
+            Ok(Sampled { slot: slot as u32, ends: ends.to_vec(), class: class.to_vec(), random })
         });
         Ok(Self { rows: rows.collect::<Result<_, Error>>()? })
+    }
+
+    /// Appends them to `to`.
+    pub(super) fn write(&self, to: &mut Writer) {
+        to.u64(self.rows.len() as u64);
+        for Sampled { slot, ends, class, random } in &self.rows {
+            to.u32(*slot);
+            to.u32s(ends);
+            to.bytes(class);
+            for (end, class) in random {
+                to.u32(*end);
+                to.bytes(&[*class]);
+            }
+        }
+    }
+
+    /// Those that [`write`](Self::write) appended, of a map with so many records and slots per record.
+    ///
+    /// # Errors
+    /// When there are none.
+    pub(super) fn read(from: &mut Reader<'_>, map: (usize, usize)) -> Result<Self, Error> {
+        let n_slots = map.0 * map.1;
+        let n = from.count(SLOTS)?;
+        let row = |_| {
+            let slot = from.below(n_slots)?;
+            let ends = from.u32s(2 * n_slots)?;
+            let class = from.bytes(ends.len())?.to_vec();
+            let mut random = [(0, 0); RANDOM];
+            for edge in &mut random {
+                *edge = (from.u32()?, from.array::<1>()?[0]);
+            }
+            let all = ends.iter().copied().zip(class.iter().copied()).chain(random);
+            all.into_iter().try_for_each(|edge| check_edge(edge, map))?;
+            Ok(Sampled { slot, ends, class, random })
+        };
+        Ok(Self { rows: (0..n).map(row).collect::<Result<_, Error>>()? })
     }
 
     /// All of them.

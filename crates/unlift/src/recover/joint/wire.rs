@@ -45,19 +45,19 @@ impl<const D: usize> Standing<D> {
     /// # Errors
     /// When `bytes` are anything else.
     pub(crate) fn from_bytes(bytes: &[u8], n_slots: usize) -> Result<Self, Error> {
-        let mut from = Reader::new(bytes);
+        let mut from = Reader::new("round", bytes);
         let [dimensions, done, turns, turn] = head(&mut from, STANDING, n_slots)?;
         if usize::from(dimensions) != D || turns == 0 {
-            let expected = format!("one in {D} dimensions");
-            return Err(Error::new("round", expected, dimensions.to_string()));
+            return Err(from.wrong(format!("one in {D} dimensions"), dimensions.to_string()));
         }
         let next: Vec<Estimate<D>> =
             (0..n_slots).map(|_| estimate(&mut from)).collect::<Result<_, _>>()?;
         let ahead = from.f32s(n_slots)?;
         let mut jumps = Jumps::new(n_slots);
+        let mut first = 0;
         for _ in 0..from.count(n_slots)? {
-            let (slot, n) = (from.u32()?, from.u32()?);
-            jumps.add(below(slot, n_slots)?, n);
+            let slot = ascending(&mut from, &mut first, n_slots)?;
+            jumps.add(slot as usize, from.u32()?);
         }
         let density = Density::read(&mut from, n_slots)?;
         let law = Law::read(&mut from)?;
@@ -117,20 +117,19 @@ impl<const D: usize> News<D> {
     /// # Errors
     /// When `bytes` are anything else.
     pub(crate) fn from_bytes(bytes: &[u8], n_slots: usize) -> Result<Self, Error> {
-        let mut from = Reader::new(bytes);
+        let mut from = Reader::new("news", bytes);
         let [dimensions, ..] = head(&mut from, NEWS, n_slots)?;
         if usize::from(dimensions) != D {
-            let expected = format!("news in {D} dimensions");
-            return Err(Error::new("round", expected, dimensions.to_string()));
+            return Err(from.wrong(format!("some in {D} dimensions"), dimensions.to_string()));
         }
         let reach = from.f32()?;
         let bits = from.bytes(n_slots.div_ceil(8))?;
         let is_ahead = (0..n_slots).map(|slot| bits[slot / 8] >> (slot % 8) & 1 == 1).collect();
         let n = from.count(n_slots)?;
         let mut jumps = Vec::with_capacity(n);
+        let mut first = 0;
         for _ in 0..n {
-            let slot = from.u32()?;
-            below(slot, n_slots)?;
+            let slot = ascending(&mut from, &mut first, n_slots)?;
             let mut places = [[0.0; D]; 2];
             for x in places.as_flattened_mut() {
                 *x = from.f32()?;
@@ -159,12 +158,12 @@ impl<const D: usize> News<D> {
 /// The first bytes: what they are, four more, and how many slots.
 fn head(from: &mut Reader<'_>, magic: [u8; 8], n_slots: usize) -> Result<[u8; 4], Error> {
     if from.array()? != magic {
-        return Err(Error::new("round", "bytes of a round of this version", "others"));
+        return Err(from.wrong("bytes of this version", "others"));
     }
     let four = from.array()?;
     match from.u64()? {
         n if n == n_slots as u64 => Ok(four),
-        n => Err(Error::new("round", format!("one of {n_slots} slots"), n.to_string())),
+        n => Err(from.wrong(format!("those of {n_slots} slots"), n.to_string())),
     }
 }
 
@@ -177,16 +176,19 @@ fn estimate<const D: usize>(from: &mut Reader<'_>) -> Result<Estimate<D>, Error>
     let [status, axis] = from.array()?;
     let status = *Status::ALL
         .get(usize::from(status))
-        .ok_or_else(|| Error::new("round", "a status", status.to_string()))?;
+        .ok_or_else(|| from.wrong("a status", status.to_string()))?;
     if usize::from(axis) >= D {
-        return Err(Error::new("round", format!("an axis below {D}"), axis.to_string()));
+        return Err(from.wrong(format!("an axis below {D}"), axis.to_string()));
     }
     Ok(Estimate { position, status, support, axis, evidence: from.f32()? })
 }
 
-fn below(slot: u32, n_slots: usize) -> Result<usize, Error> {
-    match slot as usize {
-        slot if slot < n_slots => Ok(slot),
-        slot => Err(Error::new("round", format!("slots below {n_slots}"), slot.to_string())),
+/// The next slot, not before `first`, which becomes the one after it.
+fn ascending(from: &mut Reader<'_>, first: &mut u32, n_slots: usize) -> Result<u32, Error> {
+    let slot = from.below(n_slots)?;
+    if slot < *first {
+        return Err(from.wrong("ascending slots", format!("{slot} after {}", *first - 1)));
     }
+    *first = slot + 1;
+    Ok(slot)
 }

@@ -27,6 +27,12 @@ impl Writer {
         self.bytes(&x.to_le_bytes());
     }
 
+    /// Appends whole numbers, and how many there are.
+    pub(crate) fn u32s(&mut self, numbers: &[u32]) {
+        self.u64(numbers.len() as u64);
+        numbers.iter().for_each(|&x| self.u32(x));
+    }
+
     /// Appends every bit of numbers, but not how many there are.
     pub(crate) fn f32s(&mut self, numbers: &[f32]) {
         numbers.iter().for_each(|x| self.bytes(&x.to_bits().to_le_bytes()));
@@ -40,22 +46,29 @@ impl Writer {
 
 /// Takes numbers off the front.
 #[derive(Debug)]
-pub(crate) struct Reader<'a>(&'a [u8]);
+pub(crate) struct Reader<'a> {
+    what: &'static str,
+    left: &'a [u8],
+}
 
 impl<'a> Reader<'a> {
-    /// From the first byte on.
-    pub(crate) fn new(bytes: &'a [u8]) -> Self {
-        Self(bytes)
+    /// From the first byte on, of what errors call so.
+    pub(crate) fn new(what: &'static str, bytes: &'a [u8]) -> Self {
+        Self { what, left: bytes }
+    }
+
+    /// An error about these bytes.
+    pub(crate) fn wrong(&self, expected: impl Into<String>, found: impl Into<String>) -> Error {
+        Error::new(self.what, expected, found)
     }
 
     /// The next `n` bytes.
     pub(crate) fn bytes(&mut self, n: usize) -> Result<&'a [u8], Error> {
-        if n > self.0.len() {
-            let found = format!("{} bytes", self.0.len());
-            return Err(Error::new("model", format!("{n} more bytes"), found));
+        if n > self.left.len() {
+            return Err(self.wrong(format!("{n} more bytes"), format!("{} bytes", self.left.len())));
         }
-        let (front, rest) = self.0.split_at(n);
-        self.0 = rest;
+        let (front, rest) = self.left.split_at(n);
+        self.left = rest;
         Ok(front)
     }
 
@@ -76,12 +89,33 @@ impl<'a> Reader<'a> {
         self.array().map(u32::from_le_bytes)
     }
 
+    /// A whole number below `end`.
+    pub(crate) fn below(&mut self, end: usize) -> Result<u32, Error> {
+        let x = self.u32()?;
+        self.all_below(&[x], end).map(|()| x)
+    }
+
+    /// So many whole numbers at `most` as it says.
+    pub(crate) fn u32s(&mut self, most: usize) -> Result<Vec<u32>, Error> {
+        let n = self.count(most)?;
+        let (rows, _) = self.bytes(n.saturating_mul(4))?.as_chunks::<4>();
+        Ok(rows.iter().map(|&bytes| u32::from_le_bytes(bytes)).collect())
+    }
+
+    /// Refuses numbers that are not below `end`.
+    pub(crate) fn all_below(&self, numbers: &[u32], end: usize) -> Result<(), Error> {
+        match numbers.iter().find(|&&x| x as usize >= end) {
+            None => Ok(()),
+            Some(x) => Err(self.wrong(format!("numbers below {end}"), x.to_string())),
+        }
+    }
+
     /// A whole number that counts something, at most `most`.
     pub(crate) fn count(&mut self, most: usize) -> Result<usize, Error> {
         let n = self.u64()?;
         match usize::try_from(n) {
             Ok(n) if n <= most => Ok(n),
-            _ => Err(Error::new("model", format!("a count of at most {most}"), n.to_string())),
+            _ => Err(self.wrong(format!("a count of at most {most}"), n.to_string())),
         }
     }
 
@@ -97,15 +131,15 @@ impl<'a> Reader<'a> {
 
     /// So many numbers.
     pub(crate) fn f32s(&mut self, n: usize) -> Result<Vec<f32>, Error> {
-        let (rows, _) = self.bytes(4 * n)?.as_chunks::<4>();
+        let (rows, _) = self.bytes(n.saturating_mul(4))?.as_chunks::<4>();
         Ok(rows.iter().map(|&bytes| f32::from_le_bytes(bytes)).collect())
     }
 
     /// Nothing may be left.
     pub(crate) fn end(&self) -> Result<(), Error> {
-        match self.0.len() {
+        match self.left.len() {
             0 => Ok(()),
-            n => Err(Error::new("model", "its end", format!("{n} more bytes"))),
+            n => Err(self.wrong("its end", format!("{n} more bytes"))),
         }
     }
 }

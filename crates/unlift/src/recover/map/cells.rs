@@ -80,11 +80,8 @@ impl<const D: usize> Grid<D> {
         let n_cells = dims.iter().try_fold(1usize, |all, &n| all.checked_mul(n));
         let n_cells = n_cells.filter(|&n| n <= most && cell > 0.0);
         let Some(n_cells) = n_cells else {
-            return Err(Error::new(
-                "model",
-                format!("a grid of at most {most} cells"),
-                format!("{dims:?}"),
-            ));
+            let expected = format!("a grid of at most {most} cells");
+            return Err(from.wrong(expected, format!("{dims:?}")));
         };
         let last = dims.map(|n| (n - 1) as f32);
         let values = from.f32s(n_cells)?;

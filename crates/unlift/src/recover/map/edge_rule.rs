@@ -1,14 +1,12 @@
 //! What the edges of one slot owe to the lists of all: how many who name it count, and how high a score is.
 
 use super::bytes::{Reader, Writer};
-use super::edges::{score_bounds, score_class};
+use super::edges::{SCORE_CLASSES, score_bounds, score_class};
 use crate::Error;
 
 /// Reverse entries of a row at most, as a multiple of the mean list: whoever is named by everyone is
 /// named by mistake.
 const MOST_REVERSE: usize = 3;
-/// Where classes of scores begin at most.
-const MOST_BOUNDS: usize = 16;
 
 /// The rule by which edges are made of lists.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,7 +49,7 @@ impl EdgeRule {
     /// When it is none.
     pub(crate) fn read(from: &mut Reader<'_>) -> Result<Self, Error> {
         let most = from.count(u32::MAX as usize)?.max(1);
-        let n = from.count(MOST_BOUNDS)?;
+        let n = from.count(SCORE_CLASSES - 1)?;
         Ok(Self { most, bounds: from.f32s(n)? })
     }
 }

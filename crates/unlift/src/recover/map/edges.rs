@@ -1,6 +1,7 @@
 //! Kinds of edges: who names whom, and how high a source scores it.
 
 use super::named_by::MOST_CLASSES;
+use crate::Error;
 
 /// Which end of an edge names the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,6 +32,22 @@ pub(crate) fn record_of(slot: usize, slots_per_record: usize) -> usize {
 #[inline(always)]
 pub(crate) fn either(class: u8, slots_per_record: usize) -> bool {
     slots_per_record == 2 && side(class) != Side::Reverse
+}
+
+/// Refuses an edge that is none in a map of so many records and slots per record.
+pub(crate) fn check_edge((end, class): (u32, u8), map: (usize, usize)) -> Result<(), Error> {
+    let n_slots = map.0 * map.1;
+    if end as usize >= n_slots {
+        return Err(Error::new("edge", format!("a slot below {n_slots}"), end.to_string()));
+    }
+    if usize::from(class) >= CLASSES {
+        return Err(Error::new("edge", format!("a class below {CLASSES}"), class.to_string()));
+    }
+    // What may be either slot of a record is called by the first.
+    if either(class, map.1) && end % 2 == 1 {
+        return Err(Error::new("edge", "the first slot of a record", end.to_string()));
+    }
+    Ok(())
 }
 
 /// Who names whom in an edge of this class.

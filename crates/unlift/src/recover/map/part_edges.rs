@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use super::edge_rule::EdgeRule;
-use super::edges::{CLASSES, Side, either, record_of, side};
+use super::edges::{Side, check_edge, record_of, side};
 use super::graph::EdgeRows;
 use super::merge::Rows;
 use crate::neighbors::Neighborhoods;
@@ -17,6 +17,8 @@ use crate::{Error, RecordId};
 #[derive(Clone, Debug, PartialEq)]
 pub struct Edges {
     slots: Range<usize>,
+    /// Records of the map, and slots of each.
+    map: (usize, usize),
     /// Where the edges of each slot start; one more entry than there are slots.
     offsets: Vec<u64>,
     ends: Vec<u32>,
@@ -45,13 +47,13 @@ impl Edges {
         offsets: Vec<u64>,
         ends: Vec<u32>,
         class: Vec<u8>,
-        (n_records, slots_per_record): (usize, usize),
+        map: (usize, usize),
     ) -> Result<Self, Error> {
-        let n_slots = n_records * slots_per_record;
         let wrong = |what: &str, expected: String, found: String| {
             Err(Error::new(format!("edges: {what}"), expected, found))
         };
-        if slots.end > n_slots || offsets.len() != slots.len() + 1 {
+        let n_slots = map.0.saturating_mul(map.1);
+        if slots.start > slots.end || slots.end > n_slots || offsets.len() != slots.len() + 1 {
             let expected = format!("{} offsets within {n_slots} slots", slots.len() + 1);
             return wrong("slots", expected, format!("{slots:?}, {} offsets", offsets.len()));
         }
@@ -60,19 +62,11 @@ impl Edges {
             let expected = format!("{n} ends and classes");
             return wrong("offsets", expected, format!("{} and {}", ends.len(), class.len()));
         }
-        if let Some(end) = ends.iter().find(|&&end| end as usize >= n_slots) {
-            return wrong("end", format!("a slot below {n_slots}"), end.to_string());
-        }
-        if let Some(class) = class.iter().find(|&&class| usize::from(class) >= CLASSES) {
-            return wrong("class", format!("a number below {CLASSES}"), class.to_string());
-        }
-        // What may be either slot of a record is called by the first.
-        let is_second = |end: u32, class: u8| either(class, slots_per_record) && end % 2 == 1;
-        if let Some(at) = (0..ends.len()).find(|&at| is_second(ends[at], class[at])) {
-            return wrong("end", "the first slot of a record".into(), ends[at].to_string());
-        }
-        let edges = Self { slots, offsets, ends, class };
-        match edges.slots.clone().find(|&slot| !edges.rows().of(slot).0.is_sorted()) {
+        let mut all = ends.iter().copied().zip(class.iter().copied());
+        all.try_for_each(|edge| check_edge(edge, map)).map_err(|error| error.within("edges"))?;
+        let edges = Self { slots, map, offsets, ends, class };
+        let ascends = |slot: usize| edges.rows().of(slot).0.windows(2).all(|w| w[0] < w[1]);
+        match edges.slots.clone().find(|&slot| !ascends(slot)) {
             Some(slot) => wrong("ends", "ascending slots".into(), format!("others, slot {slot}")),
             None => Ok(edges),
         }
@@ -81,7 +75,7 @@ impl Edges {
     /// Those of `slots` (whole records) with these `lists` of theirs, and whoever names their records in `named_by`.
     ///
     /// # Errors
-    /// When somebody names a record that is not of these slots, or is no slot.
+    /// When somebody names a record that is not of these slots, or twice, or is no slot.
     pub(crate) fn of_lists(
         lists: &Neighborhoods,
         slots: Range<usize>,
@@ -90,13 +84,9 @@ impl Edges {
         slots_per_record: usize,
     ) -> Result<Self, Error> {
         let records = slots.start / slots_per_record..slots.end / slots_per_record;
-        let (starts, by) = sorted(named_by, &records, lists.n_slots(), rule)?;
-        let of_record = |record: usize| {
-            let at = record - records.start;
-            &by[starts[at]..starts[at + 1]]
-        };
+        let naming = Naming::new(named_by, records, lists.n_slots(), rule)?;
         let n_own = lists.offsets()[slots.end] - lists.offsets()[slots.start];
-        let room = n_own as usize + slots_per_record * by.len();
+        let room = n_own as usize + slots_per_record * naming.by.len();
         let (mut ends, mut class) = (vec![0; room], vec![0; room]);
         let mut rows = Rows { ends: &mut ends, class: &mut class, n: 0 };
         let mut offsets = Vec::with_capacity(slots.len() + 1);
@@ -104,19 +94,25 @@ impl Edges {
         for slot in slots.clone() {
             let scores = lists.scores_of(slot);
             let class = |at| rule.class_at(scores, at);
-            let all = of_record(record_of(slot, slots_per_record));
+            let all = naming.of(record_of(slot, slots_per_record));
             rows.add(lists.of(slot), all, slots_per_record, rule.most, class);
             offsets.push(rows.n as u64);
         }
         let n = rows.n;
         ends.truncate(n);
         class.truncate(n);
-        Ok(Self { slots, offsets, ends, class })
+        let map = (lists.n_slots() / slots_per_record, slots_per_record);
+        Ok(Self { slots, map, offsets, ends, class })
     }
 
     /// The slots whose edges these are.
     pub fn slots(&self) -> Range<usize> {
         self.slots.clone()
+    }
+
+    /// Records of the map that they are of, and slots of each.
+    pub fn map(&self) -> (usize, usize) {
+        self.map
     }
 
     /// Where the edges of each slot start; one more entry than there are slots.
@@ -148,11 +144,8 @@ impl Edges {
     ///
     /// # Errors
     /// When an end is no record.
-    pub(crate) fn lists(
-        &self,
-        n_records: usize,
-        slots_per_record: usize,
-    ) -> Result<Neighborhoods, Error> {
+    pub(crate) fn lists(&self) -> Result<Neighborhoods, Error> {
+        let slots_per_record = self.map.1;
         let stays = |class: u8| slots_per_record == 1 || side(class) != Side::Reverse;
         let mut records = Vec::with_capacity(self.ends.len());
         let mut offsets = Vec::with_capacity(self.offsets.len());
@@ -168,41 +161,67 @@ impl Edges {
             );
             offsets.push(records.len() as u64);
         }
-        let map = (n_records, slots_per_record);
-        Neighborhoods::of_slots(self.slots.start, &offsets, records, None, map)
+        Neighborhoods::of_slots(self.slots.start, &offsets, records, None, self.map)
     }
 }
 
-/// Who names each of `records`, ascending, with the class of the score: where those of each start, and all end to end.
-fn sorted(
-    NamedBy { records: named, slots, scores }: NamedBy<'_>,
-    records: &Range<usize>,
-    n_slots: usize,
-    rule: &EdgeRule,
-) -> Result<(Vec<usize>, Vec<(u32, u8)>), Error> {
-    let lengths = [slots.len(), scores.map_or(slots.len(), <[f32]>::len)];
-    if lengths != [named.len(); 2] {
-        let expected = format!("columns of {}", named.len());
-        return Err(Error::new("named by", expected, format!("{lengths:?}")));
+/// Who names each of some records.
+struct Naming {
+    records: Range<usize>,
+    /// Where those that name each start; one more entry than there are records.
+    starts: Vec<usize>,
+    /// The slot that names it, and the class of its score; ascending for each record.
+    by: Vec<(u32, u8)>,
+}
+
+impl Naming {
+    fn new(
+        NamedBy { records: named, slots, scores }: NamedBy<'_>,
+        records: Range<usize>,
+        n_slots: usize,
+        rule: &EdgeRule,
+    ) -> Result<Self, Error> {
+        let lengths = [slots.len(), scores.map_or(slots.len(), <[f32]>::len)];
+        if lengths != [named.len(); 2] {
+            let expected = format!("columns of {}", named.len());
+            return Err(Error::new("named by", expected, format!("{lengths:?}")));
+        }
+        if let Some(record) = named.iter().find(|&&record| !records.contains(&(record as usize))) {
+            return Err(Error::new("named by", format!("records {records:?}"), record.to_string()));
+        }
+        if let Some(slot) = slots.iter().find(|&&slot| slot as usize >= n_slots) {
+            return Err(Error::new("named by", format!("slots below {n_slots}"), slot.to_string()));
+        }
+        let mut starts = vec![0; records.len() + 1];
+        named.iter().for_each(|&record| starts[record as usize - records.start + 1] += 1);
+        for at in 1..starts.len() {
+            starts[at] += starts[at - 1];
+        }
+        let mut next = starts.clone();
+        let mut by = vec![(0, 0); named.len()];
+        for (at, (&record, &slot)) in named.iter().zip(slots).enumerate() {
+            let next = &mut next[record as usize - records.start];
+            by[*next] = (slot, rule.class_at(scores, at));
+            *next += 1;
+        }
+        for (record, row) in records.clone().zip(starts.windows(2)) {
+            let by = &mut by[row[0]..row[1]];
+            by.sort_unstable();
+            if let Some(twice) = by.windows(2).find(|two| two[0].0 == two[1].0) {
+                let found = format!("slot {} twice", twice[0].0);
+                return Err(Error::new(
+                    format!("named by: record {record}"),
+                    "each slot once",
+                    found,
+                ));
+            }
+        }
+        Ok(Self { records, starts, by })
     }
-    if let Some(record) = named.iter().find(|&&record| !records.contains(&(record as usize))) {
-        return Err(Error::new("named by", format!("records {records:?}"), record.to_string()));
+
+    /// Who names `record`, which is among them.
+    fn of(&self, record: usize) -> &[(u32, u8)] {
+        let at = record - self.records.start;
+        &self.by[self.starts[at]..self.starts[at + 1]]
     }
-    if let Some(slot) = slots.iter().find(|&&slot| slot as usize >= n_slots) {
-        return Err(Error::new("named by", format!("slots below {n_slots}"), slot.to_string()));
-    }
-    let mut starts = vec![0; records.len() + 1];
-    named.iter().for_each(|&record| starts[record as usize - records.start + 1] += 1);
-    for at in 1..starts.len() {
-        starts[at] += starts[at - 1];
-    }
-    let mut next = starts.clone();
-    let mut by = vec![(0, 0); named.len()];
-    for (at, (&record, &slot)) in named.iter().zip(slots).enumerate() {
-        let next = &mut next[record as usize - records.start];
-        by[*next] = (slot, rule.class_at(scores, at));
-        *next += 1;
-    }
-    starts.windows(2).for_each(|row| by[row[0]..row[1]].sort_unstable());
-    Ok((starts, by))
 }

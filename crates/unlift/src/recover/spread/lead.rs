@@ -1,36 +1,30 @@
 //! Who leads the rounds of a map whose edges are elsewhere.
 
-use std::cell::RefCell;
-use std::collections::{BTreeMap, BTreeSet};
-
-use crate::Error;
-use crate::neighbors::Neighborhoods;
 use crate::recover::exact;
-use crate::recover::joint::{Agree, Course, Digest, Judges, Kind, News, Sample};
+use crate::recover::joint::{Agree, Course, Kind, News, Outline};
 use crate::recover::learned::Model;
-use crate::recover::map::part_edges::Edges;
 use crate::recover::map::pieces::Pieces;
-use crate::recover::map::places::Places;
+use crate::recover::map::places::{FAR, Places};
 use crate::recover::map::with_pieces::WithPieces;
-use crate::recover::result::estimate::Estimate;
+use crate::recover::result::estimate::{Estimate, Status};
 use crate::recover::result::recovered::Recovered;
 use crate::recover::result::unknown::Unknown;
 use crate::recover::solve::Moved;
-use crate::recover::task::Task;
+use crate::recover::task::in_columns;
 use crate::released::Released;
-
-/// The other ends of the edges of a slot, and the class of each.
-pub type EdgesOfSlot = (Vec<u32>, Vec<u8>);
+use crate::{About, Error, Fingerprint};
 
 /// Leads the rounds of a map whose edges others have, each those of some slots.
 ///
-/// In memory are 90 bytes a slot or so, and a sample of the edges. One process does all of it, in this order:
+/// In memory are some 100 bytes a slot, 50 more for what is sent in a round, and the sample of an [`Outline`]. One process does all of it, in
+/// this order:
 ///
-/// 1. [`wanted`](Self::wanted): whose edges are the sample, [`new`](Self::new) with them.
+/// 1. [`new`](Self::new) with what [`Model::start_part`] says of all slots.
 /// 2. Until it [`is_done`](Self::is_done): [`standing`](Self::standing) to all parts; [`moved`](Self::moved) with what
 ///    [`Model::move_part`] says; the news that come of it to all parts; [`told`](Self::told) with what [`Model::tell_part`] says.
 /// 3. [`finish`](Self::finish).
 pub struct Lead<const D: usize> {
+    map: Fingerprint,
     course: Course<D>,
     /// Slots without edges stay where they are, and nobody asks for them.
     has_edges: Vec<bool>,
@@ -43,82 +37,44 @@ pub struct Lead<const D: usize> {
 }
 
 impl<const D: usize> Lead<D> {
-    /// The slots whose edges the lead must know, ascending: some 50,000, however large the map is. `lengths` are the numbers of
-    /// edges of all slots.
+    /// Before the first round: `start` is what [`Model::start_part`] says of all slots, and `lengths` how many edges each has in
+    /// its part.
     ///
     /// # Errors
-    /// None that a caller can cause.
-    pub fn wanted(model: &Model<D>, lengths: &[u32]) -> Result<Vec<u32>, Error> {
-        let starts = starts(lengths);
-        let (n_slots, n_edges) = (lengths.len(), starts[lengths.len()] as usize);
-        // Asked as if for the edges themselves.
-        let slots = RefCell::new(BTreeSet::new());
-        let want = |slot: usize| {
-            slots.borrow_mut().insert(slot as u32);
-        };
-        let row = |slot: usize| {
-            want(slot);
-            Ok(EdgesOfSlot::default())
-        };
-        let edge = |at: u64| {
-            want(slot_of(&starts, at));
-            Ok((0, 0))
-        };
-        Judges::of(n_slots, |slot| row(slot).map(|row| row.0))?;
-        Sample::of((n_slots, n_edges), model.options().seed, row, edge)?;
-        Ok(slots.into_inner().into_iter().collect())
-    }
-
-    /// Before the first round, of a map with so many edges per slot (`lengths`). `listed` says how often each record is at the other
-    /// end of an edge, `edges` are those of the [`wanted`](Self::wanted) slots, and `start` is what [`Model::start_part`] says of all slots.
-    ///
-    /// # Errors
-    /// When the model is of another map or not for rounds, columns are not as long as the map, or edges are missing.
+    /// When model or outline are of another map or not for rounds, columns are not as long as the map, edges are lost or are others than
+    /// those of the outline, or an estimate cannot be.
     pub fn new(
         model: &Model<D>,
         released: &Released<D>,
-        (lengths, listed): (&[u32], Vec<u32>),
-        edges: &BTreeMap<u32, EdgesOfSlot>,
-        start: &[Estimate<D>],
+        outline: Outline,
+        (start, lengths): (&[Estimate<D>], &[u32]),
     ) -> Result<Self, Error> {
         let family = model.family_of_rounds(released)?;
+        let map = released.fingerprint();
+        map.expect(Some(outline.map())).map_err(|error| error.within("outline"))?;
         if model.options().confidence {
             let expected = "a model without: who has no lists cannot say how sure it is";
             return Err(Error::new("confidence of rounds in parts", expected, "asked for"));
         }
         let n_slots = released.n_slots();
-        for (what, expected, found) in [
-            ("lengths", n_slots, lengths.len()),
-            ("listed", released.n_records(), listed.len()),
-            ("start", n_slots, start.len()),
-        ] {
-            if found != expected {
-                return Err(Error::new(what, format!("{expected} rows"), found.to_string()));
+        for (what, n) in
+            [("outline", outline.lengths.len()), ("start", start.len()), ("lengths", lengths.len())]
+        {
+            if n != n_slots {
+                return Err(Error::new(what, format!("{n_slots} rows"), n.to_string()));
             }
         }
-        let starts = starts(lengths);
-        let map = (released.n_records(), released.slots_per_record());
-        let row = |slot: usize| -> Result<EdgesOfSlot, Error> {
-            let (ends, class) = edges.get(&(slot as u32)).cloned().unwrap_or_default();
-            let offsets = vec![0, u64::from(lengths[slot])];
-            Edges::try_new(slot..slot + 1, offsets, ends.clone(), class.clone(), map)
-                .map_err(|error| error.within("wanted"))?;
-            Ok((ends, class))
-        };
-        let edge = |at: u64| {
-            let slot = slot_of(&starts, at);
-            let (ends, class) = row(slot)?;
-            let at = (at - starts[slot]) as usize;
-            Ok((ends[at], class[at]))
-        };
-        let n_edges = starts[n_slots] as usize;
-        let judges = Judges::of(n_slots, |slot| row(slot).map(|row| row.0))?;
-        let sample = Sample::of((n_slots, n_edges), model.options().seed, row, edge)?;
+        let mut pairs = outline.lengths.iter().zip(lengths).enumerate();
+        if let Some((slot, (expected, found))) = pairs.find(|(_, (a, b))| a != b) {
+            let what = format!("edges of slot {slot}");
+            return Err(Error::new(what, expected.to_string(), found.to_string()));
+        }
+        check_estimates(start.iter())?;
         let kind = family.with_pieces(model.delta as f32, OfKind(model.delta as f32));
         let has_edges = lengths.iter().map(|&n| n > 0).collect();
-        let course = Course::new(kind, Digest { listed, sample, judges }, start);
+        let course = Course::new(kind, outline.digest, start);
         let feeds = if is_settled(model, released) { exact::feeds(released) } else { 0 };
-        Ok(Self { course, has_edges, after: None, last: None, feeds })
+        Ok(Self { map, course, has_edges, after: None, last: None, feeds })
     }
 
     /// Whether all rounds are done.
@@ -135,11 +91,13 @@ impl<const D: usize> Lead<D> {
     /// none.
     ///
     /// # Errors
-    /// When a slot with edges is missing, a slot is there twice or out of turn, or the round is one that has moved.
+    /// When a slot with edges is missing, a slot is there twice or out of turn, an estimate cannot be, or the round is one that has
+    /// moved.
     pub fn moved(&mut self, moved: &[Moved<D>]) -> Result<Option<Vec<u8>>, Error> {
         if self.after.is_some() || self.is_done() {
             return Err(Error::new("round", "one after the other", "slots that move twice"));
         }
+        check_estimates(moved.iter().map(|one| &one.estimate))?;
         let standing = self.course.standing();
         let turn = |slot: usize| standing.is_turn_of(slot);
         let mut open: Vec<bool> = (0..self.has_edges.len()).map(turn).collect();
@@ -174,14 +132,18 @@ impl<const D: usize> Lead<D> {
         if let Some((slot, _)) = concerning.iter().find(|(slot, _)| *slot as usize >= n_slots) {
             return Err(Error::new("told", format!("slots below {n_slots}"), slot.to_string()));
         }
-        let family = model.family_of_rounds(released)?;
+        self.map.expect(Some(released.fingerprint()))?;
+        // Records are asked at the end of a sweep alone.
+        let ends_sweep = self.course.ends_sweep();
+        let family = ends_sweep.then(|| model.family_of_rounds(released)).transpose()?;
         let Some(after) = self.after.take() else {
             return Err(Error::new("round", "slots that have moved", "others"));
         };
         let delta = model.delta as f32;
         self.course.tell(concerning);
-        self.course.go_on(after, |judges, next| {
-            family.with_pieces(delta, Agree { judges, estimates: next, delta })
+        self.course.go_on(after, |judges, estimates| {
+            let agree = Agree { judges, estimates, delta };
+            family.map_or(0.0, |family| family.with_pieces(delta, agree))
         });
         if self.course.is_done() {
             self.settle(model, released);
@@ -210,19 +172,18 @@ impl<const D: usize> Lead<D> {
     /// # Errors
     /// When rounds are left, or columns are not those of this map.
     pub fn finish(
-        self,
+        &self,
         model: &Model<D>,
         released: &Released<D>,
         descriptor_row: Option<Vec<u32>>,
     ) -> Result<Recovered<D>, Error> {
-        let Some(last) = self.last else {
+        self.map.expect(Some(released.fingerprint()))?;
+        let Some(last) = &self.last else {
             return Err(Error::new("rounds", "all of them", "some that are left"));
         };
-        let map = (released.n_records(), released.slots_per_record());
-        let lists = Neighborhoods::of_slots(0, &[0], Vec::new(), None, map)?;
-        let lists = lists.with_about(model.about);
-        let task = Task::new(model, released, &lists)?;
-        Ok(task.in_columns(&last, descriptor_row)?.without_confidence(Unknown::NotAsked))
+        let about = About { map: Some(self.map), ..model.about };
+        let recovered = in_columns(released, (last, descriptor_row), model.delta, about)?;
+        Ok(recovered.without_confidence(Unknown::NotAsked))
     }
 }
 
@@ -237,21 +198,20 @@ fn is_settled<const D: usize>(model: &Model<D>, released: &Released<D>) -> bool 
     model.options().exact_constraints && exact::can_settle(released)
 }
 
-/// Where the edges of each slot start among all; one more entry than there are slots.
-fn starts(lengths: &[u32]) -> Vec<u64> {
-    let mut starts = Vec::with_capacity(lengths.len() + 1);
-    starts.push(0);
-    let mut start = 0;
-    starts.extend(lengths.iter().map(|&n| {
-        start += u64::from(n);
-        start
-    }));
-    starts
-}
-
-/// The slot that the edge `at` of all is of.
-fn slot_of(starts: &[u64], at: u64) -> usize {
-    starts.partition_point(|&start| start <= at) - 1
+/// Refuses what no part says of a slot.
+fn check_estimates<'a, const D: usize>(
+    mut estimates: impl Iterator<Item = &'a Estimate<D>>,
+) -> Result<(), Error> {
+    let can_be = |one: &&Estimate<D>| {
+        let is_place = one.position.iter().all(|x| x.abs() < FAR);
+        usize::from(one.axis) < D && is_place == (one.status == Status::Ok)
+    };
+    match estimates.find(|one| !can_be(one)) {
+        None => Ok(()),
+        Some(one) => {
+            Err(Error::new("estimate", "a place if and only if it is ok", format!("{one:?}")))
+        }
+    }
 }
 
 struct OfKind(f32);

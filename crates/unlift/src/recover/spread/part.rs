@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::Error;
 use crate::neighbors::Neighborhoods;
-use crate::recover::checks::check_anchors;
+use crate::recover::checks::{check_anchors, check_lists};
 use crate::recover::consensus::Consensus;
 use crate::recover::joint::{News, Standing};
 use crate::recover::learned::Model;
@@ -36,12 +36,10 @@ impl<const D: usize> Model<D> {
         named_by: NamedBy<'_>,
     ) -> Result<Edges, Error> {
         let rule = self.rule_of_rounds(released)?;
+        check_lists(released, lists)?;
+        released.fingerprint().expect(lists.about().map)?;
         let per_record = released.slots_per_record();
-        let is_there = slots.start <= slots.end && slots.end <= released.n_slots();
-        if !is_there || slots.start % per_record + slots.end % per_record > 0 {
-            let expected = format!("a range of whole records, {per_record} slots each");
-            return Err(Error::new("slots", expected, format!("{slots:?}")));
-        }
+        check_records(&slots, (released.n_records(), per_record))?;
         let has_scores = [lists.scores().is_some(), named_by.scores.is_some()];
         if rule.has_scores() && has_scores != [true; 2] {
             return Err(Error::new("scores", "some, as the model's lists have", "none"));
@@ -53,12 +51,13 @@ impl<const D: usize> Model<D> {
     /// descriptor is whose.
     ///
     /// # Errors
-    /// When the model is of another map or solver.
+    /// When the model or the edges are of another map or solver, or these end within a record.
     pub fn start_part(&self, released: &Released<D>, edges: &Edges) -> Result<Part<D>, Error> {
-        let family = self.family_of_rounds(released)?;
+        let family = self.family_of_part(released, edges)?;
         let per_record = released.slots_per_record();
-        let lists = edges.lists(released.n_records(), per_record)?;
         let (slots, delta) = (edges.slots(), self.delta as f32);
+        check_records(&slots, edges.map())?;
+        let lists = edges.lists()?;
         let lists = Listed::Here(&lists);
         let records = slots.start / per_record..slots.end / per_record;
         let estimates = Consensus { family: &family, lists, delta }.solve(slots)?;
@@ -68,7 +67,7 @@ impl<const D: usize> Model<D> {
     /// Where those slots go whose turn it is and that have `edges` (others stay where they are): `standing` is what the lead [said](super::Lead::standing).
     ///
     /// # Errors
-    /// When it is of another map, or the model is.
+    /// When it is of another map, or the model or the edges are.
     pub fn move_part(
         &self,
         released: &Released<D>,
@@ -76,7 +75,7 @@ impl<const D: usize> Model<D> {
         standing: &[u8],
     ) -> Result<Vec<Moved<D>>, Error> {
         let standing = Standing::from_bytes(standing, released.n_slots())?;
-        let family = self.family_of_rounds(released)?;
+        let family = self.family_of_part(released, edges)?;
         let delta = self.delta as f32;
         let rows = edges.rows();
         let moves = |&slot: &usize| standing.is_turn_of(slot) && !rows.of(slot).0.is_empty();
@@ -89,7 +88,7 @@ impl<const D: usize> Model<D> {
     /// Whom the jumps of slots of `edges` concern, and how many: `news` is what the lead had to tell.
     ///
     /// # Errors
-    /// When it is of another map, or the model is.
+    /// When it is of another map, or the model or the edges are.
     pub fn tell_part(
         &self,
         released: &Released<D>,
@@ -97,8 +96,22 @@ impl<const D: usize> Model<D> {
         news: &[u8],
     ) -> Result<Vec<(u32, u32)>, Error> {
         let news = News::from_bytes(news, released.n_slots())?;
-        let family = self.family_of_rounds(released)?;
+        let family = self.family_of_part(released, edges)?;
         Ok(family.with_pieces(self.delta as f32, Tell { news: &news, edges }))
+    }
+
+    /// The records of `released`, if the model is for rounds over them and the edges are of a map like it.
+    fn family_of_part<'a>(
+        &self,
+        released: &'a Released<D>,
+        edges: &Edges,
+    ) -> Result<Family<'a, D>, Error> {
+        let map = (released.n_records(), released.slots_per_record());
+        if edges.map() != map {
+            let found = format!("{:?}", edges.map());
+            return Err(Error::new("edges: records, and slots of each", format!("{map:?}"), found));
+        }
+        self.family_of_rounds(released)
     }
 
     /// The records of `released`, if the model is for rounds over them.
@@ -121,6 +134,19 @@ impl<const D: usize> Model<D> {
         let rule = self.rule.as_ref().filter(|_| solver == Solver::Joint);
         rule.ok_or_else(|| Error::new("solver of rounds", Solver::Joint.name(), solver.name()))
     }
+}
+
+/// Refuses slots that end within a record, or are not there.
+fn check_records(
+    slots: &Range<usize>,
+    (n_records, per_record): (usize, usize),
+) -> Result<(), Error> {
+    let is_there = slots.start <= slots.end && slots.end <= n_records * per_record;
+    if is_there && slots.start % per_record + slots.end % per_record == 0 {
+        return Ok(());
+    }
+    let expected = format!("a range of whole records, {per_record} slots each");
+    Err(Error::new("slots", expected, format!("{slots:?}")))
 }
 
 struct Move<'a, const D: usize> {
