@@ -36,7 +36,6 @@ On Spark: `unlift.spark.recover_in_rounds`.
 
 from __future__ import annotations
 
-import functools
 import os
 from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any
@@ -274,12 +273,13 @@ def _held(rows: _pa.Table, of_map: Released) -> tuple[Edges, int, int]:
     return Edges(of_map, first, offsets, columns["ends"], columns["classes"]), first, n
 
 
-def _rows(table: _pa.Table | None, first: int, n: int, names: tuple[str, str]) -> tuple[Any, dict[str, Any]]:
+def _rows(given: _pa.Table | None, first: int, n: int, names: tuple[str, str]) -> tuple[Any, dict[str, Any]]:
     """Lists of `n` slots from `first` on: where they start, and columns end to end; None for one that is not there."""
     pa = _pyarrow()
     lengths = np.zeros(n + 1, dtype=np.int64)
-    if table is None:
+    if given is None:
         return lengths, {names[0]: np.zeros(0, dtype=np.int64), names[1]: None}
+    table: Any = given
     slots = table["slot"].to_numpy()
     if (slots[1:] < slots[:-1]).any():
         table = table.sort_by("slot")
@@ -329,10 +329,16 @@ def _read(released: Released | Hidden | str | os.PathLike[str]) -> Released:
     return released.released if isinstance(released, Hidden) else released
 
 
-@functools.lru_cache(maxsize=1)
+#: The map that this process read last: those of engines live through many rounds of one.
+_LAST: dict[tuple[str, int, int], Released] = {}
+
+
 def _read_once(path: str, modified: int, size: int) -> Released:
-    """Processes of engines live through many rounds of a map."""
-    return Released.read(path)
+    found = _LAST.get((path, modified, size))
+    if found is None:
+        _LAST.clear()
+        found = _LAST[path, modified, size] = Released.read(path)
+    return found
 
 
 def _schema(columns: dict[str, str]) -> _pa.Schema:

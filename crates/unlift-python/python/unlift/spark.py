@@ -119,10 +119,9 @@ def recover_in_rounds(
         if not given:
             return
         rows = pyarrow.Table.from_batches(given)
-        is_own = rows["slot"].is_valid()
         scores = ["scores"] if has_scores else []
-        own = rows.filter(is_own).select(["slot", "records", *scores])
-        named = rows.filter(pyarrow.compute.invert(is_own)).select(["record", "by", *(["score"] if scores else [])])
+        own = rows.filter(rows["slot"].is_valid()).select(["slot", "records", *scores])
+        named = rows.filter(rows["slot"].is_null()).select(["record", "by", *(["score"] if scores else [])])
         made = rounds.edges(own.to_batches(), named.to_batches(), released, Model.from_bytes(learned), threads=1)
         yield from made
 

@@ -8,7 +8,7 @@
 //! 4. `delta`: the distance that decides support, chosen by how well consensus then does.
 //! 5. `exact`: coordinates that a rule of the scheme fixes. `confidence`: how sure the attacker is.
 //!    `pairs_of_descriptors`: whose descriptor is whose on a paired line.
-//! 6. `checks`: what goes together. `learned`: what is learned of a map. `task`: model, records and lists together, solved in any parts; `rounds`: joint
+//! 6. `checks`: what goes together. `learned`: what is learned of a map. `records`: records with their lists as solvers read them. `task`: model, records and lists together, solved in any parts; `rounds`: joint
 //!    recovery one round at a time; `parts`: consensus where each part has its own lists alone; `spread`: joint recovery where each has its own
 //!    edges alone.
 //!
@@ -27,6 +27,7 @@ mod options;
 mod pairs_of_descriptors;
 mod parts;
 mod placement;
+mod records;
 mod result;
 mod rounds;
 mod solve;

@@ -9,20 +9,19 @@ use super::confidence::seen::{Seen, Solved};
 use super::consensus::Consensus;
 use super::joint::{Joint, Outline};
 use super::learned::Model;
-use super::map::family::Family;
-use super::map::graph::Graph;
 use super::map::lists::Listed;
-use super::options::{Delta, RecoverOptions, Solver};
+use super::options::{RecoverOptions, Solver};
 use super::pairs_of_descriptors::descriptor_rows;
-use super::placement::{self, Placement};
+use super::placement::Placement;
+use super::records::{Records, at_peaks, listed, used};
 use super::result::estimate::Estimate;
 use super::result::recovered::Recovered;
 use super::result::trials::TrialCounts;
 use super::result::unknown::Unknown;
 use super::rounds::Rounds;
 use super::solve::Solve;
-use super::{confidence, delta, exact};
-use crate::density::{Peaks, tomography};
+use super::{confidence, exact};
+use crate::density::tomography;
 use crate::neighbors::{Neighborhoods, ShelvedLists};
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, Fingerprint, Shelf};
@@ -54,21 +53,6 @@ pub struct Task<'a, const D: usize> {
     delta: f64,
     records: Records<'a, D>,
     trials: TrialCounts,
-}
-
-/// Records as solvers read them.
-#[derive(Debug)]
-enum Records<'a, const D: usize> {
-    /// Where records alone say that points are.
-    Alone(Peaks),
-    /// Records with their lists.
-    Listed {
-        family: Family<'a, D>,
-        /// Who lists whom, where the solver asks.
-        graph: Option<Box<Graph>>,
-        /// The same as lists, where records have one slot.
-        both_ways: Option<Neighborhoods>,
-    },
 }
 
 impl<'a, const D: usize> Task<'a, D> {
@@ -358,61 +342,4 @@ pub(super) fn in_columns<const D: usize>(
     let (origin, unit) = (released.origin(), released.unit());
     Recovered::try_new(estimates, with_axis, descriptor_row, origin, unit, delta)
         .map(|recovered| recovered.with_about(about))
-}
-
-/// What attacks on the records alone leave to do.
-fn at_peaks<'a, const D: usize>(peaks: Peaks) -> (Records<'a, D>, f64) {
-    let delta = placement::delta(&peaks);
-    (Records::Alone(peaks), delta)
-}
-
-/// Records with their lists, and delta: learned, or as `model` says.
-fn listed<'a, const D: usize>(
-    released: &'a Released<D>,
-    (lists, shelf): (Listed<'a>, Option<&dyn Shelf>),
-    options: &RecoverOptions,
-    model: Option<&Model<D>>,
-) -> Result<(Records<'a, D>, f64), Error> {
-    let family = match model.and_then(|model| model.chance.clone()) {
-        Some(chance) => Family::with_chance(released, chance)?,
-        None => Family::learn(released, lists)?,
-    };
-    // Joint recovery also asks who lists whom, from the first pass on.
-    let slots_per_record = released.slots_per_record();
-    let graph = match (lists, shelf) {
-        _ if !matches!(options.solver, Solver::Joint | Solver::JointStart) => None,
-        (Listed::Here(lists), _) => Some(Box::new(Graph::new(lists, slots_per_record))),
-        (Listed::Away(lists), Some(shelf)) => {
-            Some(Box::new(Graph::away(lists, slots_per_record, shelf)?))
-        }
-        _ => None,
-    };
-    let both_ways = match (&graph, lists) {
-        (Some(graph), Listed::Here(_)) if slots_per_record == 1 => Some(graph.neighborhoods()?),
-        _ => None,
-    };
-    let delta = match (model, options.delta) {
-        (Some(model), _) => model.delta,
-        (None, Delta::Fixed(delta)) => delta,
-        (None, Delta::Auto) => {
-            let used = used(lists, graph.as_deref(), both_ways.as_ref());
-            delta::learn(released, &family, (used, lists), graph.is_some(), options.seed)?
-        }
-    };
-    Ok((Records::Listed { family, graph, both_ways }, delta))
-}
-
-/// The lists that consensus reads: as given, or those of both directions, where joint recovery has them.
-fn used<'a>(
-    lists: Listed<'a>,
-    graph: Option<&'a Graph>,
-    both_ways: Option<&'a Neighborhoods>,
-) -> Listed<'a> {
-    match (lists, graph, both_ways) {
-        (_, _, Some(both_ways)) => Listed::Here(both_ways),
-        (Listed::Away(_), Some(graph), _) if graph.slots_per_record() == 1 => {
-            Listed::Edges(graph, lists.about())
-        }
-        _ => lists,
-    }
 }

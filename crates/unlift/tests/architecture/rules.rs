@@ -85,6 +85,7 @@ pub const INSIDE_RECOVER: &[(&str, &[&str])] = &[
     ("checks", &[]),
     ("learned", &["map", "options"]),
     ("rounds", &["result", "solve"]),
+    ("records", &["delta", "learned", "map", "options", "placement"]),
     (
         "task",
         &[
@@ -96,7 +97,7 @@ pub const INSIDE_RECOVER: &[(&str, &[&str])] = &[
             "joint",
             "baselines",
             "placement",
-            "delta",
+            "records",
             "exact",
             "confidence",
             "pairs_of_descriptors",
