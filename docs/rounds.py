@@ -9,7 +9,9 @@ import argparse, os, pathlib, resource, sys, tempfile, time
 
 import numpy as np
 import pyarrow.parquet as pq
+import pyspark
 import unlift
+import unlift.spark
 
 
 def tiled(points, n):
@@ -36,9 +38,6 @@ def main():
     kitchen = unlift.read(args.shared / "data" / "redkitchen" / "model", scale=1.0)
     hidden = unlift.obfuscate(unlift.Map(tiled(kitchen.positions, args.points), scale=1.0), args.scheme, seed=1)
     lists = unlift.neighbors.oracle(hidden, 0.3, k=50)
-
-    import pyspark
-    import unlift.spark
 
     os.environ["PYSPARK_PYTHON"] = sys.executable
     os.environ.setdefault("SPARK_LOCAL_IP", "127.0.0.1")

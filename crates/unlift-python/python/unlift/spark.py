@@ -90,43 +90,41 @@ def recover_in_rounds(
     with them), and this process what became of those that moved.
     """
     from pyspark import StorageLevel
-    from pyspark.sql import functions
 
-    per = Released.read(released).slots_per_record
-    has_scores = "scores" in lists.columns
-    lists = lists.select("slot", "records", *(["scores"] if has_scores else []))
-    own = lists.withColumn("record", functions.floor(functions.col("slot") / per))
-    if has_scores:
-        pairs = lists.select("slot", functions.explode(functions.arrays_zip("records", "scores")).alias("entry"))
-        named = pairs.select(
-            functions.col("entry.records").cast("bigint").alias("record"),
-            functions.col("slot").alias("by"),
-            functions.col("entry.scores").alias("score"),
-        )
-    else:
-        named = lists.select(functions.col("slot").alias("by"), functions.explode("records").alias("record"))
-        named = named.withColumn("record", functions.col("record").cast("bigint"))
-    both = own.unionByName(named, allowMissingColumns=True)
-    ranged = both.repartitionByRange("record") if n_parts is None else both.repartitionByRange(n_parts, "record")
+    of_map = Released.read(released)
+    per, n_records = of_map.slots_per_record, of_map.n_slots // of_map.slots_per_record
+    session = lists.sparkSession
+    if n_parts is None:
+        n_parts = int(session.conf.get("spark.sql.shuffle.partitions") or 200)
+    n_parts = max(1, min(n_parts, n_records))
+    scores = ["scores"] if "scores" in lists.columns else []
     learned = model.to_bytes()
 
-    def of_partition(batches: Iterator[_pa.RecordBatch]) -> Iterator[_pa.RecordBatch]:
-        import pyarrow
+    def to_parts(batches: Iterator[_pa.RecordBatch]) -> Iterator[_pa.RecordBatch]:
+        from unlift import rounds
 
+        for batch in batches:
+            own = batch["slot"].to_numpy(zero_copy_only=False) // per
+            yield _blocks(batch, own * n_parts // n_records, True)
+            (named,) = rounds.entries([batch])
+            yield _blocks(named, named["record"].to_numpy() * n_parts // n_records, False)
+
+    def of_part(batches: Iterator[_pa.RecordBatch]) -> Iterator[_pa.RecordBatch]:
         from unlift import Model, rounds
 
-        given = [batch for batch in batches if len(batch)]
-        if not given:
-            return
-        rows = pyarrow.Table.from_batches(given)
-        scores = ["scores"] if has_scores else []
-        own = rows.filter(rows["slot"].is_valid()).select(["slot", "records", *scores])
-        named = rows.filter(rows["slot"].is_null()).select(["record", "by", *(["score"] if scores else [])])
-        made = rounds.edges(own.to_batches(), named.to_batches(), released, Model.from_bytes(learned), threads=1)
-        yield from made
+        blocks: dict[bool, list[_pa.RecordBatch]] = {True: [], False: []}
+        for batch in batches:
+            for is_own, block in zip(batch["own"], batch["block"]):
+                blocks[is_own.as_py()] += _unpacked(block)
+        if blocks[True] or blocks[False]:
+            model = Model.from_bytes(learned)
+            yield from rounds.edges(blocks[True], blocks[False], released, model, threads=1)
 
-    edges = ranged.mapInArrow(of_partition, _spec(rounds.EDGES))
-    if lists.sparkSession.sparkContext.getCheckpointDir() is None:
+    # Entries travel in blocks: a row each would cost a cluster more than all that comes after.
+    blocks = lists.select("slot", "records", *scores).mapInArrow(to_parts, "part bigint, own boolean, block binary")
+    ranged = blocks.repartitionByRange(n_parts, "part")
+    edges = ranged.mapInArrow(of_part, _spec(rounds.EDGES))
+    if session.sparkContext.getCheckpointDir() is None:
         edges = edges.persist(StorageLevel.DISK_ONLY)
     else:
         edges = edges.checkpoint()
@@ -139,6 +137,33 @@ def recover_in_rounds(
         return rounds.recover(over, released, model, outline)
     finally:
         edges.unpersist()
+
+
+def _blocks(batch: _pa.RecordBatch, part: Any, is_own: bool) -> _pa.RecordBatch:
+    """The rows of `batch` by the part that each goes to, all of a part in one binary value."""
+    import numpy as np
+    import pyarrow as pa
+
+    order = np.argsort(part, kind="stable")
+    sorted_batch, part = batch.take(pa.array(order)), part[order]
+    starts = np.flatnonzero(np.diff(part, prepend=-1))
+    ends = np.append(starts[1:], len(part))
+    packed = []
+    for start, end in zip(starts.tolist(), ends.tolist()):
+        sink = pa.BufferOutputStream()
+        with pa.ipc.new_stream(sink, batch.schema) as stream:
+            stream.write_batch(sorted_batch.slice(start, end - start))
+        packed.append(sink.getvalue().to_pybytes())
+    columns = {"part": part[starts], "own": [is_own] * len(packed), "block": packed}
+    types = pa.schema([("part", pa.int64()), ("own", pa.bool_()), ("block", pa.binary())])
+    return pa.RecordBatch.from_pydict(columns, schema=types)
+
+
+def _unpacked(block: Any) -> list[_pa.RecordBatch]:
+    import pyarrow as pa
+
+    with pa.ipc.open_stream(block.as_buffer()) as stream:
+        return list(stream)
 
 
 def _spec(columns: dict[str, str]) -> str:
