@@ -47,7 +47,7 @@ impl<const D: usize> Model<D> {
         Edges::of_lists(lists, slots, named_by, rule, per_record)
     }
 
-    /// Where the slots of `edges` are before the first round: what [`Task::solve`](super::super::Task::solve) says of them, and whose
+    /// Where the slots of `edges` are before the first round: what [`Task::solve`](crate::recover::Task::solve) says of them, and whose
     /// descriptor is whose.
     ///
     /// # Errors
@@ -64,7 +64,7 @@ impl<const D: usize> Model<D> {
         Ok(Part { estimates, descriptor_row: descriptor_rows(released, lists, records)? })
     }
 
-    /// Where those slots go whose turn it is and that have `edges` (others stay where they are): `standing` is what the lead [said](super::Lead::standing).
+    /// Where those slots go whose turn it is and that have `edges` (others stay where they are): `standing` is what the lead [said](crate::recover::Lead::standing).
     ///
     /// # Errors
     /// When it is of another map, or the model or the edges are.
