@@ -5,13 +5,12 @@ use std::sync::Arc;
 use unlift::audit::{Bound, NeighborsBy, Outcome, Plan, Row, Silent, run};
 use unlift::evaluate::evaluate;
 use unlift::geometry::frame::Bounds;
-use unlift::neighbors::oracle::Noise;
 use unlift::neighbors::{Geometric, Neighborhoods};
 use unlift::obfuscate::{Lifted, Scheme, SchemeOptions, obfuscate, scheme};
 use unlift::recover::{RecoverOptions, Solver, Unknown, recover};
 use unlift::seed::{Key, Stage};
 use unlift::truth::Original;
-use unlift::{About, Error, PointSet, RowOrder, Shelf, Unit, synthetic};
+use unlift::{About, Error, PointSet, RowOrder, Unit, synthetic};
 
 fn original(points: Vec<[f64; 3]>) -> Original<3> {
     Original::new(PointSet::try_new(points, Unit::Meter).unwrap())
@@ -54,45 +53,6 @@ fn a_usual_audit_has_a_row_for_what_joint_recovery_starts_from() {
         let reason = if is_start { Unknown::OtherSolver } else { Unknown::SmallMap };
         assert_eq!(row.sure_unknown, Some(reason));
         assert!(row.reliability.is_none());
-    }
-}
-
-/// Files of the system, with windows of so many bytes.
-#[derive(Debug)]
-struct Files(usize);
-
-impl Shelf for Files {
-    fn file(&self) -> std::io::Result<std::fs::File> {
-        tempfile::tempfile()
-    }
-
-    fn place(&self) -> String {
-        "tests".to_owned()
-    }
-
-    fn window(&self) -> usize {
-        self.0
-    }
-}
-
-#[test]
-fn lists_on_a_shelf_change_no_row() {
-    let (room, mut plan) = (room(900), plan(&["olc", "ppl", "plane", "cp"]));
-    plan.records_alone = false;
-    plan.oracle_noise = vec![Noise::Uniform, Noise::Near, Noise::Clustered];
-    plan.solvers.push(Solver::Consensus);
-    let usual = audit(&room, &plan);
-    plan.shelf = Some(Arc::new(Files(9_000)));
-    let shelved = audit(&room, &plan);
-    assert_eq!(usual.rows.len(), 4 * 3 * 3);
-    assert_eq!(usual.rows, shelved.rows);
-    // A solver that takes lists in memory has them there, and so have the others.
-    plan.solvers.push(Solver::Ransac);
-    plan.oracle_noise.truncate(1);
-    let mixed = audit(&room, &plan);
-    assert_eq!(mixed.rows.len(), 4 * 4);
-    for row in usual.rows.iter().filter(|row| row.oracle_noise == Some("uniform")) {
-        assert!(mixed.rows.contains(row), "{} by {}", row.scheme, row.solver);
     }
 }
 

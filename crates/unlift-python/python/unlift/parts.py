@@ -20,7 +20,7 @@ On Spark: `unlift.spark.recover`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -52,9 +52,7 @@ _BATCH = 1 << 16
 
 def schema() -> _pa.Schema:
     """The schema of what comes out."""
-    pa = _pyarrow()
-    types = {"bigint": pa.int64(), "int": pa.int32(), "float": pa.float32()}
-    return pa.schema([(name, types[of]) for name, of in COLUMNS.items()])
+    return _schema(COLUMNS)
 
 
 def table(lists: Neighborhoods) -> _pa.Table:
@@ -84,33 +82,16 @@ def recover(
     Yields rows of `COLUMNS`, in order of slots; none for a part without rows.
     """
     pa = _pyarrow()
-    given = [batch for batch in batches if len(batch)]
-    if not given:
+    lists = _table(batches, "slot", "records")
+    if lists is None:
         return
-    lists = pa.Table.from_batches(given)
-    for column in ("slot", "records"):
-        if column not in lists.schema.names:
-            raise UnliftError(f"batches: expected a column {column}, found {', '.join(lists.schema.names) or 'none'}")
-    lists = lists.select(["slot", "records"])
-    slots = lists["slot"].to_numpy()
-    if (slots[1:] < slots[:-1]).any():
-        lists = lists.sort_by("slot")
-        slots = lists["slot"].to_numpy()
-    if lists["slot"].null_count or slots[0] < 0 or (slots[1:] == slots[:-1]).any():
-        raise UnliftError("slot: expected numbers from 0, each once, found others")
-    per_record = (released.released if isinstance(released, Hidden) else released).slots_per_record
-    first = int(slots[0]) // per_record * per_record
-    n = (int(slots[-1]) // per_record + 1) * per_record - first
-    lengths = np.zeros(n + 1, dtype=np.int64)
-    lengths[slots - first + 1] = pa.compute.fill_null(pa.compute.list_value_length(lists["records"]), 0).to_numpy()
-    records = pa.compute.list_flatten(lists["records"])
-    if records.null_count:
-        raise UnliftError("records: expected numbers, found null")
-    numbers = records.to_numpy()
+    first, n = _span(lists, released.released if isinstance(released, Hidden) else released)
+    offsets, columns = _rows(lists, first, n, ("records",))
+    numbers = columns["records"]
     if len(numbers) and 0 <= numbers.min() and numbers.max() < 2**32:
         numbers = numbers.astype(np.uint32)
-    del lists, given, records
-    found = model.solve_part(released, first, np.cumsum(lengths), numbers, threads=threads)
+    del lists, columns
+    found = model.solve_part(released, first, offsets, numbers, threads=threads)
     for start in range(0, n, _BATCH):
         yield _batch(first, found, slice(start, min(start + _BATCH, n)))
 
@@ -162,6 +143,71 @@ def _batch(first: int, found: dict[str, Any], part: slice) -> _pa.RecordBatch:
         pa.nulls(size, pa.int64()) if rows is None else pa.array(rows[part].astype(np.int64)),
     ]
     return pa.RecordBatch.from_arrays(columns, schema=schema())
+
+
+def _table(batches: Iterable[_pa.RecordBatch], *names: str) -> _pa.Table | None:
+    """Batches as a table that has these columns; None without rows."""
+    given = [batch for batch in batches if len(batch)]
+    if not given:
+        return None
+    table = _pyarrow().Table.from_batches(given)
+    _check(table.schema.names, *names)
+    for name in names:
+        if name in ("slot", "record", "by") and table[name].null_count:
+            raise UnliftError(f"{name}: expected numbers, found null")
+    return table
+
+
+def _check(found: list[str], *names: str) -> None:
+    for name in names:
+        if name not in found:
+            raise UnliftError(f"batches: expected a column {name}, found {', '.join(found) or 'none'}")
+
+
+def _span(table: _pa.Table, of_map: Released) -> tuple[int, int]:
+    """The first slot of the records that rows are about, and how many there are from there to the last."""
+    slots, per = table["slot"].to_numpy(), of_map.slots_per_record
+    low, high = int(slots.min()), int(slots.max())
+    if low < 0 or high >= of_map.n_slots:
+        raise UnliftError(f"slot: expected numbers from 0 to {of_map.n_slots - 1}, found {low} to {high}")
+    first = low // per * per
+    return first, (high // per + 1) * per - first
+
+
+def _rows(given: _pa.Table | None, first: int, n: int, names: Sequence[str]) -> tuple[Any, dict[str, Any]]:
+    """Lists of `n` slots from `first` on: where they start, and columns end to end; None for one that is not there, nothing
+    without a table."""
+    pa = _pyarrow()
+    lengths = np.zeros(n + 1, dtype=np.int64)
+    if given is None:
+        return lengths, dict.fromkeys(names, np.zeros(0, dtype=np.int64))
+    table: Any = given
+    slots = table["slot"].to_numpy()
+    if (slots[1:] < slots[:-1]).any():
+        table = table.sort_by("slot")
+        slots = table["slot"].to_numpy()
+    if (slots[1:] == slots[:-1]).any():
+        raise UnliftError("slot: expected each once, found some twice")
+    columns: dict[str, Any] = dict.fromkeys(names)
+    sizes = pa.compute.fill_null(pa.compute.list_value_length(table[names[0]]), 0).to_numpy()
+    for name in names:
+        if name not in table.schema.names:
+            continue
+        values = pa.compute.list_flatten(table[name])
+        if values.null_count:
+            raise UnliftError(f"{name}: expected numbers, found null")
+        if (pa.compute.fill_null(pa.compute.list_value_length(table[name]), 0).to_numpy() != sizes).any():
+            raise UnliftError(f"{name}: expected one for each of {names[0]}, found others")
+        columns[name] = values.to_numpy()
+    lengths[slots - first + 1] = sizes
+    return np.cumsum(lengths), columns
+
+
+def _schema(columns: dict[str, str]) -> _pa.Schema:
+    pa = _pyarrow()
+    types = {"bigint": pa.int64(), "int": pa.int32(), "float": pa.float32()}
+    types |= {"array<int>": pa.list_(pa.int32()), "array<tinyint>": pa.list_(pa.int8())}
+    return pa.schema([(name, types[of]) for name, of in columns.items()])
 
 
 def _pyarrow() -> Any:

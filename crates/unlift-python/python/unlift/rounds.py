@@ -44,7 +44,7 @@ import numpy as np
 
 from . import parts
 from ._unlift import Edges, Hidden, Lead, Model, Neighborhoods, Outline, Recovered, Released, UnliftError, prepare_rounds
-from .parts import _pyarrow
+from .parts import _check, _pyarrow, _rows, _schema, _span, _table
 
 if TYPE_CHECKING:
     import pyarrow as _pa  # type: ignore[import-untyped,unused-ignore]
@@ -114,22 +114,19 @@ def edges(
         raise UnliftError(f"records: expected numbers from 0 to {of_map.n_slots // per - 1}, found {low} to {high}")
     first, n = low * per, (high - low + 1) * per
     offsets, columns = _rows(own, first, n, ("records", "scores"))
-    empty = np.zeros(0, dtype=np.int64)
-    given = (empty, empty) if naming is None else (naming["record"].to_numpy(), naming["by"].to_numpy())
-    named_scores = None if naming is None or "score" not in naming.schema.names else naming["score"].to_numpy()
-    if columns["scores"] is not None and named_scores is None:
-        named_scores = np.zeros(0, dtype=np.float32)
-    if named_scores is not None and columns["scores"] is None and len(columns["records"]) == 0:
-        columns["scores"] = np.zeros(0, dtype=np.float32)
+    given: dict[str, Any] = dict.fromkeys(("record", "by", "score"), np.zeros(0, dtype=np.int64))
+    if naming is not None:
+        given = {name: naming[name].to_numpy() if name in naming.schema.names else None for name in given}
     found = Edges.of_lists(
         model,
         of_map,
         first,
         offsets,
         columns["records"],
-        *given,
+        given["record"],
+        given["by"],
         scores=columns["scores"],
-        named_scores=named_scores,
+        named_scores=given["score"],
         threads=threads,
     ).columns()
     lengths = np.diff(found["offsets"].astype(np.int64))
@@ -193,7 +190,7 @@ def recover(
     released: the map, or the path of its file where every machine reads it.
     model, outline: what `prepare` learned of the map and all of its lists. Edges that are lost on the way, or come twice, are told.
 
-    In memory are some 300 bytes a slot at most, while slots come back; on every machine some 150 a task while it works, beside the records.
+    In memory are some 300 bytes a slot at most, while slots come back; on every machine 100 to 130 a task while it works, beside the records.
     How sure the attacker is, is not asked: that takes all edges.
     """
     pa = _pyarrow()
@@ -266,57 +263,9 @@ class Work:
 
 def _held(rows: _pa.Table, of_map: Released) -> tuple[Edges, int, int]:
     """The edges of a part, its first slot, and how many there are from there to the last."""
-    slots, per = rows["slot"].to_numpy(), of_map.slots_per_record
-    first = int(slots.min()) // per * per
-    n = (int(slots.max()) // per + 1) * per - first
+    first, n = _span(rows, of_map)
     offsets, columns = _rows(rows, first, n, ("ends", "classes"))
     return Edges(of_map, first, offsets, columns["ends"], columns["classes"]), first, n
-
-
-def _rows(given: _pa.Table | None, first: int, n: int, names: tuple[str, str]) -> tuple[Any, dict[str, Any]]:
-    """Lists of `n` slots from `first` on: where they start, and columns end to end; None for one that is not there."""
-    pa = _pyarrow()
-    lengths = np.zeros(n + 1, dtype=np.int64)
-    if given is None:
-        return lengths, {names[0]: np.zeros(0, dtype=np.int64), names[1]: None}
-    table: Any = given
-    slots = table["slot"].to_numpy()
-    if (slots[1:] < slots[:-1]).any():
-        table = table.sort_by("slot")
-        slots = table["slot"].to_numpy()
-    if slots[0] < 0 or (slots[1:] == slots[:-1]).any():
-        raise UnliftError("slot: expected numbers from 0, each once, found others")
-    columns: dict[str, Any] = {names[1]: None}
-    of_first = pa.compute.fill_null(pa.compute.list_value_length(table[names[0]]), 0).to_numpy()
-    for name in names:
-        if name not in table.schema.names:
-            continue
-        values = pa.compute.list_flatten(table[name])
-        sizes = pa.compute.fill_null(pa.compute.list_value_length(table[name]), 0).to_numpy()
-        if values.null_count or (sizes != of_first).any():
-            raise UnliftError(f"{name}: expected a number for each of {names[0]}, found others")
-        columns[name] = values.to_numpy()
-    lengths[slots - first + 1] = of_first
-    return np.cumsum(lengths), columns
-
-
-def _table(batches: Iterable[_pa.RecordBatch], *names: str) -> _pa.Table | None:
-    """Batches as a table that has these columns; None without rows."""
-    given = [batch for batch in batches if len(batch)]
-    if not given:
-        return None
-    table = _pyarrow().Table.from_batches(given)
-    _check(table.schema.names, *names)
-    for name in names:
-        if table[name].null_count and name in ("slot", "record", "by"):
-            raise UnliftError(f"{name}: expected numbers, found null")
-    return table
-
-
-def _check(found: list[str], *names: str) -> None:
-    for name in names:
-        if name not in found:
-            raise UnliftError(f"batches: expected a column {name}, found {', '.join(found) or 'none'}")
 
 
 def _read(released: Released | Hidden | str | os.PathLike[str]) -> Released:
@@ -339,10 +288,3 @@ def _read_once(path: str, modified: int, size: int) -> Released:
         _LAST.clear()
         found = _LAST[path, modified, size] = Released.read(path)
     return found
-
-
-def _schema(columns: dict[str, str]) -> _pa.Schema:
-    pa = _pyarrow()
-    types = {"bigint": pa.int64(), "int": pa.int32(), "float": pa.float32()}
-    types |= {"array<int>": pa.list_(pa.int32()), "array<tinyint>": pa.list_(pa.int8())}
-    return pa.schema([(name, types[of]) for name, of in columns.items()])

@@ -86,8 +86,8 @@ def recover_in_rounds(
 
     Entries of lists are shuffled once, to where the records are that they name. What comes of it stays on the disks of executors, or in the
     checkpoint folder of the SparkContext, if it has one: then what an executor loses is not made again. A round is two jobs,
-    in which nothing is shuffled: all executors are sent where all slots are (30 to 50 bytes each, and some 150 in every task that works
-    with them), and this process what became of those that moved.
+    in which nothing is shuffled: all executors are sent where all slots are (24 bytes each at least, and 100 to 130 in every task that
+    works with them), and this process what became of those that moved.
     """
     from pyspark import StorageLevel
 

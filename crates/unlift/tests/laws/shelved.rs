@@ -2,12 +2,16 @@
 
 use std::fs::File;
 use std::io;
+use std::sync::Arc;
 
-use unlift::Shelf;
+use unlift::audit::{Plan, Silent, run};
+use unlift::neighbors::oracle::Noise;
 use unlift::neighbors::{Neighborhoods, ShelvedLists};
 use unlift::obfuscate::Entry;
 use unlift::recover::{RecoverOptions, Solver, prepare, prepare_shelved, recover_shelved};
 use unlift::released::Obfuscation;
+use unlift::truth::Original;
+use unlift::{PointSet, Shelf, Unit};
 
 use crate::maps::*;
 
@@ -99,6 +103,33 @@ fn shelved_is_in_memory<const D: usize>(name: &str, scheme: &Entry) {
 #[test]
 fn lists_on_a_shelf_give_what_they_give_in_memory() {
     over_schemes!(shelved_is_in_memory);
+}
+
+#[test]
+fn an_audit_with_lists_on_a_shelf_has_the_same_rows() {
+    let original = Original::new(PointSet::try_new(room(61, 900), Unit::Meter).unwrap());
+    let mut plan = Plan::new(Unit::Meter);
+    plan.schemes.retain(|scheme| ["olc", "ppl", "plane", "cp"].contains(&scheme.name()));
+    (plan.inlier_ratios, plan.k, plan.records_alone) = (vec![0.5], 20, false);
+    plan.oracle_noise = vec![Noise::Uniform, Noise::Near, Noise::Clustered];
+    plan.solvers.push(Solver::Consensus);
+    let audit = |plan: &Plan<3>| run(&original, None, plan, &mut Silent);
+    let usual = audit(&plan).unwrap();
+    plan.shelf = Some(Arc::new(Files(9_000)));
+    assert_eq!(usual.rows.len(), 4 * 3 * 3);
+    assert_eq!(usual.rows, audit(&plan).unwrap().rows);
+    // A full disk is no scheme that was not audited: nothing goes on.
+    plan.shelf = Some(Arc::new(Full));
+    let error = audit(&plan).unwrap_err().to_string();
+    assert!(error.contains("file in tests for what does not fit into memory"), "{error}");
+    // A solver that takes lists in memory has them there, and so have the others: the shelf is not asked.
+    plan.solvers.push(Solver::Ransac);
+    plan.oracle_noise.truncate(1);
+    let mixed = audit(&plan).unwrap();
+    assert_eq!(mixed.rows.len(), 4 * 4);
+    for row in usual.rows.iter().filter(|row| row.oracle_noise == Some("uniform")) {
+        assert!(mixed.rows.contains(row), "{} by {}", row.scheme, row.solver);
+    }
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! How rounds of joint recovery follow each other: what is learned anew, and when it is enough.
 
+use std::sync::Arc;
+
 use super::agreement::Judges;
 use super::jumps::Jumps;
 use super::look::{Look, Sample};
@@ -75,7 +77,7 @@ impl Kind {
 /// Rounds, one after the other.
 pub(crate) struct Course<const D: usize> {
     kind: Kind,
-    digest: Digest,
+    digest: Arc<Digest>,
     least_radius: f32,
     /// The best estimates of whole sweeps.
     now: Vec<Estimate<D>>,
@@ -93,8 +95,22 @@ pub(crate) struct Course<const D: usize> {
 
 impl<const D: usize> Course<D> {
     /// Before the first round, at `start`.
-    pub(crate) fn new(kind: Kind, digest: Digest, start: &[Estimate<D>]) -> Self {
-        let (standing, least_radius) = begin(kind, &digest, start);
+    pub(crate) fn new(kind: Kind, digest: Arc<Digest>, start: &[Estimate<D>]) -> Self {
+        let n = start.len();
+        let places = Places::new(start);
+        let least_radius = (ROUNDING * places.farthest()).max(f32::MIN_POSITIVE);
+        let (density, law) = learned(kind, &places, &digest, kind.most_radius, least_radius);
+        let standing = Standing {
+            next: start.to_vec(),
+            places,
+            density,
+            law,
+            ahead: vec![0.0; n],
+            jumps: Jumps::new(n),
+            turns: 1,
+            turn: 0,
+            done: false,
+        };
         Self {
             kind,
             digest,
@@ -105,18 +121,15 @@ impl<const D: usize> Course<D> {
             sweep: 0,
             n_jumped: 0,
             // Nothing is settled yet.
-            n_jumped_before: start.len(),
+            n_jumped_before: n,
             n_jumped_since: 0,
             most: f64::NEG_INFINITY,
         }
     }
 
-    /// The same map from another `start`.
-    pub(crate) fn begin_anew(&mut self, start: &[Estimate<D>]) {
-        (self.standing, self.least_radius) = begin(self.kind, &self.digest, start);
-        (self.now, self.jumpers) = (start.to_vec(), Vec::new());
-        (self.sweep, self.n_jumped, self.n_jumped_since) = (0, 0, 0);
-        (self.n_jumped_before, self.most) = (start.len(), f64::NEG_INFINITY);
+    /// The rounds of the same map from another `start`.
+    pub(crate) fn anew(&self, start: &[Estimate<D>]) -> Self {
+        Self::new(self.kind, Arc::clone(&self.digest), start)
     }
 
     /// Where the round stands.
@@ -225,26 +238,6 @@ impl<const D: usize> Course<D> {
         (standing.density, standing.law) = (density, law);
         self.n_jumped_since = 0;
     }
-}
-
-/// Where the first round from `start` stands, and the least radius of the law.
-fn begin<const D: usize>(kind: Kind, digest: &Digest, start: &[Estimate<D>]) -> (Standing<D>, f32) {
-    let n = start.len();
-    let places = Places::new(start);
-    let least_radius = (ROUNDING * places.farthest()).max(f32::MIN_POSITIVE);
-    let (density, law) = learned(kind, &places, digest, kind.most_radius, least_radius);
-    let standing = Standing {
-        next: start.to_vec(),
-        places,
-        density,
-        law,
-        ahead: vec![0.0; n],
-        jumps: Jumps::new(n),
-        turns: 1,
-        turn: 0,
-        done: false,
-    };
-    (standing, least_radius)
 }
 
 /// Density and law of `places`, with neighbors looked for as if `radius` were that of the law.

@@ -14,7 +14,7 @@ const MAGIC: [u8; 8] = *b"unliftO1";
 /// a few megabytes. What [`prepare_rounds`](crate::recover::prepare_rounds) learns for a [`Lead`](crate::recover::Lead).
 pub struct Outline {
     map: Fingerprint,
-    slots_per_record: usize,
+    pub(crate) slots_per_record: usize,
     pub(crate) lengths: Vec<u32>,
     pub(crate) digest: Digest,
 }

@@ -1,6 +1,7 @@
 //! The rounds of a map whose edges are all at hand.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::agreement;
 use super::course::{Course, Digest, Kind};
@@ -34,7 +35,8 @@ impl<'a, const D: usize, P: Pieces<D>> Sweeps<'a, D, P> {
         delta: f32,
         seed: u64,
     ) -> Result<Self, Error> {
-        let course = Course::new(Kind::of(&pieces, delta), Digest::new(graph, seed)?, start);
+        let digest = Arc::new(Digest::new(graph, seed)?);
+        let course = Course::new(Kind::of(&pieces, delta), digest, start);
         let windows = graph.windows();
         let order = along_curve_in(&windows, &course.standing().places);
         let mut end = 0;

@@ -1,5 +1,7 @@
 //! Who leads the rounds of a map whose edges are elsewhere.
 
+use std::sync::Arc;
+
 use crate::recover::exact;
 use crate::recover::joint::{Agree, Course, Kind, News, Outline};
 use crate::recover::learned::Model;
@@ -64,6 +66,10 @@ impl<const D: usize> Lead<D> {
                 return Err(Error::new(what, format!("{n_slots} rows"), n.to_string()));
             }
         }
+        if outline.slots_per_record != released.slots_per_record() {
+            let expected = format!("{} slots a record", released.slots_per_record());
+            return Err(Error::new("outline", expected, outline.slots_per_record.to_string()));
+        }
         let mut pairs = outline.lengths.iter().zip(lengths).enumerate();
         if let Some((slot, (expected, found))) = pairs.find(|(_, (a, b))| a != b) {
             let what = format!("edges of slot {slot}");
@@ -72,7 +78,7 @@ impl<const D: usize> Lead<D> {
         check_estimates(start.iter())?;
         let kind = family.with_pieces(model.delta as f32, OfKind(model.delta as f32));
         let has_edges = lengths.iter().map(|&n| n > 0).collect();
-        let course = Course::new(kind, outline.digest, start);
+        let course = Course::new(kind, Arc::new(outline.digest), start);
         let feeds = if is_settled(model, released) { exact::feeds(released) } else { 0 };
         Ok(Self { map, course, has_edges, after: None, last: None, feeds })
     }
@@ -160,7 +166,7 @@ impl<const D: usize> Lead<D> {
         match self.feeds.checked_sub(1) {
             Some(feeds) => {
                 self.feeds = feeds;
-                self.course.begin_anew(&estimates);
+                self.course = self.course.anew(&estimates);
             }
             None => self.last = Some(estimates),
         }
