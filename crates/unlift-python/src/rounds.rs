@@ -1,5 +1,7 @@
 //! Joint recovery whose edges are spread: what a part does with its own, and who leads.
 
+use std::io::Write;
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use pyo3::prelude::*;
@@ -11,6 +13,7 @@ use unlift::recover::{
     Edges as Rows, Lead as Leading, Moved, NamedBy, Outline as Outlined, RecoverOptions,
     prepare_rounds as learn, prepare_rounds_shelved as learn_shelved,
 };
+use unlift_io::atomic::{Access, OutputFile, write_file};
 
 use crate::arrays::{column, indices, to_array, whole};
 use crate::errors::{raised, wrong};
@@ -226,6 +229,36 @@ impl Lead {
             Leading::new(&of, &map, outline, (&start, &lengths))
         })?;
         Ok(Self { model, released, rounds: Arc::new(Mutex::new(rounds)) })
+    }
+
+    /// The lead that `save` put in a file. `lengths`: how many edges each slot has in its part.
+    #[staticmethod]
+    fn resume(
+        py: Python<'_>,
+        model: &Model,
+        released: &Bound<'_, PyAny>,
+        outline: &Outline,
+        lengths: &Bound<'_, PyAny>,
+        path: PathBuf,
+    ) -> PyResult<Self> {
+        let released = released_of(released)?.of_map()?;
+        let (lengths, _) = indices("lengths", lengths, &[1], u32::MAX)?;
+        let outline = Outlined::from_bytes(&outline.0).map_err(raised)?;
+        let (model, map) = (Arc::clone(&model.0), Arc::clone(&released));
+        let of = Arc::clone(&model);
+        OutputFile::check(&path).map_err(raised)?;
+        let kept = std::fs::read(&path).map_err(|e| wrong(&path.display().to_string(), "a file", e))?;
+        let rounds = work::run(py, None, None, move || {
+            Leading::resume(&of, &map, outline, (&lengths, &kept))
+                .map_err(|error| error.within(path.display().to_string()))
+        })?;
+        Ok(Self { model, released, rounds: Arc::new(Mutex::new(rounds)) })
+    }
+
+    /// Puts the lead between two rounds in a file, whole or not at all.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let kept = self.with(py, |rounds| rounds.to_bytes())?;
+        py.detach(|| write_file(&path, Access::Private, |to| to.write_all(&kept))).map_err(raised)
     }
 
     /// Whether all rounds are done.

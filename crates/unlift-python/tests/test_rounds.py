@@ -145,3 +145,46 @@ def test_what_is_no_part_of_rounds_is_refused(tmp_path: pathlib.Path):
         unlift.rounds.prepare(of, 3)
     with pytest.raises(unlift.UnliftError, match="missing: expected a released map, found No such file"):
         list(unlift.rounds.edges(rows.to_batches(), entries.to_batches(), tmp_path / "missing", model))
+
+
+def test_rounds_go_on_where_they_were(tmp_path: pathlib.Path):
+    of = hidden("ppl")
+    lists = unlift.neighbors.oracle(of, 0.3, k=20)
+    model, outline = unlift.rounds.prepare(of, lists)
+    run, file = over(spread(lists, of, model, [50])), tmp_path / "rounds"
+    of.released.save(tmp_path / "released")
+    steps: list[str] = []
+
+    def dies(work, columns):
+        steps.append(work.step)
+        if len(steps) % 4 == 0:
+            raise KeyboardInterrupt
+        return run(work, columns)
+
+    for died in range(100):
+        try:
+            back = unlift.rounds.recover(dies, tmp_path / "released", model, outline, checkpoint=file)
+            break
+        except KeyboardInterrupt:
+            assert died == 0 or file.stat().st_mode & 0o77 == 0
+    assert died > 2 and not file.exists()
+    whole = unlift.recover(of, lists, confidence=False)
+    assert bytes_of(back, tmp_path) == bytes_of(whole, tmp_path)
+
+    def failing(**others) -> str:
+        given = {"over": run, "released": tmp_path / "released", "model": model, "outline": outline, "checkpoint": file}
+        with pytest.raises(unlift.UnliftError) as error:
+            unlift.rounds.recover(**(given | others))
+        return str(error.value)
+
+    file.write_bytes(b"a text of mine")
+    assert failing() == f"{file}: lead: expected one of this version, found other bytes"
+    assert file.read_bytes() == b"a text of mine"
+    file.unlink()
+    steps.clear()
+    with pytest.raises(KeyboardInterrupt):
+        unlift.rounds.recover(dies, tmp_path / "released", model, outline, checkpoint=file)
+    other, others = unlift.rounds.prepare(of, lists, seed=3)
+    found = failing(model=other, outline=others)
+    assert found == f"{file}: lead: expected one with this model and outline, found one with others"
+    assert "expected a file, found a folder" in failing(checkpoint=tmp_path)

@@ -181,7 +181,12 @@ def prepare(
 
 
 def recover(
-    over: Over, released: Released | Hidden | str | os.PathLike[str], model: Model, outline: Outline
+    over: Over,
+    released: Released | Hidden | str | os.PathLike[str],
+    model: Model,
+    outline: Outline,
+    *,
+    checkpoint: str | os.PathLike[str] | None = None,
 ) -> Recovered:
     """Recovers a map whose edges are spread: `unlift.recover(.., confidence=False)`, bit for bit.
 
@@ -189,6 +194,8 @@ def recover(
         gives have `columns`: names, and types as Spark writes them. `work` can be pickled if `released` is a path.
     released: the map, or the path of its file where every machine reads it.
     model, outline: what `prepare` learned of the map and all of its lists. Edges that are lost on the way, or come twice, are told.
+    checkpoint: a file that is written after every round, some 60 bytes a slot, and gone at the end. Where it is there, rounds go on from it, to
+        the same bits.
 
     In memory are some 300 bytes a slot at most, while slots come back; on every machine 100 to 130 a task while it works, beside the records.
     How sure the attacker is, is not asked: that takes all edges.
@@ -205,7 +212,10 @@ def recover(
     start, lengths = parts._columns(started, of_map), np.zeros(n, dtype=np.int64)
     lengths[started["slot"].to_numpy()] = started["edges"].to_numpy()
     del started
-    lead = Lead(model, of_map, outline, start, lengths)
+    if checkpoint is not None and os.path.lexists(checkpoint):
+        lead = Lead.resume(model, of_map, outline, lengths, checkpoint)
+    else:
+        lead = Lead(model, of_map, outline, start, lengths)
     rows = start["descriptor_row"]
     del start
     while not lead.is_done:
@@ -217,7 +227,12 @@ def recover(
         if news is not None:
             told = all_of("tell", _TOLD, news)
         lead.told(told["slot"].to_numpy(), told["jumps"].to_numpy())
-    return lead.finish(rows)
+        if checkpoint is not None:
+            lead.save(checkpoint)
+    found = lead.finish(rows)
+    if checkpoint is not None and os.path.lexists(checkpoint):
+        os.unlink(checkpoint)
+    return found
 
 
 class Work:

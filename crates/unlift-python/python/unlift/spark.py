@@ -18,6 +18,7 @@ Every executor needs this package. A task that is lost with its executor is run 
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -76,13 +77,21 @@ def recover(lists: _DataFrame, released: str, model: Model, *, n_parts: int | No
 
 
 def recover_in_rounds(
-    lists: _DataFrame, released: str, model: Model, outline: Outline, *, n_parts: int | None = None
+    lists: _DataFrame,
+    released: str,
+    model: Model,
+    outline: Outline,
+    *,
+    n_parts: int | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
 ) -> Recovered:
     """`unlift.rounds.recover`: `unlift.recover(.., confidence=False)`, bit for bit, of lists that no machine has all of.
 
     lists: columns `slot` and `records`, and `scores` where the model's lists have some, in any order and partitions.
     released, n_parts: as for `recover`.
     model, outline: what `unlift.rounds.prepare` learned of the map and all of its lists.
+    checkpoint: a file of this process, as for `unlift.rounds.recover`: after a driver is lost the next one makes the edges again, and goes on
+        with the round that was under way.
 
     Entries of lists are shuffled once, to where the records are that they name. What comes of it stays on the disks of executors, or in the
     checkpoint folder of the SparkContext, if it has one: then what an executor loses is not made again. A round is two jobs,
@@ -134,7 +143,7 @@ def recover_in_rounds(
         return batches
 
     try:
-        return rounds.recover(over, released, model, outline)
+        return rounds.recover(over, released, model, outline, checkpoint=checkpoint)
     finally:
         edges.unpersist()
 

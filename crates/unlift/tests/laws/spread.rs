@@ -88,8 +88,13 @@ fn spread<const D: usize>(
         start.extend(estimates);
         rows.extend(descriptor_row.into_iter().flatten());
     }
+    let known = outline.to_bytes();
     let mut lead = Lead::new(model, released, outline, (&start, &lengths))?;
     while !lead.is_done() {
+        // Whoever leads may be another in every round.
+        let kept = lead.to_bytes()?;
+        lead = Lead::resume(model, released, Outline::from_bytes(&known)?, (&lengths, &kept))?;
+        assert!(lead.to_bytes()? == kept);
         let standing = lead.standing();
         let mut moved = Vec::new();
         for edges in parts.iter().rev() {
@@ -103,6 +108,9 @@ fn spread<const D: usize>(
         }
         lead.told(model, released, &told)?;
     }
+    let done = lead.to_bytes()?;
+    let lead = Lead::resume(model, released, Outline::from_bytes(&known)?, (&lengths, &done))?;
+    assert!(lead.is_done());
     let has_rows = per == 2 && released.descriptors().is_some();
     lead.finish(model, released, has_rows.then_some(rows))
 }
@@ -247,12 +255,17 @@ fn a_lead_is_told_what_all_parts_say() {
     let missing = format!("round: expected slot {}, found none", left.slot);
     assert_eq!(line(lead.moved(&moved)), missing);
     assert!(lead.told(&one.model, released, &[]).is_err());
+    assert!(lead.to_bytes().is_ok());
     moved.push(moved[0]);
     assert!(line(lead.moved(&moved)).contains("each slot in its turn"));
     moved.pop();
     moved.push(left);
     lead.moved(&moved).unwrap();
     assert!(lead.moved(&moved).is_err());
+    assert_eq!(
+        line(lead.to_bytes()),
+        "lead: expected one between two rounds, found one within a round"
+    );
     assert!(lead.told(&one.model, released, &[(200, 1)]).is_err());
     assert!(lead.finish(&one.model, released, None).is_err());
 
@@ -293,6 +306,21 @@ fn other_bytes_are_no_round() {
     };
     refuses(&standing, &|bytes| one.moved(bytes).is_ok());
     refuses(&news, &|bytes| tell(bytes).is_ok());
+    lead.told(&one.model, released, &tell(&news).unwrap()).unwrap();
+    let kept = lead.to_bytes().unwrap();
+    let resume = |kept: &[u8], lengths: &[u32]| {
+        let outline = Outline::from_bytes(&one.outline)?;
+        Lead::resume(&one.model, released, outline, (lengths, kept))
+    };
+    assert!(resume(&kept, &one.lengths).is_ok());
+    refuses(&kept, &|bytes| resume(bytes, &one.lengths).is_ok());
+    let mut lengths = one.lengths.clone();
+    lengths[0] += 1;
+    assert!(line(resume(&kept, &lengths)).starts_with("edges of slot 0: expected"));
+    let seeded = RecoverOptions { seed: 10, ..options() };
+    let (other, outline) = prepare_rounds(released, &one.lists, &seeded).unwrap();
+    let found = line(Lead::resume(&other, released, outline, (&one.lengths, &kept)));
+    assert_eq!(found, "lead: expected one with this model and outline, found one with others");
     refuses(&one.outline, &|bytes| Outline::from_bytes(bytes).is_ok());
     // Slots that do not ascend would be looked for in the wrong part.
     let last = news.len() - 28;

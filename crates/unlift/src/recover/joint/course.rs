@@ -7,7 +7,9 @@ use super::jumps::Jumps;
 use super::look::{Look, Sample};
 use super::neighbor_law::Law;
 use super::standing::Standing;
+use super::wire::{read_estimates, write_estimates};
 use crate::Error;
+use crate::recover::map::bytes::{Reader, Writer};
 use crate::recover::map::crowding::Density;
 use crate::recover::map::graph::Graph;
 use crate::recover::map::pieces::Pieces;
@@ -125,6 +127,61 @@ impl<const D: usize> Course<D> {
             n_jumped_since: 0,
             most: f64::NEG_INFINITY,
         }
+    }
+
+    /// Appends all but what is asked of the map and its edges.
+    pub(crate) fn write(&self, to: &mut Writer) {
+        to.f32s(&[self.least_radius]);
+        to.f64(self.most);
+        let counts = [self.sweep, self.n_jumped, self.n_jumped_before, self.n_jumped_since];
+        counts.iter().for_each(|&n| to.u64(n as u64));
+        write_estimates(&self.now, to);
+        let standing = self.standing.to_bytes();
+        to.u64(standing.len() as u64);
+        to.bytes(&standing);
+    }
+
+    /// What [`write`](Self::write) appended of a course between two rounds, of a map with so many slots.
+    ///
+    /// # Errors
+    /// When it is anything else.
+    pub(crate) fn read(
+        from: &mut Reader<'_>,
+        (kind, digest): (Kind, Arc<Digest>),
+        n_slots: usize,
+    ) -> Result<Self, Error> {
+        let (least_radius, most) = (from.f32()?, from.f64()?);
+        if !(least_radius.is_normal() && least_radius > 0.0) || most.is_nan() {
+            return Err(from.wrong("numbers", format!("{least_radius}, {most}")));
+        }
+        let sweep = from.count(SWEEPS - 1)?;
+        let [n_jumped, n_jumped_before, n_jumped_since] =
+            [from.count(n_slots)?, from.count(n_slots)?, from.count(SWEEPS * n_slots)?];
+        let now = read_estimates(from, n_slots)?;
+        let length = from.count(usize::MAX)?;
+        let standing = Standing::from_bytes(from.bytes(length)?, n_slots)?;
+        if standing.turns > TURNS {
+            return Err(from.wrong(format!("{TURNS} turns at most"), standing.turns.to_string()));
+        }
+        let jumpers = Vec::new();
+        Ok(Self {
+            kind,
+            digest,
+            least_radius,
+            now,
+            standing,
+            jumpers,
+            sweep,
+            n_jumped,
+            n_jumped_before,
+            n_jumped_since,
+            most,
+        })
+    }
+
+    /// The estimates that it holds.
+    pub(crate) fn all_estimates(&self) -> impl Iterator<Item = &Estimate<D>> {
+        self.now.iter().chain(&self.standing.next)
     }
 
     /// The rounds of the same map from another `start`.

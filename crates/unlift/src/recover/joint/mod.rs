@@ -39,7 +39,7 @@ pub(crate) use course::{Course, Kind};
 pub use outline::Outline;
 pub(crate) use standing::Standing;
 use sweeps::Sweeps;
-pub(crate) use wire::News;
+pub(crate) use wire::{News, read_estimates, write_estimates};
 
 /// Joint recovery of one map.
 pub(crate) struct Joint<'a, const D: usize> {

@@ -22,12 +22,7 @@ impl<const D: usize> Standing<D> {
         to.bytes(&STANDING);
         to.bytes(&[D as u8, u8::from(self.done), self.turns as u8, self.turn as u8]);
         to.u64(self.next.len() as u64);
-        for estimate in &self.next {
-            to.f32s(&estimate.position);
-            to.bytes(&estimate.support.to_le_bytes());
-            to.bytes(&[estimate.status as u8, estimate.axis]);
-            to.f32s(&[estimate.evidence]);
-        }
+        write_estimates(&self.next, &mut to);
         to.f32s(&self.ahead);
         let told: Vec<(u32, u32)> = self.jumps.told().collect();
         to.u64(told.len() as u64);
@@ -47,11 +42,14 @@ impl<const D: usize> Standing<D> {
     pub(crate) fn from_bytes(bytes: &[u8], n_slots: usize) -> Result<Self, Error> {
         let mut from = Reader::new("round", bytes);
         let [dimensions, done, turns, turn] = head(&mut from, STANDING, n_slots)?;
-        if usize::from(dimensions) != D || turns == 0 {
+        if usize::from(dimensions) != D {
             return Err(from.wrong(format!("one in {D} dimensions"), dimensions.to_string()));
         }
-        let next: Vec<Estimate<D>> =
-            (0..n_slots).map(|_| estimate(&mut from)).collect::<Result<_, _>>()?;
+        // The turn of a sweep that is over is the one after the last.
+        if turn > turns || (turn == turns && done == 0) {
+            return Err(from.wrong(format!("a turn below {turns}"), turn.to_string()));
+        }
+        let next = read_estimates(&mut from, n_slots)?;
         let ahead = from.f32s(n_slots)?;
         let mut jumps = Jumps::new(n_slots);
         let mut first = 0;
@@ -165,6 +163,27 @@ fn head(from: &mut Reader<'_>, magic: [u8; 8], n_slots: usize) -> Result<[u8; 4]
         n if n == n_slots as u64 => Ok(four),
         n => Err(from.wrong(format!("those of {n_slots} slots"), n.to_string())),
     }
+}
+
+/// Appends estimates, but not how many there are.
+pub(crate) fn write_estimates<const D: usize>(estimates: &[Estimate<D>], to: &mut Writer) {
+    for estimate in estimates {
+        to.f32s(&estimate.position);
+        to.bytes(&estimate.support.to_le_bytes());
+        to.bytes(&[estimate.status as u8, estimate.axis]);
+        to.f32s(&[estimate.evidence]);
+    }
+}
+
+/// So many estimates.
+///
+/// # Errors
+/// When they are not there, or one cannot be.
+pub(crate) fn read_estimates<const D: usize>(
+    from: &mut Reader<'_>,
+    n: usize,
+) -> Result<Vec<Estimate<D>>, Error> {
+    (0..n).map(|_| estimate(from)).collect()
 }
 
 fn estimate<const D: usize>(from: &mut Reader<'_>) -> Result<Estimate<D>, Error> {

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use sha2::{Digest, Sha256};
+
 use crate::recover::exact;
 use crate::recover::joint::{Agree, Course, Kind, News, Outline};
 use crate::recover::learned::Model;
@@ -26,16 +28,61 @@ use crate::{About, Error, Fingerprint};
 ///    [`Model::move_part`] says; the news that come of it to all parts; [`told`](Self::told) with what [`Model::tell_part`] says.
 /// 3. [`finish`](Self::finish).
 pub struct Lead<const D: usize> {
-    map: Fingerprint,
-    course: Course<D>,
-    /// Slots without edges stay where they are, and nobody asks for them.
-    has_edges: Vec<bool>,
+    pub(super) led: Led,
+    pub(super) course: Course<D>,
     /// Where slots are after the round under way, once they have moved.
-    after: Option<Places<D>>,
+    pub(super) after: Option<Places<D>>,
     /// The last word, once there is one.
-    last: Option<Vec<Estimate<D>>>,
+    pub(super) last: Option<Vec<Estimate<D>>>,
     /// How often rounds begin anew from where a rule of the scheme moved slots.
-    feeds: usize,
+    pub(super) feeds: usize,
+}
+
+/// What is led: a map, and edges that others have.
+pub(super) struct Led {
+    pub(super) map: Fingerprint,
+    /// Of model and outline.
+    pub(super) learned: [u8; 32],
+    pub(super) kind: Kind,
+    /// Slots without edges stay where they are, and nobody asks for them.
+    pub(super) has_edges: Vec<bool>,
+}
+
+impl Led {
+    /// Refuses what does not belong together; `lengths` is how many edges each slot has in its part.
+    pub(super) fn check<const D: usize>(
+        model: &Model<D>,
+        released: &Released<D>,
+        outline: &Outline,
+        lengths: &[u32],
+    ) -> Result<Self, Error> {
+        let family = model.family_of_rounds(released)?;
+        let map = released.fingerprint();
+        map.expect(Some(outline.map())).map_err(|error| error.within("outline"))?;
+        if model.options().confidence {
+            let expected = "a model without: who has no lists cannot say how sure it is";
+            return Err(Error::new("confidence of rounds in parts", expected, "asked for"));
+        }
+        let n_slots = released.n_slots();
+        for (what, n) in [("outline", outline.lengths.len()), ("lengths", lengths.len())] {
+            if n != n_slots {
+                return Err(Error::new(what, format!("{n_slots} rows"), n.to_string()));
+            }
+        }
+        if outline.slots_per_record != released.slots_per_record() {
+            let expected = format!("{} slots a record", released.slots_per_record());
+            return Err(Error::new("outline", expected, outline.slots_per_record.to_string()));
+        }
+        let mut pairs = outline.lengths.iter().zip(lengths).enumerate();
+        if let Some((slot, (expected, found))) = pairs.find(|(_, (a, b))| a != b) {
+            let what = format!("edges of slot {slot}");
+            return Err(Error::new(what, expected.to_string(), found.to_string()));
+        }
+        let hash = Sha256::new().chain_update(model.to_bytes()).chain_update(outline.to_bytes());
+        let kind = family.with_pieces(model.delta as f32, OfKind(model.delta as f32));
+        let has_edges = lengths.iter().map(|&n| n > 0).collect();
+        Ok(Self { map, learned: hash.finalize().into(), kind, has_edges })
+    }
 }
 
 impl<const D: usize> Lead<D> {
@@ -51,36 +98,15 @@ impl<const D: usize> Lead<D> {
         outline: Outline,
         (start, lengths): (&[Estimate<D>], &[u32]),
     ) -> Result<Self, Error> {
-        let family = model.family_of_rounds(released)?;
-        let map = released.fingerprint();
-        map.expect(Some(outline.map())).map_err(|error| error.within("outline"))?;
-        if model.options().confidence {
-            let expected = "a model without: who has no lists cannot say how sure it is";
-            return Err(Error::new("confidence of rounds in parts", expected, "asked for"));
-        }
-        let n_slots = released.n_slots();
-        for (what, n) in
-            [("outline", outline.lengths.len()), ("start", start.len()), ("lengths", lengths.len())]
-        {
-            if n != n_slots {
-                return Err(Error::new(what, format!("{n_slots} rows"), n.to_string()));
-            }
-        }
-        if outline.slots_per_record != released.slots_per_record() {
-            let expected = format!("{} slots a record", released.slots_per_record());
-            return Err(Error::new("outline", expected, outline.slots_per_record.to_string()));
-        }
-        let mut pairs = outline.lengths.iter().zip(lengths).enumerate();
-        if let Some((slot, (expected, found))) = pairs.find(|(_, (a, b))| a != b) {
-            let what = format!("edges of slot {slot}");
-            return Err(Error::new(what, expected.to_string(), found.to_string()));
+        let led = Led::check(model, released, &outline, lengths)?;
+        if start.len() != released.n_slots() {
+            let expected = format!("{} rows", released.n_slots());
+            return Err(Error::new("start", expected, start.len().to_string()));
         }
         check_estimates(start.iter())?;
-        let kind = family.with_pieces(model.delta as f32, OfKind(model.delta as f32));
-        let has_edges = lengths.iter().map(|&n| n > 0).collect();
-        let course = Course::new(kind, Arc::new(outline.digest), start);
-        let feeds = if is_settled(model, released) { exact::feeds(released) } else { 0 };
-        Ok(Self { map, course, has_edges, after: None, last: None, feeds })
+        let course = Course::new(led.kind, Arc::new(outline.digest), start);
+        let feeds = most_feeds(model, released);
+        Ok(Self { led, course, after: None, last: None, feeds })
     }
 
     /// Whether all rounds are done.
@@ -106,14 +132,14 @@ impl<const D: usize> Lead<D> {
         check_estimates(moved.iter().map(|one| &one.estimate))?;
         let standing = self.course.standing();
         let turn = |slot: usize| standing.is_turn_of(slot);
-        let mut open: Vec<bool> = (0..self.has_edges.len()).map(turn).collect();
+        let mut open: Vec<bool> = (0..self.led.has_edges.len()).map(turn).collect();
         for Moved { slot, .. } in moved {
             match open.get_mut(*slot as usize) {
                 Some(open) if *open => *open = false,
                 _ => return Err(Error::new("round", "each slot in its turn", slot.to_string())),
             }
         }
-        let missing = open.iter().zip(&self.has_edges).position(|(&open, &has)| open && has);
+        let missing = open.iter().zip(&self.led.has_edges).position(|(&open, &has)| open && has);
         if let Some(slot) = missing {
             return Err(Error::new("round", format!("slot {slot}"), "none"));
         }
@@ -134,11 +160,11 @@ impl<const D: usize> Lead<D> {
         released: &Released<D>,
         concerning: &[(u32, u32)],
     ) -> Result<(), Error> {
-        let n_slots = self.has_edges.len();
+        let n_slots = self.led.has_edges.len();
         if let Some((slot, _)) = concerning.iter().find(|(slot, _)| *slot as usize >= n_slots) {
             return Err(Error::new("told", format!("slots below {n_slots}"), slot.to_string()));
         }
-        self.map.expect(Some(released.fingerprint()))?;
+        self.led.map.expect(Some(released.fingerprint()))?;
         // Records are asked at the end of a sweep alone.
         let ends_sweep = self.course.ends_sweep();
         let family = ends_sweep.then(|| model.family_of_rounds(released)).transpose()?;
@@ -183,11 +209,11 @@ impl<const D: usize> Lead<D> {
         released: &Released<D>,
         descriptor_row: Option<Vec<u32>>,
     ) -> Result<Recovered<D>, Error> {
-        self.map.expect(Some(released.fingerprint()))?;
+        self.led.map.expect(Some(released.fingerprint()))?;
         let Some(last) = &self.last else {
             return Err(Error::new("rounds", "all of them", "some that are left"));
         };
-        let about = About { map: Some(self.map), ..model.about };
+        let about = About { map: Some(self.led.map), ..model.about };
         let recovered = in_columns(released, (last, descriptor_row), model.delta, about)?;
         Ok(recovered.without_confidence(Unknown::NotAsked))
     }
@@ -199,13 +225,18 @@ impl<const D: usize> std::fmt::Debug for Lead<D> {
     }
 }
 
+/// How often rounds of `released` begin anew.
+pub(super) fn most_feeds<const D: usize>(model: &Model<D>, released: &Released<D>) -> usize {
+    if is_settled(model, released) { exact::feeds(released) } else { 0 }
+}
+
 /// Whether a rule of the scheme moves slots.
 fn is_settled<const D: usize>(model: &Model<D>, released: &Released<D>) -> bool {
     model.options().exact_constraints && exact::can_settle(released)
 }
 
 /// Refuses what no part says of a slot.
-fn check_estimates<'a, const D: usize>(
+pub(super) fn check_estimates<'a, const D: usize>(
     mut estimates: impl Iterator<Item = &'a Estimate<D>>,
 ) -> Result<(), Error> {
     let can_be = |one: &&Estimate<D>| {
