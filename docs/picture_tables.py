@@ -6,15 +6,16 @@ import csv, json, pathlib, subprocess, tempfile
 
 METRICS = ["ssim", "psnr", "lpips"]
 RATIOS = ["1.0", "0.5", "0.3"]
-SOURCES = ["overlap", "learned"]
+# Attacks that read lists: of records alone, and of the descriptors of each kind.
+SIFT, ALIKED = ["overlap", "learned"], ["overlap", "similarity", "learned"]
 FLAT, SOLID = ["lines2d", "cp2d", "dcl2d"], ["olc", "ppl", "ray", "plane", "cp"]
 SCENES = [("RedKitchen, 40 photos", "redkitchen", ["--scale", "1"]), ("Castle, 11 photos", "castle", [])]
 
 
-def audit(program, *options):
+def audit(program, names, *options):
     with tempfile.TemporaryDirectory() as out:
         ratios = ["--inlier-ratios", ",".join(RATIOS), "--neighbors", "oracle"]
-        sources = [option for name in SOURCES for option in ("--neighbors", name)]
+        sources = [option for name in names for option in ("--neighbors", name)]
         command = [program, "audit", *options, *ratios, *sources, "--invert", "--solver", "joint", "--quiet", "--share-safe", "--out", f"{out}/audit"]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         return json.loads(pathlib.Path(out, "audit/audit.json").read_text())
@@ -36,7 +37,7 @@ def published(shared, dim):
     return table
 
 
-def table(document, schemes, paper):
+def table(document, schemes, sources, paper):
     rows = {}
     for row in document["results"]:
         key = row["inlier_ratio"] if row["neighbors"] == "oracle" else row["neighbors"]
@@ -46,7 +47,7 @@ def table(document, schemes, paper):
     base = [told(rows[1.0, scheme], "_baseline") for scheme in schemes]
     known = paper.get(("none", "baseline"))
     yield "| true points | " + " | ".join(f"{text} [{known}]" if known else text for text in base) + " |"
-    for key in [*map(float, RATIOS), *SOURCES]:
+    for key in [*map(float, RATIOS), *sources]:
         cells = []
         for scheme in schemes:
             known = paper.get((scheme, key))
@@ -82,15 +83,23 @@ def tables(program, shared):
     """All lines of the section."""
     data = shared / "data"
     yield from ["SSIM / PSNR in dB / LPIPS, means over photos, at half their size; in brackets the paper's SSIM on 7-Scenes (another network, full size).", ""]
-    for name, photos, scale in SCENES:
-        yield from [f"### {name}, keypoints", ""]
-        paper = published(shared, "2") if photos == "redkitchen" else {}
-        document = audit(program, "images", data / photos / "images")
-        yield from table(document, FLAT, paper)
+    for name, scene, scale in SCENES:
+        photos = data / scene / "images"
+        yield from [f"### {name}, SIFT keypoints", ""]
+        paper = published(shared, "2") if scene == "redkitchen" else {}
+        document = audit(program, SIFT, "images", photos)
+        yield from table(document, FLAT, SIFT, paper)
         yield from recall(document, FLAT)
-        yield from [f"### {name}, the map as its cameras see it", ""]
-        paper = published(shared, "3") if photos == "redkitchen" else {}
-        document = audit(program, "map", data / photos / "model", "--descriptors", data / photos / "descriptors.bin", *scale,
-                               "--photos", data / photos / "images", "--max-photos", "40", "--schemes", ",".join(SOLID), "--no-records-alone")
-        yield from table(document, SOLID, paper)
-        yield from recall(document, SOLID)
+        yield from [f"### {name}, ALIKED keypoints", ""]
+        document = audit(program, ALIKED, "images", photos, "--features", "aliked")
+        yield from table(document, FLAT, ALIKED, {})
+        yield from recall(document, FLAT)
+        for kind, sources, map_of in [("SIFT", SIFT, data / scene), ("ALIKED", ALIKED, data / f"{scene}-aliked")]:
+            if not map_of.exists():
+                continue
+            yield from [f"### {name}, the map as its cameras see it, {kind}", ""]
+            paper = published(shared, "3") if (scene, kind) == ("redkitchen", "SIFT") else {}
+            document = audit(program, sources, "map", map_of / "model", "--descriptors", map_of / "descriptors.bin", *scale,
+                             "--photos", photos, "--max-photos", "40", "--schemes", ",".join(SOLID), "--no-records-alone")
+            yield from table(document, SOLID, sources, paper)
+            yield from recall(document, SOLID)

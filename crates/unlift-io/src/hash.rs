@@ -3,6 +3,7 @@
 use crate::Error;
 use crate::features::ImageFeatures;
 use crate::input;
+use crate::read::Input;
 use crate::stage::part_files;
 use sha2::{Digest, Sha256};
 use std::io::Read;
@@ -49,6 +50,16 @@ pub fn hash_files<P: AsRef<Path>>(paths: &[P]) -> Result<String, Error> {
         lines.push((name.to_string_lossy().into_owned(), hash_file(path)?));
     }
     Ok(hash_list(lines))
+}
+
+/// [`hash_files`] of the files of a map that was read.
+///
+/// # Errors
+/// When one cannot be read, or is not what it was when reading began.
+pub fn hash_input(input: &Input) -> Result<String, Error> {
+    let hash = hash_files(&input.files)?;
+    input.seen.check()?;
+    Ok(hash)
 }
 
 /// The hash of a stage file; of a folder of parts, [`hash_files`] of these.

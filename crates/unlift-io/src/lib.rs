@@ -40,6 +40,7 @@ mod guard;
 pub mod hash;
 pub mod input;
 pub mod read;
+pub mod seen;
 pub mod shelf;
 pub mod stage;
 mod unfinished;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use unlift_audit::{OutlierFilter, Preparation, Prepared, Quiet, check_scale, maps, prepare};
-use unlift_io::hash::{hash_file, hash_files, hash_positions};
+use unlift_io::hash::{hash_file, hash_input, hash_positions};
 use unlift_report::document::Input;
 
 use crate::arrays::{descriptors, rows, to_array, to_descriptors, to_rows};
@@ -171,7 +171,7 @@ pub fn read(
     let preparation = preparation(scale, k, max_points, outlier_filter, seed)?;
     work::run(py, None, None, move || {
         let (input, prepared) = maps::open(&path, descriptors.as_deref(), &preparation, &Quiet)?;
-        let sha256 = Some(hash_files(&input.files)?);
+        let sha256 = Some(hash_input(&input)?);
         let unit = prepared.unit_in_map_units;
         let mut other_sha256 = unlift_audit::ordered([]);
         if let Some(file) = &descriptors {

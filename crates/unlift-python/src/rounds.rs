@@ -247,10 +247,11 @@ impl Lead {
         let (model, map) = (Arc::clone(&model.0), Arc::clone(&released));
         let of = Arc::clone(&model);
         OutputFile::check(&path).map_err(raised)?;
-        let kept = std::fs::read(&path).map_err(|e| wrong(&path.display().to_string(), "a file", e))?;
+        let kept =
+            std::fs::read(&path).map_err(|e| wrong(&path.display().to_string(), "a file", e))?;
         let rounds = work::run(py, None, None, move || {
             Leading::resume(&of, &map, outline, (&lengths, &kept))
-                .map_err(|error| error.within(path.display().to_string()))
+                .map_err(|error| error.within(&path.display().to_string()))
         })?;
         Ok(Self { model, released, rounds: Arc::new(Mutex::new(rounds)) })
     }

@@ -72,19 +72,26 @@ pub fn find(job: ImagesJob<'_>) -> Result<(Option<Audited>, Used), Error> {
         true => Default::default(),
         false => drawn(&job, &tally, &figures)?,
     };
+    let input = input(&job, &tally, &outcome)?;
     let doubt = tally.doubt();
     if let Some(doubt) = &doubt {
         steps.say(&format!("note: {doubt}"));
     }
-    let doubts = vec![doubt.clone(); outcome.rows.len()];
+    // Photos are read for figures, for pictures and for their hash.
+    let changed = job.source.changed(&tally.used);
+    if let Some(path) = changed {
+        steps.say(&format!("note: {}: {CHANGED}", path.display()));
+    }
+    let changed = changed.map(|_| format!("input: {CHANGED}"));
+    let notes: Vec<String> = doubt.into_iter().chain(changed).collect();
+    let doubts = vec![notes.first().cloned(); outcome.rows.len()];
     let gates = gate_results(&job.gates, &job.plan, &outcome.rows, &[], &doubts)?;
-    let input = input(&job, &tally, &outcome)?;
     let mut options = job.options;
     if let Some(inversion) = &job.inversion {
         options.insert("inverter_sha256".into(), inversion.sha256().into());
     }
     let provenance = Provenance {
-        notes: doubt.into_iter().collect(),
+        notes,
         input,
         options: document::options(&job.plan, options),
         gates,
@@ -103,6 +110,10 @@ pub fn find(job: ImagesJob<'_>) -> Result<(Option<Audited>, Used), Error> {
     };
     Ok((Some(Audited { document, scene: None, drawn }), used))
 }
+
+/// Why no gate holds on images of which a file is not what it was.
+const CHANGED: &str =
+    "changed since reading began: figures, hash and pictures may be of different files";
 
 /// What was read: of photos, those that were used.
 fn input(job: &ImagesJob<'_>, tally: &Tally, outcome: &Outcome) -> Result<Input, Error> {

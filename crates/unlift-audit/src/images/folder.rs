@@ -9,6 +9,7 @@ use unlift::descriptors::Values;
 use unlift_features::{Extraction, Extractor, Features, Found as FoundFeatures, LearnedFeatures};
 use unlift_io::Error;
 use unlift_io::features::{ImageFeatures, round_to_half};
+use unlift_io::seen::Seen;
 
 /// What is taken for a photo; what a file is, its bytes decide when it is read.
 const ENDINGS: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
@@ -33,6 +34,8 @@ pub struct Folder {
     extraction: Extraction,
     names: Vec<String>,
     paths: Vec<PathBuf>,
+    /// The same before any of them was read.
+    seen: Seen,
     refused: Vec<Error>,
     passed_over: Option<String>,
 }
@@ -62,9 +65,10 @@ impl Folder {
             format!("{root}: passed over {others}: only JPEG, PNG and WebP are read")
         });
         found.photos.sort_unstable();
-        let (names, paths) = found.photos.into_iter().unzip();
+        let (names, paths): (_, Vec<PathBuf>) = found.photos.into_iter().unzip();
         let (extraction, refused) = (extraction.clone(), found.refused);
-        Ok(Self { extractor, extraction, names, paths, refused, passed_over })
+        let seen = Seen::new(&paths);
+        Ok(Self { extractor, extraction, names, paths, seen, refused, passed_over })
     }
 
     /// Names of all photos, sorted by their bytes.
@@ -85,6 +89,11 @@ impl Folder {
     /// Where photo `at` is.
     pub fn path(&self, at: usize) -> &Path {
         &self.paths[at]
+    }
+
+    /// One of the photos `which` that is not what it was when the folder was opened.
+    pub fn changed(&self, which: &[usize]) -> Option<&Path> {
+        self.seen.changed(which.iter().copied())
     }
 
     /// The features of photo `at`.

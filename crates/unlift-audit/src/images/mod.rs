@@ -72,6 +72,15 @@ impl FeatureSource {
         }
     }
 
+    /// A file of the images `which` that is not what it was when it was opened.
+    pub fn changed(&self, which: &[usize]) -> Option<&Path> {
+        match self {
+            Self::Folder(folder) => folder.changed(which),
+            Self::File(file) => file.changed(),
+            Self::InMemory(_) => None,
+        }
+    }
+
     /// The features of image `at` of [`names`](Self::names).
     ///
     /// # Errors

@@ -11,7 +11,7 @@ use unlift::released::Released;
 use unlift::truth::{Original, Secret};
 use unlift::{Descriptors, Unit};
 use unlift_io::atomic::OutputSet;
-use unlift_io::hash::hash_files;
+use unlift_io::hash::hash_input;
 use unlift_io::read;
 use unlift_report::RenderOptions;
 use unlift_report::document::Input;
@@ -78,7 +78,7 @@ impl<'a> Job<'a> {
     /// The default audit of the map at `path`, as [`open`] read it, into the folder `out`.
     ///
     /// # Errors
-    /// When the files of the map cannot be read again, for their hash.
+    /// When the files of the map cannot be read again, for their hash, or are not what they were.
     pub fn new(
         path: &Path,
         input: &read::Input,
@@ -97,7 +97,7 @@ impl<'a> Job<'a> {
             plan: Plan::new(points.unit()).for_map(points.len(), USUAL_K),
             input: Input {
                 path: Some(path.display().to_string()),
-                sha256: Some(hash_files(&input.files)?),
+                sha256: Some(hash_input(input)?),
                 n_points: prepared.original.len() as u64,
                 scale_m_per_unit: (points.unit() == Unit::Meter).then_some(scale),
                 unit_in_map_units: Some(prepared.unit_in_map_units),

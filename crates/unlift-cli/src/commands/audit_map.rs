@@ -1,6 +1,6 @@
 //! `unlift audit map`: a map in, one honest answer out.
 
-use std::path::PathBuf;
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -14,6 +14,7 @@ use unlift_audit::{Finished, Job, Journal, Prepared, Shown, check_thresholds, op
 use unlift_io::atomic::Rules;
 use unlift_io::hash::{hash_file, hash_stage};
 use unlift_io::read;
+use unlift_io::seen::Seen;
 
 use super::common::{open_map, with_threads};
 use super::gate_files::GateFiles;
@@ -43,6 +44,7 @@ pub fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
     };
     let gate_files = GateFiles::check(&args.result, &rules(args))?;
     let out = open_audit(&args.result.out, rules(args), shown, &Stderr)?;
+    let beside = Seen::of_stages(beside(args).map(|(_, path)| path));
     let finished = with_threads(args.run.threads, || {
         let (input, prepared) = open_map(&args.path, &args.map, args.run.quiet)?;
         let progress = Progress::new(args.run.quiet);
@@ -65,6 +67,7 @@ pub fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
             ..Job::new(path, &input, &prepared, &result.out, started)?
         };
         job.input.other_sha256 = others(args)?;
+        beside.check()?;
         Ok(perform(job, out)?)
     })?;
     gate_files.write(&finished.document)?;
@@ -100,12 +103,8 @@ fn inversion(
 
 /// What must not be written over.
 fn rules(args: &AuditMapArgs) -> Rules {
-    let lists = args.neighbors.iter().filter_map(|source| match source {
-        NeighborSource::File(path) => Some(path.as_path()),
-        NeighborSource::Oracle | NeighborSource::Own(_) => None,
-    });
-    let inputs = [args.path.as_path()].into_iter().chain(args.map.descriptors.as_deref());
-    Rules::new(inputs.chain(lists), args.result.force)
+    let inputs = [args.path.as_path()].into_iter().chain(beside(args).map(|(_, path)| path));
+    Rules::new(inputs, args.result.force)
 }
 
 fn plan(
@@ -153,15 +152,18 @@ fn plan(
     })
 }
 
-/// Hashes of the files that were read beside the map.
-fn others(args: &AuditMapArgs) -> anyhow::Result<IndexMap<String, String>> {
+/// Files that are read beside the map, and what they are.
+fn beside(args: &AuditMapArgs) -> impl Iterator<Item = (&'static str, &Path)> {
     let lists = args.neighbors.iter().filter_map(|source| match source {
-        NeighborSource::File(path) => Some(("neighbors", path)),
+        NeighborSource::File(path) => Some(("neighbors", path.as_path())),
         NeighborSource::Oracle | NeighborSource::Own(_) => None,
     });
-    let descriptors = args.map.descriptors.iter().map(|path| ("descriptors", path));
-    let hash = |(name, path): (&str, &PathBuf)| Ok((name.to_owned(), hash_stage(path)?));
-    descriptors.chain(lists).map(hash).collect()
+    args.map.descriptors.iter().map(|path| ("descriptors", path.as_path())).chain(lists)
+}
+
+/// Their hashes.
+fn others(args: &AuditMapArgs) -> anyhow::Result<IndexMap<String, String>> {
+    beside(args).map(|(name, path)| Ok((name.to_owned(), hash_stage(path)?))).collect()
 }
 
 /// Options that change the points, not the plan.

@@ -1,5 +1,6 @@
 //! `unlift audit released`: records that somebody else made, and their truth, in; one honest answer out.
 
+use std::path::Path;
 use std::time::Instant;
 
 use serde_json::{Map, json};
@@ -11,6 +12,7 @@ use unlift_audit::{Finished, Job, Prepared, Shown, check_thresholds, open_audit,
 use unlift_io::atomic::Rules;
 use unlift_io::hash::{hash_file, hash_files, hash_stage};
 use unlift_io::read::{self, Input as Points};
+use unlift_io::seen::Seen;
 use unlift_io::stage::{has_images, part_files, read_released, read_truth, scheme_name};
 use unlift_report::document::Input;
 
@@ -42,7 +44,8 @@ pub fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
         (false, false) => Shown::Points,
     };
     let inputs = [args.released.as_path(), &args.truth].into_iter();
-    let inputs = inputs.chain(args.descriptors.as_deref()).chain(lists(args));
+    let inputs: Vec<&Path> = inputs.chain(args.descriptors.as_deref()).chain(lists(args)).collect();
+    let seen = Seen::of_stages(inputs.iter().copied());
     let rules = Rules::new(inputs, args.result.force);
     let gate_files = GateFiles::check(&args.result, &rules)?;
     let out = open_audit(&args.result.out, rules, shown, &Stderr)?;
@@ -60,7 +63,7 @@ pub fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
             up: None,
             plan,
             notes,
-            input: provenance(args, &prepared)?,
+            input: provenance(args, &prepared, &seen)?,
             options: with_attack(
                 Map::from_iter([("released".to_owned(), json!(true))]),
                 &args.attack,
@@ -83,7 +86,7 @@ pub fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
 }
 
 /// Files of lists.
-fn lists(args: &AuditReleasedArgs) -> impl Iterator<Item = &std::path::Path> {
+fn lists(args: &AuditReleasedArgs) -> impl Iterator<Item = &Path> {
     args.neighbors.iter().filter_map(|source| match source {
         NeighborSource::File(path) => Some(path.as_path()),
         NeighborSource::Oracle | NeighborSource::Own(_) => None,
@@ -144,6 +147,7 @@ fn described(
         cameras: Vec::new(),
         up: None,
         files: Vec::new(),
+        seen: Seen::default(),
         format: "",
         skipped: Vec::new(),
         model: None,
@@ -197,7 +201,7 @@ fn plan(
     })
 }
 
-fn provenance(args: &AuditReleasedArgs, prepared: &Prepared) -> anyhow::Result<Input> {
+fn provenance(args: &AuditReleasedArgs, prepared: &Prepared, seen: &Seen) -> anyhow::Result<Input> {
     let mut others = vec![("truth".to_owned(), hash_stage(&args.truth)?)];
     if let Some(path) = &args.descriptors {
         others.push(("descriptors".to_owned(), hash_file(path)?));
@@ -205,9 +209,11 @@ fn provenance(args: &AuditReleasedArgs, prepared: &Prepared) -> anyhow::Result<I
     for path in lists(args) {
         others.push(("neighbors".to_owned(), hash_stage(path)?));
     }
+    let sha256 = Some(hash_files(&part_files(&args.released)?)?);
+    seen.check()?;
     Ok(Input {
         path: Some(args.released.display().to_string()),
-        sha256: Some(hash_files(&part_files(&args.released)?)?),
+        sha256,
         n_points: prepared.original.len() as u64,
         scale_m_per_unit: None,
         unit_in_map_units: None,

@@ -32,6 +32,7 @@ use std::path::Path;
 use crate::error::Error;
 use crate::input;
 use crate::read::lines::quoted;
+use crate::seen::Seen;
 
 pub use hloc::decode;
 pub use image::{ImageFeatures, round_to_half};
@@ -40,7 +41,10 @@ pub use writer::{FeatureWriter, encode};
 /// Features in a file, one image at a time: memory does not grow with the number of images.
 ///
 /// Shared by threads: [`get`](Self::get) may be called from many at once.
-pub struct FeatureSource(Kind);
+pub struct FeatureSource {
+    kind: Kind,
+    seen: Seen,
+}
 
 enum Kind {
     Hloc(hloc::Hloc),
@@ -56,6 +60,7 @@ impl FeatureSource {
     /// # Errors
     /// When the file cannot be read, is neither, is cut off, or lists no image.
     pub fn open(path: &Path) -> Result<Self, Error> {
+        let seen = Seen::new([path]);
         let (file, len) = input::open(path)?;
         let mut start = Vec::new();
         file_start(&file, &mut start).map_err(|e| Error::read(path, e))?;
@@ -71,16 +76,21 @@ impl FeatureSource {
                 return Err(Error::new(path, "", expected, found));
             }
         };
-        let source = Self(kind);
+        let source = Self { kind, seen };
         if source.names().is_empty() {
             return Err(Error::new(path, "", "at least one image", "none"));
         }
         Ok(source)
     }
 
+    /// The file, if it is not what it was when it was opened.
+    pub fn changed(&self) -> Option<&Path> {
+        self.seen.changed([0])
+    }
+
     /// The images, sorted by the bytes of their names.
     pub fn names(&self) -> &[String] {
-        match &self.0 {
+        match &self.kind {
             Kind::Hloc(file) => file.names(),
             Kind::Colmap(database) => database.names(),
         }
@@ -94,7 +104,7 @@ impl FeatureSource {
     /// # Panics
     /// When there is no such image.
     pub fn get(&self, at: usize) -> Result<ImageFeatures, Error> {
-        match &self.0 {
+        match &self.kind {
             Kind::Hloc(file) => file.get(at),
             Kind::Colmap(database) => database.get(at),
         }

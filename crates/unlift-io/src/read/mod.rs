@@ -18,6 +18,7 @@ use std::path::{Path, PathBuf};
 pub use descriptors::descriptors;
 
 use crate::error::Error;
+use crate::seen::Seen;
 use models::Model;
 
 /// A map as it was read, in the units of its file.
@@ -35,6 +36,8 @@ pub struct Input {
     pub up: Option<[f64; 3]>,
     /// Every file that was read, for hashes in a report.
     pub files: Vec<PathBuf>,
+    /// The same before anything was read of them, but for files that one of them names.
+    pub seen: Seen,
     /// The name of the format, for people: `COLMAP binary`, `ply ascii`.
     pub format: &'static str,
     /// What was found but not used, one line each.
@@ -59,7 +62,12 @@ fn mean_direction(directions: impl Iterator<Item = [f64; 3]>) -> Option<[f64; 3]
 /// When nothing readable is there, a file is malformed, a coordinate is not finite, or there is no point.
 pub fn open(path: &Path) -> Result<Input, Error> {
     let metadata = std::fs::metadata(path).map_err(|e| Error::read(path, e))?;
-    let input = if metadata.is_dir() { folder(path)? } else { file(path)? };
+    let input = if metadata.is_dir() {
+        folder(path)?
+    } else {
+        let seen = Seen::new([path]);
+        Input { seen, ..file(path)? }
+    };
     if input.positions.is_empty() {
         let file = input.files.last().map_or(path, PathBuf::as_path);
         return Err(Error::new(file, "", "at least one point", "none"));
@@ -153,7 +161,10 @@ fn colmap_points(path: &Path) -> Result<Input, Error> {
 fn folder(path: &Path) -> Result<Input, Error> {
     let Some(model) = Model::find(path)? else {
         return match others::in_folder(path) {
-            Some(other) => file(&other),
+            Some(other) => {
+                let seen = Seen::new([&other]);
+                Ok(Input { seen, ..file(&other)? })
+            }
             None => Err(Error::new(path, "", models::EXPECTED, "none")),
         };
     };
@@ -180,6 +191,7 @@ fn colmap_model(model: &Path, extension: &str) -> Result<Input, Error> {
     let rigs = present("rigs");
     let frames = present("frames");
     let points = present("points3D").expect("found by the caller");
+    input.seen = Seen::new(&input.files);
 
     let cameras = cameras.map(|path| colmap::read_cameras(&path)).transpose()?;
     if let Some(path) = images {
