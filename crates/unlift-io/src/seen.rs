@@ -60,6 +60,16 @@ impl Seen {
         Self::new(paths.into_iter().flat_map(files))
     }
 
+    /// Number of files.
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
     /// The first of the files `which` (by their place among those that were looked at) that is not what it was, or not there.
     ///
     /// # Panics

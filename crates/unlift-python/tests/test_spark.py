@@ -172,7 +172,7 @@ def test_rounds_go_on_when_an_executor_is_killed(spark, tmp_path: pathlib.Path):
         ends = time.monotonic() + 400
         while time.monotonic() < ends:
             # Edges are made, and some rounds are over.
-            if jobs() >= at_first + 8:
+            if jobs() >= at_first + 5:
                 os.kill(before[0], signal.SIGKILL)
                 seen.append(jobs())
                 return
@@ -182,7 +182,7 @@ def test_rounds_go_on_when_an_executor_is_killed(spark, tmp_path: pathlib.Path):
     killer.start()
     back = unlift.spark.recover_in_rounds(frame, str(tmp_path / "released.parquet"), model, outline, n_parts=3)
     killer.join()
-    assert seen and jobs() > seen[0] + 4, "it was killed between the first round and the last"
+    assert seen and jobs() > seen[0] + 2, "it was killed between the first round and the last"
     assert before[0] not in executors()
     whole = unlift.recover(hidden, lists, confidence=False)
     back.save(tmp_path / "parts")

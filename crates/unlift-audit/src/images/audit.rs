@@ -1,11 +1,12 @@
 //! One audit of images from a source of features to what it found, and to the files in its folder.
 
 use std::cell::RefCell;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use unlift::audit::{self, Cell, Observer, Outcome, Plan, Row, run_images};
 use unlift_io::atomic::OutputSet;
 use unlift_io::hash::{hash_file, hash_files, hash_list};
+use unlift_io::seen::Seen;
 use unlift_report::RenderOptions;
 use unlift_report::document::{ImageCounts, ImageFigures, Input};
 
@@ -56,6 +57,7 @@ pub fn find(job: ImagesJob<'_>) -> Result<(Option<Audited>, Used), Error> {
         steps.say(&error.to_string());
     }
     let of = (job.source, job.path);
+    let beside = beside(&job);
     let needs = Needs::of_plan(&job.plan);
     let images = Stream::new(of, &job.chosen, needs, &tally, steps);
     let outcome = run_images(images, &job.plan, &mut watcher)?;
@@ -78,7 +80,7 @@ pub fn find(job: ImagesJob<'_>) -> Result<(Option<Audited>, Used), Error> {
         steps.say(&format!("note: {doubt}"));
     }
     // Photos are read for figures, for pictures and for their hash.
-    let changed = job.source.changed(&tally.used);
+    let changed = job.source.changed(&tally.used).or_else(|| beside.changed(0..beside.len()));
     if let Some(path) = changed {
         steps.say(&format!("note: {}: {CHANGED}", path.display()));
     }
@@ -114,6 +116,17 @@ pub fn find(job: ImagesJob<'_>) -> Result<(Option<Audited>, Used), Error> {
 /// Why no gate holds on images of which a file is not what it was.
 const CHANGED: &str =
     "changed since reading began: figures, hash and pictures may be of different files";
+
+/// Photos of the images, where the source is a file.
+fn beside(job: &ImagesJob<'_>) -> Seen {
+    let names = job.source.names();
+    let of_folder = |folder: &Path| -> Vec<PathBuf> {
+        let paths = job.chosen.iter().map(|&at| folder.join(&names[at]));
+        // Of those that are missing it is said that they are not painted.
+        paths.filter(|path| path.is_file()).collect()
+    };
+    Seen::new(job.photos.as_deref().map(of_folder).unwrap_or_default())
+}
 
 /// What was read: of photos, those that were used.
 fn input(job: &ImagesJob<'_>, tally: &Tally, outcome: &Outcome) -> Result<Input, Error> {

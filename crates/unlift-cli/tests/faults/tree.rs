@@ -36,12 +36,14 @@ impl Tree {
         }
     }
 
-    /// The figures of audits alone, without what they are of.
+    /// The figures of audits alone, without what they are of and what is noted of it.
     pub fn figures(&self) -> Self {
         let mut tree = self.files_without(|name| !name.ends_with("audit.json"));
         for bytes in tree.0.values_mut() {
             let Ok(mut value) = serde_json::from_slice::<Value>(bytes) else { continue };
-            value.as_object_mut().map(|value| value.remove("input"));
+            if let Some(value) = value.as_object_mut() {
+                value.retain(|name, _| !["input", "notes"].contains(&name.as_str()));
+            }
             *bytes = value.to_string().into_bytes();
         }
         tree

@@ -3,7 +3,7 @@
 //! copying what the failing test prints, and shows in the diff.
 
 use unlift::obfuscate::{Entry, SCHEMES};
-use unlift::recover::{Delta, RecoverOptions, Solver};
+use unlift::recover::{Delta, RecoverOptions, Solver, recover};
 
 use crate::maps::*;
 
@@ -85,4 +85,76 @@ fn bytes_of_joint_recovery_are_pinned() {
         |(name, d, bytes): &(&str, usize, u64)| format!("    (\"{name}\", {d}, {bytes:#018x}),");
     let printed: Vec<String> = found.iter().map(literal).collect();
     assert!(found == JOINT, "the bytes are now\n{}", printed.join("\n"));
+}
+
+/// (scheme, hash of how sure the attacker is of each point).
+const SURE: &[(&str, u64)] = &[
+    ("olc", 0x89c24f02502d4f1c),
+    ("ppl", 0xb5aaae98eeeba3a5),
+    ("ray", 0x2c0e5aea6d688f29),
+    ("plane", 0x2e8ca48258aeb7eb),
+    ("cp", 0xd71c546c5895710b),
+];
+
+/// On a map large enough for it to be said.
+#[test]
+fn bytes_of_confidence_are_pinned() {
+    let points = room::<3>(2028, 2100);
+    let mut found = Vec::new();
+    for name in ["olc", "ppl", "ray", "plane", "cp"] {
+        let hidden = hide(unlift::obfuscate::scheme(name).unwrap(), &points, 0);
+        let recovered =
+            solve(&hidden.released, &hidden.lists(20, 0.5, 0), RecoverOptions::default());
+        let rows = recovered.confidence().expect("a map of usual size");
+        let bits = rows.iter().flat_map(|one| [one.found, one.scale].map(f32::to_bits));
+        found.push((name, hash(&bits.flat_map(u32::to_le_bytes).collect::<Vec<_>>())));
+    }
+    let literal = |(name, bytes): &(&str, u64)| format!("    (\"{name}\", {bytes:#018x}),");
+    let printed: Vec<String> = found.iter().map(literal).collect();
+    assert!(found == SURE, "the bytes are now\n{}", printed.join("\n"));
+}
+
+/// (solver, scheme, hash of what it makes of it).
+const BASELINES: &[(&str, &str, u64)] = &[
+    ("joint-start", "olc", 0xaf63f5032f96a9d9),
+    ("joint-start", "ppl", 0x46e1864ebd342411),
+    ("joint-start", "ray", 0xaffb76e949a42c6b),
+    ("joint-start", "plane", 0xde5bb20120e6f20f),
+    ("joint-start", "cp", 0xeb49c5ea752fd143),
+    ("ransac", "olc", 0x5a77b2272a0c53f4),
+    ("ransac", "ppl", 0x2ab7ecf141fcf04d),
+    ("ransac", "ray", 0x3d2f0fdf5c4a7191),
+    ("ransac", "plane", 0xd20e8407c287d092),
+    ("ransac", "cp", 0x9e694a90f945dea7),
+    ("density", "olc", 0x5fe90bc4b08ad839),
+    ("density", "ppl", 0x4f76618e599ebc54),
+    ("density", "ray", 0xdcb9f6d14f4a14b8),
+    ("density", "plane", 0x0ebf5689908d068c),
+    ("density", "cp", 0x4f53456fb305bccc),
+    ("tomography", "olc", 0xdf0f8328d1c8c7bd),
+    ("tomography", "ppl", 0xe9b68d6e14c8f4f5),
+    ("tomography", "ray", 0x402f7f93493e3731),
+    ("tomography", "plane", 0x0ebf5689908d068c),
+    ("tomography", "cp", 0xb899e30b8b0c36f4),
+];
+
+#[test]
+fn bytes_of_other_solvers_are_pinned() {
+    let points = room::<3>(2029, 300);
+    let mut found = Vec::new();
+    for solver in [Solver::JointStart, Solver::Ransac, Solver::Density, Solver::Tomography] {
+        for name in ["olc", "ppl", "ray", "plane", "cp"] {
+            let hidden = hide(unlift::obfuscate::scheme(name).unwrap(), &points, 0);
+            let options = RecoverOptions { solver, seed: 4, ..RecoverOptions::default() };
+            let lists = hidden.lists(20, 0.5, 0);
+            // Not every attack on records alone knows every family.
+            let Ok(recovered) = recover(&hidden.released, &lists, &options) else { continue };
+            found.push((solver.name(), name, hash(&recovered_bytes(&recovered))));
+        }
+    }
+    let literal = |(solver, name, bytes): &(&str, &str, u64)| {
+        format!("    (\"{solver}\", \"{name}\", {bytes:#018x}),")
+    };
+    let printed: Vec<String> = found.iter().map(literal).collect();
+    assert!(found == BASELINES, "the bytes are now\n{}", printed.join("\n"));
 }
