@@ -6,6 +6,9 @@ use std::fs;
 
 use common::Place;
 use serde_json::Value;
+use unlift::Descriptors;
+use unlift::descriptors::Values;
+use unlift_io::features::{FeatureWriter, ImageFeatures};
 
 const CHEAP: &str = "--schemes lines2d --inlier-ratios 0.5 --solver joint-start --k 8";
 
@@ -75,10 +78,20 @@ fn what_cannot_be_painted_is_a_usage_error() {
 #[test]
 fn a_network_of_ones_own_paints_what_the_program_has_none_for() {
     let place = place();
-    let missing = "inverter-aliked.onnx: expected in ";
-    for line in
-        ["audit images photos --features aliked --invert", "invert photos --features aliked"]
-    {
+    // Of SuperPoint there is none.
+    let mut writer = FeatureWriter::create(&place.path("superpoint.h5")).unwrap();
+    let values = (0..40 * 256).map(|i| f32::from(u8::from(i % 256 == i / 256))).collect();
+    let image = ImageFeatures {
+        name: "a.jpg".to_owned(),
+        size: Some([320, 240]),
+        keypoints: (0..40).map(|i| [f64::from(7 * i), f64::from(5 * i)]).collect(),
+        descriptors: Some(Descriptors::try_new(Values::F32(values), 256).unwrap()),
+        ..ImageFeatures::default()
+    };
+    writer.append(&image).unwrap();
+    writer.finish().unwrap();
+    let missing = "inverter-superpoint.onnx: expected in ";
+    for line in ["audit images superpoint.h5 --photos photos --invert", "invert superpoint.h5"] {
         let (_, stderr) = place.ends(&format!("{line} --out x"), 3);
         assert!(stderr.contains(missing) && stderr.contains("training/inversion"), "{stderr}");
     }

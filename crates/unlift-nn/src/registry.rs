@@ -90,23 +90,26 @@ const ALIKED_N16ROT: Entry = Entry {
 
 const INVERTER_ALIKED: Entry = Entry {
     name: "inverter-aliked",
-    purpose: "pictures from keypoints or points of a map and their ALIKED descriptors, trained by yourself: \
-              training/inversion",
-    licence: "yours",
-    owner: "training/inversion/README.md of https://github.com/unlift/unlift",
-    // Whoever trains it knows what they trained.
-    sha256: None,
+    purpose: "pictures from keypoints or points of a map and their ALIKED descriptors",
+    licence: "MIT OR Apache-2.0",
+    owner: "https://github.com/unlift/unlift",
+    sha256: Some("99a466241a5d569053bb514c0e35f348faed8867c65c7054aeb8422841aca69e"),
     inputs: &[Port { name: "features", shape: &[Some(1), Some(131), None, None] }],
     outputs: &[Port { name: "picture", shape: &[Some(1), Some(3), None, None] }],
-    carried: None,
+    carried: Some(include_bytes!("../models/inverter-aliked/inverter-aliked.onnx")),
 };
 
 const INVERTER_SUPERPOINT: Entry = Entry {
     name: "inverter-superpoint",
     purpose: "pictures from keypoints or points of a map and their SuperPoint descriptors, trained by those who have \
               SuperPoint: training/inversion",
+    licence: "yours",
+    owner: "training/inversion/README.md of https://github.com/unlift/unlift",
+    // Whoever trains it knows what they trained.
+    sha256: None,
     inputs: &[Port { name: "features", shape: &[Some(1), Some(259), None, None] }],
-    ..INVERTER_ALIKED
+    outputs: &[Port { name: "picture", shape: &[Some(1), Some(3), None, None] }],
+    carried: None,
 };
 
 const INVERTER_SIFT: Entry = Entry {

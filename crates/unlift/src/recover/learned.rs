@@ -133,6 +133,9 @@ impl<const D: usize> Model<D> {
         let lists_by = if by_oracle == 0 { ListsBy::Unstated } else { ListsBy::Oracle };
         let about = About { map: Some(map), order, lists_by };
         let delta = from.f64()?;
+        if !(delta >= 0.0 && (delta as f32).is_finite()) {
+            return Err(Error::new("model", "a delta that is a length", delta.to_string()));
+        }
         let [kind] = from.array()?;
         let chance = match kind {
             0 => None,

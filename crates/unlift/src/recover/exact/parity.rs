@@ -154,3 +154,18 @@ pub(super) fn find<const D: usize>(
 fn score<const D: usize>(of: &[([f32; D], u8)], start: &[f64; D], edge: f64) -> i64 {
     of.iter().map(|(x, center)| if odd(x, start, edge) == (*center == 1) { 1 } else { -1 }).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::score;
+
+    #[test]
+    fn a_checkerboard_is_seen_or_its_opposite() {
+        let of = [([0.5; 3], 0), ([1.5, 0.5, 0.5], 1), ([1.5, 1.5, 0.5], 0), ([0.5, 0.5, 1.5], 1)];
+        assert_eq!(score(&of, &[0.0; 3], 1.0), 4);
+        assert_eq!(score(&of, &[1.0, 0.0, 0.0], 1.0), -4);
+        assert_eq!(score(&of[..3], &[0.0; 3], 1.0), 3);
+        // In one cell, half of these have another parity.
+        assert_eq!(score(&of, &[0.0; 3], 8.0), 0);
+    }
+}
