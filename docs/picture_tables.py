@@ -7,7 +7,7 @@ import csv, json, pathlib, subprocess, tempfile
 METRICS = ["ssim", "psnr", "lpips"]
 RATIOS = ["1.0", "0.5", "0.3"]
 # Attacks that read lists: of records alone, and of the descriptors of each kind.
-SIFT, ALIKED = ["overlap", "learned"], ["overlap", "similarity", "learned"]
+SIFT, ALIKED = ["overlap", "learned"], ["similarity", "learned"]
 FLAT, SOLID = ["lines2d", "cp2d", "dcl2d"], ["olc", "ppl", "ray", "plane", "cp"]
 SCENES = [("RedKitchen, 40 photos", "redkitchen", ["--scale", "1"]), ("Castle, 11 photos", "castle", [])]
 

@@ -82,7 +82,7 @@ fn a_network_of_ones_own_paints_what_the_program_has_none_for() {
     let mut writer = FeatureWriter::create(&place.path("superpoint.h5")).unwrap();
     let values = (0..40 * 256).map(|i| f32::from(u8::from(i % 256 == i / 256))).collect();
     let image = ImageFeatures {
-        name: "a.jpg".to_owned(),
+        name: "a.png".to_owned(),
         size: Some([320, 240]),
         keypoints: (0..40).map(|i| [f64::from(7 * i), f64::from(5 * i)]).collect(),
         descriptors: Some(Descriptors::try_new(Values::F32(values), 256).unwrap()),

@@ -152,33 +152,3 @@ fn to_record<const D: usize>(obfuscation: &Obfuscation<D>, record: usize, point:
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::obfuscate::{SchemeOptions, obfuscate, scheme};
-    use crate::seed::{Draws, Key, Stage};
-    use crate::{PointSet, Unit};
-
-    #[test]
-    fn a_truth_that_is_moved_is_not_that_of_the_map() {
-        let mut draws = Draws::new(3, Stage::Synthetic, 0);
-        let mut point = || std::array::from_fn(|_| 4.0 * draws.unit());
-        let points: Vec<[f64; 3]> = (0..200).map(|_| point()).collect();
-        let original = |points| Original::new(PointSet::try_new(points, Unit::Meter).unwrap());
-        let (truth, options) = (original(points.clone()), SchemeOptions { voxel: 0.5 });
-        let moved = original(points.iter().map(|p| [p[1], p[2], p[0]]).collect());
-        for name in ["olc", "ppl", "ray", "plane", "cp"] {
-            let scheme = scheme(name).unwrap().of_dimension(&options).unwrap();
-            let (released, secret) = obfuscate(&*scheme, &truth, None, &Key::from_seed(1)).unwrap();
-            assert!(belongs(&truth, &released, &secret).is_ok(), "{name}");
-            assert!(belongs(&moved, &released, &secret).is_err(), "{name}");
-            // A point lies on its record, but for rounding, which is less than a thousandth.
-            let away = away_from_own(&released, &truth, &secret);
-            assert!(away.iter().all(|&away| away < 1e-4), "{name}");
-            let point = [2.0; 3];
-            let rounding = rounding(released.obfuscation(), 0, &point);
-            assert!((1e-7..1e-4).contains(&rounding), "{name}: {rounding}");
-        }
-    }
-}

@@ -1,9 +1,12 @@
 //! What a released map holds: containment, normal form, shape, determinism.
 
 use proptest::prelude::*;
+use unlift::evaluate::{away_from_own, belongs};
 use unlift::obfuscate::Entry;
 use unlift::recover::Solver;
 use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays};
+use unlift::truth::Original;
+use unlift::{PointSet, Unit};
 
 use crate::maps::*;
 
@@ -160,4 +163,20 @@ fn shape_of_the_smallest_maps() {
 fn determinism() {
     over_schemes!(threads_change_no_byte, 11);
     over_schemes!(seeds_matter);
+}
+
+#[test]
+fn a_truth_in_another_frame_is_not_that_of_the_map() {
+    let points = room::<3>(64, 200);
+    let turned = points.iter().map(|p| [p[1], p[2], p[0]]).collect();
+    let moved = Original::new(PointSet::try_new(turned, Unit::Meter).unwrap());
+    for name in ["olc", "ppl", "ray", "plane", "cp"] {
+        let hidden = hide::<3>(unlift::obfuscate::scheme(name).unwrap(), &points, 6);
+        let (released, secret) = (&hidden.released, &hidden.secret);
+        assert!(belongs(&hidden.original, released, secret).is_ok(), "{name}");
+        assert!(belongs(&moved, released, secret).is_err(), "{name}");
+        // A point lies on its record, but for rounding.
+        let away = away_from_own(released, &hidden.original, secret);
+        assert!(away.iter().all(|&away| away < 1e-4), "{name}");
+    }
 }
