@@ -6,6 +6,7 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use unlift_audit::{OutlierFilter, Preparation, Prepared, Quiet, check_scale, maps, prepare};
 use unlift_io::hash::{hash_file, hash_input, hash_positions};
+use unlift_io::seen::Seen;
 use unlift_report::document::Input;
 
 use crate::arrays::{descriptors, rows, to_array, to_descriptors, to_rows};
@@ -170,6 +171,7 @@ pub fn read(
 ) -> PyResult<Map> {
     let preparation = preparation(scale, k, max_points, outlier_filter, seed)?;
     work::run(py, None, None, move || {
+        let beside = Seen::new(&descriptors);
         let (input, prepared) = maps::open(&path, descriptors.as_deref(), &preparation, &Quiet)?;
         let sha256 = Some(hash_input(&input)?);
         let unit = prepared.unit_in_map_units;
@@ -177,6 +179,7 @@ pub fn read(
         if let Some(file) = &descriptors {
             other_sha256.insert("descriptors".to_owned(), hash_file(file)?);
         }
+        beside.check()?;
         Ok::<_, unlift_audit::Error>(Map {
             input: Input {
                 path: Some(path.display().to_string()),

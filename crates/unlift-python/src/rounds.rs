@@ -1,6 +1,6 @@
 //! Joint recovery whose edges are spread: what a part does with its own, and who leads.
 
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -13,7 +13,8 @@ use unlift::recover::{
     Edges as Rows, Lead as Leading, Moved, NamedBy, Outline as Outlined, RecoverOptions,
     prepare_rounds as learn, prepare_rounds_shelved as learn_shelved,
 };
-use unlift_io::atomic::{Access, OutputFile, write_file};
+use unlift_io::atomic::{Access, write_file};
+use unlift_io::input;
 
 use crate::arrays::{column, indices, to_array, whole};
 use crate::errors::{raised, wrong};
@@ -219,16 +220,11 @@ impl Lead {
         start: &Bound<'_, PyDict>,
         lengths: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
-        let released = released_of(released)?.of_map()?;
-        let (lengths, _) = indices("lengths", lengths, &[1], u32::MAX)?;
-        let start = part(start, released.n_slots())?.estimates;
-        let outline = Outlined::from_bytes(&outline.0).map_err(raised)?;
-        let (model, map) = (Arc::clone(&model.0), Arc::clone(&released));
-        let of = Arc::clone(&model);
-        let rounds = work::run(py, None, None, move || {
-            Leading::new(&of, &map, outline, (&start, &lengths))
-        })?;
-        Ok(Self { model, released, rounds: Arc::new(Mutex::new(rounds)) })
+        let map = released_of(released)?.of_map()?;
+        let start = part(start, map.n_slots())?.estimates;
+        Self::made(py, (model, map, outline), lengths, move |model, map, outline, lengths| {
+            Leading::new(model, map, outline, (&start, lengths))
+        })
     }
 
     /// The lead that `save` put in a file. `lengths`: how many edges each slot has in its part.
@@ -241,19 +237,14 @@ impl Lead {
         lengths: &Bound<'_, PyAny>,
         path: PathBuf,
     ) -> PyResult<Self> {
-        let released = released_of(released)?.of_map()?;
-        let (lengths, _) = indices("lengths", lengths, &[1], u32::MAX)?;
-        let outline = Outlined::from_bytes(&outline.0).map_err(raised)?;
-        let (model, map) = (Arc::clone(&model.0), Arc::clone(&released));
-        let of = Arc::clone(&model);
-        OutputFile::check(&path).map_err(raised)?;
-        let kept =
-            std::fs::read(&path).map_err(|e| wrong(&path.display().to_string(), "a file", e))?;
-        let rounds = work::run(py, None, None, move || {
-            Leading::resume(&of, &map, outline, (&lengths, &kept))
-                .map_err(|error| error.within(&path.display().to_string()))
-        })?;
-        Ok(Self { model, released, rounds: Arc::new(Mutex::new(rounds)) })
+        let map = released_of(released)?.of_map()?;
+        let (mut file, _) = input::open(&path).map_err(raised)?;
+        let (mut kept, place) = (Vec::new(), path.display().to_string());
+        file.read_to_end(&mut kept).map_err(|error| wrong(&place, "a file", error))?;
+        Self::made(py, (model, map, outline), lengths, move |model, map, outline, lengths| {
+            Leading::resume(model, map, outline, (lengths, &kept))
+                .map_err(|error| error.within(&place))
+        })
     }
 
     /// Puts the lead between two rounds in a file, whole or not at all.
@@ -331,6 +322,28 @@ impl Lead {
 }
 
 impl Lead {
+    /// The lead that `make` makes of model, map, outline and lengths.
+    fn made(
+        py: Python<'_>,
+        (model, released, outline): (&Model, Arc<Map>, &Outline),
+        lengths: &Bound<'_, PyAny>,
+        make: impl FnOnce(
+            &unlift::recover::Model<3>,
+            &Map,
+            Outlined,
+            &[u32],
+        ) -> Result<Leading<3>, unlift::Error>
+        + Send
+        + 'static,
+    ) -> PyResult<Self> {
+        let (lengths, _) = indices("lengths", lengths, &[1], u32::MAX)?;
+        let outline = Outlined::from_bytes(&outline.0).map_err(raised)?;
+        let (model, map) = (Arc::clone(&model.0), Arc::clone(&released));
+        let of = Arc::clone(&model);
+        let rounds = work::run(py, None, None, move || make(&of, &map, outline, &lengths))?;
+        Ok(Self { model, released, rounds: Arc::new(Mutex::new(rounds)) })
+    }
+
     /// Does something with the rounds, without the interpreter's lock.
     fn with<T: Send + 'static>(
         &self,

@@ -156,8 +156,10 @@ def test_rounds_go_on_where_they_were(tmp_path: pathlib.Path):
     steps: list[str] = []
 
     def dies(work, columns):
+        """In the second round of every run, so that each gets a round farther."""
         steps.append(work.step)
-        if len(steps) % 4 == 0:
+        if steps.count("move") == 2:
+            steps.clear()
             raise KeyboardInterrupt
         return run(work, columns)
 
@@ -166,8 +168,8 @@ def test_rounds_go_on_where_they_were(tmp_path: pathlib.Path):
             back = unlift.rounds.recover(dies, tmp_path / "released", model, outline, checkpoint=file)
             break
         except KeyboardInterrupt:
-            assert died == 0 or file.stat().st_mode & 0o77 == 0
-    assert died > 1 and not file.exists()
+            assert file.stat().st_mode & 0o77 == 0
+    assert died > 2 and not file.exists()
     whole = unlift.recover(of, lists, confidence=False)
     assert bytes_of(back, tmp_path) == bytes_of(whole, tmp_path)
 

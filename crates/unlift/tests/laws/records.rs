@@ -165,6 +165,16 @@ fn determinism() {
     over_schemes!(seeds_matter);
 }
 
+/// Each is as near to the record of any other as to its own, but for rounding.
+#[test]
+fn points_that_fall_together_belong_to_their_map() {
+    let together = vec![[1.3, 0.7, 2.1]; 200];
+    for name in ["olc", "plane", "cp"] {
+        let hidden = hide::<3>(unlift::obfuscate::scheme(name).unwrap(), &together, 6);
+        assert!(belongs(&hidden.original, &hidden.released, &hidden.secret).is_ok(), "{name}");
+    }
+}
+
 #[test]
 fn a_truth_in_another_frame_is_not_that_of_the_map() {
     let points = room::<3>(64, 200);

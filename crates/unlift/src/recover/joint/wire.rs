@@ -46,7 +46,7 @@ impl<const D: usize> Standing<D> {
             return Err(from.wrong(format!("one in {D} dimensions"), dimensions.to_string()));
         }
         // The turn of a sweep that is over is the one after the last.
-        if turn > turns || (turn == turns && done == 0) {
+        if turns == 0 || turn > turns || (turn == turns && done == 0) {
             return Err(from.wrong(format!("a turn below {turns}"), turn.to_string()));
         }
         let next = read_estimates(&mut from, n_slots)?;
