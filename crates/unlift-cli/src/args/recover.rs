@@ -36,6 +36,10 @@ pub struct RecoverArgs {
     /// The integer that all randomness comes from
     #[arg(long, value_name = "INTEGER", default_value_t = 0)]
     pub seed: u64,
+    /// Keep where the rounds of joint recovery of a map stand in this folder until all is done, and go on from
+    /// there if it was interrupted: the same options, the same result. As private as the map
+    #[arg(long, value_name = "DIR")]
+    pub journal: Option<PathBuf>,
     /// Threads to use; never changes a result [default: one per core]
     #[arg(long, value_name = "N")]
     pub threads: Option<NonZeroUsize>,

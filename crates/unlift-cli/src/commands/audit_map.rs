@@ -12,11 +12,11 @@ use unlift_audit::inversion::MapInversion;
 use unlift_audit::maps::perform;
 use unlift_audit::{Finished, Job, Journal, Prepared, Shown, check_thresholds, open_audit};
 use unlift_io::atomic::Rules;
-use unlift_io::hash::{hash_file, hash_stage};
+use unlift_io::hash::hash_stage;
 use unlift_io::read;
 use unlift_io::seen::Seen;
 
-use super::common::{open_map, with_threads};
+use super::common::{open_map, this_program, with_threads};
 use super::gate_files::GateFiles;
 use super::painter::{kind, painter};
 use super::plan::{attack, neighbors, shelf, solvers, summary, thresholds, with_attack};
@@ -77,8 +77,7 @@ pub fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
 /// What was recovered before, if it was to be kept: by this very program.
 fn journal<'a>(args: &AuditMapArgs, progress: &'a Progress) -> anyhow::Result<Option<Journal<'a>>> {
     let Some(folder) = &args.journal else { return Ok(None) };
-    let program = hash_file(&std::env::current_exe()?)?;
-    Ok(Some(Journal::open(folder, program, progress)?))
+    Ok(Some(Journal::open(folder, this_program()?, progress)?))
 }
 
 /// What paints pictures, if that was asked for.
@@ -146,8 +145,7 @@ fn plan(
         records_alone: !args.solvers.no_records_alone,
         thresholds,
         seed: args.map.seed.unwrap_or(0),
-        // What was recovered before is told by its lists, which are then in memory.
-        shelf: if args.journal.is_none() { shelf(&args.result.out) } else { None },
+        shelf: shelf(&args.result.out),
         ..attack(&args.attack, usual)
     })
 }

@@ -8,6 +8,7 @@ use unlift::Fingerprint;
 use unlift::released::Released;
 use unlift::truth::Secret;
 use unlift_audit::{Preparation, Prepared, maps};
+use unlift_io::hash::hash_file;
 use unlift_io::read::Input;
 
 use crate::args::MapArgs;
@@ -17,6 +18,14 @@ use crate::progress::Spinner;
 pub const RELEASED: &str = "released.parquet";
 /// What only the owner has.
 pub const TRUTH: &str = "truth.parquet";
+
+/// What tells this program from others, which may recover different bits: a hash of its file.
+///
+/// # Errors
+/// When it cannot be read.
+pub fn this_program() -> anyhow::Result<String> {
+    Ok(hash_file(&std::env::current_exe()?)?)
+}
 
 /// Runs `work` on `threads` threads (all cores without a number); never changes a result. Without a pool of its own
 /// work would panic where the system refuses threads.

@@ -3,38 +3,10 @@
 use super::plan::{NeighborsBy, Plan, Variant};
 use crate::geometry::knn::Knn;
 use crate::neighbors::oracle::{self, InParts, Noise, Outliers, TrueNeighbors};
-use crate::neighbors::{Neighborhoods, ShelvedLists, of_what_there_is};
+use crate::neighbors::{Listing, Neighborhoods, ShelvedLists, of_what_there_is};
 use crate::released::{Obfuscation, Released};
 use crate::truth::Secret;
 use crate::{About, Error, RecordId, RowOrder, Shelf};
-
-/// Lists of a map, wherever they are.
-#[derive(Debug)]
-pub enum Listing {
-    /// In memory.
-    Here(Neighborhoods),
-    /// On the plan's shelf.
-    Away(ShelvedLists),
-}
-
-impl Listing {
-    /// Those in memory, if they are there.
-    pub fn here(&self) -> Option<&Neighborhoods> {
-        match self {
-            Self::Here(lists) => Some(lists),
-            Self::Away(_) => None,
-        }
-    }
-
-    /// Entries of all of them.
-    pub fn n_entries(&self) -> usize {
-        let offsets = match self {
-            Self::Here(lists) => lists.offsets(),
-            Self::Away(lists) => lists.offsets(),
-        };
-        offsets.last().map_or(0, |&n| n as usize)
-    }
-}
 
 /// Why there are no lists.
 #[derive(Debug)]

@@ -4,7 +4,7 @@ use std::fmt::Debug;
 
 use super::row::Row;
 use crate::evaluate::Accuracy;
-use crate::neighbors::Neighborhoods;
+use crate::neighbors::{Listing, Neighborhoods};
 use crate::recover::{RecoverOptions, Recovered};
 use crate::released::Released;
 use crate::truth::{Original, Secret};
@@ -41,7 +41,7 @@ pub struct Recovery<'a, const D: usize = 3> {
     /// What the attacker sees.
     pub released: &'a Released<D>,
     /// Its lists.
-    pub lists: &'a Neighborhoods,
+    pub lists: &'a Listing,
     /// How it works.
     pub options: &'a RecoverOptions,
 }
@@ -63,13 +63,13 @@ pub trait Observer<const D: usize = 3> {
         let _ = cell;
     }
 
-    /// What was recovered of the same before, bit for bit; not asked of lists that are not in memory; `None` has it done now, and [kept](Self::keep).
+    /// What was recovered of the same before, bit for bit; `None` has it done now, and [kept](Self::keep).
     fn recall(&mut self, recovery: &Recovery<'_, D>) -> Option<Recovered<D>> {
         let _ = recovery;
         None
     }
 
-    /// What was recovered now, of lists in memory.
+    /// What was recovered now.
     fn keep(&mut self, recovery: &Recovery<'_, D>, recovered: &Recovered<D>) {
         let _ = (recovery, recovered);
     }

@@ -2,9 +2,9 @@
 
 use std::time::Instant;
 
-use super::lists::Listing;
 use super::observer::{Observer, Recovery};
 use super::plan::Plan;
+use crate::neighbors::Listing;
 use crate::recover::{
     RecoverOptions, Recovered, Solver, recover, recover_shelved, recover_shelved_with_start,
     recover_with_start,
@@ -46,20 +46,20 @@ impl<'a, const D: usize> Solved<'a, D> {
         if let Some(kept) = self.start.take_if(|_| is_start(&solver)) {
             return Ok((kept, 0.0));
         }
-        let recalled = self.recovery(&options).and_then(|recovery| observer.recall(&recovery));
+        let recalled = observer.recall(&self.recovery(&options));
         let with_start = solver == Solver::Joint && self.plan.solvers[at..].iter().any(is_start);
         let recovered = match recalled {
             Some(recalled) => recalled,
             None if with_start => {
                 let (joint, start) = self.recover_with_start(&options)?;
-                self.keep(observer, &options, &joint);
-                self.keep(observer, &self.options(Solver::JointStart), &start);
+                observer.keep(&self.recovery(&options), &joint);
+                observer.keep(&self.recovery(&self.options(Solver::JointStart)), &start);
                 self.start = Some(start);
                 joint
             }
             None => {
                 let recovered = self.recover(&options)?;
-                self.keep(observer, &options, &recovered);
+                observer.keep(&self.recovery(&options), &recovered);
                 recovered
             }
         };
@@ -89,18 +89,6 @@ impl<'a, const D: usize> Solved<'a, D> {
         self.plan.shelf().ok_or_else(|| Error::new("lists", "a shelf that they are on", "none"))
     }
 
-    /// Has what was recovered kept, where its lists can be told from others.
-    fn keep(
-        &self,
-        observer: &mut dyn Observer<D>,
-        options: &RecoverOptions,
-        recovered: &Recovered<D>,
-    ) {
-        if let Some(recovery) = self.recovery(options) {
-            observer.keep(&recovery, recovered);
-        }
-    }
-
     fn options(&self, solver: Solver) -> RecoverOptions {
         RecoverOptions {
             solver,
@@ -111,11 +99,10 @@ impl<'a, const D: usize> Solved<'a, D> {
         }
     }
 
-    fn recovery<'b>(&self, options: &'b RecoverOptions) -> Option<Recovery<'b, D>>
+    fn recovery<'b>(&self, options: &'b RecoverOptions) -> Recovery<'b, D>
     where
         'a: 'b,
     {
-        let (released, lists) = (self.released, self.lists.here()?);
-        Some(Recovery { released, lists, options })
+        Recovery { released: self.released, lists: self.lists, options }
     }
 }

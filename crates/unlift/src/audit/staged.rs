@@ -5,15 +5,15 @@ pub use super::chance::{key_of, oracle_seed};
 
 use super::cells::Finished;
 use super::clock::RowSeconds;
-use super::lists::{Listing, Lists};
+use super::lists::Lists;
 use super::measure::measure;
 use super::plan::{NeighborsBy, Plan, Variant};
 use super::pool::Pool;
 use super::row::Row;
 use super::threshold::Threshold;
 use crate::evaluate::{blind, distinct_weights};
-use crate::neighbors::Neighborhoods;
 use crate::neighbors::oracle::{self, Noise};
+use crate::neighbors::{Listing, Neighborhoods};
 use crate::recover::Recovered;
 use crate::released::Released;
 use crate::truth::{DropReason, Original, Secret};

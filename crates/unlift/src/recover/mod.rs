@@ -9,7 +9,7 @@
 //! 5. `exact`: coordinates that a rule of the scheme fixes. `confidence`: how sure the attacker is.
 //!    `pairs_of_descriptors`: whose descriptor is whose on a paired line.
 //! 6. `checks`: what goes together. `learned`: what is learned of a map. `records`: records with their lists as solvers read them. `task`: model, records and lists together, solved in any parts; `rounds`: joint
-//!    recovery one round at a time; `parts`: consensus where each part has its own lists alone; `spread`: joint recovery where each has its own
+//!    recovery one round at a time; `kept`: where they stand, for a run that goes on; `parts`: consensus where each part has its own lists alone; `spread`: joint recovery where each has its own
 //!    edges alone.
 //!
 //! [`prepare`] learns a model, [`Task`] solves with it, and [`recover`] does both.
@@ -21,6 +21,7 @@ mod consensus;
 mod delta;
 mod exact;
 mod joint;
+mod kept;
 mod learned;
 mod map;
 mod options;
@@ -40,6 +41,7 @@ pub use confidence::model::{N_KINDS, N_TERMS, centered, terms};
 #[doc(hidden)]
 pub use confidence::seen::{Cues, Seen};
 pub use joint::Outline;
+pub use kept::{Kept, Nowhere};
 pub use learned::Model;
 pub use map::part_edges::{Edges, NamedBy};
 pub use options::{Delta, RecoverOptions, Solver};
@@ -56,7 +58,7 @@ pub use task::Task;
 
 use crate::compiled::{no_such, which};
 use crate::density::Peaks;
-use crate::neighbors::{Neighborhoods, ShelvedLists};
+use crate::neighbors::{Listing, Neighborhoods, ShelvedLists};
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, RowOrder, Shelf};
 use placement::Placement;
@@ -190,6 +192,47 @@ fn shelved<const D: usize>(
     let task = Task::learn_shelved(released, (lists, shelf), options)?;
     let start = task.solve(0..task.n_slots())?;
     task.finish(task.go_on(start)?)
+}
+
+/// [`recover`] or [`recover_shelved`], as `lists` are in memory or on `shelf`, that goes on from where the rounds stood that were `kept`: the
+/// same, bit for bit.
+///
+/// # Errors
+/// As there, when lists are on a shelf and none is given, and when what was kept is not of this map and solver.
+pub fn recover_kept<const D: usize>(
+    released: &Released<D>,
+    (lists, shelf): (&Listing, Option<&dyn Shelf>),
+    options: &RecoverOptions,
+    kept: &mut dyn Kept,
+) -> Result<Recovered<D>, Error> {
+    let compiled = which(&(go_on::<2> as GoOn<2>), &(go_on::<3> as GoOn<3>));
+    let go_on: GoOn<D> = compiled.ok_or_else(no_such::<D>)?;
+    go_on(released, (lists, shelf), options, kept)
+}
+
+type GoOn<const D: usize> = fn(
+    &Released<D>,
+    (&Listing, Option<&dyn Shelf>),
+    &RecoverOptions,
+    &mut dyn Kept,
+) -> Result<Recovered<D>, Error>;
+
+fn go_on<const D: usize>(
+    released: &Released<D>,
+    (lists, shelf): (&Listing, Option<&dyn Shelf>),
+    options: &RecoverOptions,
+    kept: &mut dyn Kept,
+) -> Result<Recovered<D>, Error> {
+    let task = match (lists, shelf) {
+        (Listing::Here(lists), _) => Task::learn(released, lists, options)?,
+        (Listing::Away(lists), Some(shelf)) => {
+            Task::learn_shelved(released, (lists, shelf), options)?
+        }
+        (Listing::Away(_), None) => {
+            return Err(Error::new("lists", "a shelf that they are on", "none"));
+        }
+    };
+    task.finish(task.run(kept)?)
 }
 
 /// [`recover_with_start`] with lists that do not fit into memory: the same, bit for bit.

@@ -1,7 +1,9 @@
 //! Joint recovery one round at a time: positions in, positions out.
 
+use std::io;
 use std::ops::Range;
 
+use super::kept::Kept;
 use super::result::estimate::Estimate;
 use super::solve::{InRounds, Moved};
 use crate::Error;
@@ -71,17 +73,26 @@ impl<'a, const D: usize> Rounds<'a, D> {
         self.0.estimates()
     }
 
+    /// Writes where rounds stand between two of them, some 60 bytes a slot, the same on every machine.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub(super) fn write(&self, to: &mut dyn io::Write) -> io::Result<()> {
+        self.0.write(to)
+    }
+
     /// The estimates after all rounds that are left, each in the parts that the solver likes.
     ///
     /// # Errors
     /// When lists are on a shelf and cannot be read.
-    pub(super) fn run(mut self) -> Result<Vec<Estimate<D>>, Error> {
+    pub(super) fn run(mut self, kept: &mut dyn Kept) -> Result<Vec<Estimate<D>>, Error> {
         while !self.is_done() {
             for part in self.0.parts() {
                 let moved = self.0.solve(part)?;
                 self.0.take(&moved);
             }
             self.0.end_round()?;
+            kept.keep(&|to| self.write(to));
         }
         Ok(self.0.into_estimates())
     }

@@ -14,6 +14,7 @@
 //! that stays as published (`Task::is_settled`). Where it is known which points are whose center's (`Family::has_regions`,
 //! `dcl2d`), rays of two centers meet nowhere that both points may lie: `consensus::anchors` looks at bearings instead.
 
+use std::io;
 use std::ops::Range;
 
 use super::result::estimate::Estimate;
@@ -27,13 +28,22 @@ pub(crate) trait Solve<'a, const D: usize> {
     /// When lists cannot be read, which are on a shelf.
     fn solve(&self, slots: Range<usize>) -> Result<Vec<Estimate<D>>, Error>;
 
-    /// What goes on from estimates of all slots; `None` where these are the last word.
+    /// What goes on from there; `None` where estimates of all slots are the last word.
     ///
     /// # Errors
-    /// As of [`solve`](Self::solve).
-    fn rounds(&self, _start: &[Estimate<D>]) -> Result<Option<Box<dyn InRounds<D> + 'a>>, Error> {
+    /// As of [`solve`](Self::solve), and when rounds were not written by this solver about this map.
+    fn rounds(&self, _begin: Begin<'_, D>) -> Result<Option<Box<dyn InRounds<D> + 'a>>, Error> {
         Ok(None)
     }
+}
+
+/// Where rounds go on from.
+#[derive(Clone, Copy)]
+pub(crate) enum Begin<'a, const D: usize> {
+    /// Estimates of all slots.
+    At(&'a [Estimate<D>]),
+    /// What [`InRounds::write`] wrote between two rounds.
+    Written(&'a [u8]),
 }
 
 /// Recovery in rounds over a whole map, each of which may be solved in parts.
@@ -61,6 +71,12 @@ pub(crate) trait InRounds<const D: usize> {
     /// # Errors
     /// As of [`solve`](Self::solve).
     fn end_round(&mut self) -> Result<(), Error>;
+
+    /// Writes where all stands between two rounds: what others go on from, to the same bits.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    fn write(&self, to: &mut dyn io::Write) -> io::Result<()>;
 
     /// Where slots are believed to be.
     fn estimates(&self) -> &[Estimate<D>];

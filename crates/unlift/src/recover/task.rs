@@ -8,6 +8,7 @@ use super::checks::{check_anchors, check_lists, check_slots};
 use super::confidence::seen::{Seen, Solved};
 use super::consensus::Consensus;
 use super::joint::{Joint, Outline};
+use super::kept::{Headed, Kept, Nowhere};
 use super::learned::Model;
 use super::map::lists::Listed;
 use super::options::{RecoverOptions, Solver};
@@ -19,7 +20,7 @@ use super::result::recovered::Recovered;
 use super::result::trials::TrialCounts;
 use super::result::unknown::Unknown;
 use super::rounds::Rounds;
-use super::solve::Solve;
+use super::solve::{Begin, Solve};
 use super::{confidence, exact};
 use crate::density::tomography;
 use crate::neighbors::{Neighborhoods, ShelvedLists};
@@ -159,7 +160,7 @@ impl<'a, const D: usize> Task<'a, D> {
     /// When there is not one estimate per slot.
     pub fn rounds(&self, start: &[Estimate<D>]) -> Result<Option<Rounds<'_, D>>, Error> {
         self.check_estimates(start)?;
-        Ok(self.solver(self.options.solver)?.rounds(start)?.map(Rounds::new))
+        Ok(self.solver(self.options.solver)?.rounds(Begin::At(start))?.map(Rounds::new))
     }
 
     /// Recovered points from the last estimates of all slots: exact constraints are met where a rule fixes coordinates, and it
@@ -294,7 +295,31 @@ impl<'a, const D: usize> Task<'a, D> {
         let Some(rounds) = self.rounds(&start)? else { return Ok(start) };
         // They have copies of their own, and maps may be large.
         drop(start);
-        rounds.run()
+        rounds.run(&mut Nowhere)
+    }
+
+    /// Estimates after all rounds, from where those stood that were `kept`, or from the beginning.
+    pub(super) fn run(&self, kept: &mut dyn Kept) -> Result<Vec<Estimate<D>>, Error> {
+        let solver = self.solver(self.options.solver)?;
+        let mut kept = Headed::new(kept, &self.model());
+        let recalled = kept.recall();
+        let rounds = match &recalled {
+            Some(bytes) => solver.rounds(Begin::Written(kept.rounds_of(bytes)?))?,
+            None => {
+                let start = solver.solve(0..self.n_slots())?;
+                match solver.rounds(Begin::At(&start))? {
+                    None => return Ok(start),
+                    rounds => rounds,
+                }
+            }
+        };
+        drop(recalled);
+        match rounds {
+            Some(rounds) => Rounds::new(rounds).run(&mut kept),
+            None => {
+                Err(Error::new("kept rounds", "a solver of rounds", self.options.solver.name()))
+            }
+        }
     }
 
     fn in_columns(

@@ -20,6 +20,7 @@ mod degenerate;
 mod density;
 mod exact;
 mod gauge;
+mod kept;
 mod leaks;
 mod maps;
 mod noise;

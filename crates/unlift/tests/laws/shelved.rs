@@ -17,7 +17,7 @@ use crate::maps::*;
 
 /// Files of the system, with windows of so many bytes.
 #[derive(Debug)]
-struct Files(usize);
+pub struct Files(pub usize);
 
 impl Shelf for Files {
     fn file(&self) -> io::Result<File> {
@@ -52,7 +52,7 @@ impl Shelf for Full {
 }
 
 /// `lists` on a shelf, some thousand entries at a time.
-fn put(lists: &Neighborhoods, map: (usize, usize), shelf: &dyn Shelf) -> ShelvedLists {
+pub fn put(lists: &Neighborhoods, map: (usize, usize), shelf: &dyn Shelf) -> ShelvedLists {
     let mut away = ShelvedLists::new(map, lists.scores().is_some(), shelf).unwrap();
     let slots: Vec<usize> = (0..lists.n_slots()).collect();
     for slots in slots.chunks(77) {

@@ -1,5 +1,6 @@
 //! How rounds of joint recovery follow each other: what is learned anew, and when it is enough.
 
+use std::io::{self, Write};
 use std::sync::Arc;
 
 use super::agreement::Judges;
@@ -130,15 +131,17 @@ impl<const D: usize> Course<D> {
     }
 
     /// Appends all but what is asked of the map and its edges.
-    pub(crate) fn write(&self, to: &mut Writer) {
+    pub(crate) fn write<W: Write>(&self, to: &mut Writer<W>) {
         to.f32s(&[self.least_radius]);
         to.f64(self.most);
         let counts = [self.sweep, self.n_jumped, self.n_jumped_before, self.n_jumped_since];
         counts.iter().for_each(|&n| to.u64(n as u64));
         write_estimates(&self.now, to);
-        let standing = self.standing.to_bytes();
-        to.u64(standing.len() as u64);
-        to.bytes(&standing);
+        // Written twice: there may be no memory for a copy.
+        let mut counted = Writer::new(io::sink());
+        self.standing.write(&mut counted);
+        to.u64(counted.written());
+        self.standing.write(to);
     }
 
     /// What [`write`](Self::write) appended of a course between two rounds, of a map with so many slots.

@@ -33,13 +33,13 @@ use crate::recover::map::family::Family;
 use crate::recover::map::graph::Graph;
 use crate::recover::map::pieces::{CandidatePieces, LinePieces, PlanePieces};
 use crate::recover::result::estimate::Estimate;
-use crate::recover::solve::{InRounds, Solve};
+use crate::recover::solve::{Begin, InRounds, Solve};
 pub(crate) use agreement::Agree;
 pub(crate) use course::{Course, Kind};
 pub use outline::Outline;
 pub(crate) use standing::Standing;
 use sweeps::Sweeps;
-pub(crate) use wire::{News, read_estimates, write_estimates};
+pub(crate) use wire::{News, check_estimates, read_estimates, write_estimates};
 
 /// Joint recovery of one map.
 pub(crate) struct Joint<'a, const D: usize> {
@@ -61,23 +61,26 @@ impl<'a, const D: usize> Solve<'a, D> for Joint<'a, D> {
         self.start.solve(slots)
     }
 
-    fn rounds(&self, start: &[Estimate<D>]) -> Result<Option<Box<dyn InRounds<D> + 'a>>, Error> {
+    fn rounds(&self, begin: Begin<'_, D>) -> Result<Option<Box<dyn InRounds<D> + 'a>>, Error> {
         let Self { family, graph, delta, seed, .. } = *self;
-        if family.has_regions() && mean_evidence(start) < LEAST_EVIDENCE {
+        if let Begin::At(start) = begin
+            && family.has_regions()
+            && mean_evidence(start) < LEAST_EVIDENCE
+        {
             return Ok(None);
         }
         Ok(Some(match family {
             Family::Lines { rows, slots_per_record, chance } => {
                 let pieces = LinePieces::new(rows, *slots_per_record, chance, delta);
-                Box::new(Sweeps::new(pieces, graph, start, delta, seed)?)
+                Box::new(Sweeps::new(pieces, graph, begin, (delta, seed))?)
             }
             Family::Planes { planes, sorted } => {
                 let pieces = PlanePieces::new(planes, sorted, delta);
-                Box::new(Sweeps::new(pieces, graph, start, delta, seed)?)
+                Box::new(Sweeps::new(pieces, graph, begin, (delta, seed))?)
             }
             Family::Candidates { rows, chance } => {
                 let pieces = CandidatePieces::new(rows, chance, delta);
-                Box::new(Sweeps::new(pieces, graph, start, delta, seed)?)
+                Box::new(Sweeps::new(pieces, graph, begin, (delta, seed))?)
             }
         }))
     }

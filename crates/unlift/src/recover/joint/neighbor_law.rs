@@ -5,6 +5,8 @@
 //! among the edges of each class and the radius within which half of them lie. Their density is taken
 //! as `(1 + r^2 / a^2)^-3`: flat where estimates are too uncertain to tell, with a heavy tail.
 
+use std::io::Write;
+
 use rayon::prelude::*;
 
 use super::crowds;
@@ -66,7 +68,7 @@ impl Law {
     }
 
     /// Appends the law to `to`.
-    pub(super) fn write(&self, to: &mut Writer) {
+    pub(super) fn write<W: Write>(&self, to: &mut Writer<W>) {
         let Self { radius, odds, share, inverse_a2, center, region, surplus } = self;
         to.f32s(odds);
         to.f32s(&[*radius, *share, *inverse_a2, *center, *region, *surplus]);

@@ -1,17 +1,20 @@
 //! The rounds of a map whose edges are all at hand.
 
+use std::io;
 use std::ops::Range;
 use std::sync::Arc;
 
 use super::agreement;
 use super::course::{Course, Digest, Kind};
+use super::wire::check_estimates;
 use crate::Error;
 use crate::recover::map::along_curve::along_curve_in;
+use crate::recover::map::bytes::{Reader, Writer};
 use crate::recover::map::graph::Graph;
 use crate::recover::map::pieces::Pieces;
 use crate::recover::map::places::Places;
 use crate::recover::result::estimate::Estimate;
-use crate::recover::solve::{InRounds, Moved};
+use crate::recover::solve::{Begin, InRounds, Moved};
 
 /// Sweeps over the slots of a map, each in rounds.
 pub(super) struct Sweeps<'a, const D: usize, P> {
@@ -27,16 +30,24 @@ pub(super) struct Sweeps<'a, const D: usize, P> {
 }
 
 impl<'a, const D: usize, P: Pieces<D>> Sweeps<'a, D, P> {
-    /// Before the first round, at `start`.
+    /// Between two rounds or before the first one, where `begin` says.
     pub(super) fn new(
         pieces: P,
         graph: &'a Graph,
-        start: &[Estimate<D>],
-        delta: f32,
-        seed: u64,
+        begin: Begin<'_, D>,
+        (delta, seed): (f32, u64),
     ) -> Result<Self, Error> {
-        let digest = Arc::new(Digest::new(graph, seed)?);
-        let course = Course::new(Kind::of(&pieces, delta), digest, start);
+        let (kind, digest) = (Kind::of(&pieces, delta), Arc::new(Digest::new(graph, seed)?));
+        let course = match begin {
+            Begin::At(start) => Course::new(kind, digest, start),
+            Begin::Written(bytes) => {
+                let mut from = Reader::new("kept rounds", bytes);
+                let course = Course::read(&mut from, (kind, digest), graph.n_slots())?;
+                from.end()?;
+                check_estimates(course.all_estimates())?;
+                course
+            }
+        };
         let windows = graph.windows();
         let order = along_curve_in(&windows, &course.standing().places);
         let mut end = 0;
@@ -113,6 +124,12 @@ impl<const D: usize, P: Pieces<D>> InRounds<D> for Sweeps<'_, D, P> {
         let agree = |judges: &_, next: &[Estimate<D>]| agreement::of(pieces, judges, next, delta2);
         self.course.go_on(after, agree);
         Ok(())
+    }
+
+    fn write(&self, to: &mut dyn io::Write) -> io::Result<()> {
+        let mut to = Writer::new(to);
+        self.course.write(&mut to);
+        to.finish().map(drop)
     }
 
     fn estimates(&self) -> &[Estimate<D>] {

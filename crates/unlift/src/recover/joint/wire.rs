@@ -1,5 +1,7 @@
 //! What a round is made of, as bytes for whoever holds a part of the edges.
 
+use std::io::Write;
+
 use super::jumps::Jumps;
 use super::neighbor_law::Law;
 use super::standing::Standing;
@@ -8,7 +10,7 @@ use crate::recover::map::bytes::{Reader, Writer};
 use crate::recover::map::crowding::Density;
 use crate::recover::map::graph::EdgeRows;
 use crate::recover::map::pieces::Pieces;
-use crate::recover::map::places::Places;
+use crate::recover::map::places::{FAR, Places};
 use crate::recover::result::estimate::{Estimate, Status};
 
 /// How they begin.
@@ -19,10 +21,16 @@ impl<const D: usize> Standing<D> {
     /// Where the round stands, some 30 bytes a slot, and as many again where the density is fine.
     pub(crate) fn to_bytes(&self) -> Vec<u8> {
         let mut to = Writer::default();
+        self.write(&mut to);
+        to.into_bytes()
+    }
+
+    /// Appends these bytes.
+    pub(crate) fn write<W: Write>(&self, to: &mut Writer<W>) {
         to.bytes(&STANDING);
         to.bytes(&[D as u8, u8::from(self.done), self.turns as u8, self.turn as u8]);
         to.u64(self.next.len() as u64);
-        write_estimates(&self.next, &mut to);
+        write_estimates(&self.next, to);
         to.f32s(&self.ahead);
         let told: Vec<(u32, u32)> = self.jumps.told().collect();
         to.u64(told.len() as u64);
@@ -30,9 +38,8 @@ impl<const D: usize> Standing<D> {
             to.u32(slot);
             to.u32(jumps);
         }
-        self.density.write(&mut to);
-        self.law.write(&mut to);
-        to.into_bytes()
+        self.density.write(to);
+        self.law.write(to);
     }
 
     /// What [`to_bytes`](Self::to_bytes) gave, of a map with so many slots.
@@ -166,12 +173,31 @@ fn head(from: &mut Reader<'_>, magic: [u8; 8], n_slots: usize) -> Result<[u8; 4]
 }
 
 /// Appends estimates, but not how many there are.
-pub(crate) fn write_estimates<const D: usize>(estimates: &[Estimate<D>], to: &mut Writer) {
+pub(crate) fn write_estimates<const D: usize, W: Write>(
+    estimates: &[Estimate<D>],
+    to: &mut Writer<W>,
+) {
     for estimate in estimates {
         to.f32s(&estimate.position);
         to.bytes(&estimate.support.to_le_bytes());
         to.bytes(&[estimate.status as u8, estimate.axis]);
         to.f32s(&[estimate.evidence]);
+    }
+}
+
+/// Refuses what nobody can have found of a slot.
+pub(crate) fn check_estimates<'a, const D: usize>(
+    mut estimates: impl Iterator<Item = &'a Estimate<D>>,
+) -> Result<(), Error> {
+    let can_be = |one: &&Estimate<D>| {
+        let is_place = one.position.iter().all(|x| x.abs() < FAR);
+        usize::from(one.axis) < D && is_place == (one.status == Status::Ok)
+    };
+    match estimates.find(|one| !can_be(one)) {
+        None => Ok(()),
+        Some(one) => {
+            Err(Error::new("estimate", "a place if and only if it is ok", format!("{one:?}")))
+        }
     }
 }
 

@@ -1,15 +1,29 @@
 //! Numbers as bytes and back, little-endian.
 
+use std::io;
+
 use crate::Error;
 
-/// Appends numbers.
+/// Appends numbers, in memory or where there may be no room.
 #[derive(Debug, Default)]
-pub(crate) struct Writer(Vec<u8>);
+pub(crate) struct Writer<W = Vec<u8>> {
+    to: W,
+    written: u64,
+    failed: Option<io::Error>,
+}
 
-impl Writer {
-    /// Appends bytes as they are.
+impl<W: io::Write> Writer<W> {
+    /// Behind what is there.
+    pub(crate) fn new(to: W) -> Self {
+        Self { to, written: 0, failed: None }
+    }
+
+    /// Appends bytes as they are; nothing after some could not be written.
     pub(crate) fn bytes(&mut self, bytes: &[u8]) {
-        self.0.extend_from_slice(bytes);
+        if self.failed.is_none() {
+            self.failed = self.to.write_all(bytes).err();
+            self.written += bytes.len() as u64;
+        }
     }
 
     /// Appends a whole number.
@@ -38,9 +52,27 @@ impl Writer {
         numbers.iter().for_each(|x| self.bytes(&x.to_bits().to_le_bytes()));
     }
 
+    /// How many bytes were appended.
+    pub(crate) fn written(&self) -> u64 {
+        self.written
+    }
+
+    /// Where all was written.
+    ///
+    /// # Errors
+    /// When some of it could not be.
+    pub(crate) fn finish(self) -> io::Result<W> {
+        match self.failed {
+            None => Ok(self.to),
+            Some(failed) => Err(failed),
+        }
+    }
+}
+
+impl Writer {
     /// All that was appended.
     pub(crate) fn into_bytes(self) -> Vec<u8> {
-        self.0
+        self.to
     }
 }
 

@@ -1,5 +1,7 @@
 //! How dense estimates of listed records lie: the votes a place gets by chance.
 
+use std::io::Write;
+
 use super::bytes::{Reader, Writer};
 use super::cells::Grid;
 use super::edges::record_of;
@@ -57,7 +59,7 @@ impl<const D: usize> Density<D> {
     }
 
     /// Appends the density to `to`.
-    pub(crate) fn write(&self, to: &mut Writer) {
+    pub(crate) fn write<W: Write>(&self, to: &mut Writer<W>) {
         self.grid.write(to);
         to.f32s(&[self.typical]);
     }

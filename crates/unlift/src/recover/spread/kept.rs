@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::lead::{Lead, Led, check_estimates, most_feeds};
+use super::lead::{Lead, Led, most_feeds};
 use crate::Error;
-use crate::recover::joint::{Course, Outline, read_estimates, write_estimates};
+use crate::recover::joint::{Course, Outline, check_estimates, read_estimates, write_estimates};
 use crate::recover::learned::Model;
 use crate::recover::map::bytes::{Reader, Writer};
 use crate::released::Released;

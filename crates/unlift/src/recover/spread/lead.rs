@@ -5,12 +5,12 @@ use std::sync::Arc;
 use sha2::{Digest, Sha256};
 
 use crate::recover::exact;
-use crate::recover::joint::{Agree, Course, Kind, News, Outline};
+use crate::recover::joint::{Agree, Course, Kind, News, Outline, check_estimates};
 use crate::recover::learned::Model;
 use crate::recover::map::pieces::Pieces;
-use crate::recover::map::places::{FAR, Places};
+use crate::recover::map::places::Places;
 use crate::recover::map::with_pieces::WithPieces;
-use crate::recover::result::estimate::{Estimate, Status};
+use crate::recover::result::estimate::Estimate;
 use crate::recover::result::recovered::Recovered;
 use crate::recover::result::unknown::Unknown;
 use crate::recover::solve::Moved;
@@ -233,22 +233,6 @@ pub(super) fn most_feeds<const D: usize>(model: &Model<D>, released: &Released<D
 /// Whether a rule of the scheme moves slots.
 fn is_settled<const D: usize>(model: &Model<D>, released: &Released<D>) -> bool {
     model.options().exact_constraints && exact::can_settle(released)
-}
-
-/// Refuses what no part says of a slot.
-pub(super) fn check_estimates<'a, const D: usize>(
-    mut estimates: impl Iterator<Item = &'a Estimate<D>>,
-) -> Result<(), Error> {
-    let can_be = |one: &&Estimate<D>| {
-        let is_place = one.position.iter().all(|x| x.abs() < FAR);
-        usize::from(one.axis) < D && is_place == (one.status == Status::Ok)
-    };
-    match estimates.find(|one| !can_be(one)) {
-        None => Ok(()),
-        Some(one) => {
-            Err(Error::new("estimate", "a place if and only if it is ok", format!("{one:?}")))
-        }
-    }
 }
 
 struct OfKind(f32);

@@ -1,22 +1,29 @@
-//! What an audit recovered, kept in a folder until the audit is done: an interrupted one goes on from there.
+//! What was recovered, kept in a folder until all is done: an interrupted run goes on from there.
 //!
 //! A file is named by everything that its content follows from (program, released map, lists, options) and by the hash of that
 //! content. So nothing is taken that another audit, another version or a damaged disk left, whatever the folder is called.
+//! An audit keeps every recovery that is done; of one alone [`KeptRounds`] keeps where its rounds stand.
 
+mod key;
+mod rounds;
+
+use std::fmt::Display;
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use unlift::OneLine;
 use unlift::audit::Recovery;
-use unlift::recover::{Delta, Recovered, Solver};
+use unlift::recover::{Recovered, Solver};
 use unlift_io::atomic::sweep;
-use unlift_io::hash::{Hasher, hash_file};
+use unlift_io::hash::hash_file;
 use unlift_io::stage::{read_recovered, write_recovered};
 
 use crate::{Error, Progress};
+use key::key;
+pub use rounds::KeptRounds;
 
-/// How names end.
+/// How names of recoveries end.
 const ENDING: &str = ".recovered.parquet";
 
 /// A folder of recovered points.
@@ -63,10 +70,10 @@ impl<'a> Journal<'a> {
         if recovery.options.solver == Solver::Ransac {
             return None;
         }
-        let key = self.key(recovery);
-        let path = self.find(&key)?;
+        let key = self.key(recovery)?;
+        let path = self.find(&key, ENDING)?;
         let is_whole =
-            |path: &Path| hash_file(path).is_ok_and(|hash| path == self.named(&key, &hash));
+            |path: &Path| hash_file(path).is_ok_and(|hash| path == self.named(&key, &hash, ENDING));
         match read_recovered::<3>(&path) {
             Ok(recovered) if is_whole(&path) => {
                 self.used.push(path);
@@ -74,10 +81,7 @@ impl<'a> Journal<'a> {
                 Some(recovered)
             }
             _ => {
-                let shown = OneLine(path.display());
-                self.progress.say(&format!("note: --journal: {shown} is damaged: recovered again"));
-                // Its name is one that only we give.
-                let _ = fs::remove_file(&path);
+                self.drop_damaged(&path);
                 None
             }
         }
@@ -88,18 +92,21 @@ impl<'a> Journal<'a> {
         if self.is_full || recovery.options.solver == Solver::Ransac {
             return;
         }
-        let key = self.key(recovery);
+        let Some(key) = self.key(recovery) else { return };
         match self.write(&key, recovered) {
             Ok(path) => self.used.push(path),
-            Err(error) => {
-                self.is_full = true;
-                self.progress.say(&format!("note: --journal: {error}; nothing more is kept"));
-            }
+            Err(error) => self.give_up(&error),
         }
     }
 
-    /// Removes what this audit took or wrote, and the folder if nothing else is in it.
-    pub(crate) fn finish(self) {
+    /// Where the rounds of `recovery` stand, which this journal keeps.
+    pub fn rounds(&mut self, recovery: &Recovery<'_, 3>) -> KeptRounds<'_, 'a> {
+        let key = if self.is_full { None } else { self.key(recovery) };
+        KeptRounds::new(self, key)
+    }
+
+    /// Removes what this run took or wrote, and the folder if nothing else is in it.
+    pub fn finish(self) {
         if self.n_recalled > 0 {
             let (n, folder) = (self.n_recalled, OneLine(self.folder.display()));
             self.progress.say(&format!("note: {n} recoveries were taken from {folder}"));
@@ -114,21 +121,21 @@ impl<'a> Journal<'a> {
     fn write(&self, key: &str, recovered: &Recovered<3>) -> Result<PathBuf, unlift_io::Error> {
         let unnamed = self.folder.join(format!("{key}{ENDING}"));
         write_recovered(&unnamed, recovered)?;
-        let path = self.named(key, &hash_file(&unnamed)?);
+        let path = self.named(key, &hash_file(&unnamed)?, ENDING);
         fs::rename(&unnamed, &path).map_err(|source| unlift_io::Error::write(&path, source))?;
         Ok(path)
     }
 
-    fn named(&self, key: &str, hash: &str) -> PathBuf {
-        self.folder.join(format!("{key}-{hash}{ENDING}"))
+    fn named(&self, key: &str, hash: &str, ending: &str) -> PathBuf {
+        self.folder.join(format!("{key}-{hash}{ending}"))
     }
 
-    /// The file of `key`, whatever its content.
-    fn find(&self, key: &str) -> Option<PathBuf> {
+    /// The file of `key` with such an ending, whatever its content.
+    fn find(&self, key: &str, ending: &str) -> Option<PathBuf> {
         let names = fs::read_dir(&self.folder).ok()?.filter_map(Result::ok);
         let is_of_key = |name: &str| {
             let rest = name.strip_prefix(key).and_then(|name| name.strip_prefix('-'));
-            rest.is_some_and(|rest| rest.ends_with(ENDING))
+            rest.is_some_and(|rest| rest.ends_with(ending))
         };
         let mut found: Vec<PathBuf> = names
             .filter(|entry| entry.file_name().to_str().is_some_and(is_of_key))
@@ -138,31 +145,27 @@ impl<'a> Journal<'a> {
         found.into_iter().next()
     }
 
-    /// A hash of all that a recovery follows from.
-    fn key(&self, recovery: &Recovery<'_, 3>) -> String {
-        let Recovery { released, lists, options } = recovery;
-        let mut hasher = Hasher::default();
-        hasher.add(self.program.as_bytes());
-        hasher.add(&[0]);
-        hasher.add(&released.fingerprint().0);
-        let about = lists.about();
-        hasher.add(
-            format!("{:?} {:?} {}\n", about.order, about.lists_by, lists.n_slots()).as_bytes(),
-        );
-        for offset in lists.offsets() {
-            hasher.add(&offset.to_le_bytes());
+    /// A hash of all that `recovery` follows from; `None` where its lists cannot be read, and nothing more is kept.
+    fn key(&mut self, recovery: &Recovery<'_, 3>) -> Option<String> {
+        match key(&self.program, recovery) {
+            Ok(key) => Some(key),
+            Err(error) => {
+                self.give_up(&error);
+                None
+            }
         }
-        for record in lists.records() {
-            hasher.add(&record.0.to_le_bytes());
-        }
-        for score in lists.scores().unwrap_or_default() {
-            hasher.add(&score.to_le_bytes());
-        }
-        let delta = if let Delta::Fixed(delta) = options.delta { delta } else { 0.0 };
-        hasher.add(options.solver.name().as_bytes());
-        hasher.add(&[0, u8::from(options.exact_constraints), u8::from(options.confidence)]);
-        hasher.add(&delta.to_le_bytes());
-        hasher.add(&options.seed.to_le_bytes());
-        hasher.hex()
+    }
+
+    fn give_up(&mut self, error: &dyn Display) {
+        self.is_full = true;
+        self.progress.say(&format!("note: --journal: {error}; nothing more is kept"));
+    }
+
+    /// Removes a file whose content is not the one that it is named by.
+    fn drop_damaged(&self, path: &Path) {
+        let shown = OneLine(path.display());
+        self.progress.say(&format!("note: --journal: {shown} is damaged: recovered again"));
+        // Its name is one that only we give.
+        let _ = fs::remove_file(path);
     }
 }
