@@ -14,6 +14,7 @@ or parts of them, named after the folder; each tells on stderr how long it took 
     images      5 min    keypoints of photos
     pictures    5 min    what came back, painted
     scale      40 min    maps of up to ten million points under a memory limit; 12 GB of disk (in $UNLIFT_SCALE)
+    resumed     2 min    a recovery of a million points that is killed and goes on
 
 `± s` is the standard deviation over seeds, where it exceeds 0.5. Needs the scenes (SHARED/data) and the paper's tables (SHARED/paper/tables);
 standard library only. Everything between the begin and end markers of the two files is replaced.
@@ -357,9 +358,13 @@ def scale():
     put(ROOT / "docs/benchmarks.md", "scale", scale_tables.tables(ROOT / "target/release/unlift", tiled))
 
 
+def resumed():
+    put(ROOT / "docs/benchmarks.md", "resumed", scale_tables.resumed(ROOT / "target/release/unlift", tiled))
+
+
 def main():
     sections = {"accuracy": accuracy, "low": below_a_tenth, "noise": noise, "own": own, "alone": alone, "large": large,
-                "images": images, "pictures": pictures, "scale": scale}
+                "images": images, "pictures": pictures, "scale": scale, "resumed": resumed}
     for name in sys.argv[2:] or sections:
         started = time.monotonic()
         sections[name]()

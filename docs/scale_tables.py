@@ -1,4 +1,4 @@
-"""The table of large maps in docs/benchmarks.md: RedKitchen tiled with jitter, lists in memory and beside it.
+"""The tables of large maps in docs/benchmarks.md: RedKitchen tiled with jitter, lists in memory and beside it.
 
 Used by make_benchmarks.py; standard library only.
 """
@@ -44,4 +44,44 @@ def tables(program, tiled, sizes=(100_000, 1_000_000, 10_000_000), in_memory=10_
                     same = "yes" if filecmp.cmp(at / "away", at / "here", shallow=False) else "NO"
                 yield f"| {n:,} | {scheme} | {told(oracle, n)} | {told(away, n)} | {here} | {same} |"
                 lists.unlink()
+    yield ""
+
+
+def made(program, tiled, at, n, scheme):
+    """A released map of so many points with lists in a folder; what recovers it under the limit."""
+    tiled(at / "map.npy", n)
+    spent(program, "obfuscate", at / "map.npy", "--scale", 1, "--scheme", scheme, "--seed", 1, "--out", at / scheme)
+    limited, lists = ["--memory-limit", LIMIT], at / "lists"
+    spent(program, "neighbors", "oracle", at / scheme / "truth.parquet", "--k", 50, "--inlier-ratio", 0.3, "--seed", 1, "--out", lists, *limited)
+    return ["recover", at / scheme / "released.parquet", "--neighbors", lists, "--seed", 1, *limited, "--out"]
+
+
+def killed(command, journal, seconds):
+    """Kills a run after so many seconds, or when something is kept: how many seconds it ran, and bytes that are kept."""
+    started = time.monotonic()
+    child = subprocess.Popen([*map(str, command)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    kept = lambda: [path for path in journal.glob("*.rounds") if not path.name.startswith(".")]
+    while not kept() or time.monotonic() - started < seconds:
+        if child.poll() is not None:
+            raise SystemExit("it ended before it was killed")
+        time.sleep(0.1)
+    child.kill()
+    child.wait()
+    return time.monotonic() - started, sum(path.stat().st_size for path in kept())
+
+
+def resumed(program, tiled, sizes=(100_000, 1_000_000), scheme="ppl"):
+    yield "| points | scheme | without a journal | killed after | kept | then | the same bytes |"
+    yield "| --- | --- | --- | --- | --- | --- | --- |"
+    for n in sizes:
+        with tempfile.TemporaryDirectory(dir=os.environ.get("UNLIFT_SCALE")) as folder:
+            at = pathlib.Path(folder)
+            recover = made(program, tiled, at, n, scheme)
+            plain = spent(program, *recover, at / "plain")
+            again = [*recover, at / "again", "--journal", at / "kept"]
+            seconds, kept = killed([program, *again], at / "kept", 0.7 * plain[0])
+            rest = spent(program, *again)
+            same = filecmp.cmp(at / "plain", at / "again", shallow=False)
+            yield (f"| {n:,} | {scheme} | {told(plain, n)} | {seconds:.0f} s | {kept / 1e6:.0f} MB | {told(rest, n)} | "
+                   f"{'yes' if same else 'NO'} |")
     yield ""

@@ -60,7 +60,8 @@ def main():
     parser.add_argument("--slots-per-record", type=int, default=1)
     parser.add_argument("--core-us", type=float, required=True)
     parser.add_argument("--spilled", type=float, required=True)
-    parser.add_argument("--per-core-hour", type=float, default=0.05, help="what an hour of a core costs [default: 0.05]")
+    parser.add_argument("--per-core-hour", type=float, default=0.0408,
+                        help="what an hour of a core costs [default: 0.0408 dollars: EC2 m7g.large, two cores, on demand, Linux, us-east-1, June 2026]")
     parser.add_argument("--gigabit", type=float, default=10, help="what a machine of 16 cores sends a second [default: 10]")
     args = parser.parse_args()
 

@@ -1,7 +1,7 @@
 """How good pictures of whole photos are: `evaluate.py WEIGHTS PREPARED --lpips FILE [--images N] [--pictures DIR]`.
 
 SSIM (mean of the channels), PSNR and LPIPS (squeeze) at half the photos' size, of the true keypoints and of what
-recovery could leave of them.
+recovery could leave of them; of the true ones also at the photos' size, to which pictures are enlarged.
 """
 
 import argparse
@@ -10,6 +10,7 @@ import pathlib
 import numpy
 import torch
 from PIL import Image
+from torch.nn import functional
 
 import data
 import metrics
@@ -49,11 +50,21 @@ def pictures(network, photo: data.Photo, how: str) -> tuple[torch.Tensor, torch.
     return made, torch.from_numpy(data.shrunk(photo.pixels[:high, :wide]))[None]
 
 
-def measure(network, distance: metrics.Lpips, photos: list[data.Photo], how: str) -> list[float]:
-    """Means of SSIM, PSNR and LPIPS."""
+def enlarged(made: torch.Tensor, photo: data.Photo) -> tuple[torch.Tensor, torch.Tensor]:
+    """The picture at the photo's size (bicubic), and the photo."""
+    real = torch.from_numpy(photo.pixels.transpose(2, 0, 1).astype(numpy.float32) / 255)[None]
+    high, wide = (2 * side for side in made.shape[-2:])
+    made = functional.interpolate(made, size=(high, wide), mode="bicubic", align_corners=False).clamp(0, 1)
+    return made, real[..., :high, :wide].contiguous()
+
+
+def measure(network, distance: metrics.Lpips, photos: list[data.Photo], how: str, full: bool = False) -> list[float]:
+    """Means of SSIM, PSNR and LPIPS, at half the photos' size or at the `full` one."""
     rows = []
     for photo in photos:
         made, real = pictures(network, photo, how)
+        if full:
+            made, real = enlarged(made, photo)
         with torch.inference_mode():
             rows.append([metrics.ssim(made, real), metrics.psnr(made, real), distance(made, real)])
     return torch.tensor(rows).mean(0).tolist()
@@ -74,6 +85,7 @@ def main():
     photos = data.photos(options.data, options.images)
     for how in WORN:
         print(how, *(f"{figure:.3f}" for figure in measure(network, distance, photos, how)))
+    print("true, full size", *(f"{figure:.3f}" for figure in measure(network, distance, photos, "true", full=True)))
     if options.pictures:
         options.pictures.mkdir(parents=True, exist_ok=True)
         for at, photo in enumerate(photos):

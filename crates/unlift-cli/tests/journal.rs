@@ -132,7 +132,7 @@ fn with_lists(n: usize) -> (Place, String) {
 
 #[test]
 fn a_recovery_goes_on_from_its_rounds() {
-    let (place, recover) = with_lists(3000);
+    let (place, recover) = with_lists(12_000);
     place.ends(&format!("{recover} --out whole.parquet"), 0);
     let whole = fs::read(place.path("whole.parquet")).expect("a result");
     for limit in ["", " --memory-limit 100MB"] {
@@ -149,7 +149,7 @@ fn a_recovery_goes_on_from_its_rounds() {
 
 #[test]
 fn rounds_that_are_damaged_or_of_others_are_not_taken() {
-    let (place, recover) = with_lists(3000);
+    let (place, recover) = with_lists(12_000);
     let line = format!("{recover} --journal kept --out out.parquet");
     killed_at(&place, &line, (1, ".rounds"));
     // Of another seed: neither taken nor cleared away.

@@ -165,14 +165,14 @@ fn failed(place: &str, done: &str, source: &io::Error) -> Error {
 
 /// A column in memory or on a shelf.
 #[derive(Debug)]
-pub(crate) enum Kept<T> {
+pub(crate) enum Stored<T> {
     /// In memory.
     Here(Vec<T>),
     /// On a shelf.
     Away(Column<T>),
 }
 
-impl<T: Number> Kept<T> {
+impl<T: Number> Stored<T> {
     /// How many numbers there are.
     pub(crate) fn len(&self) -> usize {
         match self {
@@ -252,7 +252,7 @@ pub(crate) mod tests {
         assert_eq!(column.len(), u64::from(n) + 6);
         assert_eq!(column.read(0..6).unwrap(), [1, 2, 3, 4, 5, values[0]]);
         assert_eq!(column.read(5..5 + u64::from(n)).unwrap(), values);
-        assert_eq!(Kept::Away(column).one(5 + u64::from(n)).unwrap(), 9);
+        assert_eq!(Stored::Away(column).one(5 + u64::from(n)).unwrap(), 9);
     }
 
     #[test]

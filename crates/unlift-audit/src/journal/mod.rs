@@ -7,6 +7,7 @@
 mod key;
 mod rounds;
 
+use std::collections::BTreeSet;
 use std::fmt::Display;
 use std::fs;
 use std::io::ErrorKind;
@@ -32,8 +33,8 @@ pub struct Journal<'a> {
     /// The same for the same program only.
     program: String,
     progress: &'a dyn Progress,
-    /// Files that were taken or written, to be removed when all is done.
-    used: Vec<PathBuf>,
+    /// Of what was asked for or kept: their files are removed when all is done.
+    keys: BTreeSet<String>,
     n_recalled: usize,
     /// Whether a file could not be written: the audit goes on without.
     is_full: bool,
@@ -62,7 +63,7 @@ impl<'a> Journal<'a> {
         // What was being written when a run was killed.
         sweep(folder);
         let folder = folder.to_owned();
-        Ok(Self { folder, program, progress, used: Vec::new(), n_recalled: 0, is_full: false })
+        Ok(Self { folder, program, progress, keys: BTreeSet::new(), n_recalled: 0, is_full: false })
     }
 
     /// What was recovered before, where that is so. The sampling loop's counts are in no file: it is run again.
@@ -71,17 +72,17 @@ impl<'a> Journal<'a> {
             return None;
         }
         let key = self.key(recovery)?;
-        let path = self.find(&key, ENDING)?;
-        let is_whole =
-            |path: &Path| hash_file(path).is_ok_and(|hash| path == self.named(&key, &hash, ENDING));
-        match read_recovered::<3>(&path) {
-            Ok(recovered) if is_whole(&path) => {
-                self.used.push(path);
+        let recalled = self.whole(&key, ENDING, |path| {
+            let hash = hash_file(path)?;
+            Ok((hash, read_recovered::<3>(path)))
+        })?;
+        match recalled {
+            (_, Ok(recovered)) => {
                 self.n_recalled += 1;
                 Some(recovered)
             }
-            _ => {
-                self.drop_damaged(&path);
+            (path, Err(error)) => {
+                self.pass_over(&path, &error);
                 None
             }
         }
@@ -93,9 +94,8 @@ impl<'a> Journal<'a> {
             return;
         }
         let Some(key) = self.key(recovery) else { return };
-        match self.write(&key, recovered) {
-            Ok(path) => self.used.push(path),
-            Err(error) => self.give_up(&error),
+        if let Err(error) = self.write(&key, recovered) {
+            self.give_up(&error);
         }
     }
 
@@ -105,50 +105,78 @@ impl<'a> Journal<'a> {
         KeptRounds::new(self, key)
     }
 
-    /// Removes what this run took or wrote, and the folder if nothing else is in it.
+    /// Removes all files of what this run asked for or kept, and the folder if nothing else is in it.
     pub fn finish(self) {
         if self.n_recalled > 0 {
             let (n, folder) = (self.n_recalled, OneLine(self.folder.display()));
             self.progress.say(&format!("note: {n} recoveries were taken from {folder}"));
         }
-        for path in &self.used {
+        for path in self.files(|name| self.keys.iter().any(|key| name.starts_with(key.as_str()))) {
             // What stays is found by its name, and is as right then as now.
             let _ = fs::remove_file(path);
         }
-        let _ = fs::remove_dir(&self.folder);
     }
 
-    fn write(&self, key: &str, recovered: &Recovered<3>) -> Result<PathBuf, unlift_io::Error> {
-        let unnamed = self.folder.join(format!("{key}{ENDING}"));
+    fn write(&self, key: &str, recovered: &Recovered<3>) -> Result<(), unlift_io::Error> {
+        let unnamed = self.unnamed(key, ENDING);
         write_recovered(&unnamed, recovered)?;
-        let path = self.named(key, &hash_file(&unnamed)?, ENDING);
-        fs::rename(&unnamed, &path).map_err(|source| unlift_io::Error::write(&path, source))?;
+        self.name(&unnamed, (key, &hash_file(&unnamed)?, ENDING)).map(drop)
+    }
+
+    /// Where a file of `key` is before its content is known: another one for every process.
+    fn unnamed(&self, key: &str, ending: &str) -> PathBuf {
+        self.folder.join(format!("{key}.{}{ending}", std::process::id()))
+    }
+
+    /// Gives `unnamed` the name of a file of such a key, hash and ending.
+    fn name(
+        &self,
+        unnamed: &Path,
+        (key, hash, ending): (&str, &str, &str),
+    ) -> Result<PathBuf, unlift_io::Error> {
+        let path = self.folder.join(format!("{key}-{hash}{ending}"));
+        fs::rename(unnamed, &path).map_err(|source| unlift_io::Error::write(&path, source))?;
         Ok(path)
     }
 
-    fn named(&self, key: &str, hash: &str, ending: &str) -> PathBuf {
-        self.folder.join(format!("{key}-{hash}{ending}"))
+    /// Files of the folder whose names are such, in order.
+    fn files(&self, is: impl Fn(&str) -> bool) -> Vec<PathBuf> {
+        let Ok(entries) = fs::read_dir(&self.folder) else { return Vec::new() };
+        let entries = entries.filter_map(Result::ok);
+        let named = entries.filter(|entry| entry.file_name().to_str().is_some_and(&is));
+        let mut paths: Vec<PathBuf> = named.map(|entry| entry.path()).collect();
+        paths.sort();
+        paths
     }
 
-    /// The file of `key` with such an ending, whatever its content.
-    fn find(&self, key: &str, ending: &str) -> Option<PathBuf> {
-        let names = fs::read_dir(&self.folder).ok()?.filter_map(Result::ok);
-        let is_of_key = |name: &str| {
-            let rest = name.strip_prefix(key).and_then(|name| name.strip_prefix('-'));
-            rest.is_some_and(|rest| rest.ends_with(ending))
-        };
-        let mut found: Vec<PathBuf> = names
-            .filter(|entry| entry.file_name().to_str().is_some_and(is_of_key))
-            .map(|entry| entry.path())
-            .collect();
-        found.sort();
-        found.into_iter().next()
+    /// The first file of `key` with such an ending whose content has the hash that it is named by, as `read` says with what it
+    /// read. Others are removed; what cannot be read stays.
+    fn whole<T>(
+        &self,
+        key: &str,
+        ending: &str,
+        read: impl Fn(&Path) -> Result<(String, T), unlift_io::Error>,
+    ) -> Option<(PathBuf, T)> {
+        let of_key = format!("{key}-");
+        for path in self.files(|name| name.starts_with(&of_key) && name.ends_with(ending)) {
+            match read(&path) {
+                Ok((hash, read)) if path.ends_with(format!("{key}-{hash}{ending}")) => {
+                    return Some((path, read));
+                }
+                Ok(_) => self.drop_damaged(&path),
+                Err(error) => self.pass_over(&path, &error),
+            }
+        }
+        None
     }
 
     /// A hash of all that `recovery` follows from; `None` where its lists cannot be read, and nothing more is kept.
     fn key(&mut self, recovery: &Recovery<'_, 3>) -> Option<String> {
         match key(&self.program, recovery) {
-            Ok(key) => Some(key),
+            Ok(key) => {
+                self.keys.insert(key.clone());
+                Some(key)
+            }
             Err(error) => {
                 self.give_up(&error);
                 None
@@ -161,11 +189,24 @@ impl<'a> Journal<'a> {
         self.progress.say(&format!("note: --journal: {error}; nothing more is kept"));
     }
 
+    /// Says that a file cannot be used, which may be as right as it was.
+    fn pass_over(&self, path: &Path, error: &dyn Display) {
+        let shown = OneLine(path.display());
+        self.progress.say(&format!("note: --journal: {shown}: {error}: recovered again"));
+    }
+
     /// Removes a file whose content is not the one that it is named by.
     fn drop_damaged(&self, path: &Path) {
         let shown = OneLine(path.display());
         self.progress.say(&format!("note: --journal: {shown} is damaged: recovered again"));
         // Its name is one that only we give.
         let _ = fs::remove_file(path);
+    }
+}
+
+impl Drop for Journal<'_> {
+    fn drop(&mut self) {
+        // Only if it is empty, as after a run that ended before anything was kept.
+        let _ = fs::remove_dir(&self.folder);
     }
 }

@@ -1,14 +1,15 @@
 //! Where the rounds of one recovery stand.
 
 use std::fs;
-use std::io::{self, BufWriter, Write};
-use std::path::PathBuf;
+use std::io::{self, BufWriter, Read, Write};
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use unlift::OneLine;
 use unlift::recover::Kept;
 use unlift_io::atomic::{Access, write_file};
 use unlift_io::hash::Hasher;
+use unlift_io::input::open;
 
 use super::Journal;
 
@@ -43,7 +44,7 @@ impl<'b, 'a> KeptRounds<'b, 'a> {
         key: &str,
         write: &dyn Fn(&mut dyn Write) -> io::Result<()>,
     ) -> Result<PathBuf, unlift_io::Error> {
-        let unnamed = self.journal.folder.join(format!("{key}{ENDING}"));
+        let unnamed = self.journal.unnamed(key, ENDING);
         let mut hasher = Hasher::default();
         write_file(&unnamed, Access::Private, |to| {
             // Numbers come one by one.
@@ -51,35 +52,28 @@ impl<'b, 'a> KeptRounds<'b, 'a> {
             write(&mut pieces)?;
             pieces.flush()
         })?;
-        let path = self.journal.named(key, &hasher.hex(), ENDING);
-        fs::rename(&unnamed, &path).map_err(|source| unlift_io::Error::write(&path, source))?;
-        Ok(path)
+        self.journal.name(&unnamed, (key, &hasher.hex(), ENDING))
     }
+}
+
+/// The bytes of a file, and their hash.
+fn bytes_of(path: &Path) -> Result<(String, Vec<u8>), unlift_io::Error> {
+    let (mut file, _) = open(path)?;
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes).map_err(|source| unlift_io::Error::read(path, source))?;
+    let mut hasher = Hasher::default();
+    hasher.add(&bytes);
+    Ok((hasher.hex(), bytes))
 }
 
 impl Kept for KeptRounds<'_, '_> {
     fn recall(&mut self) -> Option<Vec<u8>> {
         let key = self.key.as_ref()?;
-        let path = self.journal.find(key, ENDING)?;
-        let bytes = fs::read(&path).ok();
-        let hash = |bytes: &Vec<u8>| {
-            let mut hasher = Hasher::default();
-            hasher.add(bytes);
-            hasher.hex()
-        };
-        match bytes.filter(|bytes| path == self.journal.named(key, &hash(bytes), ENDING)) {
-            Some(bytes) => {
-                let folder = OneLine(self.journal.folder.display());
-                self.journal.progress.say(&format!("note: goes on from the rounds in {folder}"));
-                self.journal.used.push(path.clone());
-                self.path = Some(path);
-                Some(bytes)
-            }
-            None => {
-                self.journal.drop_damaged(&path);
-                None
-            }
-        }
+        let (path, bytes) = self.journal.whole(key, ENDING, bytes_of)?;
+        let folder = OneLine(self.journal.folder.display());
+        self.journal.progress.say(&format!("note: goes on from the rounds in {folder}"));
+        self.path = Some(path);
+        Some(bytes)
     }
 
     fn keep(&mut self, write: &dyn Fn(&mut dyn Write) -> io::Result<()>) {
@@ -94,7 +88,6 @@ impl Kept for KeptRounds<'_, '_> {
                     // Left behind, it is as right: only fewer rounds are done there.
                     let _ = fs::remove_file(before);
                 }
-                self.journal.used.push(path);
             }
             Err(error) => self.journal.give_up(&error),
         }

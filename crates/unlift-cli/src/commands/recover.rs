@@ -35,9 +35,7 @@ fn open_lists(
         return Ok((Listing::Here(read_neighborhoods(path, map.0, map.1)?), None));
     };
     let files = Files::beside(&args.out, limit);
-    let alive = Spinner::new("reading lists");
     let lists = shelve_neighborhoods(path, map, &files)?;
-    drop(alive);
     Ok((Listing::Away(lists), Some(files)))
 }
 
@@ -83,15 +81,15 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
     if options.solver != Solver::Joint {
         check_journal(args, options.solver.name())?;
     }
+    let alive = Spinner::new("recovering");
+    let mut journal = journal(args, &alive)?;
     let released = read_released::<3>(&args.released)?;
     let (lists, files) = open_lists(args, &released)?;
     let of = &args.released;
     same_map(&args.neighbors, lists.about().map, of, Some(released.fingerprint()))?;
     for note in notes(lists.offsets(), lists.about(), released.slots_per_record()) {
-        stderr::note(format_args!("{}: {note}", args.neighbors.display()));
+        alive.say(&format!("unlift: note: {}: {note}", args.neighbors.display()));
     }
-    let alive = Spinner::new("recovering");
-    let mut journal = journal(args, &alive)?;
     let recovered = with_threads(args.threads, || {
         let shelf = files.as_ref().map(|files| files as &dyn Shelf);
         let recovery = Recovery { released: &released, lists: &lists, options: &options };
@@ -106,9 +104,7 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
     })?;
     check_file(&args.out, kind, &rules)?;
     write_recovered(&args.out, &recovered)?;
-    if let Some(journal) = journal {
-        journal.finish();
-    }
+    journal.into_iter().for_each(Journal::finish);
     drop(alive);
     let n = recovered.status().iter().filter(|&&status| status == Status::Ok).count();
     print(&format!(

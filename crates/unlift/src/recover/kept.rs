@@ -33,7 +33,7 @@ impl Kept for Nowhere {
     fn keep(&mut self, _write: &dyn Fn(&mut dyn io::Write) -> io::Result<()>) {}
 }
 
-/// Rounds kept with a head that tells of which map, lists and options they are.
+/// Before rounds: what tells of which map and model they are. Their edges they tell themselves.
 pub(super) struct Headed<'a> {
     kept: &'a mut dyn Kept,
     head: [u8; HEAD],
@@ -48,24 +48,24 @@ impl<'a> Headed<'a> {
         Self { kept, head }
     }
 
-    /// What stands behind the head of what was recalled.
+    /// What was kept last, with its head.
+    pub(super) fn recall(&mut self) -> Option<Vec<u8>> {
+        self.kept.recall()
+    }
+
+    /// The rounds behind the head of what was recalled.
     ///
     /// # Errors
     /// When it has another one.
     pub(super) fn rounds_of<'b>(&self, bytes: &'b [u8]) -> Result<&'b [u8], Error> {
         bytes.strip_prefix(&self.head).ok_or_else(|| {
-            let expected = "rounds of this version and of this map, its lists and options";
+            let expected = "rounds of this version, map and options";
             Error::new("kept rounds", expected, "others")
         })
     }
-}
 
-impl Kept for Headed<'_> {
-    fn recall(&mut self) -> Option<Vec<u8>> {
-        self.kept.recall()
-    }
-
-    fn keep(&mut self, write: &dyn Fn(&mut dyn io::Write) -> io::Result<()>) {
+    /// Keeps rounds that `write` writes, behind the head.
+    pub(super) fn keep(&mut self, write: &dyn Fn(&mut dyn io::Write) -> io::Result<()>) {
         let head = self.head;
         self.kept.keep(&|to| {
             to.write_all(&head)?;

@@ -195,7 +195,7 @@ fn shelved<const D: usize>(
 }
 
 /// [`recover`] or [`recover_shelved`], as `lists` are in memory or on `shelf`, that goes on from where the rounds stood that were `kept`: the
-/// same, bit for bit.
+/// same, bit for bit. Rounds that begin anew from where a rule of the scheme moved slots (`cp2d`) are not kept.
 ///
 /// # Errors
 /// As there, when lists are on a shelf and none is given, and when what was kept is not of this map and solver.

@@ -3,7 +3,7 @@
 use std::io;
 use std::ops::Range;
 
-use super::kept::Kept;
+use super::kept::Headed;
 use super::result::estimate::Estimate;
 use super::solve::{InRounds, Moved};
 use crate::Error;
@@ -73,7 +73,7 @@ impl<'a, const D: usize> Rounds<'a, D> {
         self.0.estimates()
     }
 
-    /// Writes where rounds stand between two of them, some 60 bytes a slot, the same on every machine.
+    /// Writes where rounds stand between two of them, some 45 bytes a slot and what the density takes, the same on every machine.
     ///
     /// # Errors
     /// When it cannot be written.
@@ -85,14 +85,16 @@ impl<'a, const D: usize> Rounds<'a, D> {
     ///
     /// # Errors
     /// When lists are on a shelf and cannot be read.
-    pub(super) fn run(mut self, kept: &mut dyn Kept) -> Result<Vec<Estimate<D>>, Error> {
+    pub(super) fn run(mut self, mut kept: Option<Headed<'_>>) -> Result<Vec<Estimate<D>>, Error> {
         while !self.is_done() {
             for part in self.0.parts() {
                 let moved = self.0.solve(part)?;
                 self.0.take(&moved);
             }
             self.0.end_round()?;
-            kept.keep(&|to| self.write(to));
+            if let Some(kept) = &mut kept {
+                kept.keep(&|to| self.write(to));
+            }
         }
         Ok(self.0.into_estimates())
     }

@@ -8,7 +8,7 @@ use super::checks::{check_anchors, check_lists, check_slots};
 use super::confidence::seen::{Seen, Solved};
 use super::consensus::Consensus;
 use super::joint::{Joint, Outline};
-use super::kept::{Headed, Kept, Nowhere};
+use super::kept::{Headed, Kept};
 use super::learned::Model;
 use super::map::lists::Listed;
 use super::options::{RecoverOptions, Solver};
@@ -295,7 +295,7 @@ impl<'a, const D: usize> Task<'a, D> {
         let Some(rounds) = self.rounds(&start)? else { return Ok(start) };
         // They have copies of their own, and maps may be large.
         drop(start);
-        rounds.run(&mut Nowhere)
+        rounds.run(None)
     }
 
     /// Estimates after all rounds, from where those stood that were `kept`, or from the beginning.
@@ -315,7 +315,7 @@ impl<'a, const D: usize> Task<'a, D> {
         };
         drop(recalled);
         match rounds {
-            Some(rounds) => Rounds::new(rounds).run(&mut kept),
+            Some(rounds) => Rounds::new(rounds).run(Some(kept)),
             None => {
                 Err(Error::new("kept rounds", "a solver of rounds", self.options.solver.name()))
             }

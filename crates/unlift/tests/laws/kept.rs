@@ -4,7 +4,7 @@ use std::io;
 
 use unlift::neighbors::{Listing, Neighborhoods};
 use unlift::obfuscate::Entry;
-use unlift::recover::{Kept, RecoverOptions, Solver, recover_kept};
+use unlift::recover::{Delta, Kept, RecoverOptions, Solver, recover_kept};
 use unlift::released::{Obfuscation, Released};
 
 use crate::maps::*;
@@ -100,8 +100,19 @@ fn what_was_not_kept_of_this_recovery_is_refused() {
     }
     let longer = [&bytes[..], &[0]].concat();
     assert!(go_on(&map, options(), &longer).is_err());
-    let others = "kept rounds: expected rounds of this version and of this map, its lists and options, found others";
+    let others = "kept rounds: expected rounds of this version, map and options, found others";
     assert_eq!(go_on(&of(500), options(), bytes).unwrap_err(), others);
+    let of_others = {
+        let hidden = hide::<3>(unlift::obfuscate::scheme("plane").unwrap(), &room(61, 400), 6);
+        let listed = |seed: u64| Listing::Here(hidden.lists(15, 0.5, seed));
+        let fixed = RecoverOptions { delta: Delta::Fixed(0.1), ..options() };
+        let mut all = All::default();
+        recover_kept(&hidden.released, (&listed(6), None), &fixed, &mut all).unwrap();
+        let mut kept = All::from(&all.kept[0]);
+        recover_kept(&hidden.released, (&listed(7), None), &fixed, &mut kept).map(|_| ())
+    };
+    let refused = of_others.unwrap_err().to_string();
+    assert_eq!(refused, "kept rounds: expected those of these lists, found of others");
     let seeded = RecoverOptions { seed: 10, ..options() };
     assert_eq!(go_on(&map, seeded, bytes).unwrap_err(), others);
     let consensus = RecoverOptions { solver: Solver::Consensus, ..options() };

@@ -3,6 +3,8 @@
 use std::io::{self, Write};
 use std::sync::Arc;
 
+use sha2::{Digest as _, Sha256};
+
 use super::agreement::Judges;
 use super::jumps::Jumps;
 use super::look::{Look, Sample};
@@ -57,6 +59,20 @@ impl Digest {
     pub(super) fn new(graph: &Graph, seed: u64) -> Result<Self, Error> {
         let (sample, judges) = (Sample::new(graph, seed)?, Judges::new(graph)?);
         Ok(Self { listed: graph.times_listed()?, sample, judges })
+    }
+
+    /// Appends all of it.
+    pub(super) fn write(&self, to: &mut Writer) {
+        to.u32s(&self.listed);
+        self.sample.write(to);
+        self.judges.write(to);
+    }
+
+    /// A hash of all of it: what tells these edges from others.
+    pub(super) fn hash(&self) -> [u8; 32] {
+        let mut bytes = Writer::default();
+        self.write(&mut bytes);
+        Sha256::digest(bytes.into_bytes()).into()
     }
 }
 
@@ -190,6 +206,11 @@ impl<const D: usize> Course<D> {
     /// The rounds of the same map from another `start`.
     pub(crate) fn anew(&self, start: &[Estimate<D>]) -> Self {
         Self::new(self.kind, Arc::clone(&self.digest), start)
+    }
+
+    /// What it follows edges by.
+    pub(super) fn digest(&self) -> &Digest {
+        &self.digest
     }
 
     /// Where the round stands.

@@ -42,9 +42,7 @@ impl Outline {
         to.bytes(&self.map.0);
         to.bytes(&[self.slots_per_record as u8]);
         to.u32s(&self.lengths);
-        to.u32s(&self.digest.listed);
-        self.digest.sample.write(&mut to);
-        self.digest.judges.write(&mut to);
+        self.digest.write(&mut to);
         to.into_bytes()
     }
 

@@ -42,6 +42,9 @@ impl<'a, const D: usize, P: Pieces<D>> Sweeps<'a, D, P> {
             Begin::At(start) => Course::new(kind, digest, start),
             Begin::Written(bytes) => {
                 let mut from = Reader::new("kept rounds", bytes);
+                if from.array()? != digest.hash() {
+                    return Err(from.wrong("those of these lists", "of others"));
+                }
                 let course = Course::read(&mut from, (kind, digest), graph.n_slots())?;
                 from.end()?;
                 check_estimates(course.all_estimates())?;
@@ -90,6 +93,9 @@ impl<const D: usize, P: Pieces<D>> InRounds<D> for Sweeps<'_, D, P> {
         for (window, &end) in self.windows.iter().zip(&self.ends) {
             let order = &self.order[start..end];
             start = end;
+            if window.end <= slots.start || slots.end <= window.start {
+                continue;
+            }
             let is_asked = |slot: usize| standing.is_turn_of(slot) && slots.contains(&slot);
             let mut moved: Vec<Moved<D>> = order
                 .iter()
@@ -128,6 +134,7 @@ impl<const D: usize, P: Pieces<D>> InRounds<D> for Sweeps<'_, D, P> {
 
     fn write(&self, to: &mut dyn io::Write) -> io::Result<()> {
         let mut to = Writer::new(to);
+        to.bytes(&self.course.digest().hash());
         self.course.write(&mut to);
         to.finish().map(drop)
     }

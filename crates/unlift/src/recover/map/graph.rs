@@ -14,7 +14,7 @@ use super::edges::{record_of, score_step};
 use super::merge::Rows;
 use super::named_by::{Block, NamedBy};
 use crate::neighbors::Neighborhoods;
-use crate::shelf::{Kept, windows};
+use crate::shelf::{Stored, windows};
 use crate::{Error, RecordId};
 
 /// Rows of edges in order of their other ends, a class beside each.
@@ -22,8 +22,8 @@ use crate::{Error, RecordId};
 pub(crate) struct Graph {
     pub(super) offsets: Vec<u64>,
     /// Slots; the first of a record's where it is not known which.
-    pub(super) ends: Kept<u32>,
-    pub(super) class: Kept<u8>,
+    pub(super) ends: Stored<u32>,
+    pub(super) class: Stored<u8>,
     /// Edges that may be in memory at a time, where they are not all there.
     pub(super) window: u64,
     pub(super) slots_per_record: usize,
@@ -106,7 +106,7 @@ impl Graph {
         class.truncate(to);
         ends.shrink_to_fit();
         class.shrink_to_fit();
-        let (ends, class) = (Kept::Here(ends), Kept::Here(class));
+        let (ends, class) = (Stored::Here(ends), Stored::Here(class));
         Self { offsets, ends, class, window: u64::MAX, slots_per_record, rule }
     }
 
@@ -118,8 +118,8 @@ impl Graph {
     /// Slots whose edges are read at a time; all, where they are in memory.
     pub(crate) fn windows(&self) -> Vec<Range<usize>> {
         match self.ends {
-            Kept::Here(_) => std::iter::once(0..self.n_slots()).collect(),
-            Kept::Away(_) => windows(&self.offsets, self.window, self.slots_per_record),
+            Stored::Here(_) => std::iter::once(0..self.n_slots()).collect(),
+            Stored::Away(_) => windows(&self.offsets, self.window, self.slots_per_record),
         }
     }
 

@@ -8,7 +8,7 @@ use super::graph::Graph;
 use super::merge::Rows;
 use crate::Error;
 use crate::neighbors::ShelvedLists;
-use crate::shelf::{Column, Kept, Number, Shelf, windows};
+use crate::shelf::{Column, Number, Shelf, Stored, windows};
 
 /// Entries for one block that are written together.
 const TOGETHER: usize = 1 << 14;
@@ -63,7 +63,7 @@ impl Graph {
                 class.push_all(&part_class[..n])?;
             }
         }
-        let (ends, class) = (Kept::Away(ends), Kept::Away(class));
+        let (ends, class) = (Stored::Away(ends), Stored::Away(class));
         let window = (shelf.window() / EDGE) as u64;
         Ok(Self { offsets, ends, class, window, slots_per_record, rule })
     }

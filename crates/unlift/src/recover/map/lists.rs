@@ -172,11 +172,7 @@ impl<'a> Lists<'a> {
         match self {
             Self::Given { first, offsets, records } => row(*first, offsets, records, slot),
             Self::Picked(picked) => picked.of(slot),
-            Self::Mixed { offsets, records } => {
-                // What is in memory can be read.
-                let _ = mix(offsets, (slot, 1), buffer, |at| Ok(records[at as usize]));
-                buffer
-            }
+            Self::Mixed { offsets, records } => mixed(offsets, records, slot, buffer),
         }
     }
 
@@ -201,6 +197,19 @@ impl<'a> Lists<'a> {
             Self::Picked(picked) => picked.n_slots,
         }
     }
+}
+
+/// The list of `slot`, mixed, put together in `buffer`.
+#[inline(never)]
+fn mixed<'b>(
+    offsets: &[u64],
+    records: &[RecordId],
+    slot: usize,
+    buffer: &'b mut Vec<RecordId>,
+) -> &'b [RecordId] {
+    // What is in memory can be read.
+    let _ = mix(offsets, (slot, 1), buffer, |at| Ok(records[at as usize]));
+    buffer
 }
 
 /// Puts a list in `buffer` that is as long as that of `slot` and made of entries of others, where a record has so many slots and
@@ -294,7 +303,8 @@ impl Picked {
     }
 
     /// The list of `slot`; empty where it was not picked. All chunks before the last one are whole.
-    #[inline(always)]
+    // Out of line, as `mixed` is: solvers hardly ever ask for them in their loops.
+    #[inline(never)]
     fn of(&self, slot: usize) -> &[RecordId] {
         let Ok(chunk) = self.chunks.binary_search(&(slot / CHUNK)) else { return &[] };
         let at = chunk * CHUNK + slot % CHUNK;

@@ -121,6 +121,8 @@ pub(crate) struct Window {
 
 /// The window of width `2 delta` over the listed planes of one axis that maximizes evidence plus
 /// prior. `listed` holds (offset, record) of these planes and is sorted here.
+// In line: called, consensus on planes takes half as long again.
+#[inline(always)]
 pub(crate) fn best_window(
     listed: &mut [(f32, RecordId)],
     chance: &WindowChance,
