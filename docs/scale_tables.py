@@ -5,7 +5,7 @@ Used by make_benchmarks.py; standard library only.
 import filecmp, os, pathlib, subprocess, tempfile, time
 
 SCHEMES = ["ppl", "plane"]
-LIMIT = "2GB"
+LIMITED = ["--memory-limit", "2GB"]
 
 
 def spent(program, *options):
@@ -24,6 +24,15 @@ def told(cost, n):
     return f"{seconds:.1f} s ({1e6 * seconds / n:.1f} µs a point), {peak:.0f} MiB, {written:.1f} GB"
 
 
+def listed(program, at, scheme):
+    """Releases the map in a folder and lists neighbors, under the limit: the cost of the lists, their file, and what recovers the map."""
+    spent(program, "obfuscate", at / "map.npy", "--scale", 1, "--scheme", scheme, "--seed", 1, "--out", at / scheme)
+    lists = at / f"{scheme}-lists"
+    cost = spent(program, "neighbors", "oracle", at / scheme / "truth.parquet", "--k", 50, "--inlier-ratio", 0.3,
+                 "--seed", 1, "--out", lists, *LIMITED)
+    return cost, lists, ["recover", at / scheme / "released.parquet", "--neighbors", lists, "--seed", 1, "--out"]
+
+
 def tables(program, tiled, sizes=(100_000, 1_000_000, 10_000_000), in_memory=10_000_000):
     yield "| points | scheme | lists, limited | recover, limited | recover, in memory | the same bytes |"
     yield "| --- | --- | --- | --- | --- | --- |"
@@ -32,12 +41,8 @@ def tables(program, tiled, sizes=(100_000, 1_000_000, 10_000_000), in_memory=10_
             at = pathlib.Path(folder)
             tiled(at / "map.npy", n)
             for scheme in SCHEMES:
-                spent(program, "obfuscate", at / "map.npy", "--scale", 1, "--scheme", scheme, "--seed", 1, "--out", at / scheme)
-                limited, lists = ["--memory-limit", LIMIT], at / f"{scheme}-lists"
-                oracle = spent(program, "neighbors", "oracle", at / scheme / "truth.parquet", "--k", 50, "--inlier-ratio", 0.3,
-                               "--seed", 1, "--out", lists, *limited)
-                recover = ["recover", at / scheme / "released.parquet", "--neighbors", lists, "--seed", 1, "--out"]
-                away = spent(program, *recover, at / "away", "--force", *limited)
+                oracle, lists, recover = listed(program, at, scheme)
+                away = spent(program, *recover, at / "away", "--force", *LIMITED)
                 here, same = "not run", ""
                 if n <= in_memory:
                     here = told(spent(program, *recover, at / "here", "--force"), n)
@@ -47,17 +52,8 @@ def tables(program, tiled, sizes=(100_000, 1_000_000, 10_000_000), in_memory=10_
     yield ""
 
 
-def made(program, tiled, at, n, scheme):
-    """A released map of so many points with lists in a folder; what recovers it under the limit."""
-    tiled(at / "map.npy", n)
-    spent(program, "obfuscate", at / "map.npy", "--scale", 1, "--scheme", scheme, "--seed", 1, "--out", at / scheme)
-    limited, lists = ["--memory-limit", LIMIT], at / "lists"
-    spent(program, "neighbors", "oracle", at / scheme / "truth.parquet", "--k", 50, "--inlier-ratio", 0.3, "--seed", 1, "--out", lists, *limited)
-    return ["recover", at / scheme / "released.parquet", "--neighbors", lists, "--seed", 1, *limited, "--out"]
-
-
 def killed(command, journal, seconds):
-    """Kills a run after so many seconds, or when something is kept: how many seconds it ran, and bytes that are kept."""
+    """Kills a run after so many seconds, and not before something is kept: how many seconds it ran, and bytes that are kept."""
     started = time.monotonic()
     child = subprocess.Popen([*map(str, command)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     kept = lambda: [path for path in journal.glob("*.rounds") if not path.name.startswith(".")]
@@ -76,9 +72,10 @@ def resumed(program, tiled, sizes=(100_000, 1_000_000), scheme="ppl"):
     for n in sizes:
         with tempfile.TemporaryDirectory(dir=os.environ.get("UNLIFT_SCALE")) as folder:
             at = pathlib.Path(folder)
-            recover = made(program, tiled, at, n, scheme)
-            plain = spent(program, *recover, at / "plain")
-            again = [*recover, at / "again", "--journal", at / "kept"]
+            tiled(at / "map.npy", n)
+            *_, recover = listed(program, at, scheme)
+            plain = spent(program, *recover, at / "plain", *LIMITED)
+            again = [*recover, at / "again", *LIMITED, "--journal", at / "kept"]
             seconds, kept = killed([program, *again], at / "kept", 0.7 * plain[0])
             rest = spent(program, *again)
             same = filecmp.cmp(at / "plain", at / "again", shallow=False)
