@@ -1,6 +1,5 @@
 //! Joint recovery one round at a time: positions in, positions out.
 
-use std::io;
 use std::ops::Range;
 
 use super::kept::Headed;
@@ -73,14 +72,6 @@ impl<'a, const D: usize> Rounds<'a, D> {
         self.0.estimates()
     }
 
-    /// Writes where rounds stand between two of them, some 45 bytes a slot and what the density takes, the same on every machine.
-    ///
-    /// # Errors
-    /// When it cannot be written.
-    pub(super) fn write(&self, to: &mut dyn io::Write) -> io::Result<()> {
-        self.0.write(to)
-    }
-
     /// The estimates after all rounds that are left, each in the parts that the solver likes.
     ///
     /// # Errors
@@ -93,7 +84,7 @@ impl<'a, const D: usize> Rounds<'a, D> {
             }
             self.0.end_round()?;
             if let Some(kept) = &mut kept {
-                kept.keep(&|to| self.write(to));
+                kept.keep(&|to| self.0.write(to));
             }
         }
         Ok(self.0.into_estimates())

@@ -72,7 +72,8 @@ pub(crate) trait InRounds<const D: usize> {
     /// As of [`solve`](Self::solve).
     fn end_round(&mut self) -> Result<(), Error>;
 
-    /// Writes where all stands between two rounds: what others go on from, to the same bits.
+    /// Writes where all stands between two rounds, some 45 bytes a slot and what the density takes, the same on every machine: what others go
+    /// on from, to the same bits.
     ///
     /// # Errors
     /// When it cannot be written.

@@ -4,11 +4,13 @@ use std::fs::File;
 use std::io;
 use std::sync::Arc;
 
-use unlift::audit::{Plan, Silent, run};
+use unlift::audit::{Observer, Plan, Recovery, Silent, run};
 use unlift::neighbors::oracle::Noise;
 use unlift::neighbors::{Neighborhoods, ShelvedLists};
 use unlift::obfuscate::Entry;
-use unlift::recover::{RecoverOptions, Solver, prepare, prepare_shelved, recover_shelved};
+use unlift::recover::{
+    RecoverOptions, Recovered, Solver, prepare, prepare_shelved, recover_shelved,
+};
 use unlift::released::Obfuscation;
 use unlift::truth::Original;
 use unlift::{PointSet, Shelf, Unit};
@@ -105,6 +107,24 @@ fn lists_on_a_shelf_give_what_they_give_in_memory() {
     over_schemes!(shelved_is_in_memory);
 }
 
+/// Recoveries with lists on a shelf that an observer heard of.
+#[derive(Default)]
+struct Heard {
+    asked: usize,
+    kept: usize,
+}
+
+impl Observer for Heard {
+    fn recall(&mut self, recovery: &Recovery<'_>) -> Option<Recovered<3>> {
+        self.asked += usize::from(recovery.lists.here().is_none());
+        None
+    }
+
+    fn keep(&mut self, recovery: &Recovery<'_>, _recovered: &Recovered<3>) {
+        self.kept += usize::from(recovery.lists.here().is_none());
+    }
+}
+
 #[test]
 fn an_audit_with_lists_on_a_shelf_has_the_same_rows() {
     let original = Original::new(PointSet::try_new(room(61, 900), Unit::Meter).unwrap());
@@ -117,7 +137,10 @@ fn an_audit_with_lists_on_a_shelf_has_the_same_rows() {
     let usual = audit(&plan).unwrap();
     plan.shelf = Some(Arc::new(Files(9_000)));
     assert_eq!(usual.rows.len(), 4 * 3 * 3);
-    assert_eq!(usual.rows, audit(&plan).unwrap().rows);
+    let mut heard = Heard::default();
+    assert_eq!(usual.rows, run(&original, None, &plan, &mut heard).unwrap().rows);
+    // A journal is asked and told of lists that are not in memory as well; where joint recovery started comes with it, unasked.
+    assert_eq!((heard.asked, heard.kept), (4 * 3 * 2, 4 * 3 * 3));
     // A full disk is no scheme that was not audited: nothing goes on.
     plan.shelf = Some(Arc::new(Full));
     let error = audit(&plan).unwrap_err().to_string();
