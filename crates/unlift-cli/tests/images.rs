@@ -117,7 +117,7 @@ fn a_file_without_photos_has_frames_and_chosen_images_are_shown() {
     place.ends(&format!("audit images bare.h5 {QUICK} --show b.png --out b"), 0);
     let page = fs::read_to_string(place.path("b/report.html")).unwrap();
     assert!(
-        page.contains("\"label\":\"oracle, 50 % right\"")
+        page.contains("\"label\":\"oracle, 50 % true neighbors\"")
             && !page.contains("\"label\":\"overlap, ")
     );
     let (_, stderr) = place.ends("audit images f.h5 --show x.png", 2);

@@ -110,12 +110,6 @@ pub(crate) fn percent(value: f64) -> String {
     format!("{value:.1}")
 }
 
-/// A whole percentage that can stand after "at least": rounded down.
-pub(crate) fn at_least(percent: f64) -> String {
-    // The small lift keeps 29.000000000000004 - 1e-13 style sums from losing a whole point.
-    format!("{:.0}", (percent + 1e-9).floor())
-}
-
 /// "if half of the neighbors were known", for any inlier ratio.
 pub(crate) fn if_known(ratio: f64) -> String {
     let common = [
@@ -226,13 +220,6 @@ mod tests {
         assert_eq!(said("2.5"), "within 2.5 times the usual distance between neighboring points");
         assert_eq!(within("0.10", LengthUnit::Meter), "within 10 cm");
         assert_eq!(within("10", LengthUnit::Pixel), "within 10 px");
-    }
-
-    #[test]
-    fn shares_are_rounded_down_after_at_least() {
-        assert_eq!(at_least(89.99), "89");
-        assert_eq!(at_least(100.0), "100");
-        assert_eq!(at_least(0.1 + 28.9), "29");
     }
 
     #[test]

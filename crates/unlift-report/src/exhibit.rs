@@ -1,0 +1,189 @@
+//! What a page with pictures begins with: the photo, what the service receives, what an attacker paints from it.
+
+use serde::Serialize;
+
+use crate::attack::{self, Basis, Given};
+use crate::cards::Level;
+use crate::document::{Document, Row};
+use crate::inversions::{InvertedView, Inversion, source, strongest};
+use crate::pictures::Marks;
+use crate::{tables, words};
+
+/// One row of three pictures, with a sentence.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Exhibit {
+    level: Level,
+    /// "An attacker can rebuild the picture."
+    verdict: &'static str,
+    /// Who gets what from what.
+    said: String,
+    photo: String,
+    released: Option<Drawing>,
+    painted: String,
+    /// The image's name.
+    name: String,
+}
+
+/// Released records as an SVG path.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct Drawing {
+    size: [u32; 2],
+    /// `lines` or `points`.
+    kind: &'static str,
+    path: String,
+    /// What is drawn, in words.
+    said: String,
+}
+
+/// Share of the SSIM without protection from which on the picture is rebuilt, or parts of it are.
+const REBUILT: f64 = 0.85;
+const IN_PARTS: f64 = 0.6;
+
+/// How well a picture came back, by its SSIM over that of the picture without protection.
+fn rebuilt(ratio: f64) -> (Level, &'static str) {
+    match ratio {
+        REBUILT.. => (Level::Red, "An attacker can rebuild the picture."),
+        IN_PARTS.. => (Level::Orange, "An attacker can rebuild parts of the picture."),
+        _ => (Level::Gray, "The picture does not come back well by this attack."),
+    }
+}
+
+/// What the pictures of a row say, by their mean SSIM; `None` where nothing was painted.
+pub(crate) fn picture_said(row: &Row) -> Option<&'static str> {
+    let of = |name: &str| row.metrics.get(name).copied();
+    let (ssim, baseline) = (of("ssim")?, of("ssim_baseline").filter(|ssim| *ssim > 0.0)?);
+    Some(rebuilt(ssim / baseline).1)
+}
+
+/// At most three exhibits. The first two show the best pictures from the released data alone: of different schemes and
+/// photos, where there are several. The last one shows what half of the neighbors would give.
+pub(crate) fn exhibits(document: &Document, inversions: &[Inversion]) -> Vec<Exhibit> {
+    let Some(first) = inversions.first() else { return Vec::new() };
+    let mut shown: Vec<(&Inversion, &InvertedView)> = Vec::new();
+    for inversion in inversions.iter().take(2) {
+        let seen: Vec<&str> = shown.iter().map(|(_, view)| view.scheme.as_str()).collect();
+        let best = best(document, inversion, Basis::Released, &seen);
+        shown.extend(best.map(|view| (inversion, view)));
+    }
+    for basis in [Basis::Given, Basis::Oracle] {
+        shown.extend(best(document, first, basis, &[]).map(|view| (first, view)));
+    }
+    shown.into_iter().filter_map(|(one, view)| exhibit(document, one, view)).take(3).collect()
+}
+
+/// The view whose picture came back best; of equally good ones the first in the order of schemes.
+fn best<'a>(
+    document: &Document,
+    inversion: &'a Inversion,
+    basis: Basis,
+    without: &[&str],
+) -> Option<&'a InvertedView> {
+    let mut best: Option<&InvertedView> = None;
+    let level = |view: &InvertedView| rebuilt(kept(inversion, view)).0;
+    for view in inversion.views.iter().filter(|view| !without.contains(&view.scheme.as_str())) {
+        let strongest = strongest(document, inversion, &view.scheme, basis);
+        if strongest.is_some_and(|one| std::ptr::eq(one, view))
+            && best.is_none_or(|best| level(view) > level(best))
+        {
+            best = Some(view);
+        }
+    }
+    best
+}
+
+/// How much of the SSIM without protection the picture has.
+fn kept(inversion: &Inversion, view: &InvertedView) -> f64 {
+    let baseline = inversion.baseline.likeness.ssim;
+    if baseline > 0.0 { view.painted.likeness.ssim / baseline } else { 0.0 }
+}
+
+fn exhibit(document: &Document, inversion: &Inversion, view: &InvertedView) -> Option<Exhibit> {
+    let (level, verdict) = rebuilt(kept(inversion, view));
+    let given = |row: &&Row| view.given.same_choice(&Given::of(row)) && row.solver == view.solver;
+    let row = document.results.iter().filter(|row| row.scheme == view.scheme).find(given)?;
+    let typed = tables::headline_threshold(document)?;
+    let back = format!(
+        "{} % of the {} come back {}",
+        words::percent(row.recovered_percent.get(&typed).copied().unwrap_or(0.0)),
+        words::points(row.unit),
+        words::within(&typed, row.unit),
+    );
+    let by = format!("({}, {})", view.scheme.to_uppercase(), attack::briefly(row));
+    let said = match view.basis()? {
+        Basis::Released => format!("From the released data alone, {back} {by}."),
+        Basis::Given => format!("With the given neighbors, {back} {by}."),
+        Basis::Oracle => {
+            let known = words::capital(&words::if_known(row.inlier_ratio));
+            format!("{known}: {back} {by}.")
+        }
+    };
+    let released = inversion.released.iter().find(|one| one.scheme == view.scheme);
+    Some(Exhibit {
+        level,
+        verdict,
+        said,
+        photo: source(&inversion.photo),
+        released: released.and_then(|one| drawing(inversion.size, &one.scheme, &one.marks)),
+        painted: source(&view.painted.jpeg),
+        name: inversion.name.clone(),
+    })
+}
+
+/// More lines than this are a fog.
+const MOST_LINES: usize = 700;
+const MOST_POINTS: usize = 4_000;
+
+/// The records as one path, thinned evenly; `None` where there is nothing to draw.
+fn drawing(size: [u32; 2], scheme: &str, marks: &Marks) -> Option<Drawing> {
+    let mut path = String::new();
+    let at = |p: [f32; 2]| format!("{} {}", p[0].round(), p[1].round());
+    let (kind, drawn, all) = match marks {
+        Marks::Lines(all) | Marks::Rays(all) => {
+            let all: Vec<[[f32; 2]; 2]> = all.iter().copied().flatten().collect();
+            let few = evenly(&all, MOST_LINES);
+            few.iter().for_each(|[a, b]| path.push_str(&format!("M{}L{}", at(*a), at(*b))));
+            ("lines", few.len(), all.len())
+        }
+        Marks::Points(all) => {
+            let all: Vec<[f32; 2]> = all.iter().copied().flatten().collect();
+            let few = evenly(&all, MOST_POINTS);
+            few.iter().for_each(|p| path.push_str(&format!("M{}h0", at(*p))));
+            ("points", few.len(), all.len())
+        }
+    };
+    let [n, of] = [drawn, all].map(|n| words::thousands(n as u64));
+    let some = if drawn < all { format!(" ({n} of {of} drawn)") } else { String::new() };
+    let rule = words::scheme_rule(scheme);
+    let rule = if rule.is_empty() { "Its records." } else { rule };
+    let said = format!("{rule}{some}");
+    (drawn > 0).then_some(Drawing { size, kind, path, said })
+}
+
+/// At most `most` of `all`, evenly spaced.
+fn evenly<T: Copy>(all: &[T], most: usize) -> Vec<T> {
+    let n = all.len().min(most);
+    (0..n).map(|at| all[at * all.len() / n]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_said_of_a_picture_follows_its_ssim() {
+        let said = [1.1, 0.85, 0.8499, 0.6, 0.5999, 0.0].map(|ratio| rebuilt(ratio).1);
+        let whole = "An attacker can rebuild the picture.";
+        let parts = "An attacker can rebuild parts of the picture.";
+        let not = "The picture does not come back well by this attack.";
+        assert_eq!(said, [whole, whole, parts, parts, not, not]);
+    }
+
+    #[test]
+    fn many_lines_are_thinned_and_counted() {
+        let lines = Marks::Lines((0..2_000).map(|at| Some([[at as f32, 0.0], [0.0, 5.0]])).collect());
+        let drawn = drawing([640, 480], "lines2d", &lines).expect("a drawing");
+        assert_eq!(drawn.path.matches('M').count(), MOST_LINES);
+        assert!(drawn.said.ends_with("(700 of 2,000 drawn)"), "{}", drawn.said);
+        assert_eq!(drawing([9, 9], "cp2d", &Marks::Points(vec![None])), None);
+    }
+}
