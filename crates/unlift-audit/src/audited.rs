@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use unlift::OneLine;
 use unlift_io::atomic::OutputSet;
 use unlift_report::scene::Scene3d;
-use unlift_report::{Document, Opening, RenderOptions, render, text_table};
+use unlift_report::{Document, Opening, RenderOptions, Shares, render, shares, text_table};
 
 use crate::Error;
 use crate::outputs::{FIGURES, PAGE, stage_audit};
@@ -36,6 +36,11 @@ impl Audited {
     pub fn page(&self, share_safe: bool) -> Result<String, Error> {
         let options = RenderOptions { share_safe, ..self.drawn.clone() };
         Ok(render(&self.document, self.scene.as_ref(), &options)?)
+    }
+
+    /// What came back of every scheme, the worst first.
+    pub fn shares(&self) -> Vec<Shares> {
+        shares(&self.document, &self.drawn.inversions)
     }
 
     /// The same audit, whose page begins with the verdict and pictures of `other` under `title`; `details` is a link

@@ -120,12 +120,20 @@ pub(crate) fn briefly(row: &Row) -> String {
     }
 }
 
-/// The whole attack of a row: `overlap, 11 % true neighbors, joint`.
+/// The whole attack of a row: `oracle, 50 % true neighbors, joint`, `overlap, 35 listed, 11 % of them true, joint`.
 pub(crate) fn name(row: &Row) -> String {
     if !has_neighborhoods(row) {
         return records_alone(Some(&row.solver));
     }
-    let given = neighborhoods(&row.neighbors, row.oracle_noise.as_deref(), row.inlier_ratio);
+    // An attacker's own lists are as long as it chose: the share of true ones says nothing without that.
+    let given = match basis(row) {
+        Some(Basis::Released | Basis::Given) => {
+            let (source, true_ones) =
+                (source(&row.neighbors, None), words::ratio_percent(row.inlier_ratio));
+            format!("{source}, {} listed, {true_ones} % of them true", row.k)
+        }
+        _ => neighborhoods(&row.neighbors, row.oracle_noise.as_deref(), row.inlier_ratio),
+    };
     format!("{given}, {}", row.solver)
 }
 
@@ -157,7 +165,10 @@ mod tests {
     fn neighborhoods_have_the_name_of_their_source() {
         assert_eq!(neighborhoods("oracle", Some("uniform"), 0.5), "oracle, 50 % true neighbors");
         assert_eq!(neighborhoods("oracle", None, 0.5), "oracle, 50 % true neighbors");
-        assert_eq!(neighborhoods("oracle", Some("near"), 0.1), "oracle (near), 10 % true neighbors");
+        assert_eq!(
+            neighborhoods("oracle", Some("near"), 0.1),
+            "oracle (near), 10 % true neighbors"
+        );
         assert_eq!(neighborhoods("overlap", None, 0.113), "overlap, 11 % true neighbors");
         assert_eq!(neighborhoods("file", None, 0.2), "given lists, 20 % true neighbors");
     }

@@ -56,7 +56,7 @@ pub(crate) struct Finding {
     /// The percentage as every table says it: one decimal.
     pub percent: String,
     pub level: Level,
-    /// The attack: "overlap, 11 % true neighbors, joint".
+    /// The attack: "overlap, 35 listed, 11 % of them true, joint".
     pub by: String,
     /// The attack in a word or two: "overlap neighbors".
     #[serde(skip)]

@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::attack::{self, Basis, Given};
 use crate::cards::Level;
 use crate::document::{Document, Row};
-use crate::inversions::{InvertedView, Inversion, source, strongest};
+use crate::inversions::{Inversion, InvertedView, source, strongest};
 use crate::pictures::Marks;
 use crate::{tables, words};
 
@@ -48,11 +48,23 @@ fn rebuilt(ratio: f64) -> (Level, &'static str) {
     }
 }
 
-/// What the pictures of a row say, by their mean SSIM; `None` where nothing was painted.
-pub(crate) fn picture_said(row: &Row) -> Option<&'static str> {
-    let of = |name: &str| row.metrics.get(name).copied();
-    let (ssim, baseline) = (of("ssim")?, of("ssim_baseline").filter(|ssim| *ssim > 0.0)?);
-    Some(rebuilt(ssim / baseline).1)
+/// How many photos of a scheme can be rebuilt from the released data alone: "1 of 2 pictures can be rebuilt, 1 in
+/// parts"; `None` where nothing was painted.
+pub(crate) fn pictures_said(
+    document: &Document,
+    inversions: &[Inversion],
+    scheme: &str,
+) -> Option<String> {
+    let level = |one: &Inversion| {
+        let view = strongest(document, one, scheme, Basis::Released)?;
+        Some(rebuilt(kept(one, view)).0)
+    };
+    let levels: Vec<Level> = inversions.iter().filter_map(level).collect();
+    let count = |level| levels.iter().filter(|&&one| one == level).count();
+    let (n, whole, parts) = (levels.len(), count(Level::Red), count(Level::Orange));
+    let pictures = if n == 1 { "picture" } else { "pictures" };
+    let in_parts = if parts > 0 { format!(", {parts} in parts") } else { String::new() };
+    (n > 0).then(|| format!("{whole} of {n} {pictures} can be rebuilt{in_parts}"))
 }
 
 /// At most three exhibits. The first two show the best pictures from the released data alone: of different schemes and
@@ -180,7 +192,8 @@ mod tests {
 
     #[test]
     fn many_lines_are_thinned_and_counted() {
-        let lines = Marks::Lines((0..2_000).map(|at| Some([[at as f32, 0.0], [0.0, 5.0]])).collect());
+        let lines =
+            Marks::Lines((0..2_000).map(|at| Some([[at as f32, 0.0], [0.0, 5.0]])).collect());
         let drawn = drawing([640, 480], "lines2d", &lines).expect("a drawing");
         assert_eq!(drawn.path.matches('M').count(), MOST_LINES);
         assert!(drawn.said.ends_with("(700 of 2,000 drawn)"), "{}", drawn.said);

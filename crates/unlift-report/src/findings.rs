@@ -63,8 +63,16 @@ fn errors(document: &Document) -> String {
     let strongest = speaking(document);
     match strongest.and_then(|row| Some((row, row.median_error?))) {
         Some((row, median)) => {
-            let (error, scheme) = (words::length(median, row.unit), row.scheme.to_uppercase());
-            format!("Half of the {points} come back to within {error} ({scheme})")
+            let scheme = row.scheme.to_uppercase();
+            let smallest = tables::thresholds(document).first().and_then(|t| t.parse::<f64>().ok());
+            // An exchanged coordinate that is put back leaves an error of rounding.
+            match smallest.is_some_and(|smallest| median < 0.001 * smallest) {
+                true => format!("Half of the {points} come back exactly ({scheme})"),
+                false => {
+                    let error = words::length(median, row.unit);
+                    format!("Half of the {points} come back to within {error} ({scheme})")
+                }
+            }
         }
         None => format!("How far off the recovered {points} are"),
     }

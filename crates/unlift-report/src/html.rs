@@ -221,7 +221,12 @@ impl Opening {
     }
 
     /// The opening of another audit under this title, whose own page `details` is a link to.
-    pub fn titled(document: &Document, inversions: &[Inversion], title: &str, details: &str) -> Self {
+    pub fn titled(
+        document: &Document,
+        inversions: &[Inversion],
+        title: &str,
+        details: &str,
+    ) -> Self {
         let (title, details) = (Some(title.to_owned()), Some(details.to_owned()));
         Self { title, details, ..Self::of(document, inversions) }
     }

@@ -181,9 +181,7 @@ pub(crate) fn strongest<'a>(
     };
     let row = verdict::strongest(document, scheme, basis);
     let is_row = |view: &&InvertedView| {
-        row.is_some_and(|row| {
-            view.solver == row.solver && view.given.same_choice(&Given::of(row))
-        })
+        row.is_some_and(|row| view.solver == row.solver && view.given.same_choice(&Given::of(row)))
     };
     let best = |a: &&InvertedView, b: &&InvertedView| {
         a.painted.likeness.ssim.total_cmp(&b.painted.likeness.ssim)

@@ -22,10 +22,11 @@ pub fn text_table(document: &Document) -> String {
         let rows = verdict::by_source(document, &card.scheme);
         let Some(first) = rows.first() else { continue };
         let blind = percent(first.blind_percent.get(&headline), None);
-        let mut alone = records_alone(document, &card.scheme, &thresholds).map(|(share, mut cells)| {
-            cells.extend([blind.clone(), "-".to_owned()]);
-            (share, cells)
-        });
+        let mut alone =
+            records_alone(document, &card.scheme, &thresholds).map(|(share, mut cells)| {
+                cells.extend([blind.clone(), "-".to_owned()]);
+                (share, cells)
+            });
         for row in rows {
             let share = row.recovered_percent.get(&headline).copied().unwrap_or(0.0);
             let is_oracle = attack::basis(row) == Some(attack::Basis::Oracle);

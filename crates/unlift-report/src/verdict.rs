@@ -10,6 +10,7 @@ use crate::attack::{self, Basis, Given};
 use crate::banner::{Banner, banner, next_steps};
 use crate::cards::{Card, Finding, Level, Refusal};
 use crate::document::{Bound, BreakEven, Document, Row};
+use crate::inversions::Inversion;
 use crate::{exhibit, tables, words};
 
 /// The inlier ratio of the oracle's headline, if it was tested; else the tested one nearest to it.
@@ -60,16 +61,16 @@ pub struct Shares {
     pub today: Option<f64>,
     /// Percent if neighbors were known, at the tested share nearest to half; `None` without an oracle.
     pub known: Option<f64>,
-    /// What the pictures of the strongest attack of today say, in a sentence; `None` where nothing was painted.
-    pub picture: Option<&'static str>,
+    /// How many pictures can be rebuilt from the released data alone; `None` where nothing was painted.
+    pub pictures: Option<String>,
 }
 
 /// The shares of every scheme, the worst first, as the page leads with them.
-pub fn shares(document: &Document) -> Vec<Shares> {
+pub fn shares(document: &Document, inversions: &[Inversion]) -> Vec<Shares> {
     let of = |card: Card| Shares {
         today: card.today(),
         known: card.finding(Basis::Oracle).map(|finding| finding.recovered),
-        picture: strongest(document, &card.scheme, Basis::Released).and_then(exhibit::picture_said),
+        pictures: exhibit::pictures_said(document, inversions, &card.scheme),
         scheme: card.scheme,
         title: card.title,
     };

@@ -141,9 +141,13 @@ pub(crate) fn list(items: &[String]) -> String {
     }
 }
 
-/// An inlier ratio as a percentage without the sign, to two digits.
+/// An inlier ratio as a percentage without the sign, to two digits; 100 is said of nothing less.
 pub(crate) fn ratio_percent(ratio: f64) -> String {
-    significant(ratio * 100.0, 2)
+    match ratio {
+        0.999..1.0 => "99.9".to_owned(),
+        0.99..1.0 => significant(ratio * 100.0, 3),
+        _ => significant(ratio * 100.0, 2),
+    }
 }
 
 /// A reason in words: `odd_point` reads "odd point".
@@ -227,7 +231,7 @@ mod tests {
         assert_eq!(if_known(0.5), "if half of the neighbors were known");
         assert_eq!(if_known(0.3), "if 30 % of the neighbors were known");
         assert_eq!(ratio_percent(0.071), "7.1");
-        assert_eq!(ratio_percent(1.0), "100");
+        assert_eq!([0.989, 0.9963, 0.9999, 1.0].map(ratio_percent), ["99", "99.6", "99.9", "100"]);
     }
 
     #[test]

@@ -46,10 +46,7 @@ fn inversion(document: &Document, ssim: impl Fn(&Row) -> f64) -> Inversion {
         name: picture.name,
         size: picture.size,
         objects: vec![object("chair")],
-        baseline: Painted {
-            likeness: Likeness { ssim: 0.5, lpips: 0.2 },
-            ..Painted::default()
-        },
+        baseline: Painted { likeness: Likeness { ssim: 0.5, lpips: 0.2 }, ..Painted::default() },
         released: picture.released,
         views: document.results.iter().map(view).collect(),
         ..Inversion::default()
@@ -66,11 +63,16 @@ fn the_page_begins_with_what_an_attacker_paints_from_the_released_data() {
     let document = document();
     let ssim = |row: &Row| if row.neighbors == "overlap" { 0.48 } else { 0.2 };
     let found = page(&document, vec![inversion(&document, ssim)], false);
-    let rebuilt = "<strong>An attacker can rebuild the picture.</strong> From the released data alone, ";
+    let rebuilt =
+        "<strong>An attacker can rebuild the picture.</strong> From the released data alone, ";
     let not = "<strong>The picture does not come back well by this attack.</strong> If half of the neighbors were known: ";
     let (first, second) = (found.find(rebuilt), found.find(not));
     assert!(first.is_some() && first < second, "{found}");
-    assert!(found.contains("% of the keypoints come back within 10\u{a0}px (LINES2D, overlap neighbors)."));
+    assert!(
+        found.contains(
+            "% of the keypoints come back within 10\u{a0}px (LINES2D, overlap neighbors)."
+        )
+    );
     assert!(found.contains("What the service receives") && found.contains("<path d=\"M"));
     assert!(!found.to_lowercase().contains("worse picture"));
     let safe = page(&document, vec![inversion(&document, ssim)], true);
@@ -83,7 +85,10 @@ fn two_photos_show_two_schemes() {
     let all = || inversion(&document, |_| 0.48);
     let found = page(&document, vec![all(), all(), all()], false);
     assert_eq!(found.matches("<div class=\"exhibit").count(), 3);
-    assert!(found.contains("(LINES2D, overlap neighbors)") && found.contains("(CP2D, overlap neighbors)"));
+    assert!(
+        found.contains("(LINES2D, overlap neighbors)")
+            && found.contains("(CP2D, overlap neighbors)")
+    );
 }
 
 #[test]

@@ -17,7 +17,6 @@
     const solvers = distinct(oracle.map((row) => row.solver));
     const datasets = distinct(data.published.map((curve) => curve.dataset));
     const state = { threshold: data.headline, solver: solvers.length > 1 ? STRONGEST : solvers[0] ?? STRONGEST, source: sources[0], dataset: datasets[0] };
-    // Charts in a folded part have no size: they are drawn when it is opened.
     const folded = at("by-scheme");
     const redraw = () => {
       overview(at("chart-overview"), data, state);
@@ -34,6 +33,11 @@
     single(form, state, "dataset", "The paper’s curves, on", options(datasets, String), redraw);
     redraw();
     redraws.push(redraw);
+  }
+
+  /** Charts in a folded part have no size: `work` is done when it is first opened. */
+  function once(folded, work) {
+    folded.addEventListener("toggle", work, { once: true });
   }
 
   /** A chart over all schemes: neighborhoods and solver are chosen, what is drawn are the rows that fit. */
@@ -115,7 +119,7 @@
   const parts = [
     [rows.length, curves],
     [rows.length, () => chart(at("error-controls"), at("chart-errors"), rows, errors)],
-    [judged.length, () => chart(at("reliability-controls"), at("chart-reliability"), judged, reliability, firstTold)],
+    [judged.length, () => once(at("certainty"), () => chart(at("reliability-controls"), at("chart-reliability"), judged, reliability, firstTold))],
     [data.scene, scene],
     [data.pictures.length, pictures],
     [sheets.length, () => chosen(sheets)],

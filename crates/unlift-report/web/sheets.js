@@ -13,12 +13,11 @@
     show();
   }
 
-  /** The name of a picture, as it stands below it and above its row. */
+  /** The name of a picture, as it stands below it, with its scheme. */
   function named(shot) {
-    let row = shot.closest(".strip").previousElementSibling;
-    if (row?.tagName === "SUMMARY") row = row.parentElement.previousElementSibling.previousElementSibling;
+    const scheme = shot.closest(".of-scheme")?.querySelector("h3");
     const label = shot.closest("figure").querySelector("strong").textContent;
-    return row?.tagName === "H3" ? `${row.textContent}, ${label}` : label;
+    return scheme ? `${scheme.textContent}, ${label}` : label;
   }
 
   /** Adds to a sheet the photo with a picture over it; pictures become buttons that choose. */

@@ -235,7 +235,8 @@ fn marks(view: &View, shapes: &Shapes, middle: &[f64; 3]) -> Result<Marks, Error
             Marks::Lines(all.iter().map(|&[a, b]| line(a, b)).collect::<Result<_, _>>()?)
         }
         Shapes::Patches(all) => {
-            let edges = all.iter().flat_map(|patch| (0..4).map(|at| (patch[at], patch[(at + 1) % 4])));
+            let edges =
+                all.iter().flat_map(|patch| (0..4).map(|at| (patch[at], patch[(at + 1) % 4])));
             Marks::Lines(edges.map(|(a, b)| line(a, b)).collect::<Result<_, _>>()?)
         }
         Shapes::Points(all) => {

@@ -64,7 +64,7 @@ pub use table::TableArgs;
     term_width = 100,
     after_help = "\
 Examples:
-  unlift demo                                  audit a made-up room, no data needed
+  unlift demo                                  what comes back of two photos and a map; no data needed
   unlift audit map PROJECT/sparse/0 --scale 1  audit a COLMAP map that is in meters
   unlift audit images photos                   audit the keypoints of photos
   unlift check                                 the audits of unlift.toml, for a build
@@ -112,7 +112,7 @@ fn numbers_may_be_negative(command: clap::Command) -> clap::Command {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Audit a made-up furnished room under every scheme
+    /// Protect two photos and a map, attack them, and show what comes back
     Demo(DemoArgs),
     /// Audit what you have
     #[command(subcommand)]

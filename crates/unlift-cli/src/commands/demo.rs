@@ -21,8 +21,8 @@ use unlift_features::{AlikedOptions, Extraction};
 use unlift_io::atomic::{Access, Kind, OutputSet, Rules};
 use unlift_io::hash::hash_positions;
 use unlift_nn::{DescriptorKind, Learned};
+use unlift_report::Shares;
 use unlift_report::document::Input;
-use unlift_report::{Document, shares};
 
 use super::common::with_threads;
 use super::painter::painter;
@@ -49,8 +49,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
         (PHOTOS[1], Kind::AuditJson),
     ];
     let rules = Rules::new([], args.force);
-    let mut out =
-        OutputSet::create(&args.out, rules, Access::Private, &files).map_err(refused)?;
+    let mut out = OutputSet::create(&args.out, rules, Access::Private, &files).map_err(refused)?;
     let text = with_threads(args.threads, || {
         let bar = Progress::new(args.quiet);
         bar.show(0, PARTS, "");
@@ -60,10 +59,11 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
         mapping.finish();
         let map = map(&Part::new(&bar, "attacking the protected map", 30.0), &args.out, &room)?;
         photos.stage(&mut out, PHOTOS, false)?;
+        let (of_photos, of_map) = (photos.shares(), map.shares());
         let title = "Two photos: a cat and a cup of coffee";
-        let finished =
-            map.opening_with(&photos, title, PHOTOS[0]).write(out, &args.out, false)?;
-        Ok(said(&photos.document, &finished.document, &finished.report))
+        let map = map.opening_with(&photos, title, PHOTOS[0]);
+        let finished = map.write(out, &args.out, false)?;
+        Ok(said(of_photos, of_map, &finished.report))
     })?;
     print(&text)?;
     Ok(Outcome::Done)
@@ -115,11 +115,7 @@ fn photos(progress: &Part<'_>, out: &Path) -> anyhow::Result<Audited> {
 }
 
 /// Attacks the map of the room.
-fn map(
-    progress: &Part<'_>,
-    out: &Path,
-    room: &unlift_demo::Mapped,
-) -> anyhow::Result<Audited> {
+fn map(progress: &Part<'_>, out: &Path, room: &unlift_demo::Mapped) -> anyhow::Result<Audited> {
     let started = Instant::now();
     let sha256 = hash_positions(&room.points);
     let original = Original::new(PointSet::try_new(room.points.clone(), Unit::Meter)?);
@@ -161,22 +157,23 @@ fn map(
     Ok(find_map(job, None)?)
 }
 
-/// What came back, in a dozen lines that need no page.
-fn said(photos: &Document, map: &Document, page: &Path) -> String {
+/// What came back, in a dozen lines for somebody who has not heard of any scheme.
+fn said(photos: Vec<Shares>, map: Vec<Shares>, page: &Path) -> String {
     let percent = |share: Option<f64>| share.map_or("-".to_owned(), |x| format!("{x:.1} %"));
-    let of_photos = shares(photos).into_iter().map(|one| {
-        let picture = one.picture.unwrap_or_default().to_owned();
-        vec![format!("  {}", one.scheme), one.title, percent(one.today), picture]
+    let of_photos = photos.into_iter().map(|one| {
+        let back = format!("{} of the keypoints came back", percent(one.today));
+        vec![format!("  {}", one.scheme), one.title, back, one.pictures.unwrap_or_default()]
     });
-    let of_map = shares(map).into_iter().map(|one| {
+    let of_map = map.into_iter().map(|one| {
         vec![format!("  {}", one.scheme), one.title, percent(one.today), percent(one.known)]
     });
-    let head = ["  scheme", "", "from the protected data alone", "if half of the neighbors were known"];
+    let head = ["", "points that came back:", "today", "if half of the neighbors were known"];
     let mut map_rows = vec![head.map(str::to_owned).to_vec()];
     map_rows.extend(of_map);
     format!(
-        "Two protected photos, attacked from the protected data alone. Keypoints that came back within 10 px:\n\
-         {}A protected map of a room. Points that came back within 10 cm:\n{}page: {}\n",
+        "Two photos, protected by three published schemes, attacked from the protected data alone:\n{}\
+         The map of a room, protected by seven published schemes:\n{}\
+         Photos, pictures that came back and all figures: {}\n",
         table(&of_photos.collect::<Vec<_>>(), &[1, 3]),
         table(&map_rows, &[1]),
         unlift::OneLine(page.display())

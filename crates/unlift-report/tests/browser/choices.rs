@@ -98,6 +98,7 @@ fn charts_show_the_rows_that_are_chosen() {
     let file = PageFile::new("mixed-charts", &page);
     browser.emulate(1280, 900, "light");
     browser.open(&file.0);
+    browser.unfold();
     for (form, chart) in [("error-controls", "errors"), ("reliability-controls", "reliability")] {
         let show = format!(
             "() => [document.getElementById('chart-{chart}').dataset.rows, \

@@ -169,7 +169,9 @@ impl Browser {
 
     /// Opens all folded parts of the page and waits until what is in them is drawn.
     pub fn unfold(&mut self) {
-        self.evaluate("document.querySelectorAll('details').forEach(part => { part.open = true; })");
+        self.evaluate(
+            "document.querySelectorAll('details').forEach(part => { part.open = true; })",
+        );
         std::thread::sleep(std::time::Duration::from_millis(200));
     }
 

@@ -16,7 +16,10 @@ fn curves_tables_and_canvas_are_there_without_errors_or_network() {
         browser.emulate(width, height, "light");
         browser.open(&file.0);
         // Charts that are folded away are drawn when they are opened.
-        assert_eq!(browser.evaluate("document.querySelectorAll('#chart-multiples .chart').length"), json!(0));
+        assert_eq!(
+            browser.evaluate("document.querySelectorAll('#chart-multiples .chart').length"),
+            json!(0)
+        );
         browser.unfold();
         // One overview, one chart per scheme, one of errors, one of certainty; each with drawn curves.
         assert_eq!(browser.evaluate(CHARTS), json!(10));

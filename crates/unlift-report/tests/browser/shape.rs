@@ -16,8 +16,7 @@ fn tables_fit_a_laptop_and_say_on_a_phone_that_there_is_more() {
         browser.emulate(1280, 900, "light");
         browser.open(&file.0);
         browser.unfold();
-        let cut =
-            "[...document.querySelectorAll('.wide')].filter(s => s.wideWidth > s.clientWidth)
+        let cut = "[...document.querySelectorAll('.wide')].filter(s => s.wideWidth > s.clientWidth)
             .map(s => `${s.ariaLabel}: ${s.wideWidth} > ${s.clientWidth}`)";
         assert_eq!(browser.evaluate(cut), json!([]));
         browser.emulate(390, 844, "light");
