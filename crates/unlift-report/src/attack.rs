@@ -116,6 +116,7 @@ pub(crate) fn briefly(row: &Row) -> String {
     match row.neighbors.as_str() {
         _ if !has_neighborhoods(row) => "records alone".to_owned(),
         "file" => "given neighbors".to_owned(),
+        "descriptors" => "descriptor neighbors".to_owned(),
         _ => format!("{} neighbors", source(&row.neighbors, row.oracle_noise.as_deref())),
     }
 }

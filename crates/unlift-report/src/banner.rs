@@ -57,8 +57,8 @@ fn headline(level: Level, cards: &[Card]) -> String {
     let (n, of) = (cards.iter().filter(at_level).count(), cards.len());
     let under = match (n, of) {
         (_, 1) => String::new(),
-        (2, 2) => " under both schemes".to_owned(),
-        (n, of) if n == of => format!(" under any of {of} schemes"),
+        (2, 2) => " under either scheme".to_owned(),
+        (n, of) if n == of => format!(" under any of the {of} schemes"),
         (n, of) => format!(" under {n} of {of} schemes"),
     };
     match level {

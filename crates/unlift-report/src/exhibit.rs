@@ -39,6 +39,9 @@ struct Drawing {
 const REBUILT: f64 = 0.85;
 const IN_PARTS: f64 = 0.6;
 
+/// The picture of true points is poor below this SSIM, whatever comes back of it.
+const POOR: f64 = 0.5;
+
 /// How well a picture came back, by its SSIM over that of the picture without protection.
 fn rebuilt(ratio: f64) -> (Level, &'static str) {
     match ratio {
@@ -83,24 +86,40 @@ pub(crate) fn exhibits(document: &Document, inversions: &[Inversion]) -> Vec<Exh
     shown.into_iter().filter_map(|(one, view)| exhibit(document, one, view)).take(3).collect()
 }
 
-/// The view whose picture came back best; of equally good ones the first in the order of schemes.
+/// The view whose picture came back best; of equally good ones that of the stronger attack.
 fn best<'a>(
     document: &Document,
     inversion: &'a Inversion,
     basis: Basis,
     without: &[&str],
 ) -> Option<&'a InvertedView> {
-    let mut best: Option<&InvertedView> = None;
-    let level = |view: &InvertedView| rebuilt(kept(inversion, view)).0;
-    for view in inversion.views.iter().filter(|view| !without.contains(&view.scheme.as_str())) {
+    let views = inversion.views.iter().filter(|view| {
         let strongest = strongest(document, inversion, &view.scheme, basis);
-        if strongest.is_some_and(|one| std::ptr::eq(one, view))
-            && best.is_none_or(|best| level(view) > level(best))
-        {
-            best = Some(view);
-        }
-    }
-    best
+        strongest.is_some_and(|one| std::ptr::eq(one, *view))
+    });
+    let views = views.filter(|view| !without.contains(&view.scheme.as_str()));
+    let rank = |view: &InvertedView| {
+        let share = row_of(document, view).and_then(|row| share(document, row));
+        (rebuilt(kept(inversion, view)).0, share.unwrap_or(0.0))
+    };
+    let ranked = views.map(|view| (rank(view), view));
+    let best =
+        ranked.reduce(|a, b| if b.0.partial_cmp(&a.0).is_some_and(|o| o.is_gt()) { b } else { a });
+    best.map(|(_, view)| view)
+}
+
+/// The row that a view is of.
+fn row_of<'a>(document: &'a Document, view: &InvertedView) -> Option<&'a Row> {
+    document.results.iter().find(|row| {
+        row.scheme == view.scheme
+            && row.solver == view.solver
+            && view.given.same_choice(&Given::of(row))
+    })
+}
+
+/// Percent that came back within the headline threshold.
+fn share(document: &Document, row: &Row) -> Option<f64> {
+    row.recovered_percent.get(&tables::headline_threshold(document)?).copied()
 }
 
 /// How much of the SSIM without protection the picture has.
@@ -111,17 +130,16 @@ fn kept(inversion: &Inversion, view: &InvertedView) -> f64 {
 
 fn exhibit(document: &Document, inversion: &Inversion, view: &InvertedView) -> Option<Exhibit> {
     let (level, verdict) = rebuilt(kept(inversion, view));
-    let given = |row: &&Row| view.given.same_choice(&Given::of(row)) && row.solver == view.solver;
-    let row = document.results.iter().filter(|row| row.scheme == view.scheme).find(given)?;
+    let row = row_of(document, view)?;
     let typed = tables::headline_threshold(document)?;
     let back = format!(
         "{} % of the {} come back {}",
-        words::percent(row.recovered_percent.get(&typed).copied().unwrap_or(0.0)),
+        words::percent(share(document, row).unwrap_or(0.0)),
         words::points(row.unit),
         words::within(&typed, row.unit),
     );
     let by = format!("({}, {})", view.scheme.to_uppercase(), attack::briefly(row));
-    let said = match view.basis()? {
+    let mut said = match view.basis()? {
         Basis::Released => format!("From the released data alone, {back} {by}."),
         Basis::Given => format!("With the given neighbors, {back} {by}."),
         Basis::Oracle => {
@@ -129,6 +147,13 @@ fn exhibit(document: &Document, inversion: &Inversion, view: &InvertedView) -> O
             format!("{known}: {back} {by}.")
         }
     };
+    // What little there was cannot come back.
+    let baseline = inversion.baseline.likeness.ssim;
+    if baseline < POOR {
+        said.push_str(&format!(
+            " Even from the true points this network paints a poor picture (SSIM {baseline:.2})."
+        ));
+    }
     let released = inversion.released.iter().find(|one| one.scheme == view.scheme);
     Some(Exhibit {
         level,

@@ -80,6 +80,16 @@ fn the_page_begins_with_what_an_attacker_paints_from_the_released_data() {
 }
 
 #[test]
+fn a_picture_that_was_poor_without_protection_is_called_so() {
+    let document = document();
+    let mut poor = inversion(&document, |_| 0.4);
+    let said = "Even from the true points this network paints a poor picture (SSIM 0.43).";
+    assert!(!page(&document, vec![poor.clone()], false).contains("Even from the true points"));
+    poor.baseline.likeness.ssim = 0.43;
+    assert!(page(&document, vec![poor], false).contains(said));
+}
+
+#[test]
 fn two_photos_show_two_schemes() {
     let document = document();
     let all = || inversion(&document, |_| 0.48);
