@@ -49,6 +49,7 @@ pub fn audit(
             input,
             options,
             notes,
+            doubts: prepared.doubts.clone(),
             gates,
             out: PathBuf::new(),
             unit_in_map_units: prepared.unit_in_map_units,

@@ -52,6 +52,8 @@ pub struct Job<'a> {
     pub options: serde_json::Map<String, serde_json::Value>,
     /// What whoever reads the figures must know; told to `progress` as well.
     pub notes: Vec<String>,
+    /// Why figures may be too small, whatever the attack: told as notes are, and no gate holds.
+    pub doubts: Vec<String>,
     /// Bounds to hold.
     pub gates: Vec<Gate>,
     /// Folder to write.
@@ -106,6 +108,7 @@ impl<'a> Job<'a> {
             },
             options: serde_json::Map::new(),
             notes: prepared.notes.clone(),
+            doubts: prepared.doubts.clone(),
             gates: Vec::new(),
             out: out.to_owned(),
             unit_in_map_units: prepared.unit_in_map_units,
@@ -153,6 +156,7 @@ pub fn open(
         if few { error.advise("a smaller --k, or more points") } else { error }
     })?;
     prepared.notes.extend(prepared.descriptors.as_ref().and_then(zeros));
+    prepared.doubts.clone_from(&input.doubts);
     Ok((input, prepared))
 }
 
@@ -213,7 +217,9 @@ fn find_with(
     if let Some(error) = watcher.failed {
         return Err(error);
     }
-    let doubts = doubts(job.original, job.hidden, &job.plan, &outcome.rows).map_err(of_file)?;
+    let mut doubts = doubts(job.original, job.hidden, (&job.plan, &outcome.rows), &job.doubts)
+        .map_err(of_file)?;
+    doubts.notes.extend(watcher.journal.as_ref().and_then(|journal| journal.note()));
     for note in &doubts.notes {
         job.progress.say(&format!("note: {note}"));
     }

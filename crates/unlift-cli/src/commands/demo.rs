@@ -143,6 +143,7 @@ fn map(progress: &Part<'_>, out: &Path, room: &unlift_demo::Mapped) -> anyhow::R
         },
         options,
         notes: Vec::new(),
+        doubts: Vec::new(),
         gates: Vec::new(),
         out: out.to_owned(),
         unit_in_map_units: 1.0,

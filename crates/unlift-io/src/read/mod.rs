@@ -42,10 +42,19 @@ pub struct Input {
     pub format: &'static str,
     /// What was found but not used, one line each.
     pub skipped: Vec<String>,
+    /// Why figures of the points may be too small, one line each: no gate holds then.
+    pub doubts: Vec<String>,
     /// The folder of the COLMAP model, when the input is one: descriptors are found through its tracks.
     pub model: Option<PathBuf>,
     /// The COLMAP database of the project, if there is one where such projects have it.
     pub database: Option<PathBuf>,
+}
+
+/// What to say of a file with room for so many `more` points behind the `n` that it declares.
+fn undeclared(n: u64, more: u64) -> Option<String> {
+    (more > 0).then(|| {
+        format!("{n} points are declared, and {more} more seem to follow, which are not read: a part of the map at most")
+    })
 }
 
 fn mean_direction(directions: impl Iterator<Item = [f64; 3]>) -> Option<[f64; 3]> {
@@ -100,13 +109,16 @@ fn file(path: &Path) -> Result<Input, Error> {
             let found = "another file of a COLMAP model (give its folder)";
             return Err(Error::new(path, "", "a file with points", found));
         }
-        (_, "ply") => ply::read(path)?,
+        (_, "ply") => {
+            let (positions, format, doubts) = ply::read(path)?;
+            return Ok(Input { doubts, ..alone(path, positions, format) });
+        }
         (_, "csv" | "xyz" | "txt") => (table::read(path)?, "table"),
         (_, "npy") => (npy::positions(path)?, "npy"),
         (_, other) => {
             if let Some(scan) = scans::file(path, other) {
-                let scans::Scan { positions, format, notes } = scan?;
-                return Ok(Input { skipped: notes, ..alone(path, positions, format) });
+                let scans::Scan { positions, format, notes, doubts } = scan?;
+                return Ok(Input { skipped: notes, doubts, ..alone(path, positions, format) });
             }
             if let Some(found) = others::file(path) {
                 return found.map(|(format, found)| of_another_program(path, format, found));
@@ -141,6 +153,7 @@ fn of_another_program(path: &Path, format: &'static str, found: others::Found) -
         files: std::iter::once(path.to_owned()).chain(found.more).collect(),
         format,
         skipped: found.notes,
+        doubts: found.doubts,
         ..Input::default()
     }
 }

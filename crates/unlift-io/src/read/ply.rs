@@ -7,6 +7,7 @@ use crate::error::{Error, Place};
 use crate::input;
 use crate::read::bytes::Bytes;
 use crate::read::lines::{Lines, number, quoted, words};
+use crate::read::undeclared;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Encoding {
@@ -89,25 +90,24 @@ struct Header {
     n_bytes: u64,
 }
 
-/// Reads the positions `(n, 3)` of a PLY file, and says which form it has.
+/// Reads the positions `(n, 3)` of a PLY file, and says which form it has, and why the points may be too few.
 ///
 /// Coordinates are `float` or `double`; other properties and elements are skipped.
 ///
 /// # Errors
 /// When the file cannot be read, is malformed, has lists in or (if binary) before its vertices,
 /// declares more or fewer vertices than it holds, or has a coordinate that is not finite.
-pub fn read(path: &Path) -> Result<(Vec<[f64; 3]>, &'static str), Error> {
+pub fn read(path: &Path) -> Result<(Vec<[f64; 3]>, &'static str, Vec<String>), Error> {
     let (file, len) = input::open(path)?;
     let mut reader = BufReader::new(file);
     let header = header(path, &mut reader)?;
-    match header.encoding {
-        Encoding::Ascii => {
-            let positions = ascii(path, reader, &header, len)?;
-            Ok((positions, "ply ascii"))
-        }
-        Encoding::Little => Ok((binary(path, reader, &header, len)?, "ply binary little endian")),
-        Encoding::Big => Ok((binary(path, reader, &header, len)?, "ply binary big endian")),
-    }
+    let ((positions, more), format) = match header.encoding {
+        Encoding::Ascii => (ascii(path, reader, &header, len)?, "ply ascii"),
+        Encoding::Little => (binary(path, reader, &header, len)?, "ply binary little endian"),
+        Encoding::Big => (binary(path, reader, &header, len)?, "ply binary big endian"),
+    };
+    let doubt = undeclared(positions.len() as u64, more);
+    Ok((positions, format, doubt.into_iter().collect()))
 }
 
 fn header(path: &Path, reader: &mut BufReader<std::fs::File>) -> Result<Header, Error> {
@@ -224,7 +224,7 @@ fn ascii(
     reader: BufReader<std::fs::File>,
     header: &Header,
     len: u64,
-) -> Result<Vec<[f64; 3]>, Error> {
+) -> Result<(Vec<[f64; 3]>, u64), Error> {
     let vertex = &header.elements[header.vertex];
     let n_properties = vertex.properties.len();
     // A value takes a digit and a separator; the last one of the file only the digit.
@@ -248,7 +248,7 @@ fn ascii(
             advance(&mut lines, &name, row, element.count)?;
         }
     }
-    let mut positions = Vec::with_capacity(vertex.count as usize);
+    let mut positions = input::Budget::new(path, len).room("vertices", vertex.count)?;
     for row in 0..vertex.count {
         advance(&mut lines, "vertex", row, vertex.count)?;
         let mut position = [f64::NAN; 3];
@@ -272,15 +272,17 @@ fn ascii(
         }
         positions.push(position);
     }
-    if header.elements.len() == header.vertex + 1 {
-        while lines.advance()? {
-            if !lines.line().is_empty() {
-                let expected = format!("end of file after {} vertices", vertex.count);
-                return Err(lines.error(expected, quoted(lines.line())));
-            }
+    let behind = &header.elements[header.vertex + 1..];
+    let mut n_rows = 0u64;
+    while lines.advance()? {
+        n_rows += u64::from(!lines.line().is_empty());
+        if n_rows > 0 && behind.is_empty() {
+            let expected = format!("end of file after {} vertices", vertex.count);
+            return Err(lines.error(expected, quoted(lines.line())));
         }
     }
-    Ok(positions)
+    let declared = behind.iter().fold(0u64, |sum, element| sum.saturating_add(element.count));
+    Ok((positions, n_rows.saturating_sub(declared)))
 }
 
 fn binary(
@@ -288,7 +290,7 @@ fn binary(
     reader: BufReader<std::fs::File>,
     header: &Header,
     len: u64,
-) -> Result<Vec<[f64; 3]>, Error> {
+) -> Result<(Vec<[f64; 3]>, u64), Error> {
     let mut bytes = Bytes::continuing(path, reader, header.n_bytes, len);
     let fits = |bytes: &Bytes, element: &Element| {
         let stride = element.stride() as u64;
@@ -307,7 +309,7 @@ fn binary(
     fits(&bytes, vertex)?;
     let big = header.encoding == Encoding::Big;
     let mut row = vec![0; vertex.stride()];
-    let mut positions = Vec::with_capacity(vertex.count as usize);
+    let mut positions = bytes.room("vertices", vertex.count)?;
     for number in 1..=vertex.count {
         bytes.record(number);
         bytes.fill(&mut row, "vertex")?;
@@ -318,10 +320,20 @@ fn binary(
         }
         positions.push(position);
     }
-    if header.elements.len() == header.vertex + 1 {
+    let behind = &header.elements[header.vertex + 1..];
+    if behind.is_empty() {
         bytes.end()?;
     }
-    Ok(positions)
+    // Of lists only their values say how long they are.
+    let size = |sum: u64, element: &Element| {
+        sum.saturating_add(element.count.saturating_mul(element.stride() as u64))
+    };
+    let declared = match behind.iter().any(Element::has_list) {
+        true => u64::MAX,
+        false => behind.iter().fold(0, size),
+    };
+    let more = bytes.remaining().saturating_sub(declared);
+    Ok((positions, more / (vertex.stride() as u64).max(1)))
 }
 
 fn coordinate(row: &[u8], axis: Axis, big: bool) -> f64 {

@@ -5,6 +5,7 @@ use std::path::Path;
 use super::found::{Found, UPWARD, camera};
 use crate::error::Error;
 use crate::read::lines::{Lines, number, quoted, words};
+use crate::read::undeclared;
 
 /// Exactly `N` numbers in the current line.
 fn numbers<const N: usize>(lines: &Lines, what: &str) -> Result<[f64; N], Error> {
@@ -69,6 +70,12 @@ pub fn read(path: &Path) -> Result<Found, Error> {
         next(&mut lines, &format!("the color of {what}"))?;
         next(&mut lines, &format!("the views of {what}"))?;
     }
+    let mut more = 0;
+    while lines.advance_to_data()? {
+        more += 1;
+    }
+    // Three lines a point.
+    found.doubts.extend(undeclared(*n_points, more / 3));
     if unplaced > 0 {
         found.notes.push(format!("{unplaced} of {n_cameras} cameras have no place"));
     }

@@ -10,6 +10,8 @@ pub struct Found {
     /// What is up in each photo, in the world.
     pub up: Vec<[f64; 3]>,
     pub notes: Vec<String>,
+    /// Why figures of the points may be too small, one line each.
+    pub doubts: Vec<String>,
     /// Read beside the file itself.
     pub more: Vec<PathBuf>,
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 use super::found::{DOWNWARD, Found, camera};
 use crate::error::Error;
 use crate::read::lines::{Lines, number, quoted, words};
+use crate::read::undeclared;
 
 /// The next line that is not blank, as a count.
 fn count(lines: &mut Lines, what: &str) -> Result<u64, Error> {
@@ -82,9 +83,15 @@ pub fn read(path: &Path) -> Result<Found, Error> {
         }
         found.positions.push(position);
     }
-    // A zero ends the list of models.
-    if lines.advance_to_data()? && number::<u64>(lines.line()).is_some_and(|n| n > 0) {
-        found.notes.push("read, the first of several models".to_owned());
+    // A count of cameras begins another model, and a zero ends the list of them.
+    let mut more = 0;
+    while lines.advance_to_data()? {
+        if let Some(n) = number::<u64>(lines.line()) {
+            found.notes.extend((n > 0).then(|| "read, the first of several models".to_owned()));
+            break;
+        }
+        more += 1;
     }
+    found.doubts.extend(undeclared(n_points, more));
     Ok(found)
 }

@@ -11,6 +11,7 @@ use super::scan::Scan;
 use crate::error::Error;
 use crate::read::bytes::Bytes;
 use crate::read::lines::quoted;
+use crate::read::undeclared;
 
 /// Bytes of the heads of all versions up to the numbers that positions are made with.
 const HEAD: usize = 179;
@@ -19,6 +20,9 @@ const COUNT_1_4: usize = 247;
 const HEAD_1_4: usize = 375;
 /// Bytes of a point at least, by format.
 const LEAST: [u16; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
+/// Where the heads of versions 1.3 and 1.4 say that waveforms begin, and that of 1.4 more records.
+const WAVES: usize = 227;
+const EXTENDED_1_4: usize = 235;
 /// Formats have these bits where a program compressed the points.
 const COMPRESSED: u8 = 0b1100_0000;
 
@@ -55,6 +59,8 @@ pub fn read(path: &Path) -> Result<Scan, Error> {
     let long = |head: &[u8], at: usize| {
         u64::from(u32::from_le_bytes(std::array::from_fn(|byte| head[at + byte])))
     };
+    let wide =
+        |head: &[u8], at: usize| u64::from_le_bytes(std::array::from_fn(|byte| head[at + byte]));
     let (start, mut n) = (long(&head, 96), long(&head, 107));
     let double = |at: usize| f64::from_le_bytes(std::array::from_fn(|byte| head[at + byte]));
     let scale: [f64; 3] = std::array::from_fn(|axis| double(131 + 8 * axis));
@@ -63,7 +69,7 @@ pub fn read(path: &Path) -> Result<Scan, Error> {
     if version.1 == 4 && usize::from(head_size) >= HEAD_1_4 {
         bytes.fill(&mut head[HEAD..], "the head")?;
         at = HEAD_1_4;
-        let all = u64::from_le_bytes(std::array::from_fn(|byte| head[COUNT_1_4 + byte]));
+        let all = wide(&head, COUNT_1_4);
         n = if all == 0 { n } else { all };
     }
     let Some(behind) = start.checked_sub(at as u64) else {
@@ -71,13 +77,18 @@ pub fn read(path: &Path) -> Result<Scan, Error> {
         return Err(bytes.error(expected, format!("at byte {start}")));
     };
     bytes.skip(behind, "what stands before the points")?;
+    // What may stand behind the points.
+    let behind = match version.1 {
+        4 if at == HEAD_1_4 => [wide(&head, WAVES), wide(&head, EXTENDED_1_4)],
+        _ => [0; 2],
+    };
     let size = n.checked_mul(u64::from(record));
     if size.is_none_or(|size| size > bytes.remaining()) {
         let expected = format!("{n} points, {record} bytes each");
         return Err(bytes.error_ahead(expected, format!("{} bytes", bytes.remaining())));
     }
     let mut row = vec![0; usize::from(record)];
-    let mut positions = Vec::with_capacity(n as usize);
+    let mut positions = bytes.room("points", n)?;
     for number in 1..=n {
         bytes.record(number);
         bytes.fill(&mut row, "point")?;
@@ -91,5 +102,11 @@ pub fn read(path: &Path) -> Result<Scan, Error> {
         }
         positions.push(position);
     }
-    Ok(Scan::new(positions, "LAS", 0))
+    let end = bytes.at();
+    let next = behind.into_iter().filter(|&next| next >= end).min();
+    let more = next.map_or(bytes.remaining(), |next| next - end) / u64::from(record);
+    let mut scan = Scan::new(positions, "LAS", 0);
+    // Of 1.3 the head does not say where waveforms are.
+    scan.doubts.extend(undeclared(n, more).filter(|_| version.1 != 3));
+    Ok(scan)
 }

@@ -14,6 +14,7 @@ use crate::error::{Error, Place};
 use crate::input::{self, Budget};
 use crate::read::bytes::Bytes;
 use crate::read::lines::{Lines, number, quoted, words};
+use crate::read::undeclared;
 
 /// One column, or several of a name.
 #[derive(Clone, Copy, Debug)]
@@ -57,16 +58,21 @@ pub fn read(path: &Path) -> Result<Scan, Error> {
         // Nothing says how much there is to read.
         return Ok(Scan::new(Vec::new(), "PCD", 0));
     }
-    let (all, format) = match &*header.data {
-        b"ascii" => (ascii(path, reader, &header, len)?, "PCD ascii"),
-        b"binary" => (binary(path, reader, &header, len)?, "PCD binary"),
-        _ => (compressed(path, reader, &header, len)?, "PCD compressed"),
+    let (all, more, format) = match &*header.data {
+        b"ascii" => (ascii(path, reader, &header, len)?, 0, "PCD ascii"),
+        b"binary" => {
+            let (all, more) = binary(path, reader, &header, len)?;
+            (all, more, "PCD binary")
+        }
+        _ => (compressed(path, reader, &header, len)?, 0, "PCD compressed"),
     };
     let n = all.len();
     let positions: Vec<[f64; 3]> =
         all.into_iter().filter(|position| position.iter().all(|x| x.is_finite())).collect();
     let without = (n - positions.len()) as u64;
-    Ok(Scan::new(positions, format, without))
+    let mut scan = Scan::new(positions, format, without);
+    scan.doubts.extend(undeclared(header.n, more));
+    Ok(scan)
 }
 
 /// The lines up to `DATA`, each a word and its values.
@@ -177,7 +183,7 @@ fn ascii(
         return Err(Error::new(path, "header", expected, header.n.to_string()));
     }
     let mut lines = Lines::continuing(path, reader, header.n_lines);
-    let mut positions = Vec::with_capacity(header.n as usize);
+    let mut positions = Budget::new(path, len).room("points", header.n)?;
     for at in 1..=header.n {
         if !lines.advance_to_data()? {
             return Err(lines.end_error(format!("point {at} of {}", header.n)));
@@ -206,12 +212,13 @@ fn ascii(
     Ok(positions)
 }
 
+/// The points, and how many more there is room for behind them.
 fn binary(
     path: &Path,
     reader: BufReader<File>,
     header: &Header,
     len: u64,
-) -> Result<Vec<[f64; 3]>, Error> {
+) -> Result<(Vec<[f64; 3]>, u64), Error> {
     let mut bytes = Bytes::continuing(path, reader, header.n_bytes, len);
     let (n, stride) = (header.n, header.stride);
     if n.checked_mul(stride).is_none_or(|size| size > bytes.remaining()) {
@@ -219,13 +226,13 @@ fn binary(
         return Err(bytes.error_ahead(expected, format!("{} bytes", bytes.remaining())));
     }
     let mut row = vec![0; stride as usize];
-    let mut positions = Vec::with_capacity(n as usize);
+    let mut positions = bytes.room("points", n)?;
     for number in 1..=n {
         bytes.record(number);
         bytes.fill(&mut row, "point")?;
         positions.push(header.axes.map(|axis| coordinate(&row, axis.byte, axis.is_f64)));
     }
-    Ok(positions)
+    Ok((positions, bytes.remaining() / stride))
 }
 
 /// All values of a field stand together, field by field, and the whole is compressed.

@@ -9,6 +9,8 @@ pub struct Scan {
     pub format: &'static str,
     /// What was found but not used, one line each.
     pub notes: Vec<String>,
+    /// Why figures of the points may be too small, one line each.
+    pub doubts: Vec<String>,
 }
 
 impl Scan {
@@ -16,6 +18,6 @@ impl Scan {
     pub fn new(positions: Vec<[f64; 3]>, format: &'static str, n_without: u64) -> Self {
         let n = n_without + positions.len() as u64;
         let note = (n_without > 0).then(|| format!("{n_without} of {n} points have no place"));
-        Self { positions, format, notes: note.into_iter().collect() }
+        Self { positions, format, notes: note.into_iter().collect(), doubts: Vec::new() }
     }
 }
