@@ -36,6 +36,16 @@ pub(crate) struct Doubts {
     pub(crate) notes: Vec<String>,
 }
 
+impl Doubts {
+    /// Adds what speaks against every figure.
+    pub(crate) fn of_all(&mut self, doubts: Vec<String>) {
+        if let Some(first) = doubts.first() {
+            self.of_rows.fill(Some(first.clone()));
+        }
+        self.notes.splice(0..0, doubts);
+    }
+}
+
 /// Looks at the figures `rows` of a map; `hidden` is what was released of it, where that was given and not made here.
 pub(crate) fn doubts(
     original: &Original<3>,

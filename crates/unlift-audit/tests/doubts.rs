@@ -62,6 +62,7 @@ fn audit(
         },
         options: Default::default(),
         notes: prepared.notes.clone(),
+        doubts: Vec::new(),
         gates: vec![Gate::parse(gate).expect("a gate")],
         out: PathBuf::from(Path::new("none")),
         unit_in_map_units: 1.0,

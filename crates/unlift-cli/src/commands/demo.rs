@@ -74,6 +74,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
             },
             options,
             notes: Vec::new(),
+            doubts: Vec::new(),
             gates: Vec::new(),
             out: args.out.clone(),
             unit_in_map_units: 1.0,
