@@ -157,16 +157,23 @@ pub(crate) fn given(row: &Row) -> Given {
 /// What is not known of a row where points came from files: its name.
 const UNKNOWN: [&str; 6] = ["scheme", "neighbors", "oracle_noise", "inlier_ratio", "k", "solver"];
 
-/// A row as `evaluate` tells it, rounded as it is written: without its name.
+/// A row as `evaluate` tells it, rounded as it is written: without its name, with what speaks against its figures.
 ///
 /// # Errors
 /// When a figure cannot be written (a bug).
-pub fn evaluated(found: &Row, thresholds: &[Threshold]) -> Result<Value, serde_json::Error> {
+pub fn evaluated(
+    found: &Row,
+    thresholds: &[Threshold],
+    notes: &[String],
+) -> Result<Value, serde_json::Error> {
     let mut value = unlift_report::rounded(&row(found, thresholds))?;
     if let Some(fields) = value.as_object_mut() {
         fields.retain(|name, _| !UNKNOWN.contains(&name.as_str()));
         if found.blind_percent.is_empty() {
             fields.retain(|name, _| !name.starts_with("blind_"));
+        }
+        if !notes.is_empty() {
+            fields.insert("notes".to_owned(), json!(notes));
         }
     }
     Ok(value)

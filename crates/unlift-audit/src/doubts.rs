@@ -2,7 +2,7 @@
 //! coming back reads as protection, so that each is said beside the verdict and lets no gate hold.
 
 use unlift::Unit;
-use unlift::audit::{Plan, REFERENCE, Row};
+use unlift::audit::{Plan, REFERENCE, Row, Threshold};
 use unlift::evaluate::away_from_own;
 use unlift::geometry::knn::Knn;
 use unlift::released::Released;
@@ -36,22 +36,13 @@ pub(crate) struct Doubts {
     pub(crate) notes: Vec<String>,
 }
 
-impl Doubts {
-    /// Adds what speaks against every figure.
-    pub(crate) fn of_all(&mut self, doubts: Vec<String>) {
-        if let Some(first) = doubts.first() {
-            self.of_rows.fill(Some(first.clone()));
-        }
-        self.notes.splice(0..0, doubts);
-    }
-}
-
-/// Looks at the figures `rows` of a map; `hidden` is what was released of it, where that was given and not made here.
+/// Looks at the figures `rows` of a map; `hidden` is what was released of it, where that was given and not made here, and `of_file`
+/// what speaks against the points.
 pub(crate) fn doubts(
     original: &Original<3>,
     hidden: Option<&(Released<3>, Secret)>,
-    plan: &Plan<3>,
-    rows: &[Row],
+    (plan, rows): (&Plan<3>, &[Row]),
+    of_file: &[String],
 ) -> Result<Doubts, unlift::Error> {
     let Spread { low, middle, high } = Spread::of(original.reveal().positions(), plan.k)?;
     let unit = original.reveal().unit();
@@ -59,7 +50,8 @@ pub(crate) fn doubts(
     let mistaken = hidden.and_then(|_| mistaken_unit(unit, plan.k, middle));
     let of_map = strangers.or(mistaken);
     let mut found = Doubts::default();
-    found.notes.extend(of_map.clone());
+    found.notes.extend(of_map.iter().chain(of_file).cloned());
+    let of_map = of_map.or_else(|| of_file.first().cloned());
     let share = plan.k as f64 / original.len().max(1) as f64;
     if plan.asks_oracle() && plan.k > SHORT && share > LONG {
         found.notes.push(format!(
@@ -122,17 +114,38 @@ fn not_its_own(
     (released, secret): &(Released<3>, Secret),
     plan: &Plan<3>,
 ) -> Option<String> {
-    let least = plan.thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min);
     let away = away_from_own(released, original, secret);
+    stray_truth(&away, &plan.thresholds, released.unit())
+}
+
+/// What to say of a truth of which such lengths lie between points and their own records.
+pub(crate) fn stray_truth(away: &[f64], thresholds: &[Threshold], unit: Unit) -> Option<String> {
+    let strays = strays(away, thresholds, unit)?;
+    Some(format!(
+        "truth: {strays} away from their own records, where no attack could find them: is it that of this map, in its \
+         frame, scale and order?"
+    ))
+}
+
+/// What to say of recovered positions of which such lengths lie between them and their own records.
+pub(crate) fn stray_positions(
+    away: &[f64],
+    thresholds: &[Threshold],
+    unit: Unit,
+) -> Option<String> {
+    let strays = strays(away, thresholds, unit)?;
+    Some(format!(
+        "recovered: {strays} away from their own records, where no hidden point is: are they of this map, in its frame, \
+         scale and order?"
+    ))
+}
+
+/// How many are farther away than the smallest threshold, if they are more than a few.
+fn strays(away: &[f64], thresholds: &[Threshold], unit: Unit) -> Option<String> {
+    let least = thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min);
     let (n, of) = (away.iter().filter(|&&away| away >= least).count(), away.len());
-    (n as f64 > STRAY * of as f64).then(|| {
-        let unit = original.reveal().unit();
-        format!(
-            "truth: {n} of {of} points are {} or more away from their own records, where no attack could find them: is it \
-             that of this map, in its frame, scale and order?",
-            in_unit(least, unit)
-        )
-    })
+    let are_many = n as f64 > STRAY * of as f64;
+    are_many.then(|| format!("{n} of {of} points are {} or more", in_unit(least, unit)))
 }
 
 /// What to say of lengths that are not in the unit that a file states.

@@ -94,6 +94,7 @@ mod tests {
             unit_in_map_units: 1.0,
             rows: (0..n as u32).collect(),
             notes: Vec::new(),
+            doubts: Vec::new(),
         };
         let offsets: Vec<u64> = (0..=n).map(|point| (point * length) as u64).collect();
         let row = |point: usize| (1..=length).map(move |step| (point * factor + step) % n);

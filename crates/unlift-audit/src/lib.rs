@@ -35,6 +35,7 @@
 //! Schemes, sources of neighborhoods and measures of the plan may be anybody's; see `unlift`.
 
 mod audited;
+mod checked;
 mod clouds;
 mod document;
 mod doubts;
@@ -55,6 +56,7 @@ mod scene;
 pub mod sources;
 
 pub use audited::{Audited, Finished};
+pub use checked::Checked;
 pub use document::{evaluated, ordered, row};
 pub use error::Error;
 pub use gate::{Candidate, Figure, Gate};

@@ -49,8 +49,10 @@ pub struct Prepared {
     pub unit_in_map_units: f64,
     /// Which rows of the file were kept, ascending.
     pub rows: Vec<u32>,
-    /// What whoever reads figures of them must know; no paths, as these are told in share-safe documents, too.
+    /// What whoever reads figures of them must know; share-safe documents withhold those with a path.
     pub notes: Vec<String>,
+    /// Why any figure of them may be wrong, which lets no gate hold.
+    pub doubts: Vec<String>,
 }
 
 /// Filters, thins out and scales `positions` (and `descriptors` with them). Positions that are handed over, all of which stay,
@@ -87,8 +89,8 @@ pub fn prepare<'a>(
         rows.sort_unstable();
     }
     let k = preparation.k;
-    if rows.len() < k + 1 {
-        let expected = format!("at least {} (K + 1)", k + 1);
+    if rows.len() <= k {
+        let expected = format!("at least {} (K + 1)", k.saturating_add(1));
         return Err(Error::new("points", expected, rows.len().to_string()));
     }
     let kept: Vec<[f64; 3]> = match rows.len() == n_read {
@@ -106,7 +108,7 @@ pub fn prepare<'a>(
     let points = if factor == 1.0 { points } else { points.scaled(factor, unit)? };
     let descriptors = descriptors.map(|all| all.select(&rows));
     let original = Original::new(points);
-    Ok(Prepared { original, descriptors, unit_in_map_units, rows, notes })
+    Ok(Prepared { original, descriptors, unit_in_map_units, rows, notes, doubts: Vec::new() })
 }
 
 /// The median over all points of the distance to the `k`-th nearest other point.
@@ -124,8 +126,8 @@ fn median_kth_distance(points: &[[f64; 3]], k: usize) -> Result<f64, Error> {
 /// The rows whose mean distance to their nearest neighbors is usual.
 fn without_outliers(points: &[[f64; 3]], filter: OutlierFilter) -> Result<Vec<u32>, Error> {
     let n = filter.neighbors;
-    if points.len() < n + 1 {
-        let expected = format!("at least {} for the outlier filter", n + 1);
+    if points.len() <= n {
+        let expected = format!("more than {n} for the outlier filter");
         return Err(Error::new("points", expected, points.len().to_string()));
     }
     let knn = Knn::new(points)?;

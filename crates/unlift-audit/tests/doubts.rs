@@ -62,7 +62,7 @@ fn audit(
         },
         options: Default::default(),
         notes: prepared.notes.clone(),
-        doubts: Vec::new(),
+        doubts: prepared.doubts.clone(),
         gates: vec![Gate::parse(gate).expect("a gate")],
         out: PathBuf::from(Path::new("none")),
         unit_in_map_units: 1.0,
@@ -181,8 +181,9 @@ fn a_unit_that_is_only_stated_is_no_protection() {
     let points = PointSet::try_new(points, Unit::KthNeighbor).expect("points");
     let original = Original::new(points);
     let rows = (0..N as u32).collect();
+    let (notes, doubts) = Default::default();
     let prepared =
-        Prepared { original, descriptors: None, unit_in_map_units: 1.0, rows, notes: Vec::new() };
+        Prepared { original, descriptors: None, unit_in_map_units: 1.0, rows, notes, doubts };
     let options = SchemeOptions::usual(Unit::KthNeighbor);
     let olc = scheme("olc").expect("olc").of_dimension::<3>(&options).expect("in 3D");
     let hidden = obfuscate(&*olc, &prepared.original, None, &Key::from_seed(1)).expect("hidden");

@@ -5,11 +5,19 @@ use std::io::{self, Write};
 
 use unlift::OneLine;
 
+/// Characters of a line at most: what is found in a file may be all of it.
+const LONGEST: usize = 2000;
+
 /// Tells `line`, whatever text of others is in it. Where stderr cannot be written (a full disk, a closed pipe) the line
 /// is lost and the work goes on: its result is elsewhere.
 pub fn tell(line: impl Display) {
+    let mut line = OneLine(line).to_string();
+    if let Some((end, _)) = line.char_indices().nth(LONGEST) {
+        line.truncate(end);
+        line.push_str(" ..");
+    }
+    line.push('\n');
     // In one piece: other threads tell lines, too.
-    let line = format!("{}\n", OneLine(line));
     let _ = io::stderr().lock().write_all(line.as_bytes());
 }
 

@@ -1,5 +1,6 @@
 //! Strings become types, here and in `unlift_audit::Gate` and nowhere else.
 
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use unlift::audit::Threshold;
@@ -24,6 +25,32 @@ pub enum NeighborSource {
 /// Features by their name.
 pub fn feature_type(text: &str) -> Result<DescriptorKind, String> {
     DescriptorKind::from_name(text).map_err(|error| expected(&error))
+}
+
+/// Threads at most: more than machines have cores, and few enough to be started.
+const MOST_THREADS: usize = 512;
+/// Points, images or features at most: as many rows as files number.
+const MOST: usize = u32::MAX as usize;
+
+/// A number of threads.
+pub fn threads(text: &str) -> Result<NonZeroUsize, String> {
+    whole(text, MOST_THREADS)
+}
+
+/// A number of points, images or features.
+pub fn count(text: &str) -> Result<NonZeroUsize, String> {
+    whole(text, MOST)
+}
+
+/// Points of a map that is made up: what hundreds of gigabytes hold.
+pub fn made_points(text: &str) -> Result<NonZeroUsize, String> {
+    whole(text, 1_000_000_000)
+}
+
+/// A whole number from 1 to `most`.
+fn whole(text: &str, most: usize) -> Result<NonZeroUsize, String> {
+    let number = text.trim().parse::<NonZeroUsize>().ok().filter(|number| number.get() <= most);
+    number.ok_or_else(|| format!("expected a whole number from 1 to {most}, found {text}"))
 }
 
 /// A score from 0 to below 1.
@@ -206,10 +233,10 @@ pub fn own_source(text: &str) -> Result<Named, String> {
 /// `NEIGHBORS,RATIO`, for example `20,2.0`.
 pub fn outlier_filter(text: &str) -> Result<OutlierFilter, String> {
     let fields = text.split_once(',').and_then(|(neighbors, std_ratio)| {
-        Some((neighbors.trim().parse::<usize>().ok()?, positive(std_ratio).ok()?))
+        Some((count(neighbors).ok()?.get(), positive(std_ratio).ok()?))
     });
     match fields {
-        Some((neighbors, std_ratio)) if neighbors > 0 => Ok(OutlierFilter { neighbors, std_ratio }),
+        Some((neighbors, std_ratio)) => Ok(OutlierFilter { neighbors, std_ratio }),
         _ => Err(format!(
             "expected NEIGHBORS,RATIO with both above 0 (for example 20,2.0), found {text}"
         )),
@@ -300,6 +327,21 @@ mod tests {
         assert_eq!(neighbor_source("lists,overlapping.parquet"), Ok(file));
         let file = NeighborSource::File("./lists,overlap".into());
         assert_eq!(neighbor_source("./lists,overlap"), Ok(file));
+    }
+
+    #[test]
+    fn whole_numbers_have_bounds() {
+        let number = |n: usize| Ok(NonZeroUsize::new(n).unwrap());
+        assert_eq!([threads("512"), count(" 4294967295"), count("1")], [512, MOST, 1].map(number));
+        for text in ["0", "-1", "1.5", "x", "", "513"] {
+            let expected = format!("expected a whole number from 1 to 512, found {text}");
+            assert_eq!(threads(text), Err(expected));
+        }
+        let huge = u64::MAX.to_string();
+        assert!(
+            count("4294967296").is_err() && count(&huge).is_err() && made_points(&huge).is_err()
+        );
+        assert!(outlier_filter(&format!("{huge},1")).is_err());
     }
 
     #[test]

@@ -110,3 +110,44 @@ fn what_is_wrong_with_a_configuration_is_one_line_before_any_work() {
     let (_, stderr) = place("").ends("check", 3);
     assert!(stderr.starts_with("unlift: unlift.toml: "), "{stderr}");
 }
+
+/// One place by several names, and outputs over what is read: told before any work.
+#[test]
+fn no_audit_writes_over_another_or_over_what_is_read() {
+    let map = |out: &str| format!("[[map]]\npath = \"room.csv\"\n{QUICK}out = \"{out}\"\n");
+    let told = |config: &str| {
+        let place = place(config);
+        #[cfg(unix)]
+        std::os::unix::fs::symlink("real", place.path("ci/link")).unwrap();
+        fs::create_dir(place.path("ci/real")).unwrap();
+        let (stdout, stderr) = place.ends("check ci/unlift.toml", 2);
+        assert!(stdout.is_empty() && !place.path("ci/real/report.html").exists(), "{stdout}");
+        assert_eq!(fs::read_to_string(place.path("ci/unlift.toml")).unwrap(), config);
+        stderr
+    };
+    let others = ["new/../real", "./real", "real/x/.."];
+    let links = if cfg!(unix) { &["link", "link/a/.."][..] } else { &[] };
+    for other in others.iter().chain(links) {
+        let stderr = told(&(map("real") + &map(other)));
+        assert!(
+            stderr.contains(&format!("expected a place of its own, found {other}, that of line 1")),
+            "{stderr}"
+        );
+    }
+    let one = "{path=\"room.csv\", out=\"real\"}";
+    let stderr = told(&format!("map = [{one}, {one}]\n"));
+    assert!(stderr.contains("expected a place of its own, found real, that of line 1"), "{stderr}");
+    for (key, file) in
+        [("junit", "unlift.toml"), ("sarif", "photos/a.jpg"), ("junit", "./room.csv")]
+    {
+        let written = format!("gate = \"all:1.0<=100\"\n{key} = \"{file}\"\nforce = true\n");
+        let images = "[[images]]\npath = \"photos\"\nout = \"images\"\n";
+        let stderr = told(&format!("{}{written}{images}", map("real")));
+        assert!(
+            stderr.contains(&format!(
+                "[[map]]: {key}: expected a file that is not read, found {file}"
+            )),
+            "{stderr}"
+        );
+    }
+}

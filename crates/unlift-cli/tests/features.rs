@@ -241,6 +241,43 @@ fn a_part_that_has_changed_is_made_again() {
     assert_eq!(left(&place), ["again.h5", "photos", "whole.h5"]);
 }
 
+/// Another photo of the same length and time, put there between two runs.
+#[cfg(unix)]
+#[test]
+fn a_photo_put_in_place_of_another_is_extracted_again() {
+    let place = photos();
+    common::photo(7).save(place.path("other.jpg")).unwrap();
+    let first = &place.path("photos/b/c.jpg");
+    let other = fs::read(place.path("other.jpg")).unwrap();
+    let whole = fs::read(first).unwrap();
+    let put = |bytes: &[u8]| {
+        let mut padded = bytes.to_vec();
+        padded.resize(whole.len().max(other.len()) + 10, 0);
+        fs::write(first, padded).unwrap();
+        fs::File::options()
+            .write(true)
+            .open(first)
+            .unwrap()
+            .set_modified(std::time::UNIX_EPOCH)
+            .unwrap();
+    };
+    put(&whole);
+    place.ends("features photos --out whole.h5", 0);
+    let blocks = fs::read(place.path("whole.h5")).unwrap().len() / 512 * 2 / 3;
+    let line = "exec \"$0\" features photos --out again.h5 --quiet";
+    let stopped = Command::new("sh")
+        .args(["-c", &format!("ulimit -f {blocks}; {line}"), env!("CARGO_BIN_EXE_unlift")])
+        .current_dir(place.path(""))
+        .output()
+        .expect("a shell");
+    assert!(!stopped.status.success() && place.path("again.h5.parts").exists());
+    put(&other);
+    place.ends("features photos --out again.h5", 0);
+    place.ends("features photos --out fresh.h5", 0);
+    let read = |name| fs::read(place.path(name)).unwrap();
+    assert!(read("again.h5") == read("fresh.h5") && read("fresh.h5") != read("whole.h5"));
+}
+
 #[test]
 fn features_of_a_file_are_copied() {
     let place = photos();

@@ -121,3 +121,21 @@ fn lists_that_cannot_be_made_at_some_ratios_cost_these_rows() {
         missing.as_array().unwrap().iter().filter_map(|m| m["reason"].as_str()).collect();
     assert!(told.iter().all(|reason| reason.starts_with("at 0.")), "{told:?}");
 }
+
+/// A file that declares fewer points than it holds: what is audited is a part of the map.
+#[test]
+fn no_gate_holds_on_a_part_of_a_map_that_is_not_told() {
+    let place = Place::with_room(300);
+    let rows = fs::read_to_string(place.path("room.csv")).unwrap().replace(',', " ");
+    let head = "ply\nformat ascii 1.0\nelement vertex 100\nproperty float x\nproperty float y\nproperty float z\n\
+                element face 0\nproperty list uchar int vertex_indices\nend_header\n";
+    fs::write(place.path("less.ply"), format!("{head}{rows}")).unwrap();
+    let audit = "audit map less.ply --scale 1 --k 5 --schemes olc --inlier-ratios 0.5 --gate olc:0.25<=100 --out a";
+    let (_, told) = place.ends(audit, 1);
+    assert!(told.contains("note: 100 points are declared, and 200 more seem to follow"), "{told}");
+    let document = json(&place, "a/audit.json");
+    assert_eq!(document["gates"][0]["passed"], false);
+    let is_told =
+        |note: &Value| note.as_str().is_some_and(|note| note.starts_with("100 points are"));
+    assert!(document["notes"].as_array().unwrap().iter().any(is_told));
+}

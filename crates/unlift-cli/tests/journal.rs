@@ -30,11 +30,26 @@ fn kept(place: &Place, ending: &str) -> Vec<PathBuf> {
     paths
 }
 
+/// What is said of so many recoveries that were kept.
+fn taken(n: usize) -> String {
+    format!("{n} recoveries were taken from a journal, as a run that was interrupted left them")
+}
+
+/// The notes that an audit wrote.
+fn notes(place: &Place, out: &str) -> Vec<String> {
+    let text = fs::read_to_string(place.path(out).join("audit.json")).expect("figures");
+    let document: Value = serde_json::from_str(&text).expect("JSON");
+    let notes = document["notes"].as_array().cloned().unwrap_or_default();
+    notes.iter().map(|note| note.as_str().expect("a text").to_owned()).collect()
+}
+
 /// The figures that an audit wrote, without what tells one run from another.
 fn figures(place: &Place, out: &str) -> Value {
     let text = fs::read_to_string(place.path(out).join("audit.json")).expect("figures");
     let mut document: Value = serde_json::from_str(&text).expect("JSON");
-    document.as_object_mut().expect("fields").remove("run").expect("what tells runs apart");
+    let fields = document.as_object_mut().expect("fields");
+    fields.remove("run").expect("what tells runs apart");
+    fields.remove("notes");
     document
 }
 
@@ -71,7 +86,8 @@ fn what_was_recovered_is_not_recovered_again() {
     let n_kept = interrupted(&place).len();
     let (_, told) = place.ends(&format!("{AUDIT} --journal kept --out out"), 0);
     let told = told.lines().find(|line| line.contains("recoveries were taken")).expect("a note");
-    assert_eq!(told, format!("unlift: note: {n_kept} recoveries were taken from kept"));
+    assert_eq!(told, format!("unlift: note: {}", taken(n_kept)));
+    assert!(notes(&place, "out").contains(&taken(n_kept)), "whoever reads the figures knows");
     assert_eq!(figures(&place, "out"), figures(&place, "whole"));
     assert!(!place.path("kept").exists(), "what is done is cleared away");
 }
@@ -102,6 +118,30 @@ fn what_is_damaged_or_of_another_audit_is_not_taken() {
     assert_eq!(left, [place.path("kept/notes.txt")], "what is not ours stays");
 }
 
+/// Two files that change places, or one with another content: neither is the recovery that its key asks for.
+#[test]
+fn files_that_were_exchanged_or_replaced_are_not_taken() {
+    let place = Place::with_room(3000);
+    let kept_files = interrupted(&place);
+    let name = |path: &PathBuf| path.file_name().unwrap().to_str().unwrap().to_owned();
+    let names: Vec<String> = kept_files.iter().map(name).collect();
+    let parts: Vec<(&str, &str)> = names.iter().map(|name| name.split_once('-').unwrap()).collect();
+    let exchanged = |key: usize, content: usize| {
+        place.path("kept").join(format!("{}-{}", parts[key].0, parts[content].1))
+    };
+    fs::rename(&kept_files[0], place.path("first")).unwrap();
+    fs::rename(&kept_files[1], exchanged(0, 1)).unwrap();
+    fs::rename(place.path("first"), exchanged(1, 0)).unwrap();
+    // Its own content under the plain hash of that content.
+    let hash = unlift_io::hash::hash_file(&kept_files[2]).unwrap();
+    fs::rename(&kept_files[2], place.path(&format!("kept/{}-{hash}{RECOVERED}", parts[2].0)))
+        .unwrap();
+    let (_, told) = place.ends(&format!("{AUDIT} --journal kept --out out"), 0);
+    assert!(!told.contains("were taken"), "{told}");
+    place.ends(&format!("{AUDIT} --out whole"), 0);
+    assert_eq!(figures(&place, "out"), figures(&place, "whole"));
+}
+
 #[test]
 fn a_journal_that_is_a_file_is_refused() {
     let place = Place::with_room(300);
@@ -117,7 +157,7 @@ fn lists_that_are_not_in_memory_go_on_as_well() {
     // Told by their content, wherever they are.
     let (_, told) =
         place.ends(&format!("{AUDIT} --memory-limit 100MB --journal kept --out out"), 0);
-    let note = format!("unlift: note: {n_kept} recoveries were taken from kept");
+    let note = format!("unlift: note: {}", taken(n_kept));
     assert!(told.lines().any(|line| line == note), "{told}");
     assert_eq!(figures(&place, "out"), figures(&place, "whole"));
 }

@@ -270,8 +270,64 @@ fn files_that_do_not_say_are_taken_with_a_note() {
 
     let (stdout, stderr) = place.ends("evaluate bare-back --truth two/truth.parquet", 3);
     assert!(stdout.is_empty(), "{stdout}");
-    let start = "unlift: bare-back: expected positions nearer to their own points than to those of other records";
+    let start = "unlift: bare-back: positions: expected nearer to their own records or points than to those of others";
     assert!(stderr.starts_with(start), "{stderr}");
+}
+
+/// Rows in another order, and a truth in another scale, with the fingerprint of the right one copied: next to nothing comes back,
+/// as if the scheme protected the map.
+#[test]
+fn what_does_not_belong_together_is_not_believed_for_its_fingerprint() {
+    let place = Stages::new();
+    for scheme in ["olc", "ppl", "plane", "cp"] {
+        let out = format!("{scheme}-of");
+        place.chain(&out, scheme, 1);
+        let truth = place.path(&out).join("truth.parquet");
+        let (_, stderr) =
+            place.ends(&format!("evaluate {out}-back --truth {out}/truth.parquet"), 0);
+        assert_eq!(stderr, "", "{scheme}");
+
+        let back = read_recovered::<3>(&place.path(&format!("{out}-back"))).unwrap();
+        let n = back.n_slots();
+        // All rows in other places, or of every fifth place: once seen by where they lie, once told.
+        let rolled = |slot: usize| (slot + 8) % n;
+        let some = |slot: usize| if slot % 20 < 4 { rolled(slot) } else { slot };
+        for (name, code) in [("rolled", 3), ("some", 0)] {
+            let of = |slot| if name == "rolled" { rolled(slot) } else { some(slot) };
+            let estimates: Vec<Estimate<3>> =
+                (0..n).map(|slot| estimate(&back, of(slot))).collect();
+            let (origin, unit) = (back.origin(), back.unit());
+            let moved = Recovered::try_new(&estimates, false, None, origin, unit, 0.1).unwrap();
+            write_recovered(&place.path(name), &moved.with_about(back.about())).unwrap();
+            let line = format!("evaluate {name} --truth {out}/truth.parquet --json");
+            let (stdout, stderr) = place.ends(&line, code);
+            assert!(stderr.contains("their own records"), "{scheme}, {name}: {stderr}");
+            assert_eq!(stdout.contains("their own records"), code == 0, "{scheme}: {stdout}");
+        }
+
+        let (original, secret) = read_truth::<3>(&truth).unwrap();
+        let larger = original.reveal().scaled(1.3, original.reveal().unit()).unwrap();
+        write_truth(&place.path("larger"), &Original::new(larger), &secret).unwrap();
+        let line = format!("evaluate {out}-back --truth larger --released {out}/released.parquet");
+        let (_, stderr) = place.ends(&line, 0);
+        assert!(
+            stderr.contains("truth: ") && stderr.contains("away from their own records"),
+            "{stderr}"
+        );
+    }
+}
+
+/// The estimate of one slot.
+fn estimate(of: &Recovered<3>, slot: usize) -> Estimate<3> {
+    let origin = of.origin();
+    let position = of.position(slot).unwrap_or([f64::NAN; 3]);
+    Estimate {
+        position: std::array::from_fn(|axis| (position[axis] - origin[axis]) as f32),
+        status: of.status()[slot],
+        support: of.support()[slot],
+        axis: 0,
+        evidence: of.evidence()[slot],
+    }
 }
 
 /// What makes figures smaller than those of the whole map is said.

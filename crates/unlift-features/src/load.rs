@@ -22,6 +22,8 @@ const JPEG_PIXELS_PER_BYTE: u64 = 512;
 const OTHER_PIXELS_PER_BYTE: u64 = 1032;
 /// A photo may have as many pixels, 4096 x 4096, whatever its bytes: black frames exist.
 const FREE_PIXELS: u64 = 1 << 24;
+/// Bytes that a decoder may take for what is no pixel.
+const BESIDE_PIXELS: u64 = 32 << 20;
 /// Bytes that a decoder may take for a pixel: four channels of 16 bits.
 const PIXEL_BYTES: u64 = 8;
 
@@ -117,8 +119,14 @@ fn decoded(bytes: &[u8], name: &str) -> Result<(DynamicImage, Orientation), Erro
     let broken = |error: ::image::ImageError| wrong(&whole, error.to_string());
     let most = most_pixels(format, bytes.len() as u64);
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+    // A PNG says first how large it is: what else it holds, as a profile of colors, inflates a thousand times.
+    let declared = bytes.get(16..24).filter(|_| format == ImageFormat::Png).map(|sides| {
+        let side =
+            |at: usize| u64::from(u32::from_be_bytes(std::array::from_fn(|byte| sides[at + byte])));
+        side(0).saturating_mul(side(4))
+    });
     let mut limits = Limits::no_limits();
-    limits.max_alloc = Some(most * PIXEL_BYTES);
+    limits.max_alloc = Some(declared.map_or(most, |n| n.min(most)) * PIXEL_BYTES + BESIDE_PIXELS);
     reader.limits(limits);
     let mut decoder = reader.into_decoder().map_err(broken)?;
     let (width, height) = decoder.dimensions();

@@ -49,7 +49,17 @@ impl Inverter {
         self.takes(points.descriptors)?;
         let features = feature_image(points, size)?;
         let [picture] = self.network.run(vec![("features", features)], ["picture"])?;
-        color_image(&picture, size.map(|side| side / 2))
+        let size = size.map(|side| side / 2);
+        match *picture.shape() {
+            [1, 3, rows, columns] if columns >= size[0] && rows >= size[1] => {
+                color_image(&picture, size)
+            }
+            ref shape => {
+                let expected =
+                    format!("a picture of 3 planes of {} x {} pixels at least", size[0], size[1]);
+                Err(Error::new("inverter", expected, format!("one of shape {shape:?}")))
+            }
+        }
     }
 
     /// Whether `descriptors` are of the kind that the network knows.
@@ -77,7 +87,7 @@ fn model(kind: DescriptorKind) -> &'static str {
 
 /// The upper-left part of planes `(1, 3, height, width)` from 0 to 1, rounded to bytes.
 fn color_image(planes: &Tensor, [width, height]: [usize; 2]) -> Result<ColorImage, Error> {
-    let [.., rows, columns] = planes.shape() else { unreachable!("the registry says four sides") };
+    let [.., rows, columns] = planes.shape() else { unreachable!("four sides were seen") };
     let (plane, columns) = (rows * columns, *columns);
     let mut pixels = Vec::with_capacity(3 * width * height);
     for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {

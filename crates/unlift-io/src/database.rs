@@ -245,7 +245,8 @@ fn image_ids(
 /// The URI of a database that is read and never written, not even its journal.
 ///
 /// `immutable` lets a database in a folder without write permission open although COLMAP left it in
-/// write-ahead mode. It must not be used while a journal waits beside the file: its rows would be missed.
+/// write-ahead mode. It must not be used while a journal of either kind waits beside the file: its rows would be missed, or those
+/// of a transaction taken that never was.
 fn uri(path: &Path) -> OsString {
     let mut uri = "file:".to_owned();
     let bytes = path.as_os_str().as_encoded_bytes();
@@ -265,9 +266,12 @@ fn uri(path: &Path) -> OsString {
             _ => write!(uri, "%{byte:02X}").expect("strings take everything"),
         }
     }
-    let mut journal = path.as_os_str().to_owned();
-    journal.push("-wal");
-    if std::fs::metadata(journal).map_or(0, |m| m.len()) == 0 {
+    let waits = |ending: &str| {
+        let mut journal = path.as_os_str().to_owned();
+        journal.push(ending);
+        std::fs::metadata(journal).is_ok_and(|found| found.len() > 0)
+    };
+    if !waits("-wal") && !waits("-journal") {
         uri.push_str("?immutable=1");
     }
     uri.into()

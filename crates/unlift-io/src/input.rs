@@ -69,6 +69,19 @@ impl Budget {
         self.most
     }
 
+    /// An empty list with room for `n` entries of what stands at `place`.
+    ///
+    /// # Errors
+    /// When they do not fit, here or into the memory of the machine: a file with holes declares as much as it likes.
+    pub fn room<T>(&self, place: impl Into<Place> + Clone, n: u64) -> Result<Vec<T>, Error> {
+        let bytes = n.saturating_mul(std::mem::size_of::<T>() as u64);
+        self.admit(place.clone(), bytes)?;
+        let mut room = Vec::new();
+        let there = usize::try_from(n).is_ok_and(|n| room.try_reserve_exact(n).is_ok());
+        let expected = "as much as fits into memory";
+        there.then_some(room).ok_or_else(|| Error::new(&self.path, place, expected, size(bytes)))
+    }
+
     /// Whether `bytes` fit, which what stands at `place` is about to take.
     ///
     /// # Errors

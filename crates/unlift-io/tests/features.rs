@@ -221,3 +221,20 @@ fn chunks_beyond_the_end_of_the_file_are_refused() {
     let expected = "expected chunks within the 13504 bytes of the file, found one that ends at ";
     assert!(lines.iter().any(|line| line.contains(expected)), "{lines:?}");
 }
+
+/// A name of 20,000 folders overflowed the stack, and one of 10,000 became a file that is not read.
+#[test]
+fn names_are_as_deep_as_can_be_read() {
+    let deep = |n: usize| made(&format!("{}x.jpg", "a/".repeat(n - 1)), 2);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("f.h5");
+    fs::write(&path, encode(&deep(64), &path).unwrap()).unwrap();
+    assert_eq!(all(&path)[0].name, deep(64).name);
+    for n in [65, 20_000] {
+        let error = encode(&deep(n), &path).unwrap_err().to_string();
+        assert!(
+            error.ends_with(&format!("expected a name of at most 64 parts, found {n}")),
+            "{error}"
+        );
+    }
+}

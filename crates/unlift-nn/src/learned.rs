@@ -112,6 +112,10 @@ fn scores(network: &Network, part: &Part) -> Result<Vec<f32>, Error> {
     let likeness = if reaches == 1 { pairs.clone() } else { Vec::new() };
     let pairs = Tensor::try_new(&[reaches, n, n], pairs)?;
     let [scores] = network.run(vec![("descriptors", descriptors), ("pairs", pairs)], ["scores"])?;
+    if scores.shape() != [n, n] {
+        let found = format!("{:?}", scores.shape());
+        return Err(Error::new("learned neighbors", format!("scores of shape ({n}, {n})"), found));
+    }
     let mut scores = scores.into_values();
     scores.iter_mut().zip(likeness).for_each(|(score, alike)| *score += LIKENESS * alike);
     Ok(scores)

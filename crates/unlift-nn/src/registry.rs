@@ -1,5 +1,7 @@
 //! All models that the program knows.
 
+use std::fmt;
+
 use unlift::Error;
 
 /// What is known about a model.
@@ -31,6 +33,22 @@ pub struct Port {
     pub name: &'static str,
     /// Lengths of its sides; `None` is any.
     pub shape: &'static [Option<usize>],
+}
+
+impl Port {
+    /// Whether a tensor of `shape` is one.
+    pub(crate) fn takes(&self, shape: &[usize]) -> bool {
+        let fits = |(side, expected): (&usize, &Option<usize>)| expected.is_none_or(|n| n == *side);
+        shape.len() == self.shape.len() && shape.iter().zip(self.shape).all(fits)
+    }
+}
+
+impl fmt::Display for Port {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let side = |side: &Option<usize>| side.map_or("any".to_owned(), |n| n.to_string());
+        let sides: Vec<String> = self.shape.iter().map(side).collect();
+        write!(f, "{} of shape ({})", self.name, sides.join(", "))
+    }
 }
 
 impl Entry {

@@ -3,6 +3,8 @@
 
 /// Graphs within graphs, at most; a message of ONNX without them is nested less deep.
 const MOST_DEEP: u32 = 64;
+/// Nodes, at most: the loader follows them one within the other. Networks of hundreds of layers have fewer.
+const MOST_NODES: u32 = 4096;
 /// Bytes of a number, at most.
 const MOST_LONG: usize = 10;
 
@@ -71,12 +73,13 @@ static MODEL: Message = Message(&[(7, of(&GRAPH)), (8, of(&TEXTS)), (14, of(&TEX
 /// # Errors
 /// What is wrong, and at which byte.
 pub fn check(bytes: &[u8]) -> Result<(), String> {
-    Walk { bytes, at: 0 }.message(&MODEL, bytes.len(), 0)
+    Walk { bytes, at: 0, n_nodes: 0 }.message(&MODEL, bytes.len(), 0)
 }
 
 struct Walk<'a> {
     bytes: &'a [u8],
     at: usize,
+    n_nodes: u32,
 }
 
 impl Walk<'_> {
@@ -84,6 +87,10 @@ impl Walk<'_> {
     fn message(&mut self, message: &Message, end: usize, deep: u32) -> Result<(), String> {
         if deep > MOST_DEEP {
             return Err(format!("parts nested more than {MOST_DEEP} deep at byte {}", self.at));
+        }
+        self.n_nodes += u32::from(std::ptr::eq(message, &NODE));
+        if self.n_nodes > MOST_NODES {
+            return Err(format!("more than {MOST_NODES} nodes"));
         }
         while self.at < end {
             let tag = self.number(end)?;

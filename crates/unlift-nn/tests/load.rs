@@ -109,3 +109,92 @@ fn many_threads_give_the_same_bytes() {
         }
     });
 }
+
+/// A field of a message of ONNX, which holds bytes.
+fn field(number: u8, inside: &[u8]) -> Vec<u8> {
+    let mut bytes = vec![number << 3 | 2];
+    let mut length = inside.len();
+    while length >= 0x80 {
+        bytes.push(length as u8 | 0x80);
+        length >>= 7;
+    }
+    bytes.push(length as u8);
+    bytes.extend(inside);
+    bytes
+}
+
+/// A network from `features` to `picture`: in turn the operators, each of what the one before made.
+fn network(operators: &[&str]) -> Vec<u8> {
+    let name = |at: usize| match at {
+        0 => "features".to_owned(),
+        at if at == operators.len() => "picture".to_owned(),
+        at => format!("v{at}"),
+    };
+    let node = |(at, operator): (usize, &&str)| {
+        let parts = [(1, name(at)), (2, name(at + 1)), (4, (*operator).to_owned())];
+        field(1, &parts.map(|(number, text)| field(number, text.as_bytes())).concat())
+    };
+    // Floats of four sides.
+    let sides = [0; 4].map(|_| field(1, &field(2, b"n"))).concat();
+    let tensor = [&[8, 1][..], &field(2, &sides)].concat();
+    let value = |name: &str| [field(1, name.as_bytes()), field(2, &field(1, &tensor))].concat();
+    let mut graph = operators.iter().enumerate().map(node).collect::<Vec<_>>().concat();
+    graph.extend(
+        [field(2, b"g"), field(11, &value("features")), field(12, &value("picture"))].concat(),
+    );
+    // IR version 8, operators of version 13.
+    [vec![8, 8], field(7, &graph), field(8, &[16, 13])].concat()
+}
+
+/// Of a file that nobody knows: an inverter of one's own.
+fn stranger() -> Entry {
+    let any = &[None; 4];
+    let port = |name| Port { name, shape: any };
+    Entry {
+        sha256: None,
+        inputs: Box::leak(Box::new([port("features")])),
+        outputs: Box::leak(Box::new([port("picture")])),
+        ..*aliked()
+    }
+}
+
+#[test]
+fn what_could_be_huge_or_endless_is_not_loaded() {
+    let entry = stranger();
+    let (_place, folders) = with_file(&entry, &network(&["Relu", "Sigmoid"]));
+    let plain = Network::load_from(&folders, &entry).unwrap();
+    let ones = || Tensor::try_new(&[1, 1, 2, 2], vec![1.0; 4]).unwrap();
+    assert_eq!(
+        plain.run(vec![("features", ones())], ["picture"]).unwrap()[0].shape(),
+        [1, 1, 2, 2]
+    );
+    for operator in
+        ["ConstantOfShape", "Range", "OneHot", "Loop", "If", "Expand", "Tile", "NonZero"]
+    {
+        let error = refused(&entry, &network(&[operator]));
+        assert!(
+            error.starts_with("DIR/aliked-n16rot.onnx: expected a model in ONNX, found "),
+            "{error}"
+        );
+        assert!(error.contains(operator), "{error}");
+    }
+    let error = refused(&entry, &network(&vec!["Relu"; 4097]));
+    assert!(error.ends_with("found more than 4096 nodes"), "{error}");
+    let (_place, folders) = with_file(&entry, &network(&vec!["Relu"; 4096]));
+    let long = Network::load_from(&folders, &entry).unwrap();
+    assert_eq!(long.run(vec![("features", ones())], ["picture"]).unwrap()[0].values(), [1.0; 4]);
+}
+
+#[test]
+fn an_output_of_another_shape_is_one_line() {
+    let entry = stranger();
+    let (_place, folders) = with_file(&entry, &network(&["Flatten"]));
+    // The file says four sides, and gives two.
+    let network = Network::load_from(&folders, &entry).unwrap();
+    let ones = Tensor::try_new(&[1, 1, 2, 2], vec![1.0; 4]).unwrap();
+    let error = network.run(vec![("features", ones)], ["picture"]).unwrap_err().to_string();
+    assert!(
+        error.ends_with("expected an output picture of shape (any, any, any, any), found [1, 4]"),
+        "{error}"
+    );
+}

@@ -38,7 +38,6 @@ pub fn audit(
     let (prepared, input) = (Arc::clone(&map.prepared), map.input.clone());
     let (cameras, up) = (map.cameras.clone(), map.up);
     let notes = map.notes.iter().cloned().chain(notes).collect();
-    let doubts = map.doubts.clone();
     let found = work::run(py, asked.threads, Some(stop), move || {
         let job = Job {
             original: &prepared.original,
@@ -50,7 +49,7 @@ pub fn audit(
             input,
             options,
             notes,
-            doubts,
+            doubts: prepared.doubts.clone(),
             gates,
             out: PathBuf::new(),
             unit_in_map_units: prepared.unit_in_map_units,

@@ -1,42 +1,16 @@
 //! The laws of schemes and sources, for tests in Python.
 
-use std::cell::Cell;
-use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
-use std::sync::Once;
-
 use pyo3::exceptions::PyAssertionError;
 use pyo3::prelude::*;
+use unlift::guard::caught;
 
 use crate::hidden::released_of;
 use crate::own::{OwnScheme, OwnSource, Raised};
-use crate::work::{self, told};
-
-thread_local! {
-    /// Whether a broken law is what this thread panics of.
-    static TRIES: Cell<bool> = const { Cell::new(false) };
-}
-
-/// What a broken law says; the report of a panic is kept to the others.
-fn broken(laws: impl FnOnce()) -> Result<(), String> {
-    static QUIET: Once = Once::new();
-    // Once and for all: a hook that is set and taken back would be one of all threads in the meantime.
-    QUIET.call_once(|| {
-        let report = take_hook();
-        set_hook(Box::new(move |panic| {
-            if !TRIES.get() {
-                report(panic);
-            }
-        }));
-    });
-    let outer = TRIES.replace(true);
-    let result = catch_unwind(AssertUnwindSafe(laws));
-    TRIES.set(outer);
-    result.map_err(|panic| told(&*panic))
-}
+use crate::work;
 
 /// Runs `laws`; one that is broken is an AssertionError that says which, on which points, and what was found.
 fn kept(py: Python<'_>, by: &Raised, laws: impl FnOnce() + Send + 'static) -> PyResult<()> {
-    let result = work::run(py, None, Some(by.stop()), move || Ok::<_, String>(broken(laws)))?;
+    let result = work::run(py, None, Some(by.stop()), move || Ok::<_, String>(caught(laws)))?;
     result.map_err(|text| by.as_cause_of(py, PyAssertionError::new_err(text)))
 }
 

@@ -25,8 +25,6 @@ pub struct Map {
     pub up: Option<[f64; 3]>,
     /// What whoever reads figures of it must know.
     pub notes: Vec<String>,
-    /// Why any figure of it may be wrong.
-    pub doubts: Vec<String>,
 }
 
 /// What is done with points before anything else.
@@ -92,9 +90,8 @@ impl Map {
             };
             let zeros = prepared.descriptors.as_ref().and_then(maps::zeros);
             let notes = prepared.notes.iter().cloned().chain(zeros).collect();
-            let (cameras, doubts) = (Vec::new(), Vec::new());
-            let prepared = Arc::new(prepared);
-            Ok::<_, unlift_audit::Error>(Self { prepared, input, cameras, up: None, notes, doubts })
+            let (prepared, cameras) = (Arc::new(prepared), Vec::new());
+            Ok::<_, unlift_audit::Error>(Self { prepared, input, cameras, up: None, notes })
         })
     }
 
@@ -138,7 +135,7 @@ impl Map {
     /// What you should know of how it was read and made ready; a report has these, too.
     #[getter]
     fn notes(&self) -> Vec<String> {
-        self.doubts.iter().chain(&self.notes).cloned().collect()
+        self.prepared.doubts.iter().chain(&self.notes).cloned().collect()
     }
 
     /// Which of the points that were given are left, ascending `(n,)`.
@@ -185,7 +182,6 @@ pub fn read(
             },
             cameras: input.cameras.iter().map(|center| center.map(|x| x / unit)).collect(),
             up: input.up,
-            doubts: input.doubts,
             notes: prepared.notes.clone(),
             prepared: Arc::new(prepared),
         })

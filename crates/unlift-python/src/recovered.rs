@@ -8,6 +8,7 @@ use pyo3::types::PyDict;
 use unlift::audit::{Plan, measure};
 use unlift::evaluate::blind;
 use unlift::recover::{RecoverOptions, Recovered as Found, Solver, recover as solve};
+use unlift_audit::Checked;
 use unlift_io::stage::{Kind, read_recovered, write_recovered};
 
 use crate::arrays::{to_array, to_rows};
@@ -156,11 +157,15 @@ pub fn evaluate<'py>(
     let usual = Plan::<3>::new(truth.original().reveal().unit()).thresholds;
     let thresholds = self::thresholds(thresholds, &usual)?;
     let (recovered, asked) = (Arc::clone(&recovered.0), thresholds.clone());
-    let (row, _) = work::run(py, None, None, move || {
+    let (row, notes) = work::run(py, None, None, move || {
         let (original, secret) = (truth.original(), &truth.secret);
+        let mut checked = Checked::default();
+        checked.add(&recovered, original, secret, released.as_ref())?;
+        let notes = checked.notes(&asked, original.reveal().unit())?;
         let baseline = released.map(|released| blind(&released, original, secret));
-        measure(&recovered, original, secret, baseline.as_ref(), &asked)
+        let (row, _) = measure(&recovered, original, secret, baseline.as_ref(), &asked)?;
+        Ok::<_, unlift::Error>((row, notes))
     })?;
-    let figures = unlift_audit::evaluated(&row, &thresholds).map_err(raised)?;
+    let figures = unlift_audit::evaluated(&row, &thresholds, &notes).map_err(raised)?;
     Ok(as_python(py, &figures)?.cast_into::<PyDict>()?)
 }

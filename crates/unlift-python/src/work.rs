@@ -3,7 +3,6 @@
 //! All that computes runs here, on threads that end with it: the threads of rayon's own pool, which lasts, a forked child would
 //! wait for and not have.
 
-use std::any::Any;
 use std::fmt::Display;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,12 +10,16 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
 use pyo3::prelude::*;
+use unlift::guard::told;
 
 use crate::calls;
-use crate::errors::raised;
+use crate::errors::{raised, wrong};
 
 /// How often the interpreter is asked whether the user has interrupted.
 const ASKED: Duration = Duration::from_millis(50);
+
+/// Threads at most: more than machines have cores, and few enough to be started.
+const MOST_THREADS: usize = 512;
 
 /// Runs `work` on `threads` threads (all cores without a number) and waits for it. An interrupt ends the wait at once; the work
 /// ends where `stop` is asked about, and of work that never asks the result is thrown away.
@@ -26,6 +29,9 @@ pub fn run<T: Send + 'static, E: Display>(
     stop: Option<Arc<AtomicBool>>,
     work: impl FnOnce() -> Result<T, E> + Send + 'static,
 ) -> PyResult<T> {
+    if let Some(n) = threads.filter(|n| *n > MOST_THREADS) {
+        return Err(wrong("threads", format!("at most {MOST_THREADS}"), n));
+    }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
     let pool = pool.map_err(raised)?;
     let slot = Arc::new((Mutex::new(None), Condvar::new()));
@@ -56,11 +62,4 @@ pub fn run<T: Send + 'static, E: Display>(
             return Err(interrupt);
         }
     }
-}
-
-/// What a panic says.
-pub fn told(panic: &(dyn Any + Send)) -> String {
-    let text = panic.downcast_ref::<String>().cloned();
-    text.or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).to_owned()))
-        .unwrap_or_else(|| "a panic".to_owned())
 }

@@ -142,7 +142,12 @@ pub fn render(
     for (name, source) in TEMPLATES {
         env.add_template(name, source)?;
     }
-    Ok(env.get_template("report.html")?.render(Serde(&page))?)
+    Ok(env.get_template("report.html")?.render(Serde(&page))?.replace(turns, "\u{fffd}"))
+}
+
+/// Whether a character turns the direction of what follows: names may hold it, and nothing of ours does.
+fn turns(c: char) -> bool {
+    matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 /// All that the template may print.

@@ -7,9 +7,9 @@ use crate::document::Document;
 /// What stands in place of a value that names something on the owner's machine.
 const WITHHELD: &str = "(withheld)";
 
-/// Options whose value is a name of the owner's.
-const NAMING_OPTIONS: [&str; 8] =
-    ["descriptors", "input", "map", "model", "out", "path", "photos", "show"];
+/// Options whose value is a name of the owner's, or tells a file of theirs.
+const NAMING_OPTIONS: [&str; 9] =
+    ["descriptors", "input", "inverter_sha256", "map", "model", "out", "path", "photos", "show"];
 
 /// Schemes and sources of unlift's. What others say of why they failed may be anything: a line of their data, a path.
 const SCHEMES: [&str; 10] =
@@ -92,14 +92,14 @@ mod tests {
     #[test]
     fn names_are_withheld_and_choices_stay() {
         let mut options = json!({
-            "neighbors": "oracle", "descriptors": "secret.bin", "solver": ["consensus"],
+            "neighbors": "oracle", "descriptors": "secret.bin", "inverter_sha256": "00ff", "solver": ["consensus"],
             "delta": "auto", "note": "/home/me/map", "k": 50
         });
         for (name, value) in options.as_object_mut().unwrap() {
             withhold(name, value);
         }
         let expected = json!({
-            "neighbors": "oracle", "descriptors": WITHHELD, "solver": ["consensus"],
+            "neighbors": "oracle", "descriptors": WITHHELD, "inverter_sha256": WITHHELD, "solver": ["consensus"],
             "delta": "auto", "note": WITHHELD, "k": 50
         });
         assert_eq!(options, expected);

@@ -1,5 +1,7 @@
 //! The color and mark of a scheme.
 
+use std::collections::HashSet;
+
 use crate::document::Document;
 
 /// Schemes with a color and a mark of their own, the same on every page.
@@ -19,13 +21,10 @@ pub(crate) fn slot(document: &Document, scheme: &str) -> usize {
     if let Some(slot) = KNOWN_SCHEMES.iter().position(|name| *name == known) {
         return slot;
     }
-    let mut unknown: Vec<&str> = Vec::new();
-    for row in &document.results {
-        let name = row.scheme.as_str();
-        if !KNOWN_SCHEMES.contains(&name) && !unknown.contains(&name) {
-            unknown.push(name);
-        }
-    }
-    let turn = unknown.iter().position(|name| *name == scheme).unwrap_or(0);
-    (KNOWN_SCHEMES.len() + turn) % SLOTS
+    let names = document.results.iter().map(|row| row.scheme.as_str());
+    let before: HashSet<&str> = names
+        .take_while(|name| *name != scheme)
+        .filter(|name| !KNOWN_SCHEMES.contains(name))
+        .collect();
+    (KNOWN_SCHEMES.len() + before.len()) % SLOTS
 }

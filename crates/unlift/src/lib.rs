@@ -52,6 +52,9 @@ pub mod descriptors;
 mod error;
 pub mod evaluate;
 pub mod geometry;
+// Not part of the interface: for crates that run code of others.
+#[doc(hidden)]
+pub mod guard;
 mod ids;
 mod line;
 pub mod neighbors;

@@ -4,7 +4,6 @@ use std::collections::HashMap;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::time::UNIX_EPOCH;
 
 use unlift_io::Error;
 use unlift_io::atomic::{Access, sweep, write_file};
@@ -23,7 +22,7 @@ const HASH: usize = 64;
 /// The folder `FILE.parts` beside an output `FILE`.
 ///
 /// A part's name is a key and the SHA-256 of its content. The key is a hash of all that the content depends on: the
-/// program's version, the options, and the photo's name, length and time of change. So a part is either right or none.
+/// program's version, the options, and the photo's name and content. So a part is either right or none.
 pub struct Parts {
     target: PathBuf,
     folder: PathBuf,
@@ -68,14 +67,11 @@ impl Parts {
     /// The key of the photo `name` at `photo`.
     ///
     /// # Errors
-    /// When the photo is gone.
+    /// When the photo cannot be read.
     pub fn key(&self, name: &str, photo: &Path) -> Result<Key, Error> {
-        let metadata = fs::metadata(photo).map_err(|source| Error::read(photo, source))?;
-        let changed =
-            metadata.modified().ok().and_then(|time| time.duration_since(UNIX_EPOCH).ok());
-        let changed = changed.map_or(0, |since| since.as_nanos());
-        let length = metadata.len();
-        let key = format!("{VERSION}\n{}\n{length} {changed}\n{name}", self.options);
+        // Its length and time would not tell one that was put in its place.
+        let content = hash_file(photo)?;
+        let key = format!("{VERSION}\n{}\n{content}\n{name}", self.options);
         let hash = hash_bytes(key.as_bytes());
         Ok(Key(hash[..KEY].to_owned()))
     }

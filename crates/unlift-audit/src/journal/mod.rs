@@ -1,7 +1,8 @@
 //! What was recovered, kept in a folder until all is done: an interrupted run goes on from there.
 //!
-//! A file is named by everything that its content follows from (program, released map, lists, options) and by the hash of that
-//! content. So nothing is taken that another audit, another version or a damaged disk left, whatever the folder is called.
+//! A file is named by a key, a hash of everything that its content follows from (program, released map, lists, options), and by a
+//! hash of that key and the content together. So nothing is taken that another audit, another version or a damaged disk left, nor
+//! a file that was given the name of another. What was taken is said in the notes of the audit.
 //! An audit keeps every recovery that is done; of one alone [`KeptRounds`] keeps where its rounds stand.
 
 mod key;
@@ -17,7 +18,7 @@ use unlift::OneLine;
 use unlift::audit::Recovery;
 use unlift::recover::{Recovered, Solver};
 use unlift_io::atomic::sweep;
-use unlift_io::hash::hash_file;
+use unlift_io::hash::{Hasher, hash_file};
 use unlift_io::stage::{read_recovered, write_recovered};
 
 use crate::{Error, Progress};
@@ -105,12 +106,18 @@ impl<'a> Journal<'a> {
         KeptRounds::new(self, key)
     }
 
+    /// What to say of recoveries that were not done now, if there are any.
+    pub(crate) fn note(&self) -> Option<String> {
+        let n = self.n_recalled;
+        (n > 0).then(|| {
+            format!(
+                "{n} recoveries were taken from a journal, as a run that was interrupted left them"
+            )
+        })
+    }
+
     /// Removes all files of what this run asked for or kept, and the folder if nothing else is in it.
     pub fn finish(self) {
-        if self.n_recalled > 0 {
-            let (n, folder) = (self.n_recalled, OneLine(self.folder.display()));
-            self.progress.say(&format!("note: {n} recoveries were taken from {folder}"));
-        }
         for path in self.files(|name| self.keys.iter().any(|key| name.starts_with(key.as_str()))) {
             // What stays is found by its name, and is as right then as now.
             let _ = fs::remove_file(path);
@@ -128,13 +135,13 @@ impl<'a> Journal<'a> {
         self.folder.join(format!("{key}.{}{ending}", std::process::id()))
     }
 
-    /// Gives `unnamed` the name of a file of such a key, hash and ending.
+    /// Gives `unnamed`, whose content has such a hash, the name of a file of such a key and ending.
     fn name(
         &self,
         unnamed: &Path,
         (key, hash, ending): (&str, &str, &str),
     ) -> Result<PathBuf, unlift_io::Error> {
-        let path = self.folder.join(format!("{key}-{hash}{ending}"));
+        let path = self.folder.join(named(key, hash, ending));
         fs::rename(unnamed, &path).map_err(|source| unlift_io::Error::write(&path, source))?;
         Ok(path)
     }
@@ -149,7 +156,7 @@ impl<'a> Journal<'a> {
         paths
     }
 
-    /// The first file of `key` with such an ending whose content has the hash that it is named by, as `read` says with what it
+    /// The first file of `key` with such an ending that is named as its content asks for, whose hash `read` gives with what it
     /// read. Others are removed; what cannot be read stays.
     fn whole<T>(
         &self,
@@ -160,7 +167,7 @@ impl<'a> Journal<'a> {
         let of_key = format!("{key}-");
         for path in self.files(|name| name.starts_with(&of_key) && name.ends_with(ending)) {
             match read(&path) {
-                Ok((hash, read)) if path.ends_with(format!("{key}-{hash}{ending}")) => {
+                Ok((hash, read)) if path.ends_with(named(key, &hash, ending)) => {
                     return Some((path, read));
                 }
                 Ok(_) => self.drop_damaged(&path),
@@ -202,6 +209,14 @@ impl<'a> Journal<'a> {
         // Its name is one that only we give.
         let _ = fs::remove_file(path);
     }
+}
+
+/// The name of a file of `key` whose content has the hash `content`.
+fn named(key: &str, content: &str, ending: &str) -> String {
+    let mut both = Hasher::default();
+    both.add(key.as_bytes());
+    both.add(content.as_bytes());
+    format!("{key}-{}{ending}", both.hex())
 }
 
 impl Drop for Journal<'_> {

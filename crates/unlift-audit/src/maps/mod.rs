@@ -52,7 +52,7 @@ pub struct Job<'a> {
     pub options: serde_json::Map<String, serde_json::Value>,
     /// What whoever reads the figures must know; told to `progress` as well.
     pub notes: Vec<String>,
-    /// Why any figure may be wrong: told as notes, and no gate holds.
+    /// Why any figure may be wrong, whatever the attack: told as notes are, and no gate holds.
     pub doubts: Vec<String>,
     /// Bounds to hold.
     pub gates: Vec<Gate>,
@@ -108,7 +108,7 @@ impl<'a> Job<'a> {
             },
             options: serde_json::Map::new(),
             notes: prepared.notes.clone(),
-            doubts: input.doubts.clone(),
+            doubts: prepared.doubts.clone(),
             gates: Vec::new(),
             out: out.to_owned(),
             unit_in_map_units: prepared.unit_in_map_units,
@@ -129,7 +129,7 @@ const SHEETS: usize = 3;
 const USUAL_K: usize = 50;
 
 /// Reads a map and makes it ready for an audit; `descriptors` is a file of them, beside the map. What a user should
-/// know of how it was read stands in the notes of what was made ready, and in the doubts of what was read.
+/// know of how it was read stands in the notes and doubts of what was made ready.
 ///
 /// # Errors
 /// When a file cannot be read, there is a scale and coordinates are no lengths or lengths become meaningless by it, or too
@@ -160,6 +160,7 @@ pub fn open(
     })?;
     prepared.notes.extend(prepared.descriptors.as_ref().and_then(zeros));
     prepared.notes.splice(0..0, input.notes.iter().cloned());
+    prepared.doubts.clone_from(&input.doubts);
     // Rows of the file, also where some of its points are left out.
     let mut left_out = input.left_out.iter().peekable();
     let mut shift = 0;
@@ -229,8 +230,9 @@ fn find_with(
     if let Some(error) = watcher.failed {
         return Err(error);
     }
-    let mut doubts = doubts(job.original, job.hidden, &job.plan, &outcome.rows).map_err(of_file)?;
-    doubts.of_all(job.doubts);
+    let mut doubts = doubts(job.original, job.hidden, (&job.plan, &outcome.rows), &job.doubts)
+        .map_err(of_file)?;
+    doubts.notes.extend(watcher.journal.as_ref().and_then(|journal| journal.note()));
     for note in &doubts.notes {
         job.progress.say(&format!("note: {note}"));
     }

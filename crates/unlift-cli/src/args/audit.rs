@@ -35,7 +35,7 @@ pub struct AttackArgs {
     pub delta: Delta,
     /// Average over this many seeds
     #[arg(long, value_name = "N", default_value = "1",
-          value_parser = clap::value_parser!(u32).range(1..))]
+          value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub repeats: u32,
 }
 
@@ -71,7 +71,7 @@ pub struct ResultArgs {
 #[command(next_help_heading = "Run")]
 pub struct RunArgs {
     /// Threads to use; never changes a figure [default: one per core]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_parser = values::threads, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
     /// No progress on stderr
     #[arg(long)]

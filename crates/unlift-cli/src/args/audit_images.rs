@@ -40,14 +40,14 @@ pub struct AuditImagesArgs {
     pub features: Option<DescriptorKind>,
     /// Features wanted per photo; sift: coarse ones first, and the last scale is kept whole, others:
     /// the best [default: 8192, aliked 2048, superpoint 4096]
-    #[arg(long, value_name = "N", help_heading = "Input")]
+    #[arg(long, value_parser = values::count, value_name = "N", help_heading = "Input")]
     pub max_features: Option<NonZeroUsize>,
     /// Score that a keypoint must exceed, not for sift [default: aliked 0.2, superpoint
     /// 0.005]
     #[arg(long, value_name = "SCORE", value_parser = values::score, help_heading = "Input")]
     pub min_score: Option<f32>,
     /// Use at most this many images, evenly spaced over their sorted names
-    #[arg(long, value_name = "N", help_heading = "Input")]
+    #[arg(long, value_parser = values::count, value_name = "N", help_heading = "Input")]
     pub max_images: Option<NonZeroUsize>,
     /// True neighbors per keypoint
     #[arg(long, value_name = "K", default_value = "20", help_heading = "Input",

@@ -75,7 +75,7 @@ pub struct AuditMapArgs {
     #[arg(long, value_name = "DIR", help_heading = "Result", requires = "invert")]
     pub photos: Option<PathBuf>,
     /// Photos to compare with at most, evenly spaced over their names
-    #[arg(long, value_name = "N", default_value = "12", help_heading = "Result")]
+    #[arg(long, value_parser = values::count, value_name = "N", default_value = "12", help_heading = "Result")]
     pub max_photos: NonZeroUsize,
     /// Also write original, obfuscated and recovered clouds (PLY, OBJ)
     #[arg(long, help_heading = "Result", conflicts_with = "share_safe")]

@@ -23,7 +23,7 @@ The paper's seconds (64 cores) are shown where it measured the same scheme, K, i
 number of points: ppl, 50, and 100000, 300000 or 700000.")]
 pub struct BenchRecoverArgs {
     /// Points of the map
-    #[arg(long, value_name = "N", default_value = "700000")]
+    #[arg(long, value_parser = values::made_points, value_name = "N", default_value = "700000")]
     pub points: NonZeroUsize,
     /// Map to thin out, or to repeat side by side with a jitter [default: the room of the demo]
     #[arg(long, value_name = "PATH")]
@@ -54,7 +54,7 @@ pub struct BenchRecoverArgs {
     #[arg(long, value_name = "INTEGER", default_value_t = 0)]
     pub seed: u64,
     /// Threads to use [default: one per core]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_parser = values::threads, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
     /// Print JSON in place of the table
     #[arg(long)]

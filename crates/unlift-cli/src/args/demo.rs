@@ -4,6 +4,8 @@ use clap::Args;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
+use crate::values;
+
 /// Options of `demo`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -18,7 +20,7 @@ pub struct DemoArgs {
     #[arg(long)]
     pub force: bool,
     /// Threads to use [default: one per core]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_parser = values::threads, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
     /// No progress on stderr
     #[arg(long)]

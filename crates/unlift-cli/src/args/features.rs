@@ -46,7 +46,7 @@ pub struct FeaturesArgs {
     pub kind: Option<DescriptorKind>,
     /// Features wanted per photo; sift: coarse ones first, and the last scale is kept whole, others:
     /// the best [default: 8192, aliked 2048, superpoint 4096]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_parser = values::count, value_name = "N")]
     pub max_features: Option<NonZeroUsize>,
     /// Score that a keypoint must exceed, not for sift [default: aliked 0.2, superpoint
     /// 0.005]
@@ -66,7 +66,7 @@ pub struct FeaturesArgs {
           value_parser = clap::value_parser!(i8).range(-1..=0))]
     pub first_octave: Option<i8>,
     /// Threads to use; never changes a byte [default: one per core]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_parser = values::threads, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
     /// No progress on stderr
     #[arg(long)]

@@ -42,10 +42,10 @@ pub struct InvertArgs {
     #[arg(long, value_name = "FILE")]
     pub inverter: Option<PathBuf>,
     /// Paint at most this many images, evenly spaced over their names; of released images the first ones
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_parser = values::count, value_name = "N")]
     pub max_images: Option<NonZeroUsize>,
     /// Threads to use; never changes a result [default: one per core]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_parser = values::threads, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
     /// Folder to write
     #[arg(long, value_name = "DIR", default_value = "unlift-pictures")]

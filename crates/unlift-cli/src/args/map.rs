@@ -19,7 +19,7 @@ pub struct MapArgs {
     #[arg(long, value_name = "FILE")]
     pub descriptors: Option<PathBuf>,
     /// Use a random subset of at most this many points
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_parser = values::count, value_name = "N")]
     pub max_points: Option<NonZeroUsize>,
     /// Leave out points whose mean distance to this many neighbors exceeds the mean of all by more
     /// than RATIO standard deviations [default when given: 20,2.0]

@@ -44,7 +44,7 @@ pub struct FindArgs {
     #[arg(long, value_name = "INTEGER", default_value_t = 0)]
     pub seed: u64,
     /// Threads to use; never changes a result [default: one per core]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_parser = values::threads, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
     /// File to write
     #[arg(long, value_name = "FILE", default_value = "neighborhoods.parquet")]

@@ -66,10 +66,10 @@ pub struct PaperArgs {
     )]
     pub parts: Vec<Part>,
     /// Photos of the test split per scene, evenly spaced over their names
-    #[arg(long, value_name = "N", default_value = "20")]
+    #[arg(long, value_parser = values::count, value_name = "N", default_value = "20")]
     pub images: NonZeroUsize,
     /// Points per map, a random subset, of which less comes back than of all [default: all]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_parser = values::count, value_name = "N")]
     pub max_points: Option<NonZeroUsize>,
     /// The integer that all randomness comes from
     #[arg(long, value_name = "INTEGER", default_value_t = 0)]
@@ -84,7 +84,7 @@ pub struct PaperArgs {
     #[arg(long)]
     pub json: bool,
     /// Threads to use; never changes a figure [default: one per core]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_parser = values::threads, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
     /// No progress on stderr
     #[arg(long)]

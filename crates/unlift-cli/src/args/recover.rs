@@ -41,7 +41,7 @@ pub struct RecoverArgs {
     #[arg(long, value_name = "DIR")]
     pub journal: Option<PathBuf>,
     /// Threads to use; never changes a result [default: one per core]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_parser = values::threads, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
     /// File to write
     #[arg(long, value_name = "FILE", default_value = "recovered.parquet")]

@@ -20,7 +20,7 @@ pub struct SplitArgs {
     #[arg(value_name = "FILE")]
     pub path: PathBuf,
     /// Rows of a part; an odd number is rounded up
-    #[arg(long, value_name = "N", default_value_t = 1 << 20, value_parser = value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 1 << 20, value_parser = value_parser!(u64).range(1..=u64::from(u32::MAX)))]
     pub rows: u64,
     /// The folder for the parts
     #[arg(long, value_name = "FOLDER")]

@@ -50,13 +50,18 @@ pub fn all_used(args: &AuditImagesArgs, used: &Used) -> anyhow::Result<()> {
     Err(Error::new(&args.path, "", expected, used.used.to_string()).into())
 }
 
+/// What is read, and must not be written over.
+pub fn inputs(args: &AuditImagesArgs) -> Vec<&Path> {
+    let others = args.photos.as_deref().into_iter().chain(args.inverter.as_deref());
+    [args.path.as_path()].into_iter().chain(others).collect()
+}
+
 /// The audit and its files; no figures without an image that can be used.
 pub fn audit(args: &AuditImagesArgs) -> anyhow::Result<(Option<Finished>, Used)> {
     let started = Instant::now();
     let mut plan = plan(args)?;
     let painted = painted(args)?;
-    let inputs = [args.path.as_path()].into_iter().chain(args.photos.as_deref());
-    let rules = Rules::new(inputs, args.result.force);
+    let rules = Rules::new(inputs(args), args.result.force);
     let shown = if args.result.share_safe { Shown::Figures } else { Shown::Points };
     let gate_files = GateFiles::check(&args.result, &rules)?;
     let out = open_audit(&args.result.out, rules, shown, &Stderr)?;
@@ -113,7 +118,7 @@ pub fn audit(args: &AuditImagesArgs) -> anyhow::Result<(Option<Finished>, Used)>
         Ok(perform(job, out)?)
     })?;
     if let Some(finished) = &finished {
-        gate_files.write(&finished.document)?;
+        gate_files.write(finished)?;
     }
     Ok((finished, used))
 }

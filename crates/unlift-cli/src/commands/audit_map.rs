@@ -1,6 +1,6 @@
 //! `unlift audit map`: a map in, one honest answer out.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -42,8 +42,9 @@ pub fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
         (false, true) => Shown::Clouds,
         (false, false) => Shown::Points,
     };
-    let gate_files = GateFiles::check(&args.result, &rules(args))?;
-    let out = open_audit(&args.result.out, rules(args), shown, &Stderr)?;
+    let rules = Rules::new(inputs(args), args.result.force);
+    let gate_files = GateFiles::check(&args.result, &rules)?;
+    let out = open_audit(&args.result.out, rules, shown, &Stderr)?;
     let beside = Seen::of_stages(beside(args).map(|(_, path)| path));
     let finished = with_threads(args.run.threads, || {
         let (input, prepared) = open_map(&args.path, &args.map, args.run.quiet)?;
@@ -70,7 +71,7 @@ pub fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
         beside.check()?;
         Ok(perform(job, out)?)
     })?;
-    gate_files.write(&finished.document)?;
+    gate_files.write(&finished)?;
     Ok(finished)
 }
 
@@ -100,10 +101,11 @@ fn inversion(
     Ok(Some(Arc::new(MapInversion::open(painter, model, photos, scale, most, progress)?)))
 }
 
-/// What must not be written over.
-fn rules(args: &AuditMapArgs) -> Rules {
-    let inputs = [args.path.as_path()].into_iter().chain(beside(args).map(|(_, path)| path));
-    Rules::new(inputs, args.result.force)
+/// What is read, and must not be written over.
+pub fn inputs(args: &AuditMapArgs) -> Vec<&Path> {
+    let beside = beside(args).map(|(_, path)| path);
+    let of_pictures = args.photos.iter().chain(&args.inverter).map(PathBuf::as_path);
+    [args.path.as_path()].into_iter().chain(beside).chain(of_pictures).collect()
 }
 
 fn plan(

@@ -43,8 +43,7 @@ pub fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
         (false, true) => Shown::Clouds,
         (false, false) => Shown::Points,
     };
-    let inputs = [args.released.as_path(), &args.truth].into_iter();
-    let inputs: Vec<&Path> = inputs.chain(args.descriptors.as_deref()).chain(lists(args)).collect();
+    let inputs = inputs(args);
     let seen = Seen::of_stages(inputs.iter().copied());
     let rules = Rules::new(inputs, args.result.force);
     let gate_files = GateFiles::check(&args.result, &rules)?;
@@ -82,8 +81,14 @@ pub fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
         };
         Ok(perform(job, out)?)
     })?;
-    gate_files.write(&finished.document)?;
+    gate_files.write(&finished)?;
     Ok(finished)
+}
+
+/// What is read, and must not be written over.
+pub fn inputs(args: &AuditReleasedArgs) -> Vec<&Path> {
+    let stages = [args.released.as_path(), &args.truth].into_iter();
+    stages.chain(args.descriptors.as_deref()).chain(lists(args)).collect()
 }
 
 /// Files of lists.
@@ -124,7 +129,14 @@ fn open(args: &AuditReleasedArgs) -> anyhow::Result<(Prepared, (Released<3>, Sec
     let secret = secret.map_err(|error| unlift_io::Error::core(&args.truth, error))?;
     let rows = (0..original.len() as u32).collect();
     let notes = released.descriptors().and_then(maps::zeros).into_iter().collect();
-    let prepared = Prepared { original, descriptors: None, unit_in_map_units: 1.0, rows, notes };
+    let prepared = Prepared {
+        original,
+        descriptors: None,
+        unit_in_map_units: 1.0,
+        rows,
+        notes,
+        doubts: Vec::new(),
+    };
     Ok((prepared, (released, secret)))
 }
 

@@ -1,13 +1,13 @@
 //! `unlift evaluate`: recovered points and the truth in, the figures of an audit's row out.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use unlift::audit::{Plan, Row, Threshold, measure};
-use unlift::evaluate::{blind, nearer_to_own};
+use unlift::evaluate::blind;
 use unlift::released::Released;
 use unlift::truth::Secret;
 use unlift::{About, RowOrder, Unit};
-use unlift_audit::evaluated;
+use unlift_audit::{Checked, evaluated};
 use unlift_io::stage::{has_images, read_recovered_in, read_released, read_truth};
 
 use super::common::{RELEASED, expect_slots, same_map};
@@ -31,13 +31,16 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
         [] => Plan::<3>::new(unit).thresholds,
         given => given.to_vec(),
     };
+    let mut checked = Checked::default();
+    checked
+        .add(&recovered, &original, &secret, released.as_ref())
+        .map_err(|error| unlift_io::Error::core(&args.truth, error))?;
     let baseline = released.map(|released| blind(&released, &original, &secret));
     let (row, _) = measure(&recovered, &original, &secret, baseline.as_ref(), &thresholds)
         .map_err(|error| unlift_io::Error::core(&args.recovered, error))?;
-    if recovered.about().map.is_none() || secret.map().is_none() {
-        check_plausible(&args.recovered, nearer_to_own(&recovered, &original, &secret))?;
-    }
-    told(args, &row, &thresholds, &notes(recovered.about(), secret.slots_per_record()))
+    let mut notes = notes(recovered.about(), secret.slots_per_record());
+    notes.extend(check(args, &checked, &thresholds, unit)?);
+    told(args, &row, &thresholds, &notes)
 }
 
 /// Compares recovered images with the truth.
@@ -47,11 +50,21 @@ fn images(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
         given => given.to_vec(),
     };
     let released = released_path(args);
-    let Evaluated { row, about, nearer } = evaluate_all(args, released.as_deref(), &thresholds)?;
-    if nearer.1 > 0 {
-        check_plausible(&args.recovered, nearer)?;
-    }
-    told(args, &row, &thresholds, &notes(about, 1))
+    let Evaluated { row, about, checked } = evaluate_all(args, released.as_deref(), &thresholds)?;
+    let mut notes = notes(about, 1);
+    notes.extend(check(args, &checked, &thresholds, Unit::Pixel)?);
+    told(args, &row, &thresholds, &notes)
+}
+
+/// What speaks against the figures.
+fn check(
+    args: &EvaluateArgs,
+    checked: &Checked,
+    thresholds: &[Threshold],
+    unit: Unit,
+) -> Result<Vec<String>, unlift_io::Error> {
+    let notes = checked.notes(thresholds, unit);
+    notes.map_err(|error| unlift_io::Error::core(&args.recovered, error))
 }
 
 /// Prints what was found.
@@ -59,13 +72,13 @@ fn told(
     args: &EvaluateArgs,
     row: &Row,
     thresholds: &[Threshold],
-    notes: &[&str],
+    notes: &[String],
 ) -> anyhow::Result<Outcome> {
     for note in notes {
         stderr::note(format_args!("{}: {note}", args.recovered.display()));
     }
     print(&if args.json {
-        format!("{:#}\n", evaluated(row, thresholds)?)
+        format!("{:#}\n", evaluated(row, thresholds, notes)?)
     } else {
         as_table(row, thresholds)
     })?;
@@ -88,33 +101,17 @@ fn released(args: &EvaluateArgs, secret: &Secret) -> anyhow::Result<Option<Relea
     Ok(Some(released))
 }
 
-/// Positions that fewer than this many slots have are too few to judge.
-const FEW: usize = 30;
-
-/// Refuses positions that by where they lie are not of this truth, of which `nearer` of all are nearer to their own
-/// points: asked where files do not say which map they are of. The figures would be next to nothing and read as "safe".
-fn check_plausible(path: &Path, (nearer, n): (usize, usize)) -> anyhow::Result<()> {
-    // Of strangers half are nearer; two standard deviations on top.
-    let chance = 0.5 * n as f64 + (n as f64).sqrt();
-    if n < FEW || nearer as f64 > chance {
-        return Ok(());
-    }
-    let expected = "positions nearer to their own points than to those of other records";
-    let found = format!("{nearer} of {n} (of another map, or in another order of rows)");
-    Err(unlift_io::Error::new(path, "", expected, found).into())
-}
-
 /// What a user should know about a file that somebody else wrote.
-fn notes(about: About, slots_per_record: usize) -> Vec<&'static str> {
+fn notes(about: About, slots_per_record: usize) -> Vec<String> {
     let mut notes = Vec::new();
     if about.map.is_none() {
-        notes.push("says not which released map it is of: taken to be of that of the truth");
+        let note = "says not which released map it is of: taken to be of that of the truth";
+        notes.push(note.to_owned());
     }
     if about.order == RowOrder::Unstated && slots_per_record > 1 {
-        notes.push(
-            "says not what its rows are counted by: every position is compared with the nearer point of its \
-             record, so the figures are upper bounds",
-        );
+        let note = "says not what its rows are counted by: every position is compared with the nearer point of its \
+                    record, so the figures are upper bounds";
+        notes.push(note.to_owned());
     }
     notes
 }

@@ -1,10 +1,12 @@
 //! `--junit` and `--sarif`: gates as services that build software show them.
 
+use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use unlift_audit::{FIGURES, PAGE, check_file_of};
-use unlift_io::atomic::{Access, Kind, Rules, write_file};
+use unlift_audit::{FIGURES, Finished, PAGE, check_file_of};
+use unlift_io::Error;
+use unlift_io::atomic::{Access, Alone, Kind, Rules, place_of, write_file};
 use unlift_report::document::Document;
 use unlift_report::{junit, sarif};
 
@@ -50,25 +52,25 @@ impl GateFiles {
         Ok(Self { files, rules: rules.clone() })
     }
 
-    /// Writes them, each whole or not at all. They are made to be shown: whoever may see a build may read them.
-    pub fn write(&self, document: &Document) -> anyhow::Result<()> {
+    /// Writes them, each whole or not at all. They are made to be shown: whoever may see a build may read them. Where another run
+    /// has put its figures in place of those of `finished`, they would be about other figures than stand there, and are not written.
+    pub fn write(&self, finished: &Finished) -> anyhow::Result<()> {
+        if self.files.is_empty() {
+            return Ok(());
+        }
+        let document = &finished.document;
+        let figures = finished.report.with_file_name(FIGURES);
+        let _alone = Alone::wait_in(finished.report.parent().unwrap_or(Path::new(".")));
+        let there = fs::read(&figures).map_err(|source| Error::read(&figures, source))?;
+        if there != document.to_json()?.as_bytes() {
+            let found = "those of another run that ended meanwhile: gates are not written";
+            return Err(Error::new(&figures, "", "the figures of this run", found).into());
+        }
         for GateFile { option, path, kind, text } in &self.files {
             check_file_of(option, path, *kind, &self.rules)?;
             let text = text(document);
             write_file(path, Access::Usual, |w| w.write_all(text.as_bytes()))?;
         }
         Ok(())
-    }
-}
-
-/// A path by which two names of one place are equal, also where no file stands yet.
-pub fn place_of(path: &Path) -> PathBuf {
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    match (folder.canonicalize(), path.file_name()) {
-        (Ok(folder), Some(name)) => folder.join(name),
-        _ => path.to_owned(),
     }
 }

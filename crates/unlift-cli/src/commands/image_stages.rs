@@ -6,7 +6,6 @@ use std::path::Path;
 use rayon::prelude::*;
 use unlift::audit::staged::{Pooled, key_of, oracle_lists, oracle_seed};
 use unlift::audit::{Row, Threshold};
-use unlift::evaluate::nearer_to_own;
 use unlift::neighbors::{Needs as SourceNeeds, Neighborhoods, Source, of_what_there_is};
 use unlift::obfuscate::{SchemeOptions, obfuscate};
 use unlift::recover::{RecoverOptions, Recovered, Status, recover};
@@ -23,9 +22,9 @@ use super::common::{RELEASED, TRUTH, expect_slots, same_map};
 use crate::args::{EvaluateArgs, ObfuscateArgs, OracleArgs};
 use crate::progress::Stderr;
 use unlift_audit::Progress as _;
-use unlift_audit::check_file;
 use unlift_audit::images::FeatureSource;
 use unlift_audit::images::stream::{Needs, Stream, Tally};
+use unlift_audit::{Checked, check_file};
 
 /// Images at work per thread.
 const AT_WORK: usize = 2;
@@ -204,8 +203,8 @@ pub struct Evaluated {
     pub row: Row,
     /// Whether every image says which released image it is of.
     pub about: About,
-    /// Positions nearer to their own points than to strangers, and how many have any, where files do not say.
-    pub nearer: (usize, usize),
+    /// Whether what was compared belongs together.
+    pub checked: Checked,
 }
 
 /// The row over all images of `args.recovered`.
@@ -217,7 +216,7 @@ pub fn evaluate_all(
     let mut pairs = Pairs::open(&args.truth, released)?;
     let mut found = ImageFile::open(&args.recovered, Stage::Recovered)?;
     let mut pooled = Pooled::new(thresholds);
-    let (mut about, mut nearer) = (None, (0, 0));
+    let (mut about, mut checked) = (None, Checked::default());
     while let Some(pair) = pairs.next()? {
         let Pair { name, original, secret, released } = pair;
         if secret.n_slots() == 0 {
@@ -231,10 +230,9 @@ pub fn evaluate_all(
             Error::core(&args.recovered, error.within(&format!("image {name}")))
         };
         added.map_err(of_image)?;
-        if recovered.about().map.is_none() || secret.map().is_none() {
-            let (closer, n) = nearer_to_own(&recovered, &original, &secret);
-            nearer = (nearer.0 + closer, nearer.1 + n);
-        }
+        checked
+            .add(&recovered, &original, &secret, released.as_ref())
+            .map_err(|error| Error::core(&args.truth, error.within(&format!("image {name}"))))?;
         // One image that does not say is enough for a note.
         if about.is_none_or(|about: About| about.map.is_some()) {
             about = Some(recovered.about());
@@ -244,7 +242,7 @@ pub fn evaluate_all(
     let row = pooled.row();
     let row =
         row.ok_or_else(|| Error::new(&args.truth, "", "images with hidden points", "none"))?;
-    Ok(Evaluated { row, about: about.unwrap_or_default(), nearer })
+    Ok(Evaluated { row, about: about.unwrap_or_default(), checked })
 }
 
 /// Truths of images with what was released of them.

@@ -30,8 +30,8 @@ pub fn run(args: &ObfuscateArgs) -> anyhow::Result<Outcome> {
     let Some(scheme) = args.scheme.of_dimension::<3>(&SchemeOptions::usual(unit)) else {
         return images(args, out);
     };
-    let (input, prepared) = open_map(&args.path, &args.map, false)?;
-    for note in input.doubts.iter().chain(&prepared.notes) {
+    let (_, prepared) = open_map(&args.path, &args.map, false)?;
+    for note in prepared.doubts.iter().chain(&prepared.notes) {
         Stderr.say(&format!("note: {note}"));
     }
     let descriptors = prepared.descriptors.as_ref();

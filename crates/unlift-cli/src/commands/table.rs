@@ -8,11 +8,11 @@ use unlift_io::atomic::{Access, Kind, Rules, write_file};
 use unlift_report::export::{curves, table, thresholds};
 
 use super::documents::read_document;
-use super::gate_files::place_of;
 use crate::args::TableArgs;
 use crate::exit::{Outcome, usage};
 use crate::output::print;
 use crate::stderr;
+use unlift_io::atomic::place_of;
 
 /// Writes a table and, where asked for, curves.
 pub fn run(args: &TableArgs) -> anyhow::Result<Outcome> {

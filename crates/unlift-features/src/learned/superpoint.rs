@@ -83,6 +83,12 @@ impl SuperPoint {
             let found = format!("{:?}", score.shape());
             return Err(Error::new(MODEL, "scores of shape (1, any, any)", found));
         };
+        if coarse.shape()[..3] != [1, height / CELL, width / CELL] || height < CELL || width < CELL
+        {
+            let expected =
+                format!("descriptors of cells of {CELL} pixels of ({height}, {width}) scores");
+            return Err(Error::new(MODEL, expected, format!("{:?}", coarse.shape())));
+        }
         let scores = Scores { width, height, values: score.into_values() };
         let wanted = Wanted {
             radius: RADIUS,

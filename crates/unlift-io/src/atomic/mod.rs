@@ -23,8 +23,8 @@ pub use file::OutputFile;
 pub(crate) use kind::{CLOUD_COMMENT, FEATURES_MARK, MODEL_MARK};
 pub use kind::{Kind, marked_picture};
 pub use partial::{abandon, make_folders, sweep};
-pub use rules::Rules;
-pub use set::OutputSet;
+pub use rules::{Rules, place_of};
+pub use set::{Alone, OutputSet};
 
 /// Who may read what is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,9 @@
 //! What an output may replace: nothing that is read in the same run, and nothing of others unless told so.
 
+use std::collections::{HashMap, HashSet, VecDeque};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
+use std::sync::{Arc, OnceLock};
 
 use super::{Kind, OutputFile};
 use crate::Error;
@@ -10,6 +12,8 @@ use crate::Error;
 #[derive(Clone, Debug, Default)]
 pub struct Rules {
     inputs: Vec<PathBuf>,
+    /// The files that are read, by what all paths to one share: found when it is first asked.
+    files: Arc<OnceLock<HashMap<Identity, PathBuf>>>,
     force: bool,
 }
 
@@ -23,7 +27,8 @@ impl Rules {
     /// The rules of a run that reads `inputs`: files, and folders with the models, databases and photos below
     /// them. With `force` files of others are replaced; inputs never are.
     pub fn new<'a>(inputs: impl IntoIterator<Item = &'a Path>, force: bool) -> Self {
-        Self { inputs: inputs.into_iter().map(Path::to_owned).collect(), force }
+        let inputs = inputs.into_iter().map(Path::to_owned).collect();
+        Self { inputs, files: Arc::default(), force }
     }
 
     /// Whether `kind` may be written at `path`; where it will stand, links followed.
@@ -48,24 +53,46 @@ impl Rules {
     }
 
     /// The input that is the same file as `target`, by whatever path or link.
-    fn input_at(&self, target: &Path) -> Option<PathBuf> {
-        let target = identity(target)?;
-        let mut waiting: Vec<(PathBuf, usize)> =
-            self.inputs.iter().map(|path| (path.clone(), DEPTH)).collect();
-        while let Some((path, depth)) = waiting.pop() {
-            if path.is_dir() {
-                let Ok(entries) = fs::read_dir(&path) else { continue };
-                let inside = entries.flatten().map(|entry| entry.path());
-                let inside = inside.filter(|path| is_read_from_folders(path) || path.is_dir());
-                if depth > 0 {
-                    waiting.extend(inside.map(|path| (path, depth - 1)));
-                }
-            } else if identity(&path).as_ref() == Some(&target) {
-                return Some(path);
-            }
-        }
-        None
+    pub fn input_at(&self, target: &Path) -> Option<&Path> {
+        let files = self.files.get_or_init(|| files(&self.inputs));
+        files.get(&identity(target)?).map(PathBuf::as_path)
     }
+}
+
+/// The files that are `inputs` or in folders below them. Every folder is looked into once, however many links lead there.
+fn files(inputs: &[PathBuf]) -> HashMap<Identity, PathBuf> {
+    let (mut files, mut folders) = (HashMap::new(), HashSet::new());
+    let mut waiting: VecDeque<(PathBuf, usize)> =
+        inputs.iter().map(|path| (path.clone(), DEPTH)).collect();
+    // The least deep first: of a folder that is met twice as much is seen as can be.
+    while let Some((path, depth)) = waiting.pop_front() {
+        let Some(identity) = identity(&path) else { continue };
+        if !path.is_dir() {
+            files.entry(identity).or_insert(path);
+        } else if depth > 0 && folders.insert(identity) {
+            let Ok(entries) = fs::read_dir(&path) else { continue };
+            let inside = entries.flatten().map(|entry| entry.path());
+            let inside = inside.filter(|path| is_read_from_folders(path) || path.is_dir());
+            waiting.extend(inside.map(|path| (path, depth - 1)));
+        }
+    }
+    files
+}
+
+/// A path by which two names of one place are equal, also where nothing stands yet: absolute, links followed, and without steps
+/// up.
+pub fn place_of(path: &Path) -> PathBuf {
+    let mut place = std::path::absolute(Path::new(".")).unwrap_or_default();
+    for step in path.components() {
+        match step {
+            Component::ParentDir => drop(place.pop()),
+            Component::CurDir => {}
+            step => place.push(step),
+        }
+        // What is not there is no link.
+        place = fs::canonicalize(&place).unwrap_or(place);
+    }
+    place
 }
 
 fn is_read_from_folders(path: &Path) -> bool {
@@ -73,15 +100,20 @@ fn is_read_from_folders(path: &Path) -> bool {
     ending.is_some_and(|ending| READ_FROM_FOLDERS.contains(&ending.as_str()))
 }
 
-/// What two paths to one file share.
+/// What all paths to one file share.
 #[cfg(unix)]
-fn identity(path: &Path) -> Option<(u64, u64)> {
+type Identity = (u64, u64);
+#[cfg(not(unix))]
+type Identity = PathBuf;
+
+#[cfg(unix)]
+fn identity(path: &Path) -> Option<Identity> {
     use std::os::unix::fs::MetadataExt;
     fs::metadata(path).ok().map(|found| (found.dev(), found.ino()))
 }
 
 #[cfg(not(unix))]
-fn identity(path: &Path) -> Option<PathBuf> {
+fn identity(path: &Path) -> Option<Identity> {
     fs::canonicalize(path).ok()
 }
 
@@ -127,5 +159,44 @@ mod tests {
         std::os::unix::fs::symlink(at("map.ply"), at("out.ply")).unwrap();
         let rules = Rules::new([at("map.ply").as_path()], true);
         assert!(rules.check(&at("out.ply"), Kind::Cloud).is_err());
+    }
+
+    /// Eight links to the folder that they are in: eight times eight times .. paths to one photo.
+    #[cfg(unix)]
+    #[test]
+    fn folders_are_looked_into_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        for name in 0..30 {
+            std::os::unix::fs::symlink(".", at(&format!("l{name}"))).unwrap();
+        }
+        fs::create_dir(at("below")).unwrap();
+        fs::write(at("below/a.jpg"), "photo").unwrap();
+        fs::write(at("audit.json"), "mine").unwrap();
+        let rules = Rules::new([folder.path()], true);
+        assert!(rules.check(&at("audit.json"), Kind::AuditJson).is_ok());
+        assert!(rules.check(&at("below/a.jpg"), Kind::Page).is_err());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn names_of_one_place_are_equal_whatever_stands_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir(at("real")).unwrap();
+        std::os::unix::fs::symlink("real", at("link")).unwrap();
+        let place = place_of(&at("real/out"));
+        for name in [
+            "link/out",
+            "real/../real/out",
+            "new/../real/out",
+            "link/../real/./out",
+            "link/a/b/../../out",
+        ] {
+            assert_eq!(place_of(&at(name)), place, "{name}");
+        }
+        assert_ne!(place_of(&at("out")), place);
+        assert_eq!(place_of(&at("link")), place_of(&at("real")));
+        assert_eq!(place_of(Path::new("a")), place_of(Path::new("./b/../a")));
     }
 }

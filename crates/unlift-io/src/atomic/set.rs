@@ -154,13 +154,14 @@ fn begin(target: &Path, access: Access) -> io::Result<(MadeFolders, Partial)> {
     }
 }
 
-/// Holds a lock (`flock`) on a folder, for the moment in which files take their places there.
-struct Alone(#[expect(dead_code, reason = "held")] Option<File>);
+/// Holds a lock (`flock`) on a folder, for the moment in which files take their places there, or others that are about them do.
+#[derive(Debug)]
+pub struct Alone(#[expect(dead_code, reason = "held")] Option<File>);
 
 impl Alone {
     /// Waits for other runs that are at it, which takes no time that anybody notices. Where folders cannot be locked,
     /// or a lock is held for seconds, as by `flock(1)` around a command, it goes on without.
-    fn wait_in(folder: &Path) -> Self {
+    pub fn wait_in(folder: &Path) -> Self {
         const PATIENCE: Duration = Duration::from_secs(5);
         let started = Instant::now();
         let Ok(file) = File::open(folder) else { return Self(None) };

@@ -6,7 +6,7 @@ use std::path::Path;
 use half::f16;
 use unlift::descriptors::Values;
 
-use super::h5::{Array, Numbers, Writer};
+use super::h5::{Array, DEEPEST, Numbers, Writer};
 use super::image::ImageFeatures;
 use crate::atomic::{Access, OutputFile};
 use crate::error::Error;
@@ -87,6 +87,11 @@ fn check(writer: &Writer, image: &ImageFeatures, path: &Path) -> Result<(), Erro
     if parts().any(|part| part.is_empty() || part == "." || part == ".." || part.contains('\0')) {
         let expected = "a name of parts that are not empty, . or ..";
         return Err(Error::new(path, place(), expected, quoted(image.name.as_bytes())));
+    }
+    let deep = parts().count();
+    if deep > DEEPEST {
+        let expected = format!("a name of at most {DEEPEST} parts");
+        return Err(Error::new(path, place(), expected, deep.to_string()));
     }
     if !writer.is_free(&image.name) {
         let found = "one that is there already, or within another image";

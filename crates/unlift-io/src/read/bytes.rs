@@ -5,7 +5,7 @@ use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Place};
-use crate::input;
+use crate::input::{self, Budget};
 
 /// A little-endian reader that knows where it is and how much is left.
 ///
@@ -42,6 +42,19 @@ impl Bytes {
     /// Errors from here on name record `number`, counted from 1.
     pub fn record(&mut self, number: u64) {
         self.part = Part::Record(number);
+    }
+
+    /// An empty list with room for `n` entries of what stands at `place`, within the budget of the file.
+    ///
+    /// # Errors
+    /// When there is not so much memory.
+    pub fn room<T>(&self, place: impl Into<Place> + Clone, n: u64) -> Result<Vec<T>, Error> {
+        Budget::new(&self.path, self.len).room(place, n)
+    }
+
+    /// Where the next byte is.
+    pub fn at(&self) -> u64 {
+        self.at
     }
 
     /// Bytes between here and the end of the file.

@@ -148,6 +148,13 @@ fn most_at_one_place(positions: &[[f64; 3]]) -> Option<(usize, [f64; 3])> {
     Some((n, place))
 }
 
+/// What to say of a file with room for so many `more` points behind the `n` that it declares.
+fn undeclared(n: u64, more: u64) -> Option<String> {
+    (more > 0).then(|| {
+        format!("{n} points are declared, and {more} more seem to follow, which are not read: a part of the map at most")
+    })
+}
+
 /// Reads the map at `path`: a COLMAP model folder or a project folder that holds one (of several, the
 /// one with the most points; `notes` says which), a map of OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler or VisualSFM (NVM),
 /// or a point cloud: see [`EXPECTED`] for the endings.

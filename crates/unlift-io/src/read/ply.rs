@@ -9,8 +9,9 @@ use super::bytes::Bytes;
 use super::columns::{Field, coordinate, is_called};
 use super::lines::{Lines, number, quoted, words};
 use super::scalar::Scalar;
+use super::undeclared;
 use crate::error::{Error, Place};
-use crate::input;
+use crate::input::{self, Budget};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Encoding {
@@ -97,7 +98,10 @@ pub fn read(path: &Path) -> Result<Input, Error> {
         return Err(refuse(format!("a property {name} in element vertex")));
     }
     let mut rows = match header.encoding {
-        Encoding::Ascii => Rows::Ascii(Lines::continuing(path, reader, header.n_lines)),
+        Encoding::Ascii => {
+            let lines = Lines::continuing(path, reader, header.n_lines);
+            Rows::Ascii(lines, Budget::new(path, len))
+        }
         encoding => {
             let bytes = Bytes::continuing(path, reader, header.n_bytes, len);
             Rows::Binary(bytes, encoding == Encoding::Big)
@@ -112,27 +116,24 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     let mut boxes = Vec::new();
     for before in &header.elements[..vertex] {
         match before.find(BOX).ok().filter(|_| axes.is_err()) {
-            Some(sides) => rows.read(before, sides, |sides| boxes.push(sides))?,
-            None => rows.read(before, [], |_| {})?,
+            Some(sides) => boxes = rows.read(before, sides)?,
+            None => drop(rows.read(before, [])?),
         }
     }
-    let mut positions = Vec::new();
-    match (axes, packed) {
-        (Ok(axes), _) => rows.read(element, axes, |position| positions.push(position))?,
+    let positions = match (axes, packed) {
+        (Ok(axes), _) => rows.read(element, axes)?,
         (Err(_), Ok(packed)) => {
             if (boxes.len() as u64).saturating_mul(PER_BOX) < element.count {
                 let expected = format!("an element chunk, a row per {PER_BOX} packed splats");
                 return Err(Error::new(path, "header", expected, boxes.len().to_string()));
             }
-            rows.read(element, packed, |[packed]| {
-                positions.push(unpacked(packed as u32, &boxes[positions.len() / PER_BOX as usize]));
-            })?;
+            let all = rows.read(element, packed)?.into_iter().enumerate();
+            all.map(|(at, [packed])| unpacked(packed as u32, &boxes[at / PER_BOX as usize]))
+                .collect()
         }
-        (Err(_), Err(_)) => {}
-    }
-    if header.elements.len() == vertex + 1 {
-        rows.end(element.count)?;
-    }
+        (Err(_), Err(_)) => Vec::new(),
+    };
+    let more = rows.more(element, &header.elements[vertex + 1..])?;
     let is_splat = element.find(["opacity", "scale_0", "rot_0"]).is_ok() || axes.is_err();
     Ok(Input {
         positions,
@@ -142,6 +143,7 @@ pub fn read(path: &Path) -> Result<Input, Error> {
             Encoding::Big => "ply binary big endian",
         },
         notes: is_splat.then(|| SPLATS.to_owned()).into_iter().collect(),
+        doubts: undeclared(element.count, more).into_iter().collect(),
         ..Input::default()
     })
 }
@@ -171,7 +173,7 @@ pub fn splats(path: &Path) -> Result<Input, Error> {
         return Err(bytes.error_ahead(format!("splats of {SPLAT} bytes each"), found));
     }
     let mut row = [0; SPLAT as usize];
-    let mut positions = Vec::with_capacity(n as usize);
+    let mut positions = bytes.room("splats", n)?;
     for _ in 0..n {
         bytes.fill(&mut row, "splat")?;
         let axis = |at: usize| Field { at: 4 * at, scalar: Scalar::F32 }.of(&row, false);
@@ -255,49 +257,66 @@ fn header(path: &Path, reader: &mut BufReader<File>) -> Result<Header, Error> {
 
 /// Rows of elements, one element after the other.
 enum Rows {
-    Ascii(Lines),
+    Ascii(Lines, Budget),
     /// Whether the most significant byte comes first.
     Binary(Bytes, bool),
 }
 
 impl Rows {
-    /// Calls `each` with the values of the properties `wanted` in every row of `element`.
+    /// The values of the properties `wanted` in every row of `element`; none if none are wanted.
     fn read<const N: usize>(
         &mut self,
         element: &Element,
         wanted: [usize; N],
-        each: impl FnMut([f64; N]),
-    ) -> Result<(), Error> {
+    ) -> Result<Vec<[f64; N]>, Error> {
         match self {
-            Self::Ascii(lines) => ascii(lines, element, wanted, each),
-            Self::Binary(bytes, big) => binary(bytes, *big, element, wanted, each),
+            Self::Ascii(lines, budget) => ascii(lines, budget, element, wanted),
+            Self::Binary(bytes, big) => binary(bytes, *big, element, wanted),
         }
     }
 
-    /// Refuses what follows the vertices, which were the last element.
-    fn end(&mut self, count: u64) -> Result<(), Error> {
+    /// How many more vertices there is room for than `vertex` declares, with the elements `behind` it.
+    ///
+    /// # Errors
+    /// When anything follows the last element that has vertices.
+    fn more(&mut self, vertex: &Element, behind: &[Element]) -> Result<u64, Error> {
         match self {
-            Self::Ascii(lines) => {
+            Self::Ascii(lines, _) => {
+                let mut n_rows = 0u64;
                 while lines.advance()? {
-                    if !lines.line().is_empty() {
-                        let expected = format!("end of file after {count} vertices");
+                    n_rows += u64::from(!lines.line().is_empty());
+                    if n_rows > 0 && behind.is_empty() {
+                        let expected = format!("end of file after {} vertices", vertex.count);
                         return Err(lines.error(expected, quoted(lines.line())));
                     }
                 }
-                Ok(())
+                let declared = behind.iter().fold(0, |sum: u64, it| sum.saturating_add(it.count));
+                Ok(n_rows.saturating_sub(declared))
             }
-            Self::Binary(bytes, _) => bytes.end(),
+            Self::Binary(bytes, _) => {
+                // Of lists only their values say how long they are.
+                if behind.iter().any(Element::has_list) {
+                    return Ok(0);
+                }
+                if behind.is_empty() {
+                    bytes.end()?;
+                }
+                let size = |it: &Element| it.count.saturating_mul(it.stride() as u64);
+                let declared = behind.iter().fold(0, |sum: u64, it| sum.saturating_add(size(it)));
+                Ok(bytes.remaining().saturating_sub(declared) / vertex.stride() as u64)
+            }
         }
     }
 }
 
 fn ascii<const N: usize>(
     lines: &mut Lines,
+    budget: &Budget,
     element: &Element,
     wanted: [usize; N],
-    mut each: impl FnMut([f64; N]),
-) -> Result<(), Error> {
+) -> Result<Vec<[f64; N]>, Error> {
     let name = String::from_utf8_lossy(&element.name);
+    let mut rows = budget.room(&*name, if N == 0 { 0 } else { element.count })?;
     for row in 1..=element.count {
         loop {
             if !lines.advance()? {
@@ -333,9 +352,9 @@ fn ascii<const N: usize>(
             let expected = format!("{n_expected} values of {name} {row}");
             return Err(lines.error(expected, n_words.to_string()));
         }
-        each(values);
+        rows.push(values);
     }
-    Ok(())
+    Ok(rows)
 }
 
 fn binary<const N: usize>(
@@ -343,8 +362,7 @@ fn binary<const N: usize>(
     big: bool,
     element: &Element,
     wanted: [usize; N],
-    mut each: impl FnMut([f64; N]),
-) -> Result<(), Error> {
+) -> Result<Vec<[f64; N]>, Error> {
     let stride = element.stride();
     let name = String::from_utf8_lossy(&element.name);
     let size = element.count.checked_mul(stride as u64);
@@ -353,7 +371,8 @@ fn binary<const N: usize>(
         return Err(bytes.error_ahead(expected, format!("{} bytes", bytes.remaining())));
     };
     if N == 0 && !element.has_list() {
-        return bytes.skip(size, "an element before vertex");
+        bytes.skip(size, "an element before vertex")?;
+        return Ok(Vec::new());
     }
     // Values up to a list stand together: how many bytes, which of them are wanted, and the list.
     let mut runs = vec![(0, Vec::new(), None)];
@@ -370,6 +389,7 @@ fn binary<const N: usize>(
         *len += scalar.size();
     }
     let mut buffer = vec![0; stride];
+    let mut rows = bytes.room(&*name, if N == 0 { 0 } else { element.count })?;
     for number in 1..=element.count {
         bytes.record(number);
         let mut values = [f64::NAN; N];
@@ -387,7 +407,7 @@ fn binary<const N: usize>(
             }
             bytes.skip((n as u64).saturating_mul(*size), "a list")?;
         }
-        each(values);
+        rows.push(values);
     }
-    Ok(())
+    Ok(rows)
 }

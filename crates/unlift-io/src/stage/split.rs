@@ -41,7 +41,7 @@ impl<'a> Split<'a> {
             let place = format!("column {}", twice[0]);
             return Err(Error::new(path, place, "one of this name", "two columns of this name"));
         }
-        let rows = rows.max(1).next_multiple_of(2);
+        let rows = rows.clamp(1, u64::MAX - 1).next_multiple_of(2);
         let n_parts = parts.n_rows().div_ceil(rows).max(1);
         let names = (0..n_parts).map(|at| format!("part-{at:06}.{ENDING}")).collect();
         Ok(Self { path, parts, kind, rows, names })

@@ -188,3 +188,27 @@ fn a_database_in_write_ahead_mode_is_read_whole() {
     let error = read::descriptors(&path, &input).unwrap_err().to_string();
     assert!(error.contains("no such image"), "the journal counts: {error}");
 }
+
+/// The writer was killed within a transaction: the file holds rows that never were, and the journal beside it those to put back.
+#[test]
+fn a_database_with_a_transaction_that_was_not_done_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("database.db");
+    fs::copy(data("project/database.db"), &path).unwrap();
+    let writer = rusqlite::Connection::open(&path).unwrap();
+    let begin = "PRAGMA journal_mode=DELETE; PRAGMA cache_size=2; BEGIN; UPDATE images SET name = name || 'x'; \
+                 CREATE TABLE pad(x);";
+    writer.execute_batch(begin).unwrap();
+    for _ in 0..20 {
+        writer.execute_batch("INSERT INTO pad VALUES(zeroblob(4000))").unwrap();
+    }
+    // As they are at this moment.
+    let killed = dir.path().join("killed.db");
+    fs::copy(&path, &killed).unwrap();
+    fs::copy(dir.path().join("database.db-journal"), dir.path().join("killed.db-journal")).unwrap();
+    drop(writer);
+    let input = read::open(&data("project")).unwrap();
+    let error = read::descriptors(&killed, &input).unwrap_err().to_string();
+    assert!(!error.contains('\n') && error.contains("killed.db: "), "{error}");
+    assert!(read::descriptors(&path, &input).is_ok(), "what was taken back");
+}

@@ -267,3 +267,32 @@ fn what_is_wrong_is_told_with_its_line() {
     );
     assert!(read::open(Path::new("no such folder")).is_err());
 }
+
+/// What is said against the points of a file, and of one that declares fewer of them, as `few` in place of `all` does.
+fn doubts(name: &str, text: String, all: &str, few: &str) -> [Vec<String>; 2] {
+    assert!(text.contains(all), "{text}");
+    let less = text.replacen(all, few, 1);
+    [text, less].map(|text| {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        fs::write(&path, text).unwrap();
+        read::open(&path).unwrap().doubts
+    })
+}
+
+/// The file was put together wrongly, or somebody wrote a smaller number: the figures are about a part of the map.
+#[test]
+fn files_with_more_points_than_they_declare_are_doubted() {
+    let faces = "element face 1\nproperty list uchar int vertex_indices\nend_header";
+    let ply = format!("{}3 0 1 2\n", ply().replacen("end_header", faces, 1));
+    for (name, text, all, few) in [
+        ("a.out", bundler(), "\n3 3\n", "\n3 2\n"),
+        ("a.nvm", nvm(), "\n3\n", "\n2\n"),
+        ("a.ply", ply, "vertex 3", "vertex 2"),
+    ] {
+        let told = "2 points are declared, and 1 more seem to follow, which are not read: a part of the map at most";
+        let [whole, less] = doubts(name, text, all, few);
+        assert!(whole.is_empty(), "{name}: {whole:?}");
+        assert_eq!(less, [told], "{name}");
+    }
+}

@@ -107,6 +107,47 @@ fn degrees_of_las_are_told() {
     }
 }
 
+/// Numbers that are too small: the rest of the points is there, and is not read.
+#[test]
+fn files_with_more_points_than_they_declare_are_doubted() {
+    let doubts = |name: &str, bytes: Vec<u8>| {
+        let (_dir, path) = write(name, bytes);
+        read::open(&path).unwrap().doubts
+    };
+    for (minor, at) in [(2, 107), (4, 247)] {
+        let mut file = made::las(minor, 34);
+        assert!(doubts("a.las", file.clone()).is_empty(), "{minor}");
+        file[at] = 1;
+        assert_eq!(doubts("a.las", file.clone()).len(), 1, "{minor}");
+        if minor == 4 {
+            // What follows are records of another kind, as the head says.
+            let end = file.len() - 2 * 34;
+            file[235..243].copy_from_slice(&(end as u64).to_le_bytes());
+            assert!(doubts("a.las", file).is_empty(), "{minor}");
+        }
+    }
+    let text = made::pcd("binary");
+    assert!(doubts("a.pcd", text.clone()).is_empty());
+    let at = text.windows(8).position(|word| word == b"POINTS 4").unwrap();
+    let mut less = text;
+    less[at + 7] = b'2';
+    assert_eq!(doubts("a.pcd", less).len(), 1);
+}
+
+/// A file with holes is as large as it likes: nothing of that size is asked for.
+#[test]
+fn a_file_with_holes_is_one_line() {
+    let head = "ply\nformat binary_little_endian 1.0\nelement vertex 200000000000\nproperty float x\n\
+                property float y\nproperty float z\nend_header\n";
+    let (_dir, path) = write("a.ply", head);
+    let file = std::fs::OpenOptions::new().write(true).open(&path).unwrap();
+    // Some file systems have no files of that size.
+    if file.set_len(head.len() as u64 + 12 * 200_000_000_000).is_ok() {
+        let error = read::open(&path).unwrap_err().to_string();
+        assert!(error.contains("expected as much as fits into memory, found "), "{error}");
+    }
+}
+
 /// `fuzz/seeds` asks for these files: a byte that says of which kind, as the target `points` reads it, and the scan.
 #[test]
 #[ignore = "writes seeds of fuzzing into the folder UNLIFT_SEEDS"]

@@ -101,10 +101,14 @@ fn line(cells: &[String]) -> String {
     cells.join(",") + "\n"
 }
 
+/// A cell in the marks of the format. Text that a spreadsheet would take for a formula has a `'` before it.
 fn quoted(cell: &str) -> String {
+    let is_formula =
+        cell.starts_with(['=', '+', '-', '@', '\t', '\r']) && cell.parse::<f64>().is_err();
+    let mark = if is_formula { "'" } else { "" };
     match cell.contains([',', '"', '\n', '\r']) {
-        true => format!("\"{}\"", cell.replace('"', "\"\"")),
-        false => cell.to_owned(),
+        true => format!("\"{mark}{}\"", cell.replace('"', "\"\"")),
+        false => format!("{mark}{cell}"),
     }
 }
 
@@ -116,5 +120,12 @@ mod tests {
     fn cells_with_marks_of_the_format_are_quoted() {
         let cells = ["a,b", "say \"c\"", "plain"].map(str::to_owned);
         assert_eq!(line(&cells), "\"a,b\",\"say \"\"c\"\"\",plain\n");
+    }
+
+    #[test]
+    fn no_cell_is_a_formula() {
+        let cells =
+            ["=HYPERLINK(\"x\")", "+1+1", "-x", "@SUM(1)", "-1.5", "ppl+"].map(str::to_owned);
+        assert_eq!(line(&cells), "\"'=HYPERLINK(\"\"x\"\")\",'+1+1,'-x,'@SUM(1),-1.5,ppl+\n");
     }
 }

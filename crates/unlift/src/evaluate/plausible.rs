@@ -6,14 +6,20 @@ use crate::recover::Recovered;
 use crate::released::{Obfuscation, Released};
 use crate::truth::{Original, Secret};
 
-/// Of how many recovered positions, how many are nearer to a point of their own record than to one of a record half
-/// a map away. Records stand in random order: of positions of another map, or in another order, it is half of them.
-/// Who knows no more than the records gets clearly more.
+/// Of how many recovered positions, how many are nearer to what they are of than to what is half a map away: to their own
+/// record, where the released map is at hand, else to a point of it. Records stand in random order: of positions of another
+/// map, or in another order, it is half of them. Who knows no more than the records has nearly all of them on their own
+/// records, and clearly more than half nearer to their own points.
 pub fn nearer_to_own<const D: usize>(
     recovered: &Recovered<D>,
     original: &Original<D>,
     secret: &Secret,
+    released: Option<&Released<D>>,
 ) -> (usize, usize) {
+    let n = recovered.n_slots().min(secret.n_slots());
+    if let Some(released) = released {
+        return nearer_to_own_record(released, n, |slot| recovered.position(slot));
+    }
     let points = original.reveal().positions();
     let slots = secret.slots_per_record();
     let n_records = secret.n_slots() / slots;
@@ -22,19 +28,27 @@ pub fn nearer_to_own<const D: usize>(
         let away = hidden.iter().map(|id| distance(position, &points[id.index()]));
         away.fold(f64::INFINITY, f64::min)
     };
-    let (mut nearer, mut n) = (0, 0);
-    for slot in 0..recovered.n_slots().min(secret.n_slots()) {
-        let Some(position) = recovered.position(slot) else { continue };
-        let record = slot / slots;
+    count((0..n).filter_map(|slot| {
+        let (position, record) = (recovered.position(slot)?, slot / slots);
         let other = (record + n_records.div_ceil(2)) % n_records;
-        n += 1;
-        nearer += usize::from(nearest(&position, record) < nearest(&position, other));
-    }
-    (nearer, n)
+        // Points that coincide are equally near.
+        Some(nearest(&position, record) <= nearest(&position, other))
+    }))
 }
 
 /// Fewer slots than this are too few to judge.
 const FEW: usize = 30;
+
+/// Whether as few of all are nearer to their own as if they were strangers.
+pub fn are_strangers((nearer, n): (usize, usize)) -> bool {
+    // Of strangers half are nearer; two standard deviations on top.
+    n >= FEW && nearer as f64 <= 0.5 * n as f64 + (n as f64).sqrt()
+}
+
+/// How many of `nearer` are true, and how many there are.
+fn count(nearer: impl Iterator<Item = bool>) -> (usize, usize) {
+    nearer.fold((0, 0), |(nearer, n), is_nearer| (nearer + usize::from(is_nearer), n + 1))
+}
 
 /// Refuses a truth that is not that of the released map: of another unit, number of points or fingerprint, or, by
 /// where its points lie, of another map. What comes back would be next to nothing, and read as "safe".
@@ -62,9 +76,9 @@ pub fn belongs<const D: usize>(
         }
     }
     released.fingerprint().expect(secret.map())?;
-    let (nearer, n) = nearer_to_own_record(released, original, secret);
-    // Of strangers half are nearer; two standard deviations on top.
-    if n >= FEW && nearer as f64 <= 0.5 * n as f64 + (n as f64).sqrt() {
+    let n = secret.n_slots().min(released.n_slots());
+    let (nearer, n) = nearer_to_own_record(released, n, point_of(original, secret));
+    if are_strangers((nearer, n)) {
         let expected = "points nearer to their own records than to others";
         let found = format!(
             "{nearer} of {n} (of another map, in another frame, or in another order of slots)"
@@ -74,25 +88,30 @@ pub fn belongs<const D: usize>(
     Ok(())
 }
 
-/// Of how many hidden points, how many are nearer to their own record than to one half a map away. Of points of
-/// another map, or in another order, it is half of them.
-fn nearer_to_own_record<const D: usize>(
-    released: &Released<D>,
+/// The point that a slot hides.
+fn point_of<const D: usize>(
     original: &Original<D>,
     secret: &Secret,
+) -> impl Fn(usize) -> Option<[f64; D]> {
+    let points = original.reveal().positions();
+    |slot| Some(points[secret.hidden()[slot].index()])
+}
+
+/// Of how many of `n` slots that have a place, how many are nearer to their own record than to one half a map away.
+fn nearer_to_own_record<const D: usize>(
+    released: &Released<D>,
+    n: usize,
+    place: impl Fn(usize) -> Option<[f64; D]>,
 ) -> (usize, usize) {
-    let (points, origin) = (original.reveal().positions(), released.origin());
     let (slots, n_records) = (released.slots_per_record(), released.n_records());
-    let n = secret.n_slots().min(released.n_slots());
-    let is_nearer = |slot: &usize| {
-        let point = sub(&points[secret.hidden()[*slot].index()], &origin);
+    count((0..n).filter_map(|slot| {
+        let point = sub(&place(slot)?, &released.origin());
         let record = slot / slots;
         let other = (record + n_records.div_ceil(2)) % n_records;
         let away = |record: usize| to_record(released.obfuscation(), record, &point);
         // Points that coincide are as near to each other's records, but for rounding.
-        away(record) <= away(other) + rounding(released.obfuscation(), record, &point)
-    };
-    ((0..n).filter(is_nearer).count(), n)
+        Some(away(record) <= away(other) + rounding(released.obfuscation(), record, &point))
+    }))
 }
 
 /// How far every hidden point lies from its own record, in the unit of the map: next to nothing, if the truth is that of the
@@ -102,14 +121,32 @@ pub fn away_from_own<const D: usize>(
     original: &Original<D>,
     secret: &Secret,
 ) -> Vec<f64> {
-    let (points, origin) = (original.reveal().positions(), released.origin());
-    let slots = released.slots_per_record();
     let n = secret.n_slots().min(released.n_slots());
-    let away = |slot: usize| {
-        let point = sub(&points[secret.hidden()[slot].index()], &origin);
-        to_record(released.obfuscation(), slot / slots, &point)
+    away(released, n, point_of(original, secret))
+}
+
+/// How far every recovered position lies from its own record: next to nothing, if rows are in the order of the released map.
+/// Slots without a position are left out.
+pub fn recovered_away<const D: usize>(
+    released: &Released<D>,
+    recovered: &Recovered<D>,
+) -> Vec<f64> {
+    let n = recovered.n_slots().min(released.n_slots());
+    away(released, n, |slot| recovered.position(slot))
+}
+
+/// How far the places of `n` slots lie from their own records.
+fn away<const D: usize>(
+    released: &Released<D>,
+    n: usize,
+    place: impl Fn(usize) -> Option<[f64; D]>,
+) -> Vec<f64> {
+    let slots = released.slots_per_record();
+    let of_slot = |slot: usize| {
+        let point = sub(&place(slot)?, &released.origin());
+        Some(to_record(released.obfuscation(), slot / slots, &point))
     };
-    (0..n).map(away).collect()
+    (0..n).filter_map(of_slot).collect()
 }
 
 /// How far from its record, held in `f32`, a point can be for that reason alone.

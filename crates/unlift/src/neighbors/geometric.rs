@@ -16,6 +16,8 @@ use crate::{About, Error, RecordId, RowOrder};
 
 /// Estimates looked at per record listed: some share a record, some records pass too far away.
 const LOOK: usize = 3;
+/// The same at most, where nearly all of them may not be listed: estimates of one center that coincide.
+const MOST_LOOKED: usize = 64 * LOOK;
 
 /// Per slot the `k` records most likely to hide points near its own, with scores that are higher for
 /// likelier ones: the distance between estimates, plus the distance from the estimate to the record
@@ -106,7 +108,7 @@ pub(crate) fn geometric_by<const D: usize>(
                     }
                 }
                 // Own partners, shared records and rays of the own center cost places.
-                if row.len() >= k || scratch.len() < look {
+                if row.len() >= k || scratch.len() < look || look >= MOST_LOOKED * k {
                     row.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
                     row.truncate(k);
                     return row;

@@ -39,6 +39,8 @@ const ROOT_NAMES: &[&str] = &[
 const ARROWS: &[(&str, &[&str])] = &[
     ("error", &[]),
     ("line", &[]),
+    // Runs code of others, whatever it does.
+    ("guard", &[]),
     ("ids", &[]),
     ("about", &[]),
     // Chooses between functions, whatever they do.

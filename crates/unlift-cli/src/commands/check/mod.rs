@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
 use unlift::OneLine;
-use unlift_audit::Finished;
+use unlift_audit::{FIGURES, Finished, PAGE};
 use unlift_io::Error;
+use unlift_io::atomic::{Rules, place_of};
 
 use self::config::Entry;
-use super::gate_files::place_of;
 use super::{audit_images, audit_map, audit_released};
 use crate::args::{AuditCommand, CheckArgs, Cli, Command, ResultArgs};
 use crate::exit::{self, Outcome, usage};
@@ -41,7 +41,9 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<Outcome> {
     if !folder.as_os_str().is_empty() {
         std::env::set_current_dir(folder).map_err(|error| Error::read(folder, error))?;
     }
-    apart(&audits, place)?;
+    let read = audits.iter().flat_map(|(_, audit)| inputs(audit));
+    let rules = Rules::new(read.chain(args.config.file_name().map(Path::new)), true);
+    apart(&audits, &rules, place)?;
     let (mut failed, mut worst, mut undone) = (false, 0, 0);
     for (entry, audit) in &audits {
         match perform(audit) {
@@ -92,26 +94,44 @@ fn result(audit: &AuditCommand) -> &ResultArgs {
     }
 }
 
-/// Refuses two audits that write to one place: the second would replace what the first found.
+/// What an audit reads.
+fn inputs(audit: &AuditCommand) -> Vec<&Path> {
+    match audit {
+        AuditCommand::Map(args) => audit_map::inputs(args),
+        AuditCommand::Images(args) => audit_images::inputs(args),
+        AuditCommand::Released(args) => audit_released::inputs(args),
+    }
+}
+
+/// Refuses two audits that write to one place, as the second would replace what the first found, and one that writes over what
+/// any of them reads by `rules`, the configuration among it.
 fn apart(
     audits: &[(&Entry, AuditCommand)],
+    rules: &Rules,
     place: impl Fn(&Entry) -> String,
 ) -> anyhow::Result<()> {
     let mut taken: Vec<(PathBuf, usize)> = Vec::new();
-    for (entry, audit) in audits {
+    for (at, (entry, audit)) in audits.iter().enumerate() {
         let result = result(audit);
         let files = [("junit", &result.junit), ("sarif", &result.sarif)];
-        let files = files.into_iter().filter_map(|(key, path)| Some((key, path.as_ref()?)));
-        for (key, path) in [("out", &result.out)].into_iter().chain(files) {
-            let target = place_of(path);
-            let other = taken.iter().find(|(other, line)| *other == target && *line != entry.line);
-            if let Some((_, line)) = other {
-                let (path, place) = (path.display(), place(entry));
-                return Err(usage(format!(
-                    "{place}: {key}: expected a place of its own, found {path}, that of line {line}"
-                )));
+        let files = files.into_iter().filter_map(|(key, path)| Some((key, path.as_ref()?, None)));
+        let own = [PAGE, FIGURES].map(|name| ("out", &result.out, Some(name)));
+        for (key, path, name) in own.into_iter().chain(files) {
+            let file = name.map_or(path.clone(), |name| path.join(name));
+            let wrong = |expected: &str, found: String| {
+                usage(format!("{}: {key}: expected {expected}, found {found}", place(entry)))
+            };
+            if let Some(input) = rules.input_at(&file) {
+                let found = format!("{}, the input {}", file.display(), input.display());
+                return Err(wrong("a file that is not read", found));
             }
-            taken.push((target, entry.line));
+            let target = place_of(&file);
+            if let Some((_, other)) = taken.iter().find(|(taken, by)| *taken == target && *by != at)
+            {
+                let (path, line) = (path.display(), audits[*other].0.line);
+                return Err(wrong("a place of its own", format!("{path}, that of line {line}")));
+            }
+            taken.push((target, at));
         }
     }
     Ok(())

@@ -15,7 +15,7 @@ mod write;
 
 use half::f16;
 
-pub(crate) use read::FeatureStore;
+pub(crate) use read::{DEEPEST, FeatureStore};
 pub(crate) use write::Writer;
 
 /// Values of an array, row-major.

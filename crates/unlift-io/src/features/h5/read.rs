@@ -19,7 +19,7 @@ use crate::read::lines::quoted;
 /// Values of one array at most: a header can claim any size in a few bytes.
 const MOST_VALUES: u64 = 1 << 28;
 /// How deep groups nest: links may lead in circles.
-const DEEPEST: usize = 64;
+pub(crate) const DEEPEST: usize = 64;
 /// What the library and we hold of a group beside its path, of a chunk beside its bytes, and of a value
 /// once it is read: at least, in bytes.
 const PER_GROUP: u64 = 256;

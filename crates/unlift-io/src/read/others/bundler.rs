@@ -7,6 +7,7 @@ use crate::error::Error;
 use crate::read::Input;
 use crate::read::columns::coordinate;
 use crate::read::lines::{Lines, number, quoted, words};
+use crate::read::undeclared;
 
 /// Exactly `N` numbers in the current line.
 fn numbers<const N: usize>(lines: &Lines, what: &str) -> Result<[f64; N], Error> {
@@ -60,5 +61,11 @@ pub fn read(path: &Path) -> Result<Input, Error> {
         next(&mut lines, &format!("the color of {what}"))?;
         next(&mut lines, &format!("the views of {what}"))?;
     }
+    let mut more = 0;
+    while lines.advance_to_data()? {
+        more += 1;
+    }
+    // Three lines a point.
+    found.doubts.extend(undeclared(*n_points, more / 3));
     Ok(found)
 }

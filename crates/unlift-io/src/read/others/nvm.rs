@@ -7,6 +7,7 @@ use crate::error::Error;
 use crate::read::Input;
 use crate::read::columns::coordinate;
 use crate::read::lines::{Lines, number, quoted, words};
+use crate::read::undeclared;
 
 /// The rotation of a quaternion (w, x, y, z).
 fn rotation([w, x, y, z]: [f64; 4]) -> [[f64; 3]; 3] {
@@ -49,6 +50,7 @@ pub fn read(path: &Path) -> Result<Input, Error> {
         return Err(lines.error("NVM_V3, as VisualSFM writes it", quoted(lines.line())));
     }
     let (mut largest, mut n_models, mut n_without) = (Input::default(), 0, 0);
+    let mut more = 0;
     loop {
         if !lines.advance_to_data()? {
             // A zero ends the list of models; some writers leave it out.
@@ -57,7 +59,14 @@ pub fn read(path: &Path) -> Result<Input, Error> {
             }
             break;
         }
-        let n_cameras = count(&lines, "a number of cameras")?;
+        let n_cameras = match count(&lines, "a number of cameras") {
+            // Behind a model, a point that it does not declare.
+            Err(_) if n_models + n_without > 0 => {
+                more += 1;
+                continue;
+            }
+            n_cameras => n_cameras?,
+        };
         if n_cameras == 0 {
             break;
         }
@@ -71,6 +80,7 @@ pub fn read(path: &Path) -> Result<Input, Error> {
             largest = model;
         }
     }
+    largest.doubts.extend(undeclared(largest.positions.len() as u64, more));
     if n_models > 1 {
         let points = largest.positions.len();
         largest.notes.push(format!("read, the largest of {n_models} models ({points} points)"));

@@ -12,6 +12,7 @@ use crate::error::Error;
 use crate::read::Input;
 use crate::read::bytes::Bytes;
 use crate::read::lines::quoted;
+use crate::read::undeclared;
 
 /// Bytes of the heads of all versions up to the numbers that positions are made with.
 const HEAD: usize = 179;
@@ -20,6 +21,9 @@ const COUNT_1_4: usize = 247;
 const HEAD_1_4: usize = 375;
 /// Bytes of a point at least, by format.
 const LEAST: [u16; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
+/// Where the heads of versions 1.3 and 1.4 say that waveforms begin, and that of 1.4 more records.
+const WAVES: usize = 227;
+const EXTENDED_1_4: usize = 235;
 /// Formats have these bits where a program compressed the points.
 const COMPRESSED: u8 = 0b1100_0000;
 
@@ -56,6 +60,8 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     let long = |head: &[u8], at: usize| {
         u64::from(u32::from_le_bytes(std::array::from_fn(|byte| head[at + byte])))
     };
+    let wide =
+        |head: &[u8], at: usize| u64::from_le_bytes(std::array::from_fn(|byte| head[at + byte]));
     let (start, mut n) = (long(&head, 96), long(&head, 107));
     let double = |at: usize| f64::from_le_bytes(std::array::from_fn(|byte| head[at + byte]));
     let scale: [f64; 3] = std::array::from_fn(|axis| double(131 + 8 * axis));
@@ -64,26 +70,32 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     if version.1 == 4 && usize::from(head_size) >= HEAD_1_4 {
         bytes.fill(&mut head[HEAD..], "the head")?;
         at = HEAD_1_4 as u64;
-        let all = u64::from_le_bytes(std::array::from_fn(|byte| head[COUNT_1_4 + byte]));
+        let all = wide(&head, COUNT_1_4);
         n = if all == 0 { n } else { all };
     }
     if start < at {
         let expected = format!("points behind the head of {at} bytes");
         return Err(bytes.error(expected, format!("at byte {start}")));
     }
+    // What may stand behind the points.
+    let behind = match at > HEAD as u64 {
+        true => [wide(&head, WAVES), wide(&head, EXTENDED_1_4)],
+        false => [0; 2],
+    };
     let mut system = System::default();
     if let Some(gap) = u64::from(head_size).checked_sub(at).filter(|gap| at + gap <= start) {
         bytes.skip(gap, "the head")?;
-        at += gap + system.look(&mut bytes, long(&head, 100), start - at - gap, false)?;
+        system.look(&mut bytes, long(&head, 100), start - at - gap, false)?;
     }
-    bytes.skip(start - at, "what stands before the points")?;
+    let gap = start - bytes.at();
+    bytes.skip(gap, "what stands before the points")?;
     let size = n.checked_mul(u64::from(record));
     if size.is_none_or(|size| size > bytes.remaining()) {
         let expected = format!("{n} points, {record} bytes each");
         return Err(bytes.error_ahead(expected, format!("{} bytes", bytes.remaining())));
     }
     let mut row = vec![0; usize::from(record)];
-    let mut positions = Vec::with_capacity(n as usize);
+    let mut positions = bytes.room("points", n)?;
     for number in 1..=n {
         bytes.record(number);
         bytes.fill(&mut row, "point")?;
@@ -93,18 +105,19 @@ pub fn read(path: &Path) -> Result<Input, Error> {
             std::array::from_fn(|axis| f64::from(integer(axis)) * scale[axis] + offset[axis]);
         positions.push(position);
     }
-    if at >= HEAD_1_4 as u64 {
-        let (behind, number) =
-            (u64::from_le_bytes(std::array::from_fn(|byte| head[235 + byte])), long(&head, 243));
-        let gap = behind.checked_sub(start + n * u64::from(record));
-        if let Some(gap) = gap.filter(|&gap| number > 0 && gap <= bytes.remaining()) {
-            bytes.skip(gap, "what stands behind the points")?;
-            let left = bytes.remaining();
-            system.look(&mut bytes, number, left, true)?;
-        }
+    let end = bytes.at();
+    let next = behind.into_iter().filter(|&next| next >= end).min();
+    let more = next.map_or(bytes.remaining(), |next| next - end) / u64::from(record);
+    // Of 1.3 the head does not say where waveforms are.
+    let doubts = undeclared(n, more).filter(|_| version.1 != 3).into_iter().collect();
+    let (gap, number) = (behind[1].checked_sub(end), long(&head, EXTENDED_1_4 + 8));
+    if let Some(gap) = gap.filter(|&gap| number > 0 && gap <= bytes.remaining()) {
+        bytes.skip(gap, "what stands behind the points")?;
+        let left = bytes.remaining();
+        system.look(&mut bytes, number, left, true)?;
     }
     let is_geographic = system.is_geographic();
-    Ok(Input { positions, format: "LAS", is_geographic, ..Input::default() })
+    Ok(Input { positions, format: "LAS", is_geographic, doubts, ..Input::default() })
 }
 
 /// What records of a file say of its coordinate system.
@@ -115,15 +128,9 @@ struct System {
 }
 
 impl System {
-    /// Looks through at most `number` records in `left` bytes; records behind the points are `long`. Returns how many bytes
-    /// they took. One that is cut off is the last: points do not depend on it.
-    fn look(
-        &mut self,
-        bytes: &mut Bytes,
-        number: u64,
-        left: u64,
-        long: bool,
-    ) -> Result<u64, Error> {
+    /// Looks through at most `number` records in `left` bytes; records behind the points are `long`. One that is
+    /// cut off is the last: points do not depend on it.
+    fn look(&mut self, bytes: &mut Bytes, number: u64, left: u64, long: bool) -> Result<(), Error> {
         /// Text is shorter.
         const LONGEST: u64 = 1 << 20;
         let mut head = [0; 60];
@@ -156,7 +163,7 @@ impl System {
                 _ => {}
             }
         }
-        Ok(taken)
+        Ok(())
     }
 
     /// Text is newer than keys, and goes first.

@@ -16,6 +16,7 @@ use crate::read::bytes::Bytes;
 use crate::read::columns::{self, coordinate};
 use crate::read::lines::{Lines, number, quoted, words};
 use crate::read::scalar::Scalar;
+use crate::read::undeclared;
 
 /// One column, or several of a name.
 #[derive(Clone, Copy, Debug)]
@@ -55,14 +56,19 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     let (file, len) = input::open(path)?;
     let mut reader = BufReader::new(file);
     let header = header(path, &mut reader)?;
+    let mut doubt = None;
     let (positions, format) = match &*header.data {
         // Nothing says how much there is to read.
         _ if header.n == 0 => (Vec::new(), "PCD"),
         b"ascii" => (ascii(path, reader, &header, len)?, "PCD ascii"),
-        b"binary" => (binary(path, reader, &header, len)?, "PCD binary"),
+        b"binary" => {
+            let (positions, more) = binary(path, reader, &header, len)?;
+            doubt = undeclared(header.n, more);
+            (positions, "PCD binary")
+        }
         _ => (compressed(path, reader, &header, len)?, "PCD compressed"),
     };
-    Ok(Input { positions, format, ..Input::default() })
+    Ok(Input { positions, format, doubts: doubt.into_iter().collect(), ..Input::default() })
 }
 
 /// The lines up to `DATA`, each a word and its values.
@@ -173,7 +179,7 @@ fn ascii(
         return Err(Error::new(path, "header", expected, header.n.to_string()));
     }
     let mut lines = Lines::continuing(path, reader, header.n_lines);
-    let mut positions = Vec::with_capacity(header.n as usize);
+    let mut positions = Budget::new(path, len).room("points", header.n)?;
     for at in 1..=header.n {
         if !lines.advance_to_data()? {
             return Err(lines.end_error(format!("point {at} of {}", header.n)));
@@ -203,12 +209,13 @@ fn ascii(
     Ok(positions)
 }
 
+/// The points, and how many more there is room for behind them.
 fn binary(
     path: &Path,
     reader: BufReader<File>,
     header: &Header,
     len: u64,
-) -> Result<Vec<[f64; 3]>, Error> {
+) -> Result<(Vec<[f64; 3]>, u64), Error> {
     let mut bytes = Bytes::continuing(path, reader, header.n_bytes, len);
     let (n, stride) = (header.n, header.stride);
     if n.checked_mul(stride).is_none_or(|size| size > bytes.remaining()) {
@@ -216,13 +223,13 @@ fn binary(
         return Err(bytes.error_ahead(expected, format!("{} bytes", bytes.remaining())));
     }
     let mut row = vec![0; stride as usize];
-    let mut positions = Vec::with_capacity(n as usize);
+    let mut positions = bytes.room("points", n)?;
     for number in 1..=n {
         bytes.record(number);
         bytes.fill(&mut row, "point")?;
         positions.push(header.axes.map(|axis| axis.scalar.read(&row[axis.byte as usize..], false)));
     }
-    Ok(positions)
+    Ok((positions, bytes.remaining() / stride))
 }
 
 /// All values of a field stand together, field by field, and the whole is compressed.

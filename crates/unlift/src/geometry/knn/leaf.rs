@@ -67,7 +67,7 @@ pub(super) fn solve<const D: usize>(
         }
         return;
     }
-    gather(tree, &middle, (reach + 2.0 * width) * SLACK, scratch);
+    gather(tree, &middle, ((reach + 2.0 * width) * SLACK, k + 1), scratch);
     let bound = (reach + width) * SLACK;
     for (at, place) in places.enumerate() {
         let row = tree.rows[place];
@@ -89,17 +89,18 @@ pub(super) fn solve<const D: usize>(
     }
 }
 
-/// Copies every point within `radius` of `middle` to the columns of `scratch`.
+/// Copies every point within `radius` of `middle` to the columns of `scratch`, of those that coincide at least the `most` with the
+/// lowest rows.
 fn gather<const D: usize>(
     tree: &Knn<'_, D>,
     middle: &[f64; D],
-    radius: f64,
+    (radius, most): (f64, usize),
     scratch: &mut Scratch<D>,
 ) {
     let bound = radius * radius + f64::MIN_POSITIVE;
     scratch.rows.clear();
     scratch.columns.iter_mut().for_each(Vec::clear);
-    tree.leaves_within(middle, bound, usize::MAX, |places| {
+    tree.leaves_within(middle, (bound, most), usize::MAX, |places| {
         for place in places {
             let point: [f64; D] = std::array::from_fn(|c| tree.columns[c][place]);
             if squared_distance(middle, &point) <= bound {

@@ -66,6 +66,32 @@ fn coincident_points_are_found_by_row() {
     assert_eq!(found, [(0.0, 0), (0.0, 1), (0.0, 2)]);
 }
 
+/// Depth cameras write (0, 0, 0) for "nothing": piles of thousands among other points.
+#[test]
+fn piles_are_as_if_every_point_was_looked_at() {
+    let mut draws = Draws::new(3, Stage::Synthetic, 0);
+    for share in [0.3, 0.9] {
+        let points: Vec<[f64; 3]> = (0..900)
+            .map(|row| match draws.uniform() < share {
+                // Zeros of both signs are one place.
+                true => [if row % 2 == 0 { 0.0 } else { -0.0 }, 0.0, 0.0],
+                false => std::array::from_fn(|_| draws.between(-1.0, 1.0)),
+            })
+            .collect();
+        compare(&points);
+    }
+}
+
+#[test]
+fn points_at_one_place_cost_no_more_than_others() {
+    let points = vec![[1.0; 3]; 200_000];
+    let knn = Knn::new(&points).unwrap();
+    let sums = knn.per_row(50, |_, found| found.iter().map(|item| item.1).sum::<u32>());
+    assert_eq!(sums[199_999], (0..50).sum::<u32>());
+    let mut found = Vec::new();
+    (0..points.len()).for_each(|row| knn.nearest(row, 50, &mut found));
+}
+
 #[test]
 fn any_position_can_ask() {
     let mut draws = Draws::new(9, Stage::Synthetic, 0);

@@ -125,7 +125,7 @@ impl<'a, const D: usize> Knn<'a, D> {
         }
         // Any place will do to start from; a position of its own has none, so it walks down.
         let leaf = match own {
-            Some(place) => (((place + 1) << self.depth) - 1) / self.rows.len(),
+            Some(place) => self.leaf_of(place),
             None => self.leaf_towards(&query),
         };
         let own = own.map_or(u32::MAX, |place| place as u32);
@@ -147,12 +147,12 @@ impl<'a, const D: usize> Knn<'a, D> {
     }
 
     /// Calls `take` with the places of every leaf within the squared distance `bound`, those below
-    /// node `but` left out.
+    /// node `but` left out; of points that coincide with at least the `most` of them that have the lowest rows.
     #[inline(always)]
     pub(super) fn leaves_within(
         &self,
         query: &[f64; D],
-        bound: f64,
+        (bound, most): (f64, usize),
         but: usize,
         mut take: impl FnMut(std::ops::Range<usize>),
     ) {
@@ -165,8 +165,8 @@ impl<'a, const D: usize> Knn<'a, D> {
             if node == but {
                 continue;
             }
-            if node >> self.depth != 0 {
-                take(self.range(node));
+            if node >> self.depth != 0 || self.is_pile(node) {
+                take(self.lowest(node, most));
                 continue;
             }
             for half in [2 * node, 2 * node + 1] {
@@ -176,6 +176,31 @@ impl<'a, const D: usize> Knn<'a, D> {
                 }
             }
         }
+    }
+
+    /// Whether all points of a node coincide.
+    #[inline(always)]
+    fn is_pile(&self, node: usize) -> bool {
+        self.boxes[node].low == self.boxes[node].high
+    }
+
+    /// The places of a node; of one whose points coincide the leaves that hold the `most` lowest rows, or a few more: of equal
+    /// distances no others can be among the nearest, however many there are.
+    #[inline(always)]
+    fn lowest(&self, node: usize, most: usize) -> std::ops::Range<usize> {
+        let all = self.range(node);
+        if all.len() <= most || !self.is_pile(node) {
+            return all;
+        }
+        // In such a node rows ascend from leaf to leaf.
+        let last = self.leaf_of(all.start + most.max(1) - 1);
+        all.start..self.range((1 << self.depth) + last).end
+    }
+
+    /// The leaf that has a place.
+    #[inline(always)]
+    fn leaf_of(&self, place: usize) -> usize {
+        (((place + 1) << self.depth) - 1) / self.rows.len()
     }
 
     /// The places of a node.
@@ -211,7 +236,9 @@ fn split<const D: usize>(
     let longest = (1..D).fold(0, |best, c| if side(c) > side(best) { c } else { best });
     let middle = first + (1 << (depth - 1));
     let at = starts(middle) - starts(first);
-    if at < items.len() {
+    if at < items.len() && side(longest) == 0.0 {
+        items.select_nth_unstable_by_key(at, |item| item.1);
+    } else if at < items.len() {
         items.select_nth_unstable_by(at, |a, b| {
             a.0[longest].total_cmp(&b.0[longest]).then(a.1.cmp(&b.1))
         });
@@ -252,13 +279,18 @@ impl<const D: usize> Kernel for Search<'_, '_, D> {
         while near > 1 && tree.range(near).len() < 2 * k + 1 {
             near /= 2;
         }
-        take(tree, &query, own, tree.range(near), f64::INFINITY, found);
+        // All that coincide with these, of which the lowest rows will do: one more, as the point itself may be among them.
+        while near > 1 && tree.is_pile(near / 2) {
+            near /= 2;
+        }
+        let most = k + 1;
+        take(tree, &query, own, tree.lowest(near, most), f64::INFINITY, found);
         if near == 1 {
             return;
         }
         let bound = found.select_nth_unstable_by_key(k - 1, canonical).1.0;
         found.retain(|item| item.0 <= bound);
-        tree.leaves_within(&query, bound, near, |places| {
+        tree.leaves_within(&query, (bound, most), near, |places| {
             take(tree, &query, own, places, bound, found);
         });
     }
