@@ -10,7 +10,7 @@ use unlift::Error;
 use unlift::audit::{Cell, Measure, Row};
 use unlift::geometry::frame::rounded_origin;
 use unlift_features::ColorImage;
-use unlift_features::load::read_color_as_stored;
+use unlift_features::load::{Turn, read_color_with};
 use unlift_features::preview::jpeg_of;
 use unlift_invert::{Detection, Lens, View};
 use unlift_io::read::colmap;
@@ -253,7 +253,7 @@ fn one(
     scale: f64,
 ) -> Result<Seen, Error> {
     // COLMAP does not turn photos.
-    let photo = read_color_as_stored(path)?;
+    let photo = read_color_with(path, Turn::AsStored)?;
     let name = String::from_utf8_lossy(&image.name).into_owned();
     view(camera, image, scale)
         .and_then(|view| seen(painter, name, view, &photo))

@@ -167,7 +167,7 @@ Examples:
   unlift audit images photos
   unlift audit released mine.parquet --truth truth.parquet")]
 pub enum AuditCommand {
-    /// Audit a 3D map: COLMAP, OpenSfM, nerfstudio, Bundler, NVM, PLY, CSV, XYZ, NPY, LAS, PCD or E57
+    /// Audit a 3D map: COLMAP, OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler, NVM, PLY, tables, NPY, LAS, PCD or E57
     // Boxed: ten times the size of the other commands.
     Map(Box<AuditMapArgs>),
     /// Audit images: a folder of photos, hloc's features.h5, or a COLMAP database.db

@@ -3,6 +3,7 @@
 use std::fs;
 
 use unlift::descriptors::Values;
+use unlift_io::features::ImageFeatures;
 use unlift_io::read::{self, Input};
 
 use super::{data, write};
@@ -29,6 +30,46 @@ fn descriptors_follow_the_ids_of_the_input() {
         let expected = read::descriptors(&path, &all).unwrap().select(&[4, 1]);
         assert_eq!(read::descriptors(&path, &some).unwrap(), expected, "{file}");
     }
+}
+
+/// Features as hloc writes them of the images of the project, of which one has another number of keypoints.
+fn features(folder: &std::path::Path, odd: Option<&str>) -> std::path::PathBuf {
+    use unlift_io::features::{FeatureSource, FeatureWriter};
+    let path = folder.join(format!("features-{}.h5", odd.is_some()));
+    let mut writer = FeatureWriter::create(&path).unwrap();
+    let database = FeatureSource::open(&data("project/database.db")).unwrap();
+    for at in 0..database.names().len() {
+        let mut image = database.get(at).unwrap();
+        let rows: Vec<u32> = (1..image.keypoints.len() as u32).collect();
+        if odd == Some(&*image.name) {
+            image.keypoints.remove(0);
+            image.descriptors = image.descriptors.map(|all| all.select(&rows));
+        }
+        let (scores, scales, orientations_deg) = (None, None, None);
+        writer.append(&ImageFeatures { scores, scales, orientations_deg, ..image }).unwrap();
+    }
+    writer.finish().unwrap();
+    path
+}
+
+#[test]
+fn features_of_hloc_are_descriptors_of_the_points_that_they_made() {
+    let dir = tempfile::tempdir().unwrap();
+    let input = read::open(&data("project")).unwrap();
+    let expected = read::descriptors(&data("project/database.db"), &input).unwrap();
+    assert_eq!(read::descriptors(&features(dir.path(), None), &input).unwrap(), expected);
+    let odd = features(dir.path(), Some("küche/ä 0.jpg"));
+    let line = read::descriptors(&odd, &input).unwrap_err().to_string();
+    assert!(
+        line.contains("küche/ä 0.jpg") && line.contains("keypoints, as the model has, found"),
+        "{line}"
+    );
+    let cloud = read::open(&data("cloud.ply")).unwrap();
+    let line = read::descriptors(&odd, &cloud).unwrap_err().to_string();
+    assert!(
+        line.ends_with("whose tracks lead to images, found ply binary little endian points"),
+        "{line}"
+    );
 }
 
 /// The descriptors of the project as floats: of norm 1, so that halves hold them too.
