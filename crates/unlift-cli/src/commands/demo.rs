@@ -76,7 +76,8 @@ fn photos(progress: &Part<'_>, out: &Path) -> anyhow::Result<Audited> {
     unlift_demo::write_photos(folder.path())?;
     let options = AlikedOptions { min_score: MIN_SCORE, ..AlikedOptions::default() };
     let source = FeatureSource::open(folder.path(), &Extraction::Aliked(options))?;
-    let inversion = Inversion::new(painter(DescriptorKind::Aliked, None)?, folder.path());
+    let painter = painter(DescriptorKind::Aliked, None)?;
+    let inversion = Inversion::new(painter, folder.path(), source.turn());
     let inversion = Arc::new(inversion);
     let usual = Plan::new(Unit::Pixel);
     let plan = Plan {
