@@ -13,7 +13,7 @@ use unlift_io::stage::{has_images, read_recovered_in, read_released, read_truth}
 use super::common::{RELEASED, expect_slots, same_map};
 use super::image_stages::{Evaluated, evaluate_all};
 use crate::args::EvaluateArgs;
-use crate::exit::Outcome;
+use crate::exit::{Outcome, advise};
 use crate::output::{print, table};
 use crate::stderr;
 
@@ -62,9 +62,14 @@ fn check(
     checked: &Checked,
     thresholds: &[Threshold],
     unit: Unit,
-) -> Result<Vec<String>, unlift_io::Error> {
-    let notes = checked.notes(thresholds, unit);
-    notes.map_err(|error| unlift_io::Error::core(&args.recovered, error))
+) -> anyhow::Result<Vec<String>> {
+    checked.notes(thresholds, unit).map_err(|error| {
+        let error = unlift_io::Error::core(&args.recovered, error).into();
+        match released_path(args) {
+            Some(_) => error,
+            None => advise(error, "--released FILE, as records tell more surely than points"),
+        }
+    })
 }
 
 /// Prints what was found.
