@@ -15,6 +15,8 @@ pub(crate) struct Banner {
     pub headline: String,
     /// Who recovers how much from what.
     pub sentence: String,
+    /// What known neighbors would give away under every scheme: a scheme that is not named above is not fine.
+    pub every: Option<String>,
     /// What is not known, if anything.
     pub unknown: Option<String>,
 }
@@ -42,7 +44,17 @@ pub(crate) fn banner(document: &Document, cards: &[Card], refusals: &[Refusal]) 
             (Level::Gray, "No scheme was tested.".to_owned(), nothing.to_owned())
         }
     };
-    Banner { level, headline, sentence, unknown }
+    Banner { level, headline, sentence, every: every(cards), unknown }
+}
+
+/// What all schemes give back if neighbors were known, of several that were tried so.
+fn every(cards: &[Card]) -> Option<String> {
+    let known: Option<Vec<&Finding>> =
+        cards.iter().map(|card| card.finding(Basis::Oracle)).collect();
+    let known = known.filter(|known| known.len() > 1)?;
+    let least = known.into_iter().reduce(|a, b| if b.recovered < a.recovered { b } else { a })?;
+    let (when, percent) = (&least.when, &least.percent);
+    Some(format!("{when}, every scheme tried would give back {percent} % or more."))
 }
 
 /// The card and finding of this basis with the largest share.
