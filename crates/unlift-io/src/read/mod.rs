@@ -13,6 +13,7 @@ mod ply;
 mod scalar;
 mod scans;
 mod table;
+mod undeclared;
 
 use std::path::{Path, PathBuf};
 
@@ -146,13 +147,6 @@ fn most_at_one_place(positions: &[[f64; 3]]) -> Option<(usize, [f64; 3])> {
     // By the bits: two places may have one hash.
     let n = positions.iter().filter(|position| bits(position) == bits(&place)).count();
     Some((n, place))
-}
-
-/// What to say of a file with room for so many `more` points behind the `n` that it declares.
-fn undeclared(n: u64, more: u64) -> Option<String> {
-    (more > 0).then(|| {
-        format!("{n} points are declared, and {more} more seem to follow, which are not read: a part of the map at most")
-    })
 }
 
 /// Reads the map at `path`: a COLMAP model folder or a project folder that holds one (of several, the

@@ -9,7 +9,7 @@ use super::bytes::Bytes;
 use super::columns::{Field, coordinate, is_called};
 use super::lines::{Lines, number, quoted, words};
 use super::scalar::Scalar;
-use super::undeclared;
+use super::undeclared::undeclared;
 use crate::error::{Error, Place};
 use crate::input::{self, Budget};
 

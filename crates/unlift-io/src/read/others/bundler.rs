@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::read::Input;
 use crate::read::columns::coordinate;
 use crate::read::lines::{Lines, number, quoted, words};
-use crate::read::undeclared;
+use crate::read::undeclared::undeclared;
 
 /// Exactly `N` numbers in the current line.
 fn numbers<const N: usize>(lines: &Lines, what: &str) -> Result<[f64; N], Error> {

@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::read::Input;
 use crate::read::columns::coordinate;
 use crate::read::lines::{Lines, number, quoted, words};
-use crate::read::undeclared;
+use crate::read::undeclared::undeclared;
 
 /// The rotation of a quaternion (w, x, y, z).
 fn rotation([w, x, y, z]: [f64; 4]) -> [[f64; 3]; 3] {

@@ -16,7 +16,7 @@ use crate::read::bytes::Bytes;
 use crate::read::columns::{self, coordinate};
 use crate::read::lines::{Lines, number, quoted, words};
 use crate::read::scalar::Scalar;
-use crate::read::undeclared;
+use crate::read::undeclared::undeclared;
 
 /// One column, or several of a name.
 #[derive(Clone, Copy, Debug)]
