@@ -96,9 +96,11 @@ fn degrees_of_las_are_told() {
                 let (_dir, path) = write("a.las", made::las_with(minor, id, &record, long));
                 let input = read::open(&path).unwrap();
                 let expected = is_geographic && (minor == 4 || !long);
+                // Old files have no records behind their points: what is there may be points.
+                let n_doubts = usize::from(expected) + usize::from(minor == 2 && long);
                 assert_eq!(
                     (input.is_geographic, input.doubts.len()),
-                    (expected, usize::from(expected)),
+                    (expected, n_doubts),
                     "{id} {minor} {long}"
                 );
                 assert_eq!(input.positions.len(), 3);
@@ -127,11 +129,12 @@ fn files_with_more_points_than_they_declare_are_doubted() {
         }
     }
     let text = made::pcd("binary");
-    assert!(doubts("a.pcd", text.clone()).is_empty());
+    assert_eq!(doubts("a.pcd", text.clone()), [NO_PLACE]);
     let at = text.windows(8).position(|word| word == b"POINTS 4").unwrap();
     let mut less = text;
     less[at + 7] = b'2';
-    assert_eq!(doubts("a.pcd", less).len(), 1);
+    let less = doubts("a.pcd", less);
+    assert!(less[0].starts_with("2 points are declared, and 2 more seem to follow"), "{less:?}");
 }
 
 /// A file with holes is as large as it likes: nothing of that size is asked for.
