@@ -8,6 +8,7 @@ mod descriptors;
 pub(crate) mod lines;
 mod models;
 mod npy;
+mod npz;
 mod others;
 mod ply;
 mod scalar;
@@ -218,7 +219,7 @@ fn file(path: &Path) -> Result<Input, Error> {
             None => colmap_points(path)?,
         },
         (_, "npy") => npy::positions(path)?,
-        (_, "npz") => npy::positions_in_archive(path)?,
+        (_, "npz") => npz::positions(path)?,
         (_, "las") => scans::las::read(path)?,
         (_, "pcd") => scans::pcd::read(path)?,
         (_, "e57") => scans::e57::read(path)?,

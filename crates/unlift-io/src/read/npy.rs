@@ -1,15 +1,11 @@
-//! NumPy arrays, also in archives: positions, and descriptors.
+//! NumPy arrays: positions, and descriptors.
 //!
 //! A reader of our own rather than a crate: the arrays we take are of few types, and a header that
 //! declares 2^62 rows must be an error on one line, not an overflow.
 
-use std::io::{self, BufReader, Read, Seek};
 use std::path::Path;
 
 use unlift::descriptors::Values;
-use zip::ZipArchive;
-use zip::read::ZipFile;
-use zip::result::ZipError;
 
 use super::Input;
 use super::bytes::Bytes;
@@ -17,8 +13,6 @@ use super::columns::{Field, axes};
 use super::lines::{number, quoted};
 use super::scalar::Scalar;
 use crate::error::Error;
-use crate::guard::without_panic;
-use crate::input::{self, Budget};
 
 /// How every array begins.
 pub(crate) const MAGIC: &[u8; 6] = b"\x93NUMPY";
@@ -26,7 +20,7 @@ pub(crate) const MAGIC: &[u8; 6] = b"\x93NUMPY";
 /// Columns of an array of points at most: what has more are descriptors.
 const MOST_COLUMNS: u64 = 16;
 /// How an array, or a field of three values, is called that holds all coordinates.
-const PLACES: [&str; 7] =
+pub(super) const PLACES: [&str; 7] =
     ["xyz", "position", "positions", "points", "points3d", "coordinates", "pts"];
 /// Rows of fewer points may begin with their number by accident.
 const TELLING: usize = 10;
@@ -40,64 +34,8 @@ pub fn positions(path: &Path) -> Result<Input, Error> {
     of_points(&mut Bytes::open(path)?, "npy")
 }
 
-/// Reads positions from the one array of an `.npz` archive that holds some.
-///
-/// # Errors
-/// When the file is no such archive, or several arrays or none may be points.
-pub fn positions_in_archive(path: &Path) -> Result<Input, Error> {
-    let damaged = || Error::new(path, "", "an archive of NumPy arrays", "a damaged one");
-    without_panic(|| in_archive(path)).unwrap_or_else(|| Err(damaged()))
-}
-
-fn in_archive(path: &Path) -> Result<Input, Error> {
-    /// Bytes that hold the header of an array.
-    const HEADER: u64 = 1 << 16;
-    let (file, len) = input::open(path)?;
-    let wrong =
-        |error: ZipError| Error::new(path, "", "an archive of NumPy arrays", error.to_string());
-    let mut archive = ZipArchive::new(BufReader::new(file)).map_err(wrong)?;
-    // Arrays are unpacked into a file that has no name: nothing but its header is read in memory.
-    let unpacked = |entry: ZipFile<'_, _>, most: u64| -> Result<Bytes, Error> {
-        let mut file = tempfile::tempfile().map_err(|error| Error::read(path, error))?;
-        let copied = io::copy(&mut entry.take(most), &mut file);
-        let n =
-            copied.and_then(|n| file.rewind().map(|()| n)).map_err(|error| wrong(error.into()))?;
-        Ok(Bytes::continuing(path, BufReader::new(file), 0, n))
-    };
-    let (mut all, mut fit) = (Vec::new(), Vec::new());
-    for at in 0..archive.len() {
-        let entry = archive.by_index(at).map_err(wrong)?;
-        let name = entry.name().map_err(wrong)?;
-        let Some(name) = name.strip_suffix(".npy").map(str::to_owned) else { continue };
-        let header = unpacked(entry, HEADER).and_then(|mut bytes| Header::read(&mut bytes));
-        if header.is_ok_and(|header| header.points().is_some()) {
-            fit.push((at, name.clone()));
-        }
-        all.push(name);
-    }
-    let is_known = |name: &str| PLACES.iter().any(|known| name.eq_ignore_ascii_case(known));
-    if fit.iter().filter(|(_, name)| is_known(name)).count() == 1 {
-        fit.retain(|(_, name)| is_known(name));
-    }
-    let [(at, name)] = &fit[..] else {
-        let fit: Vec<String> = fit.into_iter().map(|(_, name)| name).collect();
-        let names = if fit.is_empty() { &all } else { &fit };
-        let names: Vec<String> = names.iter().take(5).map(|name| quoted(name.as_bytes())).collect();
-        let found = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-        let expected = "one array of points, (n, 3), or one that is called points or xyz";
-        return Err(Error::new(path, "", expected, found));
-    };
-    let entry = archive.by_index(*at).map_err(wrong)?;
-    let size = entry.size();
-    Budget::new(path, len).admit(&**name, size)?;
-    let mut found = of_points(&mut unpacked(entry, size)?, "npz")?;
-    if all.len() > 1 {
-        found.notes.push(format!("read, the array {} of {}", quoted(name.as_bytes()), all.len()));
-    }
-    Ok(found)
-}
-
-fn of_points(bytes: &mut Bytes, format: &'static str) -> Result<Input, Error> {
+/// Reads positions from the array that `bytes` begin with.
+pub(super) fn of_points(bytes: &mut Bytes, format: &'static str) -> Result<Input, Error> {
     let header = Header::read(bytes)?;
     let mut found = Input { format, ..Input::default() };
     let (rows, layout) = match header.points() {
@@ -147,7 +85,7 @@ fn of_points(bytes: &mut Bytes, format: &'static str) -> Result<Input, Error> {
 }
 
 /// Where the coordinates of a point are in an array.
-enum Layout {
+pub(super) enum Layout {
     Matrix {
         columns: u64,
     },
@@ -280,11 +218,11 @@ fn check_size(bytes: &Bytes, rows: u64, row: Option<u64>) -> Result<(), Error> {
 }
 
 /// The header of an array: a Python dictionary of three known keys.
-struct Header(Vec<u8>);
+pub(super) struct Header(Vec<u8>);
 
 impl Header {
     /// Reads up to the first value.
-    fn read(bytes: &mut Bytes) -> Result<Self, Error> {
+    pub(super) fn read(bytes: &mut Bytes) -> Result<Self, Error> {
         let mut magic = [0; 8];
         bytes.fill(&mut magic, "magic and version")?;
         if &magic[..6] != MAGIC {
@@ -338,7 +276,7 @@ impl Header {
     }
 
     /// How many points there are, and where they have their coordinates; `None` of what cannot be points.
-    fn points(&self) -> Option<(u64, Layout)> {
+    pub(super) fn points(&self) -> Option<(u64, Layout)> {
         if !self.is_structured() {
             let [rows, columns] = self.sides().filter(|_| self.scalar().is_some())?;
             let is_usual = (3..=MOST_COLUMNS).contains(&columns);

@@ -188,10 +188,10 @@ impl Columns {
         }
         match other {
             None => Ok(FIRST),
-            Some((comment, names)) if n == 3 && !names.iter().any(|name| is_quantity(name)) => {
+            Some((comment, names)) if !names.iter().any(|name| is_quantity(name)) => {
                 let what = quoted(comment);
                 let doubt = format!(
-                    "columns: taken for x, y and z, and the comment {what} for no names of them"
+                    "columns: the first three are taken for x, y and z, and the comment {what} for no names"
                 );
                 Ok(Self { doubt: Some(doubt), ..FIRST })
             }
@@ -221,7 +221,19 @@ fn is_name(word: &[u8]) -> bool {
 
 /// Whether a column of that name is surely no length along an axis.
 fn is_quantity(name: &[u8]) -> bool {
-    const NAMES: [&str; 30] = [
+    const NAMES: [&str; 42] = [
+        "alpha",
+        "class",
+        "confidence",
+        "error",
+        "frame",
+        "intensity",
+        "label",
+        "name",
+        "point_id",
+        "qx",
+        "reflectance",
+        "tx",
         "lat",
         "latitude",
         "lon",

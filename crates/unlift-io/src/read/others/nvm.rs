@@ -45,7 +45,8 @@ fn pose(lines: &Lines, what: &str) -> Result<([f64; 3], [f64; 3]), Error> {
 /// When the file is not NVM, or is cut off.
 pub fn read(path: &Path) -> Result<Input, Error> {
     let mut lines = Lines::open(path)?;
-    let is_nvm = lines.advance_to_data()? && lines.line().starts_with(b"NVM_V3");
+    // NVM_V3_R9T, with matrices for quaternions, is another form.
+    let is_nvm = lines.advance_to_data()? && words(lines.line()).next() == Some(b"NVM_V3");
     if !is_nvm {
         return Err(lines.error("NVM_V3, as VisualSFM writes it", quoted(lines.line())));
     }
