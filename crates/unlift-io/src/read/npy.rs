@@ -101,7 +101,7 @@ fn stored(text: &str) -> Option<(Scalar, bool)> {
     let (big, text) = (text.starts_with('>'), text.trim_start_matches(['<', '>', '|', '=']));
     let kind = *text.as_bytes().first()?;
     Some((
-        Scalar::of_kind(kind, number(text[1..].as_bytes())?).filter(|_| b"fiu".contains(&kind))?,
+        Scalar::of_kind(kind, number(&text.as_bytes()[1..])?).filter(|_| b"fiu".contains(&kind))?,
         big,
     ))
 }
