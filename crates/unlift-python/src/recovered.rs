@@ -160,7 +160,7 @@ pub fn evaluate<'py>(
     let (row, notes) = work::run(py, None, None, move || {
         let (original, secret) = (truth.original(), &truth.secret);
         let mut checked = Checked::default();
-        checked.add(&recovered, original, secret, released.as_ref())?;
+        checked.add(&recovered, original, secret, released.as_deref())?;
         let notes = checked.notes(&asked, original.reveal().unit())?;
         let baseline = released.map(|released| blind(&released, original, secret));
         let (row, _) = measure(&recovered, original, secret, baseline.as_ref(), &asked)?;
