@@ -5,7 +5,12 @@ mod common;
 use common::Place;
 use serde_json::Value;
 use unlift::About;
-use unlift_io::stage::{read_neighborhoods, read_recovered, write_neighborhoods, write_recovered};
+use unlift::recover::{Estimate, Recovered};
+use unlift::truth::Original;
+use unlift_io::stage::{
+    read_neighborhoods, read_recovered, read_truth, write_neighborhoods, write_recovered,
+    write_truth,
+};
 
 const POINTS: u32 = 400;
 

@@ -12,6 +12,7 @@ mod ply;
 mod scalar;
 mod scans;
 mod table;
+mod undeclared;
 
 use std::path::{Path, PathBuf};
 
@@ -48,13 +49,6 @@ pub struct Input {
     pub model: Option<PathBuf>,
     /// The COLMAP database of the project, if there is one where such projects have it.
     pub database: Option<PathBuf>,
-}
-
-/// What to say of a file with room for so many `more` points behind the `n` that it declares.
-fn undeclared(n: u64, more: u64) -> Option<String> {
-    (more > 0).then(|| {
-        format!("{n} points are declared, and {more} more seem to follow, which are not read: a part of the map at most")
-    })
 }
 
 fn mean_direction(directions: impl Iterator<Item = [f64; 3]>) -> Option<[f64; 3]> {

@@ -7,7 +7,7 @@ use crate::error::{Error, Place};
 use crate::input;
 use crate::read::bytes::Bytes;
 use crate::read::lines::{Lines, number, quoted, words};
-use crate::read::undeclared;
+use crate::read::undeclared::undeclared;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Encoding {

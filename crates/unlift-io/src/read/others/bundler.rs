@@ -5,7 +5,7 @@ use std::path::Path;
 use super::found::{Found, UPWARD, camera};
 use crate::error::Error;
 use crate::read::lines::{Lines, number, quoted, words};
-use crate::read::undeclared;
+use crate::read::undeclared::undeclared;
 
 /// Exactly `N` numbers in the current line.
 fn numbers<const N: usize>(lines: &Lines, what: &str) -> Result<[f64; N], Error> {

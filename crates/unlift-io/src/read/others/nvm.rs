@@ -5,7 +5,7 @@ use std::path::Path;
 use super::found::{DOWNWARD, Found, camera};
 use crate::error::Error;
 use crate::read::lines::{Lines, number, quoted, words};
-use crate::read::undeclared;
+use crate::read::undeclared::undeclared;
 
 /// The next line that is not blank, as a count.
 fn count(lines: &mut Lines, what: &str) -> Result<u64, Error> {

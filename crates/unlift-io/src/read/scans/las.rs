@@ -11,7 +11,7 @@ use super::scan::Scan;
 use crate::error::Error;
 use crate::read::bytes::Bytes;
 use crate::read::lines::quoted;
-use crate::read::undeclared;
+use crate::read::undeclared::undeclared;
 
 /// Bytes of the heads of all versions up to the numbers that positions are made with.
 const HEAD: usize = 179;

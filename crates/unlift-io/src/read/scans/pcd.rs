@@ -14,7 +14,7 @@ use crate::error::{Error, Place};
 use crate::input::{self, Budget};
 use crate::read::bytes::Bytes;
 use crate::read::lines::{Lines, number, quoted, words};
-use crate::read::undeclared;
+use crate::read::undeclared::undeclared;
 
 /// One column, or several of a name.
 #[derive(Clone, Copy, Debug)]

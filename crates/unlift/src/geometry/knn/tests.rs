@@ -72,7 +72,7 @@ fn piles_are_as_if_every_point_was_looked_at() {
     let mut draws = Draws::new(3, Stage::Synthetic, 0);
     for share in [0.3, 0.9] {
         let points: Vec<[f64; 3]> = (0..900)
-            .map(|row| match draws.uniform() < share {
+            .map(|row| match draws.unit() < share {
                 // Zeros of both signs are one place.
                 true => [if row % 2 == 0 { 0.0 } else { -0.0 }, 0.0, 0.0],
                 false => std::array::from_fn(|_| draws.between(-1.0, 1.0)),
