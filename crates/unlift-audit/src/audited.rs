@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use unlift::OneLine;
 use unlift_io::atomic::OutputSet;
 use unlift_report::scene::Scene3d;
-use unlift_report::{Document, RenderOptions, render, text_table};
+use unlift_report::{Document, Opening, RenderOptions, Shares, render, shares, text_table};
 
 use crate::Error;
-use crate::outputs::{PAGE, commit_audit};
+use crate::outputs::{FIGURES, PAGE, stage_audit};
 
 /// What an audit found, before it is written.
 #[derive(Clone, Debug)]
@@ -38,19 +38,49 @@ impl Audited {
         Ok(render(&self.document, self.scene.as_ref(), &options)?)
     }
 
+    /// What came back of every scheme, the worst first.
+    pub fn shares(&self) -> Vec<Shares> {
+        shares(&self.document, &self.drawn.inversions)
+    }
+
+    /// The same audit, whose page begins with the verdict and pictures of `other` under `title`; `details` is a link
+    /// to the page of `other`.
+    #[must_use]
+    pub fn opening_with(mut self, other: &Self, title: &str, details: &str) -> Self {
+        let inversions = &other.drawn.inversions;
+        self.drawn.opening = Some(Opening::titled(&other.document, inversions, title, details));
+        self
+    }
+
+    /// Writes page and figures under these names into the folder that `out` was opened for; they appear when `out` is
+    /// committed.
+    ///
+    /// # Errors
+    /// When they cannot be written.
+    pub fn stage(
+        &self,
+        out: &mut OutputSet,
+        names: [&str; 2],
+        share_safe: bool,
+    ) -> Result<Document, Error> {
+        let page = self.page(share_safe)?;
+        let document = if share_safe { self.document.share_safe() } else { self.document.clone() };
+        stage_audit(out, names, [&page, &document.to_json()?], share_safe)?;
+        Ok(document)
+    }
+
     /// Writes page and figures into the folder that `out` was opened for, both or none; `share_safe`: figures only.
     ///
     /// # Errors
     /// When they cannot be written.
     pub fn write(
         &self,
-        out: OutputSet,
+        mut out: OutputSet,
         folder: &Path,
         share_safe: bool,
     ) -> Result<Finished, Error> {
-        let page = self.page(share_safe)?;
-        let document = if share_safe { self.document.share_safe() } else { self.document.clone() };
-        commit_audit(out, &page, &document.to_json()?, share_safe)?;
+        let document = self.stage(&mut out, [PAGE, FIGURES], share_safe)?;
+        out.commit()?;
         Ok(Finished { document, report: folder.join(PAGE) })
     }
 }

@@ -16,7 +16,7 @@
 //! # fn main() -> Result<(), unlift_audit::Error> {
 //! let (started, path) = (Instant::now(), Path::new("reconstruction/0"));
 //! let preparation = Preparation { scale: Some(1.0), ..Preparation::default() };
-//! let (input, prepared) = maps::open(path, None, &preparation, &Quiet)?;
+//! let (input, prepared) = maps::open(path, None, &preparation)?;
 //! let out = Path::new("audit");
 //! let files = open_audit(out, Rules::new([path], false), Shown::Points, &Quiet)?;
 //! let finished = maps::perform(

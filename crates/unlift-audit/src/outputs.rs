@@ -75,19 +75,21 @@ pub fn open_audit(
     OutputSet::create(out, rules, access, &first).map_err(refused)
 }
 
-/// Puts an audit in its place: the page, then the figures.
-pub fn commit_audit(
-    mut out: OutputSet,
-    page: &str,
-    json: &str,
+/// Writes a page and its figures under these names into the folder that `out` was opened for; neither is in its place
+/// before `out` is committed.
+pub fn stage_audit(
+    out: &mut OutputSet,
+    [page_name, figures_name]: [&str; 2],
+    [page, figures]: [&str; 2],
     share_safe: bool,
 ) -> Result<(), unlift_io::Error> {
     let access = if share_safe { Access::Usual } else { Access::Private };
-    for (name, kind, text) in [(PAGE, Kind::Page, page), (FIGURES, Kind::AuditJson, json)] {
+    let files = [(page_name, Kind::Page, page), (figures_name, Kind::AuditJson, figures)];
+    for (name, kind, text) in files {
         let staged = out.stage(name, kind)?;
         unlift_io::atomic::write_file(&staged, access, |w| {
             std::io::Write::write_all(w, text.as_bytes())
         })?;
     }
-    out.commit()
+    Ok(())
 }

@@ -49,9 +49,9 @@ pub struct Prepared {
     pub unit_in_map_units: f64,
     /// Which rows of the file were kept, ascending.
     pub rows: Vec<u32>,
-    /// What whoever reads figures of them must know; no paths, as these are told in share-safe documents, too.
+    /// What whoever reads figures of them must know; share-safe documents withhold those with a path.
     pub notes: Vec<String>,
-    /// Why figures may be too small, which lets no gate hold; no paths either.
+    /// Why any figure of them may be wrong, which lets no gate hold.
     pub doubts: Vec<String>,
 }
 

@@ -48,7 +48,7 @@ impl Pictures {
             records.sort_unstable();
             records.dedup();
             records.truncate(MOST_SHAPES);
-            let shapes = self.shapes(cell.released, &records);
+            let shapes = shapes(&self.bounds, &self.middle, cell.released, &records);
             let shown = self.sample.iter().enumerate();
             let withheld = shown.filter(|&(_, &at)| slot_of[at].is_none()).map(|(i, _)| i);
             self.scene.obfuscations.push(ObfuscationView {
@@ -76,42 +76,46 @@ impl Pictures {
         self.scene.up = up.map(|v| v.map(|x| x as f32));
         self.scene
     }
+}
 
-    fn shapes(&self, released: &Released<3>, records: &[usize]) -> Shapes {
-        let origin = released.origin();
-        let place = |p: &[f32; 3]| -> [f32; 3] {
-            std::array::from_fn(|c| (f64::from(p[c]) + origin[c] - self.middle[c]) as f32)
-        };
-        let bounds = &self.bounds;
-        match released.obfuscation() {
-            Obfuscation::Lines(lines) => Shapes::Segments(
-                records
-                    .iter()
-                    .filter_map(|&r| {
-                        bounds.clip_line(place(&lines.foot()[r]), lines.direction()[r])
-                    })
-                    .collect(),
-            ),
-            Obfuscation::Rays(rays) => {
-                let center = |r: usize| &rays.centers()[usize::from(rays.center()[r])];
-                let clip = |&r: &usize| bounds.clip_ray(place(center(r)), rays.direction()[r]);
-                Shapes::Segments(records.iter().filter_map(clip).collect())
-            }
-            Obfuscation::AxisPlanes(planes) => {
-                let patch = |&r: &usize| {
-                    let axis = usize::from(planes.axis()[r]);
-                    let shift = (origin[axis] - self.middle[axis]) as f32;
-                    bounds.axis_patch(axis, planes.offset()[r] + shift)
-                };
-                Shapes::Patches(records.iter().filter_map(patch).collect())
-            }
-            Obfuscation::AxisCandidates(candidates) => {
-                Shapes::Points(records.iter().map(|&r| place(&candidates.position()[r])).collect())
-            }
+/// The records of these numbers, clipped to `bounds`, about `middle`.
+pub fn shapes(
+    bounds: &SceneBox,
+    middle: &[f64; 3],
+    released: &Released<3>,
+    records: &[usize],
+) -> Shapes {
+    let origin = released.origin();
+    let place = |p: &[f32; 3]| -> [f32; 3] {
+        std::array::from_fn(|c| (f64::from(p[c]) + origin[c] - middle[c]) as f32)
+    };
+    match released.obfuscation() {
+        Obfuscation::Lines(lines) => Shapes::Segments(
+            records
+                .iter()
+                .filter_map(|&r| bounds.clip_line(place(&lines.foot()[r]), lines.direction()[r]))
+                .collect(),
+        ),
+        Obfuscation::Rays(rays) => {
+            let center = |r: usize| &rays.centers()[usize::from(rays.center()[r])];
+            let clip = |&r: &usize| bounds.clip_ray(place(center(r)), rays.direction()[r]);
+            Shapes::Segments(records.iter().filter_map(clip).collect())
+        }
+        Obfuscation::AxisPlanes(planes) => {
+            let patch = |&r: &usize| {
+                let axis = usize::from(planes.axis()[r]);
+                let shift = (origin[axis] - middle[axis]) as f32;
+                bounds.axis_patch(axis, planes.offset()[r] + shift)
+            };
+            Shapes::Patches(records.iter().filter_map(patch).collect())
+        }
+        Obfuscation::AxisCandidates(candidates) => {
+            Shapes::Points(records.iter().map(|&r| place(&candidates.position()[r])).collect())
         }
     }
 }
 
-fn near(point: &[f64; 3], middle: &[f64; 3]) -> [f32; 3] {
+/// A point about `middle`.
+pub fn near(point: &[f64; 3], middle: &[f64; 3]) -> [f32; 3] {
     std::array::from_fn(|c| (point[c] - middle[c]) as f32)
 }

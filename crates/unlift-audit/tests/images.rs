@@ -104,6 +104,22 @@ fn images_in_memory_have_the_figures_of_a_file() {
 }
 
 #[test]
+fn keypoints_that_halves_rounded_out_of_the_image_are_moved_to_its_edge() {
+    let with = |x: f64| {
+        in_memory(move |at| {
+            let mut image = image(at);
+            image.keypoints[7][0] = x;
+            Ok(image)
+        })
+    };
+    let document = found(find(job(&with(640.4), Path::new("images"))).expect("an audit")).document;
+    let note =
+        "5 keypoints were at most a pixel outside of their images, and are moved to the edge";
+    assert_eq!(document.notes, [note]);
+    assert!(find(job(&with(641.0), Path::new("images"))).is_err());
+}
+
+#[test]
 fn a_mistake_in_memory_ends_the_audit_in_a_line() {
     let line = |wrong: fn(ImageFeatures) -> ImageFeatures| {
         let images = in_memory(move |at| Ok(if at == 1 { wrong(image(at)) } else { image(at) }));

@@ -36,7 +36,7 @@ fn audit(folder: &Path, factor: f64) -> Result<Finished, AuditError> {
     let text: String = points.iter().map(|[x, y, z]| format!("{x},{y},{z}\n")).collect();
     fs::write(&map, text).expect("room.csv");
     let preparation = Preparation { scale: Some(1.0), k: 10, ..Preparation::default() };
-    let (input, prepared) = maps::open(&map, None, &preparation, &Quiet)?;
+    let (input, prepared) = maps::open(&map, None, &preparation)?;
     let usual = Plan::new(Unit::Meter);
     let plan = Plan {
         schemes: usual.schemes.iter().filter(|s| s.name() == "cp").cloned().collect(),

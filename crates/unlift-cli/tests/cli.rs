@@ -291,8 +291,8 @@ fn every_noise_model_has_rows_and_break_even_ratios_of_its_own() {
     let noises: Vec<&str> = by_joint.filter_map(|p| p["oracle_noise"].as_str()).collect();
     assert_eq!(noises, ["uniform", "near", "clustered", "uniform", "near", "clustered"]);
     let page = std::fs::read_to_string(place.path().join("audit/report.html")).expect("a report");
-    assert!(page.contains("oracle (clustered), 30 % right"));
-    assert!(page.contains("oracle (near), 30 % right"));
+    assert!(page.contains("oracle (clustered), 30 % true neighbors"));
+    assert!(page.contains("oracle (near), 30 % true neighbors"));
 
     // The uniform rows are those of an audit that names no model.
     place.stdout(&format!("audit map room.csv --scale 1 {quick}"), 0);

@@ -57,7 +57,7 @@ fn what_leaks_more_than_the_tolerance_fails() {
     let lines: Vec<&str> = text.lines().collect();
     let words = |line: &str| line.split_whitespace().collect::<Vec<_>>().join(" ");
     assert_eq!(words(lines[0]), "scheme attack within old new points");
-    let more = "olc oracle, 50 % right, K = 10, joint 0.10 40.0 % 41.5 % +1.5 leaks more";
+    let more = "olc oracle, 50 % true neighbors, K = 10, joint 0.10 40.0 % 41.5 % +1.5 leaks more";
     assert_eq!(words(lines[1]), more);
     assert_eq!(
         lines[2],
@@ -112,7 +112,7 @@ fn what_is_out_of_view_fails_and_what_only_one_has_is_told() {
     let (text, _) = place.ends("compare a/audit.json gone.json", 1);
     assert!(text.contains("OUT OF VIEW: ppl: no row in the new audit\n"), "{text}");
     assert!(
-        text.contains("only in the old audit: ppl: oracle, 50 % right, K = 10, joint\n"),
+        text.contains("only in the old audit: ppl: oracle, 50 % true neighbors, K = 10, joint\n"),
         "{text}"
     );
     changed(&place, "flat.json", |document| {
@@ -134,9 +134,9 @@ fn what_is_out_of_view_fails_and_what_only_one_has_is_told() {
         rows(document).retain(|row| row["inlier_ratio"] != 1.0);
     });
     let (text, _) = place.ends("compare a/audit.json ratios.json", 0);
-    assert!(text.contains("only in the old audit: olc: oracle, 100 % right"), "{text}");
+    assert!(text.contains("only in the old audit: olc: oracle, 100 % true neighbors"), "{text}");
     let (text, _) = place.ends("compare ratios.json a/audit.json", 0);
-    assert!(text.contains("only in the new audit: olc: oracle, 100 % right"), "{text}");
+    assert!(text.contains("only in the new audit: olc: oracle, 100 % true neighbors"), "{text}");
     // A baseline that was left out (`--no-records-alone`).
     changed(&place, "blind.json", |document| {
         for row in rows(document).iter_mut().filter(|row| row["scheme"] == "olc") {

@@ -55,6 +55,39 @@ fn photos_become_one_file_that_is_the_same_for_any_number_of_threads() {
 }
 
 #[test]
+fn photos_are_turned_unless_they_are_to_be_left_as_stored() {
+    let place = photos();
+    let path = place.path("photos/b/c.jpg");
+    // An EXIF header that says that the photo stands on its head.
+    let jpeg = fs::read(&path).unwrap();
+    let mut exif =
+        b"\xff\xe1\0\x22Exif\0\0MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0".to_vec();
+    exif.extend([3, 0, 0, 0, 0, 0, 0]);
+    fs::write(&path, [&jpeg[..2], &exif, &jpeg[2..]].concat()).unwrap();
+    place.ends("features photos --out upright.h5 --quiet", 0);
+    place.ends("features photos --out stored.h5 --quiet --as-stored", 0);
+    place.ends("features stored.h5 --out copy.h5 --quiet", 0);
+    let middle = |file: &str| {
+        let source = FeatureSource::open(&place.path(file)).unwrap();
+        let image = source.get(1).unwrap();
+        let n = image.keypoints.len() as f64;
+        let sum = image.keypoints.iter().fold([0.0; 2], |s, x| [s[0] + x[0] / n, s[1] + x[1] / n]);
+        assert_eq!(image.upright, source.is_upright());
+        (source.is_upright(), sum)
+    };
+    let ((upright, a), (as_stored, b), (copy, _)) =
+        (middle("upright.h5"), middle("stored.h5"), middle("copy.h5"));
+    assert_eq!([upright, as_stored, copy], [true, false, false]);
+    // The same blobs, turned by half about the middle of 128 x 96 pixels.
+    assert!((a[0] + b[0] - 127.0).abs() < 3.0 && (a[1] + b[1] - 95.0).abs() < 3.0, "{a:?} {b:?}");
+    let (_, stderr) = place.ends("features stored.h5 --as-stored", 2);
+    assert!(
+        stderr.contains("--as-stored: expected with a folder of photos, found a file"),
+        "{stderr}"
+    );
+}
+
+#[test]
 fn keypoints_are_in_the_convention_of_hloc() {
     let place = photos();
     // A blob whose middle is the pixel in column 30 and row 34.

@@ -102,11 +102,8 @@ fn a_file_without_photos_has_frames_and_chosen_images_are_shown() {
     let page = fs::read_to_string(place.path("a/report.html")).unwrap();
     assert!(page.contains("\"name\":\"b.png\"") && !page.contains("\"name\":\"a.png\""));
     assert!(!page.contains("/9j/"));
-    // What a server sees is drawn unasked, where there are descriptors; it is in no table.
-    assert!(page.contains("\"label\":\"overlap, ") && page.contains("\"label\":\"similarity, "));
-    let rows = json(&place, "a/audit.json")["results"].clone();
-    assert!(rows.as_array().unwrap().iter().all(|row| row["neighbors"] == "oracle"));
-    // Of SIFT `descriptors` is another name of `overlap`: drawn once.
+    // Only the neighborhoods that were asked for are drawn.
+    assert!(!page.contains("\"label\":\"overlap, ") && page.contains("\"label\":\"oracle, "));
     let asked = format!(
         "audit images f.h5 {QUICK} --neighbors oracle --neighbors descriptors --show b.png --out c"
     );
@@ -117,7 +114,7 @@ fn a_file_without_photos_has_frames_and_chosen_images_are_shown() {
     place.ends(&format!("audit images bare.h5 {QUICK} --show b.png --out b"), 0);
     let page = fs::read_to_string(place.path("b/report.html")).unwrap();
     assert!(
-        page.contains("\"label\":\"oracle, 50 % right\"")
+        page.contains("\"label\":\"oracle, 50 % true neighbors\"")
             && !page.contains("\"label\":\"overlap, ")
     );
     let (_, stderr) = place.ends("audit images f.h5 --show x.png", 2);

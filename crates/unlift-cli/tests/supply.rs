@@ -102,3 +102,19 @@ fn no_crate_is_compiled_twice_unless_others_ask_for_it() {
     let new: Vec<&&str> = twice.iter().filter(|name| !TWICE.contains(name)).collect();
     assert!(new.is_empty(), "compiled twice: {new:?}");
 }
+
+/// A constant that holds a file is copied wherever it is used; a static is in the program once.
+#[test]
+fn the_program_holds_every_network_once() {
+    let program = std::fs::read(env!("CARGO_BIN_EXE_unlift")).expect("the program");
+    for entry in unlift_nn::MODELS.iter() {
+        let Some(network) = entry.carried else { continue };
+        let middle = network.len() / 2;
+        let sample = &network[middle..middle + 64];
+        let copies = program.windows(sample.len()).filter(|window| *window == sample).count();
+        assert_eq!(copies, 1, "{}", entry.name);
+    }
+    // Lines for backtraces are most of a program that is built for tests.
+    let most = if cfg!(debug_assertions) { 200 } else { 70 };
+    assert!(program.len() < most * 1_000_000, "{} bytes", program.len());
+}

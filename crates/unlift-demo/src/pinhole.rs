@@ -1,8 +1,6 @@
 //! A camera without distortion.
 
-use unlift::Error;
 use unlift::synthetic::Camera;
-use unlift_invert::{Lens, View};
 
 use unlift::synthetic::vectors::{cross, dot, sub, unit};
 
@@ -58,11 +56,5 @@ impl Pinhole {
     /// The direction in the world of what [`ray`](Self::ray) gives.
     pub(crate) fn in_world(&self, ray: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|c| (0..3).map(|row| self.rotation[row][c] * ray[row]).sum())
-    }
-
-    pub(crate) fn view(&self) -> Result<View, Error> {
-        let [x, y] = self.size.map(|side| 0.5 * side as f64);
-        let lens = Lens::try_new("SIMPLE_PINHOLE", &[self.focal, x, y])?;
-        Ok(View { center: self.center, rotation: self.rotation, lens, size: self.size })
     }
 }

@@ -7,7 +7,7 @@ use unlift_nn::DescriptorKind;
 
 use crate::color::ColorImage;
 use crate::learned::{Aliked, AlikedOptions, LearnedFeatures, SuperPoint, SuperPointOptions};
-use crate::load;
+use crate::load::{self, Turn};
 use crate::options::SiftOptions;
 use crate::sift::{Features, Sift};
 
@@ -58,6 +58,7 @@ impl Extraction {
 pub struct Extractor {
     of: Of,
     max_image_size: usize,
+    turn: Turn,
 }
 
 enum Of {
@@ -68,7 +69,7 @@ enum Of {
 
 /// The features of a photo.
 pub struct Photo {
-    /// Width and height in pixels, upright.
+    /// Width and height in pixels of the photo in which features were found.
     pub size: [usize; 2],
     /// Standard deviation of a keypoint in pixels of the photo.
     pub noise_px: f64,
@@ -97,7 +98,13 @@ impl Extractor {
                 Of::SuperPoint(SuperPoint::try_new(options.clone())?)
             }
         };
-        Ok(Self { of, max_image_size: extraction.max_image_size() })
+        Ok(Self { of, max_image_size: extraction.max_image_size(), turn: Turn::Upright })
+    }
+
+    /// The same, of photos that are turned so.
+    #[must_use]
+    pub fn with_turn(self, turn: Turn) -> Self {
+        Self { turn, ..self }
     }
 
     /// The features of the photo at `path`.
@@ -107,16 +114,16 @@ impl Extractor {
     pub fn read(&self, path: &Path) -> Result<Photo, Error> {
         let (size, noise_px, found) = match &self.of {
             Of::Sift(sift) => {
-                let image = load::read(path)?;
+                let image = load::read_with(path, self.turn)?;
                 let size = large_enough(path, [image.width(), image.height()])?;
                 (size, DETECTION_NOISE, Found::Sift(sift.extract(&image)))
             }
             Of::Aliked(aliked) => {
-                let (image, size) = color(path)?;
+                let (image, size) = color(path, self.turn)?;
                 (size, DETECTION_NOISE, Found::Learned(aliked.extract(&image)?))
             }
             Of::SuperPoint(superpoint) => {
-                let (image, size) = color(path)?;
+                let (image, size) = color(path, self.turn)?;
                 (size, SUPERPOINT_NOISE, Found::Learned(superpoint.extract(&image)?))
             }
         };
@@ -133,8 +140,8 @@ impl Extractor {
     }
 }
 
-fn color(path: &Path) -> Result<(ColorImage, [usize; 2]), Error> {
-    let image = load::read_color(path)?;
+fn color(path: &Path, turn: Turn) -> Result<(ColorImage, [usize; 2]), Error> {
+    let image = load::read_color_with(path, turn)?;
     let size = large_enough(path, [image.width(), image.height()])?;
     Ok((image, size))
 }

@@ -27,65 +27,78 @@ const BESIDE_PIXELS: u64 = 32 << 20;
 /// Bytes that a decoder may take for a pixel: four channels of 16 bits.
 const PIXEL_BYTES: u64 = 8;
 
-/// Reads the photo at `path`, turned upright as its EXIF orientation says, as gray values.
+/// Whether a photo is turned as its EXIF orientation says. Keypoints are in pixels of the photo that they were found in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Turn {
+    /// Turned, as people see it.
+    Upright,
+    /// Not turned, as COLMAP and hloc see it.
+    AsStored,
+}
+
+/// Reads the photo at `path`, upright, as gray values.
 ///
-/// What a file is, its bytes decide, not its name. COLMAP does not turn photos; keypoints of a turned
-/// photo are in pixels of the upright one.
+/// What a file is, its bytes decide, not its name.
 ///
 /// # Errors
 /// One line with the path: no such file, neither JPEG nor PNG nor WebP, cut off, larger than
 /// 2^28 pixels, or larger than so few bytes can describe.
 pub fn read(path: &Path) -> Result<GrayImage, Error> {
-    let (bytes, name) = bytes_of(path)?;
-    decode(&bytes, &name)
+    gray(&photo(path, Turn::Upright)?)
 }
 
-/// The same in colors.
+/// Reads the photo at `path`, upright, in colors.
 ///
 /// # Errors
 /// As [`read`].
 pub fn read_color(path: &Path) -> Result<ColorImage, Error> {
-    let (bytes, name) = bytes_of(path)?;
-    let photo = upright(&bytes, &name)?;
-    let (width, height) = (photo.width() as usize, photo.height() as usize);
-    ColorImage::try_new(width, height, photo.into_rgb8().into_raw())
+    read_color_with(path, Turn::Upright)
 }
 
-/// The same as it is stored, not turned: as COLMAP and most other programs see it.
+/// Reads the photo at `path` in colors.
 ///
 /// # Errors
 /// As [`read`].
-pub fn read_color_as_stored(path: &Path) -> Result<ColorImage, Error> {
-    let (bytes, name) = bytes_of(path)?;
-    let (photo, _) = decoded(&bytes, &name)?;
+pub fn read_color_with(path: &Path, turn: Turn) -> Result<ColorImage, Error> {
+    let photo = photo(path, turn)?;
     let (width, height) = (photo.width() as usize, photo.height() as usize);
     ColorImage::try_new(width, height, photo.into_rgb8().into_raw())
 }
 
+/// Reads the photo at `path` as gray values.
+///
+/// # Errors
+/// As [`read`].
+pub(crate) fn read_with(path: &Path, turn: Turn) -> Result<GrayImage, Error> {
+    gray(&photo(path, turn)?)
+}
+
+/// The photo at `path` as it is decoded.
+pub(crate) fn photo(path: &Path, turn: Turn) -> Result<DynamicImage, Error> {
+    let (bytes, name) = bytes_of(path)?;
+    let (mut photo, orientation) = decoded(&bytes, &name)?;
+    if turn == Turn::Upright {
+        photo.apply_orientation(orientation);
+    }
+    Ok(photo)
+}
+
 /// The bytes of a file, and how it is called in errors.
-pub(crate) fn bytes_of(path: &Path) -> Result<(Vec<u8>, String), Error> {
+fn bytes_of(path: &Path) -> Result<(Vec<u8>, String), Error> {
     let name = path.display().to_string();
     let bytes = unlift_nn::file::bytes(path)
         .map_err(|error| Error::new(name.escape_debug().to_string(), KINDS, error.to_string()))?;
     Ok((bytes, name))
 }
 
-/// The same from the bytes of a file called `name`.
+/// Decodes the bytes of a photo in a file called `name`, upright, as gray values.
 ///
 /// # Errors
 /// As [`read`].
 pub fn decode(bytes: &[u8], name: &str) -> Result<GrayImage, Error> {
-    gray(&upright(bytes, name)?)
-}
-
-/// The photo itself, turned upright.
-///
-/// # Errors
-/// As [`read`].
-pub(crate) fn upright(bytes: &[u8], name: &str) -> Result<DynamicImage, Error> {
     let (mut photo, orientation) = decoded(bytes, name)?;
     photo.apply_orientation(orientation);
-    Ok(photo)
+    gray(&photo)
 }
 
 /// The photo as it is stored, and how it is to be turned.

@@ -9,25 +9,26 @@ use ::image::{ImageError, ImageFormat, Rgb, RgbImage};
 use unlift::Error;
 
 use crate::color::ColorImage;
-use crate::load;
+use crate::load::{self, Turn};
 
 /// Quality of the JPEG, of 100: good enough to recognize, small enough to embed.
 const QUALITY: u8 = 72;
 
-/// The photo at `path`, upright and shrunk so that no side exceeds `longest` pixels, as the bytes of a
+/// The photo at `path`, shrunk so that no side exceeds `longest` pixels, as the bytes of a
 /// JPEG in color. Nothing of its metadata is kept.
 ///
 /// # Errors
 /// As [`load::read`].
-pub fn jpeg(path: &Path, longest: u32) -> Result<Vec<u8>, Error> {
-    let (bytes, name) = load::bytes_of(path)?;
-    let photo = load::upright(&bytes, &name)?;
+pub fn jpeg(path: &Path, longest: u32, turn: Turn) -> Result<Vec<u8>, Error> {
+    let photo = load::photo(path, turn)?;
     let photo = match photo.width().max(photo.height()) > longest {
         true => photo.resize(longest, longest, FilterType::Triangle),
         false => photo,
     };
-    encoded(&photo.to_rgb8())
-        .map_err(|error| Error::new(name, "a photo that can be shrunk", error.to_string()))
+    encoded(&photo.to_rgb8()).map_err(|error| {
+        let name = path.display().to_string();
+        Error::new(name, "a photo that can be shrunk", error.to_string())
+    })
 }
 
 /// An image, shrunk so that no side exceeds `longest` pixels, as the bytes of a JPEG.

@@ -74,11 +74,6 @@ impl Database {
         Ok(Self { path: path.to_owned(), connection, image_ids, has_type, steps })
     }
 
-    /// The file, for errors.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
     /// The names of all images, sorted by their bytes.
     pub fn names(&self) -> Vec<Vec<u8>> {
         let mut names: Vec<Vec<u8>> = self.image_ids.keys().cloned().collect();

@@ -38,6 +38,7 @@ fn made(name: &str, n: usize) -> ImageFeatures {
         scales: Some(values(2.0)),
         orientations_deg: Some(values(-3.0)),
         uncertainty_px: Some(1.25),
+        upright: n % 2 == 0,
         photo: None,
     }
 }

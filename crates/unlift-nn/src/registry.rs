@@ -69,159 +69,139 @@ pub fn entry(name: &str) -> Result<&'static Entry, Error> {
     })
 }
 
-/// All models, by name.
-pub const MODELS: &[Entry] = &[
-    ALIKED_N16ROT,
-    INVERTER_ALIKED,
-    INVERTER_SIFT,
-    INVERTER_SUPERPOINT,
-    LPIPS_SQUEEZE,
-    NEIGHBORS_ALIKED,
-    NEIGHBORS_SIFT,
-    NEIGHBORS_SUPERPOINT,
-    SUPERPOINT,
-    YOLOX_NANO,
+/// All models, by name. A `static`, as a `const` would put the bytes of all carried files into the program at each use.
+pub static MODELS: &[Entry] = &[
+    Entry {
+        name: "aliked-n16rot",
+        purpose: "keypoints and descriptors of photos (ALIKED)",
+        licence: "BSD-3-Clause",
+        owner: "https://github.com/Shiaoming/ALIKED",
+        sha256: Some("94bcc6401df51e1368e44f997f16f17765fba2fbe8050ffc59f54f6876f58754"),
+        inputs: &[
+            Port { name: "image", shape: &[Some(1), Some(3), None, None] },
+            Port { name: "patch", shape: &[None, Some(9), Some(128)] },
+            Port { name: "samples", shape: &[None, Some(16), Some(128)] },
+        ],
+        outputs: &[
+            Port { name: "score", shape: &[Some(1), Some(1), None, None] },
+            Port { name: "level1", shape: &[Some(1), Some(32), None, None] },
+            Port { name: "level2", shape: &[Some(1), None, None, Some(32)] },
+            Port { name: "level3", shape: &[Some(1), None, None, Some(32)] },
+            Port { name: "level4", shape: &[Some(1), None, None, Some(32)] },
+            Port { name: "offsets", shape: &[None, Some(2), Some(16)] },
+            Port { name: "descriptors", shape: &[None, Some(128)] },
+        ],
+        carried: Some(include_bytes!("../models/aliked-n16rot/aliked-n16rot.onnx")),
+    },
+    Entry {
+        name: "inverter-aliked",
+        purpose: "pictures from keypoints or points of a map and their ALIKED descriptors",
+        licence: "MIT OR Apache-2.0",
+        owner: "https://github.com/unlift/unlift",
+        sha256: Some("99a466241a5d569053bb514c0e35f348faed8867c65c7054aeb8422841aca69e"),
+        inputs: &[Port { name: "features", shape: &[Some(1), Some(131), None, None] }],
+        outputs: &[Port { name: "picture", shape: &[Some(1), Some(3), None, None] }],
+        carried: Some(include_bytes!("../models/inverter-aliked/inverter-aliked.onnx")),
+    },
+    Entry {
+        name: "inverter-sift",
+        purpose: "pictures from keypoints or points of a map and their SIFT descriptors",
+        licence: "MIT OR Apache-2.0",
+        owner: "https://github.com/unlift/unlift",
+        sha256: Some("a7c0124cf6b1b5c90323086b544d539bd4030135d66ddc5f344d437a006428f5"),
+        inputs: &[Port { name: "features", shape: &[Some(1), Some(131), None, None] }],
+        outputs: &[Port { name: "picture", shape: &[Some(1), Some(3), None, None] }],
+        carried: Some(include_bytes!("../models/inverter-sift/inverter-sift.onnx")),
+    },
+    Entry {
+        name: "inverter-superpoint",
+        purpose: "pictures from keypoints or points of a map and their SuperPoint descriptors, trained by those who have \
+                  SuperPoint: training/inversion",
+        licence: "yours",
+        owner: "training/inversion/README.md of https://github.com/unlift/unlift",
+        // Whoever trains it knows what they trained.
+        sha256: None,
+        inputs: &[Port { name: "features", shape: &[Some(1), Some(259), None, None] }],
+        outputs: &[Port { name: "picture", shape: &[Some(1), Some(3), None, None] }],
+        carried: None,
+    },
+    Entry {
+        name: "lpips-squeeze",
+        purpose: "how far apart two pictures look (LPIPS 0.1, SqueezeNet)",
+        licence: "BSD-2-Clause",
+        owner: "https://github.com/richzhang/PerceptualSimilarity",
+        sha256: Some("848fca4cbcbe77262fd39ae6ebcc16adab9261d03e558f0a5881b3dcaf5c261e"),
+        inputs: &[
+            Port { name: "a", shape: &[Some(1), Some(3), None, None] },
+            Port { name: "b", shape: &[Some(1), Some(3), None, None] },
+        ],
+        outputs: &[Port { name: "distance", shape: &[Some(1)] }],
+        carried: Some(include_bytes!("../models/lpips-squeeze/lpips-squeeze.onnx")),
+    },
+    Entry {
+        name: "neighbors-aliked",
+        purpose: "near points by their ALIKED descriptors (the source `learned`)",
+        licence: "MIT OR Apache-2.0",
+        owner: "https://github.com/unlift/unlift",
+        sha256: Some("af102cee72965b6bd486c5fbbcb573dd593b0dd54a56b04083e728ce7292c661"),
+        inputs: &[
+            Port { name: "descriptors", shape: &[None, Some(128)] },
+            Port { name: "pairs", shape: &[Some(1), None, None] },
+        ],
+        outputs: &[Port { name: "scores", shape: &[None, None] }],
+        carried: Some(include_bytes!("../models/neighbors-aliked/neighbors-aliked.onnx")),
+    },
+    Entry {
+        name: "neighbors-sift",
+        purpose: "near points by their SIFT descriptors (the source `learned`)",
+        licence: "MIT OR Apache-2.0",
+        owner: "https://github.com/unlift/unlift",
+        sha256: Some("70a05b3e7c40fdbd4f542f1e4a85374a6b24b2050d831b8ce1f11a42e76fe2e8"),
+        inputs: &[
+            Port { name: "descriptors", shape: &[None, Some(128)] },
+            Port { name: "pairs", shape: &[Some(3), None, None] },
+        ],
+        outputs: &[Port { name: "scores", shape: &[None, None] }],
+        carried: Some(include_bytes!("../models/neighbors-sift/neighbors-sift.onnx")),
+    },
+    Entry {
+        name: "neighbors-superpoint",
+        purpose: "near points by their SuperPoint descriptors (the source `learned`), trained by those who have SuperPoint: \
+                  training/neighbors",
+        licence: "yours",
+        owner: "training/neighbors/README.md of https://github.com/unlift/unlift",
+        // Whoever trains it knows what they trained.
+        sha256: None,
+        inputs: &[
+            Port { name: "descriptors", shape: &[None, Some(256)] },
+            Port { name: "pairs", shape: &[Some(1), None, None] },
+        ],
+        outputs: &[Port { name: "scores", shape: &[None, None] }],
+        carried: None,
+    },
+    Entry {
+        name: "superpoint",
+        purpose: "keypoints and descriptors of photos (SuperPoint), made of the owner's superpoint_v1.pth by \
+                  training/export/superpoint.py",
+        licence: "non-commercial research only, not to be passed on",
+        owner: "https://github.com/magicleap/SuperPointPretrainedNetwork",
+        // What an exporter writes depends on its version; the script checks the hash of the published weights.
+        sha256: None,
+        inputs: &[Port { name: "image", shape: &[Some(1), Some(1), None, None] }],
+        outputs: &[
+            Port { name: "score", shape: &[Some(1), None, None] },
+            Port { name: "coarse", shape: &[Some(1), None, None, Some(256)] },
+        ],
+        carried: None,
+    },
+    Entry {
+        name: "yolox-nano",
+        purpose: "everyday objects in pictures (YOLOX-nano, the classes of COCO)",
+        licence: "Apache-2.0",
+        owner: "https://github.com/Megvii-BaseDetection/YOLOX",
+        sha256: Some("695e750a5d5754bb5a8d5325643b59282191a7e7a564e435a415fd3c578eab14"),
+        inputs: &[Port { name: "images", shape: &[Some(1), Some(3), Some(416), Some(416)] }],
+        outputs: &[Port { name: "output", shape: &[Some(1), Some(3549), Some(85)] }],
+        carried: Some(include_bytes!("../models/yolox-nano/yolox-nano.onnx")),
+    },
 ];
-
-const ALIKED_N16ROT: Entry = Entry {
-    name: "aliked-n16rot",
-    purpose: "keypoints and descriptors of photos (ALIKED)",
-    licence: "BSD-3-Clause",
-    owner: "https://github.com/Shiaoming/ALIKED",
-    sha256: Some("94bcc6401df51e1368e44f997f16f17765fba2fbe8050ffc59f54f6876f58754"),
-    inputs: &[
-        Port { name: "image", shape: &[Some(1), Some(3), None, None] },
-        Port { name: "patch", shape: &[None, Some(9), Some(128)] },
-        Port { name: "samples", shape: &[None, Some(16), Some(128)] },
-    ],
-    outputs: &[
-        Port { name: "score", shape: &[Some(1), Some(1), None, None] },
-        Port { name: "level1", shape: &[Some(1), Some(32), None, None] },
-        Port { name: "level2", shape: &[Some(1), None, None, Some(32)] },
-        Port { name: "level3", shape: &[Some(1), None, None, Some(32)] },
-        Port { name: "level4", shape: &[Some(1), None, None, Some(32)] },
-        Port { name: "offsets", shape: &[None, Some(2), Some(16)] },
-        Port { name: "descriptors", shape: &[None, Some(128)] },
-    ],
-    carried: Some(include_bytes!("../models/aliked-n16rot/aliked-n16rot.onnx")),
-};
-
-const INVERTER_ALIKED: Entry = Entry {
-    name: "inverter-aliked",
-    purpose: "pictures from keypoints or points of a map and their ALIKED descriptors",
-    licence: "MIT OR Apache-2.0",
-    owner: "https://github.com/unlift/unlift",
-    sha256: Some("99a466241a5d569053bb514c0e35f348faed8867c65c7054aeb8422841aca69e"),
-    inputs: &[Port { name: "features", shape: &[Some(1), Some(131), None, None] }],
-    outputs: &[Port { name: "picture", shape: &[Some(1), Some(3), None, None] }],
-    carried: Some(include_bytes!("../models/inverter-aliked/inverter-aliked.onnx")),
-};
-
-const INVERTER_SUPERPOINT: Entry = Entry {
-    name: "inverter-superpoint",
-    purpose: "pictures from keypoints or points of a map and their SuperPoint descriptors, trained by those who have \
-              SuperPoint: training/inversion",
-    licence: "yours",
-    owner: "training/inversion/README.md of https://github.com/unlift/unlift",
-    // Whoever trains it knows what they trained.
-    sha256: None,
-    inputs: &[Port { name: "features", shape: &[Some(1), Some(259), None, None] }],
-    outputs: &[Port { name: "picture", shape: &[Some(1), Some(3), None, None] }],
-    carried: None,
-};
-
-const INVERTER_SIFT: Entry = Entry {
-    name: "inverter-sift",
-    purpose: "pictures from keypoints or points of a map and their SIFT descriptors",
-    licence: "MIT OR Apache-2.0",
-    owner: "https://github.com/unlift/unlift",
-    sha256: Some("a7c0124cf6b1b5c90323086b544d539bd4030135d66ddc5f344d437a006428f5"),
-    inputs: &[Port { name: "features", shape: &[Some(1), Some(131), None, None] }],
-    outputs: &[Port { name: "picture", shape: &[Some(1), Some(3), None, None] }],
-    carried: Some(include_bytes!("../models/inverter-sift/inverter-sift.onnx")),
-};
-
-const LPIPS_SQUEEZE: Entry = Entry {
-    name: "lpips-squeeze",
-    purpose: "how far apart two pictures look (LPIPS 0.1, SqueezeNet)",
-    licence: "BSD-2-Clause",
-    owner: "https://github.com/richzhang/PerceptualSimilarity",
-    sha256: Some("848fca4cbcbe77262fd39ae6ebcc16adab9261d03e558f0a5881b3dcaf5c261e"),
-    inputs: &[
-        Port { name: "a", shape: &[Some(1), Some(3), None, None] },
-        Port { name: "b", shape: &[Some(1), Some(3), None, None] },
-    ],
-    outputs: &[Port { name: "distance", shape: &[Some(1)] }],
-    carried: Some(include_bytes!("../models/lpips-squeeze/lpips-squeeze.onnx")),
-};
-
-const NEIGHBORS_ALIKED: Entry = Entry {
-    name: "neighbors-aliked",
-    purpose: "near points by their ALIKED descriptors (the source `learned`)",
-    licence: "MIT OR Apache-2.0",
-    owner: "https://github.com/unlift/unlift",
-    sha256: Some("af102cee72965b6bd486c5fbbcb573dd593b0dd54a56b04083e728ce7292c661"),
-    inputs: &[
-        Port { name: "descriptors", shape: &[None, Some(128)] },
-        Port { name: "pairs", shape: &[Some(1), None, None] },
-    ],
-    outputs: &[Port { name: "scores", shape: &[None, None] }],
-    carried: Some(include_bytes!("../models/neighbors-aliked/neighbors-aliked.onnx")),
-};
-
-const NEIGHBORS_SIFT: Entry = Entry {
-    name: "neighbors-sift",
-    purpose: "near points by their SIFT descriptors (the source `learned`)",
-    licence: "MIT OR Apache-2.0",
-    owner: "https://github.com/unlift/unlift",
-    sha256: Some("70a05b3e7c40fdbd4f542f1e4a85374a6b24b2050d831b8ce1f11a42e76fe2e8"),
-    inputs: &[
-        Port { name: "descriptors", shape: &[None, Some(128)] },
-        Port { name: "pairs", shape: &[Some(3), None, None] },
-    ],
-    outputs: &[Port { name: "scores", shape: &[None, None] }],
-    carried: Some(include_bytes!("../models/neighbors-sift/neighbors-sift.onnx")),
-};
-
-const NEIGHBORS_SUPERPOINT: Entry = Entry {
-    name: "neighbors-superpoint",
-    purpose: "near points by their SuperPoint descriptors (the source `learned`), trained by those who have SuperPoint: \
-              training/neighbors",
-    licence: "yours",
-    owner: "training/neighbors/README.md of https://github.com/unlift/unlift",
-    // Whoever trains it knows what they trained.
-    sha256: None,
-    inputs: &[
-        Port { name: "descriptors", shape: &[None, Some(256)] },
-        Port { name: "pairs", shape: &[Some(1), None, None] },
-    ],
-    outputs: &[Port { name: "scores", shape: &[None, None] }],
-    carried: None,
-};
-
-const SUPERPOINT: Entry = Entry {
-    name: "superpoint",
-    purpose: "keypoints and descriptors of photos (SuperPoint), made of the owner's superpoint_v1.pth by \
-              training/export/superpoint.py",
-    licence: "non-commercial research only, not to be passed on",
-    owner: "https://github.com/magicleap/SuperPointPretrainedNetwork",
-    // What an exporter writes depends on its version; the script checks the hash of the published weights.
-    sha256: None,
-    inputs: &[Port { name: "image", shape: &[Some(1), Some(1), None, None] }],
-    outputs: &[
-        Port { name: "score", shape: &[Some(1), None, None] },
-        Port { name: "coarse", shape: &[Some(1), None, None, Some(256)] },
-    ],
-    carried: None,
-};
-
-const YOLOX_NANO: Entry = Entry {
-    name: "yolox-nano",
-    purpose: "everyday objects in pictures (YOLOX-nano, the classes of COCO)",
-    licence: "Apache-2.0",
-    owner: "https://github.com/Megvii-BaseDetection/YOLOX",
-    sha256: Some("695e750a5d5754bb5a8d5325643b59282191a7e7a564e435a415fd3c578eab14"),
-    inputs: &[Port { name: "images", shape: &[Some(1), Some(3), Some(416), Some(416)] }],
-    outputs: &[Port { name: "output", shape: &[Some(1), Some(3549), Some(85)] }],
-    carried: Some(include_bytes!("../models/yolox-nano/yolox-nano.onnx")),
-};

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use unlift_audit::{OutlierFilter, Preparation, Prepared, Quiet, check_scale, maps, prepare};
+use unlift_audit::{OutlierFilter, Preparation, Prepared, check_scale, maps, prepare};
 use unlift_io::hash::{hash_file, hash_input, hash_positions};
 use unlift_io::seen::Seen;
 use unlift_report::document::Input;
@@ -23,9 +23,7 @@ pub struct Map {
     /// Camera centers in the unit of the map.
     pub cameras: Vec<[f64; 3]>,
     pub up: Option<[f64; 3]>,
-    /// What was not read of its files; may name them.
-    skipped: Vec<String>,
-    /// What whoever reads figures of it must know; no paths, as it is told in share-safe reports, too.
+    /// What whoever reads figures of it must know.
     pub notes: Vec<String>,
 }
 
@@ -92,16 +90,8 @@ impl Map {
             };
             let zeros = prepared.descriptors.as_ref().and_then(maps::zeros);
             let notes = prepared.notes.iter().cloned().chain(zeros).collect();
-            let (cameras, skipped) = (Vec::new(), Vec::new());
-            let prepared = Arc::new(prepared);
-            Ok::<_, unlift_audit::Error>(Self {
-                prepared,
-                input,
-                cameras,
-                up: None,
-                skipped,
-                notes,
-            })
+            let (prepared, cameras) = (Arc::new(prepared), Vec::new());
+            Ok::<_, unlift_audit::Error>(Self { prepared, input, cameras, up: None, notes })
         })
     }
 
@@ -142,10 +132,10 @@ impl Map {
         self.prepared.unit_in_map_units
     }
 
-    /// What you should know of how it was read and made ready; a report has those that matter for its figures.
+    /// What you should know of how it was read and made ready; a report has these, too.
     #[getter]
     fn notes(&self) -> Vec<String> {
-        self.skipped.iter().chain(&self.notes).cloned().collect()
+        self.prepared.doubts.iter().chain(&self.notes).cloned().collect()
     }
 
     /// Which of the points that were given are left, ascending `(n,)`.
@@ -172,7 +162,7 @@ pub fn read(
     let preparation = preparation(scale, k, max_points, outlier_filter, seed)?;
     work::run(py, None, None, move || {
         let beside = Seen::new(&descriptors);
-        let (input, prepared) = maps::open(&path, descriptors.as_deref(), &preparation, &Quiet)?;
+        let (input, prepared) = maps::open(&path, descriptors.as_deref(), &preparation)?;
         let sha256 = Some(hash_input(&input)?);
         let unit = prepared.unit_in_map_units;
         let mut other_sha256 = unlift_audit::ordered([]);
@@ -192,7 +182,6 @@ pub fn read(
             },
             cameras: input.cameras.iter().map(|center| center.map(|x| x / unit)).collect(),
             up: input.up,
-            skipped: input.skipped,
             notes: prepared.notes.clone(),
             prepared: Arc::new(prepared),
         })

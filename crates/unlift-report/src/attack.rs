@@ -34,7 +34,7 @@ impl Given {
                 || (self.inlier_ratio == other.inlier_ratio && noise(self) == noise(other)))
     }
 
-    /// As the page calls them everywhere: `overlap, 11 % right (measured)`.
+    /// What the page calls them everywhere: `overlap, 11 % true neighbors`.
     pub(crate) fn label(&self) -> String {
         neighborhoods(&self.neighbors, self.oracle_noise.as_deref(), self.inlier_ratio)
     }
@@ -102,26 +102,39 @@ pub(crate) fn source(neighbors: &str, oracle_noise: Option<&str>) -> String {
     }
 }
 
-/// How many of the listed neighbors are right: `50 % right`, `11 % right (measured)`.
-pub(crate) fn right(neighbors: &str, ratio: f64) -> String {
-    let measured = if is_oracle(neighbors) { "" } else { " (measured)" };
-    format!("{} % right{measured}", words::ratio_percent(ratio))
-}
-
-/// Neighborhoods as the page calls them everywhere: `overlap, 11 % right (measured)`.
+/// Neighborhoods as the page calls them everywhere: `overlap, 11 % true neighbors`.
 pub(crate) fn neighborhoods(neighbors: &str, oracle_noise: Option<&str>, ratio: f64) -> String {
     if neighbors == REFERENCE {
         return "reference: told where true neighbors are".to_owned();
     }
-    format!("{}, {}", source(neighbors, oracle_noise), right(neighbors, ratio))
+    let source = source(neighbors, oracle_noise);
+    format!("{source}, {} % true neighbors", words::ratio_percent(ratio))
 }
 
-/// The whole attack of a row: `overlap, 11 % right (measured), joint`.
+/// The attack of a row in two words, for a sentence: `overlap neighbors`, `records alone`.
+pub(crate) fn briefly(row: &Row) -> String {
+    match row.neighbors.as_str() {
+        _ if !has_neighborhoods(row) => "records alone".to_owned(),
+        "file" => "given neighbors".to_owned(),
+        "descriptors" => "descriptor neighbors".to_owned(),
+        _ => format!("{} neighbors", source(&row.neighbors, row.oracle_noise.as_deref())),
+    }
+}
+
+/// The whole attack of a row: `oracle, 50 % true neighbors, joint`, `overlap, 35 listed, 11 % of them true, joint`.
 pub(crate) fn name(row: &Row) -> String {
     if !has_neighborhoods(row) {
         return records_alone(Some(&row.solver));
     }
-    let given = neighborhoods(&row.neighbors, row.oracle_noise.as_deref(), row.inlier_ratio);
+    // An attacker's own lists are as long as it chose: the share of true ones says nothing without that.
+    let given = match basis(row) {
+        Some(Basis::Released | Basis::Given) => {
+            let (source, true_ones) =
+                (source(&row.neighbors, None), words::ratio_percent(row.inlier_ratio));
+            format!("{source}, {} listed, {true_ones} % of them true", row.k)
+        }
+        _ => neighborhoods(&row.neighbors, row.oracle_noise.as_deref(), row.inlier_ratio),
+    };
     format!("{given}, {}", row.solver)
 }
 
@@ -151,10 +164,13 @@ mod tests {
 
     #[test]
     fn neighborhoods_have_the_name_of_their_source() {
-        assert_eq!(neighborhoods("oracle", Some("uniform"), 0.5), "oracle, 50 % right");
-        assert_eq!(neighborhoods("oracle", None, 0.5), "oracle, 50 % right");
-        assert_eq!(neighborhoods("oracle", Some("near"), 0.1), "oracle (near), 10 % right");
-        assert_eq!(neighborhoods("overlap", None, 0.113), "overlap, 11 % right (measured)");
-        assert_eq!(neighborhoods("file", None, 0.2), "given lists, 20 % right (measured)");
+        assert_eq!(neighborhoods("oracle", Some("uniform"), 0.5), "oracle, 50 % true neighbors");
+        assert_eq!(neighborhoods("oracle", None, 0.5), "oracle, 50 % true neighbors");
+        assert_eq!(
+            neighborhoods("oracle", Some("near"), 0.1),
+            "oracle (near), 10 % true neighbors"
+        );
+        assert_eq!(neighborhoods("overlap", None, 0.113), "overlap, 11 % true neighbors");
+        assert_eq!(neighborhoods("file", None, 0.2), "given lists, 20 % true neighbors");
     }
 }

@@ -36,7 +36,7 @@ pub(crate) struct SchemeChoice {
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct GivenChoice {
-    /// `oracle, 50 % right`, `overlap, 9 to 12 % right (measured)`.
+    /// `oracle, 50 % true neighbors`, `overlap, 9 to 12 % true neighbors`.
     pub label: String,
     /// `released`, `given`, `oracle` or `reference` (no attack): the groups of a menu.
     pub group: &'static str,
@@ -128,7 +128,7 @@ fn given_choice(document: &Document, row: &Row) -> GivenChoice {
     let said = [low, high].map(words::ratio_percent);
     let label = match said[0] == said[1] {
         true => given.label(),
-        false => format!("{source}, {} to {} % right (measured)", said[0], said[1]),
+        false => format!("{source}, {} to {} % true neighbors", said[0], said[1]),
     };
     GivenChoice { label, group: group(row), source, given }
 }

@@ -5,19 +5,21 @@ use minijinja::{AutoEscape, Environment, UndefinedBehavior};
 use serde::Serialize;
 
 use crate::document::{Document, ImageCounts, LengthUnit};
+use crate::exhibit::{Exhibit, exhibits};
+use crate::findings::{Findings, findings};
 use crate::gates::{Gates, gates};
-use crate::inversions::{Lead, Sheet, lead, sheets};
+use crate::inversions::{Inversion, Sheet, sheets};
 use crate::options::RenderOptions;
 use crate::page_data::page_data;
 use crate::scene::{Scene3d, encode};
-use crate::slot::slot;
 use crate::tables::Table;
 use crate::verdict::Verdict;
 use crate::{Error, attack, paper, pictures, tables, verdict, words};
 
 /// The template and its parts, by the names they include each other with.
-const TEMPLATES: [(&str, &str); 8] = [
+const TEMPLATES: [(&str, &str); 9] = [
     ("report.html", include_str!("../template/report.html")),
+    ("terms.html", include_str!("../template/terms.html")),
     ("gates.html", include_str!("../template/gates.html")),
     ("verdict.html", include_str!("../template/verdict.html")),
     ("figures.html", include_str!("../template/figures.html")),
@@ -29,13 +31,14 @@ const TEMPLATES: [(&str, &str); 8] = [
 const STYLE: [&str; 2] =
     [include_str!("../template/style.css"), include_str!("../template/figures.css")];
 const BUNDLE: &str = include_str!("../web/vendor/bundle.min.js");
-const SCRIPTS: [&str; 7] = [
+const SCRIPTS: [&str; 8] = [
     include_str!("../web/choices.js"),
     include_str!("../web/charts.js"),
     include_str!("../web/figures.js"),
     include_str!("../web/scene.js"),
     include_str!("../web/pictures.js"),
-    include_str!("../web/wipe.js"),
+    include_str!("../web/sheets.js"),
+    include_str!("../web/tables.js"),
     include_str!("../web/report.js"),
 ];
 
@@ -66,7 +69,6 @@ pub fn render(
     let pictures = pictures::encode(shown, within.unwrap_or(10.0), &mut blocks);
     let page_data = page_data(&document, encoded.as_ref(), &pictures, options);
     let data = serde_json::to_string(&page_data)?;
-    let verdict = verdict::verdict(&document);
     let options_text: Vec<(String, String)> =
         document.options.iter().map(|(name, value)| (name.clone(), plain(value))).collect();
     let table_list = [
@@ -83,7 +85,9 @@ pub fn render(
         [Some(tables::losses(&document)), tables::choices(&document), tables::trials(&document)];
 
     let shown = if options.share_safe { &[] } else { options.inversions.as_slice() };
-    let (drawn, sheets_left_out) = sheets(shown);
+    let (drawn, sheets_left_out) = sheets(&document, shown);
+    let opening = options.opening.clone().filter(|_| !options.share_safe);
+    let own = Opening::of(&document, shown);
     let page = Page {
         style: STYLE,
         bundle: BUNDLE,
@@ -91,7 +95,8 @@ pub fn render(
         data: script_text(&data),
         blocks: &blocks,
         pictures: pictures.len(),
-        lead: lead(&document, shown),
+        findings: findings(&document),
+        parts: opening.into_iter().chain([own]).collect(),
         sheets: drawn,
         sheets_left_out,
         scene: encoded.as_ref().map(|scene| SceneWords {
@@ -101,8 +106,6 @@ pub fn render(
         }),
         share_safe: options.share_safe,
         subject: subject(&document),
-        slots: verdict.cards.iter().map(|card| slot(&document, &card.scheme)).collect(),
-        verdict,
         gates: gates(&document),
         published: page_data.has_published(),
         judged: document
@@ -139,6 +142,7 @@ pub fn render(
             .iter()
             .fold(text, |text, unit| text.replace(unit, &unit.replace(' ', "\u{a0}")))
     });
+    env.add_filter("coded", coded);
     for (name, source) in TEMPLATES {
         env.add_template(name, source)?;
     }
@@ -155,24 +159,23 @@ fn turns(c: char) -> bool {
 struct Page<'a> {
     style: [&'static str; 2],
     bundle: &'static str,
-    scripts: [&'static str; 7],
+    scripts: [&'static str; 8],
     /// JSON for the script; free of `<`.
     data: String,
     blocks: &'a [String],
     scene: Option<SceneWords>,
     /// Images that are drawn.
     pictures: usize,
-    /// What the pictures say, and three of them.
-    lead: Option<Lead>,
-    /// Pictures made of what came back.
+    /// The verdict of this audit, after that of another one if there is any.
+    parts: Vec<Opening>,
+    /// Titles of charts.
+    findings: Findings,
+    /// Pictures painted from what came back.
     sheets: Vec<Sheet>,
     /// How many of them would make the page too large.
     sheets_left_out: usize,
     share_safe: bool,
     subject: Subject,
-    verdict: Verdict,
-    /// Color and mark of each card's scheme.
-    slots: Vec<usize>,
     gates: Option<Gates>,
     published: bool,
     /// Whether any attacker said how sure it is.
@@ -194,6 +197,55 @@ struct Page<'a> {
     notes: &'a [String],
     document: &'a Document,
     attribution: &'static str,
+}
+
+/// What a page begins with: the verdict on an audit, and its pictures if it has any.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Opening {
+    /// Stands above the verdict where a page has several.
+    title: Option<String>,
+    /// A page with the details, as a link relative to this one.
+    details: Option<String>,
+    verdict: Verdict,
+    exhibits: Vec<Exhibit>,
+    notes: Vec<String>,
+    /// Whether it is about images.
+    images: bool,
+}
+
+impl Opening {
+    fn of(document: &Document, inversions: &[Inversion]) -> Self {
+        Self {
+            title: None,
+            details: None,
+            verdict: verdict::verdict(document),
+            exhibits: exhibits(document, inversions),
+            notes: document.notes.clone(),
+            images: document.results.first().is_some_and(|row| row.unit == LengthUnit::Pixel),
+        }
+    }
+
+    /// The opening of another audit under this title, whose own page `details` is a link to.
+    pub fn titled(
+        document: &Document,
+        inversions: &[Inversion],
+        title: &str,
+        details: &str,
+    ) -> Self {
+        let (title, details) = (Some(title.to_owned()), Some(details.to_owned()));
+        Self { title, details, ..Self::of(document, inversions) }
+    }
+}
+
+/// Text with what stands in back quotes set as code; everything else is escaped.
+fn coded(text: &str) -> minijinja::Value {
+    let escaped = text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+    let parts = escaped.split('`').enumerate();
+    let parts = parts.map(|(at, part)| match at % 2 {
+        1 => format!("<code>{part}</code>"),
+        _ => part.to_owned(),
+    });
+    minijinja::Value::from_safe_string(parts.collect())
 }
 
 #[derive(Debug, Serialize)]

@@ -1,29 +1,34 @@
-//! Pictures that a network made of what came back, beside the photos.
+//! Pictures that a network paints from recovered points, beside the photos.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
 
-use crate::attack::{self, Basis, Given, basis};
-use crate::document::{Document, Row};
-use crate::words;
+use crate::attack::{self, Basis, Given, basis_of};
+use crate::document::Document;
+use crate::pictures::ReleasedView;
+use crate::verdict;
 
-/// One photo and the pictures made of its keypoints. All pictures are JPEGs of one size.
+/// One photo and the pictures painted from its keypoints. All pictures are JPEGs of one size.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Inversion {
     /// The image's name.
     pub name: String,
+    /// Width and height of the photo in pixels.
+    pub size: [u32; 2],
     /// The photo.
     pub photo: Vec<u8>,
     /// What a detector finds in the photo.
     pub objects: Vec<Object>,
     /// The picture of the true keypoints.
     pub baseline: Painted,
+    /// What each scheme releases, in pixels of the photo.
+    pub released: Vec<ReleasedView>,
     /// Pictures of what came back.
     pub views: Vec<InvertedView>,
 }
 
-/// A picture that a network made.
+/// A picture that a network painted.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Painted {
     /// The picture.
@@ -37,10 +42,21 @@ pub struct Painted {
 /// An everyday object that a detector found in a picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Object {
-    /// What it is: `chair`.
+    /// Its class: `chair`.
     pub class: String,
     /// Left, top, right and bottom as shares of the picture's sides; may reach beyond it.
     pub sides: [f32; 4],
+}
+
+impl Object {
+    /// Whether `other` is this object: of one class, and at least half of the boxes in common.
+    fn is(&self, other: &Self) -> bool {
+        let [a, b] = [self.sides, other.sides];
+        let side = |low: f32, high: f32| (high - low).max(0.0);
+        let area = |s: [f32; 4]| side(s[0], s[2]) * side(s[1], s[3]);
+        let common = side(a[0].max(b[0]), a[2].min(b[2])) * side(a[1].max(b[1]), a[3].min(b[3]));
+        self.class == other.class && common >= 0.5 * (area(a) + area(b) - common)
+    }
 }
 
 /// How alike a picture is to the photo.
@@ -71,12 +87,18 @@ pub struct InvertedView {
     pub painted: Painted,
 }
 
+impl InvertedView {
+    /// What the attack had to go on.
+    pub(crate) fn basis(&self) -> Option<Basis> {
+        basis_of(&self.given.neighbors, &self.solver)
+    }
+}
+
 /// All pictures of one photo, as the page shows them.
 #[derive(Debug, Serialize)]
 pub(crate) struct Sheet {
     name: String,
     photo: String,
-    boxes: Vec<Boxed>,
     baseline: Shown,
     rows: Vec<SheetRow>,
 }
@@ -94,39 +116,40 @@ struct Boxed {
 #[derive(Debug, Serialize)]
 struct SheetRow {
     scheme: String,
-    pictures: Vec<Shown>,
+    /// The strongest attack from the released data alone, and the oracle's nearest to half.
+    main: Vec<Shown>,
+    /// All others.
+    others: Vec<Shown>,
 }
 
 #[derive(Debug, Serialize)]
 struct Shown {
-    /// What it was made of.
+    /// What it was painted from.
     label: String,
     said: String,
-    /// Whether an attacker can make it today, without an oracle.
-    today: bool,
     source: String,
+    /// Objects of the photo that are found again.
     boxes: Vec<Boxed>,
 }
 
 /// Bytes of the page that all of them may take.
 const BUDGET_BYTES: usize = 2_500_000;
 
-/// The sheets of `inversions`, in their order, and how many pictures are left out as they would make the page too large:
-/// those of the last photos, then of every scheme those in the middle.
-pub(crate) fn sheets(inversions: &[Inversion]) -> (Vec<Sheet>, usize) {
-    let mut sheets: Vec<Sheet> = inversions.iter().map(sheet).collect();
+/// The sheets of `inversions`, in their order, and how many pictures are left out because they would make the page too
+/// large: first whole photos from the end, then the last of the longest rows of other pictures.
+pub(crate) fn sheets(document: &Document, inversions: &[Inversion]) -> (Vec<Sheet>, usize) {
+    let mut sheets: Vec<Sheet> = inversions.iter().map(|one| sheet(document, one)).collect();
     let size = |sheets: &[Sheet]| sheets.iter().map(Sheet::size).sum::<usize>();
     let mut left_out = 0;
     while size(&sheets) > BUDGET_BYTES && sheets.len() > 1 {
-        left_out += sheets.pop().map_or(0, |sheet| sheet.count());
+        left_out += sheets.pop().map_or(0, |sheet| sheet.pictures().count());
     }
     while size(&sheets) > BUDGET_BYTES {
         let rows = sheets.iter_mut().flat_map(|sheet| &mut sheet.rows);
-        let Some(longest) = rows.max_by_key(|row| row.pictures.len()) else { break };
-        if longest.pictures.len() < 2 {
+        let longest = rows.max_by_key(|row| row.others.len());
+        if longest.and_then(|row| row.others.pop()).is_none() {
             break;
         }
-        longest.pictures.remove(longest.pictures.len() / 2);
         left_out += 1;
     }
     (sheets, left_out)
@@ -134,140 +157,94 @@ pub(crate) fn sheets(inversions: &[Inversion]) -> (Vec<Sheet>, usize) {
 
 impl Sheet {
     /// Pictures of what came back.
-    fn count(&self) -> usize {
-        self.rows.iter().map(|row| row.pictures.len()).sum()
+    fn pictures(&self) -> impl Iterator<Item = &Shown> {
+        self.rows.iter().flat_map(|row| row.main.iter().chain(&row.others))
     }
 
     fn size(&self) -> usize {
-        let pictures = self.rows.iter().flat_map(|row| &row.pictures);
-        let shown = pictures.chain([&self.baseline]).map(|shown| shown.source.len());
+        let shown = self.pictures().chain([&self.baseline]).map(|shown| shown.source.len());
         self.photo.len() + shown.sum::<usize>()
     }
 }
 
-/// The three pictures and the sentence that a page begins with.
-#[derive(Debug, Serialize)]
-pub(crate) struct Lead {
-    sentence: String,
-    photo: String,
-    baseline: String,
-    recovered: String,
-    /// What the third picture was made of.
-    label: String,
+/// The view of `scheme` that speaks for attacks on this basis: of the attack that recovers most, of the oracle's the
+/// one nearest to half.
+pub(crate) fn strongest<'a>(
+    document: &Document,
+    inversion: &'a Inversion,
+    scheme: &str,
+    basis: Basis,
+) -> Option<&'a InvertedView> {
+    let views = || {
+        let of_scheme = inversion.views.iter().filter(|view| view.scheme == scheme);
+        of_scheme.filter(|view| view.basis() == Some(basis))
+    };
+    let row = verdict::strongest(document, scheme, basis);
+    let is_row = |view: &&InvertedView| {
+        row.is_some_and(|row| view.solver == row.solver && view.given.same_choice(&Given::of(row)))
+    };
+    let best = |a: &&InvertedView, b: &&InvertedView| {
+        a.painted.likeness.ssim.total_cmp(&b.painted.likeness.ssim)
+    };
+    // The strongest attack may not have been painted: then the best picture there is.
+    views().find(is_row).or_else(|| views().max_by(best))
 }
 
-/// What the pictures say in a sentence: of the attack that gets the best pictures, one without an oracle if there is
-/// any, else one where half of the neighbors are known.
-pub(crate) fn lead(document: &Document, inversions: &[Inversion]) -> Option<Lead> {
-    let kept = |row: &Row| {
-        let of = |name: &str| row.metrics.get(name).copied();
-        Some((of("ssim")?, of("ssim_baseline").filter(|baseline| *baseline > 0.0)?))
-    };
-    let away = |row: &Row| (row.inlier_ratio - 0.5).abs();
-    let rows = || document.results.iter().filter_map(|row| Some((row, kept(row)?)));
-    let painted = |row: &Row| {
-        let views = inversions.first().map_or(&[][..], |sheet| &sheet.views);
-        views.iter().find(|view| {
-            view.scheme == row.scheme
-                && view.solver == row.solver
-                && view.given.same_choice(&Given::of(row))
-        })
-    };
-    let rows = || rows().filter(|(row, _)| painted(row).is_some());
-    let today = rows().any(|(row, _)| basis(row) == Some(Basis::Released));
-    let nearest = rows().map(|(row, _)| away(row)).fold(f64::INFINITY, f64::min);
-    let candidates = rows().filter(|(row, _)| match today {
-        true => basis(row) == Some(Basis::Released),
-        false => away(row) <= nearest,
-    });
-    let (row, (ssim, baseline)) = candidates.max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
-    let (sheet, view) = (inversions.first()?, painted(row)?);
-    let scheme = row.scheme.to_uppercase();
-    let who = match today {
-        true => "From the released data alone".to_owned(),
-        false => {
-            format!("With {} % of the neighbors known", words::ratio_percent(row.inlier_ratio))
-        }
-    };
-    let amount = match ssim / baseline {
-        share if share >= 0.95 => "as good a picture as without any protection",
-        share if share >= 0.8 => "nearly as good a picture as without any protection",
-        share if share >= 0.5 => "a worse picture than without protection",
-        _ => "a much worse picture than without protection",
-    };
-    Some(Lead {
-        sentence: format!(
-            "{who}, a network paints {amount} of what {scheme} hides (SSIM {ssim:.2}, {baseline:.2} without)."
-        ),
-        photo: source(&sheet.photo),
-        baseline: source(&sheet.baseline.jpeg),
-        recovered: source(&view.painted.jpeg),
-        label: format!("{scheme}, {}", label(view)),
-    })
-}
-
-fn sheet(inversion: &Inversion) -> Sheet {
-    let mut rows: Vec<SheetRow> = Vec::new();
-    let several = inversion.views.iter().any(|view| view.solver != inversion.views[0].solver);
+fn sheet(document: &Document, inversion: &Inversion) -> Sheet {
+    let mut schemes: Vec<&str> = Vec::new();
     for view in &inversion.views {
-        let shown = Shown {
-            label: match several {
-                true => label(view),
-                false => attack::without_solver(&view.given, &view.solver),
-            },
-            today: attack::basis_of(&view.given.neighbors, &view.solver) == Some(Basis::Released),
-            ..Shown::of(&view.painted)
-        };
-        match rows.iter_mut().find(|row| row.scheme == view.scheme) {
-            Some(row) => row.pictures.push(shown),
-            None => rows.push(SheetRow { scheme: view.scheme.clone(), pictures: vec![shown] }),
+        if !schemes.contains(&view.scheme.as_str()) {
+            schemes.push(&view.scheme);
         }
     }
+    let rows = schemes.into_iter().map(|scheme| {
+        let main: Vec<&InvertedView> = [Basis::Released, Basis::Given, Basis::Oracle]
+            .into_iter()
+            .filter_map(|basis| strongest(document, inversion, scheme, basis))
+            .collect();
+        let is_main = |view: &InvertedView| main.iter().any(|other| std::ptr::eq(*other, view));
+        let others = inversion.views.iter().filter(|view| view.scheme == scheme && !is_main(view));
+        SheetRow {
+            scheme: scheme.to_owned(),
+            others: others.map(|view| shown(inversion, view)).collect(),
+            main: main.into_iter().map(|view| shown(inversion, view)).collect(),
+        }
+    });
     Sheet {
         name: inversion.name.clone(),
         photo: source(&inversion.photo),
-        boxes: boxes(&inversion.objects),
-        baseline: Shown {
-            label: "without protection".to_owned(),
-            ..Shown::of(&inversion.baseline)
-        },
-        rows,
+        baseline: painted(inversion, &inversion.baseline, "without protection".to_owned()),
+        rows: rows.collect(),
     }
 }
 
-impl Shown {
-    fn of(painted: &Painted) -> Self {
-        Self {
-            label: String::new(),
-            said: painted.likeness.said(),
-            today: false,
-            source: source(&painted.jpeg),
-            boxes: boxes(&painted.objects),
-        }
+fn shown(inversion: &Inversion, view: &InvertedView) -> Shown {
+    painted(inversion, &view.painted, attack::without_solver(&view.given, &view.solver))
+}
+
+fn painted(inversion: &Inversion, painted: &Painted, label: String) -> Shown {
+    Shown {
+        label,
+        said: painted.likeness.said(),
+        source: source(&painted.jpeg),
+        boxes: found_again(&inversion.objects, &painted.objects),
     }
 }
 
-/// What lies within the picture.
-fn boxes(objects: &[Object]) -> Vec<Boxed> {
-    let of = |object: &Object| {
+/// Boxes of objects that were found in the photo and again in a picture. A box that only the picture has is no
+/// evidence of anything.
+fn found_again(photo: &[Object], picture: &[Object]) -> Vec<Boxed> {
+    let again = picture.iter().filter(|object| photo.iter().any(|one| one.is(object)));
+    let boxed = |object: &Object| {
         let [left, top, right, bottom] = object.sides.map(|side| 100.0 * side.clamp(0.0, 1.0));
         let class = object.class.clone();
         Boxed { class, left, top, width: right - left, height: bottom - top }
     };
-    objects.iter().map(of).collect()
-}
-
-/// The whole attack: neighborhoods and solver.
-fn label(view: &InvertedView) -> String {
-    let given = attack::without_solver(&view.given, &view.solver);
-    match attack::looks_at_neighbors(&view.solver) {
-        true => format!("{given}, {}", view.solver),
-        false => given,
-    }
+    again.map(boxed).collect()
 }
 
 /// A JPEG as a page holds it.
-fn source(jpeg: &[u8]) -> String {
+pub(crate) fn source(jpeg: &[u8]) -> String {
     format!("data:image/jpeg;base64,{}", STANDARD.encode(jpeg))
 }
 
@@ -275,26 +252,44 @@ fn source(jpeg: &[u8]) -> String {
 mod tests {
     use super::*;
 
-    fn view(scheme: &str, neighbors: &str, inlier_ratio: f64, bytes: usize) -> InvertedView {
-        let given = Given { neighbors: neighbors.into(), oracle_noise: None, inlier_ratio };
-        let solver = "joint".to_owned();
+    fn view(scheme: &str, inlier_ratio: f64, bytes: usize) -> InvertedView {
+        let given = Given { neighbors: "oracle".into(), oracle_noise: None, inlier_ratio };
         let painted = Painted { jpeg: vec![7; bytes], ..Painted::default() };
-        InvertedView { scheme: scheme.into(), given, solver, painted }
+        InvertedView { scheme: scheme.into(), given, solver: "joint".into(), painted }
+    }
+
+    fn document() -> Document {
+        let text = serde_json::json!({
+            "unlift": "0.1.0", "schema": 1, "options": {}, "seed": 0, "break_even": [],
+            "input": {"path": null, "n_points": 1, "scale_m_per_unit": null}, "results": [],
+            "run": {"threads": 1, "peak_memory_bytes": null, "seconds": {"total": 1.0, "rows": []}}
+        });
+        Document::from_json(&text.to_string()).expect("a document")
     }
 
     #[test]
     fn pictures_that_would_make_a_page_too_large_are_left_out() {
         let inversion = |bytes: usize| Inversion {
-            views: (0..40).map(|at| view(["olc", "cp"][at % 2], "oracle", 0.5, bytes)).collect(),
+            views: (0..40).map(|at| view(["olc", "cp"][at % 2], at as f64, bytes)).collect(),
             ..Inversion::default()
         };
         let of = |inversions: &[Inversion]| {
-            let (sheets, left_out) = sheets(inversions);
-            (sheets.iter().map(Sheet::count).collect::<Vec<_>>(), left_out)
+            let (sheets, left_out) = sheets(&document(), inversions);
+            (sheets.iter().map(|one| one.pictures().count()).collect::<Vec<_>>(), left_out)
         };
         assert_eq!(of(&[inversion(9_000), inversion(9_000)]), (vec![40, 40], 0));
         assert_eq!(of(&[inversion(40_000), inversion(40_000)]), (vec![40], 40));
         let (few, left_out) = of(&[inversion(200_000)]);
         assert!(few[0] > 4 && few[0] + left_out == 40, "{few:?}");
+    }
+
+    #[test]
+    fn only_objects_that_are_found_again_have_boxes() {
+        let object = |class: &str, sides| Object { class: class.into(), sides };
+        let photo = [object("cat", [0.0, 0.0, 0.5, 0.5])];
+        let of = |found: Object| found_again(&photo, &[found]).len();
+        assert_eq!(of(object("cat", [0.0, 0.0, 0.5, 0.4])), 1);
+        assert_eq!(of(object("bed", [0.0, 0.0, 0.5, 0.5])), 0, "another class");
+        assert_eq!(of(object("cat", [0.25, 0.0, 0.75, 0.5])), 0, "a third in common");
     }
 }

@@ -2,6 +2,7 @@
 
 #[cfg(doc)]
 use crate::document::Document;
+use crate::html::Opening;
 use crate::inversions::Inversion;
 use crate::pictures::Picture;
 
@@ -14,8 +15,10 @@ pub struct RenderOptions {
     pub error_cdf: Vec<ErrorCdf>,
     /// Audits of images: those to be drawn, at most [`MOST_PICTURES`](crate::pictures::MOST_PICTURES).
     pub pictures: Vec<Picture>,
-    /// Pictures that a network made of what came back.
+    /// Pictures that a network painted from what came back.
     pub inversions: Vec<Inversion>,
+    /// The verdict on another audit, which the page begins with.
+    pub opening: Option<Opening>,
 }
 
 /// The error curve of one row of the results.

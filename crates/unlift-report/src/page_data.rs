@@ -47,7 +47,7 @@ struct RowData {
     scheme: usize,
     given: usize,
     solver: usize,
-    /// The neighborhoods of this very row: `overlap, 11 % right (measured)`.
+    /// The neighborhoods of this very row: `overlap, 11 % true neighbors`.
     label: String,
     ratio: f64,
     /// Whether it is an attack: a reference row is told what no attacker knows.

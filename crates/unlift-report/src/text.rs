@@ -1,56 +1,48 @@
 //! The short table for a terminal.
 
 use crate::document::{Bound, Document, LengthUnit, Row, STRONGEST};
+use crate::verdict::Verdict;
 use crate::{attack, tables, verdict, words};
 
-/// A few lines per scheme, worst first: what comes back today by every source tried, then by the oracle
-/// at the headline inlier ratio. Percent recovered within each threshold, the two baselines, the
-/// break-even ratio.
+/// The verdict in a line or two, then a few lines per scheme, the worst first: what comes back today by every source
+/// tried and by the records alone, then by the oracle at the headline inlier ratio. Percent recovered within each
+/// threshold, a blind guess, the break-even ratio.
 ///
 /// Plain text, at most about 100 columns, ends with a line break.
 pub fn text_table(document: &Document) -> String {
     let thresholds = tables::thresholds(document);
     let headline = tables::headline_threshold(document).unwrap_or_default();
-    let alone = |scheme: &str| verdict::records_alone(document, scheme, &headline);
-    let cards = verdict::verdict(document).cards;
-    let any_alone = cards.iter().any(|card| alone(&card.scheme).is_some());
+    let Verdict { banner, cards, .. } = verdict::verdict(document);
 
-    let mut head = ["scheme", "neighbors by", "right", "solver"].map(str::to_owned).to_vec();
+    let mut head = ["scheme", "neighbors by", "true", "solver"].map(str::to_owned).to_vec();
     head.extend(thresholds.iter().map(|typed| format!("{typed} {}", unit(document))));
-    head.push("blind".to_owned());
-    if any_alone {
-        head.push("records".to_owned());
-    }
-    head.push("break-even".to_owned());
+    head.extend(["blind", "break-even"].map(str::to_owned));
     let mut lines = vec![head];
     for card in &cards {
-        for row in verdict::by_source(document, &card.scheme) {
-            let right = format!("{} %", words::ratio_percent(row.inlier_ratio));
-            let source = attack::source(&row.neighbors, row.oracle_noise.as_deref());
-            let mut cells = vec![row.scheme.clone(), source, right, row.solver.clone()];
-            cells.extend(thresholds.iter().map(|typed| {
-                let spread = row.std.as_ref().and_then(|std| std.recovered_percent.get(typed));
-                percent(row.recovered_percent.get(typed), spread)
-            }));
-            cells.push(percent(row.blind_percent.get(&headline), None));
-            if any_alone {
-                let alone = alone(&card.scheme).map(|(percent, _)| percent);
-                cells.push(percent(alone.as_ref(), None));
+        let rows = verdict::by_source(document, &card.scheme);
+        let Some(first) = rows.first() else { continue };
+        let blind = percent(first.blind_percent.get(&headline), None);
+        let mut alone =
+            records_alone(document, &card.scheme, &thresholds).map(|(share, mut cells)| {
+                cells.extend([blind.clone(), "-".to_owned()]);
+                (share, cells)
+            });
+        for row in rows {
+            let share = row.recovered_percent.get(&headline).copied().unwrap_or(0.0);
+            let is_oracle = attack::basis(row) == Some(attack::Basis::Oracle);
+            if let Some((_, cells)) = alone.take_if(|(alone, _)| is_oracle || *alone > share) {
+                lines.push(cells);
             }
-            cells.push(break_even(document, row, &headline));
-            lines.push(cells);
+            lines.push(cells(document, row, &thresholds, &headline));
         }
+        lines.extend(alone.map(|(_, cells)| cells));
     }
-    let mut text = align(&lines);
+    let mut text = format!("{}\n{}\n\n", banner.headline, banner.sentence);
+    text.push_str(&align(&lines));
     if thresholds.len() > 1 {
-        let others = if any_alone { "blind, records, break-even" } else { "blind, break-even" };
-        text.push_str(&format!("{others}: within {headline} {}\n", unit(document)));
+        text.push_str(&format!("blind, break-even: within {headline} {}\n", unit(document)));
     }
-    if any_alone {
-        text.push_str(
-            "records: what comes back from the released records alone, without neighborhoods\n",
-        );
-    }
+    text.push_str("true: share of the listed neighbors that are among the nearest\n");
     if document.results.first().is_some_and(|row| row.unit == LengthUnit::KthNeighbor) {
         text.push_str(&format!("x: times {}\n", words::USUAL_DISTANCE));
     }
@@ -64,6 +56,37 @@ pub fn text_table(document: &Document) -> String {
         text.push_str(&format!("not audited: {scheme}{by}: {reason}\n"));
     }
     text
+}
+
+/// The line of an attack on the records alone, without the last two cells, and its share within the headline threshold.
+fn records_alone(
+    document: &Document,
+    scheme: &str,
+    thresholds: &[String],
+) -> Option<(f64, Vec<String>)> {
+    let headline = tables::headline_threshold(document)?;
+    let (share, by) = verdict::records_alone(document, scheme, &headline)?;
+    let by = by.unwrap_or_default().to_owned();
+    let mut cells = vec![scheme.to_owned(), "records alone".to_owned(), "-".to_owned(), by];
+    cells.extend(thresholds.iter().map(|typed| {
+        let share = verdict::records_alone(document, scheme, typed).map(|(share, _)| share);
+        percent(share.as_ref(), None)
+    }));
+    Some((share, cells))
+}
+
+/// The line of a row.
+fn cells(document: &Document, row: &Row, thresholds: &[String], headline: &str) -> Vec<String> {
+    let right = format!("{} %", words::ratio_percent(row.inlier_ratio));
+    let source = attack::source(&row.neighbors, row.oracle_noise.as_deref());
+    let mut cells = vec![row.scheme.clone(), source, right, row.solver.clone()];
+    cells.extend(thresholds.iter().map(|typed| {
+        let spread = row.std.as_ref().and_then(|std| std.recovered_percent.get(typed));
+        percent(row.recovered_percent.get(typed), spread)
+    }));
+    cells.push(percent(row.blind_percent.get(headline), None));
+    cells.push(break_even(document, row, headline));
+    cells
 }
 
 fn percent(value: Option<&f64>, spread: Option<&f64>) -> String {
@@ -162,7 +185,8 @@ mod tests {
     fn the_strongest_attack_speaks_and_is_named() {
         let text = text_table(&document(&[("joint", 61.6), ("joint-start", 77.8)]));
         assert!(text.contains("joint-start  77.8 %") && !text.contains("61.6"), "{text}");
-        assert_eq!(text.lines().count(), 2, "{text}");
+        // Two lines of verdict, an empty one, the head, the row, what a word means.
+        assert_eq!(text.lines().count(), 6, "{text}");
     }
 
     #[test]
@@ -178,7 +202,10 @@ mod tests {
         };
         document.not_audited = vec![missing(None, "flat"), missing(Some("geometric"), "no lists")];
         let text = text_table(&document);
-        assert!(text.contains("95.6 %  8.1 %   58.6 %"), "{text}");
+        assert!(text.contains("95.6 %  8.1 %"), "{text}");
+        let alone = "olc     records alone     -  tomography  58.6 %  8.1 %           -";
+        assert!(text.contains(alone), "{text}");
+        assert!(text.contains("(OLC, records alone)"), "{text}");
         assert!(text.contains("not audited: ppl+: flat\n"), "{text}");
         assert!(text.contains("not audited: ppl+ by geometric: no lists\n"), "{text}");
     }

@@ -1,27 +1,29 @@
-//! What comes back, per scheme, by the strongest attack tried: first today, from the released data
-//! alone, then if neighbors were known. Worst first. The word "safe" never appears: an audit shows
-//! what one attack took, not what no attack can take.
+//! The verdict on every scheme by the strongest attack tried: first today, from the released data
+//! alone, then if neighbors were known. The worst scheme comes first. The word "safe" never appears: an
+//! audit shows what some attacks took, not what no attack can take.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
 use crate::attack::{self, Basis, Given};
-use crate::cards::{Card, Finding, Refusal};
+use crate::banner::{Banner, banner, next_steps};
+use crate::cards::{Card, Finding, Level, Refusal};
 use crate::document::{Bound, BreakEven, Document, Row};
-use crate::{lead, quantity, tables, words};
+use crate::inversions::Inversion;
+use crate::{exhibit, tables, words};
 
 /// The inlier ratio of the oracle's headline, if it was tested; else the tested one nearest to it.
 const HEADLINE_RATIO: f64 = 0.5;
 
-/// The verdicts of a document and the sentences that sum them up.
+/// The verdict on an audit: in a few lines, by scheme, and what to do next.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Verdict {
-    pub lead: Vec<String>,
+    pub banner: Banner,
     pub cards: Vec<Card>,
     pub refusals: Vec<Refusal>,
-    /// Whether any attack had the released data alone: else the page says that none was tried.
-    pub tested_today: bool,
+    /// What to do next, the most urgent first.
+    pub steps: Vec<String>,
 }
 
 /// Judges every scheme by its strongest attacks, for the headline threshold.
@@ -44,11 +46,35 @@ pub(crate) fn verdict(document: &Document) -> Verdict {
         reason: refused.reason.clone(),
     });
     let refusals: Vec<Refusal> = refusals.collect();
-    let tested_today = cards.iter().any(|card| card.finding(Basis::Released).is_some());
-    for card in &mut cards {
-        card.untried_today = tested_today && card.finding(Basis::Released).is_none();
-    }
-    Verdict { lead: lead::sentences(document, &cards, &refusals), cards, refusals, tested_today }
+    let (banner, steps) = (banner(document, &cards, &refusals), next_steps(document, &cards));
+    Verdict { banner, cards, refusals, steps }
+}
+
+/// What came back of one scheme within the headline threshold, by the strongest attacks tried.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shares {
+    /// The scheme's user-facing name.
+    pub scheme: String,
+    /// The same as a person would call it.
+    pub title: String,
+    /// Percent from the released data alone; `None` where no such attack was tried.
+    pub today: Option<f64>,
+    /// Percent if neighbors were known, at the tested share nearest to half; `None` without an oracle.
+    pub known: Option<f64>,
+    /// How many pictures can be rebuilt from the released data alone; `None` where nothing was painted.
+    pub pictures: Option<String>,
+}
+
+/// The shares of every scheme, the worst first, as the page leads with them.
+pub fn shares(document: &Document, inversions: &[Inversion]) -> Vec<Shares> {
+    let of = |card: Card| Shares {
+        today: card.today(),
+        known: card.finding(Basis::Oracle).map(|finding| finding.recovered),
+        pictures: exhibit::pictures_said(document, inversions, &card.scheme),
+        scheme: card.scheme,
+        title: card.title,
+    };
+    verdict(document).cards.into_iter().map(of).collect()
 }
 
 /// Percent that came back within the threshold `typed`.
@@ -127,29 +153,21 @@ fn card(document: &Document, scheme: &str) -> Option<Card> {
     let typed = &tables::headline_threshold(document)?;
     let alone = records_alone(document, scheme, typed);
     let blind = |row: &Row| row.blind_percent.get(typed).copied().unwrap_or(0.0);
-    // What needs no neighborhoods: whoever has more need not use it.
-    let without = |row: &Row| {
-        let guess = (blind(row), "a blind guess".to_owned());
-        match alone {
-            Some((percent, by)) if percent >= guess.0 => (percent, attack::records_alone(by)),
-            _ => guess,
+    // An attack without neighborhoods counts wherever it gets more than one with them.
+    let without = |row: &Row| match alone {
+        Some((percent, by)) if percent >= blind(row) => {
+            (percent, attack::records_alone(by), "records alone".to_owned())
         }
+        _ => (blind(row), "a blind guess".to_owned(), "a blind guess".to_owned()),
     };
     let found = |basis, row: &Row, own: Option<f64>| {
-        let (floor, by) = without(row);
-        let (recovered, by) = match own {
-            Some(own) if own >= floor => (own, attack::name(row)),
-            _ => (floor, by),
+        let (floor, by, briefly) = without(row);
+        let (recovered, by, briefly) = match own {
+            Some(own) if own >= floor => (own, attack::name(row), attack::briefly(row)),
+            _ => (floor, by, briefly),
         };
-        Finding {
-            basis,
-            when: when(basis, row),
-            recovered,
-            at_least: words::at_least(recovered),
-            amount: quantity::amount(recovered),
-            by,
-            floor,
-        }
+        let (percent, level) = (words::percent(recovered), Level::of(recovered));
+        Finding { basis, when: when(basis, row), recovered, percent, level, by, briefly, floor }
     };
     let of = |basis| {
         let row = strongest(document, scheme, basis)?;
@@ -158,13 +176,16 @@ fn card(document: &Document, scheme: &str) -> Option<Card> {
     let any = document.results.iter().find(|row| row.scheme == scheme)?;
     let mut findings: Vec<Finding> =
         [Basis::Released, Basis::Given, Basis::Oracle].into_iter().filter_map(of).collect();
-    // Records alone are released as well.
-    if alone.is_some() && findings.iter().all(|finding| finding.basis != Basis::Released) {
+    // Records alone are released as well, and so is what a guess needs.
+    let (floor, ..) = without(any);
+    let tells = alone.is_some() || Level::of(floor) > Level::Gray;
+    if tells && findings.iter().all(|finding| finding.basis != Basis::Released) {
         findings.insert(0, found(Basis::Released, any, None));
     }
     if findings.is_empty() {
         return None;
     }
+    let has_today = findings.iter().any(|finding| finding.basis == Basis::Released);
     let refused = document.not_audited.iter().filter(|refused| refused.scheme == scheme);
     let refused = refused.filter_map(|refused| {
         let source = attack::source(refused.neighbors.as_deref()?, None);
@@ -181,9 +202,8 @@ fn card(document: &Document, scheme: &str) -> Option<Card> {
         findings,
         baselines: baselines(document, scheme, typed, alone),
         break_even: lowest(document, scheme, typed).map(|point| break_even(point, points)),
-        untried_today: false,
+        untried_today: !has_today,
         refused: refused.collect(),
-        alone: alone.map(|(percent, _)| percent),
     })
 }
 
@@ -196,7 +216,9 @@ fn when(basis: Basis, row: &Row) -> String {
     }
 }
 
-/// "A blind guess gets 8.1 %, the records alone 65 %. To that, neighborhoods add nothing (overlap), ..."
+/// What an attacker without neighborhoods gets, and what neighborhoods add to the larger of the two: "A blind guess
+/// gets 8.1 %, the records alone 65.2 %. Neighborhoods add 21.3 percentage
+/// points (overlap)."
 fn baselines(
     document: &Document,
     scheme: &str,
@@ -206,20 +228,13 @@ fn baselines(
     let rows = document.results.iter().filter(|row| row.scheme == scheme);
     let blind = rows.filter_map(|row| row.blind_percent.get(typed).copied());
     let blind = blind.max_by(f64::total_cmp).unwrap_or(0.0);
-    let guess = words::significant(blind, 2);
+    let guess = format!("A blind guess gets {} %", words::percent(blind));
     let (without, floor) = match alone {
         Some((percent, _)) => {
-            // The figure of the card, as there.
-            let said = match percent < 10.0 {
-                true => words::significant(percent, 2),
-                false => words::at_least(percent),
-            };
-            (
-                format!("A blind guess gets {guess} %, the records alone {said} %."),
-                percent.max(blind),
-            )
+            let records = words::percent(percent);
+            (format!("{guess}, the records alone {records} %."), percent.max(blind))
         }
-        None => (format!("A blind guess gets {guess} %."), blind),
+        None => (format!("{guess}."), blind),
     };
     let adds: Vec<String> = by_source(document, scheme)
         .into_iter()
@@ -227,12 +242,21 @@ fn baselines(
         .filter(|row| attack::has_neighborhoods(row))
         .map(|row| {
             let source = attack::source(&row.neighbors, row.oracle_noise.as_deref());
-            format!("{} ({source})", quantity::added(share(row, typed) - floor))
+            format!("{} ({source})", added(share(row, typed) - floor))
         })
         .collect();
     match adds.is_empty() {
         true => without,
-        false => format!("{without} To that, neighborhoods add {}.", words::list(&adds)),
+        false => format!("{without} Neighborhoods add {}.", words::list(&adds)),
+    }
+}
+
+/// A gain over a baseline in percentage points. It is nothing only where nothing was gained.
+fn added(gain: f64) -> String {
+    match gain {
+        0.05.. => format!("{} percentage points", words::percent(gain)),
+        _ if gain > 0.0 => "less than 0.1 percentage points".to_owned(),
+        _ => "nothing".to_owned(),
     }
 }
 
@@ -270,5 +294,19 @@ fn break_even(point: &BreakEven, points: &str) -> String {
         (_, None) => {
             "Less than half came back at every share of right neighbors tested.".to_owned()
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_added_only_where_nothing_is() {
+        for gain in (-10_000..=10_000).map(|hundredth| f64::from(hundredth) / 100.0) {
+            assert_eq!(added(gain) == "nothing", gain <= 0.0, "{gain}");
+        }
+        assert_eq!(added(0.04), "less than 0.1 percentage points");
+        assert_eq!(added(87.99), "88.0 percentage points");
     }
 }

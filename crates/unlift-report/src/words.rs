@@ -110,12 +110,6 @@ pub(crate) fn percent(value: f64) -> String {
     format!("{value:.1}")
 }
 
-/// A whole percentage that can stand after "at least": rounded down.
-pub(crate) fn at_least(percent: f64) -> String {
-    // The small lift keeps 29.000000000000004 - 1e-13 style sums from losing a whole point.
-    format!("{:.0}", (percent + 1e-9).floor())
-}
-
 /// "if half of the neighbors were known", for any inlier ratio.
 pub(crate) fn if_known(ratio: f64) -> String {
     let common = [
@@ -147,9 +141,13 @@ pub(crate) fn list(items: &[String]) -> String {
     }
 }
 
-/// An inlier ratio as a percentage without the sign, to two digits.
+/// An inlier ratio as a percentage without the sign, to two digits; 100 is said of nothing less.
 pub(crate) fn ratio_percent(ratio: f64) -> String {
-    significant(ratio * 100.0, 2)
+    match ratio {
+        0.999..1.0 => "99.9".to_owned(),
+        0.99..1.0 => significant(ratio * 100.0, 3),
+        _ => significant(ratio * 100.0, 2),
+    }
 }
 
 /// A reason in words: `odd_point` reads "odd point".
@@ -229,18 +227,11 @@ mod tests {
     }
 
     #[test]
-    fn shares_are_rounded_down_after_at_least() {
-        assert_eq!(at_least(89.99), "89");
-        assert_eq!(at_least(100.0), "100");
-        assert_eq!(at_least(0.1 + 28.9), "29");
-    }
-
-    #[test]
     fn ratios_read_as_words_or_percent() {
         assert_eq!(if_known(0.5), "if half of the neighbors were known");
         assert_eq!(if_known(0.3), "if 30 % of the neighbors were known");
         assert_eq!(ratio_percent(0.071), "7.1");
-        assert_eq!(ratio_percent(1.0), "100");
+        assert_eq!([0.989, 0.9963, 0.9999, 1.0].map(ratio_percent), ["99", "99.6", "99.9", "100"]);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-// The charts: recovered share over right neighbors, share over error, what was said over what came true.
+// The charts: recovered share over true neighbors, share over error, what was said over what came true.
 "use strict";
 
 (() => {
@@ -33,11 +33,11 @@
   }
 
   const ratioAxis = () =>
-    percentAxis({ ...below("neighbors that are right", "{value} %"), interval: 20, splitLine: { show: false } });
+    percentAxis({ ...below("true neighbors in the lists", "{value} %"), interval: 20, splitLine: { show: false } });
 
   const schemeEntries = (schemes) => schemes.map((s) => [s.name, color(s.slot), "solid", MARKS[s.slot]]);
   const sourceEntries = (data) =>
-    ownSources(data).map((source, i) => [`${source} (measured)`, css("--ink"), "none", SOURCE_MARKS[i % SOURCE_MARKS.length]]);
+    ownSources(data).map((source, i) => [source, css("--ink"), "none", SOURCE_MARKS[i % SOURCE_MARKS.length]]);
 
   /** All schemes at one threshold and solver, with what each gives back without neighborhoods. */
   function overview(node, data, state) {
@@ -56,7 +56,7 @@
     });
     draw(node, {
       ...baseOption(),
-      tooltip: tooltip((x) => `${+x.toFixed(1)} % of neighbors right, within ${data.thresholds[t].label}`),
+      tooltip: tooltip((x) => `${+x.toFixed(1)} % true neighbors, within ${data.thresholds[t].label}`),
       xAxis: ratioAxis(),
       yAxis: percentAxis({}),
       series: series.filter((one) => one.data.length),
@@ -73,7 +73,7 @@
       let figure = node.children[s];
       if (!figure) {
         const caption = element("figcaption", {}, `${scheme.name} `, element("span", {}, scheme.title));
-        const label = `${scheme.title}: percent recovered over the share of right neighbors`;
+        const label = `${scheme.title}: percent recovered over the share of true neighbors`;
         figure = element("figure", {}, caption, element("div", { class: "chart", role: "img", "aria-label": label }));
         node.append(figure);
       }
@@ -98,7 +98,7 @@
       series.push(line(scheme.alone_by, across(scheme.alone[t]), scheme.slot, { ...thin, dash: DASH_DOT }));
       draw(figure.querySelector(".chart"), {
         ...baseOption({ right: 12, top: 10 }),
-        tooltip: tooltip((x) => `${+x.toFixed(1)} % of neighbors right`),
+        tooltip: tooltip((x) => `${+x.toFixed(1)} % true neighbors`),
         xAxis: ratioAxis(),
         yAxis: percentAxis({}),
         series: series.filter((one) => one.data.length),
@@ -156,7 +156,7 @@
     const diagonal = line("perfect", [[0, 0], [100, 100]], 4, { dash: "dotted", width: 1, mark: "none" });
     draw(node, {
       ...baseOption({ right: 26, top: 22 }),
-      tooltip: itemTooltip((item) => `${item.seriesName}: ${item.value[1].toFixed(1)} % right where ${item.value[0].toFixed(1)} % was said`),
+      tooltip: itemTooltip((item) => `${item.seriesName}: ${item.value[1].toFixed(1)} % came true where ${item.value[0].toFixed(1)} % was said`),
       xAxis: axis({ type: "value", min: 0, max: 100, ...below("said, %", "{value}") }),
       yAxis: percentAxis({}),
       series: [...series, { ...diagonal, silent: true }],

@@ -2,7 +2,7 @@
 "use strict";
 
 (() => {
-  const { STRONGEST, Chain, fieldsOf, element, distinct, single, check, overview, multiples, errors, reliability, chartCount, SceneView, ramp, drawPicture, wipe } = window.Unlift;
+  const { STRONGEST, Chain, fieldsOf, element, distinct, single, check, overview, multiples, errors, reliability, chartCount, SceneView, ramp, drawPicture, chosen, wipe, sortable } = window.Unlift;
   const root = document.documentElement;
   const data = JSON.parse(document.getElementById("data").textContent);
   const rows = data.rows.map((row, index) => ({ ...row, index }));
@@ -17,10 +17,12 @@
     const solvers = distinct(oracle.map((row) => row.solver));
     const datasets = distinct(data.published.map((curve) => curve.dataset));
     const state = { threshold: data.headline, solver: solvers.length > 1 ? STRONGEST : solvers[0] ?? STRONGEST, source: sources[0], dataset: datasets[0] };
+    const folded = at("by-scheme");
     const redraw = () => {
       overview(at("chart-overview"), data, state);
-      multiples(at("chart-multiples"), data, state);
+      if (folded.open) multiples(at("chart-multiples"), data, state);
     };
+    folded.addEventListener("toggle", redraw);
     const options = (values, label) => values.map((value) => ({ value, label: label(value) }));
     single(form, state, "threshold", "Recovered within", data.thresholds.map((t, value) => ({ value, label: t.label })), redraw);
     if (solvers.length > 1) {
@@ -31,6 +33,11 @@
     single(form, state, "dataset", "The paper’s curves, on", options(datasets, String), redraw);
     redraw();
     redraws.push(redraw);
+  }
+
+  /** Charts in a folded part have no size: `work` is done when it is first opened. */
+  function once(folded, work) {
+    folded.addEventListener("toggle", work, { once: true });
   }
 
   /** A chart over all schemes: neighborhoods and solver are chosen, what is drawn are the rows that fit. */
@@ -108,13 +115,16 @@
   // A chart without a curve reads as one without an error: it begins with what has one, if there is any.
   const told = judged.filter((row) => row.reliability.length);
   const firstTold = (told.find((row) => row.given === data.first_given) ?? told[0])?.given ?? data.first_given;
+  const sheets = [...document.querySelectorAll(".sheet")];
   const parts = [
     [rows.length, curves],
     [rows.length, () => chart(at("error-controls"), at("chart-errors"), rows, errors)],
-    [judged.length, () => chart(at("reliability-controls"), at("chart-reliability"), judged, reliability, firstTold)],
+    [judged.length, () => once(at("certainty"), () => chart(at("reliability-controls"), at("chart-reliability"), judged, reliability, firstTold))],
     [data.scene, scene],
     [data.pictures.length, pictures],
-    ...[...document.querySelectorAll(".sheet")].map((sheet) => [sheet.querySelectorAll(".shot").length > 1, () => wipe(sheet)]),
+    [sheets.length, () => chosen(sheets)],
+    ...sheets.map((sheet) => [true, () => wipe(sheet)]),
+    ...[...document.querySelectorAll("table")].map((table) => [true, () => sortable(table)]),
   ];
   root.dataset.script = "1";
   for (const [wanted, part] of parts) {

@@ -11,8 +11,9 @@
   const MISS = ["#ffb14a", "#b3331a"];
   /** Decades of error drawn on either side of the threshold. */
   const DECADES = 1.5;
-  /** In degrees; from 2.5 radii away a usual scene just fits. */
+  /** In degrees; from 2.5 radii away a usual scene just fits. From a camera of the map it is as wide as a phone's. */
   const FIELD_OF_VIEW = 36;
+  const CAMERA_VIEW = 65;
 
   const POINT_VERTEX = `
     attribute float error;
@@ -116,13 +117,17 @@
       const { low, high, up } = this.data;
       this.radius = 0.5 * Math.hypot(...low.map((x, i) => high[i] - x));
       this.scene = new THREE.Scene();
-      this.camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW, 1, this.radius / 200, this.radius * 30);
+      const { eye } = this.data;
+      this.fov = eye ? CAMERA_VIEW : FIELD_OF_VIEW;
+      this.camera = new THREE.PerspectiveCamera(this.fov, 1, this.radius / 200, this.radius * 30);
       this.up = new THREE.Vector3(...up).normalize();
       this.camera.up.copy(this.up);
       // Any direction across `up` will do for a start; then a little above the horizon.
       const across = Math.abs(up[0]) < 0.8 * Math.hypot(...up) ? new THREE.Vector3(1, 0.35, 0) : new THREE.Vector3(0.35, 0, 1);
       across.addScaledVector(this.up, -across.dot(this.up)).normalize();
       this.camera.position.copy(across).addScaledVector(this.up, 0.55).normalize().multiplyScalar(this.radius * 2.5);
+      // Where one of the map's cameras stood, the map looks like the place that it is of.
+      if (eye) this.camera.position.set(...eye.map((x, i) => x - (low[i] + high[i]) / 2));
       this.controls = new THREE.OrbitControls(this.camera, canvas);
       this.controls.enableZoom = false;
       this.controls.addEventListener("change", () => this.render());
@@ -233,7 +238,7 @@
         const [x, y] = wide ? [index * w, 0] : [0, (this.panes.length - 1 - index) * h];
         this.camera.aspect = w / h;
         // The whole scene fits a narrow pane, too: there the width decides, not the height.
-        const half = Math.tan((FIELD_OF_VIEW * Math.PI) / 360) / Math.min(1, this.camera.aspect);
+        const half = Math.tan((this.fov * Math.PI) / 360) / Math.min(1, this.camera.aspect);
         this.camera.fov = (Math.atan(half) * 360) / Math.PI;
         this.camera.updateProjectionMatrix();
         const distance = this.camera.position.distanceTo(this.controls.target);

@@ -85,8 +85,12 @@ pub fn find(job: ImagesJob<'_>) -> Result<(Option<Audited>, Used), Error> {
         steps.say(&format!("note: {}: {CHANGED}", path.display()));
     }
     let changed = changed.map(|_| format!("input: {CHANGED}"));
-    let notes: Vec<String> = doubt.into_iter().chain(changed).collect();
+    let mut notes: Vec<String> = doubt.into_iter().chain(changed).collect();
     let doubts = vec![notes.first().cloned(); outcome.rows.len()];
+    if let Some(moved) = tally.moved() {
+        steps.say(&format!("note: {moved}"));
+        notes.push(moved);
+    }
     let gates = gate_results(&job.gates, &job.plan, &outcome.rows, &[], &doubts)?;
     let mut options = job.options;
     if let Some(inversion) = &job.inversion {

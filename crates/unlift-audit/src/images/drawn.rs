@@ -1,11 +1,8 @@
 //! Which images a report draws, and what it draws of them.
 
 use std::cell::RefCell;
-use std::sync::Arc;
 
-use unlift::audit::{NeighborsBy, Plan, run_images};
-use unlift::neighbors::{ByDescriptors, Overlap, Similarity, Source};
-use unlift_nn::DescriptorKind;
+use unlift::audit::{Plan, run_images};
 use unlift_report::document::ImageFigures;
 use unlift_report::inversions::Inversion as Inverted;
 use unlift_report::pictures::Picture;
@@ -13,7 +10,7 @@ use unlift_report::pictures::Picture;
 use super::FeatureSource;
 use super::job::ImagesJob;
 use super::pictures::Album;
-use super::stream::{Needs, Stream, Tally, lacking};
+use super::stream::{Needs, Stream, Tally};
 use crate::Error;
 
 /// Longest side of an embedded photo in pixels.
@@ -22,8 +19,7 @@ const PREVIEW: u32 = 640;
 const USUAL_RATIO: f64 = 0.5;
 
 /// Audits the images to be drawn once more, by the first solver and seed: an image's randomness comes from
-/// its name, so what is drawn is what was counted, and no picture had to be kept in between. What a server
-/// sees that has no oracle is drawn as well, whether or not it was asked for.
+/// its name, so what is drawn is what was counted, and no picture had to be kept in between.
 ///
 /// # Errors
 /// When an image cannot be audited once more.
@@ -49,7 +45,6 @@ pub fn drawn(
     let mut plan = job.plan.clone();
     plan.solvers.truncate(1);
     (plan.repeats, plan.reference) = (1, false);
-    plan.neighbors.extend(without_oracle(job, &numbers));
     let needs = Needs::of_plan(&plan);
     // The album looks for itself.
     plan.measures.clear();
@@ -66,36 +61,12 @@ pub fn drawn(
             (_, Some(photos)) => photos.join(&picture.name),
             (_, None) => continue,
         };
-        match unlift_features::preview::jpeg(&photo, PREVIEW) {
+        match unlift_features::preview::jpeg(&photo, PREVIEW, job.source.turn()) {
             Ok(jpeg) => picture.photo = Some(jpeg),
             Err(error) => job.progress.say(&format!("note: {error}")),
         }
     }
     Ok((album.pictures, album.inversions))
-}
-
-/// What needs no training and the plan lacks, where all images `numbers` have what it takes.
-fn without_oracle(job: &ImagesJob<'_>, numbers: &[usize]) -> Vec<NeighborsBy<2>> {
-    let untrained: [Arc<dyn Source<2>>; 2] = [Arc::new(Similarity), Arc::new(Overlap)];
-    let fits = |source: &Arc<dyn Source<2>>| {
-        let needs = Needs::of(source);
-        let of_image = |&at: &usize| match job.source {
-            // What was extracted as SIFT is what every source takes.
-            FeatureSource::Folder(folder) if folder.extraction().kind() == DescriptorKind::Sift => {
-                true
-            }
-            _ => job.source.get(at).is_ok_and(|image| lacking(&image, &needs).is_none()),
-        };
-        needs.descriptors() && numbers.iter().all(of_image)
-    };
-    let mut fitting: Vec<_> = untrained.into_iter().filter(fits).collect();
-    let asked: Vec<&str> = job.plan.own_sources().map(|own| own.name()).collect();
-    if asked.contains(&Source::<2>::name(&ByDescriptors)) {
-        // It is the last of these under another name.
-        fitting.pop();
-    }
-    fitting.retain(|source| !asked.contains(&source.name()));
-    fitting.into_iter().map(NeighborsBy::Source).collect()
 }
 
 /// Positions in `figures` of the images of which least, about half and most came back, by the mean over

@@ -6,13 +6,14 @@ use std::path::{Path, PathBuf};
 
 use unlift::Descriptors;
 use unlift::descriptors::Values;
+use unlift_features::load::Turn;
 use unlift_features::{Extraction, Extractor, Features, Found as FoundFeatures, LearnedFeatures};
 use unlift_io::Error;
 use unlift_io::features::{ImageFeatures, round_to_half};
 use unlift_io::seen::Seen;
 
 /// What is taken for a photo; what a file is, its bytes decide when it is read.
-const ENDINGS: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
+const ENDINGS: [&str; 6] = ["jpg", "jpeg", "jpe", "jfif", "png", "webp"];
 /// Other images that people have beside these, or in place of them: passed over, and told.
 const OTHER_ENDINGS: [&str; 24] = [
     "arw", "avif", "bmp", "cr2", "cr3", "dng", "exr", "gif", "hdr", "heic", "heif", "j2k", "jp2",
@@ -31,6 +32,7 @@ pub fn is_photo(path: &Path) -> bool {
 /// The photos of a folder, sorted by name.
 pub struct Folder {
     extractor: Extractor,
+    turn: Turn,
     extraction: Extraction,
     names: Vec<String>,
     paths: Vec<PathBuf>,
@@ -68,7 +70,19 @@ impl Folder {
         let (names, paths): (_, Vec<PathBuf>) = found.photos.into_iter().unzip();
         let (extraction, refused) = (extraction.clone(), found.refused);
         let seen = Seen::new(&paths);
-        Ok(Self { extractor, extraction, names, paths, seen, refused, passed_over })
+        let turn = Turn::Upright;
+        Ok(Self { extractor, turn, extraction, names, paths, seen, refused, passed_over })
+    }
+
+    /// How photos are turned before features are extracted.
+    pub fn turn(&self) -> Turn {
+        self.turn
+    }
+
+    /// The same, of photos that are turned so.
+    #[must_use]
+    pub fn with_turn(self, turn: Turn) -> Self {
+        Self { extractor: self.extractor.with_turn(turn), turn, ..self }
     }
 
     /// Names of all photos, sorted by their bytes.
@@ -111,6 +125,7 @@ impl Folder {
             name: self.names[at].clone(),
             size: Some(photo.size.map(|side| side as u32)),
             uncertainty_px: Some(photo.noise_px),
+            upright: self.turn == Turn::Upright,
             photo: Some(path.clone()),
             ..features
         })
@@ -118,7 +133,8 @@ impl Folder {
 
     /// All that features depend on beside the photo, as text.
     pub(crate) fn settings(&self) -> String {
-        format!("{:?} {}", self.extraction, self.extractor.sha256().unwrap_or_default())
+        let sha256 = self.extractor.sha256().unwrap_or_default();
+        format!("{:?} {:?} {sha256}", self.extraction, self.turn)
     }
 
     /// Which features they are.

@@ -14,6 +14,7 @@ pub mod stream;
 use std::path::Path;
 
 use unlift_features::Extraction;
+use unlift_features::load::Turn;
 use unlift_io::features::{self, ImageFeatures};
 
 use crate::Error;
@@ -47,6 +48,24 @@ impl FeatureSource {
         })
     }
 
+    /// How photos are turned in whose pixels the keypoints are.
+    pub fn turn(&self) -> Turn {
+        match self {
+            Self::Folder(folder) => folder.turn(),
+            Self::File(file) if !file.is_upright() => Turn::AsStored,
+            Self::File(_) | Self::InMemory(_) => Turn::Upright,
+        }
+    }
+
+    /// The same, of photos that are turned so; features of a file are as they are.
+    #[must_use]
+    pub fn with_turn(self, turn: Turn) -> Self {
+        match self {
+            Self::Folder(folder) => Self::Folder(folder.with_turn(turn)),
+            other => other,
+        }
+    }
+
     /// Names of all images, sorted by their bytes.
     pub fn names(&self) -> &[String] {
         match self {
@@ -60,7 +79,8 @@ impl FeatureSource {
     pub fn refused(&self) -> &[unlift_io::Error] {
         match self {
             Self::Folder(folder) => folder.refused(),
-            Self::File(_) | Self::InMemory(_) => &[],
+            Self::File(file) => file.refused(),
+            Self::InMemory(_) => &[],
         }
     }
 

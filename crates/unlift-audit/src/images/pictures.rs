@@ -39,7 +39,9 @@ impl<'a> Watcher for Album<'a> {
     }
 
     fn image(&mut self, name: &str, _: &[Row], page: Page<'a>) {
-        let Page { picture, painted, .. } = page;
+        let Page { picture, mut painted, .. } = page;
+        painted.size = picture.size;
+        painted.released.clone_from(&picture.released);
         if !picture.keypoints.is_empty() {
             self.pictures.push(Picture { name: name.to_owned(), ..picture });
         }

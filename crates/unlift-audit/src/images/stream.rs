@@ -35,6 +35,8 @@ pub struct Tally {
     pub hashes: Vec<String>,
     /// Images that could not be used.
     pub unusable: usize,
+    /// Keypoints that were moved to the edge of their image.
+    n_moved: usize,
     /// The part of the declared sizes that keypoints of any image fill, as a box in `[0, 1]`.
     filled: Option<Bounds<2>>,
 }
@@ -74,6 +76,14 @@ impl Tally {
                  back",
                 100.0 * share
             )
+        })
+    }
+
+    /// What to say of keypoints that were moved.
+    pub fn moved(&self) -> Option<String> {
+        let n = self.n_moved;
+        (n > 0).then(|| {
+            format!("{n} keypoints were at most a pixel outside of their images, and are moved to the edge")
         })
     }
 
@@ -120,8 +130,8 @@ impl Needs {
     }
 }
 
-/// An image, and its hash where it is one in memory.
-type Ready = (Image, Option<String>);
+/// An image, its hash where it is one in memory, and how many of its keypoints were moved.
+type Ready = (Image, Option<String>, usize);
 
 /// The images `chosen` of a source. Memory depends on the number of threads, not on that of images.
 pub struct Stream<'a> {
@@ -159,7 +169,10 @@ impl<'a> Stream<'a> {
         for (at, image) in read {
             match image {
                 Ok(image) => {
-                    self.tally.borrow_mut().fill(&image.0.original);
+                    let mut tally = self.tally.borrow_mut();
+                    tally.fill(&image.0.original);
+                    tally.n_moved += image.2;
+                    drop(tally);
                     self.ready.push_back((at, Ok(image)));
                 }
                 // A mistake of the caller's, who is there to mend it.
@@ -182,7 +195,7 @@ impl Iterator for Stream<'_> {
             self.read_ahead();
         }
         let (at, ready) = self.ready.pop_front()?;
-        let (image, sha256) = match ready {
+        let (image, sha256, _) = match ready {
             Ok(ready) => ready,
             Err(error) => return Some(Err(error)),
         };
@@ -217,11 +230,21 @@ fn image(
         Error::core(path, error.within(&format!("image {}", features.name.escape_debug())))
     };
     let bounds = Bounds::try_new([-0.5; 2], high).map_err(of_image)?;
-    let points = PointSet::try_new(features.keypoints.clone(), Unit::Pixel).map_err(of_image)?;
+    // Half floats, as hloc stores them, round by up to a pixel.
+    let mut n_moved = 0;
+    let to_edge = |keypoint: [f64; 2]| {
+        let near: [f64; 2] =
+            std::array::from_fn(|c| keypoint[c].clamp(bounds.low[c], bounds.high[c]));
+        let is_near = (0..2).all(|c| (near[c] - keypoint[c]).abs() <= 1.0) && near != keypoint;
+        n_moved += usize::from(is_near);
+        if is_near { near } else { keypoint }
+    };
+    let keypoints = features.keypoints.iter().copied().map(to_edge).collect();
+    let points = PointSet::try_new(keypoints, Unit::Pixel).map_err(of_image)?;
     let original = Original::within(points, bounds).map_err(of_image)?;
     // Nobody asks for them otherwise, and they are most of an image.
     let descriptors = features.descriptors.filter(|_| needs.descriptors() || needs.whatever);
-    Ok((Image { name: features.name, original, descriptors }, sha256))
+    Ok((Image { name: features.name, original, descriptors }, sha256, n_moved))
 }
 
 /// What was expected of these features, and found; `None` where they have what is needed. An image

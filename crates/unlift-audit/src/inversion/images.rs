@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use unlift::Error;
 use unlift::audit::{Cell, Counts, Measure};
 use unlift_features::ColorImage;
-use unlift_features::load::read_color;
+use unlift_features::load::{Turn, read_color_with};
 use unlift_features::preview::jpeg_of;
 use unlift_invert::Detection;
 use unlift_report::inversions::Inversion as Sheet;
@@ -34,6 +34,7 @@ pub struct Inversion {
     painter: Painter,
     /// Folder of the photos, by the names of the images.
     photos: PathBuf,
+    turn: Turn,
     known: Mutex<BTreeMap<String, Arc<Truth>>>,
     failed: Mutex<BTreeMap<String, Error>>,
 }
@@ -45,10 +46,10 @@ impl fmt::Debug for Inversion {
 }
 
 impl Inversion {
-    /// Of images whose photos are in `photos`.
-    pub fn new(painter: Painter, photos: &Path) -> Self {
+    /// Of images whose photos are in `photos`; keypoints are in pixels of photos that are turned so.
+    pub fn new(painter: Painter, photos: &Path, turn: Turn) -> Self {
         let photos = photos.to_owned();
-        Self { painter, photos, known: Mutex::default(), failed: Mutex::default() }
+        Self { painter, photos, turn, known: Mutex::default(), failed: Mutex::default() }
     }
 
     /// SHA-256 of the network that paints, in hexadecimal.
@@ -85,7 +86,7 @@ impl Inversion {
             return Ok(Arc::clone(known));
         }
         let (path, size) = (self.photos.join(name), size(cell.released)?);
-        let photo = read_color(&path)?;
+        let photo = read_color_with(&path, self.turn)?;
         if [photo.width(), photo.height()] != size {
             let [expected, found] = [size, [photo.width(), photo.height()]]
                 .map(|[width, height]| format!("{width} x {height} pixels"));

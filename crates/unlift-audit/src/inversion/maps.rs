@@ -8,15 +8,19 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use rayon::prelude::*;
 use unlift::Error;
 use unlift::audit::{Cell, Measure, Row};
+use unlift::geometry::frame::rounded_origin;
 use unlift_features::ColorImage;
-use unlift_features::load::read_color_as_stored;
+use unlift_features::load::{Turn, read_color_with};
 use unlift_features::preview::jpeg_of;
 use unlift_invert::{Detection, Lens, View};
 use unlift_io::read::colmap;
 use unlift_report::inversions::Inversion as Sheet;
+use unlift_report::pictures::{Marks, ReleasedView};
+use unlift_report::scene::{SceneBox, Shapes};
 
 use super::{Judged, Painter, SHOWN, boxed, figures, needed, painted, shown};
 use crate::progress::Progress;
+use crate::scene::{near, shapes};
 
 /// Sides of a picture that metrics can be taken of.
 const LEAST_SIDE: usize = 16;
@@ -136,13 +140,20 @@ impl MapInversion {
             }
             _ => self.pictures(cell, sheets.len())?,
         };
+        let is_new = |sheet: &Sheet| sheet.released.iter().all(|one| one.scheme != cell.row.scheme);
+        let records = sheets.iter().any(is_new).then(|| records(cell));
         for ((seen, sheet), (picture, judged)) in self.seen.iter().zip(sheets).zip(pictures) {
             let (painted_of_truth, baseline) = self.truth(seen, cell)?;
             if sheet.photo.is_empty() {
                 sheet.name.clone_from(&seen.name);
+                sheet.size = seen.view.size.map(|side| side as u32);
                 sheet.photo = jpeg_of(&seen.photo, SHOWN)?;
                 sheet.objects = boxed(&seen.objects, &seen.photo);
                 sheet.baseline = painted(painted_of_truth, baseline)?;
+            }
+            if let Some((shapes, middle)) = &records {
+                let marks = marks(&seen.view, shapes, middle)?;
+                sheet.released.push(ReleasedView { scheme: cell.row.scheme.clone(), marks });
             }
             sheet.views.push(shown(cell.row, &picture, &judged)?);
         }
@@ -192,6 +203,49 @@ impl Measure<3> for MapInversion {
     }
 }
 
+/// Records that are drawn at most: more are a fog.
+const MOST_RECORDS: usize = 700;
+/// Places along a line that are looked at to find where it enters and leaves an image.
+const STEPS: u32 = 64;
+
+/// Some of the released records, clipped to the map, and the place that they are about.
+fn records(cell: &Cell<'_>) -> (Shapes, [f64; 3]) {
+    let points = cell.original.reveal().positions();
+    let middle = rounded_origin(points);
+    let bounds = SceneBox::robust(&points.iter().map(|p| near(p, &middle)).collect::<Vec<_>>());
+    let all = cell.released.obfuscation().len();
+    let n = all.min(MOST_RECORDS);
+    let chosen: Vec<usize> = (0..n).map(|at| at * all / n).collect();
+    (shapes(&bounds, &middle, cell.released, &chosen), middle)
+}
+
+/// Records as `view` would see them, in pixels.
+fn marks(view: &View, shapes: &Shapes, middle: &[f64; 3]) -> Result<Marks, Error> {
+    let place = |p: [f32; 3]| Some([0, 1, 2].map(|c| f64::from(p[c]) + middle[c]));
+    let line = |a: [f32; 3], b: [f32; 3]| -> Result<Option<[[f32; 2]; 2]>, Error> {
+        let at = |step: u32| {
+            let t = step as f32 / STEPS as f32;
+            place([0, 1, 2].map(|c| a[c] + t * (b[c] - a[c])))
+        };
+        let seen = view.project(&(0..=STEPS).map(at).collect::<Vec<_>>())?.places;
+        Ok(seen.first().zip(seen.last()).map(|(&from, &to)| [from, to]))
+    };
+    Ok(match shapes {
+        Shapes::Segments(all) => {
+            Marks::Lines(all.iter().map(|&[a, b]| line(a, b)).collect::<Result<_, _>>()?)
+        }
+        Shapes::Patches(all) => {
+            let edges =
+                all.iter().flat_map(|patch| (0..4).map(|at| (patch[at], patch[(at + 1) % 4])));
+            Marks::Lines(edges.map(|(a, b)| line(a, b)).collect::<Result<_, _>>()?)
+        }
+        Shapes::Points(all) => {
+            let points: Vec<_> = all.iter().map(|&p| place(p)).collect();
+            Marks::Points(view.project(&points)?.places.into_iter().map(Some).collect())
+        }
+    })
+}
+
 fn one(
     painter: &Painter,
     (camera, image): (&colmap::Camera, &colmap::Image),
@@ -199,7 +253,7 @@ fn one(
     scale: f64,
 ) -> Result<Seen, Error> {
     // COLMAP does not turn photos.
-    let photo = read_color_as_stored(path)?;
+    let photo = read_color_with(path, Turn::AsStored)?;
     let name = String::from_utf8_lossy(&image.name).into_owned();
     view(camera, image, scale)
         .and_then(|view| seen(painter, name, view, &photo))

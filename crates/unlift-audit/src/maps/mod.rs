@@ -52,7 +52,7 @@ pub struct Job<'a> {
     pub options: serde_json::Map<String, serde_json::Value>,
     /// What whoever reads the figures must know; told to `progress` as well.
     pub notes: Vec<String>,
-    /// Why figures may be too small, whatever the attack: told as notes are, and no gate holds.
+    /// Why any figure may be wrong, whatever the attack: told as notes are, and no gate holds.
     pub doubts: Vec<String>,
     /// Bounds to hold.
     pub gates: Vec<Gate>,
@@ -129,15 +129,15 @@ const SHEETS: usize = 3;
 const USUAL_K: usize = 50;
 
 /// Reads a map and makes it ready for an audit; `descriptors` is a file of them, beside the map. What a user should
-/// know is told to `progress`.
+/// know of how it was read stands in the notes and doubts of what was made ready.
 ///
 /// # Errors
-/// When a file cannot be read, the scale makes every length meaningless, or too few points are left.
+/// When a file cannot be read, there is a scale and coordinates are no lengths or lengths become meaningless by it, or too
+/// few points are left.
 pub fn open(
     path: &Path,
     descriptors: Option<&Path>,
     preparation: &Preparation,
-    progress: &dyn Progress,
 ) -> Result<(read::Input, Prepared), Error> {
     let input = read::open(path).map_err(|error| {
         let way_out = "the folder of a COLMAP model or project; for photos, unlift audit images";
@@ -145,8 +145,11 @@ pub fn open(
         let error = Error::from(error);
         if is_other { error.advise(way_out) } else { error }
     })?;
-    for note in &input.skipped {
-        progress.say(&format!("note: {note}"));
+    if let (true, Some(scale)) = (input.is_geographic, preparation.scale) {
+        let error = format!(
+            "--scale {scale}: expected a map with lengths, found degrees of longitude and latitude"
+        );
+        return Err(Error::request(error).advise("a map that is projected, in meters"));
     }
     check_scale(&input.positions, preparation.scale)?;
     let rows = descriptors.map(|file| read::descriptors(file, &input)).transpose()?;
@@ -156,7 +159,17 @@ pub fn open(
         if few { error.advise("a smaller --k, or more points") } else { error }
     })?;
     prepared.notes.extend(prepared.descriptors.as_ref().and_then(zeros));
+    prepared.notes.splice(0..0, input.notes.iter().cloned());
     prepared.doubts.clone_from(&input.doubts);
+    // Rows of the file, also where some of its points are left out.
+    let mut left_out = input.left_out.iter().peekable();
+    let mut shift = 0;
+    for row in &mut prepared.rows {
+        while left_out.next_if(|&&out| out <= u64::from(*row) + shift).is_some() {
+            shift += 1;
+        }
+        *row += shift as u32;
+    }
     Ok((input, prepared))
 }
 

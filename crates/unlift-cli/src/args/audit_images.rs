@@ -81,7 +81,8 @@ pub struct AuditImagesArgs {
     /// Draw this image in the report; repeatable [default: the least, the median and the most recovered]
     #[arg(long, value_name = "NAME", help_heading = "Result", conflicts_with = "share_safe")]
     pub show: Vec<String>,
-    /// Folder of the photos, when PATH is a file: to draw, and to compare with (--invert)
+    /// Folder of the photos, when PATH is a file: to draw, and to compare with (--invert). They are
+    /// turned by EXIF only if the file says that its features are of upright photos
     #[arg(long, value_name = "DIR", help_heading = "Result")]
     pub photos: Option<PathBuf>,
     /// Paint what came back and compare with the photos: rows get ssim, psnr and lpips, and the

@@ -38,8 +38,8 @@ tomography), lists are in memory.
 
 Exit codes: 0 done, 1 a gate failed, 2 usage, 3 bad input.")]
 pub struct AuditMapArgs {
-    /// A COLMAP model or project folder, one of OpenSfM or nerfstudio, or a .ply, .csv, .xyz, .txt, .npy, .las, .pcd, .e57,
-    /// .out (Bundler) or .nvm file
+    /// A COLMAP model or project folder, a map of OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler or NVM, or a .ply, .csv,
+    /// .xyz, .txt, .asc, .pts, .npy, .npz, .las, .pcd, .e57 or .splat file
     #[arg(value_name = "PATH")]
     pub path: PathBuf,
     #[command(flatten)]

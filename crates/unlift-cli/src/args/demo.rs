@@ -11,9 +11,12 @@ use crate::values;
 #[command(after_help = "\
 Examples:
   unlift demo
-  unlift demo --out /tmp/room")]
+  unlift demo --out /tmp/demo
+
+Protects two photos and the map of a made-up room by ten published schemes, attacks what a service
+would receive, and shows what came back. It needs no data.")]
 pub struct DemoArgs {
-    /// Folder for report.html and audit.json; whatever else is in it stays
+    /// Folder for report.html, photos.html and their figures; whatever else is in it stays
     #[arg(long, value_name = "DIR", default_value = "unlift-demo")]
     pub out: PathBuf,
     /// Replace files of that name that unlift did not write

@@ -21,6 +21,10 @@ Photos are JPEG, PNG or WebP files at any depth, named relative to the folder. F
 COLMAP extracts it, descriptors bytes: RootSIFT times 512; or learned ones, descriptors floats of
 length 1 (see unlift models). Features of a file are copied, not extracted.
 
+Photos are turned upright by their EXIF orientation, and keypoints are in pixels of the upright
+photo; the file says so (attribute upright of keypoints). For a COLMAP model or hloc, which do not
+turn photos, give --as-stored.
+
 A run that is interrupted goes on where it was when the same command is given again: finished images
 wait in FILE.parts, which is gone when FILE is there. An image that cannot be used gets one line;
 the others are written, and the exit code is 3.
@@ -48,6 +52,10 @@ pub struct FeaturesArgs {
     /// 0.005]
     #[arg(long, value_name = "SCORE", value_parser = values::score)]
     pub min_score: Option<f32>,
+    /// Leave photos as they are stored, as COLMAP and hloc do; else they are turned upright by their
+    /// EXIF orientation
+    #[arg(long)]
+    pub as_stored: bool,
     /// Longest side in pixels; larger photos are shrunk, their keypoints are in pixels of the photo
     /// [default: 3200, others 1600]
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(16..=65536))]

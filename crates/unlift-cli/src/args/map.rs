@@ -13,8 +13,9 @@ pub struct MapArgs {
     /// Meters per unit of the map. Without it the unit is the median distance to the K-th neighbor
     #[arg(long, value_name = "METERS_PER_UNIT", value_parser = values::scale)]
     pub scale: Option<f64>,
-    /// Descriptors of the points: a COLMAP database.db, a .npy array with a row per point (of a COLMAP
-    /// model by ascending point id), or a file that begins with P3DESC01
+    /// Descriptors of the points: a COLMAP database.db or hloc's features.h5 that the model was made of,
+    /// a .npy array with a row per point (of a COLMAP model by ascending point id), or a file that
+    /// begins with P3DESC01
     #[arg(long, value_name = "FILE")]
     pub descriptors: Option<PathBuf>,
     /// Use a random subset of at most this many points

@@ -64,7 +64,7 @@ pub use table::TableArgs;
     term_width = 100,
     after_help = "\
 Examples:
-  unlift demo                                  audit a made-up room, no data needed
+  unlift demo                                  what comes back of two photos and a map; no data needed
   unlift audit map PROJECT/sparse/0 --scale 1  audit a COLMAP map that is in meters
   unlift audit images photos                   audit the keypoints of photos
   unlift check                                 the audits of unlift.toml, for a build
@@ -112,7 +112,7 @@ fn numbers_may_be_negative(command: clap::Command) -> clap::Command {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Audit a made-up furnished room under every scheme
+    /// Protect two photos and a map, attack them, and show what comes back
     Demo(DemoArgs),
     /// Audit what you have
     #[command(subcommand)]
@@ -167,7 +167,7 @@ Examples:
   unlift audit images photos
   unlift audit released mine.parquet --truth truth.parquet")]
 pub enum AuditCommand {
-    /// Audit a 3D map: COLMAP, OpenSfM, nerfstudio, Bundler, NVM, PLY, CSV, XYZ, NPY, LAS, PCD or E57
+    /// Audit a 3D map: COLMAP, OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler, NVM, PLY, tables, NPY, LAS, PCD or E57
     // Boxed: ten times the size of the other commands.
     Map(Box<AuditMapArgs>),
     /// Audit images: a folder of photos, hloc's features.h5, or a COLMAP database.db

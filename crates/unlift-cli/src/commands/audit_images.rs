@@ -86,7 +86,7 @@ pub fn audit(args: &AuditImagesArgs) -> anyhow::Result<(Option<Finished>, Used)>
                     _ => kind("--invert", first.as_ref())?,
                 };
                 let painter = painter(kind, args.inverter.as_deref())?;
-                Some(Arc::new(Inversion::new(painter, photos)))
+                Some(Arc::new(Inversion::new(painter, photos, source.turn())))
             }
             None => None,
         };

@@ -135,12 +135,7 @@ fn plan(
         }
     };
     Ok(Plan {
-        neighbors: neighbors(
-            asked,
-            (prepared, descriptors),
-            lacking,
-            (input.positions.len(), notes),
-        )?,
+        neighbors: neighbors(asked, (prepared, descriptors), lacking, (input.n_rows(), notes))?,
         schemes,
         k,
         solvers: solvers(&args.solvers.solver, &usual),

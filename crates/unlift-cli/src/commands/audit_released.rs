@@ -154,19 +154,7 @@ fn described(
         )));
     }
     // Which points they are of is all that is asked.
-    let points = Points {
-        positions: Vec::new(),
-        ids: (0..secret.n_originals() as u64).collect(),
-        cameras: Vec::new(),
-        up: None,
-        files: Vec::new(),
-        seen: Seen::default(),
-        format: "",
-        skipped: Vec::new(),
-        doubts: Vec::new(),
-        model: None,
-        database: None,
-    };
+    let points = Points { ids: (0..secret.n_originals() as u64).collect(), ..Points::default() };
     let of_originals = read::descriptors(path, &points)?;
     let mut of_rows = vec![0; secret.n_slots()];
     for (slot, &row) in secret.descriptor_row().iter().enumerate() {

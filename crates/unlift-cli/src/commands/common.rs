@@ -57,7 +57,7 @@ pub fn same_map(
 
 /// Reads a map and makes it ready: the first step of `audit map` and `obfuscate`.
 pub fn open_map(path: &Path, args: &MapArgs, quiet: bool) -> anyhow::Result<(Input, Prepared)> {
-    let alive = Spinner::unless(quiet, "reading the map");
+    let _alive = Spinner::unless(quiet, "reading the map");
     let preparation = Preparation {
         scale: args.scale,
         k: usize::from(args.k),
@@ -65,7 +65,7 @@ pub fn open_map(path: &Path, args: &MapArgs, quiet: bool) -> anyhow::Result<(Inp
         max_points: args.max_points.map(NonZeroUsize::get),
         seed: args.seed.unwrap_or(0),
     };
-    Ok(maps::open(path, args.descriptors.as_deref(), &preparation, &alive)?)
+    Ok(maps::open(path, args.descriptors.as_deref(), &preparation)?)
 }
 
 /// Refuses a released map that hides another number of points than the truth, or another number per record.

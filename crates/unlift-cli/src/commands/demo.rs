@@ -1,93 +1,230 @@
-//! `unlift demo`: the whole audit on a made-up room, no data needed.
+//! `unlift demo`: two photos and a map are protected and attacked, no data needed.
 
-use std::sync::Arc;
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use serde_json::{Map, json};
+use tempfile::tempdir;
 use unlift::audit::{Measure, NeighborsBy, Plan};
 use unlift::neighbors::Overlap;
 use unlift::recover::Solver;
 use unlift::truth::Original;
 use unlift::{PointSet, Unit};
-use unlift_audit::inversion::MapInversion;
-use unlift_audit::maps::perform;
-use unlift_audit::{Job, Shown, open_audit};
-use unlift_io::atomic::Rules;
+use unlift_audit::images::FeatureSource;
+use unlift_audit::images::audit::{ImagesJob, find as find_images};
+use unlift_audit::images::choice::headline;
+use unlift_audit::inversion::Inversion;
+use unlift_audit::maps::find as find_map;
+use unlift_audit::{Audited, FIGURES, Job, PAGE, refused};
+use unlift_features::{AlikedOptions, Extraction};
+use unlift_io::atomic::{Access, Kind, OutputSet, Rules};
 use unlift_io::hash::hash_positions;
-use unlift_nn::DescriptorKind;
+use unlift_nn::{DescriptorKind, Learned};
+use unlift_report::Shares;
 use unlift_report::document::Input;
 
 use super::common::with_threads;
 use super::painter::painter;
 use crate::args::DemoArgs;
 use crate::exit::Outcome;
-use crate::output::{command_line, print};
-use crate::progress::{Progress, Stderr};
+use crate::output::{command_line, print, table};
+use crate::progress::Progress;
 
 /// Which of the made-up rooms.
 const SEED: u64 = 0;
-/// Photos that are painted.
-const N_PAINTED: usize = 3;
+/// Inlier ratios of the oracle's neighborhoods of the map.
+const RATIOS: [f64; 2] = [0.5, 0.1];
+/// Score that a keypoint of the photos must exceed: faint ones, too, as there is one photo of each scene.
+const MIN_SCORE: f32 = 0.02;
+/// Page and figures of the photos; those of the map are the audit's usual ones.
+const PHOTOS: [&str; 2] = ["photos.html", "photos.json"];
 
-/// Audits a furnished room.
+/// Attacks two photos and the map of a made-up room.
 pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
-    let started = Instant::now();
-    let out = open_audit(&args.out, Rules::new([], args.force), Shown::Points, &Stderr)?;
-    let finished = with_threads(args.threads, || {
-        let progress = Progress::new(args.quiet);
-        if !args.quiet {
-            progress.say("unlift: a made-up room is photographed and mapped");
-        }
+    let files = [
+        (PAGE, Kind::Page),
+        (FIGURES, Kind::AuditJson),
+        (PHOTOS[0], Kind::Page),
+        (PHOTOS[1], Kind::AuditJson),
+    ];
+    let rules = Rules::new([], args.force);
+    let mut out = OutputSet::create(&args.out, rules, Access::Private, &files).map_err(refused)?;
+    let text = with_threads(args.threads, || {
+        let bar = Progress::new(args.quiet);
+        bar.show(0, PARTS, "");
+        let photos = photos(&Part::new(&bar, "attacking two protected photos", 40.0), &args.out)?;
+        let mapping = Part::new(&bar, "mapping a made-up room", 30.0);
         let room = unlift_demo::room(SEED)?;
-        let n_photos = room.photos.len();
-        let cameras = room.photos.iter().map(|photo| photo.view.center).collect();
-        let painted = room.telling(N_PAINTED)?.into_iter();
-        let painted =
-            painted.map(|photo| (photo.name.clone(), photo.view.clone(), photo.image.clone()));
-        let inversion = Arc::new(MapInversion::of(painter(DescriptorKind::Sift, None)?, painted)?);
-        let sha256 = hash_positions(&room.points);
-        let original = Original::new(PointSet::try_new(room.points, Unit::Meter)?);
-        let usual = Plan::new(Unit::Meter).for_map(original.len(), 50);
-        let mut options = Map::new();
-        options.insert("room".into(), json!({ "seed": SEED, "photos": n_photos }));
-        let job = Job {
-            original: &original,
-            descriptors: Some(&room.descriptors),
-            hidden: None,
-            cameras,
-            up: Some([0.0, 0.0, 1.0]),
-            plan: Plan {
-                neighbors: vec![NeighborsBy::Oracle, NeighborsBy::Source(Arc::new(Overlap))],
-                // What it starts from would be painted, too.
-                solvers: vec![Solver::Joint],
-                measures: vec![Arc::clone(&inversion) as Arc<dyn Measure<3>>],
-                ..usual
-            },
-            input: Input {
-                path: Some("demo room".to_owned()),
-                sha256: Some(sha256),
-                n_points: original.len() as u64,
-                scale_m_per_unit: Some(1.0),
-                unit_in_map_units: Some(1.0),
-                other_sha256: Default::default(),
-                images: None,
-            },
-            options,
-            notes: Vec::new(),
-            doubts: Vec::new(),
-            gates: Vec::new(),
-            out: args.out.clone(),
-            unit_in_map_units: 1.0,
-            write_clouds: false,
-            inversion: Some(inversion),
-            journal: None,
-            share_safe: false,
-            progress: &progress,
-            command: Some(command_line()),
-            started,
-        };
-        Ok(perform(job, out)?)
+        mapping.finish();
+        let map = map(&Part::new(&bar, "attacking the protected map", 30.0), &args.out, &room)?;
+        photos.stage(&mut out, PHOTOS, false)?;
+        let (of_photos, of_map) = (photos.shares(), map.shares());
+        let title = "Two photos: a cat and a cup of coffee";
+        let map = map.opening_with(&photos, title, PHOTOS[0]);
+        let finished = map.write(out, &args.out, false)?;
+        Ok(said(of_photos, of_map, &finished.report))
     })?;
-    print(&finished.text())?;
+    print(&text)?;
     Ok(Outcome::Done)
+}
+
+/// Attacks the two photos from what is released of them.
+fn photos(progress: &Part<'_>, out: &Path) -> anyhow::Result<Audited> {
+    let started = Instant::now();
+    let folder = tempdir()?;
+    unlift_demo::write_photos(folder.path())?;
+    let options = AlikedOptions { min_score: MIN_SCORE, ..AlikedOptions::default() };
+    let source = FeatureSource::open(folder.path(), &Extraction::Aliked(options))?;
+    let painter = painter(DescriptorKind::Aliked, None)?;
+    let inversion = Inversion::new(painter, folder.path(), source.turn());
+    let inversion = Arc::new(inversion);
+    let usual = Plan::new(Unit::Pixel);
+    let plan = Plan {
+        neighbors: vec![NeighborsBy::Source(Arc::new(Learned::default()))],
+        // What joint recovery starts from would be painted, too.
+        solvers: vec![Solver::Joint],
+        k: 20,
+        headline: headline(&usual.thresholds),
+        measures: vec![Arc::clone(&inversion) as Arc<dyn Measure<2>>],
+        ..usual
+    };
+    let mut record = Map::new();
+    record.insert("features".into(), json!(DescriptorKind::Aliked.name()));
+    record.insert("min_score".into(), json!(MIN_SCORE));
+    let job = ImagesJob {
+        source: &source,
+        path: folder.path(),
+        chosen: (0..source.names().len()).collect(),
+        plan,
+        options: record,
+        gates: Vec::new(),
+        show: None,
+        photos: None,
+        out: out.to_owned(),
+        share_safe: false,
+        inversion: Some(inversion),
+        progress,
+        command: Some(command_line()),
+        started,
+    };
+    let (found, _) = find_images(job)?;
+    let mut found = found.ok_or_else(|| anyhow::anyhow!("demo: the photos could not be read"))?;
+    // Where they lay for a moment says nothing.
+    found.document.input.path = Some("two photos of the demo".to_owned());
+    Ok(found)
+}
+
+/// Attacks the map of the room.
+fn map(progress: &Part<'_>, out: &Path, room: &unlift_demo::Mapped) -> anyhow::Result<Audited> {
+    let started = Instant::now();
+    let sha256 = hash_positions(&room.points);
+    let original = Original::new(PointSet::try_new(room.points.clone(), Unit::Meter)?);
+    let mut options = Map::new();
+    options.insert("room".into(), json!({ "seed": SEED }));
+    let job = Job {
+        original: &original,
+        descriptors: Some(&room.descriptors),
+        hidden: None,
+        cameras: room.cameras.clone(),
+        up: Some([0.0, 0.0, 1.0]),
+        plan: Plan {
+            neighbors: vec![NeighborsBy::Oracle, NeighborsBy::Source(Arc::new(Overlap))],
+            inlier_ratios: RATIOS.to_vec(),
+            ..Plan::new(Unit::Meter).for_map(original.len(), 50)
+        },
+        input: Input {
+            path: Some("the map of a made-up room".to_owned()),
+            sha256: Some(sha256),
+            n_points: original.len() as u64,
+            scale_m_per_unit: Some(1.0),
+            unit_in_map_units: Some(1.0),
+            other_sha256: Default::default(),
+            images: None,
+        },
+        options,
+        notes: Vec::new(),
+        doubts: Vec::new(),
+        gates: Vec::new(),
+        out: out.to_owned(),
+        unit_in_map_units: 1.0,
+        write_clouds: false,
+        inversion: None,
+        journal: None,
+        share_safe: false,
+        progress,
+        command: Some(command_line()),
+        started,
+    };
+    Ok(find_map(job, None)?)
+}
+
+/// What came back, in a dozen lines for somebody who has not heard of any scheme.
+fn said(photos: Vec<Shares>, map: Vec<Shares>, page: &Path) -> String {
+    let percent = |share: Option<f64>| share.map_or("-".to_owned(), |x| format!("{x:.1} %"));
+    let of_photos = photos.into_iter().map(|one| {
+        let back = format!("{} of the keypoints came back", percent(one.today));
+        vec![format!("  {}", one.scheme), one.title, back, one.pictures.unwrap_or_default()]
+    });
+    let of_map = map.into_iter().map(|one| {
+        vec![format!("  {}", one.scheme), one.title, percent(one.today), percent(one.known)]
+    });
+    let head = ["", "points that came back:", "today", "if half of the neighbors were known"];
+    let mut map_rows = vec![head.map(str::to_owned).to_vec()];
+    map_rows.extend(of_map);
+    format!(
+        "Two photos, protected by three published schemes, attacked from the protected data alone:\n{}\
+         The map of a room, protected by seven published schemes:\n{}\
+         Photos, pictures that came back and all figures: {}\n",
+        table(&of_photos.collect::<Vec<_>>(), &[1, 3]),
+        table(&map_rows, &[1]),
+        unlift::OneLine(page.display())
+    )
+}
+
+/// Steps of the bar in all; parts of the demo take as many as they take time.
+const PARTS: usize = 100;
+
+/// One part of the demo: moves the bar by its share, and says in plain words what it does.
+struct Part<'a> {
+    bar: &'a Progress,
+    words: &'static str,
+    /// Its steps of the bar.
+    weight: f64,
+    /// How many items are done, and of how many.
+    items: Mutex<(f64, usize)>,
+}
+
+impl<'a> Part<'a> {
+    fn new(bar: &'a Progress, words: &'static str, weight: f64) -> Self {
+        unlift_audit::Progress::add(bar, 0.0, words);
+        Self { bar, words, weight, items: Mutex::new((0.0, 1)) }
+    }
+
+    fn step(&self, change: impl FnOnce(&mut (f64, usize))) {
+        let mut items = self.items.lock().unwrap_or_else(PoisonError::into_inner);
+        let before = items.0 / items.1 as f64;
+        change(&mut items);
+        items.0 = items.0.min(items.1 as f64);
+        let share = (items.0 / items.1 as f64 - before).max(0.0);
+        unlift_audit::Progress::add(self.bar, share * self.weight, self.words);
+    }
+
+    fn finish(&self) {
+        self.step(|items| items.0 = items.1 as f64);
+    }
+}
+
+impl unlift_audit::Progress for Part<'_> {
+    fn show(&self, done: usize, total: usize, _: &str) {
+        self.step(|items| *items = (done as f64, total.max(1)));
+    }
+
+    fn add(&self, share: f64, _: &str) {
+        self.step(|items| items.0 += share);
+    }
+
+    fn say(&self, line: &str) {
+        self.bar.say(line);
+    }
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use unlift::OneLine;
 use unlift_features::Extraction;
 use unlift_features::batch::in_order;
+use unlift_features::load::Turn;
 use unlift_io::Error;
 use unlift_io::atomic::{Kind, Rules};
 use unlift_io::features::{FeatureWriter, ImageFeatures};
@@ -35,7 +36,8 @@ pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
     check_no_photo(&args.images, &target)?;
     let extraction = extraction(args)?;
     let tally = with_threads(args.threads, || {
-        let source = FeatureSource::open(&args.images, &extraction)?;
+        let turn = if args.as_stored { Turn::AsStored } else { Turn::Upright };
+        let source = FeatureSource::open(&args.images, &extraction)?.with_turn(turn);
         let mut progress = Progress::new(args.quiet);
         let mut tally = Tally::default();
         if let Some(note) = source.passed_over() {
@@ -96,6 +98,9 @@ fn extraction(args: &FeaturesArgs) -> anyhow::Result<Extraction> {
         max_image_size: args.max_image_size,
         first_octave: args.first_octave,
     };
+    if args.as_stored && args.images.is_file() {
+        return Err(usage("--as-stored: expected with a folder of photos, found a file"));
+    }
     Ok(wanted.extraction(&args.images)?)
 }
 

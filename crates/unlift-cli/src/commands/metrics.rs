@@ -97,7 +97,9 @@ fn pictures(folder: &Path) -> anyhow::Result<BTreeMap<String, PathBuf>> {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let mut bare = name.as_str();
         while let Some((stem, kind)) = bare.rsplit_once('.')
-            && ["jpg", "jpeg", "png", "webp"].iter().any(|known| kind.eq_ignore_ascii_case(known))
+            && ["jpg", "jpeg", "jpe", "jfif", "png", "webp"]
+                .iter()
+                .any(|known| kind.eq_ignore_ascii_case(known))
         {
             bare = stem;
         }

@@ -31,7 +31,7 @@ pub fn run(args: &ObfuscateArgs) -> anyhow::Result<Outcome> {
         return images(args, out);
     };
     let (_, prepared) = open_map(&args.path, &args.map, false)?;
-    for note in prepared.notes.iter().chain(&prepared.doubts) {
+    for note in prepared.doubts.iter().chain(&prepared.notes) {
         Stderr.say(&format!("note: {note}"));
     }
     let descriptors = prepared.descriptors.as_ref();

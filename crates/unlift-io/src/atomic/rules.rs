@@ -20,7 +20,8 @@ pub struct Rules {
 /// Folders in folders that are looked into: a project's models and photos.
 const DEPTH: usize = 8;
 /// Endings of what is read from folders: models, databases, photos, parts of stage files.
-const READ_FROM_FOLDERS: [&str; 8] = ["bin", "txt", "db", "jpg", "jpeg", "png", "webp", "parquet"];
+const READ_FROM_FOLDERS: [&str; 10] =
+    ["bin", "txt", "db", "jpg", "jpeg", "jpe", "jfif", "png", "webp", "parquet"];
 
 impl Rules {
     /// The rules of a run that reads `inputs`: files, and folders with the models, databases and photos below

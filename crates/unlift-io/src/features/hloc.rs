@@ -7,6 +7,8 @@ use unlift::descriptors::Values;
 
 use super::h5::{Array, FeatureStore, Numbers, shape_text};
 use super::image::ImageFeatures;
+use super::writer::UPRIGHT;
+use crate::atomic::Kind;
 use crate::error::Error;
 
 /// An open file of features.
@@ -15,11 +17,36 @@ pub(super) struct Hloc(FeatureStore);
 impl Hloc {
     /// Opens `path` and lists its images.
     pub fn open(path: &Path) -> Result<Self, Error> {
-        Ok(Self(FeatureStore::open(path)?))
+        let store = FeatureStore::open(path)?;
+        let wrong = |found: &str| {
+            let expected = "a group per image with keypoints and descriptors";
+            Err(Error::new(path, "", expected, found))
+        };
+        if store.paths().is_empty() && !store.alone().is_empty() {
+            return wrong("arrays in no group");
+        }
+        let first = if store.paths().is_empty() { Vec::new() } else { store.names(0)? };
+        let has = |name: &str| first.iter().any(|its| its == name);
+        match () {
+            () if has("keypoints") => Ok(Self(store)),
+            () if has("matches0") || has("matches") => wrong("matches of pairs of images"),
+            () if has("global_descriptor") => wrong("global descriptors, of whole images"),
+            () => Ok(Self(store)),
+        }
+    }
+
+    /// What is no image, one error each.
+    pub fn refused(&self) -> &[Error] {
+        self.0.broken()
     }
 
     pub fn names(&self) -> &[String] {
         self.0.paths()
+    }
+
+    /// Whether the keypoints of the first image are in pixels of the upright photo.
+    pub fn is_upright(&self) -> bool {
+        !self.0.paths().is_empty() && is_upright(&self.0, 0).unwrap_or(false)
     }
 
     pub fn get(&self, at: usize) -> Result<ImageFeatures, Error> {
@@ -40,6 +67,15 @@ pub fn decode(path: &Path, name: &str) -> Result<ImageFeatures, Error> {
             Err(Error::new(path, "", format!("the image {name} alone"), found))
         }
     }
+}
+
+/// What the file says; in files of the first version of unlift, which did not say it, what it extracted was upright.
+fn is_upright(store: &FeatureStore, at: usize) -> Result<bool, Error> {
+    let number = |key: &str| store.number(at, "keypoints", key);
+    Ok(match number(UPRIGHT)? {
+        Some(upright) => upright != 0.0,
+        None => number("uncertainty")?.is_some() && Kind::Features.is_at(store.path()),
+    })
 }
 
 fn image(store: &FeatureStore, at: usize) -> Result<ImageFeatures, Error> {
@@ -75,6 +111,7 @@ fn image(store: &FeatureStore, at: usize) -> Result<ImageFeatures, Error> {
         scales: per_keypoint("scales")?,
         orientations_deg: per_keypoint("oris")?,
         uncertainty_px: store.number(at, "keypoints", "uncertainty")?,
+        upright: is_upright(store, at)?,
         keypoints,
         photo: None,
     })
@@ -88,7 +125,7 @@ fn keypoints(array: &Array) -> Result<Vec<[f64; 2]>, Wrong> {
     let columns = match array.shape[..] {
         [_, columns] if columns >= 2 => columns as usize,
         // An image without keypoints, as some exporters write it.
-        [0] => return Ok(Vec::new()),
+        [0] | [0, _] | [2, 0] => return Ok(Vec::new()),
         _ => return Err(("shape (N, 2)".to_owned(), shape_text(&array.shape))),
     };
     let values = array.values.to_f64();
@@ -107,7 +144,11 @@ fn keypoints(array: &Array) -> Result<Vec<[f64; 2]>, Wrong> {
 fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
     let expected = || format!("shape (D, N) with N = {n}, one column per keypoint");
     let dim = match array.shape[..] {
-        [dim, count] if count == n as u64 && (dim > 0 || n == 0) => (dim as usize).max(1),
+        // Of an image without keypoints, written in any way.
+        ref sides if n == 0 && array.values.len() == 0 => {
+            sides.iter().copied().max().unwrap_or(0).max(1) as usize
+        }
+        [dim, count] if count == n as u64 && dim > 0 => dim as usize,
         [count, _] if count == n as u64 => {
             let found = format!("{}, rows and columns exchanged", shape_text(&array.shape));
             return Err((expected(), found));

@@ -28,6 +28,9 @@ pub struct ImageFeatures {
     pub orientations_deg: Option<Vec<f32>>,
     /// Standard deviation of a keypoint's place in pixels, as the detector states it.
     pub uncertainty_px: Option<f64>,
+    /// Keypoints are in pixels of the photo that was turned upright by its EXIF orientation, not of the photo as it is
+    /// stored, as those of COLMAP and hloc are.
+    pub upright: bool,
     /// The photo itself, where the source is a folder of them.
     pub photo: Option<PathBuf>,
 }

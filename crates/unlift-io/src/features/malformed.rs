@@ -87,7 +87,7 @@ fn every_malformed_file_of_features_is_refused_with_its_line() {
         ("no keypoints", file(vec![descriptors()]),
             "f: image \"a.jpg\": expected an array keypoints, found only descriptors"),
         ("global descriptors", file(vec![named("global_descriptor", floats(&[4096], 0.5))]),
-            "f: image \"a.jpg\": expected an array keypoints, found only global_descriptor"),
+            "f: expected a group per image with keypoints and descriptors, found global descriptors, of whole images"),
         ("no descriptors", file(vec![keypoints()]), "f: image \"a.jpg\": expected descriptors, found none"),
         ("keypoints in one column", file(vec![named("keypoints", floats(&[3, 1], 1.0)), descriptors()]),
             "f: image \"a.jpg\", keypoints: expected shape (N, 2), found (3, 1)"),

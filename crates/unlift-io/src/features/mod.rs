@@ -83,9 +83,25 @@ impl FeatureSource {
         Ok(source)
     }
 
+    /// Whether keypoints are in pixels of photos that were turned upright, as the file says of its first image.
+    pub fn is_upright(&self) -> bool {
+        match &self.kind {
+            Kind::Hloc(file) => file.is_upright(),
+            Kind::Colmap(_) => false,
+        }
+    }
+
     /// The file, if it is not what it was when it was opened.
     pub fn changed(&self) -> Option<&Path> {
         self.seen.changed([0])
+    }
+
+    /// What the file has in place of images, one error each.
+    pub fn refused(&self) -> &[Error] {
+        match &self.kind {
+            Kind::Hloc(file) => file.refused(),
+            Kind::Colmap(_) => &[],
+        }
     }
 
     /// The images, sorted by the bytes of their names.

@@ -12,6 +12,9 @@ use crate::atomic::{Access, OutputFile};
 use crate::error::Error;
 use crate::read::lines::quoted;
 
+/// The attribute of keypoints that says whether they are in pixels of upright photos: 1 or 0.
+pub(super) const UPRIGHT: &str = "upright";
+
 /// A file of features that is written image by image and appears whole.
 ///
 /// Per image a group under its name with `keypoints` `(N, 2)` and, where they are known, `descriptors`
@@ -120,9 +123,9 @@ fn write(
         writer.array(out, &image.name, name, &Array { shape, values }, attributes)
     };
     let places = image.keypoints.iter().flatten().map(|&value| value as f32).collect();
-    let uncertainty: Vec<_> =
-        image.uncertainty_px.iter().map(|&value| ("uncertainty", value)).collect();
-    put("keypoints", vec![n, 2], Numbers::F32(places), &uncertainty)?;
+    let mut attributes = vec![(UPRIGHT, f64::from(image.upright))];
+    attributes.extend(image.uncertainty_px.map(|value| ("uncertainty", value)));
+    put("keypoints", vec![n, 2], Numbers::F32(places), &attributes)?;
     if let Some(rows) = &image.descriptors {
         let dim = rows.dim();
         let values = match rows.values() {

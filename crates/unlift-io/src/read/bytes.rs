@@ -44,12 +44,12 @@ impl Bytes {
         self.part = Part::Record(number);
     }
 
-    /// An empty list with room for `n` `what`, within the budget of the file.
+    /// An empty list with room for `n` entries of what stands at `place`, within the budget of the file.
     ///
     /// # Errors
     /// When there is not so much memory.
-    pub fn room<T>(&self, what: &'static str, n: u64) -> Result<Vec<T>, Error> {
-        Budget::new(&self.path, self.len).room(what, n)
+    pub fn room<T>(&self, place: impl Into<Place> + Clone, n: u64) -> Result<Vec<T>, Error> {
+        Budget::new(&self.path, self.len).room(place, n)
     }
 
     /// Where the next byte is.

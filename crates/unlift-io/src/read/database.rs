@@ -1,4 +1,4 @@
-//! Descriptors of points as the mean over their observations, from COLMAP's `database.db`.
+//! Descriptors of points as the mean over their observations, from COLMAP's `database.db` or hloc's features.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -8,23 +8,73 @@ use unlift::descriptors::Values;
 
 use crate::database::{Database, Kind};
 use crate::error::Error;
+use crate::features::FeatureSource;
 use crate::read::Input;
-use crate::read::colmap::{self, Tracks};
+use crate::read::colmap::{self, Image, Tracks};
+use crate::read::lines::quoted;
 
 /// L2 norm of the descriptors COLMAP stores as bytes.
 const BYTE_NORM: f64 = 512.0;
 
-/// Descriptors for every point of `input`, which must be a COLMAP model.
+/// Descriptors of an image: its rows, one after the other, and how long each is.
+type Stored = (Values, usize);
+
+/// Descriptors for every point of `input`, which must be a COLMAP model, from the database at `path`.
 ///
 /// Source: COLMAP's documentation, "Database Format".
-pub fn descriptors(path: &Path, input: &Input) -> Result<Descriptors, Error> {
-    let Some(points_path) = input.files.iter().find(|file| is_points(file)) else {
-        let expected = "a COLMAP model, whose tracks lead to a database";
+pub fn of_database(path: &Path, input: &Input) -> Result<Descriptors, Error> {
+    let database = Database::open(path)?;
+    mean(path, input, |image| {
+        let rows = database.descriptors(&image.name)?;
+        Ok(match rows.kind {
+            Kind::Bytes => (Values::U8(rows.data), rows.row_bytes),
+            Kind::Floats => {
+                let floats =
+                    rows.data.as_chunks::<4>().0.iter().map(|&four| f32::from_le_bytes(four));
+                (Values::F32(floats.collect()), rows.row_bytes / 4)
+            }
+        })
+    })
+}
+
+/// The same from hloc's features at `path`, whose keypoints are numbered as the 2D points of the model.
+pub fn of_features(path: &Path, input: &Input) -> Result<Descriptors, Error> {
+    let features = FeatureSource::open(path)?;
+    mean(path, input, |image| {
+        let wrong = |expected: String, found: String| {
+            Error::new(path, format!("image {}", quoted(&image.name)), expected, found)
+        };
+        let at = features.names().binary_search_by(|name| name.as_bytes().cmp(&image.name));
+        let at = at.map_err(|_| wrong("this image of the model".into(), "no such image".into()))?;
+        let found = features.get(at)?;
+        if found.keypoints.len() as u64 != image.n_points2d {
+            let expected = format!("{} keypoints, as the model has", image.n_points2d);
+            return Err(wrong(expected, found.keypoints.len().to_string()));
+        }
+        let descriptors = found.described(path)?;
+        Ok((descriptors.values().clone(), descriptors.dim()))
+    })
+}
+
+/// The mean over the observations of each point of `input`, of which `stored` gives those in an image.
+fn mean(
+    path: &Path,
+    input: &Input,
+    stored: impl Fn(&Image) -> Result<Stored, Error>,
+) -> Result<Descriptors, Error> {
+    let of_model = |file: &&std::path::PathBuf| {
+        let is = |name: &str| file.file_name().is_some_and(|its| its == name);
+        is("points3D.bin") || is("points3D.txt")
+    };
+    let Some(points_path) = input.files.iter().find(of_model) else {
+        let expected = "a COLMAP model, whose tracks lead to images";
         return Err(Error::new(path, "", expected, format!("{} points", input.format)));
     };
     let points = colmap::read_points(points_path, true)?;
     let tracks = points.tracks.expect("asked for");
-    let images = images_of(points_path)?;
+    let extension = points_path.extension().unwrap_or_default();
+    let images = points_path.with_file_name("images").with_extension(extension);
+    let images = colmap::read_images(&images)?;
     let row_of_id: HashMap<u64, usize> = points.ids.iter().copied().zip(0..).collect();
     let rows = input
         .ids
@@ -35,26 +85,13 @@ pub fn descriptors(path: &Path, input: &Input) -> Result<Descriptors, Error> {
             })
         })
         .collect::<Result<Vec<_>, _>>()?;
-    mean_over_tracks(&Database::open(path)?, &tracks, &images, &rows, &input.ids)
-}
-
-fn is_points(file: &Path) -> bool {
-    file.file_stem().is_some_and(|stem| stem == "points3D")
-}
-
-/// Names of the model's images by their id in the model, read beside the points.
-fn images_of(points_path: &Path) -> Result<HashMap<u32, Vec<u8>>, Error> {
-    let extension = points_path.extension().unwrap_or_default();
-    let path = points_path.with_file_name("images").with_extension(extension);
-    let images = colmap::read_images(&path)?;
-    Ok(images.into_iter().map(|i| (i.id, i.name)).collect())
+    mean_over_tracks((path, stored), (&tracks, &images), &rows, &input.ids)
 }
 
 /// The mean over the observations of each of `rows` (of `tracks`), which have these `ids`.
 fn mean_over_tracks(
-    database: &Database,
-    tracks: &Tracks,
-    names: &HashMap<u32, Vec<u8>>,
+    (path, stored): (&Path, impl Fn(&Image) -> Result<Stored, Error>),
+    (tracks, images): (&Tracks, &[Image]),
     rows: &[usize],
     ids: &[u64],
 ) -> Result<Descriptors, Error> {
@@ -65,7 +102,7 @@ fn mean_over_tracks(
         if tracks.row(row).is_empty() {
             let place = format!("point {}", ids[out]);
             let expected = "an observation in its track";
-            return Err(Error::new(database.path(), place, expected, "none"));
+            return Err(Error::new(path, place, expected, "none"));
         }
         let track = tracks.row(row).iter();
         observations.extend(track.map(|&(image, index)| (image, index, out)));
@@ -75,62 +112,56 @@ fn mean_over_tracks(
     let mut layout = None;
     let mut sums: Vec<f64> = Vec::new();
     for seen in observations.chunk_by(|a, b| a.0 == b.0) {
-        let image = seen[0].0;
-        let Some(name) = names.get(&image) else {
+        let id = seen[0].0;
+        let Ok(image) = images.binary_search_by_key(&id, |image| image.id) else {
             let place = format!("point {}", ids[seen[0].2]);
             let expected = "images of the model in its track";
-            return Err(Error::new(database.path(), place, expected, format!("image {image}")));
+            return Err(Error::new(path, place, expected, format!("image {id}")));
         };
-        let stored = database.descriptors(name)?;
-        let this = (stored.kind, stored.row_bytes);
-        let (kind, row_bytes) = *layout.get_or_insert(this);
-        let dim = match kind {
-            Kind::Bytes => row_bytes,
-            Kind::Floats => row_bytes / 4,
+        let image = &images[image];
+        let wrong = |expected: String, found: String| {
+            Err(Error::new(path, format!("image {}", quoted(&image.name)), expected, found))
         };
-        if this != (kind, row_bytes) {
-            let expected = format!("{row_bytes} columns of {kind:?} as in other images");
-            let found = format!("{} of {:?}", stored.row_bytes, stored.kind);
-            return Err(database.error(name, expected, found));
+        let (values, dim) = stored(image)?;
+        let (kind, n) = match &values {
+            Values::U8(values) => ("bytes", values.len() / dim),
+            Values::F32(values) => ("floats", values.len() / dim),
+        };
+        let (usual_kind, usual_dim) = *layout.get_or_insert((kind, dim));
+        if (kind, dim) != (usual_kind, usual_dim) {
+            let expected = format!("{usual_dim} {usual_kind} each, as in other images");
+            return wrong(expected, format!("{dim} {kind}"));
         }
         sums.resize(rows.len() * dim, 0.0);
         for &(_, index, out) in seen {
             let index = index as usize;
-            if index >= stored.n {
+            if index >= n {
                 let expected = format!("a descriptor for keypoint {index}");
-                return Err(database.error(name, expected, format!("{} descriptors", stored.n)));
+                return wrong(expected, format!("{n} descriptors"));
             }
-            let row = &stored.data[index * row_bytes..(index + 1) * row_bytes];
-            let sums = &mut sums[out * dim..(out + 1) * dim];
-            match kind {
-                Kind::Bytes => {
-                    for (sum, &byte) in sums.iter_mut().zip(row) {
-                        *sum += f64::from(byte);
-                    }
+            let (row, sums) =
+                (index * dim..(index + 1) * dim, &mut sums[out * dim..(out + 1) * dim]);
+            match &values {
+                Values::U8(values) => {
+                    sums.iter_mut().zip(&values[row]).for_each(|(sum, &x)| *sum += f64::from(x));
                 }
-                Kind::Floats => {
-                    for (sum, bits) in sums.iter_mut().zip(row.as_chunks::<4>().0) {
-                        *sum += f64::from(f32::from_le_bytes(*bits));
-                    }
+                Values::F32(values) => {
+                    sums.iter_mut().zip(&values[row]).for_each(|(sum, &x)| *sum += f64::from(x));
                 }
             }
         }
     }
-    let (kind, row_bytes) = layout.unwrap_or((Kind::Bytes, 1));
-    let (values, dim) = match kind {
-        Kind::Bytes => {
-            normalize(&mut sums, row_bytes, BYTE_NORM);
-            // Ties to even, as NumPy rounds.
-            let byte = |x: &f64| x.round_ties_even().clamp(0.0, 255.0) as u8;
-            (Values::U8(sums.iter().map(byte).collect()), row_bytes)
-        }
-        Kind::Floats => {
-            normalize(&mut sums, row_bytes / 4, 1.0);
-            let floats = sums.iter().map(|&x| x as f32).collect();
-            (Values::F32(floats), row_bytes / 4)
-        }
+    let (kind, dim) = layout.unwrap_or(("bytes", 1));
+    let values = if kind == "bytes" {
+        normalize(&mut sums, dim, BYTE_NORM);
+        // Ties to even, as NumPy rounds.
+        let byte = |x: &f64| x.round_ties_even().clamp(0.0, 255.0) as u8;
+        Values::U8(sums.iter().map(byte).collect())
+    } else {
+        normalize(&mut sums, dim, 1.0);
+        Values::F32(sums.iter().map(|&x| x as f32).collect())
     };
-    Descriptors::try_new(values, dim).map_err(|e| Error::core(database.path(), e))
+    Descriptors::try_new(values, dim).map_err(|e| Error::core(path, e))
 }
 
 /// Brings every row to an L2 norm (so that a sum is as good as a mean); rows of zeros stay.

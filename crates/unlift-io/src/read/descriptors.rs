@@ -1,4 +1,4 @@
-//! Descriptors of the points of a map: from our binary form, a NumPy array or a COLMAP database.
+//! Descriptors of the points of a map: from our binary form, a NumPy array, a COLMAP database or hloc's features.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -26,8 +26,8 @@ const HDF5: &[u8; 8] = b"\x89HDF\r\n\x1a\n";
 /// - a file of the form `P3DESC01` (joined by point id), bytes or floats as they are stored;
 /// - an `.npy` array `(n, dim)` with a row per point in the order of `input`: of a COLMAP model by
 ///   ascending point id, else as the file has them;
-/// - a COLMAP `database.db`: then a point's row is the mean of the descriptors of its observations,
-///   found through the model's tracks, with images joined by name. Bytes are brought to L2 norm 512,
+/// - a COLMAP `database.db`, or hloc's `features.h5`: then a point's row is the mean of the descriptors of its
+///   observations, found through the model's tracks, with images joined by name. Bytes are brought to L2 norm 512,
 ///   rounded and clipped to 0..=255; floats to norm 1.
 ///
 /// # Errors
@@ -41,17 +41,23 @@ pub fn descriptors(path: &Path, input: &Input) -> Result<Descriptors, Error> {
     }
     match &magic {
         MAGIC => binary(path, input),
-        SQLITE => database::descriptors(path, input),
+        SQLITE => database::of_database(path, input),
+        HDF5 => database::of_features(path, input),
         _ if magic.starts_with(npy::MAGIC) => {
-            let (values, dim) = npy::descriptors(path, input.ids.len())?;
-            Descriptors::try_new(values, dim).map_err(|e| Error::core(path, e))
+            // A row per point that was read, or per point of the file.
+            let (values, dim) = npy::descriptors(path, [input.ids.len(), input.n_rows()])?;
+            let all = Descriptors::try_new(values, dim).map_err(|e| Error::core(path, e))?;
+            if all.len() == input.ids.len() {
+                return Ok(all);
+            }
+            let left_out = |row: &u32| input.left_out.binary_search(&u64::from(*row)).is_err();
+            Ok(all.select(&(0..all.len() as u32).filter(left_out).collect::<Vec<_>>()))
         }
         _ => {
-            let expected = "a file that begins with P3DESC01, a NumPy array (.npy) or a COLMAP database (SQLite)";
+            let expected = "a file that begins with P3DESC01, a NumPy array (.npy), a COLMAP database (SQLite) or hloc's features (HDF5)";
             let found = match len {
                 0 => "an empty file".to_owned(),
                 1..8 => format!("a file of {len} bytes"),
-                _ if &magic == HDF5 => "HDF5 (features of images, not of points)".to_owned(),
                 _ => quoted(&magic),
             };
             Err(Error::new(path, "", expected, found))
@@ -108,7 +114,7 @@ fn binary(path: &Path, input: &Input) -> Result<Descriptors, Error> {
         let mut values = Vec::with_capacity(n_values);
         for id in &input.ids {
             for (at, stored) in row(id)?.chunks_exact(scalar.size()).enumerate() {
-                let value = scalar.read(stored);
+                let value = scalar.read(stored, false);
                 if !value.is_finite() {
                     let place = format!("point {id}, value {at}");
                     return Err(Error::new(path, place, "a finite value", value.to_string()));

@@ -4,12 +4,15 @@ use std::fs;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
+use super::ply;
 use crate::error::Error;
 use crate::input;
 
 /// Where models lie, each in itself or in numbered folders inside: COLMAP's `sparse`, hloc's `models`
 /// (the best one stands in the folder itself), nerfstudio's `colmap/sparse`.
 const PLACES: [&str; 6] = ["", "sparse", "model", "models", "colmap", "colmap/sparse"];
+/// Where undistorted ones lie: in `sparse` of that folder, or of numbered folders inside. They are read if there is no other.
+const UNDISTORTED: &str = "dense";
 /// Where a database lies beside a model.
 const DATABASES: [&str; 2] = ["database.db", "colmap/database.db"];
 /// The same where the folder that was given is the model itself.
@@ -21,6 +24,8 @@ pub(super) struct Model {
     pub folder: PathBuf,
     /// `bin` or `txt`: the form that is read.
     pub extension: &'static str,
+    /// The file of its points, which may be a PLY.
+    pub points: PathBuf,
     /// What people should know about other models and forms.
     pub notes: Vec<String>,
 }
@@ -85,26 +90,39 @@ struct Candidate {
     name: String,
     folder: PathBuf,
     extension: &'static str,
+    points: PathBuf,
 }
 
 impl Candidate {
-    fn points(&self) -> PathBuf {
-        self.folder.join("points3D").with_extension(self.extension)
+    /// The model in `folder`, if one is there.
+    fn in_folder(name: String, folder: PathBuf) -> Option<Self> {
+        let file = |stem: &str, extension: &str| folder.join(format!("{stem}.{extension}"));
+        let there = |extension: &&str| file("points3D", extension).is_file();
+        let form = ["bin", "txt", "ply"].into_iter().find(there)?;
+        let points = file("points3D", form);
+        // Beside a PLY, cameras may be in either form.
+        let is_text = form == "txt" || (form == "ply" && !file("images", "bin").is_file());
+        Some(Self { name, folder, extension: if is_text { "txt" } else { "bin" }, points })
     }
 
     fn model(&self, mut notes: Vec<String>) -> Model {
         if self.extension == "bin" && self.folder.join("points3D.txt").is_file() {
             notes.insert(0, "points3D.txt: the binary form beside it was read".to_owned());
         }
-        Model { folder: self.folder.clone(), extension: self.extension, notes }
+        let Self { folder, extension, points, .. } = self;
+        Model { folder: folder.clone(), extension, points: points.clone(), notes }
     }
 
     /// How many points its file says that it holds.
     fn n_points(&self) -> Result<u64, Error> {
-        let path = self.points();
-        let wrong = |error| Error::read(&path, error);
-        let file = BufReader::new(input::open(&path)?.0);
-        if self.extension == "bin" {
+        let path = &self.points;
+        let wrong = |error| Error::read(path, error);
+        let file = BufReader::new(input::open(path)?.0);
+        let ends = |with: &str| path.extension().is_some_and(|extension| extension == with);
+        if ends("ply") {
+            return Ok(ply::read(path)?.positions.len() as u64);
+        }
+        if ends("bin") {
             let mut count = Vec::new();
             file.take(8).read_to_end(&mut count).map_err(wrong)?;
             // A file that is cut off counts as empty; if it is read after all, its reader tells.
@@ -140,23 +158,28 @@ fn n_lines(mut file: impl BufRead) -> io::Result<u64> {
 fn candidates(path: &Path) -> Vec<Candidate> {
     let mut found: Vec<Candidate> = Vec::new();
     let mut seen = Vec::new();
-    for place in PLACES {
-        let parent = path.join(place);
-        let numbers = numbered(&parent).into_iter().map(|number| match place {
-            "" => number.to_string(),
-            _ => format!("{place}/{number}"),
-        });
+    let mut look = |place: &str, inside: &str| {
+        let within = |number| if place.is_empty() { number } else { format!("{place}/{number}") };
+        let numbers =
+            numbered(&path.join(place)).into_iter().map(|number| within(number.to_string()));
         for name in std::iter::once(place.to_owned()).chain(numbers) {
+            let name = name + inside;
             let folder = if name.is_empty() { path.to_owned() } else { path.join(&name) };
-            let has = |extension: &&str| folder.join(format!("points3D.{extension}")).is_file();
-            let Some(extension) = ["bin", "txt"].into_iter().find(has) else { continue };
+            let Some(candidate) = Candidate::in_folder(name, folder) else { continue };
             // Links make one model appear twice.
-            let real = fs::canonicalize(&folder).unwrap_or_else(|_| folder.clone());
+            let real = fs::canonicalize(&candidate.folder);
+            let real = real.unwrap_or_else(|_| candidate.folder.clone());
             if !seen.contains(&real) {
                 seen.push(real);
-                found.push(Candidate { name, folder, extension });
+                found.push(candidate);
             }
         }
+        found.is_empty()
+    };
+    let mut none = true;
+    PLACES.iter().for_each(|place| none = look(place, ""));
+    if none {
+        look(UNDISTORTED, "/sparse");
     }
     found
 }

@@ -7,59 +7,135 @@ use std::path::Path;
 
 use unlift::descriptors::Values;
 
+use super::Input;
+use super::bytes::Bytes;
+use super::columns::{Field, axes};
+use super::lines::{number, quoted};
+use super::scalar::Scalar;
 use crate::error::Error;
-use crate::read::bytes::Bytes;
-use crate::read::lines::{number, quoted};
-use crate::read::scalar::Scalar;
 
 /// How every array begins.
 pub(crate) const MAGIC: &[u8; 6] = b"\x93NUMPY";
 
-/// Reads positions `(n, 3)` from an `.npy` file of 4- or 8-byte floats, in either byte and memory order.
+/// Columns of an array of points at most: what has more are descriptors.
+const MOST_COLUMNS: u64 = 16;
+/// How an array, or a field of three values, is called that holds all coordinates.
+pub(super) const PLACES: [&str; 7] =
+    ["xyz", "position", "positions", "points", "points3d", "coordinates", "pts"];
+/// Rows of fewer points may begin with their number by accident.
+const TELLING: usize = 10;
+
+/// Reads positions from an `.npy` file of numbers: an array `(n, 3)` or with more columns, of which the first three are
+/// x, y and z, or a structured one with fields of these names; in either byte and memory order.
 ///
 /// # Errors
-/// When the file cannot be read, is malformed, holds another type or shape, or a value that is not
-/// finite.
-pub fn positions(path: &Path) -> Result<Vec<[f64; 3]>, Error> {
-    let (mut bytes, header) = Header::open(path)?;
-    let (scalar, big) = match header.scalar() {
-        Some(stored @ (Scalar::F32 | Scalar::F64, _)) => stored,
-        _ => return Err(header.wrong_type(&bytes, "floats of 4 or 8 bytes (f4, f8)")),
-    };
-    let fortran = header.fortran(&bytes)?;
-    let Some([n, 3]) = header.sides() else {
-        return Err(bytes.error("an array of shape (n, 3)", header.shape_text()));
-    };
-    let array = Array { scalar, big, fortran, rows: n, columns: 3 };
-    array.check(&bytes)?;
-    let mut positions = vec![[0.0; 3]; n as usize];
-    array.read(&mut bytes, |bytes, row, column, value| {
-        if !value.is_finite() {
-            let expected = format!("a finite coordinate of point {row}");
-            return Err(bytes.error(expected, value.to_string()));
+/// When the file cannot be read, is malformed, holds another type or shape, or begins rows with their number.
+pub fn positions(path: &Path) -> Result<Input, Error> {
+    of_points(&mut Bytes::open(path)?, "npy")
+}
+
+/// Reads positions from the array that `bytes` begin with.
+pub(super) fn of_points(bytes: &mut Bytes, format: &'static str) -> Result<Input, Error> {
+    let header = Header::read(bytes)?;
+    let mut found = Input { format, ..Input::default() };
+    let (rows, layout) = match header.points() {
+        Some(points) => points,
+        None if header.is_structured() => {
+            return Err(
+                bytes.error("fields of numbers called x, y and z", quoted(header.type_text()))
+            );
         }
-        positions[row][column] = value;
+        None if header.scalar().is_none() => {
+            return Err(header.wrong_type(bytes, "numbers, or fields called x, y and z"));
+        }
+        None => return Err(bytes.error("an array of shape (n, 3)", header.shape_text())),
+    };
+    let (columns, fortran) = match layout {
+        Layout::Rows { fields, size } => {
+            check_size(bytes, rows, Some(size))?;
+            let mut row = vec![0; size as usize];
+            for _ in 0..rows {
+                bytes.fill(&mut row, "values")?;
+                found.positions.push(fields.map(|(field, big)| field.of(&row, big)));
+            }
+            return Ok(found);
+        }
+        Layout::Matrix { columns } => (columns, header.fortran(bytes)?),
+    };
+    let Some((scalar, big)) = header.scalar() else { return Ok(found) };
+    let array = Array { scalar, big, fortran, rows, columns };
+    array.check(bytes)?;
+    found.positions = vec![[0.0; 3]; rows as usize];
+    array.read(bytes, |_, row, column, value| {
+        if column < 3 {
+            found.positions[row][column] = value;
+        }
         Ok(())
     })?;
-    Ok(positions)
+    if columns > 3 {
+        let firsts = || found.positions.iter().map(|position| position[0]).enumerate();
+        let is_numbered = |from: usize| firsts().all(|(row, x)| x == (row + from) as f64);
+        if found.positions.len() >= TELLING && (is_numbered(0) || is_numbered(1)) {
+            let expected = "x, y and z in the first columns";
+            return Err(bytes.error(expected, "the number of the row"));
+        }
+        found.notes.push(format!("the first 3 of {columns} columns are taken for x, y and z"));
+    }
+    Ok(found)
+}
+
+/// Where the coordinates of a point are in an array.
+pub(super) enum Layout {
+    Matrix {
+        columns: u64,
+    },
+    /// In records: where each stands, and whether its most significant byte comes first.
+    Rows {
+        fields: [(Field, bool); 3],
+        size: u64,
+    },
+}
+
+/// How a value of a type is stored, and whether its most significant byte comes first.
+fn stored(text: &str) -> Option<(Scalar, bool)> {
+    let (big, text) = (text.starts_with('>'), text.trim_start_matches(['<', '>', '|', '=']));
+    let kind = *text.as_bytes().first()?;
+    Some((
+        Scalar::of_kind(kind, number(text[1..].as_bytes())?).filter(|_| b"fiu".contains(&kind))?,
+        big,
+    ))
+}
+
+/// Bytes of a value of a type.
+fn size_of(text: &str) -> Option<u64> {
+    let text = text.trim_start_matches(['<', '>', '|', '=']);
+    let digits = text.get(1..)?.split('[').next()?;
+    let n: u64 = number(digits.as_bytes())?;
+    // Text is stored in four bytes a letter.
+    n.checked_mul(if text.starts_with('U') { 4 } else { 1 })
 }
 
 /// Reads descriptors `(n, dim)` from an `.npy` file of bytes or of 2-, 4- or 8-byte floats, in either
 /// byte and memory order: their values, row-major, and `dim`. Floats of 8 bytes are rounded to 4.
 ///
 /// # Errors
-/// When the file cannot be read, is malformed, holds another type, does not have `n` rows, or has a
+/// When the file cannot be read, is malformed, holds another type, has none of these `counts` of rows, or has a
 /// value that is not finite as a float of 4 bytes.
-pub fn descriptors(path: &Path, n: usize) -> Result<(Values, usize), Error> {
-    let (mut bytes, header) = Header::open(path)?;
-    let Some((scalar, big)) = header.scalar() else {
+pub fn descriptors(path: &Path, counts: [usize; 2]) -> Result<(Values, usize), Error> {
+    let mut bytes = Bytes::open(path)?;
+    let header = Header::read(&mut bytes)?;
+    let known = [Scalar::U8, Scalar::F16, Scalar::F32, Scalar::F64];
+    let Some((scalar, big)) = header.scalar().filter(|(scalar, _)| known.contains(scalar)) else {
         let expected = "bytes, or floats of 2, 4 or 8 bytes (u1, f2, f4, f8)";
         return Err(header.wrong_type(&bytes, expected));
     };
     let fortran = header.fortran(&bytes)?;
     let (rows, columns) = match header.sides() {
-        Some([rows, columns]) if rows == n as u64 && columns > 0 => (rows, columns),
+        Some([rows, columns]) if counts.contains(&(rows as usize)) && columns > 0 => {
+            (rows, columns)
+        }
         sides => {
+            let n = counts[0];
             let expected = format!("an array of shape ({n}, dimension), a row per point");
             let found = match sides {
                 Some([_, columns]) if columns == n as u64 => {
@@ -72,7 +148,7 @@ pub fn descriptors(path: &Path, n: usize) -> Result<(Values, usize), Error> {
     };
     let array = Array { scalar, big, fortran, rows, columns };
     array.check(&bytes)?;
-    let dim = columns as usize;
+    let (n, dim) = (rows as usize, columns as usize);
     if scalar == Scalar::U8 {
         let mut values = vec![0; n * dim];
         array.read(&mut bytes, |_, row, column, value| {
@@ -107,14 +183,7 @@ impl Array {
     /// # Errors
     /// When the rest of the file is not what the header promises.
     fn check(&self, bytes: &Bytes) -> Result<(), Error> {
-        let Self { rows, columns, .. } = self;
-        let row = columns.checked_mul(self.scalar.size() as u64);
-        if row.and_then(|row| rows.checked_mul(row)) == Some(bytes.remaining()) {
-            return Ok(());
-        }
-        let row = row.map_or("too many".to_owned(), |row| row.to_string());
-        let expected = format!("{rows} rows of {row} bytes");
-        Err(bytes.error_ahead(expected, format!("{} bytes", bytes.remaining())))
+        check_size(bytes, self.rows, self.columns.checked_mul(self.scalar.size() as u64))
     }
 
     /// Calls `each` with row, column and value of every number, in the order of the file.
@@ -130,24 +199,30 @@ impl Array {
         for o in 0..outer {
             for i in 0..inner {
                 bytes.fill(buffer, "values")?;
-                if self.big {
-                    buffer.reverse();
-                }
                 let (row, column) = if self.fortran { (i, o) } else { (o, i) };
-                each(bytes, row, column, self.scalar.read(buffer))?;
+                each(bytes, row, column, self.scalar.read(buffer, self.big))?;
             }
         }
         Ok(())
     }
 }
 
+/// Refuses a file whose rest is not `rows` of so many bytes.
+fn check_size(bytes: &Bytes, rows: u64, row: Option<u64>) -> Result<(), Error> {
+    if row.and_then(|row| rows.checked_mul(row)) == Some(bytes.remaining()) {
+        return Ok(());
+    }
+    let row = row.map_or("too many".to_owned(), |row| row.to_string());
+    let expected = format!("{rows} rows of {row} bytes");
+    Err(bytes.error_ahead(expected, format!("{} bytes", bytes.remaining())))
+}
+
 /// The header of an array: a Python dictionary of three known keys.
-struct Header(Vec<u8>);
+pub(super) struct Header(Vec<u8>);
 
 impl Header {
-    /// Opens `path` and reads up to the first value.
-    fn open(path: &Path) -> Result<(Bytes, Self), Error> {
-        let mut bytes = Bytes::open(path)?;
+    /// Reads up to the first value.
+    pub(super) fn read(bytes: &mut Bytes) -> Result<Self, Error> {
         let mut magic = [0; 8];
         bytes.fill(&mut magic, "magic and version")?;
         if &magic[..6] != MAGIC {
@@ -168,7 +243,7 @@ impl Header {
         }
         let mut header = vec![0; len as usize];
         bytes.fill(&mut header, "header")?;
-        Ok((bytes, Self(header)))
+        Ok(Self(header))
     }
 
     /// The text of a value.
@@ -178,34 +253,69 @@ impl Header {
             .iter()
             .find_map(|key| header.find(key).map(|at| at + key.len()))?;
         let text = header[at..].trim_start().strip_prefix(':')?.trim_start();
-        // A tuple ends with its parenthesis, anything else with a comma or the end of the dictionary.
-        let end = match text.starts_with('(') {
-            true => text.find(')')? + 1,
-            false => text.find([',', '}'])?,
+        // A tuple ends with its parenthesis, a list with its bracket, anything else with a comma or the end of the dictionary.
+        let end = match text.as_bytes().first()? {
+            b'(' => text.find(')')? + 1,
+            b'[' => text.find(']')? + 1,
+            _ => text.find([',', '}'])?,
         };
         Some(text[..end].trim())
     }
 
-    fn type_text(&self) -> &str {
-        self.value("descr").unwrap_or_default().trim_matches(['\'', '"'])
+    fn type_text(&self) -> &[u8] {
+        self.value("descr").unwrap_or_default().trim_matches(['\'', '"']).as_bytes()
     }
 
     /// How a value is stored, and whether its first byte is the most significant one.
     fn scalar(&self) -> Option<(Scalar, bool)> {
-        Some(match self.type_text() {
-            "|u1" | "u1" => (Scalar::U8, false),
-            "<f2" => (Scalar::F16, false),
-            "<f4" => (Scalar::F32, false),
-            "<f8" => (Scalar::F64, false),
-            ">f2" => (Scalar::F16, true),
-            ">f4" => (Scalar::F32, true),
-            ">f8" => (Scalar::F64, true),
-            _ => return None,
-        })
+        stored(std::str::from_utf8(self.type_text()).ok()?)
+    }
+
+    fn is_structured(&self) -> bool {
+        self.type_text().starts_with(b"[")
+    }
+
+    /// How many points there are, and where they have their coordinates; `None` of what cannot be points.
+    pub(super) fn points(&self) -> Option<(u64, Layout)> {
+        if !self.is_structured() {
+            let [rows, columns] = self.sides().filter(|_| self.scalar().is_some())?;
+            let is_usual = (3..=MOST_COLUMNS).contains(&columns);
+            return is_usual.then_some((rows, Layout::Matrix { columns }));
+        }
+        let rows = self.value("shape")?.strip_prefix('(')?.split([',', ')']).next()?;
+        let (mut names, mut fields, mut size) = (Vec::new(), Vec::new(), 0u64);
+        let mut places = None;
+        // ('x', '<f4'), ('xyz', '<f4', (3,))
+        for entry in self.value("descr")?.split("('").skip(1) {
+            let mut parts = entry.split(['\'', ',', '(', ')', ' ']).filter(|part| !part.is_empty());
+            let (name, kind) = match entry.starts_with('\'') {
+                // Bytes between fields have no name.
+                true => ("", parts.next()?),
+                false => (parts.next()?, parts.next()?),
+            };
+            let n = parts
+                .map_while(|part| number::<u64>(part.as_bytes()))
+                .try_fold(1u64, u64::checked_mul);
+            let (n, each, at) = (n?, size_of(kind)?, usize::try_from(size).ok()?);
+            size = size.checked_add(n.checked_mul(each)?)?;
+            let Some((scalar, big)) = stored(kind) else { continue };
+            let field = |at| (Field { at, scalar }, big);
+            if n == 3 && PLACES.iter().any(|known| name.eq_ignore_ascii_case(known)) {
+                places = Some(std::array::from_fn(|axis| field(at + axis * scalar.size())));
+            } else if n == 1 {
+                names.push(name.as_bytes());
+                fields.push(field(at));
+            }
+        }
+        let by_name = || axes(names.iter().copied()).ok().map(|at| at.map(|at| fields[at]));
+        Some((
+            number(rows.trim().as_bytes())?,
+            Layout::Rows { fields: places.or_else(by_name)?, size },
+        ))
     }
 
     fn wrong_type(&self, bytes: &Bytes, expected: &str) -> Error {
-        bytes.error(expected, quoted(self.type_text().as_bytes()))
+        bytes.error(expected, quoted(self.type_text()))
     }
 
     /// Whether columns, not rows, are contiguous.

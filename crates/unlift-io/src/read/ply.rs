@@ -1,13 +1,17 @@
-//! PLY point clouds: the positions of the element `vertex`, ascii or binary.
+//! PLY point clouds: the positions of the element `vertex`, ascii or binary, and the centers of splats.
 
+use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
+use super::Input;
+use super::bytes::Bytes;
+use super::columns::{Field, coordinate, is_called};
+use super::lines::{Lines, number, quoted, words};
+use super::scalar::Scalar;
+use super::undeclared::undeclared;
 use crate::error::{Error, Place};
-use crate::input;
-use crate::read::bytes::Bytes;
-use crate::read::lines::{Lines, number, quoted, words};
-use crate::read::undeclared::undeclared;
+use crate::input::{self, Budget};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Encoding {
@@ -16,101 +20,169 @@ enum Encoding {
     Big,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Scalar {
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    F32,
-    F64,
+fn scalar(name: &[u8]) -> Option<Scalar> {
+    Some(match name {
+        b"char" | b"int8" => Scalar::I8,
+        b"uchar" | b"uint8" => Scalar::U8,
+        b"short" | b"int16" => Scalar::I16,
+        b"ushort" | b"uint16" => Scalar::U16,
+        b"int" | b"int32" => Scalar::I32,
+        b"uint" | b"uint32" => Scalar::U32,
+        b"int64" => Scalar::I64,
+        b"uint64" => Scalar::U64,
+        b"float" | b"float32" => Scalar::F32,
+        b"double" | b"float64" => Scalar::F64,
+        _ => return None,
+    })
 }
 
-impl Scalar {
-    fn from_name(name: &[u8]) -> Option<Self> {
-        Some(match name {
-            b"char" | b"int8" => Self::I8,
-            b"uchar" | b"uint8" => Self::U8,
-            b"short" | b"int16" => Self::I16,
-            b"ushort" | b"uint16" => Self::U16,
-            b"int" | b"int32" => Self::I32,
-            b"uint" | b"uint32" => Self::U32,
-            b"float" | b"float32" => Self::F32,
-            b"double" | b"float64" => Self::F64,
-            _ => return None,
-        })
-    }
-
-    fn size(self) -> usize {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::F64 => 8,
-        }
-    }
+#[derive(Debug)]
+struct Property {
+    name: Vec<u8>,
+    scalar: Scalar,
+    /// How the number of values is stored, of a list.
+    list: Option<Scalar>,
 }
 
 #[derive(Debug)]
 struct Element {
     name: Vec<u8>,
     count: u64,
-    /// Name and type; the type of a list is `None`.
-    properties: Vec<(Vec<u8>, Option<Scalar>)>,
+    properties: Vec<Property>,
 }
 
 impl Element {
     fn has_list(&self) -> bool {
-        self.properties.iter().any(|(_, scalar)| scalar.is_none())
+        self.properties.iter().any(|property| property.list.is_some())
     }
 
-    /// Bytes of one row in a binary file, without lists.
+    /// Bytes of one row in a binary file, with empty lists.
     fn stride(&self) -> usize {
-        self.properties.iter().map(|(_, scalar)| scalar.map_or(0, Scalar::size)).sum()
+        let size = |property: &Property| property.list.unwrap_or(property.scalar).size();
+        self.properties.iter().map(size).sum()
     }
-}
 
-/// The position of a coordinate in a row: which property, at which byte, of which type.
-#[derive(Clone, Copy)]
-struct Axis {
-    property: usize,
-    offset: usize,
-    is_f64: bool,
+    /// Which properties, none of them a list, are called so.
+    fn find<const N: usize>(&self, names: [&'static str; N]) -> Result<[usize; N], &'static str> {
+        let mut found = [0; N];
+        for (found, name) in found.iter_mut().zip(names) {
+            let called = |p: &Property| p.list.is_none() && is_called(&p.name, name.as_bytes());
+            *found = self.properties.iter().position(called).ok_or(name)?;
+        }
+        Ok(found)
+    }
 }
 
 struct Header {
     encoding: Encoding,
     elements: Vec<Element>,
-    /// Index of `vertex` in `elements`.
-    vertex: usize,
-    axes: [Axis; 3],
     n_lines: u64,
     n_bytes: u64,
 }
 
-/// Reads the positions `(n, 3)` of a PLY file, and says which form it has, and why the points may be too few.
-///
-/// Coordinates are `float` or `double`; other properties and elements are skipped.
+/// Reads the positions of the vertices, of any type; other properties and elements are passed over.
 ///
 /// # Errors
-/// When the file cannot be read, is malformed, has lists in or (if binary) before its vertices,
-/// declares more or fewer vertices than it holds, or has a coordinate that is not finite.
-pub fn read(path: &Path) -> Result<(Vec<[f64; 3]>, &'static str, Vec<String>), Error> {
+/// When the file cannot be read, is malformed, or declares more or fewer vertices than it holds.
+pub fn read(path: &Path) -> Result<Input, Error> {
     let (file, len) = input::open(path)?;
     let mut reader = BufReader::new(file);
     let header = header(path, &mut reader)?;
-    let ((positions, more), format) = match header.encoding {
-        Encoding::Ascii => (ascii(path, reader, &header, len)?, "ply ascii"),
-        Encoding::Little => (binary(path, reader, &header, len)?, "ply binary little endian"),
-        Encoding::Big => (binary(path, reader, &header, len)?, "ply binary big endian"),
+    let refuse = |expected: String| Error::new(path, "header", expected, "none");
+    let vertex = header.elements.iter().position(|e| e.name == b"vertex");
+    let vertex = vertex.ok_or_else(|| refuse("an element vertex".to_owned()))?;
+    let element = &header.elements[vertex];
+    let packed = element.find(["packed_position"]);
+    let axes = element.find(["x", "y", "z"]);
+    if let (Err(name), Err(_)) = (&axes, &packed) {
+        return Err(refuse(format!("a property {name} in element vertex")));
+    }
+    let mut rows = match header.encoding {
+        Encoding::Ascii => {
+            let lines = Lines::continuing(path, reader, header.n_lines);
+            Rows::Ascii(lines, Budget::new(path, len))
+        }
+        encoding => {
+            let bytes = Bytes::continuing(path, reader, header.n_bytes, len);
+            Rows::Binary(bytes, encoding == Encoding::Big)
+        }
     };
-    let doubt = undeclared(positions.len() as u64, more);
-    Ok((positions, format, doubt.into_iter().collect()))
+    // A value takes a digit and a separator; the last one of the file only the digit.
+    let most = (len.saturating_sub(header.n_bytes) + 1) / (2 * element.properties.len() as u64);
+    if header.encoding == Encoding::Ascii && element.count > most {
+        let expected = format!("at most {most} vertices (by the size of the file)");
+        return Err(Error::new(path, "header", expected, element.count.to_string()));
+    }
+    let mut boxes = Vec::new();
+    for before in &header.elements[..vertex] {
+        match before.find(BOX).ok().filter(|_| axes.is_err()) {
+            Some(sides) => boxes = rows.read(before, sides)?,
+            None => drop(rows.read(before, [])?),
+        }
+    }
+    let positions = match (axes, packed) {
+        (Ok(axes), _) => rows.read(element, axes)?,
+        (Err(_), Ok(packed)) => {
+            if (boxes.len() as u64).saturating_mul(PER_BOX) < element.count {
+                let expected = format!("an element chunk, a row per {PER_BOX} packed splats");
+                return Err(Error::new(path, "header", expected, boxes.len().to_string()));
+            }
+            let all = rows.read(element, packed)?.into_iter().enumerate();
+            all.map(|(at, [packed])| unpacked(packed as u32, &boxes[at / PER_BOX as usize]))
+                .collect()
+        }
+        (Err(_), Err(_)) => Vec::new(),
+    };
+    let more = rows.more(element, &header.elements[vertex + 1..])?;
+    let is_splat = element.find(["opacity", "scale_0", "rot_0"]).is_ok() || axes.is_err();
+    Ok(Input {
+        positions,
+        format: match header.encoding {
+            Encoding::Ascii => "ply ascii",
+            Encoding::Little => "ply binary little endian",
+            Encoding::Big => "ply binary big endian",
+        },
+        notes: is_splat.then(|| SPLATS.to_owned()).into_iter().collect(),
+        doubts: undeclared(element.count, more).into_iter().collect(),
+        ..Input::default()
+    })
 }
 
-fn header(path: &Path, reader: &mut BufReader<std::fs::File>) -> Result<Header, Error> {
+/// What is said of Gaussian splats.
+const SPLATS: &str = "Gaussian splats: only their centers are read";
+/// Packed splats that lie in one box, whose corners are these.
+const PER_BOX: u64 = 256;
+const BOX: [&str; 6] = ["min_x", "min_y", "min_z", "max_x", "max_y", "max_z"];
+
+/// A center in 11, 10 and 11 bits of a box, as PlayCanvas packs it.
+fn unpacked(packed: u32, sides: &[f64; 6]) -> [f64; 3] {
+    let parts = [(packed >> 21, 2047), (packed >> 11 & 1023, 1023), (packed & 2047, 2047)];
+    std::array::from_fn(|axis| {
+        let (low, high, (part, of)) = (sides[axis], sides[axis + 3], parts[axis]);
+        low + (high - low) * f64::from(part) / f64::from(of)
+    })
+}
+
+/// Reads the centers of splats as the web viewer of antimatter15 has them: 32 bytes each, which begin with three floats.
+pub fn splats(path: &Path) -> Result<Input, Error> {
+    const SPLAT: u64 = 32;
+    let mut bytes = Bytes::open(path)?;
+    let n = bytes.remaining() / SPLAT;
+    if !bytes.remaining().is_multiple_of(SPLAT) {
+        let found = format!("{} bytes", bytes.remaining());
+        return Err(bytes.error_ahead(format!("splats of {SPLAT} bytes each"), found));
+    }
+    let mut row = [0; SPLAT as usize];
+    let mut positions = bytes.room("splats", n)?;
+    for _ in 0..n {
+        bytes.fill(&mut row, "splat")?;
+        let axis = |at: usize| Field { at: 4 * at, scalar: Scalar::F32 }.of(&row, false);
+        positions.push(std::array::from_fn(axis));
+    }
+    Ok(Input { positions, format: "splat", notes: vec![SPLATS.to_owned()], ..Input::default() })
+}
+
+fn header(path: &Path, reader: &mut BufReader<File>) -> Result<Header, Error> {
     /// Longest header: long comments are fine, a file without line ends is not read to its end.
     const LONGEST: u64 = 1 << 20;
     let mut limited = reader.take(LONGEST);
@@ -161,19 +233,18 @@ fn header(path: &Path, reader: &mut BufReader<std::fs::File>) -> Result<Header, 
                 let element = elements.last_mut().ok_or_else(|| {
                     error("an element before its properties", quoted(line.trim_ascii()))
                 })?;
-                let (name, scalar) = match *rest {
-                    [kind, name] => {
-                        let scalar = Scalar::from_name(kind)
-                            .ok_or_else(|| error("the type of a property", quoted(kind)))?;
-                        (name, Some(scalar))
-                    }
-                    [b"list", _, _, name] => (name, None),
+                let known = |kind: &[u8]| {
+                    scalar(kind).ok_or_else(|| error("the type of a property", quoted(kind)))
+                };
+                let (name, scalar, list) = match *rest {
+                    [kind, name] => (name, known(kind)?, None),
+                    [b"list", count, kind, name] => (name, known(kind)?, Some(known(count)?)),
                     _ => {
                         let found = quoted(line.trim_ascii());
                         return Err(error("property TYPE NAME", found));
                     }
                 };
-                element.properties.push((name.to_vec(), scalar));
+                element.properties.push(Property { name: name.to_vec(), scalar, list });
             }
             [b"end_header"] => break,
             _ => return Err(error("a line of a PLY header", quoted(line.trim_ascii()))),
@@ -181,168 +252,162 @@ fn header(path: &Path, reader: &mut BufReader<std::fs::File>) -> Result<Header, 
     }
     let refuse = |expected: &str, found: String| Error::new(path, "header", expected, found);
     let encoding = encoding.ok_or_else(|| refuse("a line with the format", "none".into()))?;
-    let vertex = elements
-        .iter()
-        .position(|e| e.name == b"vertex")
-        .ok_or_else(|| refuse("an element vertex", "none".into()))?;
-    if elements[vertex].has_list() {
-        let expected = "vertices of fixed size";
-        return Err(refuse(expected, "a list property in element vertex".into()));
+    Ok(Header { encoding, elements, n_lines, n_bytes })
+}
+
+/// Rows of elements, one element after the other.
+enum Rows {
+    Ascii(Lines, Budget),
+    /// Whether the most significant byte comes first.
+    Binary(Bytes, bool),
+}
+
+impl Rows {
+    /// The values of the properties `wanted` in every row of `element`; none if none are wanted.
+    fn read<const N: usize>(
+        &mut self,
+        element: &Element,
+        wanted: [usize; N],
+    ) -> Result<Vec<[f64; N]>, Error> {
+        match self {
+            Self::Ascii(lines, budget) => ascii(lines, budget, element, wanted),
+            Self::Binary(bytes, big) => binary(bytes, *big, element, wanted),
+        }
     }
-    if encoding != Encoding::Ascii
-        && let Some(list) = elements[..vertex].iter().find(|e| e.has_list())
-    {
-        let found = format!("{} with a list property", quoted(&list.name));
-        return Err(refuse("elements of fixed size before vertex", found));
+
+    /// How many more vertices there is room for than `vertex` declares, with the elements `behind` it.
+    ///
+    /// # Errors
+    /// When anything follows the last element that has vertices.
+    fn more(&mut self, vertex: &Element, behind: &[Element]) -> Result<u64, Error> {
+        match self {
+            Self::Ascii(lines, _) => {
+                let mut n_rows = 0u64;
+                while lines.advance()? {
+                    n_rows += u64::from(!lines.line().is_empty());
+                    if n_rows > 0 && behind.is_empty() {
+                        let expected = format!("end of file after {} vertices", vertex.count);
+                        return Err(lines.error(expected, quoted(lines.line())));
+                    }
+                }
+                let declared = behind.iter().fold(0, |sum: u64, it| sum.saturating_add(it.count));
+                Ok(n_rows.saturating_sub(declared))
+            }
+            Self::Binary(bytes, _) => {
+                // Of lists only their values say how long they are.
+                if behind.iter().any(Element::has_list) {
+                    return Ok(0);
+                }
+                if behind.is_empty() {
+                    bytes.end()?;
+                }
+                let size = |it: &Element| it.count.saturating_mul(it.stride() as u64);
+                let declared = behind.iter().fold(0, |sum: u64, it| sum.saturating_add(size(it)));
+                Ok(bytes.remaining().saturating_sub(declared) / vertex.stride() as u64)
+            }
+        }
     }
-    let mut axes = [Axis { property: 0, offset: 0, is_f64: false }; 3];
-    for (axis, name) in axes.iter_mut().zip(["x", "y", "z"]) {
-        let mut offset = 0;
-        let mut found = None;
-        for (property, (its_name, scalar)) in elements[vertex].properties.iter().enumerate() {
-            let scalar = scalar.expect("lists were refused above");
-            if its_name == name.as_bytes() {
-                found = Some((property, offset, scalar));
+}
+
+fn ascii<const N: usize>(
+    lines: &mut Lines,
+    budget: &Budget,
+    element: &Element,
+    wanted: [usize; N],
+) -> Result<Vec<[f64; N]>, Error> {
+    let name = String::from_utf8_lossy(&element.name);
+    let mut rows = budget.room(&*name, if N == 0 { 0 } else { element.count })?;
+    for row in 1..=element.count {
+        loop {
+            if !lines.advance()? {
+                return Err(lines.end_error(format!("{name} {row} of {}", element.count)));
+            }
+            if !lines.line().is_empty() {
                 break;
             }
-            offset += scalar.size();
         }
-        let expected = format!("a property {name} of type float or double in element vertex");
-        let (property, offset, scalar) = found.ok_or_else(|| refuse(&expected, "none".into()))?;
-        let is_f64 = match scalar {
-            Scalar::F32 => false,
-            Scalar::F64 => true,
-            _ => return Err(refuse(&expected, "an integer type".into())),
-        };
-        *axis = Axis { property, offset, is_f64 };
-    }
-    Ok(Header { encoding, elements, vertex, axes, n_lines, n_bytes })
-}
-
-fn ascii(
-    path: &Path,
-    reader: BufReader<std::fs::File>,
-    header: &Header,
-    len: u64,
-) -> Result<(Vec<[f64; 3]>, u64), Error> {
-    let vertex = &header.elements[header.vertex];
-    let n_properties = vertex.properties.len();
-    // A value takes a digit and a separator; the last one of the file only the digit.
-    let most = (len.saturating_sub(header.n_bytes) + 1) / (2 * n_properties as u64);
-    if vertex.count > most {
-        let expected = format!("at most {most} vertices (by the size of the file)");
-        return Err(Error::new(path, "header", expected, vertex.count.to_string()));
-    }
-    let mut lines = Lines::continuing(path, reader, header.n_lines);
-    let advance = |lines: &mut Lines, what: &str, row: u64, count: u64| loop {
-        if !lines.advance()? {
-            return Err(lines.end_error(format!("{what} {} of {count}", row + 1)));
+        if N == 0 {
+            continue;
         }
-        if !lines.line().is_empty() {
-            return Ok(());
-        }
-    };
-    for element in &header.elements[..header.vertex] {
-        let name = String::from_utf8_lossy(&element.name);
-        for row in 0..element.count {
-            advance(&mut lines, &name, row, element.count)?;
-        }
-    }
-    let mut positions = input::Budget::new(path, len).room("vertices", vertex.count)?;
-    for row in 0..vertex.count {
-        advance(&mut lines, "vertex", row, vertex.count)?;
-        let mut position = [f64::NAN; 3];
-        let mut n_words = 0;
-        for (property, word) in words(lines.line()).enumerate() {
+        let mut values = [f64::NAN; N];
+        let mut all = words(lines.line());
+        let (mut n_words, mut n_expected) = (0, element.properties.len());
+        for (at, property) in element.properties.iter().enumerate() {
+            let Some(word) = all.next() else { break };
             n_words += 1;
-            for (axis, name) in [0, 1, 2].into_iter().zip(["x", "y", "z"]) {
-                if header.axes[axis].property == property {
-                    position[axis] = number(word)
-                        .ok_or_else(|| lines.error(format!("a number for {name}"), quoted(word)))?;
-                }
+            if property.list.is_some() {
+                let n: usize = number(word)
+                    .ok_or_else(|| lines.error("the length of a list", quoted(word)))?;
+                n_expected = n_expected.saturating_add(n);
+                n_words += all.by_ref().take(n).count();
+            } else if let Some(slot) = wanted.iter().position(|&wanted| wanted == at) {
+                values[slot] = coordinate(word).ok_or_else(|| {
+                    let name = String::from_utf8_lossy(&property.name);
+                    lines.error(format!("a number for {name}"), quoted(word))
+                })?;
             }
         }
-        if n_words != n_properties {
-            let expected = format!("{n_properties} values of vertex {}", row + 1);
+        n_words += all.count();
+        if n_words != n_expected {
+            let expected = format!("{n_expected} values of {name} {row}");
             return Err(lines.error(expected, n_words.to_string()));
         }
-        if position.iter().any(|x| !x.is_finite()) {
-            let expected = format!("finite coordinates of vertex {}", row + 1);
-            return Err(lines.error(expected, format!("{position:?}")));
-        }
-        positions.push(position);
+        rows.push(values);
     }
-    let behind = &header.elements[header.vertex + 1..];
-    let mut n_rows = 0u64;
-    while lines.advance()? {
-        n_rows += u64::from(!lines.line().is_empty());
-        if n_rows > 0 && behind.is_empty() {
-            let expected = format!("end of file after {} vertices", vertex.count);
-            return Err(lines.error(expected, quoted(lines.line())));
-        }
-    }
-    let declared = behind.iter().fold(0u64, |sum, element| sum.saturating_add(element.count));
-    Ok((positions, n_rows.saturating_sub(declared)))
+    Ok(rows)
 }
 
-fn binary(
-    path: &Path,
-    reader: BufReader<std::fs::File>,
-    header: &Header,
-    len: u64,
-) -> Result<(Vec<[f64; 3]>, u64), Error> {
-    let mut bytes = Bytes::continuing(path, reader, header.n_bytes, len);
-    let fits = |bytes: &Bytes, element: &Element| {
-        let stride = element.stride() as u64;
-        let size = element.count.checked_mul(stride);
-        size.filter(|&s| s <= bytes.remaining()).ok_or_else(|| {
-            let name = String::from_utf8_lossy(&element.name);
-            let expected = format!("{} rows of {name}, {stride} bytes each", element.count);
-            bytes.error_ahead(expected, format!("{} bytes", bytes.remaining()))
-        })
+fn binary<const N: usize>(
+    bytes: &mut Bytes,
+    big: bool,
+    element: &Element,
+    wanted: [usize; N],
+) -> Result<Vec<[f64; N]>, Error> {
+    let stride = element.stride();
+    let name = String::from_utf8_lossy(&element.name);
+    let size = element.count.checked_mul(stride as u64);
+    let Some(size) = size.filter(|&size| size <= bytes.remaining()) else {
+        let expected = format!("{} rows of {name}, {stride} bytes each", element.count);
+        return Err(bytes.error_ahead(expected, format!("{} bytes", bytes.remaining())));
     };
-    for element in &header.elements[..header.vertex] {
-        let size = fits(&bytes, element)?;
+    if N == 0 && !element.has_list() {
         bytes.skip(size, "an element before vertex")?;
+        return Ok(Vec::new());
     }
-    let vertex = &header.elements[header.vertex];
-    fits(&bytes, vertex)?;
-    let big = header.encoding == Encoding::Big;
-    let mut row = vec![0; vertex.stride()];
-    let mut positions = bytes.room("vertices", vertex.count)?;
-    for number in 1..=vertex.count {
-        bytes.record(number);
-        bytes.fill(&mut row, "vertex")?;
-        let position = header.axes.map(|axis| coordinate(&row, axis, big));
-        if position.iter().any(|x| !x.is_finite()) {
-            let expected = format!("finite coordinates of vertex {number}");
-            return Err(bytes.error(expected, format!("{position:?}")));
+    // Values up to a list stand together: how many bytes, which of them are wanted, and the list.
+    let mut runs = vec![(0, Vec::new(), None)];
+    for (number, Property { scalar, list, .. }) in element.properties.iter().enumerate() {
+        let (len, fields, its_list) = runs.last_mut().expect("there is one");
+        if let Some(count) = list {
+            *its_list = Some((*count, scalar.size() as u64));
+            runs.push((0, Vec::new(), None));
+            continue;
         }
-        positions.push(position);
+        if let Some(slot) = wanted.iter().position(|&wanted| wanted == number) {
+            fields.push((slot, Field { at: *len, scalar: *scalar }));
+        }
+        *len += scalar.size();
     }
-    let behind = &header.elements[header.vertex + 1..];
-    if behind.is_empty() {
-        bytes.end()?;
+    let mut buffer = vec![0; stride];
+    let mut rows = bytes.room(&*name, if N == 0 { 0 } else { element.count })?;
+    for number in 1..=element.count {
+        bytes.record(number);
+        let mut values = [f64::NAN; N];
+        for (len, fields, list) in &runs {
+            bytes.fill(&mut buffer[..*len], &name)?;
+            for (slot, field) in fields {
+                values[*slot] = field.of(&buffer, big);
+            }
+            let Some((count, size)) = list else { continue };
+            let buffer = &mut buffer[..count.size()];
+            bytes.fill(buffer, "the length of a list")?;
+            let n = count.read(buffer, big);
+            if n < 0.0 || n.fract() != 0.0 {
+                return Err(bytes.error("the length of a list", n.to_string()));
+            }
+            bytes.skip((n as u64).saturating_mul(*size), "a list")?;
+        }
+        rows.push(values);
     }
-    // Of lists only their values say how long they are.
-    let size = |sum: u64, element: &Element| {
-        sum.saturating_add(element.count.saturating_mul(element.stride() as u64))
-    };
-    let declared = match behind.iter().any(Element::has_list) {
-        true => u64::MAX,
-        false => behind.iter().fold(0, size),
-    };
-    let more = bytes.remaining().saturating_sub(declared);
-    Ok((positions, more / (vertex.stride() as u64).max(1)))
-}
-
-fn coordinate(row: &[u8], axis: Axis, big: bool) -> f64 {
-    let at = |n: usize| &row[axis.offset..axis.offset + n];
-    if axis.is_f64 {
-        let bits: [u8; 8] = at(8).try_into().expect("eight bytes");
-        if big { f64::from_be_bytes(bits) } else { f64::from_le_bytes(bits) }
-    } else {
-        let bits: [u8; 4] = at(4).try_into().expect("four bytes");
-        f64::from(if big { f32::from_be_bytes(bits) } else { f32::from_le_bytes(bits) })
-    }
+    Ok(rows)
 }

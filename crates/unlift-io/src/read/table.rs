@@ -1,9 +1,11 @@
-//! CSV and XYZ: a point per line.
+//! Tables: a point per line. What the file says of its columns decides which are read.
 
 use std::path::Path;
 
+use super::Input;
+use super::columns::{axes, coordinate, is_called, plain};
+use super::lines::{Lines, number, quoted, words};
 use crate::error::Error;
-use crate::read::lines::{Lines, number, quoted, words};
 
 /// What stands between the values of a line; decided by the first line for the whole file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,67 +36,357 @@ impl Separator {
     }
 }
 
-/// Reads positions `(n, 3)` from lines of numbers between commas, semicolons, spaces or tabs.
+/// Bytes of comments before the first point that are looked at.
+const COMMENTS: usize = 1 << 16;
+/// Columns that COLMAP's points have before their tracks.
+const COLMAP_COLUMNS: usize = 8;
+/// Rows of fewer points may be in an order by accident.
+const TELLING: usize = 10;
+
+/// Reads positions from lines of numbers between commas, semicolons, spaces or tabs; `None` if they are the points of a
+/// COLMAP model in text.
 ///
-/// The first three columns are x, y and z, unless the first line names its columns: then those called
-/// `x`, `y` and `z` (in either case). Other columns are ignored, and so are blank lines and lines that begin
-/// with `#` or `//`.
+/// The first three columns are x, y and z, unless the first line names its columns, or a comment (`#` or `//`) before it:
+/// then those called `x`, `y` and `z` (in either case). A line of one number before points is how many follow, as Leica's
+/// PTS and CloudCompare have it. Other columns are passed over, and so are blank lines and comments.
 ///
 /// # Errors
-/// When the file cannot be read or a line does not hold three finite numbers.
-pub fn read(path: &Path) -> Result<Vec<[f64; 3]>, Error> {
+/// When the file cannot be read, a line does not hold three numbers, columns are named otherwise, or rows are poses of
+/// cameras or begin with their number.
+pub fn read(path: &Path) -> Result<Option<Input>, Error> {
     let mut lines = Lines::open(path)?;
     let mut positions = Vec::new();
-    let mut columns = [0, 1, 2];
-    let mut named = false;
-    let mut separator = None;
-    while lines.advance_to_data()? {
-        if lines.line().starts_with(b"//") {
+    let mut comments: Vec<Vec<u8>> = Vec::new();
+    let mut format: Option<(Separator, Columns)> = None;
+    let mut announced: Option<(u64, u64)> = None;
+    let mut form = Form::default();
+    while lines.advance()? {
+        let line = lines.line();
+        if let Some(comment) = line.strip_prefix(b"#").or_else(|| line.strip_prefix(b"//")) {
+            let size: usize = comments.iter().map(Vec::len).sum();
+            if format.is_none() && size + comment.len() <= COMMENTS {
+                comments.push(comment.trim_ascii().to_vec());
+            }
             continue;
         }
-        if separator.is_none() {
-            let fields = Separator::of_header(lines.line()).split(lines.untrimmed());
-            if fields.iter().all(|field| number::<f64>(field).is_none()) && fields.len() > 1 {
-                separator = Some(Separator::of_header(lines.line()));
-                columns = named_columns(&lines, &fields)?;
-                named = true;
+        if line.is_empty() {
+            continue;
+        }
+        let counts = positions.is_empty() || announced.is_some();
+        if let (Some(n), true, None | Some((Separator::Space, _))) = (number(line), counts, &format)
+        {
+            check_count(&lines, announced, positions.len() as u64)?;
+            announced = Some((n, positions.len() as u64));
+            continue;
+        }
+        if format.is_none() {
+            let separator = Separator::of_header(line);
+            let names = separator.split(lines.untrimmed());
+            if names.len() > 1 && names.iter().all(|name| number::<f64>(name).is_none()) {
+                format = Some((separator, Columns::of_header(&lines, &names)?));
                 continue;
             }
         }
-        let separator = *separator.get_or_insert_with(|| Separator::of(lines.line()));
+        let (separator, columns) = match &format {
+            Some(format) => format,
+            None => {
+                let separator = Separator::of(line);
+                let n = separator.split(lines.untrimmed()).len();
+                if comments.iter().any(|comment| is_colmap_header(comment)) {
+                    return Ok(None);
+                }
+                &*format.insert((separator, Columns::of_comments(&lines, &comments, n)?))
+            }
+        };
         let fields = separator.split(lines.untrimmed());
         let mut position = [0.0_f64; 3];
-        for ((value, column), name) in position.iter_mut().zip(columns).zip(["x", "y", "z"]) {
+        for ((value, &column), name) in position.iter_mut().zip(&columns.at).zip(["x", "y", "z"]) {
             let Some(field) = fields.get(column) else {
                 let found = fields.len().to_string();
-                return Err(if named {
+                return Err(if columns.named {
                     lines.error(format!("{} columns up to {name}", column + 1), found)
                 } else {
                     lines.error("3 coordinates", found)
                 });
             };
-            *value = number(field)
+            *value = coordinate(field)
                 .ok_or_else(|| lines.error(format!("a number for {name}"), quoted(field)))?;
         }
-        if position.iter().any(|x| !x.is_finite()) {
-            let expected = format!("finite coordinates of point {}", positions.len());
-            return Err(lines.error(expected, format!("{position:?}")));
+        if !columns.named {
+            form.look(&fields, positions.len());
         }
         positions.push(position);
     }
-    Ok(positions)
+    check_count(&lines, announced, positions.len() as u64)?;
+    if let Some((expected, found)) = form.refusal() {
+        return Err(Error::new(path, "", expected, found));
+    }
+    if form.is_colmap() {
+        return Ok(None);
+    }
+    let doubts = format.and_then(|(_, columns)| columns.doubt).into_iter().collect();
+    Ok(Some(Input { positions, format: "table", doubts, ..Input::default() }))
 }
 
-fn named_columns(lines: &Lines, names: &[&[u8]]) -> Result<[usize; 3], Error> {
-    let find = |wanted: &str| {
-        names.iter().position(|name| {
-            let name = name.strip_prefix(b"\"").unwrap_or(name);
-            let name = name.strip_suffix(b"\"").unwrap_or(name);
-            name.eq_ignore_ascii_case(wanted.as_bytes())
+/// Refuses another number of points than the one that stands before them.
+fn check_count(lines: &Lines, announced: Option<(u64, u64)>, n: u64) -> Result<(), Error> {
+    match announced {
+        Some((of, before)) if n - before != of => {
+            let expected = format!("{of} points, as the line before them says");
+            Err(lines.error(expected, format!("{} up to here", n - before)))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Which columns are x, y and z.
+#[derive(Debug)]
+struct Columns {
+    at: [usize; 3],
+    named: bool,
+    doubt: Option<String>,
+}
+
+const FIRST: Columns = Columns { at: [0, 1, 2], named: false, doubt: None };
+
+impl Columns {
+    /// By the names in the first line.
+    fn of_header(lines: &Lines, names: &[&[u8]]) -> Result<Self, Error> {
+        match axes(names.iter().copied()) {
+            Ok(at) => Ok(Self { at, named: true, ..FIRST }),
+            Err(_) => {
+                let expected = "numbers, or columns named x, y and z";
+                Err(lines.error(expected, of_poses(names).unwrap_or_else(|| quoted(lines.line()))))
+            }
+        }
+    }
+
+    /// By the comment that names the `n` columns of the first point, if there is one: the last that has x, y and z, else
+    /// one of as many words.
+    fn of_comments(lines: &Lines, comments: &[Vec<u8>], n: usize) -> Result<Self, Error> {
+        let refuse = |expected: &str, comment: &[u8], names: &[&[u8]]| {
+            Err(lines.error(expected, of_poses(names).unwrap_or_else(|| quoted(comment))))
+        };
+        let mut other = None;
+        for comment in comments.iter().rev() {
+            let names = names(comment, n);
+            if let Ok(at) = axes(names.iter().copied()) {
+                // Prose may speak of x, y and z: of three columns they are these.
+                return match names.len() {
+                    len if len == n || at == FIRST.at => Ok(Self { at, named: true, ..FIRST }),
+                    _ if n == 3 => Ok(FIRST),
+                    len => {
+                        refuse(&format!("{len} columns, as a comment names them"), comment, &names)
+                    }
+                };
+            }
+            let known = names.iter().filter(|name| is_quantity(name)).count();
+            let is_naming = names.len() == n && n >= 3 && names.iter().all(|name| is_name(name));
+            if is_naming || of_poses(&names).is_some() || known >= names.len().div_ceil(2).max(2) {
+                other.get_or_insert((comment, names));
+            }
+        }
+        match other {
+            None => Ok(FIRST),
+            Some((comment, names)) if !names.iter().any(|name| is_quantity(name)) => {
+                let what = quoted(comment);
+                let doubt = format!(
+                    "columns: the first three are taken for x, y and z, and the comment {what} for no names"
+                );
+                Ok(Self { doubt: Some(doubt), ..FIRST })
+            }
+            Some((comment, names)) => refuse("columns named x, y and z", comment, &names),
+        }
+    }
+}
+
+/// Names of columns in a comment: between the separators of the table, or words; behind a colon, without units in brackets.
+fn names(comment: &[u8], n: usize) -> Vec<&[u8]> {
+    let start = comment.iter().rposition(|&byte| byte == b':').map_or(0, |at| at + 1);
+    let list = comment[start..].trim_ascii();
+    let parts = Separator::of_header(list).split(list);
+    if parts.len() == n && parts.iter().all(|part| !part.is_empty()) {
+        return parts.into_iter().map(plain).collect();
+    }
+    let words = list.split(|byte| byte.is_ascii_whitespace() || b",;".contains(byte));
+    words.filter(|word| !word.is_empty() && !b"[(".contains(&word[0])).map(plain).collect()
+}
+
+/// Whether a word may name a column: no number, and of letters, digits and what joins them.
+fn is_name(word: &[u8]) -> bool {
+    let joins =
+        |byte: &u8| byte.is_ascii_alphanumeric() || b"_-./ ".contains(byte) || *byte >= 0x80;
+    number::<f64>(word).is_none() && word.iter().all(joins)
+}
+
+/// Whether a column of that name is surely no length along an axis.
+fn is_quantity(name: &[u8]) -> bool {
+    const NAMES: [&str; 42] = [
+        "alpha",
+        "class",
+        "confidence",
+        "error",
+        "frame",
+        "intensity",
+        "label",
+        "name",
+        "point_id",
+        "qx",
+        "reflectance",
+        "tx",
+        "lat",
+        "latitude",
+        "lon",
+        "lng",
+        "long",
+        "longitude",
+        "r",
+        "g",
+        "b",
+        "red",
+        "green",
+        "blue",
+        "range",
+        "azimuth",
+        "elevation",
+        "theta",
+        "phi",
+        "rho",
+        "id",
+        "index",
+        "t",
+        "time",
+        "timestamp",
+        "u",
+        "v",
+        "row",
+        "col",
+        "nx",
+        "ny",
+        "nz",
+    ];
+    NAMES.iter().any(|known| is_called(name, known.as_bytes()))
+}
+
+/// What columns of these names are, if they are poses of cameras.
+fn of_poses(names: &[&[u8]]) -> Option<String> {
+    let has = |starts: [&str; 2]| {
+        names.iter().any(|name| {
+            let name = name.to_ascii_lowercase();
+            starts.iter().any(|start| name.starts_with(start.as_bytes()))
         })
     };
-    match (find("x"), find("y"), find("z")) {
-        (Some(x), Some(y), Some(z)) => Ok([x, y, z]),
-        _ => Err(lines.error("numbers, or columns named x, y and z", quoted(lines.line()))),
+    (has(["qw", "q_"]) || (has(["qx", "q_"]) && has(["tx", "t_"]))).then(|| POSES.to_owned())
+}
+
+const POSES: &str = "a trajectory, poses of cameras";
+
+/// Whether a comment names the columns of COLMAP's points.
+fn is_colmap_header(comment: &[u8]) -> bool {
+    let comment = comment.to_ascii_uppercase();
+    let has = |word: &[u8]| comment.windows(word.len()).any(|part| part == word);
+    has(b"POINT3D_ID") && has(b"TRACK")
+}
+
+/// What rows without names look like, as far as all of them agree.
+#[derive(Debug)]
+struct Form {
+    n: usize,
+    /// As COLMAP's points: an id, a place, a color, an error, a track.
+    colmap: bool,
+    has_track: bool,
+    ascending: bool,
+    /// As a trajectory: a time, a place, a quaternion of length 1; or the three rows of a rotation and a place.
+    pose: bool,
+    time: f64,
+    /// The number of the row before the coordinates, from 0 or 1.
+    numbered: [bool; 2],
+}
+
+impl Default for Form {
+    fn default() -> Self {
+        let time = f64::NEG_INFINITY;
+        Self {
+            n: 0,
+            colmap: true,
+            has_track: false,
+            ascending: true,
+            pose: true,
+            time,
+            numbered: [true; 2],
+        }
+    }
+}
+
+impl Form {
+    fn look(&mut self, fields: &[&[u8]], row: usize) {
+        self.n = row + 1;
+        let first = fields.first().and_then(|word| number::<f64>(word)).unwrap_or(f64::NAN);
+        self.ascending &= first > self.time;
+        self.time = first;
+        for (from, numbered) in self.numbered.iter_mut().enumerate() {
+            *numbered &= fields.len() > 3 && first == (row + from) as f64;
+        }
+        if self.colmap {
+            let is_whole = |word: &&[u8]| number::<u64>(word).is_some();
+            let is_byte = |word: &&[u8]| number::<u8>(word).is_some();
+            let track = fields.get(COLMAP_COLUMNS..).unwrap_or_default();
+            self.has_track |= !track.is_empty();
+            self.colmap = fields.len() >= COLMAP_COLUMNS
+                && is_whole(&fields[0])
+                && fields[4..7].iter().all(is_byte)
+                && number::<f64>(fields[7]).is_some_and(|error| error >= 0.0 || error == -1.0)
+                && track.len().is_multiple_of(2)
+                && track.iter().all(is_whole);
+        }
+        if self.pose {
+            let numbers: Vec<f64> =
+                fields.iter().take(13).filter_map(|word| number(word)).collect();
+            let square = |values: &[f64]| values.iter().map(|x| x * x).sum::<f64>();
+            let is_one = |square: f64| (square - 1.0).abs() < 1e-2;
+            self.pose = match numbers[..] {
+                [_, _, _, _, ref q @ ..] if q.len() == 4 && fields.len() == 8 => {
+                    self.ascending && is_one(square(q))
+                }
+                ref rows if rows.len() == 12 && fields.len() == 12 => {
+                    rows.chunks(4).all(|row| is_one(square(&row[..3])))
+                }
+                _ => false,
+            };
+        }
+    }
+
+    /// Whether these are the points of a COLMAP model: with tracks, or at least with ids that rise.
+    fn is_colmap(&self) -> bool {
+        self.n > 0 && self.colmap && (self.has_track || self.ascending)
+    }
+
+    /// What was expected of rows that are no points, and what they are.
+    fn refusal(&self) -> Option<(&'static str, &'static str)> {
+        if self.pose && self.n > 1 {
+            return Some(("points", POSES));
+        }
+        let numbered = self.n >= TELLING && self.numbered.contains(&true) && !self.colmap;
+        numbered.then_some((
+            "x, y and z first, or a line that names the columns",
+            "the number of the row before them",
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_found_in_comments() {
+        let of = |comment: &str, n| {
+            let names = names(comment.as_bytes(), n);
+            names.iter().map(|name| String::from_utf8_lossy(name).into_owned()).collect::<Vec<_>>()
+        };
+        assert_eq!(of("id x y z", 4), ["id", "x", "y", "z"]);
+        assert_eq!(of("columns: X [m], Y [m], Z [m]", 3), ["X", "Y", "Z"]);
+        assert_eq!(of("X,Y,Z", 6), ["X", "Y", "Z"]);
+        assert_eq!(of("point id\tx\ty\tz", 4), ["point id", "x", "y", "z"]);
     }
 }

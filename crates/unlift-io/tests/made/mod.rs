@@ -40,6 +40,35 @@ pub fn las(minor: u8, record: u16) -> Vec<u8> {
     file
 }
 
+/// The same with a record on its coordinate system, before the points or, `long`, behind them.
+pub fn las_with(minor: u8, id: u16, record: &[u8], long: bool) -> Vec<u8> {
+    let mut file = las(minor, 20);
+    let mut head = vec![0; 2];
+    head.extend(b"LASF_Projection\0");
+    head.extend(id.to_le_bytes());
+    if long {
+        let at = file.len() as u64;
+        if minor == 4 {
+            file[235..243].copy_from_slice(&at.to_le_bytes());
+            file[243..247].copy_from_slice(&1u32.to_le_bytes());
+        }
+        head.extend((record.len() as u64).to_le_bytes());
+    } else {
+        head.extend((record.len() as u16).to_le_bytes());
+    }
+    head.extend([0; 32]);
+    head.extend(record);
+    if long {
+        file.extend(head);
+    } else {
+        // In place of the record that is there.
+        let start = if minor == 4 { 375 } else { 227 };
+        file[96..100].copy_from_slice(&(start as u32 + head.len() as u32).to_le_bytes());
+        file.splice(start..start + 60, head);
+    }
+    file
+}
+
 /// The head of a PCD of `n` points with a color between coordinates.
 pub fn pcd_head(n: usize, data: &str) -> String {
     format!(

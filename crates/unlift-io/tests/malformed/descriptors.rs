@@ -38,11 +38,11 @@ fn every_malformed_file_of_descriptors_is_refused_with_its_line() {
     let zeros = appended(good[..n - 6 * 128].to_vec(), &[0; 6 * 128]);
     let rows: Vec<(&str, Wrong, &str)> = vec![
         bytes("empty", vec![],
-            "d: expected a file that begins with P3DESC01, a NumPy array (.npy) or a COLMAP database (SQLite), found an empty file"),
+            "d: expected a file that begins with P3DESC01, a NumPy array (.npy), a COLMAP database (SQLite) or hloc's features (HDF5), found an empty file"),
         bytes("short", b"P3D".to_vec(),
-            "d: expected a file that begins with P3DESC01, a NumPy array (.npy) or a COLMAP database (SQLite), found a file of 3 bytes"),
+            "d: expected a file that begins with P3DESC01, a NumPy array (.npy), a COLMAP database (SQLite) or hloc's features (HDF5), found a file of 3 bytes"),
         bytes("another form", b"\x89HDF\r\n\x1a\n".to_vec(),
-            "d: expected a file that begins with P3DESC01, a NumPy array (.npy) or a COLMAP database (SQLite), found HDF5 (features of images, not of points)"),
+            "d: expected a whole HDF5 file, found HDF5 format error: unexpected EOF: need 9 bytes, have 8"),
         bytes("cut in the header", good[..18].to_vec(),
             "d: header (byte 8): expected at most 0 for the number of descriptors (2 bytes are left), found 6"),
         bytes("cut in the ids", good[..40].to_vec(),
@@ -97,7 +97,7 @@ fn every_malformed_file_of_descriptors_is_refused_with_its_line() {
         sql("text for rows", "UPDATE descriptors SET rows = 'many'",
             "d: table descriptors: expected a COLMAP database, found Invalid column type Text at index: 0, name: rows"),
         sql("two kinds in one database", "UPDATE descriptors SET type = 1 WHERE image_id = 1",
-            "d: image \"i3.jpg\": expected 128 columns of Bytes as in other images, found 128 of Floats"),
+            "d: image \"i3.jpg\": expected 128 bytes each, as in other images, found 32 floats"),
         sql("dummies in a database", "UPDATE descriptors SET data = zeroblob(1024)",
             "d: descriptors: expected real descriptors, found only zeros (dummies)"),
         sql("NaN in a database", "UPDATE descriptors SET type = 1, cols = 4, data = x'0000c07f0000c07f0000c07f0000c07f0000c07f0000c07f0000c07f0000c07f'",
@@ -153,7 +153,7 @@ fn descriptors_need_a_database_or_a_model_that_fit() {
     let error = read::descriptors(&database, &cloud).unwrap_err();
     assert_eq!(
         shown(&fixtures(), &error),
-        "project/database.db: expected a COLMAP model, whose tracks lead to a database, found npy points"
+        "project/database.db: expected a COLMAP model, whose tracks lead to images, found npy points"
     );
 }
 

@@ -104,6 +104,15 @@ fn every_malformed_file_is_refused_with_its_line() {
     }
 }
 
+#[test]
+fn what_is_wrong_with_cameras_is_told() {
+    for row in colmap::cameras() {
+        let dir = tempfile::tempdir().unwrap();
+        let notes = read::open(&make(dir.path(), &row)).expect(row.what).notes;
+        assert!(notes.iter().any(|note| note.ends_with(row.line)), "{}: {notes:?}", row.what);
+    }
+}
+
 #[cfg(unix)]
 #[test]
 fn a_file_that_may_not_be_read_is_refused() {

@@ -2,8 +2,10 @@
 
 use std::fs;
 
+use unlift::Descriptors;
 use unlift::descriptors::Values;
-use unlift_io::read::{self, Input};
+use unlift_io::features::{FeatureWriter, ImageFeatures};
+use unlift_io::read::{self, Input, colmap};
 
 use super::{data, write};
 
@@ -29,6 +31,55 @@ fn descriptors_follow_the_ids_of_the_input() {
         let expected = read::descriptors(&path, &all).unwrap().select(&[4, 1]);
         assert_eq!(read::descriptors(&path, &some).unwrap(), expected, "{file}");
     }
+}
+
+/// The descriptor of keypoint `at` of the image `id`.
+fn row(id: u32, at: u32) -> [f32; 3] {
+    [id as f32, at as f32 - 2.0, 1.0]
+}
+
+/// Features as hloc writes them of the images of the project; that called `odd` has a keypoint too many.
+fn features(path: &std::path::Path, odd: &str) {
+    let images = colmap::read_images(&data("project/sparse/0/images.bin")).unwrap();
+    let mut writer = FeatureWriter::create(path).unwrap();
+    for image in images {
+        let name = String::from_utf8(image.name).unwrap();
+        let n = image.n_points2d as u32 + u32::from(name == odd);
+        let values = (0..n).flat_map(|at| row(image.id, at)).collect();
+        let descriptors = Some(Descriptors::try_new(Values::F32(values), 3).unwrap());
+        let keypoints = (0..n).map(|at| [f64::from(at), 1.0]).collect();
+        writer
+            .append(&ImageFeatures { name, keypoints, descriptors, ..Default::default() })
+            .unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+#[test]
+fn features_of_hloc_are_descriptors_of_the_points_that_they_made() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("features.h5");
+    let input = read::open(&data("project")).unwrap();
+    features(&path, "");
+    let found = read::descriptors(&path, &input).unwrap();
+    let points = colmap::read_points(&data("project/sparse/0/points3D.bin"), true).unwrap();
+    let tracks = points.tracks.unwrap();
+    let mut of_point = [0.0; 3];
+    for at in 0..points.ids.len() {
+        let rows = || tracks.row(at).iter().map(|&(id, index)| row(id, index));
+        let sum: [f32; 3] = std::array::from_fn(|c| rows().map(|row| row[c]).sum());
+        let length = sum.iter().map(|x| x * x).sum::<f32>().sqrt();
+        found.read_row(at, &mut of_point);
+        super::close(of_point.map(f64::from), sum.map(|x| f64::from(x / length)), 1e-6);
+    }
+    features(&path, "küche/ä 0.jpg");
+    let line = read::descriptors(&path, &input).unwrap_err().to_string();
+    let told = "keypoints, as the model has, found";
+    assert!(line.contains("küche/ä 0.jpg") && line.contains(told), "{line}");
+    let cloud = read::open(&data("cloud.ply")).unwrap();
+    let line = read::descriptors(&path, &cloud).unwrap_err().to_string();
+    let told = "whose tracks lead to images, found ply binary little endian points";
+    assert!(line.ends_with(told), "{line}");
 }
 
 /// The descriptors of the project as floats: of norm 1, so that halves hold them too.

@@ -2,6 +2,7 @@
 
 mod clouds;
 mod descriptors;
+mod habits;
 mod models;
 mod others;
 mod places;

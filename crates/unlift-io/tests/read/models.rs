@@ -42,7 +42,7 @@ fn model_folders_open_with_centers_ids_and_files() {
     assert_eq!(bin.cameras, txt.cameras);
     assert_eq!((bin.format, txt.format), ("COLMAP binary", "COLMAP text"));
     assert_eq!((bin.files.len(), txt.files.len()), (5, 5));
-    assert_eq!((&bin.skipped, &txt.skipped), (&vec![], &vec![]));
+    assert_eq!((&bin.notes, &txt.notes), (&vec![], &vec![]));
     assert_eq!((bin.database, bin.positions.len()), (None, 8));
     // pycolmap: `image.projection_center()` of image 20, the last; the sum of `point3D.xyz`.
     let center = [-0.18425494062287595, 0.11058267526290974, 0.11110621415901362];

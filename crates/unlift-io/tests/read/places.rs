@@ -46,7 +46,7 @@ fn what_lies_beside_the_model_is_noted_or_ignored() {
     fs::write(dir.path().join("sparse/0/rigs.bin"), b"\x01").unwrap();
     let input = read::open(dir.path()).unwrap();
     assert_eq!(input.format, "COLMAP binary");
-    let notes = input.skipped.join("\n");
+    let notes = input.notes.join("\n");
     let notes = notes.replace(dir.path().to_str().unwrap(), "");
     assert_eq!(
         notes.replace('\\', "/"),
@@ -79,7 +79,7 @@ fn models_are_found_where_programs_put_them() {
             let input = read::open(dir.path()).unwrap();
             assert_eq!((input.format, input.positions.len()), (format, 8), "{place}");
             assert_eq!(input.model, Some(dir.path().join(place)), "{place}");
-            assert_eq!(input.skipped, [""; 0], "{place}");
+            assert_eq!(input.notes, [""; 0], "{place}");
         }
     }
 }
@@ -95,7 +95,7 @@ fn of_several_models_the_largest_is_read_and_told() {
     let input = read::open(dir.path()).unwrap();
     assert_eq!((input.format, input.positions.len()), ("COLMAP text", 8));
     assert_eq!(
-        input.skipped,
+        input.notes,
         [
             "sparse/10: read, the largest of 3 models (8 points)",
             "sparse/0: another model (6 points), give its path to read it",
@@ -107,7 +107,7 @@ fn of_several_models_the_largest_is_read_and_told() {
     let input = read::open(dir.path()).unwrap();
     assert_eq!(input.positions.len(), 6);
     assert_eq!(
-        input.skipped[0],
+        input.notes[0],
         "the model of the folder itself: read, the first of 4 models (6 points)"
     );
 }

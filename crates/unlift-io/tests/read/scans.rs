@@ -8,9 +8,11 @@ use unlift_io::read::{self, Input};
 use super::write;
 use made::POINTS;
 
+/// What is said of one point of four, more than is let pass.
+const NO_PLACE: &str = "1 of 4 points have no place: what is audited is not the whole map";
+
 fn same(input: &Input, format: &str, tolerance: f64) {
     assert_eq!((input.format, input.positions.len()), (format, 3));
-    assert_eq!(input.ids, [0, 1, 2]);
     for (found, expected) in input.positions.iter().zip(POINTS) {
         super::close(*found, expected, tolerance);
     }
@@ -22,7 +24,7 @@ fn las_of_every_version_and_size_of_points() {
         let (_dir, path) = write("a.LAS", made::las(minor, record));
         let input = read::open(&path).unwrap();
         same(&input, "LAS", 1e-9);
-        assert!(input.skipped.is_empty() && input.files == [path], "{minor} {record}");
+        assert!(input.notes.is_empty() && input.files == [path], "{minor} {record}");
     }
 }
 
@@ -34,7 +36,8 @@ fn pcd_reads_the_same_in_every_form() {
         let (_dir, path) = write("a.pcd", made::pcd(data));
         let input = read::open(&path).unwrap();
         same(&input, format, 0.0);
-        assert_eq!(input.skipped, ["1 of 4 points have no place"], "{data}");
+        assert_eq!((input.ids, input.left_out), (vec![0, 2, 3], vec![1]), "{data}");
+        assert_eq!(input.doubts, [NO_PLACE], "{data}");
     }
 }
 
@@ -45,7 +48,65 @@ fn e57_brings_its_scans_into_one_frame() {
     made::e57(&path);
     let input = read::open(&path).unwrap();
     same(&input, "E57", 1e-12);
-    assert_eq!(input.skipped, ["1 of 4 points have no place", "read, all 2 scans, in one frame"]);
+    assert_eq!(input.notes, ["read, all 2 scans, in one frame"]);
+    assert_eq!(input.doubts, [NO_PLACE]);
+}
+
+#[test]
+fn e57_turns_by_quaternions_of_any_length_but_zero() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.e57");
+    made::e57(&path);
+    let file = std::fs::read(&path).unwrap();
+    // Both numbers of the quaternion, in as many digits.
+    let half = 0.5_f64.sqrt().to_string();
+    let to = |x: f64| made::e57_with(file.clone(), &half, &format!("{x:.*}", half.len() - 2));
+    let expected = read::open(&path).unwrap().positions;
+    std::fs::write(&path, to(4.0)).unwrap();
+    for (found, expected) in read::open(&path).unwrap().positions.iter().zip(expected) {
+        super::close(*found, expected, 1e-12);
+    }
+    std::fs::write(&path, to(0.0)).unwrap();
+    let notes = read::open(&path).unwrap().notes;
+    assert_eq!(notes[0], "scan 2: a rotation of zeros, taken for none");
+}
+
+#[test]
+fn degrees_of_las_are_told() {
+    let wkt = b"GEOGCS[\"WGS 84\",UNIT[\"degree\",0.0174532925199433]]\0".to_vec();
+    let keys = |keys: &[[u16; 4]]| {
+        let all = [[1, 1, 0, keys.len() as u16]]
+            .iter()
+            .chain(keys)
+            .flatten()
+            .copied()
+            .collect::<Vec<_>>();
+        all.iter().flat_map(|key| key.to_le_bytes()).collect::<Vec<_>>()
+    };
+    for (id, record, is_geographic) in [
+        (2112, wkt.clone(), true),
+        (2112, [b"PROJCS[\"UTM\",".as_slice(), &wkt, b"]"].concat(), false),
+        (34735, keys(&[[1024, 0, 1, 2], [2048, 0, 1, 4326]]), true),
+        (34735, keys(&[[2048, 0, 1, 4326]]), true),
+        (34735, keys(&[[1024, 0, 1, 1], [2048, 0, 1, 4326], [3072, 0, 1, 32632]]), false),
+        (7, wkt.clone(), false),
+    ] {
+        for minor in [2, 4] {
+            for long in [false, true] {
+                let (_dir, path) = write("a.las", made::las_with(minor, id, &record, long));
+                let input = read::open(&path).unwrap();
+                let expected = is_geographic && (minor == 4 || !long);
+                // Old files have no records behind their points: what is there may be points.
+                let n_doubts = usize::from(expected) + usize::from(minor == 2 && long);
+                assert_eq!(
+                    (input.is_geographic, input.doubts.len()),
+                    (expected, n_doubts),
+                    "{id} {minor} {long}"
+                );
+                assert_eq!(input.positions.len(), 3);
+            }
+        }
+    }
 }
 
 /// Numbers that are too small: the rest of the points is there, and is not read.
@@ -68,11 +129,12 @@ fn files_with_more_points_than_they_declare_are_doubted() {
         }
     }
     let text = made::pcd("binary");
-    assert!(doubts("a.pcd", text.clone()).is_empty());
+    assert_eq!(doubts("a.pcd", text.clone()), [NO_PLACE]);
     let at = text.windows(8).position(|word| word == b"POINTS 4").unwrap();
     let mut less = text;
     less[at + 7] = b'2';
-    assert_eq!(doubts("a.pcd", less).len(), 1);
+    let less = doubts("a.pcd", less);
+    assert!(less[0].starts_with("2 points are declared, and 2 more seem to follow"), "{less:?}");
 }
 
 /// A file with holes is as large as it likes: nothing of that size is asked for.

@@ -15,7 +15,7 @@ pub use page::page;
 pub struct Change {
     /// The scheme's user-facing name.
     pub scheme: String,
-    /// The attack: `oracle, 50 % right, K = 50, joint`, `blind guess` or `records alone`.
+    /// The attack: `oracle, 50 % true neighbors, K = 50, joint`, `blind guess` or `records alone`.
     pub attack: String,
     /// The threshold as typed in the new audit.
     pub threshold: String,
@@ -206,7 +206,7 @@ fn same_attack(a: &Row, b: &Row) -> bool {
 fn attack_of(row: &Row) -> String {
     let source = attack::source(&row.neighbors, row.oracle_noise.as_deref());
     let right = match attack::is_oracle(&row.neighbors) {
-        true => format!(", {} % right", words::ratio_percent(row.inlier_ratio)),
+        true => format!(", {} % true neighbors", words::ratio_percent(row.inlier_ratio)),
         false => String::new(),
     };
     format!("{source}{right}, K = {}, {}", row.k, row.solver)

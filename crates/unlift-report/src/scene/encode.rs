@@ -55,6 +55,8 @@ pub(crate) struct Encoded {
     /// What is drawn of them, in words.
     pub originals_said: String,
     pub n_cameras: usize,
+    /// Where the view is seen from first: a camera of the map.
+    pub eye: Option<[f32; 3]>,
     pub error_unit: f32,
     pub obfuscations: Vec<EncodedShapes>,
     pub views: Vec<EncodedView>,
@@ -82,6 +84,14 @@ pub(crate) struct EncodedView {
     pub drawn: usize,
     /// What is drawn and what is not, in words.
     pub said: String,
+}
+
+/// The camera that sees most of the scene, as it looks at the middle: of those in the box the farthest from there.
+fn eye(bounds: &SceneBox, cameras: &[[f32; 3]]) -> Option<[f32; 3]> {
+    let middle: [f32; 3] = std::array::from_fn(|c| 0.5 * (bounds.low[c] + bounds.high[c]));
+    let far = |camera: &[f32; 3]| (0..3).map(|c| (camera[c] - middle[c]).powi(2)).sum::<f32>();
+    let within = cameras.iter().filter(|&&camera| is_drawn(bounds, camera));
+    within.copied().max_by(|a, b| far(a).total_cmp(&far(b)))
 }
 
 /// Encodes `scene`, thinned further if it breaks the budget; errors are told relative to
@@ -136,6 +146,7 @@ pub(crate) fn encode(scene: &Scene3d, rows: &[Row], error_unit: f32) -> Encoded 
         }
         .said(),
         n_cameras: cameras.len(),
+        eye: eye(&bounds, &scene.cameras),
         error_unit,
         obfuscations,
         views,

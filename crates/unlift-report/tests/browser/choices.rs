@@ -42,9 +42,8 @@ fn text(value: &Value) -> &str {
 fn called(document: &Document, row: usize) -> (String, String, String) {
     let row = &document.results[row];
     let percent = format!("{:.1}", 100.0 * row.inlier_ratio);
-    let right = percent.trim_end_matches(".0");
-    let measured = if row.neighbors == "oracle" { "" } else { " (measured)" };
-    let given = format!("{}, {right} % right{measured}", row.neighbors);
+    let share = percent.trim_end_matches(".0");
+    let given = format!("{}, {share} % true neighbors", row.neighbors);
     (row.scheme.clone(), given, row.solver.clone())
 }
 
@@ -99,6 +98,7 @@ fn charts_show_the_rows_that_are_chosen() {
     let file = PageFile::new("mixed-charts", &page);
     browser.emulate(1280, 900, "light");
     browser.open(&file.0);
+    browser.unfold();
     for (form, chart) in [("error-controls", "errors"), ("reliability-controls", "reliability")] {
         let show = format!(
             "() => [document.getElementById('chart-{chart}').dataset.rows, \
@@ -119,7 +119,7 @@ fn charts_show_the_rows_that_are_chosen() {
             for &row in &rows {
                 let row = &document.results[row];
                 assert_eq!((row.neighbors.as_str(), row.solver.as_str()), (source, solver));
-                let asked = format!("oracle, {} % right", 100.0 * row.inlier_ratio);
+                let asked = format!("oracle, {} % true neighbors", 100.0 * row.inlier_ratio);
                 assert!(source != "oracle" || given == asked, "{given}, {}", row.inlier_ratio);
             }
             let said = text(&choice[1][1]);
@@ -138,7 +138,7 @@ fn charts_show_the_rows_that_are_chosen() {
         browser.open(&file.0);
         browser.evaluate(first)
     };
-    assert_eq!(browser_first, json!("overlap, 8 to 9.2 % right (measured)"));
+    assert_eq!(browser_first, json!("overlap, 8 to 9.2 % true neighbors"));
     let names = browser.evaluate("[...document.querySelectorAll('[name$=-solver]')].map(i => i.nextElementSibling?.textContent ?? '').join()");
     assert!(!text(&names).contains("overlap"), "{names}");
 }

@@ -167,6 +167,14 @@ impl Browser {
         self.wait_for("document.documentElement?.dataset.ready === '1'");
     }
 
+    /// Opens all folded parts of the page and waits until what is in them is drawn.
+    pub fn unfold(&mut self) {
+        self.evaluate(
+            "document.querySelectorAll('details').forEach(part => { part.open = true; })",
+        );
+        std::thread::sleep(std::time::Duration::from_millis(200));
+    }
+
     pub fn wait_for(&mut self, condition: &str) {
         let start = Instant::now();
         while self.evaluate(condition) != json!(true) {

@@ -5,6 +5,9 @@ use unlift_report::{RenderOptions, render};
 
 use super::{PageFile, browser, private_page, sample};
 
+/// Charts that are drawn.
+const CHARTS: &str = "document.querySelectorAll('.chart svg').length";
+
 #[test]
 fn curves_tables_and_canvas_are_there_without_errors_or_network() {
     let Some(mut browser) = browser() else { return };
@@ -12,8 +15,14 @@ fn curves_tables_and_canvas_are_there_without_errors_or_network() {
     for (width, height) in [(1280, 900), (390, 844)] {
         browser.emulate(width, height, "light");
         browser.open(&file.0);
-        // One overview, one chart per scheme, one of errors; each with drawn curves.
-        assert_eq!(browser.evaluate("document.documentElement.dataset.charts"), json!("10"));
+        // Charts that are folded away are drawn when they are opened.
+        assert_eq!(
+            browser.evaluate("document.querySelectorAll('#chart-multiples .chart').length"),
+            json!(0)
+        );
+        browser.unfold();
+        // One overview, one chart per scheme, one of errors, one of certainty; each with drawn curves.
+        assert_eq!(browser.evaluate(CHARTS), json!(10));
         let empty = "[...document.querySelectorAll('.chart')].filter(c => c.querySelectorAll('svg path').length < 10).length";
         assert_eq!(browser.evaluate(empty), json!(0));
         assert_eq!(browser.evaluate("document.querySelectorAll('table').length >= 5"), json!(true));
@@ -76,7 +85,8 @@ fn a_page_of_figures_only_has_curves_and_no_canvas() {
         PageFile::new("figures", &render(&document, Some(&scene), &options).expect("a page"));
     browser.emulate(1280, 900, "light");
     browser.open(&file.0);
-    assert_eq!(browser.evaluate("document.documentElement.dataset.charts"), json!("10"));
+    browser.unfold();
+    assert_eq!(browser.evaluate(CHARTS), json!(10));
     assert_eq!(browser.evaluate("document.querySelector('canvas')"), json!(null));
     assert_eq!(browser.complaints, Vec::<String>::new());
 }
@@ -115,9 +125,47 @@ fn the_page_can_be_read_without_script() {
     browser.call("Emulation.setScriptExecutionDisabled", json!({"value": true}));
     browser.call("Page.navigate", json!({"url": format!("file://{}", file.0.display())}));
     browser.wait_for("document.readyState === 'complete' && !!document.getElementById('use')");
-    let seen = "['.card', '.finding', '#gates li', 'table', '.stage', '.chart'].map(s =>
+    let seen = "['.card', '.finding', '#gates li', '#numbers details', '.stage', '.chart'].map(s =>
         [...document.querySelectorAll(s)].filter(n => n.getClientRects().length && n.clientHeight > 0).length)";
     let seen = browser.evaluate(seen);
-    // Cards, findings, gates and tables are there (seconds are folded away); nothing that needs script is.
+    // Cards, findings, gates and tables (folded) are there; nothing that needs script is.
     assert_eq!(seen, json!([7, 14, 2, 7, 0, 0]));
+}
+
+#[test]
+fn tables_are_sorted_by_the_column_that_is_chosen() {
+    let Some(mut browser) = browser() else { return };
+    let page = render(&sample::document(true), None, &RenderOptions::default()).expect("a page");
+    let file = PageFile::new("sorted", &page);
+    browser.emulate(1280, 900, "light");
+    browser.open(&file.0);
+    browser.unfold();
+    let sorted = |column: usize| {
+        format!(
+            "(t => {{ t.tHead.rows[0].cells[{column}].querySelector('button').click();
+            return [...t.tBodies[0].rows].map(r => r.cells[{column}].textContent); }})(document.getElementById('table-recovered'))"
+        )
+    };
+    let shares = |browser: &mut super::Browser| -> Vec<f64> {
+        let cells = browser.evaluate(&sorted(6));
+        let cells = cells.as_array().expect("cells").iter();
+        cells.map(|cell| cell.as_str().expect("text").parse().expect("a number")).collect()
+    };
+    let falling = shares(&mut browser);
+    assert!(falling.len() == 84 && falling.is_sorted_by(|a, b| a >= b), "{falling:?}");
+    assert!(shares(&mut browser).is_sorted());
+    assert_eq!(browser.complaints, Vec::<String>::new());
+}
+
+#[test]
+fn a_page_of_the_size_of_the_demos_is_short() {
+    let Some(mut browser) = browser() else { return };
+    let document = sample::mixed(true);
+    let scene = sample::scene(&document, 4_000);
+    let page = render(&document, Some(&scene), &RenderOptions::default()).expect("a page");
+    let file = PageFile::new("short", &page);
+    browser.emulate(1280, 900, "light");
+    browser.open(&file.0);
+    let height = browser.evaluate("document.documentElement.scrollHeight");
+    assert!(height.as_f64().is_some_and(|height| height < 5_300.0), "{height} px");
 }

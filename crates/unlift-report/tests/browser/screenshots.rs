@@ -9,7 +9,7 @@ use unlift_report::{RenderOptions, render};
 use super::chromium::Browser;
 use super::{PageFile, browser, private_page, sample};
 
-const SECTIONS: [&str; 6] = ["curves", "distribution", "scene", "numbers", "losses", "reading"];
+const SECTIONS: [&str; 6] = ["verdict", "next", "scene", "curves", "distribution", "numbers"];
 
 /// What an open page looks like, and how far down: first as it opens, then from each section on.
 fn pictures(browser: &mut Browser, (width, colors): (u32, &str)) -> Vec<(Vec<u8>, i64)> {

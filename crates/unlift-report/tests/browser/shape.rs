@@ -15,17 +15,17 @@ fn tables_fit_a_laptop_and_say_on_a_phone_that_there_is_more() {
         let file = PageFile::new("tables", &page);
         browser.emulate(1280, 900, "light");
         browser.open(&file.0);
-        browser.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true; })");
-        let cut =
-            "[...document.querySelectorAll('.scroll')].filter(s => s.scrollWidth > s.clientWidth)
-            .map(s => `${s.ariaLabel}: ${s.scrollWidth} > ${s.clientWidth}`)";
+        browser.unfold();
+        let cut = "[...document.querySelectorAll('.wide')].filter(s => s.wideWidth > s.clientWidth)
+            .map(s => `${s.ariaLabel}: ${s.wideWidth} > ${s.clientWidth}`)";
         assert_eq!(browser.evaluate(cut), json!([]));
         browser.emulate(390, 844, "light");
         browser.open(&file.0);
-        let silent = "[...document.querySelectorAll('.scroll')].filter(s => s.scrollWidth > s.clientWidth
+        browser.unfold();
+        let silent = "[...document.querySelectorAll('.wide')].filter(s => s.wideWidth > s.clientWidth
             && !(getComputedStyle(s).backgroundImage.includes('gradient') && s.tabIndex === 0)).length";
         assert_eq!(browser.evaluate(silent), json!(0));
-        let wider = "document.documentElement.scrollWidth > document.documentElement.clientWidth";
+        let wider = "document.documentElement.wideWidth > document.documentElement.clientWidth";
         assert_eq!(browser.evaluate(wider), json!(false));
     }
 }
@@ -85,15 +85,16 @@ fn a_crowded_page_keeps_its_shape() {
     for width in [1280, 390] {
         browser.emulate(width, 900, "light");
         browser.open(&file.0);
-        let silent = "[...document.querySelectorAll('.scroll')].filter(s => s.scrollWidth > s.clientWidth
+        browser.unfold();
+        let silent = "[...document.querySelectorAll('.wide')].filter(s => s.wideWidth > s.clientWidth
             && !(getComputedStyle(s).backgroundImage.includes('gradient') && s.tabIndex === 0)).length";
         assert_eq!(browser.evaluate(silent), json!(0), "{width} px");
         assert_eq!(browser.evaluate(OVERLAPS), json!([]), "{width} px");
         let beyond = "[...document.querySelectorAll('main *')]
-            .filter(n => !n.closest('.scroll') && n.getBoundingClientRect().right > document.documentElement.clientWidth + 1)
+            .filter(n => !n.closest('.wide') && n.getBoundingClientRect().right > document.documentElement.clientWidth + 1)
             .map(n => `${n.tagName}.${n.className?.baseVal ?? n.className}: ${n.textContent.slice(0, 60)}`)";
         assert_eq!(browser.evaluate(beyond), json!([]), "{width} px");
-        let wider = "document.documentElement.scrollWidth > document.documentElement.clientWidth";
+        let wider = "document.documentElement.wideWidth > document.documentElement.clientWidth";
         assert_eq!(browser.evaluate(wider), json!(false), "{width} px");
         assert_eq!(browser.complaints, Vec::<String>::new());
     }
@@ -121,6 +122,7 @@ fn labels_of_charts_do_not_overlap() {
         for width in [1280, 390] {
             browser.emulate(width, 900, "light");
             browser.open(&file.0);
+            browser.unfold();
             assert_eq!(browser.evaluate(OVERLAPS), json!([]), "{width} px");
         }
     }

@@ -50,7 +50,8 @@ impl Run<'_> {
         }
         let painter = request.wants(Part::Pictures).then(|| self.painter(extraction.kind()));
         let inversion = painter.flatten();
-        let inversion = inversion.map(|painter| Arc::new(Inversion::new(painter, &scene.photos)));
+        let inversion = inversion
+            .map(|painter| Arc::new(Inversion::new(painter, &scene.photos, source.turn())));
         let mut plan = Plan { neighbors, seed: request.seed, ..Plan::new(Unit::Pixel) };
         plan.schemes.retain(|scheme| schemes.contains(&scheme.name()));
         plan.thresholds = thresholds.iter().map(|(_, threshold)| threshold.clone()).collect();

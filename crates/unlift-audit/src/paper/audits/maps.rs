@@ -70,7 +70,7 @@ impl Run<'_> {
             seed: request.seed,
             ..Preparation::default()
         };
-        let (input, prepared) = maps::open(path, database.as_deref(), &preparation, progress)?;
+        let (input, prepared) = maps::open(path, database.as_deref(), &preparation)?;
         let mut inversion = None;
         if let (Some(model), Some(descriptors)) = (&input.model, &prepared.descriptors)
             && let Some(painter) = self.painter(DescriptorKind::of(descriptors, "descriptors")?)

@@ -6,6 +6,7 @@
 
 #[cfg(test)]
 mod hostile;
+mod links;
 mod messages;
 mod read;
 mod source;

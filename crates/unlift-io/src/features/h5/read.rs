@@ -4,8 +4,11 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use half::f16;
-use hdf5_pure::{AttrValue, Chunk, DType, Dataset, Datatype, DatatypeByteOrder, File, Group};
+use hdf5_pure::{
+    AttrValue, Chunk, DType, Dataset, Datatype, DatatypeByteOrder, File, Group, Source,
+};
 
+use super::links::{Target, links};
 use super::source::{self, Bounded};
 use super::{Array, Numbers, shape_text};
 use crate::error::Error;
@@ -23,6 +26,14 @@ const PER_GROUP: u64 = 256;
 const PER_CHUNK: u64 = 128;
 const PER_VALUE: u64 = 8;
 
+/// Groups with their paths, links that lead nowhere, arrays in no group.
+type Listed = (Vec<(String, Group)>, Vec<Error>, Vec<String>);
+
+/// The path of `name` in the group `path`.
+fn within(path: &str, name: &str) -> String {
+    if path.is_empty() { name.to_owned() } else { format!("{path}/{name}") }
+}
+
 /// An open HDF5 file: groups that hold arrays, and the arrays. Reads one array at a time.
 pub(crate) struct FeatureStore {
     path: PathBuf,
@@ -32,6 +43,10 @@ pub(crate) struct FeatureStore {
     paths: Vec<String>,
     /// Held open: by its path, a group would be looked for in all the names of the groups above it.
     groups: Vec<Group>,
+    /// Links that lead to no group of the file.
+    broken: Vec<Error>,
+    /// Arrays that stand in no group.
+    alone: Vec<String>,
 }
 
 impl FeatureStore {
@@ -41,9 +56,16 @@ impl FeatureStore {
     /// When it cannot be read, is no HDF5 file, is cut off, or its groups link in circles.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let (source, len) = Bounded::open(path)?;
-        let budget = Budget::new(path, len);
-        let store = Self { path: path.to_owned(), len, budget, paths: vec![], groups: vec![] };
-        let mut groups = store.step("", "", || {
+        let mut store = Self {
+            path: path.to_owned(),
+            len,
+            budget: Budget::new(path, len),
+            paths: Vec::new(),
+            groups: Vec::new(),
+            broken: Vec::new(),
+            alone: Vec::new(),
+        };
+        let (mut groups, broken, alone) = store.step("", "", || {
             let file = File::from_source(source).map_err(|error| match error {
                 hdf5_pure::Error::Io(source) => Error::read(path, source),
                 other => Error::new(path, "", "a whole HDF5 file", other.to_string()),
@@ -53,16 +75,20 @@ impl FeatureStore {
                 let expected = format!("a whole HDF5 file of {whole} bytes");
                 return Err(Error::new(path, "", expected, format!("{len} bytes")));
             }
-            store.list(file.root())
+            store.list(&file)
         })?;
         groups.sort_unstable_by(|(a, _), (b, _)| a.cmp(b));
-        let (paths, groups) = groups.into_iter().unzip();
-        Ok(Self { paths, groups, ..store })
+        (store.paths, store.groups) = groups.into_iter().unzip();
+        (store.broken, store.alone) = (broken, alone);
+        Ok(store)
     }
 
-    /// All groups that hold arrays directly, with their paths.
-    fn list(&self, root: Group) -> Result<Vec<(String, Group)>, Error> {
-        let mut found = Vec::new();
+    /// All groups that hold arrays directly, with their paths; links that lead nowhere; arrays in no group.
+    fn list(&self, file: &File) -> Result<Listed, Error> {
+        let (mut found, mut broken, mut alone) = (Vec::new(), Vec::new(), Vec::new());
+        let root = file.root();
+        let raw = Bounded::open(&self.path)?.0;
+        let raw = |at: u64, n: u64| raw.read_exact_at(at, usize::try_from(n).ok()?).ok();
         let mut waiting = vec![(String::new(), root, 0)];
         // Whether a group holds arrays and whether it holds groups, by the address of its header.
         let mut seen: HashMap<u64, [bool; 2]> = HashMap::new();
@@ -94,11 +120,39 @@ impl FeatureStore {
                 }
                 Some(&known) => known,
                 None => {
-                    let arrays = !path.is_empty() && !group.datasets().map_err(refuse)?.is_empty();
-                    let inside = group.iter_groups().map_err(refuse)?;
-                    let holds = [arrays, inside.len() > 0];
+                    let datasets = group.datasets().map_err(refuse)?;
+                    let mut inside: Vec<_> = group.iter_groups().map_err(refuse)?.collect();
+                    for (name, target) in address.and_then(|at| links(raw, at)).unwrap_or_default()
+                    {
+                        let leads_to = match &target {
+                            Target::Path(target) if target.starts_with('/') => {
+                                file.group(target).ok()
+                            }
+                            Target::Path(target) => group.group(target).ok(),
+                            Target::Elsewhere => None,
+                        };
+                        let found = match target {
+                            Target::Path(target) => {
+                                format!("a link to {}", quoted(target.as_bytes()))
+                            }
+                            Target::Elsewhere => "a link to another file".to_owned(),
+                        };
+                        match leads_to {
+                            Some(group) => inside.push((name, group)),
+                            None => broken.push(self.error(
+                                &within(&path, &name),
+                                "",
+                                "features of an image",
+                                found,
+                            )),
+                        }
+                    }
+                    let holds = [!path.is_empty() && !datasets.is_empty(), !inside.is_empty()];
+                    if path.is_empty() {
+                        alone = datasets;
+                    }
                     for (name, inside) in inside {
-                        let path = if path.is_empty() { name } else { format!("{path}/{name}") };
+                        let path = within(&path, &name);
                         memory += PER_GROUP + 2 * path.len() as u64;
                         self.budget.admit("list of groups", memory)?;
                         waiting.push((path, inside, depth + 1));
@@ -111,7 +165,17 @@ impl FeatureStore {
                 found.push((path, group));
             }
         }
-        Ok(found)
+        Ok((found, broken, alone))
+    }
+
+    /// Links that lead to no group of the file, one error each.
+    pub fn broken(&self) -> &[Error] {
+        &self.broken
+    }
+
+    /// Names of arrays that stand in no group.
+    pub fn alone(&self) -> &[String] {
+        &self.alone
     }
 
     /// Runs `step` about the array `name` of `path`: it reads no more than the size of the file allows,
@@ -124,6 +188,11 @@ impl FeatureStore {
     ) -> Result<T, Error> {
         let panicked = || Err(self.error(path, name, "readable HDF5", "damaged data"));
         source::bounded(self.len, || without_panic(step).unwrap_or_else(panicked))
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 
     /// Paths of all groups that hold arrays directly, sorted by their bytes.

@@ -50,10 +50,7 @@ pub fn images(path: &Path) -> Result<Vec<Image>, Error> {
         let id = bytes.u32("image id")?;
         let rotation = bytes.doubles("rotation")?;
         let translation = bytes.doubles("translation")?;
-        let Some((center, rotation)) = place(rotation, translation) else {
-            let expected = format!("a finite pose of image {id}");
-            return Err(bytes.error(expected, format!("{rotation:?} {translation:?}")));
-        };
+        let (center, rotation) = place(rotation, translation);
         let camera_id = bytes.u32("camera id")?;
         let name = bytes.zero_terminated("image name")?;
         let n_points2d = bytes.count("2D points", POINT2D_BYTES)?;
@@ -74,10 +71,6 @@ pub fn points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
         bytes.record(number);
         let id = bytes.u64("point id")?;
         let position = bytes.doubles::<3>("coordinates")?;
-        if position.iter().any(|x| !x.is_finite()) {
-            let expected = format!("finite coordinates of point {id}");
-            return Err(bytes.error(expected, format!("{position:?}")));
-        }
         bytes.skip(3, "color")?;
         bytes.skip(8, "reprojection error")?;
         let n_observations = bytes.count("observations", OBSERVATION_BYTES)?;

@@ -36,7 +36,7 @@ pub fn read_cameras(path: &Path) -> Result<Vec<Camera>, Error> {
 /// Reads `images.bin` or `images.txt`, by ascending id.
 ///
 /// # Errors
-/// When the file cannot be read, is malformed, has a pose that is not finite or repeats an id.
+/// When the file cannot be read, is malformed or repeats an id.
 pub fn read_images(path: &Path) -> Result<Vec<Image>, Error> {
     let mut images = if is_text(path) { text::images(path)? } else { binary::images(path)? };
     images.sort_by_key(|i| i.id);
@@ -47,34 +47,31 @@ pub fn read_images(path: &Path) -> Result<Vec<Image>, Error> {
 /// Reads the cameras and images of the model in the folder `model`, in the form that [`super::open`] reads.
 ///
 /// # Errors
-/// As [`read_cameras`] and [`read_images`]; when an image names a camera that is not there.
+/// As [`read_cameras`] and [`read_images`]; when an image names a camera that is not there, or has no pose.
 pub fn read_views(model: &Path) -> Result<(Vec<Camera>, Vec<Image>), Error> {
-    let extension = if model.join("points3D.bin").is_file() { "bin" } else { "txt" };
+    let extension = if model.join("images.bin").is_file() { "bin" } else { "txt" };
     let cameras = read_cameras(&model.join(format!("cameras.{extension}")))?;
     let path = model.join(format!("images.{extension}"));
     let images = read_images(&path)?;
     for image in &images {
-        check_camera(&path, image, &cameras)?;
+        let wrong = |expected: String, found| {
+            Err(Error::new(&path, format!("image {}", image.id), expected, found))
+        };
+        if image.camera(&cameras).is_none() {
+            let expected = format!("the id of a camera in cameras.{extension}");
+            return wrong(expected, image.camera_id.to_string());
+        }
+        if image.center.iter().any(|x| !x.is_finite()) {
+            return wrong("a finite pose".to_owned(), "none".to_owned());
+        }
     }
     Ok((cameras, images))
-}
-
-/// Refuses an image whose camera is not among `cameras`, which are by ascending id.
-pub(super) fn check_camera(path: &Path, image: &Image, cameras: &[Camera]) -> Result<(), Error> {
-    let id = image.camera_id;
-    if cameras.binary_search_by_key(&id, |camera| camera.id).is_ok() {
-        return Ok(());
-    }
-    let extension = if is_text(path) { "txt" } else { "bin" };
-    let expected = format!("the id of a camera in cameras.{extension}");
-    Err(Error::new(path, format!("image {}", image.id), expected, id.to_string()))
 }
 
 /// Reads `points3D.bin` or `points3D.txt`, by ascending id; the tracks only `with_tracks`.
 ///
 /// # Errors
-/// When the file cannot be read, is malformed, has a coordinate that is not finite (the error names
-/// the point) or repeats an id.
+/// When the file cannot be read, is malformed or repeats an id.
 pub fn read_points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
     let points = if is_text(path) {
         text::points(path, with_tracks)?

@@ -26,7 +26,7 @@ pub struct Image {
     pub name: Vec<u8>,
     /// The id of its camera.
     pub camera_id: u32,
-    /// Position of the camera's center in the world, in units of the model.
+    /// Position of the camera's center in the world, in units of the model; not finite where the file gives no pose.
     pub center: [f64; 3],
     /// How the camera is turned: a point `x` of the world is at `rotation (x - center)` from the camera, whose axes
     /// point to the right, down and ahead.
@@ -36,6 +36,14 @@ pub struct Image {
 }
 
 impl Image {
+    /// Its camera among `cameras`, which are by ascending id.
+    pub fn camera<'a>(&self, cameras: &'a [Camera]) -> Option<&'a Camera> {
+        cameras
+            .binary_search_by_key(&self.camera_id, |camera| camera.id)
+            .ok()
+            .map(|at| &cameras[at])
+    }
+
     /// The direction in the world that is up in the photo, of unit length.
     pub fn up(&self) -> [f64; 3] {
         self.rotation[1].map(|x| -x)
@@ -47,7 +55,7 @@ impl Image {
 pub struct Points {
     /// Ids, `(n,)`, ascending, each once.
     pub ids: Vec<u64>,
-    /// Coordinates, `(n, 3)`, in units of the model, all finite.
+    /// Coordinates, `(n, 3)`, in units of the model, not finite where the file gives no place.
     pub positions: Vec<[f64; 3]>,
     /// Observations of each point, when they were asked for.
     pub tracks: Option<Tracks>,
@@ -77,8 +85,8 @@ impl Tracks {
 }
 
 /// The center `-R^T t` of a camera whose pose `x_cam = R x + t` is a quaternion (w, x, y, z) and `t`,
-/// and `R`; `None` when the center is not finite or the quaternion is zero.
-pub(super) fn place([w, x, y, z]: [f64; 4], t: [f64; 3]) -> Option<([f64; 3], [[f64; 3]; 3])> {
+/// and `R`; not finite when a number is not or the quaternion is zero.
+pub(super) fn place([w, x, y, z]: [f64; 4], t: [f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
     let norm2 = w * w + x * x + y * y + z * z;
     // Rotating by the conjugate, with the norm divided out once: files hold norms like 0.9999999.
     let r = [
@@ -88,7 +96,7 @@ pub(super) fn place([w, x, y, z]: [f64; 4], t: [f64; 3]) -> Option<([f64; 3], [[
     ];
     let c: [f64; 3] =
         std::array::from_fn(|j| -(r[0][j] * t[0] + r[1][j] * t[1] + r[2][j] * t[2]) / norm2);
-    c.iter().all(|x| x.is_finite()).then(|| (c, r.map(|row| row.map(|x| x / norm2))))
+    (c, r.map(|row| row.map(|x| x / norm2)))
 }
 
 #[cfg(test)]
@@ -99,7 +107,7 @@ mod tests {
     fn center_is_where_the_pose_maps_to_zero() {
         // A quarter turn about z: x_cam = (-y, x, z) + t.
         let half = 0.5_f64.sqrt();
-        let (c, rotation) = place([half, 0.0, 0.0, half], [1.0, 2.0, 3.0]).unwrap();
+        let (c, rotation) = place([half, 0.0, 0.0, half], [1.0, 2.0, 3.0]);
         for (found, expected) in c.iter().zip([-2.0, 1.0, -3.0]) {
             assert!((found - expected).abs() < 1e-12, "{c:?}");
         }
@@ -107,7 +115,7 @@ mod tests {
         for (found, expected) in rotation.iter().flatten().zip(turned.iter().flatten()) {
             assert!((found - expected).abs() < 1e-12, "{rotation:?}");
         }
-        assert_eq!(place([0.0; 4], [1.0, 2.0, 3.0]), None);
-        assert_eq!(place([1.0, 0.0, 0.0, 0.0], [f64::NAN; 3]), None);
+        assert!(place([0.0; 4], [1.0, 2.0, 3.0]).0.iter().all(|x| x.is_nan()));
+        assert!(place([1.0, 0.0, 0.0, 0.0], [f64::NAN; 3]).0.iter().all(|x| x.is_nan()));
     }
 }

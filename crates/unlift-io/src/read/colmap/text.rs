@@ -5,6 +5,7 @@ use std::path::Path;
 use super::camera_models::CameraModel;
 use super::model::{Camera, Image, Points, Tracks, place};
 use crate::error::Error;
+use crate::read::columns::coordinate;
 use crate::read::lines::{Lines, number, quoted, words};
 
 /// The next word of the line as a number, or an error that says which one it should have been.
@@ -24,7 +25,8 @@ fn next_doubles<'a, const N: usize>(
 ) -> Result<[f64; N], Error> {
     let mut values = [0.0; N];
     for value in &mut values {
-        *value = next(lines, words, what)?;
+        let word = words.next().ok_or_else(|| lines.error(what, "end of line"))?;
+        *value = coordinate(word).ok_or_else(|| lines.error(what, quoted(word)))?;
     }
     Ok(values)
 }
@@ -62,10 +64,7 @@ pub fn images(path: &Path) -> Result<Vec<Image>, Error> {
         let id = next(&lines, &mut words, "an image id")?;
         let rotation = next_doubles(&lines, &mut words, "a rotation (4 numbers)")?;
         let translation = next_doubles(&lines, &mut words, "a translation (3 numbers)")?;
-        let Some((center, rotation)) = place(rotation, translation) else {
-            let expected = format!("a finite pose of image {id}");
-            return Err(lines.error(expected, format!("{rotation:?} {translation:?}")));
-        };
+        let (center, rotation) = place(rotation, translation);
         let camera_id = next(&lines, &mut words, "a camera id")?;
         drop(words);
         let name = after_words(lines.line(), 9).to_vec();
@@ -106,10 +105,6 @@ pub fn points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
         let mut words = words(lines.line());
         let id: u64 = next(&lines, &mut words, "a point id")?;
         let position = next_doubles::<3>(&lines, &mut words, "3 coordinates")?;
-        if position.iter().any(|x| !x.is_finite()) {
-            let expected = format!("finite coordinates of point {id}");
-            return Err(lines.error(expected, format!("{position:?}")));
-        }
         next_doubles::<3>(&lines, &mut words, "a color (3 numbers)")?;
         next_doubles::<1>(&lines, &mut words, "a reprojection error")?;
         if let Some(tracks) = &mut points.tracks {

@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
-use super::found::{Found, UPWARD, camera};
+use super::pose::{UPWARD, camera};
 use crate::error::Error;
+use crate::read::Input;
+use crate::read::columns::coordinate;
 use crate::read::lines::{Lines, number, quoted, words};
 use crate::read::undeclared::undeclared;
 
@@ -15,8 +17,8 @@ fn numbers<const N: usize>(lines: &Lines, what: &str) -> Result<[f64; N], Error>
         let word = words.next();
         let word =
             word.ok_or_else(|| lines.error(format!("{N} numbers of {what}"), at.to_string()))?;
-        *value =
-            number(word).ok_or_else(|| lines.error(format!("a number of {what}"), quoted(word)))?;
+        *value = coordinate(word)
+            .ok_or_else(|| lines.error(format!("a number of {what}"), quoted(word)))?;
     }
     Ok(values)
 }
@@ -25,11 +27,11 @@ fn next(lines: &mut Lines, what: &str) -> Result<(), Error> {
     if lines.advance_to_data()? { Ok(()) } else { Err(lines.end_error(what)) }
 }
 
-/// Reads points and cameras; cameras that were not placed are noted.
+/// Reads points and cameras.
 ///
 /// # Errors
-/// When the file is not one of Bundler, or a coordinate is not finite.
-pub fn read(path: &Path) -> Result<Found, Error> {
+/// When the file is not one of Bundler.
+pub fn read(path: &Path) -> Result<Input, Error> {
     let mut lines = Lines::open(path)?;
     next(&mut lines, "numbers of cameras and points")?;
     let counts = words(lines.line()).map(number::<u64>).collect::<Option<Vec<_>>>();
@@ -37,7 +39,7 @@ pub fn read(path: &Path) -> Result<Found, Error> {
         let found = quoted(lines.line());
         return Err(lines.error("numbers of cameras and points, as Bundler writes them", found));
     };
-    let (mut found, mut unplaced) = (Found::default(), 0);
+    let mut found = Input { format: "Bundler", ..Input::default() };
     for at in 0..*n_cameras {
         let what = format!("camera {at}");
         next(&mut lines, &what)?;
@@ -50,23 +52,12 @@ pub fn read(path: &Path) -> Result<Found, Error> {
         next(&mut lines, &what)?;
         let translation = numbers(&lines, &what)?;
         // A focal length of zero marks photos that were not registered.
-        match camera(&rotation, &translation, UPWARD).filter(|_| focal != 0.0) {
-            Some((center, up)) => {
-                found.cameras.push(center);
-                found.up.push(up);
-            }
-            None => unplaced += 1,
-        }
+        found.camera((focal != 0.0).then(|| camera(&rotation, &translation, UPWARD)));
     }
     for at in 0..*n_points {
         let what = format!("point {at}");
         next(&mut lines, &what)?;
-        let position = numbers::<3>(&lines, &what)?;
-        if position.iter().any(|x| !x.is_finite()) {
-            let expected = format!("finite coordinates of {what}");
-            return Err(lines.error(expected, format!("{position:?}")));
-        }
-        found.positions.push(position);
+        found.positions.push(numbers(&lines, &what)?);
         next(&mut lines, &format!("the color of {what}"))?;
         next(&mut lines, &format!("the views of {what}"))?;
     }
@@ -76,8 +67,5 @@ pub fn read(path: &Path) -> Result<Found, Error> {
     }
     // Three lines a point.
     found.doubts.extend(undeclared(*n_points, more / 3));
-    if unplaced > 0 {
-        found.notes.push(format!("{unplaced} of {n_cameras} cameras have no place"));
-    }
     Ok(found)
 }

@@ -1,25 +1,28 @@
-//! A JSON file, read as it comes: only what is asked for is kept.
+//! Maps in JSON, told apart by the names in them: OpenSfM, OpenMVG's `sfm_data.json`, Meshroom's `.sfm`, nerfstudio's
+//! `transforms.json`. A file is read as it comes: only points and poses are kept.
 
+use std::fmt;
 use std::io::BufReader;
-use std::path::Path;
+use std::marker::PhantomData;
+use std::path::{Component, Path, PathBuf};
 
-use serde::de::DeserializeSeed;
+use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, de};
 
+use super::pose::{DOWNWARD, camera};
 use crate::error::{Error, Place};
 use crate::input;
+use crate::read::{Input, ply};
 
-/// What `seed` makes of the file.
+/// Reads points and cameras: of several reconstructions, those of the largest.
 ///
 /// # Errors
-/// When it is no JSON, or not what `seed` expects.
-pub fn read<T>(
-    path: &Path,
-    seed: impl for<'de> DeserializeSeed<'de, Value = T>,
-) -> Result<T, Error> {
+/// When the file is no JSON, or none of these maps; when the cloud that nerfstudio's names cannot be read.
+pub fn read(path: &Path) -> Result<Input, Error> {
     let (file, _) = input::open(path)?;
     let mut json = serde_json::Deserializer::from_reader(BufReader::new(file));
-    let found = seed.deserialize(&mut json).and_then(|found| json.end().map(|()| found));
-    found.map_err(|error| {
+    let found = Top::deserialize(&mut json).and_then(|found| json.end().map(|()| found));
+    let top = found.map_err(|error| {
         if error.is_io() {
             return Error::read(path, error.into());
         }
@@ -27,5 +30,312 @@ pub fn read<T>(
         let text = error.to_string();
         let what = text.split(" at line ").next().unwrap_or_default().to_owned();
         Error::new(path, Place::Line(error.line() as u64), "a map in JSON", what)
+    })?;
+    let (object, n) = match top {
+        Top::One(object) => (object, 1),
+        Top::Several(object, n) => (object, n),
+    };
+    let Some(format) = object.format() else {
+        let expected = "a map of OpenSfM, OpenMVG, Meshroom or nerfstudio";
+        let names = object.names.iter().take(5).map(|name| name.escape_debug().to_string());
+        let names: Vec<String> = names.collect();
+        let found = match &names[..] {
+            [] => "JSON without names".to_owned(),
+            names => format!("JSON with {}", names.join(", ")),
+        };
+        return Err(Error::new(path, "", expected, found));
+    };
+    let Object { mut found, n_views, cloud, .. } = object;
+    found.format = format;
+    if n > 1 {
+        let points = found.positions.len();
+        found.notes.push(format!("read, the largest of {n} reconstructions ({points} points)"));
+    }
+    let n_poses = found.cameras.len() + found.n_unplaced;
+    found.n_unplaced += n_views.saturating_sub(n_poses);
+    if format == "nerfstudio" {
+        with_cloud(path, &mut found, cloud)?;
+    }
+    Ok(found)
+}
+
+/// Adds the points of the cloud that nerfstudio's file at `path` names.
+fn with_cloud(path: &Path, found: &mut Input, cloud: Option<PathBuf>) -> Result<(), Error> {
+    let Some(cloud) = cloud else {
+        let expected = "ply_file_path, a point cloud beside the cameras";
+        return Err(Error::new(path, "", expected, "none"));
+    };
+    // Whoever sends a file does not say which files of the reader's are opened.
+    if !cloud.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir)) {
+        let found = cloud.display().to_string();
+        return Err(Error::new(path, "ply_file_path", "a path within the folder", found));
+    }
+    let cloud = path.with_file_name("").join(cloud);
+    let points = ply::read(&cloud)?;
+    found.positions = points.positions;
+    found.notes.extend(points.notes);
+    found.files.push(cloud);
+    Ok(())
+}
+
+/// A file: an object, or OpenSfM's list of them, of which the one with the most points is kept.
+enum Top {
+    One(Object),
+    Several(Object, usize),
+}
+
+/// What is known of an object.
+#[derive(Default)]
+struct Object {
+    names: Vec<String>,
+    found: Input,
+    n_views: usize,
+    cloud: Option<PathBuf>,
+}
+
+impl Object {
+    /// The program that writes objects with such names.
+    fn format(&self) -> Option<&'static str> {
+        let has = |name: &str| self.names.iter().any(|its| its == name);
+        Some(match () {
+            () if has("frames") => "nerfstudio",
+            () if has("sfm_data_version") => "OpenMVG",
+            () if has("views") && (has("structure") || has("poses")) => "Meshroom",
+            () if has("shots") && has("points") => "OpenSfM",
+            () => return None,
+        })
+    }
+}
+
+/// A number, also where it is written as text; NaN where there is none.
+struct Number(f64);
+
+impl<'de> Deserialize<'de> for Number {
+    fn deserialize<D: Deserializer<'de>>(json: D) -> Result<Self, D::Error> {
+        struct Any;
+        impl Visitor<'_> for Any {
+            type Value = f64;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a number")
+            }
+
+            fn visit_f64<E>(self, value: f64) -> Result<f64, E> {
+                Ok(value)
+            }
+
+            fn visit_i64<E>(self, value: i64) -> Result<f64, E> {
+                Ok(value as f64)
+            }
+
+            fn visit_u64<E>(self, value: u64) -> Result<f64, E> {
+                Ok(value as f64)
+            }
+
+            fn visit_unit<E>(self) -> Result<f64, E> {
+                Ok(f64::NAN)
+            }
+
+            fn visit_str<E: de::Error>(self, value: &str) -> Result<f64, E> {
+                value.parse().map_err(|_| E::invalid_value(de::Unexpected::Str(value), &self))
+            }
+        }
+        json.deserialize_any(Any).map(Self)
+    }
+}
+
+fn numbers<const N: usize>(numbers: [Number; N]) -> [f64; N] {
+    numbers.map(|number| number.0)
+}
+
+/// OpenSfM's shot, whose rotation is axis times angle.
+#[derive(Deserialize)]
+struct Shot {
+    rotation: [Number; 3],
+    translation: [Number; 3],
+}
+
+#[derive(Deserialize)]
+struct Point {
+    coordinates: [Number; 3],
+}
+
+/// A point of OpenMVG, in its `value`, or of Meshroom.
+#[derive(Deserialize)]
+struct Landmark {
+    value: Option<Box<Landmark>>,
+    #[serde(rename = "X")]
+    place: Option<[Number; 3]>,
+}
+
+#[derive(Deserialize)]
+struct Extrinsic {
+    value: Pose<[[Number; 3]; 3]>,
+}
+
+#[derive(Deserialize)]
+struct Pose<R> {
+    rotation: R,
+    center: [Number; 3],
+}
+
+#[derive(Deserialize)]
+struct PoseOfView {
+    pose: Option<Transform>,
+}
+
+#[derive(Deserialize)]
+struct Transform {
+    /// Column by column, as the matrix lies in memory.
+    transform: Pose<[Number; 9]>,
+}
+
+#[derive(Deserialize)]
+struct Frame {
+    /// From the camera, whose y is up, to the world.
+    transform_matrix: Vec<[Number; 4]>,
+}
+
+/// The rotation by the length of `vector` about it.
+fn rotation(vector: [f64; 3]) -> [[f64; 3]; 3] {
+    let angle = vector.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let axis = if angle > 0.0 { vector.map(|x| x / angle) } else { [0.0; 3] };
+    let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+    let [x, y, z] = axis;
+    let cross = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
+    std::array::from_fn(|row| {
+        std::array::from_fn(|c| {
+            let unit = if row == c { cos } else { 0.0 };
+            unit + sin * cross[row][c] + (1.0 - cos) * axis[row] * axis[c]
+        })
     })
+}
+
+/// A camera at `center`, turned as `x_cam = R (x - center)` with y down.
+fn turned(rotation: &[[f64; 3]; 3], center: [f64; 3]) -> ([f64; 3], [f64; 3]) {
+    (center, camera(rotation, &[0.0; 3], DOWNWARD).1)
+}
+
+impl Object {
+    /// Reads one value of the object, under the name that was pushed last.
+    fn take<'de, A: MapAccess<'de>>(&mut self, json: &mut A) -> Result<(), A::Error> {
+        let Self { names, found, n_views, cloud } = self;
+        match names.last().map_or("", String::as_str) {
+            "shots" => {
+                json.next_value_seed(Items::new(|Shot { rotation: vector, translation }| {
+                    let rotation = rotation(numbers(vector));
+                    found.camera(Some(camera(&rotation, &numbers(translation), DOWNWARD)));
+                }))
+            }
+            "points" => json.next_value_seed(Items::new(|Point { coordinates }| {
+                found.positions.push(numbers(coordinates));
+            })),
+            "structure" => json.next_value_seed(Items::new(|landmark: Landmark| {
+                let place = landmark.value.map_or(landmark.place, |value| value.place);
+                found.positions.push(place.map_or([f64::NAN; 3], numbers));
+            })),
+            "extrinsics" => json.next_value_seed(Items::new(|Extrinsic { value }| {
+                let rotation = value.rotation.map(numbers);
+                found.camera(Some(turned(&rotation, numbers(value.center))));
+            })),
+            "poses" => json.next_value_seed(Items::new(|PoseOfView { pose }| {
+                found.camera(pose.map(|Transform { transform }| {
+                    let columns = numbers(transform.rotation);
+                    let row = |row: usize| std::array::from_fn(|c| columns[3 * c + row]);
+                    turned(&std::array::from_fn(row), numbers(transform.center))
+                }));
+            })),
+            "views" => json.next_value_seed(Items::new(|_: IgnoredAny| *n_views += 1)),
+            "frames" => json.next_value_seed(Items::new(|frame: Frame| {
+                let mut rows = frame.transform_matrix.into_iter().map(numbers);
+                let rows: [_; 3] = std::array::from_fn(|_| rows.next().unwrap_or([f64::NAN; 4]));
+                found.camera(Some((rows.map(|row| row[3]), rows.map(|row| row[1]))));
+            })),
+            "ply_file_path" => json.next_value().map(|path| *cloud = path),
+            _ => json.next_value::<IgnoredAny>().map(drop),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Object {
+    fn deserialize<D: Deserializer<'de>>(json: D) -> Result<Self, D::Error> {
+        json.deserialize_any(OfAny).map(|top| match top {
+            Top::One(object) | Top::Several(object, _) => object,
+        })
+    }
+}
+
+impl<'de> Deserialize<'de> for Top {
+    fn deserialize<D: Deserializer<'de>>(json: D) -> Result<Self, D::Error> {
+        json.deserialize_any(OfAny)
+    }
+}
+
+struct OfAny;
+
+impl<'de> Visitor<'de> for OfAny {
+    type Value = Top;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("an object, or a list of them")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut json: A) -> Result<Top, A::Error> {
+        let mut object = Object::default();
+        while let Some(name) = json.next_key()? {
+            object.names.push(name);
+            object.take(&mut json)?;
+        }
+        Ok(Top::One(object))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Top, A::Error> {
+        let (mut largest, mut n) = (Object::default(), 0);
+        while let Some(object) = list.next_element::<Object>()? {
+            n += 1;
+            if n == 1 || object.found.positions.len() > largest.found.positions.len() {
+                largest = object;
+            }
+        }
+        Ok(Top::Several(largest, n))
+    }
+}
+
+/// Values of a list or of an object, one after the other.
+struct Items<T, F>(F, PhantomData<T>);
+
+impl<T, F: FnMut(T)> Items<T, F> {
+    fn new(each: F) -> Self {
+        Self(each, PhantomData)
+    }
+}
+
+impl<'de, T: Deserialize<'de>, F: FnMut(T)> DeserializeSeed<'de> for Items<T, F> {
+    type Value = ();
+
+    fn deserialize<D: Deserializer<'de>>(self, json: D) -> Result<(), D::Error> {
+        json.deserialize_any(self)
+    }
+}
+
+impl<'de, T: Deserialize<'de>, F: FnMut(T)> Visitor<'de> for Items<T, F> {
+    type Value = ();
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a list or an object, as in a map")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(mut self, mut list: A) -> Result<(), A::Error> {
+        while let Some(value) = list.next_element()? {
+            (self.0)(value);
+        }
+        Ok(())
+    }
+
+    fn visit_map<A: MapAccess<'de>>(mut self, mut object: A) -> Result<(), A::Error> {
+        while object.next_key::<IgnoredAny>()?.is_some() {
+            (self.0)(object.next_value()?);
+        }
+        Ok(())
+    }
 }

@@ -1,30 +1,13 @@
-//! VisualSFM's NVM, version 3: a line per camera, a line per point, in one or more models of which the first is the map.
+//! VisualSFM's NVM, version 3: models of a line per camera and a line per point, of which the largest is the map.
 
 use std::path::Path;
 
-use super::found::{DOWNWARD, Found, camera};
+use super::pose::{DOWNWARD, camera};
 use crate::error::Error;
+use crate::read::Input;
+use crate::read::columns::coordinate;
 use crate::read::lines::{Lines, number, quoted, words};
 use crate::read::undeclared::undeclared;
-
-/// The next line that is not blank, as a count.
-fn count(lines: &mut Lines, what: &str) -> Result<u64, Error> {
-    if !lines.advance_to_data()? {
-        return Err(lines.end_error(what));
-    }
-    number(lines.line()).ok_or_else(|| lines.error(what, quoted(lines.line())))
-}
-
-/// Numbers from word `first` on.
-fn numbers<const N: usize>(lines: &Lines, first: usize, what: &str) -> Result<[f64; N], Error> {
-    let mut values = [0.0; N];
-    let mut words = words(lines.line()).skip(first);
-    for value in &mut values {
-        let word = words.next().ok_or_else(|| lines.error(what, "end of line"))?;
-        *value = number(word).ok_or_else(|| lines.error(what, quoted(word)))?;
-    }
-    Ok(values)
-}
 
 /// The rotation of a quaternion (w, x, y, z).
 fn rotation([w, x, y, z]: [f64; 4]) -> [[f64; 3]; 3] {
@@ -37,61 +20,102 @@ fn rotation([w, x, y, z]: [f64; 4]) -> [[f64; 3]; 3] {
     rows.map(|row| row.map(|value| value / norm2))
 }
 
-/// Reads points and cameras of the first model.
+/// The count in the current line.
+fn count(lines: &Lines, what: &str) -> Result<u64, Error> {
+    number(lines.line()).ok_or_else(|| lines.error(what, quoted(lines.line())))
+}
+
+/// The camera in the current line: its name, which may hold spaces, and ten numbers.
+fn pose(lines: &Lines, what: &str) -> Result<([f64; 3], [f64; 3]), Error> {
+    let all: Vec<&[u8]> = words(lines.line()).collect();
+    let start = all.len().checked_sub(10).filter(|&start| start > 0);
+    let start = start.ok_or_else(|| lines.error(what, format!("{} words", all.len())))?;
+    let mut values = [0.0; 10];
+    for (value, word) in values.iter_mut().zip(&all[start..]) {
+        *value = coordinate(word).ok_or_else(|| lines.error(what, quoted(word)))?;
+    }
+    let [_focal, w, x, y, z, a, b, c, ..] = values;
+    // The pose is a rotation and the center itself.
+    Ok(([a, b, c], camera(&rotation([w, x, y, z]), &[0.0; 3], DOWNWARD).1))
+}
+
+/// Reads points and cameras of the largest model.
 ///
 /// # Errors
-/// When the file is not NVM, or a coordinate is not finite.
-pub fn read(path: &Path) -> Result<Found, Error> {
+/// When the file is not NVM, or is cut off.
+pub fn read(path: &Path) -> Result<Input, Error> {
     let mut lines = Lines::open(path)?;
-    let is_nvm = lines.advance_to_data()? && lines.line().starts_with(b"NVM_V3");
+    // NVM_V3_R9T, with matrices for quaternions, is another form.
+    let is_nvm = lines.advance_to_data()? && words(lines.line()).next() == Some(b"NVM_V3");
     if !is_nvm {
         return Err(lines.error("NVM_V3, as VisualSFM writes it", quoted(lines.line())));
     }
-    let mut found = Found::default();
-    let n_cameras = count(&mut lines, "a number of cameras")?;
+    let (mut largest, mut n_models, mut n_without) = (Input::default(), 0, 0);
+    let mut more = 0;
+    loop {
+        if !lines.advance_to_data()? {
+            // A zero ends the list of models; some writers leave it out.
+            if n_models + n_without == 0 {
+                return Err(lines.end_error("a number of cameras"));
+            }
+            break;
+        }
+        let n_cameras = match count(&lines, "a number of cameras") {
+            // Behind a model, a point that it does not declare.
+            Err(_) if n_models + n_without > 0 => {
+                more += 1;
+                continue;
+            }
+            n_cameras => n_cameras?,
+        };
+        if n_cameras == 0 {
+            break;
+        }
+        let model = model(&mut lines, n_cameras)?;
+        if model.positions.is_empty() {
+            n_without += n_cameras;
+            continue;
+        }
+        n_models += 1;
+        if model.positions.len() > largest.positions.len() {
+            largest = model;
+        }
+    }
+    largest.doubts.extend(undeclared(largest.positions.len() as u64, more));
+    if n_models > 1 {
+        let points = largest.positions.len();
+        largest.notes.push(format!("read, the largest of {n_models} models ({points} points)"));
+    }
+    if n_without > 0 {
+        largest.notes.push(format!("{n_without} photos without a place"));
+    }
+    Ok(Input { format: "NVM", ..largest })
+}
+
+fn model(lines: &mut Lines, n_cameras: u64) -> Result<Input, Error> {
+    let mut found = Input::default();
     for at in 0..n_cameras {
-        let what = format!("camera {at}: name, focal length, quaternion and center");
+        let what = format!("camera {at}: name, focal length, quaternion, center, distortion and 0");
         if !lines.advance()? {
             return Err(lines.end_error(what));
         }
-        let values = numbers::<7>(&lines, 2, &what)?;
-        let [w, x, y, z, center @ ..] = values;
-        // The pose is a rotation and the center itself.
-        match camera(&rotation([w, x, y, z]), &[0.0; 3], DOWNWARD) {
-            Some((_, up)) if center.iter().all(|x| x.is_finite()) => {
-                found.cameras.push(center);
-                found.up.push(up);
-            }
-            _ => {
-                return Err(
-                    lines.error(format!("a finite pose of camera {at}"), format!("{values:?}"))
-                );
-            }
-        }
+        found.camera(Some(pose(lines, &what)?));
     }
-    let n_points = count(&mut lines, "a number of points")?;
-    for at in 0..n_points {
+    if !lines.advance_to_data()? {
+        return Err(lines.end_error("a number of points"));
+    }
+    for at in 0..count(lines, "a number of points")? {
         let what = format!("3 coordinates of point {at}");
         if !lines.advance()? {
             return Err(lines.end_error(what));
         }
-        let position = numbers::<3>(&lines, 0, &what)?;
-        if position.iter().any(|x| !x.is_finite()) {
-            return Err(
-                lines.error(format!("finite coordinates of point {at}"), format!("{position:?}"))
-            );
+        let mut position = [0.0; 3];
+        let mut words = words(lines.line());
+        for value in &mut position {
+            let word = words.next().ok_or_else(|| lines.error(&*what, "end of line"))?;
+            *value = coordinate(word).ok_or_else(|| lines.error(&*what, quoted(word)))?;
         }
         found.positions.push(position);
     }
-    // A count of cameras begins another model, and a zero ends the list of them.
-    let mut more = 0;
-    while lines.advance_to_data()? {
-        if let Some(n) = number::<u64>(lines.line()) {
-            found.notes.extend((n > 0).then(|| "read, the first of several models".to_owned()));
-            break;
-        }
-        more += 1;
-    }
-    found.doubts.extend(undeclared(n_points, more));
     Ok(found)
 }

@@ -17,10 +17,11 @@ use e57::RecordName::{
 };
 use e57::{E57Reader, PointCloud, RawValues, RecordDataType};
 
-use super::scan::Scan;
+use super::is_geographic;
 use crate::error::{Error, Place};
 use crate::guard::without_panic;
 use crate::input::{self, Budget};
+use crate::read::Input;
 
 /// Bytes of the head, and where in it the length of the XML stands.
 const HEAD: usize = 48;
@@ -37,12 +38,12 @@ const VALUE: u64 = 32;
 ///
 /// # Errors
 /// When the file is damaged or would take more memory than its size explains.
-pub fn read(path: &Path) -> Result<Scan, Error> {
+pub fn read(path: &Path) -> Result<Input, Error> {
     let damaged = || Error::new(path, "", "an E57 file", "a damaged one");
     without_panic(|| scans(path)).unwrap_or_else(|| Err(damaged()))
 }
 
-fn scans(path: &Path) -> Result<Scan, Error> {
+fn scans(path: &Path) -> Result<Input, Error> {
     let (mut file, len) = input::open(path)?;
     let budget = Budget::new(path, len);
     let mut head = [0; HEAD];
@@ -65,12 +66,14 @@ fn scans(path: &Path) -> Result<Scan, Error> {
     let clouds = reader.pointclouds();
     let n = clouds.iter().fold(0u64, |n, cloud| n.saturating_add(cloud.records));
     budget.admit("points", n.saturating_mul(24))?;
-    let mut positions: Vec<[f64; 3]> = Vec::new();
-    let mut without = 0;
+    let (mut positions, mut notes) = (Vec::new(), Vec::new());
     for (at, cloud) in clouds.iter().enumerate() {
         let place = || Place::from(format!("scan {}", at + 1));
         check(path, cloud, &budget, place())?;
-        let frame = Frame::of(cloud);
+        let frame = Frame::of(cloud).unwrap_or_else(|| {
+            notes.push(format!("scan {}: a rotation of zeros, taken for none", at + 1));
+            Frame::shifted(cloud)
+        });
         left.set(AHEAD);
         let fields = Fields::of(cloud);
         // As they are stored: what the crate makes of them is by functions that differ between machines.
@@ -80,19 +83,14 @@ fn scans(path: &Path) -> Result<Scan, Error> {
             left.set(AHEAD);
             let found = fields.place(cloud, &values);
             let found = found.map_err(|error| wrong(path, place(), &error))?;
-            match found.map(|found| frame.common(found)) {
-                Some(position) if position.iter().all(|x| x.is_finite()) => {
-                    positions.push(position)
-                }
-                _ => without += 1,
-            }
+            positions.push(found.map_or([f64::NAN; 3], |found| frame.common(found)));
         }
     }
-    let mut scan = Scan::new(positions, "E57", without);
     if clouds.len() > 1 {
-        scan.notes.push(format!("read, all {} scans, in one frame", clouds.len()));
+        notes.push(format!("read, all {} scans, in one frame", clouds.len()));
     }
-    Ok(scan)
+    let is_geographic = reader.coordinate_metadata().is_some_and(is_geographic);
+    Ok(Input { positions, format: "E57", notes, is_geographic, ..Input::default() })
 }
 
 /// Refuses a scan of which a few packets would become more than the budget, or that has values for which no byte stands:
@@ -152,20 +150,29 @@ struct Frame {
     translation: [f64; 3],
 }
 
+const UPRIGHT: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
 impl Frame {
-    fn of(cloud: &PointCloud) -> Self {
-        let Some(pose) = &cloud.transform else {
-            let rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-            return Self { rotation, translation: [0.0; 3] };
-        };
-        let (q, t) = (&pose.rotation, &pose.translation);
+    /// That of `cloud`, not turned.
+    fn shifted(cloud: &PointCloud) -> Self {
+        let t = cloud.transform.as_ref().map(|pose| &pose.translation);
+        Self { rotation: UPRIGHT, translation: t.map_or([0.0; 3], |t| [t.x, t.y, t.z]) }
+    }
+
+    /// That of `cloud`, by its quaternion of any length; `None` where that is zero.
+    fn of(cloud: &PointCloud) -> Option<Self> {
+        let shifted = Self::shifted(cloud);
+        let Some(pose) = &cloud.transform else { return Some(shifted) };
+        let q = &pose.rotation;
         let (w, x, y, z) = (q.w, q.x, q.y, q.z);
-        let rotation = [
+        let rows = [
             [w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
             [2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)],
             [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z],
         ];
-        Self { rotation, translation: [t.x, t.y, t.z] }
+        let norm2 = w * w + x * x + y * y + z * z;
+        let rotation = rows.map(|row| row.map(|value| value / norm2));
+        (norm2 != 0.0).then_some(Self { rotation, ..shifted })
     }
 
     fn common(&self, place: [f64; 3]) -> [f64; 3] {

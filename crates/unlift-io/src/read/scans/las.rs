@@ -7,8 +7,9 @@
 
 use std::path::Path;
 
-use super::scan::Scan;
+use super::is_geographic;
 use crate::error::Error;
+use crate::read::Input;
 use crate::read::bytes::Bytes;
 use crate::read::lines::quoted;
 use crate::read::undeclared::undeclared;
@@ -29,8 +30,8 @@ const COMPRESSED: u8 = 0b1100_0000;
 /// Reads the positions.
 ///
 /// # Errors
-/// When the file is none, is compressed, is cut off, or has a coordinate that is not finite.
-pub fn read(path: &Path) -> Result<Scan, Error> {
+/// When the file is none, is compressed, or is cut off.
+pub fn read(path: &Path) -> Result<Input, Error> {
     let mut bytes = Bytes::open(path)?;
     let mut head = [0; HEAD_1_4];
     bytes.fill(&mut head[..HEAD], "the head")?;
@@ -65,23 +66,29 @@ pub fn read(path: &Path) -> Result<Scan, Error> {
     let double = |at: usize| f64::from_le_bytes(std::array::from_fn(|byte| head[at + byte]));
     let scale: [f64; 3] = std::array::from_fn(|axis| double(131 + 8 * axis));
     let offset: [f64; 3] = std::array::from_fn(|axis| double(155 + 8 * axis));
-    let mut at = HEAD;
+    let mut at = HEAD as u64;
     if version.1 == 4 && usize::from(head_size) >= HEAD_1_4 {
         bytes.fill(&mut head[HEAD..], "the head")?;
-        at = HEAD_1_4;
+        at = HEAD_1_4 as u64;
         let all = wide(&head, COUNT_1_4);
         n = if all == 0 { n } else { all };
     }
-    let Some(behind) = start.checked_sub(at as u64) else {
+    if start < at {
         let expected = format!("points behind the head of {at} bytes");
         return Err(bytes.error(expected, format!("at byte {start}")));
-    };
-    bytes.skip(behind, "what stands before the points")?;
+    }
     // What may stand behind the points.
-    let behind = match version.1 {
-        4 if at == HEAD_1_4 => [wide(&head, WAVES), wide(&head, EXTENDED_1_4)],
-        _ => [0; 2],
+    let behind = match at > HEAD as u64 {
+        true => [wide(&head, WAVES), wide(&head, EXTENDED_1_4)],
+        false => [0; 2],
     };
+    let mut system = System::default();
+    if let Some(gap) = u64::from(head_size).checked_sub(at).filter(|gap| at + gap <= start) {
+        bytes.skip(gap, "the head")?;
+        system.look(&mut bytes, long(&head, 100), start - at - gap, false)?;
+    }
+    let gap = start - bytes.at();
+    bytes.skip(gap, "what stands before the points")?;
     let size = n.checked_mul(u64::from(record));
     if size.is_none_or(|size| size > bytes.remaining()) {
         let expected = format!("{n} points, {record} bytes each");
@@ -96,17 +103,86 @@ pub fn read(path: &Path) -> Result<Scan, Error> {
             |axis: usize| i32::from_le_bytes(std::array::from_fn(|at| row[4 * axis + at]));
         let position: [f64; 3] =
             std::array::from_fn(|axis| f64::from(integer(axis)) * scale[axis] + offset[axis]);
-        if position.iter().any(|x| !x.is_finite()) {
-            let expected = format!("finite coordinates of point {number}");
-            return Err(bytes.error(expected, format!("{position:?}")));
-        }
         positions.push(position);
     }
     let end = bytes.at();
     let next = behind.into_iter().filter(|&next| next >= end).min();
     let more = next.map_or(bytes.remaining(), |next| next - end) / u64::from(record);
-    let mut scan = Scan::new(positions, "LAS", 0);
     // Of 1.3 the head does not say where waveforms are.
-    scan.doubts.extend(undeclared(n, more).filter(|_| version.1 != 3));
-    Ok(scan)
+    let doubts = undeclared(n, more).filter(|_| version.1 != 3).into_iter().collect();
+    let (gap, number) = (behind[1].checked_sub(end), long(&head, EXTENDED_1_4 + 8));
+    if let Some(gap) = gap.filter(|&gap| number > 0 && gap <= bytes.remaining()) {
+        bytes.skip(gap, "what stands behind the points")?;
+        let left = bytes.remaining();
+        system.look(&mut bytes, number, left, true)?;
+    }
+    let is_geographic = system.is_geographic();
+    Ok(Input { positions, format: "LAS", is_geographic, doubts, ..Input::default() })
+}
+
+/// What records of a file say of its coordinate system.
+#[derive(Default)]
+struct System {
+    wkt: Option<bool>,
+    keys: Option<bool>,
+}
+
+impl System {
+    /// Looks through at most `number` records in `left` bytes; records behind the points are `long`. One that is
+    /// cut off is the last: points do not depend on it.
+    fn look(&mut self, bytes: &mut Bytes, number: u64, left: u64, long: bool) -> Result<(), Error> {
+        /// Text is shorter.
+        const LONGEST: u64 = 1 << 20;
+        let mut head = [0; 60];
+        let head = if long { &mut head[..] } else { &mut head[..54] };
+        let mut taken = 0;
+        for _ in 0..number {
+            if left.min(bytes.remaining() + taken) - taken < head.len() as u64 {
+                break;
+            }
+            bytes.fill(head, "a record")?;
+            taken += head.len() as u64;
+            let len = match long {
+                true => u64::from_le_bytes(std::array::from_fn(|byte| head[20 + byte])),
+                false => u64::from(u16::from_le_bytes([head[20], head[21]])),
+            };
+            if len > left - taken || len > bytes.remaining() {
+                break;
+            }
+            taken += len;
+            let id = u16::from_le_bytes([head[18], head[19]]);
+            if !head[2..18].starts_with(b"LASF_Projection") || len > LONGEST {
+                bytes.skip(len, "a record")?;
+                continue;
+            }
+            let mut content = vec![0; len as usize];
+            bytes.fill(&mut content, "a record")?;
+            match id {
+                2112 => self.wkt = Some(is_geographic(&String::from_utf8_lossy(&content))),
+                34735 => self.keys = Some(is_geographic_by_keys(&content)),
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Text is newer than keys, and goes first.
+    fn is_geographic(&self) -> bool {
+        self.wkt.or(self.keys).unwrap_or(false)
+    }
+}
+
+/// Whether GeoTIFF's directory of keys says that coordinates are degrees.
+fn is_geographic_by_keys(directory: &[u8]) -> bool {
+    const MODEL: u16 = 1024;
+    const GEOGRAPHIC_SYSTEM: u16 = 2048;
+    const PROJECTED_SYSTEM: u16 = 3072;
+    let shorts: Vec<u16> =
+        directory.as_chunks::<2>().0.iter().map(|&two| u16::from_le_bytes(two)).collect();
+    let keys = shorts.get(4..).unwrap_or_default().as_chunks::<4>().0;
+    let value = |key: u16| keys.iter().find(|entry| entry[0] == key).map(|entry| entry[3]);
+    match value(MODEL) {
+        Some(model) if model != 0 => model == 2,
+        _ => value(GEOGRAPHIC_SYSTEM).is_some() && value(PROJECTED_SYSTEM).is_none(),
+    }
 }

@@ -1,26 +1,32 @@
 //! Clouds as scanners and the programs around them store them: LAS, PCD, E57. Positions, nothing else.
 
-mod e57;
-mod las;
+pub mod e57;
+pub mod las;
 mod lzf;
-mod pcd;
-mod scan;
+pub mod pcd;
 
-use std::path::Path;
+/// Whether a coordinate system, written as well-known text, measures longitude and latitude, which are no lengths.
+fn is_geographic(wkt: &str) -> bool {
+    let wkt: String = wkt.chars().filter(|c| !c.is_whitespace()).collect::<String>().to_uppercase();
+    // A projected system names the geographic one that it was made of, and a geocentric one is in meters.
+    let lengths = ["PROJCS[", "PROJCRS[", "PROJECTEDCRS[", "GEOCCS[", "LOCAL_CS[", "CS[CARTESIAN"];
+    let degrees = ["GEOGCS[", "GEOGCRS[", "GEOGRAPHICCRS[", "GEODCRS[", "GEODETICCRS["];
+    !lengths.iter().any(|word| wkt.contains(word)) && degrees.iter().any(|word| wkt.contains(word))
+}
 
-pub(super) use scan::Scan;
+#[cfg(test)]
+mod tests {
+    use super::is_geographic;
 
-use crate::error::Error;
-
-/// The scan in `path`, if files with this extension (in lowercase) are such.
-///
-/// # Errors
-/// When it cannot be read.
-pub(super) fn file(path: &Path, extension: &str) -> Option<Result<Scan, Error>> {
-    match extension {
-        "las" => Some(las::read(path)),
-        "pcd" => Some(pcd::read(path)),
-        "e57" => Some(e57::read(path)),
-        _ => None,
+    #[test]
+    fn degrees_are_told_from_lengths() {
+        let wgs84 = "GEOGCS[\"WGS 84\", DATUM[\"WGS_1984\"], UNIT[\"degree\", 0.0174]]";
+        assert!(is_geographic(wgs84));
+        assert!(is_geographic(&format!("COMPD_CS[\"both\", {wgs84}, VERT_CS[\"height\"]]")));
+        assert!(is_geographic("GEOGCRS[\"WGS 84\", CS[ellipsoidal, 2]]"));
+        assert!(!is_geographic(&format!("PROJCS[\"UTM\", {wgs84}, UNIT[\"metre\", 1]]")));
+        assert!(!is_geographic("PROJCRS[\"UTM\", BASEGEOGCRS[\"WGS 84\"], CS [Cartesian, 2]]"));
+        assert!(!is_geographic("GEODCRS[\"WGS 84\", CS[Cartesian, 3]]"));
+        assert!(!is_geographic(""));
     }
 }

@@ -9,11 +9,13 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 use super::lzf::unpacked;
-use super::scan::Scan;
 use crate::error::{Error, Place};
 use crate::input::{self, Budget};
+use crate::read::Input;
 use crate::read::bytes::Bytes;
+use crate::read::columns::{self, coordinate};
 use crate::read::lines::{Lines, number, quoted, words};
+use crate::read::scalar::Scalar;
 use crate::read::undeclared::undeclared;
 
 /// One column, or several of a name.
@@ -25,12 +27,12 @@ struct Field {
     count: u64,
 }
 
-/// A coordinate: the number of its value in a line, its byte in a row, and whether it has eight.
-#[derive(Clone, Copy, Debug, Default)]
+/// A coordinate: the number of its value in a line, its byte in a row, and how it is stored.
+#[derive(Clone, Copy, Debug)]
 struct Axis {
     value: u64,
     byte: u64,
-    is_f64: bool,
+    scalar: Scalar,
 }
 
 #[derive(Debug)]
@@ -46,33 +48,27 @@ struct Header {
     n_bytes: u64,
 }
 
-/// Reads the positions of points that have one.
+/// Reads the positions.
 ///
 /// # Errors
-/// When the file is malformed, has no `x`, `y` and `z` in floats, or is cut off.
-pub fn read(path: &Path) -> Result<Scan, Error> {
+/// When the file is malformed, has no `x`, `y` and `z`, or is cut off.
+pub fn read(path: &Path) -> Result<Input, Error> {
     let (file, len) = input::open(path)?;
     let mut reader = BufReader::new(file);
     let header = header(path, &mut reader)?;
-    if header.n == 0 {
+    let mut doubt = None;
+    let (positions, format) = match &*header.data {
         // Nothing says how much there is to read.
-        return Ok(Scan::new(Vec::new(), "PCD", 0));
-    }
-    let (all, more, format) = match &*header.data {
-        b"ascii" => (ascii(path, reader, &header, len)?, 0, "PCD ascii"),
+        _ if header.n == 0 => (Vec::new(), "PCD"),
+        b"ascii" => (ascii(path, reader, &header, len)?, "PCD ascii"),
         b"binary" => {
-            let (all, more) = binary(path, reader, &header, len)?;
-            (all, more, "PCD binary")
+            let (positions, more) = binary(path, reader, &header, len)?;
+            doubt = undeclared(header.n, more);
+            (positions, "PCD binary")
         }
-        _ => (compressed(path, reader, &header, len)?, 0, "PCD compressed"),
+        _ => (compressed(path, reader, &header, len)?, "PCD compressed"),
     };
-    let n = all.len();
-    let positions: Vec<[f64; 3]> =
-        all.into_iter().filter(|position| position.iter().all(|x| x.is_finite())).collect();
-    let without = (n - positions.len()) as u64;
-    let mut scan = Scan::new(positions, format, without);
-    scan.doubts.extend(undeclared(header.n, more));
-    Ok(scan)
+    Ok(Input { positions, format, doubts: doubt.into_iter().collect(), ..Input::default() })
 }
 
 /// The lines up to `DATA`, each a word and its values.
@@ -101,9 +97,9 @@ fn header(path: &Path, reader: &mut BufReader<File>) -> Result<Header, Error> {
             Some([one]) => Ok(*one),
             _ => Err(error("one number", quoted(line.trim_ascii()))),
         };
-        match *word {
+        match &*word.to_ascii_uppercase() {
             [b'#', ..] | b"VERSION" | b"VIEWPOINT" => {}
-            b"FIELDS" => names = values.iter().map(|name| name.to_vec()).collect(),
+            b"FIELDS" | b"COLUMNS" => names = values.iter().map(|name| name.to_vec()).collect(),
             b"SIZE" => {
                 let known =
                     numbers().filter(|sizes| sizes.iter().all(|s| [1, 2, 4, 8].contains(s)));
@@ -120,8 +116,8 @@ fn header(path: &Path, reader: &mut BufReader<File>) -> Result<Header, Error> {
             b"POINTS" => points = Some(one()?),
             b"DATA" => {
                 let known: [&[u8]; 3] = [b"ascii", b"binary", b"binary_compressed"];
-                match values {
-                    [data] if known.contains(data) => break data.to_vec(),
+                match values.iter().map(|data| data.to_ascii_lowercase()).next() {
+                    Some(data) if values.len() == 1 && known.contains(&&*data) => break data,
                     _ => {
                         let expected = "DATA ascii, binary or binary_compressed";
                         return Err(error(expected, quoted(line.trim_ascii())));
@@ -147,22 +143,22 @@ fn header(path: &Path, reader: &mut BufReader<File>) -> Result<Header, Error> {
     let (Some(n_values), Some(stride)) = (sum(&|f| f.count, &fields), sum(&bytes, &fields)) else {
         return Err(refuse("points of a size that fits", "more".to_owned()));
     };
-    let mut axes = [Axis::default(); 3];
-    for (axis, name) in axes.iter_mut().zip([b"x", b"y", b"z"]) {
-        let expected =
-            format!("a field {} of type F and size 4 or 8", String::from_utf8_lossy(name));
-        let at = names.iter().position(|its| its == name);
-        let at = at.ok_or_else(|| refuse(&expected, "none".to_owned()))?;
-        let field = fields[at];
-        if kinds[at] != b"F" || ![4, 8].contains(&field.size) || field.count != 1 {
-            let kind = String::from_utf8_lossy(&kinds[at]).into_owned();
-            return Err(refuse(&expected, format!("{kind} {} {}", field.size, field.count)));
-        }
+    let at = columns::axes(names.iter().map(Vec::as_slice));
+    let at = at.map_err(|name| refuse(&format!("a field {name}"), "none".to_owned()))?;
+    let axis = |at: usize| {
+        let (field, kind) = (fields[at], &kinds[at]);
+        let scalar = kind.first().and_then(|&kind| Scalar::of_kind(kind, field.size));
+        let scalar = scalar.filter(|_| field.count == 1 && kind.len() == 1).ok_or_else(|| {
+            let (name, kind) = (String::from_utf8_lossy(&names[at]), String::from_utf8_lossy(kind));
+            let expected = format!("one value of type F, I or U for {name}");
+            refuse(&expected, format!("{kind} {} {}", field.size, field.count))
+        })?;
         // What all of them come to was counted above.
         let before = &fields[..at];
         let value = before.iter().map(|field| field.count).sum();
-        *axis = Axis { value, byte: before.iter().map(bytes).sum(), is_f64: field.size == 8 };
-    }
+        Ok(Axis { value, byte: before.iter().map(bytes).sum(), scalar })
+    };
+    let axes = [axis(at[0])?, axis(at[1])?, axis(at[2])?];
     let of_width = width.and_then(|width: u64| width.checked_mul(height));
     let n = points
         .or(of_width)
@@ -190,10 +186,11 @@ fn ascii(
         }
         let mut position = [f64::NAN; 3];
         let mut n_words = 0;
-        for word in words(lines.line()) {
+        let words = lines.line().split(|byte| byte.is_ascii_whitespace() || *byte == b',');
+        for word in words.filter(|word| !word.is_empty()) {
             for (axis, value) in header.axes.iter().zip(&mut position) {
                 if axis.value == n_words {
-                    *value = number(word)
+                    *value = coordinate(word)
                         .ok_or_else(|| lines.error("a number for a coordinate", quoted(word)))?;
                 }
             }
@@ -230,7 +227,7 @@ fn binary(
     for number in 1..=n {
         bytes.record(number);
         bytes.fill(&mut row, "point")?;
-        positions.push(header.axes.map(|axis| coordinate(&row, axis.byte, axis.is_f64)));
+        positions.push(header.axes.map(|axis| axis.scalar.read(&row[axis.byte as usize..], false)));
     }
     Ok((positions, bytes.remaining() / stride))
 }
@@ -264,17 +261,8 @@ fn compressed(
         return Err(bytes.error(expected, "others, or damaged ones"));
     };
     let at = |axis: &Axis, point: u64| {
-        let size = if axis.is_f64 { 8 } else { 4 };
-        coordinate(&values, n * axis.byte + size * point, axis.is_f64)
+        let start = n * axis.byte + axis.scalar.size() as u64 * point;
+        axis.scalar.read(&values[start as usize..], false)
     };
     Ok((0..n).map(|point| header.axes.each_ref().map(|axis| at(axis, point))).collect())
-}
-
-/// The float at byte `at`, which is among `bytes`.
-fn coordinate(bytes: &[u8], at: u64, is_f64: bool) -> f64 {
-    let byte = |offset: usize| bytes[at as usize + offset];
-    match is_f64 {
-        true => f64::from_le_bytes(std::array::from_fn(byte)),
-        false => f64::from(f32::from_le_bytes(std::array::from_fn(byte))),
-    }
 }

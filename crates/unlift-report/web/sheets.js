@@ -1,14 +1,23 @@
-// Lays a picture over its photo, with an edge that is moved.
+// Painted pictures: one photo at a time, and a picture laid over its photo with an edge that is moved.
 "use strict";
 
 (() => {
-  const { element } = window.Unlift;
+  const { element, single } = window.Unlift;
 
-  /** The name of a picture, as it stands below it and above its row. */
+  /** Shows one sheet, which a menu chooses. */
+  function chosen(sheets) {
+    const state = { sheet: 0 };
+    const show = () => sheets.forEach((sheet, at) => { sheet.hidden = at !== state.sheet; });
+    const options = sheets.map((sheet, value) => ({ value, label: sheet.dataset.name }));
+    single(document.getElementById("sheet-controls"), state, "sheet", "Photo", options, show);
+    show();
+  }
+
+  /** The name of a picture, as it stands below it, with its scheme. */
   function named(shot) {
-    const row = shot.closest(".strip").previousElementSibling;
+    const scheme = shot.closest(".of-scheme")?.querySelector("h3");
     const label = shot.closest("figure").querySelector("strong").textContent;
-    return row?.tagName === "H3" ? `${row.textContent}, ${label}` : label;
+    return scheme ? `${scheme.textContent}, ${label}` : label;
   }
 
   /** Adds to a sheet the photo with a picture over it; pictures become buttons that choose. */
@@ -17,28 +26,25 @@
     const over = element("img", { alt: "" });
     const range = element("input", { type: "range", min: "0", max: "100", value: "50", "aria-label": "Where the picture begins" });
     const under = element("img", { src: photo.querySelector("img").src, alt: "" });
-    const box = element("div", { class: "wipe" }, under, over, element("span", { class: "edge" }), range);
+    const box = element("div", { class: "wipe", hidden: "" }, under, over, element("span", { class: "edge" }), range);
     const hint = element("p", { class: "hint", "aria-live": "polite" });
     const move = () => box.style.setProperty("--at", `${range.value}%`);
     const choose = (chosen) => {
+      box.hidden = false;
       over.src = chosen.querySelector("img").src;
       hint.textContent = `Left the photo, right ${named(chosen)}.`;
       for (const shot of sheet.querySelectorAll(".shot")) shot.classList.toggle("chosen", shot === chosen);
+      box.scrollIntoView({ block: "nearest" });
     };
     range.addEventListener("input", move);
-    const buttons = shots.map((shot) => {
+    for (const shot of shots) {
       const button = element("button", { class: shot.className, type: "button" }, ...shot.childNodes);
-      button.addEventListener("click", () => {
-        choose(button);
-        box.scrollIntoView({ block: "nearest" });
-      });
+      button.addEventListener("click", () => choose(button));
       shot.replaceWith(button);
-      return button;
-    });
+    }
     move();
-    choose(buttons.find((button) => button.closest(".today")) ?? buttons.at(-1));
     sheet.querySelector(".strip").after(box, hint);
   }
 
-  Object.assign(window.Unlift, { wipe });
+  Object.assign(window.Unlift, { chosen, wipe });
 })();

@@ -1,0 +1,106 @@
+//! What is said of how a map was read, in an audit of it: beside the verdict, and in gates.
+
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+use std::time::Instant;
+
+use unlift::audit::Plan;
+use unlift::synthetic::room;
+use unlift_audit::{Gate, Job, Preparation, maps};
+use unlift_report::Document;
+
+/// A table of a room in which every `every`th point has no place.
+fn table(every: usize) -> String {
+    room(1, 400).points.iter().enumerate().fold(String::new(), |mut text, (at, [x, y, z])| {
+        match at % every {
+            0 => writeln!(text, "{x},nan,{z}"),
+            _ => writeln!(text, "{x},{y},{z}"),
+        }
+        .expect("text");
+        text
+    })
+}
+
+fn audit(map: &Path) -> Document {
+    let preparation = Preparation { k: 10, ..Preparation::default() };
+    let (input, prepared) = maps::open(map, None, &preparation).expect("a map");
+    let job = Job::new(map, &input, &prepared, Path::new(""), Instant::now()).expect("a job");
+    let mut plan = Plan { k: 10, inlier_ratios: vec![0.5], ..job.plan.clone() };
+    plan.schemes.retain(|scheme| scheme.name() == "olc");
+    let gates = vec![Gate::parse("olc:1.0<=100").expect("a gate")];
+    maps::find(Job { plan, gates, ..job }, None).expect("an audit").document
+}
+
+#[test]
+fn points_that_are_left_out_are_counted_and_many_of_them_let_no_gate_hold() {
+    let dir = tempfile::tempdir().unwrap();
+    let map = dir.path().join("map.csv");
+    fs::write(&map, table(50)).unwrap();
+    let document = audit(&map);
+    assert_eq!(document.notes[0], "8 of 400 points have no place");
+    assert_eq!((document.input.n_points, document.gates[0].passed), (392, true));
+
+    fs::write(&map, table(10)).unwrap();
+    let document = audit(&map);
+    let doubt = "40 of 400 points have no place: what is audited is not the whole map";
+    assert!(document.notes.iter().any(|note| note == doubt), "{:?}", document.notes);
+    assert!(!document.gates[0].passed);
+    assert_eq!(document.gates[0].reason.as_deref(), Some(doubt));
+}
+
+#[test]
+fn rows_are_those_of_the_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let map = dir.path().join("map.csv");
+    fs::write(&map, table(50)).unwrap();
+    let all = Preparation { k: 10, ..Preparation::default() };
+    let rows = maps::open(&map, None, &all).unwrap().1.rows;
+    let expected: Vec<u32> = (0..400).filter(|row| row % 50 != 0).collect();
+    assert_eq!(rows, expected);
+    let some = Preparation { max_points: Some(100), ..all };
+    let rows = maps::open(&map, None, &some).unwrap().1.rows;
+    assert!(rows.len() == 100 && rows.is_sorted() && rows.iter().all(|row| row % 50 != 0));
+}
+
+/// LAS of a room on a sphere of degrees, or projected.
+fn las(system: &[u8]) -> Vec<u8> {
+    let points = room(1, 400).points;
+    let mut file = vec![0; 227];
+    let mut put = |at: usize, bytes: &[u8]| file[at..at + bytes.len()].copy_from_slice(bytes);
+    put(0, b"LASF");
+    put(24, &[1, 2]);
+    put(94, &227u16.to_le_bytes());
+    put(96, &(227 + 54 + system.len() as u32).to_le_bytes());
+    put(100, &1u32.to_le_bytes());
+    put(105, &20u16.to_le_bytes());
+    put(107, &(points.len() as u32).to_le_bytes());
+    (0..3).for_each(|axis| put(131 + 8 * axis, &1e-4_f64.to_le_bytes()));
+    let mut record = [0; 54];
+    record[2..17].copy_from_slice(b"LASF_Projection");
+    record[18..20].copy_from_slice(&2112u16.to_le_bytes());
+    record[20..22].copy_from_slice(&(system.len() as u16).to_le_bytes());
+    file.extend(record);
+    file.extend(system);
+    for point in points {
+        point.iter().for_each(|x| file.extend(((x * 1e4) as i32).to_le_bytes()));
+        file.extend([0; 8]);
+    }
+    file
+}
+
+#[test]
+fn degrees_are_refused_with_a_scale_and_let_no_gate_hold() {
+    let dir = tempfile::tempdir().unwrap();
+    let map = dir.path().join("map.las");
+    fs::write(&map, las(b"GEOGCS[\"WGS 84\",UNIT[\"degree\",0.017]]")).unwrap();
+    let meters = Preparation { scale: Some(1.0), k: 10, ..Preparation::default() };
+    let line = maps::open(&map, None, &meters).unwrap_err().to_string();
+    assert!(line.contains("--scale 1: expected a map with lengths, found degrees"), "{line}");
+    let document = audit(&map);
+    let reason = document.gates[0].reason.as_deref().unwrap_or_default();
+    assert!(!document.gates[0].passed && reason.starts_with("coordinates are degrees"), "{reason}");
+    fs::write(&map, las(b"PROJCS[\"UTM\",GEOGCS[\"WGS 84\"]]")).unwrap();
+    maps::open(&map, None, &meters).unwrap();
+    assert!(audit(&map).gates[0].passed);
+}

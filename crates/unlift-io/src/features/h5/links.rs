@@ -1,0 +1,91 @@
+//! Links of a group that are paths: the library passes over them.
+//!
+//! Source: HDF5 File Format Specification 3.0, IV.A (object headers) and IV.A.2.g (the link message). Links of large groups in
+//! a heap of their own are not looked for.
+
+/// Where a link leads.
+#[derive(Debug, PartialEq)]
+pub(super) enum Target {
+    /// To a path in the file.
+    Path(String),
+    /// To another file.
+    Elsewhere,
+}
+
+const LINK: u16 = 0x06;
+const CONTINUATION: u16 = 0x10;
+/// Bytes of headers that are looked through.
+const MOST: u64 = 1 << 20;
+
+/// Names of the links in the object header at `address` that are paths, and where they lead; `read` gives the bytes of the
+/// file. What is no such header has none.
+pub(super) fn links(
+    read: impl Fn(u64, u64) -> Option<Vec<u8>>,
+    address: u64,
+) -> Option<Vec<(String, Target)>> {
+    let start = read(address, 16)?;
+    let is_new = start.starts_with(b"OHDR");
+    // Messages of the new form have numbers if a flag says so.
+    let (first, numbers) = if is_new {
+        let flags = start[5];
+        let before =
+            6 + if flags & 0x20 != 0 { 16 } else { 0 } + if flags & 0x10 != 0 { 4 } else { 0 };
+        let width = 1u64 << (flags & 3);
+        let size = number(&read(address + before, width)?);
+        ((address + before + width, size), flags & 4 != 0)
+    } else {
+        ((address + 16, number(&start[8..12])), false)
+    };
+    let (mut blocks, mut left, mut found) = (vec![first], MOST, Vec::new());
+    while let Some((at, size)) = blocks.pop() {
+        left = left.checked_sub(size)?;
+        let block = read(at, size)?;
+        let mut rest = &block[..];
+        let head = if is_new { 4 + if numbers { 2 } else { 0 } } else { 8 };
+        while let Some((start, behind)) = rest.split_at_checked(head) {
+            let kind = if is_new { u16::from(start[0]) } else { number(&start[..2]) as u16 };
+            let size = number(if is_new { &start[1..3] } else { &start[2..4] });
+            let Some((body, next)) = behind.split_at_checked(size as usize) else { break };
+            rest = next;
+            match kind {
+                LINK => found.extend(link(body)),
+                CONTINUATION if body.len() >= 16 => {
+                    let (at, size) = (number(&body[..8]), number(&body[8..16]));
+                    // Between a signature and a checksum.
+                    blocks.push(if is_new { (at + 4, size.checked_sub(8)?) } else { (at, size) });
+                }
+                _ => {}
+            }
+        }
+    }
+    Some(found)
+}
+
+/// The link in a message, if it is a path.
+fn link(body: &[u8]) -> Option<(String, Target)> {
+    let flags = *body.get(1)?;
+    let kind = if flags & 8 != 0 { *body.get(2)? } else { 0 };
+    let mut at = 2 + usize::from(flags & 8 != 0);
+    at += if flags & 4 != 0 { 8 } else { 0 } + usize::from(flags & 0x10 != 0);
+    let mut take = |n: usize| {
+        let part = body.get(at..at.checked_add(n)?)?;
+        at += n;
+        Some(part)
+    };
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    let n = number(take(1 << (flags & 3))?) as usize;
+    let name = text(take(n)?);
+    match kind {
+        1 => {
+            let n = number(take(2)?) as usize;
+            Some((name, Target::Path(text(take(n)?))))
+        }
+        64 => Some((name, Target::Elsewhere)),
+        _ => None,
+    }
+}
+
+/// Up to eight bytes, the least significant one first.
+fn number(bytes: &[u8]) -> u64 {
+    bytes.iter().rev().fold(0, |number, &byte| number << 8 | u64::from(byte))
+}

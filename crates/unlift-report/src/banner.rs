@@ -1,0 +1,173 @@
+//! The first lines of a page and of the terminal: how bad it is, by which attack, and what to do next.
+
+use serde::Serialize;
+
+use crate::attack::Basis;
+use crate::cards::{Card, Finding, Level, Refusal};
+use crate::document::{Document, LengthUnit, Row};
+use crate::{tables, words};
+
+/// The verdict on a whole audit in three lines.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Banner {
+    pub level: Level,
+    /// "Not protected."
+    pub headline: String,
+    /// Who recovers how much from what.
+    pub sentence: String,
+    /// What known neighbors would give away under every scheme: a scheme that is not named above is not fine.
+    pub every: Option<String>,
+    /// What is not known, if anything.
+    pub unknown: Option<String>,
+}
+
+/// The banner of `document`, whose schemes `cards` judge, the worst first.
+pub(crate) fn banner(document: &Document, cards: &[Card], refusals: &[Refusal]) -> Banner {
+    let names: Vec<String> = refusals.iter().map(|one| one.scheme.to_uppercase()).collect();
+    let unknown = (!refusals.is_empty())
+        .then(|| format!("Not audited, so nothing is known: {}.", words::list(&names)));
+    let today = worst(cards, Basis::Released);
+    let known = worst(cards, Basis::Given).or_else(|| worst(cards, Basis::Oracle));
+    let (level, headline, sentence) = match (today, known) {
+        (Some(found), _) => {
+            let level = Level::of(found.1.recovered);
+            (level, headline(level, cards), said(document, found))
+        }
+        // Untested is not harmless: what known neighbors would give away decides the color.
+        (None, Some(found)) => {
+            let level = Level::of(found.1.recovered).min(Level::Orange);
+            let headline = "Not tested: what an attacker gets from the released data alone.";
+            (level, headline.to_owned(), said(document, found))
+        }
+        (None, None) => {
+            let nothing = "Nothing is known about this protection.";
+            (Level::Gray, "No scheme was tested.".to_owned(), nothing.to_owned())
+        }
+    };
+    Banner { level, headline, sentence, every: every(cards), unknown }
+}
+
+/// What all schemes give back if neighbors were known, of several that were tried so.
+fn every(cards: &[Card]) -> Option<String> {
+    let known: Option<Vec<&Finding>> =
+        cards.iter().map(|card| card.finding(Basis::Oracle)).collect();
+    let known = known.filter(|known| known.len() > 1)?;
+    let least = known.into_iter().reduce(|a, b| if b.recovered < a.recovered { b } else { a })?;
+    let (when, percent) = (&least.when, &least.percent);
+    Some(format!("{when}, every scheme tried would give back {percent} % or more."))
+}
+
+/// The card and finding of this basis with the largest share.
+fn worst(cards: &[Card], basis: Basis) -> Option<(&Card, &Finding)> {
+    let found = cards.iter().filter_map(|card| Some((card, card.finding(basis)?)));
+    // Of equal ones the first.
+    found.reduce(|a, b| if b.1.recovered > a.1.recovered { b } else { a })
+}
+
+fn headline(level: Level, cards: &[Card]) -> String {
+    let at_level = |card: &&Card| card.today().is_some_and(|percent| Level::of(percent) >= level);
+    let (n, of) = (cards.iter().filter(at_level).count(), cards.len());
+    let under = match (n, of) {
+        (_, 1) => String::new(),
+        (2, 2) => " under either scheme".to_owned(),
+        (n, of) if n == of => format!(" under any of the {of} schemes"),
+        (n, of) => format!(" under {n} of {of} schemes"),
+    };
+    match level {
+        Level::Red => format!("Not protected{under}."),
+        Level::Orange => format!("Badly protected{under}."),
+        Level::Gray => "No attack tried here recovers much.".to_owned(),
+    }
+}
+
+fn said(document: &Document, (card, finding): (&Card, &Finding)) -> String {
+    let typed = tables::headline_threshold(document).unwrap_or_default();
+    let unit = document.results.first().map_or(LengthUnit::Meter, |row| row.unit);
+    let of = match unit {
+        LengthUnit::Pixel => "the keypoints of these images",
+        LengthUnit::Meter | LengthUnit::KthNeighbor => "the points of this map",
+    };
+    let what = format!("{} % of {of} {}", finding.percent, words::within(&typed, unit));
+    let by = format!("{}, {}", card.scheme.to_uppercase(), finding.briefly);
+    match finding.basis {
+        Basis::Released => {
+            format!("An attacker recovers {what} today, from the released data alone ({by}).")
+        }
+        Basis::Given => format!("An attacker recovers {what} with the given neighbors ({by})."),
+        Basis::Oracle => {
+            let known = finding.when.to_lowercase();
+            format!("An attacker would recover {what} {known} ({by}).")
+        }
+    }
+}
+
+/// Sources that read descriptors.
+const BY_DESCRIPTORS: [&str; 4] = ["similarity", "overlap", "descriptors", "learned"];
+
+/// What to do next, the most urgent first. Options of the command line stand in back quotes.
+pub(crate) fn next_steps(document: &Document, cards: &[Card]) -> Vec<String> {
+    let images = document.results.first().is_some_and(|row| row.unit == LengthUnit::Pixel);
+    let tried = |name: &str| document.results.iter().any(|row| row.neighbors.contains(name));
+    let with_descriptors = BY_DESCRIPTORS.iter().any(|name| tried(name));
+    let has_file = document.options.get("descriptors").is_some_and(|given| !given.is_null());
+    let mut steps = Vec::new();
+    if !with_descriptors {
+        let options = match images || has_file {
+            true => "`--neighbors descriptors`",
+            false => "`--descriptors FILE --neighbors descriptors`",
+        };
+        steps.push(format!(
+            "Try the stronger attack: add {options}. Descriptors tell an attacker which {} are \
+             neighbors, and no attack here has used them.",
+            if images { "keypoints" } else { "points" }
+        ));
+    } else if !tried("learned") {
+        steps.push(
+            "Try the stronger attack: add `--neighbors learned`, a network that finds neighbors \
+             from SIFT or ALIKED descriptors."
+                .to_owned(),
+        );
+    }
+    steps.extend(least(cards));
+    if with_descriptors && !document.results.iter().any(has_pictures) {
+        steps.push("See what an attacker sees: add `--invert` and the photos.".to_owned());
+    }
+    steps.push(
+        "Mitigate and measure again: release fewer points, or no descriptors. Both give an attacker \
+         less to work with."
+            .to_owned(),
+    );
+    if document.gates.is_empty() {
+        let typed = tables::headline_threshold(document).unwrap_or_default();
+        steps.push(format!(
+            "Watch it in your build: `--gate 'all@0.5:{typed}<=20'` fails when more than 20 % \
+             comes back."
+        ));
+    }
+    steps
+}
+
+fn has_pictures(row: &Row) -> bool {
+    row.metrics.contains_key("ssim")
+}
+
+/// The scheme that leaks least, of several.
+fn least(cards: &[Card]) -> Option<String> {
+    let share = |card: &Card| card.today().or(card.finding(Basis::Oracle).map(|f| f.recovered));
+    let known = cards.iter().filter(|card| card.today().is_some()).count();
+    let comparable = cards.iter().filter(|card| known == 0 || card.today().is_some());
+    let card = comparable.reduce(|a, b| if share(b) < share(a) { b } else { a })?;
+    if cards.len() < 2 {
+        return None;
+    }
+    let shares: Vec<String> = [Basis::Released, Basis::Oracle]
+        .iter()
+        .filter_map(|&basis| card.finding(basis))
+        .map(|found| match found.basis {
+            Basis::Released => format!("{} % today", found.percent),
+            _ => format!("{} % {}", found.percent, found.when.to_lowercase()),
+        })
+        .collect();
+    let name = card.scheme.to_uppercase();
+    Some(format!("Of the schemes tried, {name} leaks least: {}.", shares.join(", ")))
+}
