@@ -32,7 +32,7 @@ impl Inverter {
     /// When the file cannot be read, or has other inputs and outputs.
     pub fn read(path: &Path, kind: DescriptorKind) -> Result<Self, Error> {
         let entry = Entry { sha256: None, ..*entry(model(kind))? };
-        Ok(Self { kind, network: Network::read(path, &entry)? })
+        Ok(Self { kind, network: Network::read_plain(path, &entry)? })
     }
 
     /// SHA-256 of the model, in hexadecimal.

@@ -59,7 +59,8 @@ impl Network {
         match (folders.find(entry)?, entry.carried) {
             (Some(Place::File(path)), _) => Self::read(&path, entry),
             (Some(Place::Carried), Some(bytes)) => {
-                Self::from_bytes(Cow::Borrowed(bytes), entry.name, entry)
+                let all = OpRegistry::with_all_ops;
+                Self::from_bytes(Cow::Borrowed(bytes), (entry.name, entry), all)
             }
             _ => Err(folders.missing(entry)),
         }
@@ -70,14 +71,31 @@ impl Network {
     /// # Errors
     /// As [`load`](Self::load), and when the file cannot be read.
     pub fn read(path: &Path, entry: &Entry) -> Result<Self, Error> {
+        Self::read_with(path, entry, OpRegistry::with_all_ops)
+    }
+
+    /// The model in a file of a stranger, as `entry` describes it: with plain operators alone, whose results are about as large as
+    /// what they are made of or as the file, so that none makes anything huge or endless out of a few numbers.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read), and when it has other operators.
+    pub fn read_plain(path: &Path, entry: &Entry) -> Result<Self, Error> {
+        Self::read_with(path, entry, plain_operators)
+    }
+
+    fn read_with(path: &Path, entry: &Entry, operators: fn() -> OpRegistry) -> Result<Self, Error> {
         let place = path.display().to_string().escape_debug().to_string();
         let bytes = crate::file::bytes(path)
             .map_err(|error| Error::new(place.clone(), "a model in ONNX", error.to_string()))?;
-        Self::from_bytes(Cow::Owned(bytes), &place, entry)
+        Self::from_bytes(Cow::Owned(bytes), (&place, entry), operators)
     }
 
     /// The model of these bytes, called `place` in errors.
-    fn from_bytes(bytes: Cow<'static, [u8]>, place: &str, entry: &Entry) -> Result<Self, Error> {
+    fn from_bytes(
+        bytes: Cow<'static, [u8]>,
+        (place, entry): (&str, &Entry),
+        operators: fn() -> OpRegistry,
+    ) -> Result<Self, Error> {
         let sha256: String = Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect();
         if let Some(expected) = entry.sha256
             && sha256 != expected
@@ -86,10 +104,7 @@ impl Network {
         }
         wire::check(&bytes).map_err(|found| Error::new(place, "a model in ONNX", found))?;
         let model = aside(|| {
-            let mut options = match entry.sha256 {
-                Some(_) => ModelOptions::with_all_ops(),
-                None => ModelOptions::with_ops(plain_operators()),
-            };
+            let mut options = ModelOptions::with_ops(operators());
             // Twice the memory of the weights, a tenth of the time.
             options.prepack_weights(true);
             match bytes {
@@ -213,8 +228,7 @@ impl Network {
     }
 }
 
-/// Operators of networks that nobody has looked at: those whose results are about as large as what they are made of or as the
-/// file, so that none makes anything huge or endless out of a few numbers.
+/// Operators of networks that nobody has looked at: no loops, and none that fills a shape that it is told.
 fn plain_operators() -> OpRegistry {
     op_registry!(
         Abs,
