@@ -88,8 +88,8 @@ fn images_in_memory_have_the_figures_of_a_file() {
     let input = |audited: &Audited| audited.document.input.clone();
     assert_eq!(input(&of_memory).path, None);
     assert_ne!(input(&of_memory).sha256, input(&of_file).sha256);
-    // Three are drawn, of which one looks whether sources that nobody asked for would fit.
-    assert_eq!(asked.load(Ordering::Relaxed), NAMES.len() + 3 + 2 * 3);
+    // Three are drawn.
+    assert_eq!(asked.load(Ordering::Relaxed), NAMES.len() + 3);
 
     // What is found and then written is what is written at once.
     let out = place.path().join("audit");

@@ -9,9 +9,9 @@ use unlift::descriptors::Values;
 use crate::database::{Database, Kind};
 use crate::error::Error;
 use crate::features::FeatureSource;
-use crate::read::Input;
 use crate::read::colmap::{self, Image, Tracks};
 use crate::read::lines::quoted;
+use crate::read::map_input::Input;
 
 /// L2 norm of the descriptors COLMAP stores as bytes.
 const BYTE_NORM: f64 = 512.0;

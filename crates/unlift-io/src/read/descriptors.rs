@@ -12,8 +12,9 @@ use crate::error::Error;
 use crate::input;
 use crate::read::bytes::Bytes;
 use crate::read::lines::quoted;
+use crate::read::map_input::Input;
 use crate::read::scalar::Scalar;
-use crate::read::{Input, database, npy};
+use crate::read::{database, npy};
 
 const MAGIC: &[u8; 8] = b"P3DESC01";
 const SQLITE: &[u8; 8] = b"SQLite f";

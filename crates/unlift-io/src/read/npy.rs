@@ -7,12 +7,12 @@ use std::path::Path;
 
 use unlift::descriptors::Values;
 
-use super::Input;
 use super::bytes::Bytes;
 use super::columns::{Field, axes};
 use super::lines::{number, quoted};
 use super::scalar::Scalar;
 use crate::error::Error;
+use crate::read::map_input::Input;
 
 /// How every array begins.
 pub(crate) const MAGIC: &[u8; 6] = b"\x93NUMPY";

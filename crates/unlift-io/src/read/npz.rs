@@ -7,13 +7,13 @@ use zip::ZipArchive;
 use zip::read::ZipFile;
 use zip::result::ZipError;
 
-use super::Input;
 use super::bytes::Bytes;
 use super::lines::quoted;
 use super::npy::{Header, PLACES, of_points};
 use crate::error::Error;
 use crate::guard::without_panic;
 use crate::input::{self, Budget};
+use crate::read::map_input::Input;
 
 /// Reads positions from the one array of an `.npz` archive that holds some.
 ///

@@ -4,7 +4,6 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
-use super::Input;
 use super::bytes::Bytes;
 use super::columns::{Field, coordinate, is_called};
 use super::lines::{Lines, number, quoted, words};
@@ -12,6 +11,7 @@ use super::scalar::Scalar;
 use super::undeclared::undeclared;
 use crate::error::{Error, Place};
 use crate::input::{self, Budget};
+use crate::read::map_input::Input;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Encoding {

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use super::Input;
 use super::columns::{axes, coordinate, is_called, plain};
 use super::lines::{Lines, number, quoted, words};
 use crate::error::Error;
+use crate::read::map_input::Input;
 
 /// What stands between the values of a line; decided by the first line for the whole file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

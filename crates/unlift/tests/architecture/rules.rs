@@ -163,7 +163,7 @@ pub const CRATES: &[(&str, &[&str])] = &[
 ];
 
 /// Lines of a file at most, its unit tests not counted.
-pub const MOST_LINES: usize = 400;
+pub const MOST_LINES: usize = 800;
 
 /// What recovery may know of `neighbors`: lists as they are.
 const LISTS: &[&str] = &["Listing", "Neighborhoods", "ShelvedLists"];

@@ -12,7 +12,8 @@ use serde::{Deserialize, de};
 use super::pose::{DOWNWARD, camera};
 use crate::error::{Error, Place};
 use crate::input;
-use crate::read::{Input, ply};
+use crate::read::map_input::Input;
+use crate::read::ply;
 
 /// Reads points and cameras: of several reconstructions, those of the largest.
 ///

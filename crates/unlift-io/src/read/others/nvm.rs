@@ -4,9 +4,9 @@ use std::path::Path;
 
 use super::pose::{DOWNWARD, camera};
 use crate::error::Error;
-use crate::read::Input;
 use crate::read::columns::coordinate;
 use crate::read::lines::{Lines, number, quoted, words};
+use crate::read::map_input::Input;
 use crate::read::undeclared::undeclared;
 
 /// The rotation of a quaternion (w, x, y, z).

@@ -21,7 +21,7 @@ use super::is_geographic;
 use crate::error::{Error, Place};
 use crate::guard::without_panic;
 use crate::input::{self, Budget};
-use crate::read::Input;
+use crate::read::map_input::Input;
 
 /// Bytes of the head, and where in it the length of the XML stands.
 const HEAD: usize = 48;

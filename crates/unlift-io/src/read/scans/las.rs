@@ -9,9 +9,9 @@ use std::path::Path;
 
 use super::is_geographic;
 use crate::error::Error;
-use crate::read::Input;
 use crate::read::bytes::Bytes;
 use crate::read::lines::quoted;
+use crate::read::map_input::Input;
 use crate::read::undeclared::undeclared;
 
 /// Bytes of the heads of all versions up to the numbers that positions are made with.

@@ -11,10 +11,10 @@ use std::path::Path;
 use super::lzf::unpacked;
 use crate::error::{Error, Place};
 use crate::input::{self, Budget};
-use crate::read::Input;
 use crate::read::bytes::Bytes;
 use crate::read::columns::{self, coordinate};
 use crate::read::lines::{Lines, number, quoted, words};
+use crate::read::map_input::Input;
 use crate::read::scalar::Scalar;
 use crate::read::undeclared::undeclared;
 
