@@ -5,16 +5,15 @@ use minijinja::{AutoEscape, Environment, UndefinedBehavior};
 use serde::Serialize;
 
 use crate::document::{Document, ImageCounts, LengthUnit};
-use crate::exhibit::{Exhibit, exhibits};
 use crate::findings::{Findings, findings};
 use crate::gates::{Gates, gates};
-use crate::inversions::{Inversion, Sheet, sheets};
+use crate::inversions::{Sheet, sheets};
+use crate::opening::Opening;
 use crate::options::RenderOptions;
 use crate::page_data::page_data;
 use crate::scene::{Scene3d, encode};
 use crate::tables::Table;
-use crate::verdict::Verdict;
-use crate::{Error, attack, paper, pictures, tables, verdict, words};
+use crate::{Error, attack, paper, pictures, tables, words};
 
 /// The template and its parts, by the names they include each other with.
 const TEMPLATES: [(&str, &str); 9] = [
@@ -197,44 +196,6 @@ struct Page<'a> {
     notes: &'a [String],
     document: &'a Document,
     attribution: &'static str,
-}
-
-/// What a page begins with: the verdict on an audit, and its pictures if it has any.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Opening {
-    /// Stands above the verdict where a page has several.
-    title: Option<String>,
-    /// A page with the details, as a link relative to this one.
-    details: Option<String>,
-    verdict: Verdict,
-    exhibits: Vec<Exhibit>,
-    notes: Vec<String>,
-    /// Whether it is about images.
-    images: bool,
-}
-
-impl Opening {
-    fn of(document: &Document, inversions: &[Inversion]) -> Self {
-        Self {
-            title: None,
-            details: None,
-            verdict: verdict::verdict(document),
-            exhibits: exhibits(document, inversions),
-            notes: document.notes.clone(),
-            images: document.results.first().is_some_and(|row| row.unit == LengthUnit::Pixel),
-        }
-    }
-
-    /// The opening of another audit under this title, whose own page `details` is a link to.
-    pub fn titled(
-        document: &Document,
-        inversions: &[Inversion],
-        title: &str,
-        details: &str,
-    ) -> Self {
-        let (title, details) = (Some(title.to_owned()), Some(details.to_owned()));
-        Self { title, details, ..Self::of(document, inversions) }
-    }
 }
 
 /// Text with what stands in back quotes set as code; everything else is escaped.

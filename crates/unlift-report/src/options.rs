@@ -2,8 +2,8 @@
 
 #[cfg(doc)]
 use crate::document::Document;
-use crate::html::Opening;
 use crate::inversions::Inversion;
+use crate::opening::Opening;
 use crate::pictures::Picture;
 
 /// How to draw the page.

@@ -10,8 +10,7 @@ use crate::attack::{self, Basis, Given};
 use crate::banner::{Banner, banner, next_steps};
 use crate::cards::{Card, Finding, Level, Refusal};
 use crate::document::{Bound, BreakEven, Document, Row};
-use crate::inversions::Inversion;
-use crate::{exhibit, tables, words};
+use crate::{tables, words};
 
 /// The inlier ratio of the oracle's headline, if it was tested; else the tested one nearest to it.
 const HEADLINE_RATIO: f64 = 0.5;
@@ -48,33 +47,6 @@ pub(crate) fn verdict(document: &Document) -> Verdict {
     let refusals: Vec<Refusal> = refusals.collect();
     let (banner, steps) = (banner(document, &cards, &refusals), next_steps(document, &cards));
     Verdict { banner, cards, refusals, steps }
-}
-
-/// What came back of one scheme within the headline threshold, by the strongest attacks tried.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Shares {
-    /// The scheme's user-facing name.
-    pub scheme: String,
-    /// The same as a person would call it.
-    pub title: String,
-    /// Percent from the released data alone; `None` where no such attack was tried.
-    pub today: Option<f64>,
-    /// Percent if neighbors were known, at the tested share nearest to half; `None` without an oracle.
-    pub known: Option<f64>,
-    /// How many pictures can be rebuilt from the released data alone; `None` where nothing was painted.
-    pub pictures: Option<String>,
-}
-
-/// The shares of every scheme, the worst first, as the page leads with them.
-pub fn shares(document: &Document, inversions: &[Inversion]) -> Vec<Shares> {
-    let of = |card: Card| Shares {
-        today: card.today(),
-        known: card.finding(Basis::Oracle).map(|finding| finding.recovered),
-        pictures: exhibit::pictures_said(document, inversions, &card.scheme),
-        scheme: card.scheme,
-        title: card.title,
-    };
-    verdict(document).cards.into_iter().map(of).collect()
 }
 
 /// Percent that came back within the threshold `typed`.
