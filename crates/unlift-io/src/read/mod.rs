@@ -28,7 +28,7 @@ use models::Model;
 
 /// Reads the map at `path`: a COLMAP model folder or a project folder that holds one (of several, the
 /// one with the most points; `notes` says which), a map of OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler or VisualSFM (NVM),
-/// or a point cloud: see [`EXPECTED`] for the endings.
+/// or a point cloud: see `EXPECTED` for the endings.
 ///
 /// Points whose coordinates are not finite are left out and counted.
 ///
