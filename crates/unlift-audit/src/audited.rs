@@ -43,8 +43,8 @@ impl Audited {
         shares(&self.document, &self.drawn.inversions)
     }
 
-    /// The same audit, whose page begins with the verdict and pictures of `other` under `title`; `details` is a link
-    /// to the page of `other`.
+    /// Puts the verdict and pictures of `other` before this audit's on its page, under `title`. `details` is a link to
+    /// the page of `other`.
     #[must_use]
     pub fn opening_with(mut self, other: &Self, title: &str, details: &str) -> Self {
         let inversions = &other.drawn.inversions;

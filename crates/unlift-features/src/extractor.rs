@@ -101,7 +101,7 @@ impl Extractor {
         Ok(Self { of, max_image_size: extraction.max_image_size(), turn: Turn::Upright })
     }
 
-    /// The same, of photos that are turned so.
+    /// Sets how photos are turned before features are extracted.
     #[must_use]
     pub fn with_turn(self, turn: Turn) -> Self {
         Self { turn, ..self }

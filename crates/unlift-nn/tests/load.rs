@@ -146,7 +146,7 @@ fn network(operators: &[&str]) -> Vec<u8> {
     [vec![8, 8], field(7, &graph), field(8, &[16, 13])].concat()
 }
 
-/// Of a file that nobody knows: an inverter of one's own.
+/// The entry of a user's own inverter, whose hash is not known.
 fn stranger() -> Entry {
     let any = &[None; 4];
     let port = |name| Port { name, shape: any };

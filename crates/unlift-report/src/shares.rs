@@ -12,7 +12,7 @@ use crate::verdict::verdict;
 pub struct Shares {
     /// The scheme's user-facing name.
     pub scheme: String,
-    /// The same as a person would call it.
+    /// What a person would call the scheme.
     pub title: String,
     /// Percent from the released data alone; `None` where no such attack was tried.
     pub today: Option<f64>,

@@ -79,7 +79,7 @@ impl Folder {
         self.turn
     }
 
-    /// The same, of photos that are turned so.
+    /// Sets how photos are turned before features are extracted.
     #[must_use]
     pub fn with_turn(self, turn: Turn) -> Self {
         Self { extractor: self.extractor.with_turn(turn), turn, ..self }

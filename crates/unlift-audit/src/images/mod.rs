@@ -57,7 +57,7 @@ impl FeatureSource {
         }
     }
 
-    /// The same, of photos that are turned so; features of a file are as they are.
+    /// Sets how photos of a folder are turned. It changes nothing for a file, which says how its photos were turned.
     #[must_use]
     pub fn with_turn(self, turn: Turn) -> Self {
         match self {

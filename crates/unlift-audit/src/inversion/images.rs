@@ -46,7 +46,7 @@ impl fmt::Debug for Inversion {
 }
 
 impl Inversion {
-    /// Of images whose photos are in `photos`; keypoints are in pixels of photos that are turned so.
+    /// Paints images whose photos are in the folder `photos`. `turn` says in which photos keypoints are pixels.
     pub fn new(painter: Painter, photos: &Path, turn: Turn) -> Self {
         let photos = photos.to_owned();
         Self { painter, photos, turn, known: Mutex::default(), failed: Mutex::default() }

@@ -37,7 +37,8 @@ pub fn of_database(path: &Path, input: &Input) -> Result<Descriptors, Error> {
     })
 }
 
-/// The same from hloc's features at `path`, whose keypoints are numbered as the 2D points of the model.
+/// Descriptors of the map's points from hloc's features at `path`: the mean over each track. Keypoints are numbered as
+/// the 2D points of the model.
 pub fn of_features(path: &Path, input: &Input) -> Result<Descriptors, Error> {
     let features = FeatureSource::open(path)?;
     mean(path, input, |image| {

@@ -24,7 +24,8 @@ pub struct Input {
     pub up: Option<[f64; 3]>,
     /// Every file that was read, for hashes in a report.
     pub files: Vec<PathBuf>,
-    /// The same before anything was read of them, but for files that one of them names.
+    /// Size and time of these files before they were read, to see whether one changes meanwhile. Files that are named in
+    /// another file are not among them.
     pub seen: Seen,
     /// The name of the format, for people: `COLMAP binary`, `ply ascii`.
     pub format: &'static str,

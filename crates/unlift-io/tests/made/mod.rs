@@ -40,7 +40,7 @@ pub fn las(minor: u8, record: u16) -> Vec<u8> {
     file
 }
 
-/// The same with a record on its coordinate system, before the points or, `long`, behind them.
+/// A LAS file with a record on its coordinate system, before the points or, if `long`, behind them.
 pub fn las_with(minor: u8, id: u16, record: &[u8], long: bool) -> Vec<u8> {
     let mut file = las(minor, 20);
     let mut head = vec![0; 2];

@@ -6,10 +6,12 @@ use crate::recover::Recovered;
 use crate::released::{Obfuscation, Released};
 use crate::truth::{Original, Secret};
 
-/// Of how many recovered positions, how many are nearer to what they are of than to what is half a map away: to their own
-/// record, where the released map is at hand, else to a point of it. Records stand in random order: of positions of another
-/// map, or in another order, it is half of them. Who knows no more than the records has nearly all of them on their own
-/// records, and clearly more than half nearer to their own points.
+/// Counts how many recovered positions lie nearer to their own record than to another one, half a map away, and how many
+/// were looked at. Without the released map, it counts how many lie nearer to a true point of their own record.
+///
+/// Records stand in random order. So about half of the positions pass if they are of another map or in another order.
+/// An attacker who knows nothing but the records has nearly all positions on their own records, and clearly more than
+/// half nearer to their own points.
 pub fn nearer_to_own<const D: usize>(
     recovered: &Recovered<D>,
     original: &Original<D>,
@@ -97,7 +99,7 @@ fn point_of<const D: usize>(
     |slot| Some(points[secret.hidden()[slot].index()])
 }
 
-/// Of how many of `n` slots that have a place, how many are nearer to their own record than to one half a map away.
+/// Counts how many of `n` slots lie nearer to their own record than to one half a map away, and how many have a position.
 fn nearer_to_own_record<const D: usize>(
     released: &Released<D>,
     n: usize,

@@ -16,7 +16,8 @@ use crate::{About, Error, RecordId, RowOrder};
 
 /// Estimates looked at per record listed: some share a record, some records pass too far away.
 const LOOK: usize = 3;
-/// The same at most, where nearly all of them may not be listed: estimates of one center that coincide.
+/// Most estimates looked at per record listed. Only estimates of one center that coincide need as many, as they may not
+/// list each other.
 const MOST_LOOKED: usize = 64 * LOOK;
 
 /// Per slot the `k` records most likely to hide points near its own, with scores that are higher for

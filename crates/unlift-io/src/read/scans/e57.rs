@@ -153,13 +153,13 @@ struct Frame {
 const UPRIGHT: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 impl Frame {
-    /// That of `cloud`, not turned.
+    /// The pose of `cloud` without its rotation.
     fn shifted(cloud: &PointCloud) -> Self {
         let t = cloud.transform.as_ref().map(|pose| &pose.translation);
         Self { rotation: UPRIGHT, translation: t.map_or([0.0; 3], |t| [t.x, t.y, t.z]) }
     }
 
-    /// That of `cloud`, by its quaternion of any length; `None` where that is zero.
+    /// The pose of `cloud`. Its quaternion may have any length; `None` where that is zero.
     fn of(cloud: &PointCloud) -> Option<Self> {
         let shifted = Self::shifted(cloud);
         let Some(pose) = &cloud.transform else { return Some(shifted) };

@@ -173,7 +173,7 @@ impl Strips {
         rows.map(|row| row.2).filter(move |&j| self.fit(sides, i, j as usize))
     }
 
-    /// The same, of each step no more than a few, which are other ones for every record.
+    /// Some of the possible partners of record `i`: a few of each set of equal values, and other ones for every record.
     fn some_of<'a>(&'a self, sides: &'a [Side], i: usize) -> impl Iterator<Item = u32> + 'a {
         let few = move |rows: &'a [(u64, f32, u32)]| {
             let n = rows.len().min(MOST_OF_TIES / 2);
