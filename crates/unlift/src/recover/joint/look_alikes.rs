@@ -5,8 +5,7 @@
 //! evidence as the right one. But those there do not list back, while at the right place as many list as are
 //! listed. So where crowds are found, one side may be ahead of the other only so far.
 
-use super::neighbor_distribution::Learning;
-use super::sample::{RANDOM, Sampled};
+use super::sample::{Learning, RANDOM, Sampled};
 use crate::recover::map::edges::{Side, side};
 use crate::recover::map::places::distance2;
 

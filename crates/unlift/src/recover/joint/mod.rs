@@ -19,6 +19,7 @@
 //! hold still while the others move. Only the first iteration moves all: its start comes from records alone.
 
 mod equations;
+mod input;
 mod jumps;
 mod look_alikes;
 mod neighbor_distribution;
@@ -34,6 +35,7 @@ use crate::recover::map::family::Family;
 use crate::recover::map::graph::Graph;
 use crate::recover::map::pieces::{CandidatePieces, LinePieces, Pieces, PlanePieces};
 use crate::recover::result::estimate::Estimate;
+use input::Input;
 use sample::Sample;
 use state::State;
 
@@ -51,17 +53,6 @@ pub(crate) struct Joint<'a, const D: usize> {
     /// The distance up to which a record supports a place, in the unit of the map.
     pub(crate) delta: f32,
     pub(crate) seed: u64,
-}
-
-/// [`Joint`] with the records as pieces of their family.
-struct Input<'a, const D: usize, P> {
-    pieces: P,
-    graph: &'a Graph,
-    delta: f32,
-    /// How often each record is listed.
-    listed: Vec<u32>,
-    /// The edges that the distribution of neighbors is learned from.
-    sample: Sample,
 }
 
 impl<const D: usize> Joint<'_, D> {

@@ -8,11 +8,8 @@
 use rayon::prelude::*;
 
 use super::look_alikes;
-use super::sample::{RANDOM, Sample, Sampled};
-use crate::recover::map::crowding::Density;
+use super::sample::{Learning, RANDOM, Sampled};
 use crate::recover::map::edges::{CLASSES, Side, either, side};
-use crate::recover::map::graph::Graph;
-use crate::recover::map::places::Places;
 use crate::recover::map::settings::Settings;
 use crate::simd::{Kernel, dispatch};
 
@@ -31,22 +28,6 @@ const TIGHTER: f64 = 0.65;
 const TAIL: f64 = 0.1;
 /// The share of neighbors in a class is at least and at most this: odds of nothing or without end would never change again.
 const SHARE: (f64, f64) = (5e-4, 0.95);
-
-/// What the distribution is learned from.
-pub(super) struct Learning<'a, const D: usize> {
-    pub(super) places: &'a Places<D>,
-    pub(super) density: &'a Density<D>,
-    pub(super) slots_per_record: usize,
-    /// True neighbors are looked for within this many local widths.
-    pub(super) reach: f32,
-    /// Whether entries that are near without being neighbors are told from neighbors.
-    pub(super) tells_region: bool,
-    /// The radius at least and at most.
-    pub(super) least_radius: f32,
-    pub(super) most_radius: f32,
-    pub(super) graph: &'a Graph,
-    pub(super) sample: &'a Sample,
-}
 
 /// What is known about true neighbors.
 #[derive(Clone, Debug)]

@@ -2,9 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::Input;
+use super::input::Input;
 use super::jumps::Jumps;
-use super::neighbor_distribution::{Learning, NeighborDistribution};
+use super::neighbor_distribution::NeighborDistribution;
+use super::sample::Learning;
 use super::update::{Round, Scratch, TUBE};
 use super::validation::agreement;
 use crate::recover::map::chunks::CHUNK;
@@ -68,7 +69,7 @@ pub(super) struct Update<const D: usize> {
 
 impl<const D: usize> State<D> {
     /// The state before the first iteration, at `start`.
-    pub(super) fn new<P: Pieces<D>>(input: &Input<'_, D, P>, start: Vec<Estimate<D>>) -> Self {
+    pub(super) fn new<P: Pieces<D>>(input: &Input<'_, P>, start: Vec<Estimate<D>>) -> Self {
         let n = start.len();
         let places = Places::new(&start);
         let least_radius = (ROUNDING * places.farthest()).max(f32::MIN_POSITIVE);
@@ -102,7 +103,7 @@ impl<const D: usize> State<D> {
     }
 
     /// Learns density and distribution of the present places, if enough slots jumped since.
-    pub(super) fn learn_if_stale<P: Pieces<D>>(&mut self, input: &Input<'_, D, P>) {
+    pub(super) fn learn_if_stale<P: Pieces<D>>(&mut self, input: &Input<'_, P>) {
         if self.n_jumped_since as f64 <= STALE * self.estimates.len() as f64 {
             return;
         }
@@ -119,7 +120,7 @@ impl<const D: usize> State<D> {
     /// Where `slots` go: the best of their candidates, refined.
     pub(super) fn propose_score_refine<P: Pieces<D>>(
         &self,
-        input: &Input<'_, D, P>,
+        input: &Input<'_, P>,
         slots: impl Iterator<Item = u32>,
     ) -> Vec<Update<D>> {
         let of_slot =
@@ -143,7 +144,7 @@ impl<const D: usize> State<D> {
     }
 
     /// Moves slots to where they go, and tells those whom a jump concerns.
-    pub(super) fn apply<P: Pieces<D>>(&mut self, input: &Input<'_, D, P>, updates: &[Update<D>]) {
+    pub(super) fn apply<P: Pieces<D>>(&mut self, input: &Input<'_, P>, updates: &[Update<D>]) {
         let mut jumpers = Vec::new();
         for Update { slot, ahead, estimate } in updates {
             let at = *slot as usize;
@@ -167,7 +168,7 @@ impl<const D: usize> State<D> {
     }
 
     /// Judges an iteration: whether it was the last one.
-    pub(super) fn has_converged<P: Pieces<D>>(&mut self, input: &Input<'_, D, P>) -> bool {
+    pub(super) fn has_converged<P: Pieces<D>>(&mut self, input: &Input<'_, P>) -> bool {
         let n = self.estimates.len();
         if (self.n_jumped as f64) < SETTLED * n as f64 {
             // So few hardly made it worse.
@@ -191,7 +192,7 @@ impl<const D: usize> State<D> {
 
 /// Density and distribution of `places`, with neighbors looked for as if `radius` were that of the distribution.
 fn learned<const D: usize, P: Pieces<D>>(
-    input: &Input<'_, D, P>,
+    input: &Input<'_, P>,
     places: &Places<D>,
     radius: f32,
     least_radius: f32,

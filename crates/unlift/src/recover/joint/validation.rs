@@ -6,7 +6,7 @@
 
 use rayon::prelude::*;
 
-use super::Input;
+use super::input::Input;
 use crate::recover::map::edges::record_of;
 use crate::recover::map::pieces::Pieces;
 use crate::recover::result::estimate::{Estimate, Status};
@@ -17,7 +17,7 @@ const SLOTS: usize = 1 << 12;
 /// The mean number of records at the other ends of a slot's edges that pass near its estimate, less
 /// that expected by chance; over slots spread evenly.
 pub(super) fn agreement<const D: usize, P: Pieces<D>>(
-    input: &Input<'_, D, P>,
+    input: &Input<'_, P>,
     estimates: &[Estimate<D>],
 ) -> f64 {
     let n = estimates.len();
@@ -29,7 +29,7 @@ pub(super) fn agreement<const D: usize, P: Pieces<D>>(
 }
 
 fn of_slot<const D: usize, P: Pieces<D>>(
-    input: &Input<'_, D, P>,
+    input: &Input<'_, P>,
     slot: usize,
     estimate: &Estimate<D>,
 ) -> f64 {
