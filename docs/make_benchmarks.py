@@ -13,8 +13,6 @@ or parts of them, named after the folder; each tells on stderr how long it took 
     large       5 min    the cost of 700,000 points
     images      5 min    keypoints of photos
     pictures    5 min    what came back, painted
-    scale      40 min    maps of up to ten million points under a memory limit; 12 GB of disk (in $UNLIFT_SCALE)
-    resumed     2 min    a recovery of a million points that is killed and goes on
 
 `± s` is the standard deviation over seeds, where it exceeds 0.5. Needs the scenes (SHARED/data) and the paper's tables (SHARED/paper/tables);
 standard library only. Everything between the begin and end markers of the two files is replaced.
@@ -23,7 +21,6 @@ import array, csv, json, math, pathlib, random, struct, subprocess, sys, tempfil
 
 import image_tables
 import picture_tables
-import scale_tables
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 SHARED = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else ROOT.parent / "shared").resolve()
@@ -354,17 +351,9 @@ def pictures():
     put(ROOT / "docs/benchmarks.md", "pictures", picture_tables.tables(ROOT / "target/release/unlift", SHARED))
 
 
-def scale():
-    put(ROOT / "docs/benchmarks.md", "scale", scale_tables.tables(ROOT / "target/release/unlift", tiled))
-
-
-def resumed():
-    put(ROOT / "docs/benchmarks.md", "resumed", scale_tables.resumed(ROOT / "target/release/unlift", tiled))
-
-
 def main():
     sections = {"accuracy": accuracy, "low": below_a_tenth, "noise": noise, "own": own, "alone": alone, "large": large,
-                "images": images, "pictures": pictures, "scale": scale, "resumed": resumed}
+                "images": images, "pictures": pictures}
     for name in sys.argv[2:] or sections:
         started = time.monotonic()
         sections[name]()

@@ -5,11 +5,9 @@
 mod bytes;
 mod files;
 mod records;
-mod rounds;
 
 pub use files::{descriptors, document, features, model_folder, network, photo, points, stages};
 pub use records::recovery;
-pub use rounds::rounds;
 
 /// What is done with an input.
 pub type Target = fn(&[u8]);
@@ -25,5 +23,4 @@ pub const TARGETS: &[(&str, Target)] = &[
     ("document", document),
     ("network", network),
     ("recovery", recovery),
-    ("rounds", rounds),
 ];

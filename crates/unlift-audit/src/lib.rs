@@ -61,7 +61,7 @@ pub use document::{evaluated, ordered, row};
 pub use error::Error;
 pub use gate::{Candidate, Figure, Gate};
 pub use given::by_point;
-pub use journal::{Journal, KeptRounds};
+pub use journal::Journal;
 pub use lengths::{Extent, check_scale, check_thresholds};
 pub use maps::Job;
 pub use memory::{peak_bytes, total_bytes};

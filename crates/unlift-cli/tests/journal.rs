@@ -1,4 +1,4 @@
-//! An interrupted audit or recovery goes on from what it kept, to the same figures.
+//! An interrupted audit goes on from what it kept, to the same figures.
 
 #![cfg(unix)]
 
@@ -147,71 +147,4 @@ fn a_journal_that_is_a_file_is_refused() {
     let place = Place::with_room(300);
     let (_, told) = place.ends(&format!("{AUDIT} --journal room.csv --out out"), 2);
     assert_eq!(told, "unlift: --journal: room.csv: expected a folder, found a file\n");
-}
-
-#[test]
-fn lists_that_are_not_in_memory_go_on_as_well() {
-    let place = Place::with_room(3000);
-    place.ends(&format!("{AUDIT} --out whole"), 0);
-    let n_kept = interrupted(&place).len();
-    // Told by their content, wherever they are.
-    let (_, told) =
-        place.ends(&format!("{AUDIT} --memory-limit 100MB --journal kept --out out"), 0);
-    let note = format!("unlift: note: {}", taken(n_kept));
-    assert!(told.lines().any(|line| line == note), "{told}");
-    assert_eq!(figures(&place, "out"), figures(&place, "whole"));
-}
-
-/// A released map and lists, and the command that recovers it.
-fn with_lists(n: usize) -> (Place, String) {
-    let place = Place::with_room(n);
-    place.ends("obfuscate room.csv --scale 1 --scheme ppl --out hidden", 0);
-    place.ends("neighbors oracle hidden/truth.parquet --inlier-ratio 0.3 --out lists.parquet", 0);
-    (place, "recover hidden/released.parquet --neighbors lists.parquet".to_owned())
-}
-
-#[test]
-fn a_recovery_goes_on_from_its_rounds() {
-    let (place, recover) = with_lists(12_000);
-    place.ends(&format!("{recover} --out whole.parquet"), 0);
-    let whole = fs::read(place.path("whole.parquet")).expect("a result");
-    for limit in ["", " --memory-limit 100MB"] {
-        let line = format!("{recover}{limit} --journal kept --out out.parquet");
-        killed_at(&place, &line, (1, ".rounds"));
-        assert!(!place.path("out.parquet").exists());
-        let (_, told) = place.ends(&line, 0);
-        assert_eq!(told, "unlift: note: goes on from the rounds in kept\n");
-        assert_eq!(fs::read(place.path("out.parquet")).expect("a result"), whole);
-        assert!(!place.path("kept").exists(), "what is done is cleared away");
-        fs::remove_file(place.path("out.parquet")).expect("it is there");
-    }
-}
-
-#[test]
-fn rounds_that_are_damaged_or_of_others_are_not_taken() {
-    let (place, recover) = with_lists(12_000);
-    let line = format!("{recover} --journal kept --out out.parquet");
-    killed_at(&place, &line, (1, ".rounds"));
-    // Of another seed: neither taken nor cleared away.
-    let (_, told) = place.ends(&format!("{line} --seed 4"), 0);
-    assert_eq!(told, "");
-    let path = kept(&place, ".rounds").pop().expect("what was kept before");
-    let mut bytes = fs::read(&path).expect("rounds");
-    let middle = bytes.len() / 2;
-    bytes[middle] ^= 1;
-    fs::write(&path, bytes).expect("damaged rounds");
-    let (_, told) = place.ends(&line, 0);
-    assert!(told.ends_with(".rounds is damaged: recovered again\n"), "{told}");
-    place.ends(&format!("{recover} --out whole.parquet"), 0);
-    let read = |name| fs::read(place.path(name)).expect("a result");
-    assert_eq!(read("out.parquet"), read("whole.parquet"));
-}
-
-#[test]
-fn what_has_no_rounds_has_no_journal() {
-    let (place, recover) = with_lists(300);
-    let (_, told) = place.ends(&format!("{recover} --solver consensus --journal kept"), 2);
-    let expected = "unlift: --journal keeps rounds of joint recovery: expected a map and --solver joint, found consensus\n";
-    assert_eq!(told, expected);
-    assert!(!place.path("kept").exists());
 }

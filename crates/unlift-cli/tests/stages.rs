@@ -55,10 +55,6 @@ impl Stages {
         self.ends(&format!("obfuscate {map} --scheme {scheme} --seed {seed} --out {name}"), 0);
         let oracle = format!("neighbors oracle {name}/truth.parquet --k 10 --inlier-ratio 0.5");
         self.ends(&format!("{oracle} --seed {seed} --out {name}-lists"), 0);
-        let limited = format!("{oracle} --seed {seed} --memory-limit 300MB --out {name}-limited");
-        self.ends(&limited, 0);
-        let bytes = |lists: &str| std::fs::read(self.path(&format!("{name}-{lists}"))).unwrap();
-        assert!(bytes("limited") == bytes("lists"), "{scheme}");
         let recover = format!("recover {name}/released.parquet --neighbors {name}-lists");
         self.ends(&format!("{recover} --seed {seed} --out {name}-back"), 0);
     }
@@ -78,24 +74,13 @@ fn the_stages_print_the_row_of_the_audit() {
             "audit map room.csv --scale 1 --k 10 --descriptors d.bin --seed 7 --schemes {scheme} \
              --inlier-ratios 0.5 --neighbors oracle --neighbors overlap --neighbors geometric --json"
         );
-        // Lists of the oracle in files beside the report: the same rows, and no file is left.
-        std::fs::create_dir_all(place.path("limited")).unwrap();
-        let limited = place.json(&format!("{audit} --memory-limit 300MB --out limited/audit"));
-        assert_eq!(std::fs::read_dir(place.path("limited")).unwrap().count(), 1);
         let audit = place.json(&audit);
-        assert_eq!(audit["results"], limited["results"], "{scheme}");
         for source in ["oracle", "overlap", "geometric"] {
             if source != "oracle" {
                 let find = format!("neighbors find hidden/released.parquet --source {source}");
                 place.ends(&format!("{find} --seed 7 --out hidden-lists"), 0);
                 let recover = "recover hidden/released.parquet --neighbors hidden-lists --seed 7";
                 place.ends(&format!("{recover} --out hidden-back"), 0);
-                // Lists that are in files give the same bytes, and leave no file behind.
-                std::fs::create_dir_all(place.path("away")).unwrap();
-                place.ends(&format!("{recover} --memory-limit 300MB --out away/back"), 0);
-                let bytes = |name: &str| std::fs::read(place.path(name)).unwrap();
-                assert!(bytes("away/back") == bytes("hidden-back"), "{scheme}");
-                assert_eq!(std::fs::read_dir(place.path("away")).unwrap().count(), 1);
             }
             let staged = place.json("evaluate hidden-back --truth hidden/truth.parquet --json");
             let rows = audit["results"].as_array().expect("rows");
@@ -179,11 +164,9 @@ fn parts_are_what_the_file_is() {
         parts("/released.parquet", "/released");
         parts("/truth.parquet", "/truth");
         let bytes = |file: &str| std::fs::read(stages.path(&format!("{scheme}{file}"))).unwrap();
-        for limit in ["", "--memory-limit 300MB"] {
-            let recover = format!("recover {scheme}/released --neighbors {scheme}/lists --seed 1");
-            stages.ends(&format!("{recover} {limit} --out {scheme}/again"), 0);
-            assert!(bytes("/again") == bytes("-back"), "{scheme}");
-        }
+        let recover = format!("recover {scheme}/released --neighbors {scheme}/lists --seed 1");
+        stages.ends(&format!("{recover} --out {scheme}/again"), 0);
+        assert!(bytes("/again") == bytes("-back"), "{scheme}");
         parts("-back", "/back");
         let evaluate = |back: &str, truth: &str| {
             let released = format!("--released {scheme}/released.parquet");

@@ -41,7 +41,6 @@ pub mod hash;
 pub mod input;
 pub mod read;
 pub mod seen;
-pub mod shelf;
 pub mod stage;
 mod unfinished;
 

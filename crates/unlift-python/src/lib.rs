@@ -31,7 +31,6 @@ mod plan;
 mod records;
 mod recovered;
 mod report;
-mod rounds;
 mod rows;
 mod work;
 
@@ -64,8 +63,6 @@ mod _unlift {
     use super::recovered::{Recovered, evaluate, recover};
     #[pymodule_export]
     use super::report::Report;
-    #[pymodule_export]
-    use super::rounds::{Edges, Lead, Outline, prepare_rounds};
     #[pymodule_export]
     use super::rows::Rows;
 

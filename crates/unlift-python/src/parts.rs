@@ -1,17 +1,12 @@
 //! A map solved in parts, each by whoever has its records and the lists of some slots.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyType};
 use unlift::RecordId;
 use unlift::neighbors;
-use unlift::recover::{
-    Estimate, Model as Learned, Part, RecoverOptions, Status, prepare as learn, prepare_shelved,
-};
-use unlift_io::shelf::Files;
-use unlift_io::stage::{read_neighborhoods, shelve_neighborhoods};
+use unlift::recover::{Estimate, Model as Learned, Part, Status, prepare as learn};
 
 use crate::arrays::{column, indices, rows, to_array, whole};
 use crate::errors::{raised, wrong};
@@ -22,7 +17,7 @@ use crate::work;
 
 /// What is learned of a released map and its lists before any point is placed: small, whatever the size of the map.
 #[pyclass(frozen, module = "unlift")]
-pub struct Model(pub(crate) Arc<Learned<3>>);
+pub struct Model(Arc<Learned<3>>);
 
 /// The columns of solved slots, in order.
 const COLUMNS: [&str; 6] = ["position", "status", "support", "axis", "evidence", "descriptor_row"];
@@ -50,19 +45,13 @@ impl Model {
     }
 
     fn __repr__(&self) -> String {
-        format!("<unlift.Model: {}, delta {}>", self.solver(), self.delta())
+        format!("<unlift.Model: delta {}>", self.delta())
     }
 
     /// The distance up to which a record agrees.
     #[getter]
     fn delta(&self) -> f64 {
         self.0.delta()
-    }
-
-    /// The solver that it was made for.
-    #[getter]
-    fn solver(&self) -> &'static str {
-        self.0.options().solver.name()
     }
 
     /// Solves the slots from `first` on by consensus. Their lists stand one after the other in `records` and start at `offsets`, which
@@ -109,75 +98,27 @@ impl Model {
     }
 }
 
-/// Learns what a solver must know of a released map and all of its lists, or the file of them. With a `memory_limit` (bytes) that file is
-/// read a window at a time, and what takes more is put in files of the folder for temporary ones (`TMPDIR`).
+/// Learns what consensus must know of a released map and all of its lists.
 #[pyfunction]
-#[pyo3(signature = (released, lists, *, solver="consensus", delta=None, seed=0, exact_constraints=true, memory_limit=None, threads=None))]
-#[allow(clippy::too_many_arguments)]
+#[pyo3(signature = (released, lists, *, delta=None, seed=0, exact_constraints=true, threads=None))]
 pub fn prepare(
     py: Python<'_>,
     released: &Bound<'_, PyAny>,
-    lists: &Bound<'_, PyAny>,
-    solver: &str,
+    lists: &Bound<'_, Neighborhoods>,
     delta: Option<f64>,
     seed: u64,
     exact_constraints: bool,
-    memory_limit: Option<u64>,
     threads: Option<usize>,
 ) -> PyResult<Model> {
-    let options = options(solver, delta, seed, exact_constraints)?;
-    // Nobody who has a part can say how sure it is.
-    let options = RecoverOptions { confidence: false, ..options };
-    let model = with_lists(
-        py,
-        (released, lists),
-        (memory_limit, threads),
-        move |released, lists| learn(released, lists, &options),
-        move |released, lists, files| prepare_shelved(released, lists, &options, files),
-    )?;
+    let options = options("consensus", delta, seed, exact_constraints)?;
+    let released = released_of(released)?.of_map()?;
+    let lists = Arc::clone(&lists.get().0);
+    let model = work::run(py, threads, None, move || learn(&released, &lists, &options))?;
     Ok(Model(Arc::new(model)))
 }
 
-/// Does something with a released map and its lists, which are `here` in memory or, under a limit, `away` in files.
-pub(crate) fn with_lists<T: Send + 'static>(
-    py: Python<'_>,
-    (released, lists): (&Bound<'_, PyAny>, &Bound<'_, PyAny>),
-    (memory_limit, threads): (Option<u64>, Option<usize>),
-    here: impl FnOnce(&Map, &neighbors::Neighborhoods) -> Result<T, unlift::Error> + Send + 'static,
-    away: impl FnOnce(&Map, &neighbors::ShelvedLists, &Files) -> Result<T, unlift::Error>
-    + Send
-    + 'static,
-) -> PyResult<T> {
-    let released = released_of(released)?.of_map()?;
-    if let Ok(lists) = lists.cast::<Neighborhoods>() {
-        if memory_limit.is_some() {
-            return Err(wrong("lists", "the path of a file, with memory_limit", "Neighborhoods"));
-        }
-        let lists = Arc::clone(&lists.get().0);
-        return work::run(py, threads, None, move || here(&released, &lists));
-    }
-    let Ok(path) = lists.extract::<PathBuf>() else {
-        let found = lists.get_type().name()?.to_string();
-        return Err(wrong("lists", "Neighborhoods, or the path of their file", found));
-    };
-    let map = (released.n_records(), released.slots_per_record());
-    work::run(py, threads, None, move || {
-        let done = match memory_limit {
-            None => here(&released, &read_neighborhoods(&path, map.0, map.1)?),
-            Some(limit) => {
-                let files = Files::new(std::env::temp_dir(), limit);
-                away(&released, &shelve_neighborhoods(&path, map, &files)?, &files)
-            }
-        };
-        done.map_err(|error| unlift_io::Error::core(&path, error))
-    })
-}
-
-/// What is released of a map.
-pub(crate) type Map = unlift::released::Released<3>;
-
 /// Estimates as columns.
-pub(crate) fn columns(py: Python<'_>, part: Part<3>) -> PyResult<Bound<'_, PyDict>> {
+fn columns(py: Python<'_>, part: Part<3>) -> PyResult<Bound<'_, PyDict>> {
     let rows = &part.estimates;
     let values = [
         to_array(py, rows.iter().flat_map(|row| row.position).collect())
@@ -196,7 +137,7 @@ pub(crate) fn columns(py: Python<'_>, part: Part<3>) -> PyResult<Bound<'_, PyDic
 }
 
 /// The columns of `n` slots as estimates.
-pub(crate) fn part(columns: &Bound<'_, PyDict>, n: usize) -> PyResult<Part<3>> {
+fn part(columns: &Bound<'_, PyDict>, n: usize) -> PyResult<Part<3>> {
     let given = |name: &str| -> PyResult<Bound<'_, PyAny>> {
         let missing = || wrong("columns", format!("a column {name}"), "none");
         columns.get_item(name)?.ok_or_else(missing)

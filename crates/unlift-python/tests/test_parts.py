@@ -27,7 +27,7 @@ def test_parts_are_the_whole(scheme: str, tmp_path: pathlib.Path):
     of = hidden(scheme)
     lists = unlift.neighbors.oracle(of, 0.5, k=20)
     model = pickle.loads(pickle.dumps(unlift.prepare(of, lists, seed=2)))
-    assert model.solver == "consensus" and "consensus" in repr(model)
+    assert "delta" in repr(model)
     rows = unlift.parts.table(lists)
     assert rows["records"].combine_chunks().flatten().to_pylist() == lists.records.tolist()
     found = []
@@ -71,8 +71,6 @@ def test_what_is_no_part_is_refused():
     assert refused(far) == "slot: expected numbers from 0 to 59, found 59 to 60"
     assert "expected numbers from 0 to 59, found 60" in refused(pa.table({"slot": [1], "records": [[60]]}))
     assert refused(pa.table({"slot": [1], "records": [[None]]})) == "records: expected numbers, found null"
-    joint = unlift.prepare(of, lists, solver="joint")
-    assert refused(rows, model=joint) == "solver of parts: expected consensus, found joint"
     assert refused(rows, of=hidden("olc", 61)).startswith("model: fingerprint: ")
     with pytest.raises(unlift.UnliftError, match="model: "):
         unlift.Model.from_bytes(b"other")

@@ -113,24 +113,6 @@ def test_a_map_on_a_cluster_is_the_map_of_one_machine(spark, tmp_path: pathlib.P
     assert (again.records == lists.records).all() and (again.offsets == lists.offsets).all()
 
 
-@pytest.mark.parametrize("scheme", ["ppl", "plane"])
-def test_rounds_on_a_cluster_are_those_of_one_machine(spark, scheme: str, tmp_path: pathlib.Path):
-    points = np.random.default_rng(5).uniform(0, 4, (2000, 3))
-    hidden = unlift.obfuscate(unlift.Map(points, scale=1.0), scheme, seed=1)
-    lists = unlift.neighbors.oracle(hidden, 0.3, k=20)
-    if scheme == "plane":
-        scores = np.random.default_rng(6).uniform(0, 1, (len(lists), 20))
-        lists = unlift.Neighborhoods(hidden, lists.records.reshape(-1, 20).astype(np.int64), scores)
-    hidden.released.save(tmp_path / "released.parquet")
-    model, outline = unlift.rounds.prepare(hidden, lists)
-    frame = spark.createDataFrame(unlift.parts.table(lists)).repartition(5)
-    back = unlift.spark.recover_in_rounds(frame, str(tmp_path / "released.parquet"), model, outline, n_parts=3)
-    whole = unlift.recover(hidden, lists, confidence=False)
-    back.save(tmp_path / "parts")
-    whole.save(tmp_path / "whole")
-    assert (tmp_path / "parts").read_bytes() == (tmp_path / "whole").read_bytes()
-
-
 def test_an_executor_that_is_killed_changes_nothing(spark, tmp_path: pathlib.Path):
     rows = tasks(tmp_path, 6000)
     before, seen = executors(), []
@@ -155,36 +137,3 @@ def test_an_executor_that_is_killed_changes_nothing(spark, tmp_path: pathlib.Pat
     assert seen and seen[0] < N_MAPS, "it was killed in the middle of the job"
     assert found == alone(rows)
     assert before[0] not in executors()
-
-
-def test_rounds_go_on_when_an_executor_is_killed(spark, tmp_path: pathlib.Path):
-    points = np.random.default_rng(5).uniform(0, 4, (2000, 3))
-    hidden = unlift.obfuscate(unlift.Map(points, scale=1.0), "ppl", seed=1)
-    lists = unlift.neighbors.oracle(hidden, 0.3, k=20)
-    hidden.released.save(tmp_path / "released.parquet")
-    model, outline = unlift.rounds.prepare(hidden, lists)
-    frame = spark.createDataFrame(unlift.parts.table(lists)).repartition(5)
-    tracker, before = spark.sparkContext.statusTracker(), executors()
-    jobs = lambda: len(tracker.getJobIdsForGroup())  # noqa: E731
-    at_first, seen = jobs(), []
-
-    def kill() -> None:
-        ends = time.monotonic() + 400
-        while time.monotonic() < ends:
-            # Edges are made, and some rounds are over.
-            if jobs() >= at_first + 5:
-                os.kill(before[0], signal.SIGKILL)
-                seen.append(jobs())
-                return
-            time.sleep(0.01)
-
-    killer = threading.Thread(target=kill)
-    killer.start()
-    back = unlift.spark.recover_in_rounds(frame, str(tmp_path / "released.parquet"), model, outline, n_parts=3)
-    killer.join()
-    assert seen and jobs() > seen[0] + 2, "it was killed between the first round and the last"
-    assert before[0] not in executors()
-    whole = unlift.recover(hidden, lists, confidence=False)
-    back.save(tmp_path / "parts")
-    whole.save(tmp_path / "whole")
-    assert (tmp_path / "parts").read_bytes() == (tmp_path / "whole").read_bytes()

@@ -1,18 +1,24 @@
-//! Functions of two and of three dimensions, compiled here once.
+//! Functions of two and of three dimensions, compiled in this crate once.
 //!
 //! A function that is generic over the number of dimensions is compiled anew in every crate that calls it: programs and
-//! tests that recover would each compile recovery.
+//! tests that recover would each compile recovery. A pointer to it in a `static` is not.
 
 use std::any::Any;
 
-/// That of `two` and `three` which is of type `F`, as only one can be.
-///
-/// A constant cannot choose between two types; `Any` asks whether they are the same.
-pub(crate) fn which<F: Any + Copy>(two: &dyn Any, three: &dyn Any) -> Option<F> {
-    two.downcast_ref::<F>().or_else(|| three.downcast_ref::<F>()).copied()
-}
+use crate::Error;
 
-/// The error of a number of dimensions that nobody compiled.
-pub(crate) fn no_such<const D: usize>() -> crate::Error {
-    crate::Error::new("dimensions", "2 or 3", D.to_string())
+/// A function of two dimensions, and the one of three.
+pub(crate) struct Both<A, B>(pub(crate) A, pub(crate) B);
+
+impl<A: Any, B: Any> Both<A, B> {
+    /// The one of the two that is of type `F`, as only one can be.
+    ///
+    /// # Errors
+    /// When `F` is for another number of dimensions.
+    pub(crate) fn of<F: Any + Copy>(&self) -> Result<F, Error> {
+        // A constant cannot choose between two types; `Any` asks whether they are the same.
+        let (two, three): (&dyn Any, &dyn Any) = (&self.0, &self.1);
+        let found = two.downcast_ref().or_else(|| three.downcast_ref()).copied();
+        found.ok_or_else(|| Error::new("dimensions", "2 or 3", "another number"))
+    }
 }

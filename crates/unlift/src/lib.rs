@@ -63,7 +63,6 @@ pub mod points;
 pub mod recover;
 pub mod released;
 pub mod seed;
-mod shelf;
 // Not part of the interface: the loops of `unlift-features` are compiled through it, so that `unsafe` stays here.
 #[doc(hidden)]
 pub mod simd;
@@ -76,4 +75,3 @@ pub use error::Error;
 pub use ids::{OriginalId, RecordId};
 pub use line::{OneLine, is_obeyed};
 pub use points::{PointSet, Unit};
-pub use shelf::Shelf;

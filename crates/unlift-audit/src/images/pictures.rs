@@ -108,7 +108,7 @@ impl Observer<2> for Page<'_> {
 /// True places of the neighbors of `slot` that a graph shows: those with the best scores; without scores
 /// (oracle) those with the lowest record numbers, which are random.
 fn best(cell: &Cell<'_, 2>, slot: usize) -> Vec<[f32; 2]> {
-    let Some(lists) = cell.lists else { return Vec::new() };
+    let lists = cell.lists;
     let listed = lists.of(slot);
     let mut order: Vec<usize> = (0..listed.len()).collect();
     if let Some(scores) = lists.scores_of(slot) {

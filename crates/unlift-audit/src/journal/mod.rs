@@ -3,10 +3,8 @@
 //! A file is named by a key, a hash of everything that its content follows from (program, released map, lists, options), and by a
 //! hash of that key and the content together. So nothing is taken that another audit, another version or a damaged disk left, nor
 //! a file that was given the name of another. What was taken is said in the notes of the audit.
-//! An audit keeps every recovery that is done; of one alone [`KeptRounds`] keeps where its rounds stand.
 
 mod key;
-mod rounds;
 
 use std::collections::BTreeSet;
 use std::fmt::Display;
@@ -23,7 +21,6 @@ use unlift_io::stage::{read_recovered, write_recovered};
 
 use crate::{Error, Progress};
 use key::key;
-pub use rounds::KeptRounds;
 
 /// How names of recoveries end.
 const ENDING: &str = ".recovered.parquet";
@@ -72,17 +69,14 @@ impl<'a> Journal<'a> {
         if recovery.options.solver == Solver::Ransac {
             return None;
         }
-        let key = self.key(recovery)?;
-        let recalled = self.whole(&key, ENDING, |path| {
-            let hash = hash_file(path)?;
-            Ok((hash, read_recovered::<3>(path)))
-        })?;
-        match recalled {
-            (_, Ok(recovered)) => {
+        let key = self.key(recovery);
+        let path = self.whole(&key)?;
+        match read_recovered::<3>(&path) {
+            Ok(recovered) => {
                 self.n_recalled += 1;
                 Some(recovered)
             }
-            (path, Err(error)) => {
+            Err(error) => {
                 self.pass_over(&path, &error);
                 None
             }
@@ -94,16 +88,10 @@ impl<'a> Journal<'a> {
         if self.is_full || recovery.options.solver == Solver::Ransac {
             return;
         }
-        let Some(key) = self.key(recovery) else { return };
+        let key = self.key(recovery);
         if let Err(error) = self.write(&key, recovered) {
             self.give_up(&error);
         }
-    }
-
-    /// Where the rounds of `recovery` stand, which this journal keeps.
-    pub fn rounds(&mut self, recovery: &Recovery<'_, 3>) -> KeptRounds<'_, 'a> {
-        let key = if self.is_full { None } else { self.key(recovery) };
-        KeptRounds::new(self, key)
     }
 
     /// What to say of recoveries that were not done now, if there are any.
@@ -125,25 +113,11 @@ impl<'a> Journal<'a> {
     }
 
     fn write(&self, key: &str, recovered: &Recovered<3>) -> Result<(), unlift_io::Error> {
-        let unnamed = self.unnamed(key, ENDING);
+        // Before the content is known: another name for every process.
+        let unnamed = self.folder.join(format!("{key}.{}{ENDING}", std::process::id()));
         write_recovered(&unnamed, recovered)?;
-        self.name(&unnamed, (key, &hash_file(&unnamed)?, ENDING)).map(drop)
-    }
-
-    /// Where a file of `key` is before its content is known: another one for every process.
-    fn unnamed(&self, key: &str, ending: &str) -> PathBuf {
-        self.folder.join(format!("{key}.{}{ending}", std::process::id()))
-    }
-
-    /// Gives `unnamed`, whose content has such a hash, the name of a file of such a key and ending.
-    fn name(
-        &self,
-        unnamed: &Path,
-        (key, hash, ending): (&str, &str, &str),
-    ) -> Result<PathBuf, unlift_io::Error> {
-        let path = self.folder.join(named(key, hash, ending));
-        fs::rename(unnamed, &path).map_err(|source| unlift_io::Error::write(&path, source))?;
-        Ok(path)
+        let path = self.folder.join(named(key, &hash_file(&unnamed)?));
+        fs::rename(&unnamed, &path).map_err(|source| unlift_io::Error::write(&path, source))
     }
 
     /// Files of the folder whose names are such, in order.
@@ -156,20 +130,12 @@ impl<'a> Journal<'a> {
         paths
     }
 
-    /// The first file of `key` with such an ending that is named as its content asks for, whose hash `read` gives with what it
-    /// read. Others are removed; what cannot be read stays.
-    fn whole<T>(
-        &self,
-        key: &str,
-        ending: &str,
-        read: impl Fn(&Path) -> Result<(String, T), unlift_io::Error>,
-    ) -> Option<(PathBuf, T)> {
+    /// The first file of `key` that is named as its content asks for. Others are removed; what cannot be read stays.
+    fn whole(&self, key: &str) -> Option<PathBuf> {
         let of_key = format!("{key}-");
-        for path in self.files(|name| name.starts_with(&of_key) && name.ends_with(ending)) {
-            match read(&path) {
-                Ok((hash, read)) if path.ends_with(named(key, &hash, ending)) => {
-                    return Some((path, read));
-                }
+        for path in self.files(|name| name.starts_with(&of_key) && name.ends_with(ENDING)) {
+            match hash_file(&path) {
+                Ok(hash) if path.ends_with(named(key, &hash)) => return Some(path),
                 Ok(_) => self.drop_damaged(&path),
                 Err(error) => self.pass_over(&path, &error),
             }
@@ -177,18 +143,11 @@ impl<'a> Journal<'a> {
         None
     }
 
-    /// A hash of all that `recovery` follows from; `None` where its lists cannot be read, and nothing more is kept.
-    fn key(&mut self, recovery: &Recovery<'_, 3>) -> Option<String> {
-        match key(&self.program, recovery) {
-            Ok(key) => {
-                self.keys.insert(key.clone());
-                Some(key)
-            }
-            Err(error) => {
-                self.give_up(&error);
-                None
-            }
-        }
+    /// A hash of all that `recovery` follows from.
+    fn key(&mut self, recovery: &Recovery<'_, 3>) -> String {
+        let key = key(&self.program, recovery);
+        self.keys.insert(key.clone());
+        key
     }
 
     fn give_up(&mut self, error: &dyn Display) {
@@ -212,11 +171,11 @@ impl<'a> Journal<'a> {
 }
 
 /// The name of a file of `key` whose content has the hash `content`.
-fn named(key: &str, content: &str, ending: &str) -> String {
+fn named(key: &str, content: &str) -> String {
     let mut both = Hasher::default();
     both.add(key.as_bytes());
     both.add(content.as_bytes());
-    format!("{key}-{}{ending}", both.hex())
+    format!("{key}-{}{ENDING}", both.hex())
 }
 
 impl Drop for Journal<'_> {

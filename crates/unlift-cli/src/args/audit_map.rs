@@ -32,10 +32,6 @@ neighborhoods add to an attacker without them (a blind guess, or what the record
 larger), in percentage points. A gate that names something not in the audit is a usage error; one on
 a scheme that could not be applied to the map fails.
 
-With --memory-limit the oracle's lists, and who lists whom, are put in files without a name beside
-the report: the same figures in longer time. With a solver that needs them there (ransac, density,
-tomography), lists are in memory.
-
 Exit codes: 0 done, 1 a gate failed, 2 usage, 3 bad input.")]
 pub struct AuditMapArgs {
     /// A COLMAP model or project folder, a map of OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler or NVM, or a .ply, .csv,

@@ -20,7 +20,7 @@ For schemes of your own: make the records with any program and write two Parquet
 attacker sees and of what is hidden where (docs/formats.md says how, with pyarrow). Every record must
 be a line, a ray, an axis-parallel plane, or a point with one foreign coordinate.
 
-Gates are those of unlift audit map, by the name of the scheme, or all; so is --memory-limit.
+Gates are those of unlift audit map, by the name of the scheme, or all.
 
 Exit codes: 0 done, 1 a gate failed, 2 usage, 3 bad input.")]
 pub struct AuditReleasedArgs {

@@ -58,10 +58,7 @@ pub struct FindArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
-  unlift neighbors oracle hidden/truth.parquet --inlier-ratio 0.5 --out lists.parquet
-
-With --memory-limit lists of a map are made half a million at a time, as they are written: the same
-file in longer time.")]
+  unlift neighbors oracle hidden/truth.parquet --inlier-ratio 0.5 --out lists.parquet")]
 pub struct OracleArgs {
     /// The truth.parquet of an obfuscation
     #[arg(value_name = "TRUTH")]

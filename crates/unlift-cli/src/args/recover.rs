@@ -11,12 +11,7 @@ use unlift::recover::Solver;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
-  unlift recover hidden/released.parquet --neighbors lists.parquet --out back.parquet
-  unlift recover hidden/released.parquet --neighbors lists.parquet --memory-limit 2GB
-
-With --memory-limit the lists of a map, and who lists whom, are kept in files without a name beside
-the output (joint: 22 to 27 bytes an entry) and read a window at a time, once per round: the same
-result in longer time. In memory remain the records and some 150 bytes a hidden point.")]
+  unlift recover hidden/released.parquet --neighbors lists.parquet --out back.parquet")]
 pub struct RecoverArgs {
     /// A released map
     #[arg(value_name = "OBFUSCATED")]
@@ -36,10 +31,6 @@ pub struct RecoverArgs {
     /// The integer that all randomness comes from
     #[arg(long, value_name = "INTEGER", default_value_t = 0)]
     pub seed: u64,
-    /// Keep where the rounds of joint recovery of a map stand in this folder until all is done, and go on from
-    /// there if it was interrupted: the same options, the same result. As private as the map
-    #[arg(long, value_name = "DIR")]
-    pub journal: Option<PathBuf>,
     /// Threads to use; never changes a result [default: one per core]
     #[arg(long, value_parser = values::threads, value_name = "N")]
     pub threads: Option<NonZeroUsize>,

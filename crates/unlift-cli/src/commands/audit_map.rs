@@ -19,7 +19,7 @@ use unlift_io::seen::Seen;
 use super::common::{open_map, this_program, with_threads};
 use super::gate_files::GateFiles;
 use super::painter::{kind, painter};
-use super::plan::{attack, neighbors, shelf, solvers, summary, thresholds, with_attack};
+use super::plan::{attack, neighbors, solvers, summary, thresholds, with_attack};
 use crate::args::AuditMapArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
@@ -142,7 +142,6 @@ fn plan(
         records_alone: !args.solvers.no_records_alone,
         thresholds,
         seed: args.map.seed.unwrap_or(0),
-        shelf: shelf(&args.result.out),
         ..attack(&args.attack, usual)
     })
 }

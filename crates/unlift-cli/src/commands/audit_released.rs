@@ -18,7 +18,7 @@ use unlift_report::document::Input;
 
 use super::common::{expect_slots, same_map, with_threads};
 use super::gate_files::GateFiles;
-use super::plan::{attack, neighbors, shelf, solvers, summary, thresholds, with_attack};
+use super::plan::{attack, neighbors, solvers, summary, thresholds, with_attack};
 use crate::args::AuditReleasedArgs;
 use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
@@ -198,7 +198,6 @@ fn plan(
         records_alone: !args.solvers.no_records_alone,
         thresholds,
         seed: args.seed,
-        shelf: shelf(&args.result.out),
         ..attack(&args.attack, usual)
     })
 }

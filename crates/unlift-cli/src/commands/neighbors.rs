@@ -2,16 +2,12 @@
 
 use std::path::Path;
 
-use unlift::neighbors::oracle::{InParts, Outliers, TrueNeighbors, search};
+use unlift::neighbors::oracle::{Outliers, TrueNeighbors, search};
 use unlift::neighbors::{Needs, Source};
 use unlift::released::Released;
 use unlift::{Error, OneLine};
 use unlift_io::atomic::{Kind, Rules};
-use unlift_io::input::limit;
-use unlift_io::stage::{
-    Kind as Stage, has_images, read_released, read_truth, write_neighborhoods,
-    write_neighborhoods_as_made,
-};
+use unlift_io::stage::{Kind as Stage, has_images, read_released, read_truth, write_neighborhoods};
 
 use super::common::{RELEASED, expect_slots, same_map, with_threads};
 use super::image_stages::{list_by_oracle, list_by_source};
@@ -54,17 +50,6 @@ pub fn oracle(args: &OracleArgs) -> anyhow::Result<Outcome> {
     let alive = Spinner::new("searching neighbors");
     let core = |error| unlift_io::Error::core(&args.truth, error);
     let knn = search(&original).map_err(core)?;
-    if limit().is_some() {
-        let of = (&secret, released.slots_per_record());
-        let parts = InParts::new(&knn, of, (k, args.inlier_ratio), args.oracle_noise, args.seed)
-            .map_err(core)?;
-        check_file(&args.out, kind, &rules)?;
-        let n = parts.n_slots();
-        write_neighborhoods_as_made(&args.out, (n, k), parts.about(), |slots| parts.lists(slots))?;
-        drop(alive);
-        listed(n)?;
-        return Ok(Outcome::Done);
-    }
     let near = TrueNeighbors::new(&knn, &secret, released.slots_per_record(), k).map_err(core)?;
     let outliers = Outliers::new(args.oracle_noise, &near, &knn, &secret, args.seed);
     let lists = near.lists(args.inlier_ratio, &outliers.map_err(core)?, args.seed).map_err(core)?;

@@ -1,16 +1,11 @@
 //! What audits of maps and of images have in common: from arguments to a plan, and the summary.
 
-use std::path::Path;
-use std::sync::Arc;
-
 use serde_json::{Map, Value, json};
+use unlift::Descriptors;
 use unlift::audit::{NeighborsBy, Plan, Threshold};
 use unlift::neighbors::sources::Named;
 use unlift::neighbors::{Needs, Source};
 use unlift::recover::Solver;
-use unlift::{Descriptors, Shelf};
-use unlift_io::input::limit;
-use unlift_io::shelf::Files;
 
 use crate::args::AttackArgs;
 use crate::exit::{advise, usage};
@@ -31,11 +26,6 @@ pub fn attack<const D: usize>(args: &AttackArgs, usual: Plan<D>) -> Plan<D> {
     plan.exact_constraints = !args.no_exact_constraints;
     plan.repeats = args.repeats;
     plan
-}
-
-/// Where lists are put, if memory is limited: beside the output.
-pub fn shelf(out: &Path) -> Option<Arc<dyn Shelf>> {
-    limit().map(|limit| Arc::new(Files::beside(out, limit)) as Arc<dyn Shelf>)
 }
 
 /// `options` with what the attack was told beyond the plan, for the record.

@@ -2,42 +2,22 @@
 
 use std::collections::HashSet;
 
-use unlift::audit::Recovery;
-use unlift::neighbors::{Listing, Neighborhoods};
-use unlift::recover::{Nowhere, RecoverOptions, Solver, Status, recover_kept};
-use unlift::released::Released;
-use unlift::{About, OneLine, RowOrder, Shelf};
+use unlift::neighbors::Neighborhoods;
+use unlift::recover::{RecoverOptions, Status, recover};
+use unlift::{About, OneLine, RowOrder};
 use unlift_io::atomic::{Kind, Rules};
-use unlift_io::input::limit;
-use unlift_io::shelf::Files;
 use unlift_io::stage::{
-    Kind as Stage, has_images, read_neighborhoods, read_released, shelve_neighborhoods,
-    write_recovered,
+    Kind as Stage, has_images, read_neighborhoods, read_released, write_recovered,
 };
 
-use super::common::{same_map, this_program, with_threads};
+use super::common::{same_map, with_threads};
 use super::image_stages::recover_all;
 use crate::args::RecoverArgs;
-use crate::exit::{Outcome, usage};
+use crate::exit::Outcome;
 use crate::output::print;
 use crate::progress::Spinner;
 use crate::stderr;
-use unlift_audit::{Journal, check_file};
-
-/// The lists of a map: in memory, or in files beside the output, where memory is limited and the solver can do with that.
-fn open_lists(
-    args: &RecoverArgs,
-    released: &Released<3>,
-) -> anyhow::Result<(Listing, Option<Files>)> {
-    let (path, map) = (&args.neighbors, (released.n_records(), released.slots_per_record()));
-    let limit = limit().filter(|_| args.solver.reads_shelved());
-    let Some(limit) = limit else {
-        return Ok((Listing::Here(read_neighborhoods(path, map.0, map.1)?), None));
-    };
-    let files = Files::beside(&args.out, limit);
-    let lists = shelve_neighborhoods(path, map, &files)?;
-    Ok((Listing::Away(lists), Some(files)))
-}
+use unlift_audit::check_file;
 
 /// What a user should know about lists that somebody else wrote, which start at these `offsets`.
 fn notes(offsets: &[u64], about: About, slots_per_record: usize) -> Vec<String> {
@@ -75,36 +55,23 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
         ..RecoverOptions::default()
     };
     if has_images(&args.released)? {
-        check_journal(args, "images")?;
         return images(args, &options, &rules);
     }
-    if options.solver != Solver::Joint {
-        check_journal(args, options.solver.name())?;
-    }
     let alive = Spinner::new("recovering");
-    let mut journal = journal(args, &alive)?;
     let released = read_released::<3>(&args.released)?;
-    let (lists, files) = open_lists(args, &released)?;
+    let map = (released.n_records(), released.slots_per_record());
+    let lists = read_neighborhoods(&args.neighbors, map.0, map.1)?;
     let of = &args.released;
     same_map(&args.neighbors, lists.about().map, of, Some(released.fingerprint()))?;
     for note in notes(lists.offsets(), lists.about(), released.slots_per_record()) {
         alive.say(&format!("unlift: note: {}: {note}", args.neighbors.display()));
     }
     let recovered = with_threads(args.threads, || {
-        let shelf = files.as_ref().map(|files| files as &dyn Shelf);
-        let recovery = Recovery { released: &released, lists: &lists, options: &options };
-        let result = match &mut journal {
-            None => recover_kept(&released, (&lists, shelf), &options, &mut Nowhere),
-            Some(journal) => {
-                let mut kept = journal.rounds(&recovery);
-                recover_kept(&released, (&lists, shelf), &options, &mut kept)
-            }
-        };
+        let result = recover(&released, &lists, &options);
         Ok(result.map_err(|error| unlift_io::Error::core(&args.released, error))?)
     })?;
     check_file(&args.out, kind, &rules)?;
     write_recovered(&args.out, &recovered)?;
-    journal.into_iter().for_each(Journal::finish);
     drop(alive);
     let n = recovered.status().iter().filter(|&&status| status == Status::Ok).count();
     print(&format!(
@@ -115,22 +82,6 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
         OneLine(args.out.display())
     ))?;
     Ok(Outcome::Done)
-}
-
-/// Refuses a journal where there are no rounds of a map to keep.
-fn check_journal(args: &RecoverArgs, found: &str) -> anyhow::Result<()> {
-    match args.journal {
-        None => Ok(()),
-        Some(_) => Err(usage(format!(
-            "--journal keeps rounds of joint recovery: expected a map and --solver joint, found {found}"
-        ))),
-    }
-}
-
-/// Where rounds are kept, if they are to be: by this very program.
-fn journal<'a>(args: &RecoverArgs, alive: &'a Spinner) -> anyhow::Result<Option<Journal<'a>>> {
-    let Some(folder) = &args.journal else { return Ok(None) };
-    Ok(Some(Journal::open(folder, this_program()?, alive)?))
 }
 
 /// Recovers released images, one after the other.

@@ -16,7 +16,6 @@ mod image_writer;
 mod images;
 mod manifest;
 mod neighborhoods;
-mod neighborhoods_away;
 mod order;
 mod pages;
 mod parts;
@@ -35,7 +34,6 @@ pub use images::{ImageFile, ImageRows, has_images};
 pub use neighborhoods::{
     PointNeighborhoods, read_neighborhoods, read_point_neighborhoods, write_neighborhoods,
 };
-pub use neighborhoods_away::{shelve_neighborhoods, write_neighborhoods_as_made};
 pub use parts::part_files;
 pub use peek::{Header, declared_kind, peek};
 pub use recovered::{read_recovered, read_recovered_in, write_recovered};

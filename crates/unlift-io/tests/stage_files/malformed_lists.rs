@@ -5,7 +5,6 @@ use crate::tables::{
     texts, with, write,
 };
 use arrow_array::ArrayRef;
-use unlift_io::shelf::Files;
 use unlift_io::stage;
 
 #[test]
@@ -14,14 +13,7 @@ fn neighborhoods() {
     let path = folder.path().join("lists.parquet");
     let read = |columns: Columns| {
         write(&path, "", columns);
-        let line = message(&path, stage::read_neighborhoods(&path, 3, 1));
-        let files = Files::new(folder.path(), 1 << 20);
-        let away = message(&path, stage::shelve_neighborhoods(&path, (3, 1), &files));
-        let in_order =
-            "column slot, row 2: expected 2 (lists that are not in memory stand in order), found 1";
-        let is_twice = line.starts_with("column slot, row 2: expected each slot once");
-        assert_eq!(away, if is_twice { in_order } else { &line });
-        line
+        message(&path, stage::read_neighborhoods(&path, 3, 1))
     };
     let records = |column: ArrayRef| read(vec![("records", column)]);
     let good = || lists(&[&[1], &[0, 2], &[]]);
@@ -271,26 +263,4 @@ fn truth() {
             "column swapped_axis, row 1: expected a number, as there is a slot, found null",
         ),
     ]);
-}
-
-#[test]
-fn scores_are_in_every_row_or_in_none_of_lists_that_are_not_in_memory() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("lists.parquet");
-    let files = Files::new(folder.path(), 1 << 20);
-    let good = || lists(&[&[1], &[0, 2], &[]]);
-    let shelve = || stage::shelve_neighborhoods(&path, (3, 1), &files);
-    write(&path, "", vec![("records", good())]);
-    assert!(!shelve().unwrap().has_scores());
-    write(
-        &path,
-        "",
-        vec![("records", good()), ("scores", float_lists(&[&[0.5], &[0.5, 1.0], &[]]))],
-    );
-    assert!(shelve().unwrap().has_scores());
-    let none: [Option<Vec<Option<i64>>>; 3] = [None, None, None];
-    write(&path, "", vec![("records", good()), ("scores", maybe_lists(none))]);
-    assert_eq!(stage::read_neighborhoods(&path, 3, 1).unwrap().scores(), None);
-    assert!(!shelve().unwrap().has_scores());
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "a file with a name is left");
 }

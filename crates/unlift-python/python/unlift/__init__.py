@@ -23,7 +23,7 @@ Images are keypoints in pixels, by name:
 
 from __future__ import annotations
 
-from . import fleet, neighbors, parts, rounds, testing, viewer
+from . import fleet, neighbors, parts, testing, viewer
 from ._audits import Features, audit, audit_images
 from ._plugins import scheme, source
 from ._report import Report, Table
@@ -89,7 +89,6 @@ __all__ = [
     "prepare",
     "read",
     "recover",
-    "rounds",
     "scheme",
     "source",
     "testing",

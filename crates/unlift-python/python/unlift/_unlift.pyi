@@ -19,14 +19,11 @@ __all__ = [
     "SOLVERS",
     "SOURCES",
     "Candidates",
-    "Edges",
     "Hidden",
-    "Lead",
     "Lines",
     "Map",
     "Model",
     "Neighborhoods",
-    "Outline",
     "Planes",
     "Rays",
     "Records",
@@ -46,7 +43,6 @@ __all__ = [
     "obfuscate",
     "oracle",
     "prepare",
-    "prepare_rounds",
     "read",
     "recover",
 ]
@@ -257,8 +253,6 @@ class Model:
     def to_bytes(self) -> bytes: ...
     @property
     def delta(self) -> float: ...
-    @property
-    def solver(self) -> str: ...
     def solve_part(
         self,
         released: Released | Hidden,
@@ -272,88 +266,13 @@ class Model:
         self, released: Released | Hidden, columns: dict[str, npt.NDArray[Any] | None]
     ) -> Recovered: ...
 
-@final
-class Edges:
-    def __new__(
-        cls,
-        released: Released | Hidden,
-        first: int,
-        offsets: npt.ArrayLike,
-        ends: npt.ArrayLike,
-        classes: npt.ArrayLike,
-    ) -> Edges: ...
-    @staticmethod
-    def of_lists(
-        model: Model,
-        released: Released | Hidden,
-        first: int,
-        offsets: npt.ArrayLike,
-        records: npt.ArrayLike,
-        named: npt.ArrayLike,
-        by: npt.ArrayLike,
-        *,
-        scores: npt.ArrayLike | None = None,
-        named_scores: npt.ArrayLike | None = None,
-        threads: int | None = None,
-    ) -> Edges: ...
-    def columns(self) -> dict[str, npt.NDArray[Any]]: ...
-    def start(
-        self, model: Model, released: Released | Hidden, *, threads: int | None = None
-    ) -> dict[str, npt.NDArray[Any] | None]: ...
-    def move_on(
-        self, model: Model, released: Released | Hidden, standing: bytes, *, threads: int | None = None
-    ) -> dict[str, npt.NDArray[Any]]: ...
-    def tell(
-        self, model: Model, released: Released | Hidden, news: bytes, *, threads: int | None = None
-    ) -> dict[str, npt.NDArray[Any]]: ...
-
-@final
-class Outline:
-    @staticmethod
-    def from_bytes(bytes: bytes) -> Outline: ...
-    def to_bytes(self) -> bytes: ...
-
-@final
-class Lead:
-    def __new__(
-        cls,
-        model: Model,
-        released: Released | Hidden,
-        outline: Outline,
-        start: dict[str, npt.NDArray[Any] | None],
-        lengths: npt.ArrayLike,
-    ) -> Lead: ...
-    @staticmethod
-    def resume(
-        model: Model, released: Released | Hidden, outline: Outline, lengths: npt.ArrayLike, path: _Path
-    ) -> Lead: ...
-    def save(self, path: _Path) -> None: ...
-    @property
-    def is_done(self) -> bool: ...
-    def standing(self) -> bytes: ...
-    def moved(self, columns: dict[str, npt.NDArray[Any] | None]) -> bytes | None: ...
-    def told(self, slots: npt.ArrayLike, jumps: npt.ArrayLike) -> None: ...
-    def finish(self, descriptor_row: npt.ArrayLike | None = None) -> Recovered: ...
-
-def prepare_rounds(
-    released: Released | Hidden,
-    lists: Neighborhoods | _Path,
-    *,
-    delta: float | None = None,
-    seed: int = 0,
-    exact_constraints: bool = True,
-    memory_limit: int | None = None,
-    threads: int | None = None,
-) -> tuple[Model, Outline]: ...
 def prepare(
     released: Released | Hidden,
-    lists: Neighborhoods | _Path,
+    lists: Neighborhoods,
     *,
-    solver: str = "consensus",
     delta: float | None = None,
     seed: int = 0,
     exact_constraints: bool = True,
-    memory_limit: int | None = None,
     threads: int | None = None,
 ) -> Model: ...
 def evaluate(

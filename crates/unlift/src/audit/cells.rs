@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use super::clock::Clock;
 use super::clock::RowSeconds;
-use super::lists::{Lists, MakeError};
+use super::lists::Lists;
 use super::measure::{measure, unmeasured};
 use super::not_audited::NotAudited;
 use super::observer::{Cell, Counts, Observer};
@@ -140,11 +140,11 @@ pub(super) fn attack<const D: usize>(
             false => sources.make(variant),
         };
         let made = match clock.time(|s| &mut s.neighbors, || Ok(make()))? {
-            Err(MakeError::Refused(error)) if !owned.is_one_of_many() => {
+            Err(error) if !owned.is_one_of_many() => {
                 missing.push(NotAudited::variant(scheme, variant, &error, &hidden.1));
                 continue;
             }
-            made => made.map_err(|error| of_scheme(error.into()))?,
+            made => made.map_err(of_scheme)?,
         };
         let making = started.elapsed().as_secs_f64();
         let mut solved = Solved::new(plan, (&hidden.0, &made.lists), attacker);
@@ -186,7 +186,7 @@ pub(super) fn attack<const D: usize>(
                 descriptors: owned.descriptors,
                 secret,
                 released: &hidden.0,
-                lists: made.lists.here(),
+                lists: &made.lists,
                 recovered: &recovered,
                 accuracy: &accuracy,
             };
@@ -205,7 +205,7 @@ pub(super) fn attack<const D: usize>(
                 baseline: &baseline,
                 weights: &weights,
                 whole: &whole,
-                n_listed: made.lists.n_entries(),
+                n_listed: made.lists.records().len(),
                 seconds: RowSeconds { neighbors: making, recover: took },
             };
             each(observer, None, Some(finished));

@@ -2,40 +2,17 @@
 
 use super::plan::{NeighborsBy, Plan, Variant};
 use crate::geometry::knn::Knn;
-use crate::neighbors::oracle::{self, InParts, Noise, Outliers, TrueNeighbors};
-use crate::neighbors::{Listing, Neighborhoods, ShelvedLists, of_what_there_is};
-use crate::released::{Obfuscation, Released};
+use crate::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
+use crate::neighbors::{Neighborhoods, of_what_there_is};
+use crate::released::Released;
 use crate::truth::Secret;
-use crate::{About, Error, RecordId, RowOrder, Shelf};
-
-/// Why there are no lists.
-#[derive(Debug)]
-pub enum MakeError {
-    /// Their source cannot make them for this obfuscation.
-    Refused(Error),
-    /// They cannot be written where they are put: nothing goes on.
-    Disk(Error),
-}
-
-impl From<Error> for MakeError {
-    fn from(error: Error) -> Self {
-        Self::Refused(error)
-    }
-}
-
-impl From<MakeError> for Error {
-    fn from(error: MakeError) -> Self {
-        match error {
-            MakeError::Refused(error) | MakeError::Disk(error) => error,
-        }
-    }
-}
+use crate::{About, Error, RowOrder};
 
 /// Lists, and how good they are.
 #[derive(Debug)]
 pub struct Made {
     /// The lists.
-    pub lists: Listing,
+    pub lists: Neighborhoods,
     /// The inlier ratio, as requested or measured.
     pub ratio: f64,
     /// Records per list.
@@ -77,20 +54,12 @@ impl<'a, const D: usize> Lists<'a, D> {
     ///
     /// # Errors
     /// When the source cannot make them for this obfuscation.
-    pub fn make(&mut self, variant: &Variant<'_, D>) -> Result<Made, MakeError> {
+    pub fn make(&mut self, variant: &Variant<'_, D>) -> Result<Made, Error> {
         let slots = self.released.slots_per_record();
         match variant.by {
             NeighborsBy::Oracle => {
                 let ratio = variant.inlier_ratio.unwrap_or(1.0);
-                // Rays from anchors are compared with all others of theirs, which takes all lists.
-                let of_anchors = matches!(self.released.obfuscation(), Obfuscation::Rays(rays) if rays.regions().is_some());
-                let lists = match self.plan.shelf().filter(|_| !of_anchors) {
-                    Some(shelf) => {
-                        let parts = self.in_parts(variant)?;
-                        Listing::Away(self.shelved(&parts, shelf).map_err(MakeError::Disk)?)
-                    }
-                    None => Listing::Here(self.oracle(variant, self.plan.k)?),
-                };
+                let lists = self.oracle(variant, self.plan.k)?;
                 Ok(Made { lists, ratio, k: self.plan.k, ratio_at_k: None })
             }
             NeighborsBy::Given(points) => {
@@ -100,7 +69,7 @@ impl<'a, const D: usize> Lists<'a, D> {
                 let others = self.released.n_records().saturating_sub(1);
                 let k = lists.longest().min(others).max(1);
                 let ratio = self.near(k, false)?.measured_inlier_ratio(&lists);
-                Ok(Made { lists: Listing::Here(lists), ratio, k, ratio_at_k: None })
+                Ok(Made { lists, ratio, k, ratio_at_k: None })
             }
             NeighborsBy::Source(source) => {
                 // The list of slot s is that of descriptor row s.
@@ -109,7 +78,7 @@ impl<'a, const D: usize> Lists<'a, D> {
                 let lists = source.lists(self.released, k, self.seeds.1)?;
                 let ratio = self.near(self.plan.k, true)?.measured_inlier_ratio(&lists);
                 let ratio_at_k = Some(self.near(k, true)?.measured_inlier_ratio(&lists));
-                Ok(Made { lists: Listing::Here(lists), ratio, k, ratio_at_k })
+                Ok(Made { lists, ratio, k, ratio_at_k })
             }
         }
     }
@@ -119,11 +88,11 @@ impl<'a, const D: usize> Lists<'a, D> {
     ///
     /// # Errors
     /// As [`make`](Self::make), on maps that are large enough.
-    pub fn make_of_what_there_is(&mut self, variant: &Variant<'_, D>) -> Result<Made, MakeError> {
+    pub fn make_of_what_there_is(&mut self, variant: &Variant<'_, D>) -> Result<Made, Error> {
         let others = self.released.n_records().saturating_sub(1);
         match variant.by {
             NeighborsBy::Given(_) => self.make(variant),
-            NeighborsBy::Source(_) if others == 0 => Ok(self.none(variant)?),
+            NeighborsBy::Source(_) if others == 0 => self.none(variant),
             NeighborsBy::Source(source) if others < source.k(self.released).max(self.plan.k) => {
                 let lists = of_what_there_is(&**source, self.released, self.seeds.1)?;
                 let k = source.k(self.released);
@@ -132,7 +101,7 @@ impl<'a, const D: usize> Lists<'a, D> {
                     Ok(self.near(k.min(others), true)?.measured_inlier_ratio(&lists))
                 };
                 let (ratio, ratio_at_k) = (ratio(plan_k)?, Some(ratio(k)?));
-                Ok(Made { lists: Listing::Here(lists), ratio, k, ratio_at_k })
+                Ok(Made { lists, ratio, k, ratio_at_k })
             }
             NeighborsBy::Source(_) => self.make(variant),
             NeighborsBy::Oracle => {
@@ -140,9 +109,9 @@ impl<'a, const D: usize> Lists<'a, D> {
                 let lengths = (1..=self.plan.k.min(others)).rev();
                 let mut made = lengths.map(|k| self.oracle(variant, k).ok());
                 let Some(lists) = made.find_map(|lists| lists) else {
-                    return Ok(self.none(variant)?);
+                    return self.none(variant);
                 };
-                let (lists, ratio) = (Listing::Here(lists), variant.inlier_ratio.unwrap_or(1.0));
+                let (lists, ratio) = (lists, variant.inlier_ratio.unwrap_or(1.0));
                 Ok(Made { lists, ratio, k: self.plan.k, ratio_at_k: None })
             }
         }
@@ -160,7 +129,7 @@ impl<'a, const D: usize> Lists<'a, D> {
             NeighborsBy::Source(source) => (source.k(self.released), Some(0.0)),
             NeighborsBy::Oracle | NeighborsBy::Given(_) => (self.plan.k, None),
         };
-        let (lists, ratio) = (Listing::Here(lists), variant.inlier_ratio.unwrap_or(0.0));
+        let (lists, ratio) = (lists, variant.inlier_ratio.unwrap_or(0.0));
         Ok(Made { lists, ratio, k, ratio_at_k })
     }
 
@@ -178,26 +147,6 @@ impl<'a, const D: usize> Lists<'a, D> {
         let lists = near.lists(ratio, &outliers, seed);
         self.outliers = Some((k, outliers));
         lists
-    }
-
-    /// The same, to be made some slots at a time.
-    fn in_parts(&self, variant: &Variant<'_, D>) -> Result<InParts<'a, D>, Error> {
-        let (noise, ratio) =
-            (variant.noise.unwrap_or(Noise::Uniform), variant.inlier_ratio.unwrap_or(1.0));
-        let of = (self.secret, self.released.slots_per_record());
-        InParts::new(self.search, of, (self.plan.k, ratio), noise, self.seeds.0)
-    }
-
-    /// What they make, on `shelf`.
-    fn shelved(&self, parts: &InParts<'_, D>, shelf: &dyn Shelf) -> Result<ShelvedLists, Error> {
-        let (k, map) = (self.plan.k, (self.released.n_records(), self.released.slots_per_record()));
-        let mut lists = ShelvedLists::new(map, false, shelf)?;
-        let (n, step) = (parts.n_slots(), (shelf.window() / (size_of::<RecordId>() * k)).max(1));
-        for start in (0..n).step_by(step) {
-            let slots = start..n.min(start + step);
-            lists.push(std::iter::repeat_n(k, slots.len()), parts.lists(slots), None)?;
-        }
-        lists.finish(parts.about())
     }
 
     /// The `k` true neighbors of every slot, as slots or as descriptor rows are counted.

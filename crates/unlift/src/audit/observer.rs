@@ -4,7 +4,7 @@ use std::fmt::Debug;
 
 use super::row::Row;
 use crate::evaluate::Accuracy;
-use crate::neighbors::{Listing, Neighborhoods};
+use crate::neighbors::Neighborhoods;
 use crate::recover::{RecoverOptions, Recovered};
 use crate::released::Released;
 use crate::truth::{Original, Secret};
@@ -27,8 +27,8 @@ pub struct Cell<'a, const D: usize = 3> {
     pub secret: &'a Secret,
     /// What the attacker saw.
     pub released: &'a Released<D>,
-    /// The lists it was recovered from, if they are in memory: one per slot, by descriptor row for an attacker's own sources.
-    pub lists: Option<&'a Neighborhoods>,
+    /// The lists it was recovered from: one per slot, by descriptor row for an attacker's own sources.
+    pub lists: &'a Neighborhoods,
     /// What the attacker got.
     pub recovered: &'a Recovered<D>,
     /// Error per slot.
@@ -41,7 +41,7 @@ pub struct Recovery<'a, const D: usize = 3> {
     /// What the attacker sees.
     pub released: &'a Released<D>,
     /// Its lists.
-    pub lists: &'a Listing,
+    pub lists: &'a Neighborhoods,
     /// How it works.
     pub options: &'a RecoverOptions,
 }

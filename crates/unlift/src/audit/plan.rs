@@ -8,7 +8,7 @@ use crate::neighbors::oracle::Noise;
 use crate::neighbors::{Needs, Source, lacks_descriptors};
 use crate::obfuscate::{SCHEMES, Scheme, SchemeOptions};
 use crate::recover::{Delta, Solver};
-use crate::{Error, Shelf, Unit};
+use crate::{Error, Unit};
 
 /// Neighbors of every original, by row, as an owner lists them from any source.
 #[derive(Clone, Debug, PartialEq)]
@@ -103,8 +103,6 @@ pub struct Plan<const D: usize> {
     pub seed: u64,
     /// How many seeds are averaged.
     pub repeats: u32,
-    /// Where the oracle's lists are put, and who lists whom: in memory without, or where a solver needs lists there. The same rows.
-    pub shelf: Option<Arc<dyn Shelf>>,
 }
 
 /// A map is small if it has fewer points than this many lists have entries.
@@ -142,14 +140,7 @@ impl<const D: usize> Plan<D> {
             headline: if of_images { 2 } else { 0 },
             seed: 0,
             repeats: 1,
-            shelf: None,
         }
-    }
-
-    /// Where lists are put that need not be in memory, if all solvers can do with that.
-    pub(super) fn shelf(&self) -> Option<&dyn Shelf> {
-        let shelf = self.shelf.as_deref()?;
-        self.solvers.iter().all(|solver| solver.reads_shelved()).then_some(shelf)
     }
 
     /// The same for a map of `n_points` with lists of `k`: where a list holds more than a 150th of the points, `joint`

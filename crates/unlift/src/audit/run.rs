@@ -8,7 +8,7 @@ use super::not_audited::NotAudited;
 use super::observer::Observer;
 use super::plan::Plan;
 use super::row::Row;
-use crate::compiled::{no_such, which};
+use crate::compiled::Both;
 use crate::neighbors::oracle;
 use crate::released::Released;
 use crate::truth::{Original, Secret};
@@ -48,8 +48,7 @@ pub fn run<const D: usize>(
     plan: &Plan<D>,
     observer: &mut dyn Observer<D>,
 ) -> Result<Outcome, Error> {
-    let compiled = which(&(one::<2> as One<2>), &(one::<3> as One<3>));
-    let one: One<D> = compiled.ok_or_else(no_such::<D>)?;
+    let one: One<D> = ONE.of()?;
     one(original, descriptors, plan, observer)
 }
 
@@ -59,6 +58,8 @@ type One<const D: usize> = fn(
     &Plan<D>,
     &mut dyn Observer<D>,
 ) -> Result<Outcome, Error>;
+
+static ONE: Both<One<2>, One<3>> = Both(one::<2>, one::<3>);
 
 fn one<const D: usize>(
     original: &Original<D>,

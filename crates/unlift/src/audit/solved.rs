@@ -4,19 +4,16 @@ use std::time::Instant;
 
 use super::observer::{Observer, Recovery};
 use super::plan::Plan;
-use crate::neighbors::Listing;
-use crate::recover::{
-    RecoverOptions, Recovered, Solver, recover, recover_shelved, recover_shelved_with_start,
-    recover_with_start,
-};
+use crate::Error;
+use crate::neighbors::Neighborhoods;
+use crate::recover::{RecoverOptions, Recovered, Solver, recover, recover_with_start};
 use crate::released::Released;
-use crate::{Error, Shelf};
 
 /// A released map and lists, on which a plan's solvers are run in order.
 pub(super) struct Solved<'a, const D: usize> {
     plan: &'a Plan<D>,
     released: &'a Released<D>,
-    lists: &'a Listing,
+    lists: &'a Neighborhoods,
     seed: u64,
     /// The pass that joint recovery started from, for the solver that is this pass.
     start: Option<Recovered<D>>,
@@ -25,7 +22,7 @@ pub(super) struct Solved<'a, const D: usize> {
 impl<'a, const D: usize> Solved<'a, D> {
     pub(super) fn new(
         plan: &'a Plan<D>,
-        (released, lists): (&'a Released<D>, &'a Listing),
+        (released, lists): (&'a Released<D>, &'a Neighborhoods),
         seed: u64,
     ) -> Self {
         Self { plan, released, lists, seed, start: None }
@@ -51,42 +48,19 @@ impl<'a, const D: usize> Solved<'a, D> {
         let recovered = match recalled {
             Some(recalled) => recalled,
             None if with_start => {
-                let (joint, start) = self.recover_with_start(&options)?;
+                let (joint, start) = recover_with_start(self.released, self.lists, &options)?;
                 observer.keep(&self.recovery(&options), &joint);
                 observer.keep(&self.recovery(&self.options(Solver::JointStart)), &start);
                 self.start = Some(start);
                 joint
             }
             None => {
-                let recovered = self.recover(&options)?;
+                let recovered = recover(self.released, self.lists, &options)?;
                 observer.keep(&self.recovery(&options), &recovered);
                 recovered
             }
         };
         Ok((recovered, started.elapsed().as_secs_f64()))
-    }
-
-    fn recover(&self, options: &RecoverOptions) -> Result<Recovered<D>, Error> {
-        match self.lists {
-            Listing::Here(lists) => recover(self.released, lists, options),
-            Listing::Away(lists) => recover_shelved(self.released, lists, options, self.shelf()?),
-        }
-    }
-
-    fn recover_with_start(
-        &self,
-        options: &RecoverOptions,
-    ) -> Result<(Recovered<D>, Recovered<D>), Error> {
-        match self.lists {
-            Listing::Here(lists) => recover_with_start(self.released, lists, options),
-            Listing::Away(lists) => {
-                recover_shelved_with_start(self.released, lists, options, self.shelf()?)
-            }
-        }
-    }
-
-    fn shelf(&self) -> Result<&dyn Shelf, Error> {
-        self.plan.shelf().ok_or_else(|| Error::new("lists", "a shelf that they are on", "none"))
     }
 
     fn options(&self, solver: Solver) -> RecoverOptions {

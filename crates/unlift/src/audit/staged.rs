@@ -12,8 +12,8 @@ use super::pool::Pool;
 use super::row::Row;
 use super::threshold::Threshold;
 use crate::evaluate::{blind, distinct_weights};
+use crate::neighbors::Neighborhoods;
 use crate::neighbors::oracle::{self, Noise};
-use crate::neighbors::{Listing, Neighborhoods};
 use crate::recover::Recovered;
 use crate::released::Released;
 use crate::truth::{DropReason, Original, Secret};
@@ -36,10 +36,7 @@ pub fn oracle_lists(
     let variant = Variant { by, noise: Some(noise), inlier_ratio: Some(ratio) };
     // The attacker's seed has no part in the oracle's lists.
     let mut lists = Lists::new(&plan, &search, hidden, &hidden.1, (seed, 0));
-    match lists.make_of_what_there_is(&variant)?.lists {
-        Listing::Here(lists) => Ok(lists),
-        Listing::Away(_) => Err(Error::new("lists of an image", "some in memory", "others")),
-    }
+    Ok(lists.make_of_what_there_is(&variant)?.lists)
 }
 
 /// A row over many images, one added after the other: that of an audit of images. Memory does not grow with their

@@ -4,18 +4,6 @@ use crate::Error;
 use crate::neighbors::Neighborhoods;
 use crate::released::{Obfuscation, Released};
 
-/// Refuses lists of another number of slots.
-pub(super) fn check_slots<const D: usize>(
-    released: &Released<D>,
-    n_slots: usize,
-) -> Result<(), Error> {
-    if n_slots == released.n_slots() {
-        return Ok(());
-    }
-    let expected = format!("{} rows, one per slot", released.n_slots());
-    Err(Error::new("neighborhoods", expected, n_slots.to_string()))
-}
-
 /// Refuses rays that are compared with all others of their anchor, which takes all lists.
 pub(super) fn check_anchors<const D: usize>(released: &Released<D>) -> Result<(), Error> {
     match released.obfuscation() {
@@ -31,7 +19,10 @@ pub(super) fn check_lists<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
 ) -> Result<(), Error> {
-    check_slots(released, lists.n_slots())?;
+    if lists.n_slots() != released.n_slots() {
+        let expected = format!("{} rows, one per slot", released.n_slots());
+        return Err(Error::new("neighborhoods", expected, lists.n_slots().to_string()));
+    }
     // Lists of another map may have as many rows.
     let n_records = released.n_records();
     if let Some(record) = lists.records().iter().find(|record| record.index() >= n_records) {

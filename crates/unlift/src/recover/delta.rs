@@ -10,9 +10,9 @@ use super::consensus;
 use super::map::chance_field::trimmed;
 use super::map::chunks::{CHUNK, Slots};
 use super::map::family::Family;
-use super::map::lists::{Listed, Lists, Picked};
+use super::map::lists::{Lists, Picked};
 use super::map::settings::Settings;
-use crate::Error;
+use crate::neighbors::Neighborhoods;
 use crate::released::{Obfuscation, Released};
 use crate::seed::{Draws, Stage};
 
@@ -70,25 +70,25 @@ const LEAST_OF_FLAT: f64 = 0.5;
 pub(super) fn learn<const D: usize>(
     released: &Released<D>,
     family: &Family<'_, D>,
-    (used, given): (Listed<'_>, Listed<'_>),
+    (used, given): (&Neighborhoods, &Neighborhoods),
     sharp: bool,
     seed: u64,
-) -> Result<f64, Error> {
+) -> f64 {
     let spacing = spacing(released);
     if family.has_regions() {
-        return Ok(ANCHOR_DELTA * spacing);
+        return ANCHOR_DELTA * spacing;
     }
-    let prefer = match given.has_scores() {
+    let prefer = match given.scores().is_some() {
         _ if !sharp => Prefer::Wide,
         true => Prefer::NarrowOfScored,
         false => Prefer::Narrow,
     };
     let least = LEAST_DELTA * spacing;
-    let per_list = given.n_entries() as f64 / given.n_slots().max(1) as f64;
+    let per_list = given.records().len() as f64 / given.n_slots().max(1) as f64;
     let share = per_list / released.n_records().max(1) as f64;
-    let chosen = choose(family, used, prefer, (least, share), seed)?.unwrap_or(1.0);
+    let chosen = choose(family, used, prefer, (least, share), seed).unwrap_or(1.0);
     let least = least_of_candidates(family, share);
-    Ok(if COLLAPSED * chosen < least { least } else { chosen })
+    if COLLAPSED * chosen < least { least } else { chosen }
 }
 
 /// The least delta of the candidates of a map, where a list holds a `share` of all records; 0 of other families, and in images.
@@ -157,11 +157,11 @@ impl Prefer {
 /// The delta with the best mean evidence, not below `least`, where a list as given holds a `share` of all records; `None` for an empty map or one without extent.
 fn choose<const D: usize>(
     family: &Family<'_, D>,
-    lists: Listed<'_>,
+    lists: &Neighborhoods,
     prefer: Prefer,
     (least, share): (f64, f64),
     seed: u64,
-) -> Result<Option<f64>, Error> {
+) -> Option<f64> {
     let settings = Settings::of_dimension::<D>();
     let too_wide = match family {
         Family::Candidates { .. } => settings.too_wide_of_candidates,
@@ -184,15 +184,15 @@ fn choose<const D: usize>(
     };
     let extent = family.extent();
     if lists.n_slots() == 0 || !(extent.is_finite() && extent > 0.0) {
-        return Ok(None);
+        return None;
     }
     let sample = match family {
         Family::Planes { .. } => settings.delta_chunks_of_planes,
         Family::Lines { .. } | Family::Candidates { .. } => settings.delta_chunks,
     };
     let chunks = sample_chunks(lists.n_slots(), sample, seed);
-    let given = Picked::given(lists, &chunks)?;
-    let mixed = Picked::mixed(lists, &chunks, family.slots_per_record())?;
+    let given = Picked::given(lists, &chunks);
+    let mixed = Picked::mixed(lists, &chunks, family.slots_per_record());
     let mean_evidence = |picked: &Picked, delta: f64| {
         let (lists, slots) = (Lists::Picked(picked), Slots::Chunks(&chunks));
         let solved = consensus::solve(family, lists, delta as f32, slots);
@@ -229,7 +229,7 @@ fn choose<const D: usize>(
         .collect();
     let most = fine.iter().map(|&(_, value)| value).fold(f64::NEG_INFINITY, f64::max);
     let near = |&&(_, value): &&(f64, f64)| value >= prefer.near_most() * most || value == most;
-    Ok(match prefer {
+    match prefer {
         Prefer::Wide => fine.iter().rev().find(near).map(|x| x.0),
         Prefer::Narrow | Prefer::NarrowOfScored => {
             let beyond_edge = match prefer {
@@ -239,7 +239,7 @@ fn choose<const D: usize>(
             // Some way across the plateau, in logarithm: its very edge is a matter of luck.
             let (Some(low), Some(high)) = (fine.iter().find(near), fine.iter().rev().find(near))
             else {
-                return Ok(None);
+                return None;
             };
             let (low, high) = (low.0, high.0);
             let (across, most) = match family {
@@ -253,7 +253,7 @@ fn choose<const D: usize>(
             };
             Some((low * libm::pow(high / low, across)).min(most))
         }
-    })
+    }
 }
 
 /// A chance that goes with the share of all records that a list holds: `factor * share^power`.

@@ -40,11 +40,6 @@ impl Solver {
     pub const FROM_LISTS: [Solver; 4] =
         [Self::Joint, Self::JointStart, Self::Consensus, Self::Ransac];
 
-    /// Whether it can do with lists that are not in memory.
-    pub fn reads_shelved(self) -> bool {
-        matches!(self, Self::Joint | Self::JointStart | Self::Consensus)
-    }
-
     /// The name users know it by.
     pub fn name(self) -> &'static str {
         match self {

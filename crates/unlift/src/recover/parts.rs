@@ -3,13 +3,11 @@
 use std::ops::Range;
 
 use super::checks::check_anchors;
-use super::learned::Model;
-use super::map::lists::Listed;
-use super::options::Solver;
+use super::model::Model;
 use super::pairs_of_descriptors::descriptor_rows;
+use super::problem::Problem;
 use super::result::estimate::Estimate;
 use super::result::recovered::Recovered;
-use super::task::Task;
 use crate::Error;
 use crate::neighbors::Neighborhoods;
 use crate::released::Released;
@@ -28,23 +26,24 @@ impl<const D: usize> Model<D> {
     /// [`Neighborhoods::of_slots`]: whatever other lists say changes nothing. Reads all records once: parts should be large.
     ///
     /// # Errors
-    /// When the model is of another map or solver (the rounds of joint recovery look at the lists of all), records are rays from
-    /// anchors in regions (which are compared with each other), or `slots` are not there or end within a record.
+    /// When the model is of another map, records are rays from anchors in regions (which are compared with each other), or `slots` are
+    /// not there or end within a record.
     pub fn solve_part(
         &self,
         released: &Released<D>,
         lists: &Neighborhoods,
         slots: Range<usize>,
     ) -> Result<Part<D>, Error> {
-        self.expect_parts(released)?;
+        check_anchors(released)?;
         let per_record = released.slots_per_record();
-        if slots.start % per_record + slots.end % per_record > 0 {
+        let is_there = slots.start <= slots.end && slots.end <= released.n_slots();
+        if !is_there || slots.start % per_record + slots.end % per_record > 0 {
             let expected = format!("a range of whole records, {per_record} slots each");
             return Err(Error::new("slots", expected, format!("{slots:?}")));
         }
-        let estimates = Task::new(self, released, lists)?.solve(slots.clone())?;
+        let estimates = Problem::with_model(released, lists, self)?.solve(slots.clone());
         let records = slots.start / per_record..slots.end / per_record;
-        let descriptor_row = descriptor_rows(released, Listed::Here(lists), records)?;
+        let descriptor_row = descriptor_rows(released, lists, records);
         Ok(Part { estimates, descriptor_row })
     }
 
@@ -58,7 +57,7 @@ impl<const D: usize> Model<D> {
         released: &Released<D>,
         parts: impl IntoIterator<Item = Part<D>>,
     ) -> Result<Recovered<D>, Error> {
-        self.expect_parts(released)?;
+        check_anchors(released)?;
         let (mut estimates, mut rows) = (Vec::new(), Vec::new());
         for part in parts {
             estimates.extend(part.estimates);
@@ -73,16 +72,9 @@ impl<const D: usize> Model<D> {
         )?;
         let lists = lists.with_about(self.about);
         let has_rows = released.slots_per_record() == 2 && released.descriptors().is_some();
-        let task = Task::new(self, released, &lists)?;
-        task.finish_with(estimates, has_rows.then_some(rows), false).map(|(recovered, _)| recovered)
-    }
-
-    /// Refuses what cannot be solved in parts.
-    fn expect_parts(&self, released: &Released<D>) -> Result<(), Error> {
-        let solver = self.options().solver;
-        if solver != Solver::Consensus {
-            return Err(Error::new("solver of parts", Solver::Consensus.name(), solver.name()));
-        }
-        check_anchors(released)
+        let problem = Problem::with_model(released, &lists, self)?;
+        problem
+            .finish_with(estimates, has_rows.then_some(rows), false)
+            .map(|(recovered, _)| recovered)
     }
 }

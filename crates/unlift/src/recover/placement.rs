@@ -6,8 +6,6 @@ use rayon::prelude::*;
 
 use super::map::line_rows::{LineRow, from_lines, from_rays};
 use super::result::estimate::{Estimate, Status, stored_support};
-use super::solve::Solve;
-use crate::Error;
 use crate::density::{Peak, Peaks};
 use crate::neighbors::Neighborhoods;
 use crate::released::{Obfuscation, Released};
@@ -59,8 +57,9 @@ impl<'a, const D: usize> Placement<'a, D> {
     }
 }
 
-impl<'a, const D: usize> Solve<'a, D> for Placement<'a, D> {
-    fn solve(&self, slots: Range<usize>) -> Result<Vec<Estimate<D>>, Error> {
+impl<const D: usize> Placement<'_, D> {
+    /// The estimates of `slots`, in order.
+    pub(super) fn solve(&self, slots: Range<usize>) -> Vec<Estimate<D>> {
         let reach = delta(self.peaks) as f32;
         let place = |slot: usize| {
             let is_crossed = self.slots_per_record == 2 && self.is_crossed(slot);
@@ -73,7 +72,7 @@ impl<'a, const D: usize> Solve<'a, D> for Placement<'a, D> {
             }
             estimate
         };
-        Ok(slots.into_par_iter().map(place).collect())
+        slots.into_par_iter().map(place).collect()
     }
 }
 

@@ -162,7 +162,6 @@ fn state_and_files_are_found_in_recovery() {
     assert_eq!(state("use std::fs::File;"), 1);
     assert_eq!(state("use std::{env, io};"), 1);
     assert_eq!(state("let text = std::fs::read_to_string(path);"), 1);
-    assert_eq!(state("fn quote() -> char { '\\'' }\nstatic X: u8 = b'\"';"), 1);
     assert_eq!(state("fn name(&self) -> &'static str { \"static\" }"), 0);
 }
 

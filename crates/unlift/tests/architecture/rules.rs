@@ -16,7 +16,6 @@ const VOCABULARY: &[&str] = &[
     "simd",
     "about",
     "compiled",
-    "shelf",
 ];
 /// What the root exports: vocabulary under shorter names.
 const ROOT_NAMES: &[&str] = &[
@@ -31,7 +30,6 @@ const ROOT_NAMES: &[&str] = &[
     "Fingerprint",
     "ListsBy",
     "RowOrder",
-    "Shelf",
 ];
 
 /// Per module the stages it may import, a row that ends in `/` for a folder within one. A new
@@ -49,8 +47,6 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("points", &[]),
     ("descriptors", &[]),
     ("simd", &[]),
-    // Where columns are put aside: no stage is known there.
-    ("shelf", &[]),
     ("geometry", &[]),
     ("synthetic", &[]),
     ("truth", &[]),
@@ -72,62 +68,37 @@ pub const INSIDE_RECOVER: &[(&str, &[&str])] = &[
     ("options", &[]),
     ("result", &[]),
     ("map", &["result"]),
-    ("solve", &["result"]),
-    ("consensus", &["map", "result", "solve"]),
-    // It starts from a pass of consensus.
-    ("joint", &["map", "result", "solve", "consensus"]),
+    ("consensus", &["map", "result"]),
+    ("joint", &["map", "result"]),
     // The published density attacks stand on `density` alone.
-    ("baselines", &["map", "result", "solve"]),
-    ("placement", &["map", "result", "solve"]),
+    ("baselines", &["map", "result"]),
+    ("placement", &["map", "result"]),
     // Chosen by how well consensus does.
     ("delta", &["map", "consensus"]),
     ("exact", &["map", "result"]),
     ("confidence", &["map", "result", "options"]),
-    ("pairs_of_descriptors", &["map"]),
+    ("pairs_of_descriptors", &[]),
     ("checks", &[]),
-    ("learned", &["map", "options"]),
-    ("kept", &["learned"]),
-    ("rounds", &["kept", "result", "solve"]),
-    ("records", &["delta", "learned", "map", "options", "placement"]),
+    ("model", &["map", "options"]),
     (
-        "task",
+        "problem",
         &[
             "options",
             "result",
             "map",
-            "solve",
             "consensus",
             "joint",
             "baselines",
             "placement",
-            "records",
+            "delta",
             "exact",
             "confidence",
             "pairs_of_descriptors",
             "checks",
-            "kept",
-            "learned",
-            "rounds",
+            "model",
         ],
     ),
-    ("parts", &["checks", "learned", "map", "options", "pairs_of_descriptors", "result", "task"]),
-    (
-        "spread",
-        &[
-            "checks",
-            "consensus",
-            "exact",
-            "joint",
-            "learned",
-            "map",
-            "options",
-            "pairs_of_descriptors",
-            "parts",
-            "result",
-            "solve",
-            "task",
-        ],
-    ),
+    ("parts", &["checks", "model", "pairs_of_descriptors", "problem", "result"]),
 ];
 
 /// Dependencies of the core: light, and known for long.
@@ -166,7 +137,7 @@ pub const CRATES: &[(&str, &[&str])] = &[
 pub const MOST_LINES: usize = 800;
 
 /// What recovery may know of `neighbors`: lists as they are.
-const LISTS: &[&str] = &["Listing", "Neighborhoods", "ShelvedLists"];
+const LISTS: &[&str] = &["Neighborhoods"];
 
 /// Files of `obfuscate/` that are not schemes.
 pub const NO_SCHEMES: &[&str] = &["mod", "pairs", "scheme", "hide", "size"];
@@ -221,7 +192,7 @@ pub fn forbidden_state(source: &Source) -> Vec<String> {
     if !source.path.starts_with("recover/") {
         return Vec::new();
     }
-    let mut found = complain(source, &["static", "thread_local", "OnceLock", "LazyLock"]);
+    let mut found = complain(source, &["thread_local", "OnceLock", "LazyLock", "Mutex"]);
     for path in paths(&source.code, &["std"]) {
         if let Some(module @ ("fs" | "env" | "net" | "process" | "time")) =
             path.get(1).map(String::as_str)

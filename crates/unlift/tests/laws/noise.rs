@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use unlift::RecordId;
 use unlift::neighbors::Neighborhoods;
-use unlift::neighbors::oracle::{self, InParts, Noise, Outliers, TrueNeighbors};
+use unlift::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
 use unlift::obfuscate::{Entry, olc, ppl};
 
 use crate::maps::*;
@@ -181,24 +181,4 @@ fn a_map_without_a_ring_is_told() {
         "inlier ratio 0.5 at K = 10: expected at least 5 records that are between the 2K-th and \
          the 10K-th nearest, found 3"
     );
-}
-
-#[test]
-fn lists_made_in_parts_are_those_made_at_once() {
-    for scheme in SCHEMES {
-        let oracle = Oracle::new(scheme);
-        let (secret, per) = (&oracle.hidden.secret, oracle.hidden.released.slots_per_record());
-        let search = oracle::search(&oracle.hidden.original).unwrap();
-        for noise in Noise::ALL {
-            let whole = oracle.lists(noise, 0.4, 3);
-            let parts = InParts::new(&search, (secret, per), (K, 0.4), noise, 3).unwrap();
-            assert_eq!((parts.n_slots(), parts.about()), (whole.n_slots(), whole.about()));
-            let n = parts.n_slots();
-            let found = [0..n / 3, n / 3..n / 3, n / 3..n].map(|slots| parts.lists(slots)).concat();
-            assert!(found == whole.records(), "{}, {}", scheme.name, noise.name());
-        }
-        let error = InParts::new(&search, (secret, per), (0, 0.4), Noise::Uniform, 3).unwrap_err();
-        assert!(error.to_string().starts_with("k: expected between 1 and "), "{error}");
-        assert!(InParts::new(&search, (secret, per), (K, 1.4), Noise::Uniform, 3).is_err());
-    }
 }

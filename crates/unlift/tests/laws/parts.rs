@@ -1,11 +1,20 @@
-//! Recovery in two steps and in parts gives what it gives at once, bit for bit.
+//! Consensus in parts, each with its own lists alone, gives what it gives at once, bit for bit.
 
 use unlift::neighbors::Neighborhoods;
 use unlift::obfuscate::Entry;
-use unlift::recover::{Delta, Model, RecoverOptions, Solver, Task, prepare};
+use unlift::recover::{Delta, Model, RecoverOptions, Solver, prepare};
 use unlift::released::Obfuscation;
 
 use crate::maps::*;
+
+/// Everything else as usual.
+const CONSENSUS: RecoverOptions = RecoverOptions {
+    solver: Solver::Consensus,
+    delta: Delta::Auto,
+    seed: 0,
+    exact_constraints: true,
+    confidence: false,
+};
 
 /// Where slots are cut: parts of all sizes, one of them empty, none at the end of a chunk.
 fn cuts(n: usize) -> Vec<std::ops::Range<usize>> {
@@ -13,46 +22,12 @@ fn cuts(n: usize) -> Vec<std::ops::Range<usize>> {
     at.windows(2).map(|pair| pair[0]..pair[1]).collect()
 }
 
-/// A model learned here, sent as bytes, solved in parts, joined.
-fn parts_are_the_whole<const D: usize>(name: &str, scheme: &Entry) {
-    let hidden = hide::<D>(scheme, &room(61, 500), 6);
-    let lists = hidden.lists(15, 0.5, 6);
-    let n = hidden.released.n_slots();
-    for solver in Solver::ALL {
-        let options = RecoverOptions { solver, seed: 9, ..RecoverOptions::default() };
-        let whole = solve(&hidden.released, &lists, options);
-        let bytes = prepare(&hidden.released, &lists, &options).unwrap().to_bytes();
-        let model = Model::<D>::from_bytes(&bytes).unwrap();
-        assert_eq!(model.to_bytes(), bytes, "{name}");
-        assert_eq!(model.options(), &options, "{name}");
-        let task = Task::new(&model, &hidden.released, &lists).unwrap();
-        let mut estimates = Vec::new();
-        for part in cuts(n) {
-            estimates.extend(task.solve(part).unwrap());
-        }
-        if let Some(mut rounds) = task.rounds(&estimates).unwrap() {
-            assert_eq!(solver, Solver::Joint, "{name}");
-            while !rounds.is_done() {
-                let parts = cuts(n).into_iter().rev();
-                let moved: Vec<_> = parts.flat_map(|part| rounds.solve(part).unwrap()).collect();
-                rounds.go_on(&moved).unwrap();
-            }
-            estimates = rounds.estimates().to_vec();
-        }
-        let joined = task.finish(estimates).unwrap();
-        assert!(recovered_bytes(&joined) == recovered_bytes(&whole), "{name}, {solver:?}");
-        assert_eq!(joined.confidence(), whole.confidence(), "{name}, {solver:?}");
-        assert_eq!(joined.trials(), whole.trials(), "{name}, {solver:?}");
-    }
-}
-
 /// Each part with its own lists alone: nothing of the others is there.
 fn lists_of_others_change_nothing<const D: usize>(name: &str, scheme: &Entry) {
     let hidden = hide::<D>(scheme, &room(61, 500), 6);
     let lists = hidden.lists(15, 0.5, 6);
     let (released, per) = (&hidden.released, hidden.released.slots_per_record());
-    let options =
-        RecoverOptions { solver: Solver::Consensus, seed: 9, ..RecoverOptions::default() };
+    let options = RecoverOptions { seed: 9, ..CONSENSUS };
     let whole = solve(released, &lists, options);
     let bytes = prepare(released, &lists, &options).unwrap().to_bytes();
     let model = Model::<D>::from_bytes(&bytes).unwrap();
@@ -93,13 +68,9 @@ fn lists_of_a_part_are_all_that_it_needs() {
 #[test]
 fn parts_are_of_consensus_and_all_there() {
     let (hidden, lists) = (hidden_lines(), hidden_lines().lists(12, 0.5, 6));
-    let model = |solver| {
-        let options = RecoverOptions { solver, ..RecoverOptions::default() };
-        prepare(&hidden.released, &lists, &options).unwrap()
-    };
-    let error = model(Solver::Joint).solve_part(&hidden.released, &lists, 0..200).unwrap_err();
+    let error = prepare(&hidden.released, &lists, &RecoverOptions::default()).unwrap_err();
     assert_eq!(error.to_string(), "solver of parts: expected consensus, found joint");
-    let model = model(Solver::Consensus);
+    let model = prepare(&hidden.released, &lists, &CONSENSUS).unwrap();
     let part = model.solve_part(&hidden.released, &lists, 0..150).unwrap();
     let error = model.join(&hidden.released, [part]).unwrap_err();
     assert_eq!(error.to_string(), "estimates: expected 200, one per slot, found 150");
@@ -110,59 +81,29 @@ fn parts_are_of_consensus_and_all_there() {
     );
 }
 
-#[test]
-fn recovery_in_parts_is_recovery_at_once() {
-    over_schemes!(parts_are_the_whole);
-}
-
 fn hidden_lines() -> Hidden<3> {
     let olc = unlift::obfuscate::scheme("olc").unwrap();
     hide::<3>(olc, &room(62, 200), 6)
 }
 
 #[test]
-fn a_round_takes_each_slot_in_its_turn() {
-    let hidden = hidden_lines();
-    let lists = hidden.lists(12, 0.5, 6);
-    let options = RecoverOptions::default();
-    let model = prepare(&hidden.released, &lists, &options).unwrap();
-    let task = Task::new(&model, &hidden.released, &lists).unwrap();
-    let mut rounds = task.rounds(&task.solve(0..200).unwrap()).unwrap().unwrap();
-    let mut moved = rounds.solve(0..200).unwrap();
-    let error = |found: Result<(), unlift::Error>| found.unwrap_err().to_string();
-    assert_eq!(
-        error(rounds.go_on(&moved[1..])),
-        format!("round: expected slot {}, found none", moved[0].slot)
-    );
-    moved.push(moved[0]);
-    let twice = format!("round: expected each slot in its turn, found {}", moved[0].slot);
-    assert_eq!(error(rounds.go_on(&moved)), twice);
-    moved.pop();
-    rounds.go_on(&moved).unwrap();
-    // From the second sweep on every other slot holds still.
-    assert_eq!(rounds.solve(0..200).unwrap().len(), 100);
-}
-
-#[test]
 fn a_model_is_one_of_its_map() {
     let (hidden, lists) = (hidden_lines(), hidden_lines().lists(12, 0.5, 6));
-    let options = RecoverOptions { delta: Delta::Fixed(0.1), ..RecoverOptions::default() };
+    let options = RecoverOptions { delta: Delta::Fixed(0.1), ..CONSENSUS };
     let model = prepare(&hidden.released, &lists, &options).unwrap();
     assert_eq!((model.delta(), model.map()), (0.1, hidden.released.fingerprint()));
-    let task = Task::new(&model, &hidden.released, &lists).unwrap();
-    assert!(task.solve(150..201).is_err());
-    assert!(task.rounds(&[]).is_err() && task.finish(Vec::new()).is_err());
+    assert!(model.solve_part(&hidden.released, &lists, 150..201).is_err());
     let ppl = unlift::obfuscate::scheme("ppl").unwrap();
     let other = hide::<3>(ppl, &room(62, 200), 6);
-    let error = Task::new(&model, &other.released, &other.lists(12, 0.5, 6)).unwrap_err();
+    let lists = other.lists(12, 0.5, 6);
+    let error = model.solve_part(&other.released, &lists, 0..200).unwrap_err();
     assert!(error.to_string().starts_with("model: fingerprint: "), "{error}");
 }
 
 #[test]
 fn other_bytes_are_no_model() {
     let (hidden, lists) = (hidden_lines(), hidden_lines().lists(12, 0.5, 6));
-    let options = RecoverOptions { solver: Solver::Consensus, ..RecoverOptions::default() };
-    let bytes = prepare(&hidden.released, &lists, &options).unwrap().to_bytes();
+    let bytes = prepare(&hidden.released, &lists, &CONSENSUS).unwrap().to_bytes();
     assert!(bytes.len() < 200_000, "{} bytes", bytes.len());
     for n in (0..100).chain([bytes.len() / 2, bytes.len() - 1]) {
         assert!(Model::<3>::from_bytes(&bytes[..n]).is_err(), "{n} bytes");

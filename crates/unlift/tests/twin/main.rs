@@ -5,7 +5,7 @@ mod brute;
 
 use brute::{Choice, Line, candidate_options, line_options, window_options};
 use unlift::neighbors::Neighborhoods;
-use unlift::recover::{Delta, Model, RecoverOptions, Recovered, Solver, Status, Task, prepare};
+use unlift::recover::{Delta, Model, RecoverOptions, Recovered, Solver, Status, prepare, recover};
 use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
 use unlift::seed::{Draws, Stage};
 use unlift::{Error, RecordId, Unit};
@@ -79,8 +79,7 @@ fn check(
         ..RecoverOptions::default()
     };
     let model = prepare(&released, &neighborhoods, &options).unwrap();
-    let task = Task::new(&model, &released, &neighborhoods).unwrap();
-    let solved = task.finish(task.solve(0..N).unwrap()).unwrap();
+    let solved = recover(&released, &neighborhoods, &options).unwrap();
     let mut wrong = Vec::new();
     for slot in 0..N {
         let listed: Vec<usize> = neighborhoods.of(slot).iter().map(|r| r.index()).collect();

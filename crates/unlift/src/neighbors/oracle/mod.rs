@@ -3,14 +3,12 @@
 //! The one module of this stage that reveals: it stands for an attacker of stated quality.
 
 mod from_points;
-mod in_parts;
 mod nearness;
 mod outliers;
 
 use rayon::prelude::*;
 
 pub use from_points::from_points;
-pub use in_parts::InParts;
 pub use outliers::{Noise, Outliers};
 
 use nearness::Nearness;
@@ -30,8 +28,6 @@ pub struct TrueNeighbors {
     n_records: usize,
     slots_per_record: usize,
     map: Option<Fingerprint>,
-    /// The first slot that they are of.
-    first: usize,
     /// K records per slot, in order of nearness: never released in this order.
     records: Vec<RecordId>,
 }
@@ -55,7 +51,7 @@ impl TrueNeighbors {
         Nearness::new(knn, secret, slots_per_record).each(k, &mut records, &|_, near, row| {
             row.copy_from_slice(near);
         });
-        Ok(Self { k, n_records, slots_per_record, map: secret.map(), first: 0, records })
+        Ok(Self { k, n_records, slots_per_record, map: secret.map(), records })
     }
 
     /// Neighborhoods of which `round(inlier_ratio * K)` entries (one at least above 0) are true neighbors, uniformly
@@ -99,8 +95,7 @@ impl TrueNeighbors {
     /// The lists of its slots end to end, each of K records in ascending order of which so many are true neighbors.
     fn rows(&self, keep: usize, outliers: &Outliers, seed: u64) -> Vec<RecordId> {
         let mut records = vec![RecordId(0); self.records.len()];
-        records.par_chunks_mut(self.k).enumerate().for_each_init(Vec::new, |order, (at, row)| {
-            let slot = self.first + at;
+        records.par_chunks_mut(self.k).enumerate().for_each_init(Vec::new, |order, (slot, row)| {
             order.clear();
             order.extend_from_slice(self.of(slot));
             Draws::new(seed, Stage::OracleKeep, slot as u64).shuffle(order);
@@ -121,8 +116,7 @@ impl TrueNeighbors {
 
     /// The true neighbors of `slot`, the nearest first.
     fn of(&self, slot: usize) -> &[RecordId] {
-        let at = slot - self.first;
-        &self.records[at * self.k..(at + 1) * self.k]
+        &self.records[slot * self.k..(slot + 1) * self.k]
     }
 
     /// The record that slot `slot` sits on.

@@ -1,9 +1,5 @@
 //! Records in order of nearness to an original.
 
-use std::ops::Range;
-
-use rayon::prelude::*;
-
 use crate::RecordId;
 use crate::geometry::knn::Knn;
 use crate::truth::Secret;
@@ -13,9 +9,6 @@ const MARGIN: usize = 8;
 
 /// What is made of a slot: its nearest records in order, and the row to fill.
 pub(super) type Make<'a> = dyn Fn(usize, &mut [RecordId], &mut [RecordId]) + Sync + 'a;
-
-/// Slots that one thread looks at in turn, at least.
-const TOGETHER: usize = 64;
 
 /// A search over originals, read as a search over records.
 pub(super) struct Nearness<'a, const D: usize> {
@@ -29,28 +22,6 @@ impl<'a, const D: usize> Nearness<'a, D> {
     pub(super) fn new(knn: &'a Knn<'a, D>, secret: &'a Secret, slots_per_record: usize) -> Self {
         let record_of = record_of_originals(secret, slots_per_record);
         Self { knn, secret, record_of, slots_per_record }
-    }
-
-    /// [`each`](Self::each) for `slots` alone, of which `rows` holds those; `rank` is where each original stands in spatial order.
-    pub(super) fn each_of(
-        &self,
-        n: usize,
-        (slots, rank): (Range<usize>, &[u32]),
-        rows: &mut [RecordId],
-        make: &Make<'_>,
-    ) {
-        let length = (rows.len() / slots.len().max(1)).max(1);
-        let mut ordered: Vec<(usize, &mut [RecordId])> =
-            slots.zip(rows.chunks_mut(length)).collect();
-        let original = |slot: usize| self.secret.hidden()[slot].index();
-        ordered.par_sort_unstable_by_key(|(slot, _)| rank[original(*slot)]);
-        ordered.par_iter_mut().with_min_len(TOGETHER).for_each_init(
-            Vec::new,
-            |records, (slot, row)| {
-                self.from(original(*slot), n, records);
-                make(*slot, records, row);
-            },
-        );
     }
 
     /// Calls `make(slot, the first n records from its original, row)` for every slot; `rows` holds

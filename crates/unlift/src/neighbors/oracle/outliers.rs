@@ -4,7 +4,7 @@
 //! of other places that look alike. Each model here is one such way to err, alone.
 
 use super::TrueNeighbors;
-use super::nearness::{Make, Nearness, listed};
+use super::nearness::{Nearness, listed};
 use crate::geometry::knn::Knn;
 use crate::seed::{Draws, Stage};
 use crate::truth::Secret;
@@ -102,27 +102,19 @@ impl Outliers {
         let nearness = Nearness::new(knn, secret, truth.slots_per_record);
         Ok(match noise {
             Noise::Uniform => Self::uniform(),
-            Noise::Near => Self::near(truth, n_slots, seed, |n, rows, make| {
-                nearness.each(n, rows, make);
-            }),
+            Noise::Near => Self::near(truth, &nearness, seed),
             Noise::Clustered => Self::clustered(truth, knn, secret, &nearness, seed),
         })
     }
 
-    /// Those of [`Noise::Near`] for the slots of `truth`, so many, of which `each(n, rows, make)` makes a row of each from its n
-    /// nearest records.
-    pub(super) fn near(
-        truth: &TrueNeighbors,
-        n_slots: usize,
-        seed: u64,
-        each: impl FnOnce(usize, &mut [RecordId], &Make<'_>),
-    ) -> Self {
+    fn near<const D: usize>(truth: &TrueNeighbors, nearness: &Nearness<'_, D>, seed: u64) -> Self {
         let first = RING.0 * truth.k;
         let end = (RING.1 * truth.k).min(truth.n_records - 1);
         let per_slot = truth.k.min(end.saturating_sub(first));
+        let n_slots = truth.n_records * truth.slots_per_record;
         let mut records = vec![RecordId(0); n_slots * per_slot];
         if per_slot > 0 {
-            each(end, &mut records, &|slot, near, row| {
+            nearness.each(end, &mut records, &|slot, near, row| {
                 let ring = &mut near[first..];
                 let mut draws = Draws::new(seed, Stage::OracleOutliers, slot as u64);
                 for (at, entry) in row.iter_mut().enumerate() {
@@ -135,7 +127,7 @@ impl Outliers {
         Self { noise: Noise::Near, records, per_slot, ..Self::uniform() }
     }
 
-    pub(super) fn clustered<const D: usize>(
+    fn clustered<const D: usize>(
         truth: &TrueNeighbors,
         knn: &Knn<'_, D>,
         secret: &Secret,
@@ -209,8 +201,7 @@ impl Outliers {
         row: &mut [RecordId],
     ) {
         if self.noise == Noise::Near {
-            let at = slot - truth.first;
-            row.copy_from_slice(&self.records[at * self.per_slot..][..row.len()]);
+            row.copy_from_slice(&self.records[slot * self.per_slot..][..row.len()]);
             return;
         }
         let (near, own) = (truth.of(slot), truth.own(slot));

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use crate::ListsBy;
 use crate::geometry::flatness::flatness;
 use crate::geometry::vector::widen;
-use crate::recover::map::lists::Listed;
+use crate::neighbors::Neighborhoods;
 use crate::recover::result::estimate::{Estimate, Status};
 use crate::recover::result::unknown::Unknown;
 use crate::released::{Obfuscation, Rays, Released};
@@ -26,14 +26,14 @@ const COINCIDENT: f64 = 0.5;
 /// to nine tenths of those called 90 % sure were right.
 pub(crate) fn unknown<const D: usize>(
     released: &Released<D>,
-    lists: Listed<'_>,
+    lists: &Neighborhoods,
     estimates: &[Estimate<D>],
 ) -> Option<Unknown> {
     let n_slots = lists.n_slots() as f64;
-    let mean = lists.n_entries() as f64 / n_slots.max(1.0);
+    let mean = lists.records().len() as f64 / n_slots.max(1.0);
     let found = || estimates.iter().filter(|one| one.status == Status::Ok);
     let places = || -> Vec<[f64; D]> { found().map(|one| widen(&one.position)).collect() };
-    if lists.has_scores() {
+    if lists.scores().is_some() {
         Some(Unknown::RankedLists)
     } else if lists.about().lists_by != ListsBy::Oracle {
         Some(Unknown::GivenLists)

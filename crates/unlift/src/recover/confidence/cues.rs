@@ -5,18 +5,15 @@
 //! the cues of a slot; the same over the whole map tell how well recovery went at all, which no slot can
 //! know alone: estimates that drifted together agree with each other.
 
-use std::ops::Range;
-
 use rayon::prelude::*;
 
 use super::crowd::{Crowd, Tally};
 use super::seen::{Cues, Solved};
-use crate::Error;
-use crate::recover::map::along_curve::along_curve_in;
+use crate::recover::map::along_curve::along_curve;
 use crate::recover::map::crowding::Density;
 use crate::recover::map::edges::{Side, either, record_of, side};
 use crate::recover::map::evidence::evidence;
-use crate::recover::map::graph::{EdgeRows, Graph};
+use crate::recover::map::graph::Graph;
 use crate::recover::map::pieces::Pieces;
 use crate::recover::map::places::{Places, distance2};
 use crate::recover::result::estimate::{Estimate, Status};
@@ -47,80 +44,41 @@ impl Near {
     }
 }
 
-/// What the slots of a window are looked at with.
+/// What slots are looked at with.
 struct Look<'a, const D: usize, P> {
     pieces: &'a P,
-    edges: EdgeRows<'a>,
+    graph: &'a Graph,
     places: &'a Places<D>,
     density: &'a Density<D>,
-    /// Its slots in the order in which they are looked at, and the first of them.
+    /// Slots in the order in which they are looked at.
     order: &'a [u32],
-    first: usize,
     delta2: f32,
 }
 
-/// Hands on the cues of every slot, some slots at a time in order, with the length (typical radius of crowds) that scales predicted
-/// errors.
-///
-/// # Errors
-/// When edges cannot be read, which are on a shelf.
+/// The cues of every slot, and the length (typical radius of crowds) that scales predicted errors.
 pub(super) fn of<const D: usize, P: Pieces<D>>(
     pieces: &P,
     graph: &Graph,
     solved: &Solved<'_, D>,
-    mut found: impl FnMut(Range<usize>, Vec<Cues>, f64),
-) -> Result<(), Error> {
+) -> (Vec<Cues>, f64) {
     let Solved { estimates, delta, .. } = *solved;
     let places = Places::new(estimates);
-    let density = Density::new(&places, &graph.times_listed()?, SMOOTH * delta);
-    let windows = graph.windows();
+    let density = Density::new(&places, &graph.times_listed(), SMOOTH * delta);
     // Crowds in the order in which they are looked at, then by slot: neighbors are found in the cache.
-    let order = along_curve_in(&windows, &places);
-    let looks = |window: &Range<usize>| -> Result<_, Error> {
-        let order = &order[window.clone()];
-        let (places, density) = (&places, &density);
-        let edges = graph.rows(window)?;
-        Ok(Look {
-            pieces,
-            edges,
-            places,
-            density,
-            order,
-            first: window.start,
-            delta2: delta * delta,
-        })
-    };
+    let order = along_curve(&places);
+    let (places, density, order) = (&places, &density, &order[..]);
+    let look = Look { pieces, graph, places, density, order, delta2: delta * delta };
+    let mut along = look.crowds(solved);
     let mut evidence = vec![0.0; estimates.len()];
+    for (crowd, &slot) in along.iter().zip(order) {
+        evidence[slot as usize] = libm::log1pf(crowd.evidence);
+    }
+    look.ask_all(&mut along, &evidence);
+    let crowds = look.by_slot(along);
     let mut tally = Tally::new(estimates.len());
-    // Where all edges are in memory, so are all crowds; elsewhere they are found twice.
-    let mut held = None;
-    for window in &windows {
-        let look = looks(window)?;
-        let mut along = look.crowds(solved);
-        for (crowd, &slot) in along.iter().zip(look.order) {
-            evidence[slot as usize] = libm::log1pf(crowd.evidence);
-        }
-        let is_last = windows.len() == 1;
-        look.ask_all(&mut along, is_last.then_some(&evidence));
-        let crowds = look.by_slot(along);
-        tally.add(&crowds);
-        held = is_last.then_some(crowds);
-    }
+    tally.add(&crowds);
     let map = tally.map(delta);
-    for window in windows {
-        let crowds = match held.take() {
-            Some(crowds) => crowds,
-            None => {
-                let look = looks(&window)?;
-                let mut along = look.crowds(solved);
-                look.ask_all(&mut along, Some(&evidence));
-                look.by_slot(along)
-            }
-        };
-        let cues = crowds.par_iter().map(|crowd| map.cues(crowd)).collect();
-        found(window, cues, f64::from(map.radius));
-    }
-    Ok(())
+    (crowds.par_iter().map(|crowd| map.cues(crowd)).collect(), f64::from(map.radius))
 }
 
 impl<const D: usize, P: Pieces<D>> Look<'_, D, P> {
@@ -148,11 +106,11 @@ impl<const D: usize, P: Pieces<D>> Look<'_, D, P> {
         along
     }
 
-    /// Asks the members of each crowd; where `evidence` is not known of all slots yet, for what needs none.
-    fn ask_all(&self, along: &mut [Crowd], evidence: Option<&Vec<f32>>) {
+    /// Asks the members of each crowd, whose `evidence` is known of all slots.
+    fn ask_all(&self, along: &mut [Crowd], evidence: &[f32]) {
         along.par_chunks_mut(PART).zip(self.order.par_chunks(PART)).for_each(|(crowds, slots)| {
             for (crowd, &slot) in crowds.iter_mut().zip(slots) {
-                self.ask_members(slot as usize, crowd, evidence.map(Vec::as_slice));
+                self.ask_members(slot as usize, crowd, evidence);
             }
         });
     }
@@ -161,7 +119,7 @@ impl<const D: usize, P: Pieces<D>> Look<'_, D, P> {
     fn by_slot(&self, along: Vec<Crowd>) -> Vec<Crowd> {
         let mut crowds = vec![Crowd::default(); along.len()];
         for (crowd, &slot) in along.into_iter().zip(self.order) {
-            crowds[slot as usize - self.first] = crowd;
+            crowds[slot as usize] = crowd;
         }
         crowds
     }
@@ -169,7 +127,7 @@ impl<const D: usize, P: Pieces<D>> Look<'_, D, P> {
     /// Brings near what [`crowd`](Self::crowd) looks at.
     fn prefetch(&self, slot: usize) {
         let slots_per_record = self.pieces.slots_per_record();
-        for &end in self.edges.of(slot).0 {
+        for &end in self.graph.of(slot).0 {
             self.places.prefetch(end as usize);
             self.pieces.prefetch(record_of(end as usize, slots_per_record));
         }
@@ -185,7 +143,7 @@ impl<const D: usize, P: Pieces<D>> Look<'_, D, P> {
         let (mut all, mut rates) = (0usize, 0.0f32);
         let (mut voting, mut votes) = (0usize, 0usize);
         let slots_per_record = self.pieces.slots_per_record();
-        let (ends, class) = self.edges.of(slot);
+        let (ends, class) = self.graph.of(slot);
         for (&end, &class) in ends.iter().zip(class) {
             let either = either(class, slots_per_record);
             let (d2, at) = self.places.nearest(end, either, &x);
@@ -252,7 +210,7 @@ impl<const D: usize, P: Pieces<D>> Look<'_, D, P> {
     }
 
     /// How well founded the members of a crowd are themselves.
-    fn ask_members(&self, slot: usize, crowd: &mut Crowd, evidence: Option<&[f32]>) {
+    fn ask_members(&self, slot: usize, crowd: &mut Crowd, evidence: &[f32]) {
         if crowd.evidence <= 0.0 {
             return;
         }
@@ -260,13 +218,13 @@ impl<const D: usize, P: Pieces<D>> Look<'_, D, P> {
         let reach2 = crowd.radius * crowd.radius * (1.0 + 1e-6);
         let (mut n, mut sum) = (0u32, 0.0);
         let (mut listed, mut listing) = (0u32, 0u32);
-        let (ends, class) = self.edges.of(slot);
+        let (ends, class) = self.graph.of(slot);
         for (&end, &class) in ends.iter().zip(class) {
             let either = either(class, self.pieces.slots_per_record());
             let (d2, at) = self.places.nearest(end, either, &x);
             if d2 <= reach2 {
                 n += 1;
-                sum += evidence.map_or(0.0, |evidence| evidence[at]);
+                sum += evidence[at];
                 listed += u32::from(side(class) != Side::Reverse);
                 listing += u32::from(side(class) != Side::Forward);
             }

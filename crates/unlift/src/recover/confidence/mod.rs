@@ -12,12 +12,9 @@ mod cues;
 pub(super) mod model;
 pub(super) mod seen;
 
-use std::ops::Range;
-
 pub(super) use applies::unknown;
 use rayon::prelude::*;
 
-use crate::Error;
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::Graph;
 use crate::recover::map::pieces::{CandidatePieces, LinePieces, PlanePieces};
@@ -45,43 +42,32 @@ pub(super) fn not_asked<const D: usize>(options: &RecoverOptions) -> Option<Unkn
     }
 }
 
-/// How sure the attacker is of every slot of joint recovery, and the cues that say so, if they are to be `kept`.
-///
-/// # Errors
-/// When edges cannot be read, which are on a shelf.
+/// How sure the attacker is of every slot of joint recovery, and the cues that say so.
 pub(super) fn look<const D: usize>(
     family: &Family<'_, D>,
     graph: &Graph,
     released: &Released<D>,
     solved: &Solved<'_, D>,
-    kept: bool,
-) -> Result<(Vec<Confidence>, Seen), Error> {
-    let mut seen = Seen { kind: model::kind(released), ..Seen::NOTHING };
-    let mut confidence = Vec::with_capacity(solved.estimates.len());
-    let found = |slots: Range<usize>, cues: Vec<Cues>, radius: f64| {
-        seen.radius = radius;
-        let of_slot = |(estimate, cues): (&Estimate<D>, &Cues)| match estimate.status {
-            Status::Ok => judged(&MODELS[seen.kind], cues, radius as f32),
-            _ => Confidence::LOST,
-        };
-        confidence.par_extend(solved.estimates[slots].par_iter().zip(&cues).map(of_slot));
-        if kept {
-            seen.cues.extend(cues);
-        }
-    };
-    match family {
+) -> (Vec<Confidence>, Seen) {
+    let (cues, radius) = match family {
         Family::Lines { rows, slots_per_record, chance } => {
             let pieces = LinePieces::new(rows, *slots_per_record, chance, solved.delta);
-            cues::of(&pieces, graph, solved, found)?;
+            cues::of(&pieces, graph, solved)
         }
         Family::Planes { planes, sorted } => {
-            cues::of(&PlanePieces::new(planes, sorted, solved.delta), graph, solved, found)?;
+            cues::of(&PlanePieces::new(planes, sorted, solved.delta), graph, solved)
         }
         Family::Candidates { rows, chance } => {
-            cues::of(&CandidatePieces::new(rows, chance, solved.delta), graph, solved, found)?;
+            cues::of(&CandidatePieces::new(rows, chance, solved.delta), graph, solved)
         }
-    }
-    Ok((confidence, seen))
+    };
+    let kind = model::kind(released);
+    let of_slot = |(estimate, cues): (&Estimate<D>, &Cues)| match estimate.status {
+        Status::Ok => judged(&MODELS[kind], cues, radius as f32),
+        _ => Confidence::LOST,
+    };
+    let sure = solved.estimates.par_iter().zip(&cues).map(of_slot).collect();
+    (sure, Seen { cues, radius, kind })
 }
 
 /// What `cues` say about one slot; lengths are multiples of `radius`.

@@ -47,7 +47,7 @@ pub(super) fn solve<const D: usize>(
         .map(|slot| window(rows, &bearings, slot, &lists))
         .collect();
     // The best of several windows has some evidence whatever is listed.
-    let mixed = lists.turned_to_mixed();
+    let mixed = lists.mixed();
     let every = lists.n_slots().div_ceil(SAMPLE).max(1);
     let by_chance: Vec<f32> = (0..lists.n_slots())
         .step_by(every)

@@ -9,9 +9,9 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use rayon::prelude::*;
 
 use crate::recover::map::edges::either;
-use crate::recover::map::graph::EdgeRows;
+use crate::recover::map::graph::Graph;
 use crate::recover::map::pieces::Pieces;
-use crate::recover::map::places::distance2;
+use crate::recover::map::places::{Places, distance2};
 
 /// Per slot that is ahead, how many jumps concern it since it was last its turn. Sums of integers: the same however threads
 /// share the work.
@@ -36,25 +36,13 @@ impl Jumps {
         *self.concerning[slot].get_mut() = 0;
     }
 
-    /// So many more jumps concern `slot`.
-    pub(super) fn add(&mut self, slot: usize, jumps: u32) {
-        let concerning = self.concerning[slot].get_mut();
-        *concerning = concerning.saturating_add(jumps);
-    }
-
-    /// Those who know of jumps, with how many.
-    pub(super) fn told(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
-        let all = self.concerning.iter().map(|jumps| jumps.load(Ordering::Relaxed)).enumerate();
-        all.filter(|&(_, jumps)| jumps > 0).map(|(slot, jumps)| (slot as u32, jumps))
-    }
-
-    /// Tells whom it concerns of `jumpers`, whose edges are given, each of which is a slot that jumped from one place to another:
-    /// whoever may lie within `reach` of either. Where nothing `is_ahead` a slot is looked at in any case and need not know.
-    pub(super) fn tell<const D: usize, P: Pieces<D>, J: Sync>(
+    /// Tells all whom `jumpers` concern, which moved `from` their places `to` others: whoever may lie within `reach` of either.
+    /// Where nothing `is_ahead` a slot is looked at in any case and need not know.
+    pub(super) fn tell<const D: usize, P: Pieces<D>>(
         &self,
-        (pieces, edges): (&P, &EdgeRows<'_>),
-        jumpers: &[J],
-        jump: impl Fn(&J) -> (u32, [f32; D], [f32; D]) + Sync,
+        (pieces, graph): (&P, &Graph),
+        jumpers: &[u32],
+        (from, to): (&Places<D>, &Places<D>),
         reach: f32,
         is_ahead: impl Fn(usize) -> bool + Sync,
     ) {
@@ -64,8 +52,9 @@ impl Jumps {
             (0..P::PER_SLOT).any(near)
         };
         jumpers.par_chunks(CHUNK).for_each(|jumpers| {
-            for (slot, from, to) in jumpers.iter().map(&jump) {
-                let (ends, class) = edges.of(slot as usize);
+            for &slot in jumpers {
+                let (from, to) = (from.of(slot as usize), to.of(slot as usize));
+                let (ends, class) = graph.of(slot as usize);
                 for (&end, &class) in ends.iter().zip(class) {
                     let last = end as usize + usize::from(either(class, slots_per_record));
                     let ends = end as usize..=last;

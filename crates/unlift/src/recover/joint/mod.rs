@@ -1,50 +1,53 @@
-//! Joint recovery: the estimates of neighbors vote too.
+//! Joint recovery: the estimates of neighbors vote, too.
 //!
-//! Consensus asks of every listed record whether its line or plane passes near. Joint recovery goes on
-//! from there in rounds: every slot looks at where its neighbors are believed to be, moves to the place
-//! where that is likeliest, and is re-made there from the records of the neighbors found near. What
-//! makes a vote count is how much likelier it is about a true neighbor than by chance; both sides of that
-//! ratio, and how far to look, are learned from the map, again whenever enough slots moved.
+//! Consensus asks of every listed record whether its line or plane passes near. Joint recovery starts there and
+//! iterates. In an iteration every slot
 //!
-//! Slots move from the old estimates, so that neither order nor threads matter. But if all of them moved at
-//! once, neighbors that are far from each other could change places for ever, each going where the
-//! other was. So every other slot holds still while the rest moves.
+//! 1. proposes candidates `x` on its own record: where the estimates of its listed neighbors project to (`update`);
+//! 2. scores them by the log-likelihood ratio (nats)
+//!    `sum over neighbors j of ln(1 + odds_j * p_true(|x - x_j|) / p_random(x)) + 0.5 ln p_random(x)`, where `odds_j` are the
+//!    odds that edge j leads to a true neighbor, `p_true` is the density of true neighbors at a distance and
+//!    `p_random` the density of estimates of all slots (`votes`);
+//! 3. refines the best one by weighted least squares to the records of the neighbors found near (`refine`).
+//!
+//! `odds`, `p_true` and `p_random` are learned from the present estimates (`neighbor_distribution`, `map::crowding`) and again
+//! whenever enough slots jumped. Iterations end when few slots jump, or when records that did not vote say that estimates
+//! became worse (`validation`).
+//!
+//! Slots move from the old estimates, so that neither order nor threads matter. If all of them moved at once, neighbors
+//! that are far from each other could change places for ever, each going where the other was. So half of the slots
+//! hold still while the others move. Only the first iteration moves all: its start comes from records alone.
 
-mod agreement;
-mod course;
-mod crowds;
 mod equations;
+mod input;
 mod jumps;
-mod look;
-mod near;
-mod neighbor_law;
-mod one_slot;
-mod outline;
-mod remake;
-mod standing;
-mod sweeps;
-mod wire;
+mod look_alikes;
+mod neighbor_distribution;
+mod refine;
+mod sample;
+mod state;
+mod update;
+mod validation;
+mod votes;
 
-use std::ops::Range;
-
-use crate::Error;
-use crate::recover::consensus::Consensus;
+use crate::recover::map::along_curve::along_curve;
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::Graph;
-use crate::recover::map::pieces::{CandidatePieces, LinePieces, PlanePieces};
+use crate::recover::map::pieces::{CandidatePieces, LinePieces, Pieces, PlanePieces};
 use crate::recover::result::estimate::Estimate;
-use crate::recover::solve::{Begin, InRounds, Solve};
-pub(crate) use agreement::Agree;
-pub(crate) use course::{Course, Kind};
-pub use outline::Outline;
-pub(crate) use standing::Standing;
-use sweeps::Sweeps;
-pub(crate) use wire::{News, check_estimates, read_estimates, write_estimates};
+use input::Input;
+use sample::Sample;
+use state::State;
 
-/// Joint recovery of one map.
+/// Iterations at most: a bound for maps that never settle.
+const ITERATIONS: usize = 16;
+
+/// Rays from anchors are left where they are if their evidence is less than this in the mean, in nats: where
+/// bearings say hardly more than chance does, neighbors' estimates are those of chance, too.
+const LEAST_EVIDENCE: f64 = 1.5;
+
+/// What joint recovery reads of a map and never changes.
 pub(crate) struct Joint<'a, const D: usize> {
-    /// The pass that the rounds start from.
-    pub(crate) start: Consensus<'a, D>,
     pub(crate) family: &'a Family<'a, D>,
     pub(crate) graph: &'a Graph,
     /// The distance up to which a record supports a place, in the unit of the map.
@@ -52,37 +55,46 @@ pub(crate) struct Joint<'a, const D: usize> {
     pub(crate) seed: u64,
 }
 
-/// Rays from anchors are left where they are if their evidence is less than this in the mean, in nats: where
-/// bearings say hardly more than chance does, neighbors' estimates are those of chance, too.
-const LEAST_EVIDENCE: f64 = 1.5;
-
-impl<'a, const D: usize> Solve<'a, D> for Joint<'a, D> {
-    fn solve(&self, slots: Range<usize>) -> Result<Vec<Estimate<D>>, Error> {
-        self.start.solve(slots)
-    }
-
-    fn rounds(&self, begin: Begin<'_, D>) -> Result<Option<Box<dyn InRounds<D> + 'a>>, Error> {
-        let Self { family, graph, delta, seed, .. } = *self;
-        if let Begin::At(start) = begin
-            && family.has_regions()
-            && mean_evidence(start) < LEAST_EVIDENCE
-        {
-            return Ok(None);
+impl<const D: usize> Joint<'_, D> {
+    /// The estimates of all slots after the last iteration from `start`.
+    pub(crate) fn recover(&self, start: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
+        if self.family.has_regions() && mean_evidence(&start) < LEAST_EVIDENCE {
+            return start;
         }
-        Ok(Some(match family {
+        let delta = self.delta;
+        match self.family {
             Family::Lines { rows, slots_per_record, chance } => {
-                let pieces = LinePieces::new(rows, *slots_per_record, chance, delta);
-                Box::new(Sweeps::new(pieces, graph, begin, (delta, seed))?)
+                self.iterate(LinePieces::new(rows, *slots_per_record, chance, delta), start)
             }
             Family::Planes { planes, sorted } => {
-                let pieces = PlanePieces::new(planes, sorted, delta);
-                Box::new(Sweeps::new(pieces, graph, begin, (delta, seed))?)
+                self.iterate(PlanePieces::new(planes, sorted, delta), start)
             }
             Family::Candidates { rows, chance } => {
-                let pieces = CandidatePieces::new(rows, chance, delta);
-                Box::new(Sweeps::new(pieces, graph, begin, (delta, seed))?)
+                self.iterate(CandidatePieces::new(rows, chance, delta), start)
             }
-        }))
+        }
+    }
+
+    fn iterate<P: Pieces<D>>(&self, pieces: P, start: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
+        let Self { graph, delta, seed, .. } = *self;
+        let (listed, sample) = (graph.times_listed(), Sample::new(graph, seed));
+        let input = Input { pieces, graph, delta, listed, sample };
+        let mut state = State::new(&input, start);
+        let order = along_curve(state.places());
+        for iteration in 0..ITERATIONS {
+            let groups = if iteration == 0 { 1 } else { 2 };
+            for group in 0..groups {
+                state.learn_if_stale(&input);
+                let is_moving = |slot: &u32| *slot as usize % groups == group;
+                let slots = order.iter().copied().filter(is_moving);
+                let updates = state.propose_score_refine(&input, slots);
+                state.apply(&input, &updates);
+            }
+            if state.has_converged(&input) {
+                break;
+            }
+        }
+        state.into_best()
     }
 }
 

@@ -4,8 +4,6 @@
 //! near each other share neighbors: looked at in turn, they find them in the cache. Results do not
 //! depend on the order.
 
-use std::ops::Range;
-
 use rayon::prelude::*;
 
 use super::places::Places;
@@ -14,27 +12,8 @@ use crate::geometry::curve;
 /// Cells per axis, as a power of two: place on the curve and slot share 64 bits.
 const BITS: u32 = 10;
 
-/// The slots of each window, one window after the other, along the curve.
-pub(crate) fn along_curve_in<const D: usize>(
-    windows: &[Range<usize>],
-    places: &Places<D>,
-) -> Vec<u32> {
-    let order = along_curve(places);
-    if windows.len() < 2 {
-        return order;
-    }
-    let mut next: Vec<usize> = windows.iter().map(|window| window.start).collect();
-    let mut by_window = vec![0; order.len()];
-    for slot in order {
-        let next = &mut next[windows.partition_point(|window| window.end <= slot as usize)];
-        by_window[*next] = slot;
-        *next += 1;
-    }
-    by_window
-}
-
 /// All slots, along a curve that fills space; lost ones last.
-fn along_curve<const D: usize>(places: &Places<D>) -> Vec<u32> {
+pub(crate) fn along_curve<const D: usize>(places: &Places<D>) -> Vec<u32> {
     let n = places.len();
     let (low, high) = places.trimmed_box();
     let cells = (1u32 << BITS) as f32;

@@ -1,29 +1,15 @@
 //! Numbers as bytes and back, little-endian.
 
-use std::io;
-
 use crate::Error;
 
-/// Appends numbers, in memory or where there may be no room.
+/// Appends numbers.
 #[derive(Debug, Default)]
-pub(crate) struct Writer<W = Vec<u8>> {
-    to: W,
-    written: u64,
-    failed: Option<io::Error>,
-}
+pub(crate) struct Writer(Vec<u8>);
 
-impl<W: io::Write> Writer<W> {
-    /// Behind what is there.
-    pub(crate) fn new(to: W) -> Self {
-        Self { to, written: 0, failed: None }
-    }
-
-    /// Appends bytes as they are; nothing after some could not be written.
+impl Writer {
+    /// Appends bytes as they are.
     pub(crate) fn bytes(&mut self, bytes: &[u8]) {
-        if self.failed.is_none() {
-            self.failed = self.to.write_all(bytes).err();
-            self.written += bytes.len() as u64;
-        }
+        self.0.extend_from_slice(bytes);
     }
 
     /// Appends a whole number.
@@ -36,43 +22,14 @@ impl<W: io::Write> Writer<W> {
         self.u64(x.to_bits());
     }
 
-    /// Appends a whole number.
-    pub(crate) fn u32(&mut self, x: u32) {
-        self.bytes(&x.to_le_bytes());
-    }
-
-    /// Appends whole numbers, and how many there are.
-    pub(crate) fn u32s(&mut self, numbers: &[u32]) {
-        self.u64(numbers.len() as u64);
-        numbers.iter().for_each(|&x| self.u32(x));
-    }
-
     /// Appends every bit of numbers, but not how many there are.
     pub(crate) fn f32s(&mut self, numbers: &[f32]) {
         numbers.iter().for_each(|x| self.bytes(&x.to_bits().to_le_bytes()));
     }
 
-    /// How many bytes were appended.
-    pub(crate) fn written(&self) -> u64 {
-        self.written
-    }
-
-    /// Where all was written.
-    ///
-    /// # Errors
-    /// When some of it could not be.
-    pub(crate) fn finish(self) -> io::Result<W> {
-        match self.failed {
-            None => Ok(self.to),
-            Some(failed) => Err(failed),
-        }
-    }
-}
-
-impl Writer {
     /// All that was appended.
     pub(crate) fn into_bytes(self) -> Vec<u8> {
-        self.to
+        self.0
     }
 }
 
@@ -114,32 +71,6 @@ impl<'a> Reader<'a> {
     /// A whole number.
     pub(crate) fn u64(&mut self) -> Result<u64, Error> {
         self.array().map(u64::from_le_bytes)
-    }
-
-    /// A whole number.
-    pub(crate) fn u32(&mut self) -> Result<u32, Error> {
-        self.array().map(u32::from_le_bytes)
-    }
-
-    /// A whole number below `end`.
-    pub(crate) fn below(&mut self, end: usize) -> Result<u32, Error> {
-        let x = self.u32()?;
-        self.all_below(&[x], end).map(|()| x)
-    }
-
-    /// So many whole numbers at `most` as it says.
-    pub(crate) fn u32s(&mut self, most: usize) -> Result<Vec<u32>, Error> {
-        let n = self.count(most)?;
-        let (rows, _) = self.bytes(n.saturating_mul(4))?.as_chunks::<4>();
-        Ok(rows.iter().map(|&bytes| u32::from_le_bytes(bytes)).collect())
-    }
-
-    /// Refuses numbers that are not below `end`.
-    pub(crate) fn all_below(&self, numbers: &[u32], end: usize) -> Result<(), Error> {
-        match numbers.iter().find(|&&x| x as usize >= end) {
-            None => Ok(()),
-            Some(x) => Err(self.wrong(format!("numbers below {end}"), x.to_string())),
-        }
     }
 
     /// A whole number that counts something, at most `most`.

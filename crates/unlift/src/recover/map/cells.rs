@@ -1,7 +1,5 @@
 //! A dense grid over the part of space where a map lies: sums per cell, smoothed, looked up by place.
 
-use std::io::Write;
-
 use super::bytes::{Reader, Writer};
 use crate::Error;
 
@@ -59,7 +57,7 @@ impl<const D: usize> Grid<D> {
     }
 
     /// Appends the grid to `to`.
-    pub(crate) fn write<W: Write>(&self, to: &mut Writer<W>) {
+    pub(crate) fn write(&self, to: &mut Writer) {
         to.f32s(&self.low);
         to.f32s(&[self.cell]);
         self.dims.iter().for_each(|&n| to.u64(n as u64));

@@ -12,8 +12,8 @@ use super::bytes::{Reader, Writer};
 use super::cells::Grid;
 use super::evidence::MOST_CHANCE;
 use super::line_rows::LineRow;
-use super::lists::Listed;
 use crate::Error;
+use crate::neighbors::Neighborhoods;
 use crate::simd::{Kernel, dispatch};
 
 /// Cells of a grid at most: 32 per axis, as density varies over the size of a room.
@@ -108,15 +108,15 @@ pub(crate) fn tube(dimensions: usize, delta: f32) -> f32 {
 /// Fields for lines (one) or rays (one per center: those of the other centers).
 pub(crate) fn of_lines<const D: usize>(
     rows: &[LineRow<D>],
-    lists: Listed<'_>,
+    lists: &Neighborhoods,
     slots_per_record: usize,
-) -> Result<Vec<ChanceField<D>>, Error> {
+) -> Vec<ChanceField<D>> {
     let n_groups = n_groups(rows);
-    let (low, high) = box_of_crossings(rows, lists, slots_per_record)?;
-    let counts = times_listed(lists, rows.len())?;
+    let (low, high) = box_of_crossings(rows, lists, slots_per_record);
+    let counts = times_listed(lists, rows.len());
     let every = rows.len().div_ceil(RECORDS).max(1);
     let chosen: Vec<usize> = (0..rows.len()).step_by(every).collect();
-    let fields = (0..n_groups.unwrap_or(1))
+    (0..n_groups.unwrap_or(1))
         .map(|own| {
             let of_others = |&&record: &&usize| n_groups.is_none() || rows[record].group != own;
             let chosen: Vec<usize> = chosen.iter().filter(of_others).copied().collect();
@@ -128,8 +128,7 @@ pub(crate) fn of_lines<const D: usize>(
                 .collect();
             ChanceField::new(sum(empty, &parts), weight)
         })
-        .collect();
-    Ok(fields)
+        .collect()
 }
 
 /// Centers of rays, counted up to the last that any ray comes from; `None` of lines.
@@ -194,27 +193,24 @@ fn add_line<const D: usize>(
 }
 
 /// How often each record is listed.
-fn times_listed(lists: Listed<'_>, n_records: usize) -> Result<Vec<u32>, Error> {
+fn times_listed(lists: &Neighborhoods, n_records: usize) -> Vec<u32> {
     let mut counts = vec![0; n_records];
-    for window in lists.windows() {
-        lists.rows(&window)?.records().iter().for_each(|record| counts[record.index()] += 1);
-    }
-    Ok(counts)
+    lists.records().iter().for_each(|record| counts[record.index()] += 1);
+    counts
 }
 
 /// The box that holds most places where records pass nearest to slots that list them.
 fn box_of_crossings<const D: usize>(
     rows: &[LineRow<D>],
-    lists: Listed<'_>,
+    lists: &Neighborhoods,
     slots_per_record: usize,
-) -> Result<([f32; D], [f32; D]), Error> {
+) -> ([f32; D], [f32; D]) {
     let every = lists.n_slots().div_ceil(CROSSINGS).max(1);
     let mut places: [Vec<f32>; D] = std::array::from_fn(|_| Vec::new());
     for slot in (0..lists.n_slots()).step_by(every) {
         let own = &rows[slot / slots_per_record];
         // Any entry will do: lists are in order of record, which is random.
-        let of_slot = lists.rows(&(slot..slot + 1))?;
-        for record in of_slot.records().iter().take(2) {
+        for record in lists.of(slot).iter().take(2) {
             if let Some(place) = own.crossing(&rows[record.index()]) {
                 for c in 0..D {
                     places[c].push(place[c]);
@@ -223,7 +219,7 @@ fn box_of_crossings<const D: usize>(
         }
     }
     let ends = places.map(|mut column| trimmed(&mut column));
-    Ok((ends.map(|e| e.0), ends.map(|e| e.1)))
+    (ends.map(|e| e.0), ends.map(|e| e.1))
 }
 
 /// The range of a column without its ends, widened a little.
@@ -242,9 +238,9 @@ pub(crate) fn trimmed(column: &mut [f32]) -> (f32, f32) {
 /// One field for axis candidates: the density of the records' lines along all axes.
 pub(crate) fn of_candidates<const D: usize>(
     rows: &[[f32; D]],
-    lists: Listed<'_>,
-) -> Result<CandidateField<D>, Error> {
-    let counts = times_listed(lists, rows.len())?;
+    lists: &Neighborhoods,
+) -> CandidateField<D> {
+    let counts = times_listed(lists, rows.len());
     let ends: [(f32, f32); D] =
         std::array::from_fn(|c| trimmed(&mut rows.iter().map(|row| row[c]).collect::<Vec<f32>>()));
     let weight: f32 = counts.iter().map(|&n| n as f32).sum();
@@ -260,7 +256,7 @@ pub(crate) fn of_candidates<const D: usize>(
         }
         ChanceField::new(grid, weight)
     });
-    Ok(CandidateField { along })
+    CandidateField { along }
 }
 
 /// The density of the lines through published points, per axis along which they run.

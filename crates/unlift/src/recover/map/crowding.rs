@@ -1,12 +1,8 @@
 //! How dense estimates of listed records lie: the votes a place gets by chance.
 
-use std::io::Write;
-
-use super::bytes::{Reader, Writer};
 use super::cells::Grid;
 use super::edges::record_of;
 use super::places::Places;
-use crate::Error;
 
 /// Estimates per volume, as a share of all, each counted as often as its record is listed.
 pub(crate) struct Density<const D: usize> {
@@ -56,22 +52,6 @@ impl<const D: usize> Density<D> {
             false => *sample.select_nth_unstable_by(middle, f32::total_cmp).1,
         };
         Self { grid, typical }
-    }
-
-    /// Appends the density to `to`.
-    pub(crate) fn write<W: Write>(&self, to: &mut Writer<W>) {
-        self.grid.write(to);
-        to.f32s(&[self.typical]);
-    }
-
-    /// The density that [`write`](Self::write) appended, of so many slots.
-    ///
-    /// # Errors
-    /// When it is none.
-    pub(crate) fn read(from: &mut Reader<'_>, n_slots: usize) -> Result<Self, Error> {
-        // Sides are rounded up to whole cells.
-        let grid = Grid::read(from, 2 * most_cells(n_slots))?;
-        Ok(Self { grid, typical: from.f32()? })
     }
 
     /// The density at `x`.

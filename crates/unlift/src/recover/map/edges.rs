@@ -1,7 +1,7 @@
 //! Kinds of edges: who names whom, and how high a source scores it.
 
 use super::named_by::MOST_CLASSES;
-use crate::Error;
+use crate::neighbors::Neighborhoods;
 
 /// Which end of an edge names the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,22 +34,6 @@ pub(crate) fn either(class: u8, slots_per_record: usize) -> bool {
     slots_per_record == 2 && side(class) != Side::Reverse
 }
 
-/// Refuses an edge that is none in a map of so many records and slots per record.
-pub(crate) fn check_edge((end, class): (u32, u8), map: (usize, usize)) -> Result<(), Error> {
-    let n_slots = map.0 * map.1;
-    if end as usize >= n_slots {
-        return Err(Error::new("edge", format!("a slot below {n_slots}"), end.to_string()));
-    }
-    if usize::from(class) >= CLASSES {
-        return Err(Error::new("edge", format!("a class below {CLASSES}"), class.to_string()));
-    }
-    // What may be either slot of a record is called by the first.
-    if either(class, map.1) && end % 2 == 1 {
-        return Err(Error::new("edge", "the first slot of a record", end.to_string()));
-    }
-    Ok(())
-}
-
 /// Who names whom in an edge of this class.
 #[inline(always)]
 pub(crate) fn side(class: u8) -> Side {
@@ -60,20 +44,37 @@ pub(crate) fn side(class: u8) -> Side {
     }
 }
 
-/// The least score of each class but the first, by a `sample` of all scores: equal shares of all entries, by rank.
-pub(super) fn score_bounds(mut sample: Vec<f32>) -> Vec<f32> {
-    sample.sort_unstable_by(f32::total_cmp);
-    let at = |share: &f64| sample.get((share * sample.len() as f64) as usize).copied();
-    SCORE_RANKS.iter().filter_map(at).collect()
+/// Reverse entries of a row at most, as a multiple of the mean list: whoever is named by everyone is
+/// named by mistake.
+const MOST_REVERSE: usize = 3;
+/// Scores are ranked by a sample of this many.
+const SCORES: usize = 1 << 16;
+
+/// The rule by which edges are made of lists.
+pub(super) struct EdgeRule {
+    /// Reverse entries of a row at most.
+    pub(super) most: usize,
+    /// The least score of each class but the first: equal shares of all entries, by rank. Empty without scores.
+    bounds: Vec<f32>,
 }
 
-/// Every so many of `n` scores are a sample of them.
-pub(super) fn score_step(n: usize) -> usize {
-    n.div_ceil(1 << 16).max(1)
-}
+impl EdgeRule {
+    /// The rule for `lists`.
+    pub(super) fn new(lists: &Neighborhoods) -> Self {
+        let n = lists.records().len();
+        let most = MOST_REVERSE * n.div_ceil(lists.n_slots().max(1)).max(1);
+        let step = n.div_ceil(SCORES).max(1);
+        let mut sample: Vec<f32> =
+            lists.scores().map_or_else(Vec::new, |all| all.iter().step_by(step).copied().collect());
+        sample.sort_unstable_by(f32::total_cmp);
+        let at = |share: &f64| sample.get((share * sample.len() as f64) as usize).copied();
+        Self { most, bounds: SCORE_RANKS.iter().filter_map(at).collect() }
+    }
 
-/// The class of a score.
-#[inline(always)]
-pub(super) fn score_class(bounds: &[f32], score: f32) -> u8 {
-    bounds.partition_point(|&bound| bound <= score) as u8
+    /// The class of the entry at `at` of `scores`.
+    #[inline(always)]
+    pub(super) fn class_at(&self, scores: Option<&[f32]>, at: usize) -> u8 {
+        let class = |score: f32| self.bounds.partition_point(|&bound| bound <= score) as u8;
+        scores.map_or(0, |scores| class(scores[at]))
+    }
 }

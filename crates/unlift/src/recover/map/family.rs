@@ -3,9 +3,9 @@
 use super::chance_field::{self, CandidateField, ChanceField, n_fields, tube};
 use super::extent::{interquartile_range, line_extent, ray_extent};
 use super::line_rows::{LineRow, from_lines, from_rays};
-use super::lists::Listed;
 use super::plane_windows::SortedPlanes;
 use crate::Error;
+use crate::neighbors::Neighborhoods;
 use crate::released::{AxisPlanes, Obfuscation, Released};
 
 /// Records in the form the solvers read.
@@ -32,15 +32,12 @@ pub(crate) enum Chance<const D: usize> {
 
 impl<'a, const D: usize> Family<'a, D> {
     /// The records of `released`, with the chance that goes with `lists`.
-    ///
-    /// # Errors
-    /// When lists cannot be read.
-    pub(crate) fn learn(released: &'a Released<D>, lists: Listed<'_>) -> Result<Self, Error> {
+    pub(crate) fn learn(released: &'a Released<D>, lists: &Neighborhoods) -> Self {
         let slots_per_record = released.slots_per_record();
-        Ok(match released.obfuscation() {
+        match released.obfuscation() {
             Obfuscation::Lines(_) | Obfuscation::Rays(_) => {
                 let rows = line_rows(released);
-                let chance = chance_field::of_lines(&rows, lists, slots_per_record)?;
+                let chance = chance_field::of_lines(&rows, lists, slots_per_record);
                 Self::Lines { rows, slots_per_record, chance }
             }
             Obfuscation::AxisPlanes(planes) => {
@@ -48,9 +45,9 @@ impl<'a, const D: usize> Family<'a, D> {
             }
             Obfuscation::AxisCandidates(candidates) => {
                 let rows = candidates.position();
-                Self::Candidates { rows, chance: chance_field::of_candidates(rows, lists)? }
+                Self::Candidates { rows, chance: chance_field::of_candidates(rows, lists) }
             }
-        })
+        }
     }
 
     /// The records of `released`, with a chance that was learned before.

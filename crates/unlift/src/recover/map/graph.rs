@@ -4,72 +4,31 @@
 //! neighbors. Whether an edge is named by one end, by the other or by both tells how likely it is true,
 //! and so do the scores of a source: edges of one class share an inlier ratio, which recovery learns.
 
-use std::borrow::Cow;
 use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::edge_rule::EdgeRule;
-use super::edges::{record_of, score_step};
+use super::edges::{EdgeRule, record_of};
 use super::merge::Rows;
 use super::named_by::{Block, NamedBy};
 use crate::neighbors::Neighborhoods;
-use crate::shelf::{Stored, windows};
 use crate::{Error, RecordId};
 
 /// Rows of edges in order of their other ends, a class beside each.
 #[derive(Debug)]
 pub(crate) struct Graph {
-    pub(super) offsets: Vec<u64>,
+    offsets: Vec<u64>,
     /// Slots; the first of a record's where it is not known which.
-    pub(super) ends: Stored<u32>,
-    pub(super) class: Stored<u8>,
-    /// Edges that may be in memory at a time, where they are not all there.
-    pub(super) window: u64,
-    pub(super) slots_per_record: usize,
-    /// How they were made of lists.
-    pub(super) rule: EdgeRule,
-}
-
-/// The edges of consecutive slots.
-#[derive(Debug)]
-pub(crate) struct EdgeRows<'a> {
-    first: usize,
-    offsets: &'a [u64],
-    ends: Cow<'a, [u32]>,
-    class: Cow<'a, [u8]>,
-}
-
-impl<'a> EdgeRows<'a> {
-    /// Those of the slots from `first` on, whose edges start at `offsets` less the first of these.
-    pub(crate) fn new(
-        first: usize,
-        offsets: &'a [u64],
-        ends: Cow<'a, [u32]>,
-        class: Cow<'a, [u8]>,
-    ) -> Self {
-        Self { first, offsets, ends, class }
-    }
-
-    /// The other ends of the edges of `slot`, which is among them, and the class of each.
-    #[inline(always)]
-    pub(crate) fn of(&self, slot: usize) -> (&[u32], &[u8]) {
-        let (from, at) = (self.offsets[0], slot - self.first);
-        let range = (self.offsets[at] - from) as usize..(self.offsets[at + 1] - from) as usize;
-        (&self.ends[range.clone()], &self.class[range])
-    }
-
-    /// The other ends of all of them.
-    pub(crate) fn ends(&self) -> &[u32] {
-        &self.ends
-    }
+    ends: Vec<u32>,
+    class: Vec<u8>,
+    slots_per_record: usize,
 }
 
 impl Graph {
     /// The edges of `lists`, in both directions.
     pub(crate) fn new(lists: &Neighborhoods, slots_per_record: usize) -> Self {
         let n_slots = lists.n_slots();
-        let rule = rule_of(lists);
+        let rule = EdgeRule::new(lists);
         let score_class = |at| rule.class_at(lists.scores(), at);
         let named_by = NamedBy::new(lists, slots_per_record, &score_class);
         let rooms = rooms(lists, &named_by, slots_per_record);
@@ -106,50 +65,19 @@ impl Graph {
         class.truncate(to);
         ends.shrink_to_fit();
         class.shrink_to_fit();
-        let (ends, class) = (Stored::Here(ends), Stored::Here(class));
-        Self { offsets, ends, class, window: u64::MAX, slots_per_record, rule }
+        Self { offsets, ends, class, slots_per_record }
     }
 
-    /// How the edges were made of lists.
-    pub(crate) fn rule(&self) -> &EdgeRule {
-        &self.rule
-    }
-
-    /// Slots whose edges are read at a time; all, where they are in memory.
-    pub(crate) fn windows(&self) -> Vec<Range<usize>> {
-        match self.ends {
-            Stored::Here(_) => std::iter::once(0..self.n_slots()).collect(),
-            Stored::Away(_) => windows(&self.offsets, self.window, self.slots_per_record),
-        }
-    }
-
-    /// The edges of `slots`.
-    ///
-    /// # Errors
-    /// When they cannot be read.
-    pub(crate) fn rows(&self, slots: &Range<usize>) -> Result<EdgeRows<'_>, Error> {
-        let offsets = &self.offsets[slots.start..=slots.end];
-        let range = offsets[0]..offsets[slots.len()];
-        let (ends, class) = (self.ends.part(range.clone())?, self.class.part(range)?);
-        Ok(EdgeRows { first: slots.start, offsets, ends, class })
+    /// The other ends of the edges of `slot`, and the class of each.
+    #[inline(always)]
+    pub(crate) fn of(&self, slot: usize) -> (&[u32], &[u8]) {
+        let range = self.offsets[slot] as usize..self.offsets[slot + 1] as usize;
+        (&self.ends[range.clone()], &self.class[range])
     }
 
     /// The other end and the class of the edge at `at` of all edges.
-    ///
-    /// # Errors
-    /// When it cannot be read.
-    pub(crate) fn edge(&self, at: u64) -> Result<(u32, u8), Error> {
-        Ok((self.ends.one(at)?, self.class.one(at)?))
-    }
-
-    /// Where the edges of each slot start among all; one more entry than there are slots.
-    pub(crate) fn offsets(&self) -> &[u64] {
-        &self.offsets
-    }
-
-    /// Slots per record.
-    pub(crate) fn slots_per_record(&self) -> usize {
-        self.slots_per_record
+    pub(crate) fn edge(&self, at: u64) -> (u32, u8) {
+        (self.ends[at as usize], self.class[at as usize])
     }
 
     /// Number of slots.
@@ -163,39 +91,26 @@ impl Graph {
     }
 
     /// How often each record is at the other end of an edge.
-    ///
-    /// # Errors
-    /// When edges cannot be read.
-    pub(crate) fn times_listed(&self) -> Result<Vec<u32>, Error> {
-        let mut all = vec![0; self.n_slots() / self.slots_per_record];
-        let count = |all: &mut [u32], ends: &[u32]| {
-            ends.iter().for_each(|&end| all[record_of(end as usize, self.slots_per_record)] += 1);
-        };
-        let windows = self.windows();
-        if let [window] = &windows[..] {
-            // Sums of integers: the same however threads share the work.
-            let rows = self.rows(window)?;
-            let part = rows.ends.len().div_ceil(rayon::current_num_threads()).max(1);
-            let counted = rows.ends.par_chunks(part).map(|ends| {
-                let mut counts = vec![0; all.len()];
-                count(&mut counts, ends);
-                counts
-            });
-            return Ok(counted.reduce_with(sums).unwrap_or(all));
-        }
-        for window in windows {
-            count(&mut all, self.rows(&window)?.ends());
-        }
-        Ok(all)
+    pub(crate) fn times_listed(&self) -> Vec<u32> {
+        let none = vec![0; self.n_slots() / self.slots_per_record];
+        // Sums of integers: the same however threads share the work.
+        let part = self.ends.len().div_ceil(rayon::current_num_threads()).max(1);
+        let counted = self.ends.par_chunks(part).map(|ends| {
+            let mut counts = none.clone();
+            for &end in ends {
+                counts[record_of(end as usize, self.slots_per_record)] += 1;
+            }
+            counts
+        });
+        counted.reduce_with(sums).unwrap_or(none)
     }
 
     /// The edges as neighborhoods (records with one slot each).
     ///
     /// # Errors
-    /// When they cannot be read.
+    /// None: ends are ascending records.
     pub(crate) fn neighborhoods(&self) -> Result<Neighborhoods, Error> {
-        let rows = self.rows(&(0..self.n_slots()))?;
-        let records = rows.ends.iter().map(|&end| RecordId(end)).collect();
+        let records = self.ends.iter().map(|&end| RecordId(end)).collect();
         Neighborhoods::try_new(self.offsets.clone(), records, None, self.n_slots(), 1)
     }
 }
@@ -234,13 +149,6 @@ fn split<'a>(rooms: &[Room], mut ends: &'a mut [u32], mut class: &'a mut [u8]) -
     rooms.iter().map(rows).collect()
 }
 
-/// How edges are made of `lists`.
-fn rule_of(lists: &Neighborhoods) -> EdgeRule {
-    let n = lists.records().len();
-    let every = |scores: &[f32]| scores.iter().step_by(score_step(n)).copied().collect();
-    EdgeRule::new(n, lists.n_slots(), lists.scores().map_or_else(Vec::new, every))
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::edges::{SCORE_CLASSES, Side};
@@ -267,7 +175,7 @@ mod tests {
 
     /// The edges of each slot, found one by one.
     fn expected(lists: &Neighborhoods, slots_per_record: usize) -> Vec<Vec<(u32, u8)>> {
-        let rule = rule_of(lists);
+        let rule = EdgeRule::new(lists);
         let class = |at| rule.class_at(lists.scores(), at);
         let n_slots = lists.n_slots();
         let mut named_by = vec![Vec::new(); n_slots / slots_per_record];
@@ -310,9 +218,8 @@ mod tests {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 let graph = pool.install(|| Graph::new(&lists, slots_per_record));
                 assert_eq!(graph.len(), expected.iter().map(Vec::len).sum::<usize>());
-                let rows = graph.rows(&(0..graph.n_slots())).unwrap();
                 for (slot, expected) in expected.iter().enumerate() {
-                    let (ends, class) = rows.of(slot);
+                    let (ends, class) = graph.of(slot);
                     let found: Vec<_> = ends.iter().copied().zip(class.iter().copied()).collect();
                     assert_eq!(&found, expected, "slot {slot}");
                 }

@@ -11,7 +11,6 @@ mod loops;
 
 use std::ops::Range;
 
-use crate::Error;
 use crate::RecordId;
 use crate::neighbors::Neighborhoods;
 use crate::recover::map::chunks::{Slots, solve_chunks};
@@ -20,7 +19,6 @@ use crate::recover::map::line_rows::LineColumns;
 use crate::recover::map::sections::Sections;
 use crate::recover::result::estimate::{Estimate, Status, stored_support};
 use crate::recover::result::trials::TrialCounts;
-use crate::recover::solve::Solve;
 use crate::released::AxisPlanes;
 use crate::seed::{Draws, Stage};
 use crate::simd::{Kernel, dispatch};
@@ -38,29 +36,28 @@ pub(crate) struct Ransac<'a, const D: usize> {
     pub(crate) trials: &'a TrialCounts,
 }
 
-impl<'a, const D: usize> Solve<'a, D> for Ransac<'a, D> {
-    fn solve(&self, slots: Range<usize>) -> Result<Vec<Estimate<D>>, Error> {
+impl<const D: usize> Ransac<'_, D> {
+    /// The estimates of `slots`, in order.
+    pub(crate) fn solve(&self, slots: Range<usize>) -> Vec<Estimate<D>> {
         let Self { family, lists, delta, seed, .. } = *self;
         let axes = match family {
             Family::Candidates { rows, .. } => axis_vote::vote(rows, lists),
             Family::Lines { .. } | Family::Planes { .. } => Vec::new(),
         };
         let slots = Slots::Range(slots);
-        let estimates =
-            solve_chunks(lists.n_slots(), slots, Scratch::default, |scratch, first, out| {
-                for (at, estimate) in out.iter_mut().enumerate() {
-                    let slot = first + at;
-                    let draws = Draws::new(seed, Stage::Ransac, slot as u64);
-                    let trial = Trial { family, axes: &axes, lists, delta, slot, draws, scratch };
-                    let (solved, trials) = dispatch(trial);
-                    *estimate = solved;
-                    // Slots that could not be tried at all are lost with a reason, not solved in no time.
-                    if trials > 0 {
-                        self.trials.note(trials);
-                    }
+        solve_chunks(lists.n_slots(), slots, Scratch::default, |scratch, first, out| {
+            for (at, estimate) in out.iter_mut().enumerate() {
+                let slot = first + at;
+                let draws = Draws::new(seed, Stage::Ransac, slot as u64);
+                let trial = Trial { family, axes: &axes, lists, delta, slot, draws, scratch };
+                let (solved, trials) = dispatch(trial);
+                *estimate = solved;
+                // Slots that could not be tried at all are lost with a reason, not solved in no time.
+                if trials > 0 {
+                    self.trials.note(trials);
                 }
-            });
-        Ok(estimates)
+            }
+        })
     }
 }
 

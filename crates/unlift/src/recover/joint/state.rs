@@ -1,0 +1,248 @@
+//! What changes from iteration to iteration: estimates, and what is learned from them.
+
+use rayon::prelude::*;
+
+use super::input::Input;
+use super::jumps::Jumps;
+use super::neighbor_distribution::NeighborDistribution;
+use super::sample::Learning;
+use super::update::{Round, Scratch, TUBE};
+use super::validation::agreement;
+use crate::recover::map::chunks::CHUNK;
+use crate::recover::map::crowding::Density;
+use crate::recover::map::pieces::Pieces;
+use crate::recover::map::places::{Places, distance2};
+use crate::recover::result::estimate::Estimate;
+use crate::simd::{Kernel, dispatch};
+
+/// True neighbors are looked for within this many radii of their distribution: nearly all of its mass.
+const REACH: f32 = 4.0;
+/// The radius is at least this share of the largest coordinate: estimates of one place differ by rounding.
+const ROUNDING: f32 = 8.0 * f32::EPSILON;
+/// The density of estimates is smooth over this many radii: it must not follow the very crowds that it judges.
+const SMOOTH: f32 = 4.5;
+/// Estimates enter the refined position within this many radii, less the farther they are.
+const KERNEL: f32 = 3.75;
+/// A slot that did not jump is looked at again if its place is ahead by at most this many nats per
+/// neighbor that did in one iteration. One jump can weigh more than that, but some speak for the place, too.
+const PER_JUMP: f32 = 2.0;
+/// Iterations end when fewer than this share of the slots jump farther than a radius: so few hardly change anything.
+const SETTLED: f64 = 0.03;
+/// Distribution and density are learned again when more than this share of the slots jumped since. Learned once per
+/// iteration, maps of paired lines and of planes come back worse.
+const STALE: f64 = 0.02;
+/// Iterations end when as many as this share of those that moved before move again: estimates go to and fro.
+const SLOW: f64 = 0.9;
+/// Iterations end when records agree by this share less than they did at best: a little less is noise.
+const WORSE: f64 = 0.08;
+
+/// Where joint recovery stands.
+pub(super) struct State<const D: usize> {
+    /// The best estimates of whole iterations.
+    best: Vec<Estimate<D>>,
+    /// The estimates of the iteration under way.
+    estimates: Vec<Estimate<D>>,
+    /// Their places, in the form that updates read.
+    places: Places<D>,
+    /// The density of estimates `p_random`, and the distribution of true neighbors about a slot.
+    density: Density<D>,
+    neighbors: NeighborDistribution,
+    least_radius: f32,
+    /// How many nats each place is ahead of the best one elsewhere; 0 where a slot is to be looked at in any case.
+    ahead: Vec<f32>,
+    jumps: Jumps,
+    /// Slots that jumped in this iteration, in the one before, and since density and distribution were learned.
+    n_jumped: usize,
+    n_jumped_before: usize,
+    n_jumped_since: usize,
+    /// How well records agreed at best.
+    most: f64,
+}
+
+/// Where a slot goes.
+pub(super) struct Update<const D: usize> {
+    slot: u32,
+    /// How far this place is ahead of the best one elsewhere, in nats; 0 where none is known elsewhere to compare with.
+    ahead: f32,
+    estimate: Estimate<D>,
+}
+
+impl<const D: usize> State<D> {
+    /// The state before the first iteration, at `start`.
+    pub(super) fn new<P: Pieces<D>>(input: &Input<'_, P>, start: Vec<Estimate<D>>) -> Self {
+        let n = start.len();
+        let places = Places::new(&start);
+        let least_radius = (ROUNDING * places.farthest()).max(f32::MIN_POSITIVE);
+        let radius = P::MOST_RADIUS * input.delta;
+        let (density, neighbors) = learned(input, &places, radius, least_radius);
+        Self {
+            best: start.clone(),
+            estimates: start,
+            places,
+            density,
+            neighbors,
+            least_radius,
+            ahead: vec![0.0; n],
+            jumps: Jumps::new(n),
+            n_jumped: 0,
+            // Nothing is settled yet.
+            n_jumped_before: n,
+            n_jumped_since: 0,
+            most: f64::NEG_INFINITY,
+        }
+    }
+
+    /// Where slots are believed to be.
+    pub(super) fn places(&self) -> &Places<D> {
+        &self.places
+    }
+
+    /// The best estimates of whole iterations.
+    pub(super) fn into_best(self) -> Vec<Estimate<D>> {
+        self.best
+    }
+
+    /// Learns density and distribution of the present places, if enough slots jumped since.
+    pub(super) fn learn_if_stale<P: Pieces<D>>(&mut self, input: &Input<'_, P>) {
+        if self.n_jumped_since as f64 <= STALE * self.estimates.len() as f64 {
+            return;
+        }
+        let radius = self.neighbors.radius;
+        let (density, neighbors) = learned(input, &self.places, radius, self.least_radius);
+        if neighbors.surplus != self.neighbors.surplus {
+            // Leads found under another rule say nothing.
+            self.ahead.fill(0.0);
+        }
+        (self.density, self.neighbors) = (density, neighbors);
+        self.n_jumped_since = 0;
+    }
+
+    /// Where `slots` go: the best of their candidates, refined.
+    pub(super) fn propose_score_refine<P: Pieces<D>>(
+        &self,
+        input: &Input<'_, P>,
+        slots: impl Iterator<Item = u32>,
+    ) -> Vec<Update<D>> {
+        let of_slot =
+            |slot: u32| Update { slot, ahead: 0.0, estimate: self.estimates[slot as usize] };
+        let mut updates: Vec<Update<D>> = slots.map(of_slot).collect();
+        let odds = self.neighbors.odds_of_slot(input.pieces.slots_per_record());
+        let round = Round {
+            pieces: &input.pieces,
+            graph: input.graph,
+            places: &self.places,
+            density: &self.density,
+            neighbors: &self.neighbors,
+            odds: &odds,
+            kernel: KERNEL * self.neighbors.radius,
+            delta2: input.delta * input.delta,
+        };
+        updates.par_chunks_mut(CHUNK).for_each_init(Scratch::default, |scratch, updates| {
+            dispatch(Chunk { round: &round, state: self, updates, scratch });
+        });
+        updates
+    }
+
+    /// Moves slots to where they go, and tells those whom a jump concerns.
+    pub(super) fn apply<P: Pieces<D>>(&mut self, input: &Input<'_, P>, updates: &[Update<D>]) {
+        let mut jumpers = Vec::new();
+        for Update { slot, ahead, estimate } in updates {
+            let at = *slot as usize;
+            let has_jumped = is_jump(&self.estimates[at], estimate, self.neighbors.radius);
+            // Whoever jumped is looked at again in any case.
+            (self.estimates[at], self.ahead[at]) =
+                (*estimate, if has_jumped { 0.0 } else { *ahead });
+            self.jumps.forget(at);
+            if has_jumped {
+                jumpers.push(*slot);
+            }
+        }
+        self.n_jumped += jumpers.len();
+        self.n_jumped_since += jumpers.len();
+        let after = Places::new(&self.estimates);
+        let reach = TUBE * self.neighbors.radius;
+        let is_ahead = |slot: usize| self.ahead[slot] > 0.0;
+        let (from, to) = (&self.places, &after);
+        self.jumps.tell((&input.pieces, input.graph), &jumpers, (from, to), reach, is_ahead);
+        self.places = after;
+    }
+
+    /// Judges an iteration: whether it was the last one.
+    pub(super) fn has_converged<P: Pieces<D>>(&mut self, input: &Input<'_, P>) -> bool {
+        let n = self.estimates.len();
+        if (self.n_jumped as f64) < SETTLED * n as f64 {
+            // So few hardly made it worse.
+            self.best.clone_from(&self.estimates);
+            return true;
+        }
+        let agreement = agreement(input, &self.estimates);
+        if agreement < (1.0 - WORSE) * self.most {
+            return true;
+        }
+        self.most = self.most.max(agreement);
+        self.best.clone_from(&self.estimates);
+        let is_slow = self.n_jumped as f64 > SLOW * self.n_jumped_before as f64;
+        if 2 * self.n_jumped < n && is_slow {
+            return true;
+        }
+        self.n_jumped_before = std::mem::take(&mut self.n_jumped);
+        false
+    }
+}
+
+/// Density and distribution of `places`, with neighbors looked for as if `radius` were that of the distribution.
+fn learned<const D: usize, P: Pieces<D>>(
+    input: &Input<'_, P>,
+    places: &Places<D>,
+    radius: f32,
+    least_radius: f32,
+) -> (Density<D>, NeighborDistribution) {
+    let density = Density::new(places, &input.listed, SMOOTH * radius);
+    let neighbors = NeighborDistribution::learn(&Learning {
+        places,
+        density: &density,
+        slots_per_record: input.pieces.slots_per_record(),
+        reach: REACH * radius,
+        tells_region: P::TELLS_REGION,
+        least_radius,
+        most_radius: P::MOST_RADIUS * input.delta,
+        graph: input.graph,
+        sample: &input.sample,
+    });
+    (density, neighbors)
+}
+
+/// Whether a slot is elsewhere, farther than neighbors lie.
+fn is_jump<const D: usize>(a: &Estimate<D>, b: &Estimate<D>, radius: f32) -> bool {
+    a.status != b.status || distance2(&a.position, &b.position) > radius * radius
+}
+
+struct Chunk<'a, 'b, const D: usize, P> {
+    round: &'a Round<'b, D, P>,
+    state: &'a State<D>,
+    /// Slots with their old estimates, which become the new ones.
+    updates: &'a mut [Update<D>],
+    scratch: &'a mut Scratch<D>,
+}
+
+impl<const D: usize, P: Pieces<D>> Kernel for Chunk<'_, '_, D, P> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for at in 0..self.updates.len() {
+            if let Some(next) = self.updates.get(at + 1) {
+                self.round.prefetch(next.slot as usize);
+            }
+            let update = &mut self.updates[at];
+            let slot = update.slot as usize;
+            let (ahead, n_jumps) = (self.state.ahead[slot], self.state.jumps.of(slot) as f32);
+            let is_settled = ahead > 0.0 && n_jumps <= ahead / PER_JUMP;
+            (update.estimate, update.ahead) = if is_settled {
+                (update.estimate, ahead)
+            } else {
+                self.round.solve(slot, &update.estimate, self.scratch)
+            };
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! What recovery learns of a map before any point is placed.
+
+use super::map::bytes::{Reader, Writer};
+use super::map::chance_field::{CandidateField, ChanceField, tube};
+use super::map::family::Chance;
+use super::options::{Delta, RecoverOptions, Solver};
+use crate::{About, Error, Fingerprint, ListsBy, RowOrder};
+
+/// What consensus learns of one released map and all of its lists: delta, and how likely a random listed record passes near a place.
+///
+/// It is small, whatever the size of the map (grids of 32,768 cells at most, one for lines, one per center of rays or per axis
+/// of candidates), so that whoever has the same map and the lists of some slots can solve these with it:
+/// [`solve_part`](Self::solve_part).
+#[derive(Clone, Debug)]
+pub struct Model<const D: usize> {
+    pub(super) options: RecoverOptions,
+    pub(super) map: Fingerprint,
+    /// What the rows of the lists are counted by, hence those of what comes back.
+    pub(super) about: About,
+    pub(super) delta: f64,
+    pub(super) chance: Chance<D>,
+}
+
+/// How a model begins as bytes.
+const MAGIC: [u8; 8] = *b"unliftM4";
+/// An order of rows that is not stated.
+const UNSTATED: u8 = u8::MAX;
+/// Centers of rays at most: they are counted in a byte.
+const MOST_FIELDS: usize = 256;
+
+impl<const D: usize> Model<D> {
+    /// The options that it was made with.
+    pub fn options(&self) -> &RecoverOptions {
+        &self.options
+    }
+
+    /// The released map that it is about.
+    pub fn map(&self) -> Fingerprint {
+        self.map
+    }
+
+    /// The distance up to which a record supports a position, in the unit of the map.
+    pub fn delta(&self) -> f64 {
+        self.delta
+    }
+
+    /// The chance that a random listed record passes within delta of `x` (about the released origin), for a slot of
+    /// the center `group` of rays; of other records any group will do. `None` for planes, whose offsets are counted.
+    pub fn chance(&self, group: usize, x: &[f32; D]) -> Option<f32> {
+        let delta = self.delta as f32;
+        let tube = tube(D, delta);
+        match &self.chance {
+            Chance::Lines(fields) => {
+                fields.get(group).or(fields.first()).map(|field| field.at(x, tube))
+            }
+            Chance::Planes => None,
+            Chance::Candidates(field) => Some(field.at(x, &field.tubes(delta))),
+        }
+    }
+
+    /// The model as bytes: a few hundred kilobytes at most, the same on every machine.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut to = Writer::default();
+        let RecoverOptions { delta, seed, exact_constraints, .. } = self.options;
+        to.bytes(&MAGIC);
+        to.bytes(&[D as u8, u8::from(exact_constraints)]);
+        to.u64(seed);
+        // No given delta is 0.
+        to.f64(if let Delta::Fixed(delta) = delta { delta } else { 0.0 });
+        to.bytes(&self.map.0);
+        let order = RowOrder::STATED.iter().position(|&order| order == self.about.order);
+        let by_oracle = self.about.lists_by == ListsBy::Oracle;
+        to.bytes(&[order.map_or(UNSTATED, |at| at as u8), u8::from(by_oracle)]);
+        to.f64(self.delta);
+        match &self.chance {
+            Chance::Lines(fields) => {
+                to.bytes(&[1]);
+                to.u64(fields.len() as u64);
+                fields.iter().for_each(|field| field.write(&mut to));
+            }
+            Chance::Planes => to.bytes(&[2]),
+            Chance::Candidates(field) => {
+                to.bytes(&[3]);
+                field.write(&mut to);
+            }
+        }
+        to.into_bytes()
+    }
+
+    /// The model that [`to_bytes`](Self::to_bytes) gave.
+    ///
+    /// # Errors
+    /// When `bytes` are anything else, or a model in another number of dimensions.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
+        let mut from = Reader::new("model", bytes);
+        let magic: [u8; 8] = from.array()?;
+        if magic != MAGIC {
+            return Err(Error::new("model", "a model of this version", "other bytes"));
+        }
+        let [dimensions, exact_constraints] = from.array()?;
+        if usize::from(dimensions) != D {
+            let expected = format!("a model in {D} dimensions");
+            return Err(Error::new("model", expected, dimensions.to_string()));
+        }
+        let seed = from.u64()?;
+        let given = from.f64()?;
+        let delta = if given == 0.0 { Delta::Auto } else { Delta::Fixed(given) };
+        let (solver, exact_constraints) = (Solver::Consensus, exact_constraints != 0);
+        let options = RecoverOptions { solver, delta, seed, exact_constraints, confidence: false };
+        options.check().map_err(|error| error.within("model"))?;
+        let map = Fingerprint(from.array()?);
+        let [order, by_oracle] = from.array()?;
+        let order = match order {
+            UNSTATED => RowOrder::Unstated,
+            at => *RowOrder::STATED
+                .get(usize::from(at))
+                .ok_or_else(|| Error::new("model", "an order of rows", at.to_string()))?,
+        };
+        let lists_by = if by_oracle == 0 { ListsBy::Unstated } else { ListsBy::Oracle };
+        let about = About { map: Some(map), order, lists_by };
+        let delta = from.f64()?;
+        if !(delta >= 0.0 && (delta as f32).is_finite()) {
+            return Err(Error::new("model", "a delta that is a length", delta.to_string()));
+        }
+        let [kind] = from.array()?;
+        let chance = match kind {
+            1 => {
+                let n = from.count(MOST_FIELDS)?;
+                let fields = (0..n).map(|_| ChanceField::read(&mut from));
+                Chance::Lines(fields.collect::<Result<_, _>>()?)
+            }
+            2 => Chance::Planes,
+            3 => Chance::Candidates(CandidateField::read(&mut from)?),
+            other => {
+                return Err(Error::new("model", "a kind of chance from 1 to 3", other.to_string()));
+            }
+        };
+        from.end()?;
+        Ok(Self { options, map, about, delta, chance })
+    }
+}

@@ -1,0 +1,291 @@
+//! A released map and its lists in the form that solvers read.
+
+use std::ops::Range;
+
+use super::baselines::density::published;
+use super::baselines::ransac::Ransac;
+use super::checks::check_lists;
+use super::confidence::seen::{Seen, Solved};
+use super::joint::Joint;
+use super::map::chunks::Slots;
+use super::map::family::Family;
+use super::map::graph::Graph;
+use super::map::lists::Lists;
+use super::model::Model;
+use super::options::{Delta, RecoverOptions, Solver};
+use super::pairs_of_descriptors::descriptor_rows;
+use super::placement::{self, Placement};
+use super::result::estimate::Estimate;
+use super::result::recovered::Recovered;
+use super::result::trials::TrialCounts;
+use super::result::unknown::Unknown;
+use super::{confidence, consensus, delta, exact};
+use crate::density::{Peaks, tomography};
+use crate::neighbors::Neighborhoods;
+use crate::released::{Obfuscation, Released};
+use crate::{About, Error, Fingerprint};
+
+/// One map to be recovered.
+pub(super) struct Problem<'a, const D: usize> {
+    released: &'a Released<D>,
+    map: Fingerprint,
+    lists: &'a Neighborhoods,
+    options: RecoverOptions,
+    /// The distance up to which a record supports a place, in the unit of the map.
+    delta: f64,
+    records: Records<'a, D>,
+    trials: TrialCounts,
+}
+
+/// Records as solvers read them.
+enum Records<'a, const D: usize> {
+    /// Where records alone say that points are.
+    Alone(Peaks),
+    /// Records with their lists.
+    Listed {
+        family: Family<'a, D>,
+        /// Who lists whom in both directions, for joint recovery.
+        graph: Option<Graph>,
+        /// The graph as lists, where records have one slot.
+        both_ways: Option<Neighborhoods>,
+    },
+}
+
+impl<'a, const D: usize> Problem<'a, D> {
+    /// `released` with its `lists`; what a model would say is learned here.
+    ///
+    /// # Errors
+    /// When options are out of range, or the lists are of another map.
+    pub(super) fn new(
+        released: &'a Released<D>,
+        lists: &'a Neighborhoods,
+        options: &RecoverOptions,
+    ) -> Result<Self, Error> {
+        Self::make(released, lists, options, None)
+    }
+
+    /// `released` with some of its lists, and the `model` made of it and all of them.
+    ///
+    /// # Errors
+    /// When the model or the lists are of another map.
+    pub(super) fn with_model(
+        released: &'a Released<D>,
+        lists: &'a Neighborhoods,
+        model: &Model<D>,
+    ) -> Result<Self, Error> {
+        Self::make(released, lists, &model.options, Some(model))
+    }
+
+    fn make(
+        released: &'a Released<D>,
+        lists: &'a Neighborhoods,
+        options: &RecoverOptions,
+        model: Option<&Model<D>>,
+    ) -> Result<Self, Error> {
+        check_lists(released, lists)?;
+        options.check()?;
+        let map = released.fingerprint();
+        map.expect(lists.about().map)?;
+        map.expect(model.map(|model| model.map)).map_err(|error| error.within("model"))?;
+        let (records, delta) = match options.solver {
+            Solver::Density => Self::at_peaks(published(released)),
+            Solver::Tomography => Self::at_peaks(tomography(released)),
+            Solver::Consensus | Solver::Joint | Solver::JointStart | Solver::Ransac => {
+                Self::listed(released, lists, options, model)?
+            }
+        };
+        let trials = TrialCounts::default();
+        Ok(Self { released, map, lists, options: *options, delta, records, trials })
+    }
+
+    fn at_peaks(peaks: Peaks) -> (Records<'a, D>, f64) {
+        let delta = placement::delta(&peaks);
+        (Records::Alone(peaks), delta)
+    }
+
+    fn listed(
+        released: &'a Released<D>,
+        lists: &'a Neighborhoods,
+        options: &RecoverOptions,
+        model: Option<&Model<D>>,
+    ) -> Result<(Records<'a, D>, f64), Error> {
+        let family = match model {
+            Some(model) => Family::with_chance(released, model.chance.clone())?,
+            None => Family::learn(released, lists),
+        };
+        // Joint recovery also asks who lists whom, from the first pass on.
+        let is_joint = matches!(options.solver, Solver::Joint | Solver::JointStart);
+        let graph = is_joint.then(|| Graph::new(lists, released.slots_per_record()));
+        let single = graph.as_ref().filter(|_| released.slots_per_record() == 1);
+        let both_ways = single.map(Graph::neighborhoods).transpose()?;
+        let delta = match (model, options.delta) {
+            (Some(model), _) => model.delta,
+            (None, Delta::Fixed(delta)) => delta,
+            (None, Delta::Auto) => {
+                let used = both_ways.as_ref().unwrap_or(lists);
+                delta::learn(released, &family, (used, lists), is_joint, options.seed)
+            }
+        };
+        Ok((Records::Listed { family, graph, both_ways }, delta))
+    }
+
+    /// What was learned of the map, by consensus.
+    ///
+    /// # Errors
+    /// When the solver is another one.
+    pub(super) fn model(&self) -> Result<Model<D>, Error> {
+        match &self.records {
+            Records::Listed { family, .. } if self.options.solver == Solver::Consensus => {
+                let about = self.about();
+                let (map, delta, chance) = (self.map, self.delta, family.chance());
+                Ok(Model { options: self.options, about, map, delta, chance })
+            }
+            _ => {
+                let solver = self.options.solver.name();
+                Err(Error::new("solver of parts", Solver::Consensus.name(), solver))
+            }
+        }
+    }
+
+    /// Number of slots.
+    pub(super) fn n_slots(&self) -> usize {
+        self.released.n_slots()
+    }
+
+    /// The estimates of `slots`, in order, by the solver; of joint recovery those that it starts from.
+    pub(super) fn solve(&self, slots: Range<usize>) -> Vec<Estimate<D>> {
+        let (lists, delta) = (self.lists, self.delta as f32);
+        match &self.records {
+            Records::Alone(peaks) => Placement::new(self.released, lists, peaks).solve(slots),
+            Records::Listed { family, .. } if self.options.solver == Solver::Ransac => {
+                let (seed, trials) = (self.options.seed, &self.trials);
+                Ransac { family, lists, delta, seed, trials }.solve(slots)
+            }
+            // Joint recovery starts from who lists whom in both directions, where a record hides one point.
+            Records::Listed { family, both_ways, .. } => {
+                let lists = Lists::Given(both_ways.as_ref().unwrap_or(lists));
+                consensus::solve(family, lists, delta, Slots::Range(slots))
+            }
+        }
+    }
+
+    /// The estimates of all slots after joint recovery from `start`; `start` for other solvers.
+    pub(super) fn refine(&self, start: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
+        match &self.records {
+            Records::Listed { family, graph: Some(graph), .. }
+                if self.options.solver == Solver::Joint =>
+            {
+                let (delta, seed) = (self.delta as f32, self.options.seed);
+                Joint { family, graph, delta, seed }.recover(start)
+            }
+            _ => start,
+        }
+    }
+
+    /// Recovered points from the last estimates of all slots: exact constraints are met where a rule fixes coordinates, and it
+    /// is said how sure the attacker is. Beside it what confidence is made of, if it `is_asked` for.
+    ///
+    /// # Errors
+    /// When there is not one estimate per slot.
+    pub(super) fn finish(
+        &self,
+        estimates: Vec<Estimate<D>>,
+        is_asked: bool,
+    ) -> Result<(Recovered<D>, Seen), Error> {
+        let rows = descriptor_rows(self.released, self.lists, 0..self.released.n_records());
+        self.finish_with(estimates, rows, is_asked)
+    }
+
+    /// [`finish`](Self::finish), where it is known which descriptor is whose.
+    ///
+    /// # Errors
+    /// When there is not one estimate per slot.
+    pub(super) fn finish_with(
+        &self,
+        unsettled: Vec<Estimate<D>>,
+        descriptor_row: Option<Vec<u32>>,
+        is_asked: bool,
+    ) -> Result<(Recovered<D>, Seen), Error> {
+        if unsettled.len() != self.n_slots() {
+            let expected = format!("{}, one per slot", self.n_slots());
+            return Err(Error::new("estimates", expected, unsettled.len().to_string()));
+        }
+        let settled = self.settled(&unsettled);
+        let estimates = settled.as_deref().unwrap_or(&unsettled);
+        let trials = (self.options.solver == Solver::Ransac).then(|| self.trials.histogram());
+        let recovered = self.in_columns(estimates, descriptor_row)?.with_trials(trials);
+        if let Some(unknown) = confidence::not_asked::<D>(&self.options) {
+            return Ok((recovered.without_confidence(unknown), Seen::NOTHING));
+        }
+        let Records::Listed { family, graph: Some(graph), .. } = &self.records else {
+            return Ok((recovered.without_confidence(Unknown::OtherSolver), Seen::NOTHING));
+        };
+        let unknown = confidence::unknown(self.released, self.lists, estimates);
+        if let (Some(unknown), false) = (unknown, is_asked) {
+            return Ok((recovered.without_confidence(unknown), Seen::NOTHING));
+        }
+        let solved = Solved { estimates, unsettled: &unsettled, delta: self.delta as f32 };
+        let (sure, seen) = confidence::look(family, graph, self.released, &solved);
+        let recovered = match unknown {
+            Some(unknown) => recovered.without_confidence(unknown),
+            None => recovered.with_confidence(sure)?,
+        };
+        Ok((recovered, seen))
+    }
+
+    /// The first pass of joint recovery as [`Solver::JointStart`] finishes it, beside the `last` one.
+    ///
+    /// # Errors
+    /// When there is not one estimate per slot.
+    pub(super) fn finish_start(
+        &self,
+        start: Vec<Estimate<D>>,
+        last: &Recovered<D>,
+    ) -> Result<Recovered<D>, Error> {
+        let start = if self.is_settled() { self.settle(start) } else { start };
+        let rows = last.descriptor_row().map(<[u32]>::to_vec);
+        Ok(self.in_columns(&start, rows)?.without_confidence(Unknown::OtherSolver))
+    }
+
+    /// Whether a rule of the scheme moves estimates. The paper's loop stays as published.
+    fn is_settled(&self) -> bool {
+        let asked = self.options.exact_constraints && self.options.solver != Solver::Ransac;
+        let listed = matches!(self.records, Records::Listed { .. });
+        asked && listed && exact::can_settle(self.released)
+    }
+
+    fn settle(&self, estimates: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
+        exact::settle(self.released, estimates, self.delta)
+    }
+
+    /// Estimates moved to where rules allow them to be, if they move any; joint recovery may go on from there.
+    fn settled(&self, estimates: &[Estimate<D>]) -> Option<Vec<Estimate<D>>> {
+        if !self.is_settled() {
+            return None;
+        }
+        let mut settled = self.settle(estimates.to_vec());
+        if self.options.solver == Solver::Joint {
+            for _ in 0..exact::feeds(self.released) {
+                settled = self.settle(self.refine(settled));
+            }
+        }
+        Some(settled)
+    }
+
+    /// Estimates in columns, by rows of descriptors where these are known.
+    fn in_columns(
+        &self,
+        estimates: &[Estimate<D>],
+        descriptor_row: Option<Vec<u32>>,
+    ) -> Result<Recovered<D>, Error> {
+        let released = self.released;
+        let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
+        let (origin, unit) = (released.origin(), released.unit());
+        Recovered::try_new(estimates, with_axis, descriptor_row, origin, unit, self.delta)
+            .map(|recovered| recovered.with_about(self.about()))
+    }
+
+    fn about(&self) -> About {
+        About { map: Some(self.map), ..self.lists.about() }
+    }
+}
