@@ -44,34 +44,21 @@
 //!
 //! A source of neighborhoods is a [`neighbors::Source`]; `unlift-testkit` has the laws of both, and an example of each. Audits of files, with figures and a page, are calls of `unlift-audit`.
 
-mod about;
 pub mod audit;
-mod compiled;
-mod density;
-pub mod descriptors;
-mod error;
 pub mod evaluate;
-pub mod geometry;
 // Not part of the interface: for crates that run code of others.
 #[doc(hidden)]
 pub mod guard;
-mod ids;
-mod line;
 pub mod neighbors;
 pub mod obfuscate;
-pub mod points;
-pub mod recover;
-pub mod released;
 pub mod seed;
-// Not part of the interface: the loops of `unlift-features` are compiled through it, so that `unsafe` stays here.
-#[doc(hidden)]
-pub mod simd;
 pub mod synthetic;
 pub mod truth;
 
-pub use about::{About, Fingerprint, ListsBy, RowOrder};
-pub use descriptors::Descriptors;
-pub use error::Error;
-pub use ids::{OriginalId, RecordId};
-pub use line::{OneLine, is_obeyed};
-pub use points::{PointSet, Unit};
+pub use truth::OriginalId;
+pub use unlift_attack::{
+    About, Descriptors, Error, Fingerprint, ListsBy, OneLine, PointSet, RecordId, RowOrder, Unit,
+    descriptors, geometry, is_obeyed, points, recover, released,
+};
+#[doc(hidden)]
+pub use unlift_attack::{compiled, simd};

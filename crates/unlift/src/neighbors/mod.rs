@@ -1,33 +1,8 @@
 //! Neighborhoods: which records are said to hide points near the point of a slot.
 //!
-//! `oracle` makes them from the originals, for experiments. All others take what an attacker has, a
-//! released map: [`Source`] is what they have in common, and ours stand in [`sources::SOURCES`].
+//! `oracle` makes them from the originals, for experiments. What an attacker makes from a released map alone is in `unlift_attack::neighbors`
+//! and re-exported here.
 
-mod alike;
-mod best;
-mod by_descriptors;
-mod compare;
-mod dense;
-mod geometric;
-mod neighborhoods;
 pub mod oracle;
-mod overlap;
-mod rows;
-mod scored;
-mod sets;
-mod similarity;
-mod source;
-pub mod sources;
-mod tiles;
-mod walk;
 
-pub use by_descriptors::ByDescriptors;
-pub use dense::{Dense, dense, usual};
-pub(crate) use geometric::geometric_by;
-pub use geometric::{Geometric, geometric};
-pub use neighborhoods::Neighborhoods;
-pub use overlap::{Overlap, REACHES, overlap};
-pub use scored::{Part, Scores, scored};
-pub use similarity::{Similarity, similarity};
-pub(crate) use source::lacks_descriptors;
-pub use source::{Needs, Source, of_what_there_is};
+pub use unlift_attack::neighbors::*;

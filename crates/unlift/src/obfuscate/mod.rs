@@ -4,6 +4,7 @@
 //! (the origin, the normal form, the order of records, slots and descriptors) happens here, once.
 
 mod hide;
+mod kmeans;
 mod pairs;
 mod scheme;
 mod size;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::scheme::{Entry, Facts, Lifted, Scheme};
 use crate::geometry::frame::Bounds;
-use crate::geometry::kmeans::kmeans;
+use super::kmeans::kmeans;
 use crate::geometry::vector::{dot, sub};
 use crate::released::{Obfuscation, Rays};
 use crate::seed::{Key, Stage};

@@ -16,7 +16,7 @@
 use chacha20::ChaCha20Rng;
 use chacha20::rand_core::{Rng, SeedableRng};
 
-use super::{Bits, Draws, Stage};
+use unlift_attack::seed::{Bits, Draws, Stage};
 use crate::Error;
 
 /// A key of 256 bits: all that hides a map comes from it. Part of the secret; it is not printed.
@@ -78,7 +78,7 @@ pub struct StageKey([u8; 32]);
 impl StageKey {
     /// The stream of `item`.
     pub fn draws(&self, item: u64) -> Draws<Cipher> {
-        Draws { source: Cipher(self.stream(item)) }
+        Draws::of(Cipher(self.stream(item)))
     }
 
     fn stream(&self, item: u64) -> ChaCha20Rng {

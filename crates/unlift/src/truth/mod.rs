@@ -1,10 +1,11 @@
 //! The owner's side: what recovery must never see.
 //!
-//! Only `obfuscate`, `neighbors::oracle`, `evaluate` and `audit` may import from here; a test
-//! (`tests/architecture`) fails the build otherwise.
+//! Only the owner opens it: the attacker's crate, `unlift-attack`, does not know this one.
 
+mod id;
 mod original;
 mod secret;
 
+pub use id::OriginalId;
 pub use original::Original;
 pub use secret::{DropReason, Dropped, Secret};

@@ -90,6 +90,6 @@ pub fn of_what_there_is<const D: usize>(
 }
 
 /// The error of a source that needs descriptors and has none.
-pub(crate) fn lacks_descriptors(name: &str) -> Error {
+pub fn lacks_descriptors(name: &str) -> Error {
     Error::new("descriptors", format!("some, as neighbors by {name} need them"), "none")
 }

@@ -24,7 +24,7 @@ impl<const D: usize> AxisCandidates<D> {
     }
 
     /// The rows `order[0], order[1], ...`.
-    pub(crate) fn select(&self, order: &[u32]) -> Self {
+    pub fn select(&self, order: &[u32]) -> Self {
         Self { position: super::normal_form::rows(&self.position, order) }
     }
 

@@ -41,7 +41,7 @@ impl<const D: usize> Lines<D> {
     }
 
     /// The rows `order[0], order[1], ...`.
-    pub(crate) fn select(&self, order: &[u32]) -> Self {
+    pub fn select(&self, order: &[u32]) -> Self {
         Self {
             foot: super::normal_form::rows(&self.foot, order),
             direction: super::normal_form::rows(&self.direction, order),

@@ -36,7 +36,7 @@ impl<const D: usize> AxisPlanes<D> {
     }
 
     /// The rows `order[0], order[1], ...`.
-    pub(crate) fn select(&self, order: &[u32]) -> Self {
+    pub fn select(&self, order: &[u32]) -> Self {
         Self {
             axis: super::normal_form::rows(&self.axis, order),
             offset: super::normal_form::rows(&self.offset, order),

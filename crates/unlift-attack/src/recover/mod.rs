@@ -9,7 +9,7 @@
 //! 5. `exact`: coordinates that a rule of the scheme fixes. `confidence`: how sure the attacker is.
 //!    `pairs_of_descriptors`: whose descriptor is whose on a paired line.
 //! 6. `problem`: a released map with its lists, solved and finished. `model` and `parts`: consensus where each part has its own lists
-//!    alone.
+//!    alone. `records_alone`: attacks without neighborhoods.
 //!
 //! [`recover`] is the whole attack. [`prepare`] learns a [`Model`], with which parts of a map are solved elsewhere.
 
@@ -27,9 +27,9 @@ mod pairs_of_descriptors;
 mod parts;
 mod placement;
 mod problem;
+mod records_alone;
 mod result;
 
-pub(crate) use baselines::density::published;
 #[doc(hidden)]
 pub use confidence::model::{N_KINDS, N_TERMS, centered, terms};
 #[doc(hidden)]
@@ -37,6 +37,7 @@ pub use confidence::seen::{Cues, Seen};
 pub use model::Model;
 pub use options::{Delta, RecoverOptions, Solver};
 pub use parts::Part;
+pub use records_alone::records_alone;
 pub use result::estimate::{Estimate, Status};
 pub use result::probability::Confidence;
 pub use result::recovered::Recovered;
@@ -44,11 +45,9 @@ pub use result::trials::TrialHistogram;
 pub use result::unknown::Unknown;
 
 use crate::compiled::Both;
-use crate::density::Peaks;
 use crate::neighbors::Neighborhoods;
-use crate::released::{Obfuscation, Released};
-use crate::{About, Error, RowOrder};
-use placement::Placement;
+use crate::Error;
+use crate::released::Released;
 use problem::Problem;
 
 /// Learns what consensus must know of `released` and all of its `lists` before any point is placed.
@@ -143,24 +142,4 @@ fn and_look<const D: usize>(
     let problem = Problem::new(released, lists, options)?;
     let start = problem.solve(0..problem.n_slots());
     problem.finish(problem.refine(start), is_asked)
-}
-
-/// The positions at which `peaks` puts the hidden points: which of a paired line's is whose is not known.
-///
-/// # Errors
-/// When there is not one peak, or none, per slot.
-pub(crate) fn recover_at<const D: usize>(
-    released: &Released<D>,
-    peaks: &Peaks,
-) -> Result<Recovered<D>, Error> {
-    let (n_records, slots) = (released.n_records(), released.slots_per_record());
-    let none =
-        Neighborhoods::try_new(vec![0; n_records * slots + 1], Vec::new(), None, n_records, slots)?;
-    let estimates = Placement::new(released, &none, peaks).solve(0..released.n_slots());
-    let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
-    let (origin, unit) = (released.origin(), released.unit());
-    let delta = placement::delta(peaks);
-    let about =
-        About { map: Some(released.fingerprint()), order: RowOrder::Either, ..About::default() };
-    Ok(Recovered::try_new(&estimates, with_axis, None, origin, unit, delta)?.with_about(about))
 }

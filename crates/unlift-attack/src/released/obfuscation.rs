@@ -35,7 +35,7 @@ impl<const D: usize> Obfuscation<D> {
     }
 
     /// The records `order[0], order[1], ...`.
-    pub(crate) fn select(&self, order: &[u32]) -> Self {
+    pub fn select(&self, order: &[u32]) -> Self {
         match self {
             Self::Lines(lines) => Self::Lines(lines.select(order)),
             Self::Rays(rays) => Self::Rays(rays.select(order)),

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::vector::squared_distance;
+use crate::geometry::vector::squared_distance;
 use crate::seed::{Key, Stage};
 
 /// Lloyd rounds before a restart gives up converging (scikit-learn's default).

@@ -54,7 +54,7 @@ impl<const D: usize> Rays<D> {
     }
 
     /// The rows `order[0], order[1], ...`.
-    pub(crate) fn select(&self, order: &[u32]) -> Self {
+    pub fn select(&self, order: &[u32]) -> Self {
         Self {
             centers: self.centers.clone(),
             center: super::normal_form::rows(&self.center, order),

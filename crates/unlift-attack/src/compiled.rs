@@ -8,14 +8,14 @@ use std::any::Any;
 use crate::Error;
 
 /// A function of two dimensions, and the one of three.
-pub(crate) struct Both<A, B>(pub(crate) A, pub(crate) B);
+pub struct Both<A, B>(pub A, pub B);
 
 impl<A: Any, B: Any> Both<A, B> {
     /// The one of the two that is of type `F`, as only one can be.
     ///
     /// # Errors
     /// When `F` is for another number of dimensions.
-    pub(crate) fn of<F: Any + Copy>(&self) -> Result<F, Error> {
+    pub fn of<F: Any + Copy>(&self) -> Result<F, Error> {
         // A constant cannot choose between two types; `Any` asks whether they are the same.
         let (two, three): (&dyn Any, &dyn Any) = (&self.0, &self.1);
         let found = two.downcast_ref().or_else(|| three.downcast_ref()).copied();
