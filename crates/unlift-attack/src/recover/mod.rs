@@ -44,9 +44,9 @@ pub use result::recovered::Recovered;
 pub use result::trials::TrialHistogram;
 pub use result::unknown::Unknown;
 
+use crate::Error;
 use crate::compiled::Both;
 use crate::neighbors::Neighborhoods;
-use crate::Error;
 use crate::released::Released;
 use problem::Problem;
 

@@ -114,7 +114,7 @@ pub(super) fn attack<const D: usize>(
     let Run { plan, scheme, repeat, oracle_seed } = *run;
     let original = owned.original;
     // The same integer as the owner's, by the counter: what is released comes from a key, and no attack may
-    // make keys (tests/architecture).
+    // make keys: its crate has none.
     let attacker = plan.seed.wrapping_add(u64::from(repeat));
     let of_scheme = |error: Error| error.within(scheme);
     let baseline = clock.time(|s| &mut s.evaluate, || Ok(blind(&hidden.0, original, &hidden.1)))?;

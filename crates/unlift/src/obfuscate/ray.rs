@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
+use super::kmeans::kmeans;
 use super::scheme::{Entry, Facts, Lifted, Scheme};
 use crate::geometry::frame::Bounds;
-use super::kmeans::kmeans;
 use crate::geometry::vector::{dot, sub};
 use crate::released::{Obfuscation, Rays};
 use crate::seed::{Key, Stage};

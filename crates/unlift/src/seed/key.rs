@@ -16,8 +16,8 @@
 use chacha20::ChaCha20Rng;
 use chacha20::rand_core::{Rng, SeedableRng};
 
-use unlift_attack::seed::{Bits, Draws, Stage};
 use crate::Error;
+use unlift_attack::seed::{Bits, Draws, Stage};
 
 /// A key of 256 bits: all that hides a map comes from it. Part of the secret; it is not printed.
 #[derive(Clone, PartialEq, Eq)]
