@@ -34,6 +34,17 @@ impl Bytes {
         Ok(Self::continuing(path, BufReader::new(file), 0, len))
     }
 
+    /// Whether what is left is zeros, up to a page of memory: PCL's writer stretched its files so far. Reads it, if it is so short.
+    pub fn is_padding(&mut self) -> Result<bool, Error> {
+        let n = self.remaining();
+        if n > 1 << 16 {
+            return Ok(false);
+        }
+        let mut rest = vec![0; n as usize];
+        self.fill(&mut rest, "what follows the points")?;
+        Ok(rest.iter().all(|&byte| byte == 0))
+    }
+
     /// A reader of a file of `len` bytes of which `at` were already read from `reader`.
     pub fn continuing(path: &Path, reader: BufReader<File>, at: u64, len: u64) -> Self {
         Self { path: path.to_owned(), reader, part: Part::Header, value_at: at, at, len }

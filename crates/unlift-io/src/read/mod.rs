@@ -17,12 +17,14 @@ mod scans;
 mod table;
 mod undeclared;
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 pub use descriptors::descriptors;
 pub use map_input::Input;
 
 use crate::error::Error;
+use crate::input;
 use crate::seen::Seen;
 use models::Model;
 
@@ -79,10 +81,35 @@ fn not_read(extension: &str) -> String {
     format!("a .{extension} file{more}")
 }
 
+/// A table, or COLMAP's points under another name.
+fn table_of(path: &Path) -> Result<Input, Error> {
+    match table::read(path)? {
+        Some(input) => Ok(input),
+        None => colmap_points(path),
+    }
+}
+
+/// Refuses what Git LFS leaves in the place of a file that it did not fetch.
+fn check_fetched(path: &Path) -> Result<(), Error> {
+    const POINTER: &[u8] = b"version https://git-lfs";
+    let mut head = Vec::new();
+    let (file, _) = input::open(path)?;
+    file.take(POINTER.len() as u64)
+        .read_to_end(&mut head)
+        .map_err(|error| Error::read(path, error))?;
+    if head == POINTER {
+        let found = "a pointer of Git LFS (git lfs pull fetches the file)";
+        return Err(Error::new(path, "", "a map", found));
+    }
+    Ok(())
+}
+
 fn file(path: &Path) -> Result<Input, Error> {
+    check_fetched(path)?;
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let mut input = match (&*stem, &*extension.to_ascii_lowercase()) {
+        ("points3D", "txt") if table::has_three_columns(path)? => table_of(path)?,
         ("points3D", "bin" | "txt") => colmap_points(path)?,
         ("cameras" | "images" | "rigs" | "frames", "bin" | "txt") => {
             let found = "another file of a COLMAP model (give its folder)";
@@ -90,10 +117,7 @@ fn file(path: &Path) -> Result<Input, Error> {
         }
         (_, "ply") => ply::read(path)?,
         (_, "splat") => ply::splats(path)?,
-        (_, "csv" | "xyz" | "txt" | "asc" | "pts") => match table::read(path)? {
-            Some(input) => input,
-            None => colmap_points(path)?,
-        },
+        (_, "csv" | "xyz" | "txt" | "asc" | "pts") => table_of(path)?,
         (_, "npy") => npy::positions(path)?,
         (_, "npz") => npz::positions(path)?,
         (_, "las") => scans::las::read(path)?,

@@ -9,7 +9,7 @@ use zip::result::ZipError;
 
 use super::bytes::Bytes;
 use super::lines::quoted;
-use super::npy::{Header, PLACES, of_points};
+use super::npy::{Header, Layout, PLACES, of_points};
 use crate::error::Error;
 use crate::guard::without_panic;
 use crate::input::{self, Budget};
@@ -40,15 +40,23 @@ fn in_archive(path: &Path) -> Result<Input, Error> {
         Ok(Bytes::continuing(path, BufReader::new(file), 0, n))
     };
     let (mut all, mut fit) = (Vec::new(), Vec::new());
+    let mut n_columns = Vec::new();
     for at in 0..archive.len() {
         let entry = archive.by_index(at).map_err(wrong)?;
         let name = entry.name().map_err(wrong)?;
         let Some(name) = name.strip_suffix(".npy").map(str::to_owned) else { continue };
         let header = unpacked(entry, HEADER).and_then(|mut bytes| Header::read(&mut bytes));
-        if header.is_ok_and(|header| header.points().is_some()) {
+        if let Some((_, layout)) = header.ok().and_then(|header| header.points()) {
+            n_columns.push(if let Layout::Matrix { columns } = layout { columns } else { 3 });
             fit.push((at, name.clone()));
         }
         all.push(name);
+    }
+    let has = |start: &str| all.iter().any(|name| name.starts_with(start));
+    // Places, sizes and angles of keypoints stand in one array, and their descriptors beside it.
+    let beside_descriptors = has("descriptors") && n_columns.iter().all(|&n| n > 3);
+    if has("keypoints") || has("OPENSFM_FEATURES") || beside_descriptors {
+        return Err(Error::new(path, "", "points of a map", "features of an image"));
     }
     let is_known = |name: &str| PLACES.iter().any(|known| name.eq_ignore_ascii_case(known));
     if fit.iter().filter(|(_, name)| is_known(name)).count() == 1 {

@@ -281,6 +281,15 @@ fn of_poses(names: &[&[u8]]) -> Option<String> {
 
 const POSES: &str = "a trajectory, poses of cameras";
 
+/// Whether the first row has three columns, as one of COLMAP's points never has.
+///
+/// # Errors
+/// When the file cannot be read.
+pub(super) fn has_three_columns(path: &Path) -> Result<bool, Error> {
+    let mut lines = Lines::open(path)?;
+    Ok(lines.advance_to_data()? && Separator::of(lines.line()).split(lines.line()).len() == 3)
+}
+
 /// Whether a comment names the columns of COLMAP's points.
 fn is_colmap_header(comment: &[u8]) -> bool {
     let comment = comment.to_ascii_uppercase();

@@ -417,3 +417,92 @@ fn models_of_undistorted_images_are_found_where_there_is_no_other() {
         assert_eq!((input.model, input.notes), (Some(dir.path().join("sparse/0")), vec![]));
     }
 }
+
+/// OpenSfM's features: place, size and angle of keypoints beside their descriptors.
+#[test]
+fn an_archive_of_features_is_no_map() {
+    use std::io::Write;
+    use zip::write::{SimpleFileOptions, ZipWriter};
+    let archive = |arrays: &[(&str, &str)]| {
+        let mut out = ZipWriter::new(std::io::Cursor::new(Vec::new()));
+        for (name, shape) in arrays {
+            out.start_file(format!("{name}.npy"), SimpleFileOptions::default()).unwrap();
+            let n: usize = shape
+                .trim_matches(['(', ')'])
+                .split(", ")
+                .map(|n| n.parse::<usize>().unwrap())
+                .product();
+            out.write_all(&npy("'<f4'", shape, &vec![0; 4 * n])).unwrap();
+        }
+        out.finish().unwrap().into_inner()
+    };
+    for arrays in [
+        &[("points", "(30, 4)"), ("descriptors", "(30, 128)")][..],
+        &[("points", "(30, 3)"), ("OPENSFM_FEATURES_VERSION", "(1, 1)")],
+        &[("keypoints", "(30, 3)"), ("scores", "(30, 1)")],
+    ] {
+        let line = refused("a.npz", archive(arrays));
+        assert_eq!(line, "a.npz: expected points of a map, found features of an image");
+    }
+}
+
+#[test]
+fn points3d_of_others_are_a_table() {
+    for row in ["{} {} {}", "{}, {}, {}"] {
+        let text = POINTS.map(|point| {
+            point.iter().fold(row.to_owned(), |row, x| row.replacen("{}", &x.to_string(), 1))
+        });
+        assert_eq!(open("points3D.txt", text.join("\n")).positions, POINTS);
+    }
+    // A row of COLMAP's that is damaged is not read as a point.
+    assert!(refused("points3D.txt", "1 0.5 0.5 0.5\n").contains("points3D.txt:1: expected"));
+}
+
+/// Python's writer of JSON knows numbers that JSON does not.
+#[test]
+fn json_with_numbers_that_are_none_has_points_left_out() {
+    let point = |x: &str| format!(r#"{{"coordinates": [{x}, 2.0, 3.0]}}"#);
+    let points: Vec<String> = ["1.0", "NaN", "-1.5", "Infinity", "-Infinity", "4.0"]
+        .iter()
+        .enumerate()
+        .map(|(at, x)| format!("\"{at} NaN \\\" I\": {}", point(x)))
+        .collect();
+    let text = format!(r#"[{{"shots": {{}}, "points": {{{}}}}}]"#, points.join(", "));
+    let input = open("reconstruction.json", text);
+    assert_eq!(input.positions, [[1.0, 2.0, 3.0], [-1.5, 2.0, 3.0], [4.0, 2.0, 3.0]]);
+}
+
+#[test]
+fn json_of_others_is_told() {
+    let spaced = r#"{"views": [], "poses": [], "structure": [{"X": [" 0.5", "-1.25", " 3"]}]}"#;
+    assert_eq!(open("scene.sfm", spaced).positions, [POINTS[0]]);
+    let line = refused("a.sfm", r#"{"version": [], "views": [{}], "intrinsics": []}"#);
+    assert!(line.contains("ConvertSfMFormat") && line.ends_with("found cameras alone"), "{line}");
+    for other in [r#"{"points": [[1, 2, 3]]}"#, r#"{"frames": [{}]}"#] {
+        let line = refused("a.json", other);
+        assert!(line.contains("a map of OpenSfM, OpenMVG, Meshroom or nerfstudio"), "{line}");
+        assert!(line.contains("found other JSON ("), "{line}");
+    }
+}
+
+#[test]
+fn a_file_that_was_not_fetched_is_told() {
+    let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 179\n";
+    for name in ["a.ply", "a.las", "a.pts"] {
+        let line = refused(name, pointer);
+        assert!(
+            line.ends_with("found a pointer of Git LFS (git lfs pull fetches the file)"),
+            "{line}"
+        );
+    }
+}
+
+/// PCL's writer of binary files left zeros behind the points.
+#[test]
+fn zeros_behind_the_points_of_a_pcd_are_no_points() {
+    let head = "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 3\nHEIGHT 1\nPOINTS 3\nDATA binary\n";
+    let mut file = head.as_bytes().to_vec();
+    file.extend(POINTS.as_flattened().iter().flat_map(|&x| (x as f32).to_le_bytes()));
+    let told = |more: &[u8]| open("a.pcd", [&file[..], more].concat()).doubts.len();
+    assert_eq!([told(&[]), told(&[0; 4000]), told(&[1; 24])], [0, 0, 1]);
+}

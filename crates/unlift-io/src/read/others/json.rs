@@ -2,7 +2,7 @@
 //! `transforms.json`. A file is read as it comes: only points and poses are kept.
 
 use std::fmt;
-use std::io::BufReader;
+use std::io::{self, BufReader, Read};
 use std::marker::PhantomData;
 use std::path::{Component, Path, PathBuf};
 
@@ -21,7 +21,7 @@ use crate::read::ply;
 /// When the file is no JSON, or none of these maps; when the cloud that nerfstudio's names cannot be read.
 pub fn read(path: &Path) -> Result<Input, Error> {
     let (file, _) = input::open(path)?;
-    let mut json = serde_json::Deserializer::from_reader(BufReader::new(file));
+    let mut json = serde_json::Deserializer::from_reader(Strict::new(BufReader::new(file)));
     let found = Top::deserialize(&mut json).and_then(|found| json.end().map(|()| found));
     let top = found.map_err(|error| {
         if error.is_io() {
@@ -30,21 +30,24 @@ pub fn read(path: &Path) -> Result<Input, Error> {
         // The line is told by its number; the rest is what is wrong there.
         let text = error.to_string();
         let what = text.split(" at line ").next().unwrap_or_default().to_owned();
-        Error::new(path, Place::Line(error.line() as u64), "a map in JSON", what)
+        let (expected, what) = match error.is_data() {
+            true => (MAPS, format!("other JSON ({what})")),
+            false => ("a map in JSON", what),
+        };
+        Error::new(path, Place::Line(error.line() as u64), expected, what)
     })?;
     let (object, n) = match top {
         Top::One(object) => (object, 1),
         Top::Several(object, n) => (object, n),
     };
     let Some(format) = object.format() else {
-        let expected = "a map of OpenSfM, OpenMVG, Meshroom or nerfstudio";
         let names = object.names.iter().take(5).map(|name| name.escape_debug().to_string());
         let names: Vec<String> = names.collect();
         let found = match &names[..] {
             [] => "JSON without names".to_owned(),
             names => format!("JSON with {}", names.join(", ")),
         };
-        return Err(Error::new(path, "", expected, found));
+        return Err(Error::new(path, "", MAPS, found));
     };
     let Object { mut found, n_views, cloud, .. } = object;
     found.format = format;
@@ -52,12 +55,79 @@ pub fn read(path: &Path) -> Result<Input, Error> {
         let points = found.positions.len();
         found.notes.push(format!("read, the largest of {n} reconstructions ({points} points)"));
     }
+    if found.positions.is_empty() && format != "nerfstudio" {
+        let expected = "points (Meshroom: ConvertSfMFormat of the .abc file; OpenMVG: the file of the reconstruction)";
+        return Err(Error::new(path, "", expected, "cameras alone"));
+    }
     let n_poses = found.cameras.len() + found.n_unplaced;
     found.n_unplaced += n_views.saturating_sub(n_poses);
     if format == "nerfstudio" {
         with_cloud(path, &mut found, cloud)?;
     }
     Ok(found)
+}
+
+/// What is read, for people.
+const MAPS: &str = "a map of OpenSfM, OpenMVG, Meshroom or nerfstudio";
+
+/// JSON as other programs write it, with `NaN` and `Infinity`, read as JSON: an empty text in the place of each.
+struct Strict<R> {
+    bytes: io::Bytes<R>,
+    /// What comes next, the last byte first.
+    ahead: Vec<u8>,
+    in_text: bool,
+    is_escaped: bool,
+}
+
+impl<R: Read> Strict<R> {
+    fn new(from: R) -> Self {
+        Self { bytes: from.bytes(), ahead: Vec::new(), in_text: false, is_escaped: false }
+    }
+
+    fn next(&mut self) -> io::Result<Option<u8>> {
+        if let Some(byte) = self.ahead.pop() {
+            return Ok(Some(byte));
+        }
+        let Some(byte) = self.bytes.next().transpose()? else { return Ok(None) };
+        if self.in_text {
+            self.in_text = self.is_escaped || byte != b'"';
+            self.is_escaped = !self.is_escaped && byte == b'\\';
+            return Ok(Some(byte));
+        }
+        match byte {
+            b'"' => self.in_text = true,
+            // Letters that JSON has in no other place.
+            b'N' => return self.no_number(2),
+            b'I' => return self.no_number(7),
+            b'-' => match self.bytes.next().transpose()? {
+                Some(b'I') => return self.no_number(7),
+                other => self.ahead.extend(other),
+            },
+            _ => {}
+        }
+        Ok(Some(byte))
+    }
+
+    /// An empty text in place of a number that is none, of which so many letters are left.
+    fn no_number(&mut self, n: usize) -> io::Result<Option<u8>> {
+        for _ in 0..n {
+            self.bytes.next().transpose()?;
+        }
+        self.ahead.push(b'"');
+        Ok(Some(b'"'))
+    }
+}
+
+impl<R: Read> Read for Strict<R> {
+    fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
+        for (at, place) in to.iter_mut().enumerate() {
+            match self.next()? {
+                Some(byte) => *place = byte,
+                None => return Ok(at),
+            }
+        }
+        Ok(to.len())
+    }
 }
 
 /// Adds the points of the cloud that nerfstudio's file at `path` names.
@@ -101,7 +171,9 @@ impl Object {
         Some(match () {
             () if has("frames") => "nerfstudio",
             () if has("sfm_data_version") => "OpenMVG",
-            () if has("views") && (has("structure") || has("poses")) => "Meshroom",
+            () if has("views") && ["structure", "poses", "intrinsics"].into_iter().any(has) => {
+                "Meshroom"
+            }
             () if has("shots") && has("points") => "OpenSfM",
             () => return None,
         })
@@ -138,7 +210,13 @@ impl<'de> Deserialize<'de> for Number {
             }
 
             fn visit_str<E: de::Error>(self, value: &str) -> Result<f64, E> {
-                value.parse().map_err(|_| E::invalid_value(de::Unexpected::Str(value), &self))
+                // Text may begin with a space. None is what stands for NaN here.
+                match value.trim() {
+                    "" => Ok(f64::NAN),
+                    value => value
+                        .parse()
+                        .map_err(|_| E::invalid_value(de::Unexpected::Str(value), &self)),
+                }
             }
         }
         json.deserialize_any(Any).map(Self)

@@ -229,7 +229,8 @@ fn binary(
         bytes.fill(&mut row, "point")?;
         positions.push(header.axes.map(|axis| axis.scalar.read(&row[axis.byte as usize..], false)));
     }
-    Ok((positions, bytes.remaining() / stride))
+    let more = bytes.remaining() / stride;
+    Ok((positions, if bytes.is_padding()? { 0 } else { more }))
 }
 
 /// All values of a field stand together, field by field, and the whole is compressed.
