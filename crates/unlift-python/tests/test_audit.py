@@ -159,6 +159,14 @@ def test_what_a_function_raises_is_the_cause(small):
 
     with pytest.raises(AssertionError, match="elsewhere"):
         unlift.testing.check_scheme(elsewhere)
+    with pytest.raises(unlift.UnliftError, match="elsewhere: hidden points: expected on their own records, found 600 of 600"):
+        cheap(small, [elsewhere], gates=["all:0.10<=20"])
+
+    def careless(points):
+        return unlift.Lines(points, np.random.default_rng().normal(size=points.shape))
+
+    with pytest.raises(unlift.UnliftError, match="careless: records: expected the same of one key"):
+        cheap(small, [careless])
 
 
 def test_progress_is_told_and_may_stop(small):
