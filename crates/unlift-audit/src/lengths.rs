@@ -74,7 +74,16 @@ pub fn check_scale(points: &[[f64; 3]], scale: Option<f64>) -> Result<(), Error>
     Err(error.advise("--scale 1 for a map in meters, or no --scale for relative lengths"))
 }
 
-/// Checks thresholds against the points in the unit of the audit: what to tell the user, if anything.
+/// What to tell the user of lengths: a note, and a doubt, on which no gate holds.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub struct SaidOfLengths {
+    /// Figures may be too large.
+    pub note: Option<String>,
+    /// Figures may be too small.
+    pub doubt: Option<String>,
+}
+
+/// Checks thresholds against the points in the unit of the audit, and says what to tell the user.
 /// Usual thresholds in a relative unit fit by themselves.
 ///
 /// # Errors
@@ -84,15 +93,15 @@ pub fn check_thresholds(
     unit: Unit,
     thresholds: &[Threshold],
     typed: bool,
-) -> Result<Option<String>, Error> {
+) -> Result<SaidOfLengths, Error> {
     if unit != Unit::Meter && !typed {
-        return Ok(None);
+        return Ok(SaidOfLengths::default());
     }
     let by_size = |a: &&Threshold, b: &&Threshold| a.value.total_cmp(&b.value);
     let (Some(least), Some(most)) =
         (thresholds.iter().min_by(by_size), thresholds.iter().max_by(by_size))
     else {
-        return Ok(None);
+        return Ok(SaidOfLengths::default());
     };
     let Extent { across, nearest } = Extent::of(points)?;
     let option = if typed { "--thresholds" } else { "--scale" };
@@ -131,20 +140,23 @@ pub fn check_thresholds(
         return Err(error.advise(way_out));
     }
     if across > 0.0 && most.value >= across {
-        return Ok(Some(format!(
+        let note = format!(
             "the map is {} across, less than the threshold {}: within it any guess counts as recovered",
             in_unit(across),
             named(most),
-        )));
+        );
+        return Ok(SaidOfLengths { note: Some(note), doubt: None });
     }
     if nearest >= UNUSUAL * most.value {
-        return Ok(Some(format!(
-            "neighboring points are {} apart, far more than the largest threshold, {}: is {option} right?",
+        let doubt = format!(
+            "lengths are doubtful: neighboring points are {} apart, far more than the largest threshold, {}: is \
+             {option} right?",
             in_unit(nearest),
             named(most),
-        )));
+        );
+        return Ok(SaidOfLengths { note: None, doubt: Some(doubt) });
     }
-    Ok(None)
+    Ok(SaidOfLengths::default())
 }
 
 /// Checks the threshold of every gate: a bound that no attack could ever break says nothing.
@@ -188,7 +200,7 @@ mod tests {
         labels.iter().map(|label| Threshold::parse(label).unwrap()).collect()
     }
 
-    fn told(scale: f64) -> Result<Option<String>, String> {
+    fn told(scale: f64) -> Result<SaidOfLengths, String> {
         let usual = thresholds(&["0.10", "0.25"]);
         check_thresholds(&room(scale), Unit::Meter, &usual, false).map_err(|e| e.to_string())
     }
@@ -215,16 +227,16 @@ mod tests {
         assert!(error.starts_with("--scale: expected a map larger than"), "{error}");
         assert!(error.ends_with("any guess would count as recovered"), "{error}");
         // The larger one alone is still worth a word.
-        let note = told(0.03).unwrap().unwrap();
+        let note = told(0.03).unwrap().note.unwrap();
         assert!(note.contains("less than the threshold 0.25 m"), "{note}");
-        assert_eq!(told(1.0), Ok(None));
+        assert_eq!(told(1.0), Ok(SaidOfLengths::default()));
     }
 
     #[test]
     fn points_too_far_apart_for_any_threshold_are_refused() {
         let error = told(1_000.0).unwrap_err();
         assert!(error.contains("expected neighboring points less than 100 times"), "{error}");
-        let note = told(100.0).unwrap().unwrap();
+        let note = told(100.0).unwrap().doubt.unwrap();
         assert!(note.ends_with("is --scale right?"), "{note}");
     }
 
@@ -237,9 +249,9 @@ mod tests {
         };
         for labels in [["1e300", "1e301"], ["1e-300", "1e-9"]] {
             assert!(of(&labels, true).unwrap_err().starts_with("--thresholds: expected"));
-            assert_eq!(of(&labels, false), Ok(None));
+            assert_eq!(of(&labels, false), Ok(SaidOfLengths::default()));
         }
-        assert_eq!(of(&["1.0", "2.5"], true), Ok(None));
+        assert_eq!(of(&["1.0", "2.5"], true), Ok(SaidOfLengths::default()));
     }
 
     #[test]

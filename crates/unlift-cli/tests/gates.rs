@@ -139,3 +139,18 @@ fn no_gate_holds_on_a_part_of_a_map_that_is_not_told() {
         |note: &Value| note.as_str().is_some_and(|note| note.starts_with("100 points are"));
     assert!(document["notes"].as_array().unwrap().iter().any(is_told));
 }
+
+/// A map whose scale is a hundred times too large: nothing can come back within a threshold, and that is no protection.
+#[test]
+fn no_gate_holds_on_lengths_that_are_doubtful() {
+    let place = place();
+    let audit = "audit map room.csv --scale 100 --k 10 --schemes olc --inlier-ratios 0.5 --no-records-alone --out a";
+    let (printed, told) = place.ends(&format!("{audit} --gate olc:0.25<=20"), 1);
+    assert_eq!(
+        told.matches("note: lengths are doubtful: neighboring points are").count(),
+        1,
+        "{told}"
+    );
+    let line = printed.lines().find(|line| line.starts_with("gate ")).unwrap_or_default();
+    assert!(line.contains("FAILED") && line.contains("is --scale right?"), "{line}");
+}

@@ -51,14 +51,15 @@ pub fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
         let progress = Progress::new(args.run.quiet);
         let (path, result) = (&args.path, &args.result);
         let inversion = inversion(args, &prepared, &input, &progress)?;
-        let mut notes = prepared.notes.clone();
-        let mut plan = plan(args, &prepared, &input, &mut notes)?;
+        let (mut notes, mut doubts) = (prepared.notes.clone(), prepared.doubts.clone());
+        let mut plan = plan(args, &prepared, &input, (&mut notes, &mut doubts))?;
         plan.measures.extend(inversion.iter().map(|one| Arc::clone(one) as Arc<dyn Measure<3>>));
         let mut job = Job {
             plan,
             inversion,
             journal: journal(args, &progress)?,
             notes,
+            doubts,
             options: with_attack(more_options(args), &args.attack),
             gates: result.gate.clone(),
             write_clouds: args.write_clouds,
@@ -112,7 +113,7 @@ fn plan(
     args: &AuditMapArgs,
     prepared: &Prepared,
     input: &read::Input,
-    notes: &mut Vec<String>,
+    (notes, doubts): (&mut Vec<String>, &mut Vec<String>),
 ) -> anyhow::Result<Plan<3>> {
     let k = usize::from(args.map.k);
     let unit = prepared.original.reveal().unit();
@@ -124,7 +125,9 @@ fn plan(
     let thresholds = thresholds(&args.thresholds, &usual)?;
     let points = prepared.original.reveal();
     let typed = !args.thresholds.is_empty();
-    notes.extend(check_thresholds(points.positions(), points.unit(), &thresholds, typed)?);
+    let said = check_thresholds(points.positions(), points.unit(), &thresholds, typed)?;
+    notes.extend(said.note);
+    doubts.extend(said.doubt);
     let asked = (&*args.neighbors, &args.attack);
     let descriptors = prepared.descriptors.as_ref();
     let lacking = |text: String| {
