@@ -48,7 +48,7 @@ fn across(points: &[[f64; 3]]) -> f64 {
 
 /// What a map in meters can be across: from a grain of dust to beyond the orbit of the moon.
 const ACROSS_M: [f64; 2] = [1e-6, 1e9];
-/// Where even neighboring points are this many times the largest threshold apart, no attack could hit.
+/// Where even nearest neighbors are this many times the largest threshold apart, no attack could hit.
 const HOPELESS: f64 = 100.0;
 /// The same for what is possible but unusual.
 const UNUSUAL: f64 = 10.0;
@@ -109,7 +109,7 @@ pub fn check_thresholds(
         Unit::Meter => format!("{} m", short(length)),
         Unit::Pixel => format!("{} px", short(length)),
         Unit::KthNeighbor => {
-            format!("{} times the usual distance between neighboring points", short(length))
+            format!("{} times the usual distance to the K-th neighbor", short(length))
         }
     };
     let named = |threshold: &Threshold| match unit {
@@ -132,7 +132,7 @@ pub fn check_thresholds(
     }
     if nearest >= HOPELESS * most.value {
         let error = Error::request(format!(
-            "{option}: expected neighboring points less than {HOPELESS} times the largest threshold, {}, apart, \
+            "{option}: expected points less than {HOPELESS} times the largest threshold, {}, from their nearest neighbors, \
              found {}: no attack could come near",
             named(most),
             in_unit(nearest),
@@ -149,7 +149,7 @@ pub fn check_thresholds(
     }
     if nearest >= UNUSUAL * most.value {
         let doubt = format!(
-            "lengths are doubtful: neighboring points are {} apart, far more than the largest threshold, {}: is \
+            "lengths are doubtful: points are {} from their nearest neighbors, far more than the largest threshold, {}: is \
              {option} right?",
             in_unit(nearest),
             named(most),
@@ -162,7 +162,7 @@ pub fn check_thresholds(
 /// Checks the threshold of every gate: a bound that no attack could ever break says nothing.
 ///
 /// # Errors
-/// When even neighboring points are too far apart for one.
+/// When even nearest neighbors are too far apart for one.
 pub(crate) fn check_lengths_of_gates(points: &PointSet<3>, gates: &[Gate]) -> Result<(), Error> {
     let by_size = |a: &&Gate, b: &&Gate| a.threshold.total_cmp(&b.threshold);
     let Some(gate) = gates.iter().min_by(by_size) else { return Ok(()) };
@@ -171,8 +171,8 @@ pub(crate) fn check_lengths_of_gates(points: &PointSet<3>, gates: &[Gate]) -> Re
         return Ok(());
     }
     Err(Error::request(format!(
-        "--gate {}: expected neighboring points less than {HOPELESS} times its threshold apart, found {} times: no \
-         attack could come near",
+        "--gate {}: expected points less than {HOPELESS} times its threshold from their nearest neighbors, found {} times: \
+         no attack could come near",
         gate.typed,
         short(nearest / gate.threshold)
     )))
@@ -235,7 +235,7 @@ mod tests {
     #[test]
     fn points_too_far_apart_for_any_threshold_are_refused() {
         let error = told(1_000.0).unwrap_err();
-        assert!(error.contains("expected neighboring points less than 100 times"), "{error}");
+        assert!(error.contains("expected points less than 100 times"), "{error}");
         let note = told(100.0).unwrap().doubt.unwrap();
         assert!(note.ends_with("is --scale right?"), "{note}");
     }

@@ -61,7 +61,7 @@ fn scales_without_meaning_are_refused_with_a_way_out() {
     // What can be meant is told and done.
     let quick = format!("{QUICK} --inlier-ratios 1");
     let (_, stderr) = place.ends(&format!("audit map room.csv --scale 100 {quick}"), 0);
-    assert!(stderr.starts_with("unlift: note: neighboring points are"), "{stderr}");
+    assert!(stderr.starts_with("unlift: note: lengths are doubtful: points are"), "{stderr}");
     assert_eq!(place.ends(&format!("audit map room.csv --scale 1 {quick}"), 0).1, "");
 }
 
