@@ -64,7 +64,7 @@ fn the_example_of_the_help_runs_and_its_gates_point_to_the_configuration() {
         let result = &log["runs"][0]["results"][0];
         let at = &result["locations"][0]["physicalLocation"];
         assert_eq!(at["artifactLocation"]["uri"], "ci/unlift.toml");
-        assert_eq!(at["region"]["startLine"], 7);
+        assert_eq!(at["region"]["startLine"], 8);
         let said = result["message"]["text"].as_str().unwrap();
         assert!(said.contains("; olc, oracle at 0.50, joint, recovered within 1.0 x"), "{said}");
     }

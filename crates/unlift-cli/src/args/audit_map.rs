@@ -45,7 +45,7 @@ pub struct AuditMapArgs {
     pub path: PathBuf,
     #[command(flatten)]
     pub map: MapArgs,
-    /// A first look: random lines (olc) and paired lines (ppl) at half of the neighbors right, and the attack on what is released
+    /// A first look: random lines (olc) and paired lines (ppl) at half of the neighbors right, and lists by similarity
     /// where there are descriptors
     #[arg(long, conflicts_with_all = ["schemes", "inlier_ratios", "neighbors"], help_heading = "Attack")]
     pub quick: bool,

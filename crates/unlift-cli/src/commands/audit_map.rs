@@ -32,8 +32,8 @@ use crate::values::{NeighborSource, all_schemes, distinct};
 const QUICK_SCHEMES: [&str; 2] = ["olc", "ppl"];
 /// The inlier ratio of a first look.
 const QUICK_RATIO: f64 = 0.5;
-/// The attack on what is released, of a first look.
-const QUICK_SOURCE: &str = "descriptors";
+/// The attack on what is released, of a first look: the fastest one, of any descriptors.
+const QUICK_SOURCE: &str = "similarity";
 
 /// Audits a map.
 pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
