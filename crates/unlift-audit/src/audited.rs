@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use unlift::OneLine;
 use unlift_io::atomic::OutputSet;
 use unlift_report::scene::Scene3d;
-use unlift_report::{Document, Opening, RenderOptions, Shares, render, shares, text_table};
+use unlift_report::{
+    Document, Opening, RenderOptions, Shares, gate_lines, render, shares, text_table,
+};
 
 use crate::Error;
 use crate::outputs::{FIGURES, PAGE, stage_audit};
@@ -91,15 +93,10 @@ impl Finished {
         self.document.gates.iter().all(|gate| gate.passed)
     }
 
-    /// The short table, the gates that failed, and where the report is.
+    /// The short table, how gates ended, and where the report is.
     pub fn text(&self) -> String {
         let mut text = text_table(&self.document);
-        for gate in &self.document.gates {
-            let word = if gate.passed { "held" } else { "FAILED" };
-            let found = gate.found_percent.map(|found| format!("found {found:.1} %"));
-            let found: Vec<String> = found.into_iter().chain(gate.reason.clone()).collect();
-            text.push_str(&format!("gate {}: {word}, {}\n", gate.gate, found.join("; ")));
-        }
+        text.push_str(&gate_lines(&self.document));
         text.push_str(&format!("\nreport: {}\n", OneLine(self.report.display())));
         text
     }

@@ -64,8 +64,8 @@ pub(crate) fn doubts(
         let is_usual = (NARROW * low..=WIDE * high).contains(&row.delta);
         let of_delta = (row.solver != REFERENCE && row.delta > 0.0 && !is_usual).then(|| {
             format!(
-                "{}: delta, {}, is far from how far apart neighbors are, {} to {}, so that less may have come back than \
-                 could (try --delta, --outlier-filter, or parts of the map by themselves)",
+                "{}: delta, {}, is far from the usual distance to the K-th neighbor, {} to {}, so that less may have come back \
+                 than could (try --delta, --outlier-filter, or parts of the map by themselves)",
                 row.scheme,
                 in_unit(row.delta, unit),
                 short(low),
@@ -153,7 +153,7 @@ fn mistaken_unit(unit: Unit, k: usize, middle: f64) -> Option<String> {
     let is_usual = (UNIT[0]..=UNIT[1]).contains(&middle);
     (unit == Unit::KthNeighbor && !is_usual).then(|| {
         format!(
-            "unit: expected a usual distance to neighbor {k} of about 1, as lengths are said to be in multiples of it, found \
+            "unit: expected a usual distance to the K-th neighbor (K = {k}) of about 1, as lengths are said to be in multiples of it, found \
              {}: thresholds mean something else than they say",
             short(middle)
         )

@@ -48,7 +48,7 @@ fn across(points: &[[f64; 3]]) -> f64 {
 
 /// What a map in meters can be across: from a grain of dust to beyond the orbit of the moon.
 const ACROSS_M: [f64; 2] = [1e-6, 1e9];
-/// Where even neighboring points are this many times the largest threshold apart, no attack could hit.
+/// Where even nearest neighbors are this many times the largest threshold apart, no attack could hit.
 const HOPELESS: f64 = 100.0;
 /// The same for what is possible but unusual.
 const UNUSUAL: f64 = 10.0;
@@ -74,7 +74,16 @@ pub fn check_scale(points: &[[f64; 3]], scale: Option<f64>) -> Result<(), Error>
     Err(error.advise("--scale 1 for a map in meters, or no --scale for relative lengths"))
 }
 
-/// Checks thresholds against the points in the unit of the audit: what to tell the user, if anything.
+/// What to tell the user of lengths: a note, and a doubt, on which no gate holds.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub struct SaidOfLengths {
+    /// Figures may be too large.
+    pub note: Option<String>,
+    /// Figures may be too small.
+    pub doubt: Option<String>,
+}
+
+/// Checks thresholds against the points in the unit of the audit, and says what to tell the user.
 /// Usual thresholds in a relative unit fit by themselves.
 ///
 /// # Errors
@@ -84,15 +93,15 @@ pub fn check_thresholds(
     unit: Unit,
     thresholds: &[Threshold],
     typed: bool,
-) -> Result<Option<String>, Error> {
+) -> Result<SaidOfLengths, Error> {
     if unit != Unit::Meter && !typed {
-        return Ok(None);
+        return Ok(SaidOfLengths::default());
     }
     let by_size = |a: &&Threshold, b: &&Threshold| a.value.total_cmp(&b.value);
     let (Some(least), Some(most)) =
         (thresholds.iter().min_by(by_size), thresholds.iter().max_by(by_size))
     else {
-        return Ok(None);
+        return Ok(SaidOfLengths::default());
     };
     let Extent { across, nearest } = Extent::of(points)?;
     let option = if typed { "--thresholds" } else { "--scale" };
@@ -100,7 +109,7 @@ pub fn check_thresholds(
         Unit::Meter => format!("{} m", short(length)),
         Unit::Pixel => format!("{} px", short(length)),
         Unit::KthNeighbor => {
-            format!("{} times the usual distance between neighboring points", short(length))
+            format!("{} times the usual distance to the K-th neighbor", short(length))
         }
     };
     let named = |threshold: &Threshold| match unit {
@@ -123,7 +132,7 @@ pub fn check_thresholds(
     }
     if nearest >= HOPELESS * most.value {
         let error = Error::request(format!(
-            "{option}: expected neighboring points less than {HOPELESS} times the largest threshold, {}, apart, \
+            "{option}: expected points less than {HOPELESS} times the largest threshold, {}, from their nearest neighbors, \
              found {}: no attack could come near",
             named(most),
             in_unit(nearest),
@@ -131,26 +140,29 @@ pub fn check_thresholds(
         return Err(error.advise(way_out));
     }
     if across > 0.0 && most.value >= across {
-        return Ok(Some(format!(
+        let note = format!(
             "the map is {} across, less than the threshold {}: within it any guess counts as recovered",
             in_unit(across),
             named(most),
-        )));
+        );
+        return Ok(SaidOfLengths { note: Some(note), doubt: None });
     }
     if nearest >= UNUSUAL * most.value {
-        return Ok(Some(format!(
-            "neighboring points are {} apart, far more than the largest threshold, {}: is {option} right?",
+        let doubt = format!(
+            "lengths are doubtful: points are {} from their nearest neighbors, far more than the largest threshold, {}: is \
+             {option} right?",
             in_unit(nearest),
             named(most),
-        )));
+        );
+        return Ok(SaidOfLengths { note: None, doubt: Some(doubt) });
     }
-    Ok(None)
+    Ok(SaidOfLengths::default())
 }
 
 /// Checks the threshold of every gate: a bound that no attack could ever break says nothing.
 ///
 /// # Errors
-/// When even neighboring points are too far apart for one.
+/// When even nearest neighbors are too far apart for one.
 pub(crate) fn check_lengths_of_gates(points: &PointSet<3>, gates: &[Gate]) -> Result<(), Error> {
     let by_size = |a: &&Gate, b: &&Gate| a.threshold.total_cmp(&b.threshold);
     let Some(gate) = gates.iter().min_by(by_size) else { return Ok(()) };
@@ -159,8 +171,8 @@ pub(crate) fn check_lengths_of_gates(points: &PointSet<3>, gates: &[Gate]) -> Re
         return Ok(());
     }
     Err(Error::request(format!(
-        "--gate {}: expected neighboring points less than {HOPELESS} times its threshold apart, found {} times: no \
-         attack could come near",
+        "--gate {}: expected points less than {HOPELESS} times its threshold from their nearest neighbors, found {} times: \
+         no attack could come near",
         gate.typed,
         short(nearest / gate.threshold)
     )))
@@ -188,7 +200,7 @@ mod tests {
         labels.iter().map(|label| Threshold::parse(label).unwrap()).collect()
     }
 
-    fn told(scale: f64) -> Result<Option<String>, String> {
+    fn told(scale: f64) -> Result<SaidOfLengths, String> {
         let usual = thresholds(&["0.10", "0.25"]);
         check_thresholds(&room(scale), Unit::Meter, &usual, false).map_err(|e| e.to_string())
     }
@@ -215,16 +227,16 @@ mod tests {
         assert!(error.starts_with("--scale: expected a map larger than"), "{error}");
         assert!(error.ends_with("any guess would count as recovered"), "{error}");
         // The larger one alone is still worth a word.
-        let note = told(0.03).unwrap().unwrap();
+        let note = told(0.03).unwrap().note.unwrap();
         assert!(note.contains("less than the threshold 0.25 m"), "{note}");
-        assert_eq!(told(1.0), Ok(None));
+        assert_eq!(told(1.0), Ok(SaidOfLengths::default()));
     }
 
     #[test]
     fn points_too_far_apart_for_any_threshold_are_refused() {
         let error = told(1_000.0).unwrap_err();
-        assert!(error.contains("expected neighboring points less than 100 times"), "{error}");
-        let note = told(100.0).unwrap().unwrap();
+        assert!(error.contains("expected points less than 100 times"), "{error}");
+        let note = told(100.0).unwrap().doubt.unwrap();
         assert!(note.ends_with("is --scale right?"), "{note}");
     }
 
@@ -237,9 +249,9 @@ mod tests {
         };
         for labels in [["1e300", "1e301"], ["1e-300", "1e-9"]] {
             assert!(of(&labels, true).unwrap_err().starts_with("--thresholds: expected"));
-            assert_eq!(of(&labels, false), Ok(None));
+            assert_eq!(of(&labels, false), Ok(SaidOfLengths::default()));
         }
-        assert_eq!(of(&["1.0", "2.5"], true), Ok(None));
+        assert_eq!(of(&["1.0", "2.5"], true), Ok(SaidOfLengths::default()));
     }
 
     #[test]

@@ -62,7 +62,7 @@ pub use error::Error;
 pub use gate::{Candidate, Figure, Gate};
 pub use given::by_point;
 pub use journal::Journal;
-pub use lengths::{Extent, check_scale, check_thresholds};
+pub use lengths::{Extent, SaidOfLengths, check_scale, check_thresholds};
 pub use maps::Job;
 pub use memory::{peak_bytes, total_bytes};
 pub use outputs::{FIGURES, PAGE, Shown, check_file, check_file_of, open_audit, refused};

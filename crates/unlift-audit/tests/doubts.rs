@@ -152,7 +152,7 @@ fn a_gate_that_no_attack_could_break_is_refused() {
     let plan = Plan { thresholds: thresholds.to_vec(), ..plan(&["olc"]) };
     let error = audit(&prepared(&room()), None, plan, "olc:1e-6<=1").expect_err("an error");
     let error = error.to_string();
-    assert!(error.starts_with("--gate olc:1e-6<=1: expected neighboring points less"), "{error}");
+    assert!(error.starts_with("--gate olc:1e-6<=1: expected points less"), "{error}");
 }
 
 /// The truth of a map that was scaled since: its points are nearer to their own records than to others, but not near.

@@ -6,6 +6,9 @@ use std::time::Duration;
 /// Steps this long ago count for a third; longer in long work, whose items may differ in cost.
 const MEMORY_S: f64 = 30.0;
 
+/// Items that must be done at most, or a tenth of all, before a time is told.
+const BASIS: f64 = 5.0;
+
 /// Items that are done, and how fast that went. Times are those since the beginning.
 #[derive(Clone, Debug, Default)]
 pub struct Pace {
@@ -50,10 +53,11 @@ impl Pace {
         self.last = now;
     }
 
-    /// How long it will still take; `None` when there is nothing to tell by.
+    /// How long it will still take; `None` when there is nothing to tell by: the first items are often far from usual.
     pub fn left(&self, now: Duration) -> Option<Duration> {
         let open = self.total as f64 - self.done;
-        if self.items <= 0.0 || open <= 0.0 {
+        let basis = (self.total as f64 / 10.0).clamp(1.0, BASIS);
+        if self.done < basis || self.items <= 0.0 || open <= 0.0 {
             return None;
         }
         let since = (now.as_secs_f64() - self.last).max(0.0);
@@ -102,7 +106,10 @@ mod tests {
         let mut pace = Pace::default();
         pace.set(0.0, 40, s(0.0));
         assert_eq!(pace.status(s(1.0)).to_string(), "0/40", "nothing to tell by");
-        for n in 1..=10 {
+        pace.add(0.5, s(1.0));
+        assert_eq!(pace.status(s(1.0)).to_string(), "0/40", "too little to tell by");
+        pace.add(0.5, s(2.0));
+        for n in 2..=10 {
             pace.add(1.0, s(2.0 * f64::from(n)));
         }
         assert_eq!(pace.status(s(20.0)).to_string(), "10/40, 60 s left");

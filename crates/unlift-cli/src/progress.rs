@@ -2,7 +2,7 @@
 //! line a minute; nothing of either when `--quiet`.
 
 use std::io::IsTerminal;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
@@ -44,6 +44,8 @@ pub struct Steps {
 struct State {
     pace: Pace,
     shown: Shown,
+    /// What is at work, as it was said last.
+    what: String,
 }
 
 impl Progress {
@@ -58,7 +60,8 @@ impl Progress {
 
     fn with(shown: Shown) -> Self {
         let started = Instant::now();
-        let state = Arc::new(Mutex::new(State { pace: Pace::default(), shown }));
+        let state =
+            Arc::new(Mutex::new(State { pace: Pace::default(), shown, what: String::new() }));
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
         let template = "{bar:30} {status} {wide_msg}";
         let style = ProgressStyle::with_template(template).expect("the template is ours");
@@ -161,8 +164,11 @@ impl Steps {
         let now = self.started.elapsed();
         let mut state = lock(&self.state);
         step(&mut state.pace, now);
-        let pace = state.pace.clone();
-        match &mut state.shown {
+        if !what.is_empty() {
+            state.what = OneLine(what).to_string();
+        }
+        let State { pace, shown, what } = &mut *state;
+        match shown {
             Shown::Nothing => {}
             Shown::Lines(last) => {
                 if now.saturating_sub(*last) >= LINES {
@@ -171,12 +177,11 @@ impl Steps {
                 }
             }
             Shown::Bar(_) => {
+                let (pace, what) = (pace.clone(), what.clone());
                 // The bar asks for the state when it is drawn.
                 drop(state);
                 self.bar.set_length((pace.total() as f64 * PARTS) as u64);
-                if !what.is_empty() {
-                    self.bar.set_message(OneLine(what).to_string());
-                }
+                self.bar.set_message(what);
                 self.bar.set_position((pace.done() * PARTS) as u64);
             }
         }
@@ -187,9 +192,12 @@ fn lock(state: &Mutex<State>) -> MutexGuard<'_, State> {
     state.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A sign of life for work whose steps cannot be counted; gone when dropped. Hidden where stderr is no
-/// terminal.
-pub struct Spinner(ProgressBar);
+/// A sign of life for work whose steps cannot be counted; gone when dropped. Where stderr is no terminal it is a line a minute.
+pub struct Spinner {
+    bar: ProgressBar,
+    /// Lines end when this is dropped.
+    _lines: Option<mpsc::Sender<()>>,
+}
 
 impl Spinner {
     /// Says `what` is being done, and for how long.
@@ -200,24 +208,40 @@ impl Spinner {
         // A thread of its own, which nobody needs where it is hidden.
         if !bar.is_hidden() {
             bar.enable_steady_tick(PATIENCE / 8);
+            return Self { bar, _lines: None };
         }
-        Self(bar)
+        let (lines, ended) = mpsc::channel();
+        std::thread::spawn(move || tell_each(LINES, what, &ended, tell));
+        Self { bar, _lines: Some(lines) }
     }
 
     /// None of it when `quiet`.
     pub fn unless(quiet: bool, what: &'static str) -> Self {
-        if quiet { Self(ProgressBar::hidden()) } else { Self::new(what) }
+        if quiet { Self { bar: ProgressBar::hidden(), _lines: None } } else { Self::new(what) }
     }
 
     /// Prints a line on stderr without tearing it.
     pub fn say(&self, line: &str) {
-        self.0.suspend(|| tell(line));
+        self.bar.suspend(|| tell(line));
     }
 }
 
 impl Drop for Spinner {
     fn drop(&mut self) {
-        self.0.finish_and_clear();
+        self.bar.finish_and_clear();
+    }
+}
+
+/// Says `what` is being done, and for how long, once in a `while_`, until the other end of `ended` is dropped.
+fn tell_each(
+    while_: Duration,
+    what: &str,
+    ended: &mpsc::Receiver<()>,
+    mut say: impl FnMut(String),
+) {
+    let started = Instant::now();
+    while ended.recv_timeout(while_) == Err(mpsc::RecvTimeoutError::Timeout) {
+        say(format!("unlift: {what}, {} s", started.elapsed().as_secs()));
     }
 }
 
@@ -262,6 +286,26 @@ mod tests {
         fn flush(&self) -> io::Result<()> {
             Ok(())
         }
+    }
+
+    #[test]
+    fn work_that_cannot_be_counted_says_that_it_goes_on_until_it_ends() {
+        let (lines, ended) = mpsc::channel();
+        let mut lines = Some(lines);
+        let mut said = Vec::new();
+        tell_each(Duration::from_millis(5), "finding neighbors", &ended, |line| {
+            said.push(line);
+            lines = lines.take().filter(|_| said.len() < 2);
+        });
+        assert_eq!(said, ["unlift: finding neighbors, 0 s"; 2]);
+    }
+
+    #[test]
+    fn what_is_at_work_is_said_also_where_only_a_share_is_told() {
+        let progress = Progress::with(Shown::Lines(Duration::ZERO));
+        progress.show(0, 4, "a.jpg");
+        progress.steps().add(0.5, "");
+        assert_eq!(lock(&progress.0.state).what, "a.jpg");
     }
 
     fn wait_until(done: impl Fn() -> bool) {

@@ -35,7 +35,8 @@ fn every_audit_is_a_line_and_paths_are_relative_to_the_configuration() {
     assert_eq!(lines[1], "images photos: audited, no gates; ci/images/report.html");
     let failed = "map room.csv: 1 of 2 gates FAILED: olc:1.0<=1 (found ";
     assert!(
-        lines[2].starts_with(failed) && lines[2].ends_with(" %); ci/other/report.html"),
+        lines[2].starts_with(failed)
+            && lines[2].ends_with(", joint, recovered within 1.0 x); ci/other/report.html"),
         "{text}"
     );
     for file in ["map/audit.json", "map.xml", "images/report.html", "other/audit.json"] {
@@ -45,6 +46,28 @@ fn every_audit_is_a_line_and_paths_are_relative_to_the_configuration() {
     assert!(audit.contains("\"0.250\""), "thresholds are names: {audit}");
     let safe = fs::read_to_string(place.path("ci/other/audit.json")).unwrap();
     assert!(!safe.contains("room"), "{safe}");
+}
+
+#[test]
+fn the_example_of_the_help_runs_and_its_gates_point_to_the_configuration() {
+    let place = place(&format!(
+        "[[map]]\npath = \"room.csv\"\n{QUICK}\n[[map]]\npath = \"room.csv\"\n{QUICK}\
+         gate = [\"all@0.5:1.0<=1\"]\nout = \"audits/office\"\njunit = \"audits/office.xml\"\n\
+         sarif = \"more/office.sarif\"\nshare-safe = true\n"
+    ));
+    for config in ["ci/unlift.toml".to_owned(), place.path("ci/unlift.toml").display().to_string()]
+    {
+        place.ends(&format!("check {config} --quiet"), 1);
+        assert!(place.path("ci/audits/office.xml").is_file());
+        let text = fs::read_to_string(place.path("ci/more/office.sarif")).unwrap();
+        let log: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let result = &log["runs"][0]["results"][0];
+        let at = &result["locations"][0]["physicalLocation"];
+        assert_eq!(at["artifactLocation"]["uri"], "ci/unlift.toml");
+        assert_eq!(at["region"]["startLine"], 8);
+        let said = result["message"]["text"].as_str().unwrap();
+        assert!(said.contains("; olc, oracle at 0.50, joint, recovered within 1.0 x"), "{said}");
+    }
 }
 
 #[test]

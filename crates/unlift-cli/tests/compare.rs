@@ -53,7 +53,7 @@ fn what_leaks_more_than_the_tolerance_fails() {
     let place = audited();
     changed(&place, "old.json", |document| set_share(document, 40.0));
     changed(&place, "new.json", |document| set_share(document, 41.5));
-    let (text, _) = place.ends("compare old.json new.json --out c", 1);
+    let (text, _) = place.ends("compare old.json new.json --tolerance 1 --out c", 1);
     let lines: Vec<&str> = text.lines().collect();
     let words = |line: &str| line.split_whitespace().collect::<Vec<_>>().join(" ");
     assert_eq!(words(lines[0]), "scheme attack within old new points");
@@ -73,8 +73,19 @@ fn what_leaks_more_than_the_tolerance_fails() {
     );
 
     place.ends("compare old.json new.json --tolerance 1.5", 0);
-    let (text, _) = place.ends("compare new.json old.json", 0);
+    let (text, _) = place.ends("compare new.json old.json --tolerance 1", 0);
     assert!(text.contains("-1.5  leaks less"), "{text}");
+    // Seeds differ by a point or two.
+    let (text, _) = place.ends("compare old.json new.json", 0);
+    let usual = "tolerance 2 points (usual without repeats): 0 leak more";
+    assert!(text.contains(usual), "{text}");
+    changed(&place, "repeated.json", |document| {
+        set_share(document, 41.5);
+        rows(document)[0]["std"] = json!({ "recovered_percent": { "0.10": 0.3, "0.25": 0.601 } });
+    });
+    let (text, _) = place.ends("compare old.json repeated.json", 1);
+    let twice = "tolerance 1.21 points (twice the spread of repeats): 1 leak more";
+    assert!(text.contains(twice), "{text}");
     // The page is written over by the next one, another file is not.
     place.ends("compare new.json old.json --out c", 0);
     fs::write(place.path("c/compare.html"), "mine").unwrap();

@@ -41,6 +41,10 @@ fn the_truth_comes_back_in_every_form_and_on_the_map() {
             assert!(near, "{name}: {read:?} {known:?}");
         }
     }
+    let (_, stderr) = place.ends("export hidden/truth.parquet --out x.stl", 2);
+    let wrong = "unlift: --out: expected a name that ends in .ply, .obj or transforms.json, or a folder without an ending, \
+                 found x.stl\n";
+    assert!(stderr == wrong && !place.path("x.stl").exists(), "{stderr}");
     // Without a scale lengths are those of the file: meters, half as many as units.
     place.ends("export hidden/truth.parquet --out meters.ply", 0);
     let meters = positions(&place, "meters.ply");

@@ -139,3 +139,40 @@ fn no_gate_holds_on_a_part_of_a_map_that_is_not_told() {
         |note: &Value| note.as_str().is_some_and(|note| note.starts_with("100 points are"));
     assert!(document["notes"].as_array().unwrap().iter().any(is_told));
 }
+
+/// A map whose scale is a hundred times too large: nothing can come back within a threshold, and that is no protection.
+#[test]
+fn no_gate_holds_on_lengths_that_are_doubtful() {
+    let place = place();
+    let audit = "audit map room.csv --scale 100 --k 10 --schemes olc --inlier-ratios 0.5 --no-records-alone --out a";
+    let (printed, told) = place.ends(&format!("{audit} --gate olc:0.25<=20"), 1);
+    assert_eq!(told.matches("note: lengths are doubtful: points are").count(), 1, "{told}");
+    let line = printed.lines().find(|line| line.starts_with("gate ")).unwrap_or_default();
+    assert!(line.contains("FAILED") && line.contains("is --scale right?"), "{line}");
+}
+
+/// A first look is two schemes at one ratio, and the attack on what is released where there are descriptors.
+#[test]
+fn a_first_look_is_two_schemes_and_the_attack_on_what_is_released() {
+    let place = place();
+    place.ends("audit map room.csv --scale 1 --k 10 --quick --out a", 0);
+    let schemes = |document: &Value| {
+        let rows = document["results"].as_array().unwrap();
+        assert!(rows.iter().all(|row| row["neighbors"] != "oracle" || row["inlier_ratio"] == 0.5));
+        let mut found: Vec<String> = rows
+            .iter()
+            .map(|row| {
+                format!(
+                    "{} {}",
+                    row["scheme"].as_str().unwrap(),
+                    row["neighbors"].as_str().unwrap()
+                )
+            })
+            .collect();
+        found.dedup();
+        found
+    };
+    assert_eq!(schemes(&json(&place, "a/audit.json")), ["olc oracle", "ppl oracle"]);
+    let (_, stderr) = place.ends("audit map room.csv --quick --schemes ppl --out b", 2);
+    assert!(stderr.contains("--quick") && stderr.contains("--schemes"), "{stderr}");
+}

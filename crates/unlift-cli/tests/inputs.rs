@@ -61,7 +61,7 @@ fn scales_without_meaning_are_refused_with_a_way_out() {
     // What can be meant is told and done.
     let quick = format!("{QUICK} --inlier-ratios 1");
     let (_, stderr) = place.ends(&format!("audit map room.csv --scale 100 {quick}"), 0);
-    assert!(stderr.starts_with("unlift: note: neighboring points are"), "{stderr}");
+    assert!(stderr.starts_with("unlift: note: lengths are doubtful: points are"), "{stderr}");
     assert_eq!(place.ends(&format!("audit map room.csv --scale 1 {quick}"), 0).1, "");
 }
 
@@ -87,6 +87,14 @@ fn similarity_takes_descriptors_of_any_kind_and_overlap_those_of_sift() {
     };
     audit("learned.npy", "similarity", 0);
     audit("sift.npy", "overlap", 0);
+    let first_look = "audit map room.csv --descriptors learned.npy --k 10 --quick --out quick";
+    let (table, _) = place.ends(first_look, 0);
+    for source in ["oracle", "similarity"] {
+        for scheme in ["olc", "ppl"] {
+            let is = |line: &&str| line.starts_with(scheme) && line.contains(source);
+            assert!(table.lines().any(|line| is(&line)), "{scheme} {source}: {table}");
+        }
+    }
     let wrong = "SIFT descriptors (128 values each, none negative), found 64 values each\n";
     let way_out = "  try: --neighbors similarity, which takes descriptors of any kind\n";
     let (_, stderr) = audit("learned.npy", "overlap", 2);

@@ -26,7 +26,7 @@ pub fn audit(
 ) -> PyResult<Report> {
     let (started, by) = (Instant::now(), Raised::default());
     let asked = asked_of::<Asked<'_>>(asked)?;
-    let (plan, notes) = asked.plan(py, &map.prepared, &by)?;
+    let (plan, notes, doubt) = asked.plan(py, &map.prepared, &by)?;
     let gates = gates_of(&asked.gates)?;
     let mut options = serde_json::Map::new();
     if let Some(k) = asked.source_k {
@@ -49,7 +49,7 @@ pub fn audit(
             input,
             options,
             notes,
-            doubts: prepared.doubts.clone(),
+            doubts: prepared.doubts.iter().cloned().chain(doubt).collect(),
             gates,
             out: PathBuf::new(),
             unit_in_map_units: prepared.unit_in_map_units,

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use unlift::evaluate::belongs;
+use unlift::audit::check_laws;
 use unlift::obfuscate::{Scheme, SchemeOptions, obfuscate as hide, scheme};
 use unlift::seed::Key;
 
@@ -43,17 +43,14 @@ pub fn obfuscate(
 ) -> PyResult<Hidden> {
     let by = Raised::default();
     let unit = map.prepared.original.reveal().unit();
-    let is_own = scheme.extract::<String>().is_err();
     let scheme = scheme_of::<3>(scheme, &SchemeOptions::usual(unit), &by)?;
     let key = seed.map_or_else(Key::fresh, |seed| Ok(Key::from_seed(seed))).map_err(raised)?;
     let prepared = Arc::clone(&map.prepared);
     let hidden = work::run(py, None, Some(by.stop()), move || {
         let (original, descriptors) = (&prepared.original, prepared.descriptors.as_ref());
         let (released, secret) = hide(&*scheme, original, descriptors, &key)?;
-        if is_own {
-            // As an audit asks: of a scheme with a mistake next to nothing comes back.
-            belongs(original, &released, &secret).map_err(|error| error.within(scheme.name()))?;
-        }
+        check_laws(&*scheme, original, &key, (&released, &secret))
+            .map_err(|error| error.within(scheme.name()))?;
         Ok::<_, unlift::Error>((released, secret))
     });
     let (released, secret) = hidden.map_err(|error| by.as_cause_of(py, error))?;

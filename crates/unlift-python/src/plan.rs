@@ -56,13 +56,13 @@ pub struct Asked<'py> {
 }
 
 impl Asked<'_> {
-    /// The plan for `prepared`, and what a user should know about it.
+    /// The plan for `prepared`, what a user should know about it, and what speaks against its figures.
     pub fn plan(
         &self,
         py: Python<'_>,
         prepared: &Arc<Prepared>,
         by: &Raised,
-    ) -> PyResult<(Plan<3>, Vec<String>)> {
+    ) -> PyResult<(Plan<3>, Vec<String>, Option<String>)> {
         let points = prepared.original.reveal();
         let usual = Plan::<3>::new(points.unit()).for_map(points.len(), self.k);
         let plan = self.with(usual, points.unit(), by)?;
@@ -71,15 +71,15 @@ impl Asked<'_> {
         work::run(py, self.threads, None, move || {
             let points = prepared.original.reveal();
             let (positions, unit) = (points.positions(), points.unit());
-            let note = check_thresholds(positions, unit, &plan.thresholds, typed)?;
-            let mut notes: Vec<String> = note.into_iter().collect();
+            let said = check_thresholds(positions, unit, &plan.thresholds, typed)?;
+            let mut notes: Vec<String> = said.note.into_iter().collect();
             for source in plan.neighbors.iter().filter_map(NeighborsBy::source) {
                 if let Some(descriptors) = &prepared.descriptors {
                     source.takes(descriptors)?;
                 }
                 notes.extend(source.note(points.len()));
             }
-            Ok::<_, unlift_audit::Error>((plan, notes))
+            Ok::<_, unlift_audit::Error>((plan, notes, said.doubt))
         })
     }
 

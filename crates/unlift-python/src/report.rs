@@ -81,9 +81,10 @@ impl Report {
         })
     }
 
-    /// The table that the command line prints.
+    /// The table that the command line prints, and how gates ended.
     fn __str__(&self) -> String {
-        unlift_report::text_table(&self.0.document)
+        let document = &self.0.document;
+        unlift_report::text_table(document) + &unlift_report::gate_lines(document)
     }
 
     fn __repr__(&self) -> String {

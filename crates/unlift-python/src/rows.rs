@@ -14,8 +14,8 @@ use serde_json::Value;
 use crate::errors::raised;
 use crate::json::as_python;
 
-/// The rows of an audit, one column per figure: names as in `audit.json`, with a dot before what stands within
-/// (`recovered_percent.0.10`).
+/// The rows of an audit, one column per figure: names as in the CSV of `unlift table` (`recovered_percent_within_0.10`), and
+/// those of `audit.json` for what the CSV lacks, with a dot before what stands within (`lost.no_neighbors`).
 #[pyclass(frozen, module = "unlift")]
 pub struct Rows {
     columns: Vec<(String, Vec<Value>)>,
@@ -36,11 +36,19 @@ impl Rows {
                 columns[column].1.push(value.clone());
             };
             for (name, value) in row.as_object().into_iter().flatten() {
-                match value {
-                    Value::Object(within) => {
-                        within.iter().for_each(|(key, value)| put(format!("{name}.{key}"), value))
+                match (&**name, value) {
+                    ("std", Value::Object(spreads)) => {
+                        for (name, value) in spreads {
+                            let name = format!("{}_std", name.trim_end_matches("_percent"));
+                            put_each(&name, value, &mut put);
+                        }
                     }
-                    value => put(name.clone(), value),
+                    ("dropped", Value::Object(reasons)) => {
+                        let n: u64 = reasons.values().filter_map(Value::as_u64).sum();
+                        put_each(name, value, &mut put);
+                        put("n_dropped".to_owned(), &n.into());
+                    }
+                    _ => put_each(name, value, &mut put),
                 }
             }
         }
@@ -55,6 +63,25 @@ impl Rows {
             fields.map(|((name, _), array)| Field::new(name, array.data_type().clone(), true));
         let schema = Schema::new(fields.collect::<Vec<_>>());
         RecordBatch::try_new(Arc::new(schema), columns)
+    }
+}
+
+/// A value, or each of those that stand within it, under the names of the CSV.
+fn put_each(name: &str, value: &Value, put: &mut impl FnMut(String, &Value)) {
+    let Value::Object(within) = value else { return put(name.to_owned(), value) };
+    for (key, value) in within {
+        let column = match name {
+            "recovered_percent"
+            | "recovered_std"
+            | "blind_percent"
+            | "blind_std"
+            | "records_alone_percent"
+            | "records_alone_by" => format!("{name}_within_{key}"),
+            "error_percentiles" => format!("error_percentile_{key}"),
+            "metrics" => format!("metric_{key}"),
+            _ => format!("{name}.{key}"),
+        };
+        put(column, value);
     }
 }
 

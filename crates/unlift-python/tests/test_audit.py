@@ -51,6 +51,9 @@ def test_figures_are_those_of_the_command_line(points, tmp_path):
         unlift.Map(points, scale=1.0, k=20), ["olc", "cp"], inlier_ratios=[0.5], k=20, gates=["all:0.10<=1"]
     )
     assert not report.passed
+    lines = [line for line in done.stdout.splitlines() if line.startswith("gate ")]
+    assert lines[0].startswith("gate all:0.10<=1: FAILED, found ") and lines[0].endswith(", recovered within 0.10 m")
+    assert lines == [line for line in str(report).splitlines() if line.startswith("gate ")]
     cli = json.loads((tmp_path / "cli" / "audit.json").read_text())
     assert figures(report.document) == figures(cli)
     # From the file, with its path and hash.
@@ -85,7 +88,7 @@ def test_a_scheme_is_a_function(small):
     report = cheap(small, ["olc", level])
     rows = report.rows
     assert rows["scheme"] == ["olc", "level"]
-    assert rows["recovered_percent.0.25"][1] > rows["blind_percent.0.25"][1]
+    assert rows["recovered_percent_within_0.25"][1] > rows["blind_percent_within_0.25"][1]
     assert figures(cheap(small, ["olc", level]).document) == figures(report.document)
     assert "level" in report.html()
 
@@ -159,6 +162,23 @@ def test_what_a_function_raises_is_the_cause(small):
 
     with pytest.raises(AssertionError, match="elsewhere"):
         unlift.testing.check_scheme(elsewhere)
+    with pytest.raises(unlift.UnliftError, match="elsewhere: hidden points: expected on their own records, found 600 of 600"):
+        cheap(small, [elsewhere], gates=["all:0.10<=20"])
+
+    def careless(points):
+        return unlift.Lines(points, np.random.default_rng().normal(size=points.shape))
+
+    with pytest.raises(unlift.UnliftError, match="careless: records: expected the same of one key"):
+        cheap(small, [careless])
+
+
+def test_a_scheme_of_ones_own_that_fails_is_told_when_the_audit_returns(small):
+    def broken(points):
+        raise KeyError("mine")
+
+    with pytest.warns(UserWarning, match="broken was not audited: .*mine"):
+        report = cheap(small, ["olc", broken], gates=["all:0.10<=100"])
+    assert report.rows["scheme"] == ["olc"] and not report.passed
 
 
 def test_progress_is_told_and_may_stop(small):
@@ -202,9 +222,27 @@ def test_reports_are_saved_and_tables_read_by_others(small, tmp_path):
     assert report._repr_html_().startswith("<iframe srcdoc=")
     assert "olc" in str(report)
 
+    rows = report.rows._repr_html_()
+    assert rows.startswith("<table>") and "<td>olc</td>" in rows and "<th>recovered_percent_within_0.10</th>" in rows
+    if PROGRAM is not None:
+        csv = subprocess.run([PROGRAM, "table", tmp_path / "out" / "audit.json", "--format", "csv"], capture_output=True, text=True)
+        heads, cells = (line.split(",") for line in csv.stdout.splitlines()[:2])
+        # What is not known has no column here; a single repeat is not said.
+        known = {head for head, cell in zip(heads, cells) if cell} - {"repeats"}
+        assert len(known) > 15 and known <= set(report.rows.columns)
+
     pyarrow = pytest.importorskip("pyarrow")
     table = pyarrow.table(report.rows)
     assert table.column("scheme").to_pylist() == ["olc", "plane"]
     assert table.schema.field("n_points").type == pyarrow.int64()
-    assert table.column("recovered_percent.0.10").to_pylist() == report.rows["recovered_percent.0.10"]
+    assert table.column("recovered_percent_within_0.10").to_pylist() == report.rows["recovered_percent_within_0.10"]
     assert len(report.rows) == 2 and set(report.rows.to_dict()) == set(table.column_names)
+
+
+def test_a_plot_takes_a_threshold_as_number_or_text(small):
+    pytest.importorskip("matplotlib").use("Agg")
+    report = cheap(small, ["olc"], thresholds=["0.10", "0.25"])
+    for threshold in (None, 0.1, "0.10", "0.1"):
+        assert "within 0.10 m" in report.plot(threshold).get_ylabel()
+    with pytest.raises(unlift.UnliftError, match="threshold: expected one of 0.10, 0.25, found 0.3"):
+        report.plot(0.3)

@@ -135,7 +135,7 @@ def test_a_report_of_images_is_like_one_of_maps(images, tmp_path):
     assert 'id="picture-graph"' not in safe and "sub/c.jpg" not in safe
     assert report._repr_html_().startswith("<iframe srcdoc=") and "lines2d" in str(report)
     pyarrow = pytest.importorskip("pyarrow")
-    assert pyarrow.table(report.rows).column("recovered_percent.10").to_pylist() == report.rows["recovered_percent.10"]
+    assert pyarrow.table(report.rows).column("recovered_percent_within_10").to_pylist() == report.rows["recovered_percent_within_10"]
 
 
 def test_arrays_are_taken_in_every_kind_of_number(images):
@@ -192,8 +192,8 @@ def test_a_scheme_and_a_source_are_functions(images):
     report = quick(images, ["lines2d", level], ["oracle", meeting])
     assert report.rows["scheme"] == ["lines2d"] * 2 + ["level"] * 2
     assert report.rows["neighbors"] == ["oracle", "meeting"] * 2 and report.rows["k"] == [10, 5] * 2
-    of_ours, of_level = (report.rows["recovered_percent.25"][at] for at in (0, 2))
-    assert of_level == pytest.approx(of_ours, abs=15) and of_level > report.rows["blind_percent.25"][2]
+    of_ours, of_level = (report.rows["recovered_percent_within_25"][at] for at in (0, 2))
+    assert of_level == pytest.approx(of_ours, abs=15) and of_level > report.rows["blind_percent_within_25"][2]
     assert figures(quick(images, ["lines2d", level], ["oracle", meeting]).document) == figures(report.document)
 
 

@@ -38,7 +38,7 @@ def use():
     unlift.testing.check_scheme(upright)
     report = unlift.audit(m, ["olc", upright], inlier_ratios=[0.5], solvers=["consensus"], thresholds=[0.5])
     report.save(f"{path}.out")
-    return found["recovered_percent"], report.rows["recovered_percent.0.5"], len(report.html()) > 0
+    return found["recovered_percent"], report.rows["recovered_percent_within_0.5"], len(report.html()) > 0
 """
 
 
@@ -267,7 +267,7 @@ import multiprocessing
 
 def use():
     images = {"a": image(1), "b": image(2)}
-    return unlift.audit_images(images, "lines2d", inlier_ratios=[0.5], solvers="consensus").rows["recovered_percent.5"]
+    return unlift.audit_images(images, "lines2d", inlier_ratios=[0.5], solvers="consensus").rows["recovered_percent_within_5"]
 
 first = use()
 with multiprocessing.get_context("fork").Pool(1) as pool:

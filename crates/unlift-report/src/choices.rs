@@ -151,7 +151,7 @@ fn first_given(document: &Document, givens: &[GivenChoice]) -> usize {
     place.unwrap_or(0)
 }
 
-/// What stands behind a length in charts: `2.5×` is so many times the usual distance of neighbors.
+/// What stands behind a length in charts: `2.5×` is so many times the usual distance to the K-th neighbor.
 pub(crate) fn unit_sign(unit: Option<LengthUnit>) -> &'static str {
     match unit {
         Some(LengthUnit::KthNeighbor) => "×",

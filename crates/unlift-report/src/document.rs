@@ -262,6 +262,9 @@ pub struct GateResult {
     /// The figure that was compared, in percent (or percentage points for a gain over the larger
     /// baseline); `None` when no row could be audited that the gate is about.
     pub found_percent: Option<f64>,
+    /// What that figure is of: scheme, source and ratio, solver, distance.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub of: Option<String>,
     /// The bound it may not exceed.
     pub bound_percent: f64,
     /// Whether every figure keeps the bound; `false` whenever one that the gate is about is not known.

@@ -21,7 +21,7 @@ pub(crate) struct GateWords {
     pub passed: bool,
     /// `PASS` or `FAIL`.
     pub word: &'static str,
-    /// "88.7 % came back, at most 20 % may".
+    /// "88.7 % came back, at most 20 % may; olc, oracle at 0.50, joint, recovered within 0.10 m".
     pub said: String,
     /// "at most 20 % may come back".
     #[serde(skip)]
@@ -52,6 +52,23 @@ pub(crate) fn unusable(document: &Document) -> Option<String> {
     Some(format!("{unusable} of {found} images could not be used, and are in no figure"))
 }
 
+/// A line per gate: whether it held, what was found, and what that is of. Ends with a line break, or is empty.
+pub fn gate_lines(document: &Document) -> String {
+    let line = |gate: &GateResult| {
+        let word = if gate.passed { "held" } else { "FAILED" };
+        format!("gate {}: {word}, {}\n", gate.gate, gate_found(gate))
+    };
+    document.gates.iter().map(line).collect()
+}
+
+/// What was found of a gate, what that is of, and why the gate did not hold in spite of it.
+pub fn gate_found(gate: &GateResult) -> String {
+    let of = gate.of.as_ref().map_or_else(String::new, |of| format!(": {of}"));
+    let found = gate.found_percent.map(|found| format!("found {found:.1} %{of}"));
+    let found: Vec<String> = found.into_iter().chain(gate.reason.clone()).collect();
+    found.join("; ")
+}
+
 pub(crate) fn in_words(gate: &GateResult) -> GateWords {
     let bound = words::significant(gate.bound_percent, 4);
     let (unit, verb, whole) = match gate.gate.contains(":gain") {
@@ -65,7 +82,8 @@ pub(crate) fn in_words(gate: &GateResult) -> GateWords {
     });
     let found = found.unwrap_or_else(|| format!("not known; at most {bound}{unit} {}", verb.1));
     let word = if gate.passed { "PASS" } else { "FAIL" };
-    let said: Vec<String> = [found].into_iter().chain(gate.reason.clone()).collect();
+    let said = [Some(found), gate.of.clone(), gate.reason.clone()];
+    let said: Vec<String> = said.into_iter().flatten().collect();
     GateWords { gate: gate.gate.clone(), passed: gate.passed, word, said: said.join("; "), allowed }
 }
 
@@ -109,6 +127,10 @@ mod tests {
         let held = in_words(&gate("all:0.10:gain<=20", 19.96, 20.0));
         let said = "20.0 percentage points were gained, at most 20 percentage points may be";
         assert_eq!((held.word, held.said.as_str()), ("PASS", said));
+        let of = "olc, oracle at 0.50, joint, recovered within 0.10 m";
+        let named = GateResult { of: Some(of.into()), ..gate("all:0.10<=20", 20.04, 20.0) };
+        assert_eq!(gate_found(&named), format!("found 20.0 %: {of}"));
+        assert_eq!(in_words(&named).said, format!("20.04 % came back, at most 20 % may; {of}"));
         let unknown = GateResult {
             found_percent: None,
             passed: false,

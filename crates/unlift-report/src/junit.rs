@@ -30,7 +30,7 @@ pub fn junit(document: &Document) -> String {
         let case =
             format!("    <testcase name=\"{name}\" classname=\"unlift.{}\"", escaped(scheme));
         text.push_str(&match gate.passed {
-            true => format!("{case}/>\n"),
+            true => format!("{case}>\n      <system-out>{said}</system-out>\n    </testcase>\n"),
             false => format!(
                 "{case}>\n      <failure message=\"{said}\" type=\"gate\">{name}: {said}</failure>\n    \
                  </testcase>\n"

@@ -64,6 +64,7 @@ mod xml;
 pub use attack::Given;
 pub use document::Document;
 pub use error::Error;
+pub use gates::{gate_found, gate_lines};
 pub use html::render;
 pub use junit::junit;
 pub use opening::Opening;

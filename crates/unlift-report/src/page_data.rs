@@ -20,7 +20,7 @@ pub(crate) struct PageData<'a> {
     published: Vec<PublishedData>,
     /// The threshold that is shown first.
     headline: usize,
-    /// `m`, `px`, or `×` for multiples of the usual distance of neighbors.
+    /// `m`, `px`, or `×` for multiples of the usual distance to the K-th neighbor.
     unit: &'static str,
     scene: Option<&'a Encoded>,
     pictures: &'a [EncodedPicture],

@@ -9,10 +9,11 @@ use crate::gates::{self, GateWords};
 const UNNAMED: &str = "audit.json";
 const REPOSITORY: &str = env!("CARGO_PKG_REPOSITORY");
 
-/// The gates of `document` as a SARIF log of one run.
+/// The gates of `document` as a SARIF log of one run. Results point to `asked_at`, a file and a line of it that asks for the
+/// audit, else to the map.
 ///
 /// Ends with a line break.
-pub fn sarif(document: &Document) -> String {
+pub fn sarif(document: &Document, asked_at: Option<(&str, usize)>) -> String {
     let mut gates: Vec<GateWords> = Vec::new();
     for gate in document.gates.iter().map(gates::in_words) {
         // A rule has one place in the list, however often its gate was typed.
@@ -21,7 +22,11 @@ pub fn sarif(document: &Document) -> String {
         }
     }
     let path = document.input.path.as_deref();
-    let uri = path.map_or_else(|| UNNAMED.to_owned(), uri);
+    let of_map = path.map(uri);
+    let (at, line) = match asked_at {
+        Some((file, line)) => (uri(file), line),
+        None => (of_map.clone().unwrap_or_else(|| UNNAMED.to_owned()), 1),
+    };
     let unusable = gates::unusable(document);
     let mut invocation = json!({ "executionSuccessful": unusable.is_none() });
     if let Some(said) = unusable {
@@ -37,11 +42,12 @@ pub fn sarif(document: &Document) -> String {
             "rules": gates.iter().map(rule).collect::<Vec<_>>(),
         }},
         "invocations": [invocation],
-        "results": failed.map(|(at, gate)| result(at, gate, &uri)).collect::<Vec<_>>(),
+        "results": failed.map(|(rule, gate)| result(rule, gate, (&at, line))).collect::<Vec<_>>(),
     });
-    if path.is_some() {
-        // Two audits of one commit replace each other's alerts unless each has a category; the slash ends it.
-        run["automationDetails"] = json!({ "id": format!("unlift/{uri}/") });
+    // Two audits of one commit replace each other's alerts unless each has a category; the slash ends it.
+    let category = of_map.or_else(|| asked_at.map(|_| format!("{at}/{line}")));
+    if let Some(category) = category {
+        run["automationDetails"] = json!({ "id": format!("unlift/{category}/") });
     }
     let log = json!({
         "$schema": "https://json.schemastore.org/sarif-2.1.0.json",
@@ -61,16 +67,16 @@ fn rule(gate: &GateWords) -> Value {
     })
 }
 
-fn result(rule: usize, gate: &GateWords, uri: &str) -> Value {
+fn result(rule: usize, gate: &GateWords, (uri, line): (&str, usize)) -> Value {
     json!({
         "ruleId": gate.gate,
         "ruleIndex": rule,
         "level": "error",
         "message": { "text": format!("{}: {}", gate.gate, gate.said) },
-        // A map has no lines; GitHub takes no result without one.
+        // GitHub takes no result without a line.
         "locations": [{ "physicalLocation": {
             "artifactLocation": { "uri": uri },
-            "region": { "startLine": 1 },
+            "region": { "startLine": line },
         }}],
     })
 }

@@ -37,7 +37,7 @@ pub(crate) fn scheme_rule(scheme: &str) -> &'static str {
 }
 
 /// The unit of a map without a scale, in words; the page says once what it is exactly.
-pub(crate) const USUAL_DISTANCE: &str = "the usual distance between neighboring points";
+pub(crate) const USUAL_DISTANCE: &str = "the usual distance to the K-th neighbor";
 
 /// A threshold as typed, short: `10 cm`, `2.5×` (times [`USUAL_DISTANCE`]), `10 px`.
 pub(crate) fn threshold(typed: &str, unit: LengthUnit) -> String {
@@ -220,8 +220,8 @@ mod tests {
     #[test]
     fn without_a_scale_lengths_are_compared_with_the_distance_of_neighbors() {
         let said = |typed| within(typed, LengthUnit::KthNeighbor);
-        assert_eq!(said("1.0"), "within the usual distance between neighboring points");
-        assert_eq!(said("2.5"), "within 2.5 times the usual distance between neighboring points");
+        assert_eq!(said("1.0"), "within the usual distance to the K-th neighbor");
+        assert_eq!(said("2.5"), "within 2.5 times the usual distance to the K-th neighbor");
         assert_eq!(within("0.10", LengthUnit::Meter), "within 10 cm");
         assert_eq!(within("10", LengthUnit::Pixel), "within 10 px");
     }

@@ -8,6 +8,7 @@ use unlift::geometry::frame::Bounds;
 use unlift::neighbors::{Geometric, Neighborhoods};
 use unlift::obfuscate::{Lifted, Scheme, SchemeOptions, obfuscate, scheme};
 use unlift::recover::{RecoverOptions, Solver, Unknown, recover};
+use unlift::released::{Lines, Obfuscation};
 use unlift::seed::{Key, Stage};
 use unlift::truth::Original;
 use unlift::{About, Error, PointSet, RowOrder, Unit, synthetic};
@@ -252,6 +253,51 @@ impl Scheme<3> for Mistaken {
         let mut lifted = olc.lift(points, bounds, key)?;
         key.draws(Stage::Scheme, 1).shuffle(&mut lifted.hidden);
         Ok(lifted)
+    }
+}
+
+/// Lines a meter beside their points, or, where `off` is zero, other lines in every call.
+#[derive(Debug, Default)]
+struct Beside {
+    off: f64,
+    calls: std::sync::atomic::AtomicU32,
+}
+
+impl Scheme<3> for Beside {
+    fn name(&self) -> &str {
+        "beside"
+    }
+
+    fn lift(
+        &self,
+        points: &[[f64; 3]],
+        _: Option<&Bounds<3>>,
+        _: &Key,
+    ) -> Result<Lifted<3>, Error> {
+        let call = self.calls.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        let through: Vec<[f64; 3]> = points.iter().map(|p| [p[0], p[1] + self.off, p[2]]).collect();
+        let lines = Lines::through(&through, &vec![[1.0, 0.0, f64::from(call)]; points.len()])?;
+        Ok(Lifted::one_each(Obfuscation::Lines(lines)))
+    }
+}
+
+/// Next to nothing came back of lines a meter beside their points, and the gate held.
+#[test]
+fn a_scheme_that_breaks_a_law_has_no_row() {
+    let room = room(600);
+    for (off, law) in
+        [(1.0, "on their own records, found 600 of 600"), (0.0, "the same of one key")]
+    {
+        let mut plan = plan(&["olc"]);
+        plan.records_alone = false;
+        plan.schemes.push(Arc::new(Beside { off, ..Beside::default() }));
+        let outcome = audit(&room, &plan);
+        assert!(outcome.rows.iter().all(|row| row.scheme == "olc"));
+        let missing = &outcome.not_audited[0];
+        assert!(missing.scheme == "beside" && missing.reason.contains(law), "{}", missing.reason);
+        plan.schemes.remove(0);
+        let error = run(&room, None, &plan, &mut Silent).unwrap_err().to_string();
+        assert!(error.contains(law), "{error}");
     }
 }
 

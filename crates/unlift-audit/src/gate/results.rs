@@ -1,18 +1,23 @@
 //! Gates about an audit: whether each is about a row of it, and how it ended.
 
-use unlift::audit::{NotAudited, Plan, REFERENCE, Row};
+use unlift::Unit;
+use unlift::audit::{NotAudited, Plan, REFERENCE, Row, Threshold};
+use unlift::neighbors::oracle::Noise;
 use unlift_report::document::GateResult;
 
-use super::{Candidate, Gate};
+use super::{Candidate, Figure, Gate};
 use crate::Error;
 
-/// Rows as gates see them.
-fn candidates<'a, const D: usize>(plan: &Plan<D>, rows: &'a [Row]) -> Vec<Candidate<'a>> {
+/// Rows as gates see them, each with the row and the number of the threshold that it is from.
+fn candidates<'a, const D: usize>(
+    plan: &Plan<D>,
+    rows: &'a [Row],
+) -> Vec<(Candidate<'a>, &'a Row, usize)> {
     let mut candidates = Vec::new();
     // The reference is no attack.
     for row in rows.iter().filter(|row| row.solver != REFERENCE) {
         for (at, threshold) in plan.thresholds.iter().enumerate() {
-            candidates.push(Candidate {
+            let candidate = Candidate {
                 scheme: &row.scheme,
                 solver: row.solver,
                 source: &row.neighbors,
@@ -20,10 +25,36 @@ fn candidates<'a, const D: usize>(plan: &Plan<D>, rows: &'a [Row]) -> Vec<Candid
                 threshold: threshold.value,
                 recovered_percent: row.recovered_percent[at],
                 baseline_percent: row.baseline_percent(at),
-            });
+            };
+            candidates.push((candidate, row, at));
         }
     }
     candidates
+}
+
+/// What the figure of `gate` is of, the threshold numbered `at` of `row`, in words.
+fn in_words(gate: &Gate, found: f64, row: &Row, at: usize, threshold: &Threshold) -> String {
+    // Where the row's own figure is smaller, that of an attack without neighborhoods decides.
+    let is_own = gate.figure == Figure::Gain || found == row.recovered_percent[at];
+    let attack = match row.best_alone(at) {
+        _ if is_own => {
+            let noise = row.oracle_noise.filter(|noise| *noise != Noise::Uniform.name());
+            let noise = noise.map_or_else(String::new, |noise| format!(" ({noise})"));
+            format!("{}{noise} at {:.2}, {}", row.neighbors, row.inlier_ratio, row.solver)
+        }
+        Some((name, alone)) if found == alone => format!("records alone, {name}"),
+        _ => "a blind guess".to_owned(),
+    };
+    let verb = match gate.figure {
+        Figure::Recovered => "recovered",
+        Figure::Gain => "gained",
+    };
+    let unit = match row.unit {
+        Unit::Meter => "m",
+        Unit::Pixel => "px",
+        Unit::KthNeighbor => "x",
+    };
+    format!("{}, {attack}, {verb} within {} {unit}", row.scheme, threshold.label)
 }
 
 /// A gate about no row is told before the audit runs, not after.
@@ -54,12 +85,21 @@ pub fn gate_results<const D: usize>(
     doubts: &[Option<String>],
 ) -> Result<Vec<GateResult>, Error> {
     let doubtful = rows.iter().zip(doubts).filter_map(|(row, doubt)| Some((row, doubt.as_ref()?)));
-    let doubtful: Vec<(Vec<Candidate<'_>>, &String)> =
+    let doubtful: Vec<(Vec<_>, &String)> =
         doubtful.map(|(row, doubt)| (candidates(plan, std::slice::from_ref(row)), doubt)).collect();
     let rows = candidates(plan, rows);
     let result = |gate: &Gate| {
-        let found_percent = gate.worst(rows.iter().copied());
-        let is_about = |rows: &[Candidate<'_>]| rows.iter().any(|row| gate.covers(row));
+        let found_percent = gate.worst(rows.iter().map(|(candidate, ..)| *candidate));
+        let of = found_percent.and_then(|found| {
+            let decides = |candidate| {
+                gate.worst([candidate]).is_some_and(|one| one.total_cmp(&found).is_eq())
+            };
+            let (_, row, at) = rows.iter().find(|(candidate, ..)| decides(*candidate))?;
+            Some(in_words(gate, found, row, *at, &plan.thresholds[*at]))
+        });
+        let is_about = |rows: &[(Candidate<'_>, &Row, usize)]| {
+            rows.iter().any(|(candidate, ..)| gate.covers(candidate))
+        };
         let doubt = doubtful.iter().find(|(rows, _)| is_about(rows)).map(|(_, doubt)| doubt);
         let reason = not_audited.iter().find(|missing| gate.misses(missing)).map(|missing| {
             let with = missing.neighbors.as_ref().map(|name| format!(" with neighbors by {name}"));
@@ -77,7 +117,7 @@ pub fn gate_results<const D: usize>(
         }
         let passed = reason.is_none() && keeps;
         let (gate, bound_percent) = (gate.typed.clone(), gate.bound_percent);
-        Ok(GateResult { gate, found_percent, bound_percent, passed, reason })
+        Ok(GateResult { gate, found_percent, of, bound_percent, passed, reason })
     };
     gates.iter().map(result).collect()
 }

@@ -194,7 +194,7 @@ impl<'a> Watcher<'a> {
     fn new(job: &'a ImagesJob<'_>, tally: &'a RefCell<Tally>) -> Self {
         let most = job.plan.thresholds.iter().map(|t| t.value).fold(0.0, f64::max);
         let progress = job.progress;
-        progress.show(0, job.chosen.len(), "");
+        progress.show(0, job.chosen.len(), "reading images");
         Self {
             progress,
             tally,

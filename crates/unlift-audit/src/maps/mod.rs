@@ -212,7 +212,7 @@ fn find_with(
 ) -> Result<Audited, Error> {
     check_gates(&job.gates, &job.plan)?;
     check_lengths_of_gates(job.original.reveal(), &job.gates)?;
-    for note in &job.notes {
+    for note in job.doubts.iter().chain(&job.notes) {
         job.progress.say(&format!("note: {note}"));
     }
     let mut watcher = watcher(&job, journal, out);
@@ -233,7 +233,7 @@ fn find_with(
     let mut doubts = doubts(job.original, job.hidden, (&job.plan, &outcome.rows), &job.doubts)
         .map_err(of_file)?;
     doubts.notes.extend(watcher.journal.as_ref().and_then(|journal| journal.note()));
-    for note in &doubts.notes {
+    for note in doubts.notes.iter().filter(|note| !job.doubts.contains(note)) {
         job.progress.say(&format!("note: {note}"));
     }
     let (rows, missing) = (&outcome.rows, &outcome.not_audited);

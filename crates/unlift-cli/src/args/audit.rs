@@ -64,6 +64,9 @@ pub struct ResultArgs {
     /// Print a summary as JSON on stdout in place of the table
     #[arg(long)]
     pub json: bool,
+    /// The configuration and the line of it that ask for the audit, seen from where `check` was started.
+    #[arg(skip)]
+    pub asked_at: Option<(String, usize)>,
 }
 
 /// How the program runs.

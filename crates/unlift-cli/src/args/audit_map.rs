@@ -16,6 +16,7 @@ use crate::values::{self, NeighborSource};
 #[command(after_help = "\
 Examples:
   unlift audit map PROJECT --scale 1
+  unlift audit map PROJECT --scale 1 --quick
   unlift audit map cloud.ply --schemes ppl,ppl+ --inlier-ratios 1,0.5 --out ppl-audit
   unlift audit map PROJECT --scale 1 --gate 'ppl@0.5:0.10<=20' --gate 'all:0.25:gain<=30'
   unlift audit map PROJECT --descriptors PROJECT/database.db --neighbors overlap \
@@ -40,6 +41,10 @@ pub struct AuditMapArgs {
     pub path: PathBuf,
     #[command(flatten)]
     pub map: MapArgs,
+    /// A first look: random lines (olc) and paired lines (ppl) at half of the neighbors right, and lists by similarity
+    /// where there are descriptors
+    #[arg(long, conflicts_with_all = ["schemes", "inlier_ratios", "neighbors"], help_heading = "Attack")]
+    pub quick: bool,
     /// Schemes to audit, by commas [default: all, see unlift schemes]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::scheme,
           help_heading = "Attack")]

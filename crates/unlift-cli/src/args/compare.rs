@@ -29,9 +29,9 @@ pub struct CompareArgs {
     /// The figures of the later audit
     #[arg(value_name = "NEW.json")]
     pub new: PathBuf,
-    /// Percentage points up to which a figure counts as the same
-    #[arg(long, value_name = "POINTS", default_value = "1", value_parser = values::points)]
-    pub tolerance: f64,
+    /// Percentage points up to which a figure counts as the same [default: twice the spread of repeats, or 2 without repeats]
+    #[arg(long, value_name = "POINTS", value_parser = values::points)]
+    pub tolerance: Option<f64>,
     /// Also write a page, compare.html, to this folder; whatever else is in it stays
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,

@@ -10,7 +10,7 @@ use unlift_audit::OutlierFilter;
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Input")]
 pub struct MapArgs {
-    /// Meters per unit of the map. Without it the unit is the median distance to the K-th neighbor
+    /// Meters per unit of the map. Without it the unit is the usual distance to the K-th neighbor (the median)
     #[arg(long, value_name = "METERS_PER_UNIT", value_parser = values::scale)]
     pub scale: Option<f64>,
     /// Descriptors of the points: a COLMAP database.db or hloc's features.h5 that the model was made of,

@@ -10,7 +10,9 @@ use unlift::audit::{Measure, Plan};
 use unlift::obfuscate::SchemeOptions;
 use unlift_audit::inversion::MapInversion;
 use unlift_audit::maps::perform;
-use unlift_audit::{Finished, Job, Journal, Prepared, Shown, check_thresholds, open_audit};
+use unlift_audit::{
+    Finished, Job, Journal, Prepared, Shown, check_thresholds, open_audit, sources,
+};
 use unlift_io::atomic::Rules;
 use unlift_io::hash::hash_stage;
 use unlift_io::read;
@@ -25,6 +27,13 @@ use crate::exit::{Outcome, advise, usage};
 use crate::output::{command_line, print};
 use crate::progress::{Progress, Stderr};
 use crate::values::{NeighborSource, all_schemes, distinct};
+
+/// Schemes of a first look: the one that most is known of, and the one that hides two points in a record.
+const QUICK_SCHEMES: [&str; 2] = ["olc", "ppl"];
+/// The inlier ratio of a first look.
+const QUICK_RATIO: f64 = 0.5;
+/// The attack on what is released, of a first look: the fastest one, of any descriptors.
+const QUICK_SOURCE: &str = "similarity";
 
 /// Audits a map.
 pub fn run(args: AuditMapArgs) -> anyhow::Result<Outcome> {
@@ -51,14 +60,15 @@ pub fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
         let progress = Progress::new(args.run.quiet);
         let (path, result) = (&args.path, &args.result);
         let inversion = inversion(args, &prepared, &input, &progress)?;
-        let mut notes = prepared.notes.clone();
-        let mut plan = plan(args, &prepared, &input, &mut notes)?;
+        let (mut notes, mut doubts) = (prepared.notes.clone(), prepared.doubts.clone());
+        let mut plan = plan(args, &prepared, &input, (&mut notes, &mut doubts))?;
         plan.measures.extend(inversion.iter().map(|one| Arc::clone(one) as Arc<dyn Measure<3>>));
         let mut job = Job {
             plan,
             inversion,
             journal: journal(args, &progress)?,
             notes,
+            doubts,
             options: with_attack(more_options(args), &args.attack),
             gates: result.gate.clone(),
             write_clouds: args.write_clouds,
@@ -112,20 +122,29 @@ fn plan(
     args: &AuditMapArgs,
     prepared: &Prepared,
     input: &read::Input,
-    notes: &mut Vec<String>,
+    (notes, doubts): (&mut Vec<String>, &mut Vec<String>),
 ) -> anyhow::Result<Plan<3>> {
     let k = usize::from(args.map.k);
     let unit = prepared.original.reveal().unit();
     let usual = Plan::new(unit).for_map(prepared.original.len(), k);
-    let entries = if args.schemes.is_empty() { all_schemes() } else { args.schemes.clone() };
+    let mut entries = if args.schemes.is_empty() { all_schemes() } else { args.schemes.clone() };
+    let mut asked = args.neighbors.clone();
+    if args.quick {
+        entries.retain(|entry| QUICK_SCHEMES.contains(&entry.name));
+        if prepared.descriptors.is_some() {
+            asked.push(NeighborSource::Own(sources::named(QUICK_SOURCE)?));
+        }
+    }
     let entries = distinct(entries, |a, b| a.name == b.name);
     let options = SchemeOptions::usual(unit);
     let schemes = entries.iter().filter_map(|entry| entry.of_dimension(&options)).collect();
     let thresholds = thresholds(&args.thresholds, &usual)?;
     let points = prepared.original.reveal();
     let typed = !args.thresholds.is_empty();
-    notes.extend(check_thresholds(points.positions(), points.unit(), &thresholds, typed)?);
-    let asked = (&*args.neighbors, &args.attack);
+    let said = check_thresholds(points.positions(), points.unit(), &thresholds, typed)?;
+    notes.extend(said.note);
+    doubts.extend(said.doubt);
+    let asked = (&*asked, &args.attack);
     let descriptors = prepared.descriptors.as_ref();
     let lacking = |text: String| {
         let error = usage(format!("{text} (--descriptors FILE), found none"));
@@ -134,15 +153,18 @@ fn plan(
             None => error,
         }
     };
+    let usual = attack(&args.attack, usual);
+    let inlier_ratios = if args.quick { vec![QUICK_RATIO] } else { usual.inlier_ratios.clone() };
     Ok(Plan {
         neighbors: neighbors(asked, (prepared, descriptors), lacking, (input.n_rows(), notes))?,
+        inlier_ratios,
         schemes,
         k,
         solvers: solvers(&args.solvers.solver, &usual),
         records_alone: !args.solvers.no_records_alone,
         thresholds,
         seed: args.map.seed.unwrap_or(0),
-        ..attack(&args.attack, usual)
+        ..usual
     })
 }
 

@@ -53,7 +53,8 @@ pub fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
         let (prepared, hidden) = open(args)?;
         let progress = Progress::new(args.run.quiet);
         let mut notes = prepared.notes.clone();
-        let plan = plan(args, &name, &prepared, &hidden.0, &mut notes)?;
+        let mut doubts = Vec::new();
+        let plan = plan(args, &name, &prepared, &hidden.0, (&mut notes, &mut doubts))?;
         let job = Job {
             original: &prepared.original,
             descriptors: None,
@@ -62,7 +63,7 @@ pub fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
             up: None,
             plan,
             notes,
-            doubts: Vec::new(),
+            doubts,
             input: provenance(args, &prepared, &seen)?,
             options: with_attack(
                 Map::from_iter([("released".to_owned(), json!(true))]),
@@ -176,13 +177,15 @@ fn plan(
     name: &str,
     prepared: &Prepared,
     released: &Released<3>,
-    notes: &mut Vec<String>,
+    (notes, doubts): (&mut Vec<String>, &mut Vec<String>),
 ) -> anyhow::Result<Plan<3>> {
     let (k, points) = (usize::from(args.k), prepared.original.reveal());
     let usual = Plan::new(points.unit()).for_map(prepared.original.len(), k);
     let thresholds = thresholds(&args.thresholds, &usual)?;
     let typed = !args.thresholds.is_empty();
-    notes.extend(check_thresholds(points.positions(), points.unit(), &thresholds, typed)?);
+    let said = check_thresholds(points.positions(), points.unit(), &thresholds, typed)?;
+    notes.extend(said.note);
+    doubts.extend(said.doubt);
     let asked = (&*args.neighbors, &args.attack);
     let lacking = |text: String| usage(format!("{text} in the released map, found none"));
     Ok(Plan {

@@ -33,7 +33,8 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<Outcome> {
     let inputs = [Some(args.path.as_path()), args.cameras.as_deref()];
     let rules = Rules::new(inputs.into_iter().flatten(), args.force);
     let ending = args.out.extension().map(|ending| ending.to_ascii_lowercase());
-    let ending = ending.as_ref().and_then(|ending| ending.to_str());
+    let ending = ending.as_ref().map(|ending| ending.to_string_lossy());
+    let ending = ending.as_deref();
     if args.cameras.is_some() && matches!(ending, Some("ply" | "obj")) {
         let found = OneLine(args.out.display());
         return Err(usage(format!("--cameras: expected a folder as --out, found {found}")));
@@ -45,6 +46,12 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<Outcome> {
             cloud(args, ending, &shown)?
         }
         Some("json") => transforms(args, rules)?,
+        Some(_) if !args.out.is_dir() => {
+            let found = OneLine(args.out.display());
+            return Err(usage(format!(
+                "--out: expected a name that ends in .ply, .obj or transforms.json, or a folder without an ending, found {found}"
+            )));
+        }
         _ => model(args, rules)?,
     };
     print(&format!("{n}, in {}\n", OneLine(args.out.display())))?;

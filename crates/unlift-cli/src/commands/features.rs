@@ -127,7 +127,7 @@ fn extract(
         }
         Ok(Done::Now(parts.write(&key, &folder.get(at)?).map_err(Fatal)?))
     };
-    progress.show(0, names.len(), "");
+    progress.show(0, names.len(), "reading images");
     let steps = progress.steps();
     // Told here: results are handed over many at a time.
     let one = |&at: &usize| {
@@ -195,7 +195,7 @@ fn copy(
         image.described(&args.images)?;
         Ok(image)
     };
-    progress.show(0, names.len(), "");
+    progress.show(0, names.len(), "reading images");
     in_order(&all, one, |at, result| -> anyhow::Result<()> {
         progress.show(at + 1, names.len(), &names[at]);
         let usable = result.and_then(|image| {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use unlift_audit::{FIGURES, Finished, PAGE, check_file_of};
 use unlift_io::Error;
-use unlift_io::atomic::{Access, Alone, Kind, Rules, place_of, write_file};
+use unlift_io::atomic::{Access, Alone, Kind, Rules, make_folders, place_of, write_file};
 use unlift_report::document::Document;
 use unlift_report::{junit, sarif};
 
@@ -18,20 +18,24 @@ struct GateFile {
     option: &'static str,
     path: PathBuf,
     kind: Kind,
-    text: fn(&Document) -> String,
+    text: Text,
 }
+
+/// The text of a file of gates, and what it points to.
+type Text = fn(&Document, Option<(&str, usize)>) -> String;
 
 /// The files of gates of an audit: checked before the work, written after it.
 pub struct GateFiles {
     files: Vec<GateFile>,
     rules: Rules,
+    asked_at: Option<(String, usize)>,
 }
 
 impl GateFiles {
     /// Those that `result` asks for, if they can be written, and over nothing else of the same run.
     pub fn check(result: &ResultArgs, rules: &Rules) -> anyhow::Result<Self> {
         let asked = [
-            ("--junit", &result.junit, Kind::Junit, junit as fn(&Document) -> String),
+            ("--junit", &result.junit, Kind::Junit, (|document, _| junit(document)) as Text),
             ("--sarif", &result.sarif, Kind::Sarif, sarif),
         ];
         let mut taken: Vec<(&str, PathBuf)> =
@@ -39,6 +43,13 @@ impl GateFiles {
         let mut files = Vec::new();
         for (option, path, kind, text) in asked {
             let Some(path) = path else { continue };
+            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+            if let Some(folder) = folder.filter(|folder| !folder.exists()) {
+                // As the folder of the report, which may be the same.
+                let access = if result.share_safe { Access::Usual } else { Access::Private };
+                make_folders(folder, access)
+                    .map_err(|error| usage(format!("{option}: {error}")))?;
+            }
             let target = place_of(&check_file_of(option, path, kind, rules)?);
             if let Some((other, _)) = taken.iter().find(|(_, other)| *other == target) {
                 let path = path.display();
@@ -49,7 +60,7 @@ impl GateFiles {
             taken.push((option, target));
             files.push(GateFile { option, path: path.clone(), kind, text });
         }
-        Ok(Self { files, rules: rules.clone() })
+        Ok(Self { files, rules: rules.clone(), asked_at: result.asked_at.clone() })
     }
 
     /// Writes them, each whole or not at all. They are made to be shown: whoever may see a build may read them. Where another run
@@ -68,7 +79,8 @@ impl GateFiles {
         }
         for GateFile { option, path, kind, text } in &self.files {
             check_file_of(option, path, *kind, &self.rules)?;
-            let text = text(document);
+            let text =
+                text(document, self.asked_at.as_ref().map(|(file, line)| (file.as_str(), *line)));
             write_file(path, Access::Usual, |w| w.write_all(text.as_bytes()))?;
         }
         Ok(())

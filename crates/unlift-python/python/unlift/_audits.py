@@ -11,7 +11,7 @@ from typing import Any, Protocol, TypedDict, TypeVar
 import numpy.typing as npt
 
 from ._report import Report
-from ._unlift import Map, Records
+from ._unlift import SCHEMES, SOURCES, Map, Records
 from ._unlift import Report as _Report
 from ._unlift import audit as _audit
 from ._unlift import audit_images as _audit_images
@@ -101,7 +101,8 @@ def audit(
     threads: never change a result.
     progress: True for a bar (tqdm if it is there), or a function of done, total and what comes next.
 
-    Raises UnliftError in one line; KeyboardInterrupt at once.
+    A scheme or source of your own that fails, and a scheme that breaks a law, has no row and is told by a warning. Raises UnliftError in one line, also where
+    no scheme has a row; KeyboardInterrupt at once.
     """
     asked = _asked(
         schemes=schemes,
@@ -121,7 +122,12 @@ def audit(
         gates=gates,
         threads=threads,
     )
-    return Report(_told(lambda tell: _audit(map, asked, tell), progress, "row"))
+    report = Report(_told(lambda tell: _audit(map, asked, tell), progress, "row"))
+    for one in report.document.get("not_audited") or []:
+        if one["scheme"] not in SCHEMES or one.get("neighbors") not in (None, "oracle", *SOURCES):
+            by = f" with neighbors by {one['neighbors']}" if one.get("neighbors") else ""
+            warnings.warn(f"{one['scheme']}{by} was not audited: {one['reason']}", stacklevel=2)
+    return report
 
 
 def audit_images(

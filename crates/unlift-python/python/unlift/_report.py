@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import html
+import math
 import os
 import pathlib
 from typing import Any
 
 from ._unlift import Report as _Report
-from ._unlift import Rows
+from ._unlift import Rows, UnliftError
 
 #: Height of the page in a notebook, in pixels.
 HEIGHT = 720
+#: Rows that a table shows in a notebook at most.
+ROWS = 100
 
 
 class Table:
@@ -22,7 +25,10 @@ class Table:
 
     @property
     def columns(self) -> list[str]:
-        """Names: as in `audit.json`, with a dot before what stands within (`recovered_percent.0.10`)."""
+        """Names: those of the CSV of `unlift table` (`recovered_percent_within_0.10`).
+
+        What the CSV lacks has the name of `audit.json`, with a dot before what stands within.
+        """
         return self._rows.columns
 
     def __len__(self) -> int:
@@ -46,6 +52,17 @@ class Table:
 
     def __repr__(self) -> str:
         return repr(self._rows).replace("Rows", "Table")
+
+    def _repr_html_(self) -> str:
+        """The first rows as a notebook shows them, without columns that are empty."""
+        shown = {name: values for name, values in self.to_dict().items() if any(value is not None for value in values)}
+        heads = "".join(f"<th>{html.escape(name)}</th>" for name in shown)
+        rows = "".join(
+            "<tr>" + "".join(f"<td>{_cell(values[at])}</td>" for values in shown.values()) + "</tr>"
+            for at in range(min(len(self), ROWS))
+        )
+        more = f"<p>{len(self) - ROWS} more rows</p>" if len(self) > ROWS else ""
+        return f"<table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table>{more}"
 
 
 class Report:
@@ -86,15 +103,20 @@ class Report:
         """
         return self._found.save(os.fspath(out), share_safe=share_safe, force=force)
 
-    def plot(self, threshold: str | None = None, ax: Any = None) -> Any:
+    def plot(self, threshold: str | float | None = None, ax: Any = None) -> Any:
         """Draws how much comes back over the inlier ratio, a curve per scheme, of the strongest solver; returns the axes.
 
-        threshold: one of those of the audit, as written; the first without it. Needs matplotlib.
+        threshold: one of those of the audit, a number or a text; the first without it. Needs matplotlib.
         """
         import matplotlib.pyplot  # type: ignore[import-not-found,import-untyped,unused-ignore]
 
         rows = self.document["results"]
-        threshold = threshold or next(iter(rows[0]["recovered_percent"]))
+        typed = list(rows[0]["recovered_percent"])
+        given = typed[0] if threshold is None else threshold
+        same = [one for one in typed if one == given or float(one) == _number(given)]
+        if not same:
+            raise UnliftError(f"threshold: expected one of {', '.join(typed)}, found {given}")
+        threshold = same[0]
         ax = ax or matplotlib.pyplot.gca()
         for scheme in dict.fromkeys(row["scheme"] for row in rows):
             best: dict[float, float] = {}
@@ -127,6 +149,19 @@ class Report:
     def _repr_html_(self) -> str:
         """The page as a notebook shows and saves it: figures only, as notebooks are shared. `show` has the points, too."""
         return _frame(self.html(share_safe=True))
+
+
+def _number(given: str | float) -> float:
+    try:
+        return float(given)
+    except ValueError:
+        return math.nan
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return ""
+    return f"{value:g}" if isinstance(value, float) else html.escape(str(value))
 
 
 def _frame(page: str) -> str:

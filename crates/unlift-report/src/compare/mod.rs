@@ -52,6 +52,8 @@ pub struct Lost {
 pub struct Comparison {
     /// Percentage points up to which a figure counts as the same.
     pub tolerance_points: f64,
+    /// Why so many: `asked`, `twice the spread of repeats` or `usual without repeats`.
+    pub tolerance_is: &'static str,
     /// Whether nothing leaks more and nothing is lost.
     pub passed: bool,
     /// What leaks more, most first.
@@ -79,18 +81,24 @@ pub struct Incomparable {
     pub found: String,
 }
 
+/// Why a tolerance is what it is, where it was asked for.
+const ASKED: &str = "asked";
+/// Percentage points by which seeds of one audit differ at most, usually.
+const USUAL_TOLERANCE: f64 = 2.0;
 /// What the second baseline is called.
 const RECORDS_ALONE: &str = "records alone";
 
 /// Compares the figures of two audits. Rows are the same by scheme, source, noise, inlier ratio as requested (a measured one is a
 /// result), K and solver; a blind guess and the records alone are compared per scheme.
 ///
+/// Without a tolerance, figures count as the same up to twice the largest spread of repeats in both, or 2 points without repeats.
+///
 /// # Errors
 /// When their units or thresholds differ, or no row of one has its like in the other.
 pub fn compare(
     old: &Document,
     new: &Document,
-    tolerance_points: f64,
+    tolerance_points: Option<f64>,
 ) -> Result<Comparison, Incomparable> {
     let within = common_thresholds(old, new)?;
     let mut changes = Vec::new();
@@ -142,6 +150,11 @@ pub fn compare(
         }
     }
     let lost = lost(old, new, &taken);
+    let (tolerance_points, tolerance_is) = match (tolerance_points, spread(old, new)) {
+        (Some(points), _) => (points, ASKED),
+        (None, Some(spread)) => ((200.0 * spread).ceil() / 100.0, "twice the spread of repeats"),
+        (None, None) => (USUAL_TOLERANCE, "usual without repeats"),
+    };
     // Sums of decimals must not fail a build by the last bit.
     let beyond = tolerance_points + 1e-9;
     let (mut more, rest): (Vec<_>, Vec<_>) =
@@ -151,7 +164,26 @@ pub fn compare(
     more.sort_by(|a, b| b.points.total_cmp(&a.points));
     less.sort_by(|a, b| a.points.total_cmp(&b.points));
     let passed = more.is_empty() && lost.is_empty();
-    Ok(Comparison { tolerance_points, passed, more, less, same, lost, only_old, only_new })
+    Ok(Comparison {
+        tolerance_points,
+        tolerance_is,
+        passed,
+        more,
+        less,
+        same,
+        lost,
+        only_old,
+        only_new,
+    })
+}
+
+/// The largest standard deviation of a share over repeats, in percentage points; `None` where nothing was repeated.
+fn spread(old: &Document, new: &Document) -> Option<f64> {
+    let rows = old.results.iter().chain(&new.results);
+    let spreads = rows.filter_map(|row| row.std.as_ref());
+    let shares =
+        spreads.flat_map(|std| std.recovered_percent.values().chain(std.blind_percent.values()));
+    shares.copied().reduce(f64::max)
 }
 
 /// The thresholds of both, as typed in each: equal as numbers.
@@ -295,8 +327,12 @@ impl Comparison {
     pub fn summary(&self) -> String {
         let count = self.more.len() + self.less.len() + self.same.len();
         let point = if self.tolerance_points == 1.0 { "point" } else { "points" };
+        let why = match self.tolerance_is {
+            ASKED => String::new(),
+            other => format!(" ({other})"),
+        };
         let mut text = format!(
-            "{count} figures compared, tolerance {} {point}: {} leak more, {} less, {} as before",
+            "{count} figures compared, tolerance {} {point}{why}: {} leak more, {} less, {} as before",
             self.tolerance_points,
             self.more.len(),
             self.less.len(),

@@ -1,6 +1,6 @@
 //! What the page's 3D view shows: originals, obfuscations and recovered points.
 //!
-//! All positions are in the document's unit (meters, or usual distances of neighbors), about any origin near
+//! All positions are in the document's unit (meters, or usual distances to the K-th neighbor), about any origin near
 //! the map: coordinates of 10^6 must be re-centered before they become `f32`.
 
 mod encode;

@@ -40,7 +40,7 @@ const RECORDS_ALONE: [(&str, [f64; 2]); 6] = [
     ("cp", [16.2, 31.9]),
 ];
 
-/// A whole audit; without a scale lengths are times the usual distance of neighbors.
+/// A whole audit; without a scale lengths are times the usual distance to the K-th neighbor.
 pub fn document(metric: bool) -> Document {
     let thresholds = if metric { ["0.10", "0.25"] } else { ["1.0", "2.5"] };
     let unit = if metric { LengthUnit::Meter } else { LengthUnit::KthNeighbor };
@@ -67,6 +67,7 @@ pub fn document(metric: bool) -> Document {
     let gate = |gate: &str, found_percent: f64, bound_percent: f64| GateResult {
         gate: gate.into(),
         found_percent: Some(found_percent),
+        of: None,
         bound_percent,
         passed: found_percent <= bound_percent,
         reason: None,

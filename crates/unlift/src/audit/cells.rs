@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use super::clock::Clock;
 use super::clock::RowSeconds;
+use super::laws::check_laws;
 use super::lists::Lists;
 use super::measure::{measure, unmeasured};
 use super::not_audited::NotAudited;
@@ -12,7 +13,7 @@ use super::plan::Plan;
 use super::records_alone::records_alone;
 use super::row::{Alone, Row};
 use super::solved::Solved;
-use crate::evaluate::{Accuracy, belongs, blind, distinct_weights, joined, reference};
+use crate::evaluate::{Accuracy, blind, distinct_weights, joined, reference};
 use crate::geometry::knn::Knn;
 use crate::neighbors::oracle::Noise;
 use crate::obfuscate::{Scheme, obfuscate};
@@ -87,8 +88,7 @@ pub(super) fn cells<const D: usize>(
     }
     let hide = || {
         let hidden = obfuscate(scheme, owned.original, owned.descriptors, key)?;
-        // Of a scheme with a mistake next to nothing comes back.
-        belongs(owned.original, &hidden.0, &hidden.1)?;
+        check_laws(scheme, owned.original, key, (&hidden.0, &hidden.1))?;
         Ok(hidden)
     };
     match clock.time(|s| &mut s.obfuscate, hide) {

@@ -12,6 +12,8 @@ pub use accuracy::{Accuracy, evaluate};
 pub use blind::blind;
 pub use distinct::distinct_weights;
 pub use join::joined;
-pub use plausible::{are_strangers, away_from_own, belongs, nearer_to_own, recovered_away};
+pub use plausible::{
+    are_strangers, away_from_own, belongs, farthest_for_rounding, nearer_to_own, recovered_away,
+};
 pub use reference::reference;
 pub use reliability::{BINS, Bin, Reliability, SURE, reliability};

@@ -127,6 +127,21 @@ pub fn away_from_own<const D: usize>(
     away(released, n, point_of(original, secret))
 }
 
+/// How far a hidden point can lie from its own record because records are held in `f32`, in the unit of the map.
+pub fn farthest_for_rounding<const D: usize>(
+    released: &Released<D>,
+    original: &Original<D>,
+    secret: &Secret,
+) -> f64 {
+    let place = point_of(original, secret);
+    let of_slot = |slot: usize| {
+        let point = sub(&place(slot)?, &released.origin());
+        Some(rounding(released.obfuscation(), slot / released.slots_per_record(), &point))
+    };
+    let n = secret.n_slots().min(released.n_slots());
+    (0..n).filter_map(of_slot).fold(0.0, f64::max)
+}
+
 /// How far every recovered position lies from its own record: next to nothing, if rows are in the order of the released map.
 /// Slots without a position are left out.
 pub fn recovered_away<const D: usize>(

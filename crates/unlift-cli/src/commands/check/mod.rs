@@ -10,6 +10,7 @@ use unlift::OneLine;
 use unlift_audit::{FIGURES, Finished, PAGE};
 use unlift_io::Error;
 use unlift_io::atomic::{Rules, place_of};
+use unlift_report::gate_found;
 
 use self::config::Entry;
 use super::{audit_images, audit_map, audit_released};
@@ -30,7 +31,8 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<Outcome> {
     let place = |entry: &Entry| at(entry.line, &format!("[[{}]]", entry.kind));
     let mut audits = Vec::new();
     for entry in &entries {
-        let audit = parsed(entry).map_err(|what| usage(format!("{}: {what}", place(entry))))?;
+        let mut audit = parsed(entry).map_err(|what| usage(format!("{}: {what}", place(entry))))?;
+        result_mut(&mut audit).asked_at = Some((in_repository(&args.config), entry.line));
         audits.push((entry, audit));
     }
     // Everything in it is relative to it: paths, lists of neighbors, and what is written.
@@ -92,6 +94,26 @@ fn result(audit: &AuditCommand) -> &ResultArgs {
         AuditCommand::Images(args) => &args.result,
         AuditCommand::Released(args) => &args.result,
     }
+}
+
+fn result_mut(audit: &mut AuditCommand) -> &mut ResultArgs {
+    match audit {
+        AuditCommand::Map(args) => &mut args.result,
+        AuditCommand::Images(args) => &mut args.result,
+        AuditCommand::Released(args) => &mut args.result,
+    }
+}
+
+/// A configuration as files that are shown name it: without folders of this machine.
+fn in_repository(config: &Path) -> String {
+    let here = std::env::current_dir().ok();
+    let within = here.and_then(|here| config.strip_prefix(here).ok());
+    let named = match within {
+        Some(within) => within,
+        None if config.is_absolute() => config.file_name().map_or(config, Path::new),
+        None => config.strip_prefix(".").unwrap_or(config),
+    };
+    named.display().to_string()
 }
 
 /// What an audit reads.
@@ -157,11 +179,7 @@ fn told(entry: &Entry, finished: &Finished, folder: &Path) -> String {
     let broken: Vec<String> = gates
         .iter()
         .filter(|gate| !gate.passed)
-        .map(|gate| {
-            let found = gate.found_percent.map(|found| format!("found {found:.1} %"));
-            let said: Vec<String> = found.into_iter().chain(gate.reason.clone()).collect();
-            format!("{} ({})", gate.gate, said.join("; "))
-        })
+        .map(|gate| format!("{} ({})", gate.gate, gate_found(gate)))
         .collect();
     let ended = match (gates.len(), broken.len()) {
         (0, _) => "audited, no gates".to_owned(),

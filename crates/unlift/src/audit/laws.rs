@@ -1,0 +1,40 @@
+//! Laws of schemes that an audit holds before any row of a scheme stands.
+
+use crate::Error;
+use crate::evaluate::{away_from_own, belongs, farthest_for_rounding};
+use crate::obfuscate::{SCHEMES, Scheme, obfuscate};
+use crate::released::Released;
+use crate::seed::Key;
+use crate::truth::{Original, Secret};
+
+/// Refuses what a scheme made of `original` under `key` where it breaks a law: every hidden point lies on its own record, and
+/// one key gives one map. Next to nothing comes back of a scheme with a mistake, and that reads as "safe".
+///
+/// Schemes of ours keep both laws in tests. Those of others are applied a second time.
+///
+/// # Errors
+/// The first law that is broken.
+pub fn check_laws<const D: usize>(
+    scheme: &dyn Scheme<D>,
+    original: &Original<D>,
+    key: &Key,
+    (released, secret): (&Released<D>, &Secret),
+) -> Result<(), Error> {
+    belongs(original, released, secret)?;
+    if SCHEMES.iter().any(|entry| entry.name == scheme.name()) {
+        return Ok(());
+    }
+    let away = away_from_own(released, original, secret);
+    let farthest = away.iter().copied().fold(0.0, f64::max);
+    let most = farthest_for_rounding(released, original, secret);
+    if farthest > most {
+        let off = away.iter().filter(|&&away| away > most).count();
+        let found = format!("{off} of {} off theirs, by up to {farthest:.2e}", away.len());
+        return Err(Error::new("hidden points", "on their own records", found));
+    }
+    let (again, secret_again) = obfuscate(scheme, original, None, key)?;
+    if again.obfuscation() != released.obfuscation() || secret_again.hidden() != secret.hidden() {
+        return Err(Error::new("records", "the same of one key", "others the second time"));
+    }
+    Ok(())
+}
