@@ -6,13 +6,11 @@
 //! evidence in excess of what the same slots yield with lists mixed from other slots': the
 //! number of places tried, uneven density and the noise of the null sample are in both.
 
-use super::consensus;
-use super::map::chance_field::trimmed;
-use super::map::chunks::{CHUNK, Slots};
-use super::map::family::Family;
-use super::map::lists::{Lists, Picked};
-use super::map::settings::Settings;
 use crate::neighbors::Neighborhoods;
+use crate::recover::consensus;
+use crate::recover::map::chance::trimmed;
+use crate::recover::map::family::{Family, Settings};
+use crate::recover::map::lists::{CHUNK, Lists, Picked, Slots};
 use crate::released::{Obfuscation, Released};
 use crate::seed::{Draws, Stage};
 

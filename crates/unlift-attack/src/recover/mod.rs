@@ -3,18 +3,15 @@
 //! In order, a file or a folder per step, each of which imports only what stands above it and `map`:
 //!
 //! 1. `options`: what a user may choose; `result`: what comes out.
-//! 2. `map`: records, lists and places as solvers read them; `map/settings` is all that differs between maps and images.
-//! 3. Solvers: `consensus`, `joint`, `placement`, and those of `baselines`.
+//! 2. `map`: records, lists and places as solvers read them; `Settings` (in `map/family`) is all that differs between maps and images.
+//! 3. Solvers: `consensus` and `joint`; `ransac` and `published_density` are attacks as published, for comparison.
 //! 4. `delta`: the distance that decides support, chosen by how well consensus then does.
 //! 5. `exact`: coordinates that a rule of the scheme fixes. `confidence`: how sure the attacker is.
-//!    `pairs_of_descriptors`: whose descriptor is whose on a paired line.
-//! 6. `problem`: a released map with its lists, solved and finished. `model` and `parts`: consensus where each part has its own lists
+//! 6. `problem`: a released map with its lists, solved and finished. `model`: consensus in parts, where each part has its own lists
 //!    alone. `records_alone`: attacks without neighborhoods.
 //!
 //! [`recover`] is the whole attack. [`prepare`] learns a [`Model`], with which parts of a map are solved elsewhere.
 
-mod baselines;
-mod checks;
 mod confidence;
 mod consensus;
 mod delta;
@@ -23,26 +20,20 @@ mod joint;
 mod map;
 mod model;
 mod options;
-mod pairs_of_descriptors;
-mod parts;
-mod placement;
 mod problem;
+mod published_density;
+mod ransac;
 mod records_alone;
 mod result;
 
 #[doc(hidden)]
-pub use confidence::model::{N_KINDS, N_TERMS, centered, terms};
+pub use confidence::crowd::{Cues, Seen};
 #[doc(hidden)]
-pub use confidence::seen::{Cues, Seen};
-pub use model::Model;
+pub use confidence::{N_KINDS, N_TERMS, centered, terms};
+pub use model::{Model, Part};
 pub use options::{Delta, RecoverOptions, Solver};
-pub use parts::Part;
 pub use records_alone::records_alone;
-pub use result::estimate::{Estimate, Status};
-pub use result::probability::Confidence;
-pub use result::recovered::Recovered;
-pub use result::trials::TrialHistogram;
-pub use result::unknown::Unknown;
+pub use result::{Confidence, Estimate, Recovered, Status, TrialHistogram, Unknown};
 
 use crate::Error;
 use crate::compiled::Both;

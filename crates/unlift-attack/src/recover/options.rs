@@ -8,9 +8,9 @@ pub enum Solver {
     /// The position that agrees with the listed records least probably by chance: exact, no
     /// sampling, the same cost at every inlier ratio.
     Consensus,
-    /// Consensus, then rounds in which the estimates of listed neighbors vote too.
+    /// Consensus, then iterations in which the estimates of listed neighbors vote too.
     Joint,
-    /// The consensus pass that joint recovery starts from, and no round more. It is not [`Self::Consensus`]:
+    /// The consensus pass that joint recovery starts from, and no iteration more. It is not [`Self::Consensus`]:
     /// with one point a record it reads every list in both directions (who lists, and who is listed by),
     /// and its delta is a narrower one, so that estimates are sharp.
     JointStart,

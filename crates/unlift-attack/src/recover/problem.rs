@@ -2,28 +2,24 @@
 
 use std::ops::Range;
 
-use super::baselines::density::published;
-use super::baselines::ransac::Ransac;
-use super::checks::check_lists;
-use super::confidence::seen::{Seen, Solved};
-use super::joint::Joint;
-use super::map::chunks::Slots;
-use super::map::family::Family;
-use super::map::graph::Graph;
-use super::map::lists::Lists;
-use super::model::Model;
-use super::options::{Delta, RecoverOptions, Solver};
-use super::pairs_of_descriptors::descriptor_rows;
-use super::placement::{self, Placement};
-use super::result::estimate::Estimate;
-use super::result::recovered::Recovered;
-use super::result::trials::TrialCounts;
-use super::result::unknown::Unknown;
-use super::{confidence, consensus, delta, exact};
+use rayon::prelude::*;
+
 use crate::density::{Peaks, tomography};
 use crate::neighbors::Neighborhoods;
+use crate::recover::confidence::crowd::{Seen, Solved};
+use crate::recover::joint::Joint;
+use crate::recover::map::family::Family;
+use crate::recover::map::graph::Graph;
+use crate::recover::map::lists::{Lists, Slots};
+use crate::recover::model::Model;
+use crate::recover::options::{Delta, RecoverOptions, Solver};
+use crate::recover::published_density::published;
+use crate::recover::ransac::Ransac;
+use crate::recover::records_alone::{self, Placement};
+use crate::recover::result::{Estimate, Recovered, TrialCounts, Unknown};
+use crate::recover::{confidence, consensus, delta, exact};
 use crate::released::{Obfuscation, Released};
-use crate::{About, Error, Fingerprint};
+use crate::{About, Descriptors, Error, Fingerprint, RecordId};
 
 /// One map to be recovered.
 pub(super) struct Problem<'a, const D: usize> {
@@ -99,7 +95,7 @@ impl<'a, const D: usize> Problem<'a, D> {
     }
 
     fn at_peaks(peaks: Peaks) -> (Records<'a, D>, f64) {
-        let delta = placement::delta(&peaks);
+        let delta = records_alone::delta(&peaks);
         (Records::Alone(peaks), delta)
     }
 
@@ -288,4 +284,68 @@ impl<'a, const D: usize> Problem<'a, D> {
     fn about(&self) -> About {
         About { map: Some(self.map), ..self.lists.about() }
     }
+}
+
+// Whether lists and records go together, and can be solved as it is asked.
+
+/// Refuses rays that are compared with all others of their anchor, which takes all lists.
+pub(super) fn check_anchors<const D: usize>(released: &Released<D>) -> Result<(), Error> {
+    match released.obfuscation() {
+        Obfuscation::Rays(rays) if rays.regions().is_some() => {
+            Err(Error::new("records of parts", "such as say nothing about others", "anchors"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Refuses lists that are not of this map.
+pub(super) fn check_lists<const D: usize>(
+    released: &Released<D>,
+    lists: &Neighborhoods,
+) -> Result<(), Error> {
+    if lists.n_slots() != released.n_slots() {
+        let expected = format!("{} rows, one per slot", released.n_slots());
+        return Err(Error::new("neighborhoods", expected, lists.n_slots().to_string()));
+    }
+    // Lists of another map may have as many rows.
+    let n_records = released.n_records();
+    if let Some(record) = lists.records().iter().find(|record| record.index() >= n_records) {
+        let expected = format!("records below {n_records}");
+        return Err(Error::new("neighborhoods", expected, record.0.to_string()));
+    }
+    Ok(())
+}
+
+// Which of a paired line's two descriptors belongs to which of its points (supplement B).
+
+/// Per slot of `records` the released descriptor row said to belong to it; `None` unless records hide two points
+/// and have descriptors.
+///
+/// The cheaper of the two bijections wins, where a descriptor and a neighborhood cost the sum of
+/// its distances to the listed records, each counted with the nearer of its two descriptors.
+/// Positions play no part.
+pub(super) fn descriptor_rows<const D: usize>(
+    released: &Released<D>,
+    lists: &Neighborhoods,
+    records: Range<usize>,
+) -> Option<Vec<u32>> {
+    let descriptors = released.descriptors().filter(|_| released.slots_per_record() == 2)?;
+    let rows_of = |record: usize| {
+        let [a, b] = [2 * record, 2 * record + 1];
+        let cost = |row: usize, slot: usize| affinity_cost(descriptors, row, lists.of(slot));
+        let straight = cost(a, a) + cost(b, b);
+        let crossed = cost(a, b) + cost(b, a);
+        let first = if straight <= crossed { [a, b] } else { [b, a] };
+        first.map(|row| row as u32)
+    };
+    Some(records.into_par_iter().flat_map_iter(rows_of).collect())
+}
+
+fn affinity_cost(descriptors: &Descriptors, row: usize, listed: &[RecordId]) -> f64 {
+    let to_record = |record: usize| {
+        let one = descriptors.squared_distance(row, 2 * record);
+        let other = descriptors.squared_distance(row, 2 * record + 1);
+        f64::from(one.min(other).sqrt())
+    };
+    listed.iter().map(|record| to_record(record.index())).sum()
 }

@@ -1,9 +1,10 @@
 //! Constants of confidence, printed by `cargo run --release -p unlift --example fit_confidence`.
 
-// A fitted weight may look like a constant of mathematics.
 #![allow(clippy::approx_constant)]
 
-use super::model::{Model, N_KINDS, N_TERMS};
+use crate::recover::confidence::{Model, N_KINDS, N_TERMS};
+
+// A fitted weight may look like a constant of mathematics.
 
 /// Means of terms.
 pub(super) const CENTER: [f32; N_TERMS] = [

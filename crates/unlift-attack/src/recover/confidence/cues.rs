@@ -7,16 +7,13 @@
 
 use rayon::prelude::*;
 
-use super::crowd::{Crowd, Tally};
-use super::seen::{Cues, Solved};
-use crate::recover::map::along_curve::along_curve;
-use crate::recover::map::crowding::Density;
-use crate::recover::map::edges::{Side, either, record_of, side};
-use crate::recover::map::evidence::evidence;
-use crate::recover::map::graph::Graph;
+use crate::recover::confidence::crowd::{Crowd, Cues, Solved, Tally};
+use crate::recover::map::chance::evidence;
+use crate::recover::map::graph::{Graph, Side, either, record_of, side};
+use crate::recover::map::grid::Density;
 use crate::recover::map::pieces::Pieces;
-use crate::recover::map::places::{Places, distance2};
-use crate::recover::result::estimate::{Estimate, Status};
+use crate::recover::map::places::{Places, along_curve, distance2};
+use crate::recover::result::{Estimate, Status};
 
 /// Crowds are looked for where chance expects at most this share of the listed estimates: beyond, a crowd is no news.
 const MOST_CHANCE: f32 = 0.3;

@@ -5,28 +5,24 @@
 //! place was found and a scale of its error. Its constants come from synthetic rooms
 //! (`examples/fit_confidence.rs`), never from a real map. Cues are ratios: a scaled map has the same.
 
-mod applies;
 mod constants;
-mod crowd;
+pub(super) mod crowd;
 mod cues;
-pub(super) mod model;
-pub(super) mod seen;
 
-pub(super) use applies::unknown;
 use rayon::prelude::*;
 
-use crate::recover::map::family::Family;
+use crate::ListsBy;
+use crate::geometry::flatness::flatness;
+use crate::geometry::vector::widen;
+use crate::neighbors::Neighborhoods;
+use crate::recover::confidence::constants::{CENTER, MODELS, SPREAD};
+use crate::recover::confidence::crowd::{Cues, N_CUES, Seen, Solved};
+use crate::recover::map::family::{Family, Settings};
 use crate::recover::map::graph::Graph;
 use crate::recover::map::pieces::{CandidatePieces, LinePieces, PlanePieces};
-use crate::recover::map::settings::Settings;
 use crate::recover::options::{RecoverOptions, Solver};
-use crate::recover::result::estimate::{Estimate, Status};
-use crate::recover::result::probability::Confidence;
-use crate::recover::result::unknown::Unknown;
-use crate::released::Released;
-use constants::{CENTER, MODELS, SPREAD};
-use model::{Model, N_TERMS, centered, terms};
-use seen::{Cues, Seen, Solved};
+use crate::recover::result::{Confidence, Estimate, Status, Unknown};
+use crate::released::{Obfuscation, Rays, Released};
 
 /// Why nobody looks how sure the attacker is, if `options` or the kind of map say so.
 pub(super) fn not_asked<const D: usize>(options: &RecoverOptions) -> Option<Unknown> {
@@ -61,7 +57,7 @@ pub(super) fn look<const D: usize>(
             cues::of(&CandidatePieces::new(rows, chance, solved.delta), graph, solved)
         }
     };
-    let kind = model::kind(released);
+    let kind = kind(released);
     let of_slot = |(estimate, cues): (&Estimate<D>, &Cues)| match estimate.status {
         Status::Ok => judged(&MODELS[kind], cues, radius as f32),
         _ => Confidence::LOST,
@@ -77,4 +73,156 @@ fn judged(model: &Model, cues: &Cues, radius: f32) -> Confidence {
         |weights: &[f32; N_TERMS]| -> f32 { terms.iter().zip(weights).map(|(t, w)| t * w).sum() };
     let scale = libm::expf(sum(&model.scale).clamp(-12.0, 12.0)) * radius;
     Confidence { found: 1.0 / (1.0 + libm::expf(-sum(&model.found))), scale }
+}
+
+// Where the model of confidence says what comes true: on maps and lists like those that it was fitted on.
+
+/// A list has at most as many entries as this share of all hidden points in the maps that the model was fitted on.
+const MOST_LISTED: f64 = 0.01;
+
+/// A map is flat whose smallest extent is at most this share of its largest one.
+const FLAT: f64 = 0.01;
+
+/// Points fall together where at least this share of all rays has another one in its place. Of points that differ this
+/// hardly ever happens by rounding.
+const COINCIDENT: f64 = 0.5;
+
+/// Why the model says nothing that comes true about maps recovered from `lists`, if so.
+///
+/// On smaller maps, on flat ones and on those of which most points fall together, and with lists that sources make, a tenth
+/// to nine tenths of those called 90 % sure were right.
+pub(crate) fn unknown<const D: usize>(
+    released: &Released<D>,
+    lists: &Neighborhoods,
+    estimates: &[Estimate<D>],
+) -> Option<Unknown> {
+    let n_slots = lists.n_slots() as f64;
+    let mean = lists.records().len() as f64 / n_slots.max(1.0);
+    let found = || estimates.iter().filter(|one| one.status == Status::Ok);
+    let places = || -> Vec<[f64; D]> { found().map(|one| widen(&one.position)).collect() };
+    if lists.scores().is_some() {
+        Some(Unknown::RankedLists)
+    } else if lists.about().lists_by != ListsBy::Oracle {
+        Some(Unknown::GivenLists)
+    } else if mean > MOST_LISTED * n_slots {
+        Some(Unknown::SmallMap)
+    } else if coincident(released) >= COINCIDENT {
+        Some(Unknown::Coincident)
+    } else {
+        (flatness(&places()) <= FLAT).then_some(Unknown::Flat)
+    }
+}
+
+/// Share of the records that tell of points that fall together: rays in the place of others. Records of other families are
+/// drawn anew for every point, or for a pair.
+fn coincident<const D: usize>(released: &Released<D>) -> f64 {
+    match released.obfuscation() {
+        Obfuscation::Rays(rays) => twins(rays),
+        Obfuscation::Lines(_) | Obfuscation::AxisPlanes(_) | Obfuscation::AxisCandidates(_) => 0.0,
+    }
+}
+
+/// Share of the rays of which there is another one, bit for bit.
+fn twins<const D: usize>(rays: &Rays<D>) -> f64 {
+    let bits = |row: usize| (rays.center()[row], rays.direction()[row].map(f32::to_bits));
+    let mut rows: Vec<_> = (0..rays.len()).into_par_iter().map(bits).collect();
+    rows.par_sort_unstable();
+    let same = rows.chunk_by(|a, b| a == b).map(<[_]>::len).filter(|&n| n > 1);
+    same.sum::<usize>() as f64 / rays.len().max(1) as f64
+}
+
+// From cues to a probability: one small model per kind of record, fitted on synthetic rooms.
+
+/// Kinds of records that are calibrated apart: lines, paired lines, rays, axis planes, axis candidates.
+pub const N_KINDS: usize = 5;
+
+/// Number of products of two cues that count too.
+const N_PRODUCTS: usize = 27;
+
+/// Number of terms: the constant, the cues, and the products.
+pub const N_TERMS: usize = 1 + N_CUES + N_PRODUCTS;
+
+/// Terms farther than this many spreads from the center count as that far: nothing was seen there.
+const FARTHEST: f32 = 4.0;
+
+/// The weights of one kind of record.
+pub(super) struct Model {
+    /// Of the logit of the right place.
+    pub(super) found: [f32; N_TERMS],
+    /// Of the logarithm of the error scale per typical radius of crowds.
+    pub(super) scale: [f32; N_TERMS],
+}
+
+/// Which kind of records a map holds, below [`N_KINDS`].
+pub(super) fn kind<const D: usize>(released: &Released<D>) -> usize {
+    match released.obfuscation() {
+        Obfuscation::Lines(_) => released.slots_per_record() - 1,
+        Obfuscation::Rays(_) => 2,
+        Obfuscation::AxisPlanes(_) => 3,
+        Obfuscation::AxisCandidates(_) => 4,
+    }
+}
+
+/// The products of two cues that count too: what one says depends on the other, or bends.
+fn products(c: &Cues) -> [f32; N_PRODUCTS] {
+    [
+        c.evidence * c.evidence,
+        c.ln_radius * c.ln_radius,
+        c.record_evidence * c.record_evidence,
+        c.of_members * c.of_members,
+        c.sparsity * c.sparsity,
+        c.evidence * c.of_members,
+        c.evidence * c.map_evidence,
+        c.of_members * c.map_evidence,
+        c.map_evidence * c.map_evidence,
+        c.evidence * c.ln_radius,
+        c.map_share * c.map_share,
+        c.map_record_share * c.map_record_share,
+        c.evidence * c.map_share,
+        c.record_evidence * c.map_record_share,
+        c.record_evidence * c.map_evidence,
+        c.voting_share * c.voting_share,
+        c.evidence * c.voting_share,
+        c.evidence * c.map_voting_share,
+        c.voting_share * c.map_voting_share,
+        c.evidence * c.is_settled,
+        c.map_evidence * c.is_settled,
+        c.one_sided * c.one_sided,
+        c.evidence * c.one_sided,
+        c.one_sided * c.map_one_sided,
+        c.map_one_sided * c.map_one_sided,
+        c.map_evidence * c.map_one_sided,
+        c.map_share * c.map_one_sided,
+    ]
+}
+
+/// A constant, the cues and their products, before they are centered.
+pub fn terms(cues: &Cues) -> [f32; N_TERMS] {
+    let mut terms = [1.0; N_TERMS];
+    terms[1..=N_CUES].copy_from_slice(&cues.in_order());
+    terms[1 + N_CUES..].copy_from_slice(&products(cues));
+    terms
+}
+
+/// Terms centered and scaled, none too far; the constant stays 1.
+pub fn centered(terms: [f32; N_TERMS], center: &[f32], spread: &[f32]) -> [f32; N_TERMS] {
+    let far = |at: usize| ((terms[at] - center[at]) / spread[at]).clamp(-FARTHEST, FARTHEST);
+    std::array::from_fn(|at| if at == 0 { 1.0 } else { far(at) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::twins;
+    use crate::released::Rays;
+
+    #[test]
+    fn rays_in_the_same_place_from_the_same_center_are_twins() {
+        let centers = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]];
+        let up = [0.0, 0.0, 1.0];
+        let rays = |center: Vec<u8>, directions: Vec<[f64; 3]>| {
+            Rays::try_new(&centers, center, &directions).unwrap()
+        };
+        assert_eq!(twins(&rays(vec![0, 0, 0, 1], vec![up, up, [0.0, 1.0, 0.0], up])), 0.5);
+        assert_eq!(twins(&rays(vec![0, 1], vec![up, up])), 0.0);
+    }
 }

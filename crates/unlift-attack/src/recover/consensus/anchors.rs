@@ -9,11 +9,10 @@
 
 use rayon::prelude::*;
 
-use crate::recover::map::chunks::{Slots, solve_chunks};
-use crate::recover::map::evidence::evidence;
-use crate::recover::map::line_rows::LineRow;
-use crate::recover::map::lists::Lists;
-use crate::recover::result::estimate::{Estimate, Status, stored_support};
+use crate::recover::map::chance::evidence;
+use crate::recover::map::lines::LineRow;
+use crate::recover::map::lists::{Lists, Slots, solve_chunks};
+use crate::recover::result::{Estimate, Status, stored_support};
 
 /// Slots whose lists are mixed to see what chance alone yields: a mean over so many is known to a few percent.
 const SAMPLE: usize = 1 << 9;

@@ -5,12 +5,10 @@ mod anchors;
 mod on_candidates;
 mod on_lines;
 mod on_planes;
-mod refit;
 
-use crate::recover::map::chunks::Slots;
 use crate::recover::map::family::Family;
-use crate::recover::map::lists::Lists;
-use crate::recover::result::estimate::Estimate;
+use crate::recover::map::lists::{Lists, Slots};
+use crate::recover::result::Estimate;
 
 /// Estimates for `slots` at a given `delta`.
 pub(crate) fn solve<const D: usize>(

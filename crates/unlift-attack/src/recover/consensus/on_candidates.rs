@@ -1,13 +1,11 @@
 //! Consensus for axis candidates: axis and position are chosen together.
 
-use super::refit::refit;
 use crate::RecordId;
-use crate::recover::map::candidate_rows::CandidateColumns;
-use crate::recover::map::chance_field::CandidateField;
-use crate::recover::map::chunks::{Slots, solve_chunks};
-use crate::recover::map::lists::Lists;
-use crate::recover::map::sections::{Intervals, Sections};
-use crate::recover::result::estimate::{Estimate, Status, stored_support};
+use crate::recover::consensus::on_lines::refit;
+use crate::recover::map::chance::CandidateField;
+use crate::recover::map::lines::{CandidateColumns, Intervals, Sections};
+use crate::recover::map::lists::{Lists, Slots, solve_chunks};
+use crate::recover::result::{Estimate, Status, stored_support};
 use crate::simd::{Kernel, dispatch};
 
 /// Estimates for `slots`.

@@ -1,13 +1,10 @@
 //! Consensus for lines and rays: one unknown, sections with the listed lines.
 
-use super::refit::refit;
 use crate::RecordId;
-use crate::recover::map::chance_field::{ChanceField, tube};
-use crate::recover::map::chunks::{Slots, solve_chunks};
-use crate::recover::map::line_rows::{LineColumns, LineRow};
-use crate::recover::map::lists::Lists;
-use crate::recover::map::sections::{Intervals, Sections};
-use crate::recover::result::estimate::{Estimate, Status, stored_support};
+use crate::recover::map::chance::{ChanceField, tube};
+use crate::recover::map::lines::{Intervals, LineColumns, LineRow, Sections};
+use crate::recover::map::lists::{Lists, Slots, solve_chunks};
+use crate::recover::result::{Estimate, Status, stored_support};
 use crate::simd::{Kernel, dispatch};
 
 /// Estimates for `slots`.
@@ -100,4 +97,20 @@ fn solve_slot<const D: usize>(
         axis: 0,
         evidence: peak.evidence,
     }
+}
+
+// The last step of consensus along a line.
+
+/// Least squares over the records within delta of `t` (Eq. (4) with squared distances: on a line a
+/// weighted mean of the closest approaches), the support selected anew once. Returns the position
+/// and its support.
+#[inline(always)]
+pub(crate) fn refit(sections: &Sections, t: f32, delta2: f32) -> (f32, u32) {
+    // The start of an interval is at delta up to rounding, of delta and of t: it counts as within.
+    let reach = delta2.sqrt() * (1.0 + 5e-5) + 4.0 * f32::EPSILON * t.abs();
+    let reach2 = reach * reach;
+    let (shift, _) = sections.least_squares_step(t, reach2);
+    let t = t + shift;
+    let (shift, support) = sections.least_squares_step(t, reach2);
+    (t + shift, support)
 }

@@ -1,10 +1,9 @@
 //! Consensus for axis planes: each free coordinate on its own.
 
 use crate::RecordId;
-use crate::recover::map::chunks::{Slots, solve_chunks};
-use crate::recover::map::lists::Lists;
-use crate::recover::map::plane_windows::{SortedPlanes, WindowChance, best_window};
-use crate::recover::result::estimate::{Estimate, Status, stored_support};
+use crate::recover::map::lists::{Lists, Slots, solve_chunks};
+use crate::recover::map::planes::{SortedPlanes, WindowChance, best_window};
+use crate::recover::result::{Estimate, Status, stored_support};
 use crate::released::AxisPlanes;
 
 /// Estimates for `slots`.

@@ -6,13 +6,11 @@
 
 use rayon::prelude::*;
 
-use super::distance_law::{CLASSES, Law, Tally};
-use super::matching::{Messages, by_part};
-use super::partners::{PART, Partners};
-use super::side::{LOST, Side};
-use super::side_by_side::side_by_side;
-use crate::recover::map::settings::Settings;
-use crate::recover::result::estimate::{Estimate, Status};
+use crate::recover::exact::partners::{
+    CLASSES, LOST, Law, Messages, PART, Partners, Side, Tally, by_part, side_by_side,
+};
+use crate::recover::map::family::Settings;
+use crate::recover::result::{Estimate, Status};
 
 /// Rounds of learning: a fixed number, so that time does not depend on the map.
 const ROUNDS: usize = 6;

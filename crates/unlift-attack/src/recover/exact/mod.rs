@@ -4,16 +4,12 @@
 //! were exchanged are still in the map, one in each of two records ([`exchanges`]), and a center that follows
 //! from a voxel grid leaves only every other voxel along a ray ([`parity`]).
 
-mod distance_law;
 mod exchanges;
-mod matching;
 mod parity;
 mod partners;
-mod side;
-mod side_by_side;
 
-use crate::recover::map::settings::Settings;
-use crate::recover::result::estimate::Estimate;
+use crate::recover::map::family::Settings;
+use crate::recover::result::Estimate;
 use crate::released::{Obfuscation, Released};
 
 /// Whether the rule of the family of `released` says more than its records.

@@ -5,7 +5,7 @@
 
 use rayon::prelude::*;
 
-use crate::recover::result::estimate::{Estimate, Status};
+use crate::recover::result::{Estimate, Status};
 use crate::released::Rays;
 
 /// Starts tried per axis and voxel, at first and in each finer step: between two of them most voxels keep their parity.

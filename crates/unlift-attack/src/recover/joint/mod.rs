@@ -18,26 +18,20 @@
 //! that are far from each other could change places for ever, each going where the other was. So half of the slots
 //! hold still while the others move. Only the first iteration moves all: its start comes from records alone.
 
-mod equations;
 mod input;
-mod jumps;
-mod look_alikes;
 mod neighbor_distribution;
 mod refine;
-mod sample;
 mod state;
 mod update;
-mod validation;
 mod votes;
 
-use crate::recover::map::along_curve::along_curve;
+use crate::recover::joint::input::{Input, Sample};
+use crate::recover::joint::state::State;
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::Graph;
 use crate::recover::map::pieces::{CandidatePieces, LinePieces, Pieces, PlanePieces};
-use crate::recover::result::estimate::Estimate;
-use input::Input;
-use sample::Sample;
-use state::State;
+use crate::recover::map::places::along_curve;
+use crate::recover::result::Estimate;
 
 /// Iterations at most: a bound for maps that never settle.
 const ITERATIONS: usize = 16;

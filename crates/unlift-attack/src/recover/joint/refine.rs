@@ -1,8 +1,7 @@
 //! A place made anew: least squares to the records of the neighbors found near it.
 
-use super::equations::solve_symmetric;
-use super::votes::Columns;
-use crate::recover::map::lanes::{LANES, Lanes};
+use crate::recover::joint::votes::Columns;
+use crate::recover::map::chance::{LANES, Lanes};
 use crate::recover::map::pieces::{Piece, Pieces};
 use crate::recover::map::places::Places;
 
@@ -111,7 +110,7 @@ fn total(lanes: &Lanes) -> f32 {
 /// estimates are: within `1 / sqrt(inverse_kernel2)`. Estimates hold fully across their own pieces, and
 /// a little along them. With it the number of these records. `at` tells kernel, law and doubt at a place.
 #[inline(always)]
-pub(crate) fn remade<const D: usize, P: Pieces<D>>(
+pub(crate) fn refined<const D: usize, P: Pieces<D>>(
     pieces: &P,
     places: &Places<D>,
     own: &Piece<D>,
@@ -194,4 +193,31 @@ fn solve_within<const D: usize>(
         return *x;
     }
     std::array::from_fn(|c| x[c] + right[c])
+}
+
+// Systems of two or three equations.
+
+/// Solves `a x = b` for a symmetric positive `a`; `b` becomes `x`. `false` when it is singular.
+#[inline(always)]
+pub(crate) fn solve_symmetric<const D: usize>(a: &mut [[f32; D]; D], b: &mut [f32; D]) -> bool {
+    for i in 0..D {
+        if a[i][i] <= 0.0 || a[i][i].is_nan() {
+            return false;
+        }
+        for r in i + 1..D {
+            let f = a[r][i] / a[i][i];
+            let pivot = a[i];
+            for (value, p) in a[r].iter_mut().zip(&pivot).skip(i) {
+                *value -= f * p;
+            }
+            b[r] -= f * b[i];
+        }
+    }
+    for i in (0..D).rev() {
+        for c in i + 1..D {
+            b[i] -= a[i][c] * b[c];
+        }
+        b[i] /= a[i][i];
+    }
+    true
 }

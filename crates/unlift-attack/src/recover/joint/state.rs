@@ -1,18 +1,18 @@
 //! What changes from iteration to iteration: estimates, and what is learned from them.
 
+use std::sync::atomic::{AtomicU32, Ordering};
+
 use rayon::prelude::*;
 
-use super::input::Input;
-use super::jumps::Jumps;
-use super::neighbor_distribution::NeighborDistribution;
-use super::sample::Learning;
-use super::update::{Round, Scratch, TUBE};
-use super::validation::agreement;
-use crate::recover::map::chunks::CHUNK;
-use crate::recover::map::crowding::Density;
+use crate::recover::joint::input::{Input, Learning};
+use crate::recover::joint::neighbor_distribution::NeighborDistribution;
+use crate::recover::joint::update::{Context, Scratch, TUBE};
+use crate::recover::map::graph::{Graph, either, record_of};
+use crate::recover::map::grid::Density;
+use crate::recover::map::lists::CHUNK;
 use crate::recover::map::pieces::Pieces;
 use crate::recover::map::places::{Places, distance2};
-use crate::recover::result::estimate::Estimate;
+use crate::recover::result::{Estimate, Status};
 use crate::simd::{Kernel, dispatch};
 
 /// True neighbors are looked for within this many radii of their distribution: nearly all of its mass.
@@ -127,7 +127,7 @@ impl<const D: usize> State<D> {
             |slot: u32| Update { slot, ahead: 0.0, estimate: self.estimates[slot as usize] };
         let mut updates: Vec<Update<D>> = slots.map(of_slot).collect();
         let odds = self.neighbors.odds_of_slot(input.pieces.slots_per_record());
-        let round = Round {
+        let context = Context {
             pieces: &input.pieces,
             graph: input.graph,
             places: &self.places,
@@ -138,7 +138,7 @@ impl<const D: usize> State<D> {
             delta2: input.delta * input.delta,
         };
         updates.par_chunks_mut(CHUNK).for_each_init(Scratch::default, |scratch, updates| {
-            dispatch(Chunk { round: &round, state: self, updates, scratch });
+            dispatch(Chunk { context: &context, state: self, updates, scratch });
         });
         updates
     }
@@ -218,7 +218,7 @@ fn is_jump<const D: usize>(a: &Estimate<D>, b: &Estimate<D>, radius: f32) -> boo
 }
 
 struct Chunk<'a, 'b, const D: usize, P> {
-    round: &'a Round<'b, D, P>,
+    context: &'a Context<'b, D, P>,
     state: &'a State<D>,
     /// Slots with their old estimates, which become the new ones.
     updates: &'a mut [Update<D>],
@@ -232,7 +232,7 @@ impl<const D: usize, P: Pieces<D>> Kernel for Chunk<'_, '_, D, P> {
     fn run(self) {
         for at in 0..self.updates.len() {
             if let Some(next) = self.updates.get(at + 1) {
-                self.round.prefetch(next.slot as usize);
+                self.context.prefetch(next.slot as usize);
             }
             let update = &mut self.updates[at];
             let slot = update.slot as usize;
@@ -241,8 +241,121 @@ impl<const D: usize, P: Pieces<D>> Kernel for Chunk<'_, '_, D, P> {
             (update.estimate, update.ahead) = if is_settled {
                 (update.estimate, ahead)
             } else {
-                self.round.solve(slot, &update.estimate, self.scratch)
+                self.context.solve(slot, &update.estimate, self.scratch)
             };
         }
     }
+}
+
+// Whom a jump concerns: the slots that must be looked at again.
+//
+// A slot that jumps tells those at the other ends of its edges, if it jumped to or from where they may lie. Few
+// slots jump after the first iteration, so telling is cheaper than asking. A slot whom many list knows only some of
+// them: the others are not told, and stay until something else jumps.
+
+/// Per slot that is ahead, how many jumps concern it since it was last its turn. Sums of integers: the same however threads
+/// share the work.
+pub(super) struct Jumps {
+    concerning: Vec<AtomicU32>,
+}
+
+impl Jumps {
+    /// No jumps yet.
+    pub(super) fn new(n_slots: usize) -> Self {
+        Self { concerning: (0..n_slots).map(|_| AtomicU32::new(0)).collect() }
+    }
+
+    /// How many jumps concern `slot` since it was its turn last, whether it was then looked at or passed over.
+    #[inline(always)]
+    pub(super) fn of(&self, slot: usize) -> u32 {
+        self.concerning[slot].load(Ordering::Relaxed)
+    }
+
+    /// It was the turn of `slot`.
+    pub(super) fn forget(&mut self, slot: usize) {
+        *self.concerning[slot].get_mut() = 0;
+    }
+
+    /// Tells all whom `jumpers` concern, which moved `from` their places `to` others: whoever may lie within `reach` of either.
+    /// Where nothing `is_ahead` a slot is looked at in any case and need not know.
+    pub(super) fn tell<const D: usize, P: Pieces<D>>(
+        &self,
+        (pieces, graph): (&P, &Graph),
+        jumpers: &[u32],
+        (from, to): (&Places<D>, &Places<D>),
+        reach: f32,
+        is_ahead: impl Fn(usize) -> bool + Sync,
+    ) {
+        let slots_per_record = pieces.slots_per_record();
+        let concerns = |slot: usize, x: &[f32; D]| {
+            let near = |piece| distance2(&pieces.piece(slot, piece).project(x), x) < reach * reach;
+            (0..P::PER_SLOT).any(near)
+        };
+        jumpers.par_chunks(JUMPERS).for_each(|jumpers| {
+            for &slot in jumpers {
+                let (from, to) = (from.of(slot as usize), to.of(slot as usize));
+                let (ends, class) = graph.of(slot as usize);
+                for (&end, &class) in ends.iter().zip(class) {
+                    let last = end as usize + usize::from(either(class, slots_per_record));
+                    let ends = end as usize..=last;
+                    if !ends.clone().any(&is_ahead) {
+                        continue;
+                    }
+                    // Both slots of a record lie on one piece.
+                    if concerns(end as usize, &from) || concerns(end as usize, &to) {
+                        for end in ends {
+                            self.concerning[end].fetch_add(1, Ordering::Relaxed);
+                        }
+                    }
+                }
+            }
+        });
+    }
+}
+
+/// Slots whose jumps one thread tells at a time: enough that sharing them out costs nothing.
+const JUMPERS: usize = 64;
+
+// How well records agree with estimates: the judge of iterations.
+//
+// Estimates that agree with each other prove nothing: they may have drifted together. Records cannot
+// drift. If fewer of them pass near the estimates of an iteration than before, beyond chance, the iteration
+// made things worse.
+
+/// Slots looked at: the mean over so many is known better than the share by which it may fall.
+const SLOTS: usize = 1 << 12;
+
+/// The mean number of records at the other ends of a slot's edges that pass near its estimate, less
+/// that expected by chance; over slots spread evenly.
+pub(super) fn agreement<const D: usize, P: Pieces<D>>(
+    input: &Input<'_, P>,
+    estimates: &[Estimate<D>],
+) -> f64 {
+    let n = estimates.len();
+    let slots: Vec<usize> = (0..n).step_by(n.div_ceil(SLOTS).max(1)).collect();
+    let of_part =
+        |part: &[usize]| part.iter().map(|&slot| of_slot(input, slot, &estimates[slot])).sum();
+    let parts: Vec<f64> = slots.par_chunks(256).map(of_part).collect();
+    parts.iter().sum::<f64>() / slots.len().max(1) as f64
+}
+
+fn of_slot<const D: usize, P: Pieces<D>>(
+    input: &Input<'_, P>,
+    slot: usize,
+    estimate: &Estimate<D>,
+) -> f64 {
+    if estimate.status != Status::Ok {
+        return 0.0;
+    }
+    let Input { pieces, graph, delta, .. } = input;
+    let (mut near, mut all) = (0u32, 0u32);
+    for &end in graph.of(slot).0 {
+        let record = record_of(end as usize, pieces.slots_per_record());
+        if pieces.may_vote(slot, record) {
+            all += 1;
+            near += u32::from(pieces.record_distance2(record, &estimate.position) <= delta * delta);
+        }
+    }
+    let chance = pieces.record_chance(slot, &estimate.position);
+    f64::from(near) - f64::from(all) * f64::from(chance)
 }

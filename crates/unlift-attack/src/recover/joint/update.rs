@@ -1,18 +1,17 @@
-//! One slot in one round: candidates from neighbors' estimates, the likeliest of them, re-made.
+//! One slot in one iteration: candidates from the estimates of neighbors, the likeliest of them, refined.
 
-use super::neighbor_distribution::NeighborDistribution;
-use super::refine::{Directions, remade};
-use super::votes::{Columns, Ends, Odds};
-use crate::recover::map::crowding::Density;
-use crate::recover::map::edges::{CLASSES, either, record_of};
-use crate::recover::map::graph::Graph;
-use crate::recover::map::lanes::ln;
+use crate::recover::joint::neighbor_distribution::NeighborDistribution;
+use crate::recover::joint::refine::{Directions, refined};
+use crate::recover::joint::votes::{Columns, Ends, Odds};
+use crate::recover::map::chance::ln;
+use crate::recover::map::graph::{CLASSES, Graph, either, record_of};
+use crate::recover::map::grid::Density;
 use crate::recover::map::pieces::{Piece, Pieces};
 use crate::recover::map::places::{Places, distance2};
-use crate::recover::result::estimate::{Estimate, Status, stored_support};
+use crate::recover::result::{Estimate, Status, stored_support};
 
-/// Everything a round reads.
-pub(crate) struct Round<'a, const D: usize, P> {
+/// Everything that an update of a slot reads.
+pub(crate) struct Context<'a, const D: usize, P> {
     pub(crate) pieces: &'a P,
     pub(crate) graph: &'a Graph,
     pub(crate) places: &'a Places<D>,
@@ -20,14 +19,14 @@ pub(crate) struct Round<'a, const D: usize, P> {
     pub(crate) neighbors: &'a NeighborDistribution,
     /// Per class, as in [`Odds`].
     pub(crate) odds: &'a [(f32, f32); CLASSES],
-    /// Within this many local widths estimates enter the re-made position.
+    /// Within this many local widths estimates enter the refined position.
     pub(crate) kernel: f32,
     pub(crate) delta2: f32,
 }
 
-/// Estimates farther from a piece than this many radii of the law say nothing about it.
+/// Estimates farther from a piece than this many radii of the distribution say nothing about it.
 pub(super) const TUBE: f32 = 6.0;
-/// Estimates within this many radii of the law of the center of a ray are near all of its rays. They would
+/// Estimates within this many radii of the distribution of the center of a ray are near all of its rays. They would
 /// draw others there, as nothing tells them apart.
 const BLIND: f32 = 3.0;
 /// Candidates looked at per piece: about as many as hold so many true neighbors' estimates,
@@ -53,7 +52,7 @@ struct Candidate<const D: usize> {
     prior: f32,
 }
 
-/// Places that could win, with the law there, in columns.
+/// Places that could win, with the distribution there, in columns.
 #[derive(Debug)]
 struct Tried<const D: usize> {
     x: [Vec<f32>; D],
@@ -87,18 +86,18 @@ impl<const D: usize> Tried<D> {
 
     /// Looks up density and law.
     #[inline(always)]
-    fn weigh<P: Pieces<D>>(&mut self, round: &Round<'_, D, P>) {
+    fn weigh<P: Pieces<D>>(&mut self, context: &Context<'_, D, P>) {
         let n = self.x[0].len();
         self.cell.resize(n, 0);
         let Self { x, cell, density, gain, inverse_a2, prior } = self;
         for column in [&mut *density, &mut *gain, &mut *inverse_a2, &mut *prior] {
             column.resize(n, 0.0);
         }
-        round.density.at_each(&x.each_ref().map(|column| &column[..]), cell, density);
+        context.density.at_each(&x.each_ref().map(|column| &column[..]), cell, density);
         let (density, gain, inverse_a2, prior) =
             (&density[..n], &mut gain[..n], &mut inverse_a2[..n], &mut prior[..n]);
         for i in 0..n {
-            (gain[i], inverse_a2[i]) = round.law_where(density[i]);
+            (gain[i], inverse_a2[i]) = context.distribution_where(density[i]);
             prior[i] = PRIOR * ln(density[i]);
         }
     }
@@ -127,7 +126,7 @@ impl<const D: usize> Default for Scratch<D> {
     }
 }
 
-impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
+impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
     /// Brings the places near that [`solve`](Self::solve) looks at.
     #[inline(always)]
     pub(crate) fn prefetch(&self, slot: usize) {
@@ -168,10 +167,10 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
             let density = self.density.at(x);
             let kernel = self.kernel * self.density.width(density);
             let doubt = P::DOUBT * (1.0 + self.neighbors.region / self.volume(density) / density);
-            (1.0 / (kernel * kernel), self.law_where(density), doubt)
+            (1.0 / (kernel * kernel), self.distribution_where(density), doubt)
         };
         let near = (near, &mut scratch.directions);
-        let (x, support) = remade(self.pieces, self.places, &own, near, first.x, at);
+        let (x, support) = refined(self.pieces, self.places, &own, near, first.x, at);
         if !x.iter().all(|c| c.is_finite()) {
             return (*old, 0.0);
         }
@@ -191,18 +190,19 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
         let other = slot ^ 1;
         let has_partner = self.pieces.slots_per_record() == 2 && self.places.is_known(other);
         let partner = if has_partner { self.places.of(other) } else { [0.0; D] };
-        let (gain, inverse_a2) = if has_partner { self.law_at(&partner) } else { (0.0, 0.0) };
+        let (gain, inverse_a2) =
+            if has_partner { self.distribution_at(&partner) } else { (0.0, 0.0) };
         Odds { of_class: self.odds, partner, gain, inverse_a2 }
     }
 
     /// The law at `x`: the gain of an estimate on the spot, and `1 / a^2`.
     #[inline(always)]
-    fn law_at(&self, x: &[f32; D]) -> (f32, f32) {
-        self.law_where(self.density.at(x))
+    fn distribution_at(&self, x: &[f32; D]) -> (f32, f32) {
+        self.distribution_where(self.density.at(x))
     }
 
     #[inline(always)]
-    fn law_where(&self, density: f32) -> (f32, f32) {
+    fn distribution_where(&self, density: f32) -> (f32, f32) {
         let width = self.density.width(density);
         let gain = self.neighbors.center / (self.volume(density) * density);
         (gain, self.neighbors.inverse_a2 / (width * width))
@@ -289,7 +289,7 @@ impl<const D: usize, P: Pieces<D>> Round<'_, D, P> {
     #[inline(always)]
     fn by_records(&self, slot: usize, x: [[f32; D]; 2]) -> [f32; 2] {
         let slots_per_record = self.pieces.slots_per_record();
-        let at = x.map(|x| (self.law_at(&x), self.pieces.record_chance(slot, &x)));
+        let at = x.map(|x| (self.distribution_at(&x), self.pieces.record_chance(slot, &x)));
         let (ends, class) = self.graph.of(slot);
         let mut sums = [0.0; 2];
         for (&end, &class) in ends.iter().zip(class) {

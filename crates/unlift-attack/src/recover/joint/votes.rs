@@ -1,7 +1,7 @@
 //! Columns of neighbors' estimates, and how likely they are about a place.
 
-use crate::recover::map::edges::{CLASSES, Side, either, side};
-use crate::recover::map::lanes::{LANES, Lanes, ln};
+use crate::recover::map::chance::{LANES, Lanes, ln};
+use crate::recover::map::graph::{CLASSES, Side, either, side};
 use crate::recover::map::pieces::Piece;
 use crate::recover::map::places::{FAR, Places, distance2};
 
@@ -260,7 +260,7 @@ impl<const D: usize> Columns<D> {
         self.odds.as_chunks().0
     }
 
-    /// The logarithm of how much likelier these estimates are about a point at `x` than by chance, where the law has
+    /// The logarithm of how much likelier these estimates are about a point at `x` than by chance, where the distribution has
     /// this gain and `1 / a^2`: the sum of `ln(1 + odds * gain * (1 + r^2 / a^2)^-3)`.
     #[inline(always)]
     pub(crate) fn log_likelihood(&self, x: &[f32; D], law: (f32, f32)) -> f32 {

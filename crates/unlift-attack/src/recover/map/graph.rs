@@ -8,9 +8,6 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::edges::{EdgeRule, record_of};
-use super::merge::Rows;
-use super::named_by::{Block, NamedBy};
 use crate::neighbors::Neighborhoods;
 use crate::{Error, RecordId};
 
@@ -149,11 +146,287 @@ fn split<'a>(rooms: &[Room], mut ends: &'a mut [u32], mut class: &'a mut [u8]) -
     rooms.iter().map(rows).collect()
 }
 
+// Kinds of edges: who names whom, and how high a source scores it.
+
+/// Which end of an edge names the other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Side {
+    /// The slot names the neighbor.
+    Forward,
+    /// The neighbor names the slot. On a paired line it may mean the other slot, nobody knows.
+    Reverse,
+    /// Each names the other.
+    Mutual,
+}
+
+/// Classes of scores per direction.
+pub(super) const SCORE_CLASSES: usize = MOST_CLASSES;
+/// Where score classes begin, as shares of all entries: finer at the top, where most neighbors are.
+const SCORE_RANKS: [f64; SCORE_CLASSES - 1] = [0.3, 0.55, 0.72, 0.84, 0.91, 0.955, 0.98];
+/// Classes of edges at most.
+pub(crate) const CLASSES: usize = 3 * SCORE_CLASSES;
+
+/// The record of a slot: one or two make a record, so a shift does for a division.
+#[inline(always)]
+pub(crate) fn record_of(slot: usize, slots_per_record: usize) -> usize {
+    slot >> (slots_per_record - 1)
+}
+
+/// Whether an edge of this class says which record it leads to, but not which of its two slots: a list
+/// names records, while the slot that a list belongs to is known.
+#[inline(always)]
+pub(crate) fn either(class: u8, slots_per_record: usize) -> bool {
+    slots_per_record == 2 && side(class) != Side::Reverse
+}
+
+/// Who names whom in an edge of this class.
+#[inline(always)]
+pub(crate) fn side(class: u8) -> Side {
+    match usize::from(class) / SCORE_CLASSES {
+        0 => Side::Forward,
+        1 => Side::Reverse,
+        _ => Side::Mutual,
+    }
+}
+
+/// Reverse entries of a row at most, as a multiple of the mean list: whoever is named by everyone is
+/// named by mistake.
+const MOST_REVERSE: usize = 3;
+/// Scores are ranked by a sample of this many.
+const SCORES: usize = 1 << 16;
+
+/// The rule by which edges are made of lists.
+pub(super) struct EdgeRule {
+    /// Reverse entries of a row at most.
+    pub(super) most: usize,
+    /// The least score of each class but the first: equal shares of all entries, by rank. Empty without scores.
+    bounds: Vec<f32>,
+}
+
+impl EdgeRule {
+    /// The rule for `lists`.
+    pub(super) fn new(lists: &Neighborhoods) -> Self {
+        let n = lists.records().len();
+        let most = MOST_REVERSE * n.div_ceil(lists.n_slots().max(1)).max(1);
+        let step = n.div_ceil(SCORES).max(1);
+        let mut sample: Vec<f32> =
+            lists.scores().map_or_else(Vec::new, |all| all.iter().step_by(step).copied().collect());
+        sample.sort_unstable_by(f32::total_cmp);
+        let at = |share: &f64| sample.get((share * sample.len() as f64) as usize).copied();
+        Self { most, bounds: SCORE_RANKS.iter().filter_map(at).collect() }
+    }
+
+    /// The class of the entry at `at` of `scores`.
+    #[inline(always)]
+    pub(super) fn class_at(&self, scores: Option<&[f32]>, at: usize) -> u8 {
+        let class = |score: f32| self.bounds.partition_point(|&bound| bound <= score) as u8;
+        scores.map_or(0, |scores| class(scores[at]))
+    }
+}
+
+// Who names a record: lists turned around, a block of records at a time.
+//
+// Entries first go to the blocks of the records they name, in four bytes each; a block is then put in order only where its
+// rows are made.
+
+/// Records in a block, and slots whose entries are turned around by one thread at a time: what belongs to them stays in the
+/// cache.
+pub(super) const BLOCK: usize = 1 << BITS;
+/// Bits of a slot or a record within its block: 4,096.
+const BITS: u32 = 12;
+/// Classes of scores are less than this.
+pub(super) const MOST_CLASSES: usize = 1 << CLASS_BITS;
+/// Bits of a class of scores: what two times twelve leave of an entry, and no more than serves.
+const CLASS_BITS: u32 = 3;
+/// A slot, a record and a class side by side.
+const _: () = assert!(2 * BITS + CLASS_BITS <= u32::BITS);
+
+/// All entries by the block of the record that they name.
+pub(super) struct NamedBy {
+    parts: Vec<Part>,
+    n_records: usize,
+}
+
+/// The entries of the lists of [`BLOCK`] slots, in order of slot within each block.
+struct Part {
+    /// Where blocks begin.
+    offsets: Vec<u32>,
+    /// From the highest bit: slot (of this part), record (of its block), class.
+    entries: Vec<u32>,
+}
+
+impl NamedBy {
+    /// Turns `lists` around, with the class of each entry's score.
+    pub(super) fn new(
+        lists: &Neighborhoods,
+        slots_per_record: usize,
+        score_class: &(impl Fn(usize) -> u8 + Sync),
+    ) -> Self {
+        let n_records = lists.n_slots() / slots_per_record;
+        let n_blocks = n_records.div_ceil(BLOCK);
+        let parts = (0..lists.n_slots().div_ceil(BLOCK))
+            .into_par_iter()
+            .map(|part| Part::new(lists, part, n_blocks, score_class))
+            .collect();
+        Self { parts, n_records }
+    }
+
+    /// Records of each block in turn.
+    pub(super) fn blocks(&self) -> impl Iterator<Item = Range<usize>> {
+        let n = self.n_records;
+        (0..n.div_ceil(BLOCK)).map(move |block| block * BLOCK..((block + 1) * BLOCK).min(n))
+    }
+
+    /// Number of entries that name a record of `block`.
+    pub(super) fn n_entries(&self, block: usize) -> usize {
+        self.of_block(block).map(|(_, entries)| entries.len()).sum()
+    }
+
+    /// The parts' entries that name records of `block`, each with the first slot of its part.
+    fn of_block(&self, block: usize) -> impl Iterator<Item = (u32, &[u32])> {
+        self.parts.iter().enumerate().map(move |(part, Part { offsets, entries })| {
+            let range = offsets[block] as usize..offsets[block + 1] as usize;
+            ((part * BLOCK) as u32, &entries[range])
+        })
+    }
+}
+
+impl Part {
+    fn new(
+        lists: &Neighborhoods,
+        part: usize,
+        n_blocks: usize,
+        score_class: &impl Fn(usize) -> u8,
+    ) -> Self {
+        let slots = part * BLOCK..((part + 1) * BLOCK).min(lists.n_slots());
+        let mut offsets = vec![0u32; n_blocks + 1];
+        for record in slots.clone().flat_map(|slot| lists.of(slot)) {
+            offsets[record.index() / BLOCK + 1] += 1;
+        }
+        for block in 0..n_blocks {
+            offsets[block + 1] += offsets[block];
+        }
+        let mut next = offsets.clone();
+        let mut entries = vec![0; offsets[n_blocks] as usize];
+        for (in_part, slot) in slots.enumerate() {
+            let first = lists.offsets()[slot] as usize;
+            for (at, record) in lists.of(slot).iter().enumerate() {
+                let to = &mut next[record.index() / BLOCK];
+                let in_block = record.index() % BLOCK;
+                let packed = (in_part << BITS | in_block) << CLASS_BITS;
+                entries[*to as usize] = packed as u32 | u32::from(score_class(first + at));
+                *to += 1;
+            }
+        }
+        Self { offsets, entries }
+    }
+}
+
+/// The entries that name the records of one block, in order of slot.
+#[derive(Default)]
+pub(super) struct Block {
+    offsets: Vec<u32>,
+    /// The slot that names it, and the class of its score.
+    by: Vec<(u32, u8)>,
+}
+
+impl Block {
+    /// Puts the entries of `block` in order.
+    pub(super) fn fill(&mut self, named_by: &NamedBy, block: usize) {
+        let record = |entry: u32| (entry >> CLASS_BITS) as usize % BLOCK;
+        let Self { offsets, by } = self;
+        // Starts are two places ahead and become ends of the rows before as rows fill.
+        offsets.clear();
+        offsets.resize(BLOCK + 2, 0);
+        for (_, entries) in named_by.of_block(block) {
+            entries.iter().for_each(|&entry| offsets[record(entry) + 2] += 1);
+        }
+        for r in 0..BLOCK {
+            offsets[r + 2] += offsets[r + 1];
+        }
+        by.resize(offsets[BLOCK + 1] as usize, (0, 0));
+        for (first, entries) in named_by.of_block(block) {
+            for &entry in entries {
+                let slot = first + (entry >> (BITS + CLASS_BITS));
+                let to = &mut offsets[record(entry) + 1];
+                by[*to as usize] = (slot, (entry % MOST_CLASSES as u32) as u8);
+                *to += 1;
+            }
+        }
+    }
+
+    /// The slots that name the record at a place of the block, and the class of each score.
+    #[inline(always)]
+    pub(super) fn of(&self, record: usize) -> &[(u32, u8)] {
+        &self.by[self.offsets[record] as usize..self.offsets[record + 1] as usize]
+    }
+}
+
+// Rows of edges: the list of a slot and those who name its record, merged.
+
+/// The rows of one block, in a place that has room for all of them.
+pub(super) struct Rows<'a> {
+    pub(super) ends: &'a mut [u32],
+    pub(super) class: &'a mut [u8],
+    /// Edges so far.
+    pub(super) n: usize,
+}
+
+impl Rows<'_> {
+    /// Merges the `list` of a slot with `all` who name its record, of whom so many count at `most`; both are in ascending order. The
+    /// entry at a place of the list has a class of scores.
+    pub(super) fn add(
+        &mut self,
+        list: &[RecordId],
+        all: &[(u32, u8)],
+        slots_per_record: usize,
+        most: usize,
+        score_class: impl Fn(usize) -> u8,
+    ) {
+        // Slots are in random order: every so many of them are as good as any.
+        let every = all.len().div_ceil(most).max(1);
+        let n_reverse = all.len().div_ceil(every);
+        let class = |side: Side, of_score: u8| (side as usize * SCORE_CLASSES) as u8 + of_score;
+        let own = slots_per_record as u32;
+        let room = self.n..self.n + list.len() + n_reverse;
+        let (ends, classes) = (&mut self.ends[room.clone()], &mut self.class[room]);
+        let mut to = 0;
+        let mut put = |end: u32, class: u8, stays: bool| {
+            (ends[to], classes[to]) = (end, class);
+            to += usize::from(stays);
+        };
+        // Which of two lists goes on is anyone's guess: steps are added, not branched on.
+        let (mut at, mut reverse, mut mutual) = (0, 0, u32::MAX);
+        while at < list.len() && reverse < n_reverse {
+            let (mine, (by, of_score)) = (list[at].0, all[reverse * every]);
+            // One or two slots make a record.
+            let theirs = by >> (own - 1);
+            let (is_mine, is_theirs) = (mine <= theirs, theirs <= mine);
+            let side = if is_theirs { Side::Mutual } else { Side::Forward };
+            let of_mine = class(side, score_class(at));
+            let of_theirs = class(Side::Reverse, of_score);
+            let end = if is_mine { mine * own } else { by };
+            // The other slot of a record that is mutual already says nothing new.
+            put(end, if is_mine { of_mine } else { of_theirs }, is_mine | (theirs != mutual));
+            mutual = if is_mine & is_theirs { theirs } else { mutual };
+            at += usize::from(is_mine);
+            reverse += usize::from(is_theirs);
+        }
+        for (at, record) in list.iter().enumerate().skip(at) {
+            put(record.0 * own, class(Side::Forward, score_class(at)), true);
+        }
+        for &(by, of_score) in all.iter().step_by(every).skip(reverse) {
+            put(by, class(Side::Reverse, of_score), by >> (own - 1) != mutual);
+        }
+        self.n += to;
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::edges::{SCORE_CLASSES, Side};
-    use super::super::named_by::BLOCK;
     use super::*;
+    use crate::recover::map::graph::BLOCK;
+    use crate::recover::map::graph::{SCORE_CLASSES, Side};
     use crate::seed::{Draws, Stage};
 
     /// Everyone names record 7, nobody the last one, many each other, and every fifth slot nobody.

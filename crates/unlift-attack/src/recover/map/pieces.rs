@@ -1,11 +1,10 @@
 //! Where a slot may lie, as flat pieces: all that joint recovery knows of a record family.
 
-use super::chance_field::{CandidateField, ChanceField, tube};
-use super::edges::record_of;
-use super::lanes::ln;
-use super::line_rows::LineRow;
-use super::plane_windows::SortedPlanes;
-use super::settings::Settings;
+use crate::recover::map::chance::{CandidateField, ChanceField, ln, tube};
+use crate::recover::map::family::Settings;
+use crate::recover::map::graph::record_of;
+use crate::recover::map::lines::LineRow;
+use crate::recover::map::planes::SortedPlanes;
 use crate::released::AxisPlanes;
 use crate::simd::prefetch;
 

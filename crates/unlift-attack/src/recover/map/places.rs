@@ -1,7 +1,10 @@
-//! Where slots are believed to be, in the form the rounds read.
+//! Where slots are believed to be, in the form that joint recovery reads.
 
-use super::chance_field::trimmed;
-use crate::recover::result::estimate::{Estimate, Status};
+use rayon::prelude::*;
+
+use crate::geometry::curve;
+use crate::recover::map::chance::trimmed;
+use crate::recover::result::{Estimate, Status};
 use crate::simd::prefetch;
 
 /// A slot's estimate: one memory access.
@@ -106,4 +109,33 @@ pub(crate) fn distance2<const D: usize>(a: &[f32; D], b: &[f32; D]) -> f32 {
         sum += (a[c] - b[c]) * (a[c] - b[c]);
     }
     sum
+}
+
+// The order in which slots are looked at: neighbors one after the other.
+//
+// Records lie in random order, so each look at a neighbor is a cache miss on a large map. Slots that are
+// near each other share neighbors: looked at in turn, they find them in the cache. Results do not
+// depend on the order.
+
+/// Cells per axis, as a power of two: place on the curve and slot share 64 bits.
+const BITS: u32 = 10;
+
+/// All slots, along a curve that fills space; lost ones last.
+pub(crate) fn along_curve<const D: usize>(places: &Places<D>) -> Vec<u32> {
+    let n = places.len();
+    let (low, high) = places.trimmed_box();
+    let cells = (1u32 << BITS) as f32;
+    let key = |slot: usize| {
+        if !places.is_known(slot) {
+            return u64::MAX << u32::BITS | slot as u64;
+        }
+        let x = places.of(slot);
+        let cell: [u32; D] = std::array::from_fn(|c| {
+            (((x[c] - low[c]) / (high[c] - low[c]) * cells) as u32).min((1 << BITS) - 1)
+        });
+        curve::along(&cell, BITS) << u32::BITS | slot as u64
+    };
+    let mut keys: Vec<u64> = (0..n).into_par_iter().map(key).collect();
+    keys.par_sort_unstable();
+    keys.into_iter().map(|key| key as u32).collect()
 }

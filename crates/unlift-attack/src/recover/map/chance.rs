@@ -8,12 +8,12 @@
 
 use rayon::prelude::*;
 
-use super::bytes::{Reader, Writer};
-use super::cells::Grid;
-use super::evidence::MOST_CHANCE;
-use super::line_rows::LineRow;
 use crate::Error;
+use crate::geometry::vector::{along, dot, median, sub, widen};
 use crate::neighbors::Neighborhoods;
+use crate::recover::map::bytes::{Reader, Writer};
+use crate::recover::map::grid::Grid;
+use crate::recover::map::lines::LineRow;
 use crate::simd::{Kernel, dispatch};
 
 /// Cells of a grid at most: 32 per axis, as density varies over the size of a room.
@@ -347,5 +347,198 @@ impl<const D: usize> CandidateField<D> {
         for (field, &tube) in self.along.iter().zip(tubes) {
             field.add_along((&through, &direction), t, tube, (&mut *cells, &mut *chance));
         }
+    }
+}
+
+// How improbable an agreement is by chance (the evidence that decides between positions).
+//
+// Of `k` listed records `n` support a position, while a random one does with chance `p`. A wrong
+// position gets Bin(k, p) votes. The evidence is the Chernoff bound on the tail, `k KL(n/k || p)` nats:
+// it orders as the tail does, and has no branches.
+
+/// The chance that a random record agrees is taken for at most this: beyond, a density is no probability.
+pub(crate) const MOST_CHANCE: f32 = 0.5;
+
+/// Evidence in nats that `n` of `k` listed records agree where a random one does with probability
+/// `p`, above 0 and below 1; 0 when chance alone would give as many.
+#[inline(always)]
+pub(crate) fn evidence(n: f32, k: f32, p: f32) -> f32 {
+    let missed = k - n;
+    // The logarithm of 0 is some number here, and counts for nothing.
+    let evidence = n * (ln(n) - ln(k * p)) + missed * (ln(missed) - ln(k * (1.0 - p)));
+    // Just above chance the two terms cancel up to rounding.
+    if n <= p * k { 0.0 } else { evidence.max(0.0) }
+}
+
+// Whole vectors at a time: what the hot loops share.
+
+/// Columns are padded to a multiple of this many entries that do not vote, so that every loop runs
+/// over whole vectors, with the same order of additions whatever the machine.
+pub(crate) const LANES: usize = 8;
+
+/// One vector.
+pub(crate) type Lanes = [f32; LANES];
+
+/// The logarithm of a positive number, to 2e-6: exponent plus a polynomial of the mantissa, without
+/// branches.
+#[inline(always)]
+pub(crate) fn ln(y: f32) -> f32 {
+    let bits = y.to_bits();
+    let exponent = (bits >> 23) as i32 - 127;
+    let m = f32::from_bits(bits & 0x007f_ffff | 0x3f80_0000) - 1.0;
+    // ln(1 + m) on [0, 1), zero at 0, fitted for the smallest largest error.
+    let p = m * (0.317_648_7 + m * (-0.193_760_2 + m * (0.085_569_24 - m * 0.018_338_63)));
+    exponent as f32 * std::f32::consts::LN_2 + m * (0.999_901_65 + m * (-0.497_875 + p))
+}
+
+// A length of the order of the map's size, from the records alone.
+
+/// Quartiles are those of parts far from one another where they are so many times as far apart as one part is wide.
+const FAR_APART: f64 = 4.0;
+
+/// The distance between the quartiles of sorted values.
+pub(crate) fn interquartile_range(sorted: &[f32]) -> f64 {
+    let Some(last) = sorted.len().checked_sub(1) else {
+        return 0.0;
+    };
+    f64::from(sorted[last - last / 4]) - f64::from(sorted[last / 4])
+}
+
+/// Whether sorted values lie in parts far from one another: four times the width of an eighth of them, about a typical
+/// value, is as much as the distance of their quartiles where they are spread evenly.
+pub(crate) fn are_in_parts(sorted: &[f32]) -> bool {
+    let many = sorted.len() / 8;
+    if many == 0 {
+        return false;
+    }
+    let width = |at: usize| f64::from(sorted[at + many]) - f64::from(sorted[at]);
+    let mut widths: Vec<f64> = (0..sorted.len() - many).map(width).collect();
+    FAR_APART * 4.0 * median(&mut widths) < interquartile_range(sorted)
+}
+
+fn length<const D: usize>(v: &[f32; D]) -> f64 {
+    v.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>().sqrt()
+}
+
+/// Lines, and rounds (each leaves a third of the error), in which [`line_extent`] looks for the middle of a map.
+const MIDDLE: (usize, usize) = (1000, 60);
+
+/// The median distance of the lines from their middle. Distances from the origin would not do: it is
+/// rounded, so that a shifted or scaled map has it elsewhere.
+pub(crate) fn line_extent<const D: usize>(rows: &[LineRow<D>]) -> f64 {
+    // Spread over the file: a third party's map need not be in random order.
+    let every = rows.len().div_ceil(MIDDLE.0).max(1);
+    let rows: Vec<&LineRow<D>> = rows.iter().step_by(every).collect();
+    let offset = |row: &LineRow<D>, from: &[f64; D]| {
+        let (through, direction) = (widen(&row.through), widen(&row.direction));
+        let away = sub(&through, from);
+        along(&away, -dot(&away, &direction), &direction)
+    };
+    // Each round moves to the mean of the lines' nearest points; what is left of the start shrinks
+    // by the mean squared cosine with the lines, about a third.
+    let mut middle = [0.0; D];
+    for _ in 0..MIDDLE.1 {
+        let mut step = [0.0; D];
+        for row in &rows {
+            step = along(&step, 1.0 / rows.len() as f64, &offset(row, &middle));
+        }
+        middle = along(&middle, 1.0, &step);
+    }
+    let mut distances: Vec<f64> = rows
+        .iter()
+        .map(|row| {
+            let away = offset(row, &middle);
+            dot(&away, &away).sqrt()
+        })
+        .collect();
+    median(&mut distances)
+}
+
+/// The largest distance between centers.
+pub(crate) fn ray_extent<const D: usize>(rows: &[LineRow<D>]) -> f64 {
+    let mut centers: Vec<&LineRow<D>> = Vec::new();
+    for row in rows {
+        if !centers.iter().any(|center| center.group == row.group) {
+            centers.push(row);
+        }
+    }
+    let mut largest = 0.0;
+    for (at, a) in centers.iter().enumerate() {
+        for b in &centers[..at] {
+            let apart: [f32; D] = std::array::from_fn(|c| a.through[c] - b.through[c]);
+            largest = f64::max(largest, length(&apart));
+        }
+    }
+    largest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// ln P(X >= n) for X ~ Bin(k, p), by summation.
+    fn ln_tail(n: usize, k: usize, p: f64) -> f64 {
+        let mut term = (1.0 - p).powi(k as i32);
+        let mut tail = 0.0;
+        for x in 0..=k {
+            if x >= n {
+                tail += term;
+            }
+            term *= (k - x) as f64 / (x + 1) as f64 * p / (1.0 - p);
+        }
+        tail.ln()
+    }
+
+    #[test]
+    fn evidence_bounds_the_binomial_tail_and_orders_like_it() {
+        for (n, p) in [(26, 0.4), (4, 0.005), (10, 0.035), (50, 0.2), (1, 0.005), (49, 0.5)] {
+            let evidence = f64::from(evidence(n as f32, 50.0, p as f32));
+            // Chernoff: P(X >= n) <= exp(-k KL); tight up to a polynomial factor.
+            assert!(evidence <= -ln_tail(n, 50, p) + 1e-3, "n {n} p {p}");
+            assert!(evidence >= -ln_tail(n, 50, p) - 4.0, "n {n} p {p}");
+        }
+        // 26 votes where 20 are expected are far likelier than 4 where 0.25 are.
+        assert!(evidence(26.0, 50.0, 0.4) < evidence(4.0, 50.0, 0.005));
+    }
+
+    #[test]
+    fn evidence_is_near_the_exact_bound() {
+        for k in [1, 2, 7, 20, 50, 100, 400] {
+            for n in 0..=k {
+                for p in [1e-6, 1e-4, 0.005, 0.03, 0.2, f64::from(MOST_CHANCE)] {
+                    let share = n as f64 / k as f64;
+                    let term = |x: f64, y: f64| if x > 0.0 { x * (x / y).ln() } else { 0.0 };
+                    let exact = k as f64 * (term(share, p) + term(1.0 - share, 1.0 - p));
+                    let exact = if share <= p { 0.0 } else { exact };
+                    let found = f64::from(evidence(n as f32, k as f32, p as f32));
+                    assert!((found - exact).abs() <= 2e-3, "{n} of {k} at {p}: {found}, {exact}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn no_evidence_at_or_below_chance() {
+        assert_eq!(evidence(0.0, 50.0, 0.005), 0.0);
+        assert_eq!(evidence(10.0, 50.0, 0.2), 0.0);
+    }
+}
+
+#[cfg(test)]
+mod lanes_tests {
+    use super::*;
+
+    #[test]
+    fn logarithm_is_near_the_exact_one() {
+        // Every exponent, and mantissas all over.
+        for exponent in -126..127 {
+            for step in 0..1000 {
+                let y = (exponent as f32).exp2() * (1.0 + step as f32 / 1000.0);
+                let exact = f64::from(y).ln();
+                let off = (f64::from(ln(y)) - exact).abs();
+                assert!(off <= 2.5e-6 + 1e-7 * exact.abs(), "ln {y}: off by {off}");
+            }
+        }
+        assert_eq!(ln(1.0), 0.0);
     }
 }

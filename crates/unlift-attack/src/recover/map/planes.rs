@@ -1,10 +1,8 @@
 //! Axis planes: the free coordinates separate, each is the densest window of offsets.
 
-use super::evidence::evidence;
-use super::extent::{are_in_parts, interquartile_range};
-use super::lanes::ln;
 use crate::RecordId;
 use crate::geometry::vector::median;
+use crate::recover::map::chance::{are_in_parts, evidence, interquartile_range, ln};
 use crate::released::AxisPlanes;
 
 /// The planes of each axis in order of their offsets.

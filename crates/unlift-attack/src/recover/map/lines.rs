@@ -1,0 +1,507 @@
+//! Lines and rays as rows of one table, and their sections with a feasible line.
+
+use crate::RecordId;
+use crate::geometry::frame::Bounds;
+use crate::geometry::vector::{along, widen};
+use crate::recover::map::chance::{LANES, MOST_CHANCE, evidence, ln};
+use crate::released::{Lines, Rays};
+
+/// One line or ray: half a cache line, so that a neighbor costs one memory access.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(32))]
+pub(crate) struct LineRow<const D: usize> {
+    /// A point of the line: the foot, or the center of a ray.
+    pub(crate) through: [f32; D],
+    /// Unit direction; signed for rays.
+    pub(crate) direction: [f32; D],
+    /// The center of a ray, or [`NO_GROUP`].
+    pub(crate) group: u32,
+    /// Where it ends: infinite, except within known bounds.
+    pub(crate) to: f32,
+}
+
+/// The group of lines, which all may vote for each other.
+pub(crate) const NO_GROUP: u32 = u32::MAX;
+
+/// Squared sines below this count as parallel: such a record does not tell where along the line.
+const PARALLEL: f32 = 1e-6;
+
+/// All records as rows; within `bounds` about the released origin, where these are known: a chord starts
+/// where the line enters.
+pub(crate) fn from_lines<const D: usize>(
+    lines: &Lines<D>,
+    bounds: Option<&Bounds<D>>,
+) -> Vec<LineRow<D>> {
+    let row = |(&foot, &direction): (&[f32; D], &[f32; D])| {
+        let clip = |bounds: &Bounds<D>| bounds.clip(&widen(&foot), &widen(&direction));
+        let (through, to) = match bounds.and_then(clip) {
+            Some((from, to)) => (
+                along(&widen(&foot), from, &widen(&direction)).map(|x| x as f32),
+                (to - from) as f32,
+            ),
+            None => (foot, f32::INFINITY),
+        };
+        LineRow { through, direction, group: NO_GROUP, to }
+    };
+    lines.foot().iter().zip(lines.direction()).map(row).collect()
+}
+
+/// All records as rows; within the region of their center or else within `bounds`, where these are known.
+pub(crate) fn from_rays<const D: usize>(
+    rays: &Rays<D>,
+    bounds: Option<&Bounds<D>>,
+) -> Vec<LineRow<D>> {
+    let row = |(&center, &direction): (&u8, &[f32; D])| {
+        let through = rays.centers()[usize::from(center)];
+        let region = rays.regions().map(|regions| &regions[usize::from(center)]).or(bounds);
+        let clip = |region: &Bounds<D>| region.clip(&widen(&through), &widen(&direction));
+        // A ray that leaves its region at once is a file's fault: nothing is known about it.
+        let to = region.and_then(clip).map(|(_, to)| to as f32).filter(|&to| to > 0.0);
+        let to = to.unwrap_or(f32::INFINITY);
+        LineRow { through, direction, group: u32::from(center), to }
+    };
+    rays.center().iter().zip(rays.direction()).map(row).collect()
+}
+
+impl<const D: usize> LineRow<D> {
+    /// Whether this is a half-line.
+    #[inline(always)]
+    pub(crate) fn is_ray(&self) -> bool {
+        self.group != NO_GROUP
+    }
+
+    /// Whether this record is evidence for a point on `own`: rays of one center meet trivially.
+    #[inline(always)]
+    pub(crate) fn may_vote_for(&self, own: &Self) -> bool {
+        !own.is_ray() || self.group != own.group
+    }
+
+    /// Where half-lines and chords begin to count.
+    #[inline(always)]
+    pub(crate) fn floor(&self) -> f32 {
+        if self.group == NO_GROUP && self.to == f32::INFINITY { f32::NEG_INFINITY } else { 0.0 }
+    }
+
+    /// `t` moved to where the record is.
+    #[inline(always)]
+    pub(crate) fn clamp(&self, t: f32) -> f32 {
+        t.max(self.floor()).min(self.to)
+    }
+
+    /// The point of this line nearest to `other`; `None` when they are parallel or it lies behind a
+    /// center.
+    pub(crate) fn crossing(&self, other: &Self) -> Option<[f32; D]> {
+        let of_other = (other.through, other.direction, other.group);
+        let (t, miss2, _) = self.section(of_other);
+        (miss2 < NO_VOTE && t >= self.floor() && t <= self.to).then(|| self.at(t))
+    }
+
+    /// Where the record with this point, direction and group passes nearest, how far away (squared) and
+    /// at which angle (squared sine).
+    ///
+    /// With `v` and `u` the parts of `self.through - through` and `self.direction` perpendicular to
+    /// the record, the squared distance is `|v + t u|^2`: no difference of large squares, so that
+    /// `f32` suffices far from the origin.
+    #[inline(always)]
+    fn section(&self, (through, direction, group): ([f32; D], [f32; D], u32)) -> (f32, f32, f32) {
+        let (mut w_e, mut d_e) = (0.0, 0.0);
+        for c in 0..D {
+            w_e += (self.through[c] - through[c]) * direction[c];
+            d_e += self.direction[c] * direction[c];
+        }
+        let v = |c: usize| self.through[c] - through[c] - w_e * direction[c];
+        let u = |c: usize| self.direction[c] - d_e * direction[c];
+        let (mut v_u, mut u_u) = (0.0, 0.0);
+        for c in 0..D {
+            v_u += v(c) * u(c);
+            u_u += u(c) * u(c);
+        }
+        let parallel = u_u < PARALLEL;
+        let t = if parallel { 0.0 } else { -v_u / u_u };
+        let mut miss = 0.0;
+        for c in 0..D {
+            let m = v(c) + t * u(c);
+            miss += m * m;
+        }
+        // Rays of one center meet trivially; a closest approach behind a center is none.
+        let behind = self.is_ray() & ((group == self.group) | (w_e + t * d_e <= 0.0));
+        let miss2 = if parallel | behind { NO_VOTE } else { miss };
+        (t, miss2, if parallel { 1.0 } else { u_u })
+    }
+
+    /// The point at parameter `t`.
+    #[inline(always)]
+    pub(crate) fn at(&self, t: f32) -> [f32; D] {
+        std::array::from_fn(|c| self.through[c] + t * self.direction[c])
+    }
+}
+
+/// Neighbors gathered into one column per coordinate: the section loop then runs over whole vectors.
+#[derive(Clone, Debug)]
+pub(crate) struct LineColumns<const D: usize> {
+    through: [Vec<f32>; D],
+    direction: [Vec<f32>; D],
+    group: Vec<u32>,
+}
+
+impl<const D: usize> Default for LineColumns<D> {
+    fn default() -> Self {
+        Self {
+            through: std::array::from_fn(|_| Vec::new()),
+            direction: std::array::from_fn(|_| Vec::new()),
+            group: Vec::new(),
+        }
+    }
+}
+
+impl<const D: usize> LineColumns<D> {
+    /// Gathers `records` from `rows`.
+    #[inline(always)]
+    pub(crate) fn gather(&mut self, rows: &[LineRow<D>], records: &[RecordId]) {
+        let n = records.len();
+        for column in self.through.iter_mut().chain(&mut self.direction) {
+            column.resize(n, 0.0);
+        }
+        self.group.resize(n, NO_GROUP);
+        let through = self.through.each_mut().map(|column| &mut column[..n]);
+        let direction = self.direction.each_mut().map(|column| &mut column[..n]);
+        let group = &mut self.group[..n];
+        for j in 0..n {
+            let row = &rows[records[j].index()];
+            for c in 0..D {
+                through[c][j] = row.through[c];
+                direction[c][j] = row.direction[c];
+            }
+            group[j] = row.group;
+        }
+    }
+
+    /// How many of the gathered records are evidence for a point on `own`.
+    #[inline(always)]
+    pub(crate) fn n_that_may_vote(&self, own: &LineRow<D>) -> usize {
+        let strange = |&&group: &&u32| !own.is_ray() || group != own.group;
+        self.group.iter().filter(strange).count()
+    }
+
+    /// The sections of the gathered records with `own`.
+    #[inline(always)]
+    pub(crate) fn sections(&self, own: &LineRow<D>, out: &mut Sections) {
+        let n = self.group.len();
+        out.resize(n);
+        let through: [&[f32]; D] = std::array::from_fn(|c| &self.through[c][..n]);
+        let direction: [&[f32]; D] = std::array::from_fn(|c| &self.direction[c][..n]);
+        let group = &self.group[..n];
+        let (at, miss2, bend) = (&mut out.at[..n], &mut out.miss2[..n], &mut out.bend[..n]);
+        for j in 0..n {
+            let through = std::array::from_fn(|c| through[c][j]);
+            let direction = std::array::from_fn(|c| direction[c][j]);
+            (at[j], miss2[j], bend[j]) = own.section((through, direction, group[j]));
+        }
+    }
+}
+
+// Axis candidates: sections of listed records with one of a slot's own axis lines.
+
+/// Neighbors gathered into one column per coordinate.
+#[derive(Clone, Debug)]
+pub(crate) struct CandidateColumns<const D: usize> {
+    position: [Vec<f32>; D],
+}
+
+impl<const D: usize> Default for CandidateColumns<D> {
+    fn default() -> Self {
+        Self { position: std::array::from_fn(|_| Vec::new()) }
+    }
+}
+
+impl<const D: usize> CandidateColumns<D> {
+    /// Gathers `records` from `rows`.
+    #[inline(always)]
+    pub(crate) fn gather(&mut self, rows: &[[f32; D]], records: &[RecordId]) {
+        let n = records.len();
+        for column in &mut self.position {
+            column.resize(n, 0.0);
+        }
+        let position = self.position.each_mut().map(|column| &mut column[..n]);
+        for j in 0..n {
+            let row = &rows[records[j].index()];
+            for c in 0..D {
+                position[c][j] = row[c];
+            }
+        }
+    }
+
+    /// The sections of the gathered records with the line through `own` along `axis`.
+    ///
+    /// A record stands for its `D` axis lines and counts once, with the nearest of them. Its line
+    /// along `axis` is parallel to mine: if it passes within delta it agrees with every `t` (it
+    /// tells nothing about the position, but it does tell about the axis). Of the others the
+    /// nearest is the one whose free coordinate is that of the largest difference.
+    #[inline(always)]
+    pub(crate) fn sections(&self, own: &[f32; D], axis: usize, delta2: f32, out: &mut Sections) {
+        let n = self.position[0].len();
+        out.resize(n);
+        let position: [&[f32]; D] = std::array::from_fn(|c| &self.position[c][..n]);
+        let along = position[axis];
+        let (at, miss2, bend) = (&mut out.at[..n], &mut out.miss2[..n], &mut out.bend[..n]);
+        // Factors instead of branches keep the loop in vectors.
+        let counts: [f32; D] = std::array::from_fn(|c| if c == axis { 0.0 } else { 1.0 });
+        for j in 0..n {
+            let (mut sum, mut largest) = (0.0f32, 0.0f32);
+            for c in 0..D {
+                let d = (position[c][j] - own[c]) * counts[c];
+                sum += d * d;
+                largest = largest.max(d * d);
+            }
+            let crossing = (sum - largest).max(0.0);
+            let free = if sum <= delta2 { 0.0 } else { 1.0 };
+            at[j] = along[j] * free;
+            bend[j] = free;
+            let miss = crossing + (1.0 - free) * (sum - crossing);
+            // Beyond the range of f32 the difference is no number, and no vote.
+            let near = (crossing <= delta2) & (sum < f32::INFINITY);
+            miss2[j] = if near { miss } else { NO_VOTE };
+        }
+    }
+}
+
+// Where listed records pass a feasible line: the common currency of all one-unknown families.
+//
+// Along `x(t)` the squared distance to record `j` is `miss2[j] + bend[j] (t - at[j])^2`: `at` is
+// the parameter of the closest approach, `miss2` the squared distance there, `bend` the squared
+// sine of the angle between the lines (1 when the record is seen square on, 0 when it agrees with
+// every `t` alike, as a parallel axis of a candidate does). Within `delta` of a
+// record is therefore an interval of `t`.
+
+/// Sections of one list of records with one feasible line, in columns.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Sections {
+    pub(crate) at: Vec<f32>,
+    pub(crate) miss2: Vec<f32>,
+    pub(crate) bend: Vec<f32>,
+}
+
+/// `miss2` of a record that says nothing here (parallel, same center, behind it).
+pub(crate) const NO_VOTE: f32 = f32::INFINITY;
+
+impl Sections {
+    /// Makes room for `n` sections, of which the first `n` must then be written; the padding is silent.
+    #[inline(always)]
+    pub(crate) fn resize(&mut self, n: usize) {
+        let padded = n.next_multiple_of(LANES);
+        self.at.resize(padded, 0.0);
+        self.miss2.resize(padded, NO_VOTE);
+        self.bend.resize(padded, 1.0);
+        self.at[n..].fill(0.0);
+        self.miss2[n..].fill(NO_VOTE);
+        self.bend[n..].fill(1.0);
+    }
+
+    /// Number of sections, padding included.
+    #[inline(always)]
+    pub(crate) fn len(&self) -> usize {
+        self.at.len()
+    }
+
+    /// How many records say anything at all.
+    #[inline(always)]
+    pub(crate) fn n_voting(&self) -> usize {
+        self.miss2.iter().map(|&miss2| usize::from(miss2 < NO_VOTE)).sum()
+    }
+
+    /// Squared distance from `x(t)` to record `j`.
+    #[inline(always)]
+    pub(crate) fn squared_distance(&self, j: usize, t: f32) -> f32 {
+        let d = t - self.at[j];
+        self.miss2[j] + self.bend[j] * d * d
+    }
+
+    /// One step of least squares over the records within `reach2` (squared) of `x(t)`: the shift of
+    /// `t` and the number of these records; no shift when none of them tells where.
+    #[inline(always)]
+    pub(crate) fn least_squares_step(&self, t: f32, reach2: f32) -> (f32, u32) {
+        let (mut weight, mut sum, mut n) = ([0.0f32; LANES], [0.0f32; LANES], [0u32; LANES]);
+        let (at, _) = self.at.as_chunks::<LANES>();
+        let (miss2, _) = self.miss2.as_chunks::<LANES>();
+        let (bend, _) = self.bend.as_chunks::<LANES>();
+        for ((at, miss2), bend) in at.iter().zip(miss2).zip(bend) {
+            for lane in 0..LANES {
+                let d = at[lane] - t;
+                let near = miss2[lane] + bend[lane] * d * d <= reach2;
+                weight[lane] += if near { bend[lane] } else { 0.0 };
+                sum[lane] += if near { bend[lane] * d } else { 0.0 };
+                n[lane] += u32::from(near);
+            }
+        }
+        let weight: f32 = weight.iter().sum();
+        let sum: f32 = sum.iter().sum();
+        (if weight > 0.0 { sum / weight } else { 0.0 }, n.iter().sum())
+    }
+}
+
+/// Intervals of `t` within delta of the records that pass there, in order of record.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Intervals {
+    low: Vec<f32>,
+    high: Vec<f32>,
+    /// Records that are within delta everywhere.
+    everywhere: u32,
+    at_starts: AtStarts,
+}
+
+/// What is looked at where each interval starts, in columns.
+#[derive(Clone, Debug, Default)]
+struct AtStarts {
+    /// How many intervals hold it.
+    count: Vec<u32>,
+    /// The chance that a random record passes there.
+    chance: Vec<f32>,
+    cell: Vec<u32>,
+    evidence: Vec<f32>,
+    score: Vec<f32>,
+}
+
+impl Intervals {
+    /// The intervals of `sections` at `delta`, as far as they lie between `floor` and `top`.
+    #[inline(always)]
+    pub(crate) fn fill(&mut self, sections: &Sections, delta2: f32, floor: f32, top: f32) {
+        let n = sections.len();
+        self.low.resize(n, f32::INFINITY);
+        self.high.resize(n, f32::NEG_INFINITY);
+        let (at, miss2, bend) = (&sections.at[..n], &sections.miss2[..n], &sections.bend[..n]);
+        let (low, high) = (&mut self.low[..n], &mut self.high[..n]);
+        for j in 0..n {
+            let room = delta2 - miss2[j];
+            let half = (room.max(0.0) / bend[j]).sqrt();
+            let (start, end) = (at[j] - half, at[j] + half);
+            let empty = (room < 0.0) | (end < floor) | (start > top);
+            low[j] = if empty { f32::INFINITY } else { start.max(floor) };
+            high[j] = end;
+        }
+        // Every row is written, and stays if it begins somewhere: no branch to guess.
+        let (mut kept, mut everywhere) = (0, 0);
+        for j in 0..n {
+            let start = low[j];
+            (low[kept], high[kept]) = (start, high[j]);
+            kept += usize::from(start.is_finite());
+            everywhere += u32::from(start == f32::NEG_INFINITY);
+        }
+        self.everywhere = everywhere;
+        self.low.truncate(kept);
+        self.high.truncate(kept);
+        let padded = kept.next_multiple_of(LANES);
+        self.low.resize(padded, f32::INFINITY);
+        self.high.resize(padded, f32::NEG_INFINITY);
+    }
+}
+
+/// A position along a feasible line and why it was chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Peak {
+    /// The position.
+    pub(crate) t: f32,
+    /// Improbability by chance that so many records pass there, in nats.
+    pub(crate) evidence: f32,
+    /// Evidence and prior: what is maximized.
+    pub(crate) score: f32,
+}
+
+impl Intervals {
+    /// The start of a listed interval that maximizes evidence plus prior. The number of agreeing records
+    /// changes only at interval ends and is largest at some start, so no position has more votes than the
+    /// starts looked at.
+    ///
+    /// `k` listed records could vote; `chances` adds to its last argument the chance that a random record
+    /// passes at each start (of the first), with room for cells of a grid (in the second). The prior is the chance
+    /// itself: a point is likelier to lie where the map is dense, and chance measures density (without it the empty
+    /// parts of a map, where two votes are already improbable, win too often). Ties are won by the lower record.
+    #[inline(always)]
+    pub(crate) fn best_start(
+        &mut self,
+        k: usize,
+        chances: impl Fn(&[f32], &mut [u32], &mut [f32]),
+    ) -> Option<Peak> {
+        let n = self.low.len();
+        self.at_starts.resize(n);
+        let AtStarts { count, chance, cell, evidence: nats, score } = &mut self.at_starts;
+        let (count, chance, nats, score) =
+            (&mut count[..n], &mut chance[..n], &mut nats[..n], &mut score[..n]);
+        // A vector of starts at a time is compared with every interval.
+        let (starts, counts) = (self.low.as_chunks::<LANES>().0, count.as_chunks_mut::<LANES>().0);
+        for (starts, counts) in starts.iter().zip(counts) {
+            let mut sums = [self.everywhere; LANES];
+            for (low, high) in self.low.iter().zip(&self.high) {
+                for lane in 0..LANES {
+                    sums[lane] += u32::from((*low <= starts[lane]) & (starts[lane] <= *high));
+                }
+            }
+            *counts = sums;
+        }
+        chance.fill(0.0);
+        chances(&self.low, cell, chance);
+        for i in 0..n {
+            let p = chance[i].min(MOST_CHANCE);
+            nats[i] = evidence(count[i] as i32 as f32, k as f32, p);
+            score[i] = nats[i] + ln(p);
+        }
+        let mut best: Option<usize> = None;
+        for (i, start) in self.low.iter().enumerate() {
+            if *start < f32::INFINITY && best.is_none_or(|best| score[i] > score[best]) {
+                best = Some(i);
+            }
+        }
+        best.map(|i| Peak { t: self.low[i], evidence: nats[i], score: score[i] })
+    }
+}
+
+impl AtStarts {
+    #[inline(always)]
+    fn resize(&mut self, n: usize) {
+        self.count.resize(n, 0);
+        self.cell.resize(n, 0);
+        for column in [&mut self.chance, &mut self.evidence, &mut self.score] {
+            column.resize(n, 0.0);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::seed::{Draws, Stage};
+    use crate::simd::{Kernel, dispatch, portable};
+
+    /// Sections of a list with a line: a kernel whose rounding could differ between instruction sets.
+    struct SectionBits<'a> {
+        rows: &'a [LineRow<3>],
+        own: usize,
+    }
+
+    impl Kernel for SectionBits<'_> {
+        type Output = Vec<u32>;
+
+        #[inline(always)]
+        fn run(self) -> Vec<u32> {
+            let records: Vec<RecordId> = (0..self.rows.len()).map(RecordId::from_index).collect();
+            let mut columns = LineColumns::default();
+            let mut sections = Sections::default();
+            columns.gather(self.rows, &records);
+            columns.sections(&self.rows[self.own], &mut sections);
+            let columns = [&sections.at, &sections.miss2, &sections.bend];
+            columns.into_iter().flatten().map(|x| x.to_bits()).collect()
+        }
+    }
+
+    #[test]
+    fn instruction_sets_change_no_bit() {
+        let mut draws = Draws::new(5, Stage::Synthetic, 5);
+        let points: Vec<[f64; 3]> =
+            (0..403).map(|_| std::array::from_fn(|_| draws.between(-3.0, 3.0))).collect();
+        let directions: Vec<[f64; 3]> = points.iter().map(|_| draws.direction()).collect();
+        let rows = from_lines(&Lines::through(&points, &directions).unwrap(), None);
+        for own in 0..50 {
+            let bits = portable(SectionBits { rows: &rows, own });
+            assert!(bits == dispatch(SectionBits { rows: &rows, own }));
+        }
+    }
+}

@@ -1,0 +1,544 @@
+//! The published density attacks, for comparison: constants as published, nothing read but the records.
+//!
+//! One point per line (Chelani et al., CVPR 2021): the nearest lines vote where they pass; the peak of
+//! the votes is the estimate; then lines vote again, chosen near the present estimates. Two points per
+//! line (Lee et al., CVPR 2023): the two highest peaks of a kernel density of the votes. Rays (Moon et
+//! al., CVPR 2024): rays of other centers vote, once. (Paper, supplement, "Comparison to other 3D line recoveries".)
+//!
+//! The published programs read more than the records: votes counted from the true point, a line that
+//! votes for itself exactly there, ranges from true distances. Here votes are counted from the foot, a line
+//! has no vote of its own, ranges come from the votes.
+
+use rayon::prelude::*;
+
+use crate::density::feasible::{Feasible, FeasibleLine, Hides};
+use crate::density::{Peak, Peaks};
+use crate::released::Released;
+use crate::simd::{Kernel, dispatch};
+
+/// Nearest lines that vote at first: at most so many, and at most this share of all.
+const COARSE: (usize, f64) = (500, 0.05);
+/// The same for paired points, of which a vote may mean either.
+const COARSE_OF_PAIRS: (usize, f64) = (1000, 0.05);
+/// Rounds in which the voting lines are chosen anew.
+const REFINEMENTS: usize = 3;
+/// Estimates nearest to a line, and lines nearest to its estimate, of which those in both vote.
+const REFINE: usize = 100;
+/// Fewer than this in both are too few: then all lines of the near estimates vote.
+const FEWEST: usize = 10;
+/// Larger maps let this many lines vote, spread evenly over the file: all pairs would be too many.
+const MOST_VOTERS: usize = 100_000;
+
+/// Where the published attacks put the points of `released`. No answer for planes, axis candidates and
+/// maps that are not in three dimensions.
+pub(crate) fn published<const D: usize>(released: &Released<D>) -> Peaks {
+    let n_slots = released.n_slots();
+    let Some(feasible) = Feasible::new(released) else {
+        return Peaks::none(n_slots);
+    };
+    if feasible.hides == Hides::OnAxis || n_slots == 0 {
+        return Peaks::none(n_slots);
+    }
+    let lines = &feasible.lines;
+    let every = lines.len().div_ceil(MOST_VOTERS);
+    let voters: Vec<u32> = (0..lines.len() as u32).step_by(every).collect();
+    let columns = LineColumns::new(lines, &voters);
+    let (most, share) = if feasible.hides == Hides::Two { COARSE_OF_PAIRS } else { COARSE };
+    let k = most.min((share * lines.len() as f64) as usize).max(2);
+    let vote = |scratch: &mut Scratch, row: usize| {
+        columns.distances_to_line(&lines[row], &mut scratch.distances);
+        scratch.silence(row, lines, &voters);
+        let reach = nearest(&scratch.distances, k, &mut scratch.keys, &mut scratch.near);
+        let near = scratch.near.iter().map(|&at| &lines[voters[at as usize] as usize]);
+        passes(&lines[row], near, &mut scratch.votes);
+        reach
+    };
+    let place = |row: usize, t: f64| on(&lines[row], t);
+    if feasible.hides == Hides::Two {
+        let rows: Vec<([Option<Peak>; 2], f32)> = (0..lines.len())
+            .into_par_iter()
+            .map_init(Scratch::default, |scratch, row| {
+                let reach = vote(scratch, row);
+                let found = two_crowds(&mut scratch.votes);
+                (found.map_or([None; 2], |pair| pair.map(|t| place(row, t))), reach)
+            })
+            .collect();
+        let resolution = median(rows.iter().map(|row| row.1));
+        return Peaks { of: rows.into_iter().flat_map(|row| row.0).collect(), resolution };
+    }
+    let rows: Vec<(Option<Peak>, f32)> = (0..lines.len())
+        .into_par_iter()
+        .map_init(Scratch::default, |scratch, row| {
+            let reach = vote(scratch, row);
+            (crowd(&mut scratch.votes).and_then(|t| place(row, t)), reach)
+        })
+        .collect();
+    let resolution = median(rows.iter().map(|row| row.1));
+    let mut of: Vec<Option<Peak>> = rows.into_iter().map(|row| row.0).collect();
+    if feasible.hides == Hides::One {
+        for _ in 0..REFINEMENTS {
+            of = refine(lines, &voters, &columns, &of);
+        }
+    }
+    Peaks { of, resolution }
+}
+
+/// One refinement: lines whose estimates are near a line and that pass near its estimate vote again.
+fn refine(
+    lines: &[FeasibleLine],
+    voters: &[u32],
+    columns: &LineColumns,
+    estimates: &[Option<Peak>],
+) -> Vec<Option<Peak>> {
+    let points = PointColumns::new(estimates, voters);
+    let step = |scratch: &mut Scratch, row: usize| {
+        let estimate = estimates[row]?;
+        points.distances_to_line(&lines[row], &mut scratch.distances);
+        scratch.silence(row, lines, voters);
+        nearest(&scratch.distances, REFINE, &mut scratch.keys, &mut scratch.near);
+        columns.distances_to_point(&estimate.position, &mut scratch.distances);
+        scratch.silence(row, lines, voters);
+        nearest(&scratch.distances, REFINE, &mut scratch.keys, &mut scratch.passing);
+        scratch.passing.sort_unstable();
+        let passes_too = |at: &u32| scratch.passing.binary_search(at).is_ok();
+        let both: Vec<u32> = scratch.near.iter().copied().filter(passes_too).collect();
+        let chosen = if both.len() > FEWEST { &both } else { &scratch.near };
+        let near = chosen.iter().map(|&at| &lines[voters[at as usize] as usize]);
+        passes(&lines[row], near, &mut scratch.votes);
+        crowd(&mut scratch.votes).and_then(|t| on(&lines[row], t)).or(Some(estimate))
+    };
+    (0..lines.len()).into_par_iter().map_init(Scratch::default, step).collect()
+}
+
+#[derive(Default)]
+struct Scratch {
+    distances: Vec<f32>,
+    keys: Vec<u64>,
+    near: Vec<u32>,
+    passing: Vec<u32>,
+    votes: Vec<f64>,
+}
+
+impl Scratch {
+    /// Takes the vote of the line itself, and of rays of its center.
+    fn silence(&mut self, row: usize, lines: &[FeasibleLine], voters: &[u32]) {
+        let own = lines[row].group;
+        if own.is_some() {
+            for (distance, &voter) in self.distances.iter_mut().zip(voters) {
+                if lines[voter as usize].group == own {
+                    *distance = f32::INFINITY;
+                }
+            }
+        } else if let Ok(at) = voters.binary_search(&(row as u32)) {
+            self.distances[at] = f32::INFINITY;
+        }
+    }
+}
+
+/// The parameters at which `line` is passed most closely by each of `others`; parallel ones do not tell.
+fn passes<'a>(
+    line: &FeasibleLine,
+    others: impl Iterator<Item = &'a FeasibleLine>,
+    out: &mut Vec<f64>,
+) {
+    out.clear();
+    for other in others {
+        let (mut along, mut own, mut cosine) = (0.0f64, 0.0f64, 0.0f64);
+        for c in 0..3 {
+            let away = f64::from(line.through[c]) - f64::from(other.through[c]);
+            let (d, e) = (f64::from(line.direction[c]), f64::from(other.direction[c]));
+            own += away * d;
+            along += away * e;
+            cosine += d * e;
+        }
+        let square_sine = 1.0 - cosine * cosine;
+        let t = (cosine * along - own) / square_sine;
+        if square_sine > 1e-6 && t > f64::from(line.from) {
+            out.push(t);
+        }
+    }
+}
+
+fn on(line: &FeasibleLine, t: f64) -> Option<Peak> {
+    let position = std::array::from_fn(|c| {
+        (f64::from(line.through[c]) + t * f64::from(line.direction[c])) as f32
+    });
+    let finite = position.iter().all(|x: &f32| x.is_finite());
+    finite.then_some(Peak { position, axis: 0, evidence: 0.0 })
+}
+
+fn median(values: impl Iterator<Item = f32>) -> f64 {
+    let mut values: Vec<f64> = values.map(f64::from).filter(|x| x.is_finite()).collect();
+    if values.is_empty() { 0.0 } else { crate::geometry::vector::median(&mut values) }
+}
+
+// Where votes along a line crowd: rules and constants of the published programs.
+
+/// Votes left out at either end before anything is counted.
+const CUT: usize = 5;
+/// Bins of the histogram of votes.
+const BINS: usize = 500;
+/// The crowd begins within this share of the range.
+const BEGINS_WITHIN: f64 = 0.9;
+/// A crowd is narrowed down while the votes differ from even ones by more than this (Kuiper's
+/// statistic), and while more than [`CUT`] are left.
+const EVEN: f64 = 0.3;
+
+/// The middle of the crowd that `votes` (reordered) form, by Chelani et al.: where the cumulative votes
+/// rise most above even ones, again and again. `None` without votes.
+pub(super) fn crowd(votes: &mut [f64]) -> Option<f64> {
+    votes.sort_unstable_by(f64::total_cmp);
+    let all: &[f64] = votes;
+    let mut left = if all.len() > 2 * CUT { &all[CUT..all.len() - CUT] } else { all };
+    while left.len() > CUT {
+        let (low, width) = (left[0], (left[left.len() - 1] - left[0]) / BINS as f64);
+        if width <= 0.0 {
+            break;
+        }
+        let mut counts = [0usize; BINS];
+        for &vote in left {
+            counts[(((vote - low) / width) as usize).min(BINS - 1)] += 1;
+        }
+        let mut excess = [0.0; BINS];
+        let mut sum = 0;
+        for bin in 0..BINS {
+            sum += counts[bin];
+            excess[bin] = sum as f64 / left.len() as f64 - (bin + 1) as f64 / BINS as f64;
+        }
+        let most_begin = (BEGINS_WITHIN * BINS as f64) as usize;
+        let begin = first_extreme(&excess[..most_begin], |a, b| a < b);
+        let end = begin + first_extreme(&excess[begin..], |a, b| a > b);
+        let kuiper = excess[end] - excess[begin];
+        let edge = |bin: usize| low + (bin + 1) as f64 * width;
+        let inside = left.partition_point(|&vote| vote <= edge(begin))
+            ..left.partition_point(|&vote| vote < edge(end));
+        // Nothing left out means nothing more to narrow down.
+        if inside.len() == left.len() {
+            break;
+        }
+        left = left.get(inside).unwrap_or(&[]);
+        if kuiper <= EVEN {
+            break;
+        }
+    }
+    let middle = if left.is_empty() { all } else { left };
+    middle.get(middle.len().saturating_sub(1) / 2).copied()
+}
+
+fn first_extreme(values: &[f64], beats: impl Fn(f64, f64) -> bool) -> usize {
+    let mut found = 0;
+    for (at, &value) in values.iter().enumerate() {
+        if beats(value, values[found]) {
+            found = at;
+        }
+    }
+    found
+}
+
+/// The kernel's standard deviation, in standard deviations of the votes.
+const BANDWIDTH: f64 = 0.07;
+/// Places at which the density of votes is evaluated. (10,000 as published; the kernel spans many of these.)
+const PLACES: usize = 1024;
+/// Share of the votes left out at either end: lines nearly parallel vote anywhere. (The published range
+/// comes from distances between true points.)
+const FAR: f64 = 0.01;
+
+/// The two highest peaks of the density of `votes` (reordered), in ascending order, by Lee et al.; twice
+/// the same if there is one peak. `None` without votes.
+pub(super) fn two_crowds(votes: &mut [f64]) -> Option<[f64; 2]> {
+    votes.sort_unstable_by(f64::total_cmp);
+    let cut = (FAR * votes.len() as f64).ceil() as usize;
+    let kept = votes.get(cut..votes.len().saturating_sub(cut)).filter(|kept| !kept.is_empty());
+    let kept = kept.unwrap_or(votes);
+    let (&low, &high) = (kept.first()?, kept.last()?);
+    let n = kept.len() as f64;
+    let mean = kept.iter().sum::<f64>() / n;
+    let deviation = (kept.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / n).sqrt();
+    let step = (high - low) / PLACES as f64;
+    if step <= 0.0 || deviation <= 0.0 {
+        return Some([mean; 2]);
+    }
+    let mut counts = vec![0.0f64; PLACES];
+    for &vote in kept {
+        counts[(((vote - low) / step) as usize).min(PLACES - 1)] += 1.0;
+    }
+    let sigma = BANDWIDTH * deviation / step;
+    let reach = (4.0 * sigma).ceil() as usize;
+    let kernel: Vec<f64> =
+        (0..=reach).map(|x| libm::exp(-0.5 * (x as f64 / sigma) * (x as f64 / sigma))).collect();
+    let mut density = vec![0.0f64; PLACES];
+    for (at, &count) in counts.iter().enumerate().filter(|(_, count)| **count > 0.0) {
+        for place in at.saturating_sub(reach)..(at + reach + 1).min(PLACES) {
+            density[place] += count * kernel[place.abs_diff(at)];
+        }
+    }
+    let height = |at: Option<usize>| at.and_then(|at| density.get(at)).copied().unwrap_or(0.0);
+    let mut peaks: Vec<usize> = (0..PLACES)
+        .filter(|&at| {
+            density[at] > height(at.checked_sub(1)) && density[at] >= height(Some(at + 1))
+        })
+        .collect();
+    peaks.sort_by(|&a, &b| density[b].total_cmp(&density[a]));
+    let place = |at: usize| low + (at as f64 + 0.5) * step;
+    let (&first, second) = (peaks.first()?, peaks.get(1).or(peaks.first())?);
+    let pair = [place(first), place(*second)];
+    Some([pair[0].min(pair[1]), pair[0].max(pair[1])])
+}
+
+// Distances from one line or point to all lines: the hot loops of the published attacks.
+
+/// Lines with a column per coordinate, so that distances to all of them run over whole vectors.
+#[derive(Debug)]
+pub(super) struct LineColumns {
+    through: [Vec<f32>; 3],
+    direction: [Vec<f32>; 3],
+}
+
+impl LineColumns {
+    /// The lines `rows` of `lines`.
+    pub(super) fn new(lines: &[FeasibleLine], rows: &[u32]) -> Self {
+        let column = |of: &dyn Fn(&FeasibleLine) -> f32| -> Vec<f32> {
+            rows.iter().map(|&row| of(&lines[row as usize])).collect()
+        };
+        Self {
+            through: std::array::from_fn(|c| column(&|line| line.through[c])),
+            direction: std::array::from_fn(|c| column(&|line| line.direction[c])),
+        }
+    }
+
+    /// Squared distances between `line` and every line; infinite for parallel ones.
+    pub(super) fn distances_to_line(&self, line: &FeasibleLine, out: &mut Vec<f32>) {
+        out.resize(self.through[0].len(), 0.0);
+        dispatch(LineToLines { columns: self, line, out });
+    }
+
+    /// Squared distances from `point` to every line.
+    pub(super) fn distances_to_point(&self, point: &[f32; 3], out: &mut Vec<f32>) {
+        out.resize(self.through[0].len(), 0.0);
+        dispatch(PointToLines { columns: self, point, out });
+    }
+}
+
+/// Estimates with a column per coordinate; NaN where there is none.
+#[derive(Debug)]
+pub(super) struct PointColumns {
+    position: [Vec<f32>; 3],
+}
+
+impl PointColumns {
+    /// The rows `rows` of `estimates`.
+    pub(super) fn new(estimates: &[Option<Peak>], rows: &[u32]) -> Self {
+        let at = |row: u32, c: usize| estimates[row as usize].map_or(f32::NAN, |p| p.position[c]);
+        Self { position: std::array::from_fn(|c| rows.iter().map(|&row| at(row, c)).collect()) }
+    }
+
+    /// Squared distances from `line` to every estimate; infinite where there is none.
+    pub(super) fn distances_to_line(&self, line: &FeasibleLine, out: &mut Vec<f32>) {
+        out.resize(self.position[0].len(), 0.0);
+        dispatch(LineToPoints { columns: self, line, out });
+    }
+}
+
+struct LineToLines<'a> {
+    columns: &'a LineColumns,
+    line: &'a FeasibleLine,
+    out: &'a mut [f32],
+}
+
+impl Kernel for LineToLines<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let (p, d, n) = (self.line.through, self.line.direction, self.out.len());
+        let through: [&[f32]; 3] = std::array::from_fn(|c| &self.columns.through[c][..n]);
+        let direction: [&[f32]; 3] = std::array::from_fn(|c| &self.columns.direction[c][..n]);
+        for j in 0..n {
+            let e = [direction[0][j], direction[1][j], direction[2][j]];
+            let normal =
+                [d[1] * e[2] - d[2] * e[1], d[2] * e[0] - d[0] * e[2], d[0] * e[1] - d[1] * e[0]];
+            let (mut across, mut square) = (0.0, 0.0);
+            for c in 0..3 {
+                across += (through[c][j] - p[c]) * normal[c];
+                square += normal[c] * normal[c];
+            }
+            let parallel = square < 1e-6;
+            self.out[j] = if parallel { f32::INFINITY } else { across * across / square };
+        }
+    }
+}
+
+struct PointToLines<'a> {
+    columns: &'a LineColumns,
+    point: &'a [f32; 3],
+    out: &'a mut [f32],
+}
+
+impl Kernel for PointToLines<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let n = self.out.len();
+        let through: [&[f32]; 3] = std::array::from_fn(|c| &self.columns.through[c][..n]);
+        let direction: [&[f32]; 3] = std::array::from_fn(|c| &self.columns.direction[c][..n]);
+        for j in 0..n {
+            let away: [f32; 3] = std::array::from_fn(|c| self.point[c] - through[c][j]);
+            let d = [direction[0][j], direction[1][j], direction[2][j]];
+            self.out[j] = square_across(&away, &d);
+        }
+    }
+}
+
+struct LineToPoints<'a> {
+    columns: &'a PointColumns,
+    line: &'a FeasibleLine,
+    out: &'a mut [f32],
+}
+
+impl Kernel for LineToPoints<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let (p, d, n) = (self.line.through, self.line.direction, self.out.len());
+        let position: [&[f32]; 3] = std::array::from_fn(|c| &self.columns.position[c][..n]);
+        for (j, out) in self.out.iter_mut().enumerate() {
+            let away: [f32; 3] = std::array::from_fn(|c| position[c][j] - p[c]);
+            let square = square_across(&away, &d);
+            *out = if square.is_nan() { f32::INFINITY } else { square };
+        }
+    }
+}
+
+/// The squared length of the part of `v` perpendicular to `d`: no difference of large squares.
+#[inline(always)]
+fn square_across(v: &[f32; 3], d: &[f32; 3]) -> f32 {
+    let along = v[0] * d[0] + v[1] * d[1] + v[2] * d[2];
+    let mut square = 0.0;
+    for c in 0..3 {
+        let across = v[c] - along * d[c];
+        square += across * across;
+    }
+    square
+}
+
+/// The places of the `k` smallest finite distances (ties by place) into `near`, in no order; returns
+/// the largest of them, not squared.
+pub(super) fn nearest(squared: &[f32], k: usize, keys: &mut Vec<u64>, near: &mut Vec<u32>) -> f32 {
+    keys.clear();
+    // Distances are not negative, so their bits order as they do.
+    let key = |(at, d): (usize, &f32)| u64::from(d.to_bits()) << 32 | at as u64;
+    keys.extend(squared.iter().enumerate().filter(|(_, d)| d.is_finite()).map(key));
+    if keys.len() > k {
+        keys.select_nth_unstable(k - 1);
+        keys.truncate(k);
+    }
+    near.clear();
+    near.extend(keys.iter().map(|&key| key as u32));
+    keys.iter().max().map_or(f32::INFINITY, |&key| f32::from_bits((key >> 32) as u32).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::seed::{Draws, Stage};
+
+    fn votes(crowds: &[(f64, usize)], strays: usize) -> Vec<f64> {
+        let mut draws = Draws::new(8, Stage::Synthetic, 0);
+        let mut votes: Vec<f64> = (0..strays).map(|_| draws.between(-10.0, 10.0)).collect();
+        for &(middle, n) in crowds {
+            votes.extend((0..n).map(|_| middle + 0.1 * draws.normal()));
+        }
+        votes
+    }
+
+    #[test]
+    fn one_crowd_is_found_among_strays() {
+        let t = crowd(&mut votes(&[(3.0, 150)], 350)).unwrap();
+        assert!((t - 3.0).abs() < 0.1, "{t}");
+        assert_eq!(crowd(&mut []), None);
+        assert_eq!(crowd(&mut [2.0]), Some(2.0));
+        assert_eq!(crowd(&mut [2.0; 40]), Some(2.0));
+    }
+
+    #[test]
+    fn two_crowds_are_found_among_strays() {
+        let [a, b] = two_crowds(&mut votes(&[(4.0, 200), (-2.0, 300)], 500)).unwrap();
+        assert!((a + 2.0).abs() < 0.2 && (b - 4.0).abs() < 0.2, "{a} {b}");
+        assert_eq!(two_crowds(&mut []), None);
+        assert_eq!(two_crowds(&mut [2.0; 9]), Some([2.0; 2]));
+    }
+}
+
+#[cfg(test)]
+mod columns_tests {
+    use super::*;
+    use crate::seed::{Draws, Stage};
+    use crate::simd::portable;
+
+    fn lines(n: usize) -> Vec<FeasibleLine> {
+        let mut draws = Draws::new(4, Stage::Synthetic, 0);
+        let line = |_| FeasibleLine {
+            through: std::array::from_fn(|_| draws.between(-3.0, 3.0) as f32),
+            direction: draws.direction::<3>().map(|x| x as f32),
+            from: f32::NEG_INFINITY,
+            prior: 1.0,
+            group: None,
+        };
+        (0..n).map(line).collect()
+    }
+
+    #[test]
+    fn distances_between_lines_are_the_least_over_their_points() {
+        let lines = lines(40);
+        let rows: Vec<u32> = (0..40).collect();
+        let columns = LineColumns::new(&lines, &rows);
+        let mut out = Vec::new();
+        columns.distances_to_line(&lines[0], &mut out);
+        assert_eq!(out[0], f32::INFINITY);
+        for (other, &squared) in lines.iter().zip(&out).skip(1) {
+            // The nearest point of the first line, by golden steps of a convex function.
+            let mut to_point = vec![0.0];
+            let single = LineColumns::new(&[*other], &[0]);
+            let mut at = |t: f32| {
+                let point: [f32; 3] =
+                    std::array::from_fn(|c| lines[0].through[c] + t * lines[0].direction[c]);
+                single.distances_to_point(&point, &mut to_point);
+                to_point[0]
+            };
+            let (mut low, mut high) = (-1e3f32, 1e3f32);
+            for _ in 0..100 {
+                let (a, b) = (low + 0.382 * (high - low), low + 0.618 * (high - low));
+                if at(a) < at(b) { high = b } else { low = a }
+            }
+            let least = at(0.5 * (low + high));
+            assert!((least.sqrt() - squared.sqrt()).abs() < 2e-3, "{least} {squared}");
+        }
+    }
+
+    #[test]
+    fn vector_and_portable_code_give_the_same_bits() {
+        let lines = lines(101);
+        let rows: Vec<u32> = (0..101).collect();
+        let columns = LineColumns::new(&lines, &rows);
+        let (mut fast, mut plain) = (Vec::new(), vec![0.0; 101]);
+        columns.distances_to_line(&lines[7], &mut fast);
+        portable(LineToLines { columns: &columns, line: &lines[7], out: &mut plain });
+        assert_eq!(fast, plain);
+        let point = [0.3, -0.2, 1.0];
+        columns.distances_to_point(&point, &mut fast);
+        portable(PointToLines { columns: &columns, point: &point, out: &mut plain });
+        assert_eq!(fast, plain);
+    }
+
+    #[test]
+    fn nearest_takes_the_smallest_and_counts_ties_by_place() {
+        let (mut keys, mut near) = (Vec::new(), Vec::new());
+        let squared = [4.0, f32::INFINITY, 1.0, 4.0, 0.0];
+        assert_eq!(nearest(&squared, 3, &mut keys, &mut near), 2.0);
+        near.sort_unstable();
+        assert_eq!(near, [0, 2, 4]);
+        assert_eq!(nearest(&[], 3, &mut keys, &mut near), f32::INFINITY);
+    }
+}
