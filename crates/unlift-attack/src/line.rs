@@ -8,7 +8,7 @@ use std::fmt::{self, Display, Write};
 /// or clears the screen, a mark that turns the direction of what follows. Text that was escaped stays as it is.
 ///
 /// ```
-/// # use unlift::OneLine;
+/// # use unlift_attack::OneLine;
 /// assert_eq!(OneLine("a\u{1b}[2J\u{202e}gpj.ü\n").to_string(), r"a\u{1b}[2J\u{202e}gpj.ü\n");
 /// ```
 #[derive(Clone, Copy, Debug)]

@@ -281,13 +281,19 @@ fn of_poses(names: &[&[u8]]) -> Option<String> {
 
 const POSES: &str = "a trajectory, poses of cameras";
 
-/// Whether the first row has three columns, as one of COLMAP's points never has.
+/// Whether the first row is three coordinates, and no row of COLMAP's points that is cut off after its id and two coordinates.
 ///
 /// # Errors
 /// When the file cannot be read.
 pub(super) fn has_three_columns(path: &Path) -> Result<bool, Error> {
     let mut lines = Lines::open(path)?;
-    Ok(lines.advance_to_data()? && Separator::of(lines.line()).split(lines.line()).len() == 3)
+    if !lines.advance_to_data()? {
+        return Ok(false);
+    }
+    let separator = Separator::of(lines.line());
+    let fields = separator.split(lines.line());
+    let begins_with_id = separator == Separator::Space && number::<u64>(fields[0]).is_some();
+    Ok(fields.len() == 3 && !begins_with_id)
 }
 
 /// Whether a comment names the columns of COLMAP's points.
