@@ -2,7 +2,7 @@
 //! `transforms.json`. A file is read as it comes: only points and poses are kept.
 
 use std::fmt;
-use std::io::{self, BufReader, Read};
+use std::io::{self, BufRead, BufReader, Read};
 use std::marker::PhantomData;
 use std::path::{Component, Path, PathBuf};
 
@@ -79,7 +79,7 @@ struct Strict<R> {
     is_escaped: bool,
 }
 
-impl<R: Read> Strict<R> {
+impl<R: BufRead> Strict<R> {
     fn new(from: R) -> Self {
         Self { bytes: from.bytes(), ahead: Vec::new(), in_text: false, is_escaped: false }
     }
@@ -118,7 +118,7 @@ impl<R: Read> Strict<R> {
     }
 }
 
-impl<R: Read> Read for Strict<R> {
+impl<R: BufRead> Read for Strict<R> {
     fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
         for (at, place) in to.iter_mut().enumerate() {
             match self.next()? {
