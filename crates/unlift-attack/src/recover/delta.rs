@@ -8,9 +8,9 @@
 
 use crate::neighbors::Neighborhoods;
 use crate::recover::consensus;
-use crate::recover::map::chance::trimmed;
 use crate::recover::map::family::{Family, Settings};
 use crate::recover::map::lists::{CHUNK, Lists, Picked, Slots};
+use crate::recover::map::places::trimmed;
 use crate::released::{Obfuscation, Released};
 use crate::seed::{Draws, Stage};
 

@@ -7,8 +7,8 @@
 //! 3. Solvers: `consensus` and `joint`; `ransac` and `published_density` are attacks as published, for comparison.
 //! 4. `delta`: the distance that decides support, chosen by how well consensus then does.
 //! 5. `exact`: coordinates that a rule of the scheme fixes. `confidence`: how sure the attacker is.
-//! 6. `problem`: a released map with its lists, solved and finished. `model`: consensus in parts, where each part has its own lists
-//!    alone. `records_alone`: attacks without neighborhoods.
+//! 6. `problem`: a released map with its lists, solved and finished, at once or in parts by consensus. `model`: what parts must know of the
+//!    whole map. `records_alone`: attacks without neighborhoods.
 //!
 //! [`recover`] is the whole attack. [`prepare`] learns a [`Model`], with which parts of a map are solved elsewhere.
 
@@ -30,8 +30,9 @@ mod result;
 pub use confidence::crowd::{Cues, Seen};
 #[doc(hidden)]
 pub use confidence::{N_KINDS, N_TERMS, centered, terms};
-pub use model::{Model, Part};
+pub use model::Model;
 pub use options::{Delta, RecoverOptions, Solver};
+pub use problem::Part;
 pub use records_alone::records_alone;
 pub use result::{Confidence, Estimate, Recovered, Status, TrialHistogram, Unknown};
 

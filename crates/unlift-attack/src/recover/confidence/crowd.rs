@@ -172,25 +172,25 @@ pub struct Cues {
     pub ln_record_excess: f32,
     /// How far the middle of the crowd is off the estimate along its piece, per radius of the crowd.
     pub off_along: f32,
-    /// The same across it.
+    /// How far the middle of the crowd is off the estimate across its piece, per radius of the crowd.
     pub off_across: f32,
     /// The mean of `evidence` over the members of the crowd.
     pub of_members: f32,
     /// The logarithm of how much sparser estimates are than at a typical place.
     pub sparsity: f32,
-    /// Of the map: the mean of `evidence`.
+    /// The mean of `evidence` over all slots of the map.
     pub map_evidence: f32,
-    /// Of the map: the logarithm of the share of entries that are in crowds beyond chance.
+    /// The logarithm of the share of all entries of the map that are in crowds beyond chance.
     pub map_share: f32,
-    /// Of the map: the logarithm of the share of entries whose records pass beyond chance.
+    /// The logarithm of the share of all entries of the map whose records pass beyond chance.
     pub map_record_share: f32,
-    /// Of the map: the logarithm of the typical radius of crowds per delta.
+    /// The logarithm of the typical radius of crowds in the map, per delta.
     pub map_ln_radius_per_delta: f32,
     /// The logarithm of the number of listed records that may vote.
     pub ln_listed: f32,
     /// The share of the crowd's members whose records may vote.
     pub voting_share: f32,
-    /// Of the map: the mean of `voting_share`.
+    /// The mean of `voting_share` over all slots of the map.
     pub map_voting_share: f32,
     /// 1 where an exact constraint moved the estimate, 0 elsewhere.
     pub is_settled: f32,
@@ -198,7 +198,7 @@ pub struct Cues {
     pub settled_by: f32,
     /// The logarithm of how many more members the slot lists than list it.
     pub one_sided: f32,
-    /// Of the map: the mean of `one_sided` without its sign.
+    /// The mean of `one_sided`, without its sign, over all slots of the map.
     pub map_one_sided: f32,
 }
 
@@ -250,7 +250,7 @@ impl Seen {
 pub(crate) struct Solved<'a, const D: usize> {
     /// Per slot.
     pub(crate) estimates: &'a [Estimate<D>],
-    /// The same before exact constraints moved them.
+    /// The estimates per slot before exact constraints moved them.
     pub(crate) unsettled: &'a [Estimate<D>],
     /// The distance that decided support.
     pub(crate) delta: f32,

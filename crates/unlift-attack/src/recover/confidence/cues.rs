@@ -8,9 +8,9 @@
 use rayon::prelude::*;
 
 use crate::recover::confidence::crowd::{Crowd, Cues, Solved, Tally};
-use crate::recover::map::chance::evidence;
 use crate::recover::map::graph::{Graph, Side, either, record_of, side};
 use crate::recover::map::grid::Density;
+use crate::recover::map::lines::evidence;
 use crate::recover::map::pieces::Pieces;
 use crate::recover::map::places::{Places, along_curve, distance2};
 use crate::recover::result::{Estimate, Status};

@@ -9,8 +9,8 @@
 
 use rayon::prelude::*;
 
-use crate::recover::map::chance::evidence;
 use crate::recover::map::lines::LineRow;
+use crate::recover::map::lines::evidence;
 use crate::recover::map::lists::{Lists, Slots, solve_chunks};
 use crate::recover::result::{Estimate, Status, stored_support};
 

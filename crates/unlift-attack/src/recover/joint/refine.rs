@@ -1,7 +1,7 @@
 //! A place made anew: least squares to the records of the neighbors found near it.
 
 use crate::recover::joint::votes::Columns;
-use crate::recover::map::chance::{LANES, Lanes};
+use crate::recover::map::lines::{LANES, Lanes};
 use crate::recover::map::pieces::{Piece, Pieces};
 use crate::recover::map::places::Places;
 

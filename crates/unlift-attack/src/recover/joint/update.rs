@@ -3,9 +3,9 @@
 use crate::recover::joint::neighbor_distribution::NeighborDistribution;
 use crate::recover::joint::refine::{Directions, refined};
 use crate::recover::joint::votes::{Columns, Ends, Odds};
-use crate::recover::map::chance::ln;
 use crate::recover::map::graph::{CLASSES, Graph, either, record_of};
 use crate::recover::map::grid::Density;
+use crate::recover::map::lines::ln;
 use crate::recover::map::pieces::{Piece, Pieces};
 use crate::recover::map::places::{Places, distance2};
 use crate::recover::result::{Estimate, Status, stored_support};

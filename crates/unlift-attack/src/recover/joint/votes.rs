@@ -1,7 +1,7 @@
 //! Columns of neighbors' estimates, and how likely they are about a place.
 
-use crate::recover::map::chance::{LANES, Lanes, ln};
 use crate::recover::map::graph::{CLASSES, Side, either, side};
+use crate::recover::map::lines::{LANES, Lanes, ln};
 use crate::recover::map::pieces::Piece;
 use crate::recover::map::places::{FAR, Places, distance2};
 

@@ -13,7 +13,8 @@ use crate::geometry::vector::{along, dot, median, sub, widen};
 use crate::neighbors::Neighborhoods;
 use crate::recover::map::bytes::{Reader, Writer};
 use crate::recover::map::grid::Grid;
-use crate::recover::map::lines::LineRow;
+use crate::recover::map::lines::{LineRow, MOST_CHANCE};
+use crate::recover::map::places::trimmed;
 use crate::simd::{Kernel, dispatch};
 
 /// Cells of a grid at most: 32 per axis, as density varies over the size of a room.
@@ -22,8 +23,6 @@ const CELLS: usize = 1 << 15;
 const RECORDS: usize = 1 << 15;
 /// Slots whose crossings with listed records tell where the map lies: enough for a quantile of 3 %.
 const CROSSINGS: usize = 1 << 12;
-/// The share of crossings left out on either side of the box: those of wrong entries may lie anywhere.
-const TRIM: f64 = 0.03;
 /// Every place has at least this share of the mean density: where no record was counted one vote would prove all.
 const FLOOR: f32 = 0.05;
 /// A map is flat if neighborhoods are more than so many times as wide as it is thin.
@@ -222,19 +221,6 @@ fn box_of_crossings<const D: usize>(
     (ends.map(|e| e.0), ends.map(|e| e.1))
 }
 
-/// The range of a column without its ends, widened a little.
-pub(crate) fn trimmed(column: &mut [f32]) -> (f32, f32) {
-    if column.is_empty() {
-        return (0.0, 0.0);
-    }
-    let last = column.len() - 1;
-    let cut = (last as f64 * TRIM) as usize;
-    let mut at = |rank: usize| *column.select_nth_unstable_by(rank, f32::total_cmp).1;
-    let (low, high) = (at(cut), at(last - cut));
-    let margin = 0.1 * (high - low);
-    (low - margin, high + margin)
-}
-
 /// One field for axis candidates: the density of the records' lines along all axes.
 pub(crate) fn of_candidates<const D: usize>(
     rows: &[[f32; D]],
@@ -350,47 +336,6 @@ impl<const D: usize> CandidateField<D> {
     }
 }
 
-// How improbable an agreement is by chance (the evidence that decides between positions).
-//
-// Of `k` listed records `n` support a position, while a random one does with chance `p`. A wrong
-// position gets Bin(k, p) votes. The evidence is the Chernoff bound on the tail, `k KL(n/k || p)` nats:
-// it orders as the tail does, and has no branches.
-
-/// The chance that a random record agrees is taken for at most this: beyond, a density is no probability.
-pub(crate) const MOST_CHANCE: f32 = 0.5;
-
-/// Evidence in nats that `n` of `k` listed records agree where a random one does with probability
-/// `p`, above 0 and below 1; 0 when chance alone would give as many.
-#[inline(always)]
-pub(crate) fn evidence(n: f32, k: f32, p: f32) -> f32 {
-    let missed = k - n;
-    // The logarithm of 0 is some number here, and counts for nothing.
-    let evidence = n * (ln(n) - ln(k * p)) + missed * (ln(missed) - ln(k * (1.0 - p)));
-    // Just above chance the two terms cancel up to rounding.
-    if n <= p * k { 0.0 } else { evidence.max(0.0) }
-}
-
-// Whole vectors at a time: what the hot loops share.
-
-/// Columns are padded to a multiple of this many entries that do not vote, so that every loop runs
-/// over whole vectors, with the same order of additions whatever the machine.
-pub(crate) const LANES: usize = 8;
-
-/// One vector.
-pub(crate) type Lanes = [f32; LANES];
-
-/// The logarithm of a positive number, to 2e-6: exponent plus a polynomial of the mantissa, without
-/// branches.
-#[inline(always)]
-pub(crate) fn ln(y: f32) -> f32 {
-    let bits = y.to_bits();
-    let exponent = (bits >> 23) as i32 - 127;
-    let m = f32::from_bits(bits & 0x007f_ffff | 0x3f80_0000) - 1.0;
-    // ln(1 + m) on [0, 1), zero at 0, fitted for the smallest largest error.
-    let p = m * (0.317_648_7 + m * (-0.193_760_2 + m * (0.085_569_24 - m * 0.018_338_63)));
-    exponent as f32 * std::f32::consts::LN_2 + m * (0.999_901_65 + m * (-0.497_875 + p))
-}
-
 // A length of the order of the map's size, from the records alone.
 
 /// Quartiles are those of parts far from one another where they are so many times as far apart as one part is wide.
@@ -474,7 +419,7 @@ pub(crate) fn ray_extent<const D: usize>(rows: &[LineRow<D>]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use crate::recover::map::lines::{MOST_CHANCE, evidence};
 
     /// ln P(X >= n) for X ~ Bin(k, p), by summation.
     fn ln_tail(n: usize, k: usize, p: f64) -> f64 {
@@ -526,7 +471,7 @@ mod tests {
 
 #[cfg(test)]
 mod lanes_tests {
-    use super::*;
+    use crate::recover::map::lines::ln;
 
     #[test]
     fn logarithm_is_near_the_exact_one() {

@@ -3,7 +3,6 @@
 use crate::RecordId;
 use crate::geometry::frame::Bounds;
 use crate::geometry::vector::{along, widen};
-use crate::recover::map::chance::{LANES, MOST_CHANCE, evidence, ln};
 use crate::released::{Lines, Rays};
 
 /// One line or ray: half a cache line, so that a neighbor costs one memory access.
@@ -463,6 +462,47 @@ impl AtStarts {
             column.resize(n, 0.0);
         }
     }
+}
+
+// How improbable an agreement is by chance (the evidence that decides between positions).
+//
+// Of `k` listed records `n` support a position, while a random one does with chance `p`. A wrong
+// position gets Bin(k, p) votes. The evidence is the Chernoff bound on the tail, `k KL(n/k || p)` nats:
+// it orders as the tail does, and has no branches.
+
+/// The chance that a random record agrees is taken for at most this: beyond, a density is no probability.
+pub(crate) const MOST_CHANCE: f32 = 0.5;
+
+/// Evidence in nats that `n` of `k` listed records agree where a random one does with probability
+/// `p`, above 0 and below 1; 0 when chance alone would give as many.
+#[inline(always)]
+pub(crate) fn evidence(n: f32, k: f32, p: f32) -> f32 {
+    let missed = k - n;
+    // The logarithm of 0 is some number here, and counts for nothing.
+    let evidence = n * (ln(n) - ln(k * p)) + missed * (ln(missed) - ln(k * (1.0 - p)));
+    // Just above chance the two terms cancel up to rounding.
+    if n <= p * k { 0.0 } else { evidence.max(0.0) }
+}
+
+// Whole vectors at a time: what the hot loops share.
+
+/// Columns are padded to a multiple of this many entries that do not vote, so that every loop runs
+/// over whole vectors, with the same order of additions whatever the machine.
+pub(crate) const LANES: usize = 8;
+
+/// One vector.
+pub(crate) type Lanes = [f32; LANES];
+
+/// The logarithm of a positive number, to 2e-6: exponent plus a polynomial of the mantissa, without
+/// branches.
+#[inline(always)]
+pub(crate) fn ln(y: f32) -> f32 {
+    let bits = y.to_bits();
+    let exponent = (bits >> 23) as i32 - 127;
+    let m = f32::from_bits(bits & 0x007f_ffff | 0x3f80_0000) - 1.0;
+    // ln(1 + m) on [0, 1), zero at 0, fitted for the smallest largest error.
+    let p = m * (0.317_648_7 + m * (-0.193_760_2 + m * (0.085_569_24 - m * 0.018_338_63)));
+    exponent as f32 * std::f32::consts::LN_2 + m * (0.999_901_65 + m * (-0.497_875 + p))
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
 //! Where a slot may lie, as flat pieces: all that joint recovery knows of a record family.
 
-use crate::recover::map::chance::{CandidateField, ChanceField, ln, tube};
+use crate::recover::map::chance::{CandidateField, ChanceField, tube};
 use crate::recover::map::family::Settings;
 use crate::recover::map::graph::record_of;
-use crate::recover::map::lines::LineRow;
+use crate::recover::map::lines::{LineRow, ln};
 use crate::recover::map::planes::SortedPlanes;
 use crate::released::AxisPlanes;
 use crate::simd::prefetch;

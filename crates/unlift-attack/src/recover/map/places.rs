@@ -3,7 +3,6 @@
 use rayon::prelude::*;
 
 use crate::geometry::curve;
-use crate::recover::map::chance::trimmed;
 use crate::recover::result::{Estimate, Status};
 use crate::simd::prefetch;
 
@@ -99,6 +98,22 @@ impl<const D: usize> Places<D> {
         }
         (one, end as usize)
     }
+}
+
+/// The share of values left out at either end of a range: those of wrong entries may lie anywhere.
+const TRIM: f64 = 0.03;
+
+/// The range of a column without its ends, widened a little.
+pub(crate) fn trimmed(column: &mut [f32]) -> (f32, f32) {
+    if column.is_empty() {
+        return (0.0, 0.0);
+    }
+    let last = column.len() - 1;
+    let cut = (last as f64 * TRIM) as usize;
+    let mut at = |rank: usize| *column.select_nth_unstable_by(rank, f32::total_cmp).1;
+    let (low, high) = (at(cut), at(last - cut));
+    let margin = 0.1 * (high - low);
+    (low - margin, high + margin)
 }
 
 /// The squared distance.

@@ -2,7 +2,8 @@
 
 use crate::RecordId;
 use crate::geometry::vector::median;
-use crate::recover::map::chance::{are_in_parts, evidence, interquartile_range, ln};
+use crate::recover::map::chance::{are_in_parts, interquartile_range};
+use crate::recover::map::lines::{evidence, ln};
 use crate::released::AxisPlanes;
 
 /// The planes of each axis in order of their offsets.
