@@ -1,7 +1,7 @@
 //! Recovery from records and lists that nobody made: whatever is accepted comes out finite or lost with a reason.
 
 use unlift::neighbors::Neighborhoods;
-use unlift::recover::{Delta, RecoverOptions, Solver, Status, recover};
+use unlift::recover::{Builtin, Delta, RecoverOptions, Status, recover};
 use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
 use unlift::{About, Error, ListsBy, RecordId, Unit};
 
@@ -23,12 +23,12 @@ fn of<const D: usize>(bytes: &mut Bytes<'_>) {
         _ => Delta::Auto,
     };
     let options = RecoverOptions {
-        solver: Solver::ALL[usize::from(solver) % Solver::ALL.len()],
         delta,
         exact_constraints: bytes.byte().is_multiple_of(2),
         ..RecoverOptions::default()
     };
-    let Ok(recovered) = recover(&released, &lists, &options) else { return };
+    let solver = Builtin::ALL[usize::from(solver) % Builtin::ALL.len()];
+    let Ok(recovered) = recover(&released, &lists, &solver, &options) else { return };
     assert_eq!(recovered.n_slots(), released.n_slots());
     assert!(recovered.delta().is_finite() && recovered.delta() >= 0.0);
     assert!(recovered.evidence().iter().all(|x| x.is_finite()));

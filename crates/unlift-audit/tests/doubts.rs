@@ -1,11 +1,13 @@
 //! Audits that would hold their gates because the attack was not at its best, or the truth was that of something else.
 
+use std::sync::Arc;
+
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use unlift::audit::{Plan, Threshold};
 use unlift::obfuscate::{SchemeOptions, obfuscate, scheme};
-use unlift::recover::{Delta, Solver};
+use unlift::recover::{Builtin, Delta};
 use unlift::released::Released;
 use unlift::seed::Key;
 use unlift::truth::{Original, Secret};
@@ -31,7 +33,7 @@ fn plan(names: &[&str]) -> Plan<3> {
         schemes: usual.schemes.iter().filter(|s| is_asked(s.name())).cloned().collect(),
         inlier_ratios: vec![0.5],
         k: 20,
-        solvers: vec![Solver::Joint],
+        solvers: vec![Arc::new(Builtin::Joint)],
         records_alone: false,
         ..usual
     }

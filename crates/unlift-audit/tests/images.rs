@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use unlift::audit::Plan;
 use unlift::descriptors::Values;
-use unlift::recover::Solver;
+use unlift::recover::Builtin;
 use unlift::{Descriptors, Unit};
 use unlift_audit::images::audit::{ImagesJob, Used, find, perform};
 use unlift_audit::images::{FeatureSource, InMemory};
@@ -39,7 +39,12 @@ fn job<'a>(source: &'a FeatureSource, path: &'a Path) -> ImagesJob<'a> {
         source,
         path,
         chosen: (0..source.names().len()).collect(),
-        plan: Plan { inlier_ratios: vec![0.5], k: 10, solvers: vec![Solver::Consensus], ..usual },
+        plan: Plan {
+            inlier_ratios: vec![0.5],
+            k: 10,
+            solvers: vec![Arc::new(Builtin::Consensus)],
+            ..usual
+        },
         options: serde_json::Map::new(),
         gates: Vec::new(),
         show: None,

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use unlift::audit::{Cell, Counts, Image, Measure, Plan, Silent, run_images};
 use unlift::geometry::frame::Bounds;
-use unlift::recover::Solver;
+use unlift::recover::Builtin;
 use unlift::truth::Original;
 use unlift::{Error, PointSet, Unit};
 use unlift_audit::{Error as AuditError, Finished, Job, Preparation, Quiet, Shown};
@@ -42,7 +42,7 @@ fn audit(folder: &Path, factor: f64) -> Result<Finished, AuditError> {
         schemes: usual.schemes.iter().filter(|s| s.name() == "cp").cloned().collect(),
         inlier_ratios: vec![1.0, 0.1],
         k: 10,
-        solvers: vec![Solver::Joint, Solver::Ransac],
+        solvers: vec![Arc::new(Builtin::Joint), Arc::new(Builtin::Ransac)],
         measures: vec![Arc::new(Found { factor })],
         ..usual
     };
@@ -106,7 +106,7 @@ fn size(counts: Counts, images: &[(&str, usize)]) -> Option<f64> {
         schemes: usual.schemes.iter().filter(|s| s.name() == "cp2d").cloned().collect(),
         inlier_ratios: vec![1.0],
         k: 5,
-        solvers: vec![Solver::Consensus],
+        solvers: vec![Arc::new(Builtin::Consensus)],
         measures: vec![Arc::new(Size(counts))],
         ..usual
     };

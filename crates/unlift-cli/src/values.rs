@@ -7,7 +7,7 @@ use unlift::audit::Threshold;
 use unlift::neighbors::oracle::Noise;
 use unlift::neighbors::sources::Named;
 use unlift::obfuscate::{Entry, SCHEMES};
-use unlift::recover::{Delta, Solver};
+use unlift::recover::{Builtin, Delta};
 use unlift_audit::{OutlierFilter, sources};
 use unlift_nn::DescriptorKind;
 
@@ -122,9 +122,9 @@ pub fn image_scheme(text: &str) -> Result<&'static Entry, String> {
 
 /// A solver for images by its name: one that recovers from lists. In the plane all lines meet, so
 /// records alone tell nothing.
-pub fn image_solver(text: &str) -> Result<Solver, String> {
-    let names = || Solver::FROM_LISTS.map(|solver| solver.name()).join(", ");
-    let found = Solver::FROM_LISTS.into_iter().find(|solver| solver.name() == text);
+pub fn image_solver(text: &str) -> Result<Builtin, String> {
+    let names = || Builtin::FROM_LISTS.map(|solver| solver.name()).join(", ");
+    let found = Builtin::FROM_LISTS.into_iter().find(|solver| solver.name() == text);
     found.ok_or_else(|| format!("expected one of {}, found {text}", names()))
 }
 
@@ -148,8 +148,8 @@ pub fn all_schemes() -> Vec<&'static Entry> {
 }
 
 /// A solver by its name.
-pub fn solver(text: &str) -> Result<Solver, String> {
-    Solver::from_name(text).map_err(|error| expected(&error))
+pub fn solver(text: &str) -> Result<Builtin, String> {
+    Builtin::from_name(text).map_err(|error| expected(&error))
 }
 
 /// A noise model by its name.

@@ -2,6 +2,8 @@
 //!
 //! Every scheme with every source. What files do not keep (the trials of `ransac`) is left out.
 
+use std::sync::Arc;
+
 use std::path::Path;
 
 use unlift::audit::staged::{Pooled, key_of, oracle_lists, oracle_seed};
@@ -15,7 +17,7 @@ use unlift::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
 use unlift::neighbors::sources::Named;
 use unlift::neighbors::{Neighborhoods, of_what_there_is};
 use unlift::obfuscate::{SCHEMES, Scheme, obfuscate};
-use unlift::recover::{RecoverOptions, Solver, recover};
+use unlift::recover::{Builtin, RecoverOptions, recover};
 use unlift::seed::{Draws, Key, Stage};
 use unlift::truth::Original;
 use unlift::{Descriptors, PointSet, Unit};
@@ -74,12 +76,12 @@ fn staged<const D: usize>(
     for variant in &plan.variants() {
         let lists = lists::<D>(folder, variant, plan, owner);
         stage::write_neighborhoods(&path("lists.parquet"), &lists).unwrap();
-        for &solver in &plan.solvers {
+        for solver in &plan.solvers {
             let released = stage::read_released::<D>(&path("released.parquet")).unwrap();
             let (n, slots) = (released.n_records(), released.slots_per_record());
             let lists = stage::read_neighborhoods(&path("lists.parquet"), n, slots).unwrap();
-            let options = RecoverOptions { solver, seed: SEED, ..RecoverOptions::default() };
-            let recovered = recover(&released, &lists, &options).unwrap();
+            let options = RecoverOptions { seed: SEED, ..RecoverOptions::default() };
+            let recovered = recover(&released, &lists, &**solver, &options).unwrap();
             stage::write_recovered(&path("back.parquet"), &recovered).unwrap();
             let back = stage::read_recovered::<D>(&path("back.parquet")).unwrap();
             let (original, secret) = stage::read_truth::<D>(&path("truth.parquet")).unwrap();
@@ -125,7 +127,7 @@ fn without_name(row: &Row) -> Row {
         oracle_noise: None,
         inlier_ratio: 0.0,
         k: 0,
-        solver: "",
+        solver: String::new(),
         distinct: None,
         // Of the lists alone, as their ratio and K.
         metrics: Default::default(),
@@ -143,7 +145,8 @@ fn plan<const D: usize>(unit: Unit, name: &str, sources: Vec<NeighborsBy<D>>) ->
     plan.k = 8;
     plan.oracle_noise = vec![Noise::Uniform, Noise::Near, Noise::Clustered];
     plan.inlier_ratios = vec![1.0, 0.3];
-    plan.solvers = vec![Solver::Joint, Solver::JointStart, Solver::Consensus];
+    plan.solvers =
+        vec![Arc::new(Builtin::Joint), Arc::new(Builtin::JointStart), Arc::new(Builtin::Consensus)];
     plan.records_alone = false;
     plan.seed = SEED;
     plan
@@ -234,7 +237,7 @@ fn many_images_in_one_file() {
     for entry in SCHEMES.iter().filter(|entry| entry.in_2d.is_some()) {
         let sources = vec![NeighborsBy::Oracle, NeighborsBy::Source(overlap.clone())];
         let mut plan = plan(Unit::Pixel, entry.name, sources);
-        plan.solvers = vec![Solver::Joint];
+        plan.solvers = vec![Arc::new(Builtin::Joint)];
         plan.oracle_noise = vec![Noise::Uniform];
         plan.inlier_ratios = vec![0.5];
         let of_audit = images.iter().map(|(name, original, descriptors)| {
@@ -296,9 +299,9 @@ fn many_images_in_one_file() {
                 let map = rows.released().unwrap();
                 let lists = lists.expect(&name, &released).unwrap();
                 let lists = lists.neighborhoods(map.n_records(), 1).unwrap();
-                let options =
-                    RecoverOptions { solver: Solver::Joint, seed: SEED, ..Default::default() };
-                back.recovered(&name, &recover(&map, &lists, &options).unwrap()).unwrap();
+                let options = RecoverOptions { seed: SEED, ..Default::default() };
+                back.recovered(&name, &recover(&map, &lists, &Builtin::Joint, &options).unwrap())
+                    .unwrap();
             }
             back.finish().unwrap();
             output.commit().unwrap();

@@ -12,7 +12,7 @@ use unlift::neighbors::oracle;
 use unlift::neighbors::sources::Named;
 use unlift::obfuscate::olc::Olc;
 use unlift::obfuscate::{SCHEMES, SchemeOptions, obfuscate, scheme};
-use unlift::recover::{RecoverOptions, Solver, recover};
+use unlift::recover::{Builtin, RecoverOptions, recover};
 use unlift::seed::Key;
 use unlift::truth::Original;
 use unlift::{PointSet, Unit};
@@ -164,8 +164,8 @@ fn what_is_said_about_a_real_map_comes_true() {
             let near = oracle::TrueNeighbors::new(&search, &secret, slots, 50).unwrap();
             for ratio in [0.5, 0.1] {
                 let lists = near.at_inlier_ratio(ratio, 0).unwrap();
-                let options = RecoverOptions { solver: Solver::Joint, ..RecoverOptions::default() };
-                let recovered = recover(&released, &lists, &options).unwrap();
+                let options = RecoverOptions::default();
+                let recovered = recover(&released, &lists, &Builtin::Joint, &options).unwrap();
                 let accuracy = evaluate(&recovered, &original, &secret).unwrap();
                 let one = reliability(&recovered, &accuracy, threshold).unwrap();
                 match &mut found {

@@ -1,11 +1,14 @@
-//! The laws of schemes and sources, for tests in Python.
+//! The laws of schemes, sources and solvers, for tests in Python.
+
+use std::sync::Arc;
 
 use pyo3::exceptions::PyAssertionError;
 use pyo3::prelude::*;
 use unlift::guard::caught;
 
 use crate::hidden::released_of;
-use crate::own::{OwnScheme, OwnSource, Raised};
+use crate::lists::Neighborhoods;
+use crate::own::{OwnScheme, OwnSolver, OwnSource, Raised};
 use crate::work;
 
 /// Runs `laws`; one that is broken is an AssertionError that says which, on which points, and what was found.
@@ -41,4 +44,19 @@ pub fn check_source(
     let (by, released) = (Raised::default(), released_of(released)?.of_map()?);
     let source = OwnSource::new(source, &by)?;
     kept(py, &by, move || unlift_testkit::source_laws::<3>(&source, &released))
+}
+
+/// Checks that a solver answers for every hidden point of `released`, and gives the same positions again.
+///
+/// It is called three times, the last time with empty lists.
+#[pyfunction]
+pub fn check_solver(
+    py: Python<'_>,
+    solver: &Bound<'_, PyAny>,
+    released: &Bound<'_, PyAny>,
+    lists: &Neighborhoods,
+) -> PyResult<()> {
+    let (by, released) = (Raised::default(), released_of(released)?.of_map()?);
+    let (solver, lists) = (OwnSolver::new(solver, &by)?, Arc::clone(&lists.0));
+    kept(py, &by, move || unlift_testkit::solver_laws::<3>(&solver, &released, &lists))
 }

@@ -35,6 +35,7 @@ mod rows;
 mod work;
 
 use pyo3::prelude::*;
+use unlift::recover::Builtin;
 
 /// What `unlift` (the package) is made of.
 #[pymodule]
@@ -48,7 +49,7 @@ mod _unlift {
     #[pymodule_export]
     use super::hidden::{Hidden, Released, Truth};
     #[pymodule_export]
-    use super::laws::{check_scheme, check_source};
+    use super::laws::{check_scheme, check_solver, check_source};
     #[pymodule_export]
     use super::lists::{Neighborhoods, find, oracle};
     #[pymodule_export]
@@ -80,8 +81,7 @@ fn names(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("IMAGE_SCHEMES", schemes.map(|entry| entry.name).collect::<Vec<_>>())?;
     let sources = all_sources.iter().filter(|entry| entry.in_2d.is_some());
     module.add("IMAGE_SOURCES", sources.map(|entry| entry.name).collect::<Vec<_>>())?;
-    let solvers = unlift::recover::Solver::FROM_LISTS.iter().copied();
-    let solvers = solvers.map(unlift::recover::Solver::name).collect::<Vec<_>>();
+    let solvers = Builtin::FROM_LISTS.map(|solver| solver.name()).to_vec();
     module.add("IMAGE_SOLVERS", solvers)?;
     let schemes = all_schemes.iter().filter(|entry| entry.in_3d.is_some());
     let sources = all_sources.iter().filter(|entry| entry.in_3d.is_some());
@@ -89,5 +89,5 @@ fn names(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add("SCHEMES", schemes.map(|entry| entry.name).collect::<Vec<_>>())?;
     module.add("SOURCES", sources.map(|entry| entry.name).collect::<Vec<_>>())?;
-    module.add("SOLVERS", unlift::recover::Solver::ALL.map(unlift::recover::Solver::name).to_vec())
+    module.add("SOLVERS", Builtin::ALL.map(|solver| solver.name()).to_vec())
 }

@@ -1,4 +1,4 @@
-//! Schemes and sources that are functions in Python.
+//! Schemes, sources and solvers that are functions in Python.
 
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -8,15 +8,16 @@ use pyo3::types::PyTuple;
 use unlift::geometry::frame::Bounds;
 use unlift::neighbors::{Needs, Neighborhoods, Source};
 use unlift::obfuscate::{Lifted, Scheme};
+use unlift::recover::{Builtin, RecoverOptions, Recovered, Solver};
 use unlift::released::Released;
 use unlift::seed::{Key, Stage};
 use unlift::{Error, OneLine};
 
-use crate::arrays::to_rows;
+use crate::arrays::{rows, to_rows};
 use crate::calls;
-use crate::errors::wrong;
+use crate::errors::{raised, wrong};
 use crate::hidden::Released as PyReleased;
-use crate::lists;
+use crate::lists::{self, Neighborhoods as PyNeighborhoods};
 use crate::records::{Hiding, InDimension, hiding};
 
 /// What ended functions of the user's, one of which is the cause of what the user sees; and whether none is to be called any more.
@@ -68,7 +69,12 @@ struct Function {
 }
 
 impl Function {
-    fn new(function: &Bound<'_, PyAny>, what: &str, raised: &Raised) -> PyResult<Self> {
+    /// A function of `n_given` arguments, and of a random generator if it takes one more.
+    fn new(
+        function: &Bound<'_, PyAny>,
+        (what, n_given): (&str, usize),
+        raised: &Raised,
+    ) -> PyResult<Self> {
         if !function.is_callable() {
             let found = function.repr()?.to_string();
             return Err(wrong(what, "a name or a function", OneLine(found)));
@@ -81,7 +87,7 @@ impl Function {
         let inspect = function.py().import("inspect")?;
         let parameters = inspect.call_method1("signature", (function,))?.getattr("parameters")?;
         let (call, raised) = (function.clone().unbind(), raised.clone());
-        Ok(Self { name, call, takes_random: parameters.len()? > 1, raised })
+        Ok(Self { name, call, takes_random: parameters.len()? > n_given, raised })
     }
 
     /// What `make` makes of a call, an error where it raises, or where no function is called any more.
@@ -90,13 +96,16 @@ impl Function {
         let made =
             calls::attached(&raised.stop, |py| make(py).map_err(|error| raised.keep(py, error)));
         let made = made.unwrap_or_else(|| Err("an interrupt".to_owned()));
-        made.map_err(|found| Error::new(name, "records or lists", found))
+        made.map_err(|found| Error::new(name, "records, lists or positions", found))
     }
 
     /// What it returns for `given`; with a generator of these words of seed, if it takes one.
-    fn call<'py>(&self, given: Bound<'py, PyAny>, seed: [u64; 4]) -> PyResult<Bound<'py, PyAny>> {
-        let py = given.py();
-        let mut arguments = vec![given];
+    fn call<'py>(
+        &self,
+        py: Python<'py>,
+        mut arguments: Vec<Bound<'py, PyAny>>,
+        seed: [u64; 4],
+    ) -> PyResult<Bound<'py, PyAny>> {
         if self.takes_random {
             let random = py.import("numpy")?.getattr("random")?;
             arguments.push(random.call_method1("default_rng", (seed.to_vec(),))?);
@@ -111,7 +120,7 @@ pub struct OwnScheme(Function);
 
 impl OwnScheme {
     pub fn new(function: &Bound<'_, PyAny>, raised: &Raised) -> PyResult<Self> {
-        Function::new(function, "schemes", raised).map(Self)
+        Function::new(function, ("schemes", 1), raised).map(Self)
     }
 }
 
@@ -133,7 +142,7 @@ where
         let mut draws = key.draws(Stage::Scheme, 0);
         let seed = [(); 4].map(|()| draws.bits());
         let hiding = self.0.made(|py| {
-            let returned = self.0.call(to_rows(py, points.to_vec())?.into_any(), seed)?;
+            let returned = self.0.call(py, vec![to_rows(py, points.to_vec())?.into_any()], seed)?;
             hiding(&returned, name)
         })?;
         hiding.lifted(points.len(), name)
@@ -167,7 +176,7 @@ impl OwnSource {
         if k == 0 {
             return Err(wrong("k", "at least 1", k));
         }
-        Ok(Self { function: Function::new(function, "neighbors", raised)?, needs, k })
+        Ok(Self { function: Function::new(function, ("neighbors", 1), raised)?, needs, k })
     }
 }
 
@@ -190,8 +199,58 @@ where
     fn lists(&self, released: &Released<D>, k: usize, seed: u64) -> Result<Neighborhoods, Error> {
         self.function.made(|py| {
             let shown = Bound::new(py, PyReleased::from(released.clone()))?.into_any();
-            let returned = self.function.call(shown, [seed, 0, 0, 0])?;
+            let returned = self.function.call(py, vec![shown], [seed, 0, 0, 0])?;
             lists::returned(&returned, released, k, self.needs)
         })
+    }
+}
+
+/// A solver that is a function: a released map, its lists, and a random generator if it takes one, to positions about the released
+/// origin, `(n_slots, D)`; what is not finite was not recovered.
+#[derive(Debug)]
+pub struct OwnSolver(Function);
+
+impl OwnSolver {
+    pub fn new(function: &Bound<'_, PyAny>, raised: &Raised) -> PyResult<Self> {
+        Function::new(function, ("solvers", 2), raised).map(Self)
+    }
+}
+
+impl<const D: usize> Solver<D> for OwnSolver
+where
+    PyReleased: From<Released<D>>,
+{
+    fn name(&self) -> &str {
+        &self.0.name
+    }
+
+    fn recover(
+        &self,
+        released: &Released<D>,
+        lists: &Neighborhoods,
+        options: &RecoverOptions,
+    ) -> Result<Recovered<D>, Error> {
+        let positions = self.0.made(|py| {
+            let shown = Bound::new(py, PyReleased::from(released.clone()))?.into_any();
+            let listed = Bound::new(py, PyNeighborhoods(Arc::new(lists.clone())))?.into_any();
+            let returned = self.0.call(py, vec![shown, listed], [options.seed, 0, 0, 0])?;
+            rows::<D>("positions", &returned)
+        })?;
+        let positions: Vec<[f32; D]> = positions.iter().map(|x| x.map(|x| x as f32)).collect();
+        Recovered::from_positions(released, lists, &positions)
+    }
+}
+
+/// The solver that `given` is: the name of one of ours, or a function.
+pub fn solver_of<const D: usize>(
+    given: &Bound<'_, PyAny>,
+    raised_by: &Raised,
+) -> PyResult<Arc<dyn Solver<D>>>
+where
+    OwnSolver: Solver<D>,
+{
+    match given.extract::<String>() {
+        Ok(name) => Ok(Arc::new(Builtin::from_name(&name).map_err(raised)?)),
+        Err(_) => Ok(Arc::new(OwnSolver::new(given, raised_by)?)),
     }
 }

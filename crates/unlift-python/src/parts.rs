@@ -110,7 +110,7 @@ pub fn prepare(
     exact_constraints: bool,
     threads: Option<usize>,
 ) -> PyResult<Model> {
-    let options = options("consensus", delta, seed, exact_constraints)?;
+    let options = options(delta, seed, exact_constraints)?;
     let released = released_of(released)?.of_map()?;
     let lists = Arc::clone(&lists.get().0);
     let model = work::run(py, threads, None, move || learn(&released, &lists, &options))?;

@@ -15,7 +15,7 @@ use unlift_audit::{Prepared, check_thresholds, sources};
 use crate::errors::{raised, wrong};
 use crate::lists;
 use crate::obfuscate::scheme_of;
-use crate::own::{OwnScheme, OwnSource, Raised};
+use crate::own::{OwnScheme, OwnSolver, OwnSource, Raised, solver_of};
 use crate::work;
 
 /// What an audit was asked for; `None` is as usual.
@@ -30,7 +30,7 @@ pub struct Asked<'py> {
     #[pyo3(item)]
     pub oracle_noise: Option<Vec<String>>,
     #[pyo3(item)]
-    pub solvers: Option<Vec<String>>,
+    pub solvers: Option<Vec<Bound<'py, PyAny>>>,
     #[pyo3(item)]
     pub thresholds: Option<Bound<'py, PyAny>>,
     #[pyo3(item)]
@@ -96,6 +96,7 @@ impl Asked<'_> {
     where
         OwnScheme: Scheme<D>,
         OwnSource: Source<D>,
+        OwnSolver: Solver<D>,
     {
         let options = SchemeOptions::usual(unit);
         let schemes = match &self.schemes {
@@ -111,7 +112,7 @@ impl Asked<'_> {
             None => usual.schemes.clone(),
         };
         let noise = self.oracle_noise.as_deref().map(|names| named(names, Noise::from_name));
-        let solvers = self.solvers.as_deref().map(|names| named(names, Solver::from_name));
+        let solvers = self.solvers.as_deref().map(|given| solvers(given, by));
         let neighbors = self.sources(by)?;
         self.check_about(&neighbors)?;
         Ok(Plan {
@@ -205,6 +206,25 @@ fn of_its_own(what: &str, given: &Bound<'_, PyAny>, name: &str, taken: bool) -> 
         true => Err(wrong(what, "functions with a name that unlift does not use", name)),
         false => Ok(()),
     }
+}
+
+/// Solvers by name or as functions; names that repeat an earlier one are left out, as on the command line.
+fn solvers<const D: usize>(
+    given: &[Bound<'_, PyAny>],
+    by: &Raised,
+) -> PyResult<Vec<Arc<dyn Solver<D>>>>
+where
+    OwnSolver: Solver<D>,
+{
+    let mut kept: Vec<Arc<dyn Solver<D>>> = Vec::new();
+    for one in given {
+        let solver = solver_of::<D>(one, by)?;
+        let is_name = one.extract::<String>().is_ok();
+        if !(is_name && kept.iter().any(|other| other.name() == solver.name())) {
+            kept.push(solver);
+        }
+    }
+    Ok(kept)
 }
 
 /// What `names` stand for, each once.

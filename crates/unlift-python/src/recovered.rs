@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use unlift::audit::{Plan, measure};
 use unlift::evaluate::blind;
-use unlift::recover::{RecoverOptions, Recovered as Found, Solver, recover as solve};
+use unlift::recover::{Builtin, RecoverOptions, Recovered as Found, recover as solve};
 use unlift_audit::Checked;
 use unlift_io::stage::{Kind, read_recovered, write_recovered};
 
@@ -17,6 +17,7 @@ use crate::files::save;
 use crate::hidden::{Hidden, released_of, truth_of};
 use crate::json::as_python;
 use crate::lists::Neighborhoods;
+use crate::own::{Raised, solver_of};
 use crate::plan::{delta, thresholds};
 use crate::work;
 
@@ -98,16 +99,17 @@ impl Recovered {
     }
 }
 
-/// Recovers the points of a released map from lists of near records: no truth is looked at. Without `confidence` nobody asks how sure
+/// Recovers the points of a released map from lists of near records by `solver`, a name of `SOLVERS` ("joint" without one) or a
+/// function: no truth is looked at. Without `confidence` nobody asks how sure
 /// the attacker is.
 #[pyfunction]
-#[pyo3(signature = (released, lists, *, solver="joint", delta=None, seed=0, exact_constraints=true, confidence=true, threads=None))]
+#[pyo3(signature = (released, lists, *, solver=None, delta=None, seed=0, exact_constraints=true, confidence=true, threads=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn recover(
     py: Python<'_>,
     released: &Bound<'_, PyAny>,
     lists: &Neighborhoods,
-    solver: &str,
+    solver: Option<&Bound<'_, PyAny>>,
     delta: Option<f64>,
     seed: u64,
     exact_constraints: bool,
@@ -115,26 +117,25 @@ pub fn recover(
     threads: Option<usize>,
 ) -> PyResult<Recovered> {
     let released = released_of(released)?.of_map()?;
-    let options = options(solver, delta, seed, exact_constraints)?;
+    let (by, options) = (Raised::default(), options(delta, seed, exact_constraints)?);
     let options = RecoverOptions { confidence, ..options };
+    let solver = match solver {
+        Some(given) => solver_of::<3>(given, &by)?,
+        None => Arc::new(Builtin::Joint),
+    };
     let fingerprint = Some(released.fingerprint());
     if lists.0.about().map.is_some_and(|map| Some(map) != fingerprint) {
         return Err(wrong("lists", "lists of this released map", "those of another"));
     }
     let lists = Arc::clone(&lists.0);
-    let found = work::run(py, threads, None, move || solve(&released, &lists, &options))?;
-    Ok(Recovered(Arc::new(found)))
+    let work = move || solve(&released, &lists, &*solver, &options);
+    let found = work::run(py, threads, Some(by.stop()), work);
+    Ok(Recovered(Arc::new(found.map_err(|error| by.as_cause_of(py, error))?)))
 }
 
 /// Options of recovery as arguments say them.
-pub fn options(
-    solver: &str,
-    delta: Option<f64>,
-    seed: u64,
-    exact_constraints: bool,
-) -> PyResult<RecoverOptions> {
+pub fn options(delta: Option<f64>, seed: u64, exact_constraints: bool) -> PyResult<RecoverOptions> {
     Ok(RecoverOptions {
-        solver: Solver::from_name(solver).map_err(raised)?,
         delta: self::delta(delta)?,
         seed,
         exact_constraints,

@@ -93,6 +93,30 @@ def test_a_scheme_is_a_function(small):
     assert "level" in report.html()
 
 
+def test_a_solver_is_a_function(small):
+    def foot(released, lists):
+        assert len(lists) == released.n_slots
+        return released.columns["foot"]
+
+    hidden = unlift.obfuscate(small, "olc", seed=1)
+    lists = unlift.neighbors.oracle(hidden, 0.5, k=20)
+    unlift.testing.check_solver(foot, hidden, lists)
+    found = unlift.recover(hidden, lists, solver=foot)
+    assert np.allclose(found.positions, hidden.released.columns["foot"] + hidden.released.origin, atol=1e-5)
+    rows = cheap(small, ["olc"], solvers=[foot, "consensus"]).rows
+    assert rows["solver"] == ["foot", "consensus"]
+    # It knows no planes: its rows are missing, those of ours are there.
+    report = cheap(small, ["plane"], solvers=[foot, "consensus"])
+    assert report.rows["solver"] == ["consensus"]
+    assert "KeyError" in report.document["not_audited"][0]["reason"]
+
+    def consensus(released, lists):
+        return foot(released, lists)
+
+    with pytest.raises(unlift.UnliftError, match="a name that no solver of unlift has, found consensus"):
+        cheap(small, ["olc"], solvers=[consensus])
+
+
 @pytest.mark.parametrize("family", ["pairs", "rays", "planes", "candidates"])
 def test_every_family_of_records_can_be_returned(small, family):
     def pairs(points, random):

@@ -40,7 +40,8 @@ impl Document {
             let source = missing.neighbors.as_deref();
             let is_ours = SCHEMES.contains(&&*missing.scheme)
                 && source.is_none_or(|source| SOURCES.contains(&source));
-            if !is_ours {
+            // So are reasons told of solvers of others.
+            if !is_ours || missing.reason.contains("solver ") {
                 missing.reason = OWN_FAILED.to_owned();
             }
             without_places(&mut missing.reason);

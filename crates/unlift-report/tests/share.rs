@@ -16,6 +16,7 @@ fn what_others_say_of_why_they_failed_is_kept_back() {
     document.not_audited = vec![
         missing("mine", None, "mine: expected records or lists, found KeyError: 'secret'"),
         missing("plane", Some("near"), "near: expected records or lists, found secret"),
+        missing("plane", Some("oracle"), "solver mine: expected positions, found secret"),
         missing("plane", Some("learned"), "/home/secret/x.onnx: expected a network, found none"),
         missing("plane", Some("geometric"), "k: expected at most 3, found 50"),
     ];
@@ -28,7 +29,7 @@ fn what_others_say_of_why_they_failed_is_kept_back() {
     assert!(!page.contains("secret") && !json.contains("secret"), "{json}");
     let reasons = safe.not_audited.iter().map(|missing| missing.reason.as_str());
     let failed = "its own function failed";
-    let expected = [failed, failed, "(withheld)", "k: expected at most 3, found 50"];
+    let expected = [failed, failed, failed, "(withheld)", "k: expected at most 3, found 50"];
     assert_eq!(reasons.collect::<Vec<_>>(), expected);
     assert_eq!(safe.gates[0].reason.as_deref(), Some("mine was not audited"));
     assert_eq!(safe.notes, ["(withheld)", "5 of 9 descriptors"]);

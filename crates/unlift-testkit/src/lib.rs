@@ -1,4 +1,4 @@
-//! Laws that every scheme and every source of neighborhoods keeps: call them in the test of yours.
+//! Laws that every scheme, every source of neighborhoods and every solver keeps: call them in the test of yours.
 //!
 //! ```
 //! use unlift::obfuscate::olc::Olc;
@@ -11,8 +11,10 @@
 
 mod points;
 mod schemes;
+mod solvers;
 mod sources;
 
 pub use points::{distance_to_record, dot, norm, piles, room, uniform};
 pub use schemes::scheme_laws;
+pub use solvers::solver_laws;
 pub use sources::{described_map, source_laws};

@@ -1,14 +1,16 @@
 //! The laws on all of ours, and on ones that break them.
 
 use unlift::geometry::frame::Bounds;
+use unlift::neighbors::oracle::{TrueNeighbors, search};
 use unlift::neighbors::sources::SOURCES;
 use unlift::neighbors::{Needs, Neighborhoods, Source};
 use unlift::obfuscate::olc::Olc;
 use unlift::obfuscate::{Lifted, SCHEMES, Scheme, SchemeOptions};
+use unlift::recover::{Builtin, RecoverOptions, Recovered, Solver};
 use unlift::released::{Lines, Obfuscation, Released};
 use unlift::seed::Key;
 use unlift::{Error, Unit};
-use unlift_testkit::{described_map, scheme_laws, source_laws};
+use unlift_testkit::{described_map, scheme_laws, solver_laws, source_laws};
 
 #[test]
 fn our_schemes() {
@@ -29,6 +31,44 @@ fn our_sources() {
     for source in SOURCES.iter().filter_map(|entry| entry.of_dimension::<3>()) {
         source_laws(&*source, &released);
     }
+}
+
+#[test]
+fn our_solvers() {
+    let (original, released, secret) = described_map(&Olc, 300);
+    let knn = search(&original).unwrap();
+    let lists = TrueNeighbors::new(&knn, &secret, 1, 12).unwrap().at_inlier_ratio(0.5, 1).unwrap();
+    for solver in Builtin::ALL {
+        solver_laws::<3>(&solver, &released, &lists);
+    }
+}
+
+/// Answers for the first half of the slots.
+#[derive(Debug)]
+struct Half;
+
+impl Solver<3> for Half {
+    fn name(&self) -> &str {
+        "half"
+    }
+
+    fn recover(
+        &self,
+        released: &Released<3>,
+        lists: &Neighborhoods,
+        _: &RecoverOptions,
+    ) -> Result<Recovered<3>, Error> {
+        let half = vec![[0.0; 3]; released.n_slots() / 2];
+        Recovered::from_positions(released, lists, &half)
+    }
+}
+
+#[test]
+#[should_panic(expected = "positions: expected 300, one per slot, found 150")]
+fn a_solver_that_answers_for_some_slots_is_found_out() {
+    let (_, released, _) = described_map(&Olc, 300);
+    let lists = Neighborhoods::try_new(vec![0; 301], Vec::new(), None, 300, 1).unwrap();
+    solver_laws(&Half, &released, &lists);
 }
 
 /// Draws nothing: all lines are level, whatever the key.

@@ -18,7 +18,7 @@ use unlift::geometry::vector::median;
 use unlift::neighbors::Needs;
 use unlift::neighbors::oracle::Noise;
 use unlift::neighbors::sources::Named;
-use unlift::recover::Solver;
+use unlift::recover::Builtin;
 use unlift::seed::{Draws, Stage};
 use unlift::synthetic::{self, Shape};
 use unlift::truth::Original;
@@ -70,7 +70,7 @@ struct Suite {
     seeds: u32,
     k: usize,
     cells: bool,
-    solver: Solver,
+    solver: Builtin,
 }
 
 impl Suite {
@@ -93,7 +93,7 @@ impl Suite {
             seeds: if quick { 1 } else { 2 },
             k: 50,
             cells: false,
-            solver: Solver::Joint,
+            solver: Builtin::Joint,
         };
         for argument in std::env::args().skip(1) {
             let Some((name, list)) = argument.split_once('=') else { continue };
@@ -111,7 +111,7 @@ impl Suite {
                 "k" => suite.k = number(list),
                 "cells" => suite.cells = list == "1",
                 "solver" => {
-                    suite.solver = Solver::from_name(list).unwrap_or_else(|e| panic!("{e}"));
+                    suite.solver = Builtin::from_name(list).unwrap_or_else(|e| panic!("{e}"));
                 }
                 _ => panic!(
                     "expected maps, schemes, ratios, noise, sources, seeds, k, cells or solver, found {name}"
@@ -140,7 +140,7 @@ impl Suite {
             oracle_noise: self.noise.clone(),
             inlier_ratios: self.ratios.clone(),
             k: if of_images { 20 } else { self.k },
-            solvers: vec![self.solver, Solver::Consensus],
+            solvers: Builtin::list(&[self.solver, Builtin::Consensus]),
             thresholds,
             repeats: self.seeds,
             records_alone: false,

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use unlift::neighbors::Neighborhoods;
 use unlift::neighbors::oracle::{TrueNeighbors, search};
 use unlift::obfuscate::{Entry, SchemeOptions, obfuscate, scheme};
-use unlift::recover::{Delta, RecoverOptions, Solver, recover};
+use unlift::recover::{Builtin, Delta, RecoverOptions, recover};
 use unlift::released::{Obfuscation, Released};
 use unlift::seed::Key;
 use unlift::truth::Original;
@@ -33,7 +33,7 @@ struct Sizes {
     points: Vec<usize>,
     schemes: Vec<&'static Entry>,
     ratios: Vec<f64>,
-    solvers: Vec<Solver>,
+    solvers: Vec<Builtin>,
     threads: Vec<usize>,
     map: String,
     /// Of so many runs of a cell the fastest counts.
@@ -48,7 +48,7 @@ impl Sizes {
             points: if quick { vec![1_000] } else { vec![10_000, 100_000, 700_000, 5_000_000] },
             schemes: ["olc", "ppl", "plane"].iter().filter_map(|n| scheme(n).ok()).collect(),
             ratios: if quick { vec![0.5] } else { vec![1.0, 0.75, 0.5, 0.3, 0.2, 0.1] },
-            solvers: Solver::ALL.to_vec(),
+            solvers: Builtin::ALL.to_vec(),
             threads: vec![1, 2],
             map: MAP.to_owned(),
             runs: if quick { 1 } else { 3 },
@@ -61,7 +61,7 @@ impl Sizes {
                 "schemes" => sizes.schemes = fields.map(|n| scheme(n).expect(n)).collect(),
                 "ratios" => sizes.ratios = fields.map(number).collect(),
                 "solvers" => {
-                    sizes.solvers = fields.map(|n| Solver::from_name(n).expect(n)).collect();
+                    sizes.solvers = fields.map(|n| Builtin::from_name(n).expect(n)).collect();
                 }
                 "threads" => sizes.threads = fields.map(number).collect(),
                 "map" => sizes.map = list.to_owned(),
@@ -136,16 +136,15 @@ fn table(sizes: &Sizes, pools: &[ThreadPool], original: &Original<3>, entry: &En
         row(sizes, &lists, (entry.name, ratio, "gather"), &gather, gather[0]);
         drop(rows);
         for &solver in &sizes.solvers {
-            if solver == Solver::Ransac && original.len() > MOST_SAMPLED {
+            if solver == Builtin::Ransac && original.len() > MOST_SAMPLED {
                 continue;
             }
             let options = RecoverOptions {
-                solver,
                 delta: Delta::Fixed(DELTA),
                 confidence: false,
                 ..RecoverOptions::default()
             };
-            let work = || recover(&released, &lists, &options).expect("valid input");
+            let work = || recover(&released, &lists, &solver, &options).expect("valid input");
             let took = seconds(sizes, pools, &work);
             row(sizes, &lists, (entry.name, ratio, solver.name()), &took, gather[0]);
         }

@@ -7,8 +7,8 @@ use unlift::evaluate::evaluate;
 use unlift::geometry::frame::Bounds;
 use unlift::neighbors::{Geometric, Neighborhoods};
 use unlift::obfuscate::{Lifted, Scheme, SchemeOptions, obfuscate, scheme};
-use unlift::recover::{RecoverOptions, Solver, Unknown, recover};
-use unlift::released::{Lines, Obfuscation};
+use unlift::recover::{Builtin, RecoverOptions, Recovered, Solver, Unknown, recover};
+use unlift::released::{Lines, Obfuscation, Released};
 use unlift::seed::{Key, Stage};
 use unlift::truth::Original;
 use unlift::{About, Error, PointSet, RowOrder, Unit, synthetic};
@@ -39,10 +39,13 @@ fn a_usual_audit_has_a_row_for_what_joint_recovery_starts_from() {
     let (room, mut plan) = (room(900), plan(&["olc", "ppl", "ray", "cp"]));
     plan.records_alone = false;
     let usual = audit(&room, &plan);
-    let solvers: Vec<&str> = usual.rows.iter().map(|row| row.solver).collect();
+    let solvers: Vec<&str> = usual.rows.iter().map(|row| &*row.solver).collect();
     assert_eq!(solvers, ["joint", "joint-start"].repeat(4));
     // The by-product is what the solver gives by itself, in either order.
-    for solvers in [vec![Solver::JointStart], vec![Solver::JointStart, Solver::Joint]] {
+    for solvers in [
+        Builtin::list(&[Builtin::JointStart]),
+        Builtin::list(&[Builtin::JointStart, Builtin::Joint]),
+    ] {
         plan.solvers = solvers;
         for row in audit(&room, &plan).rows {
             assert!(usual.rows.contains(&row), "{} by {}", row.scheme, row.solver);
@@ -58,7 +61,7 @@ fn a_usual_audit_has_a_row_for_what_joint_recovery_starts_from() {
 }
 
 /// The percentages of an attack on the records alone, made by hand.
-fn by_hand(original: &Original<3>, name: &str, solver: Solver, plan: &Plan<3>) -> Vec<f64> {
+fn by_hand(original: &Original<3>, name: &str, solver: Builtin, plan: &Plan<3>) -> Vec<f64> {
     let entry = scheme(name).unwrap();
     let scheme = entry.of_dimension::<3>(&SchemeOptions { voxel: 0.5 }).unwrap();
     let (released, secret) =
@@ -66,8 +69,7 @@ fn by_hand(original: &Original<3>, name: &str, solver: Solver, plan: &Plan<3>) -
     let (n, slots) = (released.n_records(), released.slots_per_record());
     let none = Neighborhoods::try_new(vec![0; n * slots + 1], Vec::new(), None, n, slots).unwrap();
     let none = none.with_about(About { map: None, order: RowOrder::Either, ..About::default() });
-    let options = RecoverOptions { solver, ..RecoverOptions::default() };
-    let recovered = recover(&released, &none, &options).unwrap();
+    let recovered = recover(&released, &none, &solver, &RecoverOptions::default()).unwrap();
     let accuracy = evaluate(&recovered, original, &secret).unwrap();
     plan.thresholds.iter().map(|t| accuracy.percent_within(t.value)).collect()
 }
@@ -84,7 +86,7 @@ fn the_best_attack_on_the_records_alone_is_the_second_baseline() {
             assert_eq!(row.baseline_percent(0), row.blind_percent[0]);
             continue;
         }
-        let alone = by_hand(&room, &row.scheme, Solver::Tomography, &plan);
+        let alone = by_hand(&room, &row.scheme, Builtin::Tomography, &plan);
         for (at, percent) in alone.iter().enumerate() {
             assert!(best(at).unwrap() >= *percent, "{}: at least tomography", row.scheme);
             assert!(row.baseline_percent(at) >= row.blind_percent[at].max(*percent));
@@ -121,19 +123,19 @@ fn the_second_baseline_is_averaged_over_seeds() {
 fn break_even_takes_the_strongest_attack_at_every_ratio() {
     let (room, mut plan) = (room(600), plan(&["olc", "cp"]));
     (plan.records_alone, plan.inlier_ratios) = (false, vec![0.5, 0.1]);
-    plan.solvers.push(Solver::Ransac);
+    plan.solvers.push(Arc::new(Builtin::Ransac));
     let outcome = audit(&room, &plan);
     let mut rows = outcome.rows.clone();
     // As if another attack won at each ratio.
     for row in rows.iter_mut().filter(|row| row.scheme == "olc") {
-        row.recovered_percent[0] = match (row.solver, row.inlier_ratio) {
+        row.recovered_percent[0] = match (&*row.solver, row.inlier_ratio) {
             ("joint", 0.5) | ("ransac", 0.1) => 60.0,
             _ => 40.0,
         };
     }
     let found = unlift::audit::break_even(&plan, &rows);
     let of =
-        |solver: &str| found.iter().find(|b| (&*b.scheme, b.solver) == ("olc", solver)).unwrap();
+        |solver: &str| found.iter().find(|b| (&*b.scheme, &*b.solver) == ("olc", solver)).unwrap();
     assert_eq!(of("strongest").inlier_ratio, 0.1, "half comes back at the lowest ratio");
     assert!((of("joint").inlier_ratio - 0.3).abs() < 1e-12);
     assert_eq!(found.len(), 2 * 4);
@@ -184,10 +186,11 @@ fn a_source_without_lists_for_a_scheme_costs_its_rows_alone() {
     let [missing] = outcome.not_audited.as_slice() else { panic!("{:?}", outcome.not_audited) };
     assert_eq!((&*missing.scheme, missing.neighbors.as_deref()), ("plane", Some("geometric")));
     assert!(missing.reason.ends_with("found planes"), "{}", missing.reason);
-    let of = |row: &Row| (row.scheme.clone(), row.neighbors.clone(), row.solver);
+    let of = |row: &Row| [&row.scheme, &row.neighbors, &row.solver].map(String::clone);
     let rows: Vec<_> = outcome.rows.iter().map(of).collect();
-    let row =
-        |scheme: &str, neighbors: &str, solver| (scheme.to_owned(), neighbors.to_owned(), solver);
+    let row = |scheme: &str, neighbors: &str, solver: &str| {
+        [scheme, neighbors, solver].map(str::to_owned)
+    };
     let expected = [
         row("olc", "oracle", "joint"),
         row("olc", "oracle", "joint-start"),
@@ -214,7 +217,7 @@ fn a_map_too_small_for_wrong_neighbors_loses_these_rows_alone() {
 fn what_needs_no_neighborhoods_counts_in_break_even() {
     let mut plan = plan(&["ray", "cp"]);
     (plan.records_alone, plan.inlier_ratios) = (false, vec![0.5, 0.1]);
-    plan.solvers = vec![Solver::Joint];
+    plan.solvers = vec![Arc::new(Builtin::Joint)];
     let mut rows = audit(&room(600), &plan).rows;
     for row in &mut rows {
         (row.recovered_percent[0], row.blind_percent[0]) = (25.0, 96.0);
@@ -312,4 +315,47 @@ fn a_scheme_whose_records_are_not_where_its_points_are_has_no_row() {
     let [missing] = &outcome.not_audited[..] else { panic!("{:?}", outcome.not_audited) };
     assert_eq!(missing.scheme, "mistaken");
     assert!(missing.reason.contains("points nearer to their own records"), "{}", missing.reason);
+}
+
+/// Knows nothing but lines, and puts every point at the foot of its line.
+#[derive(Debug)]
+struct AtFoot(&'static str);
+
+impl Solver<3> for AtFoot {
+    fn name(&self) -> &str {
+        self.0
+    }
+
+    fn recover(
+        &self,
+        released: &Released<3>,
+        lists: &Neighborhoods,
+        _: &RecoverOptions,
+    ) -> Result<Recovered<3>, Error> {
+        let Obfuscation::Lines(lines) = released.obfuscation() else {
+            return Err(Error::new("records", "lines", released.obfuscation().family()));
+        };
+        Recovered::from_positions(released, lists, lines.foot())
+    }
+}
+
+#[test]
+fn a_solver_of_ones_own_has_rows_and_loses_those_that_it_fails_on() {
+    let mut plan = plan(&["olc", "plane"]);
+    plan.inlier_ratios = vec![0.5];
+    plan.solvers = vec![Arc::new(AtFoot("foot")), Arc::new(Builtin::Joint)];
+    let outcome = audit(&room(400), &plan);
+    let rows: Vec<[&str; 2]> =
+        outcome.rows.iter().map(|row| [&*row.scheme, &*row.solver]).collect();
+    assert_eq!(rows, [["olc", "foot"], ["olc", "joint"], ["plane", "joint"]]);
+    assert_eq!(outcome.rows[0].sure_unknown, Some(Unknown::OtherSolver));
+    let [missing] = outcome.not_audited.as_slice() else { panic!("{:?}", outcome.not_audited) };
+    assert_eq!((&*missing.scheme, missing.neighbors.as_deref()), ("plane", Some("oracle")));
+    let expected = "solver foot: records: expected lines, found";
+    assert!(missing.reason.starts_with(expected), "{}", missing.reason);
+    // A report says of `joint` what is true of ours.
+    plan.solvers = vec![Arc::new(AtFoot("joint"))];
+    let error = run(&room(400), None, &plan, &mut Silent).unwrap_err();
+    let expected = "solver: expected a name that no solver of unlift has, found joint";
+    assert_eq!(error.to_string(), expected);
 }

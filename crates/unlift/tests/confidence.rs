@@ -6,7 +6,7 @@ use unlift::geometry::vector::median;
 use unlift::neighbors::Neighborhoods;
 use unlift::neighbors::oracle::{self, Noise, Outliers, TrueNeighbors};
 use unlift::obfuscate::{SchemeOptions, obfuscate, scheme};
-use unlift::recover::{RecoverOptions, Recovered, Solver, Unknown, recover};
+use unlift::recover::{Builtin, RecoverOptions, Recovered, Unknown, recover};
 use unlift::seed::Key;
 use unlift::synthetic::room;
 use unlift::truth::{Original, Secret};
@@ -22,7 +22,7 @@ fn scene(seed: u64, n: usize, scale: f64) -> (Original<3>, f64) {
 fn recovered(
     (original, typical): &(Original<3>, f64),
     name: &str,
-    solver: Solver,
+    solver: Builtin,
     (noise, ratio): (Noise, f64),
 ) -> (Recovered<3>, Secret) {
     let knn = oracle::search(original).unwrap();
@@ -32,8 +32,8 @@ fn recovered(
     let near = TrueNeighbors::new(&knn, &secret, released.slots_per_record(), 50).unwrap();
     let outliers = Outliers::new(noise, &near, &knn, &secret, 7).unwrap();
     let lists = near.lists(ratio, &outliers, 7).unwrap();
-    let options = RecoverOptions { solver, ..RecoverOptions::default() };
-    (recover(&released, &lists, &options).unwrap(), secret)
+    let options = RecoverOptions::default();
+    (recover(&released, &lists, &solver, &options).unwrap(), secret)
 }
 
 /// The distance from the diagonal, a mean over points, in percent.
@@ -48,7 +48,7 @@ fn judge(schemes: &[&str], cases: &[(Noise, f64)]) -> Reliability {
     let mut all: Option<Reliability> = None;
     for name in schemes {
         for &case in cases {
-            let (recovered, secret) = recovered(&scene, name, Solver::Joint, case);
+            let (recovered, secret) = recovered(&scene, name, Builtin::Joint, case);
             let accuracy = evaluate(&recovered, &scene.0, &secret).unwrap();
             let one = reliability(&recovered, &accuracy, scene.1).unwrap();
             match &mut all {
@@ -84,8 +84,8 @@ fn the_unit_of_the_map_changes_nothing() {
     let (small, large) = (scene(208, 5_200, 1.0), scene(208, 5_200, 7.3));
     for name in ["olc", "cp"] {
         let case = (Noise::Uniform, 0.3);
-        let (a, _) = recovered(&small, name, Solver::Joint, case);
-        let (b, _) = recovered(&large, name, Solver::Joint, case);
+        let (a, _) = recovered(&small, name, Builtin::Joint, case);
+        let (b, _) = recovered(&large, name, Builtin::Joint, case);
         let off = (0..a.n_slots()).filter(|&slot| {
             let p = a.probability_within(slot, small.1).unwrap();
             let q = b.probability_within(slot, large.1).unwrap();
@@ -102,7 +102,7 @@ fn threads_change_no_bit() {
     let scene = scene(209, 5_200, 1.0);
     let on = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let run = |case| pool.install(|| recovered(&scene, "ppl", Solver::Joint, case).0);
+        let run = |case| pool.install(|| recovered(&scene, "ppl", Builtin::Joint, case).0);
         [(Noise::Uniform, 0.3), (Noise::Clustered, 0.3)].map(|case| {
             let found = run(case);
             let bits = found.confidence().unwrap().iter();
@@ -136,7 +136,7 @@ fn crowds_that_do_not_list_back_are_not_followed() {
     let scene = scene(207, 6_000, 1.0);
     // Two points below what comes back, and above what did when they were followed (89, 75, 72).
     for (name, least) in [("olc", 90.9), ("ppl", 84.3), ("ray", 79.7)] {
-        let (recovered, secret) = recovered(&scene, name, Solver::Joint, (Noise::Clustered, 0.15));
+        let (recovered, secret) = recovered(&scene, name, Builtin::Joint, (Noise::Clustered, 0.15));
         let accuracy = evaluate(&recovered, &scene.0, &secret).unwrap();
         let percent = accuracy.percent_within(scene.1);
         assert!(percent > least, "{name}: {percent} %");
@@ -147,9 +147,9 @@ fn crowds_that_do_not_list_back_are_not_followed() {
 fn nothing_is_said_where_nothing_was_fitted() {
     let small = scene(210, 2_000, 1.0);
     for (solver, why) in [
-        (Solver::Joint, Unknown::SmallMap),
-        (Solver::Consensus, Unknown::OtherSolver),
-        (Solver::Ransac, Unknown::OtherSolver),
+        (Builtin::Joint, Unknown::SmallMap),
+        (Builtin::Consensus, Unknown::OtherSolver),
+        (Builtin::Ransac, Unknown::OtherSolver),
     ] {
         let (recovered, secret) = recovered(&small, "ppl", solver, (Noise::Uniform, 0.1));
         assert_eq!(recovered.confidence_unknown(), Some(why), "{solver:?}");
@@ -169,7 +169,8 @@ fn lists_that_do_not_come_from_the_oracle_say_nothing_about_certainty() {
     let outliers = Outliers::new(Noise::Uniform, &near, &knn, &secret, 7).unwrap();
     let lists = near.lists(0.5, &outliers, 7).unwrap();
     let unknown = |lists: &Neighborhoods| {
-        recover(&released, lists, &RecoverOptions::default()).unwrap().confidence_unknown()
+        let options = RecoverOptions::default();
+        recover(&released, lists, &Builtin::Joint, &options).unwrap().confidence_unknown()
     };
     assert_eq!(unknown(&lists), None);
     let about = About { lists_by: ListsBy::Unstated, ..lists.about() };

@@ -1,8 +1,10 @@
 //! Maps at the limits of geometry and of numbers, audited under every scheme: counted losses or a reason, never a NaN,
 //! never "sure" of what is wrong.
 
+use std::sync::Arc;
+
 use unlift::audit::{Outcome, Plan, Row, Silent, Threshold, run};
-use unlift::recover::Solver;
+use unlift::recover::Builtin;
 use unlift::seed::{Draws, Stage};
 use unlift::truth::Original;
 use unlift::{Error, PointSet, Unit, synthetic};
@@ -16,7 +18,7 @@ fn try_audit(points: Vec<[f64; 3]>, unit: f64, k: usize) -> Result<Outcome, Erro
     let original = Original::new(PointSet::try_new(points, Unit::Meter).unwrap());
     let mut plan = Plan::new(Unit::Meter);
     plan.inlier_ratios = vec![1.0, 0.3];
-    plan.solvers = vec![Solver::Joint, Solver::Consensus];
+    plan.solvers = vec![Arc::new(Builtin::Joint), Arc::new(Builtin::Consensus)];
     plan.records_alone = false;
     plan.k = k;
     plan.thresholds = [0.1, 0.25]

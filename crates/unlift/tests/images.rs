@@ -10,7 +10,7 @@ use unlift::geometry::frame::Bounds;
 use unlift::neighbors::oracle::Noise;
 use unlift::neighbors::sources::Named;
 use unlift::neighbors::{Overlap, Similarity};
-use unlift::recover::Solver;
+use unlift::recover::Builtin;
 use unlift::seed::{Draws, Stage};
 use unlift::truth::Original;
 use unlift::{Descriptors, Error, PointSet, Unit};
@@ -138,7 +138,7 @@ fn images_with_few_keypoints_are_attacked() {
     let mut plan = plan();
     plan.inlier_ratios = vec![1.0, 0.5, 0.1];
     plan.oracle_noise = Noise::ALL.to_vec();
-    plan.solvers = Solver::FROM_LISTS.to_vec();
+    plan.solvers = Builtin::list(&Builtin::FROM_LISTS);
     plan.neighbors.push(NeighborsBy::Source(Arc::new(Similarity)));
     for n in [4, 12, plan.k, plan.k + 3] {
         let outcome = run(&[image_of("few", keypoints(3, n, 0))], &plan);
@@ -224,13 +224,13 @@ fn images_with_hardly_any_keypoints_are_counted() {
     ];
     let mut plan = plan();
     plan.inlier_ratios = vec![1.0, 0.1];
-    plan.solvers = Solver::FROM_LISTS.to_vec();
+    plan.solvers = Builtin::list(&Builtin::FROM_LISTS);
     plan.neighbors.push(NeighborsBy::Source(Arc::new(Similarity)));
     plan.neighbors.push(NeighborsBy::Source(Arc::new(Overlap)));
     let outcome = run(&images, &plan);
     assert_eq!((outcome.n_items, outcome.n_too_small), (9, 4));
     let n: usize = images.iter().map(|image| image.original.len()).sum();
-    assert_eq!(outcome.rows.len(), 3 * 4 * Solver::FROM_LISTS.len());
+    assert_eq!(outcome.rows.len(), 3 * 4 * Builtin::FROM_LISTS.len());
     for row in &outcome.rows {
         let what = format!("{} by {} with {}", row.scheme, row.neighbors, row.solver);
         assert_eq!(row.n_points + row.dropped.values().sum::<usize>(), n, "{what}");
@@ -262,7 +262,7 @@ fn what_is_not_for_images_is_refused() {
         run_images(images, plan, &mut Silent).unwrap_err().to_string()
     };
     let mut alone = plan();
-    alone.solvers = vec![Solver::Density];
+    alone.solvers = vec![Arc::new(Builtin::Density)];
     assert_eq!(message(&alone), "solver: expected one that recovers from lists, found density");
     let mut given = plan();
     given.neighbors = vec![NeighborsBy::Given(PointNeighbors {

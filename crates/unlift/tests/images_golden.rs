@@ -2,10 +2,12 @@
 //! K = 20, everything automatic, joint recovery. Floors are two points below what came back, or less: they guard
 //! against losses and claim nothing.
 
+use std::sync::Arc;
+
 use unlift::audit::{Image, run_images};
 use unlift::audit::{Plan, Row, Silent};
 use unlift::geometry::frame::Bounds;
-use unlift::recover::Solver;
+use unlift::recover::Builtin;
 use unlift::seed::{Draws, Stage};
 use unlift::truth::Original;
 use unlift::{Error, PointSet, Unit};
@@ -50,7 +52,7 @@ fn rows(schemes: &[&str], ratios: &[f64]) -> Vec<Row> {
     let mut plan = Plan::new(Unit::Pixel);
     plan.schemes.retain(|scheme| schemes.contains(&scheme.name()));
     plan.inlier_ratios = ratios.to_vec();
-    plan.solvers = vec![Solver::Joint];
+    plan.solvers = vec![Arc::new(Builtin::Joint)];
     let images = (1..=3).map(|seed| Ok::<_, Error>(image(seed)));
     let rows = run_images(images, &plan, &mut Silent).unwrap().rows;
     for row in &rows {

@@ -3,10 +3,12 @@
 //! Joint recovery begins with a pass of consensus. On maps whose lists hold a good part of all records it used to lose what
 //! that pass had found.
 
+use std::sync::Arc;
+
 use unlift::audit::{Plan, Silent, run};
 use unlift::geometry::knn::Knn;
 use unlift::geometry::vector::median;
-use unlift::recover::{Delta, Solver};
+use unlift::recover::{Builtin, Delta};
 use unlift::synthetic::{Shape, shape};
 use unlift::truth::Original;
 use unlift::{PointSet, Unit};
@@ -21,13 +23,13 @@ fn both(of: Shape, n: usize, name: &str, ratio: f64) -> ([f64; 2], [f64; 2]) {
     plan.schemes.retain(|scheme| scheme.name() == name);
     plan.inlier_ratios = vec![ratio];
     plan.records_alone = false;
-    plan.solvers = vec![Solver::Joint, Solver::Consensus];
+    plan.solvers = vec![Arc::new(Builtin::Joint), Arc::new(Builtin::Consensus)];
     let outcome = run(&original, None, &plan, &mut Silent).unwrap();
-    let percent = |solver: Solver| {
+    let percent = |solver: Builtin| {
         let row = outcome.rows.iter().find(|row| row.solver == solver.name()).unwrap();
         [row.recovered_percent[0], row.recovered_percent[1]]
     };
-    (percent(Solver::Joint), percent(Solver::Consensus))
+    (percent(Builtin::Joint), percent(Builtin::Consensus))
 }
 
 #[test]
@@ -56,7 +58,7 @@ fn cp(points: &[[f64; 3]], k: usize, delta: Delta) -> f64 {
     let original = Original::new(PointSet::try_new(points.to_vec(), Unit::Meter).unwrap());
     let mut plan = Plan { k, delta, records_alone: false, ..Plan::new(Unit::Meter) };
     plan.schemes.retain(|scheme| scheme.name() == "cp");
-    (plan.inlier_ratios, plan.solvers) = (vec![0.3], vec![Solver::Joint]);
+    (plan.inlier_ratios, plan.solvers) = (vec![0.3], Builtin::list(&[Builtin::Joint]));
     run(&original, None, &plan, &mut Silent).unwrap().rows[0].recovered_percent[1]
 }
 

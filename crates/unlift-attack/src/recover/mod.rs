@@ -2,7 +2,7 @@
 //!
 //! In order, a file or a folder per step, each of which imports only what stands above it and `map`:
 //!
-//! 1. `options`: what a user may choose; `result`: what comes out.
+//! 1. `options`: what a user may choose; `result`: what comes out; `solver`: the trait that you implement for a solver of your own.
 //! 2. `map`: records, lists and places as solvers read them; `Settings` (in `map/family`) is all that differs between maps and images.
 //! 3. Solvers: `consensus` and `joint`; `ransac` and `published_density` are attacks as published, for comparison.
 //! 4. `delta`: the distance that decides support, chosen by how well consensus then does.
@@ -12,6 +12,7 @@
 //!
 //! [`recover`] is the whole attack. [`prepare`] learns a [`Model`], with which parts of a map are solved elsewhere.
 
+mod assignment;
 mod confidence;
 mod consensus;
 mod delta;
@@ -25,55 +26,85 @@ mod published_density;
 mod ransac;
 mod records_alone;
 mod result;
+mod solver;
 
 #[doc(hidden)]
 pub use confidence::crowd::{Cues, Seen};
 #[doc(hidden)]
 pub use confidence::{N_KINDS, N_TERMS, centered, terms};
 pub use model::Model;
-pub use options::{Delta, RecoverOptions, Solver};
+pub use options::{Delta, RecoverOptions};
 pub use problem::Part;
 pub use records_alone::records_alone;
 pub use result::{Confidence, Estimate, Recovered, Status, TrialHistogram, Unknown};
+pub use solver::{Builtin, Solver};
 
 use crate::Error;
 use crate::compiled::Both;
 use crate::neighbors::Neighborhoods;
 use crate::released::Released;
-use problem::Problem;
+use problem::{Problem, check_lists};
 
 /// Learns what consensus must know of `released` and all of its `lists` before any point is placed.
 ///
 /// # Errors
-/// When options are out of range or ask for another solver, or the lists do not have one row per slot.
+/// When options are out of range, or the lists do not have one row per slot.
 pub fn prepare<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
     options: &RecoverOptions,
 ) -> Result<Model<D>, Error> {
-    Problem::new(released, lists, options)?.model()
+    Problem::new(released, lists, Builtin::Consensus, options)?.model()
 }
 
-/// Recovers the hidden points of `released` with the help of `lists`: `R` of Eq. (3).
+/// Recovers the hidden points of `released` with the help of `lists` by `solver`: `R` of Eq. (3).
 ///
 /// The result depends on the records, the neighborhoods and the options alone, not on threads.
 ///
 /// # Errors
-/// When options are out of range, or the lists do not have one row per slot.
+/// When options are out of range, the lists do not have one row per slot, or the solver fails or does not answer for every slot.
 pub fn recover<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
+    solver: &dyn Solver<D>,
     options: &RecoverOptions,
 ) -> Result<Recovered<D>, Error> {
-    let and_look: AndLook<D> = AND_LOOK.of()?;
-    and_look(released, lists, options, false).map(|(recovered, _)| recovered)
+    check_lists(released, lists)?;
+    options.check()?;
+    let recovered = solver.recover(released, lists, options)?;
+    if recovered.n_slots() == released.n_slots() {
+        return Ok(recovered);
+    }
+    let expected = format!("{} positions, one per slot", released.n_slots());
+    let found = recovered.n_slots().to_string();
+    Err(Error::new("solver", expected, found).within(solver.name()))
 }
 
-/// Recovers as [`recover`] does by [`Solver::Joint`]; beside it stands the pass that it starts from: bit for bit what
-/// [`Solver::JointStart`] gives, without a run of its own.
+impl<const D: usize> Solver<D> for Builtin {
+    fn name(&self) -> &str {
+        Self::name(self)
+    }
+
+    fn recover(
+        &self,
+        released: &Released<D>,
+        lists: &Neighborhoods,
+        options: &RecoverOptions,
+    ) -> Result<Recovered<D>, Error> {
+        let solve: Solve<D> = SOLVE.of()?;
+        solve(*self, released, lists, options, false).map(|(recovered, _)| recovered)
+    }
+
+    fn reads_lists(&self) -> bool {
+        Self::FROM_LISTS.contains(self)
+    }
+}
+
+/// Recovers by [`Builtin::Joint`] and returns beside it the pass that it starts from: bit for bit what [`Builtin::JointStart`]
+/// gives, without a run of its own.
 ///
 /// # Errors
-/// As of [`recover`], and when `options` ask for another solver.
+/// When options are out of range, or the lists do not have one row per slot.
 pub fn recover_with_start<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
@@ -96,42 +127,45 @@ fn with_start<const D: usize>(
     lists: &Neighborhoods,
     options: &RecoverOptions,
 ) -> Result<(Recovered<D>, Recovered<D>), Error> {
-    if options.solver != Solver::Joint {
-        return Err(Error::new("solver", Solver::Joint.name(), options.solver.name()));
-    }
-    let problem = Problem::new(released, lists, options)?;
+    let problem = Problem::new(released, lists, Builtin::Joint, options)?;
     let start = problem.solve(0..problem.n_slots());
     let (recovered, _) = problem.finish(problem.refine(start.clone()), false)?;
     let start = problem.finish_start(start, &recovered)?;
     Ok((recovered, start))
 }
 
-/// Recovers as [`recover`] does; beside it stands what confidence is made of, for fitting it.
+/// Recovers by [`Builtin::Joint`] and returns beside it what confidence is made of, for fitting it.
 ///
 /// # Errors
-/// As of [`recover`].
+/// When options are out of range, or the lists do not have one row per slot.
 #[doc(hidden)]
 pub fn recover_and_look<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
     options: &RecoverOptions,
 ) -> Result<(Recovered<D>, Seen), Error> {
-    let and_look: AndLook<D> = AND_LOOK.of()?;
-    and_look(released, lists, options, true)
+    let solve: Solve<D> = SOLVE.of()?;
+    solve(Builtin::Joint, released, lists, options, true)
 }
 
-type AndLook<const D: usize> =
-    fn(&Released<D>, &Neighborhoods, &RecoverOptions, bool) -> Result<(Recovered<D>, Seen), Error>;
+type Solve<const D: usize> = fn(
+    Builtin,
+    &Released<D>,
+    &Neighborhoods,
+    &RecoverOptions,
+    bool,
+) -> Result<(Recovered<D>, Seen), Error>;
 
-static AND_LOOK: Both<AndLook<2>, AndLook<3>> = Both(and_look::<2>, and_look::<3>);
+static SOLVE: Both<Solve<2>, Solve<3>> = Both(solve::<2>, solve::<3>);
 
-fn and_look<const D: usize>(
+fn solve<const D: usize>(
+    solver: Builtin,
     released: &Released<D>,
     lists: &Neighborhoods,
     options: &RecoverOptions,
     is_asked: bool,
 ) -> Result<(Recovered<D>, Seen), Error> {
-    let problem = Problem::new(released, lists, options)?;
+    let problem = Problem::new(released, lists, solver, options)?;
     let start = problem.solve(0..problem.n_slots());
     problem.finish(problem.refine(start), is_asked)
 }

@@ -3,7 +3,7 @@
 use crate::recover::map::bytes::{Reader, Writer};
 use crate::recover::map::chance::{CandidateField, ChanceField, tube};
 use crate::recover::map::family::Chance;
-use crate::recover::options::{Delta, RecoverOptions, Solver};
+use crate::recover::options::{Delta, RecoverOptions};
 use crate::{About, Error, Fingerprint, ListsBy, RowOrder};
 
 /// What consensus learns of one released map and all of its lists: delta, and how likely a random listed record passes near a place.
@@ -105,8 +105,8 @@ impl<const D: usize> Model<D> {
         let seed = from.u64()?;
         let given = from.f64()?;
         let delta = if given == 0.0 { Delta::Auto } else { Delta::Fixed(given) };
-        let (solver, exact_constraints) = (Solver::Consensus, exact_constraints != 0);
-        let options = RecoverOptions { solver, delta, seed, exact_constraints, confidence: false };
+        let exact_constraints = exact_constraints != 0;
+        let options = RecoverOptions { delta, seed, exact_constraints, confidence: false };
         options.check().map_err(|error| error.within("model"))?;
         let map = Fingerprint(from.array()?);
         let [order, by_oracle] = from.array()?;

@@ -2,30 +2,31 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use crate::density::{Peaks, tomography};
 use crate::neighbors::Neighborhoods;
+use crate::recover::assignment::descriptor_rows;
 use crate::recover::confidence::crowd::{Seen, Solved};
 use crate::recover::joint::Joint;
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::Graph;
 use crate::recover::map::lists::{Lists, Slots};
 use crate::recover::model::Model;
-use crate::recover::options::{Delta, RecoverOptions, Solver};
+use crate::recover::options::{Delta, RecoverOptions};
 use crate::recover::published_density::published;
 use crate::recover::ransac::Ransac;
 use crate::recover::records_alone::{self, Placement};
 use crate::recover::result::{Estimate, Recovered, TrialCounts, Unknown};
+use crate::recover::solver::Builtin;
 use crate::recover::{confidence, consensus, delta, exact};
 use crate::released::{Obfuscation, Released};
-use crate::{About, Descriptors, Error, Fingerprint, RecordId};
+use crate::{About, Error, Fingerprint};
 
 /// One map to be recovered.
 pub(super) struct Problem<'a, const D: usize> {
     released: &'a Released<D>,
     map: Fingerprint,
     lists: &'a Neighborhoods,
+    solver: Builtin,
     options: RecoverOptions,
     /// The distance up to which a record supports a place, in the unit of the map.
     delta: f64,
@@ -55,9 +56,10 @@ impl<'a, const D: usize> Problem<'a, D> {
     pub(super) fn new(
         released: &'a Released<D>,
         lists: &'a Neighborhoods,
+        solver: Builtin,
         options: &RecoverOptions,
     ) -> Result<Self, Error> {
-        Self::make(released, lists, options, None)
+        Self::make(released, lists, solver, options, None)
     }
 
     /// `released` with some of its lists, and the `model` made of it and all of them.
@@ -69,12 +71,13 @@ impl<'a, const D: usize> Problem<'a, D> {
         lists: &'a Neighborhoods,
         model: &Model<D>,
     ) -> Result<Self, Error> {
-        Self::make(released, lists, &model.options, Some(model))
+        Self::make(released, lists, Builtin::Consensus, &model.options, Some(model))
     }
 
     fn make(
         released: &'a Released<D>,
         lists: &'a Neighborhoods,
+        solver: Builtin,
         options: &RecoverOptions,
         model: Option<&Model<D>>,
     ) -> Result<Self, Error> {
@@ -83,15 +86,15 @@ impl<'a, const D: usize> Problem<'a, D> {
         let map = released.fingerprint();
         map.expect(lists.about().map)?;
         map.expect(model.map(|model| model.map)).map_err(|error| error.within("model"))?;
-        let (records, delta) = match options.solver {
-            Solver::Density => Self::at_peaks(published(released)),
-            Solver::Tomography => Self::at_peaks(tomography(released)),
-            Solver::Consensus | Solver::Joint | Solver::JointStart | Solver::Ransac => {
-                Self::listed(released, lists, options, model)?
+        let (records, delta) = match solver {
+            Builtin::Density => Self::at_peaks(published(released)),
+            Builtin::Tomography => Self::at_peaks(tomography(released)),
+            Builtin::Consensus | Builtin::Joint | Builtin::JointStart | Builtin::Ransac => {
+                Self::listed(released, lists, solver, options, model)?
             }
         };
         let trials = TrialCounts::default();
-        Ok(Self { released, map, lists, options: *options, delta, records, trials })
+        Ok(Self { released, map, lists, solver, options: *options, delta, records, trials })
     }
 
     fn at_peaks(peaks: Peaks) -> (Records<'a, D>, f64) {
@@ -102,6 +105,7 @@ impl<'a, const D: usize> Problem<'a, D> {
     fn listed(
         released: &'a Released<D>,
         lists: &'a Neighborhoods,
+        solver: Builtin,
         options: &RecoverOptions,
         model: Option<&Model<D>>,
     ) -> Result<(Records<'a, D>, f64), Error> {
@@ -110,7 +114,7 @@ impl<'a, const D: usize> Problem<'a, D> {
             None => Family::learn(released, lists),
         };
         // Joint recovery also asks who lists whom, from the first pass on.
-        let is_joint = matches!(options.solver, Solver::Joint | Solver::JointStart);
+        let is_joint = matches!(solver, Builtin::Joint | Builtin::JointStart);
         let graph = is_joint.then(|| Graph::new(lists, released.slots_per_record()));
         let single = graph.as_ref().filter(|_| released.slots_per_record() == 1);
         let both_ways = single.map(Graph::neighborhoods).transpose()?;
@@ -125,22 +129,20 @@ impl<'a, const D: usize> Problem<'a, D> {
         Ok((Records::Listed { family, graph, both_ways }, delta))
     }
 
-    /// What was learned of the map, by consensus.
+    /// What was learned of the map.
     ///
     /// # Errors
-    /// When the solver is another one.
+    /// When the solver does not read lists.
     pub(super) fn model(&self) -> Result<Model<D>, Error> {
-        match &self.records {
-            Records::Listed { family, .. } if self.options.solver == Solver::Consensus => {
-                let about = self.about();
-                let (map, delta, chance) = (self.map, self.delta, family.chance());
-                Ok(Model { options: self.options, about, map, delta, chance })
-            }
-            _ => {
-                let solver = self.options.solver.name();
-                Err(Error::new("solver of parts", Solver::Consensus.name(), solver))
-            }
-        }
+        let Records::Listed { family, .. } = &self.records else {
+            return Err(Error::new(
+                "solver of parts",
+                Builtin::Consensus.name(),
+                self.solver.name(),
+            ));
+        };
+        let (map, delta, chance) = (self.map, self.delta, family.chance());
+        Ok(Model { options: self.options, about: self.about(), map, delta, chance })
     }
 
     /// Number of slots.
@@ -153,7 +155,7 @@ impl<'a, const D: usize> Problem<'a, D> {
         let (lists, delta) = (self.lists, self.delta as f32);
         match &self.records {
             Records::Alone(peaks) => Placement::new(self.released, lists, peaks).solve(slots),
-            Records::Listed { family, .. } if self.options.solver == Solver::Ransac => {
+            Records::Listed { family, .. } if self.solver == Builtin::Ransac => {
                 let (seed, trials) = (self.options.seed, &self.trials);
                 Ransac { family, lists, delta, seed, trials }.solve(slots)
             }
@@ -168,9 +170,7 @@ impl<'a, const D: usize> Problem<'a, D> {
     /// The estimates of all slots after joint recovery from `start`; `start` for other solvers.
     pub(super) fn refine(&self, start: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
         match &self.records {
-            Records::Listed { family, graph: Some(graph), .. }
-                if self.options.solver == Solver::Joint =>
-            {
+            Records::Listed { family, graph: Some(graph), .. } if self.solver == Builtin::Joint => {
                 let (delta, seed) = (self.delta as f32, self.options.seed);
                 Joint { family, graph, delta, seed }.recover(start)
             }
@@ -208,9 +208,9 @@ impl<'a, const D: usize> Problem<'a, D> {
         }
         let settled = self.settled(&unsettled);
         let estimates = settled.as_deref().unwrap_or(&unsettled);
-        let trials = (self.options.solver == Solver::Ransac).then(|| self.trials.histogram());
+        let trials = (self.solver == Builtin::Ransac).then(|| self.trials.histogram());
         let recovered = self.in_columns(estimates, descriptor_row)?.with_trials(trials);
-        if let Some(unknown) = confidence::not_asked::<D>(&self.options) {
+        if let Some(unknown) = confidence::not_asked::<D>(self.solver, &self.options) {
             return Ok((recovered.without_confidence(unknown), Seen::NOTHING));
         }
         let Records::Listed { family, graph: Some(graph), .. } = &self.records else {
@@ -229,7 +229,7 @@ impl<'a, const D: usize> Problem<'a, D> {
         Ok((recovered, seen))
     }
 
-    /// The first pass of joint recovery as [`Solver::JointStart`] finishes it, beside the `last` one.
+    /// The first pass of joint recovery as [`Builtin::JointStart`] finishes it, beside the `last` one.
     ///
     /// # Errors
     /// When there is not one estimate per slot.
@@ -245,7 +245,7 @@ impl<'a, const D: usize> Problem<'a, D> {
 
     /// Whether a rule of the scheme moves estimates. The paper's loop stays as published.
     fn is_settled(&self) -> bool {
-        let asked = self.options.exact_constraints && self.options.solver != Solver::Ransac;
+        let asked = self.options.exact_constraints && self.solver != Builtin::Ransac;
         let listed = matches!(self.records, Records::Listed { .. });
         asked && listed && exact::can_settle(self.released)
     }
@@ -260,7 +260,7 @@ impl<'a, const D: usize> Problem<'a, D> {
             return None;
         }
         let mut settled = self.settle(estimates.to_vec());
-        if self.options.solver == Solver::Joint {
+        if self.solver == Builtin::Joint {
             for _ in 0..exact::feeds(self.released) {
                 settled = self.settle(self.refine(settled));
             }
@@ -314,40 +314,6 @@ pub(super) fn check_lists<const D: usize>(
         return Err(Error::new("neighborhoods", expected, record.0.to_string()));
     }
     Ok(())
-}
-
-// Which of a paired line's two descriptors belongs to which of its points (supplement B).
-
-/// Per slot of `records` the released descriptor row said to belong to it; `None` unless records hide two points
-/// and have descriptors.
-///
-/// The cheaper of the two bijections wins, where a descriptor and a neighborhood cost the sum of
-/// its distances to the listed records, each counted with the nearer of its two descriptors.
-/// Positions play no part.
-pub(super) fn descriptor_rows<const D: usize>(
-    released: &Released<D>,
-    lists: &Neighborhoods,
-    records: Range<usize>,
-) -> Option<Vec<u32>> {
-    let descriptors = released.descriptors().filter(|_| released.slots_per_record() == 2)?;
-    let rows_of = |record: usize| {
-        let [a, b] = [2 * record, 2 * record + 1];
-        let cost = |row: usize, slot: usize| affinity_cost(descriptors, row, lists.of(slot));
-        let straight = cost(a, a) + cost(b, b);
-        let crossed = cost(a, b) + cost(b, a);
-        let first = if straight <= crossed { [a, b] } else { [b, a] };
-        first.map(|row| row as u32)
-    };
-    Some(records.into_par_iter().flat_map_iter(rows_of).collect())
-}
-
-fn affinity_cost(descriptors: &Descriptors, row: usize, listed: &[RecordId]) -> f64 {
-    let to_record = |record: usize| {
-        let one = descriptors.squared_distance(row, 2 * record);
-        let other = descriptors.squared_distance(row, 2 * record + 1);
-        f64::from(one.min(other).sqrt())
-    };
-    listed.iter().map(|record| to_record(record.index())).sum()
 }
 
 // Consensus in parts, each with its own lists alone: what the machines of a cluster solve.

@@ -7,10 +7,11 @@ use rayon::prelude::*;
 use crate::density::{Peak, Peaks, tomography};
 use crate::neighbors::{Geometric, Neighborhoods, geometric_by};
 use crate::recover::map::lines::{LineRow, from_lines, from_rays};
-use crate::recover::options::{RecoverOptions, Solver};
+use crate::recover::options::RecoverOptions;
 use crate::recover::published_density::published;
 use crate::recover::recover_with_start;
 use crate::recover::result::{Estimate, Recovered, Status, stored_support};
+use crate::recover::solver::Builtin;
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, RowOrder};
 
@@ -30,10 +31,10 @@ pub fn records_alone<const D: usize>(
 ) -> Result<Vec<(&'static str, Recovered<D>)>, Error> {
     let mut attacks = Vec::new();
     if matches!(released.obfuscation(), Obfuscation::Rays(_)) {
-        attacks.push((Solver::Density.name(), at(released, &published(released))?));
+        attacks.push((Builtin::Density.name(), at(released, &published(released))?));
     }
     let peaks = tomography(released);
-    attacks.push((Solver::Tomography.name(), at(released, &peaks)?));
+    attacks.push((Builtin::Tomography.name(), at(released, &peaks)?));
     // A map of planes, or of rays from one center, has no such lists.
     if let Ok(lists) = geometric_by(released, Geometric::K, &peaks) {
         let options = RecoverOptions { confidence: false, ..*options };

@@ -2,6 +2,9 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use crate::neighbors::Neighborhoods;
+use crate::recover::assignment::descriptor_rows;
+use crate::released::{Obfuscation, Released};
 use crate::{About, Error, Unit};
 
 /// What became of a slot.
@@ -272,6 +275,47 @@ impl<const D: usize> Recovered<D> {
             trials: None,
             about: About::default(),
         })
+    }
+
+    /// What a solver of your own returns: `positions` about the released origin, one per slot. A position that is not finite
+    /// stands for a point that could not be placed.
+    ///
+    /// Of axis candidates the hidden axis is taken to be the one along which a position is farthest from the published one.
+    ///
+    /// # Errors
+    /// When there is not one position per slot.
+    pub fn from_positions(
+        released: &Released<D>,
+        lists: &Neighborhoods,
+        positions: &[[f32; D]],
+    ) -> Result<Self, Error> {
+        if positions.len() != released.n_slots() {
+            let expected = format!("{}, one per slot", released.n_slots());
+            return Err(Error::new("positions", expected, positions.len().to_string()));
+        }
+        let candidates = match released.obfuscation() {
+            Obfuscation::AxisCandidates(candidates) => Some(candidates.position()),
+            _ => None,
+        };
+        let estimate = |(slot, &position): (usize, &[f32; D])| {
+            if !position.iter().all(|x| x.is_finite()) {
+                return Estimate::lost(Status::NoSupport);
+            }
+            let moved = |published: &[f32; D], c: usize| (position[c] - published[c]).abs();
+            let axis = candidates.map_or(0, |published| {
+                let farther = |&a: &usize, &b: &usize| {
+                    moved(&published[slot], a).total_cmp(&moved(&published[slot], b))
+                };
+                (0..D).max_by(farther).unwrap_or(0)
+            });
+            Estimate { position, status: Status::Ok, support: 0, axis: axis as u8, evidence: 0.0 }
+        };
+        let estimates: Vec<Estimate<D>> = positions.iter().enumerate().map(estimate).collect();
+        let rows = descriptor_rows(released, lists, 0..released.n_records());
+        let (origin, unit) = (released.origin(), released.unit());
+        let about = About { map: Some(released.fingerprint()), ..lists.about() };
+        Self::try_new(&estimates, candidates.is_some(), rows, origin, unit, 0.0)
+            .map(|recovered| recovered.with_about(about).without_confidence(Unknown::OtherSolver))
     }
 
     /// The same positions, said to be of a released map and counted in an order: that of the lists they were

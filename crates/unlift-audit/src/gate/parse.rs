@@ -1,6 +1,6 @@
 //! From the text of a gate to a gate.
 
-use unlift::recover::Solver;
+use unlift::recover::Builtin;
 
 use super::{Figure, Gate};
 use crate::sources;
@@ -76,7 +76,7 @@ fn n_names(parts: &[&str]) -> usize {
 }
 
 fn solver_name(text: &str) -> Option<&'static str> {
-    Solver::from_name(text.trim()).ok().map(Solver::name)
+    Builtin::from_name(text.trim()).ok().map(|solver| solver.name())
 }
 
 /// A source as rows name it.
@@ -105,7 +105,7 @@ fn qualifiers(names: &[&str]) -> Result<(Option<&'static str>, Option<String>), 
                 source = Some(found);
             }
             (None, None) => {
-                let solvers = Solver::ALL.map(Solver::name).join(", ");
+                let solvers = Builtin::ALL.map(|solver| solver.name()).join(", ");
                 let sources: Vec<&str> = sources::all().iter().map(|entry| entry.name).collect();
                 return Err(format!(
                     "expected a solver ({solvers}) or a source of neighborhoods ({ORACLE}, file, {}), \

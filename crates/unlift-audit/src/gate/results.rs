@@ -19,7 +19,7 @@ fn candidates<'a, const D: usize>(
         for (at, threshold) in plan.thresholds.iter().enumerate() {
             let candidate = Candidate {
                 scheme: &row.scheme,
-                solver: row.solver,
+                solver: &row.solver,
                 source: &row.neighbors,
                 inlier_ratio: row.oracle_noise.is_some().then_some(row.inlier_ratio),
                 threshold: threshold.value,

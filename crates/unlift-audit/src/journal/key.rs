@@ -6,7 +6,7 @@ use unlift_io::hash::Hasher;
 
 /// A hash of all that `recovery` by `program` follows from.
 pub(super) fn key(program: &str, recovery: &Recovery<'_, 3>) -> String {
-    let Recovery { released, lists, options } = recovery;
+    let Recovery { released, lists, solver, options } = recovery;
     let mut hasher = Hasher::default();
     hasher.add(program.as_bytes());
     hasher.add(&[0]);
@@ -23,7 +23,7 @@ pub(super) fn key(program: &str, recovery: &Recovery<'_, 3>) -> String {
         hasher.add(&score.to_le_bytes());
     }
     let delta = if let Delta::Fixed(delta) = options.delta { delta } else { 0.0 };
-    hasher.add(options.solver.name().as_bytes());
+    hasher.add(solver.name().as_bytes());
     hasher.add(&[0, u8::from(options.exact_constraints), u8::from(options.confidence)]);
     hasher.add(&delta.to_le_bytes());
     hasher.add(&options.seed.to_le_bytes());
@@ -34,7 +34,7 @@ pub(super) fn key(program: &str, recovery: &Recovery<'_, 3>) -> String {
 mod tests {
     use super::*;
     use unlift::neighbors::Neighborhoods;
-    use unlift::recover::RecoverOptions;
+    use unlift::recover::{Builtin, RecoverOptions};
     use unlift::released::{AxisPlanes, Obfuscation, Released};
     use unlift::{RecordId, Unit};
 
@@ -62,7 +62,10 @@ mod tests {
         let released = Released::try_new(obfuscation, 1, [0.0; 3], Unit::Meter, None).unwrap();
         let usual = RecoverOptions::default();
         let of = |lists: &Neighborhoods, options: &RecoverOptions| {
-            key("program", &Recovery { released: &released, lists, options })
+            key(
+                "program",
+                &Recovery { released: &released, lists, solver: &Builtin::Joint, options },
+            )
         };
         let mut keys = Vec::new();
         for (first, scores) in [(1, None), (3, None), (1, Some(1.0)), (1, Some(2.0))] {

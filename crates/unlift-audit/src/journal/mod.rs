@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 use unlift::OneLine;
 use unlift::audit::Recovery;
-use unlift::recover::{Recovered, Solver};
+use unlift::recover::{Builtin, Recovered};
 use unlift_io::atomic::sweep;
 use unlift_io::hash::{Hasher, hash_file};
 use unlift_io::stage::{read_recovered, write_recovered};
@@ -64,9 +64,9 @@ impl<'a> Journal<'a> {
         Ok(Self { folder, program, progress, keys: BTreeSet::new(), n_recalled: 0, is_full: false })
     }
 
-    /// What was recovered before, where that is so. The sampling loop's counts are in no file: it is run again.
+    /// What was recovered before, where that is so.
     pub(crate) fn recall(&mut self, recovery: &Recovery<'_, 3>) -> Option<Recovered<3>> {
-        if recovery.options.solver == Solver::Ransac {
+        if !can_keep(recovery) {
             return None;
         }
         let key = self.key(recovery);
@@ -85,7 +85,7 @@ impl<'a> Journal<'a> {
 
     /// Keeps what was recovered now.
     pub(crate) fn keep(&mut self, recovery: &Recovery<'_, 3>, recovered: &Recovered<3>) {
-        if self.is_full || recovery.options.solver == Solver::Ransac {
+        if self.is_full || !can_keep(recovery) {
             return;
         }
         let key = self.key(recovery);
@@ -183,4 +183,10 @@ impl Drop for Journal<'_> {
         // Only if it is empty, as after a run that ended before anything was kept.
         let _ = fs::remove_dir(&self.folder);
     }
+}
+
+/// Whether a journal may answer for the solver. The sampling loop's counts are in no file, and a solver of somebody's own may have
+/// changed since.
+fn can_keep(recovery: &Recovery<'_, 3>) -> bool {
+    Builtin::of(recovery.solver).is_some_and(|builtin| builtin != Builtin::Ransac)
 }

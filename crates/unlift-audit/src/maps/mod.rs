@@ -280,7 +280,7 @@ fn watcher<'a, 'j>(
         progress: job.progress,
         pictures: (!job.share_safe).then(|| Pictures::new(job.original, &job.plan, n_views)),
         curves: Vec::new(),
-        drawn: drawn.iter().map(|solver| solver.name()).collect(),
+        drawn,
         clouds: out
             .filter(|_| job.write_clouds)
             .map(|out| (Clouds::new(job.unit_in_map_units), out)),

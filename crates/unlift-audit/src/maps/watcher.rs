@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use unlift::audit::{Cell, Observer, Plan, Recovery, Row};
-use unlift::recover::{Recovered, Solver};
+use unlift::recover::{Builtin, Recovered};
 use unlift_io::atomic::OutputSet;
 use unlift_report::ErrorCdf;
 use unlift_report::inversions::Inversion as Sheet;
@@ -23,7 +23,7 @@ pub(super) struct Watcher<'a, 'j> {
     /// The error curve of every cell.
     pub(super) curves: Vec<(Row, Vec<(f64, f64)>)>,
     /// Names of the solvers whose points are drawn.
-    pub(super) drawn: Vec<&'static str>,
+    pub(super) drawn: Vec<String>,
     pub(super) clouds: Option<(Clouds, &'a mut OutputSet)>,
     pub(super) thresholds: Vec<f64>,
     pub(super) inversion: Option<Arc<MapInversion>>,
@@ -32,11 +32,12 @@ pub(super) struct Watcher<'a, 'j> {
     pub(super) failed: Option<Error>,
 }
 
-/// The solvers whose points are drawn: what joint recovery starts from is not, beside what it ends with.
-pub(super) fn drawn<const D: usize>(plan: &Plan<D>) -> Vec<Solver> {
-    let is_drawn =
-        |solver: &Solver| *solver != Solver::JointStart || !plan.solvers.contains(&Solver::Joint);
-    plan.solvers.iter().copied().filter(is_drawn).collect()
+/// Names of the solvers whose points are drawn: what joint recovery starts from is not, beside what it ends with.
+pub(super) fn drawn<const D: usize>(plan: &Plan<D>) -> Vec<String> {
+    let hides_start = plan.has_solver(Builtin::Joint);
+    let solvers = plan.solvers.iter();
+    let drawn = solvers.filter(|s| !hides_start || Builtin::of(&***s) != Some(Builtin::JointStart));
+    drawn.map(|solver| solver.name().to_owned()).collect()
 }
 
 /// The curve of every row of `rows` that has one, by its cell.
@@ -107,8 +108,8 @@ mod tests {
     #[test]
     fn what_joint_starts_from_is_drawn_only_by_itself() {
         let mut plan = Plan::<3>::new(unlift::Unit::Meter);
-        assert_eq!(drawn(&plan), [Solver::Joint]);
-        plan.solvers = vec![Solver::JointStart, Solver::Ransac];
-        assert_eq!(drawn(&plan), plan.solvers);
+        assert_eq!(drawn(&plan), ["joint"]);
+        plan.solvers = vec![Arc::new(Builtin::JointStart), Arc::new(Builtin::Ransac)];
+        assert_eq!(drawn(&plan), ["joint-start", "ransac"]);
     }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use unlift::neighbors::oracle::Noise;
-use unlift::recover::{Delta, Solver};
+use unlift::recover::{Builtin, Delta};
 
 use crate::values;
 use unlift_audit::Gate;
@@ -88,7 +88,7 @@ pub struct SolverArgs {
     /// [default: joint, and joint-start, the pass that it begins with; consensus on maps of fewer than 150 K points]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
           help_heading = "Attack")]
-    pub solver: Vec<Solver>,
+    pub solver: Vec<Builtin>,
     /// Leave out the second baseline: attacks on the released records alone, without neighborhoods and
     /// descriptors
     #[arg(long, help_heading = "Attack")]

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use unlift::audit::Threshold;
 use unlift::obfuscate::Entry;
-use unlift::recover::Solver;
+use unlift::recover::Builtin;
 use unlift_nn::DescriptorKind;
 
 use crate::args::audit::{AttackArgs, ResultArgs, RunArgs};
@@ -64,7 +64,7 @@ pub struct AuditImagesArgs {
     /// joint-start, the pass that it begins with]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_solver,
           help_heading = "Attack")]
-    pub solver: Vec<Solver>,
+    pub solver: Vec<Builtin>,
     /// Where neighborhoods come from, repeatable: oracle (made from the keypoints themselves), or what
     /// an attacker makes from the released descriptors: descriptors (the best that they allow without training),
     /// similarity, overlap (SIFT), learned (a network; SIFT or ALIKED)

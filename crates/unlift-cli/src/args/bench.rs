@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use unlift::obfuscate::Entry;
-use unlift::recover::{Delta, Solver};
+use unlift::recover::{Builtin, Delta};
 
 use crate::values;
 
@@ -43,7 +43,7 @@ pub struct BenchRecoverArgs {
     /// tomography
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
           default_value = "joint")]
-    pub solver: Vec<Solver>,
+    pub solver: Vec<Builtin>,
     /// Distance up to which a neighbor supports a position, in the unit of the map
     #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto")]
     pub delta: Delta,

@@ -187,7 +187,7 @@ pub enum BenchCommand {
 mod tests {
     use super::*;
     use crate::values::NeighborSource;
-    use unlift::recover::{Delta, Solver};
+    use unlift::recover::{Builtin, Delta};
     use unlift_audit::OutlierFilter;
 
     fn audit(arguments: &[&str]) -> Result<AuditMapArgs, clap::Error> {
@@ -236,7 +236,7 @@ mod tests {
     fn lists_are_split_at_commas_and_repeated_options_add_up() {
         let args =
             audit(&["--solver", "consensus", "--solver", "ransac", "--schemes=ppl+,cp"]).unwrap();
-        assert_eq!(args.solvers.solver, [Solver::Consensus, Solver::Ransac]);
+        assert_eq!(args.solvers.solver, [Builtin::Consensus, Builtin::Ransac]);
         let names: Vec<&str> = args.schemes.iter().map(|scheme| scheme.name).collect();
         assert_eq!(names, ["ppl+", "cp"]);
     }

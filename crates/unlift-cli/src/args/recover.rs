@@ -4,8 +4,8 @@ use crate::values;
 use clap::Args;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
+use unlift::recover::Builtin;
 use unlift::recover::Delta;
-use unlift::recover::Solver;
 
 /// Options of `recover`.
 #[derive(Debug, Args)]
@@ -21,7 +21,7 @@ pub struct RecoverArgs {
     pub neighbors: PathBuf,
     /// Recovery method: joint, joint-start, consensus, ransac, density or tomography
     #[arg(long, value_name = "SOLVER", value_parser = values::solver, default_value = "joint")]
-    pub solver: Solver,
+    pub solver: Builtin,
     /// Do not use rules that tie records together (cp: swaps are mutual; ray-voxel: parity)
     #[arg(long)]
     pub no_exact_constraints: bool,

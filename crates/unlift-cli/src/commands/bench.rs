@@ -59,13 +59,12 @@ fn measure(args: &BenchRecoverArgs) -> anyhow::Result<Bench> {
         let lists = near.at_inlier_ratio(ratio, args.seed)?;
         for &solver in &args.solver {
             let options = RecoverOptions {
-                solver,
                 delta: args.delta,
                 confidence: args.confidence,
                 ..RecoverOptions::default()
             };
             let started = Instant::now();
-            recover(&released, &lists, &options)?;
+            recover(&released, &lists, &solver, &options)?;
             rows.push((ratio, solver.name(), started.elapsed().as_secs_f64()));
         }
     }

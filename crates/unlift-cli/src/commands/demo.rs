@@ -8,7 +8,7 @@ use serde_json::{Map, json};
 use tempfile::tempdir;
 use unlift::audit::{Measure, NeighborsBy, Plan};
 use unlift::neighbors::Overlap;
-use unlift::recover::Solver;
+use unlift::recover::Builtin;
 use unlift::truth::Original;
 use unlift::{PointSet, Unit};
 use unlift_audit::images::FeatureSource;
@@ -83,7 +83,7 @@ fn photos(progress: &Part<'_>, out: &Path) -> anyhow::Result<Audited> {
     let plan = Plan {
         neighbors: vec![NeighborsBy::Source(Arc::new(Learned::default()))],
         // What joint recovery starts from would be painted, too.
-        solvers: vec![Solver::Joint],
+        solvers: vec![Arc::new(Builtin::Joint)],
         k: 20,
         headline: headline(&usual.thresholds),
         measures: vec![Arc::clone(&inversion) as Arc<dyn Measure<2>>],

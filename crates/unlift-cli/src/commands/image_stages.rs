@@ -8,7 +8,7 @@ use unlift::audit::staged::{Pooled, key_of, oracle_lists, oracle_seed};
 use unlift::audit::{Row, Threshold};
 use unlift::neighbors::{Needs as SourceNeeds, Neighborhoods, Source, of_what_there_is};
 use unlift::obfuscate::{SchemeOptions, obfuscate};
-use unlift::recover::{RecoverOptions, Recovered, Status, recover};
+use unlift::recover::{Builtin, RecoverOptions, Recovered, Status, recover};
 use unlift::released::Released;
 use unlift::seed::Key;
 use unlift::truth::{Original, Secret};
@@ -165,7 +165,7 @@ pub fn list_by_source(
 /// lists of each.
 pub fn recover_all(
     (released, neighbors): (&Path, &Path),
-    options: &RecoverOptions,
+    (solver, options): (Builtin, &RecoverOptions),
     out: (&Path, &Rules),
     mut note: impl FnMut(&Neighborhoods, usize),
 ) -> anyhow::Result<Counts> {
@@ -185,7 +185,7 @@ pub fn recover_all(
         Ok(Some((name, image, of_image)))
     };
     let work = |(name, image, lists): (String, Released<2>, Neighborhoods)| {
-        let recovered = recover(&image, &lists, options);
+        let recovered = recover(&image, &lists, &solver, options);
         let recovered = recovered
             .map_err(|error| Error::core(released, error.within(&format!("image {name}"))))?;
         Ok(Some((name, recovered)))

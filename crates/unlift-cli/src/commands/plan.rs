@@ -1,11 +1,13 @@
 //! What audits of maps and of images have in common: from arguments to a plan, and the summary.
 
+use std::sync::Arc;
+
 use serde_json::{Map, Value, json};
 use unlift::Descriptors;
 use unlift::audit::{NeighborsBy, Plan, Threshold};
 use unlift::neighbors::sources::Named;
 use unlift::neighbors::{Needs, Source};
-use unlift::recover::Solver;
+use unlift::recover::{Builtin, Solver};
 
 use crate::args::AttackArgs;
 use crate::exit::{advise, usage};
@@ -34,11 +36,11 @@ pub fn with_attack(mut options: Map<String, Value>, args: &AttackArgs) -> Map<St
     options
 }
 
-/// The recovery methods asked for, each once, else the usual ones.
-pub fn solvers<const D: usize>(given: &[Solver], usual: &Plan<D>) -> Vec<Solver> {
+/// The solvers asked for, each once, else the usual ones.
+pub fn solvers<const D: usize>(given: &[Builtin], usual: &Plan<D>) -> Vec<Arc<dyn Solver<D>>> {
     match given {
         [] => usual.solvers.clone(),
-        given => distinct(given.to_vec(), |a, b| a == b),
+        given => Builtin::list(&distinct(given.to_vec(), |a, b| a == b)),
     }
 }
 

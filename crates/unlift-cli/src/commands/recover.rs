@@ -48,7 +48,6 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
     let kind = Kind::Stage(Stage::Recovered);
     check_file(&args.out, kind, &rules)?;
     let options = RecoverOptions {
-        solver: args.solver,
         delta: args.delta,
         seed: args.seed,
         exact_constraints: !args.no_exact_constraints,
@@ -67,7 +66,7 @@ pub fn run(args: &RecoverArgs) -> anyhow::Result<Outcome> {
         alive.say(&format!("unlift: note: {}: {note}", args.neighbors.display()));
     }
     let recovered = with_threads(args.threads, || {
-        let result = recover(&released, &lists, &options);
+        let result = recover(&released, &lists, &args.solver, &options);
         Ok(result.map_err(|error| unlift_io::Error::core(&args.released, error))?)
     })?;
     check_file(&args.out, kind, &rules)?;
@@ -100,7 +99,7 @@ fn images(args: &RecoverArgs, options: &RecoverOptions, rules: &Rules) -> anyhow
     let counts = with_threads(args.threads, || {
         let (files, out) =
             ((args.released.as_path(), args.neighbors.as_path()), args.out.as_path());
-        recover_all(files, options, (out, rules), note)
+        recover_all(files, (args.solver, options), (out, rules), note)
     })?;
     drop(alive);
     print(&format!(

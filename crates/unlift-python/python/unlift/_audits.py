@@ -34,6 +34,8 @@ SEVERAL = {
 Scheme = str | Callable[..., Records]
 #: A name of ours, or a function (`source`).
 Source = str | Callable[..., Any]
+#: A name of ours, or a function of a Released and its Neighborhoods that returns positions.
+Solver = str | Callable[..., Any]
 
 
 class _Keypoints(TypedDict):
@@ -69,7 +71,7 @@ def audit(
     *,
     inlier_ratios: Sequence[float] | None = None,
     oracle_noise: Sequence[str] | str | None = None,
-    solvers: Sequence[str] | str | None = None,
+    solvers: Sequence[Solver] | Solver | None = None,
     thresholds: Iterable[float | str] | str | None = None,
     k: int = 50,
     source_k: int | None = None,
@@ -90,7 +92,9 @@ def audit(
     neighbors: "oracle", names of `SOURCES`, or functions (`source`).
     inlier_ratios: shares of true neighbors to try (oracle); six without it.
     oracle_noise: how the oracle errs: "uniform", "near", "clustered".
-    solvers: names of `SOLVERS`; the strongest ones for this size without it.
+    solvers: names of `SOLVERS`, or functions; the strongest ones for this size without it. A function takes a Released and its
+        Neighborhoods, and a `numpy.random.Generator` if it has a third parameter. It returns positions `(n_slots, 3)` about
+        `released.origin`; a row of NaN says that a point was not recovered.
     thresholds: errors up to which a point counts as recovered, in the unit of the map; texts are kept as written.
     k: true neighbors per point. source_k: records per list of a source of ours, which chooses itself without it.
     delta: the distance that decides support; the attack chooses without it.
@@ -143,7 +147,7 @@ def audit_images(
     photos: str | os.PathLike[str] | None = None,
     inlier_ratios: Sequence[float] | None = None,
     oracle_noise: Sequence[str] | str | None = None,
-    solvers: Sequence[str] | str | None = None,
+    solvers: Sequence[Solver] | Solver | None = None,
     thresholds: Iterable[float | str] | str | None = None,
     k: int = 20,
     source_k: int | None = None,
@@ -171,7 +175,7 @@ def audit_images(
     max_images: use at most so many, evenly spaced over their sorted names.
     show: names of images to draw, none where it is empty; the least, the median and the most recovered without it. photos: the folder of photos, where
         `images` is none, to draw.
-    solvers: names of `IMAGE_SOLVERS`.
+    solvers: names of `IMAGE_SOLVERS`, or functions as `audit` takes them, with positions `(n_slots, 2)`.
     thresholds: errors in pixels up to which a keypoint counts as recovered.
     k: true neighbors per keypoint.
     progress: True for a bar, or a function of images done, all, and the one at work.

@@ -37,6 +37,7 @@ __all__ = [
     "audit",
     "audit_images",
     "check_scheme",
+    "check_solver",
     "check_source",
     "evaluate",
     "find",
@@ -238,7 +239,7 @@ def recover(
     released: Released | Hidden,
     lists: Neighborhoods,
     *,
-    solver: str = "joint",
+    solver: str | Callable[..., Any] | None = None,
     delta: float | None = None,
     seed: int = 0,
     exact_constraints: bool = True,
@@ -311,6 +312,14 @@ def check_scheme(scheme: Callable[..., Records], *, images: bool = False) -> Non
     It is called with 0, 1, 2, 3, 7, 120, 200, 300, 301, 600 and 700 points: of a made-up room, at random, many in one place. By
     an exception it refuses points, which it may but for 200, 600 and 700 of a room. With `images` with keypoints `(n, 2)` in
     their place.
+    """
+
+def check_solver(
+    solver: Callable[..., Any], released: Released | Hidden, lists: Neighborhoods
+) -> None:
+    """Checks that a solver answers for every hidden point of `released`, and gives the same positions again.
+
+    It is called three times, the last time with empty lists.
     """
 
 def check_source(source: Callable[..., Any], released: Released | Hidden) -> None:

@@ -36,7 +36,7 @@ pub struct BreakEven {
     /// Scheme name.
     pub scheme: String,
     /// Solver name, or [`STRONGEST`].
-    pub solver: &'static str,
+    pub solver: String,
     /// How the oracle erred.
     pub oracle_noise: &'static str,
     /// Threshold label.
@@ -55,17 +55,16 @@ pub const STRONGEST: &str = "strongest";
 /// guess, the records alone) are among them: whoever knows neighbors need not use them.
 pub fn break_even<const D: usize>(plan: &Plan<D>, rows: &[Row]) -> Vec<BreakEven> {
     let mut result = Vec::new();
-    let solvers: Vec<&'static str> = plan.solvers.iter().map(|solver| solver.name()).collect();
     for scheme in &plan.schemes {
         for noise in &plan.oracle_noise {
             let (scheme, oracle_noise) = (scheme.name(), noise.name());
             let of = |row: &&Row| row.scheme == scheme && row.oracle_noise == Some(oracle_noise);
             let by_rows = |row: &Row| row.recovered_percent[plan.headline];
             let by_any = |row: &Row| by_rows(row).max(row.baseline_percent(plan.headline));
-            let mut push = |solver: &'static str, rows: &[&Row], share: &dyn Fn(&Row) -> f64| {
+            let mut push = |solver: &str, rows: &[&Row], share: &dyn Fn(&Row) -> f64| {
                 if let Some((inlier_ratio, bound)) = crossing(&curve(rows, share)) {
                     let threshold = plan.thresholds[plan.headline].label.clone();
-                    let scheme = scheme.to_owned();
+                    let (scheme, solver) = (scheme.to_owned(), solver.to_owned());
                     let found =
                         BreakEven { scheme, solver, oracle_noise, threshold, inlier_ratio, bound };
                     result.push(found);
@@ -73,10 +72,10 @@ pub fn break_even<const D: usize>(plan: &Plan<D>, rows: &[Row]) -> Vec<BreakEven
             };
             let all: Vec<&Row> = rows.iter().filter(of).collect();
             let differs = crossing(&curve(&all, &by_any)) != crossing(&curve(&all, &by_rows));
-            if solvers.len() > 1 || differs {
+            if plan.solvers.len() > 1 || differs {
                 push(STRONGEST, &all, &by_any);
             }
-            for &solver in &solvers {
+            for solver in plan.solvers.iter().map(|solver| solver.name()) {
                 let of_solver = |row: &&Row| row.solver == solver;
                 push(solver, &all.iter().copied().filter(of_solver).collect::<Vec<_>>(), &by_rows);
             }

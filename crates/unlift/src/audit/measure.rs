@@ -47,7 +47,7 @@ pub(super) fn unmeasured(unit: Unit, secret: &Secret) -> Row {
         oracle_noise: None,
         inlier_ratio: 0.0,
         k: 0,
-        solver: "",
+        solver: String::new(),
         delta: 0.0,
         unit,
         n_points: secret.n_slots(),

@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use super::row::Row;
 use crate::evaluate::Accuracy;
 use crate::neighbors::Neighborhoods;
-use crate::recover::{RecoverOptions, Recovered};
+use crate::recover::{RecoverOptions, Recovered, Solver};
 use crate::released::Released;
 use crate::truth::{Original, Secret};
 use crate::{Descriptors, Error};
@@ -42,6 +42,8 @@ pub struct Recovery<'a, const D: usize = 3> {
     pub released: &'a Released<D>,
     /// Its lists.
     pub lists: &'a Neighborhoods,
+    /// The solver.
+    pub solver: &'a dyn Solver<D>,
     /// How it works.
     pub options: &'a RecoverOptions,
 }

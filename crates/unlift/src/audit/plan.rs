@@ -1,5 +1,6 @@
 //! What is to be audited.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::observer::Measure;
@@ -7,7 +8,7 @@ use super::threshold::Threshold;
 use crate::neighbors::oracle::Noise;
 use crate::neighbors::{Needs, Source, lacks_descriptors};
 use crate::obfuscate::{SCHEMES, Scheme, SchemeOptions};
-use crate::recover::{Delta, Solver};
+use crate::recover::{Builtin, Delta, Solver};
 use crate::{Error, Unit};
 
 /// Neighbors of every original, by row, as an owner lists them from any source.
@@ -83,8 +84,8 @@ pub struct Plan<const D: usize> {
     /// True neighbors per slot: of the oracle, and where the inlier ratio of an attacker's own lists
     /// is measured. For given lists, the longest list decides.
     pub k: usize,
-    /// Recovery methods: a row each. [`Solver::JointStart`] after [`Solver::Joint`] takes no run of its own.
-    pub solvers: Vec<Solver>,
+    /// Solvers, ours or anybody's: a row each. [`Builtin::JointStart`] after [`Builtin::Joint`] takes no run of its own.
+    pub solvers: Vec<Arc<dyn Solver<D>>>,
     /// Whether maps are also attacked by their records alone, the second baseline.
     pub records_alone: bool,
     /// Whether each scheme also gets a row for an attacker who is told the true neighbors' places.
@@ -130,7 +131,7 @@ impl<const D: usize> Plan<D> {
             inlier_ratios: vec![1.0, 0.75, 0.5, 0.3, 0.2, 0.1],
             k: if of_images { 20 } else { 50 },
             // What joint recovery starts from costs nothing more, and is at times the stronger attack.
-            solvers: vec![Solver::Joint, Solver::JointStart],
+            solvers: vec![Arc::new(Builtin::Joint), Arc::new(Builtin::JointStart)],
             records_alone: true,
             reference: false,
             delta: Delta::Auto,
@@ -147,10 +148,15 @@ impl<const D: usize> Plan<D> {
     /// can come out weaker than plain `consensus`, which then has a row of its own.
     #[must_use]
     pub fn for_map(mut self, n_points: usize, k: usize) -> Self {
-        if n_points < SMALL * k && !self.solvers.contains(&Solver::Consensus) {
-            self.solvers.push(Solver::Consensus);
+        if n_points < SMALL * k && !self.has_solver(Builtin::Consensus) {
+            self.solvers.push(Arc::new(Builtin::Consensus));
         }
         self
+    }
+
+    /// Whether the plan has this solver of ours.
+    pub fn has_solver(&self, builtin: Builtin) -> bool {
+        self.solvers.iter().any(|solver| Builtin::of(&**solver) == Some(builtin))
     }
 
     /// Whether the oracle is among the sources.
@@ -212,8 +218,8 @@ impl<const D: usize> Plan<D> {
     /// Names the first field out of range, or that is for one map alone.
     pub fn check_for_many(&self) -> Result<(), Error> {
         self.check_fields()?;
-        let lone = |solver: &&Solver| !Solver::FROM_LISTS.contains(solver);
-        if let (2, Some(solver)) = (D, self.solvers.iter().find(lone)) {
+        let lone = self.solvers.iter().find(|solver| !solver.reads_lists());
+        if let (2, Some(solver)) = (D, lone) {
             // In the plane all lines meet: records alone tell nothing.
             return Err(Error::new("solver", "one that recovers from lists", solver.name()));
         }
@@ -235,16 +241,13 @@ impl<const D: usize> Plan<D> {
     }
 
     fn check_fields(&self) -> Result<(), Error> {
-        for (at, scheme) in self.schemes.iter().enumerate() {
-            if self.schemes[..at].iter().any(|other| other.name() == scheme.name()) {
-                return Err(Error::new("schemes", "each name once", scheme.name()));
-            }
-            // Names become parts of gates and of file names.
-            let is_plain = |c: char| c.is_ascii_alphanumeric() || "-+_.".contains(c);
-            if scheme.name().is_empty() || !scheme.name().chars().all(is_plain) {
-                let expected = "a name of letters, digits, - + _ and .";
-                return Err(Error::new("scheme", expected, format!("{:?}", scheme.name())));
-            }
+        check_names("scheme", self.schemes.iter().map(|scheme| scheme.name()))?;
+        check_names("solver", self.solvers.iter().map(|solver| solver.name()))?;
+        let own = self.solvers.iter().filter(|solver| Builtin::of(&***solver).is_none());
+        if let Some(solver) = own.into_iter().find(|one| Builtin::from_name(one.name()).is_ok()) {
+            // A report would say of it what is true of ours.
+            let expected = "a name that no solver of unlift has";
+            return Err(Error::new("solver", expected, solver.name()));
         }
         if self.headline >= self.thresholds.len().max(1) {
             let expected = format!("below {}", self.thresholds.len());
@@ -270,4 +273,20 @@ impl<const D: usize> Plan<D> {
         }
         Ok(())
     }
+}
+
+/// Refuses names that are not plain words, as they become parts of gates and of file names, and names that occur twice.
+fn check_names<'a>(what: &str, names: impl Iterator<Item = &'a str>) -> Result<(), Error> {
+    let mut seen = BTreeSet::new();
+    for name in names {
+        let is_plain = |c: char| c.is_ascii_alphanumeric() || "-+_.".contains(c);
+        if name.is_empty() || !name.chars().all(is_plain) {
+            let expected = "a name of letters, digits, - + _ and .";
+            return Err(Error::new(what, expected, format!("{name:?}")));
+        }
+        if !seen.insert(name) {
+            return Err(Error::new(format!("{what}s"), "each name once", name));
+        }
+    }
+    Ok(())
 }

@@ -26,7 +26,7 @@ pub struct Row {
     /// lists against those of the plan, so that a short list is not judged by a stricter rule.
     pub k: usize,
     /// Solver name.
-    pub solver: &'static str,
+    pub solver: String,
     /// The distance that decided support, in the unit of the points.
     pub delta: f64,
     /// The unit of lengths.

@@ -6,7 +6,7 @@ use super::observer::{Observer, Recovery};
 use super::plan::Plan;
 use crate::Error;
 use crate::neighbors::Neighborhoods;
-use crate::recover::{RecoverOptions, Recovered, Solver, recover, recover_with_start};
+use crate::recover::{Builtin, RecoverOptions, Recovered, Solver, recover, recover_with_start};
 use crate::released::Released;
 
 /// A released map and lists, on which a plan's solvers are run in order.
@@ -37,35 +37,36 @@ impl<'a, const D: usize> Solved<'a, D> {
         at: usize,
         observer: &mut dyn Observer<D>,
     ) -> Result<(Recovered<D>, f64), Error> {
-        let (solver, started) = (self.plan.solvers[at], Instant::now());
-        let options = self.options(solver);
-        let is_start = |solver: &Solver| *solver == Solver::JointStart;
-        if let Some(kept) = self.start.take_if(|_| is_start(&solver)) {
+        let (solver, started) = (&*self.plan.solvers[at], Instant::now());
+        let is = |builtin, solver: &dyn Solver<D>| Builtin::of(solver) == Some(builtin);
+        if let Some(kept) = self.start.take_if(|_| is(Builtin::JointStart, solver)) {
             return Ok((kept, 0.0));
         }
-        let recalled = observer.recall(&self.recovery(&options));
-        let with_start = solver == Solver::Joint && self.plan.solvers[at..].iter().any(is_start);
+        let options = self.options();
+        let recalled = observer.recall(&self.recovery(solver, &options));
+        let mut later = self.plan.solvers[at..].iter();
+        let with_start =
+            is(Builtin::Joint, solver) && later.any(|later| is(Builtin::JointStart, &**later));
         let recovered = match recalled {
             Some(recalled) => recalled,
             None if with_start => {
                 let (joint, start) = recover_with_start(self.released, self.lists, &options)?;
-                observer.keep(&self.recovery(&options), &joint);
-                observer.keep(&self.recovery(&self.options(Solver::JointStart)), &start);
+                observer.keep(&self.recovery(solver, &options), &joint);
+                observer.keep(&self.recovery(&Builtin::JointStart, &options), &start);
                 self.start = Some(start);
                 joint
             }
             None => {
-                let recovered = recover(self.released, self.lists, &options)?;
-                observer.keep(&self.recovery(&options), &recovered);
+                let recovered = recover(self.released, self.lists, solver, &options)?;
+                observer.keep(&self.recovery(solver, &options), &recovered);
                 recovered
             }
         };
         Ok((recovered, started.elapsed().as_secs_f64()))
     }
 
-    fn options(&self, solver: Solver) -> RecoverOptions {
+    fn options(&self) -> RecoverOptions {
         RecoverOptions {
-            solver,
             delta: self.plan.delta,
             seed: self.seed,
             exact_constraints: self.plan.exact_constraints,
@@ -73,10 +74,14 @@ impl<'a, const D: usize> Solved<'a, D> {
         }
     }
 
-    fn recovery<'b>(&self, options: &'b RecoverOptions) -> Recovery<'b, D>
+    fn recovery<'b>(
+        &self,
+        solver: &'b dyn Solver<D>,
+        options: &'b RecoverOptions,
+    ) -> Recovery<'b, D>
     where
         'a: 'b,
     {
-        Recovery { released: self.released, lists: self.lists, options }
+        Recovery { released: self.released, lists: self.lists, solver, options }
     }
 }

@@ -1,9 +1,9 @@
 //! How much must come back: two points below what did.
 
-use unlift::recover::Solver;
+use unlift::recover::Builtin;
 
 /// The columns of a [`Floor`].
-pub const SOLVERS: [Solver; 3] = [Solver::Joint, Solver::Consensus, Solver::Ransac];
+pub const SOLVERS: [Builtin; 3] = [Builtin::Joint, Builtin::Consensus, Builtin::Ransac];
 
 /// A scheme, an inlier ratio, and per solver the least percentages within 10 and 25 cm.
 pub type Floor = (&'static str, f64, [[f64; 2]; 3]);

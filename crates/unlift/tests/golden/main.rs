@@ -7,6 +7,7 @@ use std::path::Path;
 
 use floors::{Floor, REAL, ROOM, SOLVERS};
 use unlift::audit::{Plan, Row, Silent, run};
+use unlift::recover::Builtin;
 use unlift::truth::Original;
 use unlift::{PointSet, Unit};
 
@@ -47,8 +48,13 @@ fn rows(points: Vec<[f64; 3]>, k: usize, floors: &[Floor]) -> Vec<Row> {
     let mut ratios: Vec<f64> = floors.iter().map(|&(_, ratio, _)| ratio).collect();
     ratios.dedup();
     let usual = Plan::new(Unit::Meter);
-    let plan =
-        Plan { inlier_ratios: ratios, k, solvers: SOLVERS.to_vec(), records_alone: false, ..usual };
+    let plan = Plan {
+        inlier_ratios: ratios,
+        k,
+        solvers: Builtin::list(&SOLVERS),
+        records_alone: false,
+        ..usual
+    };
     let rows = run(&original, None, &plan, &mut Silent).unwrap().rows;
     assert_eq!(rows.len(), SOLVERS.len() * floors.len(), "a row for every floor");
     rows

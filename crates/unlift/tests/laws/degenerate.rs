@@ -6,23 +6,19 @@ use proptest::prelude::*;
 use unlift::Unit;
 use unlift::neighbors::Neighborhoods;
 use unlift::obfuscate::Entry;
-use unlift::recover::{Delta, RecoverOptions, Solver, Status, recover};
+use unlift::recover::{Builtin, Delta, RecoverOptions, Status, recover};
 use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
 use unlift::seed::{Draws, Stage};
 
 use crate::maps::*;
 
 /// The solvers that read lists; deltas from absurdly small to absurdly large.
-fn harsh_options() -> Vec<RecoverOptions> {
+fn harsh_options() -> Vec<Options> {
     let mut options = all_options();
-    for solver in Solver::FROM_LISTS {
+    for solver in Builtin::FROM_LISTS {
         for delta in [1e-18, 1e-9, 1e9, 1e18] {
-            options.push(RecoverOptions {
-                solver,
-                delta: Delta::Fixed(delta),
-                seed: 0,
-                ..RecoverOptions::default()
-            });
+            let delta = Delta::Fixed(delta);
+            options.push((solver, RecoverOptions { delta, ..RecoverOptions::default() }));
         }
     }
     options
@@ -49,13 +45,13 @@ fn statuses<const D: usize>(
     what: &str,
     released: &Released<D>,
     lists: &Neighborhoods,
-    options: &[RecoverOptions],
+    options: &[Options],
 ) -> Vec<Status> {
     let mut all = Vec::new();
     let both_ways = both_ways(released, lists);
-    for options in options {
-        let recovered = recover(released, lists, options)
-            .unwrap_or_else(|error| panic!("{what}, {options:?}: {error}"));
+    for (solver, options) in options {
+        let recovered = recover(released, lists, solver, options)
+            .unwrap_or_else(|error| panic!("{what}, {solver:?}, {options:?}: {error}"));
         assert_eq!(recovered.n_slots(), both_ways.len(), "{what}");
         for (slot, both_ways) in both_ways.iter().enumerate() {
             let ok = recovered.status()[slot] == Status::Ok;
@@ -64,12 +60,15 @@ fn statuses<const D: usize>(
             assert_eq!(ok, recovered.position(slot).is_some(), "{what}");
             let evidence = recovered.evidence()[slot];
             assert!(evidence >= 0.0 && evidence.is_finite(), "{what}: evidence {evidence}");
-            let asked = match options.solver {
-                Solver::Joint | Solver::JointStart => both_ways.len(),
+            let asked = match solver {
+                Builtin::Joint | Builtin::JointStart => both_ways.len(),
                 _ => lists.of(slot).len(),
             };
             let support = usize::from(recovered.support()[slot]);
-            assert!(support <= asked, "{what}, {options:?}: support {support} of {asked}");
+            assert!(
+                support <= asked,
+                "{what}, {solver:?}, {options:?}: support {support} of {asked}"
+            );
         }
         assert!(recovered.delta().is_finite() && recovered.delta() > 0.0, "{what}");
         all.extend(recovered.status());
@@ -103,9 +102,8 @@ fn short_lists<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
         let what = format!("{name}, lists of {length}");
         let got = statuses(&what, &hidden.released, &lists, &harsh_options());
         // Joint recovery also asks who lists a record: lists of one may make two.
-        let both_ways = [Solver::Joint, Solver::JointStart];
-        let by_lists =
-            |options: &RecoverOptions| !both_ways.contains(&options.solver) || length == 0;
+        let both_ways = [Builtin::Joint, Builtin::JointStart];
+        let by_lists = |options: &Options| !both_ways.contains(&options.0) || length == 0;
         let told = harsh_options().iter().flat_map(|o| vec![by_lists(o); n]).collect::<Vec<_>>();
         if length < 2 {
             let few = |(&s, told): (&Status, bool)| !told || s == Status::TooFewNeighbors;

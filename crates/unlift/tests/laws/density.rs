@@ -2,21 +2,21 @@
 
 use unlift::neighbors::{Neighborhoods, geometric};
 use unlift::obfuscate::{Entry, scheme};
-use unlift::recover::{RecoverOptions, Recovered, Solver, Status};
+use unlift::recover::{Builtin, RecoverOptions, Recovered, Status};
 use unlift::released::{Lines, Obfuscation, Released};
 use unlift::seed::{Draws, Stage};
 
 use crate::maps::*;
 
-const ALONE: [Solver; 2] = [Solver::Density, Solver::Tomography];
+const ALONE: [Builtin; 2] = [Builtin::Density, Builtin::Tomography];
 
 fn empty_lists<const D: usize>(released: &Released<D>) -> Neighborhoods {
     let rows = vec![Vec::new(); released.n_slots()];
     lists_of(&rows, released.n_records(), released.slots_per_record())
 }
 
-fn alone<const D: usize>(released: &Released<D>, solver: Solver) -> Recovered<D> {
-    solve(released, &empty_lists(released), RecoverOptions { solver, ..Default::default() })
+fn alone<const D: usize>(released: &Released<D>, solver: Builtin) -> Recovered<D> {
+    solve(released, &empty_lists(released), (solver, RecoverOptions::default()))
 }
 
 /// The furnished room, denser than the one other laws use: crowds are what these attacks see.
@@ -75,7 +75,7 @@ fn a_wall_comes_back_from_random_lines() {
     let wall: Vec<[f64; 3]> =
         (0..2000).map(|_| [draws.between(0.0, 2.0), 0.5, draws.between(0.0, 2.0)]).collect();
     let hidden = hide::<3>(scheme("olc").unwrap(), &wall, 1);
-    for (solver, least) in [(Solver::Density, 65.1), (Solver::Tomography, 65.7)] {
+    for (solver, least) in [(Builtin::Density, 65.1), (Builtin::Tomography, 65.7)] {
         let percent = percent_within(&hidden, &alone(&hidden.released, solver), 0.1);
         assert!(percent >= least, "{solver:?}: {percent}");
     }
@@ -94,7 +94,7 @@ fn a_room_comes_back_from_its_records() {
     let points = furnished(4000);
     for (name, published, ours) in floors {
         let hidden = hide(scheme(name).unwrap(), &points, 1);
-        for (solver, least) in [(Solver::Density, published), (Solver::Tomography, Some(ours))] {
+        for (solver, least) in [(Builtin::Density, published), (Builtin::Tomography, Some(ours))] {
             let recovered = alone(&hidden.released, solver);
             let Some(least) = least else {
                 let lost = recovered.status().iter().all(|&status| status == Status::NoSupport);

@@ -1,10 +1,10 @@
 //! Laws of exact constraints: what they fix is right, from both sides, and nothing else moves.
 
 use unlift::obfuscate::scheme;
-use unlift::recover::{Delta, RecoverOptions, Recovered};
+use unlift::recover::{Builtin, RecoverOptions, Recovered};
 use unlift::released::Obfuscation;
 
-use crate::maps::{Hidden, hide, norm, recovered_bytes, room, solve};
+use crate::maps::{Hidden, Options, hide, norm, recovered_bytes, room, solve};
 
 const N: usize = 4000;
 const K: usize = 20;
@@ -15,8 +15,9 @@ fn hidden(name: &str, scale: f64) -> Hidden<3> {
     crate::maps::try_hide(scheme, &points, 0.5 * scale, 5).unwrap()
 }
 
-fn options(exact_constraints: bool) -> RecoverOptions {
-    RecoverOptions { exact_constraints, delta: Delta::Auto, seed: 1, ..Default::default() }
+fn options(exact_constraints: bool) -> Options {
+    let options = RecoverOptions { exact_constraints, seed: 1, ..Default::default() };
+    (Builtin::Joint, options)
 }
 
 /// The share of slots within `most` of the truth.

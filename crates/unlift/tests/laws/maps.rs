@@ -6,7 +6,7 @@ use unlift::geometry::frame::Bounds;
 use unlift::neighbors::Neighborhoods;
 use unlift::neighbors::oracle::{self, TrueNeighbors};
 use unlift::obfuscate::{Entry, SchemeOptions, obfuscate};
-use unlift::recover::{Delta, RecoverOptions, Recovered, Solver, recover};
+use unlift::recover::{Builtin, Delta, RecoverOptions, Recovered, recover};
 use unlift::released::{Obfuscation, Released};
 use unlift::seed::{Draws, Key, Stage};
 use unlift::truth::{Original, Secret};
@@ -132,12 +132,20 @@ pub fn random_lists<const D: usize>(hidden: &Hidden<D>, k: usize, seed: u64) -> 
     hidden.lists_of(&(0..hidden.released.n_slots()).map(row).collect::<Vec<_>>())
 }
 
+/// A solver and how it works.
+pub type Options = (Builtin, RecoverOptions);
+
+/// Joint recovery as it is by default.
+pub fn joint() -> Options {
+    (Builtin::Joint, RecoverOptions::default())
+}
+
 /// The solvers that read lists, both ways to choose delta.
-pub fn all_options() -> Vec<RecoverOptions> {
+pub fn all_options() -> Vec<Options> {
     let mut options = Vec::new();
-    for solver in Solver::FROM_LISTS {
+    for solver in Builtin::FROM_LISTS {
         for delta in [Delta::Fixed(0.1), Delta::Auto] {
-            options.push(RecoverOptions { solver, delta, seed: 3, ..RecoverOptions::default() });
+            options.push((solver, RecoverOptions { delta, seed: 3, ..RecoverOptions::default() }));
         }
     }
     options
@@ -147,9 +155,9 @@ pub fn all_options() -> Vec<RecoverOptions> {
 pub fn solve<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
-    options: RecoverOptions,
+    (solver, options): Options,
 ) -> Recovered<D> {
-    recover(released, lists, &options).unwrap()
+    recover(released, lists, &solver, &options).unwrap()
 }
 
 /// Bits of rows of floats.

@@ -2,19 +2,14 @@
 
 use unlift::neighbors::Neighborhoods;
 use unlift::obfuscate::Entry;
-use unlift::recover::{Delta, Model, RecoverOptions, Solver, prepare};
+use unlift::recover::{Builtin, Delta, Model, RecoverOptions, prepare};
 use unlift::released::Obfuscation;
 
 use crate::maps::*;
 
 /// Everything else as usual.
-const CONSENSUS: RecoverOptions = RecoverOptions {
-    solver: Solver::Consensus,
-    delta: Delta::Auto,
-    seed: 0,
-    exact_constraints: true,
-    confidence: false,
-};
+const CONSENSUS: RecoverOptions =
+    RecoverOptions { delta: Delta::Auto, seed: 0, exact_constraints: true, confidence: false };
 
 /// Where slots are cut: parts of all sizes, one of them empty, none at the end of a chunk.
 fn cuts(n: usize) -> Vec<std::ops::Range<usize>> {
@@ -28,7 +23,7 @@ fn lists_of_others_change_nothing<const D: usize>(name: &str, scheme: &Entry) {
     let lists = hidden.lists(15, 0.5, 6);
     let (released, per) = (&hidden.released, hidden.released.slots_per_record());
     let options = RecoverOptions { seed: 9, ..CONSENSUS };
-    let whole = solve(released, &lists, options);
+    let whole = solve(released, &lists, (Builtin::Consensus, options));
     let bytes = prepare(released, &lists, &options).unwrap().to_bytes();
     let model = Model::<D>::from_bytes(&bytes).unwrap();
     let of_part = |slots: std::ops::Range<usize>| {
@@ -66,10 +61,8 @@ fn lists_of_a_part_are_all_that_it_needs() {
 }
 
 #[test]
-fn parts_are_of_consensus_and_all_there() {
+fn parts_are_all_there() {
     let (hidden, lists) = (hidden_lines(), hidden_lines().lists(12, 0.5, 6));
-    let error = prepare(&hidden.released, &lists, &RecoverOptions::default()).unwrap_err();
-    assert_eq!(error.to_string(), "solver of parts: expected consensus, found joint");
     let model = prepare(&hidden.released, &lists, &CONSENSUS).unwrap();
     let part = model.solve_part(&hidden.released, &lists, 0..150).unwrap();
     let error = model.join(&hidden.released, [part]).unwrap_err();

@@ -3,7 +3,7 @@
 //! copying what the failing test prints, and shows in the diff.
 
 use unlift::obfuscate::{Entry, SCHEMES};
-use unlift::recover::{Delta, RecoverOptions, Solver, recover};
+use unlift::recover::{Builtin, Delta, RecoverOptions, recover};
 
 use crate::maps::*;
 
@@ -35,13 +35,9 @@ fn bytes_are_pinned() {
         }
         let hidden = hide(entry, &points, 0);
         let lists = hidden.lists(20, 0.5, 0);
-        let options = RecoverOptions {
-            solver: Solver::Consensus,
-            delta: Delta::Fixed(0.1),
-            seed: 0,
-            ..RecoverOptions::default()
-        };
-        let recovered = solve(&hidden.released, &lists, options);
+        let options =
+            RecoverOptions { delta: Delta::Fixed(0.1), seed: 0, ..RecoverOptions::default() };
+        let recovered = solve(&hidden.released, &lists, (Builtin::Consensus, options));
         let hashes = (hash(&released_bytes(&hidden.released)), hash(&recovered_bytes(&recovered)));
         found.push((entry.name, hashes.0, hashes.1));
     }
@@ -68,7 +64,7 @@ const JOINT: &[(&str, usize, u64)] = &[
 fn joint_bytes<const D: usize>(entry: &Entry) -> (&'static str, usize, u64) {
     let hidden = hide::<D>(entry, &room(2027, 500), 0);
     let lists = hidden.lists(20, 0.5, 0);
-    let recovered = solve(&hidden.released, &lists, RecoverOptions::default());
+    let recovered = solve(&hidden.released, &lists, joint());
     (entry.name, D, hash(&recovered_bytes(&recovered)))
 }
 
@@ -103,8 +99,7 @@ fn bytes_of_confidence_are_pinned() {
     let mut found = Vec::new();
     for name in ["olc", "ppl", "ray", "plane", "cp"] {
         let hidden = hide(unlift::obfuscate::scheme(name).unwrap(), &points, 0);
-        let recovered =
-            solve(&hidden.released, &hidden.lists(20, 0.5, 0), RecoverOptions::default());
+        let recovered = solve(&hidden.released, &hidden.lists(20, 0.5, 0), joint());
         let rows = recovered.confidence().expect("a map of usual size");
         let bits = rows.iter().flat_map(|one| [one.found, one.scale].map(f32::to_bits));
         found.push((name, hash(&bits.flat_map(u32::to_le_bytes).collect::<Vec<_>>())));
@@ -142,13 +137,15 @@ const BASELINES: &[(&str, &str, u64)] = &[
 fn bytes_of_other_solvers_are_pinned() {
     let points = room::<3>(2029, 300);
     let mut found = Vec::new();
-    for solver in [Solver::JointStart, Solver::Ransac, Solver::Density, Solver::Tomography] {
+    for solver in [Builtin::JointStart, Builtin::Ransac, Builtin::Density, Builtin::Tomography] {
         for name in ["olc", "ppl", "ray", "plane", "cp"] {
             let hidden = hide(unlift::obfuscate::scheme(name).unwrap(), &points, 0);
-            let options = RecoverOptions { solver, seed: 4, ..RecoverOptions::default() };
+            let options = RecoverOptions { seed: 4, ..RecoverOptions::default() };
             let lists = hidden.lists(20, 0.5, 0);
             // Not every attack on records alone knows every family.
-            let Ok(recovered) = recover(&hidden.released, &lists, &options) else { continue };
+            let Ok(recovered) = recover(&hidden.released, &lists, &solver, &options) else {
+                continue;
+            };
             found.push((solver.name(), name, hash(&recovered_bytes(&recovered))));
         }
     }

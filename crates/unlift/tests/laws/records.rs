@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use unlift::evaluate::{away_from_own, belongs};
 use unlift::obfuscate::Entry;
-use unlift::recover::Solver;
+use unlift::recover::Builtin;
 use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays};
 use unlift::truth::Original;
 use unlift::{PointSet, Unit};
@@ -110,7 +110,7 @@ fn threads_change_no_byte<const D: usize>(name: &str, scheme: &Entry, seed: u64)
         bytes.extend(lists.records().iter().flat_map(|r| r.0.to_le_bytes()));
         for options in all_options() {
             let recovered = solve(&hidden.released, &lists, options);
-            assert_eq!(recovered.trials().is_some(), options.solver == Solver::Ransac);
+            assert_eq!(recovered.trials().is_some(), options.0 == Builtin::Ransac);
             bytes.extend(recovered_bytes(&recovered));
             let bins = recovered.trials().into_iter().flat_map(|trials| trials.bins());
             bytes.extend(bins.flat_map(|(_, slots)| slots.to_le_bytes()));

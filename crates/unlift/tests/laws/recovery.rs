@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use unlift::neighbors::Neighborhoods;
 use unlift::obfuscate::Entry;
-use unlift::recover::{Delta, RecoverOptions, Solver, Status, recover};
+use unlift::recover::{Builtin, Delta, RecoverOptions, Status, recover};
 use unlift::released::{Obfuscation, Released};
 use unlift::seed::{Draws, Stage};
 use unlift::{PointSet, RecordId, Unit};
@@ -74,8 +74,9 @@ fn exact_limit<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     };
     let lists = hidden.lists_of(&(0..n).map(row).collect::<Vec<_>>());
     // About votes: piles of equal points share all values, which an assignment may exchange.
-    for options in
-        all_options().into_iter().map(|o| RecoverOptions { exact_constraints: false, ..o })
+    for options in all_options()
+        .into_iter()
+        .map(|(solver, o)| (solver, RecoverOptions { exact_constraints: false, ..o }))
     {
         let recovered = solve(&hidden.released, &lists, options);
         let mut fixed = 0;
@@ -88,7 +89,7 @@ fn exact_limit<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
             // and a refit with wrong neighbors is off by what support allows.
             let status = recovered.status()[slot];
             let mut tolerance = 4e-6 / sine;
-            if options.solver == Solver::Ransac
+            if options.0 == Builtin::Ransac
                 && let (Some(said), Some(swapped)) =
                     (recovered.axis(), hidden.secret.swapped_axis())
             {
@@ -98,7 +99,7 @@ fn exact_limit<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
                 tolerance = delta;
             }
             // Joint recovery is re-made from all estimates within reach, so a pile close by pulls a little.
-            if options.solver == Solver::Joint {
+            if options.0 == Builtin::Joint {
                 tolerance = tolerance.max(0.05 * delta);
             }
             // Else: a few units in the last place at 6 m, over the sine of the best crossing.
@@ -161,13 +162,13 @@ fn bounded_influence<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     let without: Vec<Vec<u32>> =
         agreeing.iter().map(|row| row.iter().skip(1).copied().collect()).collect();
     let options = RecoverOptions {
-        solver: Solver::Consensus,
         delta: Delta::Fixed(DELTA),
         seed: 3,
         // About votes: an assignment looks at the whole map.
         exact_constraints: false,
         ..RecoverOptions::default()
     };
+    let options = (Builtin::Consensus, options);
     let lists = hidden.lists_of(&without);
     let alone = solve(&hidden.released, &lists, options);
     let mut with = without.clone();
@@ -251,9 +252,9 @@ fn no_hidden_input<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
         assert!(first == recovered_bytes(&solve(&released, &copied, options)), "{name}");
     }
     let Hidden { original, released, secret } = hidden;
-    let before = recovered_bytes(&solve(&released, &lists, RecoverOptions::default()));
+    let before = recovered_bytes(&solve(&released, &lists, joint()));
     drop((original, secret));
-    let after = recovered_bytes(&solve(&released, &lists, RecoverOptions::default()));
+    let after = recovered_bytes(&solve(&released, &lists, joint()));
     assert!(before == after, "{name}");
 }
 
@@ -261,14 +262,19 @@ fn no_hidden_input<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
 fn foreign_lists_are_refused<const D: usize>(name: &str, scheme: &Entry) {
     let one = hide::<D>(scheme, &room(1, 100), 1);
     let other = hide::<D>(scheme, &room(1, 160), 1);
-    let error = recover(&one.released, &other.lists(5, 1.0, 1), &RecoverOptions::default());
+    let error = recover(
+        &one.released,
+        &other.lists(5, 1.0, 1),
+        &Builtin::Joint,
+        &RecoverOptions::default(),
+    );
     assert!(error.unwrap_err().to_string().contains("one per slot"), "{name}");
     let n = one.released.n_slots();
     if one.released.n_records() < n {
         // As many rows, but of a map with one slot per record.
         let next = (0..n).map(|slot| RecordId::from_index((slot + 1) % n)).collect();
         let lists = Neighborhoods::try_new((0..=n as u64).collect(), next, None, n, 1).unwrap();
-        let error = recover(&one.released, &lists, &RecoverOptions::default());
+        let error = recover(&one.released, &lists, &Builtin::Joint, &RecoverOptions::default());
         assert!(error.unwrap_err().to_string().contains("records below"), "{name}");
     }
 }

@@ -3,7 +3,7 @@
 
 use unlift::neighbors::Neighborhoods;
 use unlift::obfuscate::Entry;
-use unlift::recover::{RecoverOptions, Solver};
+use unlift::recover::{Builtin, RecoverOptions};
 use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
 use unlift::seed::{Draws, Stage};
 
@@ -94,9 +94,9 @@ fn right<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
     order: &[usize],
-    solver: Solver,
+    solver: Builtin,
 ) -> f64 {
-    let options = RecoverOptions { solver, seed: 3, ..RecoverOptions::default() };
+    let options = (solver, RecoverOptions { seed: 3, ..RecoverOptions::default() });
     let recovered = solve(released, lists, options);
     let per = released.slots_per_record();
     let near = |new: usize| {
@@ -110,7 +110,7 @@ fn right<const D: usize>(
 }
 
 fn shares_do_not_depend_on_how_a_map_is_written<const D: usize>(name: &str, scheme: &Entry) {
-    for solver in Solver::FROM_LISTS {
+    for solver in Builtin::FROM_LISTS {
         let mut differences = Vec::new();
         for time in 0..TIMES {
             let hidden = hide::<D>(scheme, &room(time, POINTS), 50 + time);

@@ -2,7 +2,7 @@
 
 use unlift::evaluate::{blind, evaluate};
 use unlift::obfuscate::Entry;
-use unlift::recover::{RecoverOptions, Solver};
+use unlift::recover::{Builtin, RecoverOptions};
 use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
 use unlift::seed::{Draws, Stage};
 use unlift::{About, RowOrder};
@@ -14,11 +14,11 @@ fn shares<const D: usize>(
     scheme: &Entry,
     points: &[[f64; D]],
     scale: f64,
-    solver: Solver,
+    solver: Builtin,
 ) -> [f64; 2] {
     let hidden = try_hide::<D>(scheme, points, 0.5 * scale, 7).unwrap();
     let lists = hidden.lists(30, 0.5, 7);
-    let options = RecoverOptions { solver, ..RecoverOptions::default() };
+    let options = (solver, RecoverOptions::default());
     let recovered = solve(&hidden.released, &lists, options);
     let accuracy = evaluate(&recovered, &hidden.original, &hidden.secret).unwrap();
     [0.10, 0.25].map(|threshold| accuracy.percent_within(threshold * scale))
@@ -29,7 +29,7 @@ fn shares<const D: usize>(
 fn shifted_and_scaled_maps_leak_the_same<const D: usize>(
     name: &str,
     scheme: &Entry,
-    solver: Solver,
+    solver: Builtin,
     most: f64,
 ) {
     let points: Vec<[f64; D]> = room(31, 4000);
@@ -55,7 +55,7 @@ fn least_shares<const D: usize>(
     name: &str,
     scheme: &Entry,
     points: &[[f64; D]],
-    solver: Solver,
+    solver: Builtin,
 ) -> [f64; 2] {
     if D == 3 {
         return [19.4, 59.8];
@@ -64,7 +64,7 @@ fn least_shares<const D: usize>(
     let blind = blind(&hidden.released, &hidden.original, &hidden.secret).percent_within(0.25);
     assert!(blind < 30.0, "{name}: {blind} % within reach of a blind attacker");
     // `dcl2d`: blind 21, recovered by consensus 22.1 (22.2 to 23.9 over seven other keys), by joint recovery 25.4.
-    [0.0, if solver == Solver::Joint { 1.1 * blind } else { 1.03 * blind }]
+    [0.0, if solver == Builtin::Joint { 1.1 * blind } else { 1.03 * blind }]
 }
 
 /// With lists that tell nothing, nothing scores above the blind attacker beyond noise. On a map of
@@ -98,13 +98,13 @@ fn random_lists_tell_nothing<const D: usize>(name: &str, scheme: &Entry) {
 /// Ten slots of 4,000 (eight of `ray-voxel` with the present key, one of all others together).
 #[test]
 fn equivariance() {
-    over_schemes!(shifted_and_scaled_maps_leak_the_same, Solver::Consensus, 0.25);
+    over_schemes!(shifted_and_scaled_maps_leak_the_same, Builtin::Consensus, 0.25);
 }
 
 /// What differs in one round spreads in the next: sixteen slots of `dcl2d` with the present key, three of any other.
 #[test]
 fn equivariance_of_joint_recovery() {
-    over_schemes!(shifted_and_scaled_maps_leak_the_same, Solver::Joint, 0.5);
+    over_schemes!(shifted_and_scaled_maps_leak_the_same, Builtin::Joint, 0.5);
 }
 
 /// The same records in another order, each row with the same number of slots; `None` where regions or voxels
@@ -151,7 +151,7 @@ fn order_of_records_hardly_matters<const D: usize>(name: &str, scheme: &Entry) {
     let rows: Vec<Vec<u32>> = (0..released.n_slots())
         .map(|slot| lists.of(old_slot(slot)).iter().map(|r| place[r.index()]).collect())
         .collect();
-    let options = RecoverOptions::default();
+    let options = joint();
     let before = solve(&hidden.released, &lists, options);
     let after = solve(&released, &hidden.lists_of(&rows), options);
     let is_same = |slot: usize| {
@@ -182,7 +182,7 @@ fn pairs_in_better_order_do_not_depend_on_the_order() {
     let ppl = unlift::obfuscate::scheme("ppl").unwrap();
     let hidden = try_hide(ppl, &points, 0.5, 7).unwrap();
     let lists = hidden.lists(20, 0.6, 7);
-    let recovered = solve(&hidden.released, &lists, RecoverOptions::default());
+    let recovered = solve(&hidden.released, &lists, joint());
     let percent = |order: RowOrder, secret: &unlift::truth::Secret| {
         let recovered = recovered.clone().with_about(About { order, ..recovered.about() });
         evaluate(&recovered, &hidden.original, secret).unwrap().percent_within(0.25)

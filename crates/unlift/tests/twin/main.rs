@@ -5,7 +5,7 @@ mod brute;
 
 use brute::{Choice, Line, candidate_options, line_options, window_options};
 use unlift::neighbors::Neighborhoods;
-use unlift::recover::{Delta, Model, RecoverOptions, Recovered, Solver, Status, prepare, recover};
+use unlift::recover::{Builtin, Delta, Model, RecoverOptions, Recovered, Status, prepare, recover};
 use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
 use unlift::seed::{Draws, Stage};
 use unlift::{Error, RecordId, Unit};
@@ -71,7 +71,6 @@ fn check(
     let neighborhoods = lists(N, &mut draws);
     let released = released(obfuscation.unwrap());
     let options = RecoverOptions {
-        solver: Solver::Consensus,
         delta: Delta::Fixed(delta),
         // About votes alone.
         exact_constraints: false,
@@ -79,7 +78,7 @@ fn check(
         ..RecoverOptions::default()
     };
     let model = prepare(&released, &neighborhoods, &options).unwrap();
-    let solved = recover(&released, &neighborhoods, &options).unwrap();
+    let solved = recover(&released, &neighborhoods, &Builtin::Consensus, &options).unwrap();
     let mut wrong = Vec::new();
     for slot in 0..N {
         let listed: Vec<usize> = neighborhoods.of(slot).iter().map(|r| r.index()).collect();

@@ -20,21 +20,21 @@ use crate::recover::confidence::crowd::{Cues, N_CUES, Seen, Solved};
 use crate::recover::map::family::{Family, Settings};
 use crate::recover::map::graph::Graph;
 use crate::recover::map::pieces::{CandidatePieces, LinePieces, PlanePieces};
-use crate::recover::options::{RecoverOptions, Solver};
+use crate::recover::options::RecoverOptions;
 use crate::recover::result::{Confidence, Estimate, Status, Unknown};
+use crate::recover::solver::Builtin;
 use crate::released::{Obfuscation, Rays, Released};
 
 /// Why nobody looks how sure the attacker is, if `options` or the kind of map say so.
-pub(super) fn not_asked<const D: usize>(options: &RecoverOptions) -> Option<Unknown> {
-    match options.solver {
-        Solver::Joint if !options.confidence => Some(Unknown::NotAsked),
-        Solver::Joint if !Settings::of_dimension::<D>().confidence => Some(Unknown::OfImages),
-        Solver::Joint => None,
-        Solver::JointStart
-        | Solver::Consensus
-        | Solver::Ransac
-        | Solver::Density
-        | Solver::Tomography => Some(Unknown::OtherSolver),
+pub(super) fn not_asked<const D: usize>(
+    solver: Builtin,
+    options: &RecoverOptions,
+) -> Option<Unknown> {
+    match solver {
+        Builtin::Joint if !options.confidence => Some(Unknown::NotAsked),
+        Builtin::Joint if !Settings::of_dimension::<D>().confidence => Some(Unknown::OfImages),
+        Builtin::Joint => None,
+        _ => Some(Unknown::OtherSolver),
     }
 }
 
