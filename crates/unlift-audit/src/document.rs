@@ -10,6 +10,8 @@ use unlift::recover::Delta;
 use unlift_report::Given;
 use unlift_report::document as report;
 
+use crate::maps::Tile;
+
 /// What an outcome does not know about itself.
 pub struct Provenance {
     /// What was read.
@@ -103,6 +105,7 @@ pub fn document<const D: usize>(
         break_even: outcome.break_even.iter().map(break_even).collect(),
         gates: provenance.gates,
         images: Vec::new(),
+        tiles: Vec::new(),
         run: report::Run {
             command: provenance.command,
             threads: rayon::current_num_threads() as u32,
@@ -119,6 +122,27 @@ pub fn document<const D: usize>(
 /// Percentages by threshold as typed.
 fn by_threshold(thresholds: &[Threshold], percents: &[f64]) -> report::ByThreshold {
     ordered(thresholds.iter().map(|t| t.label.clone()).zip(percents.iter().copied()))
+}
+
+/// The figures of every tile: of its `rows`, those that are among the pooled `results`.
+pub fn tiles(
+    tiles: &[Tile],
+    rows: &[Vec<Row>],
+    results: &[Row],
+    thresholds: &[Threshold],
+) -> Vec<report::TileFigures> {
+    let one = |(tile, rows): (&Tile, &Vec<Row>)| {
+        let percent = |result: &Row| {
+            let row = rows.iter().find(|row| row.is_same_cell(result));
+            row.map(|row| by_threshold(thresholds, &row.recovered_percent)).unwrap_or_default()
+        };
+        report::TileFigures {
+            bounds: Some(tile.bounds),
+            n_points: tile.rows.len() as u64,
+            recovered_percent: results.iter().map(percent).collect(),
+        }
+    };
+    tiles.iter().zip(rows).map(one).collect()
 }
 
 /// The figures of one image of an audit.

@@ -9,6 +9,7 @@ use unlift::released::Released;
 use unlift::truth::{Original, Secret};
 
 use crate::lengths::short;
+use crate::maps::Tile;
 
 /// On RedKitchen and Castle delta is 0.1 (`density`) to 4.8 times (`consensus`, noise that is near) the median distance to the
 /// K-th neighbor, whatever scheme, solver, source and noise. Beyond these times the quartiles of that distance the attack has not
@@ -36,15 +37,15 @@ pub(crate) struct Doubts {
     pub(crate) notes: Vec<String>,
 }
 
-/// Looks at the figures `rows` of a map; `hidden` is what was released of it, where that was given and not made here, and `of_file`
+/// Looks at the figures `rows` of a map, whose points are as far apart as `spread` says; `hidden` is what was released of it, where that was given and not made here, and `of_file`
 /// what speaks against the points.
 pub(crate) fn doubts(
-    original: &Original<3>,
+    (original, spread): (&Original<3>, Spread),
     hidden: Option<&(Released<3>, Secret)>,
     (plan, rows): (&Plan<3>, &[Row]),
     of_file: &[String],
-) -> Result<Doubts, unlift::Error> {
-    let Spread { low, middle, high } = Spread::of(original.reveal().positions(), plan.k)?;
+) -> Doubts {
+    let Spread { low, middle, high, n_points } = spread;
     let unit = original.reveal().unit();
     let strangers = hidden.and_then(|hidden| not_its_own(original, hidden, plan));
     let mistaken = hidden.and_then(|_| mistaken_unit(unit, plan.k, middle));
@@ -52,7 +53,7 @@ pub(crate) fn doubts(
     let mut found = Doubts::default();
     found.notes.extend(of_map.iter().chain(of_file).cloned());
     let of_map = of_map.or_else(|| of_file.first().cloned());
-    let share = plan.k as f64 / original.len().max(1) as f64;
+    let share = plan.k as f64 / n_points.max(1) as f64;
     if plan.asks_oracle() && plan.k > SHORT && share > LONG {
         found.notes.push(format!(
             "K = {} is {:.0} % of the map's points: of so long lists less comes back than of shorter ones (--k)",
@@ -81,31 +82,63 @@ pub(crate) fn doubts(
         }
         found.of_rows.push(of_map.clone().or(of_delta));
     }
-    Ok(found)
+    found
 }
 
 /// Quartiles of the distance to the K-th neighbor.
-struct Spread {
+pub(crate) struct Spread {
     low: f64,
     middle: f64,
     high: f64,
+    /// Points of the map, or of its smallest tile.
+    n_points: usize,
 }
 
 impl Spread {
-    fn of(points: &[[f64; 3]], k: usize) -> Result<Self, unlift::Error> {
-        let knn = Knn::new(points)?;
-        let mut found = Vec::new();
-        let mut kth = |row: usize| {
-            knn.nearest(row, k, &mut found);
-            found.last().map_or(0.0, |last| last.0.sqrt())
-        };
-        let every = points.len().div_ceil(SAMPLE).max(1);
-        let mut distances: Vec<f64> = (0..points.len()).step_by(every).map(&mut kth).collect();
+    /// That of a map, from a sample of its points.
+    ///
+    /// # Errors
+    /// When points cannot be searched.
+    pub(crate) fn of(points: &[[f64; 3]], k: usize) -> Result<Self, unlift::Error> {
+        Ok(Self::of_distances(distances(points, k, SAMPLE)?, points.len()))
+    }
+
+    /// That of a map in tiles, whose points have no neighbors beyond their tile.
+    ///
+    /// # Errors
+    /// When points cannot be searched.
+    pub(crate) fn of_tiles(
+        original: &Original<3>,
+        tiles: &[Tile],
+        k: usize,
+    ) -> Result<Self, unlift::Error> {
+        let (mut found, of_each) = (Vec::new(), SAMPLE.div_ceil(tiles.len().max(1)));
+        for tile in tiles {
+            let item = tile.item(original, None)?;
+            found.extend(distances(item.original.reveal().positions(), k, of_each)?);
+        }
+        let least = tiles.iter().map(|tile| tile.rows.len()).min();
+        Ok(Self::of_distances(found, least.unwrap_or(0)))
+    }
+
+    fn of_distances(mut distances: Vec<f64>, n_points: usize) -> Self {
         distances.sort_unstable_by(f64::total_cmp);
         let last = distances.len().saturating_sub(1);
         let at = |rank: usize| distances.get(rank).copied().unwrap_or(0.0);
-        Ok(Self { low: at(last / 4), middle: at(last / 2), high: at(last - last / 4) })
+        Self { low: at(last / 4), middle: at(last / 2), high: at(last - last / 4), n_points }
     }
+}
+
+/// Distances to the K-th neighbor of about `sample` points.
+fn distances(points: &[[f64; 3]], k: usize, sample: usize) -> Result<Vec<f64>, unlift::Error> {
+    let knn = Knn::new(points)?;
+    let mut found = Vec::new();
+    let kth = |row: usize| {
+        knn.nearest(row, k, &mut found);
+        found.last().map_or(0.0, |last| last.0.sqrt())
+    };
+    let every = points.len().div_ceil(sample).max(1);
+    Ok((0..points.len()).step_by(every).map(kth).collect())
 }
 
 /// What to say of a truth whose points are not where the released records are.

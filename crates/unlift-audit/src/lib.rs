@@ -37,6 +37,7 @@
 mod audited;
 mod checked;
 mod clouds;
+mod curves;
 mod document;
 mod doubts;
 mod error;

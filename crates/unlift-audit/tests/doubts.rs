@@ -68,6 +68,7 @@ fn audit(
         gates: vec![Gate::parse(gate).expect("a gate")],
         out: PathBuf::from(Path::new("none")),
         unit_in_map_units: 1.0,
+        tiles: None,
         write_clouds: false,
         share_safe: false,
         inversion: None,

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use unlift::audit::{Cell, Counts, Image, Measure, Plan, Silent, run_images};
+use unlift::audit::{Cell, Counts, Item, Measure, Plan, Silent, run_many};
 use unlift::geometry::frame::Bounds;
 use unlift::recover::Builtin;
 use unlift::truth::Original;
@@ -115,9 +115,9 @@ fn size(counts: Counts, images: &[(&str, usize)]) -> Option<f64> {
         let points = PointSet::try_new((0..n).map(place).collect(), Unit::Pixel)?;
         let bounds = Bounds::try_new([-0.5; 2], [127.5; 2])?;
         let original = Original::within(points, bounds)?;
-        Ok::<_, Error>(Image { name: name.to_owned(), original, descriptors: None })
+        Ok::<_, Error>(Item { name: name.to_owned(), original, descriptors: None })
     });
-    let outcome = run_images(images, &plan, &mut Silent).unwrap();
+    let outcome = run_many(images, &plan, &mut Silent).unwrap();
     outcome.rows[0].metrics.get("size").copied()
 }
 

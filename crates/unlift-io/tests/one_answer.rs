@@ -198,14 +198,14 @@ impl Observer<2> for Unseen {
 
 struct Rows(Vec<Row>);
 
-impl audit::Watcher for Rows {
-    type OfImage = Unseen;
+impl audit::Watcher<2> for Rows {
+    type OfItem = Unseen;
 
     fn begin(&mut self) -> Unseen {
         Unseen
     }
 
-    fn image(&mut self, _: &str, rows: &[Row], _: Unseen) {
+    fn item(&mut self, _: &str, rows: &[Row], _: Unseen) {
         self.0.extend_from_slice(rows);
     }
 }
@@ -242,10 +242,10 @@ fn many_images_in_one_file() {
         plan.inlier_ratios = vec![0.5];
         let of_audit = images.iter().map(|(name, original, descriptors)| {
             let (original, descriptors) = (original.clone(), Some(descriptors.clone()));
-            Ok(audit::Image { name: name.clone(), original, descriptors })
+            Ok(audit::Item { name: name.clone(), original, descriptors })
         });
         let audited =
-            audit::run_images::<unlift::Error>(of_audit, &plan, &mut audit::Silent).unwrap();
+            audit::run_many::<2, unlift::Error>(of_audit, &plan, &mut audit::Silent).unwrap();
         for (row, source) in audited.rows.iter().zip(["oracle", "overlap"]) {
             // Hidden.
             let mut truth = OutputFile::create(&path("truth"), Access::Private).unwrap();
@@ -336,13 +336,13 @@ fn images() {
     let (original, descriptors) = keypoints(5, 220);
     for entry in SCHEMES.iter().filter(|entry| entry.in_2d.is_some()) {
         let plan = plan(Unit::Pixel, entry.name, sources::<2>(9));
-        let image = audit::Image {
+        let image = audit::Item {
             name: String::new(),
             original: original.clone(),
             descriptors: Some(descriptors.clone()),
         };
         let mut audited = Rows(Vec::new());
-        audit::run_images::<unlift::Error>([Ok(image)], &plan, &mut audited).unwrap();
+        audit::run_many::<2, unlift::Error>([Ok(image)], &plan, &mut audited).unwrap();
         // The randomness of an image is that of its name: FNV-1a of no bytes.
         let name = 0xCBF2_9CE4_8422_2325;
         let key = Key::from_seed(SEED).of_item(Stage::Image, name);

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use pyo3::prelude::*;
-use unlift_audit::maps::find;
+use unlift_audit::maps::{Tiles, find};
 use unlift_audit::{Gate, Job};
 
-use crate::errors::raised;
+use crate::errors::{raised, wrong};
 use crate::heard::Heard;
 use crate::map::Map;
 use crate::own::Raised;
@@ -32,6 +32,12 @@ pub fn audit(
     if let Some(k) = asked.source_k {
         options.insert("source_k".to_owned(), k.into());
     }
+    let tiles = match (asked.tile_points, asked.tile) {
+        (Some(most), only) if most > 0 => Some(Tiles { most, only }),
+        (None, None) => None,
+        (None, Some(at)) => return Err(wrong("tile", "tile_points beside it", at)),
+        (Some(most), _) => return Err(wrong("tile_points", "at least 1", most)),
+    };
     let stop = by.stop();
     let heard = Arc::new(Heard::new(tell, Arc::clone(&stop)));
     let progress = Arc::clone(&heard);
@@ -53,6 +59,7 @@ pub fn audit(
             gates,
             out: PathBuf::new(),
             unit_in_map_units: prepared.unit_in_map_units,
+            tiles,
             write_clouds: false,
             share_safe: false,
             inversion: None,

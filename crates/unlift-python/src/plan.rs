@@ -38,6 +38,10 @@ pub struct Asked<'py> {
     #[pyo3(item)]
     pub source_k: Option<usize>,
     #[pyo3(item)]
+    pub tile_points: Option<usize>,
+    #[pyo3(item)]
+    pub tile: Option<usize>,
+    #[pyo3(item)]
     pub delta: Option<f64>,
     #[pyo3(item)]
     pub exact_constraints: bool,
@@ -64,7 +68,8 @@ impl Asked<'_> {
         by: &Raised,
     ) -> PyResult<(Plan<3>, Vec<String>, Option<String>)> {
         let points = prepared.original.reveal();
-        let usual = Plan::<3>::new(points.unit()).for_map(points.len(), self.k);
+        let at_once = self.tile_points.map_or(points.len(), |most| points.len().min(most));
+        let usual = Plan::<3>::new(points.unit()).for_map(at_once, self.k);
         let plan = self.with(usual, points.unit(), by)?;
         plan.check(points.len(), prepared.descriptors.is_some()).map_err(raised)?;
         let (prepared, typed) = (Arc::clone(prepared), self.thresholds.is_some());

@@ -113,8 +113,11 @@ def test_a_map_on_a_cluster_is_the_map_of_one_machine(spark, tmp_path: pathlib.P
     assert (again.records == lists.records).all() and (again.offsets == lists.offsets).all()
 
 
-def test_an_executor_that_is_killed_changes_nothing(spark, tmp_path: pathlib.Path):
-    rows = tasks(tmp_path, 6000)
+def test_tiles_are_those_of_one_machine_though_an_executor_is_killed(spark, tmp_path: pathlib.Path):
+    points, each = np.random.default_rng(1).uniform(0, (20, 10, 4), (N_MAPS * 6000, 3)), 6000
+    np.save(tmp_path / "city.npy", points)
+    tiles = [(str(tmp_path / "city.npy"), 1.0, each, tile) for tile in range(N_MAPS)]
+    tasks = spark.createDataFrame(tiles, "path string, scale double, tile_points bigint, tile bigint")
     before, seen = executors(), []
     assert len(before) == 2
 
@@ -132,8 +135,11 @@ def test_an_executor_that_is_killed_changes_nothing(spark, tmp_path: pathlib.Pat
 
     killer = threading.Thread(target=kill)
     killer.start()
-    found = on(spark, rows)
+    rows = unlift.spark.audit_maps(tasks.repartition(N_MAPS), **OPTIONS).collect()
     killer.join()
     assert seen and seen[0] < N_MAPS, "it was killed in the middle of the job"
-    assert found == alone(rows)
+    found = [(row["tile"], row["n_points"], dict(row["recovered_percent"])) for row in rows]
+    whole = unlift.audit(unlift.Map(points, scale=1.0), tile_points=each, **OPTIONS).document
+    expected = [(at, tile["n_points"], tile["recovered_percent"][0]) for at, tile in enumerate(whole["tiles"])]
+    assert sorted(found, key=lambda row: row[0]) == expected
     assert before[0] not in executors()

@@ -1,7 +1,7 @@
 //! The rules of `audit.json` that its types cannot say.
 
 use crate::Error;
-use crate::document::{ByThreshold, Document, ImageFigures, Row, SCHEMA};
+use crate::document::{ByThreshold, Document, ImageFigures, Row, SCHEMA, TileFigures};
 
 impl Document {
     /// Checks the rules of the format: the schema, one row per combination, finite numbers,
@@ -46,6 +46,9 @@ impl Document {
         self.check_not_audited()?;
         for (i, image) in self.images.iter().enumerate() {
             check_image(&format!("images[{i}]"), image, self.results.len())?;
+        }
+        for (i, tile) in self.tiles.iter().enumerate() {
+            check_tile(&format!("tiles[{i}]"), tile, self.results.len())?;
         }
         self.check_run()
     }
@@ -175,6 +178,19 @@ fn check_records_alone(place: &str, row: &Row) -> Result<(), Error> {
     }
     let mut percent = row.records_alone_percent.iter();
     percent.try_for_each(|map| percentages(&format!("{place}.records_alone_percent"), map))
+}
+
+fn check_tile(place: &str, tile: &TileFigures, n_results: usize) -> Result<(), Error> {
+    if tile.recovered_percent.len() != n_results {
+        let (expected, found) =
+            (format!("{n_results} rows, as in results"), tile.recovered_percent.len().to_string());
+        return Err(invalid(format!("{place}.recovered_percent"), expected, found));
+    }
+    for &corner in tile.bounds.iter().flatten().flatten() {
+        finite(&format!("{place}.bounds"), corner)?;
+    }
+    let mut percent = tile.recovered_percent.iter();
+    percent.try_for_each(|map| percentages(&format!("{place}.recovered_percent"), map))
 }
 
 fn check_image(place: &str, image: &ImageFigures, n_results: usize) -> Result<(), Error> {

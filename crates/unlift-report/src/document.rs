@@ -12,6 +12,7 @@ use crate::round::round_floats;
 
 pub use crate::images::{Distinct, ImageCounts, ImageFigures, ImageRow};
 pub use crate::round::SIGNIFICANT_DIGITS;
+pub use crate::tiles::TileFigures;
 
 /// The schema this build writes and reads.
 pub const SCHEMA: u32 = 1;
@@ -56,6 +57,9 @@ pub struct Document {
     /// Audits of images: every image that was used, in the order of names; empty for maps.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub images: Vec<ImageFigures>,
+    /// Audits of a large map in tiles: every tile, in the order in which the map was cut; empty for others.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tiles: Vec<TileFigures>,
     /// What varies from run to run.
     pub run: Run,
 }

@@ -13,10 +13,11 @@ use crate::options::RenderOptions;
 use crate::page_data::page_data;
 use crate::scene::{Scene3d, encode};
 use crate::tables::Table;
-use crate::{Error, attack, paper, pictures, tables, words};
+use crate::tiles::{HeatMap, heat_maps};
+use crate::{Error, attack, paper, pictures, tables, tiles, words};
 
 /// The template and its parts, by the names they include each other with.
-const TEMPLATES: [(&str, &str); 9] = [
+const TEMPLATES: [(&str, &str); 10] = [
     ("report.html", include_str!("../template/report.html")),
     ("terms.html", include_str!("../template/terms.html")),
     ("gates.html", include_str!("../template/gates.html")),
@@ -24,6 +25,7 @@ const TEMPLATES: [(&str, &str); 9] = [
     ("figures.html", include_str!("../template/figures.html")),
     ("inversions.html", include_str!("../template/inversions.html")),
     ("pictures.html", include_str!("../template/pictures.html")),
+    ("tiles.html", include_str!("../template/tiles.html")),
     ("tables.html", include_str!("../template/tables.html")),
     ("notes.html", include_str!("../template/notes.html")),
 ];
@@ -74,6 +76,7 @@ pub fn render(
         Some(tables::recovered(&document)),
         Some(tables::baselines(&document)),
         tables::distinct(&document),
+        tiles::table(&document),
         tables::likeness(&document),
         tables::metrics(&document),
         tables::objects(&document),
@@ -98,6 +101,7 @@ pub fn render(
         parts: opening.into_iter().chain([own]).collect(),
         sheets: drawn,
         sheets_left_out,
+        heat_maps: heat_maps(&document),
         scene: encoded.as_ref().map(|scene| SceneWords {
             n_points: words::thousands(scene.n_points),
             n_drawn: words::thousands(scene.n_drawn as u64),
@@ -173,6 +177,8 @@ struct Page<'a> {
     sheets: Vec<Sheet>,
     /// How many of them would make the page too large.
     sheets_left_out: usize,
+    /// Where a map in tiles leaks most.
+    heat_maps: Vec<HeatMap>,
     share_safe: bool,
     subject: Subject,
     gates: Option<Gates>,

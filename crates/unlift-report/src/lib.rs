@@ -57,6 +57,7 @@ mod shares;
 mod slot;
 mod tables;
 mod text;
+mod tiles;
 mod verdict;
 mod words;
 mod xml;

@@ -33,6 +33,9 @@ impl Document {
         for image in &mut safe.images {
             image.name = None;
         }
+        for tile in &mut safe.tiles {
+            tile.bounds = None;
+        }
         for (name, value) in &mut safe.options {
             withhold(name, value);
         }

@@ -2,7 +2,7 @@
 
 use crate::document::{Bound, Document, LengthUnit, Row, STRONGEST};
 use crate::verdict::Verdict;
-use crate::{attack, tables, verdict, words};
+use crate::{attack, tables, tiles, verdict, words};
 
 /// The verdict in a line or two, then a few lines per scheme, the worst first: what comes back today by every source
 /// tried and by the records alone, then by the oracle at the headline inlier ratio. Percent recovered within each
@@ -46,6 +46,7 @@ pub fn text_table(document: &Document) -> String {
     if document.results.first().is_some_and(|row| row.unit == LengthUnit::KthNeighbor) {
         text.push_str(&format!("x: times {}\n", words::USUAL_DISTANCE));
     }
+    text.push_str(&tiles::line(document).unwrap_or_default());
     for refused in &document.not_audited {
         let by = refused.neighbors.as_ref().map(|source| format!(" by {source}"));
         let (scheme, by) = (&refused.scheme, by.unwrap_or_default());

@@ -263,10 +263,10 @@ fn rows(suite: &Suite, map: &str, source: &str) -> Result<Option<Vec<Row>>, Erro
             let points = synthetic::keypoints(u64::from(at), n, IMAGE);
             let points = PointSet::try_new(points, Unit::Pixel)?;
             let original = Original::within(points, Bounds { low: [0.0; 2], high: IMAGE })?;
-            Ok(audit::Image { name: format!("{at}"), original, descriptors: None })
+            Ok(audit::Item { name: format!("{at}"), original, descriptors: None })
         };
         let images: Vec<Result<_, Error>> = (0..8).map(image).collect();
-        return Ok(Some(audit::run_images(images, &plan, &mut Silent)?.rows));
+        return Ok(Some(audit::run_many(images, &plan, &mut Silent)?.rows));
     }
     let Some((points, descriptors)) = points(name, n) else {
         if source == "oracle" {

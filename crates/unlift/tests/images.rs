@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use unlift::audit::{
-    Image, NeighborsBy, Observer, Outcome, Plan, PointNeighbors, Row, Silent, Watcher, run_images,
+    Item, NeighborsBy, Observer, Outcome, Plan, PointNeighbors, Row, Silent, Watcher, run_many,
 };
 use unlift::descriptors::Values;
 use unlift::geometry::frame::Bounds;
@@ -17,14 +17,14 @@ use unlift::{Descriptors, Error, PointSet, Unit};
 
 const SIZE: [f64; 2] = [320.0, 240.0];
 
-fn image_of(name: &str, points: Vec<[f64; 2]>) -> Image {
+fn image_of(name: &str, points: Vec<[f64; 2]>) -> Item<2> {
     let bounds = Bounds::try_new([0.0; 2], SIZE).unwrap();
     let mut draws = Draws::new(points.len() as u64, Stage::Synthetic, 1);
     let values: Vec<u8> = (0..128 * points.len()).map(|_| draws.below(200) as u8).collect();
     let descriptors = Descriptors::try_new(Values::U8(values), 128).unwrap();
     let points = PointSet::try_new(points, Unit::Pixel).unwrap();
     let original = Original::within(points, bounds).unwrap();
-    Image { name: name.to_owned(), original, descriptors: Some(descriptors) }
+    Item { name: name.to_owned(), original, descriptors: Some(descriptors) }
 }
 
 /// Keypoints in clusters; of `twins` percent there is a second one at the same place.
@@ -52,9 +52,9 @@ fn plan() -> Plan<2> {
     plan
 }
 
-fn run(images: &[Image], plan: &Plan<2>) -> Outcome {
+fn run(images: &[Item<2>], plan: &Plan<2>) -> Outcome {
     let images = images.iter().cloned().map(Ok::<_, Error>);
-    run_images(images, plan, &mut Silent).unwrap()
+    run_many(images, plan, &mut Silent).unwrap()
 }
 
 #[test]
@@ -84,14 +84,14 @@ fn keypoints_come_back() {
 fn rows_are_pooled_over_keypoints() {
     #[derive(Default)]
     struct Each(Vec<Vec<Row>>);
-    impl Watcher for Each {
-        type OfImage = Silent;
+    impl Watcher<2> for Each {
+        type OfItem = Silent;
 
         fn begin(&mut self) -> Silent {
             Silent
         }
 
-        fn image(&mut self, _: &str, rows: &[Row], _: Silent) {
+        fn item(&mut self, _: &str, rows: &[Row], _: Silent) {
             self.0.push(rows.to_vec());
         }
     }
@@ -100,7 +100,7 @@ fn rows_are_pooled_over_keypoints() {
     let images = [image_of("a", keypoints(1, 300, 20)), image_of("b", keypoints(2, 150, 0))];
     let mut each = Each::default();
     let all = images.iter().cloned().map(Ok::<_, Error>);
-    let pooled = run_images(all, &plan, &mut each).unwrap().rows;
+    let pooled = run_many(all, &plan, &mut each).unwrap().rows;
     for (at, row) in pooled.iter().enumerate() {
         let [a, b] = [0, 1].map(|image: usize| &each.0[image][at]);
         assert_eq!(row.n_points, a.n_points + b.n_points);
@@ -171,14 +171,14 @@ fn images_tell_how_far_they_are() {
     }
     #[derive(Default)]
     struct All(Vec<Heard>);
-    impl Watcher for All {
-        type OfImage = Heard;
+    impl Watcher<2> for All {
+        type OfItem = Heard;
 
         fn begin(&mut self) -> Heard {
             Heard::default()
         }
 
-        fn image(&mut self, _: &str, _: &[Row], heard: Heard) {
+        fn item(&mut self, _: &str, _: &[Row], heard: Heard) {
             self.0.push(heard);
         }
     }
@@ -190,7 +190,7 @@ fn images_tell_how_far_they_are() {
     let mut plan = plan();
     (plan.repeats, plan.reference) = (2, true);
     let mut all = All::default();
-    run_images(images.iter().cloned().map(Ok::<_, Error>), &plan, &mut all).unwrap();
+    run_many(images.iter().cloned().map(Ok::<_, Error>), &plan, &mut all).unwrap();
     let rows = (plan.inlier_ratios.len() * plan.solvers.len() + 1) * plan.schemes.len() * 2;
     for (image, Heard(heard)) in images.iter().zip(&all.0) {
         let (last, total) = *heard.last().unwrap();
@@ -259,7 +259,7 @@ fn what_is_not_for_images_is_refused() {
     let message = |plan: &Plan<2>| {
         let images = [image_of("a", keypoints(1, 100, 0))];
         let images = images.into_iter().map(Ok::<_, Error>);
-        run_images(images, plan, &mut Silent).unwrap_err().to_string()
+        run_many(images, plan, &mut Silent).unwrap_err().to_string()
     };
     let mut alone = plan();
     alone.solvers = vec![Arc::new(Builtin::Density)];

@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use unlift::audit::{Image, run_images};
+use unlift::audit::{Item, run_many};
 use unlift::audit::{Plan, Row, Silent};
 use unlift::geometry::frame::Bounds;
 use unlift::recover::Builtin;
@@ -16,7 +16,7 @@ const SIZE: [f64; 2] = [640.0, 480.0];
 const KEYPOINTS: usize = 1200;
 
 /// Keypoints along edges of objects, some strewn over the image; a fifth have a twin at the same place.
-fn image(seed: u64) -> Image {
+fn image(seed: u64) -> Item<2> {
     let mut draws = Draws::new(seed, Stage::Synthetic, 0);
     let mut points: Vec<[f64; 2]> = Vec::new();
     while points.len() < KEYPOINTS {
@@ -37,7 +37,7 @@ fn image(seed: u64) -> Image {
     let points = PointSet::try_new(points, Unit::Pixel).unwrap();
     let bounds = Bounds::try_new([0.0; 2], SIZE).unwrap();
     let original = Original::within(points, bounds).unwrap();
-    Image { name: format!("image {seed}"), original, descriptors: None }
+    Item { name: format!("image {seed}"), original, descriptors: None }
 }
 
 /// (inlier ratio, scheme, percent within 5, 10 and 25 px) at least; `dcl2d` against blind instead.
@@ -54,7 +54,7 @@ fn rows(schemes: &[&str], ratios: &[f64]) -> Vec<Row> {
     plan.inlier_ratios = ratios.to_vec();
     plan.solvers = vec![Arc::new(Builtin::Joint)];
     let images = (1..=3).map(|seed| Ok::<_, Error>(image(seed)));
-    let rows = run_images(images, &plan, &mut Silent).unwrap().rows;
+    let rows = run_many(images, &plan, &mut Silent).unwrap().rows;
     for row in &rows {
         let (found, blind) = (&row.recovered_percent, &row.blind_percent);
         let error = row.error_percentiles[0];

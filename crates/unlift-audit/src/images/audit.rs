@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
-use unlift::audit::{self, Cell, Observer, Outcome, Plan, Row, run_images};
+use unlift::audit::{self, Outcome, Plan, Row, run_many};
 use unlift_io::atomic::OutputSet;
 use unlift_io::hash::{hash_file, hash_files, hash_list};
 use unlift_io::seen::Seen;
@@ -16,9 +16,10 @@ pub use super::job::ImagesJob;
 use super::stream::{Needs, Stream, Tally};
 use crate::Error;
 use crate::audited::{Audited, Finished};
+use crate::curves::Curves;
 use crate::document::{self, Found, Provenance};
 use crate::gate::{check_gates, gate_results};
-use crate::maps::{curve_errors, curves_of};
+use crate::maps::curves_of;
 use crate::progress::Progress;
 
 /// What became of the images.
@@ -60,11 +61,12 @@ pub fn find(job: ImagesJob<'_>) -> Result<(Option<Audited>, Used), Error> {
     let beside = beside(&job);
     let needs = Needs::of_plan(&job.plan);
     let images = Stream::new(of, &job.chosen, needs, &tally, steps);
-    let outcome = run_images(images, &job.plan, &mut watcher)?;
+    let outcome = run_many(images, &job.plan, &mut watcher)?;
     for error in job.inversion.iter().flat_map(|inversion| inversion.failed()) {
         steps.say(&format!("note: not painted: {error}"));
     }
-    let Watcher { figures, errors, curves, .. } = watcher;
+    let Watcher { figures, curves, .. } = watcher;
+    let curves = curves.shares();
     let tally = tally.into_inner();
     let used = Used { used: tally.used.len(), unusable: tally.unusable };
     if used.used == 0 {
@@ -109,7 +111,7 @@ pub fn find(job: ImagesJob<'_>) -> Result<(Option<Audited>, Used), Error> {
     let mut document = document::document(&job.plan, &found, provenance);
     document.images = figures;
     let drawn = RenderOptions {
-        error_cdf: curves_of(curves.iter().map(|curve| curve.shares(&errors)).collect(), rows),
+        error_cdf: curves_of(curves, rows),
         pictures,
         inversions,
         ..RenderOptions::default()
@@ -163,31 +165,15 @@ fn input(job: &ImagesJob<'_>, tally: &Tally, outcome: &Outcome) -> Result<Input,
     })
 }
 
-/// An error curve over all images: counts, so that its size does not depend on their number.
-struct Curve {
-    /// The row of one image.
-    cell: Row,
-    within: Vec<usize>,
-    n: usize,
-}
-
-impl Curve {
-    fn shares(&self, errors: &[f64]) -> (Row, Vec<(f64, f64)>) {
-        let percent = |count: usize| 100.0 * count as f64 / self.n.max(1) as f64;
-        let points = errors.iter().zip(&self.within);
-        (self.cell.clone(), points.map(|(&e, &n)| (e, percent(n))).collect())
-    }
-}
-
 /// Shows progress and keeps the figures of every image.
 struct Watcher<'a> {
     progress: &'a dyn Progress,
     tally: &'a RefCell<Tally>,
     plan: &'a Plan<2>,
     figures: Vec<ImageFigures>,
-    /// Where curves are looked at.
-    errors: Vec<f64>,
-    curves: Vec<Curve>,
+    /// The largest threshold.
+    most: f64,
+    curves: Curves<'a>,
 }
 
 impl<'a> Watcher<'a> {
@@ -200,19 +186,17 @@ impl<'a> Watcher<'a> {
             tally,
             plan: &job.plan,
             figures: Vec::new(),
-            errors: curve_errors(most).collect(),
-            curves: Vec::new(),
+            most,
+            curves: Curves::new(most, progress),
         }
     }
 }
 
-impl<'a> audit::Watcher for Watcher<'a> {
-    type OfImage = Curves<'a>;
+impl<'a> audit::Watcher<2> for Watcher<'a> {
+    type OfItem = Curves<'a>;
 
     fn begin(&mut self) -> Curves<'a> {
-        let steps = self.progress;
-        let (errors, curves) = (self.errors.clone(), Vec::new());
-        Curves { errors, curves, steps, told: 0.0 }
+        Curves::new(self.most, self.progress)
     }
 
     fn progress(&mut self, _: usize, _: usize, what: &str) {
@@ -220,46 +204,9 @@ impl<'a> audit::Watcher for Watcher<'a> {
         self.progress.add(0.0, what);
     }
 
-    fn image(&mut self, name: &str, rows: &[Row], Curves { curves, .. }: Curves<'a>) {
-        if self.curves.is_empty() {
-            self.curves = curves;
-        } else {
-            for (to, more) in self.curves.iter_mut().zip(&curves) {
-                to.n += more.n;
-                to.within.iter_mut().zip(&more.within).for_each(|(to, more)| *to += more);
-            }
-        }
+    fn item(&mut self, name: &str, rows: &[Row], seen: Curves<'a>) {
+        self.curves.merge(seen);
         let n = self.tally.borrow_mut().take();
         self.figures.push(document::image(name, n, rows, &self.plan.thresholds));
-    }
-}
-
-/// The error curves of one image, of the first repeat.
-struct Curves<'a> {
-    errors: Vec<f64>,
-    curves: Vec<Curve>,
-    steps: &'a dyn Progress,
-    /// The share of the image that was told to be finished.
-    told: f64,
-}
-
-impl Observer<2> for Curves<'_> {
-    fn progress(&mut self, done: usize, total: usize, _: &str) {
-        let share = done as f64 / total.max(1) as f64;
-        self.steps.add(share - self.told, "");
-        self.told = share;
-    }
-
-    fn goes_on(&self) -> bool {
-        self.steps.goes_on()
-    }
-
-    fn cell(&mut self, cell: &Cell<'_, 2>) {
-        if cell.repeat > 0 {
-            return;
-        }
-        let within = self.errors.iter().map(|&error| cell.accuracy.n_within(error)).collect();
-        let n = cell.accuracy.n_points();
-        self.curves.push(Curve { cell: cell.row.clone(), within, n });
     }
 }

@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use unlift::audit::{Plan, run_images};
+use unlift::audit::{Plan, run_many};
 use unlift_report::document::ImageFigures;
 use unlift_report::inversions::Inversion as Inverted;
 use unlift_report::pictures::Picture;
@@ -51,7 +51,7 @@ pub fn drawn(
     let mut album = Album::new(job.inversion.clone(), job.progress);
     let again = RefCell::new(Tally::default());
     let images = Stream::new((job.source, job.path), &numbers, needs, &again, job.progress);
-    run_images(images, &plan, &mut album)?;
+    run_many(images, &plan, &mut album)?;
     for picture in &mut album.pictures {
         let at = numbers.iter().position(|&at| job.source.names()[at] == picture.name);
         let Some(at) = at else { continue };

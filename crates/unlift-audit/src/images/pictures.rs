@@ -30,15 +30,15 @@ impl<'a> Album<'a> {
     }
 }
 
-impl<'a> Watcher for Album<'a> {
-    type OfImage = Page<'a>;
+impl<'a> Watcher<2> for Album<'a> {
+    type OfItem = Page<'a>;
 
     fn begin(&mut self) -> Page<'a> {
         let (inverter, steps) = (self.inverter.clone(), self.steps);
         Page { inverter, steps, picture: Picture::default(), painted: Inverted::default() }
     }
 
-    fn image(&mut self, name: &str, _: &[Row], page: Page<'a>) {
+    fn item(&mut self, name: &str, _: &[Row], page: Page<'a>) {
         let Page { picture, mut painted, .. } = page;
         painted.size = picture.size;
         painted.released.clone_from(&picture.released);

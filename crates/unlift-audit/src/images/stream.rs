@@ -6,8 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use rayon::prelude::*;
-use unlift::audit::Image;
-use unlift::audit::{NeighborsBy, Plan};
+use unlift::audit::{Item, NeighborsBy, Plan};
 use unlift::geometry::frame::Bounds;
 use unlift::neighbors::{self, Source};
 use unlift::truth::Original;
@@ -131,7 +130,7 @@ impl Needs {
 }
 
 /// An image, its hash where it is one in memory, and how many of its keypoints were moved.
-type Ready = (Image, Option<String>, usize);
+type Ready = (Item<2>, Option<String>, usize);
 
 /// The images `chosen` of a source. Memory depends on the number of threads, not on that of images.
 pub struct Stream<'a> {
@@ -188,7 +187,7 @@ impl<'a> Stream<'a> {
 }
 
 impl Iterator for Stream<'_> {
-    type Item = Result<Image, crate::Error>;
+    type Item = Result<Item<2>, crate::Error>;
 
     fn next(&mut self) -> Option<Self::Item> {
         while self.ready.is_empty() && self.next < self.chosen.len() {
@@ -244,7 +243,7 @@ fn image(
     let original = Original::within(points, bounds).map_err(of_image)?;
     // Nobody asks for them otherwise, and they are most of an image.
     let descriptors = features.descriptors.filter(|_| needs.descriptors() || needs.whatever);
-    Ok((Image { name: features.name, original, descriptors }, sha256, n_moved))
+    Ok((Item { name: features.name, original, descriptors }, sha256, n_moved))
 }
 
 /// What was expected of these features, and found; `None` where they have what is needed. An image

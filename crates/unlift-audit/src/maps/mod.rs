@@ -1,12 +1,13 @@
 //! One audit from a prepared map to the files in its folder: what `audit map` and `demo` share.
 
+mod tiles;
 mod watcher;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use unlift::audit::{Plan, run, run_released};
+use unlift::audit::{Outcome, Plan, Row, run, run_released};
 use unlift::released::Released;
 use unlift::truth::{Original, Secret};
 use unlift::{Descriptors, Unit};
@@ -14,14 +15,15 @@ use unlift_io::atomic::OutputSet;
 use unlift_io::hash::hash_input;
 use unlift_io::read;
 use unlift_report::RenderOptions;
-use unlift_report::document::Input;
+use unlift_report::document::{Input, TileFigures};
 use unlift_report::inversions::Inversion as Sheet;
+use unlift_report::scene::Scene3d;
 
 use crate::Error;
 use crate::audited::{Audited, Finished};
 use crate::clouds::Clouds;
 use crate::document::{self, Provenance, ordered};
-use crate::doubts::doubts;
+use crate::doubts::{Spread, doubts};
 use crate::gate::{Gate, check_gates, gate_results};
 use crate::inversion::MapInversion;
 use crate::journal::Journal;
@@ -29,8 +31,9 @@ use crate::lengths::{check_lengths_of_gates, check_scale};
 use crate::prepare::{Preparation, Prepared, prepare};
 use crate::progress::{Progress, Quiet};
 use crate::scene::Pictures;
+pub use tiles::{Tile, Tiles};
+pub use watcher::curves_of;
 use watcher::{Watcher, drawn};
-pub use watcher::{curve_errors, curves_of};
 
 /// Everything an audit needs.
 pub struct Job<'a> {
@@ -60,6 +63,9 @@ pub struct Job<'a> {
     pub out: PathBuf,
     /// Length of the audit's unit in map units; clouds are written in map units.
     pub unit_in_map_units: f64,
+    /// Hide and attack each tile of the map as a map of its own. Nothing is drawn then but where the map leaks most, and nothing
+    /// kept in a journal.
+    pub tiles: Option<Tiles>,
     /// Also write clouds.
     pub write_clouds: bool,
     /// Figures only.
@@ -112,6 +118,7 @@ impl<'a> Job<'a> {
             gates: Vec::new(),
             out: out.to_owned(),
             unit_in_map_units: prepared.unit_in_map_units,
+            tiles: None,
             write_clouds: false,
             share_safe: false,
             inversion: None,
@@ -215,24 +222,48 @@ fn find_with(
     for note in job.doubts.iter().chain(&job.notes) {
         job.progress.say(&format!("note: {note}"));
     }
-    let mut watcher = watcher(&job, journal, out);
     let of_file = |error| match &job.input.path {
         Some(file) => Error::from(unlift_io::Error::core(file, error)),
         None => Error::from(error),
     };
-    let outcome = match job.hidden {
-        None => run(job.original, job.descriptors, &job.plan, &mut watcher)
-            .map_err(|error| of_file(error).advise("a smaller --k, or fewer --schemes"))?,
-        Some(hidden) => {
-            run_released(job.original, hidden, &job.plan, &mut watcher).map_err(of_file)?
+    let whole = (job.original, job.descriptors);
+    let cut = |asked: Tiles| asked.of(job.original.reveal().positions(), job.up);
+    let cut = job.tiles.map(cut).transpose()?;
+    let Ran { outcome, scene, curves, sheets, of_tiles, note } = match &cut {
+        Some(tiles) => {
+            let found = tiles::run(whole, tiles, &job.plan, job.progress)
+                .map_err(|error| of_file(error).advise("a larger --tile-points"))?;
+            let (rows, curves) = (found.rows, found.curves.shares());
+            let of_tiles = document::tiles(tiles, &rows, &found.outcome.rows, &job.plan.thresholds);
+            let outcome = found.outcome;
+            Ran { outcome, scene: None, curves, sheets: Vec::new(), of_tiles, note: None }
+        }
+        None => {
+            let mut watcher = watcher(&job, journal, out);
+            let outcome = match job.hidden {
+                None => run(whole.0, whole.1, &job.plan, &mut watcher)
+                    .map_err(|error| of_file(error).advise("a smaller --k, or fewer --schemes"))?,
+                Some(hidden) => {
+                    run_released(job.original, hidden, &job.plan, &mut watcher).map_err(of_file)?
+                }
+            };
+            if let Some(error) = watcher.failed {
+                return Err(error);
+            }
+            let scene = watcher.pictures.map(|p| p.into_scene(&job.cameras, job.up));
+            let note = watcher.journal.as_ref().and_then(|journal| journal.note());
+            let (curves, sheets) = (watcher.curves, watcher.sheets);
+            Ran { outcome, scene, curves, sheets, of_tiles: Vec::new(), note }
         }
     };
-    if let Some(error) = watcher.failed {
-        return Err(error);
-    }
-    let mut doubts = doubts(job.original, job.hidden, (&job.plan, &outcome.rows), &job.doubts)
-        .map_err(of_file)?;
-    doubts.notes.extend(watcher.journal.as_ref().and_then(|journal| journal.note()));
+    let spread = match &cut {
+        Some(tiles) => Spread::of_tiles(job.original, tiles, job.plan.k),
+        None => Spread::of(job.original.reveal().positions(), job.plan.k),
+    };
+    let spread = spread.map_err(of_file)?;
+    let mut doubts =
+        doubts((job.original, spread), job.hidden, (&job.plan, &outcome.rows), &job.doubts);
+    doubts.notes.extend(note);
     for note in doubts.notes.iter().filter(|note| !job.doubts.contains(note)) {
         job.progress.say(&format!("note: {note}"));
     }
@@ -241,6 +272,10 @@ fn find_with(
     let mut options = job.options;
     if let Some(inversion) = &job.inversion {
         options.insert("inverter_sha256".into(), inversion.sha256().into());
+    }
+    if let Some(Tiles { most, only }) = job.tiles {
+        options.insert("tile_points".into(), most.into());
+        options.extend(only.map(|at| ("tile".to_owned(), at.into())));
     }
     let options = document::options(&job.plan, options);
     let provenance = Provenance {
@@ -257,14 +292,25 @@ fn find_with(
         break_even: &outcome.break_even,
         seconds: &outcome.seconds,
     };
-    let document = document::document(&job.plan, &found, provenance);
-    let scene = watcher.pictures.map(|p| p.into_scene(&job.cameras, job.up));
+    let mut document = document::document(&job.plan, &found, provenance);
+    document.tiles = of_tiles;
     let drawn = RenderOptions {
-        error_cdf: curves_of(watcher.curves, &outcome.rows),
-        inversions: watcher.sheets,
+        error_cdf: curves_of(curves, &outcome.rows),
+        inversions: sheets,
         ..RenderOptions::default()
     };
     Ok(Audited { document, scene, drawn })
+}
+
+/// What a job found before it becomes a document.
+struct Ran {
+    outcome: Outcome,
+    scene: Option<Scene3d>,
+    curves: Vec<(Row, Vec<(f64, f64)>)>,
+    sheets: Vec<Sheet>,
+    of_tiles: Vec<TileFigures>,
+    /// What the journal says.
+    note: Option<String>,
 }
 
 /// What hears of the cells of `job`.

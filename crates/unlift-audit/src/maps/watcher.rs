@@ -10,6 +10,7 @@ use unlift_report::inversions::Inversion as Sheet;
 
 use crate::Error;
 use crate::clouds::Clouds;
+use crate::curves::curve_errors;
 use crate::inversion::MapInversion;
 use crate::journal::Journal;
 use crate::progress::Progress;
@@ -48,16 +49,6 @@ pub fn curves_of(cells: Vec<(Row, Vec<(f64, f64)>)>, rows: &[Row]) -> Vec<ErrorC
         Some(ErrorCdf { row, points })
     };
     cells.into_iter().filter_map(curve).collect()
-}
-
-/// Points of an error curve.
-const CURVE_POINTS: i32 = 80;
-
-/// The errors of an error curve: from a hundredth of the largest threshold to ten times it, evenly on a
-/// logarithmic axis.
-pub fn curve_errors(largest_threshold: f64) -> impl Iterator<Item = f64> {
-    let exponent = |step: i32| -2.0 + 3.0 * f64::from(step) / f64::from(CURVE_POINTS);
-    (0..=CURVE_POINTS).map(move |step| largest_threshold * 10f64.powf(exponent(step)))
 }
 
 impl Observer for Watcher<'_, '_> {

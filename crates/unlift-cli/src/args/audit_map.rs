@@ -78,6 +78,11 @@ pub struct AuditMapArgs {
     /// Photos to compare with at most, evenly spaced over their names
     #[arg(long, value_parser = values::count, value_name = "N", default_value = "12", help_heading = "Result")]
     pub max_photos: NonZeroUsize,
+    /// Cut a large map into tiles of at most so many points and audit each as a map of its own: memory stays that of one tile, and the
+    /// page shows which tiles leak most. Recommended beyond a few million points
+    #[arg(long, value_parser = values::count, value_name = "N", help_heading = "Run",
+          conflicts_with_all = ["invert", "write_clouds", "journal"])]
+    pub tile_points: Option<NonZeroUsize>,
     /// Also write original, obfuscated and recovered clouds (PLY, OBJ)
     #[arg(long, help_heading = "Result", conflicts_with = "share_safe")]
     pub write_clouds: bool,

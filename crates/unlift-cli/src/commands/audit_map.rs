@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 use unlift::audit::{Measure, Plan};
 use unlift::obfuscate::SchemeOptions;
 use unlift_audit::inversion::MapInversion;
-use unlift_audit::maps::perform;
+use unlift_audit::maps::{Tiles, perform};
 use unlift_audit::{
     Finished, Job, Journal, Prepared, Shown, check_thresholds, open_audit, sources,
 };
@@ -71,6 +71,7 @@ pub fn audit(args: &AuditMapArgs) -> anyhow::Result<Finished> {
             doubts,
             options: with_attack(more_options(args), &args.attack),
             gates: result.gate.clone(),
+            tiles: args.tile_points.map(|most| Tiles { most: most.get(), only: None }),
             write_clouds: args.write_clouds,
             share_safe: result.share_safe,
             progress: &progress,
@@ -126,7 +127,9 @@ fn plan(
 ) -> anyhow::Result<Plan<3>> {
     let k = usize::from(args.map.k);
     let unit = prepared.original.reveal().unit();
-    let usual = Plan::new(unit).for_map(prepared.original.len(), k);
+    let n_points = prepared.original.len();
+    let at_once = args.tile_points.map_or(n_points, |most| n_points.min(most.get()));
+    let usual = Plan::new(unit).for_map(at_once, k);
     let mut entries = if args.schemes.is_empty() { all_schemes() } else { args.schemes.clone() };
     let mut asked = args.neighbors.clone();
     if args.quick {

@@ -72,6 +72,7 @@ pub fn audit(args: &AuditReleasedArgs) -> anyhow::Result<Finished> {
             gates: args.result.gate.clone(),
             out: args.result.out.clone(),
             unit_in_map_units: 1.0,
+            tiles: None,
             write_clouds: args.write_clouds,
             inversion: None,
             journal: None,

@@ -148,6 +148,7 @@ fn map(progress: &Part<'_>, out: &Path, room: &unlift_demo::Mapped) -> anyhow::R
         gates: Vec::new(),
         out: out.to_owned(),
         unit_in_map_units: 1.0,
+        tiles: None,
         write_clouds: false,
         inversion: None,
         journal: None,

@@ -75,6 +75,8 @@ def audit(
     thresholds: Iterable[float | str] | str | None = None,
     k: int = 50,
     source_k: int | None = None,
+    tile_points: int | None = None,
+    tile: int | None = None,
     delta: float | None = None,
     exact_constraints: bool = True,
     records_alone: bool = True,
@@ -97,6 +99,8 @@ def audit(
         `released.origin`; a row of NaN says that a point was not recovered.
     thresholds: errors up to which a point counts as recovered, in the unit of the map; texts are kept as written.
     k: true neighbors per point. source_k: records per list of a source of ours, which chooses itself without it.
+    tile_points: cut a large map into tiles of at most so many points, and audit each as a map of its own. tile: only the tile with this
+        number, from 0, as a task of a cluster.
     delta: the distance that decides support; the attack chooses without it.
     exact_constraints: whether rules that tie records together are used.
     records_alone: whether maps are also attacked without lists. reference: also with the neighbors' true places.
@@ -117,6 +121,8 @@ def audit(
         thresholds=thresholds,
         k=k,
         source_k=source_k,
+        tile_points=tile_points,
+        tile=tile,
         delta=delta,
         exact_constraints=exact_constraints,
         records_alone=records_alone,
@@ -193,6 +199,8 @@ def audit_images(
         thresholds=thresholds,
         k=k,
         source_k=source_k,
+        tile_points=None,
+        tile=None,
         delta=delta,
         exact_constraints=exact_constraints,
         records_alone=True,

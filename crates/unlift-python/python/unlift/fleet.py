@@ -33,6 +33,7 @@ __all__ = ["ROWS", "audit_images", "audit_maps", "schema"]
 #: What rows say: name, and type as Spark writes it.
 ROWS = {
     "item": "string",
+    "tile": "bigint",
     "error": "string",
     "scheme": "string",
     "neighbors": "string",
@@ -69,7 +70,8 @@ def audit_maps(batches: Iterable[_pa.RecordBatch], **options: Any) -> Iterator[_
     """Audits the map of every row of `batches`: one row of figures per map, scheme, source, inlier ratio and solver.
 
     batches: with a column `path` (string), as `unlift.read` takes it; and, if they are there, `scale` (meters per unit) and
-        `descriptors` (a file of them), null for maps without.
+        `descriptors` (a file of them), null for maps without; and `tile_points` and `tile`, to audit one tile of a large map in every
+        row, numbered from 0. A map of n points has `-(-n // tile_points)` tiles.
     options: those of `unlift.audit`, the same for all maps. `threads=1` where an engine runs a task per core.
 
     Yields a batch per map. A map that cannot be read or audited has one row, whose `error` says why in a line, and a scheme that
@@ -83,15 +85,16 @@ def audit_maps(batches: Iterable[_pa.RecordBatch], **options: Any) -> Iterator[_
             raise UnliftError(f"batches: expected a column path, found {found}")
         for task in batch.to_pylist():
             path, scale, descriptors = task["path"], task.get("scale"), task.get("descriptors")
+            tile = {name: task.get(name) for name in ("tile_points", "tile") if task.get(name) is not None}
             try:
                 if path is None:
                     raise UnliftError("path: expected a file or folder, found null")
                 map: Map = read(path, scale=scale, descriptors=descriptors)
-                report = audit(map, **options)
+                report = audit(map, **options, **tile)
             except UnliftError as error:
-                yield _batch([{"item": path, "error": str(error)}])
+                yield _batch([{"item": path, "tile": task.get("tile"), "error": str(error)}])
                 continue
-            yield _rows_of(str(path), report.document)
+            yield _rows_of(str(path), report.document, task.get("tile"))
 
 
 def audit_images(batches: Iterable[_pa.RecordBatch], **options: Any) -> Iterator[_pa.RecordBatch]:
@@ -143,12 +146,12 @@ def _features(image: dict[str, Any]) -> Features:
     return found
 
 
-def _rows_of(item: str, document: dict[str, Any]) -> _pa.RecordBatch:
+def _rows_of(item: str, document: dict[str, Any], tile: int | None = None) -> _pa.RecordBatch:
     """The rows of one audit, under the name of its item."""
     notes = document.get("notes") or []
-    rows = [{**_figures(row), "item": item, "notes": notes} for row in document["results"]]
+    rows = [{**_figures(row), "item": item, "tile": tile, "notes": notes} for row in document["results"]]
     missing = [
-        {"item": item, "scheme": one["scheme"], "error": one["reason"]} for one in document.get("not_audited") or []
+        {"item": item, "tile": tile, "scheme": one["scheme"], "error": one["reason"]} for one in document.get("not_audited") or []
     ]
     return _batch(rows + missing)
 

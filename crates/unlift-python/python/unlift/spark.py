@@ -27,7 +27,8 @@ __all__ = ["audit_images", "audit_maps", "recover"]
 
 
 def audit_maps(maps: _DataFrame, **options: Any) -> _DataFrame:
-    """`unlift.fleet.audit_maps` on every partition of `maps`: columns `path`, and perhaps `scale` and `descriptors`.
+    """`unlift.fleet.audit_maps` on every partition of `maps`: columns `path`, and perhaps `scale`, `descriptors`,
+    `tile_points` and `tile`.
 
     options: those of `unlift.audit`; `threads` is 1 unless it is said, as Spark runs a task per core.
     """

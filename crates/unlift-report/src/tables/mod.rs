@@ -60,7 +60,7 @@ impl Table {
     }
 }
 
-fn column(name: impl Into<String>, class: Class) -> Column {
+pub(crate) fn column(name: impl Into<String>, class: Class) -> Column {
     Column { name: name.into(), class }
 }
 

@@ -42,8 +42,9 @@ pub(super) struct Owned<'a, const D: usize> {
 }
 
 impl<const D: usize> Owned<'_, D> {
-    fn is_one_of_many(&self) -> bool {
-        self.name.is_some()
+    /// Whether it may have fewer points than a list is long: images may, the tiles of a map do not.
+    fn may_be_small(&self) -> bool {
+        self.name.is_some() && D == 2
     }
 }
 
@@ -94,7 +95,7 @@ pub(super) fn cells<const D: usize>(
     };
     match clock.time(|s| &mut s.obfuscate, hide) {
         Ok(hidden) => attack(owned, run, &hidden, clock, observer, each),
-        Err(error) if !owned.is_one_of_many() => Ok(vec![NotAudited::scheme(run.scheme, &error)]),
+        Err(error) if !owned.may_be_small() => Ok(vec![NotAudited::scheme(run.scheme, &error)]),
         Err(error) => Err(error.within(run.scheme)),
     }
 }
@@ -136,12 +137,12 @@ pub(super) fn attack<const D: usize>(
         let what = format!("{scheme}, neighbors by {}", variant.by.name());
         each(observer, Some(what), None);
         let started = Instant::now();
-        let mut make = || match owned.is_one_of_many() {
+        let mut make = || match owned.may_be_small() {
             true => sources.make_of_what_there_is(variant),
             false => sources.make(variant),
         };
         let made = match clock.time(|s| &mut s.neighbors, || Ok(make()))? {
-            Err(error) if !owned.is_one_of_many() => {
+            Err(error) if !owned.may_be_small() => {
                 missing.push(NotAudited::variant(scheme, variant, &error, &hidden.1));
                 continue;
             }
@@ -157,7 +158,7 @@ pub(super) fn attack<const D: usize>(
             each(observer, Some(what), None);
             let (recovered, took) = match solved.by(at, observer) {
                 // A solver of somebody's own may not know these records: it costs its rows alone.
-                Err(error) if Builtin::of(&**solver).is_none() && !owned.is_one_of_many() => {
+                Err(error) if Builtin::of(&**solver).is_none() && !owned.may_be_small() => {
                     let error = error.within(&format!("solver {}", solver.name()));
                     missing.push(NotAudited::variant(scheme, variant, &error, &hidden.1));
                     continue;
@@ -183,7 +184,7 @@ pub(super) fn attack<const D: usize>(
             row.records_alone.clone_from(&alone);
             row.metrics.extend(made.ratio_at_k.map(|ratio| (RATIO_AT_K.to_owned(), ratio)));
             let weights = places(owned, secret);
-            if owned.is_one_of_many() {
+            if owned.may_be_small() {
                 row.fill_distinct(&accuracy, &baseline, &weights, &plan.thresholds);
             }
             let bare = row.clone();
@@ -236,7 +237,7 @@ pub(super) fn attack<const D: usize>(
 
 /// What makes distinct places count once; asked of images alone.
 fn places<const D: usize>(owned: &Owned<'_, D>, secret: &Secret) -> Vec<f64> {
-    if owned.is_one_of_many() { distinct_weights(owned.original, secret) } else { Vec::new() }
+    if owned.may_be_small() { distinct_weights(owned.original, secret) } else { Vec::new() }
 }
 
 /// The row of an attacker who is told where three true neighbors of every point are.
@@ -259,7 +260,7 @@ fn reference_row<const D: usize>(
     let accuracy = reference(released, owned.original, secret, owned.search);
     row.fill(&accuracy, Some(baseline), &plan.thresholds);
     row.records_alone = alone;
-    if owned.is_one_of_many() {
+    if owned.may_be_small() {
         row.fill_distinct(&accuracy, baseline, &places(owned, secret), &plan.thresholds);
     }
     (row, accuracy)

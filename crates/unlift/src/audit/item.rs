@@ -22,7 +22,7 @@ pub(super) struct Rows {
     pub(super) not_audited: Vec<NotAudited>,
 }
 
-/// The rows of `owned`. `finished` hears of every row of every repeat, numbered in the order of rows.
+/// The rows of `owned`. `finished` hears of every row of every repeat.
 ///
 /// # Errors
 /// As [`cells`].
@@ -31,7 +31,7 @@ pub(super) fn of_item<const D: usize>(
     plan: &Plan<D>,
     clock: &mut Clock,
     observer: &mut dyn Observer<D>,
-    finished: &mut dyn FnMut(usize, &Finished<'_>),
+    finished: &mut dyn FnMut(&Finished<'_>),
 ) -> Result<Rows, Error> {
     let per_scheme = plan.rows_per_scheme();
     let total = per_scheme * plan.schemes.len() * plan.repeats as usize;
@@ -50,7 +50,7 @@ pub(super) fn of_item<const D: usize>(
                     observer.progress(done, total, &what);
                 }
                 if let Some(one) = one {
-                    finished(n_before + of_repeat.len(), &one);
+                    finished(&one);
                     of_repeat.push((one.row, one.seconds));
                     done += 1;
                 }

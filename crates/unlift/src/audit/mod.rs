@@ -1,16 +1,16 @@
 //! One whole audit as a value: a plan in, rows out. The only module that sees the whole pipeline.
 //!
-//! [`run`](fn@run) audits a map, [`run_images`] many images; both go through the same loop and the same cells.
+//! [`run`](fn@run) audits a map, [`run_many`] many images or the tiles of a map; both go through the same loop and the same cells.
 //! Schemes, sources of neighborhoods and measures of a [`Plan`] may be anybody's.
 
 mod break_even;
 mod cells;
 mod chance;
 mod clock;
-mod images;
 mod item;
 mod laws;
 mod lists;
+mod many;
 mod measure;
 mod not_audited;
 mod observer;
@@ -27,8 +27,8 @@ mod threshold;
 pub use break_even::{Bound, BreakEven, STRONGEST, break_even};
 pub use cells::REFERENCE;
 pub use clock::{RowSeconds, Seconds};
-pub use images::{Image, Watcher, run_images};
 pub use laws::check_laws;
+pub use many::{Item, Watcher, run_many};
 pub use measure::measure;
 pub use not_audited::NotAudited;
 pub use observer::{Cell, Counts, Measure, Observer, Recovery, Silent};

@@ -1,11 +1,12 @@
-//! One row over the keypoints of many images: sums, and a histogram of errors of bounded size.
+//! One row over the points of many images or tiles: sums, and a histogram of errors of bounded size.
 
 use std::collections::BTreeMap;
 
 use super::cells::Finished;
-use super::row::{Distinct, PERCENTILES, Row};
+use super::row::{Alone, Distinct, PERCENTILES, Row};
 use super::threshold::Threshold;
-use crate::evaluate::Accuracy;
+use crate::evaluate::{Accuracy, Reliability};
+use crate::recover::Unknown;
 
 /// Bits of the mantissa of an `f32` that are left out of an error's bin: bins are 0.05 % wide.
 const DROPPED_BITS: u32 = 12;
@@ -43,6 +44,12 @@ pub(super) struct Pool {
     lost: BTreeMap<&'static str, usize>,
     dropped: BTreeMap<&'static str, usize>,
     trials: Option<BTreeMap<u32, u64>>,
+    /// Per attack on the records alone, percentages times points.
+    alone: BTreeMap<&'static str, Vec<f64>>,
+    /// Descriptors given to their own point, in percent, times points.
+    assignment: Option<f64>,
+    reliability: Option<Reliability>,
+    sure_unknown: Option<Unknown>,
     errors: Errors,
     blind_errors: Errors,
 }
@@ -68,6 +75,10 @@ impl Pool {
             lost: BTreeMap::new(),
             dropped: BTreeMap::new(),
             trials: row.ransac_trials.as_ref().map(|_| BTreeMap::new()),
+            alone: BTreeMap::new(),
+            assignment: row.assignment_accuracy_percent.map(|_| 0.0),
+            reliability: None,
+            sure_unknown: None,
             errors: Errors::default(),
             blind_errors: Errors::default(),
         }
@@ -112,6 +123,15 @@ impl Pool {
             let trials = self.trials.get_or_insert_with(BTreeMap::new);
             *trials.entry(up_to).or_insert(0) += slots;
         }
+        for alone in &row.records_alone {
+            let percent = alone.percent.iter().map(|percent| percent * n as f64);
+            self.alone.insert(alone.name, percent.collect());
+        }
+        if let Some(percent) = row.assignment_accuracy_percent {
+            *self.assignment.get_or_insert(0.0) += percent * n as f64;
+        }
+        self.reliability.clone_from(&row.reliability);
+        self.sure_unknown = row.sure_unknown;
         self.errors.add(accuracy);
         self.blind_errors.add(baseline);
     }
@@ -145,6 +165,18 @@ impl Pool {
         self.delta += more.delta;
         self.hits += more.hits;
         self.n_listed += more.n_listed;
+        for (name, more) in &more.alone {
+            // An attack that cannot be tried on an item gets nothing there.
+            sums(self.alone.entry(name).or_insert_with(|| vec![0.0; more.len()]), more);
+        }
+        if let Some(more) = more.assignment {
+            *self.assignment.get_or_insert(0.0) += more;
+        }
+        if let (Some(all), Some(more)) = (&mut self.reliability, &more.reliability) {
+            all.merge(more);
+        }
+        // Known of some is not known of all.
+        self.sure_unknown = self.sure_unknown.or(more.sure_unknown);
         merge_counts(&mut self.lost, &more.lost);
         merge_counts(&mut self.dropped, &more.dropped);
         merge_counts(&mut self.errors.0, &more.errors.0);
@@ -189,7 +221,18 @@ impl Pool {
                 .trials
                 .as_ref()
                 .map(|trials| trials.iter().map(|(&up_to, &slots)| (up_to, slots)).collect()),
-            distinct: Some(Distinct {
+            records_alone: self
+                .alone
+                .iter()
+                .map(|(&name, sums)| Alone {
+                    name,
+                    percent: sums.iter().map(|sum| sum / n).collect(),
+                })
+                .collect(),
+            assignment_accuracy_percent: self.assignment.map(|sum| sum / n),
+            reliability: self.reliability.clone().filter(|_| self.sure_unknown.is_none()),
+            sure_unknown: self.sure_unknown,
+            distinct: self.cell.distinct.as_ref().map(|_| Distinct {
                 n_places: self.n_places.round() as usize,
                 recovered_percent: of_places(&self.places_within),
                 blind_percent: of_places(&self.blind_places_within),

@@ -82,13 +82,17 @@ pub(super) fn every_cell<const D: usize>(
     let search = clock.time(|s| &mut s.search, || oracle::search(original))?;
     let owned = Owned { original, descriptors, hidden, search: &search, name: None };
     let Rows { rows, seconds, not_audited } =
-        of_item(&owned, plan, &mut clock, observer, &mut |_, _| ())?;
+        of_item(&owned, plan, &mut clock, observer, &mut |_| ())?;
     if let (true, Some(first)) = (rows.is_empty(), not_audited.first()) {
-        let expected = "one that can be applied to this map";
-        let found = format!("none: {}: {}", first.scheme, first.reason);
-        return Err(Error::new("schemes", expected, found));
+        return Err(none_applies(first));
     }
     let break_even = break_even(plan, &rows);
     let seconds = Seconds { rows: seconds, ..clock.seconds };
     Ok(Outcome { rows, not_audited, break_even, n_items: 1, n_too_small: 0, seconds })
+}
+
+/// The error of an audit without rows, for the reason of the `first` that is missing.
+pub(super) fn none_applies(first: &NotAudited) -> Error {
+    let found = format!("none: {}: {}", first.scheme, first.reason);
+    Error::new("schemes", "one that can be applied to this map", found)
 }

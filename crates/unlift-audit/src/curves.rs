@@ -1,0 +1,85 @@
+//! Error curves over many images or tiles: counts, so that their size does not depend on the number of items.
+
+use unlift::audit::{Cell, Observer, Row};
+
+use crate::progress::Progress;
+
+/// Points of an error curve.
+const CURVE_POINTS: i32 = 80;
+
+/// The errors of an error curve: from a hundredth of the largest threshold to ten times it, evenly on a
+/// logarithmic axis.
+pub fn curve_errors(largest_threshold: f64) -> impl Iterator<Item = f64> {
+    let exponent = |step: i32| -2.0 + 3.0 * f64::from(step) / f64::from(CURVE_POINTS);
+    (0..=CURVE_POINTS).map(move |step| largest_threshold * 10f64.powf(exponent(step)))
+}
+
+/// One curve.
+struct Curve {
+    /// The row of one item.
+    cell: Row,
+    within: Vec<usize>,
+    n: usize,
+}
+
+/// The error curves of one item, of the first repeat; or of many, merged.
+pub struct Curves<'a> {
+    errors: Vec<f64>,
+    curves: Vec<Curve>,
+    steps: &'a dyn Progress,
+    /// The share of the item that was told to be finished.
+    told: f64,
+}
+
+impl<'a> Curves<'a> {
+    /// No curve yet, looked at where `largest_threshold` says.
+    pub fn new(largest_threshold: f64, steps: &'a dyn Progress) -> Self {
+        let errors = curve_errors(largest_threshold).collect();
+        Self { errors, curves: Vec::new(), steps, told: 0.0 }
+    }
+
+    /// Adds those of another item.
+    pub fn merge(&mut self, more: Self) {
+        for more in more.curves {
+            match self.curves.iter_mut().find(|to| to.cell.is_same_cell(&more.cell)) {
+                Some(to) => {
+                    to.n += more.n;
+                    to.within.iter_mut().zip(&more.within).for_each(|(to, more)| *to += more);
+                }
+                None => self.curves.push(more),
+            }
+        }
+    }
+
+    /// The curves in percent, by cell.
+    pub fn shares(self) -> Vec<(Row, Vec<(f64, f64)>)> {
+        let shares = |curve: Curve| {
+            let percent = |count: usize| 100.0 * count as f64 / curve.n.max(1) as f64;
+            let points = self.errors.iter().zip(&curve.within);
+            let points = points.map(|(&error, &n)| (error, percent(n))).collect();
+            (curve.cell, points)
+        };
+        self.curves.into_iter().map(shares).collect()
+    }
+}
+
+impl<const D: usize> Observer<D> for Curves<'_> {
+    fn progress(&mut self, done: usize, total: usize, _: &str) {
+        let share = done as f64 / total.max(1) as f64;
+        self.steps.add(share - self.told, "");
+        self.told = share;
+    }
+
+    fn goes_on(&self) -> bool {
+        self.steps.goes_on()
+    }
+
+    fn cell(&mut self, cell: &Cell<'_, D>) {
+        if cell.repeat > 0 {
+            return;
+        }
+        let within = self.errors.iter().map(|&error| cell.accuracy.n_within(error)).collect();
+        let n = cell.accuracy.n_points();
+        self.curves.push(Curve { cell: cell.row.clone(), within, n });
+    }
+}

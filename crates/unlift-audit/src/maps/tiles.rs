@@ -1,0 +1,216 @@
+//! A large map in tiles: each is hidden and attacked as a map of its own, as a service releases a city.
+
+use unlift::audit::{self, Item, Outcome, Plan, Row, run_many};
+use unlift::truth::Original;
+use unlift::{Descriptors, Error, PointSet};
+
+use crate::curves::Curves;
+use crate::progress::Progress;
+
+/// A part of a map: a box in plan view, which no other tile shares.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tile {
+    /// Its number, from 0.
+    pub at: usize,
+    /// Rows of the map's points, ascending.
+    pub rows: Vec<u32>,
+    /// The lowest and highest corner of its points in plan view, but for a fiftieth on every side: a stray point would stretch it.
+    pub bounds: [[f64; 2]; 2],
+}
+
+impl Tile {
+    /// The tile as an audit takes it. Its randomness comes from its number.
+    ///
+    /// # Errors
+    /// Never for points of a map.
+    pub fn item(
+        &self,
+        original: &Original<3>,
+        descriptors: Option<&Descriptors>,
+    ) -> Result<Item<3>, Error> {
+        let points = original.reveal();
+        let own = self.rows.iter().map(|&row| points.positions()[row as usize]).collect();
+        let original = Original::new(PointSet::try_new(own, points.unit())?);
+        let descriptors = descriptors.map(|all| all.select(&self.rows));
+        Ok(Item { name: format!("tile {}", self.at + 1), original, descriptors })
+    }
+}
+
+/// How a map is cut.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tiles {
+    /// Points of a tile at most.
+    pub most: usize,
+    /// The number of the one tile that is audited, as a task of a cluster; `None` for all.
+    pub only: Option<usize>,
+}
+
+impl Tiles {
+    /// Cuts points into as few tiles as have at most `most` of them each, of nearly equal size, by a k-d split in plan view: across the
+    /// longer side, never across the height.
+    ///
+    /// The height is the axis nearest to `up`, or without it the one along which the points extend least.
+    ///
+    /// # Errors
+    /// When there is no tile of the number that is asked for.
+    pub fn of(
+        self,
+        positions: &[[f64; 3]],
+        up: Option<[f64; 3]>,
+    ) -> Result<Vec<Tile>, crate::Error> {
+        let rows: Vec<u32> = (0..positions.len() as u32).collect();
+        let extent = bounds(positions, &rows);
+        let size: [f64; 3] = std::array::from_fn(|c| extent[1][c] - extent[0][c]);
+        let longest = |by: [f64; 3]| (0..3).max_by(|&a, &b| by[a].total_cmp(&by[b])).unwrap_or(2);
+        let height = longest(up.map_or(size.map(|x| -x), |up| up.map(f64::abs)));
+        let plan = [[1, 2], [0, 2], [0, 1]][height];
+        let n_tiles = positions.len().div_ceil(self.most.max(1)).max(1);
+        if let Some(at) = self.only.filter(|&at| at >= n_tiles) {
+            return Err(crate::Error::request(format!(
+                "tile: expected below {n_tiles}, found {at}"
+            )));
+        }
+        let mut found = Vec::with_capacity(n_tiles);
+        split(positions, rows, n_tiles, plan, &mut found);
+        found.retain(|tile| self.only.is_none_or(|at| at == tile.at));
+        Ok(found)
+    }
+}
+
+fn split(
+    positions: &[[f64; 3]],
+    mut rows: Vec<u32>,
+    n_tiles: usize,
+    plan: [usize; 2],
+    found: &mut Vec<Tile>,
+) {
+    if n_tiles == 1 {
+        rows.sort_unstable();
+        let quantiles = plan.map(|axis| {
+            let mut places: Vec<f64> =
+                rows.iter().map(|&row| positions[row as usize][axis]).collect();
+            places.sort_unstable_by(f64::total_cmp);
+            let left_out = places.len() / 50;
+            let at = |rank: usize| places.get(rank).copied().unwrap_or(0.0);
+            [at(left_out), at((places.len() - left_out).saturating_sub(1))]
+        });
+        let bounds = [0, 1].map(|end| quantiles.map(|both| both[end]));
+        found.push(Tile { at: found.len(), rows, bounds });
+        return;
+    }
+    let ([low, high], [a, b]) = (bounds(positions, &rows), plan);
+    let axis = if high[a] - low[a] >= high[b] - low[b] { a } else { b };
+    let left_tiles = n_tiles / 2;
+    let n_left = rows.len() * left_tiles / n_tiles;
+    // Ties by row: the same tiles whatever the order in which a selection leaves the rest.
+    rows.select_nth_unstable_by(n_left, |&i, &j| {
+        let [x, y] = [i, j].map(|row| positions[row as usize][axis]);
+        x.total_cmp(&y).then(i.cmp(&j))
+    });
+    let right = rows.split_off(n_left);
+    split(positions, rows, left_tiles, plan, found);
+    split(positions, right, n_tiles - left_tiles, plan, found);
+}
+
+/// The lowest and the highest corner of some points.
+fn bounds(positions: &[[f64; 3]], rows: &[u32]) -> [[f64; 3]; 2] {
+    let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+    for &row in rows {
+        let point = positions[row as usize];
+        bounds[0] = std::array::from_fn(|c| bounds[0][c].min(point[c]));
+        bounds[1] = std::array::from_fn(|c| bounds[1][c].max(point[c]));
+    }
+    bounds
+}
+
+/// What is found of the tiles of a map.
+pub(super) struct Found<'a> {
+    pub(super) outcome: Outcome,
+    /// The rows of every tile.
+    pub(super) rows: Vec<Vec<Row>>,
+    pub(super) curves: Curves<'a>,
+}
+
+/// Runs `plan` on every tile of a map, one after the other.
+///
+/// # Errors
+/// When the plan does not fit a tile, or `progress` says stop.
+pub(super) fn run<'a>(
+    (original, descriptors): (&Original<3>, Option<&Descriptors>),
+    tiles: &[Tile],
+    plan: &Plan<3>,
+    progress: &'a dyn Progress,
+) -> Result<Found<'a>, Error> {
+    let most = plan.thresholds.iter().map(|t| t.value).fold(0.0, f64::max);
+    let mut watcher =
+        Watcher { progress, most, rows: Vec::new(), curves: Curves::new(most, progress) };
+    progress.show(0, tiles.len(), "cutting the map into tiles");
+    let items = tiles.iter().map(|tile| tile.item(original, descriptors));
+    let outcome = run_many(items, plan, &mut watcher)?;
+    Ok(Found { outcome, rows: watcher.rows, curves: watcher.curves })
+}
+
+/// Shows progress and keeps the figures of every tile.
+struct Watcher<'a> {
+    progress: &'a dyn Progress,
+    most: f64,
+    rows: Vec<Vec<Row>>,
+    curves: Curves<'a>,
+}
+
+impl<'a> audit::Watcher<3> for Watcher<'a> {
+    type OfItem = Curves<'a>;
+
+    fn begin(&mut self) -> Curves<'a> {
+        Curves::new(self.most, self.progress)
+    }
+
+    fn progress(&mut self, _: usize, _: usize, what: &str) {
+        // Tiles tell themselves how far they are.
+        self.progress.add(0.0, what);
+    }
+
+    fn item(&mut self, _: &str, rows: &[Row], seen: Curves<'a>) {
+        self.curves.merge(seen);
+        self.rows.push(rows.to_vec());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use unlift::seed::{Draws, Stage};
+
+    #[test]
+    fn tiles_have_every_point_once_and_do_not_overlap() {
+        let mut draws = Draws::new(3, Stage::Synthetic, 1);
+        let points: Vec<[f64; 3]> = (0..1003)
+            .map(|_| [draws.between(0.0, 9.0), draws.between(0.0, 4.0), draws.between(0.0, 1.0)])
+            .collect();
+        let cut = |most, up| Tiles { most, only: None }.of(&points, up).unwrap();
+        let found = cut(100, None);
+        assert_eq!(found.len(), 11);
+        let mut rows: Vec<u32> = found.iter().flat_map(|tile| tile.rows.clone()).collect();
+        rows.sort_unstable();
+        assert_eq!(rows, (0..1003).collect::<Vec<u32>>());
+        assert!(found.iter().all(|tile| (91..=92).contains(&tile.rows.len())));
+        for (at, one) in found.iter().enumerate() {
+            for other in &found[..at] {
+                let apart = |c: usize| {
+                    one.bounds[1][c] <= other.bounds[0][c] || other.bounds[1][c] <= one.bounds[0][c]
+                };
+                assert!(apart(0) || apart(1), "{one:?} and {other:?}");
+            }
+        }
+        // Where x is up, tiles are cut across y and z.
+        let upright = cut(600, Some([-1.0, 0.1, 0.0]));
+        assert!(
+            upright[0].bounds[1][0] <= upright[1].bounds[0][0] && upright[0].bounds[1][0] < 4.0
+        );
+        assert_eq!(cut(2000, None).len(), 1);
+        let third = Tiles { most: 100, only: Some(2) }.of(&points, None).unwrap();
+        assert_eq!(third, [found[2].clone()]);
+        let error = Tiles { most: 100, only: Some(11) }.of(&points, None).unwrap_err();
+        assert_eq!(error.to_string(), "tile: expected below 11, found 11");
+    }
+}

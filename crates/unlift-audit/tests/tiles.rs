@@ -1,0 +1,84 @@
+//! A map in tiles: each is audited as a map of its own, and the page shows which leaks most.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use unlift::audit::{NeighborsBy, Plan};
+use unlift::neighbors::Geometric;
+use unlift::obfuscate::{SchemeOptions, scheme};
+use unlift::recover::Builtin;
+use unlift::{Unit, synthetic};
+use unlift_audit::maps::{Tiles, find};
+use unlift_audit::{Job, Preparation, prepare};
+use unlift_io::read;
+
+fn audit(only: Option<usize>, threads: usize) -> unlift_audit::Audited {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("room.csv");
+    let points = synthetic::room(4, 2_000).points;
+    let lines = points.iter().map(|[x, y, z]| format!("{x},{y},{z}\n"));
+    std::fs::write(&path, lines.collect::<String>()).unwrap();
+    let input = read::open(&path).unwrap();
+    let preparation = Preparation { scale: Some(1.0), ..Preparation::default() };
+    let prepared = prepare(&input.positions, None, &preparation).unwrap();
+    let named = |name: &str| {
+        scheme(name).unwrap().of_dimension::<3>(&SchemeOptions::usual(Unit::Meter)).unwrap()
+    };
+    let plan = Plan {
+        schemes: vec![named("ppl"), named("plane")],
+        neighbors: vec![NeighborsBy::Oracle, NeighborsBy::Source(Arc::new(Geometric))],
+        inlier_ratios: vec![0.5],
+        solvers: Builtin::list(&[Builtin::Joint]),
+        k: 20,
+        ..Plan::new(Unit::Meter)
+    };
+    let job = Job::new(&path, &input, &prepared, Path::new("unused"), Instant::now()).unwrap();
+    let job = Job { plan, tiles: Some(Tiles { most: 600, only }), ..job };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    pool.install(|| find(job, None)).unwrap()
+}
+
+#[test]
+fn a_tile_is_the_same_alone_and_among_all() {
+    let whole = audit(None, 2);
+    let document = &whole.document;
+    assert_eq!(document.results, audit(None, 1).document.results);
+    let sources: Vec<[&str; 2]> =
+        document.results.iter().map(|row| [&*row.scheme, &*row.neighbors]).collect();
+    // Planes have no geometric neighbors: these rows alone are missing.
+    assert_eq!(sources, [["ppl", "oracle"], ["ppl", "geometric"], ["plane", "oracle"]]);
+    assert_eq!(document.not_audited.len(), 1);
+    assert_eq!(document.tiles.len(), 4);
+    let n: u64 = document.tiles.iter().map(|tile| tile.n_points).sum();
+    assert_eq!((n, document.results[0].n_points), (2_000, 2_000));
+    for (at, row) in document.results.iter().enumerate() {
+        for (threshold, &pooled) in &row.recovered_percent {
+            let of = |tile: &unlift_report::document::TileFigures| {
+                tile.n_points as f64 * tile.recovered_percent[at][threshold]
+            };
+            let sum: f64 = document.tiles.iter().map(of).sum();
+            assert!((sum / 2_000.0 - pooled).abs() < 1e-9);
+        }
+        // A map of planes gives nothing away by its records alone.
+        assert_eq!(row.records_alone_percent.is_some(), row.scheme == "ppl");
+    }
+    let third = audit(Some(2), 1).document;
+    assert_eq!(third.tiles, [document.tiles[2].clone()]);
+    for (row, percent) in third.results.iter().zip(&document.tiles[2].recovered_percent) {
+        assert_eq!(&row.recovered_percent, percent);
+    }
+}
+
+#[test]
+fn the_page_shows_which_tile_leaks_most_unless_it_may_be_shared() {
+    let found = audit(None, 2);
+    let page = found.page(false).unwrap();
+    assert!(page.contains("Where the map leaks most") && page.contains("<title>Tile 4: "));
+    let safe = found.page(true).unwrap();
+    assert!(
+        !safe.contains("Where the map leaks most") && safe.contains("id=\"table-tiles\""),
+        "a table alone"
+    );
+    assert!(found.document.share_safe().tiles.iter().all(|tile| tile.bounds.is_none()));
+}

@@ -1,0 +1,148 @@
+//! What is known of the tiles of a large map, and where it leaks most: a heat map of the plan view.
+
+use serde::{Deserialize, Serialize};
+
+use crate::document::{ByThreshold, Document, Row};
+use crate::tables::{self, Class, Table, column};
+use crate::{attack, verdict, words};
+
+/// The figures of one tile.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct TileFigures {
+    /// The lowest and the highest corner of its points in plan view, but for a fiftieth on every side, in the unit of the audit; `None`
+    /// in a share-safe document.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bounds: Option<[[f64; 2]; 2]>,
+    /// Its points.
+    pub n_points: u64,
+    /// Percent of them recovered within each threshold: one per row of `results`, in the same order.
+    pub recovered_percent: Vec<ByThreshold>,
+}
+
+/// A heat map of one scheme.
+#[derive(Debug, Serialize)]
+pub(crate) struct HeatMap {
+    /// What it shows.
+    title: String,
+    /// Width and height of the drawing.
+    size: [f64; 2],
+    boxes: Vec<HeatBox>,
+}
+
+/// A tile of a heat map.
+#[derive(Debug, Serialize)]
+struct HeatBox {
+    x: f64,
+    y: f64,
+    width: f64,
+    height: f64,
+    /// How strong its color is, from 0 to 1.
+    share: f64,
+    /// What it says: shown where there is room, and when pointed at.
+    percent: String,
+    title: String,
+}
+
+/// The longer side of a heat map.
+const SIDE: f64 = 480.0;
+/// Heat maps at most: those of the schemes that leak most.
+const MOST: usize = 4;
+
+/// The row that leaks most of every scheme within the headline threshold, by its place among the results; the worst scheme first.
+fn strongest(document: &Document) -> Vec<(usize, &Row)> {
+    verdict::verdict(document)
+        .cards
+        .iter()
+        .filter_map(|card| {
+            let row = *verdict::by_source(document, &card.scheme).first()?;
+            let at = document.results.iter().position(|other| std::ptr::eq(other, row))?;
+            Some((at, row))
+        })
+        .collect()
+}
+
+/// Heat maps of the schemes that leak most; none of a document without tiles or without their places.
+pub(crate) fn heat_maps(document: &Document) -> Vec<HeatMap> {
+    let Some(headline) = tables::headline_threshold(document) else { return Vec::new() };
+    let placed: Option<Vec<[[f64; 2]; 2]>> =
+        document.tiles.iter().map(|tile| tile.bounds).collect();
+    let Some(bounds) = placed.filter(|bounds| !bounds.is_empty()) else { return Vec::new() };
+    let corner = |end: usize, pick: fn(f64, f64) -> f64| -> [f64; 2] {
+        let all = |c: usize| bounds.iter().map(|b| b[end][c]).reduce(pick).unwrap_or(0.0);
+        [all(0), all(1)]
+    };
+    let (low, high) = (corner(0, f64::min), corner(1, f64::max));
+    let extent = (high[0] - low[0]).max(high[1] - low[1]);
+    let scale = if extent > 0.0 { SIDE / extent } else { 1.0 };
+    let drawn = |(at, row): &(usize, &Row)| {
+        let heat = |(number, (tile, [first, last])): (usize, (&TileFigures, &[[f64; 2]; 2]))| {
+            let percent = tile.recovered_percent.get(*at).and_then(|all| all.get(&headline));
+            let percent = percent.copied().unwrap_or(0.0);
+            let points = words::thousands(tile.n_points);
+            HeatBox {
+                x: scale * (first[0] - low[0]),
+                // The page counts downwards.
+                y: scale * (high[1] - last[1]),
+                width: (scale * (last[0] - first[0])).max(1.0),
+                height: (scale * (last[1] - first[1])).max(1.0),
+                share: percent / 100.0,
+                percent: format!("{percent:.0}"),
+                title: format!("Tile {}: {percent:.1} % of {points} points", number + 1),
+            }
+        };
+        HeatMap {
+            title: format!("{}, {}", row.scheme, attack::briefly(row)),
+            size: [0, 1].map(|c| (scale * (high[c] - low[c])).max(1.0)),
+            boxes: document.tiles.iter().zip(&bounds).enumerate().map(heat).collect(),
+        }
+    };
+    strongest(document).iter().take(MOST).map(drawn).collect()
+}
+
+/// A row per tile, a column per scheme; `None` of a document without tiles.
+pub(crate) fn table(document: &Document) -> Option<Table> {
+    if document.tiles.is_empty() {
+        return None;
+    }
+    let headline = tables::headline_threshold(document)?;
+    let strongest = strongest(document);
+    let mut columns = vec![column("tile", Class::Label), column("points", Class::Figure)];
+    let names = strongest.iter().map(|(_, row)| format!("{}, %", row.scheme));
+    columns.extend(names.map(|name| column(name, Class::Figure)));
+    let cells = |(number, tile): (usize, &TileFigures)| {
+        let mut cells = vec![(number + 1).to_string(), words::thousands(tile.n_points)];
+        cells.extend(strongest.iter().map(|(at, _)| {
+            let percent = tile.recovered_percent.get(*at).and_then(|all| all.get(&headline));
+            percent.map_or("–".to_owned(), |percent| format!("{percent:.1}"))
+        }));
+        cells
+    };
+    Some(Table {
+        id: "tiles",
+        caption: format!(
+            "Recovered points of every tile within {}, by the strongest attack on the whole map.",
+            tables::threshold_text(document, &headline)
+        ),
+        rows: document.tiles.iter().enumerate().map(cells).collect(),
+        columns,
+        notes: Vec::new(),
+    })
+}
+
+/// The tile from which most comes back, in a line for a terminal; `None` of a document without tiles.
+pub(crate) fn line(document: &Document) -> Option<String> {
+    let headline = tables::headline_threshold(document)?;
+    let (at, row) = *strongest(document).first()?;
+    let percent = |tile: &TileFigures| tile.recovered_percent.get(at)?.get(&headline).copied();
+    let found = document.tiles.iter().enumerate();
+    let mut found: Vec<(f64, usize)> = found.filter_map(|(i, t)| Some((percent(t)?, i))).collect();
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (least, most) = (found.first()?.0, found.last()?);
+    let (scheme, n) = (&row.scheme, document.tiles.len());
+    let least = words::percent(least);
+    Some(format!(
+        "tiles: of {n}, {scheme} gives back {least} to {} % each, most in tile {}\n",
+        words::percent(most.0),
+        most.1 + 1
+    ))
+}
