@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use unlift::OneLine;
 
-use crate::unfinished::place_of;
+use crate::atomic::final_place;
 
 /// Where in a file something is wrong.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -85,7 +85,7 @@ impl Error {
 
     /// `path` could not be written; what is built apart is named by the place it is for.
     pub fn write(path: impl Into<PathBuf>, source: io::Error) -> Self {
-        Self { path: place_of(path.into()), kind: Kind::Write(source) }
+        Self { path: final_place(path.into()), kind: Kind::Write(source) }
     }
 
     /// The library refused values that came from `path`.
