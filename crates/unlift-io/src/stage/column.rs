@@ -72,13 +72,19 @@ pub(super) fn coordinate_names<const D: usize>(prefix: &str) -> [String; D] {
 #[derive(Debug)]
 pub(super) struct Batch<'a> {
     path: &'a Path,
+    /// The columns that were read.
+    columns: &'a [(&'a str, Type)],
     batch: &'a RecordBatch,
     first_row: u64,
 }
 
 impl<'a> Batch<'a> {
-    pub(super) fn new(path: &'a Path, batch: &'a RecordBatch, first_row: u64) -> Self {
-        Self { path, batch, first_row }
+    pub(super) fn new(
+        (path, columns): (&'a Path, &'a [(&'a str, Type)]),
+        batch: &'a RecordBatch,
+        first_row: u64,
+    ) -> Self {
+        Self { path, columns, batch, first_row }
     }
 
     /// Number of rows here.
@@ -108,9 +114,9 @@ impl<'a> Batch<'a> {
         }
     }
 
-    /// Finite floats; null and NaN, which are the same to many programs, are none.
+    /// Finite floats; null and NaN, which are the same to many programs, are none, as are all of a column that was not read.
     pub(super) fn optional_floats(&self, name: &str) -> Result<Vec<Option<f64>>, Error> {
-        let column = self.column(name);
+        let Some(column) = self.found(name) else { return Ok(vec![None; self.len()]) };
         let values = self.widened(name)?.into_iter().enumerate();
         let checked = values.map(|(row, x)| match column.is_valid(row) && !x.is_nan() {
             false => Ok(None),
@@ -141,13 +147,14 @@ impl<'a> Batch<'a> {
         values.map(|(row, x)| x.ok_or_else(|| null(row))).collect()
     }
 
-    /// Integers from 0 to below `below` (at most 2^32); null, or NaN among floats, is none.
+    /// Integers from 0 to below `below` (at most 2^32); null, or NaN among floats, is none, as are all of a column that was not
+    /// read.
     pub(super) fn optional_integers(
         &self,
         name: &str,
         below: u64,
     ) -> Result<Vec<Option<u32>>, Error> {
-        let column = self.column(name);
+        let Some(column) = self.found(name) else { return Ok(vec![None; self.len()]) };
         if column.data_type().is_floating() {
             let values = floats(column);
             let whole = (0..self.len()).map(|row| (row, values(row))).map(|(row, x)| {
@@ -167,9 +174,10 @@ impl<'a> Batch<'a> {
         checked.collect()
     }
 
-    /// Texts or null.
+    /// Texts or null; null in every row where the column was not read.
     pub(super) fn texts(&self, name: &str) -> Vec<Option<&'a str>> {
-        self.column(name).as_string::<i32>().iter().collect()
+        let Some(column) = self.found(name) else { return vec![None; self.len()] };
+        column.as_string::<i32>().iter().collect()
     }
 
     /// Lists of integers from 0 to below `below` (at most 2^32): values appended to `to`, the end of
@@ -248,9 +256,14 @@ impl<'a> Batch<'a> {
         exact.collect()
     }
 
+    /// A column, if it was read.
+    fn found(&self, name: &str) -> Option<&'a ArrayRef> {
+        let was_read = self.columns.iter().any(|(column, _)| *column == name);
+        self.batch.column_by_name(name).filter(|_| was_read)
+    }
+
     fn column(&self, name: &str) -> &'a ArrayRef {
-        let column = self.batch.column_by_name(name);
-        column.expect("the table was read with this column")
+        self.found(name).expect("the table was read with this column")
     }
 
     fn no_null(&self, name: &str, expected: &str) -> Result<(), Error> {

@@ -26,36 +26,9 @@ pub(super) const IMAGE: &str = "image";
 pub(super) const IMAGE_META: &str = "image_meta";
 
 /// Every column that a stage file of images may have: others are not decoded.
-const COLUMNS: [&str; 28] = [
-    IMAGE,
-    IMAGE_META,
-    "foot_x",
-    "foot_y",
-    "direction_x",
-    "direction_y",
-    "center",
-    "axis",
-    "offset",
-    "x",
-    "y",
-    "descriptor",
-    "descriptor_0",
-    "descriptor_1",
-    "slot",
-    "original",
-    "swapped_axis",
-    "descriptor_row",
-    "dropped",
-    "records",
-    "scores",
-    "status",
-    "support",
-    "evidence",
-    "found",
-    "error_scale",
-    "point",
-    "neighbors",
-];
+const COLUMNS: &str = "image image_meta foot_x foot_y direction_x direction_y center axis offset x y descriptor \
+                       descriptor_0 descriptor_1 slot original swapped_axis descriptor_row dropped records scores \
+                       status support evidence found error_scale point neighbors";
 
 /// Whether the stage file `path` holds images: it has a column `image`.
 ///
@@ -100,7 +73,8 @@ impl<'a> ImageFile<'a> {
         }
         let parts = Parts::open(path)?;
         let fields = parts.schema().fields().iter().enumerate();
-        let known = fields.filter(|(_, field)| COLUMNS.contains(&field.name().as_str()));
+        let is_known = |name: &str| COLUMNS.split(' ').any(|known| known == name);
+        let known = fields.filter(|(_, field)| is_known(field.name()));
         let roots: Vec<usize> = known.map(|(at, _)| at).collect();
         let batches = parts.batches(&roots, Stay::Whole)?;
         Ok(Self { path, whole, kind, batches, rest: None, n_taken: 0, seen: HashSet::new() })

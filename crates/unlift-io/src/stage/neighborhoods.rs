@@ -5,11 +5,10 @@ use super::header::{Kind, insert_about, new_meta};
 use super::order::rows_by_key;
 use super::pages::Stay;
 use super::table::Table;
-use super::write::{Written, field, list_field, lists, numbers, write_table};
+use super::write::{Written, write_table};
 use crate::Error;
 use crate::atomic::Access;
 use arrow_array::types::{Float32Type, UInt32Type};
-use arrow_schema::DataType::{Float32, UInt32};
 use std::ops::Range;
 use std::path::Path;
 use unlift::RecordId;
@@ -60,32 +59,32 @@ impl PointNeighborhoods {
 /// # Errors
 /// When the file cannot be written.
 pub fn write_neighborhoods(path: &Path, neighborhoods: &Neighborhoods) -> Result<(), Error> {
-    write_table((path, Access::Private), written(neighborhoods))
+    write_table((path, Access::Private), &written(neighborhoods))
 }
 
 /// What is written of neighborhoods.
 pub(super) fn written(neighborhoods: &Neighborhoods) -> Written<'_> {
-    let mut fields = vec![field("slot", UInt32), list_field("records", UInt32)];
-    if neighborhoods.scores().is_some() {
-        fields.push(list_field("scores", Float32));
-    }
     let mut meta = new_meta(Kind::Neighborhoods);
     insert_about(&mut meta, neighborhoods.about());
-    let columns = Box::new(move |slots: Range<usize>| {
+    let mut written = Written::new(meta, neighborhoods.n_slots());
+    written.numbers::<UInt32Type>("slot", |slot| slot as u32);
+    // Where the lists of some slots are, and how long each is.
+    let lists = |slots: Range<usize>| {
         let offsets = &neighborhoods.offsets()[slots.start..=slots.end];
-        let lengths = || offsets.windows(2).map(|w| (w[1] - w[0]) as usize);
-        let values = offsets[0] as usize..offsets[slots.len()] as usize;
-        let records = neighborhoods.records()[values.clone()].iter().map(|r| r.0);
-        let mut columns = vec![
-            numbers::<UInt32Type>(slots.map(|slot| slot as u32)),
-            lists::<UInt32Type>(records, lengths()),
-        ];
-        if let Some(scores) = neighborhoods.scores() {
-            columns.push(lists::<Float32Type>(scores[values].iter().copied(), lengths()));
-        }
-        columns
+        let lengths = offsets.windows(2).map(|w| (w[1] - w[0]) as usize).collect();
+        (offsets[0] as usize..offsets[slots.len()] as usize, lengths)
+    };
+    written.lists::<UInt32Type>("records", move |slots| {
+        let (range, lengths) = lists(slots);
+        (neighborhoods.records()[range].iter().map(|record| record.0).collect(), lengths)
     });
-    Written { meta, fields, n_rows: neighborhoods.n_slots(), columns }
+    if let Some(scores) = neighborhoods.scores() {
+        written.lists::<Float32Type>("scores", move |slots| {
+            let (range, lengths) = lists(slots);
+            (scores[range].to_vec(), lengths)
+        });
+    }
+    written
 }
 
 /// Reads neighborhoods for a released map of `n_records` records with `slots_per_record` slots each.
