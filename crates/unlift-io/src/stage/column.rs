@@ -190,10 +190,9 @@ impl<'a> Batch<'a> {
         offsets: &mut Vec<u64>,
         to: &mut Vec<u32>,
     ) -> Result<(), Error> {
-        let lists = self.lists(name)?;
-        let values = integers(&lists.values);
-        for row in 0..self.len() {
-            let range = lists.range(row);
+        let (ranges, values) = self.lists(name)?;
+        let values = integers(&values);
+        for (row, range) in ranges.into_iter().enumerate() {
             self.at_most(name, row, range.len(), most)?;
             for at in range {
                 to.push(self.in_range(name, row, values(at), below)?);
@@ -211,17 +210,16 @@ impl<'a> Batch<'a> {
         most: u64,
         to: &mut Vec<f32>,
     ) -> Result<Vec<usize>, Error> {
-        let lists = self.lists(name)?;
-        let values: Values<'_, f64> = match lists.values.data_type().is_floating() {
-            true => floats(&lists.values),
+        let (ranges, values) = self.lists(name)?;
+        let values: Values<'_, f64> = match values.data_type().is_floating() {
+            true => floats(&values),
             false => {
-                let values = integers(&lists.values);
+                let values = integers(&values);
                 Box::new(move |at| values(at) as f64)
             }
         };
         let mut lengths = Vec::with_capacity(self.len());
-        for row in 0..self.len() {
-            let range = lists.range(row);
+        for (row, range) in ranges.into_iter().enumerate() {
             self.at_most(name, row, range.len(), most)?;
             lengths.push(range.len());
             for x in range.map(&values) {
@@ -307,22 +305,12 @@ impl<'a> Batch<'a> {
                 return Err(self.wrong(name, row, "a list of numbers", "null in the list"));
             }
         }
-        let values = values.clone();
-        Ok(Lists { ranges, values })
+        Ok((ranges, values.clone()))
     }
 }
 
-/// Where lists lie in their values.
-struct Lists {
-    ranges: Vec<Range<usize>>,
-    values: ArrayRef,
-}
-
-impl Lists {
-    fn range(&self, row: usize) -> Range<usize> {
-        self.ranges[row].clone()
-    }
-}
+/// Where lists lie in their values, and these.
+type Lists = (Vec<Range<usize>>, ArrayRef);
 
 const FINITE: &str = "a finite number";
 
@@ -334,22 +322,25 @@ fn whole_below(below: u64) -> String {
 /// sixteen times the memory of bytes.
 type Values<'a, T> = Box<dyn Fn(usize) -> T + 'a>;
 
+/// The values of an array of one of these types, as one wider type.
+macro_rules! widened {
+    ($array:expr, $wide:ident, $null:expr, $($variant:ident => $of:ty),*) => {
+        match $array.data_type() {
+            $(DataType::$variant => {
+                let values = $array.as_primitive::<$of>().values();
+                Box::new(move |at| $wide::from(values[at]))
+            })*
+            // Nothing but nulls.
+            DataType::Null => Box::new(|_| $null),
+            other => unreachable!("the type {other} was checked"),
+        }
+    };
+}
+
 /// The values of an array of integers; what stands at nulls has no meaning.
 fn integers(array: &ArrayRef) -> Values<'_, i128> {
-    macro_rules! widened {
-        ($($variant:ident => $of:ty),*) => {
-            match array.data_type() {
-                $(DataType::$variant => {
-                    let values = array.as_primitive::<$of>().values();
-                    Box::new(move |at| i128::from(values[at]))
-                })*
-                // Nothing but nulls.
-                DataType::Null => Box::new(|_| 0),
-                other => unreachable!("{other} was checked to be integers"),
-            }
-        };
-    }
     widened!(
+        array, i128, 0,
         Int8 => Int8Type, Int16 => Int16Type, Int32 => Int32Type, Int64 => Int64Type,
         UInt8 => UInt8Type, UInt16 => UInt16Type, UInt32 => UInt32Type, UInt64 => UInt64Type
     )
@@ -357,16 +348,8 @@ fn integers(array: &ArrayRef) -> Values<'_, i128> {
 
 /// The values of an array of floats; what stands at nulls has no meaning.
 fn floats(array: &ArrayRef) -> Values<'_, f64> {
-    macro_rules! widened {
-        ($($variant:ident => $of:ty),*) => {
-            match array.data_type() {
-                $(DataType::$variant => {
-                    let values = array.as_primitive::<$of>().values();
-                    Box::new(move |at| f64::from(values[at]))
-                })*
-                other => unreachable!("{other} was checked to be floats"),
-            }
-        };
-    }
-    widened!(Float16 => Float16Type, Float32 => Float32Type, Float64 => Float64Type)
+    widened!(
+        array, f64, f64::NAN,
+        Float16 => Float16Type, Float32 => Float32Type, Float64 => Float64Type
+    )
 }

@@ -274,71 +274,60 @@ fn read_descriptors(table: &Table<'_>, per_record: usize) -> Result<Option<Descr
         false => Type::Numbers,
     };
     let columns: Vec<(&str, Type)> = names.iter().map(|name| (name.as_str(), class)).collect();
-    let (mut u8s, mut f32s) = (Vec::new(), Vec::new());
-    let (mut dim, mut n_without) = (None, 0);
-    table.read(&columns, |batch| {
-        if names.iter().all(|name| batch.is_null(name)) {
+    let found = if bytes {
+        let rows = descriptor_rows(table, &columns, |batch, name| {
+            let (mut offsets, mut values) = (vec![0], Vec::new());
+            batch.integer_lists(name, 256, MOST_VALUES, &mut offsets, &mut values)?;
+            let lengths = offsets.windows(2).map(|w| (w[1] - w[0]) as usize).collect();
+            Ok((values.into_iter().map(|x| x as u8).collect(), lengths))
+        })?;
+        rows.map(|(values, dim)| (Values::U8(values), dim))
+    } else {
+        let rows = descriptor_rows(table, &columns, |batch, name| {
+            let mut values = Vec::new();
+            let lengths = batch.float_lists(name, MOST_VALUES, &mut values)?;
+            Ok((values, lengths))
+        })?;
+        rows.map(|(values, dim)| (Values::F32(values), dim))
+    };
+    let descriptors = found.map(|(values, dim)| Descriptors::try_new(values, dim));
+    descriptors.transpose().map_err(|source| table.refused(source))
+}
+
+/// The values of all lists in `columns`, row by row, and how long each list is; `None` where there is no list.
+///
+/// `read` gives the values of a column end to end, and the length of each list. All have the length of the first.
+fn descriptor_rows<T: Copy>(
+    table: &Table<'_>,
+    columns: &[(&str, Type)],
+    read: impl Fn(&Batch<'_>, &str) -> Result<(Vec<T>, Vec<usize>), Error>,
+) -> Result<Option<(Vec<T>, usize)>, Error> {
+    let (mut all, mut dim, mut n_without) = (Vec::new(), None, 0);
+    table.read(columns, |batch| {
+        if columns.iter().all(|(name, _)| batch.is_null(name)) {
             n_without += batch.len();
             return Ok(());
         }
-        let mut read = Vec::with_capacity(per_record);
-        for name in &names {
-            read.push(DescriptorRows::read(batch, name, bytes, &mut dim)?);
+        let mut slots = Vec::with_capacity(columns.len());
+        for (name, _) in columns {
+            let (values, lengths) = read(batch, name)?;
+            for (row, &length) in lengths.iter().enumerate() {
+                let dim = *dim.get_or_insert(length);
+                if length == 0 || length != dim {
+                    let expected = format!("{} values as in every row", dim.max(1));
+                    return Err(batch.wrong(name, row, expected, length.to_string()));
+                }
+            }
+            slots.push(values);
         }
         let dim = dim.unwrap_or(0);
         for row in 0..batch.len() {
-            let range = row * dim..(row + 1) * dim;
-            for slot in &read {
-                match slot {
-                    DescriptorRows::U8(values) => {
-                        u8s.extend(values[range.clone()].iter().map(|&x| x as u8));
-                    }
-                    DescriptorRows::F32(values) => f32s.extend_from_slice(&values[range.clone()]),
-                }
+            for values in &slots {
+                all.extend_from_slice(&values[row * dim..(row + 1) * dim]);
             }
         }
         Ok(())
     })?;
-    if table.is_without(&names[0], n_without)? {
-        return Ok(None);
-    }
-    let values = if bytes { Values::U8(u8s) } else { Values::F32(f32s) };
-    let descriptors = Descriptors::try_new(values, dim.unwrap_or(0));
-    descriptors.map(Some).map_err(|source| table.refused(source))
-}
-
-/// One descriptor column of a batch, rows end to end.
-enum DescriptorRows {
-    /// Below 256.
-    U8(Vec<u32>),
-    F32(Vec<f32>),
-}
-
-impl DescriptorRows {
-    /// Reads the column `name`; every row must have `dim` values, set by the first row read.
-    fn read(
-        batch: &Batch<'_>,
-        name: &str,
-        bytes: bool,
-        dim: &mut Option<usize>,
-    ) -> Result<Self, Error> {
-        let (rows, lengths) = if bytes {
-            let (mut offsets, mut values) = (vec![0], Vec::new());
-            batch.integer_lists(name, 256, MOST_VALUES, &mut offsets, &mut values)?;
-            let lengths = offsets.windows(2).map(|w| (w[1] - w[0]) as usize).collect();
-            (Self::U8(values), lengths)
-        } else {
-            let mut values = Vec::new();
-            let lengths: Vec<usize> = batch.float_lists(name, MOST_VALUES, &mut values)?;
-            (Self::F32(values), lengths)
-        };
-        for (row, &length) in lengths.iter().enumerate() {
-            let dim = *dim.get_or_insert(length);
-            if length == 0 || length != dim {
-                let expected = format!("{} values as in every row", dim.max(1));
-                return Err(batch.wrong(name, row, expected, length.to_string()));
-            }
-        }
-        Ok(rows)
-    }
+    let is_without = table.is_without(columns[0].0, n_without)?;
+    Ok((!is_without).then_some((all, dim.unwrap_or(0))))
 }

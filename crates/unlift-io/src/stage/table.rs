@@ -159,16 +159,6 @@ impl<'a> Table<'a> {
     pub(super) fn read(
         &self,
         columns: &[(&str, Type)],
-        each: impl FnMut(&Batch<'_>) -> Result<(), Error>,
-    ) -> Result<(), Error> {
-        self.read_to(columns, Stay::Whole, each)
-    }
-
-    /// The same, where what is handed on will `stay` in memory so long.
-    pub(super) fn read_to(
-        &self,
-        columns: &[(&str, Type)],
-        stay: Stay,
         mut each: impl FnMut(&Batch<'_>) -> Result<(), Error>,
     ) -> Result<(), Error> {
         let mut roots = Vec::with_capacity(columns.len());
@@ -186,7 +176,7 @@ impl<'a> Table<'a> {
                 return Ok(());
             }
         };
-        let mut batches = parts.batches(&roots, stay)?;
+        let mut batches = parts.batches(&roots, Stay::Whole)?;
         let mut first_row = 0;
         while let Some(batch) = batches.next()? {
             each(&Batch::new((self.path, columns), &batch, first_row))?;
