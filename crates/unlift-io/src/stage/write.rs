@@ -76,7 +76,9 @@ impl<'a> Written<'a> {
         });
     }
 
-    /// Adds a column of lists without nulls: the values and the lengths of some of them.
+    /// Adds a column of lists without nulls.
+    ///
+    /// `lists` gives the values of some rows, end to end, and the length of each list.
     pub(super) fn lists<T: ArrowPrimitiveType>(
         &mut self,
         name: impl Into<String>,
@@ -103,22 +105,42 @@ impl<'a> Written<'a> {
 }
 
 /// Writes one value for those whom `access` names.
-pub(super) fn write_table(
-    (path, access): (&Path, Access),
-    written: &Written<'_>,
-) -> Result<(), Error> {
+pub(super) fn write_table(to: (&Path, Access), written: &Written<'_>) -> Result<(), Error> {
     let properties = properties(to_text(written.meta.clone()), &written.fields, GROUP_ROWS);
     let schema = Arc::new(Schema::new(written.fields.clone()));
-    atomic::write_file(path, access, |file| {
-        let mut writer = writer(file, schema.clone(), properties).map_err(to_io)?;
-        for start in (0..written.n_rows).step_by(CHUNK_ROWS) {
-            let rows = start..written.n_rows.min(start + CHUNK_ROWS);
-            let batch = RecordBatch::try_new(schema.clone(), written.rows(&rows));
-            writer.write(&batch.map_err(io::Error::other)?).map_err(to_io)?;
-        }
-        writer.close().map_err(to_io)?;
-        Ok(())
+    let mut starts = (0..written.n_rows).step_by(CHUNK_ROWS);
+    write_batches(to, schema.clone(), properties, || {
+        let Some(start) = starts.next() else { return Ok(None) };
+        let rows = start..written.n_rows.min(start + CHUNK_ROWS);
+        let batch = RecordBatch::try_new(schema.clone(), written.rows(&rows));
+        batch.map(Some).map_err(|error| Error::write(to.0, io::Error::other(error)))
     })
+}
+
+/// Writes the rows that `next` gives, until it gives none.
+pub(super) fn write_batches(
+    (path, access): (&Path, Access),
+    schema: SchemaRef,
+    properties: WriterProperties,
+    mut next: impl FnMut() -> Result<Option<RecordBatch>, Error>,
+) -> Result<(), Error> {
+    // What cannot be read is told as that, not as a file that cannot be written.
+    let mut unread = None;
+    let done = atomic::write_file(path, access, |file| {
+        let mut writer = writer(file, schema, properties).map_err(to_io)?;
+        loop {
+            match next() {
+                Ok(Some(batch)) => writer.write(&batch).map_err(to_io)?,
+                Ok(None) => break,
+                Err(error) => {
+                    unread = Some(error);
+                    return Err(io::Error::other("unread"));
+                }
+            }
+        }
+        writer.close().map(drop).map_err(to_io)
+    });
+    unread.map_or(done, Err)
 }
 
 /// Starts a Parquet file.
