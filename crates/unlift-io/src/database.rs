@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use rusqlite::config::DbConfig;
 use rusqlite::limits::Limit;
-use rusqlite::{Connection, ErrorCode, OpenFlags, OptionalExtension};
+use rusqlite::{Connection, ErrorCode, OpenFlags, OptionalExtension, Row};
 
 use crate::error::Error;
 use crate::input::{self, Budget};
@@ -108,22 +108,11 @@ impl Database {
         let of_keypoints = table == "keypoints";
         let kind = if self.has_type && !of_keypoints { "type" } else { "0" };
         let query = format!("SELECT rows, cols, data, {kind} FROM {table} WHERE image_id = ?");
-        self.steps.store(0, Relaxed);
-        let found = self
-            .connection
-            .prepare(&query)
-            .and_then(|mut statement| {
-                statement
-                    .query_row([image_id], |row| {
-                        let data = row.get_ref(2)?.as_blob_or_null()?;
-                        let data = data.unwrap_or_default().to_vec();
-                        let (n, cols, kind): (i64, i64, i64) =
-                            (row.get(0)?, row.get(1)?, row.get(3)?);
-                        Ok((n, cols, kind, data))
-                    })
-                    .optional()
-            })
-            .map_err(|e| refuse(&self.path, &format!("table {table}"), &e))?;
+        let found = self.row(&query, image_id, &format!("table {table}"), |row| {
+            let data = row.get_ref(2)?.as_blob_or_null()?;
+            let (n, cols, kind): (i64, i64, i64) = (row.get(0)?, row.get(1)?, row.get(3)?);
+            Ok((n, cols, kind, data.unwrap_or_default().to_vec()))
+        })?;
         let Some((n, cols, kind, data)) = found else { return Ok(None) };
         // -1 is a database from before there were types, 0 is SIFT; the others are learned, in floats.
         let kind = if kind <= 0 && !of_keypoints { Kind::Bytes } else { Kind::Floats };
@@ -147,23 +136,29 @@ impl Database {
         Ok(Some(Rows { kind, n, row_bytes, data }))
     }
 
+    /// What `read` makes of the row that `query` finds for `image_id`, if there is one.
+    fn row<T>(
+        &self,
+        query: &str,
+        image_id: i64,
+        place: &str,
+        read: impl FnOnce(&Row<'_>) -> rusqlite::Result<T>,
+    ) -> Result<Option<T>, Error> {
+        self.steps.store(0, Relaxed);
+        let statement = self.connection.prepare(query);
+        let found =
+            statement.and_then(|mut statement| statement.query_row([image_id], read).optional());
+        found.map_err(|error| refuse(&self.path, place, &error))
+    }
+
     /// Width and height in pixels of the image called `name`, if its camera states them.
     pub fn size(&self, name: &[u8]) -> Result<Option<[u32; 2]>, Error> {
         let query = "SELECT cameras.width, cameras.height FROM images JOIN cameras \
                      ON images.camera_id = cameras.camera_id WHERE image_id = ?";
         let image_id = self.image_id(name)?;
-        self.steps.store(0, Relaxed);
-        let found = self
-            .connection
-            .prepare(query)
-            .and_then(|mut statement| {
-                statement
-                    .query_row([image_id], |row| {
-                        Ok((row.get_ref(0)?.as_i64(), row.get_ref(1)?.as_i64()))
-                    })
-                    .optional()
-            })
-            .map_err(|e| refuse(&self.path, "table cameras", &e))?;
+        let found = self.row(query, image_id, "table cameras", |row| {
+            Ok((row.get_ref(0)?.as_i64(), row.get_ref(1)?.as_i64()))
+        })?;
         let side = |value: i64| u32::try_from(value).ok().filter(|&side| side > 0);
         Ok(found.and_then(|(width, height)| Some([side(width.ok()?)?, side(height.ok()?)?])))
     }

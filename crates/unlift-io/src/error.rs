@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use unlift::OneLine;
 
-use crate::unfinished::place_of;
+use crate::atomic::final_place;
 
 /// Where in a file something is wrong.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -85,7 +85,7 @@ impl Error {
 
     /// `path` could not be written; what is built apart is named by the place it is for.
     pub fn write(path: impl Into<PathBuf>, source: io::Error) -> Self {
-        Self { path: place_of(path.into()), kind: Kind::Write(source) }
+        Self { path: final_place(path.into()), kind: Kind::Write(source) }
     }
 
     /// The library refused values that came from `path`.
@@ -134,37 +134,45 @@ impl fmt::Display for Error {
                 let (expected, found) = (OneLine(expected), OneLine(found));
                 write!(f, ": expected {expected}, found {found}")
             }
-            // The usual causes in our own words: those of the system differ between platforms.
-            Kind::Read(source) => match source.kind() {
-                io::ErrorKind::NotFound => write!(f, ": expected a file or folder, found nothing"),
-                io::ErrorKind::IsADirectory => write!(f, ": expected a file, found a folder"),
-                io::ErrorKind::NotADirectory => write!(f, ": expected a folder, found a file"),
-                io::ErrorKind::PermissionDenied => {
-                    write!(f, ": expected a readable file, found no permission to read")
-                }
-                _ => write!(f, ": cannot read: {}", OneLine(source)),
+            Kind::Read(source) => match read_cause(source.kind()) {
+                Some(cause) => write!(f, ": {cause}"),
+                None => write!(f, ": cannot read: {}", OneLine(source)),
             },
-            Kind::Write(source) => match source.kind() {
-                io::ErrorKind::PermissionDenied => {
-                    write!(f, ": expected a writable place, found no permission to write")
-                }
-                io::ErrorKind::ReadOnlyFilesystem => {
-                    write!(f, ": expected a writable place, found a read-only file system")
-                }
-                io::ErrorKind::StorageFull => {
-                    write!(f, ": expected space to write, found a full disk")
-                }
-                io::ErrorKind::QuotaExceeded => {
-                    write!(f, ": expected space to write, found a used-up quota")
-                }
-                io::ErrorKind::FileTooLarge => {
-                    write!(f, ": expected space to write, found a limit on the size of files")
-                }
-                _ => write!(f, ": cannot write: {}", OneLine(source)),
+            Kind::Write(source) => match write_cause(source.kind()) {
+                Some(cause) => write!(f, ": {cause}"),
+                None => write!(f, ": cannot write: {}", OneLine(source)),
             },
             Kind::Core(source) => write!(f, ": {}", OneLine(source)),
         }
     }
+}
+
+/// The usual causes in our own words: those of the system differ between platforms.
+fn read_cause(kind: io::ErrorKind) -> Option<&'static str> {
+    Some(match kind {
+        io::ErrorKind::NotFound => "expected a file or folder, found nothing",
+        io::ErrorKind::IsADirectory => "expected a file, found a folder",
+        io::ErrorKind::NotADirectory => "expected a folder, found a file",
+        io::ErrorKind::PermissionDenied => "expected a readable file, found no permission to read",
+        _ => return None,
+    })
+}
+
+fn write_cause(kind: io::ErrorKind) -> Option<&'static str> {
+    Some(match kind {
+        io::ErrorKind::PermissionDenied => {
+            "expected a writable place, found no permission to write"
+        }
+        io::ErrorKind::ReadOnlyFilesystem => {
+            "expected a writable place, found a read-only file system"
+        }
+        io::ErrorKind::StorageFull => "expected space to write, found a full disk",
+        io::ErrorKind::QuotaExceeded => "expected space to write, found a used-up quota",
+        io::ErrorKind::FileTooLarge => {
+            "expected space to write, found a limit on the size of files"
+        }
+        _ => return None,
+    })
 }
 
 impl std::error::Error for Error {

@@ -42,6 +42,5 @@ pub mod input;
 pub mod read;
 pub mod seen;
 pub mod stage;
-mod unfinished;
 
 pub use error::{Error, Place};

@@ -35,14 +35,8 @@ fn points_are_read_back_by_our_reader() {
         clouds::write_points(&path, &points, colors).unwrap();
         assert_eq!(unlift_io::read::open(&path).unwrap().positions, points);
     }
-}
-
-#[test]
-fn points_of_the_plane_have_z_0() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("plane.ply");
     clouds::write_points(&path, &[[1.0, 2.0]], None).unwrap();
-    assert_eq!(unlift_io::read::open(&path).unwrap().positions, [[1.0, 2.0, 0.0]]);
+    assert_eq!(unlift_io::read::open(&path).unwrap().positions, [[1.0, 2.0, 0.0]], "in the plane");
 }
 
 #[test]
@@ -78,26 +72,21 @@ fn records_are_clipped_in_the_frame_of_the_map() {
 fn what_is_not_finite_or_not_as_long_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a");
-    let line = |result: Result<(), unlift_io::Error>| {
-        let line = result.unwrap_err().to_string();
-        line.split_once(": ").unwrap().1.to_owned()
-    };
     let nan = [0.0, f64::NAN, 0.0];
-    assert_eq!(
-        line(clouds::write_points(&path, &[nan], None)),
-        "point 0: expected finite coordinates, found [0.0, NaN, 0.0]"
-    );
-    assert_eq!(
-        line(clouds::write_points(&path, &[[0.0; 3]], Some(&[]))),
-        "expected 1 colors, found 0"
-    );
-    assert_eq!(
-        line(clouds::write_recovered(&path, &[Some([0.0; 3])], &[], 1.0)),
-        "expected 1 errors, found 0"
-    );
-    assert_eq!(
-        line(clouds::write_lines(&path, &[[[0.0; 3], nan]])),
-        "segment 0: expected finite coordinates, found [[0.0, 0.0, 0.0], [0.0, NaN, 0.0]]"
-    );
+    for (result, line) in [
+        (
+            clouds::write_points(&path, &[nan], None),
+            "point 0: expected finite coordinates, found [0.0, NaN, 0.0]",
+        ),
+        (clouds::write_points(&path, &[[0.0; 3]], Some(&[])), "expected 1 colors, found 0"),
+        (clouds::write_recovered(&path, &[Some([0.0; 3])], &[], 1.0), "expected 1 errors, found 0"),
+        (
+            clouds::write_lines(&path, &[[[0.0; 3], nan]]),
+            "segment 0: expected finite coordinates, found [[0.0, 0.0, 0.0], [0.0, NaN, 0.0]]",
+        ),
+    ] {
+        let found = result.unwrap_err().to_string();
+        assert!(found.ends_with(&format!("a: {line}")), "{found}");
+    }
     assert!(!path.exists());
 }

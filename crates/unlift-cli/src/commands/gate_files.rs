@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use unlift_audit::{FIGURES, Finished, PAGE, check_file_of};
 use unlift_io::Error;
-use unlift_io::atomic::{Access, Alone, Kind, Rules, make_folders, place_of, write_file};
+use unlift_io::atomic::{Access, Kind, Rules, alone_in, make_folders, place_of, write_file};
 use unlift_report::document::Document;
 use unlift_report::{junit, sarif};
 
@@ -71,7 +71,7 @@ impl GateFiles {
         }
         let document = &finished.document;
         let figures = finished.report.with_file_name(FIGURES);
-        let _alone = Alone::wait_in(finished.report.parent().unwrap_or(Path::new(".")));
+        let _alone = alone_in(finished.report.parent().unwrap_or(Path::new(".")));
         let there = fs::read(&figures).map_err(|source| Error::read(&figures, source))?;
         if there != document.to_json()?.as_bytes() {
             let found = "those of another run that ended meanwhile: gates are not written";

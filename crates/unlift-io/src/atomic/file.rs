@@ -1,12 +1,29 @@
 //! One output file.
 
 use std::fs::{self, File};
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use super::partial::Partial;
+use super::unfinished::{Unfinished, live};
 use super::{Access, parent_of, resolved};
 use crate::Error;
+
+/// Writes the file `path` through `fill`; whatever stood there stays until the new file is whole.
+///
+/// As [`OutputFile`], for what is written in one go.
+///
+/// # Errors
+/// When the folder does not exist, `path` is a folder or a device, `fill` fails, or the disk does.
+/// Nothing is left behind then.
+pub fn write_file(
+    path: &Path,
+    access: Access,
+    fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> Result<(), Error> {
+    let mut output = OutputFile::create(path, access)?;
+    fill(output.writer()).map_err(|source| Error::write(path, source))?;
+    output.commit()
+}
 
 /// A file that is built in a temporary sibling and takes its place on [`commit`](Self::commit).
 ///
@@ -18,7 +35,7 @@ pub struct OutputFile {
     path: PathBuf,
     target: PathBuf,
     writer: BufWriter<File>,
-    partial: Partial,
+    unfinished: Unfinished,
 }
 
 impl OutputFile {
@@ -28,18 +45,14 @@ impl OutputFile {
     /// When the folder does not exist, `path` is a folder or a device, or the disk fails.
     pub fn create(path: &Path, access: Access) -> Result<Self, Error> {
         let target = Self::check(path)?;
-        let made = Partial::file(&target, access).map_err(|source| Error::write(path, source));
-        let (partial, file) = made?;
+        let made = Unfinished::file(&target, access).map_err(|source| Error::write(path, source));
+        let (unfinished, file) = made?;
         let writer = BufWriter::with_capacity(1 << 17, file);
-        Ok(Self { path: path.to_owned(), target, writer, partial })
+        Ok(Self { path: path.to_owned(), target, writer, unfinished })
     }
 
-    /// Whether a file can be put at `path`, before hours of work go into it; where it will stand,
-    /// links followed.
-    ///
-    /// # Errors
-    /// As [`create`](Self::create).
-    pub fn check(path: &Path) -> Result<PathBuf, Error> {
+    /// Where a file at `path` will stand, links followed; an error where none can be put.
+    pub(super) fn check(path: &Path) -> Result<PathBuf, Error> {
         let target = resolved(path)?;
         match fs::metadata(&target) {
             Ok(found) if found.is_dir() => return Err(Error::new(path, "", "a file", "a folder")),
@@ -75,15 +88,19 @@ impl OutputFile {
         self.writer.flush().map_err(failed)?;
         self.writer.get_ref().sync_all().map_err(failed)?;
         drop(self.writer);
-        self.partial.persist(&self.target).map_err(failed)
+        let undisturbed = live();
+        let renamed = fs::rename(self.unfinished.path(), &self.target);
+        drop(undisturbed);
+        renamed.map_err(failed)?;
+        self.unfinished.keep();
+        Ok(())
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{entries, write_file};
+    use super::super::entries;
     use super::*;
-    use std::io;
 
     #[test]
     fn a_failed_file_leaves_the_old_one() {
@@ -98,39 +115,18 @@ mod tests {
         assert!(error.ends_with("a.bin: cannot write: lost power"), "{error}");
         assert_eq!(fs::read(&path).unwrap(), b"old");
         assert_eq!(entries(folder.path()), ["a.bin"]);
-    }
-
-    #[test]
-    fn a_folder_is_not_replaced_by_a_file() {
-        let folder = tempfile::tempdir().unwrap();
         let error = write_file(folder.path(), Access::Usual, |_| Ok(())).unwrap_err();
         assert!(error.to_string().ends_with(": expected a file, found a folder"));
     }
 
     #[cfg(unix)]
     #[test]
-    fn a_link_to_nothing_is_named_with_where_it_leads() {
-        let folder = tempfile::tempdir().unwrap();
-        let link = folder.path().join("link.bin");
-        std::os::unix::fs::symlink("gone/x.bin", &link).unwrap();
-        let error = write_file(&link, Access::Usual, |_| Ok(())).unwrap_err().to_string();
-        let found = "link.bin: expected a file, a folder, or nothing, found a link to gone/x.bin, \
-                     which is not there";
-        assert!(error.ends_with(found), "{error}");
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn a_new_file_is_as_readable_as_any_other_or_private() {
+    fn a_private_file_in_place_of_a_readable_one_is_private() {
         use std::os::unix::fs::PermissionsExt;
         let folder = tempfile::tempdir().unwrap();
-        let at = |name: &str| folder.path().join(name);
-        write_file(&at("usual"), Access::Usual, |w| w.write_all(b"1")).unwrap();
-        fs::write(at("plain"), b"1").unwrap();
-        let mode = |name| fs::metadata(at(name)).unwrap().permissions().mode();
-        assert_eq!(mode("usual"), mode("plain"));
-        // What stood there was readable: what replaces it is not.
-        write_file(&at("usual"), Access::Private, |w| w.write_all(b"1")).unwrap();
-        assert_eq!(mode("usual") & 0o777, 0o600);
+        let path = folder.path().join("a.bin");
+        fs::write(&path, b"1").unwrap();
+        write_file(&path, Access::Private, |w| w.write_all(b"1")).unwrap();
+        assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
     }
 }

@@ -20,7 +20,7 @@ pub enum Kind {
     Stage(stage::Kind),
     /// What a folder of parts holds: an object with an object `unlift` and a list `parts`.
     Manifest,
-    /// A PLY or OBJ file with the comment `CLOUD_COMMENT` in its second line at the latest.
+    /// A PLY or OBJ file that begins with the comment `CLOUD_COMMENT`.
     Cloud,
     /// A file of a COLMAP model in text whose first line is `MODEL_MARK`.
     Model,
@@ -40,18 +40,23 @@ pub enum Kind {
     Curves,
 }
 
-/// The columns that a CSV table of ours begins with.
-const TABLE_COLUMNS: &str = "scheme,neighbors,oracle_noise,inlier_ratio,";
-/// First words of files of text, by kind.
-const JUNIT_MARK: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"unlift\"";
-const TABLE_MARKS: [&str; 3] = [TABLE_COLUMNS, "% unlift ", "<!-- unlift "];
-const CURVES_MARK: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?><!-- unlift ";
 /// The comment in clouds.
 pub(crate) const CLOUD_COMMENT: &str = "unlift";
+const CLOUD_MARKS: [&str; 2] =
+    ["ply\nformat binary_little_endian 1.0\ncomment unlift\n", "# unlift\n"];
 /// The first line of the files of a model.
 pub(crate) const MODEL_MARK: &str = "# unlift model";
+const JUNIT_MARK: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"unlift\"";
+/// Of a table: the columns that CSV begins with, or a comment.
+const TABLE_MARKS: [&str; 3] =
+    ["scheme,neighbors,oracle_noise,inlier_ratio,", "% unlift ", "<!-- unlift "];
+const CURVES_MARK: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?><!-- unlift ";
+/// In the head of a page, which ends before its style.
+const PAGE_MARK: &str = "<meta name=\"generator\" content=\"unlift\">";
+const PAGE_HEAD: usize = 2048;
 /// Between the superblock and the first array of features: no structure of HDF5 refers to it.
 pub(crate) const FEATURES_MARK: &[u8; 32] = b"unlift features, format 1\0\0\0\0\0\0\0";
+const SUPERBLOCK: usize = 96;
 /// A chunk of a PNG: its length, the text "Software: unlift", its checksum.
 const PICTURE_MARK: &[u8; 27] = b"\0\0\0\x0ftEXtSoftware\0unlift\xfe\xc8\xcb\xd5";
 /// Signature and first chunk of a PNG, behind which others may stand.
@@ -64,11 +69,6 @@ pub fn marked_picture(png: &[u8]) -> Vec<u8> {
     [head, PICTURE_MARK, rest].concat()
 }
 
-/// In the head of a page.
-const PAGE_MARK: &str = "<meta name=\"generator\" content=\"unlift\">";
-/// The head of a page ends before its style.
-const PAGE_HEAD: usize = 2048;
-
 impl Kind {
     /// Whether the file at `path` is one of this kind. What cannot be read is none.
     pub fn is_at(self, path: &Path) -> bool {
@@ -76,22 +76,18 @@ impl Kind {
             Self::AuditJson => {
                 is_json(path, |audit| audit["unlift"].is_string() && audit["schema"].is_u64())
             }
-            Self::Page => start(path, PAGE_HEAD)
-                .is_some_and(|head| String::from_utf8_lossy(&head).contains(PAGE_MARK)),
+            Self::Page => String::from_utf8_lossy(&start(path, PAGE_HEAD)).contains(PAGE_MARK),
             Self::Stage(kind) => stage::declared_kind(path) == Some(kind),
             Self::Manifest => {
                 is_json(path, |parts| parts["unlift"].is_object() && parts["parts"].is_array())
             }
-            Self::Cloud => start(path, 256).is_some_and(|head| is_cloud(&head)),
+            Self::Cloud => begins(path, &CLOUD_MARKS),
             Self::Model => begins(path, &[MODEL_MARK]),
             Self::Transforms => {
                 is_json(path, |map| map["unlift"].is_string() && map["frames"].is_array())
             }
-            Self::Features => start(path, 128).is_some_and(|head| {
-                head.starts_with(b"\x89HDF\r\n\x1a\n") && head.get(96..) == Some(&FEATURES_MARK[..])
-            }),
-            Self::Picture => start(path, PNG_HEAD + PICTURE_MARK.len())
-                .is_some_and(|head| head.get(PNG_HEAD..) == Some(&PICTURE_MARK[..])),
+            Self::Features => has_at(path, SUPERBLOCK, FEATURES_MARK),
+            Self::Picture => has_at(path, PNG_HEAD, PICTURE_MARK),
             Self::Junit => begins(path, &[JUNIT_MARK]),
             Self::Sarif => is_json(path, |log| {
                 log["version"].is_string() && log["runs"][0]["tool"]["driver"]["name"] == "unlift"
@@ -122,18 +118,19 @@ impl fmt::Display for Kind {
     }
 }
 
-/// The first `n` bytes of a file that may have fewer.
-fn start(path: &Path, n: usize) -> Option<Vec<u8>> {
-    let mut head = Vec::with_capacity(n);
-    File::open(path).ok()?.take(n as u64).read_to_end(&mut head).ok()?;
-    Some(head)
+/// The first `n` bytes of a file; fewer where it is shorter or cannot be read.
+fn start(path: &Path, n: usize) -> Vec<u8> {
+    let mut head = Vec::new();
+    let _ = File::open(path).and_then(|file| file.take(n as u64).read_to_end(&mut head));
+    head
 }
 
-/// Whether a text begins with one of `marks`.
 fn begins(path: &Path, marks: &[&str]) -> bool {
-    let most = marks.iter().map(|mark| mark.len()).max().unwrap_or(0);
-    let head = start(path, most);
-    head.is_some_and(|head| marks.iter().any(|mark| head.starts_with(mark.as_bytes())))
+    marks.iter().any(|mark| has_at(path, 0, mark.as_bytes()))
+}
+
+fn has_at(path: &Path, offset: usize, mark: &[u8]) -> bool {
+    start(path, offset + mark.len()).get(offset..) == Some(mark)
 }
 
 fn is_json(path: &Path, holds: impl FnOnce(Value) -> bool) -> bool {
@@ -142,88 +139,61 @@ fn is_json(path: &Path, holds: impl FnOnce(Value) -> bool) -> bool {
     parsed.is_ok_and(holds)
 }
 
-fn is_cloud(head: &[u8]) -> bool {
-    let mut lines = head.split(|&byte| byte == b'\n');
-    match lines.next() {
-        Some(b"ply") => {
-            let comment = format!("comment {CLOUD_COMMENT}");
-            lines.nth(1).is_some_and(|line| line == comment.as_bytes())
-        }
-        Some(line) => line == format!("# {CLOUD_COMMENT}").as_bytes(),
-        None => false,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use std::fs;
 
-    #[test]
-    fn files_of_others_are_not_ours() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("x");
-        let kinds = [
-            Kind::AuditJson,
-            Kind::Page,
-            Kind::Stage(stage::Kind::Truth),
-            Kind::Manifest,
-            Kind::Cloud,
-            Kind::Transforms,
-            Kind::Features,
-            Kind::Junit,
-            Kind::Sarif,
-            Kind::Table,
-            Kind::Curves,
-        ];
-        let of_others: [&[u8]; 14] = [
-            br#"{"frames": [], "ply_file_path": "sparse_pc.ply"}"#,
-            b"",
-            b"{}",
-            // What `npm audit --json` writes, in short.
-            br#"{"auditReportVersion": 2, "vulnerabilities": {}, "metadata": {}}"#,
-            br#"["unlift", "schema"]"#,
-            b"<!doctype html><title>my notes on unlift</title>",
-            b"ply\nformat ascii 1.0\nelement vertex 0\nend_header\n",
-            b"# Blender\nv 0 0 0\n",
-            b"\x89HDF\r\n\x1a\n",
-            b"PAR1PAR1",
-            b"<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"nextest-run\">",
-            br#"{"version": "2.1.0", "runs": [{"tool": {"driver": {"name": "other"}}}]}"#,
-            b"scheme,price\n",
-            b"<?xml version=\"1.0\" encoding=\"UTF-8\"?><!-- Inkscape -->",
-        ];
-        for content in of_others {
-            fs::write(&path, content).unwrap();
-            for kind in kinds {
-                assert!(!kind.is_at(&path), "{kind}: {}", String::from_utf8_lossy(content));
-            }
-        }
-        fs::write(&path, [b"\x89HDF\r\n\x1a\n".as_slice(), &[0; 200]].concat()).unwrap();
-        assert!(!Kind::Features.is_at(&path));
-    }
+    /// Stage files, features, models and pictures are written and read again in other tests.
+    const OURS: [(Kind, &str); 10] = [
+        (Kind::AuditJson, r#"{"unlift": "0.1.0", "schema": 1, "results": []}"#),
+        (Kind::Manifest, r#"{"unlift": {}, "parts": []}"#),
+        (Kind::Transforms, r#"{"unlift": "0.1.0", "frames": []}"#),
+        (Kind::Sarif, r#"{"version": "2", "runs": [{"tool": {"driver": {"name": "unlift"}}}]}"#),
+        (Kind::Page, "<!doctype html>\n<head><meta name=\"generator\" content=\"unlift\">"),
+        (Kind::Junit, "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"unlift\" t"),
+        (Kind::Curves, "<?xml version=\"1.0\" encoding=\"UTF-8\"?><!-- unlift curves --><svg>"),
+        (Kind::Table, "scheme,neighbors,oracle_noise,inlier_ratio,k\n"),
+        (Kind::Table, "% unlift k\n"),
+        (Kind::Table, "<!-- unlift k\n"),
+    ];
+    const OF_OTHERS: [&str; 13] = [
+        "",
+        "{}",
+        r#"["unlift", "schema", "parts"]"#,
+        // What `npm audit --json` writes, in short.
+        r#"{"auditReportVersion": 2, "vulnerabilities": {}, "metadata": {}}"#,
+        r#"{"frames": [], "ply_file_path": "sparse_pc.ply"}"#,
+        r#"{"version": "2.1.0", "runs": [{"tool": {"driver": {"name": "other"}}}]}"#,
+        "<!doctype html><title>my notes on unlift</title>",
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"nextest-run\">",
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?><!-- Inkscape -->",
+        "scheme,price\n",
+        "ply\nformat ascii 1.0\nelement vertex 0\nend_header\n",
+        "# Blender\nv 0 0 0\n",
+        "PAR1PAR1",
+    ];
 
     #[test]
-    fn our_own_are_known() {
+    fn our_own_are_known_and_those_of_others_are_not_ours() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x");
-        let is = |kind: Kind, content: &[u8]| {
+        for (kind, content) in OURS {
             fs::write(&path, content).unwrap();
-            kind.is_at(&path)
-        };
-        assert!(is(Kind::AuditJson, br#"{"unlift": "0.1.0", "schema": 1, "results": []}"#));
-        assert!(is(Kind::Junit, format!("{JUNIT_MARK} tests=\"1\">").as_bytes()));
-        let sarif = br#"{"version": "2.1.0", "runs": [{"tool": {"driver": {"name": "unlift"}}}]}"#;
-        assert!(is(Kind::Sarif, sarif));
-        for mark in TABLE_MARKS {
-            assert!(is(Kind::Table, format!("{mark}k\n").as_bytes()));
+            assert!(kind.is_at(&path), "{kind}");
         }
-        assert!(is(Kind::Curves, format!("{CURVES_MARK}curves -->\n<svg>").as_bytes()));
-        assert!(is(Kind::Page, format!("<!doctype html>\n<head>{PAGE_MARK}").as_bytes()));
-        let points = [[1.0, 2.0, 3.0]];
-        crate::clouds::write_points(&path, &points, None).unwrap();
+        crate::clouds::write_points(&path, &[[1.0, 2.0, 3.0]], None).unwrap();
         assert!(Kind::Cloud.is_at(&path));
         crate::clouds::write_lines(&path, &[[[0.0; 3], [1.0; 3]]]).unwrap();
         assert!(Kind::Cloud.is_at(&path));
+        let stage = Kind::Stage(stage::Kind::Truth);
+        let more = [Kind::Cloud, Kind::Features, Kind::Picture, Kind::Model, stage];
+        let features = format!("\u{89}HDF\r\n\u{1a}\n{}", "\0".repeat(200));
+        for content in OF_OTHERS.into_iter().chain([features.as_str()]) {
+            fs::write(&path, content).unwrap();
+            for kind in OURS.into_iter().map(|ours| ours.0).chain(more) {
+                assert!(!kind.is_at(&path), "{kind}: {content}");
+            }
+        }
     }
 }

@@ -1,30 +1,31 @@
 //! Outputs that appear whole or not at all, and that never cost anybody a file.
 //!
-//! Everything is built under a temporary name (`partial`) beside its place and renamed when it is whole. What
+//! Everything is built under a temporary name (`unfinished`) beside its place and renamed when it is whole. What
 //! stands at the place is replaced only if it is of the kind that is written there ([`Kind`], by content), and never
 //! if it is an input of the same run ([`Rules`]). Nothing else is touched: a folder that is written to may hold
 //! anything.
 
 mod file;
 mod kind;
-mod partial;
-mod removal;
 mod rules;
 mod set;
-mod swap;
+mod unfinished;
 
-use std::fs::{self, File};
-use std::io::{self, BufWriter};
+use std::fs::{self, File, TryLockError};
+use std::io;
 use std::path::{Path, PathBuf};
+use std::thread;
+use std::time::{Duration, Instant};
 
 use crate::Error;
 
-pub use file::OutputFile;
+pub use file::{OutputFile, write_file};
 pub(crate) use kind::{CLOUD_COMMENT, FEATURES_MARK, MODEL_MARK};
 pub use kind::{Kind, marked_picture};
-pub use partial::{abandon, make_folders, sweep};
 pub use rules::{Rules, place_of};
-pub use set::{Alone, OutputSet};
+pub use set::OutputSet;
+pub(crate) use unfinished::final_place;
+pub use unfinished::{abandon, sweep};
 
 /// Who may read what is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,21 +36,35 @@ pub enum Access {
     Private,
 }
 
-/// Writes the file `path` through `fill`; whatever stood there stays until the new file is whole.
-///
-/// As [`OutputFile`], for what is written in one go.
+/// Makes `folder` and its missing parents, to stay.
 ///
 /// # Errors
-/// When the folder does not exist, `path` is a folder or a device, `fill` fails, or the disk does.
-/// Nothing is left behind then.
-pub fn write_file(
-    path: &Path,
-    access: Access,
-    fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
-) -> Result<(), Error> {
-    let mut output = OutputFile::create(path, access)?;
-    fill(output.writer()).map_err(|source| Error::write(path, source))?;
-    output.commit()
+/// When one cannot be made.
+pub fn make_folders(folder: &Path, access: Access) -> Result<(), Error> {
+    let mut made = unfinished::Unfinished::default();
+    made.make_folders(folder, access).map_err(|source| Error::write(folder, source))?;
+    made.keep();
+    Ok(())
+}
+
+/// Waits until no other run puts files in their places in `folder`, and keeps others out until the result is dropped.
+///
+/// `None` where folders cannot be locked, or where the lock (`flock`) is held for seconds, as by `flock(1)` around a
+/// command: the work goes on without.
+#[must_use]
+pub fn alone_in(folder: &Path) -> Option<File> {
+    const PATIENCE: Duration = Duration::from_secs(5);
+    let started = Instant::now();
+    let file = File::open(folder).ok()?;
+    loop {
+        match file.try_lock() {
+            Ok(()) => return Some(file),
+            Err(TryLockError::WouldBlock) if started.elapsed() < PATIENCE => {
+                thread::sleep(Duration::from_millis(1));
+            }
+            Err(_) => return None,
+        }
+    }
 }
 
 /// Where a symbolic link points, or the path itself.
@@ -67,8 +82,7 @@ fn resolved(path: &Path) -> Result<PathBuf, Error> {
     })
 }
 
-/// Makes the names in `folder` last through a loss of power, where folders can be flushed: the file is in its place
-/// either way.
+/// Makes the names in `folder` outlast a loss of power, where folders can be flushed.
 fn flush_names(folder: &Path) {
     if cfg!(unix) {
         let _ = File::open(folder).and_then(|folder| folder.sync_all());

@@ -52,6 +52,15 @@ impl Rules {
         Ok(target)
     }
 
+    /// As [`check`](Self::check), for the file `name` of a folder that may still have to be made.
+    pub(super) fn check_in(&self, folder: &Path, name: &Path, kind: Kind) -> Result<(), Error> {
+        let place = folder.join(name);
+        if place.exists() || place.is_symlink() {
+            self.check(&place, kind)?;
+        }
+        Ok(())
+    }
+
     /// The input that is the same file as `target`, by whatever path or link.
     pub fn input_at(&self, target: &Path) -> Option<&Path> {
         let files = self.files.get_or_init(|| files(&self.inputs));
@@ -79,8 +88,9 @@ fn files(inputs: &[PathBuf]) -> HashMap<Identity, PathBuf> {
     files
 }
 
-/// A path by which two names of one place are equal, also where nothing stands yet: absolute, links followed, and without steps
-/// up.
+/// A path by which two names of one place are equal, also where nothing stands yet.
+///
+/// It is absolute, without links and without steps up.
 pub fn place_of(path: &Path) -> PathBuf {
     let mut place = std::path::absolute(Path::new(".")).unwrap_or_default();
     for step in path.components() {
@@ -126,56 +136,28 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         fs::write(at("audit.json"), "{}").unwrap();
-        let rules = |inputs: &[PathBuf], force| {
-            Rules::new(inputs.iter().map(PathBuf::as_path), force)
-                .check(&at("audit.json"), Kind::AuditJson)
-                .map_err(|error| error.to_string())
+        let told = |input: &str, force| {
+            let rules = Rules::new([at(input).as_path()], force);
+            rules.check(&at("audit.json"), Kind::AuditJson).map_err(|error| error.to_string())
         };
-        let error = rules(&[], false).unwrap_err();
+        let error = told("missing", false).unwrap_err();
         let rule = "expected nothing, or an audit.json of an earlier run (else --force), found another file";
         assert!(error.ends_with(rule), "{error}");
-        assert!(rules(&[], true).is_ok());
+        assert!(told("missing", true).is_ok());
+        // Earlier outputs in an input folder are no inputs.
+        assert!(told(".", true).is_ok());
         fs::hard_link(at("audit.json"), at("link")).unwrap();
         fs::create_dir_all(at("deep/er")).unwrap();
         fs::hard_link(at("audit.json"), at("deep/er/p.JPG")).unwrap();
-        // Earlier outputs in an input folder are no inputs.
-        let own = Rules::new([folder.path()], true).check(&at("audit.json"), Kind::AuditJson);
-        assert!(own.unwrap_err().to_string().contains("p.JPG"));
-        fs::write(at("report.html"), "other").unwrap();
-        assert!(Rules::new([folder.path()], true).check(&at("report.html"), Kind::Page).is_ok());
-        for input in ["audit.json", "link", "deep", "."] {
-            let error = rules(&[at(input)], true).unwrap_err();
-            assert!(error.contains("expected a file that is not read, found the input"), "{error}");
-        }
-        assert!(rules(&[at("missing")], true).is_ok());
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn symbolic_links_lead_to_the_input() {
-        let folder = tempfile::tempdir().unwrap();
-        let at = |name: &str| folder.path().join(name);
-        fs::write(at("map.ply"), "ply").unwrap();
-        std::os::unix::fs::symlink(at("map.ply"), at("out.ply")).unwrap();
-        let rules = Rules::new([at("map.ply").as_path()], true);
-        assert!(rules.check(&at("out.ply"), Kind::Cloud).is_err());
-    }
-
-    /// Eight links to the folder that they are in: eight times eight times .. paths to one photo.
-    #[cfg(unix)]
-    #[test]
-    fn folders_are_looked_into_once() {
-        let folder = tempfile::tempdir().unwrap();
-        let at = |name: &str| folder.path().join(name);
+        #[cfg(unix)]
         for name in 0..30 {
+            // To the folder that it is in: 30 times 30 times .. paths to one photo.
             std::os::unix::fs::symlink(".", at(&format!("l{name}"))).unwrap();
         }
-        fs::create_dir(at("below")).unwrap();
-        fs::write(at("below/a.jpg"), "photo").unwrap();
-        fs::write(at("audit.json"), "mine").unwrap();
-        let rules = Rules::new([folder.path()], true);
-        assert!(rules.check(&at("audit.json"), Kind::AuditJson).is_ok());
-        assert!(rules.check(&at("below/a.jpg"), Kind::Page).is_err());
+        for input in ["audit.json", "link", "deep", "."] {
+            let error = told(input, true).unwrap_err();
+            assert!(error.contains("expected a file that is not read, found the input"), "{error}");
+        }
     }
 
     #[cfg(unix)]
@@ -186,17 +168,16 @@ mod tests {
         fs::create_dir(at("real")).unwrap();
         std::os::unix::fs::symlink("real", at("link")).unwrap();
         let place = place_of(&at("real/out"));
-        for name in [
-            "link/out",
-            "real/../real/out",
-            "new/../real/out",
-            "link/../real/./out",
-            "link/a/b/../../out",
-        ] {
+        let names = ["link/out", "new/../real/out", "link/../real/./out", "link/a/b/../../out"];
+        for name in names {
             assert_eq!(place_of(&at(name)), place, "{name}");
         }
         assert_ne!(place_of(&at("out")), place);
         assert_eq!(place_of(&at("link")), place_of(&at("real")));
         assert_eq!(place_of(Path::new("a")), place_of(Path::new("./b/../a")));
+        fs::write(at("map.ply"), "ply").unwrap();
+        std::os::unix::fs::symlink(at("map.ply"), at("out.ply")).unwrap();
+        let rules = Rules::new([at("map.ply").as_path()], true);
+        assert!(rules.check(&at("out.ply"), Kind::Cloud).is_err());
     }
 }

@@ -5,6 +5,7 @@
 use std::io::Write;
 use std::path::Path;
 
+use super::finite;
 use crate::Error;
 use crate::atomic::{self, Access, MODEL_MARK};
 use crate::read::colmap::{Camera, Image};
@@ -58,10 +59,8 @@ pub fn write_images(path: &Path, images: &[Image]) -> Result<(), Error> {
 /// # Errors
 /// When a coordinate is not finite, or the file cannot be written.
 pub fn write_model_points(path: &Path, points: &[Option<[f64; 3]>]) -> Result<(), Error> {
-    let infinite = |point: &[f64; 3]| point.iter().any(|x| !x.is_finite());
-    if let Some(row) = points.iter().position(|point| point.as_ref().is_some_and(infinite)) {
-        let found = format!("{:?}", points[row].unwrap_or_default());
-        return Err(Error::new(path, format!("point {row}"), "finite coordinates", found));
+    for (row, point) in points.iter().enumerate() {
+        finite(path, ("point", row), &[point.unwrap_or_default()])?;
     }
     atomic::write_file(path, Access::Private, |w| {
         writeln!(w, "{MODEL_MARK}\n# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]")?;

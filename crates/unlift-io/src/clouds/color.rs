@@ -35,17 +35,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_ramp_runs_from_violet_to_yellow() {
-        assert_eq!(error_color(0.0, 0.25), [0x44, 0x01, 0x54]);
-        assert_eq!(error_color(0.125, 0.25), [0x21, 0x91, 0x8c]);
-        assert_eq!(error_color(0.25, 0.25), [0xfd, 0xe7, 0x25]);
-        assert_eq!(error_color(99.0, 0.25), [0xfd, 0xe7, 0x25]);
-    }
-
-    #[test]
-    fn odd_values_have_a_color() {
-        assert_eq!(error_color(f64::NAN, 1.0), [0xfd, 0xe7, 0x25]);
-        assert_eq!(error_color(-1.0, 1.0), [0x44, 0x01, 0x54]);
-        assert_eq!(error_color(0.0, 0.0), [0xfd, 0xe7, 0x25]);
+    fn the_ramp_runs_from_violet_to_yellow_and_odd_values_have_a_color() {
+        let [violet, green, yellow] = [0, 4, 8].map(|step| VIRIDIS[step]);
+        for (error, full_scale, color) in [
+            (0.0, 0.25, violet),
+            (0.125, 0.25, green),
+            (0.25, 0.25, yellow),
+            (99.0, 0.25, yellow),
+            (f64::NAN, 1.0, yellow),
+            (-1.0, 1.0, violet),
+            (0.0, 0.0, yellow),
+        ] {
+            assert_eq!(error_color(error, full_scale), color, "{error} of {full_scale}");
+        }
     }
 }

@@ -7,9 +7,26 @@ mod obj;
 mod ply;
 mod segments;
 
+use std::path::Path;
+
+use crate::Error;
+
 pub use colmap::{write_cameras, write_images, write_model_points};
 pub use color::error_color;
 pub use nerfstudio::{NERFSTUDIO_CLOUD, write_transforms};
 pub use obj::write_lines;
 pub use ply::{write_points, write_recovered};
-pub use segments::{Segment, clip_line_to_box, clip_ray_to_box, record_segments};
+pub use segments::{Segment, record_segments};
+
+/// Refuses what is not finite: the row `row` of what is called `what`.
+fn finite<const D: usize, const N: usize>(
+    path: &Path,
+    (what, row): (&str, usize),
+    points: &[[f64; D]; N],
+) -> Result<(), Error> {
+    if points.iter().flatten().all(|x| x.is_finite()) {
+        return Ok(());
+    }
+    let found = if N == 1 { format!("{:?}", points[0]) } else { format!("{points:?}") };
+    Err(Error::new(path, format!("{what} {row}"), "finite coordinates", found))
+}

@@ -1,6 +1,6 @@
 //! Line segments as OBJ.
 
-use super::Segment;
+use super::{Segment, finite};
 use crate::Error;
 use crate::atomic::{self, Access, CLOUD_COMMENT};
 use std::io::Write;
@@ -12,11 +12,8 @@ use std::path::Path;
 /// # Errors
 /// When a coordinate is not finite, or the file cannot be written.
 pub fn write_lines<const D: usize>(path: &Path, segments: &[Segment<D>]) -> Result<(), Error> {
-    let infinite = |segment: &Segment<D>| segment.iter().flatten().any(|x| !x.is_finite());
-    if let Some(row) = segments.iter().position(infinite) {
-        let found = format!("{:?}", segments[row]);
-        let place = format!("segment {row}");
-        return Err(Error::new(path, place, "finite coordinates", found));
+    for (row, segment) in segments.iter().enumerate() {
+        finite(path, ("segment", row), segment)?;
     }
     atomic::write_file(path, Access::Private, |w| {
         writeln!(w, "# {CLOUD_COMMENT}")?;

@@ -1,6 +1,6 @@
 //! Point clouds as binary PLY.
 
-use super::error_color;
+use super::{error_color, finite};
 use crate::Error;
 use crate::atomic::{self, Access, CLOUD_COMMENT};
 use std::io::{self, Write};
@@ -23,7 +23,7 @@ pub fn write_points<const D: usize>(
         return Err(Error::new(path, "", expected, colors.len().to_string()));
     }
     for (row, point) in points.iter().enumerate() {
-        finite(path, row, point)?;
+        finite(path, ("point", row), &[*point])?;
     }
     atomic::write_file(path, Access::Private, |w| {
         header(w, points.len(), colors.is_some(), false)?;
@@ -56,7 +56,7 @@ pub fn write_recovered<const D: usize>(
     }
     for (row, point) in points.iter().enumerate() {
         if let Some(point) = point {
-            finite(path, row, point)?;
+            finite(path, ("point", row), &[*point])?;
         }
     }
     let n_found = points.iter().flatten().count();
@@ -95,12 +95,4 @@ fn coordinates<const D: usize>(w: &mut impl Write, point: &[f64; D]) -> io::Resu
         w.write_all(&point.get(axis).copied().unwrap_or(0.0).to_le_bytes())?;
     }
     Ok(())
-}
-
-fn finite<const D: usize>(path: &Path, row: usize, point: &[f64; D]) -> Result<(), Error> {
-    if point.iter().all(|x| x.is_finite()) {
-        return Ok(());
-    }
-    let found = format!("{point:?}");
-    Err(Error::new(path, format!("point {row}"), "finite coordinates", found))
 }

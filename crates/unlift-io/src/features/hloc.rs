@@ -5,7 +5,7 @@ use std::path::Path;
 use unlift::Descriptors;
 use unlift::descriptors::Values;
 
-use super::h5::{Array, FeatureStore, Numbers, shape_text};
+use super::h5::{Array, FeatureStore, Numbers, shape_text, transposed};
 use super::image::ImageFeatures;
 use super::writer::UPRIGHT;
 use crate::atomic::Kind;
@@ -155,17 +155,13 @@ fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
         }
         _ => return Err((expected(), shape_text(&array.shape))),
     };
+    // Columns of points, which are wanted as rows.
+    let floats = |values: Vec<f32>| Values::F32(transposed(&values, dim));
     let values = match array.values {
-        Numbers::U8(bytes) => Values::U8(rows(&bytes, dim, n)),
-        Numbers::F16(halves) => {
-            let floats: Vec<f32> = halves.iter().map(|half| half.to_f32()).collect();
-            Values::F32(rows(&floats, dim, n))
-        }
-        Numbers::F32(floats) => Values::F32(rows(&floats, dim, n)),
-        Numbers::F64(doubles) => {
-            let floats: Vec<f32> = doubles.iter().map(|&value| value as f32).collect();
-            Values::F32(rows(&floats, dim, n))
-        }
+        Numbers::U8(bytes) => Values::U8(transposed(&bytes, dim)),
+        Numbers::F16(halves) => floats(halves.iter().map(|half| half.to_f32()).collect()),
+        Numbers::F32(values) => floats(values),
+        Numbers::F64(doubles) => floats(doubles.iter().map(|&value| value as f32).collect()),
         Numbers::I64(_) => {
             return Err(("floats, or bytes without sign".to_owned(), "other integers".to_owned()));
         }
@@ -180,15 +176,6 @@ fn describe(error: &unlift::Error) -> String {
         "descriptors" => error.found().to_owned(),
         place => format!("{} ({place})", error.found()),
     }
-}
-
-/// The transpose of `(dim, n)`.
-fn rows<T: Copy>(columns: &[T], dim: usize, n: usize) -> Vec<T> {
-    let mut rows = Vec::with_capacity(columns.len());
-    for at in 0..n {
-        rows.extend((0..dim).map(|row| columns[row * n + at]));
-    }
-    rows
 }
 
 fn size(array: &Array) -> Result<[u32; 2], Wrong> {

@@ -6,7 +6,7 @@ use std::path::Path;
 use half::f16;
 use unlift::descriptors::Values;
 
-use super::h5::{Array, DEEPEST, Numbers, Writer};
+use super::h5::{Array, DEEPEST, Numbers, Writer, transposed};
 use super::image::ImageFeatures;
 use crate::atomic::{Access, OutputFile};
 use crate::error::Error;
@@ -127,12 +127,12 @@ fn write(
     attributes.extend(image.uncertainty_px.map(|value| ("uncertainty", value)));
     put("keypoints", vec![n, 2], Numbers::F32(places), &attributes)?;
     if let Some(rows) = &image.descriptors {
-        let dim = rows.dim();
+        let (dim, n_rows) = (rows.dim(), rows.len());
         let values = match rows.values() {
-            Values::U8(values) => Numbers::U8(columns(values, dim)),
+            Values::U8(values) => Numbers::U8(transposed(values, n_rows)),
             Values::F32(values) => match halves(values) {
-                Some(halves) => Numbers::F16(columns(&halves, dim)),
-                None => Numbers::F32(columns(values, dim)),
+                Some(halves) => Numbers::F16(transposed(&halves, n_rows)),
+                None => Numbers::F32(transposed(values, n_rows)),
             },
         };
         put("descriptors", vec![dim as u64, n], values, &[])?;
@@ -154,14 +154,4 @@ fn write(
 fn halves(values: &[f32]) -> Option<Vec<f16>> {
     let exact = |&value: &f32| Some(f16::from_f32(value)).filter(|half| half.to_f32() == value);
     values.iter().map(exact).collect()
-}
-
-/// The transpose of `(n, dim)`.
-fn columns<T: Copy>(rows: &[T], dim: usize) -> Vec<T> {
-    let n = rows.len() / dim;
-    let mut columns = Vec::with_capacity(rows.len());
-    for column in 0..dim {
-        columns.extend((0..n).map(|row| rows[row * dim + column]));
-    }
-    columns
 }

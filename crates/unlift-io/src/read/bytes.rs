@@ -63,6 +63,14 @@ impl Bytes {
         Budget::new(&self.path, self.len).room(place, n)
     }
 
+    /// Whether `bytes` fit into the budget of the file, which what stands at `place` is about to take.
+    ///
+    /// # Errors
+    /// When they do not.
+    pub fn admit(&self, place: &str, bytes: u64) -> Result<(), Error> {
+        Budget::new(&self.path, self.len).admit(place, bytes)
+    }
+
     /// Where the next byte is.
     pub fn at(&self) -> u64 {
         self.at
@@ -90,6 +98,15 @@ impl Bytes {
             Part::End => "end".to_owned(),
         };
         Error::new(&self.path, Place::Byte { what, at }, expected, found)
+    }
+
+    /// Refuses `n` rows of `stride` bytes that are more than is left; how many bytes they are.
+    pub fn expect_rows(&self, n: u64, what: &str, stride: u64) -> Result<u64, Error> {
+        let size = n.checked_mul(stride).filter(|&size| size <= self.remaining());
+        size.ok_or_else(|| {
+            let expected = format!("{n} {what}, {stride} bytes each");
+            self.error_ahead(expected, format!("{} bytes", self.remaining()))
+        })
     }
 
     fn check(&self, bytes: u64, what: &str) -> Result<(), Error> {

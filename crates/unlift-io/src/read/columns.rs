@@ -1,7 +1,8 @@
 //! The columns of points: which of them are x, y and z, and how a coordinate is written.
 
-use super::lines::number;
+use super::lines::{Lines, number, quoted};
 use super::scalar::Scalar;
+use crate::error::Error;
 
 /// Where `x`, `y` and `z` are among names of columns, in either case, quoted or not, with a unit in brackets or not.
 ///
@@ -36,6 +37,23 @@ pub fn coordinate(word: &[u8]) -> Option<f64> {
         word.starts_with(b"1.#") || NONE.iter().any(|none| word.eq_ignore_ascii_case(none))
     };
     number(word).or_else(|| none(word).then_some(f64::NAN))
+}
+
+/// The coordinates in the next `N` of the `words` of a line, which are called `what`.
+///
+/// # Errors
+/// When there are fewer words, or one is no number.
+pub fn coordinates<'a, const N: usize>(
+    lines: &Lines,
+    words: &mut impl Iterator<Item = &'a [u8]>,
+    what: &str,
+) -> Result<[f64; N], Error> {
+    let mut values = [0.0; N];
+    for value in &mut values {
+        let word = words.next().ok_or_else(|| lines.error(what, "end of line"))?;
+        *value = coordinate(word).ok_or_else(|| lines.error(what, quoted(word)))?;
+    }
+    Ok(values)
 }
 
 /// A number in a row of bytes: where it begins, and how it is stored.

@@ -9,7 +9,7 @@ use unlift::descriptors::Values;
 use crate::database::{Database, Kind};
 use crate::error::Error;
 use crate::features::FeatureSource;
-use crate::read::colmap::{self, Image, Tracks};
+use crate::read::colmap::{self, Image};
 use crate::read::lines::quoted;
 use crate::read::map_input::Input;
 
@@ -77,36 +77,19 @@ fn mean(
     let images = points_path.with_file_name("images").with_extension(extension);
     let images = colmap::read_images(&images)?;
     let row_of_id: HashMap<u64, usize> = points.ids.iter().copied().zip(0..).collect();
-    let rows = input
-        .ids
-        .iter()
-        .map(|id| {
-            row_of_id.get(id).copied().ok_or_else(|| {
-                Error::new(points_path, format!("point {id}"), "its track", "no such point")
-            })
-        })
-        .collect::<Result<Vec<_>, _>>()?;
-    mean_over_tracks((path, stored), (&tracks, &images), &rows, &input.ids)
-}
-
-/// The mean over the observations of each of `rows` (of `tracks`), which have these `ids`.
-fn mean_over_tracks(
-    (path, stored): (&Path, impl Fn(&Image) -> Result<Stored, Error>),
-    (tracks, images): (&Tracks, &[Image]),
-    rows: &[usize],
-    ids: &[u64],
-) -> Result<Descriptors, Error> {
     // By image, so that one image's descriptors are in memory at a time; by id, so that sums of floats
     // do not depend on a hash.
     let mut observations = Vec::new();
-    for (out, &row) in rows.iter().enumerate() {
-        if tracks.row(row).is_empty() {
-            let place = format!("point {}", ids[out]);
-            let expected = "an observation in its track";
-            return Err(Error::new(path, place, expected, "none"));
+    for (out, id) in input.ids.iter().enumerate() {
+        let place = || format!("point {id}");
+        let Some(&row) = row_of_id.get(id) else {
+            return Err(Error::new(points_path, place(), "its track", "no such point"));
+        };
+        let track = tracks.row(row);
+        if track.is_empty() {
+            return Err(Error::new(path, place(), "an observation in its track", "none"));
         }
-        let track = tracks.row(row).iter();
-        observations.extend(track.map(|&(image, index)| (image, index, out)));
+        observations.extend(track.iter().map(|&(image, index)| (image, index, out)));
     }
     observations.sort_unstable();
 
@@ -115,7 +98,7 @@ fn mean_over_tracks(
     for seen in observations.chunk_by(|a, b| a.0 == b.0) {
         let id = seen[0].0;
         let Ok(image) = images.binary_search_by_key(&id, |image| image.id) else {
-            let place = format!("point {}", ids[seen[0].2]);
+            let place = format!("point {}", input.ids[seen[0].2]);
             let expected = "images of the model in its track";
             return Err(Error::new(path, place, expected, format!("image {id}")));
         };
@@ -133,22 +116,18 @@ fn mean_over_tracks(
             let expected = format!("{usual_dim} {usual_kind} each, as in other images");
             return wrong(expected, format!("{dim} {kind}"));
         }
-        sums.resize(rows.len() * dim, 0.0);
+        sums.resize(input.ids.len() * dim, 0.0);
         for &(_, index, out) in seen {
             let index = index as usize;
             if index >= n {
                 let expected = format!("a descriptor for keypoint {index}");
                 return wrong(expected, format!("{n} descriptors"));
             }
-            let (row, sums) =
-                (index * dim..(index + 1) * dim, &mut sums[out * dim..(out + 1) * dim]);
+            let row = index * dim..(index + 1) * dim;
+            let sums = &mut sums[out * dim..(out + 1) * dim];
             match &values {
-                Values::U8(values) => {
-                    sums.iter_mut().zip(&values[row]).for_each(|(sum, &x)| *sum += f64::from(x));
-                }
-                Values::F32(values) => {
-                    sums.iter_mut().zip(&values[row]).for_each(|(sum, &x)| *sum += f64::from(x));
-                }
+                Values::U8(values) => add(sums, &values[row]),
+                Values::F32(values) => add(sums, &values[row]),
             }
         }
     }
@@ -163,6 +142,10 @@ fn mean_over_tracks(
         Values::F32(sums.iter().map(|&x| x as f32).collect())
     };
     Descriptors::try_new(values, dim).map_err(|e| Error::core(path, e))
+}
+
+fn add<T: Copy + Into<f64>>(sums: &mut [f64], values: &[T]) {
+    sums.iter_mut().zip(values).for_each(|(sum, &value)| *sum += value.into());
 }
 
 /// Brings every row to an L2 norm (so that a sum is as good as a mean); rows of zeros stay.

@@ -4,12 +4,15 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
+use super::bytes::Bytes;
 use crate::error::{Error, Place};
-use crate::input;
+use crate::input::{self, Budget};
 
 /// Bytes of a line at most: as many as a point takes that a million photos show. A file of one endless
 /// line is not read to its end.
 pub(crate) const LONGEST_LINE: u64 = 16 << 20;
+/// Bytes of a head before data at most: long comments are fine, a file of comments alone is not read to its end.
+const LONGEST_HEADER: u64 = 1 << 20;
 
 /// Lines of a text file, counted from 1, as bytes: names need not be UTF-8.
 pub(crate) struct Lines {
@@ -17,18 +20,52 @@ pub(crate) struct Lines {
     reader: BufReader<File>,
     line: Vec<u8>,
     number: u64,
+    /// Where the next line begins.
+    at: u64,
+    len: u64,
 }
 
 impl Lines {
     /// A reader at the start of `path`.
     pub fn open(path: &Path) -> Result<Self, Error> {
-        let (file, _) = input::open(path)?;
-        Ok(Self::continuing(path, BufReader::new(file), 0))
+        let (file, len) = input::open(path)?;
+        let reader = BufReader::new(file);
+        Ok(Self { path: path.to_owned(), reader, line: Vec::new(), number: 0, at: 0, len })
     }
 
-    /// A reader of a file of which `number` lines were already read from `reader`.
-    pub fn continuing(path: &Path, reader: BufReader<File>, number: u64) -> Self {
-        Self { path: path.to_owned(), reader, line: Vec::new(), number }
+    /// What follows the current line, as binary data.
+    pub fn into_bytes(self) -> Bytes {
+        Bytes::continuing(&self.path, self.reader, self.at, self.len)
+    }
+
+    /// An empty list with room for `n` entries of what stands at `place`, within the budget of the file.
+    ///
+    /// # Errors
+    /// When there is not so much memory.
+    pub fn room<T>(&self, place: impl Into<Place> + Clone, n: u64) -> Result<Vec<T>, Error> {
+        Budget::new(&self.path, self.len).room(place, n)
+    }
+
+    /// Refuses `n` rows of `n_values` values that do not fit into the rest of the file: a value takes a digit and a
+    /// separator, the last one of the file only the digit.
+    pub fn expect_room(&self, n: u64, what: &str, n_values: u64) -> Result<(), Error> {
+        let most = (self.len.saturating_sub(self.at) + 1) / n_values.saturating_mul(2);
+        if n <= most {
+            return Ok(());
+        }
+        let expected = format!("at most {most} {what} (by the size of the file)");
+        Err(Error::new(&self.path, "header", expected, n.to_string()))
+    }
+
+    /// Reads the next line of a head, which is not the last line of the file.
+    pub fn advance_in_header(&mut self, expected: &str) -> Result<(), Error> {
+        if !self.advance()? {
+            return Err(self.end_error(expected));
+        }
+        if !self.line.ends_with(b"\n") || self.at > LONGEST_HEADER {
+            return Err(self.error(expected, "end of file"));
+        }
+        Ok(())
     }
 
     /// Reads the next line, whatever it holds; false at the end of the file.
@@ -39,10 +76,12 @@ impl Lines {
         self.line.clear();
         let mut limited = self.reader.by_ref().take(LONGEST_LINE + 1);
         let read = limited.read_until(b'\n', &mut self.line);
-        if read.map_err(|e| Error::read(&self.path, e))? == 0 {
+        let read = read.map_err(|e| Error::read(&self.path, e))?;
+        if read == 0 {
             return Ok(false);
         }
         self.number += 1;
+        self.at += read as u64;
         if self.line.contains(&0) {
             return Err(self.error("text", "binary data"));
         }

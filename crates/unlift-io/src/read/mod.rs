@@ -12,6 +12,7 @@ mod npy;
 mod npz;
 mod others;
 mod ply;
+mod pose;
 mod scalar;
 mod scans;
 mod table;

@@ -1,7 +1,5 @@
 //! PLY point clouds: the positions of the element `vertex`, ascii or binary, and the centers of splats.
 
-use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 use super::bytes::Bytes;
@@ -9,8 +7,7 @@ use super::columns::{Field, coordinate, is_called};
 use super::lines::{Lines, number, quoted, words};
 use super::scalar::Scalar;
 use super::undeclared::undeclared;
-use crate::error::{Error, Place};
-use crate::input::{self, Budget};
+use crate::error::Error;
 use crate::read::map_input::Input;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,19 +18,20 @@ enum Encoding {
 }
 
 fn scalar(name: &[u8]) -> Option<Scalar> {
-    Some(match name {
-        b"char" | b"int8" => Scalar::I8,
-        b"uchar" | b"uint8" => Scalar::U8,
-        b"short" | b"int16" => Scalar::I16,
-        b"ushort" | b"uint16" => Scalar::U16,
-        b"int" | b"int32" => Scalar::I32,
-        b"uint" | b"uint32" => Scalar::U32,
-        b"int64" => Scalar::I64,
-        b"uint64" => Scalar::U64,
-        b"float" | b"float32" => Scalar::F32,
-        b"double" | b"float64" => Scalar::F64,
+    let (kind, size) = match name {
+        b"char" | b"int8" => (b'i', 1),
+        b"uchar" | b"uint8" => (b'u', 1),
+        b"short" | b"int16" => (b'i', 2),
+        b"ushort" | b"uint16" => (b'u', 2),
+        b"int" | b"int32" => (b'i', 4),
+        b"uint" | b"uint32" => (b'u', 4),
+        b"int64" => (b'i', 8),
+        b"uint64" => (b'u', 8),
+        b"float" | b"float32" => (b'f', 4),
+        b"double" | b"float64" => (b'f', 8),
         _ => return None,
-    })
+    };
+    Scalar::of_kind(kind, size)
 }
 
 #[derive(Debug)]
@@ -76,8 +74,6 @@ impl Element {
 struct Header {
     encoding: Encoding,
     elements: Vec<Element>,
-    n_lines: u64,
-    n_bytes: u64,
 }
 
 /// Reads the positions of the vertices, of any type; other properties and elements are passed over.
@@ -85,9 +81,8 @@ struct Header {
 /// # Errors
 /// When the file cannot be read, is malformed, or declares more or fewer vertices than it holds.
 pub fn read(path: &Path) -> Result<Input, Error> {
-    let (file, len) = input::open(path)?;
-    let mut reader = BufReader::new(file);
-    let header = header(path, &mut reader)?;
+    let mut lines = Lines::open(path)?;
+    let header = header(path, &mut lines)?;
     let refuse = |expected: String| Error::new(path, "header", expected, "none");
     let vertex = header.elements.iter().position(|e| e.name == b"vertex");
     let vertex = vertex.ok_or_else(|| refuse("an element vertex".to_owned()))?;
@@ -99,20 +94,12 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     }
     let mut rows = match header.encoding {
         Encoding::Ascii => {
-            let lines = Lines::continuing(path, reader, header.n_lines);
-            Rows::Ascii(lines, Budget::new(path, len))
+            // A value takes a digit and a separator.
+            lines.expect_room(element.count, "vertices", element.properties.len() as u64)?;
+            Rows::Ascii(lines)
         }
-        encoding => {
-            let bytes = Bytes::continuing(path, reader, header.n_bytes, len);
-            Rows::Binary(bytes, encoding == Encoding::Big)
-        }
+        encoding => Rows::Binary(lines.into_bytes(), encoding == Encoding::Big),
     };
-    // A value takes a digit and a separator; the last one of the file only the digit.
-    let most = (len.saturating_sub(header.n_bytes) + 1) / (2 * element.properties.len() as u64);
-    if header.encoding == Encoding::Ascii && element.count > most {
-        let expected = format!("at most {most} vertices (by the size of the file)");
-        return Err(Error::new(path, "header", expected, element.count.to_string()));
-    }
     let mut boxes = Vec::new();
     for before in &header.elements[..vertex] {
         match before.find(BOX).ok().filter(|_| axes.is_err()) {
@@ -182,35 +169,21 @@ pub fn splats(path: &Path) -> Result<Input, Error> {
     Ok(Input { positions, format: "splat", notes: vec![SPLATS.to_owned()], ..Input::default() })
 }
 
-fn header(path: &Path, reader: &mut BufReader<File>) -> Result<Header, Error> {
-    /// Longest header: long comments are fine, a file without line ends is not read to its end.
-    const LONGEST: u64 = 1 << 20;
-    let mut limited = reader.take(LONGEST);
-    let (mut n_lines, mut n_bytes) = (0, 0);
+fn header(path: &Path, lines: &mut Lines) -> Result<Header, Error> {
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
-    let mut line = Vec::new();
+    let begins = "\"ply\", as every PLY file begins";
+    if !lines.advance()? {
+        return Err(lines.end_error(begins));
+    }
+    if lines.line() != b"ply" {
+        return Err(lines.error(begins, quoted(lines.line())));
+    }
     loop {
-        line.clear();
-        let read = limited.read_until(b'\n', &mut line).map_err(|e| Error::read(path, e))?;
-        n_lines += 1;
-        n_bytes += read as u64;
-        let error =
-            |expected: &str, found: String| Error::new(path, Place::Line(n_lines), expected, found);
-        if n_lines == 1 {
-            if line.trim_ascii() != b"ply" {
-                let found = match read {
-                    0 => "end of file".to_owned(),
-                    _ => quoted(line.trim_ascii()),
-                };
-                return Err(error("\"ply\", as every PLY file begins", found));
-            }
-            continue;
-        }
-        if !line.ends_with(b"\n") {
-            return Err(error("a header that ends with end_header", "end of file".into()));
-        }
-        let words: Vec<&[u8]> = words(&line).collect();
+        lines.advance_in_header("a header that ends with end_header")?;
+        let error = |expected: &str, found: String| lines.error(expected, found);
+        let line = lines.line();
+        let words: Vec<&[u8]> = words(line).collect();
         match words[..] {
             [] | [b"comment" | b"obj_info", ..] => {}
             [b"format", name, _version] => {
@@ -230,9 +203,9 @@ fn header(path: &Path, reader: &mut BufReader<File>) -> Result<Header, Error> {
                 elements.push(Element { name: name.to_vec(), count, properties: Vec::new() });
             }
             [b"property", ref rest @ ..] => {
-                let element = elements.last_mut().ok_or_else(|| {
-                    error("an element before its properties", quoted(line.trim_ascii()))
-                })?;
+                let element = elements.last_mut();
+                let element = element
+                    .ok_or_else(|| error("an element before its properties", quoted(line)))?;
                 let known = |kind: &[u8]| {
                     scalar(kind).ok_or_else(|| error("the type of a property", quoted(kind)))
                 };
@@ -240,24 +213,24 @@ fn header(path: &Path, reader: &mut BufReader<File>) -> Result<Header, Error> {
                     [kind, name] => (name, known(kind)?, None),
                     [b"list", count, kind, name] => (name, known(kind)?, Some(known(count)?)),
                     _ => {
-                        let found = quoted(line.trim_ascii());
+                        let found = quoted(line);
                         return Err(error("property TYPE NAME", found));
                     }
                 };
                 element.properties.push(Property { name: name.to_vec(), scalar, list });
             }
             [b"end_header"] => break,
-            _ => return Err(error("a line of a PLY header", quoted(line.trim_ascii()))),
+            _ => return Err(error("a line of a PLY header", quoted(line))),
         }
     }
     let refuse = |expected: &str, found: String| Error::new(path, "header", expected, found);
     let encoding = encoding.ok_or_else(|| refuse("a line with the format", "none".into()))?;
-    Ok(Header { encoding, elements, n_lines, n_bytes })
+    Ok(Header { encoding, elements })
 }
 
 /// Rows of elements, one element after the other.
 enum Rows {
-    Ascii(Lines, Budget),
+    Ascii(Lines),
     /// Whether the most significant byte comes first.
     Binary(Bytes, bool),
 }
@@ -270,7 +243,7 @@ impl Rows {
         wanted: [usize; N],
     ) -> Result<Vec<[f64; N]>, Error> {
         match self {
-            Self::Ascii(lines, budget) => ascii(lines, budget, element, wanted),
+            Self::Ascii(lines) => ascii(lines, element, wanted),
             Self::Binary(bytes, big) => binary(bytes, *big, element, wanted),
         }
     }
@@ -281,7 +254,7 @@ impl Rows {
     /// When anything follows the last element that has vertices.
     fn more(&mut self, vertex: &Element, behind: &[Element]) -> Result<u64, Error> {
         match self {
-            Self::Ascii(lines, _) => {
+            Self::Ascii(lines) => {
                 let mut n_rows = 0u64;
                 while lines.advance()? {
                     n_rows += u64::from(!lines.line().is_empty());
@@ -311,12 +284,11 @@ impl Rows {
 
 fn ascii<const N: usize>(
     lines: &mut Lines,
-    budget: &Budget,
     element: &Element,
     wanted: [usize; N],
 ) -> Result<Vec<[f64; N]>, Error> {
     let name = String::from_utf8_lossy(&element.name);
-    let mut rows = budget.room(&*name, if N == 0 { 0 } else { element.count })?;
+    let mut rows = lines.room(&*name, if N == 0 { 0 } else { element.count })?;
     for row in 1..=element.count {
         loop {
             if !lines.advance()? {
@@ -365,11 +337,7 @@ fn binary<const N: usize>(
 ) -> Result<Vec<[f64; N]>, Error> {
     let stride = element.stride();
     let name = String::from_utf8_lossy(&element.name);
-    let size = element.count.checked_mul(stride as u64);
-    let Some(size) = size.filter(|&size| size <= bytes.remaining()) else {
-        let expected = format!("{} rows of {name}, {stride} bytes each", element.count);
-        return Err(bytes.error_ahead(expected, format!("{} bytes", bytes.remaining())));
-    };
+    let size = bytes.expect_rows(element.count, &format!("rows of {name}"), stride as u64)?;
     if N == 0 && !element.has_list() {
         bytes.skip(size, "an element before vertex")?;
         return Ok(Vec::new());

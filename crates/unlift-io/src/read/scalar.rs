@@ -2,49 +2,34 @@
 
 use half::f16;
 
-/// A number in a file.
+/// A number in a file: a float, or an integer with a sign or without.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Scalar {
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    I64,
-    U64,
-    F16,
-    F32,
-    F64,
+pub(crate) struct Scalar {
+    /// `f`, `i` or `u`.
+    kind: u8,
+    size: usize,
 }
 
 impl Scalar {
+    pub const U8: Self = Self { kind: b'u', size: 1 };
+    pub const F16: Self = Self { kind: b'f', size: 2 };
+    pub const F32: Self = Self { kind: b'f', size: 4 };
+    pub const F64: Self = Self { kind: b'f', size: 8 };
+
     /// The number of `size` bytes of a kind: `f` float, `i` integer, `u` integer without sign, in either case.
     pub fn of_kind(kind: u8, size: u64) -> Option<Self> {
-        Some(match (kind.to_ascii_lowercase(), size) {
-            (b'i', 1) => Self::I8,
-            (b'u', 1) => Self::U8,
-            (b'i', 2) => Self::I16,
-            (b'u', 2) => Self::U16,
-            (b'i', 4) => Self::I32,
-            (b'u', 4) => Self::U32,
-            (b'i', 8) => Self::I64,
-            (b'u', 8) => Self::U64,
-            (b'f', 2) => Self::F16,
-            (b'f', 4) => Self::F32,
-            (b'f', 8) => Self::F64,
+        let kind = kind.to_ascii_lowercase();
+        let sizes: &[u64] = match kind {
+            b'i' | b'u' => &[1, 2, 4, 8],
+            b'f' => &[2, 4, 8],
             _ => return None,
-        })
+        };
+        sizes.contains(&size).then_some(Self { kind, size: size as usize })
     }
 
     /// Bytes of one number.
     pub fn size(self) -> usize {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 | Self::F16 => 2,
-            Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::I64 | Self::U64 | Self::F64 => 8,
-        }
+        self.size
     }
 
     /// The number in `bytes`, of which there are [`size`](Self::size), the most significant one first if `big`.
@@ -52,21 +37,45 @@ impl Scalar {
     /// # Panics
     /// When there are fewer.
     pub fn read(self, bytes: &[u8], big: bool) -> f64 {
-        fn little<const N: usize>(bytes: &[u8], big: bool) -> [u8; N] {
-            std::array::from_fn(|at| bytes[if big { N - 1 - at } else { at }])
+        let mut little = [0; 8];
+        little[..self.size].copy_from_slice(&bytes[..self.size]);
+        if big {
+            little[..self.size].reverse();
         }
-        match self {
-            Self::I8 => f64::from(bytes[0] as i8),
-            Self::U8 => f64::from(bytes[0]),
-            Self::I16 => f64::from(i16::from_le_bytes(little(bytes, big))),
-            Self::U16 => f64::from(u16::from_le_bytes(little(bytes, big))),
-            Self::I32 => f64::from(i32::from_le_bytes(little(bytes, big))),
-            Self::U32 => f64::from(u32::from_le_bytes(little(bytes, big))),
-            Self::I64 => i64::from_le_bytes(little(bytes, big)) as f64,
-            Self::U64 => u64::from_le_bytes(little(bytes, big)) as f64,
-            Self::F16 => f64::from(f16::from_le_bytes(little(bytes, big))),
-            Self::F32 => f64::from(f32::from_le_bytes(little(bytes, big))),
-            Self::F64 => f64::from_le_bytes(little(bytes, big)),
+        let [a, b, c, d, ..] = little;
+        match (self.kind, self.size) {
+            (b'u', _) => u64::from_le_bytes(little) as f64,
+            (b'i', size) => {
+                // The sign is the last bit that is stored.
+                let unused = 64 - 8 * size;
+                (i64::from_le_bytes(little) << unused >> unused) as f64
+            }
+            (_, 2) => f64::from(f16::from_le_bytes([a, b])),
+            (_, 4) => f64::from(f32::from_le_bytes([a, b, c, d])),
+            _ => f64::from_le_bytes(little),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn integers_keep_their_sign_in_either_order() {
+        for (kind, bytes, expected) in [
+            (b'i', &[0xfe][..], -2.0),
+            (b'u', &[0xfe], 254.0),
+            (b'I', &[0xd4, 0xfe], -300.0),
+            (b'u', &[0xd4, 0xfe], 65236.0),
+            (b'i', &[0xff; 4], -1.0),
+            (b'U', &[0xff, 0xff, 0xff, 0x7f], 2147483647.0),
+            (b'i', &[0xff; 8], -1.0),
+            (b'u', &[0, 0, 0, 0, 0, 0, 0, 0x80], 9223372036854775808.0),
+        ] {
+            let scalar = Scalar::of_kind(kind, bytes.len() as u64).unwrap();
+            let reversed: Vec<u8> = bytes.iter().rev().copied().collect();
+            assert_eq!([scalar.read(bytes, false), scalar.read(&reversed, true)], [expected; 2]);
         }
     }
 }

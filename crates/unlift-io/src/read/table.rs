@@ -221,51 +221,10 @@ fn is_name(word: &[u8]) -> bool {
 
 /// Whether a column of that name is surely no length along an axis.
 fn is_quantity(name: &[u8]) -> bool {
-    const NAMES: [&str; 42] = [
-        "alpha",
-        "class",
-        "confidence",
-        "error",
-        "frame",
-        "intensity",
-        "label",
-        "name",
-        "point_id",
-        "qx",
-        "reflectance",
-        "tx",
-        "lat",
-        "latitude",
-        "lon",
-        "lng",
-        "long",
-        "longitude",
-        "r",
-        "g",
-        "b",
-        "red",
-        "green",
-        "blue",
-        "range",
-        "azimuth",
-        "elevation",
-        "theta",
-        "phi",
-        "rho",
-        "id",
-        "index",
-        "t",
-        "time",
-        "timestamp",
-        "u",
-        "v",
-        "row",
-        "col",
-        "nx",
-        "ny",
-        "nz",
-    ];
-    NAMES.iter().any(|known| is_called(name, known.as_bytes()))
+    const NAMES: &str = "alpha class confidence error frame intensity label name point_id qx reflectance tx \
+                         lat latitude lon lng long longitude r g b red green blue range azimuth elevation theta \
+                         phi rho id index t time timestamp u v row col nx ny nz";
+    NAMES.split(' ').any(|known| is_called(name, known.as_bytes()))
 }
 
 /// What columns of these names are, if they are poses of cameras.

@@ -72,13 +72,19 @@ pub(super) fn coordinate_names<const D: usize>(prefix: &str) -> [String; D] {
 #[derive(Debug)]
 pub(super) struct Batch<'a> {
     path: &'a Path,
+    /// The columns that were read.
+    columns: &'a [(&'a str, Type)],
     batch: &'a RecordBatch,
     first_row: u64,
 }
 
 impl<'a> Batch<'a> {
-    pub(super) fn new(path: &'a Path, batch: &'a RecordBatch, first_row: u64) -> Self {
-        Self { path, batch, first_row }
+    pub(super) fn new(
+        (path, columns): (&'a Path, &'a [(&'a str, Type)]),
+        batch: &'a RecordBatch,
+        first_row: u64,
+    ) -> Self {
+        Self { path, columns, batch, first_row }
     }
 
     /// Number of rows here.
@@ -108,9 +114,9 @@ impl<'a> Batch<'a> {
         }
     }
 
-    /// Finite floats; null and NaN, which are the same to many programs, are none.
+    /// Finite floats; null and NaN, which are the same to many programs, are none, as are all of a column that was not read.
     pub(super) fn optional_floats(&self, name: &str) -> Result<Vec<Option<f64>>, Error> {
-        let column = self.column(name);
+        let Some(column) = self.found(name) else { return Ok(vec![None; self.len()]) };
         let values = self.widened(name)?.into_iter().enumerate();
         let checked = values.map(|(row, x)| match column.is_valid(row) && !x.is_nan() {
             false => Ok(None),
@@ -141,13 +147,14 @@ impl<'a> Batch<'a> {
         values.map(|(row, x)| x.ok_or_else(|| null(row))).collect()
     }
 
-    /// Integers from 0 to below `below` (at most 2^32); null, or NaN among floats, is none.
+    /// Integers from 0 to below `below` (at most 2^32); null, or NaN among floats, is none, as are all of a column that was not
+    /// read.
     pub(super) fn optional_integers(
         &self,
         name: &str,
         below: u64,
     ) -> Result<Vec<Option<u32>>, Error> {
-        let column = self.column(name);
+        let Some(column) = self.found(name) else { return Ok(vec![None; self.len()]) };
         if column.data_type().is_floating() {
             let values = floats(column);
             let whole = (0..self.len()).map(|row| (row, values(row))).map(|(row, x)| {
@@ -167,9 +174,10 @@ impl<'a> Batch<'a> {
         checked.collect()
     }
 
-    /// Texts or null.
+    /// Texts or null; null in every row where the column was not read.
     pub(super) fn texts(&self, name: &str) -> Vec<Option<&'a str>> {
-        self.column(name).as_string::<i32>().iter().collect()
+        let Some(column) = self.found(name) else { return vec![None; self.len()] };
+        column.as_string::<i32>().iter().collect()
     }
 
     /// Lists of integers from 0 to below `below` (at most 2^32): values appended to `to`, the end of
@@ -182,10 +190,9 @@ impl<'a> Batch<'a> {
         offsets: &mut Vec<u64>,
         to: &mut Vec<u32>,
     ) -> Result<(), Error> {
-        let lists = self.lists(name)?;
-        let values = integers(&lists.values);
-        for row in 0..self.len() {
-            let range = lists.range(row);
+        let (ranges, values) = self.lists(name)?;
+        let values = integers(&values);
+        for (row, range) in ranges.into_iter().enumerate() {
             self.at_most(name, row, range.len(), most)?;
             for at in range {
                 to.push(self.in_range(name, row, values(at), below)?);
@@ -203,17 +210,16 @@ impl<'a> Batch<'a> {
         most: u64,
         to: &mut Vec<f32>,
     ) -> Result<Vec<usize>, Error> {
-        let lists = self.lists(name)?;
-        let values: Values<'_, f64> = match lists.values.data_type().is_floating() {
-            true => floats(&lists.values),
+        let (ranges, values) = self.lists(name)?;
+        let values: Values<'_, f64> = match values.data_type().is_floating() {
+            true => floats(&values),
             false => {
-                let values = integers(&lists.values);
+                let values = integers(&values);
                 Box::new(move |at| values(at) as f64)
             }
         };
         let mut lengths = Vec::with_capacity(self.len());
-        for row in 0..self.len() {
-            let range = lists.range(row);
+        for (row, range) in ranges.into_iter().enumerate() {
             self.at_most(name, row, range.len(), most)?;
             lengths.push(range.len());
             for x in range.map(&values) {
@@ -248,9 +254,14 @@ impl<'a> Batch<'a> {
         exact.collect()
     }
 
+    /// A column, if it was read.
+    fn found(&self, name: &str) -> Option<&'a ArrayRef> {
+        let was_read = self.columns.iter().any(|(column, _)| *column == name);
+        self.batch.column_by_name(name).filter(|_| was_read)
+    }
+
     fn column(&self, name: &str) -> &'a ArrayRef {
-        let column = self.batch.column_by_name(name);
-        column.expect("the table was read with this column")
+        self.found(name).expect("the table was read with this column")
     }
 
     fn no_null(&self, name: &str, expected: &str) -> Result<(), Error> {
@@ -294,22 +305,12 @@ impl<'a> Batch<'a> {
                 return Err(self.wrong(name, row, "a list of numbers", "null in the list"));
             }
         }
-        let values = values.clone();
-        Ok(Lists { ranges, values })
+        Ok((ranges, values.clone()))
     }
 }
 
-/// Where lists lie in their values.
-struct Lists {
-    ranges: Vec<Range<usize>>,
-    values: ArrayRef,
-}
-
-impl Lists {
-    fn range(&self, row: usize) -> Range<usize> {
-        self.ranges[row].clone()
-    }
-}
+/// Where lists lie in their values, and these.
+type Lists = (Vec<Range<usize>>, ArrayRef);
 
 const FINITE: &str = "a finite number";
 
@@ -321,22 +322,25 @@ fn whole_below(below: u64) -> String {
 /// sixteen times the memory of bytes.
 type Values<'a, T> = Box<dyn Fn(usize) -> T + 'a>;
 
+/// The values of an array of one of these types, as one wider type.
+macro_rules! widened {
+    ($array:expr, $wide:ident, $null:expr, $($variant:ident => $of:ty),*) => {
+        match $array.data_type() {
+            $(DataType::$variant => {
+                let values = $array.as_primitive::<$of>().values();
+                Box::new(move |at| $wide::from(values[at]))
+            })*
+            // Nothing but nulls.
+            DataType::Null => Box::new(|_| $null),
+            other => unreachable!("the type {other} was checked"),
+        }
+    };
+}
+
 /// The values of an array of integers; what stands at nulls has no meaning.
 fn integers(array: &ArrayRef) -> Values<'_, i128> {
-    macro_rules! widened {
-        ($($variant:ident => $of:ty),*) => {
-            match array.data_type() {
-                $(DataType::$variant => {
-                    let values = array.as_primitive::<$of>().values();
-                    Box::new(move |at| i128::from(values[at]))
-                })*
-                // Nothing but nulls.
-                DataType::Null => Box::new(|_| 0),
-                other => unreachable!("{other} was checked to be integers"),
-            }
-        };
-    }
     widened!(
+        array, i128, 0,
         Int8 => Int8Type, Int16 => Int16Type, Int32 => Int32Type, Int64 => Int64Type,
         UInt8 => UInt8Type, UInt16 => UInt16Type, UInt32 => UInt32Type, UInt64 => UInt64Type
     )
@@ -344,16 +348,8 @@ fn integers(array: &ArrayRef) -> Values<'_, i128> {
 
 /// The values of an array of floats; what stands at nulls has no meaning.
 fn floats(array: &ArrayRef) -> Values<'_, f64> {
-    macro_rules! widened {
-        ($($variant:ident => $of:ty),*) => {
-            match array.data_type() {
-                $(DataType::$variant => {
-                    let values = array.as_primitive::<$of>().values();
-                    Box::new(move |at| f64::from(values[at]))
-                })*
-                other => unreachable!("{other} was checked to be floats"),
-            }
-        };
-    }
-    widened!(Float16 => Float16Type, Float32 => Float32Type, Float64 => Float64Type)
+    widened!(
+        array, f64, f64::NAN,
+        Float16 => Float16Type, Float32 => Float32Type, Float64 => Float64Type
+    )
 }

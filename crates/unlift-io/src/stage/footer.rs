@@ -1,7 +1,7 @@
 //! The footer of a Parquet file, looked through before the `parquet` crate builds a schema of it: that
 //! descends as deep, and asks for as much memory, as the footer says.
 
-use super::thrift::{Field, Kind, Walk, Wrong};
+use super::thrift::{Field, Walk, Wrong};
 use crate::Error;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -40,41 +40,29 @@ pub(super) fn check(path: &Path, file: &mut File, n_bytes: u64) -> Result<(), Er
 
 /// Walks `FileMetaData` of the Parquet format.
 fn walk(footer: &[u8]) -> Result<(), Wrong> {
-    Walk::new(footer).fields(|walk, field| match field.id {
-        2 => {
-            let n = structs(walk, field, MOST_ELEMENTS, "elements of the schema")?;
-            schema(walk, n)?;
-            Ok(true)
-        }
-        4 => {
-            let n = structs(walk, field, MOST_GROUPS, "row groups")?;
-            for _ in 0..n {
-                walk.fields(|walk, field| match field.id {
-                    1 => {
-                        let n = structs(walk, field, MOST_ELEMENTS, "columns of a row group")?;
-                        (0..n).try_for_each(|_| column(walk))?;
-                        Ok(true)
-                    }
-                    _ => Ok(false),
-                })?;
+    Walk::new(footer).fields(|walk, (id, kind)| {
+        match id {
+            2 => {
+                let n = walk.structs(kind, MOST_ELEMENTS, "elements of the schema")?;
+                schema(walk, n)?;
             }
-            Ok(true)
+            4 => {
+                for _ in 0..walk.structs(kind, MOST_GROUPS, "row groups")? {
+                    walk.fields(row_group)?;
+                }
+            }
+            _ => return Ok(false),
         }
-        _ => Ok(false),
+        Ok(true)
     })
 }
 
-/// Begins a list of at most `most` structs; how many there are.
-fn structs(walk: &mut Walk<'_>, field: Field, most: u64, what: &str) -> Result<u64, Wrong> {
-    field.expect(Kind::List)?;
-    let (kind, n) = walk.list()?;
-    if n > most {
-        return Err(Wrong::Content(format!("{n} {what}, more than {most}")));
+fn row_group(walk: &mut Walk<'_>, (id, kind): Field) -> Result<bool, Wrong> {
+    if id == 1 {
+        let n = walk.structs(kind, MOST_ELEMENTS, "columns of a row group")?;
+        (0..n).try_for_each(|_| column(walk))?;
     }
-    if n > 0 && kind != Kind::Struct {
-        return Err(Wrong::Content(format!("{what} of type {kind:?}")));
-    }
-    Ok(n)
+    Ok(id == 1)
 }
 
 /// A column of a row group has a few dozen bytes: what has fewer stands for the memory of many.
@@ -94,13 +82,11 @@ fn schema(walk: &mut Walk<'_>, n: u64) -> Result<(), Wrong> {
     let mut open: Vec<u64> = Vec::new();
     for at in 0..n {
         let mut children = 0;
-        walk.fields(|walk, field| {
-            if field.id != 5 {
-                return Ok(false);
+        walk.fields(|walk, (id, kind)| {
+            if id == 5 {
+                children = walk.integer(kind)?;
             }
-            field.expect(Kind::Integer)?;
-            children = walk.integer()?;
-            Ok(true)
+            Ok(id == 5)
         })?;
         if let Some(left) = open.last_mut() {
             *left -= 1;

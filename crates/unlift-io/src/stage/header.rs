@@ -103,98 +103,86 @@ impl<'a> Meta<'a> {
         self.object
     }
 
+    /// What `read` makes of the value of `key`, if it is given.
+    fn given<T>(
+        &self,
+        key: &str,
+        expected: impl Into<String>,
+        read: impl FnOnce(&Value) -> Option<T>,
+    ) -> Result<Option<T>, Error> {
+        let Some(value) = self.object.get(key) else { return Ok(None) };
+        read(value).map(Some).ok_or_else(|| self.wrong(key, expected))
+    }
+
     /// Kind of the file, if it is declared.
     pub(super) fn kind(&self) -> Result<Option<Kind>, Error> {
-        if self.object.get("version").is_some_and(|version| version.as_u64() != Some(VERSION)) {
-            return Err(self.wrong("version", VERSION.to_string()));
-        }
-        let Some(kind) = self.object.get("kind") else { return Ok(None) };
-        let names: Vec<&str> = Kind::ALL.into_iter().map(Kind::name).collect();
-        let kind = kind.as_str().and_then(Kind::from_name);
-        let wrong = || self.wrong("kind", format!("one of {}", names.join(", ")));
-        kind.map(Some).ok_or_else(wrong)
+        let is_known = |version: &Value| (version.as_u64() == Some(VERSION)).then_some(());
+        self.given("version", VERSION.to_string(), is_known)?;
+        let expected = format!("one of {}", Kind::ALL.map(Kind::name).join(", "));
+        self.given("kind", expected, |kind| Kind::from_name(kind.as_str()?))
     }
 
     /// 2 or 3, if it is declared.
     pub(super) fn dimension(&self) -> Result<Option<usize>, Error> {
-        match self.object.get("dimension").map(Value::as_u64) {
-            None => Ok(None),
-            Some(Some(2)) => Ok(Some(2)),
-            Some(Some(3)) => Ok(Some(3)),
-            Some(_) => Err(self.wrong("dimension", "2 or 3")),
-        }
+        let known = |value: &Value| [2, 3].into_iter().find(|&d| value.as_u64() == Some(d as u64));
+        self.given("dimension", "2 or 3", known)
     }
 
     /// The unit of every length, if it is declared.
     pub(super) fn unit(&self) -> Result<Option<Unit>, Error> {
-        match self.object.get("unit") {
-            None => Ok(None),
-            Some(unit) => match unit.as_str().and_then(Unit::from_name) {
-                Some(unit) => Ok(Some(unit)),
-                None => Err(self.wrong_unit()),
-            },
-        }
+        self.given("unit", UNITS, |unit| Unit::from_name(unit.as_str()?))
     }
 
     /// The error about a unit that is needed.
     pub(super) fn wrong_unit(&self) -> Error {
-        self.wrong("unit", "m, px or kth_neighbor")
+        self.wrong("unit", UNITS)
     }
 
     /// The origin; 0 when it is not given.
     pub(super) fn origin<const D: usize>(&self) -> Result<[f64; D], Error> {
-        match self.object.get("origin") {
-            None => Ok([0.0; D]),
-            Some(value) => {
-                vector(value).ok_or_else(|| self.wrong("origin", format!("a list of {D} numbers")))
-            }
-        }
+        let origin = self.given("origin", format!("a list of {D} numbers"), vector)?;
+        Ok(origin.unwrap_or([0.0; D]))
     }
 
     /// The table of centers of a ray cloud.
     pub(super) fn centers<const D: usize>(&self) -> Result<Vec<[f64; D]>, Error> {
-        let rows = self.object.get("centers").and_then(Value::as_array);
-        let rows = rows.and_then(|rows| rows.iter().map(vector).collect());
-        rows.ok_or_else(|| self.wrong("centers", format!("a list of lists of {D} numbers")))
+        let expected = format!("a list of lists of {D} numbers");
+        let rows = |value: &Value| value.as_array()?.iter().map(vector).collect();
+        let centers = self.given("centers", &*expected, rows)?;
+        centers.ok_or_else(|| self.wrong("centers", expected))
     }
 
     /// The box that holds all hidden points, in the frame of the map, if it is given.
     pub(super) fn bounds<const D: usize>(&self) -> Result<Option<Bounds<D>>, Error> {
-        let Some(value) = self.object.get("bounds") else { return Ok(None) };
-        corners(value).map(Some).ok_or_else(|| self.wrong("bounds", rule_of_corners::<D>()))
+        self.given("bounds", rule_of_corners::<D>(), corners)
     }
 
     /// Per center the box that holds its points, about the origin, if they are given.
     pub(super) fn regions<const D: usize>(&self) -> Result<Option<Vec<Bounds<D>>>, Error> {
-        let Some(value) = self.object.get("regions") else { return Ok(None) };
-        let regions = value.as_array().and_then(|rows| rows.iter().map(corners).collect());
-        let expected = || format!("per center {}", rule_of_corners::<D>());
-        regions.map(Some).ok_or_else(|| self.wrong("regions", expected()))
+        let expected = format!("per center {}", rule_of_corners::<D>());
+        self.given("regions", expected, |rows| rows.as_array()?.iter().map(corners).collect())
     }
 
     /// The released map that the file is about, if it says.
     pub(super) fn fingerprint(&self) -> Result<Option<Fingerprint>, Error> {
-        let Some(value) = self.object.get("fingerprint") else { return Ok(None) };
-        let found = value.as_str().and_then(Fingerprint::from_hex);
         let expected = "32 hexadecimal digits, the fingerprint of a released map";
-        found.map(Some).ok_or_else(|| self.wrong("fingerprint", expected))
+        self.given("fingerprint", expected, |value| Fingerprint::from_hex(value.as_str()?))
     }
 
     /// The released map, and what rows are counted by, as far as the file says.
     pub(super) fn about(&self) -> Result<About, Error> {
-        let order = match self.object.get("rows_by") {
-            None => RowOrder::Unstated,
-            Some(value) => value.as_str().and_then(RowOrder::from_name).ok_or_else(|| {
-                let names = RowOrder::STATED.map(|order| order.name().unwrap_or_default());
-                self.wrong("rows_by", format!("one of {}", names.join(", ")))
-            })?,
-        };
-        let lists_by = match self.object.get("lists_by") {
-            None => ListsBy::Unstated,
-            Some(value) if value.as_str() == ListsBy::Oracle.name() => ListsBy::Oracle,
-            Some(_) => return Err(self.wrong("lists_by", "oracle, or no such key")),
-        };
-        Ok(About { map: self.fingerprint()?, order, lists_by })
+        let names = RowOrder::STATED.map(|order| order.name().unwrap_or_default());
+        let expected = format!("one of {}", names.join(", "));
+        let order =
+            self.given("rows_by", expected, |value| RowOrder::from_name(value.as_str()?))?;
+        let is_oracle =
+            |value: &Value| (value.as_str() == ListsBy::Oracle.name()).then_some(ListsBy::Oracle);
+        let lists_by = self.given("lists_by", "oracle, or no such key", is_oracle)?;
+        Ok(About {
+            map: self.fingerprint()?,
+            order: order.unwrap_or(RowOrder::Unstated),
+            lists_by: lists_by.unwrap_or(ListsBy::Unstated),
+        })
     }
 
     /// A text, if the key is there and is one.
@@ -204,49 +192,26 @@ impl<'a> Meta<'a> {
 
     /// A text, if the key is there.
     pub(super) fn optional_text(&self, key: &str) -> Result<Option<String>, Error> {
-        match self.object.get(key) {
-            None => Ok(None),
-            Some(Value::String(text)) => Ok(Some(text.clone())),
-            Some(_) => Err(self.wrong(key, "text")),
-        }
-    }
-
-    /// A whole number of at least 1; 1 when it is not given.
-    pub(super) fn count_or_1(&self, key: &str) -> Result<usize, Error> {
-        Ok(self.count(key)?.unwrap_or(1))
+        self.given(key, "text", |value| value.as_str().map(str::to_owned))
     }
 
     /// A whole number of at least 1, if it is given.
     pub(super) fn count(&self, key: &str) -> Result<Option<usize>, Error> {
-        match self.object.get(key) {
-            None => Ok(None),
-            Some(value) => match value.as_u64().and_then(|n| usize::try_from(n).ok()) {
-                Some(n) if n >= 1 => Ok(Some(n)),
-                _ => Err(self.wrong(key, "a whole number of at least 1")),
-            },
-        }
+        self.given(key, "a whole number of at least 1", |value| {
+            usize::try_from(value.as_u64()?).ok().filter(|&n| n >= 1)
+        })
     }
 
     /// A number, if it is given.
     pub(super) fn number(&self, key: &str) -> Result<Option<f64>, Error> {
-        match self.object.get(key) {
-            None => Ok(None),
-            Some(value) => match value.as_f64() {
-                Some(x) => Ok(Some(x)),
-                None => Err(self.wrong(key, "a number")),
-            },
-        }
+        self.given(key, "a number", Value::as_f64)
     }
 
     /// A number of at least 0; 0 when it is not given.
     pub(super) fn number_or_0(&self, key: &str) -> Result<f64, Error> {
-        match self.object.get(key) {
-            None => Ok(0.0),
-            Some(value) => match value.as_f64() {
-                Some(x) if x >= 0.0 => Ok(x),
-                _ => Err(self.wrong(key, "a number of at least 0")),
-            },
-        }
+        let number = self
+            .given(key, "a number of at least 0", |value| value.as_f64().filter(|&x| x >= 0.0))?;
+        Ok(number.unwrap_or(0.0))
     }
 
     /// The error about `key`.
@@ -265,6 +230,8 @@ fn corners<const D: usize>(value: &Value) -> Option<Bounds<D>> {
     let [low, high] = value.as_array()?.as_slice() else { return None };
     Bounds::try_new(vector(low)?, vector(high)?).ok()
 }
+
+const UNITS: &str = "m, px or kth_neighbor";
 
 fn rule_of_corners<const D: usize>() -> String {
     format!("a low and a high corner of {D} numbers")

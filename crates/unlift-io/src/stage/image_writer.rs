@@ -106,36 +106,32 @@ impl<'a> ImageWriter<'a> {
     }
 
     fn append(&mut self, name: &str, written: Written<'_>) -> Result<(), Error> {
-        let Written { meta, fields, n_rows, columns } = written;
+        let n_rows = written.n_rows;
         if n_rows == 0 {
             return Ok(());
         }
         let (of_all, own): (Map<_, _>, Map<_, _>) =
-            meta.into_iter().partition(|(key, _)| OF_ALL.contains(&key.as_str()));
+            written.meta.clone().into_iter().partition(|(key, _)| OF_ALL.contains(&key.as_str()));
         if let Some(file) = self.file.take() {
-            self.started = Some(Started::with(file, &self.path, self.kind, &of_all, &fields)?);
+            let started = Started::with(file, &self.path, self.kind, &of_all, written.fields())?;
+            self.started = Some(started);
         }
         let Some(started) = &mut self.started else { unreachable!("started by the first image") };
-        let same = started.of_all == of_all;
-        let mut named: Vec<(String, ArrayRef)> =
-            fields.iter().map(|field| field.name().clone()).zip(columns(0..n_rows)).collect();
+        let names = written.fields().iter().map(|field| field.name().clone());
+        let mut named: Vec<(String, ArrayRef)> = names.zip(written.rows(&(0..n_rows))).collect();
         let texts = |text: &str| {
             Arc::new(StringArray::from_iter_values(std::iter::repeat_n(text, n_rows))) as ArrayRef
         };
         named.push((IMAGE.to_owned(), texts(name)));
         named.push((IMAGE_META.to_owned(), texts(&to_text(own))));
-        let of_field = |field: &Arc<Field>| {
+        let mut in_order: Vec<ArrayRef> = Vec::new();
+        for field in started.schema.fields() {
             let at = named.iter().position(|(name, _)| name == field.name());
             let column = at.map(|at| named.swap_remove(at).1);
-            column.unwrap_or_else(|| new_null_array(field.data_type(), n_rows))
-        };
-        let in_order: Vec<ArrayRef> = {
-            let mut of_field = of_field;
-            started.schema.fields().iter().map(&mut of_field).collect()
-        };
-        let batch = RecordBatch::try_new(started.schema.clone(), in_order);
-        match batch {
-            Ok(batch) if same && named.is_empty() => {
+            in_order.push(column.unwrap_or_else(|| new_null_array(field.data_type(), n_rows)));
+        }
+        match RecordBatch::try_new(started.schema.clone(), in_order) {
+            Ok(batch) if started.of_all == of_all && named.is_empty() => {
                 started.writer.write(&batch).map_err(|error| failed(&self.path, error))
             }
             _ => {

@@ -26,36 +26,9 @@ pub(super) const IMAGE: &str = "image";
 pub(super) const IMAGE_META: &str = "image_meta";
 
 /// Every column that a stage file of images may have: others are not decoded.
-const COLUMNS: [&str; 28] = [
-    IMAGE,
-    IMAGE_META,
-    "foot_x",
-    "foot_y",
-    "direction_x",
-    "direction_y",
-    "center",
-    "axis",
-    "offset",
-    "x",
-    "y",
-    "descriptor",
-    "descriptor_0",
-    "descriptor_1",
-    "slot",
-    "original",
-    "swapped_axis",
-    "descriptor_row",
-    "dropped",
-    "records",
-    "scores",
-    "status",
-    "support",
-    "evidence",
-    "found",
-    "error_scale",
-    "point",
-    "neighbors",
-];
+const COLUMNS: &str = "image image_meta foot_x foot_y direction_x direction_y center axis offset x y descriptor \
+                       descriptor_0 descriptor_1 slot original swapped_axis descriptor_row dropped records scores \
+                       status support evidence found error_scale point neighbors";
 
 /// Whether the stage file `path` holds images: it has a column `image`.
 ///
@@ -72,8 +45,6 @@ pub struct ImageFile<'a> {
     whole: Table<'a>,
     kind: Kind,
     batches: Batches,
-    /// Rows that were decoded and not yet taken.
-    rest: Option<RecordBatch>,
     /// Rows that were taken.
     n_taken: u64,
     /// Hashes of the names so far, so that an image whose rows are scattered is told.
@@ -100,10 +71,11 @@ impl<'a> ImageFile<'a> {
         }
         let parts = Parts::open(path)?;
         let fields = parts.schema().fields().iter().enumerate();
-        let known = fields.filter(|(_, field)| COLUMNS.contains(&field.name().as_str()));
+        let is_known = |name: &str| COLUMNS.split(' ').any(|known| known == name);
+        let known = fields.filter(|(_, field)| is_known(field.name()));
         let roots: Vec<usize> = known.map(|(at, _)| at).collect();
         let batches = parts.batches(&roots, Stay::Whole)?;
-        Ok(Self { path, whole, kind, batches, rest: None, n_taken: 0, seen: HashSet::new() })
+        Ok(Self { path, whole, kind, batches, n_taken: 0, seen: HashSet::new() })
     }
 
     /// The next image; `None` at the end.
@@ -123,22 +95,17 @@ impl<'a> ImageFile<'a> {
         let meta = self.whole.meta().of_image(meta_text.as_deref());
         let meta = meta.map_err(|error| error.within(&place(&name)))?;
         let mut held = Vec::new();
-        let mut rows = first;
-        loop {
+        let mut next = Some(first);
+        while let Some(rows) = next.take() {
             let n = self.n_of(&rows, &name)?;
+            let is_whole = n == rows.num_rows();
             self.n_taken += n as u64;
-            held.push(rows.slice(0, n));
-            if n < rows.num_rows() {
-                self.rest = Some(rows.slice(n, rows.num_rows() - n));
-                break;
+            let rows = self.batches.take(rows, n);
+            if n > 0 {
+                held.push(rows);
             }
-            match self.rows()? {
-                None => break,
-                Some(next) if self.name(&next, 0)? != name => {
-                    self.rest = Some(next);
-                    break;
-                }
-                Some(next) => rows = next,
+            if is_whole {
+                next = self.rows()?;
             }
         }
         Ok(Some(ImageRows { name, path: self.path, meta, held }))
@@ -178,11 +145,8 @@ impl<'a> ImageFile<'a> {
         self.kind
     }
 
-    /// Rows that were not taken yet: left over, or decoded anew; none of them is empty.
+    /// Rows that were not taken yet; none of them is empty.
     fn rows(&mut self) -> Result<Option<RecordBatch>, Error> {
-        if let Some(rest) = self.rest.take() {
-            return Ok(Some(rest));
-        }
         loop {
             match self.batches.next()? {
                 Some(batch) if batch.num_rows() == 0 => {}

@@ -1,15 +1,13 @@
 //! Neighborhoods: lists of records per slot, or of original points per point.
 
-use super::column::{Batch, Type};
+use super::column::Type;
 use super::header::{Kind, insert_about, new_meta};
 use super::order::rows_by_key;
-use super::pages::Stay;
 use super::table::Table;
-use super::write::{Written, field, list_field, lists, numbers, write_table};
+use super::write::{Written, write_table};
 use crate::Error;
 use crate::atomic::Access;
 use arrow_array::types::{Float32Type, UInt32Type};
-use arrow_schema::DataType::{Float32, UInt32};
 use std::ops::Range;
 use std::path::Path;
 use unlift::RecordId;
@@ -60,32 +58,32 @@ impl PointNeighborhoods {
 /// # Errors
 /// When the file cannot be written.
 pub fn write_neighborhoods(path: &Path, neighborhoods: &Neighborhoods) -> Result<(), Error> {
-    write_table((path, Access::Private), written(neighborhoods))
+    write_table((path, Access::Private), &written(neighborhoods))
 }
 
 /// What is written of neighborhoods.
 pub(super) fn written(neighborhoods: &Neighborhoods) -> Written<'_> {
-    let mut fields = vec![field("slot", UInt32), list_field("records", UInt32)];
-    if neighborhoods.scores().is_some() {
-        fields.push(list_field("scores", Float32));
-    }
     let mut meta = new_meta(Kind::Neighborhoods);
     insert_about(&mut meta, neighborhoods.about());
-    let columns = Box::new(move |slots: Range<usize>| {
+    let mut written = Written::new(meta, neighborhoods.n_slots());
+    written.numbers::<UInt32Type>("slot", |slot| slot as u32);
+    // Where the lists of some slots are, and how long each is.
+    let lists = |slots: Range<usize>| {
         let offsets = &neighborhoods.offsets()[slots.start..=slots.end];
-        let lengths = || offsets.windows(2).map(|w| (w[1] - w[0]) as usize);
-        let values = offsets[0] as usize..offsets[slots.len()] as usize;
-        let records = neighborhoods.records()[values.clone()].iter().map(|r| r.0);
-        let mut columns = vec![
-            numbers::<UInt32Type>(slots.map(|slot| slot as u32)),
-            lists::<UInt32Type>(records, lengths()),
-        ];
-        if let Some(scores) = neighborhoods.scores() {
-            columns.push(lists::<Float32Type>(scores[values].iter().copied(), lengths()));
-        }
-        columns
+        let lengths = offsets.windows(2).map(|w| (w[1] - w[0]) as usize).collect();
+        (offsets[0] as usize..offsets[slots.len()] as usize, lengths)
+    };
+    written.lists::<UInt32Type>("records", move |slots| {
+        let (range, lengths) = lists(slots);
+        (neighborhoods.records()[range].iter().map(|record| record.0).collect(), lengths)
     });
-    Written { meta, fields, n_rows: neighborhoods.n_slots(), columns }
+    if let Some(scores) = neighborhoods.scores() {
+        written.lists::<Float32Type>("scores", move |slots| {
+            let (range, lengths) = lists(slots);
+            (scores[range].to_vec(), lengths)
+        });
+    }
+    written
 }
 
 /// Reads neighborhoods for a released map of `n_records` records with `slots_per_record` slots each.
@@ -104,15 +102,6 @@ pub fn read_neighborhoods(
     neighborhoods_of(&Table::open_kind(path, Kind::Neighborhoods)?, n_records, slots_per_record)
 }
 
-/// Refuses a table without one row per slot.
-pub(super) fn check_rows(table: &Table<'_>, n_slots: usize) -> Result<(), Error> {
-    if table.n_rows() == n_slots as u64 {
-        return Ok(());
-    }
-    let expected = format!("{n_slots} rows, one per slot of the released map");
-    Err(Error::new(table.path(), "", expected, table.n_rows().to_string()))
-}
-
 /// The neighborhoods of a table.
 pub(super) fn neighborhoods_of(
     table: &Table<'_>,
@@ -121,7 +110,10 @@ pub(super) fn neighborhoods_of(
 ) -> Result<Neighborhoods, Error> {
     let path = table.path();
     let n_slots = n_records * slots_per_record;
-    check_rows(table, n_slots)?;
+    if table.n_rows() != n_slots as u64 {
+        let expected = format!("{n_slots} rows, one per slot of the released map");
+        return Err(Error::new(path, "", expected, table.n_rows().to_string()));
+    }
     let key = table.has("slot").then_some("slot");
     let lists =
         Lists::read(table, key, "records", n_slots, n_records)?.by_key(path, key, n_slots)?;
@@ -163,66 +155,11 @@ pub fn read_point_neighborhoods(path: &Path, n_points: usize) -> Result<PointNei
 }
 
 /// Lists as they stand in a file.
-pub(super) struct Lists {
-    pub(super) keys: Vec<u32>,
-    pub(super) offsets: Vec<u64>,
-    pub(super) ids: Vec<u32>,
-    pub(super) scores: Option<Vec<f32>>,
-}
-
-/// The columns of lists.
-pub(super) struct Columns<'a> {
-    key: Option<&'a str>,
-    /// That of the ids.
-    ids: &'a str,
-    pub(super) with_scores: bool,
-    /// How long lists stay in memory.
-    stay: Stay,
-}
-
-impl<'a> Columns<'a> {
-    /// Those of a table.
-    pub(super) fn of(table: &Table<'_>, key: Option<&'a str>, ids: &'a str, stay: Stay) -> Self {
-        Self { key, ids, with_scores: table.has("scores"), stay }
-    }
-
-    /// Hands on the lists of some thousand rows at a time: keys below `n_keys`, ids below `n_ids`. Scores are `None` where none of
-    /// these rows has any.
-    pub(super) fn read(
-        &self,
-        table: &Table<'_>,
-        n_keys: usize,
-        n_ids: usize,
-        mut each: impl FnMut(&Batch<'_>, Lists) -> Result<(), Error>,
-    ) -> Result<(), Error> {
-        let Self { key, ids: column, with_scores, stay } = *self;
-        let mut columns = vec![(column, Type::Integers)];
-        columns.extend(key.map(|key| (key, Type::Integer)));
-        if with_scores {
-            columns.push(("scores", Type::Floats));
-        }
-        table.read_to(&columns, stay, |batch| {
-            let keys = key.map(|key| batch.integers(key, n_keys as u64)).transpose()?;
-            let (mut offsets, mut ids) = (vec![0], Vec::new());
-            // Each id once: no list is longer than there are ids.
-            batch.integer_lists(column, n_ids as u64, n_ids as u64, &mut offsets, &mut ids)?;
-            let mut scores = None;
-            if with_scores && !batch.is_null("scores") {
-                // Compared with the lists: those are short.
-                let mut found = Vec::new();
-                let lengths = batch.float_lists("scores", u64::MAX, &mut found)?;
-                for (row, (length, w)) in lengths.iter().zip(offsets.windows(2)).enumerate() {
-                    let n = w[1] - w[0];
-                    if *length as u64 != n {
-                        let expected = format!("{n} values, one for each of {column}");
-                        return Err(batch.wrong("scores", row, expected, length.to_string()));
-                    }
-                }
-                scores = Some(found);
-            }
-            each(batch, Lists { keys: keys.unwrap_or_default(), offsets, ids, scores })
-        })
-    }
+struct Lists {
+    keys: Vec<u32>,
+    offsets: Vec<u64>,
+    ids: Vec<u32>,
+    scores: Option<Vec<f32>>,
 }
 
 impl Lists {
@@ -235,21 +172,36 @@ impl Lists {
         n_keys: usize,
         n_ids: usize,
     ) -> Result<Self, Error> {
-        let columns = Columns::of(table, key, column, Stay::Whole);
+        let with_scores = table.has("scores");
+        let mut columns = vec![(column, Type::Integers)];
+        columns.extend(key.map(|key| (key, Type::Integer)));
+        columns.extend(with_scores.then_some(("scores", Type::Floats)));
         let (mut keys, mut offsets, mut ids, mut scores) = (vec![], vec![0], vec![], vec![]);
         let mut n_unscored = 0;
-        columns.read(table, n_keys, n_ids, |batch, rows| {
-            let from = ids.len() as u64;
-            offsets.extend(rows.offsets[1..].iter().map(|at| from + at));
-            keys.extend(rows.keys);
-            ids.extend(rows.ids);
-            match rows.scores {
-                Some(found) => scores.extend(found),
-                None => n_unscored += batch.len(),
+        table.read(&columns, |batch| {
+            if let Some(key) = key {
+                keys.extend(batch.integers(key, n_keys as u64)?);
+            }
+            let first = offsets.len() - 1;
+            // Each id once: no list is longer than there are ids.
+            batch.integer_lists(column, n_ids as u64, n_ids as u64, &mut offsets, &mut ids)?;
+            if !with_scores || batch.is_null("scores") {
+                n_unscored += batch.len();
+                return Ok(());
+            }
+            // Compared with the lists: those are short.
+            let lengths = batch.float_lists("scores", u64::MAX, &mut scores)?;
+            for (row, (length, ends)) in lengths.iter().zip(offsets[first..].windows(2)).enumerate()
+            {
+                let n = ends[1] - ends[0];
+                if *length as u64 != n {
+                    let expected = format!("{n} values, one for each of {column}");
+                    return Err(batch.wrong("scores", row, expected, length.to_string()));
+                }
             }
             Ok(())
         })?;
-        let with_scores = columns.with_scores && !table.is_without("scores", n_unscored)?;
+        let with_scores = with_scores && !table.is_without("scores", n_unscored)?;
         Ok(Self { keys, offsets, ids, scores: with_scores.then_some(scores) })
     }
 
@@ -279,7 +231,7 @@ impl Lists {
         Ok(sorted)
     }
 
-    pub(super) fn of(&self, row: usize) -> &[u32] {
+    fn of(&self, row: usize) -> &[u32] {
         &self.ids[self.range(row)]
     }
 
@@ -289,7 +241,7 @@ impl Lists {
 }
 
 /// Refuses a list that holds its own id or an id twice; `of` and `own` are a word and a number.
-pub(super) fn check_list(
+fn check_list(
     path: &Path,
     column: &str,
     of: (&str, usize),

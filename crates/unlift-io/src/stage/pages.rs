@@ -2,7 +2,7 @@
 //! and sizes in the footer and before each page, against the file and the memory that it may take.
 
 use super::file::ParquetFile;
-use super::thrift::{Kind, Walk, Wrong};
+use super::thrift::{Walk, Wrong};
 use crate::Error;
 use crate::input::Budget;
 use parquet::basic::Type;
@@ -38,26 +38,29 @@ pub(super) fn check(
     (budget, stay): (&Budget, Stay),
 ) -> Result<u64, Error> {
     let mut longest = 0;
+    // The numbers of the values that make up a column: of a list, its own.
+    let leaves = |file: &ParquetFile, root: usize| -> Vec<usize> {
+        let schema = file.metadata().file_metadata().schema_descr();
+        let leaves = 0..schema.num_columns();
+        leaves.filter(|&leaf| schema.get_column_root_idx(leaf) == root).collect()
+    };
     for wanted in 0..roots.first().map_or(0, Vec::len) {
-        // Values and bytes per leaf of this column, through all parts.
-        let mut so_far: Vec<(u64, u64)> = Vec::new();
-        for (file, roots) in files.iter().zip(roots) {
-            let schema = file.metadata().file_metadata().schema_descr();
-            let leaves = 0..schema.num_columns();
-            let own = leaves.filter(|&leaf| schema.get_column_root_idx(leaf) == roots[wanted]);
-            let mut handle = file.handle()?;
-            for (at, leaf) in own.enumerate() {
-                if so_far.len() <= at {
-                    so_far.push((0, 0));
-                }
-                let mut column = Column {
-                    path: file.path(),
-                    place: format!("column {}", schema.get_column_root(leaf).name()),
-                    budget,
-                    n_values: so_far[at].0,
-                    n_bytes: so_far[at].1,
-                    longest: 0,
-                };
+        for at in 0..leaves(&files[0], roots[0][wanted]).len() {
+            let schema = files[0].schema();
+            let place = format!("column {}", schema.field(roots[0][wanted]).name());
+            let mut column = Column {
+                path: files[0].path(),
+                place,
+                budget,
+                n_values: 0,
+                n_bytes: 0,
+                longest: 0,
+            };
+            for (file, roots) in files.iter().zip(roots) {
+                // Every part has the same columns.
+                let Some(&leaf) = leaves(file, roots[wanted]).get(at) else { continue };
+                column.path = file.path();
+                let mut handle = file.handle()?;
                 for group in file.metadata().row_groups() {
                     if stay == Stay::Rows {
                         (column.n_values, column.n_bytes) = (0, 0);
@@ -65,11 +68,10 @@ pub(super) fn check(
                     // The crate has checked that a row group has every column of the schema.
                     if let Some(chunk) = group.columns().get(leaf) {
                         column.chunk(&mut handle, file.n_bytes(), chunk)?;
+                        if chunk.column_type() == Type::BYTE_ARRAY {
+                            longest = longest.max(column.longest);
+                        }
                     }
-                }
-                so_far[at] = (column.n_values, column.n_bytes);
-                if schema.column(leaf).physical_type() == Type::BYTE_ARRAY {
-                    longest = longest.max(column.longest);
                 }
             }
         }
@@ -203,31 +205,19 @@ impl Column<'_> {
 /// Walks `PageHeader` of the Parquet format.
 fn page(walk: &mut Walk<'_>) -> Result<Header, Wrong> {
     let mut header = Header { whole: -1, stored: -1, ..Header::default() };
-    walk.fields(|walk, field| {
-        match field.id {
-            1..=3 => {
-                field.expect(Kind::Integer)?;
-                let value = walk.integer()?;
-                match field.id {
-                    1 => {}
-                    2 => header.whole = value,
-                    _ => header.stored = value,
-                }
-            }
+    walk.fields(|walk, (id, kind)| {
+        match id {
+            2 => header.whole = walk.integer(kind)?,
+            3 => header.stored = walk.integer(kind)?,
             // Data, a dictionary, data of the second version.
             5 | 7 | 8 => {
-                field.expect(Kind::Struct)?;
-                header.is_dictionary = field.id == 7;
-                let encoding = if field.id == 8 { 4 } else { 2 };
-                walk.fields(|walk, field| {
-                    if field.id != 1 && field.id != encoding {
-                        return Ok(false);
-                    }
-                    field.expect(Kind::Integer)?;
-                    let value = walk.integer()?;
-                    match field.id {
-                        1 => header.n_values = value,
-                        _ => header.encoding = value,
+                header.is_dictionary = id == 7;
+                let encoding = if id == 8 { 4 } else { 2 };
+                walk.structure(kind, |walk, (id, kind)| {
+                    match id {
+                        1 => header.n_values = walk.integer(kind)?,
+                        id if id == encoding => header.encoding = walk.integer(kind)?,
+                        _ => return Ok(false),
                     }
                     Ok(true)
                 })?;

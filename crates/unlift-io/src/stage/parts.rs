@@ -112,7 +112,7 @@ impl<'a> Parts<'a> {
         let most_rows = budget.most().checked_div(longest).map_or(usize::MAX, |n| n as usize);
         let mut waiting: Vec<_> = self.files.iter().cloned().zip(of_files).collect();
         waiting.reverse();
-        Ok(Batches { waiting, current: None, most_rows })
+        Ok(Batches { waiting, current: None, most_rows, rest: None })
     }
 }
 
@@ -122,11 +122,16 @@ pub(super) struct Batches {
     waiting: Vec<(Arc<ParquetFile>, Vec<usize>)>,
     current: Option<file::Batches>,
     most_rows: usize,
+    /// Rows that were given back.
+    rest: Option<RecordBatch>,
 }
 
 impl Batches {
     /// The next rows; `None` at the end, where there were as many as the footers say.
     pub(super) fn next(&mut self) -> Result<Option<RecordBatch>, Error> {
+        if let Some(rest) = self.rest.take() {
+            return Ok(Some(rest));
+        }
         loop {
             if let Some(current) = &mut self.current
                 && let Some(batch) = current.next()?
@@ -136,6 +141,14 @@ impl Batches {
             let Some((file, roots)) = self.waiting.pop() else { return Ok(None) };
             self.current = Some(file.batches(&roots, self.most_rows)?);
         }
+    }
+
+    /// The first `n` of `rows`; the others, if there are any, come next.
+    pub(super) fn take(&mut self, rows: RecordBatch, n: usize) -> RecordBatch {
+        if n < rows.num_rows() {
+            self.rest = Some(rows.slice(n, rows.num_rows() - n));
+        }
+        rows.slice(0, n)
     }
 }
 

@@ -4,15 +4,14 @@ use super::column::{Batch, Type, coordinate_names};
 use super::header::{Kind, insert_about, new_meta};
 use super::order::permutation;
 use super::table::Table;
-use super::write::{Written, field, numbers, optional_numbers, write_table};
+use super::write::{Written, write_table};
 use crate::Error;
 use crate::atomic::Access;
+use arrow_array::StringArray;
 use arrow_array::types::{Float32Type, Float64Type, UInt8Type, UInt16Type, UInt32Type};
-use arrow_array::{ArrayRef, StringArray};
-use arrow_schema::DataType::{Float32, Float64, UInt8, UInt16, UInt32, Utf8};
+use arrow_schema::DataType::Utf8;
 use arrow_schema::Field;
 use serde_json::json;
-use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 use unlift::Unit;
@@ -29,7 +28,7 @@ const WHY_UNKNOWN: &str = "confidence_unknown";
 /// # Errors
 /// When an evidence or delta is not finite, or the file cannot be written.
 pub fn write_recovered<const D: usize>(path: &Path, recovered: &Recovered<D>) -> Result<(), Error> {
-    write_table((path, Access::Private), written(path, recovered)?)
+    write_table((path, Access::Private), &written(path, recovered)?)
 }
 
 /// What is written of recovered points.
@@ -58,45 +57,31 @@ pub(super) fn written<'a, const D: usize>(
     insert_about(&mut meta, recovered.about());
     let unknown = recovered.confidence_unknown().filter(|&why| why != Unknown::NotGiven);
     meta.extend(unknown.map(|why| (WHY_UNKNOWN.to_owned(), json!(why.name()))));
-    let mut fields = vec![field("slot", UInt32)];
-    fields.extend(coordinate_names::<D>("").map(|name| Field::new(name, Float64, true)));
-    fields.push(field("status", Utf8));
-    fields.push(field("support", UInt16));
-    fields.push(field("evidence", Float32));
-    if recovered.confidence().is_some() {
-        fields.push(field("found", Float32));
-        fields.push(Field::new("error_scale", Float32, true));
+    let mut written = Written::new(meta, recovered.n_slots());
+    written.numbers::<UInt32Type>("slot", |slot| slot as u32);
+    for (axis, name) in coordinate_names::<D>("").into_iter().enumerate() {
+        let coordinate = move |slot| recovered.position(slot).map(|position| position[axis]);
+        written.optional_numbers::<Float64Type>(name, coordinate);
     }
-    fields.extend(recovered.axis().map(|_| field("axis", UInt8)));
-    fields.extend(recovered.descriptor_row().map(|_| field("descriptor_row", UInt32)));
-    let columns = Box::new(move |slots: Range<usize>| {
-        let mut columns = vec![numbers::<UInt32Type>(slots.clone().map(|slot| slot as u32))];
-        columns.extend((0..D).map(|axis| {
-            let positions = slots.clone().map(|slot| recovered.position(slot));
-            optional_numbers::<Float64Type>(positions.map(|p| p.map(|p| p[axis])))
-        }));
-        let status = recovered.status()[slots.clone()].iter().map(|s| s.name());
-        columns.push(Arc::new(StringArray::from_iter_values(status)) as ArrayRef);
-        let support = &recovered.support()[slots.clone()];
-        columns.push(numbers::<UInt16Type>(support.iter().copied()));
-        let evidence = &recovered.evidence()[slots.clone()];
-        columns.push(numbers::<Float32Type>(evidence.iter().copied()));
-        if let Some(confidence) = recovered.confidence() {
-            let confidence = &confidence[slots.clone()];
-            columns.push(numbers::<Float32Type>(confidence.iter().map(|c| c.found)));
-            // A lost slot has no error.
-            let scale = |c: &Confidence| c.scale.is_finite().then_some(c.scale);
-            columns.push(optional_numbers::<Float32Type>(confidence.iter().map(scale)));
-        }
-        if let Some(axis) = recovered.axis() {
-            columns.push(numbers::<UInt8Type>(axis[slots.clone()].iter().copied()));
-        }
-        if let Some(row) = recovered.descriptor_row() {
-            columns.push(numbers::<UInt32Type>(row[slots].iter().copied()));
-        }
-        columns
+    written.column(Field::new("status", Utf8, false), |slots| {
+        let names = recovered.status()[slots].iter().map(|status| status.name());
+        Arc::new(StringArray::from_iter_values(names))
     });
-    Ok(Written { meta, fields, n_rows: recovered.n_slots(), columns })
+    written.numbers::<UInt16Type>("support", |slot| recovered.support()[slot]);
+    written.numbers::<Float32Type>("evidence", |slot| recovered.evidence()[slot]);
+    if let Some(confidence) = recovered.confidence() {
+        written.numbers::<Float32Type>("found", |slot| confidence[slot].found);
+        // A lost slot has no error.
+        let scale = |slot: usize| Some(confidence[slot].scale).filter(|scale| scale.is_finite());
+        written.optional_numbers::<Float32Type>("error_scale", scale);
+    }
+    if let Some(axis) = recovered.axis() {
+        written.numbers::<UInt8Type>("axis", |slot| axis[slot]);
+    }
+    if let Some(row) = recovered.descriptor_row() {
+        written.numbers::<UInt32Type>("descriptor_row", |slot| row[slot]);
+    }
+    Ok(written)
 }
 
 /// Reads recovered points of dimension `D` (see [`peek`](super::peek)).
@@ -135,8 +120,6 @@ pub(super) fn recovered_of<const D: usize>(
     let delta = meta.number_or_0("delta")?;
     let about = meta.about()?;
     let coordinates = coordinate_names::<D>("");
-    let mut columns: Vec<(&str, Type)> = vec![];
-    columns.extend(coordinates.iter().map(|name| (name.as_str(), Type::Float)));
     let optional = [
         ("slot", Type::Integer),
         ("status", Type::Text),
@@ -147,7 +130,8 @@ pub(super) fn recovered_of<const D: usize>(
         ("axis", Type::Integer),
         ("descriptor_row", Type::Integer),
     ];
-    columns.extend(optional.into_iter().filter(|(name, _)| table.has(name)));
+    let mut columns = table.present(&optional);
+    columns.extend(coordinates.iter().map(|name| (name.as_str(), Type::Float)));
     let mut estimates: Vec<Estimate<D>> = Vec::new();
     let (mut slots, mut rows): (Vec<u32>, Vec<u32>) = (Vec::new(), Vec::new());
     let mut confidence: Vec<Confidence> = Vec::new();
@@ -232,20 +216,10 @@ fn read_estimates<const D: usize>(
     for (column, name) in position.iter_mut().zip(coordinates) {
         *column = batch.optional_floats(name)?;
     }
-    let status = match table.has("status") {
-        true => batch.texts("status"),
-        false => vec![None; batch.len()],
-    };
-    let integers = |name, below| match table.has(name) {
-        true => batch.optional_integers(name, below),
-        false => Ok(vec![None; batch.len()]),
-    };
-    let support = integers("support", 1 << 16)?;
-    let axis = integers("axis", D as u64)?;
-    let evidence = match table.has("evidence") {
-        true => batch.optional_floats("evidence")?,
-        false => vec![None; batch.len()],
-    };
+    let status = batch.texts("status");
+    let support = batch.optional_integers("support", 1 << 16)?;
+    let axis = batch.optional_integers("axis", D as u64)?;
+    let evidence = batch.optional_floats("evidence")?;
     for row in 0..batch.len() {
         let found = position[0][row].is_some();
         let mut about_origin = [f32::NAN; D];

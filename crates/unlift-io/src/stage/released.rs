@@ -3,13 +3,10 @@
 use super::column::{Batch, Type, coordinate_names};
 use super::header::{Kind, insert_fingerprint, new_meta};
 use super::table::Table;
-use super::write::{Written, field, list_field, lists, numbers, write_table};
+use super::write::{Written, write_table};
 use crate::Error;
 use crate::atomic::Access;
-use arrow_array::ArrayRef;
 use arrow_array::types::{Float32Type, UInt8Type};
-use arrow_schema::DataType::{Float32, UInt8};
-use arrow_schema::Field;
 use serde_json::{Value, json};
 use std::ops::Range;
 use std::path::Path;
@@ -28,7 +25,7 @@ const MOST_VALUES: u64 = 1 << 16;
 /// # Errors
 /// When the file cannot be written.
 pub fn write_released<const D: usize>(path: &Path, released: &Released<D>) -> Result<(), Error> {
-    write_table((path, Access::Usual), written(released))
+    write_table((path, Access::Usual), &written(released))
 }
 
 /// What is written of a released map.
@@ -45,52 +42,68 @@ pub(super) fn written<const D: usize>(released: &Released<D>) -> Written<'_> {
     if let Some(bounds) = released.bounds() {
         meta.insert("bounds".into(), corners(&bounds));
     }
-    let mut fields: Vec<Field> = Vec::new();
-    let mut vector = |prefix| {
-        let names = coordinate_names::<D>(prefix);
-        fields.extend(names.map(|name| field(name, Float32)));
-    };
+    if let Obfuscation::Rays(rays) = obfuscation {
+        let centers = rays.centers().iter();
+        let centers: Vec<Vec<f64>> = centers.map(|c| c.map(f64::from).to_vec()).collect();
+        meta.insert("centers".into(), json!(centers));
+        if let Some(edge) = rays.voxel() {
+            meta.insert("voxel".into(), json!(edge));
+        }
+        if let Some(regions) = rays.regions() {
+            let regions: Vec<Value> = regions.iter().map(corners).collect();
+            meta.insert("regions".into(), json!(regions));
+        }
+    }
+    let mut written = Written::new(meta, released.n_records());
     match obfuscation {
-        Obfuscation::Lines(_) => {
-            vector("foot_");
-            vector("direction_");
+        Obfuscation::Lines(lines) => {
+            vectors(&mut written, "foot_", lines.foot());
+            vectors(&mut written, "direction_", lines.direction());
         }
         Obfuscation::Rays(rays) => {
-            let centers = rays.centers().iter();
-            let centers: Vec<Vec<f64>> = centers.map(|c| c.map(f64::from).to_vec()).collect();
-            meta.insert("centers".into(), json!(centers));
-            if let Some(edge) = rays.voxel() {
-                meta.insert("voxel".into(), json!(edge));
-            }
-            if let Some(regions) = rays.regions() {
-                let regions: Vec<Value> = regions.iter().map(corners).collect();
-                meta.insert("regions".into(), json!(regions));
-            }
-            vector("direction_");
-            fields.insert(0, field("center", UInt8));
+            written.numbers::<UInt8Type>("center", |row| rays.center()[row]);
+            vectors(&mut written, "direction_", rays.direction());
         }
-        Obfuscation::AxisPlanes(_) => {
-            fields.extend([field("axis", UInt8), field("offset", Float32)]);
+        Obfuscation::AxisPlanes(planes) => {
+            written.numbers::<UInt8Type>("axis", |row| planes.axis()[row]);
+            written.numbers::<Float32Type>("offset", |row| planes.offset()[row]);
         }
-        Obfuscation::AxisCandidates(_) => vector(""),
+        Obfuscation::AxisCandidates(candidates) => {
+            vectors(&mut written, "", candidates.position());
+        }
     }
     if let Some(descriptors) = released.descriptors() {
-        let of = match descriptors.values() {
-            Values::U8(_) => UInt8,
-            Values::F32(_) => Float32,
-        };
-        fields.extend(descriptor_names(per_record).map(|name| list_field(name, of.clone())));
-    }
-    let columns = Box::new(move |rows: Range<usize>| {
-        let mut columns = record_columns(obfuscation, rows.clone());
-        if let Some(descriptors) = released.descriptors() {
-            let slots =
-                (0..per_record).map(|k| descriptor_column(descriptors, &rows, per_record, k));
-            columns.extend(slots);
+        let dim = descriptors.dim();
+        for (k, name) in descriptor_names(per_record).enumerate() {
+            let slots = move |rows: Range<usize>| rows.map(move |row| row * per_record + k);
+            match descriptors.values() {
+                Values::U8(values) => {
+                    written.lists::<UInt8Type>(name, move |rows| cut(values, dim, slots(rows)));
+                }
+                Values::F32(values) => {
+                    written.lists::<Float32Type>(name, move |rows| cut(values, dim, slots(rows)));
+                }
+            }
         }
-        columns
-    });
-    Written { meta, fields, n_rows: released.n_records(), columns }
+    }
+    written
+}
+
+/// Adds a column per axis.
+fn vectors<'a, const D: usize>(written: &mut Written<'a>, prefix: &str, rows: &'a [[f32; D]]) {
+    for (axis, name) in coordinate_names::<D>(prefix).into_iter().enumerate() {
+        written.numbers::<Float32Type>(name, move |row| rows[row][axis]);
+    }
+}
+
+/// The rows `slots` of a matrix of `dim` columns, end to end, and how long each is.
+fn cut<T: Copy>(
+    values: &[T],
+    dim: usize,
+    slots: impl ExactSizeIterator<Item = usize>,
+) -> (Vec<T>, Vec<usize>) {
+    let lengths = vec![dim; slots.len()];
+    (slots.flat_map(|slot| values[slot * dim..(slot + 1) * dim].iter().copied()).collect(), lengths)
 }
 
 /// Reads a released map of dimension `D` (see [`peek`](super::peek)).
@@ -121,7 +134,7 @@ pub(super) fn released_of<const D: usize>(table: &Table<'_>) -> Result<Released<
     let family = family(table)?;
     table.expect_dimension::<D>()?;
     let (origin, unit) = (meta.origin::<D>()?, table.unit::<D>(None)?);
-    let per_record = meta.count_or_1("slots_per_record")?;
+    let per_record = meta.count("slots_per_record")?.unwrap_or(1);
     if per_record > 2 {
         return Err(meta.wrong("slots_per_record", "1 or 2"));
     }
@@ -178,64 +191,12 @@ fn corners<const D: usize>(bounds: &Bounds<D>) -> Value {
     json!([bounds.low.to_vec(), bounds.high.to_vec()])
 }
 
-fn record_columns<const D: usize>(
-    obfuscation: &Obfuscation<D>,
-    rows: Range<usize>,
-) -> Vec<ArrayRef> {
-    match obfuscation {
-        Obfuscation::Lines(lines) => {
-            let mut columns = vector_columns(&lines.foot()[rows.clone()]);
-            columns.extend(vector_columns(&lines.direction()[rows]));
-            columns
-        }
-        Obfuscation::Rays(rays) => {
-            let center = rays.center()[rows.clone()].iter().copied();
-            let mut columns = vec![numbers::<UInt8Type>(center)];
-            columns.extend(vector_columns(&rays.direction()[rows]));
-            columns
-        }
-        Obfuscation::AxisPlanes(planes) => vec![
-            numbers::<UInt8Type>(planes.axis()[rows.clone()].iter().copied()),
-            numbers::<Float32Type>(planes.offset()[rows].iter().copied()),
-        ],
-        Obfuscation::AxisCandidates(candidates) => vector_columns(&candidates.position()[rows]),
-    }
-}
-
-fn vector_columns<const D: usize>(rows: &[[f32; D]]) -> Vec<ArrayRef> {
-    let column = |axis: usize| numbers::<Float32Type>(rows.iter().map(move |row| row[axis]));
-    (0..D).map(column).collect()
-}
-
 /// `descriptor`, or one column per slot: `descriptor_0`, `descriptor_1`.
 fn descriptor_names(per_record: usize) -> impl Iterator<Item = String> {
     (0..per_record).map(move |slot| match per_record {
         1 => "descriptor".into(),
         _ => format!("descriptor_{slot}"),
     })
-}
-
-/// The descriptors of slot `k` of the records `rows`.
-fn descriptor_column(
-    descriptors: &Descriptors,
-    rows: &Range<usize>,
-    per_record: usize,
-    k: usize,
-) -> ArrayRef {
-    fn cut<'a, T: Copy>(
-        values: &'a [T],
-        dim: usize,
-        slots: impl Iterator<Item = usize> + 'a,
-    ) -> impl Iterator<Item = T> + 'a {
-        slots.flat_map(move |slot| values[slot * dim..(slot + 1) * dim].iter().copied())
-    }
-    let dim = descriptors.dim();
-    let lengths = std::iter::repeat_n(dim, rows.len());
-    let slots = rows.clone().map(move |record| record * per_record + k);
-    match descriptors.values() {
-        Values::U8(values) => lists::<UInt8Type>(cut(values, dim, slots), lengths),
-        Values::F32(values) => lists::<Float32Type>(cut(values, dim, slots), lengths),
-    }
 }
 
 fn read_lines<const D: usize>(table: &Table<'_>) -> Result<Obfuscation<D>, Error> {
@@ -313,71 +274,60 @@ fn read_descriptors(table: &Table<'_>, per_record: usize) -> Result<Option<Descr
         false => Type::Numbers,
     };
     let columns: Vec<(&str, Type)> = names.iter().map(|name| (name.as_str(), class)).collect();
-    let (mut u8s, mut f32s) = (Vec::new(), Vec::new());
-    let (mut dim, mut n_without) = (None, 0);
-    table.read(&columns, |batch| {
-        if names.iter().all(|name| batch.is_null(name)) {
+    let found = if bytes {
+        let rows = descriptor_rows(table, &columns, |batch, name| {
+            let (mut offsets, mut values) = (vec![0], Vec::new());
+            batch.integer_lists(name, 256, MOST_VALUES, &mut offsets, &mut values)?;
+            let lengths = offsets.windows(2).map(|w| (w[1] - w[0]) as usize).collect();
+            Ok((values.into_iter().map(|x| x as u8).collect(), lengths))
+        })?;
+        rows.map(|(values, dim)| (Values::U8(values), dim))
+    } else {
+        let rows = descriptor_rows(table, &columns, |batch, name| {
+            let mut values = Vec::new();
+            let lengths = batch.float_lists(name, MOST_VALUES, &mut values)?;
+            Ok((values, lengths))
+        })?;
+        rows.map(|(values, dim)| (Values::F32(values), dim))
+    };
+    let descriptors = found.map(|(values, dim)| Descriptors::try_new(values, dim));
+    descriptors.transpose().map_err(|source| table.refused(source))
+}
+
+/// The values of all lists in `columns`, row by row, and how long each list is; `None` where there is no list.
+///
+/// `read` gives the values of a column end to end, and the length of each list. All have the length of the first.
+fn descriptor_rows<T: Copy>(
+    table: &Table<'_>,
+    columns: &[(&str, Type)],
+    read: impl Fn(&Batch<'_>, &str) -> Result<(Vec<T>, Vec<usize>), Error>,
+) -> Result<Option<(Vec<T>, usize)>, Error> {
+    let (mut all, mut dim, mut n_without) = (Vec::new(), None, 0);
+    table.read(columns, |batch| {
+        if columns.iter().all(|(name, _)| batch.is_null(name)) {
             n_without += batch.len();
             return Ok(());
         }
-        let mut read = Vec::with_capacity(per_record);
-        for name in &names {
-            read.push(DescriptorRows::read(batch, name, bytes, &mut dim)?);
+        let mut slots = Vec::with_capacity(columns.len());
+        for (name, _) in columns {
+            let (values, lengths) = read(batch, name)?;
+            for (row, &length) in lengths.iter().enumerate() {
+                let dim = *dim.get_or_insert(length);
+                if length == 0 || length != dim {
+                    let expected = format!("{} values as in every row", dim.max(1));
+                    return Err(batch.wrong(name, row, expected, length.to_string()));
+                }
+            }
+            slots.push(values);
         }
         let dim = dim.unwrap_or(0);
         for row in 0..batch.len() {
-            let range = row * dim..(row + 1) * dim;
-            for slot in &read {
-                match slot {
-                    DescriptorRows::U8(values) => {
-                        u8s.extend(values[range.clone()].iter().map(|&x| x as u8));
-                    }
-                    DescriptorRows::F32(values) => f32s.extend_from_slice(&values[range.clone()]),
-                }
+            for values in &slots {
+                all.extend_from_slice(&values[row * dim..(row + 1) * dim]);
             }
         }
         Ok(())
     })?;
-    if table.is_without(&names[0], n_without)? {
-        return Ok(None);
-    }
-    let values = if bytes { Values::U8(u8s) } else { Values::F32(f32s) };
-    let descriptors = Descriptors::try_new(values, dim.unwrap_or(0));
-    descriptors.map(Some).map_err(|source| table.refused(source))
-}
-
-/// One descriptor column of a batch, rows end to end.
-enum DescriptorRows {
-    /// Below 256.
-    U8(Vec<u32>),
-    F32(Vec<f32>),
-}
-
-impl DescriptorRows {
-    /// Reads the column `name`; every row must have `dim` values, set by the first row read.
-    fn read(
-        batch: &Batch<'_>,
-        name: &str,
-        bytes: bool,
-        dim: &mut Option<usize>,
-    ) -> Result<Self, Error> {
-        let (rows, lengths) = if bytes {
-            let (mut offsets, mut values) = (vec![0], Vec::new());
-            batch.integer_lists(name, 256, MOST_VALUES, &mut offsets, &mut values)?;
-            let lengths = offsets.windows(2).map(|w| (w[1] - w[0]) as usize).collect();
-            (Self::U8(values), lengths)
-        } else {
-            let mut values = Vec::new();
-            let lengths: Vec<usize> = batch.float_lists(name, MOST_VALUES, &mut values)?;
-            (Self::F32(values), lengths)
-        };
-        for (row, &length) in lengths.iter().enumerate() {
-            let dim = *dim.get_or_insert(length);
-            if length == 0 || length != dim {
-                let expected = format!("{} values as in every row", dim.max(1));
-                return Err(batch.wrong(name, row, expected, length.to_string()));
-            }
-        }
-        Ok(rows)
-    }
+    let is_without = table.is_without(columns[0].0, n_without)?;
+    Ok((!is_without).then_some((all, dim.unwrap_or(0))))
 }

@@ -3,15 +3,13 @@
 use super::header::{Kind, Meta};
 use super::manifest::{MANIFEST, Manifest, Part};
 use super::pages::Stay;
-use super::parts::{Batches, ENDING, Parts, names_in};
+use super::parts::{ENDING, Parts, names_in};
 use super::table::Table;
-use super::write::{properties, to_io, writer};
+use super::write::{GROUP_ROWS, properties, write_batches};
 use crate::Error;
 use crate::atomic::{self, Access, OutputSet, Rules, write_file};
-use arrow_array::RecordBatch;
-use arrow_schema::{Field, SchemaRef};
+use arrow_schema::Field;
 use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 
 /// A stage file (or folder of parts) on its way to parts of so many rows each, the last one of fewer, and a manifest. Rows keep
@@ -81,13 +79,25 @@ impl<'a> Split<'a> {
         let Self { path, parts, kind, rows, names } = self;
         let meta_text = parts.meta_text().unwrap_or("{}").to_owned();
         let schema = parts.schema().clone();
-        let roots: Vec<usize> = (0..schema.fields().len()).collect();
-        let mut left = Rows { batches: parts.batches(&roots, Stay::Rows)?, rest: None };
+        let fields: Vec<Field> =
+            schema.fields().iter().map(|field| field.as_ref().clone()).collect();
+        let roots: Vec<usize> = (0..fields.len()).collect();
+        let mut batches = parts.batches(&roots, Stay::Rows)?;
         let mut written = Vec::with_capacity(names.len());
         for (at, name) in (0..).zip(names) {
             let staged = outputs.stage(&name, atomic::Kind::Stage(kind))?;
             let n_rows = rows.min(parts.n_rows() - at * rows);
-            write_part((&staged, access), (&schema, &meta_text), &mut left, n_rows)?;
+            let mut left = n_rows;
+            let properties = properties(meta_text.clone(), &fields, GROUP_ROWS);
+            write_batches((&staged, access), schema.clone(), properties, || {
+                let rows = if left > 0 { batches.next()? } else { None };
+                Ok(rows.map(|rows| {
+                    let all = rows.num_rows();
+                    let n = usize::try_from(left).map_or(all, |left| left.min(all));
+                    left -= n as u64;
+                    batches.take(rows, n)
+                }))
+            })?;
             let found = fs::metadata(&staged).map_err(|source| Error::write(&staged, source))?;
             written.push(Part { file: name, n_rows, n_bytes: found.len() });
         }
@@ -118,65 +128,5 @@ fn refuse_others(out: &Path, names: &[String]) -> Result<(), Error> {
             let (expected, found) = ("a folder without other parts", other.display().to_string());
             Err(Error::new(out, "", expected, found))
         }
-    }
-}
-
-/// Rows that were not written yet.
-struct Rows {
-    batches: Batches,
-    rest: Option<RecordBatch>,
-}
-
-impl Rows {
-    /// The next ones, at most `most`; `None` at the end.
-    fn next(&mut self, most: u64) -> Result<Option<RecordBatch>, Error> {
-        let Some(batch) = (match self.rest.take() {
-            Some(rest) => Some(rest),
-            None => self.batches.next()?,
-        }) else {
-            return Ok(None);
-        };
-        let n = batch.num_rows();
-        let taken = usize::try_from(most).map_or(n, |most| most.min(n));
-        if taken < n {
-            self.rest = Some(batch.slice(taken, n - taken));
-        }
-        Ok(Some(batch.slice(0, taken)))
-    }
-}
-
-/// Writes the next `n_rows` rows as a file of its own.
-fn write_part(
-    (path, access): (&PathBuf, Access),
-    (schema, meta_text): (&SchemaRef, &str),
-    rows: &mut Rows,
-    n_rows: u64,
-) -> Result<(), Error> {
-    let fields: Vec<Field> = schema.fields().iter().map(|field| field.as_ref().clone()).collect();
-    let properties = properties(meta_text.to_owned(), &fields, super::write::GROUP_ROWS);
-    // What cannot be read is told as that, not as a file that cannot be written.
-    let mut unread = None;
-    let done = write_file(path, access, |file| {
-        let mut writer = writer(file, schema.clone(), properties).map_err(to_io)?;
-        let mut left = n_rows;
-        while left > 0 {
-            match rows.next(left) {
-                Ok(Some(batch)) => {
-                    left -= batch.num_rows() as u64;
-                    writer.write(&batch).map_err(to_io)?;
-                }
-                Ok(None) => break,
-                Err(error) => {
-                    unread = Some(error);
-                    return Err(io::Error::other("unread"));
-                }
-            }
-        }
-        writer.close().map_err(to_io)?;
-        Ok(())
-    });
-    match unread {
-        Some(error) => Err(error),
-        None => done,
     }
 }

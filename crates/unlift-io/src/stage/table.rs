@@ -144,6 +144,11 @@ impl<'a> Table<'a> {
         named && (self.n_rows() == 0 || !self.is_all_null(name))
     }
 
+    /// Those of `columns` that are there with a value.
+    pub(super) fn present<'c>(&self, columns: &[(&'c str, Type)]) -> Vec<(&'c str, Type)> {
+        columns.iter().copied().filter(|(name, _)| self.has(name)).collect()
+    }
+
     /// Whether the column `name` is there and of type `class`.
     pub(super) fn is(&self, name: &str, class: Type) -> bool {
         let field = self.schema().column_with_name(name);
@@ -154,16 +159,6 @@ impl<'a> Table<'a> {
     pub(super) fn read(
         &self,
         columns: &[(&str, Type)],
-        each: impl FnMut(&Batch<'_>) -> Result<(), Error>,
-    ) -> Result<(), Error> {
-        self.read_to(columns, Stay::Whole, each)
-    }
-
-    /// The same, where what is handed on will `stay` in memory so long.
-    pub(super) fn read_to(
-        &self,
-        columns: &[(&str, Type)],
-        stay: Stay,
         mut each: impl FnMut(&Batch<'_>) -> Result<(), Error>,
     ) -> Result<(), Error> {
         let mut roots = Vec::with_capacity(columns.len());
@@ -175,16 +170,16 @@ impl<'a> Table<'a> {
             Rows::Held(held) => {
                 let mut first_row = 0;
                 for rows in held {
-                    each(&Batch::new(self.path, rows, first_row))?;
+                    each(&Batch::new((self.path, columns), rows, first_row))?;
                     first_row += rows.num_rows() as u64;
                 }
                 return Ok(());
             }
         };
-        let mut batches = parts.batches(&roots, stay)?;
+        let mut batches = parts.batches(&roots, Stay::Whole)?;
         let mut first_row = 0;
         while let Some(batch) = batches.next()? {
-            each(&Batch::new(self.path, &batch, first_row))?;
+            each(&Batch::new((self.path, columns), &batch, first_row))?;
             first_row += batch.num_rows() as u64;
         }
         Ok(())

@@ -1,41 +1,15 @@
-//! Thrift's compact form, in which Parquet writes its footer and the headers of its pages: walked
-//! before the `parquet` crate trusts what is declared there.
+//! Thrift's compact form, in which Parquet writes its footer and the headers of its pages.
+//!
+//! The `parquet` crate descends as deep, and asks for as much memory, as these declare, and hands out no header of a page.
+//! So they are walked here before it reads them.
 
 /// Values in values at most: Parquet itself has seven.
 const DEEPEST: u32 = 32;
 
-/// The type of a value as it is written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
-    /// True or false, which as a field have no bytes.
-    Bool,
-    Byte,
-    /// Integers of 16 to 64 bits, which are written alike.
-    Integer,
-    Double,
-    Bytes,
-    List,
-    Map,
-    Struct,
-    Uuid,
-}
-
-impl Kind {
-    fn of(code: u8) -> Result<Self, Wrong> {
-        Ok(match code {
-            1 | 2 => Self::Bool,
-            3 => Self::Byte,
-            4..=6 => Self::Integer,
-            7 => Self::Double,
-            8 => Self::Bytes,
-            9 | 10 => Self::List,
-            11 => Self::Map,
-            12 => Self::Struct,
-            13 => Self::Uuid,
-            other => return Err(Wrong::Content(format!("a value of type {other}"))),
-        })
-    }
-}
+/// Types of values, as they are written. As a field, a truth value is its type alone.
+const BOOLS: [u8; 2] = [1, 2];
+const LIST: u8 = 9;
+const STRUCT: u8 = 12;
 
 /// Why bytes could not be walked.
 #[derive(Debug)]
@@ -56,21 +30,12 @@ impl Wrong {
     }
 }
 
-/// The field of a struct.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Field {
-    pub(super) id: i64,
-    pub(super) kind: Kind,
-}
+/// A field of a struct: its number and its type.
+pub(super) type Field = (i64, u8);
 
-impl Field {
-    /// Refuses another type than Parquet gives the field: its value would be read as something else.
-    pub(super) fn expect(self, kind: Kind) -> Result<(), Wrong> {
-        if self.kind == kind {
-            return Ok(());
-        }
-        Err(Wrong::Content(format!("field {} of type {:?}", self.id, self.kind)))
-    }
+/// Refuses another type than Parquet gives a field or a list: its values would be read as something else.
+fn expect(is_right: bool, kind: u8) -> Result<(), Wrong> {
+    if is_right { Ok(()) } else { Err(Wrong::Content(format!("a value of type {kind}"))) }
 }
 
 /// Bytes that are walked from the first to the last.
@@ -96,7 +61,7 @@ impl<'a> Walk<'a> {
 
     fn byte(&mut self) -> Result<u8, Wrong> {
         let byte = *self.rest.first().ok_or(Wrong::End)?;
-        self.rest = &self.rest[1..];
+        self.pass(1)?;
         Ok(byte)
     }
 
@@ -112,26 +77,49 @@ impl<'a> Walk<'a> {
         Err(Wrong::Content("a number of more than 64 bits".to_owned()))
     }
 
-    /// An integer.
-    pub(super) fn integer(&mut self) -> Result<i64, Wrong> {
+    fn signed(&mut self) -> Result<i64, Wrong> {
         let value = self.unsigned()?;
         Ok((value >> 1) as i64 ^ -((value & 1) as i64))
     }
 
+    /// The integer in a field of this type.
+    pub(super) fn integer(&mut self, kind: u8) -> Result<i64, Wrong> {
+        expect((4..=6).contains(&kind), kind)?;
+        self.signed()
+    }
+
+    /// Begins the list in a field of this type: at most `most` structs, which are called `what`; how many there are.
+    pub(super) fn structs(&mut self, kind: u8, most: u64, what: &str) -> Result<u64, Wrong> {
+        expect(kind == LIST, kind)?;
+        let (kind, n) = self.list()?;
+        if n > most {
+            return Err(Wrong::Content(format!("{n} {what}, more than {most}")));
+        }
+        expect(n == 0 || kind == STRUCT, kind)?;
+        Ok(n)
+    }
+
     /// Begins a list; the type of its values, and how many there are: no more than bytes are left.
-    pub(super) fn list(&mut self) -> Result<(Kind, u64), Wrong> {
+    fn list(&mut self) -> Result<(u8, u64), Wrong> {
         let head = self.byte()?;
         let n = match head >> 4 {
             15 => self.unsigned()?,
             n => u64::from(n),
         };
-        if n == 0 {
-            return Ok((Kind::Byte, 0));
-        }
         if n > self.rest.len() as u64 {
             return Err(Wrong::End);
         }
-        Ok((Kind::of(head & 15)?, n))
+        Ok((head & 15, n))
+    }
+
+    /// Walks the struct in a field of this type: see [`fields`](Self::fields).
+    pub(super) fn structure(
+        &mut self,
+        kind: u8,
+        each: impl FnMut(&mut Self, Field) -> Result<bool, Wrong>,
+    ) -> Result<(), Wrong> {
+        expect(kind == STRUCT, kind)?;
+        self.fields(each)
     }
 
     /// Walks a struct: `each` walks the value of a field and returns true, or leaves it to be skipped.
@@ -150,56 +138,59 @@ impl<'a> Walk<'a> {
         let mut last = 0;
         loop {
             let head = self.byte()?;
-            if head & 15 == 0 {
+            let kind = head & 15;
+            if kind == 0 {
                 return Ok(());
             }
             let id = match head >> 4 {
-                0 => self.integer()?,
+                0 => self.signed()?,
                 more => last + i64::from(more),
             };
             if i16::try_from(id).is_err() {
                 return Err(Wrong::Content(format!("field {id}")));
             }
             last = id;
-            let field = Field { id, kind: Kind::of(head & 15)? };
-            // Of a truth value as a field, the head is all.
-            if !each(self, field)? && field.kind != Kind::Bool {
-                self.skip(field.kind, depth + 1)?;
+            if !each(self, (id, kind))? && !BOOLS.contains(&kind) {
+                self.skip(kind, depth + 1)?;
             }
         }
     }
 
-    fn skip(&mut self, kind: Kind, depth: u32) -> Result<(), Wrong> {
+    fn skip(&mut self, kind: u8, depth: u32) -> Result<(), Wrong> {
         if depth > DEEPEST {
             return Err(Wrong::Content(format!("values nested more than {DEEPEST} deep")));
         }
         match kind {
-            Kind::Bool | Kind::Byte => self.pass(1),
-            Kind::Integer => self.unsigned().map(drop),
-            Kind::Double => self.pass(8),
-            Kind::Uuid => self.pass(16),
-            Kind::Bytes => {
+            // A truth value in a list, or a byte.
+            1..=3 => self.pass(1),
+            // Integers of 16 to 64 bits, which are written alike.
+            4..=6 => self.unsigned().map(drop),
+            // A double.
+            7 => self.pass(8),
+            // Text, or other bytes.
+            8 => {
                 let n = self.unsigned()?;
                 self.pass(n)
             }
-            Kind::List => {
+            // A list, or a set.
+            LIST | 10 => {
                 let (kind, n) = self.list()?;
                 (0..n).try_for_each(|_| self.skip(kind, depth + 1))
             }
-            Kind::Map => {
+            // A map.
+            11 => {
                 let n = self.unsigned()?;
-                if n == 0 {
-                    return Ok(());
-                }
-                let kinds = self.byte()?;
-                let (key, value) = (Kind::of(kinds >> 4)?, Kind::of(kinds & 15)?);
+                let kinds = if n > 0 { self.byte()? } else { 0 };
                 for _ in 0..n {
-                    self.skip(key, depth + 1)?;
-                    self.skip(value, depth + 1)?;
+                    self.skip(kinds >> 4, depth + 1)?;
+                    self.skip(kinds & 15, depth + 1)?;
                 }
                 Ok(())
             }
-            Kind::Struct => self.fields_within(depth, &mut |_, _| Ok(false)),
+            STRUCT => self.fields_within(depth, &mut |_, _| Ok(false)),
+            // A UUID.
+            13 => self.pass(16),
+            other => expect(false, other),
         }
     }
 }
@@ -214,17 +205,16 @@ mod tests {
         let bytes = [0x16, 5, 0x11, 0x18, 2, b'a', b'b', 0x29, 0x23, 8, 9, 0];
         let mut seen = Vec::new();
         let mut walk = Walk::new(&bytes);
-        let mut each = |walk: &mut Walk<'_>, field: Field| {
-            seen.push((field.id, field.kind));
-            if field.id == 1 {
-                assert_eq!(walk.integer()?, -3);
+        walk.fields(|walk, (id, kind)| {
+            seen.push((id, kind));
+            if id == 1 {
+                assert_eq!(walk.integer(kind)?, -3);
             }
-            Ok(field.id == 1)
-        };
-        walk.fields(&mut each).unwrap();
+            Ok(id == 1)
+        })
+        .unwrap();
         assert_eq!(walk.remaining(), 0);
-        let kinds = [(1, Kind::Integer), (2, Kind::Bool), (3, Kind::Bytes), (5, Kind::List)];
-        assert_eq!(seen, kinds);
+        assert_eq!(seen, [(1, 6), (2, 1), (3, 8), (5, LIST)]);
 
         let skip = |bytes: &[u8]| Walk::new(bytes).fields(|_, _| Ok(false));
         for end in 0..bytes.len() {
@@ -234,10 +224,7 @@ mod tests {
         let Err(Wrong::Content(found)) = skip(&deep) else { panic!("5000 structs in structs") };
         assert_eq!(found, "values nested more than 32 deep");
         // Lists of lists as well, and counts that nothing follows.
-        assert!(matches!(
-            skip(&[[0x19; 1], [0x19; 1]].concat().repeat(90)),
-            Err(Wrong::Content(_))
-        ));
+        assert!(matches!(skip(&[0x19; 180]), Err(Wrong::Content(_))));
         assert!(matches!(skip(&[0x19, 0xf8, 0xff, 0xff, 0xff, 0xff, 7]), Err(Wrong::End)));
         assert!(matches!(skip(&[0x18, 0xff, 0xff, 0xff, 0xff, 7]), Err(Wrong::End)));
     }

@@ -4,15 +4,14 @@ use super::column::{Batch, Type, coordinate_names};
 use super::header::{Kind, insert_fingerprint, new_meta};
 use super::order::permutation;
 use super::table::Table;
-use super::write::{Written, field, numbers, optional_numbers, write_table};
+use super::write::{Written, write_table};
 use crate::Error;
 use crate::atomic::Access;
+use arrow_array::StringArray;
 use arrow_array::types::{Float64Type, UInt8Type, UInt32Type};
-use arrow_array::{ArrayRef, StringArray};
-use arrow_schema::DataType::{Float64, UInt8, UInt32, Utf8};
+use arrow_schema::DataType::Utf8;
 use arrow_schema::Field;
 use serde_json::json;
-use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 use unlift::truth::{DropReason, Dropped, Original, Secret};
@@ -28,7 +27,7 @@ pub fn write_truth<const D: usize>(
     original: &Original<D>,
     secret: &Secret,
 ) -> Result<(), Error> {
-    write_table((path, Access::Private), written(path, original, secret)?)
+    write_table((path, Access::Private), &written(path, original, secret)?)
 }
 
 /// What is written of a truth.
@@ -50,38 +49,30 @@ pub(super) fn written<'a, const D: usize>(
     meta.insert("unit".into(), json!(points.unit().name()));
     meta.insert("slots_per_record".into(), json!(secret.slots_per_record()));
     insert_fingerprint(&mut meta, secret.map());
-    let mut fields = vec![Field::new("slot", UInt32, true), field("original", UInt32)];
-    fields.extend(coordinate_names::<D>("").map(|name| field(name, Float64)));
-    if secret.swapped_axis().is_some() {
-        fields.push(Field::new("swapped_axis", UInt8, true));
-    }
-    fields.push(Field::new("descriptor_row", UInt32, true));
-    fields.push(Field::new("dropped", Utf8, true));
     let n_slots = secret.n_slots();
     let dropped = secret.dropped().iter().map(|d| d.original);
-    let ids: Vec<OriginalId> = secret.hidden().iter().copied().chain(dropped).collect();
-    let columns = Box::new(move |rows: Range<usize>| {
-        let slot = |row: usize| (row < n_slots).then_some(row);
-        let mut columns = vec![
-            optional_numbers::<UInt32Type>(rows.clone().map(|row| slot(row).map(|s| s as u32))),
-            numbers::<UInt32Type>(ids[rows.clone()].iter().map(|id| id.0)),
-        ];
-        columns.extend((0..D).map(|axis| {
-            let ids = ids[rows.clone()].iter();
-            numbers::<Float64Type>(ids.map(|id| points.positions()[id.index()][axis]))
-        }));
-        if let Some(axes) = secret.swapped_axis() {
-            let axes = rows.clone().map(|row| slot(row).map(|s| axes[s]));
-            columns.push(optional_numbers::<UInt8Type>(axes));
-        }
-        let descriptor_rows = rows.clone().map(|row| slot(row).map(|s| secret.descriptor_row()[s]));
-        columns.push(optional_numbers::<UInt32Type>(descriptor_rows));
-        let reasons =
-            rows.map(|row| Some(secret.dropped()[row.checked_sub(n_slots)?].reason.name()));
-        columns.push(Arc::new(reasons.collect::<StringArray>()) as ArrayRef);
-        columns
+    let ids: Arc<[OriginalId]> = secret.hidden().iter().copied().chain(dropped).collect();
+    let slot = move |row: usize| (row < n_slots).then_some(row);
+    let mut written = Written::new(meta, points.len());
+    written.optional_numbers::<UInt32Type>("slot", move |row| slot(row).map(|slot| slot as u32));
+    let of_row = ids.clone();
+    written.numbers::<UInt32Type>("original", move |row| of_row[row].0);
+    for (axis, name) in coordinate_names::<D>("").into_iter().enumerate() {
+        let of_row = ids.clone();
+        let coordinate = move |row: usize| points.positions()[of_row[row].index()][axis];
+        written.numbers::<Float64Type>(name, coordinate);
+    }
+    if let Some(axes) = secret.swapped_axis() {
+        let axis = move |row| slot(row).map(|slot| axes[slot]);
+        written.optional_numbers::<UInt8Type>("swapped_axis", axis);
+    }
+    let descriptor_row = move |row| slot(row).map(|slot| secret.descriptor_row()[slot]);
+    written.optional_numbers::<UInt32Type>("descriptor_row", descriptor_row);
+    written.column(Field::new("dropped", Utf8, true), move |rows| {
+        let reason = |row: usize| Some(secret.dropped()[row.checked_sub(n_slots)?].reason.name());
+        Arc::new(rows.map(reason).collect::<StringArray>())
     });
-    Ok(Written { meta, fields, n_rows: points.len(), columns })
+    Ok(written)
 }
 
 /// Reads the truth of an obfuscation of dimension `D` (see [`peek`](super::peek)): the owner's side
@@ -124,8 +115,7 @@ pub(super) fn truth_of<const D: usize>(table: &Table<'_>) -> Result<(Original<D>
         ("dropped", Type::Text),
         ("swapped_axis", Type::Integer),
     ];
-    let mut columns: Vec<(&str, Type)> =
-        optional.into_iter().filter(|(name, _)| table.has(name)).collect();
+    let mut columns = table.present(&optional);
     columns.extend(coordinates.iter().map(|name| (name.as_str(), Type::Float)));
     let declared = table.meta().count("slots_per_record")?;
     let with_axis = table.has("swapped_axis");
@@ -167,22 +157,15 @@ fn read_rows<const D: usize>(
     to: &mut Rows<D>,
 ) -> Result<(), Error> {
     let n_rows = table.n_rows();
-    let integers = |name: &str, below: u64| match table.has(name) {
-        true => batch.optional_integers(name, below),
-        false => Ok(vec![None; batch.len()]),
-    };
     let first = to.originals.len() as u32;
     let originals = match table.has("original") {
         true => batch.integers("original", n_rows)?,
         false => (first..first + batch.len() as u32).collect(),
     };
-    let slot = integers("slot", n_rows)?;
-    let descriptor_row = integers("descriptor_row", n_rows)?;
-    let axis = integers("swapped_axis", D as u64)?;
-    let reasons = match table.has("dropped") {
-        true => batch.texts("dropped"),
-        false => vec![None; batch.len()],
-    };
+    let slot = batch.optional_integers("slot", n_rows)?;
+    let descriptor_row = batch.optional_integers("descriptor_row", n_rows)?;
+    let axis = batch.optional_integers("swapped_axis", D as u64)?;
+    let reasons = batch.texts("dropped");
     for (row, &id) in originals.iter().enumerate() {
         let original = OriginalId(id);
         // Without slots, points that were not dropped are in the order of slots.

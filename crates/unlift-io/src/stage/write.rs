@@ -4,7 +4,7 @@ use super::header::to_text;
 use crate::Error;
 use crate::atomic::{self, Access};
 use arrow_array::types::ArrowPrimitiveType;
-use arrow_array::{Array, ArrayRef, ListArray, PrimitiveArray, RecordBatch};
+use arrow_array::{ArrayRef, ListArray, PrimitiveArray, RecordBatch};
 use arrow_buffer::OffsetBuffer;
 use arrow_schema::{DataType, Field, Schema, SchemaRef};
 use parquet::arrow::ArrowWriter;
@@ -33,34 +33,114 @@ const GROUP_BYTES: usize = 256 << 20;
 pub(super) struct Written<'a> {
     /// To be completed by nobody.
     pub(super) meta: Map<String, Value>,
-    /// The columns.
-    pub(super) fields: Vec<Field>,
     /// Number of rows.
     pub(super) n_rows: usize,
-    /// The columns of a range of rows, in the order of `fields`.
-    pub(super) columns: Box<dyn Fn(Range<usize>) -> Vec<ArrayRef> + 'a>,
+    fields: Vec<Field>,
+    columns: Vec<Column<'a>>,
+}
+
+/// Some rows of a column.
+type Column<'a> = Box<dyn Fn(Range<usize>) -> ArrayRef + 'a>;
+
+impl<'a> Written<'a> {
+    /// No column yet.
+    pub(super) fn new(meta: Map<String, Value>, n_rows: usize) -> Self {
+        Self { meta, n_rows, fields: Vec::new(), columns: Vec::new() }
+    }
+
+    /// Adds a column.
+    pub(super) fn column(&mut self, field: Field, rows: impl Fn(Range<usize>) -> ArrayRef + 'a) {
+        self.fields.push(field);
+        self.columns.push(Box::new(rows));
+    }
+
+    /// Adds a column of numbers without nulls, by row.
+    pub(super) fn numbers<T: ArrowPrimitiveType>(
+        &mut self,
+        name: impl Into<String>,
+        number: impl Fn(usize) -> T::Native + 'a,
+    ) {
+        self.column(Field::new(name, T::DATA_TYPE, false), move |rows| {
+            Arc::new(PrimitiveArray::<T>::from_iter_values(rows.map(&number)))
+        });
+    }
+
+    /// Adds a column of numbers and nulls, by row.
+    pub(super) fn optional_numbers<T: ArrowPrimitiveType>(
+        &mut self,
+        name: impl Into<String>,
+        number: impl Fn(usize) -> Option<T::Native> + 'a,
+    ) {
+        self.column(Field::new(name, T::DATA_TYPE, true), move |rows| {
+            Arc::new(rows.map(&number).collect::<PrimitiveArray<T>>())
+        });
+    }
+
+    /// Adds a column of lists without nulls.
+    ///
+    /// `lists` gives the values of some rows, end to end, and the length of each list.
+    pub(super) fn lists<T: ArrowPrimitiveType>(
+        &mut self,
+        name: impl Into<String>,
+        lists: impl Fn(Range<usize>) -> (Vec<T::Native>, Vec<usize>) + 'a,
+    ) {
+        let of = Field::new("element", T::DATA_TYPE, false);
+        self.column(Field::new_list(name, of.clone(), false), move |rows| {
+            let (values, lengths) = lists(rows);
+            let values = Arc::new(PrimitiveArray::<T>::from_iter_values(values));
+            let offsets = OffsetBuffer::from_lengths(lengths);
+            Arc::new(ListArray::new(Arc::new(of.clone()), offsets, values, None))
+        });
+    }
+
+    /// The columns.
+    pub(super) fn fields(&self) -> &[Field] {
+        &self.fields
+    }
+
+    /// The columns of some rows, in the order of [`fields`](Self::fields).
+    pub(super) fn rows(&self, rows: &Range<usize>) -> Vec<ArrayRef> {
+        self.columns.iter().map(|column| column(rows.clone())).collect()
+    }
 }
 
 /// Writes one value for those whom `access` names.
-pub(super) fn write_table(
-    (path, access): (&Path, Access),
-    written: Written<'_>,
-) -> Result<(), Error> {
-    let Written { meta, fields, n_rows, columns } = written;
-    let properties = properties(to_text(meta), &fields, GROUP_ROWS);
-    let schema = Arc::new(Schema::new(fields));
-    atomic::write_file(path, access, |file| {
-        let mut writer = writer(file, schema.clone(), properties).map_err(to_io)?;
-        let mut start = 0;
-        while start < n_rows {
-            let end = n_rows.min(start + CHUNK_ROWS);
-            let batch = RecordBatch::try_new(schema.clone(), columns(start..end));
-            writer.write(&batch.map_err(io::Error::other)?).map_err(to_io)?;
-            start = end;
-        }
-        writer.close().map_err(to_io)?;
-        Ok(())
+pub(super) fn write_table(to: (&Path, Access), written: &Written<'_>) -> Result<(), Error> {
+    let properties = properties(to_text(written.meta.clone()), &written.fields, GROUP_ROWS);
+    let schema = Arc::new(Schema::new(written.fields.clone()));
+    let mut starts = (0..written.n_rows).step_by(CHUNK_ROWS);
+    write_batches(to, schema.clone(), properties, || {
+        let Some(start) = starts.next() else { return Ok(None) };
+        let rows = start..written.n_rows.min(start + CHUNK_ROWS);
+        let batch = RecordBatch::try_new(schema.clone(), written.rows(&rows));
+        batch.map(Some).map_err(|error| Error::write(to.0, io::Error::other(error)))
     })
+}
+
+/// Writes the rows that `next` gives, until it gives none.
+pub(super) fn write_batches(
+    (path, access): (&Path, Access),
+    schema: SchemaRef,
+    properties: WriterProperties,
+    mut next: impl FnMut() -> Result<Option<RecordBatch>, Error>,
+) -> Result<(), Error> {
+    // What cannot be read is told as that, not as a file that cannot be written.
+    let mut unread = None;
+    let done = atomic::write_file(path, access, |file| {
+        let mut writer = writer(file, schema, properties).map_err(to_io)?;
+        loop {
+            match next() {
+                Ok(Some(batch)) => writer.write(&batch).map_err(to_io)?,
+                Ok(None) => break,
+                Err(error) => {
+                    unread = Some(error);
+                    return Err(io::Error::other("unread"));
+                }
+            }
+        }
+        writer.close().map(drop).map_err(to_io)
+    });
+    unread.map_or(done, Err)
 }
 
 /// Starts a Parquet file.
@@ -74,41 +154,6 @@ pub(super) fn writer<W: io::Write + Send>(
         .with_schema_root("schema".into())
         .with_skip_arrow_metadata(true);
     ArrowWriter::try_new_with_options(file, schema, options)
-}
-
-/// A column of numbers or text without nulls.
-pub(super) fn field(name: impl Into<String>, of: DataType) -> Field {
-    Field::new(name, of, false)
-}
-
-/// A column of lists without nulls.
-pub(super) fn list_field(name: impl Into<String>, of: DataType) -> Field {
-    Field::new_list(name, Field::new("element", of, false), false)
-}
-
-/// A column of numbers.
-pub(super) fn numbers<T: ArrowPrimitiveType>(
-    values: impl IntoIterator<Item = T::Native>,
-) -> ArrayRef {
-    Arc::new(PrimitiveArray::<T>::from_iter_values(values))
-}
-
-/// A column of numbers and nulls.
-pub(super) fn optional_numbers<T: ArrowPrimitiveType>(
-    values: impl IntoIterator<Item = Option<T::Native>>,
-) -> ArrayRef {
-    Arc::new(values.into_iter().collect::<PrimitiveArray<T>>())
-}
-
-/// A column of lists, `values` cut at `lengths`.
-pub(super) fn lists<T: ArrowPrimitiveType>(
-    values: impl IntoIterator<Item = T::Native>,
-    lengths: impl IntoIterator<Item = usize>,
-) -> ArrayRef {
-    let values = PrimitiveArray::<T>::from_iter_values(values);
-    let of = Arc::new(Field::new("element", values.data_type().clone(), false));
-    let offsets = OffsetBuffer::from_lengths(lengths);
-    Arc::new(ListArray::new(of, offsets, Arc::new(values), None))
 }
 
 /// How a file with this metadata and these columns is written, in row groups of at most `group_rows` rows.

@@ -335,23 +335,22 @@ fn arrays_may_have_more_columns_or_names() {
     );
 }
 
-#[test]
-fn the_points_of_an_archive_are_found() {
+/// NumPy's archive of these arrays, every second one compressed.
+fn archive(arrays: &[(&str, Vec<u8>)]) -> Vec<u8> {
     use std::io::Write;
     use zip::write::{SimpleFileOptions, ZipWriter};
-    let archive = |arrays: &[(&str, Vec<u8>)]| {
-        let mut out = ZipWriter::new(std::io::Cursor::new(Vec::new()));
-        for (at, (name, bytes)) in arrays.iter().enumerate() {
-            let method = [zip::CompressionMethod::Stored, zip::CompressionMethod::Deflated][at % 2];
-            out.start_file(
-                format!("{name}.npy"),
-                SimpleFileOptions::default().compression_method(method),
-            )
-            .unwrap();
-            out.write_all(bytes).unwrap();
-        }
-        out.finish().unwrap().into_inner()
-    };
+    let mut out = ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    for (at, (name, bytes)) in arrays.iter().enumerate() {
+        let method = [zip::CompressionMethod::Stored, zip::CompressionMethod::Deflated][at % 2];
+        let options = SimpleFileOptions::default().compression_method(method);
+        out.start_file(format!("{name}.npy"), options).unwrap();
+        out.write_all(bytes).unwrap();
+    }
+    out.finish().unwrap().into_inner()
+}
+
+#[test]
+fn the_points_of_an_archive_are_found() {
     let points = npy("'<f8'", "(3, 3)", &bytes(POINTS.concat(), f64::to_le_bytes));
     let other = npy("'<f8'", "(2, 128)", &[0; 2048]);
     assert_eq!(
@@ -421,27 +420,15 @@ fn models_of_undistorted_images_are_found_where_there_is_no_other() {
 /// OpenSfM's features: place, size and angle of keypoints beside their descriptors.
 #[test]
 fn an_archive_of_features_is_no_map() {
-    use std::io::Write;
-    use zip::write::{SimpleFileOptions, ZipWriter};
-    let archive = |arrays: &[(&str, &str)]| {
-        let mut out = ZipWriter::new(std::io::Cursor::new(Vec::new()));
-        for (name, shape) in arrays {
-            out.start_file(format!("{name}.npy"), SimpleFileOptions::default()).unwrap();
-            let n: usize = shape
-                .trim_matches(['(', ')'])
-                .split(", ")
-                .map(|n| n.parse::<usize>().unwrap())
-                .product();
-            out.write_all(&npy("'<f4'", shape, &vec![0; 4 * n])).unwrap();
-        }
-        out.finish().unwrap().into_inner()
+    let array = |shape: [usize; 2]| {
+        npy("'<f4'", &format!("({}, {})", shape[0], shape[1]), &vec![0; 4 * shape[0] * shape[1]])
     };
     for arrays in [
-        &[("points", "(30, 4)"), ("descriptors", "(30, 128)")][..],
-        &[("points", "(30, 3)"), ("OPENSFM_FEATURES_VERSION", "(1, 1)")],
-        &[("keypoints", "(30, 3)"), ("scores", "(30, 1)")],
+        [("points", [30, 4]), ("descriptors", [30, 128])],
+        [("points", [30, 3]), ("OPENSFM_FEATURES_VERSION", [1, 1])],
+        [("keypoints", [30, 3]), ("scores", [30, 1])],
     ] {
-        let line = refused("a.npz", archive(arrays));
+        let line = refused("a.npz", archive(&arrays.map(|(name, shape)| (name, array(shape)))));
         assert_eq!(line, "a.npz: expected points of a map, found features of an image");
     }
 }

@@ -36,12 +36,7 @@ fn a_project_folder_leads_to_its_model_and_database() {
 fn what_lies_beside_the_model_is_noted_or_ignored() {
     let dir = tempfile::tempdir().unwrap();
     for (from, to) in [("rig-bin", "sparse/0"), ("rig-txt", "sparse/0"), ("rig-bin", "sparse/1")] {
-        let to = dir.path().join(to);
-        fs::create_dir_all(&to).unwrap();
-        for file in fs::read_dir(data(from)).unwrap() {
-            let file = file.unwrap();
-            fs::copy(file.path(), to.join(file.file_name())).unwrap();
-        }
+        copy(from, dir.path(), to);
     }
     fs::write(dir.path().join("sparse/0/rigs.bin"), b"\x01").unwrap();
     let input = read::open(dir.path()).unwrap();

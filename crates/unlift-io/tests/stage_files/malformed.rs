@@ -1,9 +1,9 @@
 //! Every way a released map can differ from docs/formats.md, and the line that says so.
 
 use crate::tables::{
-    Columns, check, float_lists, floats, ints, lists, maybe, message, texts, with, write,
+    Columns, check, check_columns, float_lists, floats, ints, lists, maybe, message, texts, with,
+    write,
 };
-use arrow_array::ArrayRef;
 use unlift_io::stage;
 
 const LINES: &str = r#"{"kind":"released","version":1,"family":"lines","dimension":2,"unit":"m"}"#;
@@ -118,83 +118,75 @@ fn a_changed_map_is_told() {
 }
 
 #[test]
-fn lines_columns() {
-    let foot = |column| released(LINES, with(lines(), "foot_x", column));
-    let direction = |column| released(LINES, with(lines(), "direction_y", Some(column)));
-    check(vec![
-        (foot(None), "column foot_x: expected floats, found no such column"),
+fn columns() {
+    let without = released(LINES, with(lines(), "foot_x", None));
+    assert_eq!(without, "column foot_x: expected floats, found no such column");
+    let text = texts([Some("1"), None, None]);
+    let wide = ints([1, (1 << 53) + 1, 3]);
+    let rows = [
+        ("foot_x", text, ": expected floats, found type Utf8"),
+        ("foot_x", wide, ", row 1: expected a number that a double holds, found 9007199254740993"),
+        ("foot_x", floats([0.0, f64::NAN, 0.0]), ", row 1: expected a finite number, found NaN"),
         (
-            foot(Some(texts([Some("1"), None, None]))),
-            "column foot_x: expected floats, found type Utf8",
+            "foot_x",
+            maybe([Some(0.0), Some(1.0), None]),
+            ", row 2: expected a finite number, found null",
         ),
         (
-            foot(Some(ints([1, (1 << 53) + 1, 3]))),
-            "column foot_x, row 1: expected a number that a double holds, found 9007199254740993",
-        ),
-        (
-            foot(Some(texts([Some("1"), Some("2"), Some("3")]))),
-            "column foot_x: expected floats, found type Utf8",
-        ),
-        (
-            foot(Some(floats([0.0, f64::NAN, 0.0]))),
-            "column foot_x, row 1: expected a finite number, found NaN",
-        ),
-        (
-            foot(Some(maybe([Some(0.0), Some(1.0), None]))),
-            "column foot_x, row 2: expected a finite number, found null",
-        ),
-        (
-            foot(Some(floats([0.0, 0.0, 1e39]))),
+            "foot_x",
+            floats([0.0, 0.0, 1e39]),
             "foot of record 2: expected coordinates in the range of f32, found [1e39, 0.0]",
         ),
         (
-            direction(floats([0.0, 0.8, 0.0])),
+            "direction_y",
+            floats([0.0, 0.8, 0.0]),
             "direction of record 2: expected a finite vector with length, found [0.0, 0.0]",
         ),
-    ]);
+        (
+            "descriptor",
+            lists(&[&[1, 2], &[3, 4], &[5]]),
+            ", row 2: expected 2 values as in every row, found 1",
+        ),
+        ("descriptor", lists(&[&[][..]; 3]), ", row 0: expected 1 values as in every row, found 0"),
+        (
+            "descriptor",
+            lists(&[&[1, 2], &[3, 256], &[5, 6]]),
+            ", row 1: expected a whole number below 256, found 256",
+        ),
+        (
+            "descriptor",
+            float_lists(&[&[1.0], &[f64::INFINITY], &[2.0]]),
+            ", row 1: expected finite numbers in the range of f32, found inf",
+        ),
+        (
+            "descriptor",
+            lists(&[&[0][..]; 3]),
+            "descriptors: expected real descriptors, found only zeros (dummies)",
+        ),
+        ("descriptor", ints([1, 2, 3]), ": expected lists of integers or floats, found type Int64"),
+    ];
+    check_columns(lines(), |columns| released(LINES, columns), rows);
 }
 
 #[test]
-fn descriptors() {
-    let one = |column: ArrayRef| released(LINES, with(lines(), "descriptor", Some(column)));
+fn descriptors_of_two_slots() {
     let paired = LINES.replace("\"m\"", "\"m\",\"slots_per_record\":2");
     let first = || with(lines(), "descriptor_0", Some(lists(&[&[1], &[2], &[3]])));
-    let two = |second| released(&paired, with(first(), "descriptor_1", second));
-    check(vec![
+    let missing = "column descriptor_1: expected lists of integers, found no such column";
+    assert_eq!(released(&paired, first()), missing);
+    let rows = [
         (
-            one(lists(&[&[1, 2], &[3, 4], &[5]])),
-            "column descriptor, row 2: expected 2 values as in every row, found 1",
+            "descriptor_1",
+            float_lists(&[&[1.0], &[2.0], &[3.0]]),
+            ": expected lists of integers, found type List(Float64)",
         ),
         (
-            one(lists(&[&[], &[], &[]])),
-            "column descriptor, row 0: expected 1 values as in every row, found 0",
+            "descriptor_1",
+            lists(&[&[1], &[2], &[3, 4]]),
+            ", row 2: expected 1 values as in every row, found 2",
         ),
-        (
-            one(lists(&[&[1, 2], &[3, 256], &[5, 6]])),
-            "column descriptor, row 1: expected a whole number below 256, found 256",
-        ),
-        (
-            one(float_lists(&[&[1.0], &[f64::INFINITY], &[2.0]])),
-            "column descriptor, row 1: expected finite numbers in the range of f32, found inf",
-        ),
-        (
-            one(lists(&[&[0], &[0], &[0]])),
-            "descriptors: expected real descriptors, found only zeros (dummies)",
-        ),
-        (
-            one(ints([1, 2, 3])),
-            "column descriptor: expected lists of integers or floats, found type Int64",
-        ),
-        (two(None), "column descriptor_1: expected lists of integers, found no such column"),
-        (
-            two(Some(float_lists(&[&[1.0], &[2.0], &[3.0]]))),
-            "column descriptor_1: expected lists of integers, found type List(Float64)",
-        ),
-        (
-            two(Some(lists(&[&[1], &[2], &[3, 4]]))),
-            "column descriptor_1, row 2: expected 1 values as in every row, found 2",
-        ),
-    ]);
+    ];
+    check_columns(first(), |columns| released(&paired, columns), rows);
 }
 
 #[test]

@@ -82,3 +82,18 @@ pub fn check(table: Vec<(String, &str)>) {
         .collect();
     assert!(wrong.is_empty(), "found (and expected):\n{}", wrong.join("\n"));
 }
+
+/// The tables that `read` refuses when a column is replaced by another of its name: the column and the line. A line that
+/// begins with a comma or a colon stands behind the name of the column.
+pub fn check_columns<const N: usize>(
+    good: Columns,
+    read: impl Fn(Columns) -> String,
+    rows: [(&'static str, ArrayRef, &str); N],
+) {
+    let lines = rows.map(|(name, column, line)| {
+        let is_of_column = line.starts_with([',', ':']);
+        let line = if is_of_column { format!("column {name}{line}") } else { line.to_owned() };
+        (read(with(good.clone(), name, Some(column))), line)
+    });
+    check(lines.iter().map(|(found, line)| (found.clone(), line.as_str())).collect());
+}

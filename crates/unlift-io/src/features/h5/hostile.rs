@@ -118,6 +118,24 @@ fn an_image_with_two_names_is_two_images() {
     assert_eq!(store.array(0, "keypoints").unwrap(), store.array(1, "keypoints").unwrap());
 }
 
+/// As h5py writes a soft link if nothing else is asked of it.
+#[test]
+fn a_link_in_a_group_of_the_old_form_is_told() {
+    let mut file = Pieces::new();
+    let image = file.image();
+    let start = file.0.len();
+    let root = file.group(&[("a.jpg", image), ("b.jpg", UNDEFINED)]);
+    // The second entry of the leaf leads to no object but to the text in the heap at byte 8, which is "a.jpg".
+    let leaf = file.0[start..].windows(4).position(|word| word == b"SNOD").unwrap();
+    let entry = start + leaf + 8 + 40;
+    file.0[entry + 16] = 2;
+    file.0[entry + 24] = 8;
+    let line = opened(&file.finish(root)).err().unwrap();
+    let expected = "f: image \"b.jpg\": expected features of an image, found a link to \"a.jpg\" in the old form (h5py \
+                    makes one that is read with libver=\"latest\")";
+    assert_eq!(line, expected);
+}
+
 #[test]
 fn a_list_whose_nodes_are_the_same_again_and_again_is_refused() {
     let spent = "f: expected at most 256 MiB to read in a file of";

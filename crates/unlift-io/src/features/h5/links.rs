@@ -1,18 +1,21 @@
-//! Links of a group that are paths: the library passes over them.
+//! Links of a group that are paths: the library passes over them, or fails.
 //!
-//! Source: HDF5 File Format Specification 3.0, IV.A (object headers) and IV.A.2.g (the link message). Links of large groups in
-//! a heap of their own are not looked for.
+//! Source: HDF5 File Format Specification 3.0, IV.A (object headers), IV.A.2.g (the link message), and III.A to III.D (groups of
+//! the old form). Links of large groups in a heap of their own are not looked for.
 
 /// Where a link leads.
 #[derive(Debug, PartialEq)]
 pub(super) enum Target {
     /// To a path in the file.
     Path(String),
+    /// The same in a group of the old form, whose names the library cannot list then.
+    Old(String),
     /// To another file.
     Elsewhere,
 }
 
 const LINK: u16 = 0x06;
+const SYMBOL_TABLE: u16 = 0x11;
 const CONTINUATION: u16 = 0x10;
 /// Bytes of headers that are looked through.
 const MOST: u64 = 1 << 20;
@@ -49,6 +52,9 @@ pub(super) fn links(
             rest = next;
             match kind {
                 LINK => found.extend(link(body)),
+                SYMBOL_TABLE if body.len() >= 16 => {
+                    found.extend(old_links(&read, number(&body[..8]), number(&body[8..16]))?);
+                }
                 CONTINUATION if body.len() >= 16 => {
                     let (at, size) = (number(&body[..8]), number(&body[8..16]));
                     // Between a signature and a checksum.
@@ -83,6 +89,43 @@ fn link(body: &[u8]) -> Option<(String, Target)> {
         64 => Some((name, Target::Elsewhere)),
         _ => None,
     }
+}
+
+/// The links in a group of the old form, whose names are in the tree and heap at these addresses.
+fn old_links(
+    read: &impl Fn(u64, u64) -> Option<Vec<u8>>,
+    tree: u64,
+    heap: u64,
+) -> Option<Vec<(String, Target)>> {
+    let names = number(&read(heap.checked_add(24)?, 8)?);
+    let text = |at: u64| {
+        let (mut at, mut text) = (names.checked_add(at)?, Vec::new());
+        // Names begin and end at multiples of eight bytes.
+        while !text.contains(&0) && text.len() as u64 <= MOST {
+            text.extend(read(at, 8)?);
+            at = at.checked_add(8)?;
+        }
+        let name = text.split(|&byte| byte == 0).next()?;
+        Some(String::from_utf8_lossy(name).into_owned())
+    };
+    let (mut waiting, mut found) = (vec![tree], Vec::new());
+    while let Some(at) = waiting.pop() {
+        let head = read(at, 8)?;
+        let n = number(&head[6..]);
+        for child in 0..n {
+            if head.starts_with(b"TREE") {
+                waiting.push(number(&read(at.checked_add(32 + 16 * child)?, 8)?));
+            } else if head.starts_with(b"SNOD") {
+                let entry = read(at.checked_add(8 + 40 * child)?, 40)?;
+                // An entry of this kind has no object: its target is a text in the heap.
+                if number(&entry[16..20]) == 2 {
+                    let target = text(number(&entry[24..28]))?;
+                    found.push((text(number(&entry[..8]))?, Target::Old(target)));
+                }
+            }
+        }
+    }
+    Some(found)
 }
 
 /// Up to eight bytes, the least significant one first.

@@ -70,6 +70,16 @@ impl Numbers {
     }
 }
 
+/// The transpose of a matrix of `rows` rows.
+pub(crate) fn transposed<T: Copy>(values: &[T], rows: usize) -> Vec<T> {
+    let columns = values.len().checked_div(rows).unwrap_or(0);
+    let mut transposed = Vec::with_capacity(values.len());
+    for column in 0..columns {
+        transposed.extend((0..rows).map(|row| values[row * columns + column]));
+    }
+    transposed
+}
+
 /// A shape as people write it: `(128, 40)`.
 pub(crate) fn shape_text(shape: &[u64]) -> String {
     match shape {

@@ -111,40 +111,27 @@ impl FeatureStore {
                 // paths as there are ways to them.
                 Some([_, true]) => {
                     let expected = "groups that one link leads to";
-                    return Err(Error::new(
-                        &self.path,
-                        place(),
-                        expected,
-                        "a second link, or a circle",
-                    ));
+                    let found = "a second link, or a circle";
+                    return Err(Error::new(&self.path, place(), expected, found));
                 }
                 Some(&known) => known,
                 None => {
+                    let links = address.and_then(|at| links(raw, at)).unwrap_or_default();
+                    if let Some((name, Target::Old(to))) =
+                        links.iter().find(|(_, target)| matches!(target, Target::Old(_)))
+                    {
+                        let found = format!(
+                            "a link to {} in the old form (h5py makes one that is read with libver=\"latest\")",
+                            quoted(to.as_bytes())
+                        );
+                        return Err(self.no_image(&within(&path, name), found));
+                    }
                     let datasets = group.datasets().map_err(refuse)?;
                     let mut inside: Vec<_> = group.iter_groups().map_err(refuse)?.collect();
-                    for (name, target) in address.and_then(|at| links(raw, at)).unwrap_or_default()
-                    {
-                        let leads_to = match &target {
-                            Target::Path(target) if target.starts_with('/') => {
-                                file.group(target).ok()
-                            }
-                            Target::Path(target) => group.group(target).ok(),
-                            Target::Elsewhere => None,
-                        };
-                        let found = match target {
-                            Target::Path(target) => {
-                                format!("a link to {}", quoted(target.as_bytes()))
-                            }
-                            Target::Elsewhere => "a link to another file".to_owned(),
-                        };
-                        match leads_to {
-                            Some(group) => inside.push((name, group)),
-                            None => broken.push(self.error(
-                                &within(&path, &name),
-                                "",
-                                "features of an image",
-                                found,
-                            )),
+                    for (name, target) in links {
+                        match self.target(file, &group, &target) {
+                            Ok(group) => inside.push((name, group)),
+                            Err(found) => broken.push(self.no_image(&within(&path, &name), found)),
                         }
                     }
                     let holds = [!path.is_empty() && !datasets.is_empty(), !inside.is_empty()];
@@ -166,6 +153,19 @@ impl FeatureStore {
             }
         }
         Ok((found, broken, alone))
+    }
+
+    /// The group that a link of `group` leads to, or what it is instead.
+    fn target(&self, file: &File, group: &Group, target: &Target) -> Result<Group, String> {
+        let (Target::Path(to) | Target::Old(to)) = target else {
+            return Err("a link to another file".to_owned());
+        };
+        let found = if to.starts_with('/') { file.group(to) } else { group.group(to) };
+        found.map_err(|_| format!("a link to {}", quoted(to.as_bytes())))
+    }
+
+    fn no_image(&self, path: &str, found: String) -> Error {
+        self.error(path, "", "features of an image", found)
     }
 
     /// Links that lead to no group of the file, one error each.

@@ -1,6 +1,7 @@
 //! What a COLMAP model holds, as far as an audit needs it.
 
 use super::camera_models::CameraModel;
+use crate::read::pose::scaled_rotation;
 
 /// One camera: a lens and a sensor, shared by any number of images.
 #[derive(Clone, Debug, PartialEq)]
@@ -86,14 +87,9 @@ impl Tracks {
 
 /// The center `-R^T t` of a camera whose pose `x_cam = R x + t` is a quaternion (w, x, y, z) and `t`,
 /// and `R`; not finite when a number is not or the quaternion is zero.
-pub(super) fn place([w, x, y, z]: [f64; 4], t: [f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
-    let norm2 = w * w + x * x + y * y + z * z;
+pub(super) fn place(quaternion: [f64; 4], t: [f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
     // Rotating by the conjugate, with the norm divided out once: files hold norms like 0.9999999.
-    let r = [
-        [w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z],
-    ];
+    let (r, norm2) = scaled_rotation(quaternion);
     let c: [f64; 3] =
         std::array::from_fn(|j| -(r[0][j] * t[0] + r[1][j] * t[1] + r[2][j] * t[2]) / norm2);
     (c, r.map(|row| row.map(|x| x / norm2)))

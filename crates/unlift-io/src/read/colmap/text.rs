@@ -5,7 +5,7 @@ use std::path::Path;
 use super::camera_models::CameraModel;
 use super::model::{Camera, Image, Points, Tracks, place};
 use crate::error::Error;
-use crate::read::columns::coordinate;
+use crate::read::columns::coordinates;
 use crate::read::lines::{Lines, number, quoted, words};
 
 /// The next word of the line as a number, or an error that says which one it should have been.
@@ -16,19 +16,6 @@ fn next<'a, T: std::str::FromStr>(
 ) -> Result<T, Error> {
     let word = words.next().ok_or_else(|| lines.error(what, "end of line"))?;
     number(word).ok_or_else(|| lines.error(what, quoted(word)))
-}
-
-fn next_doubles<'a, const N: usize>(
-    lines: &Lines,
-    words: &mut impl Iterator<Item = &'a [u8]>,
-    what: &str,
-) -> Result<[f64; N], Error> {
-    let mut values = [0.0; N];
-    for value in &mut values {
-        let word = words.next().ok_or_else(|| lines.error(what, "end of line"))?;
-        *value = coordinate(word).ok_or_else(|| lines.error(what, quoted(word)))?;
-    }
-    Ok(values)
 }
 
 pub fn cameras(path: &Path) -> Result<Vec<Camera>, Error> {
@@ -62,8 +49,8 @@ pub fn images(path: &Path) -> Result<Vec<Image>, Error> {
     while lines.advance_to_data()? {
         let mut words = words(lines.line());
         let id = next(&lines, &mut words, "an image id")?;
-        let rotation = next_doubles(&lines, &mut words, "a rotation (4 numbers)")?;
-        let translation = next_doubles(&lines, &mut words, "a translation (3 numbers)")?;
+        let rotation = coordinates(&lines, &mut words, "a rotation (4 numbers)")?;
+        let translation = coordinates(&lines, &mut words, "a translation (3 numbers)")?;
         let (center, rotation) = place(rotation, translation);
         let camera_id = next(&lines, &mut words, "a camera id")?;
         drop(words);
@@ -104,9 +91,9 @@ pub fn points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
     while lines.advance_to_data()? {
         let mut words = words(lines.line());
         let id: u64 = next(&lines, &mut words, "a point id")?;
-        let position = next_doubles::<3>(&lines, &mut words, "3 coordinates")?;
-        next_doubles::<3>(&lines, &mut words, "a color (3 numbers)")?;
-        next_doubles::<1>(&lines, &mut words, "a reprojection error")?;
+        let position = coordinates::<3>(&lines, &mut words, "3 coordinates")?;
+        coordinates::<3>(&lines, &mut words, "a color (3 numbers)")?;
+        coordinates::<1>(&lines, &mut words, "a reprojection error")?;
         if let Some(tracks) = &mut points.tracks {
             while let Some(word) = words.next() {
                 let image_id =

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use super::pose::{UPWARD, camera};
 use crate::error::Error;
 use crate::read::columns::coordinate;
 use crate::read::lines::{Lines, number, quoted, words};
 use crate::read::map_input::Input;
+use crate::read::pose::{UPWARD, camera};
 use crate::read::undeclared::undeclared;
 
 /// Exactly `N` numbers in the current line.

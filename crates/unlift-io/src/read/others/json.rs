@@ -9,11 +9,11 @@ use std::path::{Component, Path, PathBuf};
 use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, de};
 
-use super::pose::{DOWNWARD, camera};
 use crate::error::{Error, Place};
 use crate::input;
 use crate::read::map_input::Input;
 use crate::read::ply;
+use crate::read::pose::{DOWNWARD, camera};
 
 /// Reads points and cameras: of several reconstructions, those of the largest.
 ///

@@ -3,7 +3,6 @@
 pub mod bundler;
 pub mod json;
 pub mod nvm;
-mod pose;
 
 use std::path::{Path, PathBuf};
 

@@ -2,23 +2,12 @@
 
 use std::path::Path;
 
-use super::pose::{DOWNWARD, camera};
 use crate::error::Error;
-use crate::read::columns::coordinate;
+use crate::read::columns::coordinates;
 use crate::read::lines::{Lines, number, quoted, words};
 use crate::read::map_input::Input;
+use crate::read::pose::{DOWNWARD, camera, scaled_rotation};
 use crate::read::undeclared::undeclared;
-
-/// The rotation of a quaternion (w, x, y, z).
-fn rotation([w, x, y, z]: [f64; 4]) -> [[f64; 3]; 3] {
-    let norm2 = w * w + x * x + y * y + z * z;
-    let rows = [
-        [w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z],
-    ];
-    rows.map(|row| row.map(|value| value / norm2))
-}
 
 /// The count in the current line.
 fn count(lines: &Lines, what: &str) -> Result<u64, Error> {
@@ -30,13 +19,12 @@ fn pose(lines: &Lines, what: &str) -> Result<([f64; 3], [f64; 3]), Error> {
     let all: Vec<&[u8]> = words(lines.line()).collect();
     let start = all.len().checked_sub(10).filter(|&start| start > 0);
     let start = start.ok_or_else(|| lines.error(what, format!("{} words", all.len())))?;
-    let mut values = [0.0; 10];
-    for (value, word) in values.iter_mut().zip(&all[start..]) {
-        *value = coordinate(word).ok_or_else(|| lines.error(what, quoted(word)))?;
-    }
+    let values = coordinates::<10>(lines, &mut all[start..].iter().copied(), what)?;
     let [_focal, w, x, y, z, a, b, c, ..] = values;
     // The pose is a rotation and the center itself.
-    Ok(([a, b, c], camera(&rotation([w, x, y, z]), &[0.0; 3], DOWNWARD).1))
+    let (rotation, norm2) = scaled_rotation([w, x, y, z]);
+    let rotation = rotation.map(|row| row.map(|value| value / norm2));
+    Ok(([a, b, c], camera(&rotation, &[0.0; 3], DOWNWARD).1))
 }
 
 /// Reads points and cameras of the largest model.
@@ -109,13 +97,7 @@ fn model(lines: &mut Lines, n_cameras: u64) -> Result<Input, Error> {
         if !lines.advance()? {
             return Err(lines.end_error(what));
         }
-        let mut position = [0.0; 3];
-        let mut words = words(lines.line());
-        for value in &mut position {
-            let word = words.next().ok_or_else(|| lines.error(&*what, "end of line"))?;
-            *value = coordinate(word).ok_or_else(|| lines.error(&*what, quoted(word)))?;
-        }
-        found.positions.push(position);
+        found.positions.push(coordinates(lines, &mut words(lines.line()), &what)?);
     }
     Ok(found)
 }

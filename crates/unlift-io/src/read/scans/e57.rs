@@ -22,6 +22,7 @@ use crate::error::{Error, Place};
 use crate::guard::without_panic;
 use crate::input::{self, Budget};
 use crate::read::map_input::Input;
+use crate::read::pose::scaled_rotation;
 
 /// Bytes of the head, and where in it the length of the XML stands.
 const HEAD: usize = 48;
@@ -164,13 +165,7 @@ impl Frame {
         let shifted = Self::shifted(cloud);
         let Some(pose) = &cloud.transform else { return Some(shifted) };
         let q = &pose.rotation;
-        let (w, x, y, z) = (q.w, q.x, q.y, q.z);
-        let rows = [
-            [w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-            [2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)],
-            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z],
-        ];
-        let norm2 = w * w + x * x + y * y + z * z;
+        let (rows, norm2) = scaled_rotation([q.w, q.x, q.y, q.z]);
         let rotation = rows.map(|row| row.map(|value| value / norm2));
         (norm2 != 0.0).then_some(Self { rotation, ..shifted })
     }

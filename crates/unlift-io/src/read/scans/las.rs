@@ -89,11 +89,7 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     }
     let gap = start - bytes.at();
     bytes.skip(gap, "what stands before the points")?;
-    let size = n.checked_mul(u64::from(record));
-    if size.is_none_or(|size| size > bytes.remaining()) {
-        let expected = format!("{n} points, {record} bytes each");
-        return Err(bytes.error_ahead(expected, format!("{} bytes", bytes.remaining())));
-    }
+    bytes.expect_rows(n, "points", u64::from(record))?;
     let mut row = vec![0; usize::from(record)];
     let mut positions = bytes.room("points", n)?;
     for number in 1..=n {

@@ -4,13 +4,10 @@
 //!
 //! Source: PCL's documentation, "The PCD (Point Cloud Data) file format", version 0.7.
 
-use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 use super::lzf::unpacked;
-use crate::error::{Error, Place};
-use crate::input::{self, Budget};
+use crate::error::Error;
 use crate::read::bytes::Bytes;
 use crate::read::columns::{self, coordinate};
 use crate::read::lines::{Lines, number, quoted, words};
@@ -44,8 +41,6 @@ struct Header {
     stride: u64,
     n: u64,
     data: Vec<u8>,
-    n_lines: u64,
-    n_bytes: u64,
 }
 
 /// Reads the positions.
@@ -53,49 +48,38 @@ struct Header {
 /// # Errors
 /// When the file is malformed, has no `x`, `y` and `z`, or is cut off.
 pub fn read(path: &Path) -> Result<Input, Error> {
-    let (file, len) = input::open(path)?;
-    let mut reader = BufReader::new(file);
-    let header = header(path, &mut reader)?;
+    let mut lines = Lines::open(path)?;
+    let header = header(path, &mut lines)?;
     let mut doubt = None;
     let (positions, format) = match &*header.data {
         // Nothing says how much there is to read.
         _ if header.n == 0 => (Vec::new(), "PCD"),
-        b"ascii" => (ascii(path, reader, &header, len)?, "PCD ascii"),
+        b"ascii" => (ascii(lines, &header)?, "PCD ascii"),
         b"binary" => {
-            let (positions, more) = binary(path, reader, &header, len)?;
+            let (positions, more) = binary(lines.into_bytes(), &header)?;
             doubt = undeclared(header.n, more);
             (positions, "PCD binary")
         }
-        _ => (compressed(path, reader, &header, len)?, "PCD compressed"),
+        _ => (compressed(lines.into_bytes(), &header)?, "PCD compressed"),
     };
     Ok(Input { positions, format, doubts: doubt.into_iter().collect(), ..Input::default() })
 }
 
 /// The lines up to `DATA`, each a word and its values.
-fn header(path: &Path, reader: &mut BufReader<File>) -> Result<Header, Error> {
-    /// Longest header: comments are fine, a file without line ends is not read to its end.
-    const LONGEST: u64 = 1 << 20;
-    let mut limited = reader.take(LONGEST);
-    let (mut n_lines, mut n_bytes) = (0, 0);
+fn header(path: &Path, lines: &mut Lines) -> Result<Header, Error> {
     let (mut names, mut sizes, mut kinds, mut counts) = (Vec::new(), Vec::new(), Vec::new(), None);
     let (mut width, mut height, mut points) = (None, 1, None);
-    let mut line = Vec::new();
     let data = loop {
-        line.clear();
-        let read = limited.read_until(b'\n', &mut line).map_err(|e| Error::read(path, e))?;
-        n_lines += 1;
-        n_bytes += read as u64;
-        let error = |expected: &str, found| Error::new(path, Place::Line(n_lines), expected, found);
-        if read == 0 {
-            return Err(error("a PCD header that ends with DATA", "end of file".to_owned()));
-        }
-        let words: Vec<&[u8]> = words(&line).collect();
+        lines.advance_in_header("a PCD header that ends with DATA")?;
+        let error = |expected: &str, found| lines.error(expected, found);
+        let line = lines.line();
+        let words: Vec<&[u8]> = words(line).collect();
         let [word, values @ ..] = &words[..] else { continue };
         let numbers =
             || values.iter().map(|value| number::<u64>(value)).collect::<Option<Vec<_>>>();
         let one = || match numbers().as_deref() {
             Some([one]) => Ok(*one),
-            _ => Err(error("one number", quoted(line.trim_ascii()))),
+            _ => Err(error("one number", quoted(line))),
         };
         match &*word.to_ascii_uppercase() {
             [b'#', ..] | b"VERSION" | b"VIEWPOINT" => {}
@@ -103,12 +87,11 @@ fn header(path: &Path, reader: &mut BufReader<File>) -> Result<Header, Error> {
             b"SIZE" => {
                 let known =
                     numbers().filter(|sizes| sizes.iter().all(|s| [1, 2, 4, 8].contains(s)));
-                sizes = known
-                    .ok_or_else(|| error("sizes of 1, 2, 4 or 8", quoted(line.trim_ascii())))?;
+                sizes = known.ok_or_else(|| error("sizes of 1, 2, 4 or 8", quoted(line)))?;
             }
             b"TYPE" => kinds = values.iter().map(|kind| kind.to_vec()).collect(),
             b"COUNT" => {
-                let known = numbers().ok_or_else(|| error("counts", quoted(line.trim_ascii())))?;
+                let known = numbers().ok_or_else(|| error("counts", quoted(line)))?;
                 counts = Some(known);
             }
             b"WIDTH" => width = Some(one()?),
@@ -120,11 +103,11 @@ fn header(path: &Path, reader: &mut BufReader<File>) -> Result<Header, Error> {
                     Some(data) if values.len() == 1 && known.contains(&&*data) => break data,
                     _ => {
                         let expected = "DATA ascii, binary or binary_compressed";
-                        return Err(error(expected, quoted(line.trim_ascii())));
+                        return Err(error(expected, quoted(line)));
                     }
                 }
             }
-            _ => return Err(error("a line of a PCD header", quoted(line.trim_ascii()))),
+            _ => return Err(error("a line of a PCD header", quoted(line))),
         }
     };
     let refuse = |expected: &str, found: String| Error::new(path, "header", expected, found);
@@ -163,23 +146,12 @@ fn header(path: &Path, reader: &mut BufReader<File>) -> Result<Header, Error> {
     let n = points
         .or(of_width)
         .ok_or_else(|| refuse("POINTS, or WIDTH and HEIGHT", "neither".to_owned()))?;
-    Ok(Header { axes, n_values, stride, n, data, n_lines, n_bytes })
+    Ok(Header { axes, n_values, stride, n, data })
 }
 
-fn ascii(
-    path: &Path,
-    reader: BufReader<File>,
-    header: &Header,
-    len: u64,
-) -> Result<Vec<[f64; 3]>, Error> {
-    // A value takes a digit and a separator; the last one of the file only the digit.
-    let most = (len.saturating_sub(header.n_bytes) + 1) / header.n_values.saturating_mul(2);
-    if header.n > most {
-        let expected = format!("at most {most} points (by the size of the file)");
-        return Err(Error::new(path, "header", expected, header.n.to_string()));
-    }
-    let mut lines = Lines::continuing(path, reader, header.n_lines);
-    let mut positions = Budget::new(path, len).room("points", header.n)?;
+fn ascii(mut lines: Lines, header: &Header) -> Result<Vec<[f64; 3]>, Error> {
+    lines.expect_room(header.n, "points", header.n_values)?;
+    let mut positions = lines.room("points", header.n)?;
     for at in 1..=header.n {
         if !lines.advance_to_data()? {
             return Err(lines.end_error(format!("point {at} of {}", header.n)));
@@ -210,18 +182,9 @@ fn ascii(
 }
 
 /// The points, and how many more there is room for behind them.
-fn binary(
-    path: &Path,
-    reader: BufReader<File>,
-    header: &Header,
-    len: u64,
-) -> Result<(Vec<[f64; 3]>, u64), Error> {
-    let mut bytes = Bytes::continuing(path, reader, header.n_bytes, len);
+fn binary(mut bytes: Bytes, header: &Header) -> Result<(Vec<[f64; 3]>, u64), Error> {
     let (n, stride) = (header.n, header.stride);
-    if n.checked_mul(stride).is_none_or(|size| size > bytes.remaining()) {
-        let expected = format!("{n} points, {stride} bytes each");
-        return Err(bytes.error_ahead(expected, format!("{} bytes", bytes.remaining())));
-    }
+    bytes.expect_rows(n, "points", stride)?;
     let mut row = vec![0; stride as usize];
     let mut positions = bytes.room("points", n)?;
     for number in 1..=n {
@@ -234,13 +197,7 @@ fn binary(
 }
 
 /// All values of a field stand together, field by field, and the whole is compressed.
-fn compressed(
-    path: &Path,
-    reader: BufReader<File>,
-    header: &Header,
-    len: u64,
-) -> Result<Vec<[f64; 3]>, Error> {
-    let mut bytes = Bytes::continuing(path, reader, header.n_bytes, len);
+fn compressed(mut bytes: Bytes, header: &Header) -> Result<Vec<[f64; 3]>, Error> {
     let packed = u64::from(bytes.u32("the size of the compressed points")?);
     let size = u64::from(bytes.u32("the size of the points")?);
     let (n, stride) = (header.n, header.stride);
@@ -253,8 +210,7 @@ fn compressed(
         let expected = format!("{packed} bytes of compressed points");
         return Err(bytes.error_ahead(expected, bytes.remaining().to_string()));
     }
-    let budget = Budget::new(path, len);
-    budget.admit("points", size.saturating_add(n.saturating_mul(24)))?;
+    bytes.admit("points", size.saturating_add(n.saturating_mul(24)))?;
     let mut values = vec![0; packed as usize];
     bytes.fill(&mut values, "compressed points")?;
     let Some(values) = unpacked(&values, size as usize) else {

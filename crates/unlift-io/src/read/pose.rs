@@ -13,6 +13,16 @@ pub fn camera(
     (transposed(translation).map(|x| -x), transposed(&up_cam))
 }
 
+/// The rotation of a quaternion (w, x, y, z) of any length, times the square of that length, and this square.
+pub fn scaled_rotation([w, x, y, z]: [f64; 4]) -> ([[f64; 3]; 3], f64) {
+    let rows = [
+        [w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z],
+    ];
+    (rows, w * w + x * x + y * y + z * z)
+}
+
 /// What is up in a photo whose y grows downward.
 pub const DOWNWARD: [f64; 3] = [0.0, -1.0, 0.0];
 /// The same where y grows upward.
