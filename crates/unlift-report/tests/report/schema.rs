@@ -3,14 +3,14 @@
 //! The schema uses few keywords; this file checks those and refuses any other, which costs less to
 //! compile than a validator for all of them.
 
-mod sample;
-
 use serde_json::{Value, json};
 use unlift_report::Document;
 use unlift_report::document::{NotAudited, Spread};
 
+use crate::sample;
+
 fn schema() -> Value {
-    serde_json::from_str(include_str!("../audit.schema.json")).expect("the schema is JSON")
+    serde_json::from_str(include_str!("../../audit.schema.json")).expect("the schema is JSON")
 }
 
 /// The places where `value` breaks `schema`.
@@ -141,7 +141,7 @@ fn the_schema_refuses_what_the_format_refuses() {
 
 #[test]
 fn the_example_of_the_documentation_is_a_document() {
-    let docs = include_str!("../../../docs/formats.md");
+    let docs = include_str!("../../../../docs/formats.md");
     let (_, rest) = docs.split_once("## audit.json").expect("its section");
     let (_, rest) = rest.split_once("```json\n").expect("an example");
     let (example, _) = rest.split_once("```").expect("an end");

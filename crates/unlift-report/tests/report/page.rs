@@ -1,10 +1,10 @@
 //! The page as text: numbers without script, escaping, nothing private in a page to share.
 
-mod sample;
-
 use sha2::{Digest, Sha256};
-use unlift_report::document::Document;
+use unlift_report::document::{Document, NotAudited, Spread};
 use unlift_report::{RenderOptions, Scene3d, render, text_table};
+
+use crate::sample;
 
 fn page(document: &Document, scene: Option<&Scene3d>, share_safe: bool) -> String {
     let options = RenderOptions { share_safe, ..RenderOptions::default() };
@@ -21,20 +21,6 @@ fn without_script(page: &str) -> String {
         }
     }
     text
-}
-
-#[test]
-fn every_figure_stands_in_a_table() {
-    let document = sample::document(true);
-    let text = without_script(&page(&document, None, false));
-    for row in &document.results {
-        let alone = row.records_alone_percent.iter().flat_map(|map| map.values());
-        for value in row.recovered_percent.values().chain(row.blind_percent.values()).chain(alone) {
-            assert!(text.contains(&format!("<td>{value:.1}</td>")), "{} {value}", row.scheme);
-        }
-    }
-    assert!(text.contains("12 degenerate"));
-    assert!(text.contains("1 odd point"));
 }
 
 /// The text of an element's content without tags, spaces made single.
@@ -111,43 +97,6 @@ fn the_verdict_names_the_strongest_attack_of_today() {
     assert!(text.contains(
         "Neighborhoods by geometric were not tried: planes say nothing of where points are."
     ));
-}
-
-/// An audit of these schemes of the sample alone.
-fn only(schemes: &[&str]) -> Document {
-    let mut document = sample::document(true);
-    document.results.retain(|row| schemes.contains(&row.scheme.as_str()));
-    document.run.seconds.rows.clear();
-    document
-}
-
-#[test]
-fn one_scheme_and_two_are_spoken_of_as_such() {
-    let of = |schemes: &[&str]| verdict(&only(schemes));
-    let one = of(&["olc"]);
-    assert!(one.contains("Not protected. An attacker recovers 58.6 %"), "{one}");
-    let two = of(&["ray", "ray-voxel"]);
-    assert!(two.contains("Badly protected under either scheme."), "{two}");
-    let none = of(&["ppl", "cp"]);
-    assert!(
-        none.contains("No attack tried here recovers much. An attacker recovers 16.2"),
-        "{none}"
-    );
-    let untested = of(&["plane"]);
-    let sentence = "Not tested: what an attacker gets from the released data alone. An attacker would recover \
-                    83.7 % of the points of this map within 10 cm if half of the neighbors were known \
-                    (PLANE, oracle neighbors).";
-    assert!(untested.contains(sentence), "{untested}");
-}
-
-#[test]
-fn colors_are_those_of_the_share() {
-    let page = |schemes: &[&str]| page(&only(schemes), None, true);
-    assert!(page(&["olc"]).contains("<section class=\"part red\""));
-    assert!(page(&["ray"]).contains("<section class=\"part orange\""));
-    assert!(page(&["ppl"]).contains("<section class=\"part gray\""));
-    // What was not tested is no good news.
-    assert!(page(&["plane"]).contains("<section class=\"part orange\""));
 }
 
 #[test]
@@ -237,16 +186,6 @@ fn gates_come_first_and_failed_ones_before_the_others() {
 }
 
 #[test]
-fn the_page_never_says_safe() {
-    for document in [sample::document(true), sample::mixed(false)] {
-        let text = without_script(&page(&document, None, false));
-        let (_, body) = text.split_once("<body>").expect("a body");
-        let words = body.replace("--share-safe", "");
-        assert!(!words.to_lowercase().contains("safe"));
-    }
-}
-
-#[test]
 fn centimeters_never_appear_without_a_scale() {
     let document = sample::mixed(false);
     let text = without_script(&page(&document, None, false));
@@ -257,20 +196,6 @@ fn centimeters_never_appear_without_a_scale() {
         assert!(!text.contains(unit), "{unit}");
     }
     assert!(text.contains("within 1×, %") && text.contains("within 2.5×, %"));
-}
-
-#[test]
-fn unknown_certainty_is_said_with_its_reason() {
-    let mut document = sample::document(true);
-    for row in &mut document.results {
-        if row.scheme == "olc" {
-            (row.sure_percent, row.sure_correct_percent, row.reliability) = (None, None, None);
-            row.sure_unknown = Some("the map is too small".into());
-        }
-    }
-    let text = without_script(&page(&document, None, false));
-    assert!(text.contains("<td>not known here</td>"));
-    assert!(text.contains("Not known here: the map is too small"));
 }
 
 #[test]
@@ -295,51 +220,6 @@ fn names_are_escaped_everywhere() {
 }
 
 #[test]
-fn a_page_to_share_holds_figures_only() {
-    let document = sample::document(true);
-    let scene = sample::scene(&document, 200);
-    let private = page(&document, Some(&scene), false);
-    let shared = page(&document, Some(&scene), true);
-    assert!(private.contains("furnished-room") && private.contains("id=\"block-0\""));
-    for trace in ["furnished-room", "id=\"block-0\"", "<canvas", "unlift audit map"] {
-        assert!(!shared.contains(trace), "{trace}");
-    }
-    assert!(shared.contains("Figures only.") && shared.contains("<td>92.3</td>"));
-}
-
-#[test]
-fn a_page_stays_below_ten_megabytes() {
-    let document = sample::document(true);
-    for n in [3_000, 40_000] {
-        let scene = sample::scene(&document, n);
-        let size = page(&document, Some(&scene), false).len();
-        assert!(size < 10_000_000, "{n} points: {size} bytes");
-    }
-}
-
-#[test]
-fn the_page_allows_no_network() {
-    let text = page(&sample::document(true), None, false);
-    let policy =
-        "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:";
-    assert!(text.contains(policy));
-    let markup = without_script(&text);
-    for load in [" src=", "<link", "<iframe", "url("] {
-        assert!(!markup.contains(load), "{load}");
-    }
-}
-
-#[test]
-fn an_empty_audit_still_makes_a_page() {
-    let mut document = sample::document(true);
-    document.results.clear();
-    document.break_even.clear();
-    document.gates.clear();
-    document.run.seconds.rows.clear();
-    assert!(page(&document, None, false).contains("No scheme was tested."));
-}
-
-#[test]
 fn the_terminal_table_is_short_and_worst_first() {
     let table = text_table(&sample::document(true));
     let lines: Vec<&str> = table.lines().collect();
@@ -353,32 +233,11 @@ fn the_terminal_table_is_short_and_worst_first() {
 }
 
 #[test]
-fn the_terminal_table_has_a_line_per_source() {
-    let mut document = sample::document(true);
-    let oracle = document.results.iter().find(|row| row.scheme == "olc").unwrap().clone();
-    let typed = oracle.recovered_percent.keys().next().unwrap().clone();
-    for (solver, percent) in [("consensus", 41.5), ("joint", 63.5)] {
-        let mut row = oracle.clone();
-        (row.neighbors, row.oracle_noise, row.inlier_ratio) = ("overlap".into(), None, 0.13);
-        row.solver = solver.into();
-        row.recovered_percent.insert(typed.clone(), percent);
-        document.results.push(row);
-    }
-    let table = text_table(&document);
-    let lines: Vec<&str> = table.lines().collect();
-    let cells: Vec<&str> = lines[4].split_whitespace().collect();
-    assert_eq!(cells[..5], ["olc", "overlap", "13", "%", "joint"], "{table}");
-    assert!(lines[4].contains("63.5 %") && !table.contains("41.5 %"), "{table}");
-    assert!(lines[5].starts_with("olc") && lines[5].contains("records alone"), "{table}");
-    assert!(lines[6].starts_with("olc") && lines[6].contains("oracle"), "{table}");
-}
-
-#[test]
 fn the_vendored_bundle_is_the_one_described() {
-    let bundle = include_bytes!("../web/vendor/bundle.min.js");
+    let bundle = include_bytes!("../../web/vendor/bundle.min.js");
     let sum: String = Sha256::digest(bundle).iter().map(|byte| format!("{byte:02x}")).collect();
     assert!(
-        include_str!("../web/vendor/VENDOR.md").contains(&sum),
+        include_str!("../../web/vendor/VENDOR.md").contains(&sum),
         "bundle.min.js has sha256 {sum}"
     );
 }
@@ -405,17 +264,6 @@ fn a_page_of_images_speaks_of_keypoints_and_pixels() {
     assert!(!json.contains("secret") && json.contains("\"name\": null"));
 }
 
-#[test]
-fn rows_of_an_image_are_those_of_the_results() {
-    let mut document = sample::images();
-    document.images[1].rows.pop();
-    let error = document.to_json().unwrap_err().to_string();
-    assert_eq!(error, "audit.json: images[1].rows: expected 12 rows, as in results, found 11");
-    document.images[1].rows.clear();
-    let text = document.to_json().expect("an image without keypoints has no rows");
-    assert_eq!(Document::from_json(&text).expect("the same").images, document.images);
-}
-
 /// A guess that gets more than every attack leads, and needs no other attack to be tried.
 #[test]
 fn a_guess_that_gets_more_than_every_attack_is_the_verdict() {
@@ -431,12 +279,118 @@ fn a_guess_that_gets_more_than_every_attack_is_the_verdict() {
 }
 
 #[test]
-fn what_a_reader_must_know_stands_beside_the_verdict() {
+fn every_figure_stands_in_a_table_and_what_must_be_known_beside_the_verdict() {
     let mut document = sample::document(true);
     document.notes.push("--max-points: 200 of 400 points are audited <b>".to_owned());
-    let page = page(&document, None, true);
-    let said = "<strong>Mind:</strong> --max-points: 200 of 400 points are audited &lt;b&gt;.";
-    assert!(page.contains(said));
-    let read: Document = serde_json::from_str(&document.to_json().unwrap()).unwrap();
-    assert_eq!(read.notes, document.notes);
+    for row in document.results.iter_mut().filter(|row| row.scheme == "olc") {
+        (row.sure_percent, row.sure_correct_percent, row.reliability) = (None, None, None);
+        row.sure_unknown = Some("the map is too small".into());
+    }
+    let text = without_script(&page(&document, None, true));
+    for row in &document.results {
+        let alone = row.records_alone_percent.iter().flat_map(|map| map.values());
+        for value in row.recovered_percent.values().chain(row.blind_percent.values()).chain(alone) {
+            assert!(text.contains(&format!("<td>{value:.1}</td>")), "{} {value}", row.scheme);
+        }
+    }
+    for said in [
+        "12 degenerate",
+        "1 odd point",
+        "<td>not known here</td>",
+        "Not known here: the map is too small",
+        "<strong>Mind:</strong> --max-points: 200 of 400 points are audited &lt;b&gt;.",
+    ] {
+        assert!(text.contains(said), "{said}");
+    }
+    document.results.clear();
+    document.break_even.clear();
+    document.run.seconds.rows.clear();
+    assert!(page(&document, None, false).contains("No scheme was tested."));
+}
+
+/// Few schemes are spoken of as such, and colors are those of the share.
+#[test]
+fn the_banner_says_how_bad_it_is() {
+    for (schemes, color, expected) in [
+        (&["olc"][..], "red", "Not protected. An attacker recovers 58.6 %"),
+        (&["ray", "ray-voxel"], "orange", "Badly protected under either scheme."),
+        (&["ppl", "cp"], "gray", "No attack tried here recovers much. An attacker recovers 16.2"),
+        // What was not tested is no good news.
+        (
+            &["plane"],
+            "orange",
+            "Not tested: what an attacker gets from the released data alone. An attacker would recover 83.7 % of \
+             the points of this map within 10 cm if half of the neighbors were known (PLANE, oracle neighbors).",
+        ),
+    ] {
+        let mut document = sample::document(true);
+        document.results.retain(|row| schemes.contains(&row.scheme.as_str()));
+        document.run.seconds.rows.clear();
+        let said = verdict(&document);
+        assert!(said.contains(expected), "{said}");
+        let colored = format!("<section class=\"part {color}\"");
+        assert!(page(&document, None, true).contains(&colored), "{schemes:?}");
+    }
+}
+
+#[test]
+fn pages_are_small_load_nothing_and_never_say_safe() {
+    let document = sample::document(true);
+    for n in [3_000, 40_000] {
+        let scene = sample::scene(&document, n);
+        let size = page(&document, Some(&scene), false).len();
+        assert!(size < 10_000_000, "{n} points: {size} bytes");
+    }
+    let policy =
+        "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:";
+    for document in [document, sample::mixed(false)] {
+        let text = without_script(&page(&document, None, false));
+        assert!(text.contains(policy));
+        for load in [" src=", "<link", "<iframe", "url("] {
+            assert!(!text.contains(load), "{load}");
+        }
+        let (_, body) = text.split_once("<body>").expect("a body");
+        assert!(!body.replace("--share-safe", "").to_lowercase().contains("safe"));
+    }
+}
+
+#[test]
+fn a_page_to_share_holds_figures_only() {
+    let document = sample::document(true);
+    let scene = sample::scene(&document, 200);
+    let [private, shared] = [false, true].map(|safe| page(&document, Some(&scene), safe));
+    for trace in ["furnished-room", "id=\"block-0\"", "<canvas", "unlift audit map"] {
+        assert!(private.contains(trace) && !shared.contains(trace), "{trace}");
+    }
+    assert!(shared.contains("Figures only.") && shared.contains("<td>92.3</td>"));
+}
+
+#[test]
+fn the_terminal_table_has_a_line_per_source_and_says_what_is_missing() {
+    let mut document = sample::document(true);
+    let oracle = document.results.iter().find(|row| row.scheme == "olc").unwrap().clone();
+    for (solver, percent, std) in [("consensus", 41.5, 0.0), ("joint", 63.5, 4.96)] {
+        let mut row = oracle.clone();
+        (row.neighbors, row.oracle_noise, row.inlier_ratio) = ("overlap".into(), None, 0.13);
+        row.solver = solver.into();
+        row.recovered_percent[0] = percent;
+        let recovered_percent = [("0.10".to_owned(), std), ("0.25".to_owned(), 0.5)].into();
+        row.std = Some(Spread { recovered_percent, ..Spread::default() });
+        document.results.push(row);
+    }
+    for (neighbors, reason) in [(None, "flat"), (Some("geometric"), "geometric: no lists")] {
+        let (scheme, neighbors) = ("star".to_owned(), neighbors.map(str::to_owned));
+        document.not_audited.push(NotAudited { scheme, neighbors, reason: reason.into() });
+    }
+    let table = text_table(&document);
+    let lines: Vec<&str> = table.lines().collect();
+    let cells = |line: usize| lines[line].split_whitespace().collect::<Vec<_>>().join(" ");
+    // The strongest attack of a source speaks, and a spread is shown that matters.
+    assert!(cells(4).starts_with("olc overlap 13 % joint 63.5 ± 5.0 % 98.1 %"), "{table}");
+    assert!(!table.contains("41.5 %"), "{table}");
+    let alone = "olc records alone - tomography 58.6 % 76.4 % 1.9 % -";
+    assert_eq!(cells(5), alone, "{table}");
+    assert!(cells(6).starts_with("olc oracle"), "{table}");
+    assert!(table.contains("not audited: star: flat\n"), "{table}");
+    assert!(table.contains("not audited: star by geometric: no lists\n"), "{table}");
 }

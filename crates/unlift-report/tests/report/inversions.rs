@@ -1,10 +1,10 @@
 //! Pictures of what came back, and what the page says about them.
 
-mod sample;
-
 use unlift_report::document::{Document, Row};
 use unlift_report::inversions::{Inversion, InvertedView, Likeness, Object, Painted};
 use unlift_report::{Given, RenderOptions, render};
+
+use crate::sample;
 
 /// An audit of images, of which the first two rows are from an attacker's own lists.
 fn document() -> Document {
