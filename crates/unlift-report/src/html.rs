@@ -73,12 +73,12 @@ pub fn render(
     let table_list = [
         Some(tables::recovered(&document)),
         Some(tables::baselines(&document)),
-        tables::distinct(&document),
+        tables::distinct_places(&document),
         tables::likeness(&document),
         tables::metrics(&document),
         tables::objects(&document),
         Some(tables::errors(&document)),
-        Some(tables::break_even(&document)).filter(|table| !table.rows.is_empty()),
+        tables::break_even(&document),
     ];
     let loss_list =
         [Some(tables::losses(&document)), tables::choices(&document), tables::trials(&document)];
