@@ -28,7 +28,7 @@ pub fn text_table(document: &Document) -> String {
                 (share, cells)
             });
         for row in rows {
-            let share = row.recovered_percent.get(&headline).copied().unwrap_or(0.0);
+            let share = verdict::share(row, &headline);
             let is_oracle = attack::basis(row) == Some(attack::Basis::Oracle);
             if let Some((_, cells)) = alone.take_if(|(alone, _)| is_oracle || *alone > share) {
                 lines.push(cells);
@@ -38,7 +38,7 @@ pub fn text_table(document: &Document) -> String {
         lines.extend(alone.map(|(_, cells)| cells));
     }
     let mut text = format!("{}\n{}\n\n", banner.headline, banner.sentence);
-    text.push_str(&align(&lines));
+    text.push_str(&align(&lines, &[0, 1, 3]));
     if thresholds.len() > 1 {
         text.push_str(&format!("blind, break-even: within {headline} {}\n", unit(document)));
     }
@@ -129,26 +129,25 @@ fn break_even(document: &Document, row: &Row, typed: &str) -> String {
     }
 }
 
-/// Columns two spaces apart; names flush left, numbers flush right.
-fn align(lines: &[Vec<String>]) -> String {
-    let columns = lines.iter().map(Vec::len).max().unwrap_or(0);
+/// Rows of text with columns as wide as their widest cell, two spaces apart: those in `left` flush left, others flush
+/// right.
+pub fn align(rows: &[Vec<String>], left: &[usize]) -> String {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |column: usize| {
-        let cells = lines.iter().filter_map(|line| line.get(column));
+        let cells = rows.iter().filter_map(|row| row.get(column));
         cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
     };
     let widths: Vec<usize> = (0..columns).map(width).collect();
     let mut text = String::new();
-    for line in lines {
-        let mut row = String::new();
-        for (column, cell) in line.iter().enumerate() {
-            let width = widths[column];
-            if matches!(column, 0 | 1 | 3) {
-                row.push_str(&format!("{cell:<width$}  "));
-            } else {
-                row.push_str(&format!("{cell:>width$}  "));
-            }
+    for row in rows {
+        let mut line = String::new();
+        for (column, (cell, width)) in row.iter().zip(&widths).enumerate() {
+            line.push_str(&match left.contains(&column) {
+                true => format!("{cell:<width$}  "),
+                false => format!("{cell:>width$}  "),
+            });
         }
-        text.push_str(row.trim_end());
+        text.push_str(line.trim_end());
         text.push('\n');
     }
     text

@@ -46,7 +46,7 @@ pub(crate) fn verdict(document: &Document) -> Verdict {
 }
 
 /// Percent that came back within the threshold `typed`.
-fn share(row: &Row, typed: &str) -> f64 {
+pub(crate) fn share(row: &Row, typed: &str) -> f64 {
     row.recovered_percent.get(typed).copied().unwrap_or(0.0)
 }
 
