@@ -132,9 +132,7 @@ pub fn render(
         document: &document,
         attribution: paper::ATTRIBUTION,
     };
-    let mut env = Environment::new();
-    env.set_undefined_behavior(UndefinedBehavior::Strict);
-    env.set_auto_escape_callback(|_| AutoEscape::Html);
+    let mut env = environment();
     // A figure and its unit stay on one line.
     env.add_filter("tied", |text: String| {
         [" %", " cm", " px"]
@@ -146,6 +144,14 @@ pub fn render(
         env.add_template(name, source)?;
     }
     Ok(env.get_template("report.html")?.render(Serde(&page))?.replace(turns, "\u{fffd}"))
+}
+
+/// What renders templates: what they name must be there, and text is escaped.
+pub(crate) fn environment() -> Environment<'static> {
+    let mut env = Environment::new();
+    env.set_undefined_behavior(UndefinedBehavior::Strict);
+    env.set_auto_escape_callback(|_| AutoEscape::Html);
+    env
 }
 
 /// Whether a character turns the direction of what follows: names may hold it, and nothing of ours does.
