@@ -4,7 +4,7 @@ use std::io::Cursor;
 use std::path::PathBuf;
 
 use image::{DynamicImage, ImageFormat, Rgb, RgbImage};
-use unlift_features::load::{decode, read};
+use unlift_features::load::{decode, read, read_color};
 
 fn colors(width: u32, height: u32) -> RgbImage {
     RgbImage::from_fn(width, height, |x, y| Rgb([(7 * x) as u8, (5 * y) as u8, (3 * x + y) as u8]))
@@ -152,6 +152,11 @@ fn files_are_read_by_content_and_missing_ones_named() {
     let path = folder.path().join("really a png.jpg");
     std::fs::write(&path, encode(&DynamicImage::from(colors(8, 8)), ImageFormat::Png)).unwrap();
     assert_eq!(read(&path).unwrap().width(), 8);
+    let color = read_color(&path).unwrap();
+    assert_eq!((color.width(), color.height(), color.pixel(7, 6)), (8, 8, [49, 30, 27]));
+    std::fs::write(&path, "text").unwrap();
+    let error = read_color(&path).unwrap_err().to_string();
+    assert!(error.ends_with("png.jpg: expected a JPEG, PNG or WebP image, found text"), "{error}");
     let error = read(&PathBuf::from("nowhere/photo.jpg")).unwrap_err().to_string();
     assert!(error.starts_with("nowhere/photo.jpg: expected a JPEG, PNG or WebP image, found "));
     assert!(read(folder.path()).is_err());
