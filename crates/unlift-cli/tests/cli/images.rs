@@ -207,6 +207,9 @@ fn what_cannot_be_audited_is_one_line() {
     for line in ["--neighbors geometric", "--solver tomography", "--schemes olc"] {
         place.ends(&format!("audit images photos {line}"), 2);
     }
+    // Before any photo is read.
+    let told = place.complains("audit images photos --features aliked --neighbors overlap", 2);
+    assert!(told.starts_with("unlift: --neighbors overlap: expected "), "{told}");
     assert!(!place.path("unlift-audit").exists());
     place.ends("audit images floats.h5 --k 10 --neighbors similarity --out a", 0);
 }
