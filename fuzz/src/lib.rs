@@ -1,6 +1,6 @@
 //! What is done with the bytes of a fuzzer: every reader of other people's files, and recovery from records that nobody
 //! made. No input may panic, hang or take memory that its size does not explain; what is accepted obeys the
-//! rules of its type. `crates/unlift-cli/tests/corpus.rs` replays the corpus through these functions.
+//! rules of its type. `crates/unlift-cli/tests/cli/corpus.rs` replays the corpus through these functions.
 
 mod bytes;
 mod files;

@@ -42,31 +42,7 @@ fn harmless(text: &str) -> String {
 pub fn table(rows: &[Vec<String>], left: &[usize]) -> String {
     let shown = |row: &Vec<String>| row.iter().map(|cell| OneLine(cell).to_string()).collect();
     let rows: Vec<Vec<String>> = rows.iter().map(shown).collect();
-    let n_columns = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let width = |c: usize| {
-        rows.iter().filter_map(|row| row.get(c)).map(|s| s.chars().count()).max().unwrap_or(0)
-    };
-    let widths: Vec<usize> = (0..n_columns).map(width).collect();
-    let mut text = String::new();
-    for row in &rows {
-        let mut line = String::new();
-        for (c, cell) in row.iter().enumerate() {
-            if c > 0 {
-                line.push_str("  ");
-            }
-            let pad = " ".repeat(widths[c] - cell.chars().count());
-            if c == 0 || left.contains(&c) {
-                line.push_str(cell);
-                line.push_str(&pad);
-            } else {
-                line.push_str(&pad);
-                line.push_str(cell);
-            }
-        }
-        text.push_str(line.trim_end());
-        text.push('\n');
-    }
-    text
+    unlift_report::align(&rows, &[&[0], left].concat())
 }
 
 /// The command line as a shell would need it, for the record.

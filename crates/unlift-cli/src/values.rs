@@ -3,6 +3,7 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use unlift::audit::Threshold;
 use unlift::neighbors::oracle::Noise;
 use unlift::neighbors::sources::Named;
@@ -20,6 +21,16 @@ pub enum NeighborSource {
     Own(Named),
     /// Lists by point, in a file.
     File(PathBuf),
+}
+
+/// One of a few names, each of which stands for a value. Errors and shells name all of them.
+pub fn one_of<T: Clone + Send + Sync + 'static, const N: usize>(
+    names: [(&'static str, T); N],
+) -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(names.clone().map(|(name, _)| name)).map(move |typed: String| {
+        let known = names.iter().find(|(name, _)| *name == typed);
+        known.expect("the parser takes no other name").1.clone()
+    })
 }
 
 /// Features by their name.

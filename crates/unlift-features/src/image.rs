@@ -97,14 +97,4 @@ mod tests {
             "image: pixel (1, 0): expected a finite value, found NaN"
         );
     }
-
-    #[test]
-    fn fitting_rounds_sides_down_and_keeps_gray_levels() {
-        let image = GrayImage::try_new(100, 33, vec![0.25; 3300]).unwrap();
-        assert!(image.fitted(100).is_none());
-        let small = image.fitted(50).unwrap();
-        assert_eq!((small.width(), small.height()), (50, 16));
-        assert!(small.row(7).iter().all(|value| (value - 0.25).abs() < 1e-5));
-        assert_eq!(image.fitted(1).unwrap().height(), 1);
-    }
 }

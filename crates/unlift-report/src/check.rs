@@ -86,14 +86,24 @@ impl Document {
 
 fn check_row(place: &str, row: &Row) -> Result<(), Error> {
     between(&format!("{place}.inlier_ratio"), row.inlier_ratio, 0.0, 1.0)?;
-    percentages(&format!("{place}.recovered_percent"), &row.recovered_percent)?;
-    percentages(&format!("{place}.blind_percent"), &row.blind_percent)?;
     if !row.blind_percent.keys().eq(row.recovered_percent.keys()) {
         let keys = |map: &ByThreshold| map.keys().cloned().collect::<Vec<_>>().join(", ");
         let expected = format!("the thresholds {}", keys(&row.recovered_percent));
         return Err(invalid(format!("{place}.blind_percent"), expected, keys(&row.blind_percent)));
     }
     check_records_alone(place, row)?;
+    let (distinct, std) = (row.distinct.as_ref(), row.std.as_ref());
+    for (field, map) in [
+        ("recovered_percent", Some(&row.recovered_percent)),
+        ("blind_percent", Some(&row.blind_percent)),
+        ("records_alone_percent", row.records_alone_percent.as_ref()),
+        ("distinct.recovered_percent", distinct.map(|distinct| &distinct.recovered_percent)),
+        ("distinct.blind_percent", distinct.map(|distinct| &distinct.blind_percent)),
+        ("std.recovered_percent", std.map(|std| &std.recovered_percent)),
+        ("std.blind_percent", std.map(|std| &std.blind_percent)),
+    ] {
+        map.map_or(Ok(()), |map| percentages(&format!("{place}.{field}"), map))?;
+    }
     if let (Some(sure), Some(reason)) = (row.sure_percent, &row.sure_unknown) {
         let expected = format!("null, as sure_unknown says {reason:?}");
         return Err(invalid(format!("{place}.sure_percent"), expected, sure.to_string()));
@@ -101,17 +111,14 @@ fn check_row(place: &str, row: &Row) -> Result<(), Error> {
     let lost: u64 = row.lost.values().sum();
     // With repeats each count is a rounded mean, and rounded parts need not add up.
     if row.repeats == 1 && lost != row.n_lost {
-        return Err(invalid(
-            format!("{place}.lost"),
-            format!("a sum of {}", row.n_lost),
-            lost.to_string(),
-        ));
+        let expected = format!("a sum of {}", row.n_lost);
+        return Err(invalid(format!("{place}.lost"), expected, lost.to_string()));
     }
     if row.n_lost > row.n_points {
         let expected = format!("at most {}", row.n_points);
         return Err(invalid(format!("{place}.n_lost"), expected, row.n_lost.to_string()));
     }
-    let optional = [
+    for (field, value) in [
         ("delta", row.delta),
         ("median_error", row.median_error),
         ("blind_median_error", row.blind_median_error),
@@ -120,38 +127,20 @@ fn check_row(place: &str, row: &Row) -> Result<(), Error> {
         ("assignment_accuracy_percent", row.assignment_accuracy_percent),
         ("sure_percent", row.sure_percent),
         ("sure_correct_percent", row.sure_correct_percent),
-    ];
-    for (field, value) in optional {
-        if let Some(value) = value {
-            finite(&format!("{place}.{field}"), value)?;
-        }
+    ] {
+        value.map_or(Ok(()), |value| finite(&format!("{place}.{field}"), value))?;
     }
     for (name, &value) in &row.metrics {
         finite(&format!("{place}.metrics[{name:?}]"), value)?;
     }
     for (percentile, value) in &row.error_percentiles {
-        if let Some(value) = value {
-            finite(&format!("{place}.error_percentiles[{percentile:?}]"), *value)?;
-        }
+        let place = || format!("{place}.error_percentiles[{percentile:?}]");
+        value.map_or(Ok(()), |value| finite(&place(), value))?;
     }
     for (at, bin) in row.reliability.iter().flatten().enumerate() {
         for (field, value) in [("predicted", bin.predicted), ("observed", bin.observed)] {
-            if let Some(value) = value {
-                between(&format!("{place}.reliability[{at}].{field}"), value, 0.0, 1.0)?;
-            }
-        }
-    }
-    if let Some(distinct) = &row.distinct {
-        percentages(&format!("{place}.distinct.recovered_percent"), &distinct.recovered_percent)?;
-        percentages(&format!("{place}.distinct.blind_percent"), &distinct.blind_percent)?;
-    }
-    if let Some(spread) = &row.std {
-        let maps = [
-            ("recovered_percent", &spread.recovered_percent),
-            ("blind_percent", &spread.blind_percent),
-        ];
-        for (field, map) in maps {
-            percentages(&format!("{place}.std.{field}"), map)?;
+            let place = || format!("{place}.reliability[{at}].{field}");
+            value.map_or(Ok(()), |value| between(&place(), value, 0.0, 1.0))?;
         }
     }
     Ok(())
@@ -176,8 +165,7 @@ fn check_records_alone(place: &str, row: &Row) -> Result<(), Error> {
             return Err(invalid(place, expected, keys.unwrap_or_else(|| "nothing".to_owned())));
         }
     }
-    let mut percent = row.records_alone_percent.iter();
-    percent.try_for_each(|map| percentages(&format!("{place}.records_alone_percent"), map))
+    Ok(())
 }
 
 fn check_tile(place: &str, tile: &TileFigures, n_results: usize) -> Result<(), Error> {

@@ -1,11 +1,12 @@
 //! What a reader of the page can choose: scheme, neighborhoods, solver. One list of each for every
 //! chart and for the 3D view; a row of the results is a place in each list.
 
+use std::collections::HashSet;
+
 use serde::Serialize;
 
 use crate::attack::{self, Basis, Given};
 use crate::document::{Document, LengthUnit, Row};
-use crate::slot::slot;
 use crate::{tables, verdict, words};
 
 /// The lists. A row is found by its place in them and by nothing else.
@@ -137,7 +138,7 @@ fn given_choice(document: &Document, row: &Row) -> GivenChoice {
 /// oracle nearest to half.
 fn first_given(document: &Document, givens: &[GivenChoice]) -> usize {
     let typed = tables::headline_threshold(document).unwrap_or_default();
-    let share = |row: &Row| row.recovered_percent.get(&typed).copied().unwrap_or(0.0);
+    let share = |row: &Row| verdict::share(row, &typed);
     let own = document.results.iter().filter(|row| group(row) == "released");
     let strongest = own.max_by(|a, b| share(a).total_cmp(&share(b)));
     let oracle = || {
@@ -158,4 +159,29 @@ pub(crate) fn unit_sign(unit: Option<LengthUnit>) -> &'static str {
         Some(LengthUnit::Pixel) => "px",
         Some(LengthUnit::Meter) | None => "m",
     }
+}
+
+/// Schemes with a color and a mark of their own, the same on every page.
+const KNOWN_SCHEMES: [&str; 7] = ["olc", "ppl", "ppl+", "ray", "ray-voxel", "plane", "cp"];
+/// Colors and marks there are; further schemes reuse them in turn.
+const SLOTS: usize = 8;
+
+/// The color and mark of `scheme`; unknown ones take turns in the order they appear.
+fn slot(document: &Document, scheme: &str) -> usize {
+    // Schemes for images have the color of the scheme for maps that they are most like.
+    let known = match scheme {
+        "lines2d" => "olc",
+        "cp2d" => "cp",
+        "dcl2d" => "ray",
+        other => other,
+    };
+    if let Some(slot) = KNOWN_SCHEMES.iter().position(|name| *name == known) {
+        return slot;
+    }
+    let names = document.results.iter().map(|row| row.scheme.as_str());
+    let before: HashSet<&str> = names
+        .take_while(|name| *name != scheme)
+        .filter(|name| !KNOWN_SCHEMES.contains(name))
+        .collect();
+    (KNOWN_SCHEMES.len() + before.len()) % SLOTS
 }

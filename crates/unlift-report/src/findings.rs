@@ -32,7 +32,7 @@ fn curves(document: &Document) -> String {
     let usual = format!("How many {points} come back, by the share of true neighbors");
     let Some(typed) = tables::headline_threshold(document) else { return usual };
     let oracle = || document.results.iter().filter(|row| attack::basis(row) == Some(Basis::Oracle));
-    let share = |row: &Row| row.recovered_percent.get(&typed).copied().unwrap_or(0.0);
+    let share = |row: &Row| verdict::share(row, &typed);
     let at = |ratio: f64| {
         let rows = oracle().filter(move |row| row.inlier_ratio == ratio);
         rows.map(share).fold(0.0, f64::max)
@@ -95,7 +95,7 @@ fn certainty(document: &Document) -> String {
 /// The row that the verdict leads with.
 fn speaking(document: &Document) -> Option<&Row> {
     let typed = tables::headline_threshold(document)?;
-    let share = |row: &Row| row.recovered_percent.get(&typed).copied().unwrap_or(0.0);
+    let share = |row: &Row| verdict::share(row, &typed);
     [Basis::Released, Basis::Given, Basis::Oracle].into_iter().find_map(|basis| {
         let rows = document.results.iter();
         let of_scheme = rows.filter_map(|row| verdict::strongest(document, &row.scheme, basis));

@@ -75,13 +75,13 @@ pub fn render(
     let table_list = [
         Some(tables::recovered(&document)),
         Some(tables::baselines(&document)),
-        tables::distinct(&document),
+        tables::distinct_places(&document),
         tiles::table(&document),
         tables::likeness(&document),
         tables::metrics(&document),
         tables::objects(&document),
         Some(tables::errors(&document)),
-        Some(tables::break_even(&document)).filter(|table| !table.rows.is_empty()),
+        tables::break_even(&document),
     ];
     let loss_list =
         [Some(tables::losses(&document)), tables::choices(&document), tables::trials(&document)];
@@ -136,9 +136,7 @@ pub fn render(
         document: &document,
         attribution: paper::ATTRIBUTION,
     };
-    let mut env = Environment::new();
-    env.set_undefined_behavior(UndefinedBehavior::Strict);
-    env.set_auto_escape_callback(|_| AutoEscape::Html);
+    let mut env = environment();
     // A figure and its unit stay on one line.
     env.add_filter("tied", |text: String| {
         [" %", " cm", " px"]
@@ -150,6 +148,14 @@ pub fn render(
         env.add_template(name, source)?;
     }
     Ok(env.get_template("report.html")?.render(Serde(&page))?.replace(turns, "\u{fffd}"))
+}
+
+/// What renders templates: what they name must be there, and text is escaped.
+pub(crate) fn environment() -> Environment<'static> {
+    let mut env = Environment::new();
+    env.set_undefined_behavior(UndefinedBehavior::Strict);
+    env.set_auto_escape_callback(|_| AutoEscape::Html);
+    env
 }
 
 /// Whether a character turns the direction of what follows: names may hold it, and nothing of ours does.

@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::attack::{self, Basis, Given, basis_of};
 use crate::document::Document;
 use crate::pictures::ReleasedView;
-use crate::verdict;
+use crate::{tables, verdict};
 
 /// One photo and the pictures painted from its keypoints. All pictures are JPEGs of one size.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -191,12 +191,7 @@ pub(crate) fn strongest<'a>(
 }
 
 fn sheet(document: &Document, inversion: &Inversion) -> Sheet {
-    let mut schemes: Vec<&str> = Vec::new();
-    for view in &inversion.views {
-        if !schemes.contains(&view.scheme.as_str()) {
-            schemes.push(&view.scheme);
-        }
-    }
+    let schemes = tables::distinct(inversion.views.iter().map(|view| view.scheme.as_str()));
     let rows = schemes.into_iter().map(|scheme| {
         let main: Vec<&InvertedView> = [Basis::Released, Basis::Given, Basis::Oracle]
             .into_iter()

@@ -61,7 +61,7 @@ pub fn published_2d() -> Vec<PublishedCurve> {
 /// `published_pictures.csv`: dataset, dimensions, features, scheme (`none`: of the true points), inlier ratio, SSIM, PSNR in
 /// dB and LPIPS. Source: tables "SSIM 2D", "SSIM 3D" and the supplement's tables of perceptual similarity; where two disagree
 /// (the baseline of Cambridge in 3D) the paper's own.
-const PICTURES: &str = include_str!("../published_pictures.csv");
+pub(crate) const PICTURES: &str = include_str!("../published_pictures.csv");
 
 /// How alike pictures of what came back were to the photos, SIFT, on one dataset.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,7 +4,7 @@
 //! tables 7 and 9, and the right half of table 3 a part of tables 10 and 12: what stands twice is listed once, under the
 //! larger table.
 
-use crate::paper::{published_2d, published_3d};
+use crate::paper::{PICTURES, published_2d, published_3d};
 
 /// What a printed number measures.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,55 +49,39 @@ pub struct Printed {
     pub value: f64,
 }
 
-/// `published_pictures.csv`: dataset, dimensions, features, scheme, inlier ratio, SSIM, PSNR in dB and LPIPS.
-const PICTURES: &str = include_str!("../published_pictures.csv");
 /// `published_end_to_end.csv`: dataset, features, scheme, neighborhood, inlier ratio, metric, threshold in pixels, value.
 /// Source: table "End-to-end attack evaluation".
 const END_TO_END: &str = include_str!("../published_end_to_end.csv");
 
 /// All numbers of `7-scenes`, `12-scenes` or `cambridge`, table by table.
 pub fn printed(dataset: &str) -> Vec<Printed> {
-    let mut all = recovered_2d(dataset);
-    all.extend(recovered_3d(dataset));
+    let mut all = recovered(dataset, 2);
+    all.extend(recovered(dataset, 3));
     all.extend(pictures(dataset));
     all.extend(end_to_end(dataset));
     all.sort_by_key(|number| number.table);
     all
 }
 
-fn recovered_2d(dataset: &str) -> Vec<Printed> {
-    let table = if dataset == "12-scenes" { 5 } else { 1 };
+/// What came back of images (2) or maps (3), by an oracle.
+fn recovered(dataset: &str, dim: usize) -> Vec<Printed> {
+    let table = match (dim, dataset) {
+        (2, "12-scenes") => 5,
+        (2, _) => 1,
+        (_, "7-scenes") => 7,
+        (_, "12-scenes") => 8,
+        _ => 9,
+    };
     let mut all = Vec::new();
-    for curve in published_2d() {
+    for curve in if dim == 2 { published_2d() } else { published_3d() } {
         let (of, features) = curve.dataset.split_once(' ').unwrap_or((curve.dataset, "sift"));
         if of != dataset {
             continue;
         }
         all.extend(curve.points.iter().map(|&(ratio, value)| Printed {
             table,
-            dim: 2,
+            dim,
             features,
-            scheme: curve.scheme,
-            points: Points::Oracle(ratio),
-            measured: Measured::Within(curve.threshold),
-            value,
-        }));
-    }
-    all
-}
-
-fn recovered_3d(dataset: &str) -> Vec<Printed> {
-    let table = match dataset {
-        "7-scenes" => 7,
-        "12-scenes" => 8,
-        _ => 9,
-    };
-    let mut all = Vec::new();
-    for curve in published_3d().into_iter().filter(|curve| curve.dataset == dataset) {
-        all.extend(curve.points.iter().map(|&(ratio, value)| Printed {
-            table,
-            dim: 3,
-            features: "sift",
             scheme: curve.scheme,
             points: Points::Oracle(ratio),
             measured: Measured::Within(curve.threshold),

@@ -28,7 +28,7 @@ pub fn text_table(document: &Document) -> String {
                 (share, cells)
             });
         for row in rows {
-            let share = row.recovered_percent.get(&headline).copied().unwrap_or(0.0);
+            let share = verdict::share(row, &headline);
             let is_oracle = attack::basis(row) == Some(attack::Basis::Oracle);
             if let Some((_, cells)) = alone.take_if(|(alone, _)| is_oracle || *alone > share) {
                 lines.push(cells);
@@ -38,7 +38,7 @@ pub fn text_table(document: &Document) -> String {
         lines.extend(alone.map(|(_, cells)| cells));
     }
     let mut text = format!("{}\n{}\n\n", banner.headline, banner.sentence);
-    text.push_str(&align(&lines));
+    text.push_str(&align(&lines, &[0, 1, 3]));
     if thresholds.len() > 1 {
         text.push_str(&format!("blind, break-even: within {headline} {}\n", unit(document)));
     }
@@ -130,99 +130,26 @@ fn break_even(document: &Document, row: &Row, typed: &str) -> String {
     }
 }
 
-/// Columns two spaces apart; names flush left, numbers flush right.
-fn align(lines: &[Vec<String>]) -> String {
-    let columns = lines.iter().map(Vec::len).max().unwrap_or(0);
+/// Rows of text with columns as wide as their widest cell, two spaces apart: those in `left` flush left, others flush
+/// right.
+pub fn align(rows: &[Vec<String>], left: &[usize]) -> String {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |column: usize| {
-        let cells = lines.iter().filter_map(|line| line.get(column));
+        let cells = rows.iter().filter_map(|row| row.get(column));
         cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
     };
     let widths: Vec<usize> = (0..columns).map(width).collect();
     let mut text = String::new();
-    for line in lines {
-        let mut row = String::new();
-        for (column, cell) in line.iter().enumerate() {
-            let width = widths[column];
-            if matches!(column, 0 | 1 | 3) {
-                row.push_str(&format!("{cell:<width$}  "));
-            } else {
-                row.push_str(&format!("{cell:>width$}  "));
-            }
+    for row in rows {
+        let mut line = String::new();
+        for (column, (cell, width)) in row.iter().zip(&widths).enumerate() {
+            line.push_str(&match left.contains(&column) {
+                true => format!("{cell:<width$}  "),
+                false => format!("{cell:>width$}  "),
+            });
         }
-        text.push_str(row.trim_end());
+        text.push_str(line.trim_end());
         text.push('\n');
     }
     text
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::document::{NotAudited, Spread};
-
-    /// An audit of one scheme, `olc`, within 0.10.
-    fn document(rows: &[(&str, f64)]) -> Document {
-        let row = |(solver, percent): &(&str, f64)| {
-            serde_json::json!({
-                "scheme": "olc", "neighbors": "oracle", "oracle_noise": "uniform",
-                "inlier_ratio": 0.5, "k": 50, "solver": solver, "delta": 0.08, "unit": "m",
-                "n_points": 100, "n_lost": 0, "lost": {}, "dropped": {},
-                "recovered_percent": {"0.10": percent}, "blind_percent": {"0.10": 8.1},
-                "axis_accuracy_percent": null, "assignment_accuracy_percent": null,
-                "median_error": 0.02, "error_percentiles": {}
-            })
-        };
-        let text = serde_json::json!({
-            "unlift": "0.1.0", "schema": 1,
-            "input": {"path": null, "sha256": "00", "n_points": 100, "scale_m_per_unit": 1.0},
-            "options": {}, "seed": 0, "results": rows.iter().map(row).collect::<Vec<_>>(),
-            "break_even": [],
-            "run": {"threads": 1, "peak_memory_bytes": null, "seconds": {"total": 1.0, "rows": []}}
-        });
-        Document::from_json(&text.to_string()).expect("a valid document")
-    }
-
-    #[test]
-    fn the_strongest_attack_speaks_and_is_named() {
-        let text = text_table(&document(&[("joint", 61.6), ("joint-start", 77.8)]));
-        assert!(text.contains("joint-start  77.8 %") && !text.contains("61.6"), "{text}");
-        // Two lines of verdict, an empty one, the head, the row, what a word means.
-        assert_eq!(text.lines().count(), 6, "{text}");
-    }
-
-    #[test]
-    fn both_baselines_and_what_is_missing_are_shown() {
-        let mut document = document(&[("joint", 95.6)]);
-        let row = &mut document.results[0];
-        row.records_alone_percent = Some([("0.10".to_owned(), 58.6)].into());
-        row.records_alone_by = Some([("0.10".to_owned(), "tomography".to_owned())].into());
-        let missing = |neighbors: Option<&str>, reason: &str| NotAudited {
-            scheme: "ppl+".into(),
-            neighbors: neighbors.map(str::to_owned),
-            reason: reason.into(),
-        };
-        document.not_audited = vec![missing(None, "flat"), missing(Some("geometric"), "no lists")];
-        let text = text_table(&document);
-        assert!(text.contains("95.6 %  8.1 %"), "{text}");
-        let alone = "olc     records alone     -  tomography  58.6 %  8.1 %           -";
-        assert!(text.contains(alone), "{text}");
-        assert!(text.contains("(OLC, records alone)"), "{text}");
-        assert!(text.contains("not audited: ppl+: flat\n"), "{text}");
-        assert!(text.contains("not audited: ppl+ by geometric: no lists\n"), "{text}");
-    }
-
-    #[test]
-    fn a_spread_that_matters_is_shown() {
-        let mut document = document(&[("joint", 41.6)]);
-        let row = &mut document.results[0];
-        row.repeats = 3;
-        let spread = |std: f64| Spread {
-            recovered_percent: [("0.10".to_owned(), std)].into(),
-            ..Spread::default()
-        };
-        row.std = Some(spread(4.96));
-        assert!(text_table(&document).contains(" 41.6 ± 5.0 %  "));
-        document.results[0].std = Some(spread(0.5));
-        assert!(text_table(&document).contains(" 41.6 %  "));
-    }
 }

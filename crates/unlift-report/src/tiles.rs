@@ -117,16 +117,12 @@ pub(crate) fn table(document: &Document) -> Option<Table> {
         }));
         cells
     };
-    Some(Table {
-        id: "tiles",
-        caption: format!(
-            "Recovered points of every tile within {}, by the strongest attack on the whole map.",
-            tables::threshold_text(document, &headline)
-        ),
-        rows: document.tiles.iter().enumerate().map(cells).collect(),
-        columns,
-        notes: Vec::new(),
-    })
+    let caption = format!(
+        "Recovered points of every tile within {}, by the strongest attack on the whole map.",
+        tables::threshold_text(document, &headline)
+    );
+    let rows = document.tiles.iter().enumerate().map(cells).collect();
+    Some(Table::new("tiles", caption, columns, rows))
 }
 
 /// The tile from which most comes back, in a line for a terminal; `None` of a document without tiles.

@@ -27,12 +27,8 @@ pub(crate) struct Verdict {
 
 /// Judges every scheme by its strongest attacks, for the headline threshold.
 pub(crate) fn verdict(document: &Document) -> Verdict {
-    let mut cards: Vec<Card> = Vec::new();
-    for row in &document.results {
-        if cards.iter().all(|card| card.scheme != row.scheme) {
-            cards.extend(card(document, &row.scheme));
-        }
-    }
+    let schemes = tables::schemes(document).into_iter();
+    let mut cards: Vec<Card> = schemes.filter_map(|scheme| card(document, scheme)).collect();
     // Stable: equal shares keep the document's order.
     cards.sort_by(|a, b| {
         let ((a, a_then), (b, b_then)) = (a.badness(), b.badness());
@@ -50,7 +46,7 @@ pub(crate) fn verdict(document: &Document) -> Verdict {
 }
 
 /// Percent that came back within the threshold `typed`.
-fn share(row: &Row, typed: &str) -> f64 {
+pub(crate) fn share(row: &Row, typed: &str) -> f64 {
     row.recovered_percent.get(typed).copied().unwrap_or(0.0)
 }
 

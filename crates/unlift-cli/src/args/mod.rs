@@ -1,30 +1,12 @@
 //! The command line as types. What a string means is in `values.rs`.
 
-mod audit;
-mod audit_images;
-mod audit_map;
-mod audit_released;
-mod bench;
-mod check;
-mod compare;
-mod demo;
-mod doctor;
-mod evaluate;
+mod audits;
 #[cfg(test)]
 mod examples;
-mod export;
-mod features;
-mod invert;
-mod map;
-mod metrics;
-mod models;
-mod neighbors;
-mod obfuscate;
-mod paper;
-mod recover;
-mod shell;
-mod split;
-mod table;
+mod images;
+mod program;
+mod results;
+mod stages;
 
 use std::ffi::OsString;
 
@@ -32,29 +14,16 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::values;
 
-pub use audit::{AttackArgs, ResultArgs};
-pub use audit_images::AuditImagesArgs;
-pub use audit_map::AuditMapArgs;
-pub use audit_released::AuditReleasedArgs;
-pub use bench::BenchRecoverArgs;
-pub use check::CheckArgs;
-pub use compare::CompareArgs;
-pub use demo::DemoArgs;
-pub use doctor::DoctorArgs;
-pub use evaluate::EvaluateArgs;
-pub use export::ExportArgs;
-pub use features::FeaturesArgs;
-pub use invert::InvertArgs;
-pub use map::MapArgs;
-pub use metrics::MetricsArgs;
-pub use models::ModelsArgs;
-pub use neighbors::{FindArgs, NeighborsCommand, OracleArgs};
-pub use obfuscate::ObfuscateArgs;
-pub use paper::PaperArgs;
-pub use recover::RecoverArgs;
-pub use shell::{CompletionsArgs, ManArgs};
-pub use split::SplitArgs;
-pub use table::TableArgs;
+pub use audits::{
+    AttackArgs, AuditImagesArgs, AuditMapArgs, AuditReleasedArgs, CheckArgs, MapArgs, ResultArgs,
+};
+pub use images::{FeaturesArgs, InvertArgs, MetricsArgs};
+pub use program::{CompletionsArgs, DemoArgs, DoctorArgs, ManArgs, ModelsArgs};
+pub use results::{BenchRecoverArgs, CompareArgs, PaperArgs, TableArgs};
+pub use stages::{
+    EvaluateArgs, ExportArgs, FindArgs, NeighborsCommand, ObfuscateArgs, OracleArgs, RecoverArgs,
+    SplitArgs,
+};
 
 /// How much of a privacy-preserving ("obfuscated") SfM map or image comes back?
 #[derive(Debug, Parser)]

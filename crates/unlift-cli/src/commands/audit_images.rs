@@ -19,7 +19,7 @@ use unlift_features::Extraction;
 use unlift_io::atomic::Rules;
 use unlift_io::{Error, read};
 
-use super::common::with_threads;
+use super::common::{all_could_be, with_threads};
 use super::gate_files::GateFiles;
 use super::painter::{kind, painter};
 use super::plan::{attack, check_about, check_fit, own, solvers, summary, thresholds, with_attack};
@@ -36,18 +36,9 @@ pub fn run(args: &AuditImagesArgs) -> anyhow::Result<Outcome> {
     if let Some(finished) = &finished {
         print(&if args.result.json { summary(finished)? } else { finished.text() })?;
     }
-    all_used(args, &used)?;
+    all_could_be("used", &args.path, used.used, used.unusable)?;
     let passed = finished.is_none_or(|finished| finished.passed());
     Ok(if passed { Outcome::Done } else { Outcome::GateFailed })
-}
-
-/// Whether every image could be used: the figures are of fewer than asked for else, and no gate decides.
-pub fn all_used(args: &AuditImagesArgs, used: &Used) -> anyhow::Result<()> {
-    if used.unusable == 0 {
-        return Ok(());
-    }
-    let expected = format!("{} images that can be used", used.used + used.unusable);
-    Err(Error::new(&args.path, "", expected, used.used.to_string()).into())
 }
 
 /// What is read, and must not be written over.

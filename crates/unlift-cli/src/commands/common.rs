@@ -1,5 +1,6 @@
 //! What several commands share.
 
+use std::io::Read;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
@@ -8,10 +9,13 @@ use unlift::Fingerprint;
 use unlift::released::Released;
 use unlift::truth::Secret;
 use unlift_audit::{Preparation, Prepared, maps};
+use unlift_io::Error;
 use unlift_io::hash::hash_file;
 use unlift_io::read::Input;
+use unlift_report::Document;
 
 use crate::args::MapArgs;
+use crate::exit::Outcome;
 use crate::progress::Spinner;
 
 /// What the attacker sees.
@@ -45,11 +49,11 @@ pub fn same_map(
     found: Option<Fingerprint>,
     of: &Path,
     expected: Option<Fingerprint>,
-) -> Result<(), unlift_io::Error> {
+) -> Result<(), Error> {
     match (found, expected) {
         (Some(found), Some(expected)) if found != expected => {
             let expected = format!("{expected}, that of the released map of {}", of.display());
-            Err(unlift_io::Error::new(file, "fingerprint", expected, found.to_string()))
+            Err(Error::new(file, "fingerprint", expected, found.to_string()))
         }
         _ => Ok(()),
     }
@@ -76,7 +80,7 @@ pub fn expect_slots<const D: usize>(
 ) -> anyhow::Result<()> {
     let wrong = |expected: usize, what: &str, found: usize| {
         let expected = format!("{expected} hidden points{what}, as in the truth");
-        Err(unlift_io::Error::new(path, "", expected, found.to_string()).into())
+        Err(Error::new(path, "", expected, found.to_string()).into())
     };
     if released.n_slots() != secret.n_slots() {
         return wrong(secret.n_slots(), "", released.n_slots());
@@ -85,4 +89,29 @@ pub fn expect_slots<const D: usize>(
         return wrong(secret.slots_per_record(), " per record", released.slots_per_record());
     }
     Ok(())
+}
+
+/// Reads the figures of an audit.
+///
+/// # Errors
+/// When the file cannot be read, or is no `audit.json` of this version of the format.
+pub fn read_document(path: &Path) -> anyhow::Result<Document> {
+    let mut text = String::new();
+    let (mut file, _) = unlift_io::input::open(path)?;
+    file.read_to_string(&mut text).map_err(|error| Error::read(path, error))?;
+    Document::from_json(&text).map_err(|error| {
+        let said = error.to_string();
+        // Which file it is, the user says.
+        let said = said.strip_prefix("audit.json: ").unwrap_or(&said);
+        anyhow::anyhow!("{}: {}", unlift::OneLine(path.display()), unlift::OneLine(said))
+    })
+}
+
+/// Refuses an output of fewer images than there are: `failed` of them could not be `done`, which a line told of each.
+pub fn all_could_be(done: &str, path: &Path, n: usize, failed: usize) -> anyhow::Result<Outcome> {
+    if failed == 0 {
+        return Ok(Outcome::Done);
+    }
+    let expected = format!("{} images that can be {done}", n + failed);
+    Err(Error::new(path, "", expected, n.to_string()).into())
 }

@@ -9,7 +9,7 @@ use unlift_io::Error;
 use unlift_io::atomic::{Access, Kind, OutputSet, Rules, write_file};
 use unlift_report::compare::{Change, Comparison, Unmatched, compare, page};
 
-use super::documents::read_document;
+use super::common::read_document;
 use crate::args::CompareArgs;
 use crate::exit::Outcome;
 use crate::output::{print, table};

@@ -10,7 +10,7 @@ use unlift_io::Error;
 use unlift_io::atomic::{Kind, Rules};
 use unlift_io::features::{FeatureWriter, ImageFeatures};
 
-use super::common::with_threads;
+use super::common::{all_could_be, with_threads};
 use crate::args::FeaturesArgs;
 use crate::exit::{Outcome, line, usage};
 use crate::output::print;
@@ -55,7 +55,6 @@ pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
         }
         Ok(tally)
     })?;
-    let total = tally.images + tally.failed;
     if tally.images > 0 {
         let resumed = match tally.resumed {
             0 => String::new(),
@@ -65,11 +64,7 @@ pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
         let out = OneLine(args.out.display());
         print(&format!("{images} images, {features} features{resumed}, in {out}\n"))?;
     }
-    if tally.failed > 0 {
-        let expected = format!("{total} images that can be used");
-        return Err(Error::new(&args.images, "", expected, tally.images.to_string()).into());
-    }
-    Ok(Outcome::Done)
+    all_could_be("used", &args.images, tally.images, tally.failed)
 }
 
 /// A file that would be taken for a photo by the next run.

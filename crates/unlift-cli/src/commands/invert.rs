@@ -1,14 +1,15 @@
 //! `unlift invert`: pictures of keypoints, of what came back of them, or of a map that came back.
 
 use std::collections::BTreeSet;
+use std::num::NonZeroUsize;
 use std::path::{Component, Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 use unlift::OneLine;
-use unlift_audit::images::FeatureSource;
 use unlift_audit::images::extraction::Wanted;
+use unlift_audit::images::{FeatureSource, choice};
 use unlift_audit::inversion::{Painter, view};
 use unlift_audit::refused;
 use unlift_features::{ColorImage, preview};
@@ -22,7 +23,7 @@ use unlift_io::stage::{
 };
 use unlift_nn::DescriptorKind;
 
-use super::common::{same_map, with_threads};
+use super::common::{all_could_be, same_map, with_threads};
 use super::painter::{kind, painter};
 use crate::args::InvertArgs;
 use crate::exit::{Outcome, line, usage};
@@ -50,11 +51,7 @@ pub fn run(args: &InvertArgs) -> anyhow::Result<Outcome> {
         };
         let (painted, out) = (to.painted.into_inner(), OneLine(args.out.display()));
         print(&format!("{painted} pictures, in {out}\n"))?;
-        if unusable > 0 {
-            let expected = format!("{} images that can be painted", painted + unusable);
-            return Err(Error::new(&args.path, "", expected, painted.to_string()).into());
-        }
-        Ok(Outcome::Done)
+        all_could_be("painted", &args.path, painted, unusable)
     })
 }
 
@@ -103,8 +100,7 @@ impl Target<'_> {
 
     /// Numbers of the images to paint, of `n`.
     fn chosen(&self, n: usize) -> Vec<usize> {
-        let most = self.args.max_images.map_or(n, |most| most.get().min(n));
-        (0..most).map(|at| ((2 * at + 1) * n) / (2 * most)).collect()
+        choice::evenly(n, self.args.max_images.map(NonZeroUsize::get))
     }
 }
 

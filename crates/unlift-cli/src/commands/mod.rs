@@ -1,5 +1,6 @@
 //! One file per command: parse, call the library, print.
 
+mod about;
 mod audit_images;
 mod audit_map;
 mod audit_released;
@@ -8,8 +9,6 @@ mod check;
 mod common;
 mod compare;
 mod demo;
-mod doctor;
-mod documents;
 mod evaluate;
 mod export;
 mod features;
@@ -17,15 +16,12 @@ mod gate_files;
 mod image_stages;
 mod invert;
 mod metrics;
-mod models;
 mod neighbors;
 mod obfuscate;
 mod painter;
 mod paper;
 mod plan;
 mod recover;
-mod schemes;
-mod shell;
 mod split;
 mod table;
 
@@ -61,10 +57,10 @@ pub fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Features(args) => features::run(&args),
         Command::Invert(args) => invert::run(&args),
         Command::Metrics(args) => with_threads(None, || metrics::run(&args)),
-        Command::Schemes => schemes::run(),
-        Command::Models(args) => models::run(&args),
-        Command::Doctor(args) => doctor::run(&args),
-        Command::Completions(args) => shell::completions(&args),
-        Command::Man(args) => shell::man(&args),
+        Command::Schemes => about::schemes(),
+        Command::Models(args) => about::models(&args),
+        Command::Doctor(args) => about::doctor(&args),
+        Command::Completions(args) => about::completions(&args),
+        Command::Man(args) => about::man(&args),
     }
 }

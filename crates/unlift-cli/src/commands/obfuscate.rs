@@ -6,7 +6,7 @@ use unlift::{OneLine, Unit};
 use unlift_io::atomic::{Access, Kind, OutputSet, Rules};
 use unlift_io::stage::{Kind as Stage, write_released, write_truth};
 
-use super::common::{RELEASED, TRUTH, open_map};
+use super::common::{RELEASED, TRUTH, all_could_be, open_map};
 use super::image_stages::hide;
 use crate::args::ObfuscateArgs;
 use crate::exit::{Outcome, usage};
@@ -88,12 +88,5 @@ fn images(args: &ObfuscateArgs, mut out: OutputSet) -> anyhow::Result<Outcome> {
         counts.points,
         OneLine(args.out.display())
     ))?;
-    match counts.unusable {
-        0 => Ok(Outcome::Done),
-        unusable => {
-            let expected = format!("{} images that can be used", counts.images + unusable);
-            let found = counts.images.to_string();
-            Err(unlift_io::Error::new(&args.path, "", expected, found).into())
-        }
-    }
+    all_could_be("used", &args.path, counts.images, counts.unusable)
 }

@@ -15,15 +15,15 @@ use crate::stderr;
 
 /// Audits what is there of a dataset.
 pub fn run(args: &PaperArgs) -> anyhow::Result<Outcome> {
-    let parts: Vec<Part> = args.parts.iter().map(|&part| part.into()).collect();
+    let parts = if args.parts.is_empty() { &Part::ALL[..] } else { &args.parts };
     let found = with_threads(args.threads, || {
         Ok(reproduce(&Request {
-            dataset: args.dataset.into(),
+            dataset: args.dataset,
             root: &args.path,
             models: args.models.as_deref(),
             scale: args.scale,
             scenes: args.scenes.clone(),
-            parts: if parts.is_empty() { Part::ALL.to_vec() } else { parts.clone() },
+            parts: parts.to_vec(),
             images: args.images.get(),
             max_points: args.max_points.map(NonZeroUsize::get),
             seed: args.seed,

@@ -7,7 +7,7 @@ use unlift_audit::check_file_of;
 use unlift_io::atomic::{Access, Kind, Rules, write_file};
 use unlift_report::export::{curves, table, thresholds};
 
-use super::documents::read_document;
+use super::common::read_document;
 use crate::args::TableArgs;
 use crate::exit::{Outcome, usage};
 use crate::output::print;
@@ -47,7 +47,7 @@ pub fn run(args: &TableArgs) -> anyhow::Result<Outcome> {
         })?),
         None => None,
     };
-    let text = table(&document, args.format.into(), only);
+    let text = table(&document, args.format, only);
     // Nothing is known of these, and a table without them does not say so.
     for refused in &document.not_audited {
         let by = refused.neighbors.as_ref().map(|by| format!(" by {by}")).unwrap_or_default();

@@ -1,58 +1,162 @@
 //! A folder of photos or with a small map, and the program run in it as a user would.
 
-// Every test program has a copy of this file and uses its own part of it.
+// Each test program compiles this file and uses its own part of it.
 #![allow(dead_code)]
 
 use std::fs;
-use std::path::PathBuf;
-use std::process::{Command, Output};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
 
 use image::RgbImage;
+use serde_json::Value;
 
 /// A folder of its own per test.
 pub struct Place(tempfile::TempDir);
 
 impl Place {
+    /// With nothing in it.
+    pub fn empty() -> Self {
+        Self(tempfile::tempdir().expect("a temporary folder"))
+    }
+
     /// With these photos in `photos`, each of its own kind.
     pub fn with_photos(names: &[&str]) -> Self {
-        let place = Self(tempfile::tempdir().expect("a temporary folder"));
+        let place = Self::empty();
         for (at, name) in names.iter().enumerate() {
-            let path = place.path("photos").join(name);
-            fs::create_dir_all(path.parent().expect("a folder")).unwrap();
-            photo(at as u32).save(path).unwrap();
+            place.write_photo(&format!("photos/{name}"), at as u32);
         }
         place
     }
 
     /// With `n_points` of a made-up room in `room.csv`.
     pub fn with_room(n_points: usize) -> Self {
-        let place = Self(tempfile::tempdir().expect("a temporary folder"));
+        let place = Self::empty();
         place.write_points("room.csv", &unlift::synthetic::room(1, n_points).points);
         place
+    }
+
+    /// Writes a file, and the folders that it lies in.
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+        fs::create_dir_all(self.path(name).parent().expect("a folder")).unwrap();
+        fs::write(self.path(name), content).unwrap();
     }
 
     /// Writes `points` as a table.
     pub fn write_points(&self, name: &str, points: &[[f64; 3]]) {
         let text: String = points.iter().map(|[x, y, z]| format!("{x},{y},{z}\n")).collect();
-        fs::write(self.path(name), text).unwrap();
+        self.write(name, text);
+    }
+
+    /// Writes a made-up photo.
+    pub fn write_photo(&self, name: &str, which: u32) {
+        self.write(name, "");
+        photo(which).save(self.path(name)).unwrap();
+    }
+
+    /// Writes `dim` made-up bytes for each point as descriptors: near points look alike.
+    pub fn write_descriptors(&self, name: &str, points: &[[f64; 3]], dim: u32) {
+        let mut bytes = b"P3DESC01".to_vec();
+        bytes.extend((points.len() as u64).to_le_bytes());
+        bytes.extend([dim.to_le_bytes(), 1u32.to_le_bytes()].concat());
+        (0..points.len() as u64).for_each(|id| bytes.extend(id.to_le_bytes()));
+        points.iter().for_each(|point| bytes.extend(descriptor(point, dim)));
+        self.write(name, bytes);
     }
 
     pub fn path(&self, name: &str) -> PathBuf {
         self.0.path().join(name)
     }
 
+    /// The text of a file.
+    pub fn text(&self, name: &str) -> String {
+        String::from_utf8(self.bytes(name)).expect("UTF-8")
+    }
+
+    pub fn bytes(&self, name: &str) -> Vec<u8> {
+        fs::read(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+    }
+
+    pub fn json(&self, name: &str) -> Value {
+        serde_json::from_str(&self.text(name)).expect("JSON")
+    }
+
+    /// The names of what is in a folder, sorted.
+    pub fn names(&self, folder: &str) -> Vec<String> {
+        let entries = fs::read_dir(self.path(folder)).unwrap();
+        let name = |entry: std::io::Result<fs::DirEntry>| entry.unwrap().file_name();
+        let mut names: Vec<String> =
+            entries.map(|entry| name(entry).into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    /// All files, as paths within the folder, sorted.
+    pub fn files(&self) -> Vec<String> {
+        let (mut found, mut waiting) = (Vec::new(), vec![self.path("")]);
+        while let Some(folder) = waiting.pop() {
+            for entry in fs::read_dir(folder).unwrap() {
+                let path = entry.unwrap().path();
+                match path.is_dir() {
+                    true => waiting.push(path),
+                    false => {
+                        let within = path.strip_prefix(self.0.path()).unwrap();
+                        found.push(within.to_str().unwrap().to_owned());
+                    }
+                }
+            }
+        }
+        found.sort();
+        found
+    }
+
+    /// The program with these words, in the folder.
+    pub fn program<'a>(&self, words: impl IntoIterator<Item = &'a str>) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_unlift"));
+        command.args(words).current_dir(self.0.path());
+        command
+    }
+
+    /// A line of the shell in the folder, `unlift` being the program of this build.
+    pub fn shell(&self, line: &str) -> Output {
+        let ours = Path::new(env!("CARGO_BIN_EXE_unlift")).parent().expect("a folder").to_owned();
+        let others = std::env::var_os("PATH").unwrap_or_default();
+        let path = [ours].into_iter().chain(std::env::split_paths(&others));
+        let mut shell = Command::new("sh");
+        shell.args(["-c", line]).env("PATH", std::env::join_paths(path).expect("a path"));
+        shell.current_dir(self.0.path()).stdin(Stdio::null()).output().expect("a shell")
+    }
+
+    /// Starts the program; nobody hears what it says.
+    pub fn start(&self, line: &str) -> Child {
+        let mut command = self.program(line.split_whitespace());
+        command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program starts")
+    }
+
     /// What a run that must end with `code` printed: on stdout, and on stderr.
     pub fn ends(&self, line: &str, code: i32) -> (String, String) {
-        let Output { status, stdout, stderr } = Command::new(env!("CARGO_BIN_EXE_unlift"))
-            .args(line.split_whitespace())
-            .current_dir(self.0.path())
-            .output()
-            .expect("the program starts");
-        let text = |bytes| String::from_utf8(bytes).expect("UTF-8");
-        let (stdout, stderr) = (text(stdout), text(stderr));
-        assert_eq!(status.code(), Some(code), "{line}\n{stderr}");
+        let output = self.program(line.split_whitespace()).output().expect("the program starts");
+        let (stdout, stderr) = said(&output);
+        assert_eq!(output.status.code(), Some(code), "{line}\n{stderr}");
         (stdout, stderr)
     }
+
+    /// What a run prints on stderr that must end with `code` and print nothing else.
+    pub fn complains(&self, line: &str, code: i32) -> String {
+        let (stdout, stderr) = self.ends(line, code);
+        assert!(stdout.is_empty(), "{line}: {stdout}");
+        stderr
+    }
+
+    /// The JSON that a run prints which must end with `code`.
+    pub fn prints(&self, line: &str, code: i32) -> Value {
+        serde_json::from_str(&self.ends(line, code).0).expect("JSON")
+    }
+}
+
+/// What a run printed on stdout and on stderr.
+pub fn said(output: &Output) -> (String, String) {
+    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).expect("UTF-8");
+    (text(&output.stdout), text(&output.stderr))
 }
 
 /// Blobs of several sizes; `which` moves them.
@@ -62,5 +166,14 @@ pub fn photo(which: u32) -> RgbImage {
         let wave = (x / 5.0).sin() * (y / 7.0).cos() + (x * y / 90.0).sin();
         let value = (127.0 + 60.0 * wave) as u8;
         image::Rgb([value, value, 255 - value])
+    })
+}
+
+/// A descriptor that changes with the place of its point: near points look alike.
+pub fn descriptor(point: &[f64; 3], dim: u32) -> impl Iterator<Item = u8> {
+    let [x, y, z] = *point;
+    (0..dim).map(move |c| {
+        let phase = x + y * f64::from(c % 3) + z * f64::from(c % 5);
+        (60.0 + 55.0 * (phase + f64::from(c * c)).sin()) as u8
     })
 }

@@ -11,7 +11,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use crate::commands::{Case, Writes};
-use crate::common::{Place, photo};
+use crate::common::Place;
 use crate::full;
 use crate::tree::{Tree, differing};
 
@@ -51,7 +51,7 @@ pub struct Ended {
 
 impl Bench {
     pub fn new() -> Self {
-        let place = Place::with_photos(&[]);
+        let place = Place::empty();
         fs::create_dir(place.path("work")).unwrap();
         let bench = Self { place, inputs: INPUTS.get_or_init(inputs) };
         bench.restore_inputs();
@@ -117,13 +117,13 @@ impl Bench {
 
     /// Begins a run, in a shell that does `before` first if there is something.
     pub fn start(&self, before: Option<&str>, line: &str) -> Child {
-        let program = env!("CARGO_BIN_EXE_unlift");
+        let program = self.place.program([]);
         let mut command = match before {
-            None => Command::new(program),
+            None => program,
             Some(before) => {
                 let mut shell = Command::new("sh");
                 // A kernel's dump of a program that aborts is none of its outputs.
-                shell.args(["-c", &format!("ulimit -c 0; {before}"), program]);
+                shell.args(["-c", &format!("ulimit -c 0; {before}")]).arg(program.get_program());
                 shell
             }
         };
@@ -204,7 +204,7 @@ pub fn finish(mut child: Child, line: &str) -> Ended {
 
 /// Maps, photos, features, and what the stages make of them, each twice.
 fn inputs() -> Tree {
-    let bench = Bench { place: Place::with_photos(&[]), inputs: &NONE };
+    let bench = Bench { place: Place::empty(), inputs: &NONE };
     let place = &bench.place;
     let points = |seed| unlift::synthetic::room(seed, POINTS).points;
     fs::create_dir(place.path("in")).unwrap();
@@ -213,37 +213,25 @@ fn inputs() -> Tree {
     place.write_points("in/other.csv", &points(2));
     for which in [1, 2] {
         for (at, name) in ["a.png", "b/c.jpg", "d.webp"].into_iter().enumerate() {
-            let path = place.path(&format!("in/photos{which}")).join(name);
-            fs::create_dir_all(path.parent().expect("a folder")).unwrap();
-            photo(at as u32 + 5 * which).save(path).unwrap();
+            place.write_photo(&format!("in/photos{which}/{name}"), at as u32 + 5 * which);
         }
     }
     for which in [1, 2] {
         let (hidden, images) = (format!("../in/hidden{which}"), format!("../in/images{which}"));
         let features = format!("../in/features{which}.h5");
-        for line in [
+        let mut lines = vec![
             format!("features ../in/photos{which} --out {features}"),
             format!("obfuscate {features} --scheme cp2d --k 8 --seed {which} --out {images}"),
             format!("obfuscate ../in/room.csv --scheme ppl --k 10 --seed {which} --out {hidden}"),
-            format!(
-                "neighbors oracle {hidden}/truth.parquet --inlier-ratio 1 --k 10 \
-                 --out {hidden}/lists.parquet"
-            ),
-            format!(
-                "neighbors oracle {images}/truth.parquet --inlier-ratio 1 --k 8 \
-                 --out {images}/lists.parquet"
-            ),
-            format!(
-                "recover {hidden}/released.parquet --neighbors {hidden}/lists.parquet \
-                 --out {hidden}/back.parquet"
-            ),
-            format!(
-                "recover {images}/released.parquet --neighbors {images}/lists.parquet \
-                 --out {images}/back.parquet"
-            ),
-        ] {
-            bench.succeeds(&line);
+        ];
+        for (of, k) in [(&hidden, 10), (&images, 8)] {
+            let lists = format!("{of}/lists.parquet");
+            let oracle = format!("neighbors oracle {of}/truth.parquet --inlier-ratio 1 --k {k}");
+            lines.push(format!("{oracle} --out {lists}"));
+            let recover = format!("recover {of}/released.parquet --neighbors {lists}");
+            lines.push(format!("{recover} --out {of}/back.parquet"));
         }
+        lines.iter().for_each(|line| _ = bench.succeeds(line));
     }
     Tree::of(&bench.path("in"))
 }

@@ -26,8 +26,10 @@ pub struct Case {
     pub is_slow: bool,
 }
 
-const USUAL: Case =
-    Case { name: "", line: "", earlier: None, writes: Writes::Whole, inputs: &[], is_slow: false };
+/// A command whose files belong together, and that takes seconds.
+const fn whole(name: &'static str, line: &'static str, inputs: &'static [&'static str]) -> Case {
+    Case { name, line, earlier: None, writes: Writes::Whole, inputs, is_slow: false }
+}
 
 impl Case {
     /// The run that the tests are about.
@@ -43,134 +45,105 @@ impl Case {
 
 /// Every command. Those with a seed differ by it, the others by what they read.
 pub const CASES: [Case; 19] = [
-    Case {
-        name: "obfuscate",
-        line: "obfuscate ../in/room.csv --scheme ppl --k 10 --seed {} --out out",
-        inputs: &["room.csv"],
-        ..USUAL
-    },
-    Case {
-        name: "obfuscate, images",
-        line: "obfuscate ../in/features2.h5 --scheme dcl2d --k 8 --seed {} --out out",
-        inputs: &["features2.h5"],
-        ..USUAL
-    },
-    Case {
-        name: "neighbors oracle",
-        line: "neighbors oracle ../in/hidden2/truth.parquet --inlier-ratio 0.5 --k 10 --seed {} \
+    whole(
+        "obfuscate",
+        "obfuscate ../in/room.csv --scheme ppl --k 10 --seed {} --out out",
+        &["room.csv"],
+    ),
+    whole(
+        "obfuscate, images",
+        "obfuscate ../in/features2.h5 --scheme dcl2d --k 8 --seed {} --out out",
+        &["features2.h5"],
+    ),
+    whole(
+        "neighbors oracle",
+        "neighbors oracle ../in/hidden2/truth.parquet --inlier-ratio 0.5 --k 10 --seed {} \
                --out lists.parquet",
-        inputs: &["hidden2/truth.parquet", "hidden2/released.parquet"],
-        ..USUAL
-    },
-    Case {
-        name: "neighbors find",
-        line: "neighbors find ../in/hidden{}/released.parquet --source geometric --k 10 \
+        &["hidden2/truth.parquet", "hidden2/released.parquet"],
+    ),
+    whole(
+        "neighbors find",
+        "neighbors find ../in/hidden{}/released.parquet --source geometric --k 10 \
                --out lists.parquet",
-        inputs: &["hidden2/released.parquet"],
-        ..USUAL
-    },
-    Case {
-        name: "neighbors find, images",
-        line: "neighbors find ../in/images{}/released.parquet --source overlap --out lists.parquet",
-        inputs: &["images2/released.parquet"],
-        ..USUAL
-    },
-    Case {
-        name: "recover",
-        line: "recover ../in/hidden{}/released.parquet --neighbors ../in/hidden{}/lists.parquet \
+        &["hidden2/released.parquet"],
+    ),
+    whole(
+        "neighbors find, images",
+        "neighbors find ../in/images{}/released.parquet --source overlap --out lists.parquet",
+        &["images2/released.parquet"],
+    ),
+    whole(
+        "recover",
+        "recover ../in/hidden{}/released.parquet --neighbors ../in/hidden{}/lists.parquet \
                --out back.parquet",
-        inputs: &["hidden2/released.parquet", "hidden2/lists.parquet"],
-        ..USUAL
-    },
-    Case {
-        name: "recover, images",
-        line: "recover ../in/images{}/released.parquet --neighbors ../in/images{}/lists.parquet \
+        &["hidden2/released.parquet", "hidden2/lists.parquet"],
+    ),
+    whole(
+        "recover, images",
+        "recover ../in/images{}/released.parquet --neighbors ../in/images{}/lists.parquet \
                --out back.parquet",
-        inputs: &["images2/released.parquet", "images2/lists.parquet"],
-        ..USUAL
-    },
+        &["images2/released.parquet", "images2/lists.parquet"],
+    ),
     Case {
-        name: "evaluate",
-        line: "evaluate ../in/hidden{}/back.parquet --truth ../in/hidden{}/truth.parquet --json",
-        inputs: &["hidden2/back.parquet", "hidden2/truth.parquet", "hidden2/released.parquet"],
         writes: Writes::Nothing,
-        ..USUAL
+        ..whole(
+            "evaluate",
+            "evaluate ../in/hidden{}/back.parquet --truth ../in/hidden{}/truth.parquet --json",
+            &["hidden2/back.parquet", "hidden2/truth.parquet", "hidden2/released.parquet"],
+        )
     },
-    Case {
-        name: "features",
-        line: "features ../in/photos{} --out f.h5",
-        inputs: &["photos2/b/c.jpg"],
-        ..USUAL
-    },
-    Case {
-        name: "features, a copy",
-        line: "features ../in/features{}.h5 --out f.h5",
-        inputs: &["features2.h5"],
-        ..USUAL
-    },
-    Case {
-        name: "audit map",
-        line: "audit map ../in/room.csv --k 10 --schemes olc --inlier-ratios 1 --seed {} \
+    whole("features", "features ../in/photos{} --out f.h5", &["photos2/b/c.jpg"]),
+    whole("features, a copy", "features ../in/features{}.h5 --out f.h5", &["features2.h5"]),
+    whole(
+        "audit map",
+        "audit map ../in/room.csv --k 10 --schemes olc --inlier-ratios 1 --seed {} \
                --write-clouds --out out",
-        inputs: &["room.csv"],
-        ..USUAL
-    },
-    Case {
-        name: "audit released",
-        line: "audit released ../in/hidden{}/released.parquet --truth ../in/hidden{}/truth.parquet \
+        &["room.csv"],
+    ),
+    whole(
+        "audit released",
+        "audit released ../in/hidden{}/released.parquet --truth ../in/hidden{}/truth.parquet \
                --k 10 --inlier-ratios 1 --out out",
-        inputs: &["hidden2/released.parquet", "hidden2/truth.parquet"],
-        ..USUAL
-    },
-    Case {
-        name: "audit images",
-        line: "audit images ../in/photos2 --schemes lines2d --inlier-ratios 0.5 --k 8 \
+        &["hidden2/released.parquet", "hidden2/truth.parquet"],
+    ),
+    whole(
+        "audit images",
+        "audit images ../in/photos2 --schemes lines2d --inlier-ratios 0.5 --k 8 \
                --solver joint-start --seed {} --out out",
-        inputs: &["photos2/b/c.jpg"],
-        ..USUAL
-    },
-    Case {
-        name: "audit images --invert",
-        line: "audit images ../in/features2.h5 --photos ../in/photos2 --invert --max-images 1 \
+        &["photos2/b/c.jpg"],
+    ),
+    whole(
+        "audit images --invert",
+        "audit images ../in/features2.h5 --photos ../in/photos2 --invert --max-images 1 \
                --schemes lines2d --inlier-ratios 0.5 --k 8 --solver joint-start --seed {} --out out",
-        inputs: &["features2.h5", "photos2/b/c.jpg"],
-        ..USUAL
-    },
+        &["features2.h5", "photos2/b/c.jpg"],
+    ),
     Case {
-        name: "invert",
-        line: "invert ../in/photos{} --out pictures",
-        inputs: &["photos2/b/c.jpg"],
         writes: Writes::Each,
-        ..USUAL
+        ..whole("invert", "invert ../in/photos{} --out pictures", &["photos2/b/c.jpg"])
     },
     Case {
-        name: "invert, released",
-        line: "invert ../in/images{}/released.parquet --recovered ../in/images{}/back.parquet \
+        writes: Writes::Each,
+        ..whole(
+            "invert, released",
+            "invert ../in/images{}/released.parquet --recovered ../in/images{}/back.parquet \
                --out pictures",
-        inputs: &["images2/released.parquet", "images2/back.parquet"],
-        writes: Writes::Each,
-        ..USUAL
+            &["images2/released.parquet", "images2/back.parquet"],
+        )
     },
     Case {
-        name: "metrics",
-        line: "metrics ../in/photos1 ../in/photos2 --json",
-        inputs: &["photos2/b/c.jpg"],
         writes: Writes::Nothing,
-        ..USUAL
+        ..whole("metrics", "metrics ../in/photos1 ../in/photos2 --json", &["photos2/b/c.jpg"])
     },
     Case {
-        name: "bench recover",
-        line: "bench recover --points 1000 --k 10 --inlier-ratios 1 --json",
         writes: Writes::Nothing,
-        ..USUAL
+        ..whole("bench recover", "bench recover --points 1000 --k 10 --inlier-ratios 1 --json", &[])
     },
     Case {
-        name: "demo",
-        line: "demo --out out",
-        // The same kind of output, in less than a second.
+        // Another command leaves the same kind of output in less than a second.
         earlier: Some("audit map ../in/room.csv --k 10 --schemes olc --inlier-ratios 1 --out out"),
         is_slow: true,
-        ..USUAL
+        ..whole("demo", "demo --out out", &[])
     },
 ];
 

@@ -1,12 +1,19 @@
-//! Limits on open files, on the size of files and on memory, step by step.
+//! Limits on open files, on the size of files and on memory, disks that are full, and streams that are closed, step by
+//! step: all of the output or nothing of it, and a line that names it.
+
+use std::process::Command;
 
 use crate::bench::{Bench, Ended};
 use crate::commands::{Case, Writes, named, quick};
-use crate::tree::is_partial;
+use crate::full;
+use crate::tables;
+use crate::tree::{Tree, is_partial};
 use crate::verdict::{Found, State, of_failure, state};
-use crate::{full, tables};
 
 const ABORTED: i32 = 6;
+const PAGE: usize = 4096;
+/// How a run is started that a shell has prepared.
+const EXEC: &str = "exec \"$0\" \"$@\"";
 
 /// How the runs under one limit ended.
 #[derive(Default)]
@@ -20,13 +27,26 @@ struct Row {
     swept: usize,
 }
 
-fn cases() -> Vec<&'static Case> {
-    match full() {
-        true => quick().collect(),
-        false => {
-            ["obfuscate", "recover, images", "features", "audit map", "invert"].map(named).into()
+impl Row {
+    /// Counts a run, which worked or told a line.
+    fn add(&mut self, found: Result<Found, String>, what: &str, ended: &Ended) {
+        self.runs += 1;
+        match found {
+            Ok(Found::Worked) => self.worked += 1,
+            Ok(_) => self.told += 1,
+            Err(told) => panic!("{what}: {told}: {ended:?}"),
         }
+        assert!(!ended.stderr.contains(".partial"), "{what}: {ended:?}");
     }
+}
+
+/// Every quick command in the full version, else those with these names.
+fn cases<const N: usize>(names: [&'static str; N]) -> Vec<&'static Case> {
+    if full() { quick().collect() } else { names.map(named).into() }
+}
+
+fn usual_cases() -> Vec<&'static Case> {
+    cases(["obfuscate", "recover, images", "features", "audit map", "invert"])
 }
 
 /// Runs a case under each limit, in turn onto nothing and onto an earlier output.
@@ -36,12 +56,11 @@ fn sweep(bench: &Bench, case: &'static Case, option: &str, limits: &[usize]) -> 
     for (at, limit) in limits.iter().enumerate() {
         let had_old = at % 2 == 1;
         bench.begin(had_old.then_some(&known.old));
-        let before = format!("ulimit {option} {limit} || exit 99; exec \"$0\" \"$@\"");
+        let before = format!("ulimit {option} {limit} || exit 99; {EXEC}");
         let ended = bench.run(Some(&before), &case.line());
         assert_ne!(ended.code, Some(99), "the shell knows no ulimit {option}");
         let mut left = bench.tree();
         let what = format!("{}, ulimit {option} {limit}", case.name);
-        row.runs += 1;
         let is_refused = option == "-v" && is_refused(&ended);
         if left.names().any(is_partial) && (is_refused || option == "-n") {
             // Folders cannot be emptied when no file can be opened: the next run does it.
@@ -50,7 +69,7 @@ fn sweep(bench: &Bench, case: &'static Case, option: &str, limits: &[usize]) -> 
             left = left.files_without(is_partial);
         }
         if is_refused {
-            row.refused += 1;
+            (row.runs, row.refused) = (row.runs + 1, row.refused + 1);
             let found = state(&known, had_old, &left);
             // Who writes files one by one may have written some of them, each of them whole.
             let some = found == Ok(State::Some) && !matches!(case.writes, Writes::Whole);
@@ -58,11 +77,9 @@ fn sweep(bench: &Bench, case: &'static Case, option: &str, limits: &[usize]) -> 
             assert!(all_or_nothing || some, "{what}: {found:?}");
             continue;
         }
-        match of_failure(case, &known, had_old, (&ended, &left)) {
-            Ok(Found::Worked) => row.worked += 1,
-            Ok(_) => row.told += 1,
-            Err(told) => panic!("{what}: {told}: {ended:?}"),
-        }
+        row.add(of_failure(case, &known, had_old, (&ended, &left)), &what, &ended);
+        let is_named = ended.stderr.contains("found a limit on the size of files");
+        assert!(option != "-f" || ended.code == Some(0) || is_named, "{what}: {ended:?}");
     }
     bench.goes_on(case, option);
     row
@@ -74,41 +91,35 @@ fn is_refused(ended: &Ended) -> bool {
     ended.signal == Some(ABORTED) || ended.code == Some(101) && is_told
 }
 
-fn print(title: &str, rows: Vec<(&'static str, Row)>) {
+fn print(title: &str, rows: impl Iterator<Item = (&'static str, Row)>) {
     let cells = |(name, row): (&'static str, Row)| {
         let counts = [row.runs, row.worked, row.told, row.refused, row.swept];
         [name.to_owned()].into_iter().chain(counts.map(|n| n.to_string())).collect()
     };
-    let rows: Vec<Vec<String>> = rows.into_iter().map(cells).collect();
-    tables::print(
-        title,
-        &["command", "runs", "worked", "told in a line", "aborted", "rest, swept"],
-        &rows,
-    );
+    let rows: Vec<Vec<String>> = rows.map(cells).collect();
+    let header = ["command", "runs", "worked", "told in a line", "aborted", "rest, swept"];
+    tables::print(title, &header, &rows);
 }
 
 #[test]
 fn few_open_files_leave_all_or_nothing() {
     let bench = Bench::new();
     let limits: Vec<usize> = if full() { (4..=40).collect() } else { vec![5, 6, 7, 8, 10, 13, 16] };
-    let rows = cases().into_iter().map(|case| (case.name, sweep(&bench, case, "-n", &limits)));
-    print("Open files, `ulimit -n` 4 to 40", rows.collect());
+    let row = |case: &'static Case| (case.name, sweep(&bench, case, "-n", &limits));
+    print("Open files, `ulimit -n` 4 to 40", usual_cases().into_iter().map(row));
 }
 
 #[test]
 fn small_files_leave_all_or_nothing() {
     let bench = Bench::new();
-    let of_case = |case: &'static Case| {
+    let row = |case: &'static Case| {
         // In the blocks of most shells; those of others are twice as large.
         let blocks = bench.known(case).new.largest() / 500 + 4;
         let n = if full() { 12 } else { 2 };
         let limits: Vec<usize> = (0..=n).map(|step| blocks * step / n).collect();
         (case.name, sweep(&bench, case, "-f", &limits))
     };
-    print(
-        "Size of files, `ulimit -f` 0 to the largest",
-        cases().into_iter().map(of_case).collect(),
-    );
+    print("Size of files, `ulimit -f` 0 to the largest", usual_cases().into_iter().map(row));
 }
 
 #[test]
@@ -116,7 +127,7 @@ fn little_memory_leaves_all_or_nothing() {
     let bench = Bench::new();
     // From where the program can say what it is, to where it can do everything.
     let starts = |kib: usize| {
-        let before = format!("ulimit -v {kib} || exit 99; exec \"$0\" \"$@\"");
+        let before = format!("ulimit -v {kib} || exit 99; {EXEC}");
         bench.run(Some(&before), "--version").code == Some(0)
     };
     let Some(least) = (1..400).map(|at| at * 4096).find(|&kib| starts(kib)) else {
@@ -126,7 +137,79 @@ fn little_memory_leaves_all_or_nothing() {
     let (n, factor) = if full() { (32, 1.1) } else { (6, 1.5) };
     let limits: Vec<usize> =
         (0..n).map(|step| (least as f64 * f64::powi(factor, step)) as usize).collect();
-    let rows = cases().into_iter().map(|case| (case.name, sweep(&bench, case, "-v", &limits)));
-    let title = format!("Memory, `ulimit -v` {least} KiB and up");
-    print(&title, rows.collect());
+    let row = |case: &'static Case| (case.name, sweep(&bench, case, "-v", &limits));
+    print(&format!("Memory, `ulimit -v` {least} KiB and up"), usual_cases().into_iter().map(row));
+}
+
+/// What lets a shell mount a disk that nobody else sees, where anything does.
+fn unshared() -> Option<&'static str> {
+    let works = |options: &str| {
+        let line = format!("unshare {options} sh -c 'mount -t tmpfs none /mnt'");
+        Command::new("sh").args(["-c", &line]).output().is_ok_and(|done| done.status.success())
+    };
+    ["-Urm", "-m"].into_iter().find(|options| works(options))
+}
+
+#[test]
+fn a_full_disk_costs_nothing_that_was_there() {
+    let Some(unshared) = unshared() else {
+        println!("no disk can be mounted here: not tested");
+        return;
+    };
+    let bench = Bench::new();
+    let steps = if full() { 10 } else { 3 };
+    let on_disks = |case: &'static Case| {
+        let known = bench.known(case);
+        let mut row = Row::default();
+        for step in 0..=steps {
+            let had_old = step % 2 == 1;
+            bench.begin(had_old.then_some(&known.old));
+            // On a disk with as much room beside what is there, which is copied back as it is in the end.
+            let pages = |tree: &Tree| tree.size().div_ceil(PAGE) + tree.names().count();
+            let room = 1 + pages(&known.new) * step / steps;
+            let size = PAGE * (room + if had_old { pages(&known.old) } else { 0 });
+            let before = format!(
+                "exec unshare {unshared} sh -c '\
+                 cp -r . ../kept && mount -t tmpfs -o size={size} none . && cd ../work && \
+                 cp -r ../kept/. . || exit 99; \
+                 \"$0\" \"$@\"; code=$?; cp -r . ../after; exit $code' \"$0\" \"$@\""
+            );
+            let ended = bench.run(Some(&before), &case.line());
+            let left = Tree::of(&bench.path("after")).settled();
+            for folder in ["kept", "after"] {
+                std::fs::remove_dir_all(bench.path(folder)).unwrap();
+            }
+            let what = format!("{}, {room} pages", case.name);
+            row.add(of_failure(case, &known, had_old, (&ended, &left)), &what, &ended);
+            let full = "expected space to write, found a full disk";
+            let is_named = ended.stderr.lines().any(|line| line.ends_with(full));
+            assert!(ended.code == Some(0) || is_named, "{what}: {ended:?}");
+        }
+        (case.name, row)
+    };
+    let cases = cases(["obfuscate", "features", "invert", "audit map"]).into_iter();
+    print("Full disks", cases.filter(|case| case.writes != Writes::Nothing).map(on_disks));
+}
+
+/// A file that gets the number of a closed stream hears none of our words.
+#[test]
+fn closed_streams_change_no_byte_of_an_output() {
+    let bench = Bench::new();
+    let closed = |case: &'static Case| {
+        let known = bench.known(case);
+        let mut row = Row::default();
+        for which in 0..8 {
+            let streams = [(0, "<&-"), (1, ">&-"), (2, "2>&-")];
+            let closed = streams.map(|(bit, text)| if which >> bit & 1 == 1 { text } else { "" });
+            bench.begin(None);
+            let before = format!("{EXEC} {}", closed.join(" "));
+            let ended = bench.run(Some(&before), &case.line());
+            let found = of_failure(case, &known, false, (&ended, &bench.tree()));
+            assert_eq!(found, Ok(Found::Worked), "{}, {before}: {ended:?}", case.name);
+            row.add(found, case.name, &ended);
+        }
+        (case.name, row)
+    };
+    // They have something to say on both streams.
+    print("Closed streams", cases(["obfuscate", "features", "audit map"]).into_iter().map(closed));
 }

@@ -15,10 +15,8 @@ mod common;
 
 mod bench;
 mod commands;
-mod disk;
 mod kills;
 mod limits;
-mod streams;
 mod tables;
 mod tree;
 mod vanishing;

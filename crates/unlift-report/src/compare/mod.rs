@@ -125,12 +125,7 @@ pub fn compare(
             found: format!("none among {}", new.results.len()),
         });
     }
-    let mut schemes: Vec<&str> = Vec::new();
-    for row in &new.results {
-        if !schemes.contains(&row.scheme.as_str()) {
-            schemes.push(&row.scheme);
-        }
-    }
+    let schemes = tables::schemes(new);
     for scheme in &schemes {
         changes.extend(baselines(old, new, scheme, &within));
     }

@@ -1,11 +1,11 @@
 //! A comparison as a page of its own: no script, no network.
 
 use minijinja::value::Serde;
-use minijinja::{AutoEscape, Environment, UndefinedBehavior};
 use serde::Serialize;
 
 use super::{Change, Comparison};
 use crate::document::Document;
+use crate::html::environment;
 use crate::{Error, tables, words};
 
 const STYLE: &str = include_str!("../../template/style.css");
@@ -45,7 +45,14 @@ struct Figures {
 /// # Errors
 /// [`Error::Template`] when it cannot be rendered (a bug of this crate).
 pub fn page(comparison: &Comparison, old: &Document, new: &Document) -> Result<String, Error> {
-    let audit = |which, document| Audit::of(which, document);
+    let audits = [("old", old), ("new", new)].map(|(which, document)| Audit {
+        which,
+        path: document.input.path.as_deref(),
+        sha256: document.input.sha256.as_deref(),
+        n_points: words::thousands(document.input.n_points),
+        seed: document.seed,
+        unlift: &document.unlift,
+    });
     let table = |id, title, changes: &[Change]| Figures {
         id,
         title,
@@ -61,27 +68,12 @@ pub fn page(comparison: &Comparison, old: &Document, new: &Document) -> Result<S
         comparison,
         summary: comparison.summary(),
         share_safe: old.input.path.is_none() && new.input.path.is_none(),
-        audits: [audit("old", old), audit("new", new)],
+        audits,
         tables: tables.into_iter().filter(|table| !table.rows.is_empty()).collect(),
     };
-    let mut env = Environment::new();
-    env.set_undefined_behavior(UndefinedBehavior::Strict);
-    env.set_auto_escape_callback(|_| AutoEscape::Html);
+    let mut env = environment();
     env.add_template("compare.html", TEMPLATE)?;
     Ok(env.get_template("compare.html")?.render(Serde(&page))?)
-}
-
-impl<'a> Audit<'a> {
-    fn of(which: &'static str, document: &'a Document) -> Self {
-        Self {
-            which,
-            path: document.input.path.as_deref(),
-            sha256: document.input.sha256.as_deref(),
-            n_points: words::thousands(document.input.n_points),
-            seed: document.seed,
-            unlift: &document.unlift,
-        }
-    }
 }
 
 fn cells(new: &Document, change: &Change) -> [String; 6] {

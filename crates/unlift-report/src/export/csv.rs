@@ -1,17 +1,13 @@
 //! Every row of `results` as CSV (RFC 4180): what a script or a spreadsheet works on.
 
 use crate::document::{ByThreshold, Document, Row};
+use crate::tables::distinct;
 
 /// All rows, with a column per figure and one per threshold of `within` where a figure has several. What is not known is empty.
 pub(super) fn csv(document: &Document, within: &[String]) -> String {
     let rows = &document.results;
-    let mut names: Vec<&String> = Vec::new();
-    let mut percentiles: Vec<&String> = Vec::new();
-    for row in rows {
-        names.extend(row.metrics.keys().filter(|name| !names.contains(name)).collect::<Vec<_>>());
-        let new = row.error_percentiles.keys().filter(|key| !percentiles.contains(key));
-        percentiles.extend(new.collect::<Vec<_>>());
-    }
+    let names = distinct(rows.iter().flat_map(|row| row.metrics.keys()));
+    let percentiles = distinct(rows.iter().flat_map(|row| row.error_percentiles.keys()));
     // The program knows its tables by the first four.
     let mut heads: Vec<String> = [
         "scheme",

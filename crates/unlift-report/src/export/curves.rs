@@ -24,12 +24,7 @@ pub fn curves(document: &Document, only: Option<&str>) -> Option<String> {
     let typed = only.map(str::to_owned).or_else(|| tables::headline_threshold(document))?;
     let choices = Choices::of(document);
     let oracle: Vec<_> = choices.givens.iter().filter(|given| given.group == "oracle").collect();
-    let mut sources: Vec<&str> = Vec::new();
-    for given in &oracle {
-        if !sources.contains(&given.source.as_str()) {
-            sources.push(&given.source);
-        }
-    }
+    let sources = tables::distinct(oracle.iter().map(|given| given.source.as_str()));
     sources.first()?;
     let mut text = frame(document, &typed);
     for scheme in &choices.schemes {

@@ -3,10 +3,10 @@
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
-use super::said::{self, Fate};
 use super::{ObfuscationView, Scene3d, SceneBox, Shapes, View, subsample};
 use crate::attack::Given;
 use crate::document::Row;
+use crate::words;
 
 /// Bytes of the page that the 3D view may take. With the libraries (about 1.1 MB), the tables and
 /// the curves the page stays below 10 MB.
@@ -118,7 +118,7 @@ pub(crate) fn encode(scene: &Scene3d, rows: &[Row], error_unit: f32) -> Encoded 
     let mut obfuscations = Vec::new();
     for ObfuscationView { scheme, shapes, n_records, .. } in &scene.obfuscations {
         let (kind, bytes, count) = encode_shapes(&bounds, shapes);
-        let said = said::shapes(shapes, count, *n_records);
+        let said = shapes_said(shapes, count, *n_records);
         let block = push(bytes);
         obfuscations.push(EncodedShapes { scheme: scheme.clone(), kind, count, block, said });
     }
@@ -242,6 +242,59 @@ fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
     a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f32>().sqrt()
 }
 
+/// What became of the points of one pane.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+struct Fate {
+    /// Points that are drawn.
+    drawn: usize,
+    /// Points that the scheme's rule did not release.
+    withheld: usize,
+    /// Released points without a position after recovery.
+    lost: usize,
+    /// Points outside the box that is drawn.
+    outside: usize,
+}
+
+impl Fate {
+    /// "3,861 of 3,895 points drawn; 34 not released".
+    fn said(&self) -> String {
+        let count = |n: usize| words::thousands(n as u64);
+        let all = self.drawn + self.withheld + self.lost + self.outside;
+        let others = [
+            (self.withheld, "not released"),
+            (self.lost, "lost"),
+            (self.outside, "outside the box"),
+        ];
+        let others: Vec<String> = others
+            .into_iter()
+            .filter(|(n, _)| *n > 0)
+            .map(|(n, what)| format!("{} {what}", count(n)))
+            .collect();
+        if others.is_empty() {
+            return format!("{} points drawn", count(all));
+        }
+        let drawn = match self.drawn {
+            0 => format!("None of {}", count(all)),
+            n => format!("{} of {}", count(n), count(all)),
+        };
+        format!("{drawn} points drawn; {}", others.join(", "))
+    }
+}
+
+/// "1,500 of 3,895 lines drawn".
+fn shapes_said(shapes: &Shapes, drawn: usize, n_records: u64) -> String {
+    let what = match shapes {
+        Shapes::Segments(_) => "lines",
+        Shapes::Patches(_) => "planes",
+        Shapes::Points(_) => "points",
+    };
+    let all = words::thousands(n_records.max(drawn as u64));
+    match drawn as u64 >= n_records {
+        true => format!("{all} {what} drawn"),
+        false => format!("{} of {all} {what} drawn", words::thousands(drawn as u64)),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -340,5 +393,19 @@ mod tests {
         assert_eq!(error_byte(1.0), 127);
         assert_eq!(error_byte(0.0), 0);
         assert_eq!(error_byte(f32::INFINITY), 254);
+    }
+
+    #[test]
+    fn a_pane_without_points_says_why() {
+        let fate = Fate { lost: 3_895, ..Fate::default() };
+        assert_eq!(fate.said(), "None of 3,895 points drawn; 3,895 lost");
+        assert_eq!(Fate { drawn: 4_000, ..Fate::default() }.said(), "4,000 points drawn");
+    }
+
+    #[test]
+    fn shapes_are_a_sample() {
+        let lines = Shapes::Segments(Vec::new());
+        assert_eq!(shapes_said(&lines, 1_500, 3_895), "1,500 of 3,895 lines drawn");
+        assert_eq!(shapes_said(&lines, 9, 9), "9 lines drawn");
     }
 }

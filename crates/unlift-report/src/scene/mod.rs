@@ -5,7 +5,6 @@
 
 mod encode;
 mod geometry;
-mod said;
 
 use crate::attack::Given;
 

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 use unlift_report::document::Document;
 use unlift_report::{RenderOptions, render};
 
-use super::{PageFile, browser, sample};
+use super::{browser, page, sample};
 
 /// Picks every option of a form's menus `keys`, one after the other, and says what the page shows then:
 /// an array of `[labels of the options, what "show" returns]`.
@@ -56,9 +56,7 @@ fn every_choice_of_the_view_names_its_source_and_shows_points_or_words() {
     let gone = scene.views.pop().expect("a view");
     scene.views[0].recovered.fill([f32::NAN; 3]);
     let page = render(&document, Some(&scene), &RenderOptions::default()).expect("a page");
-    let file = PageFile::new("mixed-view", &page);
-    browser.emulate(1280, 900, "light");
-    browser.open(&file.0);
+    browser.open(&page, 1280);
     let show = "() => [+document.documentElement.dataset.sceneRow, +document.documentElement.dataset.scenePoints, \
         document.getElementById('panes').textContent, document.getElementById('scene-status').textContent]";
     let seen = browser
@@ -94,10 +92,8 @@ fn every_choice_of_the_view_names_its_source_and_shows_points_or_words() {
 fn charts_show_the_rows_that_are_chosen() {
     let Some(mut browser) = browser() else { return };
     let document = sample::mixed(true);
-    let page = render(&document, None, &RenderOptions::default()).expect("a page");
-    let file = PageFile::new("mixed-charts", &page);
-    browser.emulate(1280, 900, "light");
-    browser.open(&file.0);
+    let page = page(&document);
+    browser.open(&page, 1280);
     browser.unfold();
     for (form, chart) in [("error-controls", "errors"), ("reliability-controls", "reliability")] {
         let show = format!(
@@ -134,11 +130,8 @@ fn charts_show_the_rows_that_are_chosen() {
     // Today's attack comes first, and no menu knows a solver that is none.
     let first =
         "document.querySelector('[name=error-controls-given]').selectedOptions[0].textContent";
-    let browser_first = {
-        browser.open(&file.0);
-        browser.evaluate(first)
-    };
-    assert_eq!(browser_first, json!("overlap, 8 to 9.2 % true neighbors"));
+    browser.open(&page, 1280);
+    assert_eq!(browser.evaluate(first), json!("overlap, 8 to 9.2 % true neighbors"));
     let names = browser.evaluate("[...document.querySelectorAll('[name$=-solver]')].map(i => i.nextElementSibling?.textContent ?? '').join()");
     assert!(!text(&names).contains("overlap"), "{names}");
 }

@@ -161,10 +161,25 @@ impl Browser {
         self.call("Emulation.setEmulatedMedia", json!({"features": feature}));
     }
 
-    /// Opens a file and waits until its script says that it is done.
-    pub fn open(&mut self, file: &Path) {
+    /// Opens a page without waiting for it.
+    pub fn navigate(&mut self, page: &str) {
+        let file = self.profile.join("page.html");
+        std::fs::write(&file, page).expect("the temporary folder takes a file");
         self.call("Page.navigate", json!({"url": format!("file://{}", file.display())}));
+    }
+
+    /// Opens a page at this width and waits until its script says that it is done.
+    pub fn open(&mut self, page: &str, width: u32) {
+        self.emulate(width, 900, "light");
+        self.navigate(page);
         self.wait_for("document.documentElement?.dataset.ready === '1'");
+    }
+
+    /// No errors, nothing blocked, and no scrolling sideways.
+    pub fn is_fine(&mut self) {
+        let wider = "document.documentElement.scrollWidth > document.documentElement.clientWidth";
+        assert_eq!(self.evaluate(wider), json!(false), "the page scrolls sideways");
+        assert_eq!(self.complaints, Vec::<String>::new());
     }
 
     /// Opens all folded parts of the page and waits until what is in them is drawn.

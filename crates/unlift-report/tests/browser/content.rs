@@ -3,7 +3,7 @@
 use serde_json::json;
 use unlift_report::{RenderOptions, render};
 
-use super::{PageFile, browser, private_page, sample};
+use super::{browser, page, page_with_points, sample};
 
 /// Charts that are drawn.
 const CHARTS: &str = "document.querySelectorAll('.chart svg').length";
@@ -11,15 +11,13 @@ const CHARTS: &str = "document.querySelectorAll('.chart svg').length";
 #[test]
 fn curves_tables_and_canvas_are_there_without_errors_or_network() {
     let Some(mut browser) = browser() else { return };
-    let file = PageFile::new("private", &private_page(true));
-    for (width, height) in [(1280, 900), (390, 844)] {
-        browser.emulate(width, height, "light");
-        browser.open(&file.0);
+    let page = page_with_points(&sample::document(true), 4_000);
+    for width in [1280, 390] {
+        browser.open(&page, width);
         // Charts that are folded away are drawn when they are opened.
-        assert_eq!(
-            browser.evaluate("document.querySelectorAll('#chart-multiples .chart').length"),
-            json!(0)
-        );
+        let folded =
+            browser.evaluate("document.querySelectorAll('#chart-multiples .chart').length");
+        assert_eq!(folded, json!(0));
         browser.unfold();
         // One overview, one chart per scheme, one of errors, one of certainty; each with drawn curves.
         assert_eq!(browser.evaluate(CHARTS), json!(10));
@@ -27,26 +25,16 @@ fn curves_tables_and_canvas_are_there_without_errors_or_network() {
         assert_eq!(browser.evaluate(empty), json!(0));
         assert_eq!(browser.evaluate("document.querySelectorAll('table').length >= 5"), json!(true));
         assert_eq!(browser.evaluate("document.documentElement.dataset.scene"), json!("drawn"));
-        assert_eq!(
-            browser.evaluate("+document.documentElement.dataset.scenePoints > 3000"),
-            json!(true)
-        );
-        let wider = "document.documentElement.scrollWidth > document.documentElement.clientWidth";
-        assert_eq!(
-            browser.evaluate(wider),
-            json!(false),
-            "the page scrolls sideways at {width} px"
-        );
-        assert_eq!(browser.complaints, Vec::<String>::new());
+        let drawn = browser.evaluate("+document.documentElement.dataset.scenePoints > 3000");
+        assert_eq!(drawn, json!(true));
+        browser.is_fine();
     }
 }
 
 #[test]
 fn the_canvas_shows_points_and_answers_every_choice() {
     let Some(mut browser) = browser() else { return };
-    let file = PageFile::new("choices", &private_page(true));
-    browser.emulate(1280, 900, "dark");
-    browser.open(&file.0);
+    browser.open(&page_with_points(&sample::document(true), 4_000), 1280);
     let choose_all = "document.querySelectorAll('.controls input').forEach(input => input.click())";
     browser.evaluate(choose_all);
     browser.evaluate("document.querySelector('#scene-controls input').click()");
@@ -81,14 +69,11 @@ fn a_page_of_figures_only_has_curves_and_no_canvas() {
     let document = sample::document(false);
     let scene = sample::scene(&document, 500);
     let options = RenderOptions { share_safe: true, ..RenderOptions::default() };
-    let file =
-        PageFile::new("figures", &render(&document, Some(&scene), &options).expect("a page"));
-    browser.emulate(1280, 900, "light");
-    browser.open(&file.0);
+    browser.open(&render(&document, Some(&scene), &options).expect("a page"), 1280);
     browser.unfold();
     assert_eq!(browser.evaluate(CHARTS), json!(10));
     assert_eq!(browser.evaluate("document.querySelector('canvas')"), json!(null));
-    assert_eq!(browser.complaints, Vec::<String>::new());
+    browser.is_fine();
 }
 
 #[test]
@@ -96,10 +81,8 @@ fn pictures_of_images_are_drawn_for_every_choice() {
     let Some(mut browser) = browser() else { return };
     let options = RenderOptions { pictures: vec![sample::picture()], ..RenderOptions::default() };
     let page = render(&sample::images(), None, &options).expect("a page");
-    let file = PageFile::new("images", &page);
-    for (width, height) in [(1280, 900), (390, 844)] {
-        browser.emulate(width, height, "light");
-        browser.open(&file.0);
+    for width in [1280, 390] {
+        browser.open(&page, width);
         browser.evaluate("document.querySelectorAll('.controls input').forEach(i => i.click())");
         assert_eq!(browser.evaluate("document.documentElement.dataset.pictures"), json!("drawn"));
         let lit = "[...document.querySelectorAll('.pictures canvas')].map(canvas => {
@@ -108,22 +91,16 @@ fn pictures_of_images_are_drawn_for_every_choice() {
             return new Set(new Uint32Array(pixels.buffer)).size > 2;
         }).join()";
         assert_eq!(browser.evaluate(lit), json!("true,true,true,true"));
-        let wider = "document.documentElement.scrollWidth > document.documentElement.clientWidth";
-        assert_eq!(browser.evaluate(wider), json!(false), "sideways at {width} px");
-        assert_eq!(browser.complaints, Vec::<String>::new());
+        browser.is_fine();
     }
 }
 
 #[test]
 fn the_page_can_be_read_without_script() {
     let Some(mut browser) = browser() else { return };
-    let document = sample::mixed(false);
-    let scene = sample::scene(&document, 300);
-    let page = render(&document, Some(&scene), &RenderOptions::default()).expect("a page");
-    let file = PageFile::new("no-script", &page);
     browser.emulate(1280, 900, "light");
     browser.call("Emulation.setScriptExecutionDisabled", json!({"value": true}));
-    browser.call("Page.navigate", json!({"url": format!("file://{}", file.0.display())}));
+    browser.navigate(&page_with_points(&sample::mixed(false), 300));
     browser.wait_for("document.readyState === 'complete' && !!document.getElementById('use')");
     let seen = "['.card', '.finding', '#gates li', '#numbers details', '.stage', '.chart'].map(s =>
         [...document.querySelectorAll(s)].filter(n => n.getClientRects().length && n.clientHeight > 0).length)";
@@ -135,37 +112,21 @@ fn the_page_can_be_read_without_script() {
 #[test]
 fn tables_are_sorted_by_the_column_that_is_chosen() {
     let Some(mut browser) = browser() else { return };
-    let page = render(&sample::document(true), None, &RenderOptions::default()).expect("a page");
-    let file = PageFile::new("sorted", &page);
-    browser.emulate(1280, 900, "light");
-    browser.open(&file.0);
+    browser.open(&page(&sample::document(true)), 1280);
     browser.unfold();
-    let sorted = |column: usize| {
-        format!(
-            "(t => {{ t.tHead.rows[0].cells[{column}].querySelector('button').click();
-            return [...t.tBodies[0].rows].map(r => r.cells[{column}].textContent); }})(document.getElementById('table-recovered'))"
-        )
-    };
-    let shares = |browser: &mut super::Browser| -> Vec<f64> {
-        let cells = browser.evaluate(&sorted(6));
-        let cells = cells.as_array().expect("cells").iter();
-        cells.map(|cell| cell.as_str().expect("text").parse().expect("a number")).collect()
-    };
-    let falling = shares(&mut browser);
+    let sort = "(t => { t.tHead.rows[0].cells[6].querySelector('button').click();
+        return [...t.tBodies[0].rows].map(r => +r.cells[6].textContent); })(document.getElementById('table-recovered'))";
+    let mut shares = || -> Vec<f64> { serde_json::from_value(browser.evaluate(sort)).unwrap() };
+    let falling = shares();
     assert!(falling.len() == 84 && falling.is_sorted_by(|a, b| a >= b), "{falling:?}");
-    assert!(shares(&mut browser).is_sorted());
-    assert_eq!(browser.complaints, Vec::<String>::new());
+    assert!(shares().is_sorted());
+    browser.is_fine();
 }
 
 #[test]
 fn a_page_of_the_size_of_the_demos_is_short() {
     let Some(mut browser) = browser() else { return };
-    let document = sample::mixed(true);
-    let scene = sample::scene(&document, 4_000);
-    let page = render(&document, Some(&scene), &RenderOptions::default()).expect("a page");
-    let file = PageFile::new("short", &page);
-    browser.emulate(1280, 900, "light");
-    browser.open(&file.0);
+    browser.open(&page_with_points(&sample::mixed(true), 4_000), 1280);
     let height = browser.evaluate("document.documentElement.scrollHeight");
     assert!(height.as_f64().is_some_and(|height| height < 5_300.0), "{height} px");
 }

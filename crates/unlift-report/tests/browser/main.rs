@@ -11,28 +11,9 @@ mod sample;
 mod screenshots;
 mod shape;
 
-use std::path::PathBuf;
-
 use chromium::Browser;
+use unlift_report::document::Document;
 use unlift_report::{RenderOptions, render};
-
-/// A file that is removed when the test is over.
-struct PageFile(PathBuf);
-
-impl PageFile {
-    fn new(name: &str, page: &str) -> Self {
-        let name = format!("unlift-report-{}-{name}.html", std::process::id());
-        let path = std::env::temp_dir().join(name);
-        std::fs::write(&path, page).expect("the temporary folder takes a file");
-        Self(path)
-    }
-}
-
-impl Drop for PageFile {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_file(&self.0);
-    }
-}
 
 fn browser() -> Option<Browser> {
     let found = chromium::find();
@@ -42,8 +23,13 @@ fn browser() -> Option<Browser> {
     found.map(|program| Browser::start(&program))
 }
 
-fn private_page(metric: bool) -> String {
-    let document = sample::document(metric);
-    let scene = sample::scene(&document, 4_000);
-    render(&document, Some(&scene), &RenderOptions::default()).expect("a page")
+/// The page of figures alone.
+fn page(document: &Document) -> String {
+    render(document, None, &RenderOptions::default()).expect("a page")
+}
+
+/// The page with so many points.
+fn page_with_points(document: &Document, n: usize) -> String {
+    let scene = sample::scene(document, n);
+    render(document, Some(&scene), &RenderOptions::default()).expect("a page")
 }

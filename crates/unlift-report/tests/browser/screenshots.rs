@@ -4,10 +4,9 @@
 use std::path::PathBuf;
 
 use serde_json::json;
-use unlift_report::{RenderOptions, render};
 
 use super::chromium::Browser;
-use super::{PageFile, browser, private_page, sample};
+use super::{browser, page_with_points, sample};
 
 const SECTIONS: [&str; 6] = ["verdict", "next", "scene", "curves", "distribution", "numbers"];
 
@@ -39,24 +38,19 @@ fn size(picture: &[u8]) -> [u32; 2] {
 fn every_section_is_seen_in_light_and_dark() {
     let Some(mut browser) = browser() else { return };
     let asked = std::env::var_os("UNLIFT_SCREENSHOTS").map(PathBuf::from);
-    let mixed = |metric| {
-        let document = sample::mixed(metric);
-        let scene = sample::scene(&document, 4_000);
-        render(&document, Some(&scene), &RenderOptions::default()).expect("a page")
-    };
-    let mut pages = vec![("metric", private_page(true))];
+    let mixed = |metric| page_with_points(&sample::mixed(metric), 4_000);
+    let mut pages = vec![("metric", page_with_points(&sample::document(true), 4_000))];
     let mut screens = vec![(1280, "light"), (1280, "dark")];
     if asked.is_some() {
         pages.extend([("mixed", mixed(true)), ("mixed-no-scale", mixed(false))]);
         screens.extend([(390, "light"), (390, "dark")]);
     }
     for (name, page) in pages {
-        let file = PageFile::new(name, &page);
         let mut all: Vec<Vec<u8>> = Vec::new();
         let mut n_places = 0;
         for screen in screens.iter().copied() {
+            browser.open(&page, screen.0);
             browser.emulate(screen.0, 1000, screen.1);
-            browser.open(&file.0);
             let pictures = pictures(&mut browser, screen);
             for (at, (picture, down)) in pictures.iter().enumerate() {
                 let kind = at.checked_sub(1).map_or("fold", |section| SECTIONS[section]);

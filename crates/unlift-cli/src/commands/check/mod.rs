@@ -13,6 +13,7 @@ use unlift_io::atomic::{Rules, place_of};
 use unlift_report::gate_found;
 
 use self::config::Entry;
+use super::common::all_could_be;
 use super::{audit_images, audit_map, audit_released};
 use crate::args::{AuditCommand, CheckArgs, Cli, Command, ResultArgs};
 use crate::exit::{self, Outcome, usage};
@@ -165,7 +166,7 @@ fn perform(audit: &AuditCommand) -> anyhow::Result<Finished> {
         AuditCommand::Released(args) => audit_released::audit(args),
         AuditCommand::Images(args) => {
             let (finished, used) = audit_images::audit(args)?;
-            audit_images::all_used(args, &used)?;
+            all_could_be("used", &args.path, used.used, used.unusable)?;
             let none = || Error::new(&args.path, "", "images that can be used", "none").into();
             finished.ok_or_else(none)
         }

@@ -1,0 +1,80 @@
+//! Arguments of what tells about the program.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use clap::Args;
+use clap_complete::Shell;
+
+use crate::values;
+
+/// Options of `demo`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  unlift demo
+  unlift demo --out /tmp/demo
+
+Protects two photos and the map of a made-up room by ten published schemes, attacks what a service
+would receive, and shows what came back. It needs no data.")]
+pub struct DemoArgs {
+    /// Folder for report.html, photos.html and their figures; whatever else is in it stays
+    #[arg(long, value_name = "DIR", default_value = "unlift-demo")]
+    pub out: PathBuf,
+    /// Replace files of that name that unlift did not write
+    #[arg(long)]
+    pub force: bool,
+    /// Threads to use [default: one per core]
+    #[arg(long, value_parser = values::threads, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+    /// No progress on stderr
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// Options of `models`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+A model is looked for in the folder that UNLIFT_MODELS names, then in unlift/models under
+XDG_DATA_HOME (~/.local/share), then in the program itself. A file with another hash than the one
+listed is refused.")]
+pub struct ModelsArgs {
+    /// Print a list of objects in place of the text
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Options of `doctor`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+To be pasted into a report of a defect: names no folder and no file, and sends nothing.")]
+pub struct DoctorArgs {
+    /// Print an object in place of the text
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Options of `completions`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  unlift completions bash > ~/.local/share/bash-completion/completions/unlift
+  unlift completions zsh > ~/.zfunc/_unlift
+  unlift completions fish > ~/.config/fish/completions/unlift.fish")]
+pub struct CompletionsArgs {
+    /// The shell
+    #[arg(value_name = "SHELL", value_enum)]
+    pub shell: Shell,
+}
+
+/// Options of `man`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  unlift man | man -l -
+  unlift man audit map > unlift-audit-map.1")]
+pub struct ManArgs {
+    /// A command and its own commands, for example audit map
+    #[arg(value_name = "COMMAND")]
+    pub command: Vec<String>,
+}

@@ -1,0 +1,133 @@
+//! `unlift audit map` as a user runs it: figures, baselines, noise and lengths.
+
+use crate::common::Place;
+
+const QUICK: &str = "--k 10 --schemes olc,ppl --inlier-ratios 1,0.5";
+
+#[test]
+fn results_are_the_same_bytes_for_any_number_of_threads() {
+    let place = Place::with_room(700);
+    let results = |threads: usize| {
+        let options = format!("{QUICK} --solver consensus,ransac --threads {threads}");
+        place.ends(&format!("audit map room.csv {options} --out t{threads}"), 0);
+        let document = place.json(&format!("t{threads}/audit.json"));
+        assert_eq!(document["results"].as_array().map(Vec::len), Some(8));
+        (document["results"].to_string(), document["break_even"].to_string())
+    };
+    assert_eq!(results(1), results(8));
+}
+
+#[test]
+fn without_a_scale_no_centimeter_appears() {
+    let place = Place::with_room(700);
+    let (text, _) = place.ends(&format!("audit map room.csv {QUICK} --out a"), 0);
+    assert!(!text.contains(" m ") && !text.contains("cm"), "{text}");
+    assert_eq!(place.json("a/audit.json")["results"][0]["unit"], "kth_neighbor");
+}
+
+/// What can be shared names neither the map nor a hash of it, which would confirm a guess.
+#[test]
+fn a_shareable_report_names_nothing() {
+    let place = Place::with_room(200);
+    let hash = unlift_io::hash::hash_files(&[place.path("room.csv")]).unwrap();
+    for (more, is_named) in [("--out a", true), ("--share-safe --out b", false)] {
+        place.ends(&format!("audit map room.csv {QUICK} --scale 1 {more}"), 0);
+        let folder = &more[more.len() - 1..];
+        for file in ["audit.json", "report.html"] {
+            let text = place.text(&format!("{folder}/{file}"));
+            for trace in ["room.csv", &hash, "sha256"] {
+                assert_eq!(text.contains(trace), is_named, "{folder}/{file}: {trace}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_noise_model_has_rows_and_break_even_ratios_of_its_own() {
+    let place = Place::with_room(700);
+    let quick = "--k 10 --schemes olc,ppl --inlier-ratios 1,0.3 --solver joint --quiet --out audit";
+    let noise = "--oracle-noise uniform,near --oracle-noise clustered,near";
+    place.ends(&format!("audit map room.csv --scale 1 {quick} {noise}"), 0);
+    let audit = place.json("audit/audit.json");
+    let results = audit["results"].as_array().expect("rows");
+    assert_eq!(results.len(), 2 * 3 * 2);
+    for rows in results.chunks(6) {
+        let names: Vec<&str> = rows.iter().filter_map(|row| row["oracle_noise"].as_str()).collect();
+        assert_eq!(names, ["uniform", "uniform", "near", "near", "clustered", "clustered"]);
+        // Without outliers there is nothing to differ in.
+        for other in [2, 4] {
+            assert_eq!(rows[0]["recovered_percent"], rows[other]["recovered_percent"]);
+            assert_ne!(rows[1]["recovered_percent"], rows[other + 1]["recovered_percent"]);
+        }
+    }
+    let points = audit["break_even"].as_array().expect("ratios");
+    // A blind guess may be the strongest, with a ratio of its own.
+    let by_joint = points.iter().filter(|point| point["solver"] == "joint");
+    let noises: Vec<&str> = by_joint.filter_map(|p| p["oracle_noise"].as_str()).collect();
+    assert_eq!(noises, ["uniform", "near", "clustered", "uniform", "near", "clustered"]);
+    let page = place.text("audit/report.html");
+    for noise in ["clustered", "near"] {
+        assert!(page.contains(&format!("oracle ({noise}), 30 % true neighbors")), "{noise}");
+    }
+    // The uniform rows are those of an audit that names no model.
+    place.ends(&format!("audit map room.csv --scale 1 {quick}"), 0);
+    let usual = place.json("audit/audit.json");
+    assert_eq!(usual["results"].as_array().unwrap()[..2], results[..2]);
+}
+
+/// A first look is two schemes at one ratio, and the attack on what is released where there are descriptors.
+#[test]
+fn a_first_look_is_two_schemes_and_the_attack_on_what_is_released() {
+    let place = Place::with_room(700);
+    place.write_descriptors("d.bin", &unlift::synthetic::room(1, 700).points, 64);
+    let attacks = |more: &str| {
+        place.ends(&format!("audit map room.csv --scale 1 --k 10 --quick {more} --out a"), 0);
+        let document = place.json("a/audit.json");
+        let rows = document["results"].as_array().unwrap().iter();
+        let mut found: Vec<String> = rows
+            .inspect(|row| assert!(row["neighbors"] != "oracle" || row["inlier_ratio"] == 0.5))
+            .map(|row| format!("{} {}", row["scheme"], row["neighbors"]).replace('"', ""))
+            .collect();
+        found.dedup();
+        found
+    };
+    assert_eq!(attacks(""), ["olc oracle", "ppl oracle"]);
+    let with = ["olc oracle", "olc similarity", "ppl oracle", "ppl similarity"];
+    assert_eq!(attacks("--descriptors d.bin"), with);
+    let (_, stderr) = place.ends("audit map room.csv --quick --schemes ppl --out b", 2);
+    assert!(stderr.contains("--quick") && stderr.contains("--schemes"), "{stderr}");
+}
+
+/// Whoever reads only the page or the JSON file is told as well.
+#[test]
+fn a_thinned_map_is_told() {
+    let place = Place::with_room(400);
+    let audit =
+        "audit map room.csv --scale 1 --k 10 --schemes olc --inlier-ratios 0.5 --quiet --out a";
+    let (_, stderr) = place.ends(&format!("{audit} --max-points 200"), 0);
+    let note = "--max-points: 200 of 400 points are audited";
+    assert!(stderr.contains(&format!("unlift: note: {note}")), "{stderr}");
+    assert!(
+        place.text("a/audit.json").contains(note) && place.text("a/report.html").contains(note)
+    );
+    let (_, stderr) = place.ends(&format!("{audit} --max-points 400"), 0);
+    assert!(!stderr.contains("--max-points"), "{stderr}");
+}
+
+#[test]
+fn a_bench_tells_seconds_of_every_ratio_and_solver() {
+    let place = Place::with_room(700);
+    let line = "bench recover --points 900 --map room.csv --k 10 --inlier-ratios 1,0.5 \
+                --solver consensus,ransac";
+    let (text, _) = place.ends(line, 0);
+    assert!(text.starts_with("ppl: 900 points, K = 10"), "{text}");
+    assert_eq!(text.matches("consensus").count() + text.matches("ransac").count(), 4, "{text}");
+    let json = place.prints(&format!("{line} --json"), 0);
+    assert_eq!((json["n_points"].as_u64(), json["k"].as_u64()), (Some(900), Some(10)));
+    let rows = json["rows"].as_array().expect("rows");
+    assert_eq!(rows.len(), 4);
+    let is_timed = |row: &serde_json::Value| {
+        row["seconds"].as_f64() > Some(0.0) && row["published_seconds"].is_null()
+    };
+    assert!(rows.iter().all(is_timed), "{json}");
+}

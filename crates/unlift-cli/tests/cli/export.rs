@@ -1,0 +1,116 @@
+//! `unlift export`: what was written is what is read again, on the map, and nothing else is lost.
+
+use unlift_io::read;
+
+use crate::common::Place;
+
+/// A room whose map is in half meters, hidden by `scheme` and recovered.
+fn recovered(scheme: &str) -> Place {
+    let place = Place::with_room(400);
+    let hide = "obfuscate room.csv --scale 0.5 --seed 1 --k 10 --out hidden --scheme";
+    place.ends(&format!("{hide} {scheme}"), 0);
+    let lists = "neighbors oracle hidden/truth.parquet --inlier-ratio 1 --k 10 --out lists.parquet";
+    place.ends(lists, 0);
+    place.ends("recover hidden/released.parquet --neighbors lists.parquet --out back.parquet", 0);
+    place
+}
+
+fn positions(place: &Place, name: &str) -> Vec<[f64; 3]> {
+    read::open(&place.path(name)).expect("a map").positions
+}
+
+fn distance(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>().sqrt()
+}
+
+#[test]
+fn points_and_lines_come_back_in_every_form_and_on_the_map() {
+    let place = recovered("olc");
+    place.write("project/sparse/0/cameras.txt", "1 PINHOLE 640 480 500 500 320 240\n");
+    place.write("project/sparse/0/images.txt", "1 1 0 0 0 -1 -2 3 1 a.jpg\n\n");
+    place.write("project/sparse/0/points3D.txt", "1 0 0 0 0 0 0 0\n");
+    let room = unlift::synthetic::room(1, 400).points;
+    for (more, name, said) in [
+        ("", "truth.ply", "400 points, in truth.ply\n"),
+        ("", "model", "a model of 400 points, 0 cameras and 0 images, in model\n"),
+        (
+            "--cameras project",
+            "nerf/transforms.json",
+            "400 points and 1 images, in nerf/transforms.json\n",
+        ),
+    ] {
+        // Ours are replaced.
+        for _ in 0..2 {
+            let line = format!("export hidden/truth.parquet --scale 0.5 {more} --out {name}");
+            assert_eq!(place.ends(&line, 0).0, said);
+        }
+        let read = positions(&place, name.trim_end_matches("/transforms.json"));
+        assert_eq!(read.len(), room.len(), "{name}");
+        assert!(read.iter().zip(&room).all(|(a, b)| distance(a, b) < 1e-9), "{name}");
+    }
+    let nerf = read::open(&place.path("nerf")).expect("a map");
+    assert_eq!((nerf.format, nerf.cameras), ("nerfstudio", vec![[1.0, 2.0, -3.0]]));
+    // Without a scale lengths are those of the file: meters, half as many as units.
+    place.ends("export hidden/truth.parquet --out meters.ply", 0);
+    assert!(distance(&positions(&place, "meters.ply")[7], &room[7].map(|x| 0.5 * x)) < 1e-9);
+
+    place.ends("export back.parquet --scale 0.5 --out back.ply", 0);
+    let is_near = |p: &&[f64; 3]| room.iter().any(|q| distance(p, q) < 0.5);
+    assert!(positions(&place, "back.ply").iter().filter(is_near).count() > 300);
+    let (told, _) = place.ends("export hidden/released.parquet --scale 0.5 --out lines.obj", 0);
+    let n: usize = told.split(' ').next().and_then(|n| n.parse().ok()).expect("a number");
+    let text = place.text("lines.obj");
+    assert!(n > 300 && text.lines().filter(|line| line.starts_with("l ")).count() == n, "{told}");
+}
+
+#[test]
+fn what_cannot_be_shown_is_told_and_what_is_not_ours_stays() {
+    let place = recovered("plane");
+    place.write("mine.ply", "mine");
+    place.write("mine/points3D.txt", "# mine");
+    place.write("nerf/transforms.json", "{\"frames\": []}");
+    let before = place.files();
+    for (line, code, expected) in [
+        ("hidden/released.parquet --out planes.obj", 3, "found planes, which have no end"),
+        ("lists.parquet --out lists.ply", 3, "found neighborhoods"),
+        ("back.parquet --out back.obj", 3, "expected lines or rays, as --out is .obj"),
+        ("back.parquet --cameras room.csv --out back", 3, "expected a COLMAP model with cameras"),
+        ("back.parquet --cameras room.csv --out back.ply", 2, "--cameras: expected a folder"),
+        (
+            "back.parquet --out x.stl",
+            2,
+            "--out: expected a name that ends in .ply, .obj or transforms.json, or a folder without an ending, \
+             found x.stl",
+        ),
+        (
+            "back.parquet --out other.json",
+            2,
+            "--out: expected transforms.json, as nerfstudio calls it, found other.json",
+        ),
+        (
+            "back.parquet --out transforms.json",
+            2,
+            "--cameras: expected with --out transforms.json, found none",
+        ),
+        (
+            "back.parquet --cameras room.csv --out nerf/transforms.json",
+            2,
+            "expected nothing, or cameras for nerfstudio",
+        ),
+        (
+            "back.parquet --out mine.ply",
+            2,
+            "mine.ply: expected nothing, or a cloud of an earlier run",
+        ),
+        (
+            "back.parquet --out mine",
+            2,
+            "points3D.txt: expected nothing, or a model of an earlier run",
+        ),
+    ] {
+        let stderr = place.complains(&format!("export {line}"), code);
+        assert!(stderr.contains(expected), "{line}: {stderr}");
+    }
+    assert_eq!(place.files(), before);
+    assert_eq!(place.text("mine.ply"), "mine");
+}

@@ -1,0 +1,65 @@
+//! What users, shells, manuals and reports of defects get.
+
+use std::path::Path;
+
+use crate::common::Place;
+
+#[test]
+fn help_is_part_of_the_interface() {
+    let place = Place::empty();
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/snapshots");
+    let commands = ",demo,audit map,audit images,audit released,check,obfuscate,neighbors oracle,neighbors find,\
+                    recover,evaluate,export,split,table,compare,paper,bench recover,features,invert,metrics,schemes,\
+                    models,doctor,completions,man";
+    for command in commands.split(',') {
+        let (text, _) = place.ends(&format!("{command} --help"), 0);
+        let name = if command.is_empty() { "unlift" } else { command }.replace(' ', "-");
+        let file = folder.join(format!("{name}.txt"));
+        if std::env::var_os("UPDATE_SNAPSHOTS").is_some() {
+            std::fs::write(&file, &text).expect("a writable snapshot");
+        }
+        let kept = std::fs::read_to_string(&file).expect("a snapshot (UPDATE_SNAPSHOTS=1)");
+        assert_eq!(text, kept, "{command}: UPDATE_SNAPSHOTS=1 re-blesses");
+        assert!(text.lines().all(|line| line.chars().count() <= 100), "{command}");
+    }
+}
+
+#[test]
+fn every_command_has_a_manual_page_and_every_shell_completes() {
+    let place = Place::empty();
+    for command in ["", "demo", "audit map", "neighbors find", "man"] {
+        let page = place.ends(&format!("man {command}"), 0).0;
+        let name = format!("unlift {command}").trim().replace(' ', "\\-");
+        assert!(page.contains(&format!(".SH NAME\n{name} ")), "{command}: {page}");
+    }
+    let stderr = place.complains("man audit maps", 2);
+    assert!(stderr.starts_with("unlift: unlift audit: expected one of map, images"), "{stderr}");
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
+        let script = place.ends(&format!("completions {shell}"), 0).0;
+        assert!(script.contains("oracle-noise") && script.contains("unlift"), "{shell}");
+    }
+}
+
+#[test]
+fn the_doctor_tells_what_a_report_of_a_defect_needs() {
+    let place = Place::empty();
+    let text = place.ends("doctor", 0).0;
+    let names: Vec<&str> = text.lines().filter_map(|line| line.split_whitespace().next()).collect();
+    assert_eq!(names, ["version", "instructions", "threads", "memory", "models", "browser"]);
+    let object = place.prints("doctor --json", 0);
+    assert!(object["threads"].as_u64() > Some(0));
+    let n_models = |name: &str| object[name].as_array().map_or(0, Vec::len);
+    assert!(n_models("models") > 0 && n_models("models_missing") > 0, "{object}");
+    assert!(object["version"].as_str().is_some_and(|v| v.starts_with(env!("CARGO_PKG_VERSION"))));
+}
+
+/// Without a terminal there is no color anyway; with one NO_COLOR is obeyed by what draws (clap, indicatif).
+#[test]
+fn nothing_is_colored_where_it_is_not_wanted() {
+    let place = Place::empty();
+    for line in ["--help", "audit map --help", "audit map missing.ply", "schemes"] {
+        let mut program = place.program(line.split(' '));
+        let output = program.env("NO_COLOR", "1").env("CLICOLOR_FORCE", "1").output().unwrap();
+        assert!(![output.stdout, output.stderr].concat().contains(&0x1b), "{line}");
+    }
+}

@@ -1,0 +1,243 @@
+//! `unlift audit images` as a user runs it: photos and files in, one audit out, bad images named.
+
+use std::fs;
+
+use image::RgbImage;
+use serde_json::Value;
+use unlift::Descriptors;
+use unlift::descriptors::Values;
+use unlift_io::features::{FeatureSource, FeatureWriter, ImageFeatures};
+
+use crate::common::Place;
+
+const QUICK: &str = "--k 10 --inlier-ratios 1,0.5";
+
+/// Three photos in `photos`.
+fn photos() -> Place {
+    Place::with_photos(&["a.png", "b.png", "c/d.png"])
+}
+
+/// Three photos in `photos`, and their features in `f.h5`.
+fn features() -> Place {
+    let place = photos();
+    place.ends("features photos --out f.h5", 0);
+    place
+}
+
+/// Writes the features of `f.h5` to `name`, each image as `change` leaves it.
+fn write_changed(place: &Place, name: &str, change: impl Fn(&mut ImageFeatures)) {
+    let source = FeatureSource::open(&place.path("f.h5")).unwrap();
+    let mut writer = FeatureWriter::create(&place.path(name)).unwrap();
+    for at in 0..source.names().len() {
+        let mut image = source.get(at).unwrap();
+        change(&mut image);
+        writer.append(&image).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+#[test]
+fn photos_become_pooled_rows_rows_per_image_and_pictures() {
+    let place = photos();
+    let sources = "--neighbors oracle --neighbors similarity --neighbors overlap";
+    let (stdout, stderr) = place.ends(&format!("audit images photos {QUICK} {sources} --out a"), 0);
+    assert!(stdout.ends_with("report: a/report.html\n") && stderr.is_empty(), "{stdout}{stderr}");
+    let document = place.json("a/audit.json");
+    let counts = &document["input"]["images"];
+    assert_eq!((counts["found"].as_u64(), counts["used"].as_u64()), (Some(3), Some(3)));
+    let rows = document["results"].as_array().expect("rows");
+    // By joint, and by joint-start.
+    assert_eq!(rows.len(), 3 * (2 + 2) * 2);
+    for row in rows {
+        assert_eq!(row["unit"], "px");
+        let keys: Vec<&String> = row["recovered_percent"].as_object().unwrap().keys().collect();
+        assert_eq!(keys, ["1", "5", "10", "25"]);
+        assert!(row["distinct"]["n_places"].as_u64() <= row["n_points"].as_u64());
+    }
+    let images = document["images"].as_array().expect("images");
+    let names: Vec<&str> = images.iter().filter_map(|image| image["name"].as_str()).collect();
+    assert_eq!(names, ["a.png", "b.png", "c/d.png"]);
+    let n_points: u64 = images.iter().filter_map(|image| image["n_points"].as_u64()).sum();
+    assert_eq!(Some(n_points), document["input"]["n_points"].as_u64());
+    for (at, row) in rows.iter().enumerate() {
+        // Pooled shares lie within those of the images.
+        let shares =
+            images.iter().filter_map(|i| i["rows"][at]["recovered_percent"]["10"].as_f64());
+        let (low, high) = shares.fold((100.0f64, 0.0f64), |(l, h), x| (l.min(x), h.max(x)));
+        let pooled = row["recovered_percent"]["10"].as_f64().unwrap();
+        assert!((low - 1e-3..=high + 1e-3).contains(&pooled), "{pooled} of {low} to {high}");
+    }
+    assert!(document["break_even"].as_array().unwrap().iter().all(|b| b["threshold"] == "10"));
+    let page = place.text("a/report.html");
+    assert!(page.contains("c/d.png") && page.contains("id=\"picture-graph\""));
+    assert_eq!(page.matches("/9j/").count(), 3, "a JPEG per image");
+
+    // What can be shared has neither names nor pictures.
+    place.ends(&format!("audit images photos {QUICK} --share-safe --max-images 2 --out s"), 0);
+    for file in ["s/audit.json", "s/report.html"] {
+        let text = place.text(file);
+        for secret in ["a.png", "c/d.png", "photos\"", "/9j/", "id=\"picture-graph\""] {
+            assert!(!text.contains(secret), "{file}: {secret}");
+        }
+    }
+    let document = place.json("s/audit.json");
+    assert_eq!(document["images"].as_array().map(Vec::len), Some(2));
+    assert_eq!(document["images"][0]["name"], Value::Null);
+}
+
+#[test]
+fn neither_threads_nor_where_features_come_from_change_a_byte() {
+    let place = features();
+    place.ends("features photos --type aliked --min-score 0.05 --out learned.h5", 0);
+    let figures = |line: &str| {
+        place.ends(&format!("audit images {line} --solver joint,ransac --out t"), 0);
+        let mut document = place.json("t/audit.json");
+        let page = place.text("t/report.html");
+        let data = page.split("id=\"block-").nth(1).unwrap().split("</script>").next().unwrap();
+        let fields = document.as_object_mut().unwrap();
+        ["run", "input", "options"].iter().for_each(|&field| _ = fields.remove(field));
+        (document.to_string(), data.to_owned())
+    };
+    let one = figures(&format!("photos {QUICK} --threads 1"));
+    assert_eq!(one, figures(&format!("photos {QUICK} --threads 2")));
+    assert_eq!(one, figures(&format!("f.h5 {QUICK} --threads 2 --photos photos")));
+    let usual = "--k 5 --inlier-ratios 1 --neighbors oracle --neighbors similarity";
+    let of_photos = figures(&format!("photos --features aliked --min-score 0.05 {usual}"));
+    assert_eq!(place.json("t/audit.json")["options"]["features"], "aliked");
+    assert_eq!(of_photos, figures(&format!("learned.h5 --photos photos {usual}")));
+}
+
+#[test]
+fn a_file_without_photos_has_frames_and_chosen_images_are_shown() {
+    let place = features();
+    write_changed(&place, "bare.h5", |image| image.descriptors = None);
+    let page = |line: &str| {
+        place.ends(&format!("audit images {line} {QUICK} --show b.png --out a"), 0);
+        let page = place.text("a/report.html");
+        assert!(page.contains("\"name\":\"b.png\"") && !page.contains("\"name\":\"a.png\""));
+        assert!(!page.contains("/9j/"));
+        // Only the neighborhoods that were asked for are drawn.
+        ["oracle", "descriptors", "overlap"]
+            .map(|source| page.contains(&format!("\"label\":\"{source}, ")))
+    };
+    assert_eq!(page("f.h5"), [true, false, false]);
+    assert_eq!(page("f.h5 --neighbors oracle --neighbors descriptors"), [true, true, false]);
+    // By the oracle, keypoints are enough.
+    assert_eq!(page("bare.h5"), [true, false, false]);
+}
+
+#[test]
+fn broken_images_are_named_counted_and_left_out() {
+    let place = photos();
+    place.write("photos/text.jpg", "no photo");
+    place.write_photo("photos/cut.jpg", 0);
+    let whole = place.bytes("photos/cut.jpg");
+    place.write("photos/cut.jpg", &whole[..1000]);
+    RgbImage::new(1, 1).save(place.path("photos/one.png")).unwrap();
+    // Too few keypoints to be attacked, but an image.
+    RgbImage::new(40, 40).save(place.path("photos/plain.png")).unwrap();
+    let (stdout, stderr) = place.ends(&format!("audit images photos {QUICK} --out a"), 3);
+    assert!(stdout.contains("report: a/report.html"));
+    assert_eq!(
+        stderr,
+        "unlift: photos/cut.jpg: expected a whole JPEG image, found one that is cut off\n\
+         unlift: photos/one.png: expected at least 3 pixels a side, found 1 x 1\n\
+         unlift: photos/text.jpg: expected a JPEG, PNG or WebP image, found text\n\
+         unlift: photos: expected 7 images that can be used, found 4\n"
+    );
+    let counts = place.json("a/audit.json")["input"]["images"].clone();
+    let counts = ["found", "used", "unusable", "too_small"].map(|name| counts[name].as_u64());
+    assert_eq!(counts, [7, 4, 3, 1].map(Some));
+}
+
+#[test]
+fn images_of_other_kinds_are_told() {
+    let place = photos();
+    for name in
+        ["photos/a.HEIC", "photos/b.heic", "photos/c/d.tiff", "photos/.e.heic", "raw/1.heic"]
+    {
+        place.write(name, "");
+    }
+    let note =
+        "unlift: note: photos: passed over 2 .heic, 1 .tiff: only JPEG, PNG and WebP are read\n";
+    for line in ["audit images photos --k 10 --max-images 1 --out a", "features photos --out f.h5"]
+    {
+        assert_eq!(place.ends(line, 0).1, note);
+    }
+    let stderr = place.complains("features raw --out g.h5", 3);
+    assert_eq!(stderr, "unlift: raw: expected JPEG, PNG or WebP photos, found only 1 .heic\n");
+}
+
+#[test]
+fn what_cannot_be_audited_is_one_line() {
+    let place = features();
+    fs::create_dir(place.path("empty")).unwrap();
+    write_changed(&place, "bare.h5", |image| image.descriptors = None);
+    write_changed(&place, "floats.h5", |image| {
+        let values = (0..64 * image.keypoints.len()).map(|i| (i as f32 * 0.37).sin()).collect();
+        image.descriptors = Some(Descriptors::try_new(Values::F32(values), 64).unwrap());
+    });
+    let wrong_kind = "--neighbors overlap: expected SIFT descriptors (128 values each, none negative), \
+                      found 64 values each\n  try: --neighbors similarity, which takes descriptors of any kind";
+    for (line, code, expected) in [
+        ("empty", 3, "empty: expected JPEG, PNG or WebP photos, found none"),
+        ("nothing", 3, "nothing: expected a file or folder, found nothing"),
+        ("f.h5 --show x.png", 2, "--show: expected an image of f.h5, found x.png"),
+        (
+            "f.h5 --max-features 9",
+            2,
+            "--max-features: expected with a folder of photos, found a file",
+        ),
+        (
+            "bare.h5 --neighbors similarity",
+            2,
+            "--neighbors similarity: expected descriptors, found none",
+        ),
+        ("floats.h5 --neighbors overlap", 2, wrong_kind),
+        ("photos --thresholds 5,5.0", 2, "--thresholds: expected each once, found 5.0 again"),
+        (
+            "photos --neighbors overlap --inlier-ratios 0.5",
+            2,
+            "--inlier-ratios: expected with --neighbors oracle, found only overlap",
+        ),
+    ] {
+        let told = place.complains(&format!("audit images {line}"), code);
+        assert_eq!(told, format!("unlift: {expected}\n"));
+    }
+    for line in ["--neighbors geometric", "--solver tomography", "--schemes olc"] {
+        place.ends(&format!("audit images photos {line}"), 2);
+    }
+    // Before any photo is read.
+    let told = place.complains("audit images photos --features aliked --neighbors overlap", 2);
+    assert!(told.starts_with("unlift: --neighbors overlap: expected "), "{told}");
+    assert!(!place.path("unlift-audit").exists());
+    place.ends("audit images floats.h5 --k 10 --neighbors similarity --out a", 0);
+}
+
+/// Schemes and attacks take the declared size for the true one: with twice the sides a third comes back of `dcl2d`.
+#[test]
+fn a_declared_size_that_is_too_large_lets_no_gate_hold() {
+    let place = features();
+    let gate = format!("{QUICK} --schemes dcl2d,cp2d --gate all:25<=100 --share-safe");
+    place.ends(&format!("audit images f.h5 {gate} --out right"), 0);
+    let right = place.json("right/audit.json");
+    assert!(right["notes"].is_null(), "{}", right["notes"]);
+    for factor in [2, 10] {
+        write_changed(&place, "wide.h5", |image| {
+            image.size = image.size.map(|size| size.map(|side| factor * side));
+        });
+        place.ends(&format!("audit images wide.h5 {gate} --out wide"), 1);
+        let wide = place.json("wide/audit.json");
+        let reason = wide["gates"][0]["reason"].as_str().expect("a reason");
+        assert!(reason.starts_with("sizes: keypoints fill"), "{reason}");
+        assert_eq!(wide["notes"][0], reason);
+        // What publishes coordinates is attacked by these.
+        let of = |document: &Value| {
+            let rows = document["results"].as_array().expect("rows").iter();
+            let found = rows.filter(|row| row["scheme"] == "cp2d" && row["solver"] == "joint");
+            found.map(|row| row["recovered_percent"]["25"].as_f64().unwrap()).sum::<f64>()
+        };
+        assert!((of(&wide) - of(&right)).abs() < 5.0, "{} {}", of(&wide), of(&right));
+        fs::remove_file(place.path("wide.h5")).unwrap();
+    }
+}

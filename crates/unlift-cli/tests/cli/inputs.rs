@@ -1,0 +1,178 @@
+//! Maps, descriptors and scales as users have them: what is read, and what a line tells where it is not.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::common::Place;
+
+/// A folder of what the readers are tested with.
+fn data(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../unlift-io/tests/data").join(name)
+}
+
+/// Descriptors of `dim` values for the points of `room.csv` as an array of `descr`: near rows of the file
+/// look alike.
+fn npy(place: &Place, name: &str, descr: &str, dim: usize, write: impl Fn(&mut Vec<u8>, f32)) {
+    let header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': (700, {dim}), }}");
+    let mut bytes = b"\x93NUMPY\x01\0\x76\0".to_vec();
+    bytes.extend(format!("{header:117}\n").bytes());
+    for row in 0..700 {
+        for column in 0..dim {
+            write(&mut bytes, (row as f32 / 20.0 + (column * column) as f32).sin());
+        }
+    }
+    place.write(name, bytes);
+}
+
+const QUICK: &str = "--k 10 --schemes olc --quiet --out a";
+
+/// One line each, before any work; a second line tells a way out, where there is one.
+#[test]
+fn what_cannot_be_meant_is_refused_with_a_way_out() {
+    let place = Place::with_room(700);
+    place.write("two.xyz", "1 2 3\n4 5 6\n");
+    place.write_descriptors("d.bin", &unlift::synthetic::room(1, 700).points, 128);
+    fs::create_dir(place.path("empty")).unwrap();
+    let number = "expected meters per unit of the map, a number above 0, found ";
+    let overlap = "expected with --neighbors oracle, found only overlap";
+    for (line, code, expected, advice) in [
+        ("nothing.ply", 3, "nothing.ply: expected a file or folder, found nothing", ""),
+        ("two.xyz", 3, "two.xyz: points: expected at least 11 (K + 1), found 2", ""),
+        (
+            "empty",
+            3,
+            "found none",
+            "the folder of a COLMAP model or project; for photos, unlift audit images",
+        ),
+        ("room.csv --neighbors room.csv", 3, "room.csv: expected a Parquet file", ""),
+        ("room.csv --scale -1", 2, number, ""),
+        ("room.csv --scale 0", 2, number, ""),
+        ("room.csv --scale inf", 2, number, ""),
+        ("room.csv --scale 1e999", 2, number, ""),
+        (
+            "room.csv --scale 1e-300",
+            2,
+            "units across, found 1e-300",
+            "--scale 1 for a map in meters",
+        ),
+        ("room.csv --scale 1e300", 2, "units across, found 1e300", "--scale 1 for a map in meters"),
+        ("room.csv --scale 1e-3", 2, "any guess would count as recovered", "another --scale"),
+        ("room.csv --scale 1e5", 2, "no attack could come near", "another --scale"),
+        ("room.csv --thresholds 1e9", 2, "unlift: --thresholds: expected a map larger", ""),
+        // Meters in a gate, none in the audit.
+        (
+            "room.csv --gate olc:0.10<=20",
+            2,
+            "expected one of 1.0, 2.5, found 0.1",
+            "--scale and --thresholds, which change them",
+        ),
+        (
+            "room.csv --neighbors overlap",
+            2,
+            "--neighbors overlap: expected descriptors (--descriptors FILE), found none",
+            "",
+        ),
+        ("room.csv --neighbors overlap --descriptors d.bin --inlier-ratios 0.5", 2, overlap, ""),
+        ("room.csv --neighbors overlap --descriptors d.bin --oracle-noise near", 2, overlap, ""),
+        (
+            "room.csv --source-k 7",
+            2,
+            "--source-k: expected with a source that makes its own lists, found only oracle",
+            "",
+        ),
+    ] {
+        let told = place.complains(&format!("audit map {line} {QUICK}"), code);
+        assert!(told.contains(expected), "{line}: {told}");
+        assert!(
+            advice.is_empty() || told.contains(&format!("\n  try: {advice}")),
+            "{line}: {told}"
+        );
+        assert!(!place.path("a").exists(), "{line}");
+    }
+    let told = place.complains("obfuscate room.csv --scheme olc --scale 1e-300 --out a", 2);
+    assert!(told.starts_with("unlift: --scale 1e-300: expected"), "{told}");
+}
+
+#[test]
+fn similarity_takes_descriptors_of_any_kind_and_overlap_those_of_sift() {
+    let place = Place::with_room(700);
+    npy(&place, "learned.npy", "<f2", 64, |bytes, value| {
+        // A half: sign, five bits of exponent, ten of mantissa; rounding does not matter here.
+        let bits = value.to_bits();
+        let exponent = ((bits >> 23) & 0xff) as i32 - 112;
+        let half = match exponent {
+            1.. => (bits >> 16 & 0x8000) | (exponent as u32) << 10 | (bits >> 13 & 0x3ff),
+            _ => 0,
+        };
+        bytes.extend((half as u16).to_le_bytes());
+    });
+    npy(&place, "sift.npy", "<f4", 128, |bytes, value| bytes.extend(value.abs().to_le_bytes()));
+    for (file, source) in [("learned.npy", "similarity"), ("sift.npy", "overlap")] {
+        let line = format!("audit map room.csv --descriptors {file} --neighbors {source} {QUICK}");
+        place.ends(&line, 0);
+    }
+    let hide = "obfuscate room.csv --scheme olc --k 10 --descriptors";
+    assert_eq!(place.ends(&format!("{hide} learned.npy --out hidden"), 0).1, "");
+    let wrong =
+        "SIFT descriptors (128 values each, none negative), found 64 values each\n  try: --";
+    for (line, code, expected) in [
+        (
+            "audit map room.csv --descriptors learned.npy --neighbors overlap",
+            2,
+            format!("--neighbors overlap: expected {wrong}neighbors similarity, "),
+        ),
+        (
+            "neighbors find hidden/released.parquet --source overlap",
+            3,
+            format!(
+                "hidden/released.parquet: descriptors for overlap: expected {wrong}source similarity, "
+            ),
+        ),
+    ] {
+        let told = place.complains(line, code);
+        let expected = format!("unlift: {expected}which takes descriptors of any kind\n");
+        assert_eq!(told, expected);
+    }
+    // Zeros mark points without a descriptor: lists of them are worse, which is no protection.
+    let mut bytes = place.bytes("learned.npy");
+    let n = bytes.len();
+    bytes[n - 2 * 2 * 64..].fill(0);
+    place.write("partial.npy", bytes);
+    let note = "unlift: note: 2 of 700 descriptors are all zero, and tell an attacker nothing\n";
+    assert_eq!(place.ends(&format!("{hide} partial.npy --out hidden2"), 0).1, note);
+}
+
+#[test]
+fn descriptors_that_are_missing_are_told_with_where_they_are() {
+    let place = Place::with_room(100);
+    place.ends("obfuscate room.csv --scheme olc --k 10 --out hidden", 0);
+    assert_eq!(
+        place.complains("neighbors find hidden/released.parquet --source overlap", 3),
+        "unlift: hidden/released.parquet: descriptors for overlap: expected some in the released map, \
+         found none\n  try: --source geometric, or hide the map with unlift obfuscate --descriptors FILE\n"
+    );
+    // Six points suffice: what is missing is told before any attack.
+    let project = data("project");
+    let line = format!("audit map {} --k 3 --neighbors overlap", project.display());
+    let advice = format!("\n  try: --descriptors {}\n", project.join("database.db").display());
+    assert!(place.complains(&line, 2).ends_with(&advice));
+}
+
+#[test]
+fn which_of_several_models_was_read_is_told() {
+    let place = Place::empty();
+    for (fixture, folder) in [("project/sparse/0", "p/sparse/0"), ("rig-bin", "p/models/1")] {
+        for file in fs::read_dir(data(fixture)).unwrap().map(|file| file.unwrap()) {
+            let name = format!("{folder}/{}", file.file_name().display());
+            place.write(&name, fs::read(file.path()).unwrap());
+        }
+    }
+    let told = place.complains("audit images p/sparse/0", 3);
+    assert!(told.ends_with("found none\n  try: unlift audit map, as this is a map\n"), "{told}");
+    let told = "unlift: note: models/1: read, the largest of 2 models (8 points)\n\
+                unlift: note: sparse/0: another model (6 points), give its path to read it\n";
+    let audit = "audit map p --schemes olc --k 3 --inlier-ratios 1 --out a";
+    for line in [audit, "obfuscate p --scheme olc --k 3 --out hidden"] {
+        assert_eq!(place.ends(line, 0).1, told);
+    }
+}

@@ -1,0 +1,181 @@
+//! Pictures of what came back, and how alike they are, as a user has them.
+
+use std::fs;
+
+use unlift::Descriptors;
+use unlift::descriptors::Values;
+use unlift_io::features::{FeatureWriter, ImageFeatures};
+
+use crate::common::Place;
+
+const CHEAP: &str = "--schemes lines2d --inlier-ratios 0.5 --solver joint-start --k 8";
+
+fn place() -> Place {
+    Place::with_photos(&["a.png", "b/c.jpg", "d.webp"])
+}
+
+#[test]
+fn an_audit_of_images_tells_how_alike_pictures_are_and_shows_them() {
+    let place = place();
+    let metrics = |threads: usize| {
+        let line =
+            format!("audit images photos --invert {CHEAP} --threads {threads} --out a --force");
+        place.ends(&line, 0);
+        place.json("a/audit.json")["results"][0]["metrics"].clone()
+    };
+    let found = metrics(1);
+    assert_eq!(found, metrics(4));
+    for name in ["ssim", "psnr", "lpips"] {
+        let (figure, baseline) = (&found[name], &found[&format!("{name}_baseline")]);
+        assert!(figure.is_f64() && baseline.is_f64(), "{found}");
+    }
+    let page = place.text("a/report.html");
+    assert!(page.contains("id=\"inversions\"") && page.contains("data:image/jpeg;base64,"));
+    // A photo, its baseline and what came back, of three images.
+    assert!(page.matches("<figure").count() >= 9);
+    place.ends(&format!("audit images photos --invert {CHEAP} --share-safe --out safe"), 0);
+    assert!(!place.text("safe/report.html").contains("id=\"inversions\""));
+}
+
+#[test]
+fn what_cannot_be_painted_is_told() {
+    let place = place();
+    place.ends("features photos --out features.h5", 0);
+    fs::create_dir(place.path("none")).unwrap();
+    fs::rename(place.path("photos"), place.path("some")).unwrap();
+    fs::remove_file(place.path("some/b/c.jpg")).unwrap();
+    for (line, code, expected) in [
+        (
+            "images features.h5 --photos none --invert",
+            3,
+            "unlift: none: expected photos of the images in features.h5, found none\n",
+        ),
+        (
+            "images features.h5 --invert",
+            2,
+            "unlift: --invert: expected --photos, as PATH is no folder of photos\n",
+        ),
+        ("map features.h5 --invert", 2, "--photos"),
+    ] {
+        let told = place.complains(&format!("audit {line} --out x"), code);
+        assert!(told.contains(expected), "{told}");
+    }
+    assert!(!place.path("x").exists());
+    // One photo is missing, and the others go on.
+    let line = format!("audit images features.h5 --photos some --invert {CHEAP} --out audit");
+    let (_, stderr) = place.ends(&line, 0);
+    let note = "note: not painted: image b/c.jpg: some/b/c.jpg: expected a JPEG";
+    assert!(stderr.contains(note), "{stderr}");
+    assert!(place.json("audit/audit.json")["results"][0]["metrics"]["ssim"].is_f64());
+}
+
+#[test]
+fn a_network_of_ones_own_paints_what_the_program_has_none_for() {
+    let place = place();
+    // Of SuperPoint there is none.
+    let mut writer = FeatureWriter::create(&place.path("superpoint.h5")).unwrap();
+    let values = (0..40 * 256).map(|i| f32::from(u8::from(i % 256 == i / 256))).collect();
+    let image = ImageFeatures {
+        name: "a.png".to_owned(),
+        size: Some([320, 240]),
+        keypoints: (0..40).map(|i| [f64::from(7 * i), f64::from(5 * i)]).collect(),
+        descriptors: Some(Descriptors::try_new(Values::F32(values), 256).unwrap()),
+        ..ImageFeatures::default()
+    };
+    writer.append(&image).unwrap();
+    writer.finish().unwrap();
+    for line in ["audit images superpoint.h5 --photos photos --invert", "invert superpoint.h5"] {
+        let stderr = place.complains(&format!("{line} --out x"), 3);
+        let missing = stderr.contains("inverter-superpoint.onnx: expected in ");
+        assert!(missing && stderr.contains("training/inversion"), "{stderr}");
+    }
+    let models = concat!(env!("CARGO_MANIFEST_DIR"), "/../unlift-nn/models");
+    let other =
+        format!("invert photos --inverter {models}/lpips-squeeze/lpips-squeeze.onnx --out x");
+    let told = place.complains(&other, 3);
+    assert!(told.contains("expected an input features of shape (1, 131, any, any)"), "{told}");
+    assert!(!place.path("x").exists());
+    // The network for SIFT takes as many columns as ALIKED has, whatever it makes of them.
+    let own = format!("--inverter {models}/inverter-sift/inverter-sift.onnx");
+    let line = format!("audit images photos --features aliked --invert {own} {CHEAP} --out own");
+    place.ends(&line, 0);
+    let document = place.json("own/audit.json");
+    assert!(document["results"][0]["metrics"]["ssim"].is_f64(), "{document}");
+    assert_eq!(document["options"]["inverter_sha256"].as_str().unwrap().len(), 64, "{document}");
+    let (stdout, _) = place.ends(&format!("invert photos {own} --out pictures"), 0);
+    assert_eq!(stdout, "3 pictures, in pictures\n");
+}
+
+#[test]
+fn keypoints_and_what_came_back_are_painted_to_files() {
+    let place = place();
+    let (stdout, _) = place.ends("invert photos --out pictures", 0);
+    assert_eq!(stdout, "3 pictures, in pictures\n");
+    let size = |file: &str| image::image_dimensions(place.path(file)).unwrap();
+    assert_eq!(size("pictures/b/c.jpg.png"), (64, 48));
+    // Again over its own pictures, never over others or what is read.
+    place.ends("invert photos --out pictures", 0);
+    place.write("pictures/a.png.png", "mine");
+    let (_, stderr) = place.ends("invert photos --out pictures", 3);
+    assert!(stderr.contains("pictures/a.png.png: expected nothing, or a picture of"), "{stderr}");
+    assert_eq!(place.text("pictures/a.png.png"), "mine");
+    place.ends("invert photos --out pictures --force --max-images 1", 0);
+
+    place.ends("features photos --out features.h5", 0);
+    place.ends("obfuscate features.h5 --scheme cp2d --out hidden", 0);
+    let released = "hidden/released.parquet";
+    assert_eq!(
+        place.complains(&format!("invert {released} --out y"), 2),
+        "unlift: --recovered: expected what came back of PATH, found none\n"
+    );
+    place.ends(&format!("neighbors find {released} --source overlap --out lists.parquet"), 0);
+    place.ends(&format!("recover {released} --neighbors lists.parquet --out back.parquet"), 0);
+    let (stdout, _) =
+        place.ends(&format!("invert {released} --recovered back.parquet --out back"), 0);
+    assert_eq!(stdout, "3 pictures, in back\n");
+    assert_eq!(size("back/d.webp.png"), (64, 48));
+}
+
+#[test]
+fn pictures_and_folders_of_them_have_three_figures() {
+    let place = Place::empty();
+    for (at, name) in ["a/one.png", "a/two.png", "b/one.jpg", "b/more.png"].iter().enumerate() {
+        place.write_photo(name, at as u32);
+    }
+    fs::copy(place.path("a/two.png"), place.path("b/two.png")).unwrap();
+    place.write("text.png", "not a picture");
+    fs::create_dir(place.path("empty")).unwrap();
+
+    let found = place.prints("metrics a/one.png b/one.jpg --json", 0);
+    let figure = |name: &str| found[name].as_f64().unwrap();
+    assert!((-1.0..1.0).contains(&figure("ssim")) && (1.0..60.0).contains(&figure("psnr")));
+    assert!((0.0..1.5).contains(&figure("lpips")), "{found}");
+    let (text, _) = place.ends("metrics a/one.png b/one.jpg", 0);
+    assert!(text.contains(&format!("SSIM  {:.4}\n", figure("ssim"))), "{text}");
+    // Equal pictures are alike and have no ratio of signal to noise.
+    let equal = place.prints("metrics a/one.png a/one.png --json", 0);
+    assert_eq!((equal["ssim"].as_f64(), equal["lpips"].as_f64()), (Some(1.0), Some(0.0)));
+    assert!(equal["psnr"].is_null());
+
+    let folders = place.prints("metrics a b --json", 0);
+    let pictures = folders["pictures"].as_array().unwrap();
+    let names: Vec<&str> = pictures.iter().filter_map(|one| one["name"].as_str()).collect();
+    assert_eq!(names, ["one", "two"]);
+    let mean = (pictures[0]["ssim"].as_f64().unwrap() + 1.0) / 2.0;
+    assert!((folders["ssim"].as_f64().unwrap() - mean).abs() < 1e-12);
+    let (table, stderr) = place.ends("metrics a b", 0);
+    assert!(table.lines().last().unwrap().starts_with("mean"), "{table}");
+    assert_eq!(stderr, "unlift: b/more.png: no picture of this name in a\n");
+    for (line, code, expected) in [
+        (
+            "a b/one.jpg",
+            2,
+            "a and b/one.jpg: expected two pictures or two folders, found one of each",
+        ),
+        ("text.png a/one.png", 3, "text.png: expected a JPEG, PNG or WebP image, found text"),
+        ("a empty", 3, "a: expected pictures of the same names as in empty, found none"),
+    ] {
+        let told = place.complains(&format!("metrics {line}"), code);
+        assert!(told.ends_with(&format!("unlift: {expected}\n")), "{told}");
+    }
+}

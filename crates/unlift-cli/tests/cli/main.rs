@@ -1,0 +1,30 @@
+//! The program as a user runs it: exit codes, one-line errors, whole outputs, the same bytes.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod audit_map;
+mod check;
+mod compare;
+mod corpus;
+mod export;
+mod features;
+mod gate_files;
+mod gates;
+mod help;
+mod images;
+mod inputs;
+mod invert;
+#[cfg(unix)]
+mod journal;
+mod layouts;
+mod models;
+mod outputs;
+mod paper;
+mod readme;
+mod released;
+mod stages;
+#[cfg(unix)]
+mod streams;
+mod supply;
+mod table;

@@ -1,0 +1,147 @@
+//! Every command line of the README, run in order in an empty folder: what it says can be done can be done.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::common::{Place, said};
+use crate::layouts;
+
+/// Names that the README uses for what a reader has; everything else a line must make itself.
+const FIXTURES: [&str; 3] = ["PROJECT/", "photos/", "cloud.ply"];
+
+fn repository() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// The command lines of all `sh` blocks of a document, comments taken off.
+fn command_lines(markdown: &str) -> Vec<String> {
+    let mut lines = Vec::new();
+    let mut within = false;
+    for line in markdown.lines() {
+        if let Some(language) = line.strip_prefix("```") {
+            within = !within && language.trim() == "sh";
+            continue;
+        }
+        let command = line.split(" #").next().unwrap_or_default().trim();
+        if within && !command.is_empty() && !command.starts_with('#') {
+            lines.push(command.to_owned());
+        }
+    }
+    lines
+}
+
+/// The line as it is run with the program of this build; `None` for what builds the program or runs the tests.
+fn runnable(line: &str) -> Option<String> {
+    let ours = line.strip_prefix("cargo run --release -- ").map(|words| format!("unlift {words}"));
+    let is_build = ["cargo install --path crates/unlift-cli", "cargo test --workspace"];
+    match ours {
+        Some(ours) => Some(ours),
+        None if line.starts_with("unlift ") => Some(line.to_owned()),
+        None => {
+            assert!(
+                is_build.contains(&line),
+                "the README has a line that this test cannot run: {line}"
+            );
+            None
+        }
+    }
+}
+
+/// What a line of ours writes: what `--out` names, else the usual place.
+fn output(line: &str) -> Option<&str> {
+    let mut words = line.split_whitespace();
+    match words.find(|&word| word == "--out") {
+        Some(_) => words.next(),
+        None if line.starts_with("unlift audit ") => Some("unlift-audit"),
+        None if line.starts_with("unlift demo") => Some("unlift-demo"),
+        None => None,
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn every_command_line_of_the_readme_runs_as_it_is_written() {
+    let readme = fs::read_to_string(repository().join("README.md")).unwrap();
+    let lines = command_lines(&readme);
+    assert!(lines.len() >= 15, "{lines:#?}");
+
+    let place = Place::with_photos(&["a.jpg", "b.png", "hall/c.webp"]);
+    layouts::project(&place, "PROJECT");
+    write_cloud(&place);
+    let given = || -> BTreeMap<String, Vec<u8>> {
+        let of_reader = |name: &String| FIXTURES.iter().any(|given| name.starts_with(given));
+        let names = place.files().into_iter().filter(of_reader);
+        names.map(|name| (name.clone(), place.bytes(&name))).collect()
+    };
+    let before = given();
+    let mut outputs: Vec<String> = Vec::new();
+    for line in lines.iter().filter_map(|line| runnable(line)) {
+        if let Some(out) = output(&line) {
+            assert!(!outputs.contains(&out.to_owned()), "two lines write {out}: {line}");
+            outputs.push(out.to_owned());
+        }
+        let run = place.shell(&line);
+        let (stdout, stderr) = said(&run);
+        // A gate may fail: that is what it is for. It must say so, and nothing else may go wrong.
+        let failed = line.contains("--gate") && stdout.contains("FAILED");
+        assert_eq!(run.status.code(), Some(i32::from(failed)), "{line}\n{stdout}{stderr}");
+        if let Some(out) = output(&line) {
+            assert!(place.path(out).exists(), "{line}");
+        }
+    }
+    assert!(given() == before, "a line of the README changed what a reader has");
+}
+
+/// A cloud in no unit that anybody knows.
+fn write_cloud(place: &Place) {
+    let head = "ply\nformat ascii 1.0\nelement vertex 400\nproperty float x\nproperty float y\nproperty float z\n";
+    let point = |p: &[f64; 3]| format!("{} {} {}\n", 3.0 * p[0], 3.0 * p[1], 3.0 * p[2]);
+    let rows: String = unlift::synthetic::room(2, 400).points.iter().map(point).collect();
+    place.write("cloud.ply", format!("{head}end_header\n{rows}"));
+}
+
+/// How GitHub names a heading in links.
+fn anchor(heading: &str) -> String {
+    let kept = heading.trim_start_matches('#').trim().to_lowercase();
+    let kept = kept.chars().filter(|c| c.is_alphanumeric() || [' ', '-', '_'].contains(c));
+    kept.map(|c| if c == ' ' { '-' } else { c }).collect()
+}
+
+/// The documents of the repository that link to each other.
+const DOCUMENTS: [&str; 6] = [
+    "README.md",
+    "ARCHITECTURE.md",
+    "CONTRIBUTING.md",
+    "STYLE.md",
+    "docs/formats.md",
+    "docs/benchmarks.md",
+];
+
+#[test]
+fn links_between_documents_lead_somewhere() {
+    let mut n = 0;
+    for document in DOCUMENTS {
+        let path = repository().join(document);
+        let text = fs::read_to_string(&path).unwrap();
+        for link in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+            // Code has brackets and parentheses, too.
+            if link.contains("://") || link.contains(' ') || !link.contains(['.', '#']) {
+                continue;
+            }
+            let (file, heading) = link.split_once('#').unwrap_or((link, ""));
+            let target = match file {
+                "" => path.clone(),
+                file => path.parent().unwrap().join(file),
+            };
+            assert!(target.exists(), "{document}: {link}");
+            if !heading.is_empty() {
+                let text = fs::read_to_string(&target).unwrap();
+                let mut headings = text.lines().filter(|line| line.starts_with('#'));
+                assert!(headings.any(|line| anchor(line) == heading), "{document}: {link}");
+            }
+            n += 1;
+        }
+    }
+    assert!(n > 10, "{n}");
+}

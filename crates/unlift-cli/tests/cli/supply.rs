@@ -1,0 +1,89 @@
+//! Whose code is in the program: licences that go with MIT OR Apache-2.0, one registry, no crate twice that need not be.
+//! A test, so that it runs wherever the others do, without a program that has to be compiled first. Advisories change while code does not: `cargo audit` or `cargo deny check advisories`, where there is a network.
+
+use std::collections::BTreeMap;
+use std::process::Command;
+
+use serde_json::Value;
+
+const ALLOWED: &str = "0BSD, Apache-2.0, Apache-2.0 WITH LLVM-exception, BSD-2-Clause, BSD-3-Clause, CC0-1.0, MIT, \
+    Unicode-3.0, Unlicense, Zlib";
+
+const REGISTRY: &str = "registry+https://github.com/rust-lang/crates.io-index";
+
+/// Crates of which two versions are compiled, as those that we depend on ask for different ones. Who adds one has looked.
+const TWICE: &str = "base64 block-buffer cpufeatures crypto-common digest getrandom glam hashbrown miniz_oxide num-bigint \
+    rand rand_core syn";
+
+/// All crates on this machine's platform, from the lock file.
+fn packages() -> Vec<Value> {
+    let cargo = |arguments: &[&str]| {
+        let output = Command::new(env!("CARGO")).args(arguments).output().expect("cargo runs");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).expect("UTF-8")
+    };
+    let version = cargo(&["-vV"]);
+    let host = version.lines().find_map(|line| line.strip_prefix("host: ")).expect("a host");
+    let manifest = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml");
+    let metadata = ["metadata", "--locked", "--format-version", "1", "--filter-platform", host];
+    let text = cargo(&[&metadata[..], &["--manifest-path", manifest]].concat());
+    let mut metadata: Value = serde_json::from_str(&text).expect("JSON");
+    serde_json::from_value(metadata["packages"].take()).expect("a list")
+}
+
+/// Whether an SPDX expression leaves a choice of licences that are all allowed.
+fn may_be_carried(expression: &str) -> bool {
+    let choices = |part: &str| {
+        let part = part.trim_matches(['(', ')']).replace('/', " OR ");
+        part.split(" OR ").any(|licence| ALLOWED.split(", ").any(|allowed| allowed == licence))
+    };
+    expression.split(" AND ").all(choices)
+}
+
+#[test]
+fn licences_go_with_ours_and_all_code_is_from_one_registry() {
+    for package in packages() {
+        let name = &package["name"];
+        let licence = package["license"].as_str();
+        assert!(licence.is_some_and(may_be_carried), "{name}: {licence:?}");
+        let source = package["source"].as_str();
+        assert!(source.is_none_or(|source| source == REGISTRY), "{name}: {source:?}");
+    }
+    for (expression, may) in [
+        ("MIT/Apache-2.0", true),
+        ("GPL-3.0 OR MIT", true),
+        ("(MIT OR Apache-2.0) AND Unicode-3.0", true),
+        ("GPL-3.0", false),
+        ("MIT AND GPL-3.0", false),
+    ] {
+        assert_eq!(may_be_carried(expression), may, "{expression}");
+    }
+}
+
+#[test]
+fn no_crate_is_compiled_twice_unless_others_ask_for_it() {
+    let mut versions: BTreeMap<String, usize> = BTreeMap::new();
+    for package in packages() {
+        *versions.entry(package["name"].as_str().expect("a name").to_owned()).or_default() += 1;
+    }
+    let is_new = |name: &String| TWICE.split(' ').all(|known| known != name);
+    let twice = versions.into_iter().filter(|(_, n)| *n > 1).map(|(name, _)| name);
+    let new: Vec<String> = twice.filter(is_new).collect();
+    assert!(new.is_empty(), "compiled twice: {new:?}");
+}
+
+/// A constant that holds a file is copied wherever it is used; a static is in the program once.
+#[test]
+fn the_program_holds_every_network_once() {
+    let program = std::fs::read(env!("CARGO_BIN_EXE_unlift")).expect("the program");
+    for entry in unlift_nn::MODELS.iter() {
+        let Some(network) = entry.carried else { continue };
+        let middle = network.len() / 2;
+        let sample = &network[middle..middle + 64];
+        let copies = program.windows(sample.len()).filter(|window| *window == sample).count();
+        assert_eq!(copies, 1, "{}", entry.name);
+    }
+    // Lines for backtraces are most of a program that is built for tests.
+    let most = if cfg!(debug_assertions) { 200 } else { 70 };
+    assert!(program.len() < most * 1_000_000, "{} bytes", program.len());
+}

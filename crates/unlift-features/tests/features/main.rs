@@ -1,0 +1,7 @@
+//! Photos in, features out: of SIFT, ALIKED and SuperPoint.
+
+mod aliked;
+mod learned;
+mod load;
+mod sift;
+mod superpoint;

@@ -1,0 +1,133 @@
+//! Pictures of what came back, and what the page says about them.
+
+use unlift_report::document::{Document, Row};
+use unlift_report::inversions::{Inversion, InvertedView, Likeness, Object, Painted};
+use unlift_report::{Given, RenderOptions, render};
+
+use crate::sample;
+
+/// An audit of images, of which the first two rows are from an attacker's own lists.
+fn document() -> Document {
+    let mut document = sample::images();
+    for (row, ssim) in document.results.iter_mut().zip([0.48, 0.33].into_iter().cycle()) {
+        row.metrics.insert("ssim".into(), ssim);
+        row.metrics.insert("ssim_baseline".into(), 0.5);
+        row.metrics.insert("objects_found".into(), 0.2);
+        row.metrics.insert("objects_found_of_tv".into(), 0.25);
+        row.metrics.insert("objects_found_of_tv_baseline".into(), 0.75);
+    }
+    for scheme in ["lines2d", "cp2d"] {
+        let mut row = document.results.iter().find(|row| row.scheme == scheme).unwrap().clone();
+        (row.neighbors, row.oracle_noise, row.inlier_ratio) = ("overlap".into(), None, 0.2);
+        document.results.push(row);
+    }
+    // Rows of the images are not asked here, and are as many as results or none.
+    document.images.iter_mut().for_each(|image| image.rows.clear());
+    document
+}
+
+fn object(class: &str) -> Object {
+    Object { class: class.into(), sides: [0.25, -0.5, 0.75, 0.5] }
+}
+
+fn inversion(document: &Document, ssim: impl Fn(&Row) -> f64) -> Inversion {
+    let view = |row: &Row| InvertedView {
+        scheme: row.scheme.clone(),
+        given: Given::of(row),
+        solver: row.solver.clone(),
+        painted: Painted {
+            jpeg: vec![1],
+            objects: vec![object("chair"), object("bed")],
+            likeness: Likeness { ssim: ssim(row), lpips: 0.3 },
+        },
+    };
+    let picture = sample::picture();
+    Inversion {
+        name: picture.name,
+        size: picture.size,
+        objects: vec![object("chair")],
+        baseline: Painted { likeness: Likeness { ssim: 0.5, lpips: 0.2 }, ..Painted::default() },
+        released: picture.released,
+        views: document.results.iter().map(view).collect(),
+        ..Inversion::default()
+    }
+}
+
+fn page(document: &Document, inversions: Vec<Inversion>, share_safe: bool) -> String {
+    let options = RenderOptions { inversions, share_safe, ..RenderOptions::default() };
+    render(document, None, &options).expect("a page")
+}
+
+#[test]
+fn the_page_begins_with_what_an_attacker_paints_from_the_released_data() {
+    let document = document();
+    let ssim = |row: &Row| if row.neighbors == "overlap" { 0.48 } else { 0.2 };
+    let found = page(&document, vec![inversion(&document, ssim)], false);
+    let rebuilt =
+        "<strong>An attacker can rebuild the picture.</strong> From the released data alone, ";
+    let not = "<strong>The picture does not come back well by this attack.</strong> If half of the neighbors were known: ";
+    let (first, second) = (found.find(rebuilt), found.find(not));
+    assert!(first.is_some() && first < second, "{found}");
+    assert!(
+        found.contains(
+            "% of the keypoints come back within 10\u{a0}px (LINES2D, overlap neighbors)."
+        )
+    );
+    assert!(found.contains("What the service receives") && found.contains("<path d=\"M"));
+    assert!(!found.to_lowercase().contains("worse picture"));
+    let safe = page(&document, vec![inversion(&document, ssim)], true);
+    assert!(!safe.contains("class=\"exhibit") && !safe.contains("src=\"data:image/jpeg"));
+}
+
+#[test]
+fn a_picture_that_was_poor_without_protection_is_called_so() {
+    let document = document();
+    let mut poor = inversion(&document, |_| 0.4);
+    let said = "Even from the true points this network paints a poor picture (SSIM 0.43).";
+    assert!(!page(&document, vec![poor.clone()], false).contains("Even from the true points"));
+    poor.baseline.likeness.ssim = 0.43;
+    assert!(page(&document, vec![poor], false).contains(said));
+}
+
+#[test]
+fn two_photos_show_two_schemes() {
+    let document = document();
+    let all = || inversion(&document, |_| 0.48);
+    let found = page(&document, vec![all(), all(), all()], false);
+    assert_eq!(found.matches("<div class=\"exhibit").count(), 3);
+    assert!(
+        found.contains("(LINES2D, overlap neighbors)")
+            && found.contains("(CP2D, overlap neighbors)")
+    );
+}
+
+#[test]
+fn only_the_strongest_attacks_are_shown_at_first() {
+    let document = document();
+    let found = page(&document, vec![inversion(&document, |_| 0.4)], false);
+    let (_, section) = found.split_once("id=\"inversions\"").expect("pictures");
+    let (_, row) = section.split_once("<h3>LINES2D</h3>").expect("a scheme");
+    let (main, others) = row.split_once("<details>").expect("the others are folded away");
+    assert_eq!(main.matches("<img").count(), 2, "released data alone, and half of the neighbors");
+    assert!(main.contains("overlap, 20 % true neighbors") && main.contains("oracle, 50 % true"));
+    let (others, _) = others.split_once("</details>").expect("an end");
+    assert_eq!(others.matches("<img").count(), 5);
+}
+
+#[test]
+fn boxes_are_of_objects_that_are_found_again() {
+    let document = document();
+    let found = page(&document, vec![inversion(&document, |_| 0.4)], false);
+    let frame = "style=\"left:25.0%;top:0.0%;width:50.0%;height:50.0%\"><b>chair</b>";
+    assert!(found.contains(frame) && !found.contains("<b>bed</b>"), "{found}");
+}
+
+#[test]
+fn figures_of_pictures_stand_beside_the_papers() {
+    let found = page(&document(), Vec::new(), false);
+    assert!(found.contains("tv, %"), "{found}");
+    // The paper's figures of the same cell stand beside ours.
+    assert!(found.contains("<td>0.480</td><td>0.020</td><td>0.62</td>"), "{found}");
+    assert!(!found.contains("ssim_baseline"));
+    assert!(found.contains("<td>75.0</td>") && found.contains("<td>25.0</td>"));
+}

@@ -1,0 +1,10 @@
+//! What `audit.json`, the page and the files of gates hold, without a browser.
+
+#[path = "../sample/mod.rs"]
+mod sample;
+
+mod document;
+mod gate_files;
+mod inversions;
+mod page;
+mod schema;

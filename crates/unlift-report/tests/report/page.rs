@@ -1,0 +1,396 @@
+//! The page as text: numbers without script, escaping, nothing private in a page to share.
+
+use sha2::{Digest, Sha256};
+use unlift_report::document::{Document, NotAudited, Spread};
+use unlift_report::{RenderOptions, Scene3d, render, text_table};
+
+use crate::sample;
+
+fn page(document: &Document, scene: Option<&Scene3d>, share_safe: bool) -> String {
+    let options = RenderOptions { share_safe, ..RenderOptions::default() };
+    render(document, scene, &options).expect("a page")
+}
+
+/// The page without its scripts and styles: what a browser without script shows.
+fn without_script(page: &str) -> String {
+    let mut text = page.to_owned();
+    for (open, close) in [("<script", "</script>"), ("<style", "</style>")] {
+        while let Some(start) = text.find(open) {
+            let end = start + text[start..].find(close).expect("it ends") + close.len();
+            text.replace_range(start..end, "");
+        }
+    }
+    text
+}
+
+/// The text of an element's content without tags, spaces made single.
+fn plain(markup: &str) -> String {
+    let mut text = String::new();
+    let mut inside = false;
+    for c in markup.chars() {
+        match c {
+            '<' => (inside, ()) = (true, text.push(' ')),
+            '>' => inside = false,
+            c if !inside => text.push(c),
+            _ => {}
+        }
+    }
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// The page as text without script, tags and explanations of words.
+fn said(document: &Document) -> String {
+    let mut text = without_script(&page(document, None, false));
+    while let Some(start) = text.find("<span class=\"tip\"") {
+        let end = start + text[start..].find("</span>").expect("it ends") + "</span>".len();
+        text.replace_range(start..end, "");
+    }
+    // Where the verdict begins and the contents end.
+    let text = text.replace("<section class=\"part", "VERDICT <section class=\"part");
+    let (contents, rest) = text.split_once("</nav>").expect("contents");
+    plain(&format!("{}{rest}", contents.split("<nav").next().unwrap_or_default()))
+}
+
+/// The verdict's part of a page, without tags.
+fn verdict(document: &Document) -> String {
+    let text = said(document);
+    let from = text.find("VERDICT ").expect("a verdict") + "VERDICT ".len();
+    text[from..text.find(" What to do next ").expect("what to do next")].to_owned()
+}
+
+#[test]
+fn the_verdict_leads_with_the_strongest_attack_from_the_released_data() {
+    let text = verdict(&sample::document(true));
+    let in_order = [
+        "Not protected under 1 of 7 schemes. An attacker recovers 58.6 % of the points of this map within \
+         10 cm today, from the released data alone (OLC, records alone). If half of the neighbors were known, every scheme \
+         tried would give back 83.3 % or more. Next: Try the stronger attack: add \
+         --descriptors FILE --neighbors descriptors .",
+        "OLC Random lines Today, from the released data alone 58.6 % records alone (tomography) If half of the \
+         neighbors were known 92.3 % oracle, 50 % true neighbors, consensus A blind guess gets 1.9 %, \
+         the records alone 58.6 %. Neighborhoods add 33.7 percentage points (oracle). Half of the points come \
+         back even when 10 % of the neighbors are right, the fewest tested.",
+        "PLANE Axis-aligned planes Today, from the released data alone Not tried on this scheme, so nothing is \
+         known. If half of the neighbors were known 83.7 %",
+    ];
+    let places: Vec<Option<usize>> = in_order.iter().map(|sentence| text.find(sentence)).collect();
+    assert!(places.iter().all(Option::is_some), "{places:?}\n{text}");
+    assert!(places.is_sorted(), "{places:?}\n{text}");
+}
+
+#[test]
+fn the_verdict_names_the_strongest_attack_of_today() {
+    let text = verdict(&sample::mixed(true));
+    // PPL by overlap: stronger than its records alone; the weaker solver of the cell is not named.
+    assert!(text.contains("41.0 % overlap, 35 listed, 8.2 % of them true, consensus"), "{text}");
+    // What neighborhoods add is counted from the larger baseline, per source.
+    assert!(
+        text.contains(
+            "A blind guess gets 1.2 %, the records alone 7.3 %. Neighborhoods add \
+            33.7 percentage points (overlap), nothing (geometric) and 81.8 percentage points (oracle)."
+        ),
+        "{text}"
+    );
+    // The released data, not the oracle, decides the order.
+    let (olc, plane) = (text.find("OLC Random lines"), text.find("PLANE Axis-aligned planes"));
+    assert!(olc < plane && plane.is_some());
+    assert!(text.contains(
+        "Neighborhoods by geometric were not tried: planes say nothing of where points are."
+    ));
+}
+
+#[test]
+fn what_to_do_next_names_what_was_not_tried_and_what_leaks_least() {
+    let text = said(&sample::document(true));
+    let steps = text.rsplit_once("What to do next").expect("steps").1;
+    assert!(steps.contains("add --descriptors FILE --neighbors descriptors ."), "{steps}");
+    let least = "Of the schemes tried, PPL+ leaks least: 7.1 % today, 89.7 % if half of the neighbors were known.";
+    assert!(steps.contains(least), "{steps}");
+    let mixed = said(&sample::mixed(true));
+    assert!(mixed.contains("add --neighbors learned , a network"), "{mixed}");
+    assert!(mixed.contains("add --invert and the photos."));
+    assert!(said(&sample::images()).contains("add --neighbors descriptors . Descriptors tell"));
+}
+
+#[test]
+fn terminal_and_page_say_the_same_numbers() {
+    for document in [sample::document(true), sample::mixed(true), sample::images()] {
+        let (page, text) = (said(&document), text_table(&document));
+        let lines: Vec<&str> = text.lines().take(2).collect();
+        assert!(page.contains(lines[0]) && page.contains(lines[1]), "{lines:?}");
+        for shares in unlift_report::shares(&document, &[]) {
+            for share in [shares.today, shares.known].into_iter().flatten() {
+                let share = format!("{share:.1} %");
+                assert!(page.contains(&share) && text.contains(&share), "{share}\n{text}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_solver_that_needs_no_neighborhoods_is_an_attack_of_today() {
+    let mut document = sample::document(true);
+    let mut row = document.results[0].clone();
+    (row.solver, row.inlier_ratio) = ("tomography".into(), 0.5);
+    row.recovered_percent[0] = 72.5;
+    document.results.push(row);
+    document.run.seconds.rows.clear();
+    assert!(verdict(&document).contains("72.5 % records alone (tomography)"));
+}
+
+#[test]
+fn a_reference_is_no_attack() {
+    let mut document = sample::document(true);
+    for scheme in sample::SCHEMES {
+        let mut row = document.results.iter().find(|row| row.scheme == scheme).unwrap().clone();
+        row.solver = "reference".into();
+        (row.neighbors, row.oracle_noise, row.k) = ("reference".into(), None, 3);
+        (row.inlier_ratio, row.recovered_percent[0]) = (0.5, 99.9);
+        document.results.push(row);
+    }
+    document.run.seconds.rows.clear();
+    assert_eq!(verdict(&document), verdict(&sample::document(true)));
+}
+
+#[test]
+fn what_could_not_be_audited_is_said_and_never_reads_as_little() {
+    let mut document = sample::document(true);
+    document.results.retain(|row| row.scheme != "ppl+");
+    document.break_even.retain(|point| point.scheme != "ppl+");
+    document.run.seconds.rows.clear();
+    let reason = "k: expected between 1 and 8, found 50";
+    document.not_audited =
+        serde_json::from_value(serde_json::json!([{"scheme": "ppl+", "reason": reason}])).unwrap();
+    let text = verdict(&document);
+    assert!(text.contains("Not audited, so nothing is known: PPL+."), "{text}");
+    assert!(
+        text.contains(&format!("PPL+ Paired-point lines, plane-aware Not audited : {reason}")),
+        "{text}"
+    );
+    let page = without_script(&page(&document, None, true));
+    assert!(page.contains("id=\"not-audited\"") && page.matches(reason).count() == 2);
+}
+
+#[test]
+fn gates_come_first_and_failed_ones_before_the_others() {
+    let text = page(&sample::document(true), None, true);
+    let (_, body) = text.split_once("<body>").expect("a body");
+    let gates = plain(body.split_once("<section id=\"gates\"").expect("gates").1);
+    assert!(body.find("id=\"gates\"") < body.find("id=\"verdict\""));
+    assert!(gates.contains("1 of 2 gates failed FAIL ppl@0.5:0.10&lt;=20 89.1 % came back"));
+    assert!(text.contains("<title>FAIL · "));
+    let mut passing = sample::document(true);
+    passing.gates.retain(|gate| gate.passed);
+    let text = without_script(&page(&passing, None, true));
+    assert!(text.contains("The gate passed") && !text.contains("FAIL"));
+}
+
+#[test]
+fn centimeters_never_appear_without_a_scale() {
+    let document = sample::mixed(false);
+    let text = without_script(&page(&document, None, false));
+    assert!(text.contains("No scale was declared"));
+    assert!(text.contains("within the usual distance to the K-th neighbor today"));
+    assert!(text.contains("the median distance from a point to its 50th nearest neighbor"));
+    for unit in [" cm", " mm", "3DV 2025", "neighbor distance", " nd"] {
+        assert!(!text.contains(unit), "{unit}");
+    }
+    assert!(text.contains("within 1×, %") && text.contains("within 2.5×, %"));
+}
+
+#[test]
+fn names_are_escaped_everywhere() {
+    let evil = "</script><script>alert(1)</script>";
+    let mut document = sample::document(true);
+    document.input.path = Some(evil.into());
+    document.run.command = Some(evil.into());
+    document.options.insert(evil.into(), evil.into());
+    document.gates[0].gate = evil.into();
+    for row in document.results.iter_mut().filter(|row| row.scheme == "cp") {
+        row.scheme = evil.into();
+        row.lost = [(evil.to_owned(), row.n_lost)].into();
+    }
+    let scene = sample::scene(&document, 50);
+    let usual = sample::document(true);
+    let usual = page(&usual, Some(&sample::scene(&usual, 50)), false);
+    let before = usual.matches("<script").count();
+    let text = page(&document, Some(&scene), false);
+    assert!(!text.contains("alert(1)</script>"));
+    assert_eq!(text.matches("<script").count(), before);
+}
+
+#[test]
+fn the_terminal_table_is_short_and_worst_first() {
+    let table = text_table(&sample::document(true));
+    let lines: Vec<&str> = table.lines().collect();
+    // Two lines of verdict, an empty one, a head, a line per scheme and its records alone (not of planes), what the last
+    // columns are within, and what "true" is.
+    assert_eq!(lines.len(), 4 + 7 + 6 + 2);
+    assert!(table.contains("\nblind, break-even: within 0.10 m\n"), "{table}");
+    assert!(lines[4].starts_with("olc  ") && lines[4].contains("58.6 %"), "{table}");
+    assert!(lines[5].starts_with("olc  ") && lines[5].contains("92.3 %"), "{table}");
+    assert!(lines[3..].iter().all(|line| line.len() <= 100));
+}
+
+#[test]
+fn the_vendored_bundle_is_the_one_described() {
+    let bundle = include_bytes!("../../web/vendor/bundle.min.js");
+    let sum: String = Sha256::digest(bundle).iter().map(|byte| format!("{byte:02x}")).collect();
+    assert!(
+        include_str!("../../web/vendor/VENDOR.md").contains(&sum),
+        "bundle.min.js has sha256 {sum}"
+    );
+}
+
+#[test]
+fn a_page_of_images_speaks_of_keypoints_and_pixels() {
+    let document = sample::images();
+    let options = RenderOptions { pictures: vec![sample::picture()], ..RenderOptions::default() };
+    let page = render(&document, None, &options).expect("a page");
+    let text = without_script(&page);
+    assert!(text.contains("2 of 4 images. 1 could not be used. 1 had fewer keypoints"));
+    let said = verdict(&document);
+    let sentence = "An attacker would recover 79.5 % of the keypoints of these images within 10 px";
+    assert!(said.contains(sentence), "{said}");
+    assert!(text.contains("<td>94.2</td>") && text.contains("id=\"table-distinct\""));
+    assert!(text.contains("3DV 2025") && page.contains("\"unit\":\"px\""));
+    assert!(page.contains("kitchen/secret.jpg"));
+    assert!(text_table(&document).contains("10 px"));
+
+    let safe =
+        render(&document, None, &RenderOptions { share_safe: true, ..options }).expect("a page");
+    assert!(!safe.contains("secret") && !safe.contains("id=\"picture-graph\""));
+    let json = document.share_safe().to_json().expect("a document");
+    assert!(!json.contains("secret") && json.contains("\"name\": null"));
+}
+
+/// A guess that gets more than every attack leads, and needs no other attack to be tried.
+#[test]
+fn a_guess_that_gets_more_than_every_attack_is_the_verdict() {
+    let mut document = sample::document(true);
+    for row in document.results.iter_mut().filter(|row| row.scheme == "plane") {
+        row.blind_percent.values_mut().for_each(|percent| *percent = 96.0);
+    }
+    let said = verdict(&document);
+    assert!(
+        said.contains("(PLANE, a blind guess)") && said.contains("96.0 % a blind guess"),
+        "{said}"
+    );
+}
+
+#[test]
+fn every_figure_stands_in_a_table_and_what_must_be_known_beside_the_verdict() {
+    let mut document = sample::document(true);
+    document.notes.push("--max-points: 200 of 400 points are audited <b>".to_owned());
+    for row in document.results.iter_mut().filter(|row| row.scheme == "olc") {
+        (row.sure_percent, row.sure_correct_percent, row.reliability) = (None, None, None);
+        row.sure_unknown = Some("the map is too small".into());
+    }
+    let text = without_script(&page(&document, None, true));
+    for row in &document.results {
+        let alone = row.records_alone_percent.iter().flat_map(|map| map.values());
+        for value in row.recovered_percent.values().chain(row.blind_percent.values()).chain(alone) {
+            assert!(text.contains(&format!("<td>{value:.1}</td>")), "{} {value}", row.scheme);
+        }
+    }
+    for said in [
+        "12 degenerate",
+        "1 odd point",
+        "<td>not known here</td>",
+        "Not known here: the map is too small",
+        "<strong>Mind:</strong> --max-points: 200 of 400 points are audited &lt;b&gt;.",
+    ] {
+        assert!(text.contains(said), "{said}");
+    }
+    document.results.clear();
+    document.break_even.clear();
+    document.run.seconds.rows.clear();
+    assert!(page(&document, None, false).contains("No scheme was tested."));
+}
+
+/// Few schemes are spoken of as such, and colors are those of the share.
+#[test]
+fn the_banner_says_how_bad_it_is() {
+    for (schemes, color, expected) in [
+        (&["olc"][..], "red", "Not protected. An attacker recovers 58.6 %"),
+        (&["ray", "ray-voxel"], "orange", "Badly protected under either scheme."),
+        (&["ppl", "cp"], "gray", "No attack tried here recovers much. An attacker recovers 16.2"),
+        // What was not tested is no good news.
+        (
+            &["plane"],
+            "orange",
+            "Not tested: what an attacker gets from the released data alone. An attacker would recover 83.7 % of \
+             the points of this map within 10 cm if half of the neighbors were known (PLANE, oracle neighbors).",
+        ),
+    ] {
+        let mut document = sample::document(true);
+        document.results.retain(|row| schemes.contains(&row.scheme.as_str()));
+        document.run.seconds.rows.clear();
+        let said = verdict(&document);
+        assert!(said.contains(expected), "{said}");
+        let colored = format!("<section class=\"part {color}\"");
+        assert!(page(&document, None, true).contains(&colored), "{schemes:?}");
+    }
+}
+
+#[test]
+fn pages_are_small_load_nothing_and_never_say_safe() {
+    let document = sample::document(true);
+    for n in [3_000, 40_000] {
+        let scene = sample::scene(&document, n);
+        let size = page(&document, Some(&scene), false).len();
+        assert!(size < 10_000_000, "{n} points: {size} bytes");
+    }
+    let policy =
+        "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:";
+    for document in [document, sample::mixed(false)] {
+        let text = without_script(&page(&document, None, false));
+        assert!(text.contains(policy));
+        for load in [" src=", "<link", "<iframe", "url("] {
+            assert!(!text.contains(load), "{load}");
+        }
+        let (_, body) = text.split_once("<body>").expect("a body");
+        assert!(!body.replace("--share-safe", "").to_lowercase().contains("safe"));
+    }
+}
+
+#[test]
+fn a_page_to_share_holds_figures_only() {
+    let document = sample::document(true);
+    let scene = sample::scene(&document, 200);
+    let [private, shared] = [false, true].map(|safe| page(&document, Some(&scene), safe));
+    for trace in ["furnished-room", "id=\"block-0\"", "<canvas", "unlift audit map"] {
+        assert!(private.contains(trace) && !shared.contains(trace), "{trace}");
+    }
+    assert!(shared.contains("Figures only.") && shared.contains("<td>92.3</td>"));
+}
+
+#[test]
+fn the_terminal_table_has_a_line_per_source_and_says_what_is_missing() {
+    let mut document = sample::document(true);
+    let oracle = document.results.iter().find(|row| row.scheme == "olc").unwrap().clone();
+    for (solver, percent, std) in [("consensus", 41.5, 0.0), ("joint", 63.5, 4.96)] {
+        let mut row = oracle.clone();
+        (row.neighbors, row.oracle_noise, row.inlier_ratio) = ("overlap".into(), None, 0.13);
+        row.solver = solver.into();
+        row.recovered_percent[0] = percent;
+        let recovered_percent = [("0.10".to_owned(), std), ("0.25".to_owned(), 0.5)].into();
+        row.std = Some(Spread { recovered_percent, ..Spread::default() });
+        document.results.push(row);
+    }
+    for (neighbors, reason) in [(None, "flat"), (Some("geometric"), "geometric: no lists")] {
+        let (scheme, neighbors) = ("star".to_owned(), neighbors.map(str::to_owned));
+        document.not_audited.push(NotAudited { scheme, neighbors, reason: reason.into() });
+    }
+    let table = text_table(&document);
+    let lines: Vec<&str> = table.lines().collect();
+    let cells = |line: usize| lines[line].split_whitespace().collect::<Vec<_>>().join(" ");
+    // The strongest attack of a source speaks, and a spread is shown that matters.
+    assert!(cells(4).starts_with("olc overlap 13 % joint 63.5 ± 5.0 % 98.1 %"), "{table}");
+    assert!(!table.contains("41.5 %"), "{table}");
+    let alone = "olc records alone - tomography 58.6 % 76.4 % 1.9 % -";
+    assert_eq!(cells(5), alone, "{table}");
+    assert!(cells(6).starts_with("olc oracle"), "{table}");
+    assert!(table.contains("not audited: star: flat\n"), "{table}");
+    assert!(table.contains("not audited: star by geometric: no lists\n"), "{table}");
+}
