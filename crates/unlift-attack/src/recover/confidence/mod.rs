@@ -1,13 +1,11 @@
 //! How sure the attacker can be of each recovered point, from attacker-side data alone.
 //!
-//! After joint recovery every slot is looked at once more: `cues.rs` measures how much better than by chance
-//! estimates and records agree around it, and `model.rs` turns that into the probability that the right
-//! place was found and a scale of its error. Its constants come from synthetic rooms
-//! (`examples/fit_confidence.rs`), never from a real map. Cues are ratios: a scaled map has the same.
+//! After joint recovery `crowd.rs` measures around every slot how much better than by chance estimates and records agree. A
+//! logistic model turns these cues into the probability that the right place was found, and a scale of its error. Its constants
+//! come from synthetic rooms (`examples/fit_confidence.rs`), never from a real map.
 
 mod constants;
 pub(super) mod crowd;
-mod cues;
 
 use rayon::prelude::*;
 
@@ -48,22 +46,22 @@ pub(super) fn look<const D: usize>(
     let (cues, radius) = match family {
         Family::Lines { rows, slots_per_record, chance } => {
             let pieces = LinePieces::new(rows, *slots_per_record, chance, solved.delta);
-            cues::of(&pieces, graph, solved)
+            crowd::cues(&pieces, graph, solved)
         }
         Family::Planes { planes, sorted } => {
-            cues::of(&PlanePieces::new(planes, sorted, solved.delta), graph, solved)
+            crowd::cues(&PlanePieces::new(planes, sorted, solved.delta), graph, solved)
         }
         Family::Candidates { rows, chance } => {
-            cues::of(&CandidatePieces::new(rows, chance, solved.delta), graph, solved)
+            crowd::cues(&CandidatePieces::new(rows, chance, solved.delta), graph, solved)
         }
     };
     let kind = kind(released);
     let of_slot = |(estimate, cues): (&Estimate<D>, &Cues)| match estimate.status {
-        Status::Ok => judged(&MODELS[kind], cues, radius as f32),
+        Status::Ok => judged(&MODELS[kind], cues, radius),
         _ => Confidence::LOST,
     };
     let sure = solved.estimates.par_iter().zip(&cues).map(of_slot).collect();
-    (sure, Seen { cues, radius, kind })
+    (sure, Seen { cues, radius: f64::from(radius), kind })
 }
 
 /// What `cues` say about one slot; lengths are multiples of `radius`.
@@ -164,42 +162,47 @@ pub(super) fn kind<const D: usize>(released: &Released<D>) -> usize {
 }
 
 /// The products of two cues that count too: what one says depends on the other, or bends.
-fn products(c: &Cues) -> [f32; N_PRODUCTS] {
+fn products(cues: &Cues) -> [f32; N_PRODUCTS] {
+    let [evidence, _, ln_radius, record_evidence, _, _, _, of_members, sparsity, map_evidence, ..] =
+        *cues;
+    let [.., map_share, map_record_share, _, _, voting_share, map_voting_share, settled, _, _, _] =
+        *cues;
+    let [.., one_sided, map_one_sided] = *cues;
     [
-        c.evidence * c.evidence,
-        c.ln_radius * c.ln_radius,
-        c.record_evidence * c.record_evidence,
-        c.of_members * c.of_members,
-        c.sparsity * c.sparsity,
-        c.evidence * c.of_members,
-        c.evidence * c.map_evidence,
-        c.of_members * c.map_evidence,
-        c.map_evidence * c.map_evidence,
-        c.evidence * c.ln_radius,
-        c.map_share * c.map_share,
-        c.map_record_share * c.map_record_share,
-        c.evidence * c.map_share,
-        c.record_evidence * c.map_record_share,
-        c.record_evidence * c.map_evidence,
-        c.voting_share * c.voting_share,
-        c.evidence * c.voting_share,
-        c.evidence * c.map_voting_share,
-        c.voting_share * c.map_voting_share,
-        c.evidence * c.is_settled,
-        c.map_evidence * c.is_settled,
-        c.one_sided * c.one_sided,
-        c.evidence * c.one_sided,
-        c.one_sided * c.map_one_sided,
-        c.map_one_sided * c.map_one_sided,
-        c.map_evidence * c.map_one_sided,
-        c.map_share * c.map_one_sided,
+        evidence * evidence,
+        ln_radius * ln_radius,
+        record_evidence * record_evidence,
+        of_members * of_members,
+        sparsity * sparsity,
+        evidence * of_members,
+        evidence * map_evidence,
+        of_members * map_evidence,
+        map_evidence * map_evidence,
+        evidence * ln_radius,
+        map_share * map_share,
+        map_record_share * map_record_share,
+        evidence * map_share,
+        record_evidence * map_record_share,
+        record_evidence * map_evidence,
+        voting_share * voting_share,
+        evidence * voting_share,
+        evidence * map_voting_share,
+        voting_share * map_voting_share,
+        evidence * settled,
+        map_evidence * settled,
+        one_sided * one_sided,
+        evidence * one_sided,
+        one_sided * map_one_sided,
+        map_one_sided * map_one_sided,
+        map_evidence * map_one_sided,
+        map_share * map_one_sided,
     ]
 }
 
 /// A constant, the cues and their products, before they are centered.
 pub fn terms(cues: &Cues) -> [f32; N_TERMS] {
     let mut terms = [1.0; N_TERMS];
-    terms[1..=N_CUES].copy_from_slice(&cues.in_order());
+    terms[1..=N_CUES].copy_from_slice(cues);
     terms[1 + N_CUES..].copy_from_slice(&products(cues));
     terms
 }
