@@ -1,13 +1,11 @@
 //! The published density attacks, for comparison: constants as published, nothing read but the records.
 //!
-//! One point per line (Chelani et al., CVPR 2021): the nearest lines vote where they pass; the peak of
-//! the votes is the estimate; then lines vote again, chosen near the present estimates. Two points per
-//! line (Lee et al., CVPR 2023): the two highest peaks of a kernel density of the votes. Rays (Moon et
-//! al., CVPR 2024): rays of other centers vote, once. (Paper, supplement, "Comparison to other 3D line recoveries".)
+//! One point per line (Chelani et al., CVPR 2021): the nearest lines vote where they pass, the peak of the votes is the estimate,
+//! and lines near the estimates vote again. Two points per line (Lee et al., CVPR 2023): the two highest peaks of a kernel density of
+//! the votes. Rays (Moon et al., CVPR 2024): rays of other centers vote once.
 //!
-//! The published programs read more than the records: votes counted from the true point, a line that
-//! votes for itself exactly there, ranges from true distances. Here votes are counted from the foot, a line
-//! has no vote of its own, ranges come from the votes.
+//! The published programs count votes from the true point and take ranges from true distances. Here votes are counted from the
+//! foot of the line, a line has no vote of its own, and ranges come from the votes.
 
 use rayon::prelude::*;
 
@@ -42,39 +40,28 @@ pub(crate) fn published<const D: usize>(released: &Released<D>) -> Peaks {
     let lines = &feasible.lines;
     let every = lines.len().div_ceil(MOST_VOTERS);
     let voters: Vec<u32> = (0..lines.len() as u32).step_by(every).collect();
-    let columns = LineColumns::new(lines, &voters);
+    let columns = Columns::new(voters.iter().map(|&voter| row(&lines[voter as usize])));
     let (most, share) = if feasible.hides == Hides::Two { COARSE_OF_PAIRS } else { COARSE };
     let k = most.min((share * lines.len() as f64) as usize).max(2);
-    let vote = |scratch: &mut Scratch, row: usize| {
-        columns.distances_to_line(&lines[row], &mut scratch.distances);
+    let place = |scratch: &mut Scratch, row: usize| {
+        columns.map(|other| between(&lines[row], other), &mut scratch.distances);
         scratch.silence(row, lines, &voters);
         let reach = nearest(&scratch.distances, k, &mut scratch.keys, &mut scratch.near);
         let near = scratch.near.iter().map(|&at| &lines[voters[at as usize] as usize]);
         passes(&lines[row], near, &mut scratch.votes);
-        reach
+        let found = match feasible.hides {
+            Hides::Two => two_crowds(&mut scratch.votes).map(|pair| pair.map(Some)),
+            _ => crowd(&mut scratch.votes).map(|t| [Some(t), None]),
+        };
+        let peaks = found.unwrap_or_default().map(|t| t.and_then(|t| on(&lines[row], t)));
+        (peaks, reach)
     };
-    let place = |row: usize, t: f64| on(&lines[row], t);
-    if feasible.hides == Hides::Two {
-        let rows: Vec<([Option<Peak>; 2], f32)> = (0..lines.len())
-            .into_par_iter()
-            .map_init(Scratch::default, |scratch, row| {
-                let reach = vote(scratch, row);
-                let found = two_crowds(&mut scratch.votes);
-                (found.map_or([None; 2], |pair| pair.map(|t| place(row, t))), reach)
-            })
-            .collect();
-        let resolution = median(rows.iter().map(|row| row.1));
-        return Peaks { of: rows.into_iter().flat_map(|row| row.0).collect(), resolution };
-    }
-    let rows: Vec<(Option<Peak>, f32)> = (0..lines.len())
-        .into_par_iter()
-        .map_init(Scratch::default, |scratch, row| {
-            let reach = vote(scratch, row);
-            (crowd(&mut scratch.votes).and_then(|t| place(row, t)), reach)
-        })
-        .collect();
+    let rows: Vec<([Option<Peak>; 2], f32)> =
+        (0..lines.len()).into_par_iter().map_init(Scratch::default, place).collect();
     let resolution = median(rows.iter().map(|row| row.1));
-    let mut of: Vec<Option<Peak>> = rows.into_iter().map(|row| row.0).collect();
+    let per_record = if feasible.hides == Hides::Two { 2 } else { 1 };
+    let peaks = rows.into_iter().flat_map(|row| row.0.into_iter().take(per_record));
+    let mut of: Vec<Option<Peak>> = peaks.collect();
     if feasible.hides == Hides::One {
         for _ in 0..REFINEMENTS {
             of = refine(lines, &voters, &columns, &of);
@@ -87,16 +74,20 @@ pub(crate) fn published<const D: usize>(released: &Released<D>) -> Peaks {
 fn refine(
     lines: &[FeasibleLine],
     voters: &[u32],
-    columns: &LineColumns,
+    columns: &Columns<6>,
     estimates: &[Option<Peak>],
 ) -> Vec<Option<Peak>> {
-    let points = PointColumns::new(estimates, voters);
+    let point = |&voter: &u32| estimates[voter as usize].map_or([f32::NAN; 3], |p| p.position);
+    let points = Columns::new(voters.iter().map(point));
     let step = |scratch: &mut Scratch, row: usize| {
         let estimate = estimates[row]?;
-        points.distances_to_line(&lines[row], &mut scratch.distances);
+        let FeasibleLine { through, direction, .. } = lines[row];
+        points.map(|point| from_line(point, through, direction), &mut scratch.distances);
         scratch.silence(row, lines, voters);
         nearest(&scratch.distances, REFINE, &mut scratch.keys, &mut scratch.near);
-        columns.distances_to_point(&estimate.position, &mut scratch.distances);
+        let to_line =
+            |[x, y, z, u, v, w]: [f32; 6]| from_line(estimate.position, [x, y, z], [u, v, w]);
+        columns.map(to_line, &mut scratch.distances);
         scratch.silence(row, lines, voters);
         nearest(&scratch.distances, REFINE, &mut scratch.keys, &mut scratch.passing);
         scratch.passing.sort_unstable();
@@ -285,130 +276,75 @@ pub(super) fn two_crowds(votes: &mut [f64]) -> Option<[f64; 2]> {
     Some([pair[0].min(pair[1]), pair[0].max(pair[1])])
 }
 
-// Distances from one line or point to all lines: the hot loops of the published attacks.
+// Distances to all lines or estimates: the hot loops of the published attacks.
 
-/// Lines with a column per coordinate, so that distances to all of them run over whole vectors.
+/// Rows of numbers with a column per number, so that a function of every row runs over whole vectors.
 #[derive(Debug)]
-pub(super) struct LineColumns {
-    through: [Vec<f32>; 3],
-    direction: [Vec<f32>; 3],
-}
+struct Columns<const N: usize>([Vec<f32>; N]);
 
-impl LineColumns {
-    /// The lines `rows` of `lines`.
-    pub(super) fn new(lines: &[FeasibleLine], rows: &[u32]) -> Self {
-        let column = |of: &dyn Fn(&FeasibleLine) -> f32| -> Vec<f32> {
-            rows.iter().map(|&row| of(&lines[row as usize])).collect()
-        };
-        Self {
-            through: std::array::from_fn(|c| column(&|line| line.through[c])),
-            direction: std::array::from_fn(|c| column(&|line| line.direction[c])),
+impl<const N: usize> Columns<N> {
+    fn new(rows: impl Iterator<Item = [f32; N]>) -> Self {
+        let mut columns = std::array::from_fn(|_| Vec::new());
+        for row in rows {
+            columns
+                .iter_mut()
+                .zip(row)
+                .for_each(|(column, x): (&mut Vec<f32>, f32)| column.push(x));
         }
+        Self(columns)
     }
 
-    /// Squared distances between `line` and every line; infinite for parallel ones.
-    pub(super) fn distances_to_line(&self, line: &FeasibleLine, out: &mut Vec<f32>) {
-        out.resize(self.through[0].len(), 0.0);
-        dispatch(LineToLines { columns: self, line, out });
-    }
-
-    /// Squared distances from `point` to every line.
-    pub(super) fn distances_to_point(&self, point: &[f32; 3], out: &mut Vec<f32>) {
-        out.resize(self.through[0].len(), 0.0);
-        dispatch(PointToLines { columns: self, point, out });
+    /// Puts the function `of` of each row in `out`.
+    fn map(&self, of: impl Fn([f32; N]) -> f32, out: &mut Vec<f32>) {
+        out.resize(self.0[0].len(), 0.0);
+        dispatch(Map { columns: self, of, out });
     }
 }
 
-/// Estimates with a column per coordinate; NaN where there is none.
-#[derive(Debug)]
-pub(super) struct PointColumns {
-    position: [Vec<f32>; 3],
-}
-
-impl PointColumns {
-    /// The rows `rows` of `estimates`.
-    pub(super) fn new(estimates: &[Option<Peak>], rows: &[u32]) -> Self {
-        let at = |row: u32, c: usize| estimates[row as usize].map_or(f32::NAN, |p| p.position[c]);
-        Self { position: std::array::from_fn(|c| rows.iter().map(|&row| at(row, c)).collect()) }
-    }
-
-    /// Squared distances from `line` to every estimate; infinite where there is none.
-    pub(super) fn distances_to_line(&self, line: &FeasibleLine, out: &mut Vec<f32>) {
-        out.resize(self.position[0].len(), 0.0);
-        dispatch(LineToPoints { columns: self, line, out });
-    }
-}
-
-struct LineToLines<'a> {
-    columns: &'a LineColumns,
-    line: &'a FeasibleLine,
+struct Map<'a, const N: usize, F> {
+    columns: &'a Columns<N>,
+    of: F,
     out: &'a mut [f32],
 }
 
-impl Kernel for LineToLines<'_> {
+impl<const N: usize, F: Fn([f32; N]) -> f32> Kernel for Map<'_, N, F> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let (p, d, n) = (self.line.through, self.line.direction, self.out.len());
-        let through: [&[f32]; 3] = std::array::from_fn(|c| &self.columns.through[c][..n]);
-        let direction: [&[f32]; 3] = std::array::from_fn(|c| &self.columns.direction[c][..n]);
-        for j in 0..n {
-            let e = [direction[0][j], direction[1][j], direction[2][j]];
-            let normal =
-                [d[1] * e[2] - d[2] * e[1], d[2] * e[0] - d[0] * e[2], d[0] * e[1] - d[1] * e[0]];
-            let (mut across, mut square) = (0.0, 0.0);
-            for c in 0..3 {
-                across += (through[c][j] - p[c]) * normal[c];
-                square += normal[c] * normal[c];
-            }
-            let parallel = square < 1e-6;
-            self.out[j] = if parallel { f32::INFINITY } else { across * across / square };
-        }
-    }
-}
-
-struct PointToLines<'a> {
-    columns: &'a LineColumns,
-    point: &'a [f32; 3],
-    out: &'a mut [f32],
-}
-
-impl Kernel for PointToLines<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let n = self.out.len();
-        let through: [&[f32]; 3] = std::array::from_fn(|c| &self.columns.through[c][..n]);
-        let direction: [&[f32]; 3] = std::array::from_fn(|c| &self.columns.direction[c][..n]);
-        for j in 0..n {
-            let away: [f32; 3] = std::array::from_fn(|c| self.point[c] - through[c][j]);
-            let d = [direction[0][j], direction[1][j], direction[2][j]];
-            self.out[j] = square_across(&away, &d);
-        }
-    }
-}
-
-struct LineToPoints<'a> {
-    columns: &'a PointColumns,
-    line: &'a FeasibleLine,
-    out: &'a mut [f32],
-}
-
-impl Kernel for LineToPoints<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let (p, d, n) = (self.line.through, self.line.direction, self.out.len());
-        let position: [&[f32]; 3] = std::array::from_fn(|c| &self.columns.position[c][..n]);
+        let columns = self.columns.0.each_ref().map(|column| &column[..self.out.len()]);
         for (j, out) in self.out.iter_mut().enumerate() {
-            let away: [f32; 3] = std::array::from_fn(|c| position[c][j] - p[c]);
-            let square = square_across(&away, &d);
-            *out = if square.is_nan() { f32::INFINITY } else { square };
+            *out = (self.of)(columns.map(|column| column[j]));
         }
     }
+}
+
+/// A line as a row: a point of it, then its direction.
+fn row(line: &FeasibleLine) -> [f32; 6] {
+    let ([x, y, z], [u, v, w]) = (line.through, line.direction);
+    [x, y, z, u, v, w]
+}
+
+/// The squared distance between `line` and the one in a row; infinite for parallel ones.
+#[inline(always)]
+fn between(line: &FeasibleLine, [x, y, z, u, v, w]: [f32; 6]) -> f32 {
+    let (p, d) = (line.through, line.direction);
+    let (q, e) = ([x, y, z], [u, v, w]);
+    let normal = [d[1] * e[2] - d[2] * e[1], d[2] * e[0] - d[0] * e[2], d[0] * e[1] - d[1] * e[0]];
+    let (mut across, mut square) = (0.0, 0.0);
+    for c in 0..3 {
+        across += (q[c] - p[c]) * normal[c];
+        square += normal[c] * normal[c];
+    }
+    if square < 1e-6 { f32::INFINITY } else { across * across / square }
+}
+
+/// The squared distance of `point` from the line through `through` along `direction`; infinite where there is no point.
+#[inline(always)]
+fn from_line(point: [f32; 3], through: [f32; 3], direction: [f32; 3]) -> f32 {
+    let away: [f32; 3] = std::array::from_fn(|c| point[c] - through[c]);
+    let square = square_across(&away, &direction);
+    if square.is_nan() { f32::INFINITY } else { square }
 }
 
 /// The squared length of the part of `v` perpendicular to `d`: no difference of large squares.
@@ -443,6 +379,7 @@ pub(super) fn nearest(squared: &[f32], k: usize, keys: &mut Vec<u64>, near: &mut
 mod tests {
     use super::*;
     use crate::seed::{Draws, Stage};
+    use crate::simd::portable;
 
     fn votes(crowds: &[(f64, usize)], strays: usize) -> Vec<f64> {
         let mut draws = Draws::new(8, Stage::Synthetic, 0);
@@ -469,13 +406,6 @@ mod tests {
         assert_eq!(two_crowds(&mut []), None);
         assert_eq!(two_crowds(&mut [2.0; 9]), Some([2.0; 2]));
     }
-}
-
-#[cfg(test)]
-mod columns_tests {
-    use super::*;
-    use crate::seed::{Draws, Stage};
-    use crate::simd::portable;
 
     fn lines(n: usize) -> Vec<FeasibleLine> {
         let mut draws = Draws::new(4, Stage::Synthetic, 0);
@@ -492,43 +422,32 @@ mod columns_tests {
     #[test]
     fn distances_between_lines_are_the_least_over_their_points() {
         let lines = lines(40);
-        let rows: Vec<u32> = (0..40).collect();
-        let columns = LineColumns::new(&lines, &rows);
-        let mut out = Vec::new();
-        columns.distances_to_line(&lines[0], &mut out);
-        assert_eq!(out[0], f32::INFINITY);
-        for (other, &squared) in lines.iter().zip(&out).skip(1) {
+        for other in &lines[1..] {
             // The nearest point of the first line, by golden steps of a convex function.
-            let mut to_point = vec![0.0];
-            let single = LineColumns::new(&[*other], &[0]);
-            let mut at = |t: f32| {
-                let point: [f32; 3] =
-                    std::array::from_fn(|c| lines[0].through[c] + t * lines[0].direction[c]);
-                single.distances_to_point(&point, &mut to_point);
-                to_point[0]
+            let at = |t: f32| {
+                let FeasibleLine { through, direction, .. } = lines[0];
+                let point = std::array::from_fn(|c| through[c] + t * direction[c]);
+                from_line(point, other.through, other.direction)
             };
             let (mut low, mut high) = (-1e3f32, 1e3f32);
             for _ in 0..100 {
                 let (a, b) = (low + 0.382 * (high - low), low + 0.618 * (high - low));
                 if at(a) < at(b) { high = b } else { low = a }
             }
-            let least = at(0.5 * (low + high));
+            let (least, squared) = (at(0.5 * (low + high)), between(&lines[0], row(other)));
             assert!((least.sqrt() - squared.sqrt()).abs() < 2e-3, "{least} {squared}");
         }
+        assert_eq!(between(&lines[0], row(&lines[0])), f32::INFINITY);
     }
 
     #[test]
     fn vector_and_portable_code_give_the_same_bits() {
         let lines = lines(101);
-        let rows: Vec<u32> = (0..101).collect();
-        let columns = LineColumns::new(&lines, &rows);
+        let columns = Columns::new(lines.iter().map(row));
         let (mut fast, mut plain) = (Vec::new(), vec![0.0; 101]);
-        columns.distances_to_line(&lines[7], &mut fast);
-        portable(LineToLines { columns: &columns, line: &lines[7], out: &mut plain });
-        assert_eq!(fast, plain);
-        let point = [0.3, -0.2, 1.0];
-        columns.distances_to_point(&point, &mut fast);
-        portable(PointToLines { columns: &columns, point: &point, out: &mut plain });
+        let of = |other: [f32; 6]| between(&lines[7], other);
+        columns.map(of, &mut fast);
+        portable(Map { columns: &columns, of, out: &mut plain });
         assert_eq!(fast, plain);
     }
 
