@@ -10,22 +10,20 @@
 //!    `p_random` the density of estimates of all slots (`votes`);
 //! 3. refines the best one by weighted least squares to the records of the neighbors found near (`refine`).
 //!
-//! `odds`, `p_true` and `p_random` are learned from the present estimates (`neighbor_distribution`, `map::crowding`) and again
-//! whenever enough slots jumped. Iterations end when few slots jump, or when records that did not vote say that estimates
-//! became worse (`validation`).
+//! `odds`, `p_true` and `p_random` are learned from the present estimates (`neighbor_distribution`, `map::grid`) and again
+//! whenever enough slots jumped. Iterations end when few slots jump, or when fewer records pass near the estimates (`state`).
 //!
-//! Slots move from the old estimates, so that neither order nor threads matter. If all of them moved at once, neighbors
-//! that are far from each other could change places for ever, each going where the other was. So half of the slots
-//! hold still while the others move. Only the first iteration moves all: its start comes from records alone.
+//! Slots move from the old estimates, so that neither order nor threads matter. If all of them moved at once, two neighbors
+//! could change places for ever. So half of the slots hold still while the others move. Only the first iteration moves all:
+//! its start comes from records alone.
 
-mod input;
 mod neighbor_distribution;
 mod refine;
 mod state;
 mod update;
 mod votes;
 
-use crate::recover::joint::input::{Input, Sample};
+use crate::recover::joint::neighbor_distribution::Input;
 use crate::recover::joint::state::State;
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::Graph;
@@ -71,8 +69,7 @@ impl<const D: usize> Joint<'_, D> {
 
     fn iterate<P: Pieces<D>>(&self, pieces: P, start: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
         let Self { graph, delta, seed, .. } = *self;
-        let (listed, sample) = (graph.times_listed(), Sample::new(graph, seed));
-        let input = Input { pieces, graph, delta, listed, sample };
+        let input = Input::new(pieces, graph, delta, seed);
         let mut state = State::new(&input, start);
         let order = along_curve(state.places());
         for iteration in 0..ITERATIONS {
