@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::Error;
 use crate::geometry::vector::{along, dot, median, sub, widen};
 use crate::neighbors::Neighborhoods;
-use crate::recover::map::bytes::{Reader, Writer};
+use crate::recover::map::bytes::Reader;
 use crate::recover::map::grid::Grid;
 use crate::recover::map::lines::{LineRow, MOST_CHANCE};
 use crate::recover::map::places::trimmed;
@@ -37,9 +37,8 @@ pub(crate) struct ChanceField<const D: usize> {
 impl<const D: usize> ChanceField<D> {
     /// `grid` holds sums of weighted length per cell; `weight` is that of all records.
     fn new(mut grid: Grid<D>, weight: f32) -> Self {
-        grid.smooth();
-        let volume: f32 = (0..D).map(|_| grid.cell()).product();
-        let scale = 1.0 / (weight * volume).max(f32::MIN_POSITIVE);
+        grid.smooth(1);
+        let scale = 1.0 / (weight * grid.volume()).max(f32::MIN_POSITIVE);
         let mean = grid.values.iter().sum::<f32>() / grid.values.len() as f32;
         for value in &mut grid.values {
             *value = (value.max(FLOOR * mean) * scale).max(f32::MIN_POSITIVE);
@@ -48,7 +47,7 @@ impl<const D: usize> ChanceField<D> {
     }
 
     /// Appends the field to `to`.
-    pub(crate) fn write(&self, to: &mut Writer) {
+    pub(crate) fn write(&self, to: &mut Vec<u8>) {
         self.grid.write(to);
     }
 
@@ -63,19 +62,16 @@ impl<const D: usize> ChanceField<D> {
 
     /// The density at a typical place: the mean over places weighted by density.
     pub(crate) fn typical(&self) -> f32 {
-        let (sum, squares) = self
-            .grid
-            .values
-            .iter()
-            .map(|&x| f64::from(x))
-            .fold((0.0, 0.0), |(sum, squares), x| (sum + x, squares + x * x));
+        let values = self.grid.values.iter().map(|&x| f64::from(x));
+        let add = |(sum, squares): (f64, f64), x: f64| (sum + x, squares + x * x);
+        let (sum, squares) = values.fold((0.0, 0.0), add);
         (squares / sum) as f32
     }
 
     /// The chance that a random record passes through a region of volume-per-length `tube` about `x`.
     #[inline(always)]
     pub(crate) fn at(&self, x: &[f32; D], tube: f32) -> f32 {
-        (self.grid.values[self.grid.index(x)] * tube).min(MOST_CHANCE)
+        (self.grid.at(x) * tube).min(MOST_CHANCE)
     }
 
     /// Adds the same, however large, at each `t` of a line to `chance`, with room for a cell each.
@@ -114,20 +110,23 @@ pub(crate) fn of_lines<const D: usize>(
     let (low, high) = box_of_crossings(rows, lists, slots_per_record);
     let counts = times_listed(lists, rows.len());
     let every = rows.len().div_ceil(RECORDS).max(1);
-    let chosen: Vec<usize> = (0..rows.len()).step_by(every).collect();
-    (0..n_groups.unwrap_or(1))
-        .map(|own| {
-            let of_others = |&&record: &&usize| n_groups.is_none() || rows[record].group != own;
-            let chosen: Vec<usize> = chosen.iter().filter(of_others).copied().collect();
-            let empty = Grid::over(low, high, CELLS);
-            let weight = chosen.iter().map(|&r| counts[r] as f32).sum();
-            let parts: Vec<Grid<D>> = chosen
-                .par_chunks(chosen.len().div_ceil(8).max(1))
-                .map(|part| dispatch(Lengths { grid: empty.clone(), rows, counts: &counts, part }))
-                .collect();
-            ChanceField::new(sum(empty, &parts), weight)
-        })
-        .collect()
+    let field = |own: u32| {
+        let of_others = |&record: &usize| n_groups.is_none() || rows[record].group != own;
+        let chosen: Vec<usize> = (0..rows.len()).step_by(every).filter(of_others).collect();
+        let weight = chosen.iter().map(|&r| counts[r] as f32).sum();
+        let mut total = Grid::over(low, high, CELLS);
+        let lengths = |records: &[usize]| {
+            dispatch(Lengths { grid: total.clone(), rows, counts: &counts, records })
+        };
+        // Eight parts however many threads there are: the order of sums is the same.
+        let parts: Vec<Grid<D>> =
+            chosen.par_chunks(chosen.len().div_ceil(8).max(1)).map(lengths).collect();
+        for part in &parts {
+            total.values.iter_mut().zip(&part.values).for_each(|(a, b)| *a += b);
+        }
+        ChanceField::new(total, weight)
+    };
+    (0..n_groups.unwrap_or(1)).map(field).collect()
 }
 
 /// Centers of rays, counted up to the last that any ray comes from; `None` of lines.
@@ -145,7 +144,7 @@ struct Lengths<'a, const D: usize> {
     grid: Grid<D>,
     rows: &'a [LineRow<D>],
     counts: &'a [u32],
-    part: &'a [usize],
+    records: &'a [usize],
 }
 
 impl<const D: usize> Kernel for Lengths<'_, D> {
@@ -153,41 +152,23 @@ impl<const D: usize> Kernel for Lengths<'_, D> {
 
     #[inline(always)]
     fn run(self) -> Grid<D> {
-        let Self { mut grid, rows, counts, part } = self;
-        let mut buffers = (Vec::new(), Vec::new());
-        for &record in part {
-            add_line(&mut grid, &rows[record], counts[record] as f32, &mut buffers);
+        let Self { mut grid, rows, counts, records } = self;
+        let (mut t, mut cells) = (Vec::new(), Vec::new());
+        for &record in records {
+            let (row, weight) = (&rows[record], counts[record] as f32);
+            let inside = grid.clip(&row.through, &row.direction, row.floor(), row.to);
+            let Some((from, to)) = inside else { continue };
+            let steps = ((to - from) / grid.cell()).ceil().max(1.0);
+            let step = (to - from) / steps;
+            t.clear();
+            t.extend((0..steps as i32).map(|i| from + (i as f32 + 0.5) * step));
+            cells.resize(t.len(), 0);
+            grid.cells_along(&row.through, &row.direction, &t, &mut cells);
+            for &cell in &cells {
+                grid.values[cell as usize] += weight * step;
+            }
         }
         grid
-    }
-}
-
-fn sum<const D: usize>(mut total: Grid<D>, parts: &[Grid<D>]) -> Grid<D> {
-    for part in parts {
-        total.values.iter_mut().zip(&part.values).for_each(|(a, b)| *a += b);
-    }
-    total
-}
-
-#[inline(always)]
-fn add_line<const D: usize>(
-    grid: &mut Grid<D>,
-    row: &LineRow<D>,
-    weight: f32,
-    buffers: &mut (Vec<f32>, Vec<u32>),
-) {
-    let Some((from, to)) = grid.clip(&row.through, &row.direction, row.floor(), row.to) else {
-        return;
-    };
-    let steps = ((to - from) / grid.cell()).ceil().max(1.0);
-    let step = (to - from) / steps;
-    let (t, cells) = buffers;
-    t.clear();
-    t.extend((0..steps as i32).map(|i| from + (i as f32 + 0.5) * step));
-    cells.resize(t.len(), 0);
-    grid.cells_along(&row.through, &row.direction, t, cells);
-    for &cell in cells.iter() {
-        grid.values[cell as usize] += weight * step;
     }
 }
 
@@ -253,7 +234,7 @@ pub(crate) struct CandidateField<const D: usize> {
 
 impl<const D: usize> CandidateField<D> {
     /// Appends the fields to `to`.
-    pub(crate) fn write(&self, to: &mut Writer) {
+    pub(crate) fn write(&self, to: &mut Vec<u8>) {
         self.along.iter().for_each(|field| field.write(to));
     }
 
@@ -361,11 +342,7 @@ pub(crate) fn are_in_parts(sorted: &[f32]) -> bool {
     FAR_APART * 4.0 * median(&mut widths) < interquartile_range(sorted)
 }
 
-fn length<const D: usize>(v: &[f32; D]) -> f64 {
-    v.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>().sqrt()
-}
-
-/// Lines, and rounds (each leaves a third of the error), in which [`line_extent`] looks for the middle of a map.
+/// Lines, and iterations (each leaves a third of the error), in which [`line_extent`] looks for the middle of a map.
 const MIDDLE: (usize, usize) = (1000, 60);
 
 /// The median distance of the lines from their middle. Distances from the origin would not do: it is
@@ -379,7 +356,7 @@ pub(crate) fn line_extent<const D: usize>(rows: &[LineRow<D>]) -> f64 {
         let away = sub(&through, from);
         along(&away, -dot(&away, &direction), &direction)
     };
-    // Each round moves to the mean of the lines' nearest points; what is left of the start shrinks
+    // Each iteration moves to the mean of the lines' nearest points. What is left of the start shrinks
     // by the mean squared cosine with the lines, about a third.
     let mut middle = [0.0; D];
     for _ in 0..MIDDLE.1 {
@@ -389,14 +366,8 @@ pub(crate) fn line_extent<const D: usize>(rows: &[LineRow<D>]) -> f64 {
         }
         middle = along(&middle, 1.0, &step);
     }
-    let mut distances: Vec<f64> = rows
-        .iter()
-        .map(|row| {
-            let away = offset(row, &middle);
-            dot(&away, &away).sqrt()
-        })
-        .collect();
-    median(&mut distances)
+    let length = |v: [f64; D]| dot(&v, &v).sqrt();
+    median(&mut rows.iter().map(|row| length(offset(row, &middle))).collect::<Vec<f64>>())
 }
 
 /// The largest distance between centers.
@@ -407,14 +378,12 @@ pub(crate) fn ray_extent<const D: usize>(rows: &[LineRow<D>]) -> f64 {
             centers.push(row);
         }
     }
-    let mut largest = 0.0;
-    for (at, a) in centers.iter().enumerate() {
-        for b in &centers[..at] {
-            let apart: [f32; D] = std::array::from_fn(|c| a.through[c] - b.through[c]);
-            largest = f64::max(largest, length(&apart));
-        }
-    }
-    largest
+    let apart = |a: &LineRow<D>, b: &LineRow<D>| {
+        let apart = widen(&std::array::from_fn::<f32, D, _>(|c| a.through[c] - b.through[c]));
+        dot(&apart, &apart).sqrt()
+    };
+    let pairs = centers.iter().flat_map(|a| centers.iter().map(|b| apart(a, b)));
+    pairs.fold(0.0, f64::max)
 }
 
 #[cfg(test)]
