@@ -10,7 +10,7 @@ use crate::recover::confidence::crowd::{Seen, Solved};
 use crate::recover::joint::Joint;
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::Graph;
-use crate::recover::map::lists::{Lists, Slots};
+use crate::recover::map::lists::Slots;
 use crate::recover::model::Model;
 use crate::recover::options::{Delta, RecoverOptions, Solver};
 use crate::recover::published_density::published;
@@ -19,7 +19,7 @@ use crate::recover::records_alone::{self, Placement};
 use crate::recover::result::{Estimate, Recovered, TrialCounts, Unknown};
 use crate::recover::{confidence, consensus, delta, exact};
 use crate::released::{Obfuscation, Released};
-use crate::{About, Descriptors, Error, Fingerprint, RecordId};
+use crate::{About, Error, Fingerprint, RecordId};
 
 /// One map to be recovered.
 pub(super) struct Problem<'a, const D: usize> {
@@ -27,7 +27,6 @@ pub(super) struct Problem<'a, const D: usize> {
     map: Fingerprint,
     lists: &'a Neighborhoods,
     options: RecoverOptions,
-    /// The distance up to which a record supports a place, in the unit of the map.
     delta: f64,
     records: Records<'a, D>,
     trials: TrialCounts,
@@ -60,18 +59,7 @@ impl<'a, const D: usize> Problem<'a, D> {
         Self::make(released, lists, options, None)
     }
 
-    /// `released` with some of its lists, and the `model` made of it and all of them.
-    ///
-    /// # Errors
-    /// When the model or the lists are of another map.
-    pub(super) fn with_model(
-        released: &'a Released<D>,
-        lists: &'a Neighborhoods,
-        model: &Model<D>,
-    ) -> Result<Self, Error> {
-        Self::make(released, lists, &model.options, Some(model))
-    }
-
+    /// [`new`](Self::new), where the lists may be some of those that a `model` was made of.
     fn make(
         released: &'a Released<D>,
         lists: &'a Neighborhoods,
@@ -83,9 +71,10 @@ impl<'a, const D: usize> Problem<'a, D> {
         let map = released.fingerprint();
         map.expect(lists.about().map)?;
         map.expect(model.map(|model| model.map)).map_err(|error| error.within("model"))?;
-        let (records, delta) = match options.solver {
-            Solver::Density => Self::at_peaks(published(released)),
-            Solver::Tomography => Self::at_peaks(tomography(released)),
+        let at_peaks = |peaks: Peaks| (records_alone::delta(&peaks), Records::Alone(peaks));
+        let (delta, records) = match options.solver {
+            Solver::Density => at_peaks(published(released)),
+            Solver::Tomography => at_peaks(tomography(released)),
             Solver::Consensus | Solver::Joint | Solver::JointStart | Solver::Ransac => {
                 Self::listed(released, lists, options, model)?
             }
@@ -94,17 +83,12 @@ impl<'a, const D: usize> Problem<'a, D> {
         Ok(Self { released, map, lists, options: *options, delta, records, trials })
     }
 
-    fn at_peaks(peaks: Peaks) -> (Records<'a, D>, f64) {
-        let delta = records_alone::delta(&peaks);
-        (Records::Alone(peaks), delta)
-    }
-
     fn listed(
         released: &'a Released<D>,
         lists: &'a Neighborhoods,
         options: &RecoverOptions,
         model: Option<&Model<D>>,
-    ) -> Result<(Records<'a, D>, f64), Error> {
+    ) -> Result<(f64, Records<'a, D>), Error> {
         let family = match model {
             Some(model) => Family::with_chance(released, model.chance.clone())?,
             None => Family::learn(released, lists),
@@ -113,7 +97,7 @@ impl<'a, const D: usize> Problem<'a, D> {
         let is_joint = matches!(options.solver, Solver::Joint | Solver::JointStart);
         let graph = is_joint.then(|| Graph::new(lists, released.slots_per_record()));
         let single = graph.as_ref().filter(|_| released.slots_per_record() == 1);
-        let both_ways = single.map(Graph::neighborhoods).transpose()?;
+        let both_ways = single.map(Graph::neighborhoods);
         let delta = match (model, options.delta) {
             (Some(model), _) => model.delta,
             (None, Delta::Fixed(delta)) => delta,
@@ -122,7 +106,7 @@ impl<'a, const D: usize> Problem<'a, D> {
                 delta::learn(released, &family, (used, lists), is_joint, options.seed)
             }
         };
-        Ok((Records::Listed { family, graph, both_ways }, delta))
+        Ok((delta, Records::Listed { family, graph, both_ways }))
     }
 
     /// What was learned of the map, by consensus.
@@ -157,10 +141,9 @@ impl<'a, const D: usize> Problem<'a, D> {
                 let (seed, trials) = (self.options.seed, &self.trials);
                 Ransac { family, lists, delta, seed, trials }.solve(slots)
             }
-            // Joint recovery starts from who lists whom in both directions, where a record hides one point.
             Records::Listed { family, both_ways, .. } => {
-                let lists = Lists::Given(both_ways.as_ref().unwrap_or(lists));
-                consensus::solve(family, lists, delta, Slots::Range(slots))
+                let lists = both_ways.as_ref().unwrap_or(lists);
+                consensus::solve(family, lists, delta, &Slots::range(slots))
             }
         }
     }
@@ -178,8 +161,8 @@ impl<'a, const D: usize> Problem<'a, D> {
         }
     }
 
-    /// Recovered points from the last estimates of all slots: exact constraints are met where a rule fixes coordinates, and it
-    /// is said how sure the attacker is. Beside it what confidence is made of, if it `is_asked` for.
+    /// Recovered points from the last estimates of all slots, with exact constraints and confidence. Beside it what confidence
+    /// is made of, if it `is_asked` for.
     ///
     /// # Errors
     /// When there is not one estimate per slot.
@@ -193,10 +176,7 @@ impl<'a, const D: usize> Problem<'a, D> {
     }
 
     /// [`finish`](Self::finish), where it is known which descriptor is whose.
-    ///
-    /// # Errors
-    /// When there is not one estimate per slot.
-    pub(super) fn finish_with(
+    fn finish_with(
         &self,
         unsettled: Vec<Estimate<D>>,
         descriptor_row: Option<Vec<u32>>,
@@ -206,21 +186,29 @@ impl<'a, const D: usize> Problem<'a, D> {
             let expected = format!("{}, one per slot", self.n_slots());
             return Err(Error::new("estimates", expected, unsettled.len().to_string()));
         }
-        let settled = self.settled(&unsettled);
-        let estimates = settled.as_deref().unwrap_or(&unsettled);
+        let mut estimates = self.settle(unsettled.clone());
+        if self.is_settled() && self.options.solver == Solver::Joint {
+            for _ in 0..exact::feeds(self.released) {
+                estimates = self.settle(self.refine(estimates));
+            }
+        }
         let trials = (self.options.solver == Solver::Ransac).then(|| self.trials.histogram());
-        let recovered = self.in_columns(estimates, descriptor_row)?.with_trials(trials);
+        let recovered = self.in_columns(&estimates, descriptor_row)?.with_trials(trials);
+        let nothing = |recovered: Recovered<D>, unknown: Unknown| {
+            Ok((recovered.without_confidence(unknown), Seen::NOTHING))
+        };
         if let Some(unknown) = confidence::not_asked::<D>(&self.options) {
-            return Ok((recovered.without_confidence(unknown), Seen::NOTHING));
+            return nothing(recovered, unknown);
         }
         let Records::Listed { family, graph: Some(graph), .. } = &self.records else {
-            return Ok((recovered.without_confidence(Unknown::OtherSolver), Seen::NOTHING));
+            return nothing(recovered, Unknown::OtherSolver);
         };
-        let unknown = confidence::unknown(self.released, self.lists, estimates);
+        let unknown = confidence::unknown(self.released, self.lists, &estimates);
         if let (Some(unknown), false) = (unknown, is_asked) {
-            return Ok((recovered.without_confidence(unknown), Seen::NOTHING));
+            return nothing(recovered, unknown);
         }
-        let solved = Solved { estimates, unsettled: &unsettled, delta: self.delta as f32 };
+        let (estimates, unsettled) = (&estimates, &unsettled);
+        let solved = Solved { estimates, unsettled, delta: self.delta as f32 };
         let (sure, seen) = confidence::look(family, graph, self.released, &solved);
         let recovered = match unknown {
             Some(unknown) => recovered.without_confidence(unknown),
@@ -238,9 +226,9 @@ impl<'a, const D: usize> Problem<'a, D> {
         start: Vec<Estimate<D>>,
         last: &Recovered<D>,
     ) -> Result<Recovered<D>, Error> {
-        let start = if self.is_settled() { self.settle(start) } else { start };
         let rows = last.descriptor_row().map(<[u32]>::to_vec);
-        Ok(self.in_columns(&start, rows)?.without_confidence(Unknown::OtherSolver))
+        let recovered = self.in_columns(&self.settle(start), rows)?;
+        Ok(recovered.without_confidence(Unknown::OtherSolver))
     }
 
     /// Whether a rule of the scheme moves estimates. The paper's loop stays as published.
@@ -250,22 +238,12 @@ impl<'a, const D: usize> Problem<'a, D> {
         asked && listed && exact::can_settle(self.released)
     }
 
+    /// Estimates moved to where rules of the scheme allow them to be.
     fn settle(&self, estimates: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
-        exact::settle(self.released, estimates, self.delta)
-    }
-
-    /// Estimates moved to where rules allow them to be, if they move any; joint recovery may go on from there.
-    fn settled(&self, estimates: &[Estimate<D>]) -> Option<Vec<Estimate<D>>> {
-        if !self.is_settled() {
-            return None;
+        match self.is_settled() {
+            true => exact::settle(self.released, estimates, self.delta),
+            false => estimates,
         }
-        let mut settled = self.settle(estimates.to_vec());
-        if self.options.solver == Solver::Joint {
-            for _ in 0..exact::feeds(self.released) {
-                settled = self.settle(self.refine(settled));
-            }
-        }
-        Some(settled)
     }
 
     /// Estimates in columns, by rows of descriptors where these are known.
@@ -286,10 +264,8 @@ impl<'a, const D: usize> Problem<'a, D> {
     }
 }
 
-// Whether lists and records go together, and can be solved as it is asked.
-
 /// Refuses rays that are compared with all others of their anchor, which takes all lists.
-pub(super) fn check_anchors<const D: usize>(released: &Released<D>) -> Result<(), Error> {
+fn check_anchors<const D: usize>(released: &Released<D>) -> Result<(), Error> {
     match released.obfuscation() {
         Obfuscation::Rays(rays) if rays.regions().is_some() => {
             Err(Error::new("records of parts", "such as say nothing about others", "anchors"))
@@ -299,10 +275,7 @@ pub(super) fn check_anchors<const D: usize>(released: &Released<D>) -> Result<()
 }
 
 /// Refuses lists that are not of this map.
-pub(super) fn check_lists<const D: usize>(
-    released: &Released<D>,
-    lists: &Neighborhoods,
-) -> Result<(), Error> {
+fn check_lists<const D: usize>(released: &Released<D>, lists: &Neighborhoods) -> Result<(), Error> {
     if lists.n_slots() != released.n_slots() {
         let expected = format!("{} rows, one per slot", released.n_slots());
         return Err(Error::new("neighborhoods", expected, lists.n_slots().to_string()));
@@ -316,38 +289,32 @@ pub(super) fn check_lists<const D: usize>(
     Ok(())
 }
 
-// Which of a paired line's two descriptors belongs to which of its points (supplement B).
-
-/// Per slot of `records` the released descriptor row said to belong to it; `None` unless records hide two points
+/// Per slot of `records` the released descriptor row said to belong to it (supplement B); `None` unless records hide two points
 /// and have descriptors.
 ///
 /// The cheaper of the two bijections wins, where a descriptor and a neighborhood cost the sum of
 /// its distances to the listed records, each counted with the nearer of its two descriptors.
-/// Positions play no part.
-pub(super) fn descriptor_rows<const D: usize>(
+fn descriptor_rows<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
     records: Range<usize>,
 ) -> Option<Vec<u32>> {
     let descriptors = released.descriptors().filter(|_| released.slots_per_record() == 2)?;
+    let cost = |row: usize, slot: usize| {
+        let to_record = |record: &RecordId| {
+            let [one, other] =
+                [0, 1].map(|side| descriptors.squared_distance(row, 2 * record.index() + side));
+            f64::from(one.min(other).sqrt())
+        };
+        lists.of(slot).iter().map(to_record).sum::<f64>()
+    };
     let rows_of = |record: usize| {
         let [a, b] = [2 * record, 2 * record + 1];
-        let cost = |row: usize, slot: usize| affinity_cost(descriptors, row, lists.of(slot));
-        let straight = cost(a, a) + cost(b, b);
-        let crossed = cost(a, b) + cost(b, a);
-        let first = if straight <= crossed { [a, b] } else { [b, a] };
+        let is_straight = cost(a, a) + cost(b, b) <= cost(a, b) + cost(b, a);
+        let first = if is_straight { [a, b] } else { [b, a] };
         first.map(|row| row as u32)
     };
     Some(records.into_par_iter().flat_map_iter(rows_of).collect())
-}
-
-fn affinity_cost(descriptors: &Descriptors, row: usize, listed: &[RecordId]) -> f64 {
-    let to_record = |record: usize| {
-        let one = descriptors.squared_distance(row, 2 * record);
-        let other = descriptors.squared_distance(row, 2 * record + 1);
-        f64::from(one.min(other).sqrt())
-    };
-    listed.iter().map(|record| to_record(record.index())).sum()
 }
 
 // Consensus in parts, each with its own lists alone: what the machines of a cluster solve.
@@ -381,7 +348,8 @@ impl<const D: usize> Model<D> {
             let expected = format!("a range of whole records, {per_record} slots each");
             return Err(Error::new("slots", expected, format!("{slots:?}")));
         }
-        let estimates = Problem::with_model(released, lists, self)?.solve(slots.clone());
+        let estimates =
+            Problem::make(released, lists, &self.options, Some(self))?.solve(slots.clone());
         let records = slots.start / per_record..slots.end / per_record;
         let descriptor_row = descriptor_rows(released, lists, records);
         Ok(Part { estimates, descriptor_row })
@@ -403,16 +371,10 @@ impl<const D: usize> Model<D> {
             estimates.extend(part.estimates);
             rows.extend(part.descriptor_row.into_iter().flatten());
         }
-        let lists = Neighborhoods::of_slots(
-            0,
-            &[0],
-            Vec::new(),
-            None,
-            (released.n_records(), released.slots_per_record()),
-        )?;
-        let lists = lists.with_about(self.about);
+        let none = Neighborhoods::unchecked(vec![0; released.n_slots() + 1], Vec::new());
+        let lists = none.with_about(self.about);
         let has_rows = released.slots_per_record() == 2 && released.descriptors().is_some();
-        let problem = Problem::with_model(released, &lists, self)?;
+        let problem = Problem::make(released, &lists, &self.options, Some(self))?;
         problem
             .finish_with(estimates, has_rows.then_some(rows), false)
             .map(|(recovered, _)| recovered)

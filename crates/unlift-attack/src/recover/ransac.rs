@@ -42,8 +42,7 @@ impl<const D: usize> Ransac<'_, D> {
             Family::Candidates { rows, .. } => vote(rows, self.lists),
             Family::Lines { .. } | Family::Planes { .. } => Vec::new(),
         };
-        let (n_slots, slots) = (self.lists.n_slots(), Slots::Range(slots));
-        solve_chunks(n_slots, slots, Scratch::default, |scratch, first, out| {
+        solve_chunks(&Slots::range(slots), Scratch::default, |scratch, first, out| {
             for (at, estimate) in out.iter_mut().enumerate() {
                 let slot = first + at;
                 let (solved, trials) = dispatch(Slot { ransac: self, axes: &axes, slot, scratch });

@@ -46,9 +46,7 @@ pub fn records_alone<const D: usize>(
 
 /// The positions at which `peaks` puts the hidden points: which of a paired line's is whose is not known.
 fn at<const D: usize>(released: &Released<D>, peaks: &Peaks) -> Result<Recovered<D>, Error> {
-    let (n_records, slots) = (released.n_records(), released.slots_per_record());
-    let none =
-        Neighborhoods::try_new(vec![0; n_records * slots + 1], Vec::new(), None, n_records, slots)?;
+    let none = Neighborhoods::unchecked(vec![0; released.n_slots() + 1], Vec::new());
     let estimates = Placement::new(released, &none, peaks).solve(0..released.n_slots());
     let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
     let (origin, unit) = (released.origin(), released.unit());

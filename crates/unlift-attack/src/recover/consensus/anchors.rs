@@ -9,9 +9,9 @@
 
 use rayon::prelude::*;
 
-use crate::recover::map::lines::LineRow;
-use crate::recover::map::lines::evidence;
-use crate::recover::map::lists::{Lists, Slots, solve_chunks};
+use crate::neighbors::Neighborhoods;
+use crate::recover::map::lines::{LineRow, evidence};
+use crate::recover::map::lists::{Slots, mixed};
 use crate::recover::result::{Estimate, Status, stored_support};
 
 /// Slots whose lists are mixed to see what chance alone yields: a mean over so many is known to a few percent.
@@ -37,57 +37,45 @@ struct Window {
 /// Estimates for `slots`, one slot per record.
 pub(super) fn solve<const D: usize>(
     rows: &[LineRow<D>],
-    lists: Lists<'_>,
-    slots: Slots<'_>,
+    lists: &Neighborhoods,
+    slots: &Slots,
 ) -> Vec<Estimate<D>> {
     let bearings = Bearings::new(rows);
-    let windows: Vec<Option<Window>> = (0..lists.n_slots())
-        .into_par_iter()
-        .map(|slot| window(rows, &bearings, slot, &lists))
-        .collect();
+    let n = lists.n_slots();
+    let windows: Vec<Option<Window>> =
+        (0..n).into_par_iter().map(|slot| window(rows, &bearings, slot, lists)).collect();
     // The best of several windows has some evidence whatever is listed.
-    let mixed = lists.mixed();
-    let every = lists.n_slots().div_ceil(SAMPLE).max(1);
-    let by_chance: Vec<f32> = (0..lists.n_slots())
-        .step_by(every)
-        .filter_map(|slot| Some(window(rows, &bearings, slot, &mixed)?.evidence))
-        .collect();
+    let sample = || (0..n).step_by(n.div_ceil(SAMPLE).max(1));
+    let mixed = mixed(lists, sample(), 1);
+    let by_chance: Vec<f32> =
+        sample().filter_map(|slot| Some(window(rows, &bearings, slot, &mixed)?.evidence)).collect();
     let by_chance = CHANCE * by_chance.iter().sum::<f32>() / by_chance.len().max(1) as f32;
     let shares = shares(rows, lists, &bearings, &windows);
-    solve_chunks(
-        lists.n_slots(),
-        slots,
-        || (),
-        |(), first, out| {
-            for (at, estimate) in out.iter_mut().enumerate() {
-                let own = &rows[first + at];
-                *estimate = match windows[first + at] {
-                    None => Estimate::lost(Status::TooFewNeighbors),
-                    Some(Window { count, evidence, .. }) => {
-                        let excess = (evidence - by_chance).max(0.0);
-                        let trust = excess / evidence.max(f32::MIN_POSITIVE);
-                        // Without evidence half of the points lie before it.
-                        let share = 0.5 + trust * (shares[first + at] - 0.5);
-                        let range = libm::powf(share, 1.0 / D as f32) * own.to;
-                        Estimate {
-                            position: own.at(range),
-                            status: Status::Ok,
-                            support: stored_support(count),
-                            axis: 0,
-                            evidence: excess,
-                        }
-                    }
-                };
-            }
-        },
-    )
+    let estimate = |slot: usize| {
+        let Some(Window { count, evidence, .. }) = windows[slot] else {
+            return Estimate::lost(Status::TooFewNeighbors);
+        };
+        let excess = (evidence - by_chance).max(0.0);
+        let trust = excess / evidence.max(f32::MIN_POSITIVE);
+        // Without evidence half of the points lie before it.
+        let share = 0.5 + trust * (shares[slot] - 0.5);
+        let range = libm::powf(share, 1.0 / D as f32) * rows[slot].to;
+        Estimate {
+            position: rows[slot].at(range),
+            status: Status::Ok,
+            support: stored_support(count),
+            axis: 0,
+            evidence: excess,
+        }
+    };
+    slots.iter().map(estimate).collect()
 }
 
 /// Per slot the share of its ray's region that lies before its point: by how narrow its window is
 /// among rays of about the same bearing, as points are spread evenly over a region.
 fn shares<const D: usize>(
     rows: &[LineRow<D>],
-    lists: Lists<'_>,
+    lists: &Neighborhoods,
     bearings: &Bearings,
     windows: &[Option<Window>],
 ) -> Vec<f32> {
@@ -98,9 +86,8 @@ fn shares<const D: usize>(
         let smooth = |slot: usize| {
             let Some(window) = windows[slot] else { return score[slot] };
             let own = &rows[slot];
-            let mut buffer = Vec::new();
             let (mut sum, mut n) = (0.0f32, 0.0f32);
-            for record in lists.of(slot, &mut buffer) {
+            for record in lists.of(slot) {
                 let (row, score) = (&rows[record.index()], score[record.index()]);
                 if row.group == own.group && score.is_finite() && sine(own, row) <= window.sine {
                     (sum, n) = (sum + score, n + 1.0);
@@ -142,11 +129,10 @@ fn window<const D: usize>(
     rows: &[LineRow<D>],
     bearings: &Bearings,
     slot: usize,
-    lists: &Lists<'_>,
+    lists: &Neighborhoods,
 ) -> Option<Window> {
     let own = &rows[slot];
-    let mut buffer = Vec::new();
-    let listed = lists.of(slot, &mut buffer);
+    let listed = lists.of(slot);
     let others = listed.iter().map(|record| &rows[record.index()]);
     let mut sines: Vec<f32> =
         others.filter(|row| row.group == own.group).map(|row| sine(own, row)).collect();

@@ -8,8 +8,8 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use crate::RecordId;
 use crate::neighbors::Neighborhoods;
-use crate::{Error, RecordId};
 
 /// Rows of edges in order of their other ends, a class beside each.
 #[derive(Debug)]
@@ -103,12 +103,9 @@ impl Graph {
     }
 
     /// The edges as neighborhoods (records with one slot each).
-    ///
-    /// # Errors
-    /// None: ends are ascending records.
-    pub(crate) fn neighborhoods(&self) -> Result<Neighborhoods, Error> {
+    pub(crate) fn neighborhoods(&self) -> Neighborhoods {
         let records = self.ends.iter().map(|&end| RecordId(end)).collect();
-        Neighborhoods::try_new(self.offsets.clone(), records, None, self.n_slots(), 1)
+        Neighborhoods::unchecked(self.offsets.clone(), records)
     }
 }
 

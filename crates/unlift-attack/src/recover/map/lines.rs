@@ -230,6 +230,11 @@ impl<const D: usize> CandidateColumns<D> {
         }
     }
 
+    /// Number of gathered records.
+    pub(crate) fn len(&self) -> usize {
+        self.position[0].len()
+    }
+
     /// The sections of the gathered records with the line through `own` along `axis`.
     ///
     /// A record stands for its `D` axis lines and counts once, with the nearest of them. Its line
