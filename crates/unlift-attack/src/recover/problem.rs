@@ -89,10 +89,7 @@ impl<'a, const D: usize> Problem<'a, D> {
         options: &RecoverOptions,
         model: Option<&Model<D>>,
     ) -> Result<(f64, Records<'a, D>), Error> {
-        let family = match model {
-            Some(model) => Family::with_chance(released, model.chance.clone())?,
-            None => Family::learn(released, lists),
-        };
+        let family = Family::new(released, lists, model.map(|model| model.chance.clone()))?;
         // Joint recovery also asks who lists whom, from the first pass on.
         let is_joint = matches!(options.solver, Solver::Joint | Solver::JointStart);
         let graph = is_joint.then(|| Graph::new(lists, released.slots_per_record()));

@@ -14,8 +14,8 @@ use crate::RecordId;
 use crate::neighbors::Neighborhoods;
 use crate::recover::map::family::Family;
 use crate::recover::map::lines::{LineColumns, NO_VOTE, Sections};
-use crate::recover::map::lists::{Slots, solve_chunks};
-use crate::recover::result::{Estimate, MAX_TRIALS, Status, TrialCounts, stored_support};
+use crate::recover::map::lists::{Slots, found, solve_chunks};
+use crate::recover::result::{Estimate, MAX_TRIALS, Status, TrialCounts};
 use crate::released::AxisPlanes;
 use crate::seed::{Draws, Stage};
 use crate::simd::{Kernel, dispatch};
@@ -88,7 +88,7 @@ impl<const D: usize> Kernel for Slot<'_, D> {
         let Self { ransac, axes, slot, scratch } = self;
         let listed = ransac.lists.of(slot);
         let mut draws = Draws::new(ransac.seed, Stage::Ransac, slot as u64);
-        let (found, trials, axis) = match ransac.family {
+        let (solved, trials, axis) = match ransac.family {
             Family::Lines { rows, slots_per_record, .. } => {
                 let own = &rows[slot / slots_per_record];
                 scratch.lines.gather(rows, listed);
@@ -112,11 +112,8 @@ impl<const D: usize> Kernel for Slot<'_, D> {
                 }
             }
         };
-        let estimate = match found {
-            Ok((position, support)) => {
-                let (status, support) = (Status::Ok, stored_support(support));
-                Estimate { position, status, support, axis, evidence: 0.0 }
-            }
+        let estimate = match solved {
+            Ok((position, support)) => found(position, support, axis.into(), 0.0),
             Err(status) => Estimate { axis, ..Estimate::lost(status) },
         };
         (estimate, trials)

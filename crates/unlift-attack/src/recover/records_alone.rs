@@ -4,9 +4,10 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::density::{Peak, Peaks, tomography};
+use crate::density::{Peaks, tomography};
 use crate::neighbors::{Geometric, Neighborhoods, geometric_by};
 use crate::recover::map::lines::{LineRow, from_lines, from_rays};
+use crate::recover::map::lists::found;
 use crate::recover::options::{RecoverOptions, Solver};
 use crate::recover::published_density::published;
 use crate::recover::recover_with_start;
@@ -56,8 +57,6 @@ fn at<const D: usize>(released: &Released<D>, peaks: &Peaks) -> Result<Recovered
     Ok(Recovered::try_new(&estimates, with_axis, None, origin, unit, delta)?.with_about(about))
 }
 
-// Recovery from the records alone: the attacks of `density` as solvers.
-
 /// The hidden points of one map where `peaks` puts them.
 ///
 /// Lists do not move a position. For paired lines they decide which of the two positions belongs to
@@ -85,27 +84,6 @@ impl<'a, const D: usize> Placement<'a, D> {
         Self { rows, slots_per_record: released.slots_per_record(), lists, peaks }
     }
 
-    /// The peak of `slot` as it stands.
-    fn peak(&self, slot: usize) -> Estimate<D> {
-        match self.peaks.of[slot] {
-            Some(peak) => estimate(&peak),
-            None => Estimate::lost(Status::NoSupport),
-        }
-    }
-
-    /// Whether the two peaks of `slot`'s record are better exchanged.
-    fn is_crossed(&self, slot: usize) -> bool {
-        let (a, b) = (slot & !1, slot | 1);
-        let pair = [self.peak(a), self.peak(b)];
-        let cost = |at: usize, slot: usize| {
-            let x = &pair[at].position;
-            self.lists.of(slot).iter().map(|r| distance(&self.rows[r.index()], x)).sum::<f32>()
-        };
-        cost(0, a) + cost(1, b) > cost(1, a) + cost(0, b)
-    }
-}
-
-impl<const D: usize> Placement<'_, D> {
     /// The estimates of `slots`, in order.
     pub(super) fn solve(&self, slots: Range<usize>) -> Vec<Estimate<D>> {
         let reach = delta(self.peaks) as f32;
@@ -113,31 +91,41 @@ impl<const D: usize> Placement<'_, D> {
             let is_crossed = self.slots_per_record == 2 && self.is_crossed(slot);
             let mut estimate = self.peak(if is_crossed { slot ^ 1 } else { slot });
             if !self.rows.is_empty() {
-                let near = |row: &LineRow<D>| distance(row, &estimate.position) <= reach;
-                let listed = self.lists.of(slot).iter();
-                let support = listed.filter(|r| near(&self.rows[r.index()])).count();
+                let distances = self.distances(slot, &estimate.position);
+                let support = distances.filter(|&distance| distance <= reach).count();
                 estimate.support = stored_support(support as u32);
             }
             estimate
         };
         slots.into_par_iter().map(place).collect()
     }
-}
 
-fn estimate<const D: usize>(peak: &Peak) -> Estimate<D> {
-    Estimate {
+    /// The peak of `slot` as it stands.
+    fn peak(&self, slot: usize) -> Estimate<D> {
+        let Some(peak) = self.peaks.of[slot] else {
+            return Estimate::lost(Status::NoSupport);
+        };
         // The attacks answer in three dimensions only.
-        position: std::array::from_fn(|c| peak.position[c % 3]),
-        status: Status::Ok,
-        support: 0,
-        axis: peak.axis,
-        evidence: peak.evidence,
+        let position = std::array::from_fn(|c| peak.position[c % 3]);
+        found(position, 0, peak.axis.into(), peak.evidence)
     }
-}
 
-fn distance<const D: usize>(row: &LineRow<D>, x: &[f32; D]) -> f32 {
-    let away: [f32; D] = std::array::from_fn(|c| x[c] - row.through[c]);
-    let along: f32 = (0..D).map(|c| away[c] * row.direction[c]).sum();
-    let across = |c: usize| away[c] - along * row.direction[c];
-    (0..D).map(|c| across(c) * across(c)).sum::<f32>().sqrt()
+    /// Whether the two peaks of `slot`'s record are better exchanged.
+    fn is_crossed(&self, slot: usize) -> bool {
+        let (a, b) = (slot & !1, slot | 1);
+        let cost =
+            |peak: usize, slot: usize| self.distances(slot, &self.peak(peak).position).sum::<f32>();
+        cost(a, a) + cost(b, b) > cost(b, a) + cost(a, b)
+    }
+
+    /// The distances of the records that `slot` lists from `x`.
+    fn distances(&self, slot: usize, x: &[f32; D]) -> impl Iterator<Item = f32> {
+        self.lists.of(slot).iter().map(move |record| {
+            let row = &self.rows[record.index()];
+            let away: [f32; D] = std::array::from_fn(|c| x[c] - row.through[c]);
+            let along: f32 = (0..D).map(|c| away[c] * row.direction[c]).sum();
+            let across = |c: usize| away[c] - along * row.direction[c];
+            (0..D).map(|c| across(c) * across(c)).sum::<f32>().sqrt()
+        })
+    }
 }

@@ -11,8 +11,8 @@ use rayon::prelude::*;
 
 use crate::neighbors::Neighborhoods;
 use crate::recover::map::lines::{LineRow, evidence};
-use crate::recover::map::lists::{Slots, mixed};
-use crate::recover::result::{Estimate, Status, stored_support};
+use crate::recover::map::lists::{Slots, found, mixed};
+use crate::recover::result::{Estimate, Status};
 
 /// Slots whose lists are mixed to see what chance alone yields: a mean over so many is known to a few percent.
 const SAMPLE: usize = 1 << 9;
@@ -60,13 +60,7 @@ pub(super) fn solve<const D: usize>(
         // Without evidence half of the points lie before it.
         let share = 0.5 + trust * (shares[slot] - 0.5);
         let range = libm::powf(share, 1.0 / D as f32) * rows[slot].to;
-        Estimate {
-            position: rows[slot].at(range),
-            status: Status::Ok,
-            support: stored_support(count),
-            axis: 0,
-            evidence: excess,
-        }
+        found(rows[slot].at(range), count, 0, excess)
     };
     slots.iter().map(estimate).collect()
 }

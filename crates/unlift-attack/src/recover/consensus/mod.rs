@@ -3,12 +3,13 @@
 
 mod anchors;
 
+use crate::RecordId;
 use crate::neighbors::Neighborhoods;
 use crate::recover::map::chance::{CandidateField, ChanceField, tube};
 use crate::recover::map::family::Family;
 use crate::recover::map::lines::{CandidateColumns, Intervals, LineColumns, LineRow, Sections};
-use crate::recover::map::lists::{Slots, solve_chunks};
-use crate::recover::map::planes::{WindowChance, best_window};
+use crate::recover::map::lists::{Slots, found, not_fixed, solve_chunks};
+use crate::recover::map::planes::{best_window, window_chance};
 use crate::recover::result::{Estimate, Status, stored_support};
 use crate::released::AxisPlanes;
 use crate::simd::{Kernel, dispatch, prefetch};
@@ -23,7 +24,7 @@ pub(crate) fn solve<const D: usize>(
     match family {
         Family::Lines { rows, .. } if family.has_regions() => anchors::solve(rows, lists, slots),
         Family::Planes { planes, sorted } => {
-            let chance = WindowChance::new(planes, sorted, delta);
+            let chance = window_chance(planes, sorted, delta);
             let scratch = || std::array::from_fn(|_| Vec::new());
             solve_chunks(slots, scratch, |by_axis, first, out| {
                 for (at, estimate) in out.iter_mut().enumerate() {
@@ -105,8 +106,7 @@ fn on_line<const D: usize>(
     lines.sections(own, sections);
     let may_vote = lines.n_that_may_vote(own);
     if sections.n_voting() < 2 {
-        let few = may_vote < 2;
-        return Estimate::lost(if few { Status::TooFewNeighbors } else { Status::Degenerate });
+        return not_fixed(may_vote);
     }
     intervals.fill(sections, delta2, own.floor(), own.to);
     let field = &chance[if own.is_ray() { own.group as usize } else { 0 }];
@@ -116,13 +116,7 @@ fn on_line<const D: usize>(
         return Estimate::lost(Status::NoSupport);
     };
     let (t, support) = refit(sections, peak.t, delta2);
-    Estimate {
-        position: own.at(own.clamp(t)),
-        status: Status::Ok,
-        support: stored_support(support),
-        axis: 0,
-        evidence: peak.evidence,
-    }
+    found(own.at(own.clamp(t)), support, 0, peak.evidence)
 }
 
 /// The best estimate on any of a slot's own axis lines from the gathered records. Chance decides between axes too: counts
@@ -154,13 +148,7 @@ fn on_candidates<const D: usize>(
             let (t, support) = refit(sections, peak.t, delta2);
             let mut position = *own;
             position[axis] = t;
-            best = Estimate {
-                position,
-                status: Status::Ok,
-                support: stored_support(support),
-                axis: axis as u8,
-                evidence: peak.evidence,
-            };
+            best = found(position, support, axis, peak.evidence);
         }
     }
     best
@@ -185,9 +173,9 @@ fn on_plane<const D: usize>(
     planes: &AxisPlanes<D>,
     slot: usize,
     lists: &Neighborhoods,
-    chance: &WindowChance,
+    chance: &[f32],
     delta: f32,
-    by_axis: &mut [Vec<(f32, crate::RecordId)>; D],
+    by_axis: &mut [Vec<(f32, RecordId)>; D],
 ) -> Estimate<D> {
     by_axis.iter_mut().for_each(Vec::clear);
     let listed = lists.of(slot);
@@ -196,9 +184,8 @@ fn on_plane<const D: usize>(
         by_axis[axis].push((planes.offset()[record.index()], record));
     }
     let own = usize::from(planes.axis()[slot]);
-    let few = listed.len() < 2;
-    let mut estimate =
-        Estimate { position: [0.0; D], status: Status::Ok, support: 0, axis: 0, evidence: 0.0 };
+    let n = listed.len();
+    let mut estimate = found([0.0; D], 0, 0, 0.0);
     for (axis, listed) in by_axis.iter_mut().enumerate() {
         if axis == own {
             estimate.position[axis] = planes.offset()[slot];
@@ -207,7 +194,7 @@ fn on_plane<const D: usize>(
             estimate.support = estimate.support.saturating_add(stored_support(window.count));
             estimate.evidence += window.evidence;
         } else {
-            return Estimate::lost(if few { Status::TooFewNeighbors } else { Status::Degenerate });
+            return not_fixed(n);
         }
     }
     estimate

@@ -6,9 +6,10 @@ use crate::recover::joint::votes::{Columns, Ends, Odds};
 use crate::recover::map::graph::{CLASSES, either, record_of};
 use crate::recover::map::grid::Density;
 use crate::recover::map::lines::ln;
+use crate::recover::map::lists::found;
 use crate::recover::map::pieces::{Piece, Pieces};
 use crate::recover::map::places::{Places, distance2};
-use crate::recover::result::{Estimate, Status, stored_support};
+use crate::recover::result::{Estimate, Status};
 
 /// Estimates farther from a piece than this many radii of the distribution say nothing about it.
 pub(super) const TUBE: f32 = 6.0;
@@ -117,14 +118,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         if !x.iter().all(|c| c.is_finite()) {
             return (*old, 0.0);
         }
-        let estimate = Estimate {
-            position: x,
-            status: Status::Ok,
-            support: stored_support(support),
-            axis: first.piece as u8,
-            evidence: (first.score - first.prior).max(0.0),
-        };
-        (estimate, ahead)
+        (found(x, support, first.piece, (first.score - first.prior).max(0.0)), ahead)
     }
 
     /// The odds of the edges of `slot`.

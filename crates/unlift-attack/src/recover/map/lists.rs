@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::RecordId;
 use crate::neighbors::Neighborhoods;
-use crate::recover::result::{Estimate, Status};
+use crate::recover::result::{Estimate, Status, stored_support};
 
 /// Slots per chunk: a fixed number, so that results do not depend on threads.
 pub(crate) const CHUNK: usize = 64;
@@ -36,6 +36,22 @@ impl Slots {
     pub(crate) fn iter(&self) -> impl Iterator<Item = usize> {
         self.firsts.iter().flat_map(|&first| first..first + CHUNK).take(self.n)
     }
+}
+
+/// The estimate of a slot that was recovered.
+pub(crate) fn found<const D: usize>(
+    position: [f32; D],
+    support: u32,
+    axis: usize,
+    evidence: f32,
+) -> Estimate<D> {
+    let (status, support, axis) = (Status::Ok, stored_support(support), axis as u8);
+    Estimate { position, status, support, axis, evidence }
+}
+
+/// The estimate of a slot whose neighbors do not fix a point, of which `n` could say anything.
+pub(crate) fn not_fixed<const D: usize>(n: usize) -> Estimate<D> {
+    Estimate::lost(if n < 2 { Status::TooFewNeighbors } else { Status::Degenerate })
 }
 
 /// Calls `solve(scratch, first slot, estimates)` for every chunk; estimates come back in order of `slots`.
