@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use crate::density::feasible::{Feasible, FeasibleLine, Hides};
 use crate::density::{Peak, Peaks};
+use crate::geometry::vector::{dot, sub, widen};
 use crate::released::Released;
 use crate::simd::{Kernel, dispatch};
 
@@ -43,21 +44,20 @@ pub(crate) fn published<const D: usize>(released: &Released<D>) -> Peaks {
     let columns = Columns::new(voters.iter().map(|&voter| row(&lines[voter as usize])));
     let (most, share) = if feasible.hides == Hides::Two { COARSE_OF_PAIRS } else { COARSE };
     let k = most.min((share * lines.len() as f64) as usize).max(2);
-    let place = |scratch: &mut Scratch, row: usize| {
-        columns.map(|other| between(&lines[row], other), &mut scratch.distances);
-        scratch.silence(row, lines, &voters);
-        let reach = nearest(&scratch.distances, k, &mut scratch.keys, &mut scratch.near);
-        let near = scratch.near.iter().map(|&at| &lines[voters[at as usize] as usize]);
-        passes(&lines[row], near, &mut scratch.votes);
+    let place = |row: usize| {
+        let mut distances = columns.map(|other| between(&lines[row], other));
+        silence(&mut distances, row, lines, &voters);
+        let (near, reach) = nearest(&distances, k);
+        let near = near.iter().map(|&at| &lines[voters[at as usize] as usize]);
+        let mut votes = passes(&lines[row], near);
         let found = match feasible.hides {
-            Hides::Two => two_crowds(&mut scratch.votes).map(|pair| pair.map(Some)),
-            _ => crowd(&mut scratch.votes).map(|t| [Some(t), None]),
+            Hides::Two => two_crowds(&mut votes).map(|pair| pair.map(Some)),
+            _ => crowd(&mut votes).map(|t| [Some(t), None]),
         };
         let peaks = found.unwrap_or_default().map(|t| t.and_then(|t| on(&lines[row], t)));
         (peaks, reach)
     };
-    let rows: Vec<([Option<Peak>; 2], f32)> =
-        (0..lines.len()).into_par_iter().map_init(Scratch::default, place).collect();
+    let rows: Vec<([Option<Peak>; 2], f32)> = (0..lines.len()).into_par_iter().map(place).collect();
     let resolution = median(rows.iter().map(|row| row.1));
     let per_record = if feasible.hides == Hides::Two { 2 } else { 1 };
     let peaks = rows.into_iter().flat_map(|row| row.0.into_iter().take(per_record));
@@ -79,75 +79,53 @@ fn refine(
 ) -> Vec<Option<Peak>> {
     let point = |&voter: &u32| estimates[voter as usize].map_or([f32::NAN; 3], |p| p.position);
     let points = Columns::new(voters.iter().map(point));
-    let step = |scratch: &mut Scratch, row: usize| {
+    let step = |row: usize| {
         let estimate = estimates[row]?;
         let FeasibleLine { through, direction, .. } = lines[row];
-        points.map(|point| from_line(point, through, direction), &mut scratch.distances);
-        scratch.silence(row, lines, voters);
-        nearest(&scratch.distances, REFINE, &mut scratch.keys, &mut scratch.near);
+        let mut distances = points.map(|point| from_line(point, through, direction));
+        silence(&mut distances, row, lines, voters);
+        let (near, _) = nearest(&distances, REFINE);
         let to_line =
             |[x, y, z, u, v, w]: [f32; 6]| from_line(estimate.position, [x, y, z], [u, v, w]);
-        columns.map(to_line, &mut scratch.distances);
-        scratch.silence(row, lines, voters);
-        nearest(&scratch.distances, REFINE, &mut scratch.keys, &mut scratch.passing);
-        scratch.passing.sort_unstable();
-        let passes_too = |at: &u32| scratch.passing.binary_search(at).is_ok();
-        let both: Vec<u32> = scratch.near.iter().copied().filter(passes_too).collect();
-        let chosen = if both.len() > FEWEST { &both } else { &scratch.near };
+        let mut distances = columns.map(to_line);
+        silence(&mut distances, row, lines, voters);
+        let (mut passing, _) = nearest(&distances, REFINE);
+        passing.sort_unstable();
+        let passes_too = |at: &u32| passing.binary_search(at).is_ok();
+        let both: Vec<u32> = near.iter().copied().filter(passes_too).collect();
+        let chosen = if both.len() > FEWEST { &both } else { &near };
         let near = chosen.iter().map(|&at| &lines[voters[at as usize] as usize]);
-        passes(&lines[row], near, &mut scratch.votes);
-        crowd(&mut scratch.votes).and_then(|t| on(&lines[row], t)).or(Some(estimate))
+        let mut votes = passes(&lines[row], near);
+        crowd(&mut votes).and_then(|t| on(&lines[row], t)).or(Some(estimate))
     };
-    (0..lines.len()).into_par_iter().map_init(Scratch::default, step).collect()
+    (0..lines.len()).into_par_iter().map(step).collect()
 }
 
-#[derive(Default)]
-struct Scratch {
-    distances: Vec<f32>,
-    keys: Vec<u64>,
-    near: Vec<u32>,
-    passing: Vec<u32>,
-    votes: Vec<f64>,
-}
-
-impl Scratch {
-    /// Takes the vote of the line itself, and of rays of its center.
-    fn silence(&mut self, row: usize, lines: &[FeasibleLine], voters: &[u32]) {
-        let own = lines[row].group;
-        if own.is_some() {
-            for (distance, &voter) in self.distances.iter_mut().zip(voters) {
-                if lines[voter as usize].group == own {
-                    *distance = f32::INFINITY;
-                }
+/// Takes the votes, by their `distances`, of the line of `row` itself, or of all rays of its center.
+fn silence(distances: &mut [f32], row: usize, lines: &[FeasibleLine], voters: &[u32]) {
+    let own = lines[row].group;
+    if own.is_some() {
+        for (distance, &voter) in distances.iter_mut().zip(voters) {
+            if lines[voter as usize].group == own {
+                *distance = f32::INFINITY;
             }
-        } else if let Ok(at) = voters.binary_search(&(row as u32)) {
-            self.distances[at] = f32::INFINITY;
         }
+    } else if let Ok(at) = voters.binary_search(&(row as u32)) {
+        distances[at] = f32::INFINITY;
     }
 }
 
 /// The parameters at which `line` is passed most closely by each of `others`; parallel ones do not tell.
-fn passes<'a>(
-    line: &FeasibleLine,
-    others: impl Iterator<Item = &'a FeasibleLine>,
-    out: &mut Vec<f64>,
-) {
-    out.clear();
-    for other in others {
-        let (mut along, mut own, mut cosine) = (0.0f64, 0.0f64, 0.0f64);
-        for c in 0..3 {
-            let away = f64::from(line.through[c]) - f64::from(other.through[c]);
-            let (d, e) = (f64::from(line.direction[c]), f64::from(other.direction[c]));
-            own += away * d;
-            along += away * e;
-            cosine += d * e;
-        }
+fn passes<'a>(line: &FeasibleLine, others: impl Iterator<Item = &'a FeasibleLine>) -> Vec<f64> {
+    let (through, direction) = (widen(&line.through), widen(&line.direction));
+    let pass = |other: &FeasibleLine| {
+        let (away, e) = (sub(&through, &widen(&other.through)), widen(&other.direction));
+        let cosine = dot(&direction, &e);
         let square_sine = 1.0 - cosine * cosine;
-        let t = (cosine * along - own) / square_sine;
-        if square_sine > 1e-6 && t > f64::from(line.from) {
-            out.push(t);
-        }
-    }
+        let t = (cosine * dot(&away, &e) - dot(&away, &direction)) / square_sine;
+        (square_sine > 1e-6 && t > f64::from(line.from)).then_some(t)
+    };
+    others.filter_map(pass).collect()
 }
 
 fn on(line: &FeasibleLine, t: f64) -> Option<Peak> {
@@ -177,7 +155,7 @@ const EVEN: f64 = 0.3;
 
 /// The middle of the crowd that `votes` (reordered) form, by Chelani et al.: where the cumulative votes
 /// rise most above even ones, again and again. `None` without votes.
-pub(super) fn crowd(votes: &mut [f64]) -> Option<f64> {
+fn crowd(votes: &mut [f64]) -> Option<f64> {
     votes.sort_unstable_by(f64::total_cmp);
     let all: &[f64] = votes;
     let mut left = if all.len() > 2 * CUT { &all[CUT..all.len() - CUT] } else { all };
@@ -236,7 +214,7 @@ const FAR: f64 = 0.01;
 
 /// The two highest peaks of the density of `votes` (reordered), in ascending order, by Lee et al.; twice
 /// the same if there is one peak. `None` without votes.
-pub(super) fn two_crowds(votes: &mut [f64]) -> Option<[f64; 2]> {
+fn two_crowds(votes: &mut [f64]) -> Option<[f64; 2]> {
     votes.sort_unstable_by(f64::total_cmp);
     let cut = (FAR * votes.len() as f64).ceil() as usize;
     let kept = votes.get(cut..votes.len().saturating_sub(cut)).filter(|kept| !kept.is_empty());
@@ -294,10 +272,11 @@ impl<const N: usize> Columns<N> {
         Self(columns)
     }
 
-    /// Puts the function `of` of each row in `out`.
-    fn map(&self, of: impl Fn([f32; N]) -> f32, out: &mut Vec<f32>) {
-        out.resize(self.0[0].len(), 0.0);
-        dispatch(Map { columns: self, of, out });
+    /// The function `of` of each row.
+    fn map(&self, of: impl Fn([f32; N]) -> f32) -> Vec<f32> {
+        let mut out = vec![0.0; self.0[0].len()];
+        dispatch(Map { columns: self, of, out: &mut out });
+        out
     }
 }
 
@@ -359,20 +338,19 @@ fn square_across(v: &[f32; 3], d: &[f32; 3]) -> f32 {
     square
 }
 
-/// The places of the `k` smallest finite distances (ties by place) into `near`, in no order; returns
-/// the largest of them, not squared.
-pub(super) fn nearest(squared: &[f32], k: usize, keys: &mut Vec<u64>, near: &mut Vec<u32>) -> f32 {
-    keys.clear();
+/// The places of the `k` smallest finite distances (ties by place), in no order; beside them the largest of these, not squared.
+fn nearest(squared: &[f32], k: usize) -> (Vec<u32>, f32) {
     // Distances are not negative, so their bits order as they do.
     let key = |(at, d): (usize, &f32)| u64::from(d.to_bits()) << 32 | at as u64;
-    keys.extend(squared.iter().enumerate().filter(|(_, d)| d.is_finite()).map(key));
+    let finite = squared.iter().enumerate().filter(|(_, d)| d.is_finite());
+    let mut keys: Vec<u64> = finite.map(key).collect();
     if keys.len() > k {
         keys.select_nth_unstable(k - 1);
         keys.truncate(k);
     }
-    near.clear();
-    near.extend(keys.iter().map(|&key| key as u32));
-    keys.iter().max().map_or(f32::INFINITY, |&key| f32::from_bits((key >> 32) as u32).sqrt())
+    let farthest = |&key: &u64| f32::from_bits((key >> 32) as u32).sqrt();
+    let reach = keys.iter().max().map_or(f32::INFINITY, farthest);
+    (keys.iter().map(|&key| key as u32).collect(), reach)
 }
 
 #[cfg(test)]
@@ -444,20 +422,18 @@ mod tests {
     fn vector_and_portable_code_give_the_same_bits() {
         let lines = lines(101);
         let columns = Columns::new(lines.iter().map(row));
-        let (mut fast, mut plain) = (Vec::new(), vec![0.0; 101]);
+        let mut plain = vec![0.0; 101];
         let of = |other: [f32; 6]| between(&lines[7], other);
-        columns.map(of, &mut fast);
+        let fast = columns.map(of);
         portable(Map { columns: &columns, of, out: &mut plain });
         assert_eq!(fast, plain);
     }
 
     #[test]
     fn nearest_takes_the_smallest_and_counts_ties_by_place() {
-        let (mut keys, mut near) = (Vec::new(), Vec::new());
-        let squared = [4.0, f32::INFINITY, 1.0, 4.0, 0.0];
-        assert_eq!(nearest(&squared, 3, &mut keys, &mut near), 2.0);
+        let (mut near, reach) = nearest(&[4.0, f32::INFINITY, 1.0, 4.0, 0.0], 3);
         near.sort_unstable();
-        assert_eq!(near, [0, 2, 4]);
-        assert_eq!(nearest(&[], 3, &mut keys, &mut near), f32::INFINITY);
+        assert_eq!((&near[..], reach), (&[0, 2, 4][..], 2.0));
+        assert_eq!(nearest(&[], 3), (Vec::new(), f32::INFINITY));
     }
 }

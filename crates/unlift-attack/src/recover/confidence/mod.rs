@@ -55,7 +55,12 @@ pub(super) fn look<const D: usize>(
             crowd::cues(&CandidatePieces::new(rows, chance, solved.delta), graph, solved)
         }
     };
-    let kind = kind(released);
+    let kind = match released.obfuscation() {
+        Obfuscation::Lines(_) => released.slots_per_record() - 1,
+        Obfuscation::Rays(_) => 2,
+        Obfuscation::AxisPlanes(_) => 3,
+        Obfuscation::AxisCandidates(_) => 4,
+    };
     let of_slot = |(estimate, cues): (&Estimate<D>, &Cues)| match estimate.status {
         Status::Ok => judged(&MODELS[kind], cues, radius),
         _ => Confidence::LOST,
@@ -72,8 +77,6 @@ fn judged(model: &Model, cues: &Cues, radius: f32) -> Confidence {
     let scale = libm::expf(sum(&model.scale).clamp(-12.0, 12.0)) * radius;
     Confidence { found: 1.0 / (1.0 + libm::expf(-sum(&model.found))), scale }
 }
-
-// Where the model of confidence says what comes true: on maps and lists like those that it was fitted on.
 
 /// A list has at most as many entries as this share of all hidden points in the maps that the model was fitted on.
 const MOST_LISTED: f64 = 0.01;
@@ -104,19 +107,12 @@ pub(crate) fn unknown<const D: usize>(
         Some(Unknown::GivenLists)
     } else if mean > MOST_LISTED * n_slots {
         Some(Unknown::SmallMap)
-    } else if coincident(released) >= COINCIDENT {
+    } else if matches!(released.obfuscation(), Obfuscation::Rays(rays) if twins(rays) >= COINCIDENT)
+    {
+        // Records of other families are drawn anew for every point, or for a pair.
         Some(Unknown::Coincident)
     } else {
         (flatness(&places()) <= FLAT).then_some(Unknown::Flat)
-    }
-}
-
-/// Share of the records that tell of points that fall together: rays in the place of others. Records of other families are
-/// drawn anew for every point, or for a pair.
-fn coincident<const D: usize>(released: &Released<D>) -> f64 {
-    match released.obfuscation() {
-        Obfuscation::Rays(rays) => twins(rays),
-        Obfuscation::Lines(_) | Obfuscation::AxisPlanes(_) | Obfuscation::AxisCandidates(_) => 0.0,
     }
 }
 
@@ -128,8 +124,6 @@ fn twins<const D: usize>(rays: &Rays<D>) -> f64 {
     let same = rows.chunk_by(|a, b| a == b).map(<[_]>::len).filter(|&n| n > 1);
     same.sum::<usize>() as f64 / rays.len().max(1) as f64
 }
-
-// From cues to a probability: one small model per kind of record, fitted on synthetic rooms.
 
 /// Kinds of records that are calibrated apart: lines, paired lines, rays, axis planes, axis candidates.
 pub const N_KINDS: usize = 5;
@@ -149,16 +143,6 @@ pub(super) struct Model {
     pub(super) found: [f32; N_TERMS],
     /// Of the logarithm of the error scale per typical radius of crowds.
     pub(super) scale: [f32; N_TERMS],
-}
-
-/// Which kind of records a map holds, below [`N_KINDS`].
-pub(super) fn kind<const D: usize>(released: &Released<D>) -> usize {
-    match released.obfuscation() {
-        Obfuscation::Lines(_) => released.slots_per_record() - 1,
-        Obfuscation::Rays(_) => 2,
-        Obfuscation::AxisPlanes(_) => 3,
-        Obfuscation::AxisCandidates(_) => 4,
-    }
 }
 
 /// The products of two cues that count too: what one says depends on the other, or bends.
