@@ -7,7 +7,6 @@ use rayon::prelude::*;
 use crate::density::{Peaks, tomography};
 use crate::neighbors::Neighborhoods;
 use crate::recover::confidence::crowd::{Seen, Solved};
-use crate::recover::joint::Joint;
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::Graph;
 use crate::recover::map::lists::Slots;
@@ -17,7 +16,7 @@ use crate::recover::published_density::published;
 use crate::recover::ransac::Ransac;
 use crate::recover::records_alone::{self, Placement};
 use crate::recover::result::{Estimate, Recovered, TrialCounts, Unknown};
-use crate::recover::{confidence, consensus, delta, exact};
+use crate::recover::{confidence, consensus, delta, exact, joint};
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, Fingerprint, RecordId};
 
@@ -48,9 +47,7 @@ enum Records<'a, const D: usize> {
 
 impl<'a, const D: usize> Problem<'a, D> {
     /// `released` with its `lists`; what a model would say is learned here.
-    ///
-    /// # Errors
-    /// When options are out of range, or the lists are of another map.
+    /// Fails when options are out of range, or the lists are of another map.
     pub(super) fn new(
         released: &'a Released<D>,
         lists: &'a Neighborhoods,
@@ -107,9 +104,7 @@ impl<'a, const D: usize> Problem<'a, D> {
     }
 
     /// What was learned of the map, by consensus.
-    ///
-    /// # Errors
-    /// When the solver is another one.
+    /// Fails when the solver is another one.
     pub(super) fn model(&self) -> Result<Model<D>, Error> {
         match &self.records {
             Records::Listed { family, .. } if self.options.solver == Solver::Consensus => {
@@ -152,7 +147,7 @@ impl<'a, const D: usize> Problem<'a, D> {
                 if self.options.solver == Solver::Joint =>
             {
                 let (delta, seed) = (self.delta as f32, self.options.seed);
-                Joint { family, graph, delta, seed }.recover(start)
+                joint::recover(family, graph, delta, seed, start)
             }
             _ => start,
         }
@@ -160,9 +155,7 @@ impl<'a, const D: usize> Problem<'a, D> {
 
     /// Recovered points from the last estimates of all slots, with exact constraints and confidence. Beside it what confidence
     /// is made of, if it `is_asked` for.
-    ///
-    /// # Errors
-    /// When there is not one estimate per slot.
+    /// Fails when there is not one estimate per slot.
     pub(super) fn finish(
         &self,
         estimates: Vec<Estimate<D>>,
@@ -215,9 +208,7 @@ impl<'a, const D: usize> Problem<'a, D> {
     }
 
     /// The first pass of joint recovery as [`Solver::JointStart`] finishes it, beside the `last` one.
-    ///
-    /// # Errors
-    /// When there is not one estimate per slot.
+    /// Fails when there is not one estimate per slot.
     pub(super) fn finish_start(
         &self,
         start: Vec<Estimate<D>>,

@@ -1,11 +1,10 @@
-//! Consensus for rays whose centers have a region of points each (anchors of an image): a range from
-//! the spread of bearings.
+//! Consensus for rays from anchors, each with its own region of an image: a range from the spread of bearings.
 //!
-//! Rays of one anchor meet in it, and those of two anchors meet nowhere that both may lie. What is left is
+//! Rays of one anchor meet only in the anchor, and rays of two anchors lie in different regions. What is left is
 //! perspective: neighbors within a distance `s` of a point at range `r` are seen from the anchor within
 //! an angle of `s / r`. The window of bearings that holds the listed rays least probably by chance
-//! gives that angle. What `s` is nobody knows, but of two rays of about the same bearing the one with the
-//! narrower window is likely the longer one: ranks give shares of the region, over which points are spread.
+//! gives that angle. `s` is unknown, but of two rays of about the same bearing the one with the narrower window is
+//! likely the longer one. Ranks of windows therefore give ranges, as points are spread evenly over the region.
 
 use rayon::prelude::*;
 
@@ -16,7 +15,7 @@ use crate::recover::result::{Estimate, Status};
 
 /// Slots whose lists are mixed to see what chance alone yields: a mean over so many is known to a few percent.
 const SAMPLE: usize = 1 << 9;
-/// Evidence counts in excess of this many times what chance alone yields in the mean: half of the slots lie above the mean.
+/// Only evidence beyond this many times the mean by chance counts: half of the slots exceed the mean by chance.
 const CHANCE: f32 = 2.0;
 /// How often scores are averaged with those of neighbors: each time takes half of what is a slot's own.
 const SMOOTHINGS: usize = 3;
@@ -40,7 +39,7 @@ pub(super) fn solve<const D: usize>(
     lists: &Neighborhoods,
     slots: &Slots,
 ) -> Vec<Estimate<D>> {
-    let bearings = Bearings::new(rows);
+    let bearings = bearings(rows);
     let n = lists.n_slots();
     let windows: Vec<Option<Window>> =
         (0..n).into_par_iter().map(|slot| window(rows, &bearings, slot, lists)).collect();
@@ -91,27 +90,27 @@ fn shares<const D: usize>(
         };
         score = (0..rows.len()).into_par_iter().map(smooth).collect();
     }
-    let place = |at: usize| {
-        let (group, slot) = (bearings.sorted[at].0, bearings.slot[at] as usize);
-        if score[slot].is_nan() {
+    let share = |(at, &(group, _, slot)): (usize, &(u32, f64, u32))| {
+        let own = score[slot as usize];
+        if own.is_nan() {
             return 0.5;
         }
-        let of_group = bearings.sorted.partition_point(|row| row.0 < group)
-            ..bearings.sorted.partition_point(|row| row.0 <= group);
+        let of_group = bearings.partition_point(|row| row.0 < group)
+            ..bearings.partition_point(|row| row.0 <= group);
         let half = (of_group.len() / SECTORS).max(LEAST_SECTOR);
         let from = at.saturating_sub(half).max(of_group.start);
         let (mut below, mut all) = (0.0f32, 0.0f32);
-        for &other in &bearings.slot[from..(at + half + 1).min(of_group.end)] {
+        for &(_, _, other) in &bearings[from..(at + half + 1).min(of_group.end)] {
             let other = score[other as usize];
             all += f32::from(u8::from(!other.is_nan()));
-            below += f32::from(u8::from(other < score[slot]));
-            below += 0.5 * f32::from(u8::from(other == score[slot]));
+            below += f32::from(u8::from(other < own));
+            below += 0.5 * f32::from(u8::from(other == own));
         }
         below / all
     };
-    let in_order: Vec<f32> = (0..rows.len()).into_par_iter().map(place).collect();
+    let in_order: Vec<f32> = bearings.par_iter().enumerate().map(share).collect();
     let mut shares = vec![0.5; rows.len()];
-    for (&slot, share) in bearings.slot.iter().zip(in_order) {
+    for (&(_, _, slot), share) in bearings.iter().zip(in_order) {
         shares[slot as usize] = share;
     }
     shares
@@ -131,12 +130,14 @@ fn window<const D: usize>(
     let mut sines: Vec<f32> =
         others.filter(|row| row.group == own.group).map(|row| sine(own, row)).collect();
     sines.sort_unstable_by(f32::total_cmp);
+    // A window holds a few bearings of the map at least: narrower ones tell nothing.
+    let finest = 4.0 / rows.len().max(4) as f32;
     let mut best: Option<Window> = None;
     for (at, &sine) in sines.iter().enumerate().skip(1) {
         // Twins are seen in the very same direction, which tells no range.
-        let sine = sine.max(bearings.finest);
+        let sine = sine.max(finest);
         let count = at + 1;
-        let chance = bearings.share_within(own, sine);
+        let chance = share_within(bearings, own, sine);
         let evidence = evidence(count as f32, listed.len() as f32, chance);
         if best.is_none_or(|b| evidence > b.evidence) {
             best = Some(Window { sine, count: count as u32, evidence });
@@ -153,37 +154,22 @@ fn sine<const D: usize>(a: &LineRow<D>, b: &LineRow<D>) -> f32 {
     if cosine > 0.0 { across.sqrt().min(1.0) } else { 1.0 }
 }
 
-/// All bearings, sorted within their groups.
-struct Bearings {
-    /// (group, angle).
-    sorted: Vec<(u32, f64)>,
-    /// The slot of each.
-    slot: Vec<u32>,
-    /// Windows narrower than this tell nothing.
-    finest: f32,
+/// All bearings as (group, angle, slot), sorted.
+type Bearings = [(u32, f64, u32)];
+
+fn bearings<const D: usize>(rows: &[LineRow<D>]) -> Vec<(u32, f64, u32)> {
+    let bearing = |(slot, row): (usize, &LineRow<D>)| (row.group, angle(row), slot as u32);
+    let mut bearings: Vec<_> = rows.iter().enumerate().map(bearing).collect();
+    bearings.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    bearings
 }
 
-impl Bearings {
-    fn new<const D: usize>(rows: &[LineRow<D>]) -> Self {
-        let mut slot: Vec<u32> = (0..rows.len() as u32).collect();
-        let key = |slot: &u32| (rows[*slot as usize].group, angle(&rows[*slot as usize]));
-        slot.sort_by(|a, b| {
-            let (a, b) = (key(a), key(b));
-            a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
-        });
-        let sorted = slot.iter().map(key).collect();
-        // A window holds a few bearings of the map at least.
-        let finest = 4.0 / rows.len().max(4) as f32;
-        Self { sorted, slot, finest }
-    }
-
-    /// The share of all records that are rays of the anchor of `own` within `sine` of it.
-    fn share_within<const D: usize>(&self, own: &LineRow<D>, sine: f32) -> f32 {
-        let (middle, half) = (angle(own), libm::asin(f64::from(sine)));
-        let below = |at: f64| self.sorted.partition_point(|row| *row < (own.group, at));
-        let n = below(middle + half) - below(middle - half);
-        ((n as f32 + 0.5) / (self.sorted.len() as f32 + 1.0)).min(0.5)
-    }
+/// The share of all records that are rays of the anchor of `own` within `sine` of it.
+fn share_within<const D: usize>(bearings: &Bearings, own: &LineRow<D>, sine: f32) -> f32 {
+    let (middle, half) = (angle(own), libm::asin(f64::from(sine)));
+    let below = |at: f64| bearings.partition_point(|row| (row.0, row.1) < (own.group, at));
+    let n = below(middle + half) - below(middle - half);
+    ((n as f32 + 0.5) / (bearings.len() as f32 + 1.0)).min(0.5)
 }
 
 /// The angle of a ray in the plane of the first two coordinates.

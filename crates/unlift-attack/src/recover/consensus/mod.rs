@@ -108,11 +108,12 @@ fn on_line<const D: usize>(
     if sections.n_voting() < 2 {
         return not_fixed(may_vote);
     }
-    intervals.fill(sections, delta2, own.floor(), own.to);
     let field = &chance[if own.is_ray() { own.group as usize } else { 0 }];
-    let Some(peak) = intervals.best_start(may_vote, |t, cells, chance| {
-        field.add_along((&own.through, &own.direction), t, tube(D, delta), (cells, chance));
-    }) else {
+    let Some(peak) =
+        intervals.peak(sections, (delta2, own.floor(), own.to), may_vote, |t, cells, chance| {
+            field.add_along((&own.through, &own.direction), t, tube(D, delta), (cells, chance));
+        })
+    else {
         return Estimate::lost(Status::NoSupport);
     };
     let (t, support) = refit(sections, peak.t, delta2);
@@ -137,8 +138,8 @@ fn on_candidates<const D: usize>(
     let mut best_score = f32::NEG_INFINITY;
     for axis in 0..D {
         candidates.sections(own, axis, delta2, sections);
-        intervals.fill(sections, delta2, f32::NEG_INFINITY, f32::INFINITY);
-        let Some(peak) = intervals.best_start(candidates.len(), |t, cells, chances| {
+        let limits = (delta2, f32::NEG_INFINITY, f32::INFINITY);
+        let Some(peak) = intervals.peak(sections, limits, candidates.len(), |t, cells, chances| {
             chance.add_along((own, axis), t, &tubes, (cells, chances));
         }) else {
             continue;

@@ -38,55 +38,53 @@ const ITERATIONS: usize = 16;
 /// bearings say hardly more than chance does, neighbors' estimates are those of chance, too.
 const LEAST_EVIDENCE: f64 = 1.5;
 
-/// What joint recovery reads of a map and never changes.
-pub(crate) struct Joint<'a, const D: usize> {
-    pub(crate) family: &'a Family<'a, D>,
-    pub(crate) graph: &'a Graph,
-    /// The distance up to which a record supports a place, in the unit of the map.
-    pub(crate) delta: f32,
-    pub(crate) seed: u64,
+/// The estimates of all slots after the last iteration from `start`.
+pub(crate) fn recover<const D: usize>(
+    family: &Family<'_, D>,
+    graph: &Graph,
+    delta: f32,
+    seed: u64,
+    start: Vec<Estimate<D>>,
+) -> Vec<Estimate<D>> {
+    if family.has_regions() && mean_evidence(&start) < LEAST_EVIDENCE {
+        return start;
+    }
+    match family {
+        Family::Lines { rows, slots_per_record, chance } => {
+            let pieces = LinePieces::new(rows, *slots_per_record, chance, delta);
+            iterate(&Input::new(pieces, graph, delta, seed), start)
+        }
+        Family::Planes { planes, sorted } => {
+            let pieces = PlanePieces::new(planes, sorted, delta);
+            iterate(&Input::new(pieces, graph, delta, seed), start)
+        }
+        Family::Candidates { rows, chance } => {
+            let pieces = CandidatePieces::new(rows, chance, delta);
+            iterate(&Input::new(pieces, graph, delta, seed), start)
+        }
+    }
 }
 
-impl<const D: usize> Joint<'_, D> {
-    /// The estimates of all slots after the last iteration from `start`.
-    pub(crate) fn recover(&self, start: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
-        if self.family.has_regions() && mean_evidence(&start) < LEAST_EVIDENCE {
-            return start;
+fn iterate<const D: usize, P: Pieces<D>>(
+    input: &Input<'_, P>,
+    start: Vec<Estimate<D>>,
+) -> Vec<Estimate<D>> {
+    let mut state = State::new(input, start);
+    let order = along_curve(state.places());
+    for iteration in 0..ITERATIONS {
+        let groups = if iteration == 0 { 1 } else { 2 };
+        for group in 0..groups {
+            state.learn_if_stale(input);
+            let is_moving = |slot: &u32| *slot as usize % groups == group;
+            let slots = order.iter().copied().filter(is_moving);
+            let updates = state.propose_score_refine(input, slots);
+            state.apply(input, &updates);
         }
-        let delta = self.delta;
-        match self.family {
-            Family::Lines { rows, slots_per_record, chance } => {
-                self.iterate(LinePieces::new(rows, *slots_per_record, chance, delta), start)
-            }
-            Family::Planes { planes, sorted } => {
-                self.iterate(PlanePieces::new(planes, sorted, delta), start)
-            }
-            Family::Candidates { rows, chance } => {
-                self.iterate(CandidatePieces::new(rows, chance, delta), start)
-            }
+        if state.has_converged(input) {
+            break;
         }
     }
-
-    fn iterate<P: Pieces<D>>(&self, pieces: P, start: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
-        let Self { graph, delta, seed, .. } = *self;
-        let input = Input::new(pieces, graph, delta, seed);
-        let mut state = State::new(&input, start);
-        let order = along_curve(state.places());
-        for iteration in 0..ITERATIONS {
-            let groups = if iteration == 0 { 1 } else { 2 };
-            for group in 0..groups {
-                state.learn_if_stale(&input);
-                let is_moving = |slot: &u32| *slot as usize % groups == group;
-                let slots = order.iter().copied().filter(is_moving);
-                let updates = state.propose_score_refine(&input, slots);
-                state.apply(&input, &updates);
-            }
-            if state.has_converged(&input) {
-                break;
-            }
-        }
-        state.into_best()
-    }
+    state.into_best()
 }
 
 fn mean_evidence<const D: usize>(estimates: &[Estimate<D>]) -> f64 {

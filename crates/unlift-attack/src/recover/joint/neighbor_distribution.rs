@@ -96,14 +96,14 @@ impl NeighborDistribution {
         radius: f32,
         least_radius: f32,
     ) -> Self {
-        let look = Look { input, places, density, reach: REACH * radius };
-        let part = |rows: &[Sampled]| dispatch(Part { rows, look: &look });
+        let learning = Learning { input, places, density, reach: REACH * radius };
+        let part = |rows: &[Sampled]| dispatch(Part { rows, learning: &learning });
         let parts: Vec<Tally> = input.sample.par_chunks(PART).map(part).collect();
         let mut total = Tally::default();
         parts.iter().for_each(|part| total.merge(part));
         let limits = (least_radius, P::MOST_RADIUS * input.delta);
-        let distribution = total.distribution::<D, P>(&input.pieces, look.reach, limits);
-        Self { surplus: look.surplus(), ..distribution }
+        let distribution = total.distribution::<D, P>(&input.pieces, learning.reach, limits);
+        Self { surplus: learning.surplus(), ..distribution }
     }
 
     /// Per class: the odds that an edge leads to a true neighbor of this very slot, and 1 where it may as well be
@@ -122,7 +122,7 @@ impl NeighborDistribution {
 }
 
 /// What the distribution is learned with.
-struct Look<'a, const D: usize, P> {
+struct Learning<'a, const D: usize, P> {
     input: &'a Input<'a, P>,
     places: &'a Places<D>,
     density: &'a Density<D>,
@@ -130,7 +130,7 @@ struct Look<'a, const D: usize, P> {
     reach: f32,
 }
 
-impl<const D: usize, P: Pieces<D>> Look<'_, D, P> {
+impl<const D: usize, P: Pieces<D>> Learning<'_, D, P> {
     /// How far true neighbors are looked for about `x`.
     #[inline(always)]
     fn reach_at(&self, x: &[f32; D]) -> f32 {
@@ -221,8 +221,8 @@ const EVERY: usize = 2;
 const ENTRIES: usize = 2;
 /// An entry is elsewhere when it is farther from the estimate than this many times its reach.
 const ELSEWHERE: f32 = 2.0;
-/// Lists are wrong together if an entry that does not list back has on average so many others of its list beside it elsewhere, beyond
-/// chance; entries that are not elsewhere count with none.
+/// Lists are wrong together if an entry that does not list back has on average so many others of its list beside it elsewhere,
+/// beyond chance; entries that are not elsewhere count with none.
 const CROWD: f64 = 0.25;
 /// The bound in nats then.
 const SURPLUS: f32 = 10.0;
@@ -230,7 +230,7 @@ const SURPLUS: f32 = 10.0;
 /// Some of the slots of a sample.
 struct Part<'a, const D: usize, P> {
     rows: &'a [Sampled],
-    look: &'a Look<'a, D, P>,
+    learning: &'a Learning<'a, D, P>,
 }
 
 impl<const D: usize, P: Pieces<D>> Kernel for Part<'_, D, P> {
@@ -239,8 +239,8 @@ impl<const D: usize, P: Pieces<D>> Kernel for Part<'_, D, P> {
     #[inline(always)]
     fn run(self) -> Tally {
         let mut tally = Tally::default();
-        for row in self.rows.iter().filter(|row| self.look.places.is_known(row.slot)) {
-            self.look.count(row, &mut tally);
+        for row in self.rows.iter().filter(|row| self.learning.places.is_known(row.slot)) {
+            self.learning.count(row, &mut tally);
         }
         tally
     }

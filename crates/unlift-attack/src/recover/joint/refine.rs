@@ -1,7 +1,7 @@
 //! A refined place: least squares to the records of the neighbors found near it.
 
 use crate::recover::joint::votes::Columns;
-use crate::recover::map::lines::{LANES, Lanes};
+use crate::recover::map::lines::{LANES, Lanes, fill};
 use crate::recover::map::pieces::{Piece, Pieces};
 use crate::recover::map::places::Places;
 
@@ -58,7 +58,7 @@ impl<const D: usize> Sums<D> {
                 let q = 1.0 / (1.0 + r2 * inverse_a2);
                 let likelier = odds[i][lane] * gain * (q * q * q);
                 sums.n[lane] += u32::from(closeness > 0.0);
-                // What is near by chance does not hold: on a small map half of everything is near.
+                // Estimates that are near by chance count less: on a small map half of all are near.
                 let closeness = closeness * likelier / (doubt + likelier);
                 sums.weight[lane] += closeness;
                 for r in 0..D {
@@ -87,13 +87,9 @@ pub(super) fn refined<const D: usize, P: Pieces<D>>(
     mut x: [f32; D],
     at: impl Fn(&[f32; D]) -> (f32, (f32, f32), f32),
 ) -> ([f32; D], u32) {
-    let n = near.len();
-    directions.iter_mut().for_each(|column| column.resize(n.next_multiple_of(LANES), 0.0));
-    for (i, &slot) in near.slot.iter().enumerate() {
-        let direction = pieces.direction(slot as usize, places.piece(slot as usize));
-        directions.iter_mut().zip(direction).for_each(|(column, along)| column[i] = along);
-    }
-    directions.iter_mut().for_each(|column| column[n..].fill(0.0));
+    let of = |slot: &u32| pieces.direction(*slot as usize, places.piece(*slot as usize));
+    fill(directions, &near.slot, of);
+    directions.iter_mut().for_each(|column| column.resize(near.odds.len(), 0.0));
     let mut records = 0;
     for _ in 0..STEPS {
         let weights = at(&x);

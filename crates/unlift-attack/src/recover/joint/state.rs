@@ -135,9 +135,8 @@ impl<const D: usize> State<D> {
         updates
     }
 
-    /// Moves slots to where they go. Those whom a jump concerns take note: the slots at the other ends of the jumper's edges
-    /// that may lie near its old or its new place. A slot whom many list knows only some of them; the others stay until something else
-    /// jumps.
+    /// Moves slots to where they go, and counts for each slot the jumps that concern it: those from or to places near which it may
+    /// lie, of the slots whose edges lead to it.
     pub(super) fn apply<P: Pieces<D>>(&mut self, input: &Input<'_, P>, updates: &[Update<D>]) {
         let Input { pieces, graph, .. } = input;
         let (radius, slots_per_record) = (self.neighbors.radius, pieces.slots_per_record());

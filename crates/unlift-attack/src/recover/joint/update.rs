@@ -111,7 +111,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
             let density = self.density.at(x);
             let kernel = KERNEL * self.neighbors.radius * self.density.width(density);
             let doubt = P::DOUBT * (1.0 + self.neighbors.region / self.volume(density) / density);
-            (1.0 / (kernel * kernel), self.law(density), doubt)
+            (1.0 / (kernel * kernel), self.distribution(density), doubt)
         };
         let near = (&*near, &mut scratch.directions);
         let (x, support) = refined(pieces, self.places, &own, near, first.x, at);
@@ -127,7 +127,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         let (of_class, other) = (&self.odds, slot ^ 1);
         if self.input.pieces.slots_per_record() == 2 && self.places.is_known(other) {
             let partner = self.places.of(other);
-            let (gain, inverse_a2) = self.law(self.density.at(&partner));
+            let (gain, inverse_a2) = self.distribution(self.density.at(&partner));
             return Odds { of_class, partner, gain, inverse_a2 };
         }
         Odds { of_class, partner: [0.0; D], gain: 0.0, inverse_a2: 0.0 }
@@ -135,7 +135,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
 
     /// The distribution of neighbors where the density is `density`: the gain of an estimate on the spot, and `1 / a^2`.
     #[inline(always)]
-    fn law(&self, density: f32) -> (f32, f32) {
+    fn distribution(&self, density: f32) -> (f32, f32) {
         let width = self.density.width(density);
         let gain = self.neighbors.center / (self.volume(density) * density);
         (gain, self.neighbors.inverse_a2 / (width * width))
@@ -182,17 +182,17 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         self.density.at_each(&columns, &mut cells[..n], &mut density[..n]);
         let (mut gain, mut inverse_a2, mut prior) = ([0.0; ROOM], [0.0; ROOM], [0.0; ROOM]);
         for i in 0..ROOM {
-            (gain[i], inverse_a2[i]) = self.law(density[i]);
+            (gain[i], inverse_a2[i]) = self.distribution(density[i]);
             prior[i] = PRIOR * ln(density[i]);
         }
         let surplus = self.neighbors.surplus;
         for i in 0..n {
             let x = std::array::from_fn(|c| tried[c][i]);
             let prior = prior[i] + self.input.pieces.ln_spread(slot, &x);
-            let law = (gain[i], inverse_a2[i]);
+            let distribution = (gain[i], inverse_a2[i]);
             let likelihood = match surplus < f32::INFINITY {
-                true => near.two_sided(&x, law, surplus),
-                false => near.log_likelihood(&x, law),
+                true => near.two_sided(&x, distribution, surplus),
+                false => near.log_likelihood(&x, distribution),
             };
             scratch.candidates.push(Candidate { x, piece, score: prior + likelihood, prior });
         }
@@ -233,7 +233,8 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
     fn by_records(&self, slot: usize, x: [[f32; D]; 2]) -> [f32; 2] {
         let Input { pieces, graph, delta, .. } = self.input;
         let slots_per_record = pieces.slots_per_record();
-        let at = x.map(|x| (self.law(self.density.at(&x)), pieces.record_chance(slot, &x)));
+        let at =
+            x.map(|x| (self.distribution(self.density.at(&x)), pieces.record_chance(slot, &x)));
         let (ends, class) = graph.of(slot);
         let mut sums = [0.0; 2];
         for (&end, &class) in ends.iter().zip(class) {

@@ -221,9 +221,9 @@ impl<const D: usize> Columns<D> {
     /// The logarithm of how much likelier these estimates are about a point at `x` than by chance, where the distribution has
     /// this gain and `1 / a^2`: the sum of `ln(1 + odds * gain * (1 + r^2 / a^2)^-3)`.
     #[inline(always)]
-    pub(super) fn log_likelihood(&self, x: &[f32; D], law: (f32, f32)) -> f32 {
+    pub(super) fn log_likelihood(&self, x: &[f32; D], distribution: (f32, f32)) -> f32 {
         let mut sums = [0.0f32; LANES];
-        let likelier = self.likelier(x, law);
+        let likelier = self.likelier(x, distribution);
         let n = self.odds.len() / LANES;
         // One logarithm of two at a time: no product comes near the end of `f32`.
         for i in 0..n / 2 {
@@ -242,9 +242,9 @@ impl<const D: usize> Columns<D> {
     /// The same, but forward and reverse edges may be ahead of each other by no more than `surplus` beyond what mutual
     /// edges say.
     #[inline(always)]
-    pub(super) fn two_sided(&self, x: &[f32; D], law: (f32, f32), surplus: f32) -> f32 {
+    pub(super) fn two_sided(&self, x: &[f32; D], distribution: (f32, f32), surplus: f32) -> f32 {
         let mut sums = [[0.0f32; LANES]; 3];
-        let likelier = self.likelier(x, law);
+        let likelier = self.likelier(x, distribution);
         for (i, side) in self.side.as_chunks::<LANES>().0.iter().enumerate() {
             for lane in 0..LANES {
                 let one = ln(likelier(i, lane));
@@ -281,7 +281,7 @@ impl<const D: usize> Columns<D> {
 mod tests {
     use super::*;
 
-    const LAW: (f32, f32) = (100.0, 4.0);
+    const DISTRIBUTION: (f32, f32) = (100.0, 4.0);
 
     /// Estimates at the origin: so many of each side, with odds of 1.
     fn columns(of_each: [(Side, usize); 3]) -> Columns<3> {
@@ -302,7 +302,7 @@ mod tests {
         {
             let sides =
                 [(Side::Forward, forward), (Side::Reverse, reverse), (Side::Mutual, mutual)];
-            let found = columns(sides).two_sided(&[0.0; 3], LAW, 10.0);
+            let found = columns(sides).two_sided(&[0.0; 3], DISTRIBUTION, 10.0);
             let (less, more) =
                 (forward.min(reverse) as f32 * one, forward.max(reverse) as f32 * one);
             let of_both = mutual as f32 * one;
@@ -315,7 +315,8 @@ mod tests {
     fn no_estimate_counts_twice() {
         let columns = columns([(Side::Forward, 6), (Side::Reverse, 7), (Side::Mutual, 4)]);
         let x = [0.3, -0.1, 0.2];
-        let (sided, all) = (columns.two_sided(&x, LAW, 1e9), columns.log_likelihood(&x, LAW));
+        let (sided, all) =
+            (columns.two_sided(&x, DISTRIBUTION, 1e9), columns.log_likelihood(&x, DISTRIBUTION));
         assert!((sided - all).abs() < 1e-4 * all, "{sided} {all}");
     }
 

@@ -1,10 +1,8 @@
-//! How likely a random listed record passes near a place: the density of records, from the marginal of
-//! who is listed.
+//! How likely a random listed record passes near a place.
 //!
-//! A line passes within `delta` of a place `x` with probability `density(x) * tube(delta)`, where the
-//! density is the expected length of line per volume and the tube the volume per length. The density
-//! varies over the size of a room, not over `delta`, so a coarse grid knows it better than a sample of
-//! records does, for every delta at once.
+//! A line passes within `delta` of a place `x` with probability `density(x) * tube(delta)`: the expected length of line per
+//! volume, times the volume of the tube per length. Each record counts as often as it is listed. The density
+//! varies over the size of a room, not over `delta`, so a coarse grid serves for every delta.
 
 use rayon::prelude::*;
 
@@ -14,7 +12,7 @@ use crate::neighbors::Neighborhoods;
 use crate::recover::map::bytes::Reader;
 use crate::recover::map::grid::Grid;
 use crate::recover::map::lines::{LineRow, MOST_CHANCE};
-use crate::recover::map::places::trimmed;
+use crate::recover::map::places::trimmed_box;
 use crate::simd::{Kernel, dispatch};
 
 /// Cells of a grid at most: 32 per axis, as density varies over the size of a room.
@@ -52,9 +50,7 @@ impl<const D: usize> ChanceField<D> {
     }
 
     /// The field that [`write`](Self::write) appended.
-    ///
-    /// # Errors
-    /// When it is none.
+    /// Fails when the bytes hold none.
     pub(crate) fn read(from: &mut Reader<'_>) -> Result<Self, Error> {
         // Grids of boxes without extent along an axis may exceed the number of cells asked for.
         Grid::read(from, 8 * CELLS).map(|grid| Self { grid })
@@ -74,7 +70,7 @@ impl<const D: usize> ChanceField<D> {
         (self.grid.at(x) * tube).min(MOST_CHANCE)
     }
 
-    /// Adds the same, however large, at each `t` of a line to `chance`, with room for a cell each.
+    /// Adds the same, without its limit, at each `t` of a line to `chance`. `cells` is a buffer of as many.
     #[inline(always)]
     pub(crate) fn add_along(
         &self,
@@ -186,20 +182,15 @@ fn box_of_crossings<const D: usize>(
     slots_per_record: usize,
 ) -> ([f32; D], [f32; D]) {
     let every = lists.n_slots().div_ceil(CROSSINGS).max(1);
-    let mut places: [Vec<f32>; D] = std::array::from_fn(|_| Vec::new());
-    for slot in (0..lists.n_slots()).step_by(every) {
+    let crossings = |slot: usize| {
         let own = &rows[slot / slots_per_record];
         // Any entry will do: lists are in order of record, which is random.
-        for record in lists.of(slot).iter().take(2) {
-            if let Some(place) = own.crossing(&rows[record.index()]) {
-                for c in 0..D {
-                    places[c].push(place[c]);
-                }
-            }
-        }
-    }
-    let ends = places.map(|mut column| trimmed(&mut column));
-    (ends.map(|e| e.0), ends.map(|e| e.1))
+        let listed = lists.of(slot).iter().take(2);
+        listed.filter_map(|record| own.crossing(&rows[record.index()]))
+    };
+    let slots = (0..lists.n_slots()).step_by(every);
+    let places: Vec<[f32; D]> = slots.flat_map(crossings).collect();
+    trimmed_box(|c| places.iter().map(|place| place[c]).collect())
 }
 
 /// One field for axis candidates: the density of the records' lines along all axes.
@@ -208,14 +199,13 @@ pub(crate) fn of_candidates<const D: usize>(
     lists: &Neighborhoods,
 ) -> CandidateField<D> {
     let counts = times_listed(lists, rows.len());
-    let ends: [(f32, f32); D] =
-        std::array::from_fn(|c| trimmed(&mut rows.iter().map(|row| row[c]).collect::<Vec<f32>>()));
+    let (low, high) = trimmed_box::<D>(|c| rows.iter().map(|row| row[c]).collect());
     let weight: f32 = counts.iter().map(|&n| n as f32).sum();
     let along = std::array::from_fn(|axis| {
-        let low = std::array::from_fn(|c| if c == axis { 0.0 } else { ends[c].0 });
-        let high = std::array::from_fn(|c| if c == axis { 0.0 } else { ends[c].1 });
+        let (mut low, mut high) = (low, high);
+        (low[axis], high[axis]) = (0.0, 0.0);
         let mut grid = Grid::over(low, high, CELLS / 8);
-        // All of the line lies in the one cell along its own axis: a unit of length per unit.
+        // The line lies in the one cell along its own axis: it is as long there as the cell.
         let length = grid.cell();
         for (row, &n) in rows.iter().zip(&counts) {
             let cell = grid.index(row);
@@ -239,33 +229,25 @@ impl<const D: usize> CandidateField<D> {
     }
 
     /// The fields that [`write`](Self::write) appended.
-    ///
-    /// # Errors
-    /// When there are not as many.
+    /// Fails when the bytes do not hold as many.
     pub(crate) fn read(from: &mut Reader<'_>) -> Result<Self, Error> {
         let fields = (0..D).map(|_| ChanceField::read(from)).collect::<Result<Vec<_>, _>>()?;
-        let along = fields.try_into();
-        along
-            .map(|along| Self { along })
-            .map_err(|_| Error::new("model", "a field per axis", "others"))
-    }
-
-    /// The density at a typical place.
-    fn typical(&self) -> f32 {
-        self.along.iter().map(ChanceField::typical).sum()
+        let along =
+            fields.try_into().map_err(|_| Error::new("model", "a field per axis", "others"))?;
+        Ok(Self { along })
     }
 
     /// How likely a random record agrees with a place where records are, within `delta`.
     pub(crate) fn typical_chance(&self, delta: f32) -> f32 {
         let tubes = self.tubes(delta);
         if tubes.iter().all(|&one| one == tubes[0]) {
-            return self.typical() * tubes[0];
+            return self.along.iter().map(ChanceField::typical).sum::<f32>() * tubes[0];
         }
         self.along.iter().zip(&tubes).map(|(field, tube)| field.typical() * tube).sum()
     }
 
-    /// Where the box of the map is much thinner than its neighborhoods are wide: the radius of the disc that holds a `share` of
-    /// it; `None` of other boxes.
+    /// The radius of the disc that holds a `share` of a flat map, whose box is much thinner than neighborhoods are wide; `None` of
+    /// other maps.
     pub(crate) fn radius_if_flat(&self, share: f64) -> Option<f64> {
         // Each field lacks the extent along its own axis.
         let side = |c: usize| f64::from(self.along[(c + 1) % D].grid.sides()[c]);
@@ -276,19 +258,13 @@ impl<const D: usize> CandidateField<D> {
         (FLAT * thin < radius && 2.0 * radius <= middle).then_some(radius)
     }
 
-    /// Volume per length of what is within `delta` of a line along each axis: of a map that is flat no more of it than lies
-    /// in its box.
+    /// The volume per length within `delta` of a line along each axis, as far as it lies in the box of the map.
     pub(crate) fn tubes(&self, delta: f32) -> [f32; D] {
         std::array::from_fn(|axis| {
             let sides = self.along[axis].grid.sides();
-            let across = |c: &usize| *c != axis;
-            let whole = tube(D, delta);
-            let is_cut = |c: usize| 2.0 * delta > sides[c];
-            if !(0..D).filter(across).any(is_cut) {
-                return whole;
-            }
-            let share = (0..D).filter(across).map(|c| (sides[c] / (2.0 * delta)).min(1.0));
-            whole * share.product::<f32>()
+            let across = (0..D).filter(|c| *c != axis);
+            let share = across.map(|c| (sides[c] / (2.0 * delta)).min(1.0));
+            tube(D, delta) * share.product::<f32>()
         })
     }
 
@@ -299,8 +275,7 @@ impl<const D: usize> CandidateField<D> {
         along.map(|(field, &tube)| field.at(x, tube)).sum::<f32>().min(MOST_CHANCE)
     }
 
-    /// Adds the same, however large, at each `t` of the line through `own` along `axis` to `chance`, with room for
-    /// a cell each.
+    /// Adds the same, without its limit, at each `t` of the line through `own` along `axis` to `chance`.
     #[inline(always)]
     pub(crate) fn add_along(
         &self,
@@ -309,8 +284,8 @@ impl<const D: usize> CandidateField<D> {
         tubes: &[f32; D],
         (cells, chance): (&mut [u32], &mut [f32]),
     ) {
-        let through = std::array::from_fn(|c| if c == axis { 0.0 } else { own[c] });
-        let direction = std::array::from_fn(|c| if c == axis { 1.0 } else { 0.0 });
+        let (mut through, mut direction) = (*own, [0.0; D]);
+        (through[axis], direction[axis]) = (0.0, 1.0);
         for (field, &tube) in self.along.iter().zip(tubes) {
             field.add_along((&through, &direction), t, tube, (&mut *cells, &mut *chance));
         }
@@ -319,7 +294,7 @@ impl<const D: usize> CandidateField<D> {
 
 // A length of the order of the map's size, from the records alone.
 
-/// Quartiles are those of parts far from one another where they are so many times as far apart as one part is wide.
+/// A map is in parts where its quartiles are this many times as far apart as one part is wide.
 const FAR_APART: f64 = 4.0;
 
 /// The distance between the quartiles of sorted values.
@@ -330,8 +305,8 @@ pub(crate) fn interquartile_range(sorted: &[f32]) -> f64 {
     f64::from(sorted[last - last / 4]) - f64::from(sorted[last / 4])
 }
 
-/// Whether sorted values lie in parts far from one another: four times the width of an eighth of them, about a typical
-/// value, is as much as the distance of their quartiles where they are spread evenly.
+/// Whether sorted values lie in parts far from one another. The quartiles of evenly spread values are four times as far apart as
+/// an eighth of the values is wide.
 pub(crate) fn are_in_parts(sorted: &[f32]) -> bool {
     let many = sorted.len() / 8;
     if many == 0 {

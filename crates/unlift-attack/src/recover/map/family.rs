@@ -33,9 +33,7 @@ pub(crate) enum Chance<const D: usize> {
 
 impl<'a, const D: usize> Family<'a, D> {
     /// The records of `released`, with a `chance` that was learned before, or else with the one that goes with `lists`.
-    ///
-    /// # Errors
-    /// When the chance is that of other records.
+    /// Fails when the chance is that of other records.
     pub(crate) fn new(
         released: &'a Released<D>,
         lists: &Neighborhoods,

@@ -67,9 +67,7 @@ impl<const D: usize> Grid<D> {
     }
 
     /// The grid that [`write`](Self::write) appended.
-    ///
-    /// # Errors
-    /// When it is none, or has more than `most` cells.
+    /// Fails when the bytes hold none, or one with more than `most` cells.
     pub(crate) fn read(from: &mut Reader<'_>, most: usize) -> Result<Self, Error> {
         let mut dims = [0; D];
         let box_of = from.f32s(D + 1)?;

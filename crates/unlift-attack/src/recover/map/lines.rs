@@ -133,6 +133,20 @@ impl<const D: usize> LineRow<D> {
 /// A column per coordinate.
 type Columns<const D: usize> = [Vec<f32>; D];
 
+/// Fills `columns` with a row for each item.
+#[inline(always)]
+pub(crate) fn fill<const D: usize, T>(
+    columns: &mut Columns<D>,
+    items: &[T],
+    row: impl Fn(&T) -> [f32; D],
+) {
+    columns.iter_mut().for_each(|column| column.resize(items.len(), 0.0));
+    let mut columns = columns.each_mut().map(|column| &mut column[..items.len()]);
+    for (j, item) in items.iter().enumerate() {
+        columns.iter_mut().zip(row(item)).for_each(|(column, x)| column[j] = x);
+    }
+}
+
 /// Neighbors gathered into one column per coordinate: the section loop then runs over whole vectors.
 #[derive(Clone, Debug)]
 pub(crate) struct LineColumns<const D: usize> {
@@ -152,22 +166,10 @@ impl<const D: usize> LineColumns<D> {
     /// Gathers `records` from `rows`.
     #[inline(always)]
     pub(crate) fn gather(&mut self, rows: &[LineRow<D>], records: &[RecordId]) {
-        let n = records.len();
-        for column in self.through.iter_mut().chain(&mut self.direction) {
-            column.resize(n, 0.0);
-        }
-        self.group.resize(n, NO_GROUP);
-        let through = self.through.each_mut().map(|column| &mut column[..n]);
-        let direction = self.direction.each_mut().map(|column| &mut column[..n]);
-        let group = &mut self.group[..n];
-        for j in 0..n {
-            let row = &rows[records[j].index()];
-            for c in 0..D {
-                through[c][j] = row.through[c];
-                direction[c][j] = row.direction[c];
-            }
-            group[j] = row.group;
-        }
+        fill(&mut self.through, records, |record| rows[record.index()].through);
+        fill(&mut self.direction, records, |record| rows[record.index()].direction);
+        self.group.clear();
+        self.group.extend(records.iter().map(|record| rows[record.index()].group));
     }
 
     /// How many of the gathered records are evidence for a point on `own`.
@@ -210,17 +212,7 @@ impl<const D: usize> CandidateColumns<D> {
     /// Gathers `records` from `rows`.
     #[inline(always)]
     pub(crate) fn gather(&mut self, rows: &[[f32; D]], records: &[RecordId]) {
-        let n = records.len();
-        for column in &mut self.position {
-            column.resize(n, 0.0);
-        }
-        let position = self.position.each_mut().map(|column| &mut column[..n]);
-        for j in 0..n {
-            let row = &rows[records[j].index()];
-            for c in 0..D {
-                position[c][j] = row[c];
-            }
-        }
+        fill(&mut self.position, records, |record| rows[record.index()]);
     }
 
     /// Number of gathered records.
@@ -362,7 +354,7 @@ pub(crate) struct Intervals {
 impl Intervals {
     /// The intervals of `sections` at `delta`, as far as they lie between `floor` and `top`.
     #[inline(always)]
-    pub(crate) fn fill(&mut self, sections: &Sections, delta2: f32, floor: f32, top: f32) {
+    fn fill(&mut self, sections: &Sections, delta2: f32, floor: f32, top: f32) {
         let n = sections.len();
         self.low.resize(n, f32::INFINITY);
         self.high.resize(n, f32::NEG_INFINITY);
@@ -394,20 +386,22 @@ impl Intervals {
         }
     }
 
-    /// The start of a listed interval that maximizes evidence plus prior. The number of agreeing records
-    /// changes only at interval ends and is largest at some start, so no position has more votes than the
-    /// starts looked at.
+    /// Where `sections` agree least probably by chance, between `floor` and `top` and at `delta`. The number of agreeing records
+    /// changes only at the ends of their intervals and is largest at some start, so only starts are looked at.
     ///
     /// `k` listed records could vote; `chances` adds to its last argument the chance that a random record
     /// passes at each start (of the first), with room for cells of a grid (in the second). The prior is the chance
     /// itself: a point is likelier to lie where the map is dense, and chance measures density. Ties are won by the lower
     /// record.
     #[inline(always)]
-    pub(crate) fn best_start(
+    pub(crate) fn peak(
         &mut self,
+        sections: &Sections,
+        (delta2, floor, top): (f32, f32, f32),
         k: usize,
         chances: impl Fn(&[f32], &mut [u32], &mut [f32]),
     ) -> Option<Peak> {
+        self.fill(sections, delta2, floor, top);
         let n = self.low.len();
         self.count.resize(n, 0);
         self.cell.resize(n, 0);

@@ -73,9 +73,7 @@ impl<const D: usize> Places<D> {
 
     /// The corners of a box around the known places, without the farthest.
     pub(crate) fn trimmed_box(&self) -> ([f32; D], [f32; D]) {
-        let column = |c: usize| self.sample().map(|x| x[c]).collect::<Vec<f32>>();
-        let ends: [(f32, f32); D] = std::array::from_fn(|c| trimmed(&mut column(c)));
-        (ends.map(|e| e.0), ends.map(|e| e.1))
+        trimmed_box(|c| self.sample().map(|x| x[c]).collect())
     }
 
     /// The piece of its feasible set that `slot` lies on.
@@ -109,6 +107,14 @@ pub(crate) fn trimmed(column: &mut [f32]) -> (f32, f32) {
     let (low, high) = (at(cut), at(last - cut));
     let margin = 0.1 * (high - low);
     (low - margin, high + margin)
+}
+
+/// The corners of a box around most places, given as the column of each coordinate.
+pub(crate) fn trimmed_box<const D: usize>(
+    column: impl Fn(usize) -> Vec<f32>,
+) -> ([f32; D], [f32; D]) {
+    let ends: [(f32, f32); D] = std::array::from_fn(|c| trimmed(&mut column(c)));
+    (ends.map(|e| e.0), ends.map(|e| e.1))
 }
 
 /// The squared distance.
