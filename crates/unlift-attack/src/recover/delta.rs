@@ -48,8 +48,8 @@ const BEYOND_EDGE: f64 = 2.25;
 /// The same where a source gives scores: its wrong entries look alike.
 const BEYOND_EDGE_OF_SCORED: f64 = 2.0;
 
-/// A delta of candidates is luck's if the least one is more than this many times as wide. Partners of exchanges agree exactly, so that
-/// evidence hardly falls as delta shrinks, and on maps of a few hundred points or on lattices nothing says how far.
+/// A delta of candidates was chosen by luck if the least one is more than this many times as wide. Partners of exchanges agree
+/// exactly, so that evidence hardly falls as delta shrinks, and on small maps or lattices nothing says how far.
 const COLLAPSED: f64 = 4.0;
 /// The chance at that least delta, as a multiple of the share of all records that a list holds: if points lie on
 /// surfaces, one line passes as near as neighbors are with a chance of that share, and a record has three.

@@ -1,8 +1,8 @@
 //! The published density attacks, for comparison: constants as published, nothing read but the records.
 //!
 //! One point per line (Chelani et al., CVPR 2021): the nearest lines vote where they pass, the peak of the votes is the estimate,
-//! and lines near the estimates vote again. Two points per line (Lee et al., CVPR 2023): the two highest peaks of a kernel density of
-//! the votes. Rays (Moon et al., CVPR 2024): rays of other centers vote once.
+//! and lines near the estimates vote again. Two points per line (Lee et al., CVPR 2023): the two highest peaks of a kernel
+//! density of the votes. Rays (Moon et al., CVPR 2024): rays of other centers vote once.
 //!
 //! The published programs count votes from the true point and take ranges from true distances. Here votes are counted from the
 //! foot of the line, a line has no vote of its own, and ranges come from the votes.

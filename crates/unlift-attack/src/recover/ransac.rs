@@ -1,9 +1,9 @@
 //! The paper's sampling loop (section 4), for comparison.
 //!
 //! A few listed records are drawn and the least-squares position of Eq. (4) is computed from them. The position that the
-//! most listed records pass within delta is refined by least squares over these. The number of trials follows the largest support found
-//! so far (draws without replacement, 99 % confidence) and ends at 10,000. The paper leaves the size of a sample open: here
-//! it is two records per unknown coordinate (planes may draw one twice).
+//! most listed records pass within delta is refined by least squares over these. The number of trials follows the largest
+//! support found so far (draws without replacement, 99 % confidence) and ends at 10,000. The paper leaves the size of a sample
+//! open: here it is two records per unknown coordinate (planes may draw one twice).
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};

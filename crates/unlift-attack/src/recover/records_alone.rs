@@ -35,7 +35,7 @@ pub fn records_alone<const D: usize>(
     }
     let peaks = tomography(released);
     attacks.push((Solver::Tomography.name(), at(released, &peaks)?));
-    // A map of planes, or of rays from one center, has no such lists.
+    // Planes and rays from one center have no such lists.
     if let Ok(lists) = geometric_by(released, Geometric::K, &peaks) {
         let options = RecoverOptions { confidence: false, ..*options };
         let (joint, start) = recover_with_start(released, &lists, &options)?;
@@ -69,7 +69,7 @@ pub(super) struct Placement<'a, const D: usize> {
     peaks: &'a Peaks,
 }
 
-/// The distance that decides support: the resolution of `peaks`; any, where they have none.
+/// The distance that decides support: the resolution of `peaks`, or any where there are no peaks.
 pub(super) fn delta(peaks: &Peaks) -> f64 {
     if peaks.resolution > 0.0 { peaks.resolution } else { 1.0 }
 }
@@ -100,7 +100,7 @@ impl<'a, const D: usize> Placement<'a, D> {
         slots.into_par_iter().map(place).collect()
     }
 
-    /// The peak of `slot` as it stands.
+    /// The estimate at the peak of `slot`.
     fn peak(&self, slot: usize) -> Estimate<D> {
         let Some(peak) = self.peaks.of[slot] else {
             return Estimate::lost(Status::NoSupport);

@@ -90,13 +90,13 @@ pub(super) fn cues<const D: usize, P: Pieces<D>>(
     let places = Places::new(estimates);
     let density = Density::new(&places, &graph.times_listed(), SMOOTH * delta);
     let order = along_curve(&places);
-    let look = Look { pieces, graph, places, density, delta2: delta * delta };
+    let around = Surroundings { pieces, graph, places, density, delta2: delta * delta };
     let mut crowds = by_slot(&order, |near, slot| {
         let estimate = &estimates[slot];
         if estimate.status != Status::Ok {
             return Crowd::default();
         }
-        let mut crowd = look.crowd(slot, estimate, near);
+        let mut crowd = around.crowd(slot, estimate, near);
         if unsettled[slot].status == Status::Ok {
             let moved2 = distance2(&unsettled[slot].position, &estimate.position);
             crowd.settled = (moved2 > 0.0).then(|| moved2.sqrt());
@@ -104,7 +104,7 @@ pub(super) fn cues<const D: usize, P: Pieces<D>>(
         crowd
     });
     let evidence: Vec<f32> = crowds.iter().map(|crowd| libm::log1pf(crowd.evidence)).collect();
-    crowds = by_slot(&order, |_, slot| look.with_members(slot, crowds[slot], &evidence));
+    crowds = by_slot(&order, |_, slot| around.with_members(slot, crowds[slot], &evidence));
     of_map(&crowds, delta)
 }
 
@@ -180,7 +180,7 @@ fn typical_radius(crowds: &[Crowd]) -> Option<f32> {
 }
 
 /// What slots are looked at with.
-struct Look<'a, const D: usize, P> {
+struct Surroundings<'a, const D: usize, P> {
     pieces: &'a P,
     graph: &'a Graph,
     places: Places<D>,
@@ -188,7 +188,7 @@ struct Look<'a, const D: usize, P> {
     delta2: f32,
 }
 
-impl<const D: usize, P: Pieces<D>> Look<'_, D, P> {
+impl<const D: usize, P: Pieces<D>> Surroundings<'_, D, P> {
     /// The crowd of a slot; what its members say of themselves is still open. `near` is a buffer.
     fn crowd(&self, slot: usize, own: &Estimate<D>, near: &mut Vec<(u32, u32)>) -> Crowd {
         let x = own.position;

@@ -65,14 +65,14 @@ fn pairs<const D: usize>(
     let prior = prior::<D>(&sides);
     let class = classes(estimates);
     let class: Vec<usize> = order.iter().map(|&record| class[record as usize]).collect();
-    let mut law = Law::new(partners.reach);
+    let mut distances = Distances::new(partners.reach);
     // How free a record is, as it tells the partner of an entry.
     let mut messages = vec![0.5; partners.of.len()];
     let mut weight = Vec::new();
     for _ in 0..ROUNDS {
         let likelier = |i: usize, j: usize| {
             let away = (sides[j].published - sides[i].estimate).abs();
-            law.density(class[i], away) * rarity[i]
+            distances.density(class[i], away) * rarity[i]
         };
         let odds = |i: usize, e: usize| {
             let j = partners.of[e] as usize;
@@ -80,7 +80,7 @@ fn pairs<const D: usize>(
         };
         let odds_of = |i: usize| partners.entries(i).map(move |e| odds(i, e));
         weight = by_part(n, |records| records.flat_map(odds_of).collect::<Vec<f32>>()).concat();
-        let alone = law.alone();
+        let alone = distances.alone();
         messages = sent(&messages, &partners, &weight, |i| alone[class[i]]);
         let tallies = by_part(n, |records| {
             let mut tally = vec![[0.0; STEPS]; CLASSES];
@@ -89,7 +89,7 @@ fn pairs<const D: usize>(
                     let away = (sides[partners.of[e] as usize].published - sides[i].estimate).abs();
                     let p = probability(&messages, &partners, &weight, e);
                     if p > NOTHING {
-                        tally[class[i]][law.step(away)] += f64::from(p);
+                        tally[class[i]][distances.step(away)] += f64::from(p);
                     }
                 }
             }
@@ -100,7 +100,7 @@ fn pairs<const D: usize>(
             let columns = found.as_flattened_mut().iter_mut().zip(tally.as_flattened());
             columns.for_each(|(to, more)| *to += more);
         }
-        law = law.learned(&found, &class);
+        distances = distances.learned(&found, &class);
     }
     let least = Settings::of_dimension::<D>().least_exchange;
     let best = |i: usize| {
@@ -187,7 +187,7 @@ fn classes<const D: usize>(estimates: &[Estimate<D>]) -> Vec<usize> {
 }
 
 /// How far estimates lie from the hidden coordinate: per class the share of good ones, and a mixture of normal distributions.
-struct Law {
+struct Distances {
     good: [f64; CLASSES],
     weight: [[f64; SCALES]; CLASSES],
     /// The density of each distribution in the middle of each step.
@@ -197,7 +197,7 @@ struct Law {
     table: Vec<[f64; STEPS]>,
 }
 
-impl Law {
+impl Distances {
     /// Before anything is known; partners are looked for within `reach`.
     fn new(reach: f32) -> Self {
         let shape = |step: usize, scale: usize| {
@@ -218,13 +218,13 @@ impl Law {
         shapes: Vec<[f64; SCALES]>,
         reach: f32,
     ) -> Self {
-        let mut law = Self { good, weight, shapes, reach, table: vec![[0.0; STEPS]; CLASSES] };
-        for class in 0..CLASSES {
-            for step in 0..STEPS {
-                law.table[class][step] = good[class] * law.parts(class, step).iter().sum::<f64>();
-            }
+        let mut distances =
+            Self { good, weight, shapes, reach, table: vec![[0.0; STEPS]; CLASSES] };
+        for (class, good) in good.iter().enumerate() {
+            let density = |step: usize| distances.parts(class, step).iter().sum::<f64>();
+            distances.table[class] = std::array::from_fn(|step| good * density(step));
         }
-        law
+        distances
     }
 
     /// The weighted density of each distribution of `class` in the middle of a step.
@@ -253,7 +253,7 @@ impl Law {
         self.good.iter().sum::<f64>() / CLASSES as f64
     }
 
-    /// The law that the pairs `found` with this one suggest, per class and step. `class` is that of every record.
+    /// The distribution that the pairs `found` with this one suggest, per class and step. `class` is that of every record.
     fn learned(self, found: &[[f64; STEPS]], class: &[usize]) -> Self {
         let (mut good, mut weight) = (self.good, self.weight);
         let others = self.mean_good().max(0.1);

@@ -1,7 +1,7 @@
 //! Voxel parity: where the center of a ray follows from a checkerboard, every other voxel along it is out.
 //!
-//! The edge of a voxel is published, where the grid starts is not. But estimates tell: there is one
-//! start (up to whole voxels) for which nearly all of them lie in voxels of their own center.
+//! The edge of a voxel is published, where the grid starts is not. It is the one start (up to whole voxels) for which nearly all
+//! estimates lie in voxels of their own center.
 
 use rayon::prelude::*;
 
@@ -16,10 +16,9 @@ const FINER: usize = 4;
 const SWEEPS: usize = 2;
 /// Estimates looked at for the first start, of which there are thousands, and for finer ones.
 const SAMPLE: (usize, usize) = (1 << 12, 1 << 15);
-/// The grid is believed when so many more of these estimates agree than do not: as a share, and in
-/// standard deviations of what a wrong grid yields (the best of all starts reaches 4 or 5).
+/// The grid is believed when the estimates that agree exceed those that do not by this share of all,
 const LEAST: f64 = 0.1;
-/// The standard deviations.
+/// and by this many standard deviations of what a wrong grid yields (the best of all starts reaches 4 or 5).
 const SIGMAS: f64 = 8.0;
 /// An estimate is moved this far past the wall, in voxels: on it, rounding would decide.
 const INSIDE: f32 = 1e-3;

@@ -90,9 +90,9 @@ impl Graph {
         let bounds = &score_bounds(lists);
         let most = MOST_REVERSE * lists.records().len().div_ceil(n_slots.max(1)).max(1);
         let n_blocks = n_records.div_ceil(BLOCK);
-        let turned: Vec<Turned> = (0..n_slots.div_ceil(BLOCK))
+        let transposed: Vec<Transposed> = (0..n_slots.div_ceil(BLOCK))
             .into_par_iter()
-            .map(|part| Turned::new(lists, part, n_blocks, bounds))
+            .map(|part| Transposed::new(lists, part, n_blocks, bounds))
             .collect();
         // A room for the rows of each block, as large as they could be. Memory that they do not need is hardly touched.
         let slots_of = |block: usize| {
@@ -102,7 +102,7 @@ impl Graph {
         let room = |block: usize| {
             let slots = slots_of(block);
             let n_listed = lists.offsets()[slots.end] - lists.offsets()[slots.start];
-            let n_reverse: usize = turned.iter().map(|part| part.of_block(block).len()).sum();
+            let n_reverse: usize = transposed.iter().map(|part| part.of_block(block).len()).sum();
             n_listed as usize + slots_per_record * n_reverse
         };
         let rooms: Vec<usize> = (0..n_blocks).map(room).collect();
@@ -119,7 +119,7 @@ impl Graph {
             rows.push(Rows { ends, class, n: 0 });
         }
         let merged = |reverse: &mut Block, (block, mut rows): (usize, Rows<'_>)| {
-            reverse.fill(&turned, block);
+            reverse.fill(&transposed, block);
             let slots = slots_of(block);
             let first = slots.start;
             let add = |slot: usize| {
@@ -199,12 +199,12 @@ impl Graph {
     }
 }
 
-// Who names a record: lists turned around, a block of records at a time.
+// Who names a record: lists transposed, a block of records at a time.
 //
 // Entries first go to the blocks of the records they name, in four bytes each. A block is put in order only where its
 // rows are made, while it is in the cache: a plain counting sort takes twice the time (docs/decisions/joint.md).
 
-/// Records in a block, and slots whose entries one thread turns around at a time.
+/// Records in a block, and slots whose lists one thread transposes at a time.
 const BLOCK: usize = 1 << BITS;
 /// Bits of a slot or a record within its block.
 const BITS: u32 = 12;
@@ -214,7 +214,7 @@ const CLASS_BITS: u32 = 3;
 const _: () = assert!(2 * BITS + CLASS_BITS <= u32::BITS);
 
 /// The entries of the lists of [`BLOCK`] slots by the block of the record that they name, in order of slot within each block.
-struct Turned {
+struct Transposed {
     first_slot: u32,
     /// Where blocks begin.
     offsets: Vec<u32>,
@@ -222,7 +222,7 @@ struct Turned {
     entries: Vec<u32>,
 }
 
-impl Turned {
+impl Transposed {
     fn new(lists: &Neighborhoods, part: usize, n_blocks: usize, bounds: &[f32]) -> Self {
         let slots = part * BLOCK..((part + 1) * BLOCK).min(lists.n_slots());
         let mut offsets = vec![0u32; n_blocks + 1];
@@ -238,7 +238,8 @@ impl Turned {
             let first = lists.offsets()[slot] as usize;
             for (at, record) in lists.of(slot).iter().enumerate() {
                 let to = &mut next[record.index() / BLOCK];
-                let packed = (in_part << BITS | record.index() % BLOCK) << CLASS_BITS;
+                let in_block = record.index() % BLOCK;
+                let packed = (in_part << BITS | in_block) << CLASS_BITS;
                 let class = score_class(lists, bounds, first + at);
                 entries[*to as usize] = packed as u32 | u32::from(class);
                 *to += 1;
@@ -263,20 +264,20 @@ struct Block {
 
 impl Block {
     /// Puts the entries of `block` in order.
-    fn fill(&mut self, turned: &[Turned], block: usize) {
+    fn fill(&mut self, transposed: &[Transposed], block: usize) {
         let record = |entry: u32| (entry >> CLASS_BITS) as usize % BLOCK;
         let Self { offsets, by } = self;
         // Starts are two places ahead and become ends of the rows before as rows fill.
         offsets.clear();
         offsets.resize(BLOCK + 2, 0);
-        for part in turned {
+        for part in transposed {
             part.of_block(block).iter().for_each(|&entry| offsets[record(entry) + 2] += 1);
         }
         for r in 0..BLOCK {
             offsets[r + 2] += offsets[r + 1];
         }
         by.resize(offsets[BLOCK + 1] as usize, (0, 0));
-        for part in turned {
+        for part in transposed {
             for &entry in part.of_block(block) {
                 let slot = part.first_slot + (entry >> (BITS + CLASS_BITS));
                 let to = &mut offsets[record(entry) + 1];

@@ -1,4 +1,4 @@
-//! Axis planes: the free coordinates separate, each is the densest window of offsets.
+//! Axis planes: each free coordinate is found on its own, in the densest window of offsets.
 
 use crate::RecordId;
 use crate::geometry::vector::median;
@@ -18,7 +18,7 @@ struct Sorted {
     order: Vec<u32>,
     /// The distance between the quartiles of their offsets.
     quartiles: f64,
-    /// Their offsets where the map is in parts along this axis, so that quartiles say little; else none.
+    /// Their offsets, if the map is in parts along this axis, so that quartiles say little; else empty.
     in_parts: Vec<f32>,
 }
 
@@ -111,7 +111,7 @@ pub(crate) struct Window {
 
 /// The window of width `2 delta` over the listed planes of one axis that maximizes evidence plus
 /// prior. `listed` holds (offset, record) of these planes and is sorted here; `chance` is that of [`window_chance`].
-// In line: called, consensus on planes takes half as long again.
+// Not inlined, consensus on planes takes half as long again.
 #[inline(always)]
 pub(crate) fn best_window(
     listed: &mut [(f32, RecordId)],
