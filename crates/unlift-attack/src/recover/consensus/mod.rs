@@ -65,6 +65,10 @@ impl<const D: usize> Kernel for Chunk<'_, D> {
     #[inline(always)]
     fn run(self) {
         let Self { family, lists, delta, first, out, scratch } = self;
+        let tubes = match family {
+            Family::Candidates { chance, .. } => chance.tubes(delta),
+            Family::Lines { .. } | Family::Planes { .. } => [0.0; D],
+        };
         for (at, estimate) in out.iter_mut().enumerate() {
             let slot = first + at;
             match family {
@@ -77,7 +81,7 @@ impl<const D: usize> Kernel for Chunk<'_, D> {
                 Family::Candidates { rows, chance } => {
                     prefetch_listed(lists, slot + 1, rows);
                     scratch.candidates.gather(rows, lists.of(slot));
-                    *estimate = on_candidates(&rows[slot], chance, delta, scratch);
+                    *estimate = on_candidates(&rows[slot], (chance, &tubes), delta, scratch);
                 }
                 Family::Planes { .. } => {}
             }
@@ -125,12 +129,12 @@ fn on_line<const D: usize>(
 #[inline(always)]
 fn on_candidates<const D: usize>(
     own: &[f32; D],
-    chance: &CandidateField<D>,
+    (chance, tubes): (&CandidateField<D>, &[f32; D]),
     delta: f32,
     scratch: &mut Scratch<D>,
 ) -> Estimate<D> {
     let Scratch { candidates, sections, intervals, .. } = scratch;
-    let (delta2, tubes) = (delta * delta, chance.tubes(delta));
+    let delta2 = delta * delta;
     if candidates.len() < 2 {
         return Estimate::lost(Status::TooFewNeighbors);
     }
@@ -140,7 +144,7 @@ fn on_candidates<const D: usize>(
         candidates.sections(own, axis, delta2, sections);
         let limits = (delta2, f32::NEG_INFINITY, f32::INFINITY);
         let Some(peak) = intervals.peak(sections, limits, candidates.len(), |t, cells, chances| {
-            chance.add_along((own, axis), t, &tubes, (cells, chances));
+            chance.add_along((own, axis), t, tubes, (cells, chances));
         }) else {
             continue;
         };
