@@ -59,6 +59,11 @@ impl Neighborhoods {
         Ok(Self { offsets, records, scores, about: About::default() })
     }
 
+    /// Lists in the order given, which nothing checks: rows made of checked lists.
+    pub(crate) fn unchecked(offsets: Vec<u64>, records: Vec<RecordId>) -> Self {
+        Self { offsets, records, scores: None, about: About::default() }
+    }
+
     /// Lists of some slots of a map, those from `first` on: as many as `offsets` has entries, less one. The lists of all others
     /// are empty. `map` is its number of records and of slots per record.
     ///

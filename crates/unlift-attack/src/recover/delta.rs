@@ -1,27 +1,25 @@
 //! Delta from attacker-side data alone: the one whose consensus is least probable by chance.
 //!
-//! Some slots are solved along a geometric ladder of deltas that starts at the extent of the
-//! records, so that a scaled map takes scaled steps. A small delta makes chance agreement rare but
-//! loses true neighbors; a large one keeps them but agrees with everything. What counts is the mean
-//! evidence in excess of what the same slots yield with lists mixed from other slots': the
-//! number of places tried, uneven density and the noise of the null sample are in both.
+//! Some slots are solved along a geometric ladder of deltas that starts at the extent of the records. A small delta makes
+//! chance agreement rare but loses true neighbors; a large one keeps them but agrees with everything. What counts is the mean
+//! evidence in excess of what the same slots yield with lists mixed from other slots': the number of places
+//! tried, uneven density and the noise of the null sample are in both.
 
 use crate::neighbors::Neighborhoods;
 use crate::recover::consensus;
 use crate::recover::map::family::{Family, Settings};
-use crate::recover::map::lists::{CHUNK, Lists, Picked, Slots};
+use crate::recover::map::lists::{CHUNK, Slots, mixed};
 use crate::recover::map::places::trimmed;
 use crate::released::{Obfuscation, Released};
 use crate::seed::{Draws, Stage};
 
 /// The least delta tried within known bounds, as a share of the spacing of points. A fifth of the keypoints of an image have a
 /// twin at the same place, and coordinates may be whole numbers: such records agree exactly, so that
-/// the evidence of a few slots grows without end as delta shrinks. But the neighbors that a list names
-/// are farther apart than that.
+/// the evidence of a few slots grows without end as delta shrinks.
 const LEAST_DELTA: f64 = 0.25;
-/// Bounds are those of something else if a side is so many times as long as the part of it that is filled.
+/// Bounds say nothing about a side that is so many times as long as the part of it that is filled.
 const TOO_LARGE: f64 = 1.5;
-/// Delta for rays from anchors, as a share of the spacing of points: anchors say nothing at one delta rather than at another.
+/// Delta for rays from anchors, as a share of the spacing of points: their evidence does not depend on delta.
 const ANCHOR_DELTA: f64 = 1.75;
 /// Halvings of the extent that the coarse ladder spans: down to 1 / 16,384 of it,
 const HALVINGS: u32 = 14;
@@ -29,31 +27,29 @@ const HALVINGS: u32 = 14;
 const HALVINGS_NOT_TOO_WIDE: u32 = 5;
 /// An extent is halved no more often than leaves something of it in 32 bits.
 const MOST_HALVINGS: u32 = 100;
-/// Where a random record agrees with a typical place this often, its agreement tells nothing, and the
-/// density of records within delta is no longer that of the place.
+/// Where a random record agrees with a typical place this often, its agreement tells nothing.
 const TOO_WIDE: f32 = 0.04;
 /// Steps per octave of the fine ladder: the maximum is flat, finer steps would tell nothing.
 const FINE: i32 = 3;
-/// How far across the plateau a narrow delta lies, as a share in logarithm. Planes leave two coordinates
-/// open: estimates gain from a wider support.
+/// Deltas whose excess evidence reaches this share of the largest are as good: for a wide delta, and for a narrow one.
+const AS_GOOD: (f64, f64) = (0.94, 0.95);
+/// How far across the plateau a narrow delta lies, as a share in logarithm: its very edge is a matter of luck.
 const ACROSS: f64 = 1.0 / 3.0;
-/// The same of planes.
+/// The same of planes: they leave two coordinates open, and estimates gain from a wider support.
 const ACROSS_OF_PLANES: f64 = 3.0 / 4.0;
-/// Below the lower edge of the plateau evidence grows by more than this factor per octave, or is less than a share of the
-/// best of the coarse ladder: on a plateau it hardly grows.
+/// Below the lower edge of the plateau evidence grows by more than this factor per octave,
 const GROWTH: f64 = 1.2;
-/// The share.
+/// or is less than this share of the best of the coarse ladder.
 const FAR_BELOW: f64 = 0.8;
 /// Steps below the best delta in which the edge is looked for: five octaves.
 const LOWEST: i32 = 15;
-/// A narrow delta is at most this many times the edge: beyond, wrong entries that are not far away keep it evident;
+/// A narrow delta is at most this many times the edge: wrong entries that are not far away keep wider ones evident.
 const BEYOND_EDGE: f64 = 2.25;
-/// where a source gives scores, at most so many times, as its wrong entries look alike.
+/// The same where a source gives scores: its wrong entries look alike.
 const BEYOND_EDGE_OF_SCORED: f64 = 2.0;
 
-/// A delta of candidates that is so many times below the least one is luck's. Partners of exchanges agree exactly, so that evidence
-/// hardly falls as delta shrinks, and on maps of a few hundred points or on lattices nothing says how far. Nearer to the least one it
-/// is the map's: points on a curve have neighbors within less.
+/// A delta of candidates was chosen by luck if the least one is more than this many times as wide. Partners of exchanges agree
+/// exactly, so that evidence hardly falls as delta shrinks, and on small maps or lattices nothing says how far.
 const COLLAPSED: f64 = 4.0;
 /// The chance at that least delta, as a multiple of the share of all records that a list holds: if points lie on
 /// surfaces, one line passes as near as neighbors are with a chance of that share, and a record has three.
@@ -63,8 +59,8 @@ const MOST_OF_LEAST: f64 = 0.25;
 /// Their least delta in flat maps, as a share of the radius within which a list's neighbors are.
 const LEAST_OF_FLAT: f64 = 0.5;
 
-/// Delta for `released` as `family`, whose consensus reads `used`: the lists as `given`, or those of both directions. Where
-/// estimates of neighbors are to vote it is a `sharp` one. In the unit of the map.
+/// Delta for `released` as `family`, in the unit of the map. Its consensus reads `used`: the lists as `given`, or those of both
+/// directions. A `sharp` delta is for estimates that are to vote.
 pub(super) fn learn<const D: usize>(
     released: &Released<D>,
     family: &Family<'_, D>,
@@ -76,28 +72,27 @@ pub(super) fn learn<const D: usize>(
     if family.has_regions() {
         return ANCHOR_DELTA * spacing;
     }
-    let prefer = match given.scores().is_some() {
-        _ if !sharp => Prefer::Wide,
-        true => Prefer::NarrowOfScored,
-        false => Prefer::Narrow,
+    let beyond_edge = match given.scores().is_some() {
+        true => BEYOND_EDGE_OF_SCORED,
+        false => BEYOND_EDGE,
     };
-    let least = LEAST_DELTA * spacing;
     let per_list = given.records().len() as f64 / given.n_slots().max(1) as f64;
     let share = per_list / released.n_records().max(1) as f64;
-    let chosen = choose(family, used, prefer, (least, share), seed).unwrap_or(1.0);
+    let least = LEAST_DELTA * spacing;
+    let chosen =
+        choose(family, used, sharp.then_some(beyond_edge), (least, share), seed).unwrap_or(1.0);
     let least = least_of_candidates(family, share);
     if COLLAPSED * chosen < least { least } else { chosen }
 }
 
 /// The least delta of the candidates of a map, where a list holds a `share` of all records; 0 of other families, and in images.
 fn least_of_candidates<const D: usize>(family: &Family<'_, D>, share: f64) -> f64 {
-    if !(matches!(family, Family::Candidates { .. })
-        && Settings::of_dimension::<D>().limits_by_share)
-    {
+    let is_of_candidates = matches!(family, Family::Candidates { .. });
+    if !(is_of_candidates && Settings::of_dimension::<D>().limits_by_share) {
         return 0.0;
     }
     let least = (LEAST_OF_CANDIDATES * share).min(MOST_OF_LEAST) as f32;
-    // Chance grows with delta: it is between nothing and the extent, more exactly so than 32 bits are.
+    // Chance grows with delta: bisection to more than 32 bits.
     let (mut below, mut above) = (0.0, family.extent());
     for _ in 0..48 {
         let middle = 0.5 * (below + above);
@@ -130,83 +125,53 @@ fn spacing<const D: usize>(released: &Released<D>) -> f64 {
     libm::pow(volume / released.n_slots().max(1) as f64, 1.0 / D as f64)
 }
 
-/// The maximum is flat: which of the deltas near it to take.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Prefer {
-    /// The widest: a wider support is the steadier one.
-    Wide,
-    /// A narrow one: joint recovery looks for neighbors' estimates, which are sharper than records.
-    Narrow,
-    /// A narrower one: lists with scores, as an attacker's own sources give them. Their wrong entries look alike
-    /// and so keep a wide delta evident.
-    NarrowOfScored,
-}
-
-impl Prefer {
-    /// Deltas whose excess evidence reaches this share of the largest are as good.
-    fn near_most(self) -> f64 {
-        match self {
-            Self::Wide => 0.94,
-            Self::Narrow | Self::NarrowOfScored => 0.95,
-        }
-    }
-}
-
-/// The delta with the best mean evidence, not below `least`, where a list as given holds a `share` of all records; `None` for an empty map or one without extent.
+/// The delta with the best mean evidence, not below `least`, where a list as given holds a `share` of all records; `None` for an
+/// empty map or one without extent. The maximum is flat. The widest delta near it is taken, as a wider support is the steadier one;
+/// or a narrow one, at most `beyond_edge` times the lower edge: neighbors' estimates are sharper than records.
 fn choose<const D: usize>(
     family: &Family<'_, D>,
     lists: &Neighborhoods,
-    prefer: Prefer,
+    beyond_edge: Option<f64>,
     (least, share): (f64, f64),
     seed: u64,
 ) -> Option<f64> {
     let settings = Settings::of_dimension::<D>();
-    let too_wide = match family {
-        Family::Candidates { .. } => settings.too_wide_of_candidates,
-        Family::Lines { .. } | Family::Planes { .. } => TOO_WIDE,
-    };
-    let (wide, narrow) = limits::<D>(family);
-    let too_wide = too_wide.max(wide.at(share));
+    let chance = |delta: f64| family.typical_chance(delta as f32);
+    let is_of_planes = matches!(family, Family::Planes { .. });
+    let is_of_candidates = matches!(family, Family::Candidates { .. });
+    let base = if is_of_candidates { settings.too_wide_of_candidates } else { TOO_WIDE };
+    let (wide, narrow) = limits(family, share);
+    let too_wide = base.max(wide);
     // Some steps of the ladder lie between the two.
-    let too_narrow = narrow.at(share).min(too_wide / 8.0);
+    let too_narrow = narrow.min(too_wide / 8.0);
     // In a flat map two of a record's three lines cross all of it.
-    let too_wide = family
-        .radius_if_flat(share)
-        .map_or(too_wide, |radius| too_wide.max(family.typical_chance(radius as f32)));
-    // Few points are far apart: at least one halving lies between the two limits.
-    let too_wide = too_wide.max(family.typical_chance((2.0 * least) as f32));
-    // The fine ladder reaches beyond the coarse one, but not where its limit is one of an image.
-    let most_chance = match family {
-        Family::Candidates { .. } if settings.candidates_keep_to_limit => too_wide,
-        Family::Candidates { .. } | Family::Lines { .. } | Family::Planes { .. } => f32::INFINITY,
+    let too_wide = match family.radius_if_flat(share) {
+        Some(radius) => too_wide.max(chance(radius)),
+        None => too_wide,
     };
+    // Few points are far apart: at least one halving lies between the two limits.
+    let too_wide = too_wide.max(chance(2.0 * least));
     let extent = family.extent();
     if lists.n_slots() == 0 || !(extent.is_finite() && extent > 0.0) {
         return None;
     }
-    let sample = match family {
-        Family::Planes { .. } => settings.delta_chunks_of_planes,
-        Family::Lines { .. } | Family::Candidates { .. } => settings.delta_chunks,
-    };
-    let chunks = sample_chunks(lists.n_slots(), sample, seed);
-    let given = Picked::given(lists, &chunks);
-    let mixed = Picked::mixed(lists, &chunks, family.slots_per_record());
-    let mean_evidence = |picked: &Picked, delta: f64| {
-        let (lists, slots) = (Lists::Picked(picked), Slots::Chunks(&chunks));
-        let solved = consensus::solve(family, lists, delta as f32, slots);
+    let n_chunks =
+        if is_of_planes { settings.delta_chunks_of_planes } else { settings.delta_chunks };
+    let slots = Slots::chunks(&sample_chunks(lists.n_slots(), n_chunks, seed), lists.n_slots());
+    let mixed = mixed(lists, slots.iter(), family.slots_per_record());
+    let mean_evidence = |lists: &Neighborhoods, delta: f64| {
+        let solved = consensus::solve(family, lists, delta as f32, &slots);
         solved.iter().map(|e| f64::from(e.evidence)).sum::<f64>() / solved.len() as f64
     };
-    let value = |delta: f64| mean_evidence(&given, delta) - mean_evidence(&mixed, delta);
+    let value = |delta: f64| mean_evidence(lists, delta) - mean_evidence(&mixed, delta);
     // From large to small; once well below the maximum, smaller deltas only lose more neighbors.
     let (mut coarse, mut most) = (extent, f64::NEG_INFINITY);
     let halved = |step: u32| extent * libm::exp2(-f64::from(step));
-    let is_too_wide = |&step: &u32| family.typical_chance(halved(step) as f32) > too_wide;
-    let first = (1..MOST_HALVINGS).find(|step| !is_too_wide(step));
-    for step in
-        first.into_iter().flat_map(|first| first..=HALVINGS.max(first + HALVINGS_NOT_TOO_WIDE))
-    {
-        let delta = halved(step);
-        if delta < least || family.typical_chance(delta as f32) < too_narrow {
+    let is_too_wide = |step: u32| chance(halved(step)) > too_wide;
+    let first = (1..MOST_HALVINGS).find(|&step| !is_too_wide(step));
+    let steps = first.map(|first| first..=HALVINGS.max(first + HALVINGS_NOT_TOO_WIDE));
+    for delta in steps.into_iter().flatten().map(halved) {
+        if delta < least || chance(delta) < too_narrow {
             break;
         }
         let value = value(delta);
@@ -216,72 +181,41 @@ fn choose<const D: usize>(
             break;
         }
     }
+    // The fine ladder reaches beyond the coarse one, but not where its limit is one of an image.
+    let keeps_to_limit = is_of_candidates && settings.candidates_keep_to_limit;
+    let most_chance = if keeps_to_limit { too_wide } else { f32::INFINITY };
     let fine: Vec<(f64, f64)> = (1 - FINE..2 * FINE)
         .map(|step| coarse * libm::exp2(f64::from(step) / f64::from(FINE)))
-        .filter(|&delta| {
-            delta >= least
-                && family.typical_chance(delta as f32) >= too_narrow
-                && family.typical_chance(delta as f32) <= most_chance
-        })
+        .filter(|&delta| delta >= least && (too_narrow..=most_chance).contains(&chance(delta)))
         .map(|delta| (delta, value(delta)))
         .collect();
     let most = fine.iter().map(|&(_, value)| value).fold(f64::NEG_INFINITY, f64::max);
-    let near = |&&(_, value): &&(f64, f64)| value >= prefer.near_most() * most || value == most;
-    match prefer {
-        Prefer::Wide => fine.iter().rev().find(near).map(|x| x.0),
-        Prefer::Narrow | Prefer::NarrowOfScored => {
-            let beyond_edge = match prefer {
-                Prefer::NarrowOfScored => BEYOND_EDGE_OF_SCORED,
-                _ => BEYOND_EDGE,
-            };
-            // Some way across the plateau, in logarithm: its very edge is a matter of luck.
-            let (Some(low), Some(high)) = (fine.iter().find(near), fine.iter().rev().find(near))
-            else {
-                return None;
-            };
-            let (low, high) = (low.0, high.0);
-            let (across, most) = match family {
-                Family::Planes { .. } => (ACROSS_OF_PLANES, f64::INFINITY),
-                Family::Lines { .. } | Family::Candidates { .. } if !settings.keeps_near_edge => {
-                    (ACROSS, f64::INFINITY)
-                }
-                Family::Lines { .. } | Family::Candidates { .. } => {
-                    (ACROSS, beyond_edge * edge(coarse, &value).max(least))
-                }
-            };
-            Some((low * libm::pow(high / low, across)).min(most))
-        }
-    }
+    let as_good = if beyond_edge.is_some() { AS_GOOD.1 } else { AS_GOOD.0 };
+    let near = |&&(_, value): &&(f64, f64)| value >= as_good * most || value == most;
+    let (low, high) = (fine.iter().find(near)?.0, fine.iter().rev().find(near)?.0);
+    let Some(beyond_edge) = beyond_edge else { return Some(high) };
+    let across = |share: f64| low * libm::pow(high / low, share);
+    Some(match is_of_planes {
+        true => across(ACROSS_OF_PLANES),
+        false if !settings.keeps_near_edge => across(ACROSS),
+        false => across(ACROSS).min(beyond_edge * edge(coarse, &value).max(least)),
+    })
 }
 
-/// A chance that goes with the share of all records that a list holds: `factor * share^power`.
-struct Limit {
-    factor: f64,
-    power: f64,
-}
-
-impl Limit {
-    fn at(&self, share: f64) -> f32 {
-        (self.factor * libm::pow(share, self.power)) as f32
-    }
-}
-
-/// A delta with more chance than the first is too wide whatever else, one with less than the second too narrow.
+/// A delta with more chance than the first is never too wide, whatever else; one with less than the second is too narrow.
 ///
 /// Where a list holds a share `s` of all records, neighbors are within a ball that holds as much of the map.
 /// A random line passes as near with a chance of `s^(2/3)` if points fill space and `s^2` if they lie on a curve; a
 /// random plane with `s^(1/3)` and `s`.
-fn limits<const D: usize>(family: &Family<'_, D>) -> (Limit, Limit) {
-    let none = || Limit { factor: 0.0, power: 1.0 };
+fn limits<const D: usize>(family: &Family<'_, D>, share: f64) -> (f32, f32) {
+    let power = |factor: f64, power: f64| (factor * libm::pow(share, power)) as f32;
     match family {
-        _ if !Settings::of_dimension::<D>().limits_by_share => (none(), none()),
-        Family::Planes { .. } => {
-            (Limit { factor: 0.5, power: 0.5 }, Limit { factor: 1.0, power: 1.0 })
-        }
+        _ if !Settings::of_dimension::<D>().limits_by_share => (0.0, 0.0),
+        Family::Planes { .. } => (power(0.5, 0.5), power(1.0, 1.0)),
+        // Rays are dense near their centers, so that chance is large at a typical place.
+        _ if family.is_of_rays() => (power(3.0, 2.0 / 3.0), power(1.0, 2.0)),
         Family::Lines { .. } | Family::Candidates { .. } => {
-            // Rays are dense near their centers, so that chance is large at a typical place.
-            let factor = if family.is_of_rays() { 3.0 } else { 1.0 };
-            (Limit { factor, power: 2.0 / 3.0 }, Limit { factor: 1.0, power: 2.0 })
+            (power(1.0, 2.0 / 3.0), power(1.0, 2.0))
         }
     }
 }
@@ -307,12 +241,12 @@ fn edge(coarse: f64, value: &impl Fn(f64) -> f64) -> f64 {
 
 fn sample_chunks(n_slots: usize, sample: usize, seed: u64) -> Vec<usize> {
     let n_chunks = n_slots.div_ceil(CHUNK);
-    let mut chunks: Vec<usize> = if n_chunks <= sample {
-        (0..n_chunks).collect()
-    } else {
-        let mut draws = Draws::new(seed, Stage::DeltaSlots, 0);
-        (0..sample).map(|_| draws.below(n_chunks as u64) as usize).collect()
-    };
+    if n_chunks <= sample {
+        return (0..n_chunks).collect();
+    }
+    let mut draws = Draws::new(seed, Stage::DeltaSlots, 0);
+    let mut chunks: Vec<usize> =
+        (0..sample).map(|_| draws.below(n_chunks as u64) as usize).collect();
     chunks.sort_unstable();
     chunks.dedup();
     chunks

@@ -1,6 +1,6 @@
 //! What recovery learns of a map before any point is placed.
 
-use crate::recover::map::bytes::{Reader, Writer};
+use crate::recover::map::bytes::Reader;
 use crate::recover::map::chance::{CandidateField, ChanceField, tube};
 use crate::recover::map::family::Chance;
 use crate::recover::options::{Delta, RecoverOptions};
@@ -60,31 +60,31 @@ impl<const D: usize> Model<D> {
 
     /// The model as bytes: a few hundred kilobytes at most, the same on every machine.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let mut to = Writer::default();
         let RecoverOptions { delta, seed, exact_constraints, .. } = self.options;
-        to.bytes(&MAGIC);
-        to.bytes(&[D as u8, u8::from(exact_constraints)]);
-        to.u64(seed);
+        let mut to = MAGIC.to_vec();
+        to.extend([D as u8, u8::from(exact_constraints)]);
+        to.extend(seed.to_le_bytes());
         // No given delta is 0.
-        to.f64(if let Delta::Fixed(delta) = delta { delta } else { 0.0 });
-        to.bytes(&self.map.0);
+        let given = if let Delta::Fixed(delta) = delta { delta } else { 0.0 };
+        to.extend(given.to_le_bytes());
+        to.extend(self.map.0);
         let order = RowOrder::STATED.iter().position(|&order| order == self.about.order);
         let by_oracle = self.about.lists_by == ListsBy::Oracle;
-        to.bytes(&[order.map_or(UNSTATED, |at| at as u8), u8::from(by_oracle)]);
-        to.f64(self.delta);
+        to.extend([order.map_or(UNSTATED, |at| at as u8), u8::from(by_oracle)]);
+        to.extend(self.delta.to_le_bytes());
         match &self.chance {
             Chance::Lines(fields) => {
-                to.bytes(&[1]);
-                to.u64(fields.len() as u64);
+                to.push(1);
+                to.extend((fields.len() as u64).to_le_bytes());
                 fields.iter().for_each(|field| field.write(&mut to));
             }
-            Chance::Planes => to.bytes(&[2]),
+            Chance::Planes => to.push(2),
             Chance::Candidates(field) => {
-                to.bytes(&[3]);
+                to.push(3);
                 field.write(&mut to);
             }
         }
-        to.into_bytes()
+        to
     }
 
     /// The model that [`to_bytes`](Self::to_bytes) gave.
@@ -92,18 +92,18 @@ impl<const D: usize> Model<D> {
     /// # Errors
     /// When `bytes` are anything else, or a model in another number of dimensions.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
-        let mut from = Reader::new("model", bytes);
+        let wrong = |expected: &str, found: String| Error::new("model", expected, found);
+        let mut from = Reader(bytes);
         let magic: [u8; 8] = from.array()?;
         if magic != MAGIC {
-            return Err(Error::new("model", "a model of this version", "other bytes"));
+            return Err(wrong("a model of this version", "other bytes".into()));
         }
         let [dimensions, exact_constraints] = from.array()?;
         if usize::from(dimensions) != D {
-            let expected = format!("a model in {D} dimensions");
-            return Err(Error::new("model", expected, dimensions.to_string()));
+            return Err(wrong(&format!("a model in {D} dimensions"), dimensions.to_string()));
         }
-        let seed = from.u64()?;
-        let given = from.f64()?;
+        let seed = u64::from_le_bytes(from.array()?);
+        let given = f64::from_le_bytes(from.array()?);
         let delta = if given == 0.0 { Delta::Auto } else { Delta::Fixed(given) };
         let exact_constraints = exact_constraints != 0;
         let options = RecoverOptions { delta, seed, exact_constraints, confidence: false };
@@ -114,13 +114,13 @@ impl<const D: usize> Model<D> {
             UNSTATED => RowOrder::Unstated,
             at => *RowOrder::STATED
                 .get(usize::from(at))
-                .ok_or_else(|| Error::new("model", "an order of rows", at.to_string()))?,
+                .ok_or_else(|| wrong("an order of rows", at.to_string()))?,
         };
         let lists_by = if by_oracle == 0 { ListsBy::Unstated } else { ListsBy::Oracle };
         let about = About { map: Some(map), order, lists_by };
-        let delta = from.f64()?;
+        let delta = f64::from_le_bytes(from.array()?);
         if !(delta >= 0.0 && (delta as f32).is_finite()) {
-            return Err(Error::new("model", "a delta that is a length", delta.to_string()));
+            return Err(wrong("a delta that is a length", delta.to_string()));
         }
         let [kind] = from.array()?;
         let chance = match kind {
@@ -131,11 +131,11 @@ impl<const D: usize> Model<D> {
             }
             2 => Chance::Planes,
             3 => Chance::Candidates(CandidateField::read(&mut from)?),
-            other => {
-                return Err(Error::new("model", "a kind of chance from 1 to 3", other.to_string()));
-            }
+            other => return Err(wrong("a kind of chance from 1 to 3", other.to_string())),
         };
-        from.end()?;
-        Ok(Self { options, map, about, delta, chance })
+        match from.0.len() {
+            0 => Ok(Self { options, map, about, delta, chance }),
+            n => Err(wrong("its end", format!("{n} more bytes"))),
+        }
     }
 }

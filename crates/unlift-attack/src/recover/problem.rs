@@ -6,10 +6,9 @@ use crate::density::{Peaks, tomography};
 use crate::neighbors::Neighborhoods;
 use crate::recover::assignment::descriptor_rows;
 use crate::recover::confidence::crowd::{Seen, Solved};
-use crate::recover::joint::Joint;
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::Graph;
-use crate::recover::map::lists::{Lists, Slots};
+use crate::recover::map::lists::Slots;
 use crate::recover::model::Model;
 use crate::recover::options::{Delta, RecoverOptions};
 use crate::recover::published_density::published;
@@ -17,7 +16,7 @@ use crate::recover::ransac::Ransac;
 use crate::recover::records_alone::{self, Placement};
 use crate::recover::result::{Estimate, Recovered, TrialCounts, Unknown};
 use crate::recover::solver::Builtin;
-use crate::recover::{confidence, consensus, delta, exact};
+use crate::recover::{confidence, consensus, delta, exact, joint};
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, Fingerprint};
 
@@ -28,7 +27,6 @@ pub(super) struct Problem<'a, const D: usize> {
     lists: &'a Neighborhoods,
     solver: Builtin,
     options: RecoverOptions,
-    /// The distance up to which a record supports a place, in the unit of the map.
     delta: f64,
     records: Records<'a, D>,
     trials: TrialCounts,
@@ -50,9 +48,7 @@ enum Records<'a, const D: usize> {
 
 impl<'a, const D: usize> Problem<'a, D> {
     /// `released` with its `lists`; what a model would say is learned here.
-    ///
-    /// # Errors
-    /// When options are out of range, or the lists are of another map.
+    /// Fails when options are out of range, or the lists are of another map.
     pub(super) fn new(
         released: &'a Released<D>,
         lists: &'a Neighborhoods,
@@ -62,18 +58,7 @@ impl<'a, const D: usize> Problem<'a, D> {
         Self::make(released, lists, solver, options, None)
     }
 
-    /// `released` with some of its lists, and the `model` made of it and all of them.
-    ///
-    /// # Errors
-    /// When the model or the lists are of another map.
-    pub(super) fn with_model(
-        released: &'a Released<D>,
-        lists: &'a Neighborhoods,
-        model: &Model<D>,
-    ) -> Result<Self, Error> {
-        Self::make(released, lists, Builtin::Consensus, &model.options, Some(model))
-    }
-
+    /// [`new`](Self::new), where the lists may be some of those that a `model` was made of.
     fn make(
         released: &'a Released<D>,
         lists: &'a Neighborhoods,
@@ -86,9 +71,10 @@ impl<'a, const D: usize> Problem<'a, D> {
         let map = released.fingerprint();
         map.expect(lists.about().map)?;
         map.expect(model.map(|model| model.map)).map_err(|error| error.within("model"))?;
-        let (records, delta) = match solver {
-            Builtin::Density => Self::at_peaks(published(released)),
-            Builtin::Tomography => Self::at_peaks(tomography(released)),
+        let at_peaks = |peaks: Peaks| (records_alone::delta(&peaks), Records::Alone(peaks));
+        let (delta, records) = match solver {
+            Builtin::Density => at_peaks(published(released)),
+            Builtin::Tomography => at_peaks(tomography(released)),
             Builtin::Consensus | Builtin::Joint | Builtin::JointStart | Builtin::Ransac => {
                 Self::listed(released, lists, solver, options, model)?
             }
@@ -97,27 +83,19 @@ impl<'a, const D: usize> Problem<'a, D> {
         Ok(Self { released, map, lists, solver, options: *options, delta, records, trials })
     }
 
-    fn at_peaks(peaks: Peaks) -> (Records<'a, D>, f64) {
-        let delta = records_alone::delta(&peaks);
-        (Records::Alone(peaks), delta)
-    }
-
     fn listed(
         released: &'a Released<D>,
         lists: &'a Neighborhoods,
         solver: Builtin,
         options: &RecoverOptions,
         model: Option<&Model<D>>,
-    ) -> Result<(Records<'a, D>, f64), Error> {
-        let family = match model {
-            Some(model) => Family::with_chance(released, model.chance.clone())?,
-            None => Family::learn(released, lists),
-        };
+    ) -> Result<(f64, Records<'a, D>), Error> {
+        let family = Family::new(released, lists, model.map(|model| model.chance.clone()))?;
         // Joint recovery also asks who lists whom, from the first pass on.
         let is_joint = matches!(solver, Builtin::Joint | Builtin::JointStart);
         let graph = is_joint.then(|| Graph::new(lists, released.slots_per_record()));
         let single = graph.as_ref().filter(|_| released.slots_per_record() == 1);
-        let both_ways = single.map(Graph::neighborhoods).transpose()?;
+        let both_ways = single.map(Graph::neighborhoods);
         let delta = match (model, options.delta) {
             (Some(model), _) => model.delta,
             (None, Delta::Fixed(delta)) => delta,
@@ -126,13 +104,11 @@ impl<'a, const D: usize> Problem<'a, D> {
                 delta::learn(released, &family, (used, lists), is_joint, options.seed)
             }
         };
-        Ok((Records::Listed { family, graph, both_ways }, delta))
+        Ok((delta, Records::Listed { family, graph, both_ways }))
     }
 
     /// What was learned of the map.
-    ///
-    /// # Errors
-    /// When the solver does not read lists.
+    /// Fails when the solver does not read lists.
     pub(super) fn model(&self) -> Result<Model<D>, Error> {
         let Records::Listed { family, .. } = &self.records else {
             return Err(Error::new(
@@ -159,10 +135,9 @@ impl<'a, const D: usize> Problem<'a, D> {
                 let (seed, trials) = (self.options.seed, &self.trials);
                 Ransac { family, lists, delta, seed, trials }.solve(slots)
             }
-            // Joint recovery starts from who lists whom in both directions, where a record hides one point.
             Records::Listed { family, both_ways, .. } => {
-                let lists = Lists::Given(both_ways.as_ref().unwrap_or(lists));
-                consensus::solve(family, lists, delta, Slots::Range(slots))
+                let lists = both_ways.as_ref().unwrap_or(lists);
+                consensus::solve(family, lists, delta, &Slots::range(slots))
             }
         }
     }
@@ -172,17 +147,15 @@ impl<'a, const D: usize> Problem<'a, D> {
         match &self.records {
             Records::Listed { family, graph: Some(graph), .. } if self.solver == Builtin::Joint => {
                 let (delta, seed) = (self.delta as f32, self.options.seed);
-                Joint { family, graph, delta, seed }.recover(start)
+                joint::recover(family, graph, delta, seed, start)
             }
             _ => start,
         }
     }
 
-    /// Recovered points from the last estimates of all slots: exact constraints are met where a rule fixes coordinates, and it
-    /// is said how sure the attacker is. Beside it what confidence is made of, if it `is_asked` for.
-    ///
-    /// # Errors
-    /// When there is not one estimate per slot.
+    /// Recovered points from the last estimates of all slots, with exact constraints and confidence. Beside it what confidence
+    /// is made of, if it `is_asked` for.
+    /// Fails when there is not one estimate per slot.
     pub(super) fn finish(
         &self,
         estimates: Vec<Estimate<D>>,
@@ -193,10 +166,7 @@ impl<'a, const D: usize> Problem<'a, D> {
     }
 
     /// [`finish`](Self::finish), where it is known which descriptor is whose.
-    ///
-    /// # Errors
-    /// When there is not one estimate per slot.
-    pub(super) fn finish_with(
+    fn finish_with(
         &self,
         unsettled: Vec<Estimate<D>>,
         descriptor_row: Option<Vec<u32>>,
@@ -206,19 +176,23 @@ impl<'a, const D: usize> Problem<'a, D> {
             let expected = format!("{}, one per slot", self.n_slots());
             return Err(Error::new("estimates", expected, unsettled.len().to_string()));
         }
-        let settled = self.settled(&unsettled);
-        let estimates = settled.as_deref().unwrap_or(&unsettled);
+        // Most schemes settle nothing: a copy of all estimates would double their memory.
+        let settled = self.is_settled().then(|| self.settled(unsettled.clone()));
+        let estimates = settled.as_ref().unwrap_or(&unsettled);
         let trials = (self.solver == Builtin::Ransac).then(|| self.trials.histogram());
         let recovered = self.in_columns(estimates, descriptor_row)?.with_trials(trials);
+        let nothing = |recovered: Recovered<D>, unknown: Unknown| {
+            Ok((recovered.without_confidence(unknown), Seen::NOTHING))
+        };
         if let Some(unknown) = confidence::not_asked::<D>(self.solver, &self.options) {
-            return Ok((recovered.without_confidence(unknown), Seen::NOTHING));
+            return nothing(recovered, unknown);
         }
         let Records::Listed { family, graph: Some(graph), .. } = &self.records else {
-            return Ok((recovered.without_confidence(Unknown::OtherSolver), Seen::NOTHING));
+            return nothing(recovered, Unknown::OtherSolver);
         };
         let unknown = confidence::unknown(self.released, self.lists, estimates);
         if let (Some(unknown), false) = (unknown, is_asked) {
-            return Ok((recovered.without_confidence(unknown), Seen::NOTHING));
+            return nothing(recovered, unknown);
         }
         let solved = Solved { estimates, unsettled: &unsettled, delta: self.delta as f32 };
         let (sure, seen) = confidence::look(family, graph, self.released, &solved);
@@ -230,17 +204,15 @@ impl<'a, const D: usize> Problem<'a, D> {
     }
 
     /// The first pass of joint recovery as [`Builtin::JointStart`] finishes it, beside the `last` one.
-    ///
-    /// # Errors
-    /// When there is not one estimate per slot.
+    /// Fails when there is not one estimate per slot.
     pub(super) fn finish_start(
         &self,
         start: Vec<Estimate<D>>,
         last: &Recovered<D>,
     ) -> Result<Recovered<D>, Error> {
-        let start = if self.is_settled() { self.settle(start) } else { start };
         let rows = last.descriptor_row().map(<[u32]>::to_vec);
-        Ok(self.in_columns(&start, rows)?.without_confidence(Unknown::OtherSolver))
+        let recovered = self.in_columns(&self.settle(start), rows)?;
+        Ok(recovered.without_confidence(Unknown::OtherSolver))
     }
 
     /// Whether a rule of the scheme moves estimates. The paper's loop stays as published.
@@ -250,22 +222,23 @@ impl<'a, const D: usize> Problem<'a, D> {
         asked && listed && exact::can_settle(self.released)
     }
 
+    /// Estimates moved to where rules of the scheme allow them to be.
     fn settle(&self, estimates: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
-        exact::settle(self.released, estimates, self.delta)
+        match self.is_settled() {
+            true => exact::settle(self.released, estimates, self.delta),
+            false => estimates,
+        }
     }
 
-    /// Estimates moved to where rules allow them to be, if they move any; joint recovery may go on from there.
-    fn settled(&self, estimates: &[Estimate<D>]) -> Option<Vec<Estimate<D>>> {
-        if !self.is_settled() {
-            return None;
-        }
-        let mut settled = self.settle(estimates.to_vec());
+    /// Estimates of which a rule of the scheme fixes coordinates; joint recovery goes on from there.
+    fn settled(&self, estimates: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
+        let mut settled = self.settle(estimates);
         if self.solver == Builtin::Joint {
             for _ in 0..exact::feeds(self.released) {
                 settled = self.settle(self.refine(settled));
             }
         }
-        Some(settled)
+        settled
     }
 
     /// Estimates in columns, by rows of descriptors where these are known.
@@ -286,10 +259,8 @@ impl<'a, const D: usize> Problem<'a, D> {
     }
 }
 
-// Whether lists and records go together, and can be solved as it is asked.
-
 /// Refuses rays that are compared with all others of their anchor, which takes all lists.
-pub(super) fn check_anchors<const D: usize>(released: &Released<D>) -> Result<(), Error> {
+fn check_anchors<const D: usize>(released: &Released<D>) -> Result<(), Error> {
     match released.obfuscation() {
         Obfuscation::Rays(rays) if rays.regions().is_some() => {
             Err(Error::new("records of parts", "such as say nothing about others", "anchors"))
@@ -347,7 +318,9 @@ impl<const D: usize> Model<D> {
             let expected = format!("a range of whole records, {per_record} slots each");
             return Err(Error::new("slots", expected, format!("{slots:?}")));
         }
-        let estimates = Problem::with_model(released, lists, self)?.solve(slots.clone());
+        let estimates =
+            Problem::make(released, lists, Builtin::Consensus, &self.options, Some(self))?
+                .solve(slots.clone());
         let records = slots.start / per_record..slots.end / per_record;
         let descriptor_row = descriptor_rows(released, lists, records);
         Ok(Part { estimates, descriptor_row })
@@ -369,16 +342,11 @@ impl<const D: usize> Model<D> {
             estimates.extend(part.estimates);
             rows.extend(part.descriptor_row.into_iter().flatten());
         }
-        let lists = Neighborhoods::of_slots(
-            0,
-            &[0],
-            Vec::new(),
-            None,
-            (released.n_records(), released.slots_per_record()),
-        )?;
-        let lists = lists.with_about(self.about);
+        let none = Neighborhoods::unchecked(vec![0; released.n_slots() + 1], Vec::new());
+        let lists = none.with_about(self.about);
         let has_rows = released.slots_per_record() == 2 && released.descriptors().is_some();
-        let problem = Problem::with_model(released, &lists, self)?;
+        let problem =
+            Problem::make(released, &lists, Builtin::Consensus, &self.options, Some(self))?;
         problem
             .finish_with(estimates, has_rows.then_some(rows), false)
             .map(|(recovered, _)| recovered)

@@ -1,18 +1,17 @@
 //! The published density attacks, for comparison: constants as published, nothing read but the records.
 //!
-//! One point per line (Chelani et al., CVPR 2021): the nearest lines vote where they pass; the peak of
-//! the votes is the estimate; then lines vote again, chosen near the present estimates. Two points per
-//! line (Lee et al., CVPR 2023): the two highest peaks of a kernel density of the votes. Rays (Moon et
-//! al., CVPR 2024): rays of other centers vote, once. (Paper, supplement, "Comparison to other 3D line recoveries".)
+//! One point per line (Chelani et al., CVPR 2021): the nearest lines vote where they pass, the peak of the votes is the estimate,
+//! and lines near the estimates vote again. Two points per line (Lee et al., CVPR 2023): the two highest peaks of a kernel
+//! density of the votes. Rays (Moon et al., CVPR 2024): rays of other centers vote once.
 //!
-//! The published programs read more than the records: votes counted from the true point, a line that
-//! votes for itself exactly there, ranges from true distances. Here votes are counted from the foot, a line
-//! has no vote of its own, ranges come from the votes.
+//! The published programs count votes from the true point and take ranges from true distances. Here votes are counted from the
+//! foot of the line, a line has no vote of its own, and ranges come from the votes.
 
 use rayon::prelude::*;
 
 use crate::density::feasible::{Feasible, FeasibleLine, Hides};
 use crate::density::{Peak, Peaks};
+use crate::geometry::vector::{dot, sub, widen};
 use crate::released::Released;
 use crate::simd::{Kernel, dispatch};
 
@@ -42,39 +41,27 @@ pub(crate) fn published<const D: usize>(released: &Released<D>) -> Peaks {
     let lines = &feasible.lines;
     let every = lines.len().div_ceil(MOST_VOTERS);
     let voters: Vec<u32> = (0..lines.len() as u32).step_by(every).collect();
-    let columns = LineColumns::new(lines, &voters);
+    let columns = Columns::new(voters.iter().map(|&voter| row(&lines[voter as usize])));
     let (most, share) = if feasible.hides == Hides::Two { COARSE_OF_PAIRS } else { COARSE };
     let k = most.min((share * lines.len() as f64) as usize).max(2);
-    let vote = |scratch: &mut Scratch, row: usize| {
-        columns.distances_to_line(&lines[row], &mut scratch.distances);
-        scratch.silence(row, lines, &voters);
-        let reach = nearest(&scratch.distances, k, &mut scratch.keys, &mut scratch.near);
-        let near = scratch.near.iter().map(|&at| &lines[voters[at as usize] as usize]);
-        passes(&lines[row], near, &mut scratch.votes);
-        reach
+    let place = |row: usize| {
+        let mut distances = columns.map(|other| between(&lines[row], other));
+        silence(&mut distances, row, lines, &voters);
+        let (near, reach) = nearest(&distances, k);
+        let near = near.iter().map(|&at| &lines[voters[at as usize] as usize]);
+        let mut votes = passes(&lines[row], near);
+        let found = match feasible.hides {
+            Hides::Two => two_crowds(&mut votes).map(|pair| pair.map(Some)),
+            _ => crowd(&mut votes).map(|t| [Some(t), None]),
+        };
+        let peaks = found.unwrap_or_default().map(|t| t.and_then(|t| on(&lines[row], t)));
+        (peaks, reach)
     };
-    let place = |row: usize, t: f64| on(&lines[row], t);
-    if feasible.hides == Hides::Two {
-        let rows: Vec<([Option<Peak>; 2], f32)> = (0..lines.len())
-            .into_par_iter()
-            .map_init(Scratch::default, |scratch, row| {
-                let reach = vote(scratch, row);
-                let found = two_crowds(&mut scratch.votes);
-                (found.map_or([None; 2], |pair| pair.map(|t| place(row, t))), reach)
-            })
-            .collect();
-        let resolution = median(rows.iter().map(|row| row.1));
-        return Peaks { of: rows.into_iter().flat_map(|row| row.0).collect(), resolution };
-    }
-    let rows: Vec<(Option<Peak>, f32)> = (0..lines.len())
-        .into_par_iter()
-        .map_init(Scratch::default, |scratch, row| {
-            let reach = vote(scratch, row);
-            (crowd(&mut scratch.votes).and_then(|t| place(row, t)), reach)
-        })
-        .collect();
+    let rows: Vec<([Option<Peak>; 2], f32)> = (0..lines.len()).into_par_iter().map(place).collect();
     let resolution = median(rows.iter().map(|row| row.1));
-    let mut of: Vec<Option<Peak>> = rows.into_iter().map(|row| row.0).collect();
+    let per_record = if feasible.hides == Hides::Two { 2 } else { 1 };
+    let peaks = rows.into_iter().flat_map(|row| row.0.into_iter().take(per_record));
+    let mut of: Vec<Option<Peak>> = peaks.collect();
     if feasible.hides == Hides::One {
         for _ in 0..REFINEMENTS {
             of = refine(lines, &voters, &columns, &of);
@@ -87,76 +74,58 @@ pub(crate) fn published<const D: usize>(released: &Released<D>) -> Peaks {
 fn refine(
     lines: &[FeasibleLine],
     voters: &[u32],
-    columns: &LineColumns,
+    columns: &Columns<6>,
     estimates: &[Option<Peak>],
 ) -> Vec<Option<Peak>> {
-    let points = PointColumns::new(estimates, voters);
-    let step = |scratch: &mut Scratch, row: usize| {
+    let point = |&voter: &u32| estimates[voter as usize].map_or([f32::NAN; 3], |p| p.position);
+    let points = Columns::new(voters.iter().map(point));
+    let step = |row: usize| {
         let estimate = estimates[row]?;
-        points.distances_to_line(&lines[row], &mut scratch.distances);
-        scratch.silence(row, lines, voters);
-        nearest(&scratch.distances, REFINE, &mut scratch.keys, &mut scratch.near);
-        columns.distances_to_point(&estimate.position, &mut scratch.distances);
-        scratch.silence(row, lines, voters);
-        nearest(&scratch.distances, REFINE, &mut scratch.keys, &mut scratch.passing);
-        scratch.passing.sort_unstable();
-        let passes_too = |at: &u32| scratch.passing.binary_search(at).is_ok();
-        let both: Vec<u32> = scratch.near.iter().copied().filter(passes_too).collect();
-        let chosen = if both.len() > FEWEST { &both } else { &scratch.near };
+        let FeasibleLine { through, direction, .. } = lines[row];
+        let mut distances = points.map(|point| from_line(point, through, direction));
+        silence(&mut distances, row, lines, voters);
+        let (near, _) = nearest(&distances, REFINE);
+        let to_line =
+            |[x, y, z, u, v, w]: [f32; 6]| from_line(estimate.position, [x, y, z], [u, v, w]);
+        let mut distances = columns.map(to_line);
+        silence(&mut distances, row, lines, voters);
+        let (mut passing, _) = nearest(&distances, REFINE);
+        passing.sort_unstable();
+        let passes_too = |at: &u32| passing.binary_search(at).is_ok();
+        let both: Vec<u32> = near.iter().copied().filter(passes_too).collect();
+        let chosen = if both.len() > FEWEST { &both } else { &near };
         let near = chosen.iter().map(|&at| &lines[voters[at as usize] as usize]);
-        passes(&lines[row], near, &mut scratch.votes);
-        crowd(&mut scratch.votes).and_then(|t| on(&lines[row], t)).or(Some(estimate))
+        let mut votes = passes(&lines[row], near);
+        crowd(&mut votes).and_then(|t| on(&lines[row], t)).or(Some(estimate))
     };
-    (0..lines.len()).into_par_iter().map_init(Scratch::default, step).collect()
+    (0..lines.len()).into_par_iter().map(step).collect()
 }
 
-#[derive(Default)]
-struct Scratch {
-    distances: Vec<f32>,
-    keys: Vec<u64>,
-    near: Vec<u32>,
-    passing: Vec<u32>,
-    votes: Vec<f64>,
-}
-
-impl Scratch {
-    /// Takes the vote of the line itself, and of rays of its center.
-    fn silence(&mut self, row: usize, lines: &[FeasibleLine], voters: &[u32]) {
-        let own = lines[row].group;
-        if own.is_some() {
-            for (distance, &voter) in self.distances.iter_mut().zip(voters) {
-                if lines[voter as usize].group == own {
-                    *distance = f32::INFINITY;
-                }
+/// Takes the votes, by their `distances`, of the line of `row` itself, or of all rays of its center.
+fn silence(distances: &mut [f32], row: usize, lines: &[FeasibleLine], voters: &[u32]) {
+    let own = lines[row].group;
+    if own.is_some() {
+        for (distance, &voter) in distances.iter_mut().zip(voters) {
+            if lines[voter as usize].group == own {
+                *distance = f32::INFINITY;
             }
-        } else if let Ok(at) = voters.binary_search(&(row as u32)) {
-            self.distances[at] = f32::INFINITY;
         }
+    } else if let Ok(at) = voters.binary_search(&(row as u32)) {
+        distances[at] = f32::INFINITY;
     }
 }
 
 /// The parameters at which `line` is passed most closely by each of `others`; parallel ones do not tell.
-fn passes<'a>(
-    line: &FeasibleLine,
-    others: impl Iterator<Item = &'a FeasibleLine>,
-    out: &mut Vec<f64>,
-) {
-    out.clear();
-    for other in others {
-        let (mut along, mut own, mut cosine) = (0.0f64, 0.0f64, 0.0f64);
-        for c in 0..3 {
-            let away = f64::from(line.through[c]) - f64::from(other.through[c]);
-            let (d, e) = (f64::from(line.direction[c]), f64::from(other.direction[c]));
-            own += away * d;
-            along += away * e;
-            cosine += d * e;
-        }
+fn passes<'a>(line: &FeasibleLine, others: impl Iterator<Item = &'a FeasibleLine>) -> Vec<f64> {
+    let (through, direction) = (widen(&line.through), widen(&line.direction));
+    let pass = |other: &FeasibleLine| {
+        let (away, e) = (sub(&through, &widen(&other.through)), widen(&other.direction));
+        let cosine = dot(&direction, &e);
         let square_sine = 1.0 - cosine * cosine;
-        let t = (cosine * along - own) / square_sine;
-        if square_sine > 1e-6 && t > f64::from(line.from) {
-            out.push(t);
-        }
-    }
+        let t = (cosine * dot(&away, &e) - dot(&away, &direction)) / square_sine;
+        (square_sine > 1e-6 && t > f64::from(line.from)).then_some(t)
+    };
+    others.filter_map(pass).collect()
 }
 
 fn on(line: &FeasibleLine, t: f64) -> Option<Peak> {
@@ -186,7 +155,7 @@ const EVEN: f64 = 0.3;
 
 /// The middle of the crowd that `votes` (reordered) form, by Chelani et al.: where the cumulative votes
 /// rise most above even ones, again and again. `None` without votes.
-pub(super) fn crowd(votes: &mut [f64]) -> Option<f64> {
+fn crowd(votes: &mut [f64]) -> Option<f64> {
     votes.sort_unstable_by(f64::total_cmp);
     let all: &[f64] = votes;
     let mut left = if all.len() > 2 * CUT { &all[CUT..all.len() - CUT] } else { all };
@@ -245,7 +214,7 @@ const FAR: f64 = 0.01;
 
 /// The two highest peaks of the density of `votes` (reordered), in ascending order, by Lee et al.; twice
 /// the same if there is one peak. `None` without votes.
-pub(super) fn two_crowds(votes: &mut [f64]) -> Option<[f64; 2]> {
+fn two_crowds(votes: &mut [f64]) -> Option<[f64; 2]> {
     votes.sort_unstable_by(f64::total_cmp);
     let cut = (FAR * votes.len() as f64).ceil() as usize;
     let kept = votes.get(cut..votes.len().saturating_sub(cut)).filter(|kept| !kept.is_empty());
@@ -285,130 +254,76 @@ pub(super) fn two_crowds(votes: &mut [f64]) -> Option<[f64; 2]> {
     Some([pair[0].min(pair[1]), pair[0].max(pair[1])])
 }
 
-// Distances from one line or point to all lines: the hot loops of the published attacks.
+// Distances to all lines or estimates: the hot loops of the published attacks.
 
-/// Lines with a column per coordinate, so that distances to all of them run over whole vectors.
+/// Rows of numbers with a column per number, so that a function of every row runs over whole vectors.
 #[derive(Debug)]
-pub(super) struct LineColumns {
-    through: [Vec<f32>; 3],
-    direction: [Vec<f32>; 3],
-}
+struct Columns<const N: usize>([Vec<f32>; N]);
 
-impl LineColumns {
-    /// The lines `rows` of `lines`.
-    pub(super) fn new(lines: &[FeasibleLine], rows: &[u32]) -> Self {
-        let column = |of: &dyn Fn(&FeasibleLine) -> f32| -> Vec<f32> {
-            rows.iter().map(|&row| of(&lines[row as usize])).collect()
-        };
-        Self {
-            through: std::array::from_fn(|c| column(&|line| line.through[c])),
-            direction: std::array::from_fn(|c| column(&|line| line.direction[c])),
+impl<const N: usize> Columns<N> {
+    fn new(rows: impl Iterator<Item = [f32; N]>) -> Self {
+        let mut columns = std::array::from_fn(|_| Vec::new());
+        for row in rows {
+            columns
+                .iter_mut()
+                .zip(row)
+                .for_each(|(column, x): (&mut Vec<f32>, f32)| column.push(x));
         }
+        Self(columns)
     }
 
-    /// Squared distances between `line` and every line; infinite for parallel ones.
-    pub(super) fn distances_to_line(&self, line: &FeasibleLine, out: &mut Vec<f32>) {
-        out.resize(self.through[0].len(), 0.0);
-        dispatch(LineToLines { columns: self, line, out });
-    }
-
-    /// Squared distances from `point` to every line.
-    pub(super) fn distances_to_point(&self, point: &[f32; 3], out: &mut Vec<f32>) {
-        out.resize(self.through[0].len(), 0.0);
-        dispatch(PointToLines { columns: self, point, out });
+    /// The function `of` of each row.
+    fn map(&self, of: impl Fn([f32; N]) -> f32) -> Vec<f32> {
+        let mut out = vec![0.0; self.0[0].len()];
+        dispatch(Map { columns: self, of, out: &mut out });
+        out
     }
 }
 
-/// Estimates with a column per coordinate; NaN where there is none.
-#[derive(Debug)]
-pub(super) struct PointColumns {
-    position: [Vec<f32>; 3],
-}
-
-impl PointColumns {
-    /// The rows `rows` of `estimates`.
-    pub(super) fn new(estimates: &[Option<Peak>], rows: &[u32]) -> Self {
-        let at = |row: u32, c: usize| estimates[row as usize].map_or(f32::NAN, |p| p.position[c]);
-        Self { position: std::array::from_fn(|c| rows.iter().map(|&row| at(row, c)).collect()) }
-    }
-
-    /// Squared distances from `line` to every estimate; infinite where there is none.
-    pub(super) fn distances_to_line(&self, line: &FeasibleLine, out: &mut Vec<f32>) {
-        out.resize(self.position[0].len(), 0.0);
-        dispatch(LineToPoints { columns: self, line, out });
-    }
-}
-
-struct LineToLines<'a> {
-    columns: &'a LineColumns,
-    line: &'a FeasibleLine,
+struct Map<'a, const N: usize, F> {
+    columns: &'a Columns<N>,
+    of: F,
     out: &'a mut [f32],
 }
 
-impl Kernel for LineToLines<'_> {
+impl<const N: usize, F: Fn([f32; N]) -> f32> Kernel for Map<'_, N, F> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let (p, d, n) = (self.line.through, self.line.direction, self.out.len());
-        let through: [&[f32]; 3] = std::array::from_fn(|c| &self.columns.through[c][..n]);
-        let direction: [&[f32]; 3] = std::array::from_fn(|c| &self.columns.direction[c][..n]);
-        for j in 0..n {
-            let e = [direction[0][j], direction[1][j], direction[2][j]];
-            let normal =
-                [d[1] * e[2] - d[2] * e[1], d[2] * e[0] - d[0] * e[2], d[0] * e[1] - d[1] * e[0]];
-            let (mut across, mut square) = (0.0, 0.0);
-            for c in 0..3 {
-                across += (through[c][j] - p[c]) * normal[c];
-                square += normal[c] * normal[c];
-            }
-            let parallel = square < 1e-6;
-            self.out[j] = if parallel { f32::INFINITY } else { across * across / square };
-        }
-    }
-}
-
-struct PointToLines<'a> {
-    columns: &'a LineColumns,
-    point: &'a [f32; 3],
-    out: &'a mut [f32],
-}
-
-impl Kernel for PointToLines<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let n = self.out.len();
-        let through: [&[f32]; 3] = std::array::from_fn(|c| &self.columns.through[c][..n]);
-        let direction: [&[f32]; 3] = std::array::from_fn(|c| &self.columns.direction[c][..n]);
-        for j in 0..n {
-            let away: [f32; 3] = std::array::from_fn(|c| self.point[c] - through[c][j]);
-            let d = [direction[0][j], direction[1][j], direction[2][j]];
-            self.out[j] = square_across(&away, &d);
-        }
-    }
-}
-
-struct LineToPoints<'a> {
-    columns: &'a PointColumns,
-    line: &'a FeasibleLine,
-    out: &'a mut [f32],
-}
-
-impl Kernel for LineToPoints<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let (p, d, n) = (self.line.through, self.line.direction, self.out.len());
-        let position: [&[f32]; 3] = std::array::from_fn(|c| &self.columns.position[c][..n]);
+        let columns = self.columns.0.each_ref().map(|column| &column[..self.out.len()]);
         for (j, out) in self.out.iter_mut().enumerate() {
-            let away: [f32; 3] = std::array::from_fn(|c| position[c][j] - p[c]);
-            let square = square_across(&away, &d);
-            *out = if square.is_nan() { f32::INFINITY } else { square };
+            *out = (self.of)(columns.map(|column| column[j]));
         }
     }
+}
+
+/// A line as a row: a point of it, then its direction.
+fn row(line: &FeasibleLine) -> [f32; 6] {
+    let ([x, y, z], [u, v, w]) = (line.through, line.direction);
+    [x, y, z, u, v, w]
+}
+
+/// The squared distance between `line` and the one in a row; infinite for parallel ones.
+#[inline(always)]
+fn between(line: &FeasibleLine, [x, y, z, u, v, w]: [f32; 6]) -> f32 {
+    let (p, d) = (line.through, line.direction);
+    let (q, e) = ([x, y, z], [u, v, w]);
+    let normal = [d[1] * e[2] - d[2] * e[1], d[2] * e[0] - d[0] * e[2], d[0] * e[1] - d[1] * e[0]];
+    let (mut across, mut square) = (0.0, 0.0);
+    for c in 0..3 {
+        across += (q[c] - p[c]) * normal[c];
+        square += normal[c] * normal[c];
+    }
+    if square < 1e-6 { f32::INFINITY } else { across * across / square }
+}
+
+/// The squared distance of `point` from the line through `through` along `direction`; infinite where there is no point.
+#[inline(always)]
+fn from_line(point: [f32; 3], through: [f32; 3], direction: [f32; 3]) -> f32 {
+    let away: [f32; 3] = std::array::from_fn(|c| point[c] - through[c]);
+    let square = square_across(&away, &direction);
+    if square.is_nan() { f32::INFINITY } else { square }
 }
 
 /// The squared length of the part of `v` perpendicular to `d`: no difference of large squares.
@@ -423,26 +338,26 @@ fn square_across(v: &[f32; 3], d: &[f32; 3]) -> f32 {
     square
 }
 
-/// The places of the `k` smallest finite distances (ties by place) into `near`, in no order; returns
-/// the largest of them, not squared.
-pub(super) fn nearest(squared: &[f32], k: usize, keys: &mut Vec<u64>, near: &mut Vec<u32>) -> f32 {
-    keys.clear();
+/// The places of the `k` smallest finite distances (ties by place), in no order; beside them the largest of these, not squared.
+fn nearest(squared: &[f32], k: usize) -> (Vec<u32>, f32) {
     // Distances are not negative, so their bits order as they do.
     let key = |(at, d): (usize, &f32)| u64::from(d.to_bits()) << 32 | at as u64;
-    keys.extend(squared.iter().enumerate().filter(|(_, d)| d.is_finite()).map(key));
+    let finite = squared.iter().enumerate().filter(|(_, d)| d.is_finite());
+    let mut keys: Vec<u64> = finite.map(key).collect();
     if keys.len() > k {
         keys.select_nth_unstable(k - 1);
         keys.truncate(k);
     }
-    near.clear();
-    near.extend(keys.iter().map(|&key| key as u32));
-    keys.iter().max().map_or(f32::INFINITY, |&key| f32::from_bits((key >> 32) as u32).sqrt())
+    let farthest = |&key: &u64| f32::from_bits((key >> 32) as u32).sqrt();
+    let reach = keys.iter().max().map_or(f32::INFINITY, farthest);
+    (keys.iter().map(|&key| key as u32).collect(), reach)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::seed::{Draws, Stage};
+    use crate::simd::portable;
 
     fn votes(crowds: &[(f64, usize)], strays: usize) -> Vec<f64> {
         let mut draws = Draws::new(8, Stage::Synthetic, 0);
@@ -469,13 +384,6 @@ mod tests {
         assert_eq!(two_crowds(&mut []), None);
         assert_eq!(two_crowds(&mut [2.0; 9]), Some([2.0; 2]));
     }
-}
-
-#[cfg(test)]
-mod columns_tests {
-    use super::*;
-    use crate::seed::{Draws, Stage};
-    use crate::simd::portable;
 
     fn lines(n: usize) -> Vec<FeasibleLine> {
         let mut draws = Draws::new(4, Stage::Synthetic, 0);
@@ -492,53 +400,40 @@ mod columns_tests {
     #[test]
     fn distances_between_lines_are_the_least_over_their_points() {
         let lines = lines(40);
-        let rows: Vec<u32> = (0..40).collect();
-        let columns = LineColumns::new(&lines, &rows);
-        let mut out = Vec::new();
-        columns.distances_to_line(&lines[0], &mut out);
-        assert_eq!(out[0], f32::INFINITY);
-        for (other, &squared) in lines.iter().zip(&out).skip(1) {
+        for other in &lines[1..] {
             // The nearest point of the first line, by golden steps of a convex function.
-            let mut to_point = vec![0.0];
-            let single = LineColumns::new(&[*other], &[0]);
-            let mut at = |t: f32| {
-                let point: [f32; 3] =
-                    std::array::from_fn(|c| lines[0].through[c] + t * lines[0].direction[c]);
-                single.distances_to_point(&point, &mut to_point);
-                to_point[0]
+            let at = |t: f32| {
+                let FeasibleLine { through, direction, .. } = lines[0];
+                let point = std::array::from_fn(|c| through[c] + t * direction[c]);
+                from_line(point, other.through, other.direction)
             };
             let (mut low, mut high) = (-1e3f32, 1e3f32);
             for _ in 0..100 {
                 let (a, b) = (low + 0.382 * (high - low), low + 0.618 * (high - low));
                 if at(a) < at(b) { high = b } else { low = a }
             }
-            let least = at(0.5 * (low + high));
+            let (least, squared) = (at(0.5 * (low + high)), between(&lines[0], row(other)));
             assert!((least.sqrt() - squared.sqrt()).abs() < 2e-3, "{least} {squared}");
         }
+        assert_eq!(between(&lines[0], row(&lines[0])), f32::INFINITY);
     }
 
     #[test]
     fn vector_and_portable_code_give_the_same_bits() {
         let lines = lines(101);
-        let rows: Vec<u32> = (0..101).collect();
-        let columns = LineColumns::new(&lines, &rows);
-        let (mut fast, mut plain) = (Vec::new(), vec![0.0; 101]);
-        columns.distances_to_line(&lines[7], &mut fast);
-        portable(LineToLines { columns: &columns, line: &lines[7], out: &mut plain });
-        assert_eq!(fast, plain);
-        let point = [0.3, -0.2, 1.0];
-        columns.distances_to_point(&point, &mut fast);
-        portable(PointToLines { columns: &columns, point: &point, out: &mut plain });
+        let columns = Columns::new(lines.iter().map(row));
+        let mut plain = vec![0.0; 101];
+        let of = |other: [f32; 6]| between(&lines[7], other);
+        let fast = columns.map(of);
+        portable(Map { columns: &columns, of, out: &mut plain });
         assert_eq!(fast, plain);
     }
 
     #[test]
     fn nearest_takes_the_smallest_and_counts_ties_by_place() {
-        let (mut keys, mut near) = (Vec::new(), Vec::new());
-        let squared = [4.0, f32::INFINITY, 1.0, 4.0, 0.0];
-        assert_eq!(nearest(&squared, 3, &mut keys, &mut near), 2.0);
+        let (mut near, reach) = nearest(&[4.0, f32::INFINITY, 1.0, 4.0, 0.0], 3);
         near.sort_unstable();
-        assert_eq!(near, [0, 2, 4]);
-        assert_eq!(nearest(&[], 3, &mut keys, &mut near), f32::INFINITY);
+        assert_eq!((&near[..], reach), (&[0, 2, 4][..], 2.0));
+        assert_eq!(nearest(&[], 3), (Vec::new(), f32::INFINITY));
     }
 }

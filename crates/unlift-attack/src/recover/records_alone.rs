@@ -4,9 +4,10 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::density::{Peak, Peaks, tomography};
+use crate::density::{Peaks, tomography};
 use crate::neighbors::{Geometric, Neighborhoods, geometric_by};
 use crate::recover::map::lines::{LineRow, from_lines, from_rays};
+use crate::recover::map::lists::found;
 use crate::recover::options::RecoverOptions;
 use crate::recover::published_density::published;
 use crate::recover::recover_with_start;
@@ -35,7 +36,7 @@ pub fn records_alone<const D: usize>(
     }
     let peaks = tomography(released);
     attacks.push((Builtin::Tomography.name(), at(released, &peaks)?));
-    // A map of planes, or of rays from one center, has no such lists.
+    // Planes and rays from one center have no such lists.
     if let Ok(lists) = geometric_by(released, Geometric::K, &peaks) {
         let options = RecoverOptions { confidence: false, ..*options };
         let (joint, start) = recover_with_start(released, &lists, &options)?;
@@ -47,9 +48,7 @@ pub fn records_alone<const D: usize>(
 
 /// The positions at which `peaks` puts the hidden points: which of a paired line's is whose is not known.
 fn at<const D: usize>(released: &Released<D>, peaks: &Peaks) -> Result<Recovered<D>, Error> {
-    let (n_records, slots) = (released.n_records(), released.slots_per_record());
-    let none =
-        Neighborhoods::try_new(vec![0; n_records * slots + 1], Vec::new(), None, n_records, slots)?;
+    let none = Neighborhoods::unchecked(vec![0; released.n_slots() + 1], Vec::new());
     let estimates = Placement::new(released, &none, peaks).solve(0..released.n_slots());
     let with_axis = matches!(released.obfuscation(), Obfuscation::AxisCandidates(_));
     let (origin, unit) = (released.origin(), released.unit());
@@ -58,8 +57,6 @@ fn at<const D: usize>(released: &Released<D>, peaks: &Peaks) -> Result<Recovered
         About { map: Some(released.fingerprint()), order: RowOrder::Either, ..About::default() };
     Ok(Recovered::try_new(&estimates, with_axis, None, origin, unit, delta)?.with_about(about))
 }
-
-// Recovery from the records alone: the attacks of `density` as solvers.
 
 /// The hidden points of one map where `peaks` puts them.
 ///
@@ -73,7 +70,7 @@ pub(super) struct Placement<'a, const D: usize> {
     peaks: &'a Peaks,
 }
 
-/// The distance that decides support: the resolution of `peaks`; any, where they have none.
+/// The distance that decides support: the resolution of `peaks`, or any where there are no peaks.
 pub(super) fn delta(peaks: &Peaks) -> f64 {
     if peaks.resolution > 0.0 { peaks.resolution } else { 1.0 }
 }
@@ -88,27 +85,6 @@ impl<'a, const D: usize> Placement<'a, D> {
         Self { rows, slots_per_record: released.slots_per_record(), lists, peaks }
     }
 
-    /// The peak of `slot` as it stands.
-    fn peak(&self, slot: usize) -> Estimate<D> {
-        match self.peaks.of[slot] {
-            Some(peak) => estimate(&peak),
-            None => Estimate::lost(Status::NoSupport),
-        }
-    }
-
-    /// Whether the two peaks of `slot`'s record are better exchanged.
-    fn is_crossed(&self, slot: usize) -> bool {
-        let (a, b) = (slot & !1, slot | 1);
-        let pair = [self.peak(a), self.peak(b)];
-        let cost = |at: usize, slot: usize| {
-            let x = &pair[at].position;
-            self.lists.of(slot).iter().map(|r| distance(&self.rows[r.index()], x)).sum::<f32>()
-        };
-        cost(0, a) + cost(1, b) > cost(1, a) + cost(0, b)
-    }
-}
-
-impl<const D: usize> Placement<'_, D> {
     /// The estimates of `slots`, in order.
     pub(super) fn solve(&self, slots: Range<usize>) -> Vec<Estimate<D>> {
         let reach = delta(self.peaks) as f32;
@@ -116,31 +92,41 @@ impl<const D: usize> Placement<'_, D> {
             let is_crossed = self.slots_per_record == 2 && self.is_crossed(slot);
             let mut estimate = self.peak(if is_crossed { slot ^ 1 } else { slot });
             if !self.rows.is_empty() {
-                let near = |row: &LineRow<D>| distance(row, &estimate.position) <= reach;
-                let listed = self.lists.of(slot).iter();
-                let support = listed.filter(|r| near(&self.rows[r.index()])).count();
+                let distances = self.distances(slot, &estimate.position);
+                let support = distances.filter(|&distance| distance <= reach).count();
                 estimate.support = stored_support(support as u32);
             }
             estimate
         };
         slots.into_par_iter().map(place).collect()
     }
-}
 
-fn estimate<const D: usize>(peak: &Peak) -> Estimate<D> {
-    Estimate {
+    /// The estimate at the peak of `slot`.
+    fn peak(&self, slot: usize) -> Estimate<D> {
+        let Some(peak) = self.peaks.of[slot] else {
+            return Estimate::lost(Status::NoSupport);
+        };
         // The attacks answer in three dimensions only.
-        position: std::array::from_fn(|c| peak.position[c % 3]),
-        status: Status::Ok,
-        support: 0,
-        axis: peak.axis,
-        evidence: peak.evidence,
+        let position = std::array::from_fn(|c| peak.position[c % 3]);
+        found(position, 0, peak.axis.into(), peak.evidence)
     }
-}
 
-fn distance<const D: usize>(row: &LineRow<D>, x: &[f32; D]) -> f32 {
-    let away: [f32; D] = std::array::from_fn(|c| x[c] - row.through[c]);
-    let along: f32 = (0..D).map(|c| away[c] * row.direction[c]).sum();
-    let across = |c: usize| away[c] - along * row.direction[c];
-    (0..D).map(|c| across(c) * across(c)).sum::<f32>().sqrt()
+    /// Whether the two peaks of `slot`'s record are better exchanged.
+    fn is_crossed(&self, slot: usize) -> bool {
+        let (a, b) = (slot & !1, slot | 1);
+        let cost =
+            |peak: usize, slot: usize| self.distances(slot, &self.peak(peak).position).sum::<f32>();
+        cost(a, a) + cost(b, b) > cost(b, a) + cost(a, b)
+    }
+
+    /// The distances of the records that `slot` lists from `x`.
+    fn distances(&self, slot: usize, x: &[f32; D]) -> impl Iterator<Item = f32> {
+        self.lists.of(slot).iter().map(move |record| {
+            let row = &self.rows[record.index()];
+            let away: [f32; D] = std::array::from_fn(|c| x[c] - row.through[c]);
+            let along: f32 = (0..D).map(|c| away[c] * row.direction[c]).sum();
+            let across = |c: usize| away[c] - along * row.direction[c];
+            (0..D).map(|c| across(c) * across(c)).sum::<f32>().sqrt()
+        })
+    }
 }

@@ -1,234 +1,32 @@
-//! The crowd around one estimate, and what crowds of a whole map have in common.
+//! The cues of every slot: pure numbers that tell right estimates from wrong ones.
+//!
+//! Around a right estimate the estimates of listed records form a crowd, and more listed records pass than by chance. The same
+//! measures over the whole map tell how well recovery went at all, which no slot shows alone: estimates that drifted
+//! together agree with each other.
 
-use crate::recover::result::Estimate;
+use rayon::prelude::*;
 
-/// Ratios of lengths are told apart down to this: a logarithm needs a floor.
+use crate::recover::map::graph::{Graph, Side, either, record_of, side};
+use crate::recover::map::grid::Density;
+use crate::recover::map::lines::evidence;
+use crate::recover::map::pieces::Pieces;
+use crate::recover::map::places::{Places, along_curve, distance2};
+use crate::recover::result::{Estimate, Status};
+
+/// A crowd reaches no farther than where chance expects this share of the listed estimates.
+const MOST_CHANCE: f32 = 0.3;
+/// The density of estimates is smoothed over this many deltas, so that it does not follow the crowds that it judges.
+const SMOOTH: f32 = 4.0;
+/// Ratios below this count as this: a logarithm needs a floor.
 const LEAST_RATIO: f32 = 1e-3;
-
-/// The listed estimates that crowd around one estimate.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Crowd {
-    /// How improbable it is by chance, in nats.
-    pub(super) evidence: f32,
-    /// The radius that makes it least probable.
-    pub(super) radius: f32,
-    /// Members beyond those expected by chance.
-    pub(super) excess: f32,
-    /// How far its middle is off the estimate, along and across the piece, per radius.
-    pub(super) off: [f32; 2],
-    /// The same measures of listed records that pass within delta.
-    pub(super) record_evidence: f32,
-    pub(super) record_excess: f32,
-    /// Records that could have voted.
-    pub(super) listed: f32,
-    /// The share of members whose records may vote.
-    pub(super) voting_share: f32,
-    /// How far exact constraints moved the estimate, if they did.
-    pub(super) settled: Option<f32>,
-    /// The mean of the logarithm of the members' own evidence; of the second pass.
-    pub(super) of_members: f32,
-    /// The logarithm of how many more members the slot lists than list it. Look-alikes agree on a wrong place, but
-    /// those who are there do not name who is not. Of the second pass.
-    pub(super) one_sided: f32,
-    pub(super) sparsity: f32,
-}
-
-/// What is the same for all slots.
-pub(super) struct Map {
-    /// The typical radius of crowds.
-    pub(super) radius: f32,
-    evidence: f32,
-    voting_share: f32,
-    one_sided: f32,
-    share: f32,
-    record_share: f32,
-    ln_radius_per_delta: f32,
-}
-
-/// What is asked of all crowds, which come in order of slots.
-#[derive(Default)]
-pub(super) struct Tally {
-    /// Number of slots, and those that were added.
-    n: usize,
-    added: usize,
-    evidence: f64,
-    voting_share: f64,
-    one_sided: f64,
-    listed: f64,
-    excess: f64,
-    record_excess: f64,
-    /// Radius and evidence of some crowds.
-    radii: Vec<(f32, f32)>,
-}
-
-/// Crowds that tell the typical radius, at most.
+/// The typical radius is taken from about this many crowds.
 const RADII: usize = 1 << 14;
-
-impl Tally {
-    /// Of no crowd yet, out of `n`.
-    pub(super) fn new(n: usize) -> Self {
-        Self { n, ..Self::default() }
-    }
-
-    /// Counts those of the next slots.
-    pub(super) fn add(&mut self, crowds: &[Crowd]) {
-        let every = self.n.div_ceil(RADII).max(1);
-        for crowd in crowds {
-            self.evidence += f64::from(libm::log1pf(crowd.evidence));
-            self.voting_share += f64::from(crowd.voting_share);
-            self.one_sided += f64::from(crowd.one_sided.abs());
-            self.listed += f64::from(crowd.listed);
-            self.excess += f64::from(crowd.excess);
-            self.record_excess += f64::from(crowd.record_excess);
-            if self.added.is_multiple_of(every) && crowd.evidence > 0.0 && crowd.radius > 0.0 {
-                self.radii.push((crowd.radius, crowd.evidence));
-            }
-            self.added += 1;
-        }
-    }
-
-    /// The median radius of crowds, each counted as its evidence.
-    fn radius(&mut self) -> Option<f32> {
-        self.radii.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
-        let half = 0.5 * self.radii.iter().map(|s| f64::from(s.1)).sum::<f64>();
-        let mut sum = 0.0;
-        for (radius, weight) in &self.radii {
-            sum += f64::from(*weight);
-            if sum >= half {
-                return Some(*radius);
-            }
-        }
-        None
-    }
-
-    /// What is the same for all slots, where delta decided support.
-    pub(super) fn map(mut self, delta: f32) -> Map {
-        let n = self.n.max(1) as f64;
-        let share =
-            |found: f64| libm::logf(((found / self.listed.max(1.0)) as f32).max(LEAST_RATIO));
-        let (share, record_share) = (share(self.excess), share(self.record_excess));
-        let radius = self.radius().unwrap_or(delta);
-        Map {
-            radius,
-            evidence: (self.evidence / n) as f32,
-            voting_share: (self.voting_share / n) as f32,
-            one_sided: (self.one_sided / n) as f32,
-            share,
-            record_share,
-            ln_radius_per_delta: libm::logf((radius / delta).max(LEAST_RATIO)),
-        }
-    }
-}
-
-impl Map {
-    /// The cues of a slot.
-    pub(super) fn cues(&self, crowd: &Crowd) -> Cues {
-        let ln = |x: f32| libm::logf(x.max(LEAST_RATIO));
-        let evidence = libm::log1pf(crowd.evidence);
-        let record_evidence = libm::log1pf(crowd.record_evidence);
-        let ln_radius = ln(crowd.radius / self.radius);
-        Cues {
-            evidence,
-            ln_excess: ln(crowd.excess.max(0.1)),
-            ln_radius,
-            record_evidence,
-            ln_record_excess: ln(crowd.record_excess.max(0.1)),
-            off_along: crowd.off[0],
-            off_across: crowd.off[1],
-            of_members: crowd.of_members,
-            sparsity: crowd.sparsity,
-            map_evidence: self.evidence,
-            map_share: self.share,
-            map_record_share: self.record_share,
-            map_ln_radius_per_delta: self.ln_radius_per_delta,
-            ln_listed: ln(crowd.listed.max(0.1)),
-            voting_share: crowd.voting_share,
-            map_voting_share: self.voting_share,
-            is_settled: if crowd.settled.is_some() { 1.0 } else { 0.0 },
-            settled_by: libm::log1pf(crowd.settled.unwrap_or(0.0) / self.radius),
-            one_sided: crowd.one_sided,
-            map_one_sided: self.one_sided,
-        }
-    }
-}
-
-// What is seen around every slot, and what was recovered there.
 
 /// Number of cues.
 pub const N_CUES: usize = 20;
 
-/// The cues of one slot: pure numbers. Those of the map are the same for all its slots.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cues {
-    /// How improbable its crowd is by chance: `ln(1 + nats)`.
-    pub evidence: f32,
-    /// The logarithm of the members of the crowd beyond those expected by chance.
-    pub ln_excess: f32,
-    /// The logarithm of the radius of the crowd, per typical radius of the map.
-    pub ln_radius: f32,
-    /// How improbable it is by chance that so many records pass: `ln(1 + nats)`.
-    pub record_evidence: f32,
-    /// The logarithm of the records that pass beyond those expected by chance.
-    pub ln_record_excess: f32,
-    /// How far the middle of the crowd is off the estimate along its piece, per radius of the crowd.
-    pub off_along: f32,
-    /// How far the middle of the crowd is off the estimate across its piece, per radius of the crowd.
-    pub off_across: f32,
-    /// The mean of `evidence` over the members of the crowd.
-    pub of_members: f32,
-    /// The logarithm of how much sparser estimates are than at a typical place.
-    pub sparsity: f32,
-    /// The mean of `evidence` over all slots of the map.
-    pub map_evidence: f32,
-    /// The logarithm of the share of all entries of the map that are in crowds beyond chance.
-    pub map_share: f32,
-    /// The logarithm of the share of all entries of the map whose records pass beyond chance.
-    pub map_record_share: f32,
-    /// The logarithm of the typical radius of crowds in the map, per delta.
-    pub map_ln_radius_per_delta: f32,
-    /// The logarithm of the number of listed records that may vote.
-    pub ln_listed: f32,
-    /// The share of the crowd's members whose records may vote.
-    pub voting_share: f32,
-    /// The mean of `voting_share` over all slots of the map.
-    pub map_voting_share: f32,
-    /// 1 where an exact constraint moved the estimate, 0 elsewhere.
-    pub is_settled: f32,
-    /// How far it moved it, in typical radii: `ln(1 + radii)`.
-    pub settled_by: f32,
-    /// The logarithm of how many more members the slot lists than list it.
-    pub one_sided: f32,
-    /// The mean of `one_sided`, without its sign, over all slots of the map.
-    pub map_one_sided: f32,
-}
-
-impl Cues {
-    /// All cues, in the order in which the constants of the model were fitted.
-    pub(super) fn in_order(&self) -> [f32; N_CUES] {
-        [
-            self.evidence,
-            self.ln_excess,
-            self.ln_radius,
-            self.record_evidence,
-            self.ln_record_excess,
-            self.off_along,
-            self.off_across,
-            self.of_members,
-            self.sparsity,
-            self.map_evidence,
-            self.map_share,
-            self.map_record_share,
-            self.map_ln_radius_per_delta,
-            self.ln_listed,
-            self.voting_share,
-            self.map_voting_share,
-            self.is_settled,
-            self.settled_by,
-            self.one_sided,
-            self.map_one_sided,
-        ]
-    }
-}
+/// The cues of one slot, in the order in which the constants of the model were fitted.
+pub type Cues = [f32; N_CUES];
 
 /// What the attacker sees around every slot.
 #[derive(Clone, Debug)]
@@ -248,10 +46,253 @@ impl Seen {
 
 /// What recovery found.
 pub(crate) struct Solved<'a, const D: usize> {
-    /// Per slot.
     pub(crate) estimates: &'a [Estimate<D>],
-    /// The estimates per slot before exact constraints moved them.
+    /// The estimates before exact constraints moved them.
     pub(crate) unsettled: &'a [Estimate<D>],
-    /// The distance that decided support.
     pub(crate) delta: f32,
+}
+
+/// The listed estimates that crowd around one estimate.
+#[derive(Clone, Copy, Debug, Default)]
+struct Crowd {
+    /// How improbable the crowd is by chance, in nats, at the radius that makes it least probable.
+    evidence: f32,
+    radius: f32,
+    /// Members beyond those expected by chance.
+    excess: f32,
+    /// How far its middle is off the estimate, along and across the piece, per radius.
+    off: [f32; 2],
+    /// Evidence and excess of listed records that pass within delta.
+    record_evidence: f32,
+    record_excess: f32,
+    /// Records that could have voted.
+    listed: f32,
+    /// The share of members whose records may vote.
+    voting_share: f32,
+    /// How far exact constraints moved the estimate, if they did.
+    settled: Option<f32>,
+    /// The mean of `ln(1 + evidence)` over the members.
+    of_members: f32,
+    /// The logarithm of how many more members the slot lists than list it: look-alikes agree on a wrong place, but
+    /// those who are there do not list back.
+    one_sided: f32,
+    /// The logarithm of how much sparser estimates are than at a typical place.
+    sparsity: f32,
+}
+
+/// The cues of every slot, and the typical radius of crowds, which scales predicted errors.
+pub(super) fn cues<const D: usize, P: Pieces<D>>(
+    pieces: &P,
+    graph: &Graph,
+    solved: &Solved<'_, D>,
+) -> (Vec<Cues>, f32) {
+    let Solved { estimates, unsettled, delta } = *solved;
+    let places = Places::new(estimates);
+    let density = Density::new(&places, &graph.times_listed(), SMOOTH * delta);
+    let order = along_curve(&places);
+    let around = Surroundings { pieces, graph, places, density, delta2: delta * delta };
+    let mut crowds = by_slot(&order, |near, slot| {
+        let estimate = &estimates[slot];
+        if estimate.status != Status::Ok {
+            return Crowd::default();
+        }
+        let mut crowd = around.crowd(slot, estimate, near);
+        if unsettled[slot].status == Status::Ok {
+            let moved2 = distance2(&unsettled[slot].position, &estimate.position);
+            crowd.settled = (moved2 > 0.0).then(|| moved2.sqrt());
+        }
+        crowd
+    });
+    let evidence: Vec<f32> = crowds.iter().map(|crowd| libm::log1pf(crowd.evidence)).collect();
+    crowds = by_slot(&order, |_, slot| around.with_members(slot, crowds[slot], &evidence));
+    of_map(&crowds, delta)
+}
+
+/// A crowd for each slot, in order of slots. They are made in a given order, in which neighbors find each other in the cache.
+fn by_slot(
+    order: &[u32],
+    of: impl Fn(&mut Vec<(u32, u32)>, usize) -> Crowd + Send + Sync,
+) -> Vec<Crowd> {
+    let in_order: Vec<Crowd> =
+        order.par_iter().map_init(Vec::new, |near, &slot| of(near, slot as usize)).collect();
+    let mut crowds = vec![Crowd::default(); order.len()];
+    for (crowd, &slot) in in_order.into_iter().zip(order) {
+        crowds[slot as usize] = crowd;
+    }
+    crowds
+}
+
+/// The cues of `crowds`, one per slot, and their typical radius.
+fn of_map(crowds: &[Crowd], delta: f32) -> (Vec<Cues>, f32) {
+    let sum = |of: fn(&Crowd) -> f32| crowds.iter().map(|crowd| f64::from(of(crowd))).sum::<f64>();
+    let mean = |of: fn(&Crowd) -> f32| (sum(of) / crowds.len().max(1) as f64) as f32;
+    let listed = sum(|crowd| crowd.listed).max(1.0);
+    let ln = |x: f32| libm::logf(x.max(LEAST_RATIO));
+    let radius = typical_radius(crowds).unwrap_or(delta);
+    let map_evidence = mean(|crowd| libm::log1pf(crowd.evidence));
+    let map_share = ln((sum(|crowd| crowd.excess) / listed) as f32);
+    let map_record_share = ln((sum(|crowd| crowd.record_excess) / listed) as f32);
+    let map_ln_radius_per_delta = ln(radius / delta);
+    let map_voting_share = mean(|crowd| crowd.voting_share);
+    let map_one_sided = mean(|crowd| crowd.one_sided.abs());
+    let cues = |crowd: &Crowd| {
+        [
+            libm::log1pf(crowd.evidence),
+            ln(crowd.excess.max(0.1)),
+            ln(crowd.radius / radius),
+            libm::log1pf(crowd.record_evidence),
+            ln(crowd.record_excess.max(0.1)),
+            crowd.off[0],
+            crowd.off[1],
+            crowd.of_members,
+            crowd.sparsity,
+            map_evidence,
+            map_share,
+            map_record_share,
+            map_ln_radius_per_delta,
+            ln(crowd.listed.max(0.1)),
+            crowd.voting_share,
+            map_voting_share,
+            if crowd.settled.is_some() { 1.0 } else { 0.0 },
+            libm::log1pf(crowd.settled.unwrap_or(0.0) / radius),
+            crowd.one_sided,
+            map_one_sided,
+        ]
+    };
+    (crowds.par_iter().map(cues).collect(), radius)
+}
+
+/// The median radius of crowds, each weighted by its evidence.
+fn typical_radius(crowds: &[Crowd]) -> Option<f32> {
+    let sample = crowds.iter().step_by(crowds.len().div_ceil(RADII).max(1));
+    let mut radii: Vec<(f32, f32)> = sample
+        .filter(|crowd| crowd.evidence > 0.0 && crowd.radius > 0.0)
+        .map(|crowd| (crowd.radius, crowd.evidence))
+        .collect();
+    radii.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let half = 0.5 * radii.iter().map(|one| f64::from(one.1)).sum::<f64>();
+    let mut sum = 0.0;
+    let is_half = |one: &&(f32, f32)| {
+        sum += f64::from(one.1);
+        sum >= half
+    };
+    radii.iter().find(is_half).map(|one| one.0)
+}
+
+/// What slots are looked at with.
+struct Surroundings<'a, const D: usize, P> {
+    pieces: &'a P,
+    graph: &'a Graph,
+    places: Places<D>,
+    density: Density<D>,
+    delta2: f32,
+}
+
+impl<const D: usize, P: Pieces<D>> Surroundings<'_, D, P> {
+    /// The crowd of a slot; what its members say of themselves is still open. `near` is a buffer.
+    fn crowd(&self, slot: usize, own: &Estimate<D>, near: &mut Vec<(u32, u32)>) -> Crowd {
+        let x = own.position;
+        let density = self.density.at(&x);
+        // Chance expects `rate * r^D` of the listed estimates within r, for one or either slot of a record.
+        let rate = density * ball::<D>();
+        let reach2 = libm::powf(MOST_CHANCE / rate, 2.0 / D as f32);
+        near.clear();
+        let (mut rates, mut voting, mut votes) = (0.0f32, 0usize, 0usize);
+        let slots_per_record = self.pieces.slots_per_record();
+        let (ends, class) = self.graph.of(slot);
+        for (&end, &class) in ends.iter().zip(class) {
+            let either = either(class, slots_per_record);
+            let (d2, at) = self.places.nearest(end, either, &x);
+            rates += if either { 2.0 * rate } else { rate };
+            if d2 < reach2 {
+                // The bits of a distance sort as it does; then by slot, so that the order is the same everywhere.
+                near.push((d2.to_bits(), at as u32));
+            }
+            let record = record_of(end as usize, slots_per_record);
+            if self.pieces.may_vote(slot, record) {
+                voting += 1;
+                votes += usize::from(self.pieces.record_distance2(record, &x) <= self.delta2);
+            }
+        }
+        near.sort_unstable();
+        let all = ends.len() as f32;
+        let mean_rate = rates / all.max(1.0);
+        let sparsity = self.density.sparsity(density);
+        let mut crowd = Crowd { listed: voting as f32, sparsity, ..Crowd::default() };
+        let mut members = 0;
+        for at in 1..near.len() {
+            let d2 = f32::from_bits(near[at].0);
+            let is_last = near.get(at + 1).is_none_or(|next| f32::from_bits(next.0) > d2);
+            let p = (mean_rate * power::<D>(d2)).clamp(1e-9, MOST_CHANCE);
+            let nats = if is_last { evidence((at + 1) as f32, all, p) } else { 0.0 };
+            if nats > crowd.evidence {
+                members = at + 1;
+                crowd.evidence = nats;
+                crowd.radius = d2.sqrt();
+                crowd.excess = (members as f32 - p * all).max(0.0);
+            }
+        }
+        let mut sum = [0.0f32; D];
+        let mut voting_members = 0u32;
+        for &(_, at) in &near[..members] {
+            let place = self.places.of(at as usize);
+            (0..D).for_each(|c| sum[c] += place[c] - x[c]);
+            let record = record_of(at as usize, slots_per_record);
+            voting_members += u32::from(self.pieces.may_vote(slot, record));
+        }
+        crowd.voting_share = voting_members as f32 / members.max(1) as f32;
+        if members > 0 && crowd.radius > 0.0 {
+            let piece = self.pieces.piece(slot, usize::from(own.axis));
+            let scale = 1.0 / (members as f32 * crowd.radius);
+            let (mut along2, mut all2) = (0.0, 0.0);
+            for r in 0..D {
+                let along: f32 = (0..D).map(|c| piece.along[r][c] * sum[c]).sum();
+                along2 += along * along;
+                all2 += sum[r] * sum[r];
+            }
+            crowd.off = [along2.sqrt() * scale, (all2 - along2).max(0.0).sqrt() * scale];
+        }
+        let p = self.pieces.record_chance(slot, &x).clamp(1e-9, 0.5);
+        if voting > 0 {
+            crowd.record_evidence = evidence(votes as f32, voting as f32, p);
+        }
+        crowd.record_excess = votes as f32 - p * voting as f32;
+        crowd
+    }
+
+    /// The `crowd` of a slot, with what its members say: `evidence` is that of all slots.
+    fn with_members(&self, slot: usize, mut crowd: Crowd, evidence: &[f32]) -> Crowd {
+        if crowd.evidence <= 0.0 {
+            return crowd;
+        }
+        let x = self.places.of(slot);
+        let reach2 = crowd.radius * crowd.radius * (1.0 + 1e-6);
+        let (mut n, mut sum, mut listed, mut listing) = (0u32, 0.0, 0u32, 0u32);
+        let (ends, class) = self.graph.of(slot);
+        for (&end, &class) in ends.iter().zip(class) {
+            let either = either(class, self.pieces.slots_per_record());
+            let (d2, at) = self.places.nearest(end, either, &x);
+            if d2 <= reach2 {
+                n += 1;
+                sum += evidence[at];
+                listed += u32::from(side(class) != Side::Reverse);
+                listing += u32::from(side(class) != Side::Forward);
+            }
+        }
+        crowd.of_members = sum / n.max(1) as f32;
+        crowd.one_sided = libm::logf((listed + 1) as f32 / (listing + 1) as f32);
+        crowd
+    }
+}
+
+/// The volume of the unit ball.
+fn ball<const D: usize>() -> f32 {
+    use std::f32::consts::PI;
+    if D == 2 { PI } else { 4.0 / 3.0 * PI }
+}
+
+/// `r^D` from a squared radius.
+#[inline(always)]
+fn power<const D: usize>(d2: f32) -> f32 {
+    if D == 2 { d2 } else { d2 * d2.sqrt() }
 }

@@ -1,13 +1,11 @@
 //! How sure the attacker can be of each recovered point, from attacker-side data alone.
 //!
-//! After joint recovery every slot is looked at once more: `cues.rs` measures how much better than by chance
-//! estimates and records agree around it, and `model.rs` turns that into the probability that the right
-//! place was found and a scale of its error. Its constants come from synthetic rooms
-//! (`examples/fit_confidence.rs`), never from a real map. Cues are ratios: a scaled map has the same.
+//! After joint recovery `crowd.rs` measures around every slot how much better than by chance estimates and records agree. A
+//! logistic model turns these cues into the probability that the right place was found, and a scale of its error. Its constants
+//! come from synthetic rooms (`examples/fit_confidence.rs`), never from a real map.
 
 mod constants;
 pub(super) mod crowd;
-mod cues;
 
 use rayon::prelude::*;
 
@@ -48,22 +46,27 @@ pub(super) fn look<const D: usize>(
     let (cues, radius) = match family {
         Family::Lines { rows, slots_per_record, chance } => {
             let pieces = LinePieces::new(rows, *slots_per_record, chance, solved.delta);
-            cues::of(&pieces, graph, solved)
+            crowd::cues(&pieces, graph, solved)
         }
         Family::Planes { planes, sorted } => {
-            cues::of(&PlanePieces::new(planes, sorted, solved.delta), graph, solved)
+            crowd::cues(&PlanePieces::new(planes, sorted, solved.delta), graph, solved)
         }
         Family::Candidates { rows, chance } => {
-            cues::of(&CandidatePieces::new(rows, chance, solved.delta), graph, solved)
+            crowd::cues(&CandidatePieces::new(rows, chance, solved.delta), graph, solved)
         }
     };
-    let kind = kind(released);
+    let kind = match released.obfuscation() {
+        Obfuscation::Lines(_) => released.slots_per_record() - 1,
+        Obfuscation::Rays(_) => 2,
+        Obfuscation::AxisPlanes(_) => 3,
+        Obfuscation::AxisCandidates(_) => 4,
+    };
     let of_slot = |(estimate, cues): (&Estimate<D>, &Cues)| match estimate.status {
-        Status::Ok => judged(&MODELS[kind], cues, radius as f32),
+        Status::Ok => judged(&MODELS[kind], cues, radius),
         _ => Confidence::LOST,
     };
     let sure = solved.estimates.par_iter().zip(&cues).map(of_slot).collect();
-    (sure, Seen { cues, radius, kind })
+    (sure, Seen { cues, radius: f64::from(radius), kind })
 }
 
 /// What `cues` say about one slot; lengths are multiples of `radius`.
@@ -74,8 +77,6 @@ fn judged(model: &Model, cues: &Cues, radius: f32) -> Confidence {
     let scale = libm::expf(sum(&model.scale).clamp(-12.0, 12.0)) * radius;
     Confidence { found: 1.0 / (1.0 + libm::expf(-sum(&model.found))), scale }
 }
-
-// Where the model of confidence says what comes true: on maps and lists like those that it was fitted on.
 
 /// A list has at most as many entries as this share of all hidden points in the maps that the model was fitted on.
 const MOST_LISTED: f64 = 0.01;
@@ -106,19 +107,12 @@ pub(crate) fn unknown<const D: usize>(
         Some(Unknown::GivenLists)
     } else if mean > MOST_LISTED * n_slots {
         Some(Unknown::SmallMap)
-    } else if coincident(released) >= COINCIDENT {
+    } else if matches!(released.obfuscation(), Obfuscation::Rays(rays) if twins(rays) >= COINCIDENT)
+    {
+        // Records of other families are drawn anew for every point, or for a pair.
         Some(Unknown::Coincident)
     } else {
         (flatness(&places()) <= FLAT).then_some(Unknown::Flat)
-    }
-}
-
-/// Share of the records that tell of points that fall together: rays in the place of others. Records of other families are
-/// drawn anew for every point, or for a pair.
-fn coincident<const D: usize>(released: &Released<D>) -> f64 {
-    match released.obfuscation() {
-        Obfuscation::Rays(rays) => twins(rays),
-        Obfuscation::Lines(_) | Obfuscation::AxisPlanes(_) | Obfuscation::AxisCandidates(_) => 0.0,
     }
 }
 
@@ -130,8 +124,6 @@ fn twins<const D: usize>(rays: &Rays<D>) -> f64 {
     let same = rows.chunk_by(|a, b| a == b).map(<[_]>::len).filter(|&n| n > 1);
     same.sum::<usize>() as f64 / rays.len().max(1) as f64
 }
-
-// From cues to a probability: one small model per kind of record, fitted on synthetic rooms.
 
 /// Kinds of records that are calibrated apart: lines, paired lines, rays, axis planes, axis candidates.
 pub const N_KINDS: usize = 5;
@@ -153,53 +145,48 @@ pub(super) struct Model {
     pub(super) scale: [f32; N_TERMS],
 }
 
-/// Which kind of records a map holds, below [`N_KINDS`].
-pub(super) fn kind<const D: usize>(released: &Released<D>) -> usize {
-    match released.obfuscation() {
-        Obfuscation::Lines(_) => released.slots_per_record() - 1,
-        Obfuscation::Rays(_) => 2,
-        Obfuscation::AxisPlanes(_) => 3,
-        Obfuscation::AxisCandidates(_) => 4,
-    }
-}
-
 /// The products of two cues that count too: what one says depends on the other, or bends.
-fn products(c: &Cues) -> [f32; N_PRODUCTS] {
+fn products(cues: &Cues) -> [f32; N_PRODUCTS] {
+    let [evidence, _, ln_radius, record_evidence, _, _, _, of_members, sparsity, map_evidence, ..] =
+        *cues;
+    let [.., map_share, map_record_share, _, _, voting_share, map_voting_share, settled, _, _, _] =
+        *cues;
+    let [.., one_sided, map_one_sided] = *cues;
     [
-        c.evidence * c.evidence,
-        c.ln_radius * c.ln_radius,
-        c.record_evidence * c.record_evidence,
-        c.of_members * c.of_members,
-        c.sparsity * c.sparsity,
-        c.evidence * c.of_members,
-        c.evidence * c.map_evidence,
-        c.of_members * c.map_evidence,
-        c.map_evidence * c.map_evidence,
-        c.evidence * c.ln_radius,
-        c.map_share * c.map_share,
-        c.map_record_share * c.map_record_share,
-        c.evidence * c.map_share,
-        c.record_evidence * c.map_record_share,
-        c.record_evidence * c.map_evidence,
-        c.voting_share * c.voting_share,
-        c.evidence * c.voting_share,
-        c.evidence * c.map_voting_share,
-        c.voting_share * c.map_voting_share,
-        c.evidence * c.is_settled,
-        c.map_evidence * c.is_settled,
-        c.one_sided * c.one_sided,
-        c.evidence * c.one_sided,
-        c.one_sided * c.map_one_sided,
-        c.map_one_sided * c.map_one_sided,
-        c.map_evidence * c.map_one_sided,
-        c.map_share * c.map_one_sided,
+        evidence * evidence,
+        ln_radius * ln_radius,
+        record_evidence * record_evidence,
+        of_members * of_members,
+        sparsity * sparsity,
+        evidence * of_members,
+        evidence * map_evidence,
+        of_members * map_evidence,
+        map_evidence * map_evidence,
+        evidence * ln_radius,
+        map_share * map_share,
+        map_record_share * map_record_share,
+        evidence * map_share,
+        record_evidence * map_record_share,
+        record_evidence * map_evidence,
+        voting_share * voting_share,
+        evidence * voting_share,
+        evidence * map_voting_share,
+        voting_share * map_voting_share,
+        evidence * settled,
+        map_evidence * settled,
+        one_sided * one_sided,
+        evidence * one_sided,
+        one_sided * map_one_sided,
+        map_one_sided * map_one_sided,
+        map_evidence * map_one_sided,
+        map_share * map_one_sided,
     ]
 }
 
 /// A constant, the cues and their products, before they are centered.
 pub fn terms(cues: &Cues) -> [f32; N_TERMS] {
     let mut terms = [1.0; N_TERMS];
-    terms[1..=N_CUES].copy_from_slice(&cues.in_order());
+    terms[1..=N_CUES].copy_from_slice(cues);
     terms[1 + N_CUES..].copy_from_slice(&products(cues));
     terms
 }

@@ -1,22 +1,21 @@
-//! Consensus for rays whose centers have a region of points each (anchors of an image): a range from
-//! the spread of bearings.
+//! Consensus for rays from anchors, each with its own region of an image: a range from the spread of bearings.
 //!
-//! Rays of one anchor meet in it, and those of two anchors meet nowhere that both may lie. What is left is
+//! Rays of one anchor meet only in the anchor, and rays of two anchors lie in different regions. What is left is
 //! perspective: neighbors within a distance `s` of a point at range `r` are seen from the anchor within
 //! an angle of `s / r`. The window of bearings that holds the listed rays least probably by chance
-//! gives that angle. What `s` is nobody knows, but of two rays of about the same bearing the one with the
-//! narrower window is likely the longer one: ranks give shares of the region, over which points are spread.
+//! gives that angle. `s` is unknown, but of two rays of about the same bearing the one with the narrower window is
+//! likely the longer one. Ranks of windows therefore give ranges, as points are spread evenly over the region.
 
 use rayon::prelude::*;
 
-use crate::recover::map::lines::LineRow;
-use crate::recover::map::lines::evidence;
-use crate::recover::map::lists::{Lists, Slots, solve_chunks};
-use crate::recover::result::{Estimate, Status, stored_support};
+use crate::neighbors::Neighborhoods;
+use crate::recover::map::lines::{LineRow, evidence};
+use crate::recover::map::lists::{Slots, found, mixed};
+use crate::recover::result::{Estimate, Status};
 
 /// Slots whose lists are mixed to see what chance alone yields: a mean over so many is known to a few percent.
 const SAMPLE: usize = 1 << 9;
-/// Evidence counts in excess of this many times what chance alone yields in the mean: half of the slots lie above the mean.
+/// Only evidence beyond this many times the mean by chance counts: half of the slots exceed the mean by chance.
 const CHANCE: f32 = 2.0;
 /// How often scores are averaged with those of neighbors: each time takes half of what is a slot's own.
 const SMOOTHINGS: usize = 3;
@@ -37,57 +36,39 @@ struct Window {
 /// Estimates for `slots`, one slot per record.
 pub(super) fn solve<const D: usize>(
     rows: &[LineRow<D>],
-    lists: Lists<'_>,
-    slots: Slots<'_>,
+    lists: &Neighborhoods,
+    slots: &Slots,
 ) -> Vec<Estimate<D>> {
-    let bearings = Bearings::new(rows);
-    let windows: Vec<Option<Window>> = (0..lists.n_slots())
-        .into_par_iter()
-        .map(|slot| window(rows, &bearings, slot, &lists))
-        .collect();
+    let bearings = bearings(rows);
+    let n = lists.n_slots();
+    let windows: Vec<Option<Window>> =
+        (0..n).into_par_iter().map(|slot| window(rows, &bearings, slot, lists)).collect();
     // The best of several windows has some evidence whatever is listed.
-    let mixed = lists.mixed();
-    let every = lists.n_slots().div_ceil(SAMPLE).max(1);
-    let by_chance: Vec<f32> = (0..lists.n_slots())
-        .step_by(every)
-        .filter_map(|slot| Some(window(rows, &bearings, slot, &mixed)?.evidence))
-        .collect();
+    let sample = || (0..n).step_by(n.div_ceil(SAMPLE).max(1));
+    let mixed = mixed(lists, sample(), 1);
+    let by_chance: Vec<f32> =
+        sample().filter_map(|slot| Some(window(rows, &bearings, slot, &mixed)?.evidence)).collect();
     let by_chance = CHANCE * by_chance.iter().sum::<f32>() / by_chance.len().max(1) as f32;
     let shares = shares(rows, lists, &bearings, &windows);
-    solve_chunks(
-        lists.n_slots(),
-        slots,
-        || (),
-        |(), first, out| {
-            for (at, estimate) in out.iter_mut().enumerate() {
-                let own = &rows[first + at];
-                *estimate = match windows[first + at] {
-                    None => Estimate::lost(Status::TooFewNeighbors),
-                    Some(Window { count, evidence, .. }) => {
-                        let excess = (evidence - by_chance).max(0.0);
-                        let trust = excess / evidence.max(f32::MIN_POSITIVE);
-                        // Without evidence half of the points lie before it.
-                        let share = 0.5 + trust * (shares[first + at] - 0.5);
-                        let range = libm::powf(share, 1.0 / D as f32) * own.to;
-                        Estimate {
-                            position: own.at(range),
-                            status: Status::Ok,
-                            support: stored_support(count),
-                            axis: 0,
-                            evidence: excess,
-                        }
-                    }
-                };
-            }
-        },
-    )
+    let estimate = |slot: usize| {
+        let Some(Window { count, evidence, .. }) = windows[slot] else {
+            return Estimate::lost(Status::TooFewNeighbors);
+        };
+        let excess = (evidence - by_chance).max(0.0);
+        let trust = excess / evidence.max(f32::MIN_POSITIVE);
+        // Without evidence half of the points lie before it.
+        let share = 0.5 + trust * (shares[slot] - 0.5);
+        let range = libm::powf(share, 1.0 / D as f32) * rows[slot].to;
+        found(rows[slot].at(range), count, 0, excess)
+    };
+    slots.iter().map(estimate).collect()
 }
 
 /// Per slot the share of its ray's region that lies before its point: by how narrow its window is
 /// among rays of about the same bearing, as points are spread evenly over a region.
 fn shares<const D: usize>(
     rows: &[LineRow<D>],
-    lists: Lists<'_>,
+    lists: &Neighborhoods,
     bearings: &Bearings,
     windows: &[Option<Window>],
 ) -> Vec<f32> {
@@ -98,9 +79,8 @@ fn shares<const D: usize>(
         let smooth = |slot: usize| {
             let Some(window) = windows[slot] else { return score[slot] };
             let own = &rows[slot];
-            let mut buffer = Vec::new();
             let (mut sum, mut n) = (0.0f32, 0.0f32);
-            for record in lists.of(slot, &mut buffer) {
+            for record in lists.of(slot) {
                 let (row, score) = (&rows[record.index()], score[record.index()]);
                 if row.group == own.group && score.is_finite() && sine(own, row) <= window.sine {
                     (sum, n) = (sum + score, n + 1.0);
@@ -110,27 +90,27 @@ fn shares<const D: usize>(
         };
         score = (0..rows.len()).into_par_iter().map(smooth).collect();
     }
-    let place = |at: usize| {
-        let (group, slot) = (bearings.sorted[at].0, bearings.slot[at] as usize);
-        if score[slot].is_nan() {
+    let share = |(at, &(group, _, slot)): (usize, &(u32, f64, u32))| {
+        let own = score[slot as usize];
+        if own.is_nan() {
             return 0.5;
         }
-        let of_group = bearings.sorted.partition_point(|row| row.0 < group)
-            ..bearings.sorted.partition_point(|row| row.0 <= group);
+        let of_group = bearings.partition_point(|row| row.0 < group)
+            ..bearings.partition_point(|row| row.0 <= group);
         let half = (of_group.len() / SECTORS).max(LEAST_SECTOR);
         let from = at.saturating_sub(half).max(of_group.start);
         let (mut below, mut all) = (0.0f32, 0.0f32);
-        for &other in &bearings.slot[from..(at + half + 1).min(of_group.end)] {
+        for &(_, _, other) in &bearings[from..(at + half + 1).min(of_group.end)] {
             let other = score[other as usize];
             all += f32::from(u8::from(!other.is_nan()));
-            below += f32::from(u8::from(other < score[slot]));
-            below += 0.5 * f32::from(u8::from(other == score[slot]));
+            below += f32::from(u8::from(other < own));
+            below += 0.5 * f32::from(u8::from(other == own));
         }
         below / all
     };
-    let in_order: Vec<f32> = (0..rows.len()).into_par_iter().map(place).collect();
+    let in_order: Vec<f32> = bearings.par_iter().enumerate().map(share).collect();
     let mut shares = vec![0.5; rows.len()];
-    for (&slot, share) in bearings.slot.iter().zip(in_order) {
+    for (&(_, _, slot), share) in bearings.iter().zip(in_order) {
         shares[slot as usize] = share;
     }
     shares
@@ -142,21 +122,22 @@ fn window<const D: usize>(
     rows: &[LineRow<D>],
     bearings: &Bearings,
     slot: usize,
-    lists: &Lists<'_>,
+    lists: &Neighborhoods,
 ) -> Option<Window> {
     let own = &rows[slot];
-    let mut buffer = Vec::new();
-    let listed = lists.of(slot, &mut buffer);
+    let listed = lists.of(slot);
     let others = listed.iter().map(|record| &rows[record.index()]);
     let mut sines: Vec<f32> =
         others.filter(|row| row.group == own.group).map(|row| sine(own, row)).collect();
     sines.sort_unstable_by(f32::total_cmp);
+    // A window holds a few bearings of the map at least: narrower ones tell nothing.
+    let finest = 4.0 / rows.len().max(4) as f32;
     let mut best: Option<Window> = None;
     for (at, &sine) in sines.iter().enumerate().skip(1) {
         // Twins are seen in the very same direction, which tells no range.
-        let sine = sine.max(bearings.finest);
+        let sine = sine.max(finest);
         let count = at + 1;
-        let chance = bearings.share_within(own, sine);
+        let chance = share_within(bearings, own, sine);
         let evidence = evidence(count as f32, listed.len() as f32, chance);
         if best.is_none_or(|b| evidence > b.evidence) {
             best = Some(Window { sine, count: count as u32, evidence });
@@ -173,37 +154,22 @@ fn sine<const D: usize>(a: &LineRow<D>, b: &LineRow<D>) -> f32 {
     if cosine > 0.0 { across.sqrt().min(1.0) } else { 1.0 }
 }
 
-/// All bearings, sorted within their groups.
-struct Bearings {
-    /// (group, angle).
-    sorted: Vec<(u32, f64)>,
-    /// The slot of each.
-    slot: Vec<u32>,
-    /// Windows narrower than this tell nothing.
-    finest: f32,
+/// All bearings as (group, angle, slot), sorted.
+type Bearings = [(u32, f64, u32)];
+
+fn bearings<const D: usize>(rows: &[LineRow<D>]) -> Vec<(u32, f64, u32)> {
+    let bearing = |(slot, row): (usize, &LineRow<D>)| (row.group, angle(row), slot as u32);
+    let mut bearings: Vec<_> = rows.iter().enumerate().map(bearing).collect();
+    bearings.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    bearings
 }
 
-impl Bearings {
-    fn new<const D: usize>(rows: &[LineRow<D>]) -> Self {
-        let mut slot: Vec<u32> = (0..rows.len() as u32).collect();
-        let key = |slot: &u32| (rows[*slot as usize].group, angle(&rows[*slot as usize]));
-        slot.sort_by(|a, b| {
-            let (a, b) = (key(a), key(b));
-            a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
-        });
-        let sorted = slot.iter().map(key).collect();
-        // A window holds a few bearings of the map at least.
-        let finest = 4.0 / rows.len().max(4) as f32;
-        Self { sorted, slot, finest }
-    }
-
-    /// The share of all records that are rays of the anchor of `own` within `sine` of it.
-    fn share_within<const D: usize>(&self, own: &LineRow<D>, sine: f32) -> f32 {
-        let (middle, half) = (angle(own), libm::asin(f64::from(sine)));
-        let below = |at: f64| self.sorted.partition_point(|row| *row < (own.group, at));
-        let n = below(middle + half) - below(middle - half);
-        ((n as f32 + 0.5) / (self.sorted.len() as f32 + 1.0)).min(0.5)
-    }
+/// The share of all records that are rays of the anchor of `own` within `sine` of it.
+fn share_within<const D: usize>(bearings: &Bearings, own: &LineRow<D>, sine: f32) -> f32 {
+    let (middle, half) = (angle(own), libm::asin(f64::from(sine)));
+    let below = |at: f64| bearings.partition_point(|row| (row.0, row.1) < (own.group, at));
+    let n = below(middle + half) - below(middle - half);
+    ((n as f32 + 0.5) / (bearings.len() as f32 + 1.0)).min(0.5)
 }
 
 /// The angle of a ray in the plane of the first two coordinates.

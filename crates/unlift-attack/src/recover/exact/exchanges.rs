@@ -2,13 +2,13 @@
 //!
 //! A pair explains two estimates at once: mine lies near what the partner published, the partner's near
 //! what I published. How near true partners lie is learned from all pairs together with their probabilities
-//! (expectation and maximization), per class of evidence; every record is in one pair at most.
+//! (expectation and maximization), per class of evidence. Every record is in at most one pair, so the probabilities come from
+//! belief propagation on the monomer-dimer model, one pass per round of learning. Fixing sure pairs one by one would be
+//! final; here a rival of either side keeps its share of every pair until the end.
 
 use rayon::prelude::*;
 
-use crate::recover::exact::partners::{
-    CLASSES, LOST, Law, Messages, PART, Partners, Side, Tally, by_part, side_by_side,
-};
+use crate::recover::exact::partners::{LOST, Partners, Side, by_part, side_by_side};
 use crate::recover::map::family::Settings;
 use crate::recover::result::{Estimate, Status};
 
@@ -16,6 +16,14 @@ use crate::recover::result::{Estimate, Status};
 const ROUNDS: usize = 6;
 /// Pairs less probable than this teach nothing: there are many, and together they weigh little.
 const NOTHING: f32 = 1e-3;
+/// Records are split by their evidence into this many classes of equal size: the better founded, the nearer.
+const CLASSES: usize = 8;
+/// Normal distributions in the mixture of distances, each half as wide as the one before: down to 1 / 512 of the reach.
+const SCALES: usize = 9;
+/// The least and the largest share of good estimates in a class: a share of 0 or 1 would never change again.
+const SHARE: (f64, f64) = (0.02, 0.995);
+/// Steps from 0 to the reach in which distances are counted: as fine as the narrowest distribution.
+const STEPS: usize = 1 << 9;
 
 /// `estimates` with the exact coordinate wherever the partner is known.
 pub(super) fn settle<const D: usize>(
@@ -34,7 +42,7 @@ pub(super) fn settle<const D: usize>(
 }
 
 /// The partner of every record, where it is known; always from both sides.
-pub(super) fn pairs<const D: usize>(
+fn pairs<const D: usize>(
     published: &[[f32; D]],
     estimates: &[Estimate<D>],
     reach: f32,
@@ -50,64 +58,55 @@ pub(super) fn pairs<const D: usize>(
     let sides: Vec<Side> = published.iter().zip(estimates).map(side).collect();
     let order = side_by_side(&sides, reach);
     let sides: Vec<Side> = order.iter().map(|&record| sides[record as usize]).collect();
-    let Some(partners) = Partners::find(&sides, D, reach) else {
+    let Some(partners) = Partners::find(&sides, reach) else {
         return vec![None; n];
     };
     let rarity = rarity(published, &sides, partners.reach);
     let prior = prior::<D>(&sides);
     let class = classes(estimates);
-    let class: Vec<u8> = order.iter().map(|&record| class[record as usize]).collect();
-    let mut law = Law::new(partners.reach);
-    let mut messages = Messages::new(&partners);
-    let mut weight = vec![0.0f32; partners.of.len()];
+    let class: Vec<usize> = order.iter().map(|&record| class[record as usize]).collect();
+    let mut distances = Distances::new(partners.reach);
+    // How free a record is, as it tells the partner of an entry.
+    let mut messages = vec![0.5; partners.of.len()];
+    let mut weight = Vec::new();
     for _ in 0..ROUNDS {
         let likelier = |i: usize, j: usize| {
             let away = (sides[j].published - sides[i].estimate).abs();
-            law.density(usize::from(class[i]), away) * rarity[i]
+            distances.density(class[i], away) * rarity[i]
         };
-        by_part(&partners, &mut weight).into_par_iter().for_each(|(part, out)| {
-            let records = part * PART..n.min((part + 1) * PART);
-            let first = partners.offsets[records.start];
+        let odds = |i: usize, e: usize| {
+            let j = partners.of[e] as usize;
+            (likelier(i, j) * likelier(j, i) * prior[sides[i].axis]) as f32
+        };
+        let odds_of = |i: usize| partners.entries(i).map(move |e| odds(i, e));
+        weight = by_part(n, |records| records.flat_map(odds_of).collect::<Vec<f32>>()).concat();
+        let alone = distances.alone();
+        messages = sent(&messages, &partners, &weight, |i| alone[class[i]]);
+        let tallies = by_part(n, |records| {
+            let mut tally = vec![[0.0; STEPS]; CLASSES];
             for i in records {
                 for e in partners.entries(i) {
-                    let j = partners.of[e] as usize;
-                    let odds = likelier(i, j) * likelier(j, i) * prior[sides[i].axis];
-                    out[e - first] = odds as f32;
-                }
-            }
-        });
-        let others = law.mean_good();
-        let alone: Vec<f32> =
-            class.iter().map(|&c| law.alone(usize::from(c), others) as f32).collect();
-        messages.send(&partners, &weight, &alone);
-        let tallies: Vec<Tally> = (0..n.div_ceil(PART))
-            .into_par_iter()
-            .map(|part| {
-                let mut tally = Tally::default();
-                for i in part * PART..n.min((part + 1) * PART) {
-                    let class = usize::from(class[i]);
-                    tally.records[class] += 1.0;
-                    for e in partners.entries(i) {
-                        let away =
-                            (sides[partners.of[e] as usize].published - sides[i].estimate).abs();
-                        let p = messages.probability(&partners, &weight, e);
-                        if p > NOTHING {
-                            tally.add(&law, class, away, f64::from(p));
-                        }
+                    let away = (sides[partners.of[e] as usize].published - sides[i].estimate).abs();
+                    let p = probability(&messages, &partners, &weight, e);
+                    if p > NOTHING {
+                        tally[class[i]][distances.step(away)] += f64::from(p);
                     }
                 }
-                tally
-            })
-            .collect();
-        let mut tally = Tally::default();
-        tallies.iter().for_each(|part| tally.merge(part));
-        law = law.learned(&tally);
+            }
+            tally
+        });
+        let mut found = vec![[0.0; STEPS]; CLASSES];
+        for tally in &tallies {
+            let columns = found.as_flattened_mut().iter_mut().zip(tally.as_flattened());
+            columns.for_each(|(to, more)| *to += more);
+        }
+        distances = distances.learned(&found, &class);
     }
     let least = Settings::of_dimension::<D>().least_exchange;
     let best = |i: usize| {
         let mut best: Option<(f32, u32)> = None;
         for e in partners.entries(i) {
-            let p = messages.probability(&partners, &weight, e);
+            let p = probability(&messages, &partners, &weight, e);
             if p >= least && best.is_none_or(|(most, _)| p > most) {
                 best = Some((p, partners.of[e]));
             }
@@ -121,6 +120,33 @@ pub(super) fn pairs<const D: usize>(
         found[record as usize] = mutual(i).map(|j| order[j as usize]);
     }
     found
+}
+
+/// The next messages along all pairs. `weight` is that of each pair (the same from both sides), `alone` that of each record
+/// without a partner.
+fn sent(
+    messages: &[f32],
+    partners: &Partners,
+    weight: &[f32],
+    alone: impl Fn(usize) -> f32 + Sync,
+) -> Vec<f32> {
+    let offer = |e: usize| weight[e] * messages[partners.back[e] as usize];
+    let of = |i: usize| {
+        let alone = alone(i);
+        let all: f32 = alone + partners.entries(i).map(offer).sum::<f32>();
+        // Never below what is there without any offer.
+        partners.entries(i).map(move |e| 1.0 / (all - offer(e)).max(alone))
+    };
+    let n = partners.n_records();
+    by_part(n, |records| records.flat_map(of).collect::<Vec<f32>>()).concat()
+}
+
+/// The probability of the pair at entry `e`.
+#[inline(always)]
+fn probability(messages: &[f32], partners: &Partners, weight: &[f32], e: usize) -> f32 {
+    // The product of both messages first: the same from both sides to the last bit.
+    let odds = weight[e] * (messages[e] * messages[partners.back[e] as usize]);
+    odds / (1.0 + odds)
 }
 
 /// Per axis the probability that some other record on it is the partner, before anything is known.
@@ -152,10 +178,103 @@ fn rarity<const D: usize>(published: &[[f32; D]], sides: &[Side], reach: f32) ->
 }
 
 /// Per record its class of evidence: equal shares of all records.
-fn classes<const D: usize>(estimates: &[Estimate<D>]) -> Vec<u8> {
+fn classes<const D: usize>(estimates: &[Estimate<D>]) -> Vec<usize> {
     let mut sorted: Vec<f32> = estimates.iter().map(|e| e.evidence).collect();
     sorted.par_sort_unstable_by(f32::total_cmp);
     let bounds: Vec<f32> =
         (1..CLASSES).filter_map(|c| sorted.get(c * sorted.len() / CLASSES).copied()).collect();
-    estimates.iter().map(|e| bounds.partition_point(|&bound| bound <= e.evidence) as u8).collect()
+    estimates.iter().map(|e| bounds.partition_point(|&bound| bound <= e.evidence)).collect()
+}
+
+/// How far estimates lie from the hidden coordinate: per class the share of good ones, and a mixture of normal distributions.
+struct Distances {
+    good: [f64; CLASSES],
+    weight: [[f64; SCALES]; CLASSES],
+    /// The density of each distribution in the middle of each step.
+    shapes: Vec<[f64; SCALES]>,
+    reach: f32,
+    /// Density times share, per class and step.
+    table: Vec<[f64; STEPS]>,
+}
+
+impl Distances {
+    /// Before anything is known; partners are looked for within `reach`.
+    fn new(reach: f32) -> Self {
+        let shape = |step: usize, scale: usize| {
+            let away = (step as f64 + 0.5) / STEPS as f64;
+            // In units of the reach; 1 / sqrt(2 pi).
+            let inverse = f64::from(2u32 << scale);
+            let z = away * inverse;
+            0.398_942_280_4 * inverse / f64::from(reach) * libm::exp(-0.5 * z * z)
+        };
+        let shapes =
+            (0..STEPS).map(|step| std::array::from_fn(|scale| shape(step, scale))).collect();
+        Self::of([0.8; CLASSES], [[1.0 / SCALES as f64; SCALES]; CLASSES], shapes, reach)
+    }
+
+    fn of(
+        good: [f64; CLASSES],
+        weight: [[f64; SCALES]; CLASSES],
+        shapes: Vec<[f64; SCALES]>,
+        reach: f32,
+    ) -> Self {
+        let mut distances =
+            Self { good, weight, shapes, reach, table: vec![[0.0; STEPS]; CLASSES] };
+        for (class, good) in good.iter().enumerate() {
+            let density = |step: usize| distances.parts(class, step).iter().sum::<f64>();
+            distances.table[class] = std::array::from_fn(|step| good * density(step));
+        }
+        distances
+    }
+
+    /// The weighted density of each distribution of `class` in the middle of a step.
+    fn parts(&self, class: usize, step: usize) -> [f64; SCALES] {
+        std::array::from_fn(|s| self.shapes[step][s] * self.weight[class][s])
+    }
+
+    #[inline(always)]
+    fn step(&self, away: f32) -> usize {
+        ((away / self.reach * STEPS as f32) as usize).min(STEPS - 1)
+    }
+
+    /// The density of a good estimate's distance, times the share of good ones.
+    #[inline(always)]
+    fn density(&self, class: usize, away: f32) -> f64 {
+        self.table[class][self.step(away)]
+    }
+
+    /// The weight of "no partner is known" for a record of each class.
+    fn alone(&self) -> [f32; CLASSES] {
+        let others = self.mean_good();
+        self.good.map(|good| (1.0 - good * others) as f32)
+    }
+
+    fn mean_good(&self) -> f64 {
+        self.good.iter().sum::<f64>() / CLASSES as f64
+    }
+
+    /// The distribution that the pairs `found` with this one suggest, per class and step. `class` is that of every record.
+    fn learned(self, found: &[[f64; STEPS]], class: &[usize]) -> Self {
+        let (mut good, mut weight) = (self.good, self.weight);
+        let others = self.mean_good().max(0.1);
+        for (one, found) in found.iter().enumerate() {
+            let records = class.iter().filter(|&&class| class == one).count();
+            if records == 0 {
+                continue;
+            }
+            let mut scales = [0.0; SCALES];
+            for (step, found) in found.iter().enumerate().filter(|x| *x.1 > 0.0) {
+                let parts = self.parts(one, step);
+                let sum = parts.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+                for (to, part) in scales.iter_mut().zip(parts) {
+                    *to += found * part / sum;
+                }
+            }
+            let total: f64 = scales.iter().sum();
+            good[one] = (total / records as f64 / others).clamp(SHARE.0, SHARE.1);
+            // One pair more, spread over all scales.
+            weight[one] = scales.map(|s| (s + 1.0 / SCALES as f64) / (total + 1.0));
+        }
+        Self::of(good, weight, self.shapes, self.reach)
+    }
 }

@@ -1,8 +1,7 @@
 //! Exact constraints: what a scheme's rule says about hidden coordinates beyond one record.
 //!
-//! A feasible set is what one record says. The rule that made the records says more: coordinates that
-//! were exchanged are still in the map, one in each of two records ([`exchanges`]), and a center that follows
-//! from a voxel grid leaves only every other voxel along a ray ([`parity`]).
+//! Coordinates that were exchanged are still in the map, one in each of two records ([`exchanges`]). A center that follows from a
+//! voxel grid leaves only every other voxel along a ray ([`parity`]).
 
 mod exchanges;
 mod parity;
@@ -25,8 +24,7 @@ pub(crate) fn feeds<const D: usize>(released: &Released<D>) -> usize {
     }
 }
 
-/// Estimates of `released` moved to where the rule of their family allows them to be. `delta` is the
-/// distance that decided support.
+/// Estimates of `released` moved to where the rule of their family allows them to be.
 pub(crate) fn settle<const D: usize>(
     released: &Released<D>,
     estimates: Vec<Estimate<D>>,

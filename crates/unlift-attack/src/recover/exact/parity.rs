@@ -1,7 +1,7 @@
 //! Voxel parity: where the center of a ray follows from a checkerboard, every other voxel along it is out.
 //!
-//! The edge of a voxel is published, where the grid starts is not. But estimates tell: there is one
-//! start (up to whole voxels) for which nearly all of them lie in voxels of their own center.
+//! The edge of a voxel is published, where the grid starts is not. It is the one start (up to whole voxels) for which nearly all
+//! estimates lie in voxels of their own center.
 
 use rayon::prelude::*;
 
@@ -16,17 +16,16 @@ const FINER: usize = 4;
 const SWEEPS: usize = 2;
 /// Estimates looked at for the first start, of which there are thousands, and for finer ones.
 const SAMPLE: (usize, usize) = (1 << 12, 1 << 15);
-/// The grid is believed when so many more of these estimates agree than do not: as a share, and in
-/// standard deviations of what a wrong grid yields (the best of all starts reaches 4 or 5).
+/// The grid is believed when the estimates that agree exceed those that do not by this share of all,
 const LEAST: f64 = 0.1;
-/// The standard deviations.
+/// and by this many standard deviations of what a wrong grid yields (the best of all starts reaches 4 or 5).
 const SIGMAS: f64 = 8.0;
 /// An estimate is moved this far past the wall, in voxels: on it, rounding would decide.
 const INSIDE: f32 = 1e-3;
 
 /// A checkerboard: its start, and the center of the voxel there.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Checkerboard<const D: usize> {
+struct Checkerboard<const D: usize> {
     start: [f64; D],
     edge: f64,
     first: u8,
@@ -34,8 +33,23 @@ pub(super) struct Checkerboard<const D: usize> {
 
 impl<const D: usize> Checkerboard<D> {
     /// The center that belongs to a point at `x`.
-    pub(super) fn center(&self, x: &[f32; D]) -> u8 {
+    fn center(&self, x: &[f32; D]) -> u8 {
         self.first ^ u8::from(odd(x, &self.start, self.edge))
+    }
+
+    /// How far along `direction` from `x` lies just beyond each wall of the voxel of `x`.
+    fn steps_to_walls(&self, x: &[f32; D], direction: &[f32; D]) -> Vec<f32> {
+        let mut steps = Vec::with_capacity(2 * D);
+        for (c, &along) in direction.iter().enumerate() {
+            let cell = (f64::from(x[c]) - self.start[c]) / self.edge;
+            for wall in [cell.floor(), cell.floor() + 1.0] {
+                let step = ((wall - cell) * self.edge) as f32 / along;
+                if step.is_finite() {
+                    steps.push(step + (INSIDE * self.edge as f32).copysign(step));
+                }
+            }
+        }
+        steps
     }
 }
 
@@ -56,58 +70,33 @@ pub(super) fn settle<const D: usize>(
         return estimates;
     };
     estimates.par_iter_mut().enumerate().for_each(|(i, estimate)| {
-        if estimate.status == Status::Ok && board.center(&estimate.position) != rays.center()[i] {
-            let center = &rays.centers()[usize::from(rays.center()[i])];
-            move_to_wall(&board, rays.center()[i], center, &rays.direction()[i], estimate);
+        let (own, direction) = (rays.center()[i], &rays.direction()[i]);
+        if estimate.status == Status::Ok && board.center(&estimate.position) != own {
+            let center = &rays.centers()[usize::from(own)];
+            // Every wall along a ray changes the parity: the nearest one, before or behind, ends the wrong voxel.
+            let t: f32 = (0..D).map(|c| (estimate.position[c] - center[c]) * direction[c]).sum();
+            let mut steps = board.steps_to_walls(&estimate.position, direction);
+            steps.sort_unstable_by(|a, b| a.abs().total_cmp(&b.abs()));
+            let ahead = steps.into_iter().filter(|step| t + step > 0.0);
+            let at = |step| std::array::from_fn(|c| center[c] + (t + step) * direction[c]);
+            if let Some(x) = ahead.map(at).find(|x| board.center(x) == own) {
+                estimate.position = x;
+            }
         }
     });
     estimates
 }
 
-/// Every wall along a ray changes the parity: the nearest one, before or behind, ends the wrong voxel.
-fn move_to_wall<const D: usize>(
-    board: &Checkerboard<D>,
-    own: u8,
-    center: &[f32; D],
-    direction: &[f32; D],
-    estimate: &mut Estimate<D>,
-) {
-    let t: f32 = (0..D).map(|c| (estimate.position[c] - center[c]) * direction[c]).sum();
-    let mut steps: Vec<f32> = Vec::with_capacity(2 * D);
-    for (c, &along) in direction.iter().enumerate() {
-        let cell = (f64::from(estimate.position[c]) - board.start[c]) / board.edge;
-        for wall in [cell.floor(), cell.floor() + 1.0] {
-            let step = ((wall - cell) * board.edge) as f32 / along;
-            if step.is_finite() {
-                steps.push(step + (INSIDE * board.edge as f32).copysign(step));
-            }
-        }
-    }
-    steps.sort_unstable_by(|a, b| a.abs().total_cmp(&b.abs()));
-    for step in steps.into_iter().filter(|step| t + step > 0.0) {
-        let x = std::array::from_fn(|c| center[c] + (t + step) * direction[c]);
-        if board.center(&x) == own {
-            estimate.position = x;
-            return;
-        }
-    }
-}
-
 /// The checkerboard that the estimates show, if there are two centers and the edge is known.
-pub(super) fn find<const D: usize>(
-    rays: &Rays<D>,
-    estimates: &[Estimate<D>],
-) -> Option<Checkerboard<D>> {
+fn find<const D: usize>(rays: &Rays<D>, estimates: &[Estimate<D>]) -> Option<Checkerboard<D>> {
     let edge = rays.voxel()?;
     if rays.centers().len() != 2 {
         return None;
     }
-    let known: Vec<([f32; D], u8)> = estimates
-        .iter()
-        .zip(rays.center())
-        .filter(|(e, _)| e.status == Status::Ok)
-        .map(|(e, &center)| (e.position, center))
-        .collect();
+    let rows = estimates.iter().zip(rays.center());
+    let known =
+        rows.filter(|(e, _)| e.status == Status::Ok).map(|(e, &center)| (e.position, center));
+    let known: Vec<([f32; D], u8)> = known.collect();
     let sample = |most: usize| -> Vec<([f32; D], u8)> {
         known.iter().step_by(known.len().div_ceil(most).max(1)).copied().collect()
     };
@@ -128,10 +117,8 @@ pub(super) fn find<const D: usize>(
                 tried[axis] += width * (2.0 * at as f64 / STARTS as f64 - 1.0);
                 tried
             };
-            let scores: Vec<i64> = (0..=STARTS)
-                .into_par_iter()
-                .map(|at| score(&many, &tried(at), edge).abs())
-                .collect();
+            let of = |at| score(&many, &tried(at), edge).abs();
+            let scores: Vec<i64> = (0..=STARTS).into_par_iter().map(of).collect();
             let most = scores.iter().copied().max().unwrap_or(0);
             let first = scores.iter().position(|&s| s == most).unwrap_or(STARTS / 2);
             let last = scores.iter().rposition(|&s| s == most).unwrap_or(STARTS / 2);

@@ -10,22 +10,20 @@
 //!    `p_random` the density of estimates of all slots (`votes`);
 //! 3. refines the best one by weighted least squares to the records of the neighbors found near (`refine`).
 //!
-//! `odds`, `p_true` and `p_random` are learned from the present estimates (`neighbor_distribution`, `map::crowding`) and again
-//! whenever enough slots jumped. Iterations end when few slots jump, or when records that did not vote say that estimates
-//! became worse (`validation`).
+//! `odds`, `p_true` and `p_random` are learned from the present estimates (`neighbor_distribution`, `map::grid`) and again
+//! whenever enough slots jumped. Iterations end when few slots jump, or when fewer records pass near the estimates (`state`).
 //!
-//! Slots move from the old estimates, so that neither order nor threads matter. If all of them moved at once, neighbors
-//! that are far from each other could change places for ever, each going where the other was. So half of the slots
-//! hold still while the others move. Only the first iteration moves all: its start comes from records alone.
+//! Slots move from the old estimates, so that neither order nor threads matter. If all of them moved at once, two neighbors
+//! could change places for ever. So half of the slots hold still while the others move. Only the first iteration moves all:
+//! its start comes from records alone.
 
-mod input;
 mod neighbor_distribution;
 mod refine;
 mod state;
 mod update;
 mod votes;
 
-use crate::recover::joint::input::{Input, Sample};
+use crate::recover::joint::neighbor_distribution::Input;
 use crate::recover::joint::state::State;
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::Graph;
@@ -40,56 +38,53 @@ const ITERATIONS: usize = 16;
 /// bearings say hardly more than chance does, neighbors' estimates are those of chance, too.
 const LEAST_EVIDENCE: f64 = 1.5;
 
-/// What joint recovery reads of a map and never changes.
-pub(crate) struct Joint<'a, const D: usize> {
-    pub(crate) family: &'a Family<'a, D>,
-    pub(crate) graph: &'a Graph,
-    /// The distance up to which a record supports a place, in the unit of the map.
-    pub(crate) delta: f32,
-    pub(crate) seed: u64,
+/// The estimates of all slots after the last iteration from `start`.
+pub(crate) fn recover<const D: usize>(
+    family: &Family<'_, D>,
+    graph: &Graph,
+    delta: f32,
+    seed: u64,
+    start: Vec<Estimate<D>>,
+) -> Vec<Estimate<D>> {
+    if family.has_regions() && mean_evidence(&start) < LEAST_EVIDENCE {
+        return start;
+    }
+    match family {
+        Family::Lines { rows, slots_per_record, chance } => {
+            let pieces = LinePieces::new(rows, *slots_per_record, chance, delta);
+            iterate(&Input::new(pieces, graph, delta, seed), start)
+        }
+        Family::Planes { planes, sorted } => {
+            let pieces = PlanePieces::new(planes, sorted, delta);
+            iterate(&Input::new(pieces, graph, delta, seed), start)
+        }
+        Family::Candidates { rows, chance } => {
+            let pieces = CandidatePieces::new(rows, chance, delta);
+            iterate(&Input::new(pieces, graph, delta, seed), start)
+        }
+    }
 }
 
-impl<const D: usize> Joint<'_, D> {
-    /// The estimates of all slots after the last iteration from `start`.
-    pub(crate) fn recover(&self, start: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
-        if self.family.has_regions() && mean_evidence(&start) < LEAST_EVIDENCE {
-            return start;
+fn iterate<const D: usize, P: Pieces<D>>(
+    input: &Input<'_, P>,
+    start: Vec<Estimate<D>>,
+) -> Vec<Estimate<D>> {
+    let mut state = State::new(input, start);
+    let order = along_curve(state.places());
+    for iteration in 0..ITERATIONS {
+        let groups = if iteration == 0 { 1 } else { 2 };
+        for group in 0..groups {
+            state.learn_if_stale(input);
+            let is_moving = |slot: &u32| *slot as usize % groups == group;
+            let slots = order.iter().copied().filter(is_moving);
+            let updates = state.propose_score_refine(input, slots);
+            state.apply(input, &updates);
         }
-        let delta = self.delta;
-        match self.family {
-            Family::Lines { rows, slots_per_record, chance } => {
-                self.iterate(LinePieces::new(rows, *slots_per_record, chance, delta), start)
-            }
-            Family::Planes { planes, sorted } => {
-                self.iterate(PlanePieces::new(planes, sorted, delta), start)
-            }
-            Family::Candidates { rows, chance } => {
-                self.iterate(CandidatePieces::new(rows, chance, delta), start)
-            }
+        if state.has_converged(input) {
+            break;
         }
     }
-
-    fn iterate<P: Pieces<D>>(&self, pieces: P, start: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
-        let Self { graph, delta, seed, .. } = *self;
-        let (listed, sample) = (graph.times_listed(), Sample::new(graph, seed));
-        let input = Input { pieces, graph, delta, listed, sample };
-        let mut state = State::new(&input, start);
-        let order = along_curve(state.places());
-        for iteration in 0..ITERATIONS {
-            let groups = if iteration == 0 { 1 } else { 2 };
-            for group in 0..groups {
-                state.learn_if_stale(&input);
-                let is_moving = |slot: &u32| *slot as usize % groups == group;
-                let slots = order.iter().copied().filter(is_moving);
-                let updates = state.propose_score_refine(&input, slots);
-                state.apply(&input, &updates);
-            }
-            if state.has_converged(&input) {
-                break;
-            }
-        }
-        state.into_best()
-    }
+    state.into_best()
 }
 
 fn mean_evidence<const D: usize>(estimates: &[Estimate<D>]) -> f64 {

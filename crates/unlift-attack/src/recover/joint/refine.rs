@@ -1,7 +1,7 @@
-//! A place made anew: least squares to the records of the neighbors found near it.
+//! A refined place: least squares to the records of the neighbors found near it.
 
 use crate::recover::joint::votes::Columns;
-use crate::recover::map::lines::{LANES, Lanes};
+use crate::recover::map::lines::{LANES, Lanes, fill};
 use crate::recover::map::pieces::{Piece, Pieces};
 use crate::recover::map::places::Places;
 
@@ -9,31 +9,7 @@ use crate::recover::map::places::Places;
 const STEPS: usize = 2;
 
 /// The directions of the pieces that neighbors lie on, in columns.
-pub(crate) type Directions<const D: usize> = [Vec<f32>; D];
-
-/// Makes `directions` those of the slots of `near`, padded as it is.
-#[inline(always)]
-fn gather<const D: usize, P: Pieces<D>>(
-    directions: &mut Directions<D>,
-    (pieces, places): (&P, &Places<D>),
-    near: &Columns<D>,
-) {
-    let n = near.len();
-    for column in &mut *directions {
-        column.resize(n.next_multiple_of(LANES), 0.0);
-    }
-    let mut columns = directions.each_mut().map(|column| &mut column[..]);
-    for i in 0..n {
-        let slot = near.slot(i);
-        let direction = pieces.direction(slot, places.piece(slot));
-        for (column, along) in columns.iter_mut().zip(direction) {
-            column[i] = along;
-        }
-    }
-    for column in &mut columns {
-        column[n..].fill(0.0);
-    }
-}
+pub(super) type Directions<const D: usize> = [Vec<f32>; D];
 
 /// Sums over neighbors near a place, each weighted by how near it is; one per lane.
 #[derive(Clone, Copy)]
@@ -62,16 +38,14 @@ impl<const D: usize> Sums<D> {
         near: &Columns<D>,
         directions: &Directions<D>,
         x: &[f32; D],
-        inverse_kernel2: f32,
-        (gain, inverse_a2): (f32, f32),
-        doubt: f32,
+        (inverse_kernel2, (gain, inverse_a2), doubt): (f32, (f32, f32), f32),
     ) -> Self {
         let mut sums = Self::ZERO;
-        let places = near.vectors();
-        let odds = near.odds();
+        let odds = near.odds.as_chunks::<LANES>().0;
+        let places: [&[Lanes]; D] = std::array::from_fn(|c| &near.x[c].as_chunks().0[..odds.len()]);
         let directions: [&[Lanes]; D] =
-            std::array::from_fn(|c| &directions[c].as_chunks().0[..places[0].len()]);
-        for i in 0..places[0].len() {
+            std::array::from_fn(|c| &directions[c].as_chunks().0[..odds.len()]);
+        for i in 0..odds.len() {
             for lane in 0..LANES {
                 let away: [f32; D] = std::array::from_fn(|c| places[c][i][lane] - x[c]);
                 let toward: [f32; D] = std::array::from_fn(|c| directions[c][i][lane]);
@@ -84,7 +58,7 @@ impl<const D: usize> Sums<D> {
                 let q = 1.0 / (1.0 + r2 * inverse_a2);
                 let likelier = odds[i][lane] * gain * (q * q * q);
                 sums.n[lane] += u32::from(closeness > 0.0);
-                // What is near by chance does not hold: on a small map half of everything is near.
+                // Estimates that are near by chance count less: on a small map half of all are near.
                 let closeness = closeness * likelier / (doubt + likelier);
                 sums.weight[lane] += closeness;
                 for r in 0..D {
@@ -101,35 +75,30 @@ impl<const D: usize> Sums<D> {
     }
 }
 
-#[inline(always)]
-fn total(lanes: &Lanes) -> f32 {
-    lanes.iter().sum()
-}
-
 /// `x` moved along `own` to the least squares of the records of near neighbors, weighted by how near their
-/// estimates are: within `1 / sqrt(inverse_kernel2)`. Estimates hold fully across their own pieces, and
-/// a little along them. With it the number of these records. `at` tells kernel, law and doubt at a place.
+/// estimates are, and the number of these records. Estimates hold fully across their own pieces, and
+/// a little along them. `at` tells the kernel, the distribution and the doubt at a place.
 #[inline(always)]
-pub(crate) fn refined<const D: usize, P: Pieces<D>>(
+pub(super) fn refined<const D: usize, P: Pieces<D>>(
     pieces: &P,
     places: &Places<D>,
     own: &Piece<D>,
-    (near, directions): (&mut Columns<D>, &mut Directions<D>),
+    (near, directions): (&Columns<D>, &mut Directions<D>),
     mut x: [f32; D],
     at: impl Fn(&[f32; D]) -> (f32, (f32, f32), f32),
 ) -> ([f32; D], u32) {
-    gather(directions, (pieces, places), near);
+    let of = |slot: &u32| pieces.direction(*slot as usize, places.piece(*slot as usize));
+    fill(directions, &near.slot, of);
+    directions.iter_mut().for_each(|column| column.resize(near.odds.len(), 0.0));
     let mut records = 0;
-    for step in 1..=STEPS {
-        let (inverse_kernel2, law, doubt) = at(&x);
-        let sums = Sums::new(near, directions, &x, inverse_kernel2, law, doubt);
+    for _ in 0..STEPS {
+        let weights = at(&x);
+        let sums = Sums::new(near, directions, &x, weights);
         let n: u32 = sums.n.iter().sum();
-        if step == STEPS {
-            records = n;
-            if pieces.slots_per_record() > 1 {
-                records = near.n_records(pieces.slots_per_record(), &x, inverse_kernel2);
-            }
-        }
+        records = match pieces.slots_per_record() {
+            1 => n,
+            _ => near.n_pairs(&x, weights.0),
+        };
         x = own.project(&moved::<D, P>(own, &x, &sums, n));
     }
     (x, records)
@@ -143,6 +112,7 @@ fn moved<const D: usize, P: Pieces<D>>(
     sums: &Sums<D>,
     n: u32,
 ) -> [f32; D] {
+    let total = |lanes: &Lanes| lanes.iter().sum::<f32>();
     let weight = total(&sums.weight);
     let mut pull = sums.pull.map(|lanes| total(&lanes));
     // The part of neighbors that is free along their pieces: lines, or all but the normals of planes.
@@ -195,11 +165,9 @@ fn solve_within<const D: usize>(
     std::array::from_fn(|c| x[c] + right[c])
 }
 
-// Systems of two or three equations.
-
 /// Solves `a x = b` for a symmetric positive `a`; `b` becomes `x`. `false` when it is singular.
 #[inline(always)]
-pub(crate) fn solve_symmetric<const D: usize>(a: &mut [[f32; D]; D], b: &mut [f32; D]) -> bool {
+fn solve_symmetric<const D: usize>(a: &mut [[f32; D]; D], b: &mut [f32; D]) -> bool {
     for i in 0..D {
         if a[i][i] <= 0.0 || a[i][i].is_nan() {
             return false;

@@ -4,10 +4,9 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use rayon::prelude::*;
 
-use crate::recover::joint::input::{Input, Learning};
-use crate::recover::joint::neighbor_distribution::NeighborDistribution;
+use crate::recover::joint::neighbor_distribution::{Input, NeighborDistribution};
 use crate::recover::joint::update::{Context, Scratch, TUBE};
-use crate::recover::map::graph::{Graph, either, record_of};
+use crate::recover::map::graph::{either, record_of};
 use crate::recover::map::grid::Density;
 use crate::recover::map::lists::CHUNK;
 use crate::recover::map::pieces::Pieces;
@@ -15,15 +14,11 @@ use crate::recover::map::places::{Places, distance2};
 use crate::recover::result::{Estimate, Status};
 use crate::simd::{Kernel, dispatch};
 
-/// True neighbors are looked for within this many radii of their distribution: nearly all of its mass.
-const REACH: f32 = 4.0;
 /// The radius is at least this share of the largest coordinate: estimates of one place differ by rounding.
 const ROUNDING: f32 = 8.0 * f32::EPSILON;
-/// The density of estimates is smooth over this many radii: it must not follow the very crowds that it judges.
+/// The density of estimates is smoothed over this many radii, so that it does not follow the crowds that it judges.
 const SMOOTH: f32 = 4.5;
-/// Estimates enter the refined position within this many radii, less the farther they are.
-const KERNEL: f32 = 3.75;
-/// A slot that did not jump is looked at again if its place is ahead by at most this many nats per
+/// A slot that did not jump is updated again if its place is ahead by at most this many nats per
 /// neighbor that did in one iteration. One jump can weigh more than that, but some speak for the place, too.
 const PER_JUMP: f32 = 2.0;
 /// Iterations end when fewer than this share of the slots jump farther than a radius: so few hardly change anything.
@@ -31,12 +26,16 @@ const SETTLED: f64 = 0.03;
 /// Distribution and density are learned again when more than this share of the slots jumped since. Learned once per
 /// iteration, maps of paired lines and of planes come back worse.
 const STALE: f64 = 0.02;
-/// Iterations end when as many as this share of those that moved before move again: estimates go to and fro.
+/// Iterations end when this share of those that moved before move again: estimates go to and fro.
 const SLOW: f64 = 0.9;
 /// Iterations end when records agree by this share less than they did at best: a little less is noise.
 const WORSE: f64 = 0.08;
+/// Slots on which agreement is measured: the mean over so many is known better than the share by which it may fall.
+const JUDGES: usize = 1 << 12;
+/// Slots whose jumps one thread tells at a time: enough that sharing them out costs nothing.
+const JUMPERS: usize = 64;
 
-/// Where joint recovery stands.
+/// The state of joint recovery.
 pub(super) struct State<const D: usize> {
     /// The best estimates of whole iterations.
     best: Vec<Estimate<D>>,
@@ -48,9 +47,10 @@ pub(super) struct State<const D: usize> {
     density: Density<D>,
     neighbors: NeighborDistribution,
     least_radius: f32,
-    /// How many nats each place is ahead of the best one elsewhere; 0 where a slot is to be looked at in any case.
+    /// How many nats each place is ahead of the best one elsewhere; 0 where a slot is to be updated in any case.
     ahead: Vec<f32>,
-    jumps: Jumps,
+    /// Per slot that is ahead, how many jumps of neighbors concern it since it was last its turn.
+    jumps_near: Vec<AtomicU32>,
     /// Slots that jumped in this iteration, in the one before, and since density and distribution were learned.
     n_jumped: usize,
     n_jumped_before: usize,
@@ -83,7 +83,7 @@ impl<const D: usize> State<D> {
             neighbors,
             least_radius,
             ahead: vec![0.0; n],
-            jumps: Jumps::new(n),
+            jumps_near: (0..n).map(|_| AtomicU32::new(0)).collect(),
             n_jumped: 0,
             // Nothing is settled yet.
             n_jumped_before: n,
@@ -92,7 +92,7 @@ impl<const D: usize> State<D> {
         }
     }
 
-    /// Where slots are believed to be.
+    /// The present places of all slots.
     pub(super) fn places(&self) -> &Places<D> {
         &self.places
     }
@@ -107,13 +107,13 @@ impl<const D: usize> State<D> {
         if self.n_jumped_since as f64 <= STALE * self.estimates.len() as f64 {
             return;
         }
-        let radius = self.neighbors.radius;
-        let (density, neighbors) = learned(input, &self.places, radius, self.least_radius);
-        if neighbors.surplus != self.neighbors.surplus {
+        let before = self.neighbors.surplus;
+        (self.density, self.neighbors) =
+            learned(input, &self.places, self.neighbors.radius, self.least_radius);
+        if self.neighbors.surplus != before {
             // Leads found under another rule say nothing.
             self.ahead.fill(0.0);
         }
-        (self.density, self.neighbors) = (density, neighbors);
         self.n_jumped_since = 0;
     }
 
@@ -126,45 +126,56 @@ impl<const D: usize> State<D> {
         let of_slot =
             |slot: u32| Update { slot, ahead: 0.0, estimate: self.estimates[slot as usize] };
         let mut updates: Vec<Update<D>> = slots.map(of_slot).collect();
-        let odds = self.neighbors.odds_of_slot(input.pieces.slots_per_record());
-        let context = Context {
-            pieces: &input.pieces,
-            graph: input.graph,
-            places: &self.places,
-            density: &self.density,
-            neighbors: &self.neighbors,
-            odds: &odds,
-            kernel: KERNEL * self.neighbors.radius,
-            delta2: input.delta * input.delta,
-        };
+        let Self { places, density, neighbors, .. } = self;
+        let odds = neighbors.odds_of_slot(input.pieces.slots_per_record());
+        let context = Context { input, places, density, neighbors, odds };
         updates.par_chunks_mut(CHUNK).for_each_init(Scratch::default, |scratch, updates| {
             dispatch(Chunk { context: &context, state: self, updates, scratch });
         });
         updates
     }
 
-    /// Moves slots to where they go, and tells those whom a jump concerns.
+    /// Moves slots to where they go, and counts for each slot the jumps that concern it: those from or to places near which it may
+    /// lie, of the slots whose edges lead to it.
     pub(super) fn apply<P: Pieces<D>>(&mut self, input: &Input<'_, P>, updates: &[Update<D>]) {
+        let Input { pieces, graph, .. } = input;
+        let (radius, slots_per_record) = (self.neighbors.radius, pieces.slots_per_record());
         let mut jumpers = Vec::new();
         for Update { slot, ahead, estimate } in updates {
             let at = *slot as usize;
-            let has_jumped = is_jump(&self.estimates[at], estimate, self.neighbors.radius);
-            // Whoever jumped is looked at again in any case.
-            (self.estimates[at], self.ahead[at]) =
-                (*estimate, if has_jumped { 0.0 } else { *ahead });
-            self.jumps.forget(at);
+            let has_jumped = is_jump(&self.estimates[at], estimate, radius);
+            self.estimates[at] = *estimate;
+            // Whoever jumped is updated again in any case.
+            self.ahead[at] = if has_jumped { 0.0 } else { *ahead };
+            *self.jumps_near[at].get_mut() = 0;
             if has_jumped {
-                jumpers.push(*slot);
+                jumpers.push(at);
             }
         }
         self.n_jumped += jumpers.len();
         self.n_jumped_since += jumpers.len();
-        let after = Places::new(&self.estimates);
-        let reach = TUBE * self.neighbors.radius;
-        let is_ahead = |slot: usize| self.ahead[slot] > 0.0;
-        let (from, to) = (&self.places, &after);
-        self.jumps.tell((&input.pieces, input.graph), &jumpers, (from, to), reach, is_ahead);
-        self.places = after;
+        let before = std::mem::replace(&mut self.places, Places::new(&self.estimates));
+        let reach2 = (TUBE * radius) * (TUBE * radius);
+        let may_lie_near = |slot: usize, x: &[f32; D]| {
+            let near = |piece| distance2(&pieces.piece(slot, piece).project(x), x) < reach2;
+            (0..P::PER_SLOT).any(near)
+        };
+        jumpers.par_iter().with_min_len(JUMPERS).for_each(|&slot| {
+            let (from, to) = (before.of(slot), self.places.of(slot));
+            let (ends, class) = graph.of(slot);
+            for (&end, &class) in ends.iter().zip(class) {
+                let end = end as usize;
+                let slots = end..=end + usize::from(either(class, slots_per_record));
+                // Both slots of a record lie on one piece. A slot that is not ahead is updated in any case.
+                let concerns = slots.clone().any(|slot| self.ahead[slot] > 0.0)
+                    && (may_lie_near(end, &from) || may_lie_near(end, &to));
+                if concerns {
+                    slots.for_each(|slot| {
+                        self.jumps_near[slot].fetch_add(1, Ordering::Relaxed);
+                    });
+                }
+            }
+        });
     }
 
     /// Judges an iteration: whether it was the last one.
@@ -198,17 +209,7 @@ fn learned<const D: usize, P: Pieces<D>>(
     least_radius: f32,
 ) -> (Density<D>, NeighborDistribution) {
     let density = Density::new(places, &input.listed, SMOOTH * radius);
-    let neighbors = NeighborDistribution::learn(&Learning {
-        places,
-        density: &density,
-        slots_per_record: input.pieces.slots_per_record(),
-        reach: REACH * radius,
-        tells_region: P::TELLS_REGION,
-        least_radius,
-        most_radius: P::MOST_RADIUS * input.delta,
-        graph: input.graph,
-        sample: &input.sample,
-    });
+    let neighbors = NeighborDistribution::learn(input, places, &density, radius, least_radius);
     (density, neighbors)
 }
 
@@ -236,126 +237,44 @@ impl<const D: usize, P: Pieces<D>> Kernel for Chunk<'_, '_, D, P> {
             }
             let update = &mut self.updates[at];
             let slot = update.slot as usize;
-            let (ahead, n_jumps) = (self.state.ahead[slot], self.state.jumps.of(slot) as f32);
-            let is_settled = ahead > 0.0 && n_jumps <= ahead / PER_JUMP;
-            (update.estimate, update.ahead) = if is_settled {
-                (update.estimate, ahead)
+            let ahead = self.state.ahead[slot];
+            let n_jumps = self.state.jumps_near[slot].load(Ordering::Relaxed) as f32;
+            if ahead > 0.0 && n_jumps <= ahead / PER_JUMP {
+                update.ahead = ahead;
             } else {
-                self.context.solve(slot, &update.estimate, self.scratch)
-            };
+                (update.estimate, update.ahead) =
+                    self.context.solve(slot, &update.estimate, self.scratch);
+            }
         }
     }
 }
-
-// Whom a jump concerns: the slots that must be looked at again.
-//
-// A slot that jumps tells those at the other ends of its edges, if it jumped to or from where they may lie. Few
-// slots jump after the first iteration, so telling is cheaper than asking. A slot whom many list knows only some of
-// them: the others are not told, and stay until something else jumps.
-
-/// Per slot that is ahead, how many jumps concern it since it was last its turn. Sums of integers: the same however threads
-/// share the work.
-pub(super) struct Jumps {
-    concerning: Vec<AtomicU32>,
-}
-
-impl Jumps {
-    /// No jumps yet.
-    pub(super) fn new(n_slots: usize) -> Self {
-        Self { concerning: (0..n_slots).map(|_| AtomicU32::new(0)).collect() }
-    }
-
-    /// How many jumps concern `slot` since it was its turn last, whether it was then looked at or passed over.
-    #[inline(always)]
-    pub(super) fn of(&self, slot: usize) -> u32 {
-        self.concerning[slot].load(Ordering::Relaxed)
-    }
-
-    /// It was the turn of `slot`.
-    pub(super) fn forget(&mut self, slot: usize) {
-        *self.concerning[slot].get_mut() = 0;
-    }
-
-    /// Tells all whom `jumpers` concern, which moved `from` their places `to` others: whoever may lie within `reach` of either.
-    /// Where nothing `is_ahead` a slot is looked at in any case and need not know.
-    pub(super) fn tell<const D: usize, P: Pieces<D>>(
-        &self,
-        (pieces, graph): (&P, &Graph),
-        jumpers: &[u32],
-        (from, to): (&Places<D>, &Places<D>),
-        reach: f32,
-        is_ahead: impl Fn(usize) -> bool + Sync,
-    ) {
-        let slots_per_record = pieces.slots_per_record();
-        let concerns = |slot: usize, x: &[f32; D]| {
-            let near = |piece| distance2(&pieces.piece(slot, piece).project(x), x) < reach * reach;
-            (0..P::PER_SLOT).any(near)
-        };
-        jumpers.par_chunks(JUMPERS).for_each(|jumpers| {
-            for &slot in jumpers {
-                let (from, to) = (from.of(slot as usize), to.of(slot as usize));
-                let (ends, class) = graph.of(slot as usize);
-                for (&end, &class) in ends.iter().zip(class) {
-                    let last = end as usize + usize::from(either(class, slots_per_record));
-                    let ends = end as usize..=last;
-                    if !ends.clone().any(&is_ahead) {
-                        continue;
-                    }
-                    // Both slots of a record lie on one piece.
-                    if concerns(end as usize, &from) || concerns(end as usize, &to) {
-                        for end in ends {
-                            self.concerning[end].fetch_add(1, Ordering::Relaxed);
-                        }
-                    }
-                }
-            }
-        });
-    }
-}
-
-/// Slots whose jumps one thread tells at a time: enough that sharing them out costs nothing.
-const JUMPERS: usize = 64;
-
-// How well records agree with estimates: the judge of iterations.
-//
-// Estimates that agree with each other prove nothing: they may have drifted together. Records cannot
-// drift. If fewer of them pass near the estimates of an iteration than before, beyond chance, the iteration
-// made things worse.
-
-/// Slots looked at: the mean over so many is known better than the share by which it may fall.
-const SLOTS: usize = 1 << 12;
 
 /// The mean number of records at the other ends of a slot's edges that pass near its estimate, less
 /// that expected by chance; over slots spread evenly.
-pub(super) fn agreement<const D: usize, P: Pieces<D>>(
-    input: &Input<'_, P>,
-    estimates: &[Estimate<D>],
-) -> f64 {
-    let n = estimates.len();
-    let slots: Vec<usize> = (0..n).step_by(n.div_ceil(SLOTS).max(1)).collect();
-    let of_part =
-        |part: &[usize]| part.iter().map(|&slot| of_slot(input, slot, &estimates[slot])).sum();
-    let parts: Vec<f64> = slots.par_chunks(256).map(of_part).collect();
-    parts.iter().sum::<f64>() / slots.len().max(1) as f64
-}
-
-fn of_slot<const D: usize, P: Pieces<D>>(
-    input: &Input<'_, P>,
-    slot: usize,
-    estimate: &Estimate<D>,
-) -> f64 {
-    if estimate.status != Status::Ok {
-        return 0.0;
-    }
+///
+/// Estimates that agree with each other prove nothing: they may have drifted together. Records cannot drift.
+fn agreement<const D: usize, P: Pieces<D>>(input: &Input<'_, P>, estimates: &[Estimate<D>]) -> f64 {
     let Input { pieces, graph, delta, .. } = input;
-    let (mut near, mut all) = (0u32, 0u32);
-    for &end in graph.of(slot).0 {
-        let record = record_of(end as usize, pieces.slots_per_record());
-        if pieces.may_vote(slot, record) {
-            all += 1;
-            near += u32::from(pieces.record_distance2(record, &estimate.position) <= delta * delta);
+    let of_slot = |&slot: &usize| {
+        let estimate = &estimates[slot];
+        if estimate.status != Status::Ok {
+            return 0.0;
         }
-    }
-    let chance = pieces.record_chance(slot, &estimate.position);
-    f64::from(near) - f64::from(all) * f64::from(chance)
+        let (mut near, mut all) = (0u32, 0u32);
+        for &end in graph.of(slot).0 {
+            let record = record_of(end as usize, pieces.slots_per_record());
+            if pieces.may_vote(slot, record) {
+                let d2 = pieces.record_distance2(record, &estimate.position);
+                all += 1;
+                near += u32::from(d2 <= delta * delta);
+            }
+        }
+        let chance = pieces.record_chance(slot, &estimate.position);
+        f64::from(near) - f64::from(all) * f64::from(chance)
+    };
+    let n = estimates.len();
+    let slots: Vec<usize> = (0..n).step_by(n.div_ceil(JUDGES).max(1)).collect();
+    let parts: Vec<f64> =
+        slots.par_chunks(256).map(|part| part.iter().map(of_slot).sum()).collect();
+    parts.iter().sum::<f64>() / slots.len().max(1) as f64
 }

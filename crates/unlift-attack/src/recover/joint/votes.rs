@@ -9,23 +9,22 @@ use crate::recover::map::places::{FAR, Places, distance2};
 const BEYOND: f32 = 1e19;
 
 /// The odds that edges of a slot lead to true neighbors.
-pub(crate) struct Odds<'a, const D: usize> {
+pub(super) struct Odds<'a, const D: usize> {
     /// Per class: the odds, and 1 where the edge may as well be the partner's, 0 elsewhere.
-    pub(crate) of_class: &'a [(f32, f32); CLASSES],
+    pub(super) of_class: &'a [(f32, f32); CLASSES],
     /// Where the other slot of a paired line lies.
-    pub(crate) partner: [f32; D],
-    /// The law there; a gain of 0 without a partner.
-    pub(crate) gain: f32,
-    pub(crate) inverse_a2: f32,
+    pub(super) partner: [f32; D],
+    /// The distribution of neighbors there; a gain of 0 without a partner.
+    pub(super) gain: f32,
+    pub(super) inverse_a2: f32,
 }
 
 /// The estimates at the other ends of a slot's edges, in columns.
-#[derive(Debug)]
-pub(crate) struct Ends<const D: usize> {
+pub(super) struct Ends<const D: usize> {
     x: [Vec<f32>; D],
     slot: Vec<u32>,
     class: Vec<u8>,
-    /// Squared distance to the piece last looked at.
+    /// Buffers: squared distances to a piece, and which rows are near it.
     apart2: Vec<f32>,
     kept: Vec<u32>,
 }
@@ -41,7 +40,7 @@ impl<const D: usize> Ends<D> {
     /// The places of the slots at the other ends of edges, each of a class: of both slots of a record
     /// where it is not known which.
     #[inline(always)]
-    pub(crate) fn gather(
+    pub(super) fn gather(
         &mut self,
         (ends, class): (&[u32], &[u8]),
         places: &Places<D>,
@@ -79,14 +78,14 @@ impl<const D: usize> Ends<D> {
     }
 
     /// Number of estimates.
-    pub(crate) fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.slot.len()
     }
 
     /// Puts the estimates within `reach` of `piece` into `near`, with the odds of each, but not those within
     /// `blind` of a center.
     #[inline(always)]
-    pub(crate) fn near(
+    pub(super) fn near(
         &mut self,
         piece: &Piece<D>,
         reach: f32,
@@ -100,21 +99,14 @@ impl<const D: usize> Ends<D> {
         let apart2 = &mut self.apart2[..n];
         for i in 0..n {
             let x: [f32; D] = std::array::from_fn(|c| columns[c][i]);
-            let y = piece.project(&x);
-            let mut sum = 0.0;
-            for c in 0..D {
-                sum += (x[c] - y[c]) * (x[c] - y[c]);
-            }
-            // An absurd delta reaches even those.
-            apart2[i] = if x[0] == FAR { f32::INFINITY } else { sum };
+            // An absurd delta reaches even lost slots.
+            let d2 = distance2(&x, &piece.project(&x));
+            apart2[i] = if x[0] == FAR { f32::INFINITY } else { d2 };
         }
         if piece.from_center {
             for i in 0..n {
-                let mut sum = 0.0;
-                for (column, from) in columns.iter().zip(&piece.through) {
-                    sum += (column[i] - from) * (column[i] - from);
-                }
-                apart2[i] = if sum < blind * blind { f32::INFINITY } else { apart2[i] };
+                let d2 = distance2(&std::array::from_fn(|c| columns[c][i]), &piece.through);
+                apart2[i] = if d2 < blind * blind { f32::INFINITY } else { apart2[i] };
             }
         }
         // Every number is written, and stays if it is near: no branch to guess.
@@ -137,23 +129,21 @@ impl<const D: usize> Ends<D> {
 }
 
 /// Estimates near a piece with the odds that they are a true neighbor's, in columns.
-#[derive(Debug)]
-pub(crate) struct Columns<const D: usize> {
-    x: [Vec<f32>; D],
-    odds: Vec<f32>,
+pub(super) struct Columns<const D: usize> {
+    /// Padded to whole vectors with estimates that say nothing, as are the odds and sides.
+    pub(super) x: [Vec<f32>; D],
+    pub(super) odds: Vec<f32>,
     /// 1 where the edge may as well be the partner's.
     shared: Vec<f32>,
     side: Vec<Side>,
-    slot: Vec<u32>,
-    /// Squared distance to the place last looked at.
-    apart2: Vec<f32>,
+    pub(super) slot: Vec<u32>,
 }
 
 impl<const D: usize> Default for Columns<D> {
     fn default() -> Self {
         let x = std::array::from_fn(|_| Vec::new());
-        let (odds, shared, apart2) = (Vec::new(), Vec::new(), Vec::new());
-        Self { x, odds, shared, side: Vec::new(), slot: Vec::new(), apart2 }
+        let (odds, shared) = (Vec::new(), Vec::new());
+        Self { x, odds, shared, side: Vec::new(), slot: Vec::new() }
     }
 }
 
@@ -168,7 +158,6 @@ impl<const D: usize> Columns<D> {
         self.slot.resize(n, 0);
     }
 
-    /// Writes row `i`.
     #[inline(always)]
     fn set(&mut self, i: usize, x: &[f32; D], (odds, side): ((f32, f32), Side), slot: u32) {
         for (column, x) in self.x.iter_mut().zip(x) {
@@ -189,64 +178,12 @@ impl<const D: usize> Columns<D> {
         let columns: [&[f32]; D] = std::array::from_fn(|c| &self.x[c][..n]);
         let (odds, shared) = (&mut self.odds[..n], &self.shared[..n]);
         for i in 0..n {
-            let mut r2 = 0.0;
-            for (column, partner) in columns.iter().zip(&of.partner) {
-                r2 += (partner - column[i]) * (partner - column[i]);
-            }
+            let r2 = distance2(&of.partner, &std::array::from_fn(|c| columns[c][i]));
             let q = 1.0 / (1.0 + r2 * of.inverse_a2);
             odds[i] /= 1.0 + shared[i] * odds[i] * of.gain * q * q * q;
         }
     }
 
-    /// Number of estimates.
-    #[inline(always)]
-    pub(crate) fn len(&self) -> usize {
-        self.slot.len()
-    }
-
-    /// The estimate in row `i`.
-    #[inline(always)]
-    pub(crate) fn at(&self, i: usize) -> [f32; D] {
-        std::array::from_fn(|c| self.x[c][i])
-    }
-
-    /// All estimates, a vector at a time; the last one is filled up with estimates far away.
-    #[inline(always)]
-    pub(crate) fn vectors(&self) -> [&[Lanes]; D] {
-        std::array::from_fn(|c| self.x[c].as_chunks().0)
-    }
-
-    /// Records of estimates within `1 / sqrt(inverse_kernel2)` of `x`: both slots of a paired line are one, and
-    /// stand side by side.
-    #[inline(always)]
-    pub(crate) fn n_records(
-        &mut self,
-        slots_per_record: usize,
-        x: &[f32; D],
-        inverse_kernel2: f32,
-    ) -> u32 {
-        let n = self.len();
-        self.apart2.resize(n, 0.0);
-        for i in 0..n {
-            self.apart2[i] = distance2(&self.at(i), x);
-        }
-        let within = |&apart2: &f32| 1.0 - apart2 * inverse_kernel2 > 0.0;
-        let all: u32 = self.apart2.iter().map(|apart2| u32::from(within(apart2))).sum();
-        let is_pair = |slots: &[u32]| slots_per_record == 2 && slots[0] / 2 == slots[1] / 2;
-        let pairs = self.apart2.windows(2).zip(self.slot.windows(2));
-        let twice = |(apart2, slots): (&[f32], &[u32])| {
-            u32::from(within(&apart2[0]) & within(&apart2[1]) & is_pair(slots))
-        };
-        all - pairs.map(twice).sum::<u32>()
-    }
-
-    /// The slot whose estimate is in row `i`.
-    #[inline(always)]
-    pub(crate) fn slot(&self, i: usize) -> usize {
-        self.slot[i] as usize
-    }
-
-    /// Fills up the last vector with estimates that say nothing.
     fn pad(&mut self) {
         let n = self.odds.len().next_multiple_of(LANES);
         self.x.iter_mut().for_each(|column| column.resize(n, BEYOND));
@@ -254,18 +191,39 @@ impl<const D: usize> Columns<D> {
         self.side.resize(n, Side::Mutual);
     }
 
-    /// The odds in vectors.
+    /// Number of estimates.
     #[inline(always)]
-    pub(crate) fn odds(&self) -> &[Lanes] {
-        self.odds.as_chunks().0
+    pub(super) fn len(&self) -> usize {
+        self.slot.len()
+    }
+
+    /// The estimate in row `i`.
+    #[inline(always)]
+    pub(super) fn at(&self, i: usize) -> [f32; D] {
+        std::array::from_fn(|c| self.x[c][i])
+    }
+
+    /// Records of estimates within `1 / sqrt(inverse_kernel2)` of `x`, where records have two slots, which stand side by side.
+    #[inline(always)]
+    pub(super) fn n_pairs(&self, x: &[f32; D], inverse_kernel2: f32) -> u32 {
+        let (mut n, mut last) = (0, u32::MAX);
+        for (i, slot) in self.slot.iter().enumerate() {
+            if 1.0 - distance2(&self.at(i), x) * inverse_kernel2 > 0.0 {
+                n += u32::from(slot ^ 1 != last);
+                last = *slot;
+            } else {
+                last = u32::MAX;
+            }
+        }
+        n
     }
 
     /// The logarithm of how much likelier these estimates are about a point at `x` than by chance, where the distribution has
     /// this gain and `1 / a^2`: the sum of `ln(1 + odds * gain * (1 + r^2 / a^2)^-3)`.
     #[inline(always)]
-    pub(crate) fn log_likelihood(&self, x: &[f32; D], law: (f32, f32)) -> f32 {
+    pub(super) fn log_likelihood(&self, x: &[f32; D], distribution: (f32, f32)) -> f32 {
         let mut sums = [0.0f32; LANES];
-        let likelier = self.likelier(x, law);
+        let likelier = self.likelier(x, distribution);
         let n = self.odds.len() / LANES;
         // One logarithm of two at a time: no product comes near the end of `f32`.
         for i in 0..n / 2 {
@@ -281,23 +239,21 @@ impl<const D: usize> Columns<D> {
         sums.iter().sum()
     }
 
-    /// The same, but those whom a slot names and those who name it may be ahead of each other by no more
-    /// than `surplus` beyond what both name.
+    /// The same, but forward and reverse edges may be ahead of each other by no more than `surplus` beyond what mutual
+    /// edges say.
     #[inline(always)]
-    pub(crate) fn two_sided(&self, x: &[f32; D], law: (f32, f32), surplus: f32) -> f32 {
-        let (mut all, mut forward, mut reverse) =
-            ([0.0f32; LANES], [0.0f32; LANES], [0.0f32; LANES]);
-        let likelier = self.likelier(x, law);
+    pub(super) fn two_sided(&self, x: &[f32; D], distribution: (f32, f32), surplus: f32) -> f32 {
+        let mut sums = [[0.0f32; LANES]; 3];
+        let likelier = self.likelier(x, distribution);
         for (i, side) in self.side.as_chunks::<LANES>().0.iter().enumerate() {
             for lane in 0..LANES {
                 let one = ln(likelier(i, lane));
-                all[lane] += one;
-                forward[lane] += if side[lane] == Side::Forward { one } else { 0.0 };
-                reverse[lane] += if side[lane] == Side::Reverse { one } else { 0.0 };
+                sums[0][lane] += one;
+                sums[1][lane] += if side[lane] == Side::Forward { one } else { 0.0 };
+                sums[2][lane] += if side[lane] == Side::Reverse { one } else { 0.0 };
             }
         }
-        let [all, forward, reverse]: [f32; 3] =
-            [all, forward, reverse].map(|sums| sums.iter().sum());
+        let [all, forward, reverse]: [f32; 3] = sums.map(|lanes| lanes.iter().sum());
         let of_both = all - forward - reverse;
         all - ((forward - reverse).abs() - of_both - surplus).max(0.0)
     }
@@ -314,11 +270,7 @@ impl<const D: usize> Columns<D> {
             std::array::from_fn(|c| &self.x[c].as_chunks().0[..odds.len()]);
         let x = *x;
         move |i: usize, lane: usize| {
-            let mut r2 = 0.0;
-            for c in 0..D {
-                let d = columns[c][i][lane] - x[c];
-                r2 += d * d;
-            }
+            let r2 = distance2(&std::array::from_fn(|c| columns[c][i][lane]), &x);
             let q = 1.0 / (1.0 + r2 * inverse_a2);
             1.0 + odds[i][lane] * gain * (q * q * q)
         }
@@ -329,7 +281,7 @@ impl<const D: usize> Columns<D> {
 mod tests {
     use super::*;
 
-    const LAW: (f32, f32) = (100.0, 4.0);
+    const DISTRIBUTION: (f32, f32) = (100.0, 4.0);
 
     /// Estimates at the origin: so many of each side, with odds of 1.
     fn columns(of_each: [(Side, usize); 3]) -> Columns<3> {
@@ -350,7 +302,7 @@ mod tests {
         {
             let sides =
                 [(Side::Forward, forward), (Side::Reverse, reverse), (Side::Mutual, mutual)];
-            let found = columns(sides).two_sided(&[0.0; 3], LAW, 10.0);
+            let found = columns(sides).two_sided(&[0.0; 3], DISTRIBUTION, 10.0);
             let (less, more) =
                 (forward.min(reverse) as f32 * one, forward.max(reverse) as f32 * one);
             let of_both = mutual as f32 * one;
@@ -363,7 +315,8 @@ mod tests {
     fn no_estimate_counts_twice() {
         let columns = columns([(Side::Forward, 6), (Side::Reverse, 7), (Side::Mutual, 4)]);
         let x = [0.3, -0.1, 0.2];
-        let (sided, all) = (columns.two_sided(&x, LAW, 1e9), columns.log_likelihood(&x, LAW));
+        let (sided, all) =
+            (columns.two_sided(&x, DISTRIBUTION, 1e9), columns.log_likelihood(&x, DISTRIBUTION));
         assert!((sided - all).abs() < 1e-4 * all, "{sided} {all}");
     }
 

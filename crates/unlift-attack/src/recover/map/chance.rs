@@ -1,20 +1,18 @@
-//! How likely a random listed record passes near a place: the density of records, from the marginal of
-//! who is listed.
+//! How likely a random listed record passes near a place.
 //!
-//! A line passes within `delta` of a place `x` with probability `density(x) * tube(delta)`, where the
-//! density is the expected length of line per volume and the tube the volume per length. The density
-//! varies over the size of a room, not over `delta`, so a coarse grid knows it better than a sample of
-//! records does, for every delta at once.
+//! A line passes within `delta` of a place `x` with probability `density(x) * tube(delta)`: the expected length of line per
+//! volume, times the volume of the tube per length. Each record counts as often as it is listed. The density
+//! varies over the size of a room, not over `delta`, so a coarse grid serves for every delta.
 
 use rayon::prelude::*;
 
 use crate::Error;
 use crate::geometry::vector::{along, dot, median, sub, widen};
 use crate::neighbors::Neighborhoods;
-use crate::recover::map::bytes::{Reader, Writer};
+use crate::recover::map::bytes::Reader;
 use crate::recover::map::grid::Grid;
 use crate::recover::map::lines::{LineRow, MOST_CHANCE};
-use crate::recover::map::places::trimmed;
+use crate::recover::map::places::trimmed_box;
 use crate::simd::{Kernel, dispatch};
 
 /// Cells of a grid at most: 32 per axis, as density varies over the size of a room.
@@ -37,9 +35,8 @@ pub(crate) struct ChanceField<const D: usize> {
 impl<const D: usize> ChanceField<D> {
     /// `grid` holds sums of weighted length per cell; `weight` is that of all records.
     fn new(mut grid: Grid<D>, weight: f32) -> Self {
-        grid.smooth();
-        let volume: f32 = (0..D).map(|_| grid.cell()).product();
-        let scale = 1.0 / (weight * volume).max(f32::MIN_POSITIVE);
+        grid.smooth(1);
+        let scale = 1.0 / (weight * grid.volume()).max(f32::MIN_POSITIVE);
         let mean = grid.values.iter().sum::<f32>() / grid.values.len() as f32;
         for value in &mut grid.values {
             *value = (value.max(FLOOR * mean) * scale).max(f32::MIN_POSITIVE);
@@ -48,14 +45,12 @@ impl<const D: usize> ChanceField<D> {
     }
 
     /// Appends the field to `to`.
-    pub(crate) fn write(&self, to: &mut Writer) {
+    pub(crate) fn write(&self, to: &mut Vec<u8>) {
         self.grid.write(to);
     }
 
     /// The field that [`write`](Self::write) appended.
-    ///
-    /// # Errors
-    /// When it is none.
+    /// Fails when the bytes hold none.
     pub(crate) fn read(from: &mut Reader<'_>) -> Result<Self, Error> {
         // Grids of boxes without extent along an axis may exceed the number of cells asked for.
         Grid::read(from, 8 * CELLS).map(|grid| Self { grid })
@@ -63,22 +58,19 @@ impl<const D: usize> ChanceField<D> {
 
     /// The density at a typical place: the mean over places weighted by density.
     pub(crate) fn typical(&self) -> f32 {
-        let (sum, squares) = self
-            .grid
-            .values
-            .iter()
-            .map(|&x| f64::from(x))
-            .fold((0.0, 0.0), |(sum, squares), x| (sum + x, squares + x * x));
+        let values = self.grid.values.iter().map(|&x| f64::from(x));
+        let add = |(sum, squares): (f64, f64), x: f64| (sum + x, squares + x * x);
+        let (sum, squares) = values.fold((0.0, 0.0), add);
         (squares / sum) as f32
     }
 
     /// The chance that a random record passes through a region of volume-per-length `tube` about `x`.
     #[inline(always)]
     pub(crate) fn at(&self, x: &[f32; D], tube: f32) -> f32 {
-        (self.grid.values[self.grid.index(x)] * tube).min(MOST_CHANCE)
+        (self.grid.at(x) * tube).min(MOST_CHANCE)
     }
 
-    /// Adds the same, however large, at each `t` of a line to `chance`, with room for a cell each.
+    /// Adds the same, without its limit, at each `t` of a line to `chance`. `cells` is a buffer of as many.
     #[inline(always)]
     pub(crate) fn add_along(
         &self,
@@ -114,20 +106,23 @@ pub(crate) fn of_lines<const D: usize>(
     let (low, high) = box_of_crossings(rows, lists, slots_per_record);
     let counts = times_listed(lists, rows.len());
     let every = rows.len().div_ceil(RECORDS).max(1);
-    let chosen: Vec<usize> = (0..rows.len()).step_by(every).collect();
-    (0..n_groups.unwrap_or(1))
-        .map(|own| {
-            let of_others = |&&record: &&usize| n_groups.is_none() || rows[record].group != own;
-            let chosen: Vec<usize> = chosen.iter().filter(of_others).copied().collect();
-            let empty = Grid::over(low, high, CELLS);
-            let weight = chosen.iter().map(|&r| counts[r] as f32).sum();
-            let parts: Vec<Grid<D>> = chosen
-                .par_chunks(chosen.len().div_ceil(8).max(1))
-                .map(|part| dispatch(Lengths { grid: empty.clone(), rows, counts: &counts, part }))
-                .collect();
-            ChanceField::new(sum(empty, &parts), weight)
-        })
-        .collect()
+    let field = |own: u32| {
+        let of_others = |&record: &usize| n_groups.is_none() || rows[record].group != own;
+        let chosen: Vec<usize> = (0..rows.len()).step_by(every).filter(of_others).collect();
+        let weight = chosen.iter().map(|&r| counts[r] as f32).sum();
+        let mut total = Grid::over(low, high, CELLS);
+        let lengths = |records: &[usize]| {
+            dispatch(Lengths { grid: total.clone(), rows, counts: &counts, records })
+        };
+        // Eight parts however many threads there are: the order of sums is the same.
+        let parts: Vec<Grid<D>> =
+            chosen.par_chunks(chosen.len().div_ceil(8).max(1)).map(lengths).collect();
+        for part in &parts {
+            total.values.iter_mut().zip(&part.values).for_each(|(a, b)| *a += b);
+        }
+        ChanceField::new(total, weight)
+    };
+    (0..n_groups.unwrap_or(1)).map(field).collect()
 }
 
 /// Centers of rays, counted up to the last that any ray comes from; `None` of lines.
@@ -145,7 +140,7 @@ struct Lengths<'a, const D: usize> {
     grid: Grid<D>,
     rows: &'a [LineRow<D>],
     counts: &'a [u32],
-    part: &'a [usize],
+    records: &'a [usize],
 }
 
 impl<const D: usize> Kernel for Lengths<'_, D> {
@@ -153,41 +148,23 @@ impl<const D: usize> Kernel for Lengths<'_, D> {
 
     #[inline(always)]
     fn run(self) -> Grid<D> {
-        let Self { mut grid, rows, counts, part } = self;
-        let mut buffers = (Vec::new(), Vec::new());
-        for &record in part {
-            add_line(&mut grid, &rows[record], counts[record] as f32, &mut buffers);
+        let Self { mut grid, rows, counts, records } = self;
+        let (mut t, mut cells) = (Vec::new(), Vec::new());
+        for &record in records {
+            let (row, weight) = (&rows[record], counts[record] as f32);
+            let inside = grid.clip(&row.through, &row.direction, row.floor(), row.to);
+            let Some((from, to)) = inside else { continue };
+            let steps = ((to - from) / grid.cell()).ceil().max(1.0);
+            let step = (to - from) / steps;
+            t.clear();
+            t.extend((0..steps as i32).map(|i| from + (i as f32 + 0.5) * step));
+            cells.resize(t.len(), 0);
+            grid.cells_along(&row.through, &row.direction, &t, &mut cells);
+            for &cell in &cells {
+                grid.values[cell as usize] += weight * step;
+            }
         }
         grid
-    }
-}
-
-fn sum<const D: usize>(mut total: Grid<D>, parts: &[Grid<D>]) -> Grid<D> {
-    for part in parts {
-        total.values.iter_mut().zip(&part.values).for_each(|(a, b)| *a += b);
-    }
-    total
-}
-
-#[inline(always)]
-fn add_line<const D: usize>(
-    grid: &mut Grid<D>,
-    row: &LineRow<D>,
-    weight: f32,
-    buffers: &mut (Vec<f32>, Vec<u32>),
-) {
-    let Some((from, to)) = grid.clip(&row.through, &row.direction, row.floor(), row.to) else {
-        return;
-    };
-    let steps = ((to - from) / grid.cell()).ceil().max(1.0);
-    let step = (to - from) / steps;
-    let (t, cells) = buffers;
-    t.clear();
-    t.extend((0..steps as i32).map(|i| from + (i as f32 + 0.5) * step));
-    cells.resize(t.len(), 0);
-    grid.cells_along(&row.through, &row.direction, t, cells);
-    for &cell in cells.iter() {
-        grid.values[cell as usize] += weight * step;
     }
 }
 
@@ -205,20 +182,15 @@ fn box_of_crossings<const D: usize>(
     slots_per_record: usize,
 ) -> ([f32; D], [f32; D]) {
     let every = lists.n_slots().div_ceil(CROSSINGS).max(1);
-    let mut places: [Vec<f32>; D] = std::array::from_fn(|_| Vec::new());
-    for slot in (0..lists.n_slots()).step_by(every) {
+    let crossings = |slot: usize| {
         let own = &rows[slot / slots_per_record];
         // Any entry will do: lists are in order of record, which is random.
-        for record in lists.of(slot).iter().take(2) {
-            if let Some(place) = own.crossing(&rows[record.index()]) {
-                for c in 0..D {
-                    places[c].push(place[c]);
-                }
-            }
-        }
-    }
-    let ends = places.map(|mut column| trimmed(&mut column));
-    (ends.map(|e| e.0), ends.map(|e| e.1))
+        let listed = lists.of(slot).iter().take(2);
+        listed.filter_map(|record| own.crossing(&rows[record.index()]))
+    };
+    let slots = (0..lists.n_slots()).step_by(every);
+    let places: Vec<[f32; D]> = slots.flat_map(crossings).collect();
+    trimmed_box(|c| places.iter().map(|place| place[c]).collect())
 }
 
 /// One field for axis candidates: the density of the records' lines along all axes.
@@ -227,14 +199,13 @@ pub(crate) fn of_candidates<const D: usize>(
     lists: &Neighborhoods,
 ) -> CandidateField<D> {
     let counts = times_listed(lists, rows.len());
-    let ends: [(f32, f32); D] =
-        std::array::from_fn(|c| trimmed(&mut rows.iter().map(|row| row[c]).collect::<Vec<f32>>()));
+    let (low, high) = trimmed_box::<D>(|c| rows.iter().map(|row| row[c]).collect());
     let weight: f32 = counts.iter().map(|&n| n as f32).sum();
     let along = std::array::from_fn(|axis| {
-        let low = std::array::from_fn(|c| if c == axis { 0.0 } else { ends[c].0 });
-        let high = std::array::from_fn(|c| if c == axis { 0.0 } else { ends[c].1 });
+        let (mut low, mut high) = (low, high);
+        (low[axis], high[axis]) = (0.0, 0.0);
         let mut grid = Grid::over(low, high, CELLS / 8);
-        // All of the line lies in the one cell along its own axis: a unit of length per unit.
+        // The line lies in the one cell along its own axis: it is as long there as the cell.
         let length = grid.cell();
         for (row, &n) in rows.iter().zip(&counts) {
             let cell = grid.index(row);
@@ -253,38 +224,30 @@ pub(crate) struct CandidateField<const D: usize> {
 
 impl<const D: usize> CandidateField<D> {
     /// Appends the fields to `to`.
-    pub(crate) fn write(&self, to: &mut Writer) {
+    pub(crate) fn write(&self, to: &mut Vec<u8>) {
         self.along.iter().for_each(|field| field.write(to));
     }
 
     /// The fields that [`write`](Self::write) appended.
-    ///
-    /// # Errors
-    /// When there are not as many.
+    /// Fails when the bytes do not hold as many.
     pub(crate) fn read(from: &mut Reader<'_>) -> Result<Self, Error> {
         let fields = (0..D).map(|_| ChanceField::read(from)).collect::<Result<Vec<_>, _>>()?;
-        let along = fields.try_into();
-        along
-            .map(|along| Self { along })
-            .map_err(|_| Error::new("model", "a field per axis", "others"))
-    }
-
-    /// The density at a typical place.
-    fn typical(&self) -> f32 {
-        self.along.iter().map(ChanceField::typical).sum()
+        let along =
+            fields.try_into().map_err(|_| Error::new("model", "a field per axis", "others"))?;
+        Ok(Self { along })
     }
 
     /// How likely a random record agrees with a place where records are, within `delta`.
     pub(crate) fn typical_chance(&self, delta: f32) -> f32 {
         let tubes = self.tubes(delta);
         if tubes.iter().all(|&one| one == tubes[0]) {
-            return self.typical() * tubes[0];
+            return self.along.iter().map(ChanceField::typical).sum::<f32>() * tubes[0];
         }
         self.along.iter().zip(&tubes).map(|(field, tube)| field.typical() * tube).sum()
     }
 
-    /// Where the box of the map is much thinner than its neighborhoods are wide: the radius of the disc that holds a `share` of
-    /// it; `None` of other boxes.
+    /// The radius of the disc that holds a `share` of a flat map, whose box is much thinner than neighborhoods are wide; `None` of
+    /// other maps.
     pub(crate) fn radius_if_flat(&self, share: f64) -> Option<f64> {
         // Each field lacks the extent along its own axis.
         let side = |c: usize| f64::from(self.along[(c + 1) % D].grid.sides()[c]);
@@ -295,19 +258,13 @@ impl<const D: usize> CandidateField<D> {
         (FLAT * thin < radius && 2.0 * radius <= middle).then_some(radius)
     }
 
-    /// Volume per length of what is within `delta` of a line along each axis: of a map that is flat no more of it than lies
-    /// in its box.
+    /// The volume per length within `delta` of a line along each axis, as far as it lies in the box of the map.
     pub(crate) fn tubes(&self, delta: f32) -> [f32; D] {
         std::array::from_fn(|axis| {
             let sides = self.along[axis].grid.sides();
-            let across = |c: &usize| *c != axis;
-            let whole = tube(D, delta);
-            let is_cut = |c: usize| 2.0 * delta > sides[c];
-            if !(0..D).filter(across).any(is_cut) {
-                return whole;
-            }
-            let share = (0..D).filter(across).map(|c| (sides[c] / (2.0 * delta)).min(1.0));
-            whole * share.product::<f32>()
+            let across = (0..D).filter(|c| *c != axis);
+            let share = across.map(|c| (sides[c] / (2.0 * delta)).min(1.0));
+            tube(D, delta) * share.product::<f32>()
         })
     }
 
@@ -318,8 +275,7 @@ impl<const D: usize> CandidateField<D> {
         along.map(|(field, &tube)| field.at(x, tube)).sum::<f32>().min(MOST_CHANCE)
     }
 
-    /// Adds the same, however large, at each `t` of the line through `own` along `axis` to `chance`, with room for
-    /// a cell each.
+    /// Adds the same, without its limit, at each `t` of the line through `own` along `axis` to `chance`.
     #[inline(always)]
     pub(crate) fn add_along(
         &self,
@@ -328,8 +284,8 @@ impl<const D: usize> CandidateField<D> {
         tubes: &[f32; D],
         (cells, chance): (&mut [u32], &mut [f32]),
     ) {
-        let through = std::array::from_fn(|c| if c == axis { 0.0 } else { own[c] });
-        let direction = std::array::from_fn(|c| if c == axis { 1.0 } else { 0.0 });
+        let (mut through, mut direction) = (*own, [0.0; D]);
+        (through[axis], direction[axis]) = (0.0, 1.0);
         for (field, &tube) in self.along.iter().zip(tubes) {
             field.add_along((&through, &direction), t, tube, (&mut *cells, &mut *chance));
         }
@@ -338,7 +294,7 @@ impl<const D: usize> CandidateField<D> {
 
 // A length of the order of the map's size, from the records alone.
 
-/// Quartiles are those of parts far from one another where they are so many times as far apart as one part is wide.
+/// A map is in parts where its quartiles are this many times as far apart as one part is wide.
 const FAR_APART: f64 = 4.0;
 
 /// The distance between the quartiles of sorted values.
@@ -349,8 +305,8 @@ pub(crate) fn interquartile_range(sorted: &[f32]) -> f64 {
     f64::from(sorted[last - last / 4]) - f64::from(sorted[last / 4])
 }
 
-/// Whether sorted values lie in parts far from one another: four times the width of an eighth of them, about a typical
-/// value, is as much as the distance of their quartiles where they are spread evenly.
+/// Whether sorted values lie in parts far from one another. The quartiles of evenly spread values are four times as far apart as
+/// an eighth of the values is wide.
 pub(crate) fn are_in_parts(sorted: &[f32]) -> bool {
     let many = sorted.len() / 8;
     if many == 0 {
@@ -361,11 +317,7 @@ pub(crate) fn are_in_parts(sorted: &[f32]) -> bool {
     FAR_APART * 4.0 * median(&mut widths) < interquartile_range(sorted)
 }
 
-fn length<const D: usize>(v: &[f32; D]) -> f64 {
-    v.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>().sqrt()
-}
-
-/// Lines, and rounds (each leaves a third of the error), in which [`line_extent`] looks for the middle of a map.
+/// Lines, and iterations (each leaves a third of the error), in which [`line_extent`] looks for the middle of a map.
 const MIDDLE: (usize, usize) = (1000, 60);
 
 /// The median distance of the lines from their middle. Distances from the origin would not do: it is
@@ -379,7 +331,7 @@ pub(crate) fn line_extent<const D: usize>(rows: &[LineRow<D>]) -> f64 {
         let away = sub(&through, from);
         along(&away, -dot(&away, &direction), &direction)
     };
-    // Each round moves to the mean of the lines' nearest points; what is left of the start shrinks
+    // Each iteration moves to the mean of the lines' nearest points. What is left of the start shrinks
     // by the mean squared cosine with the lines, about a third.
     let mut middle = [0.0; D];
     for _ in 0..MIDDLE.1 {
@@ -389,14 +341,8 @@ pub(crate) fn line_extent<const D: usize>(rows: &[LineRow<D>]) -> f64 {
         }
         middle = along(&middle, 1.0, &step);
     }
-    let mut distances: Vec<f64> = rows
-        .iter()
-        .map(|row| {
-            let away = offset(row, &middle);
-            dot(&away, &away).sqrt()
-        })
-        .collect();
-    median(&mut distances)
+    let length = |v: [f64; D]| dot(&v, &v).sqrt();
+    median(&mut rows.iter().map(|row| length(offset(row, &middle))).collect::<Vec<f64>>())
 }
 
 /// The largest distance between centers.
@@ -407,14 +353,12 @@ pub(crate) fn ray_extent<const D: usize>(rows: &[LineRow<D>]) -> f64 {
             centers.push(row);
         }
     }
-    let mut largest = 0.0;
-    for (at, a) in centers.iter().enumerate() {
-        for b in &centers[..at] {
-            let apart: [f32; D] = std::array::from_fn(|c| a.through[c] - b.through[c]);
-            largest = f64::max(largest, length(&apart));
-        }
-    }
-    largest
+    let apart = |a: &LineRow<D>, b: &LineRow<D>| {
+        let apart = widen(&std::array::from_fn::<f32, D, _>(|c| a.through[c] - b.through[c]));
+        dot(&apart, &apart).sqrt()
+    };
+    let pairs = centers.iter().flat_map(|a| centers.iter().map(|b| apart(a, b)));
+    pairs.fold(0.0, f64::max)
 }
 
 #[cfg(test)]

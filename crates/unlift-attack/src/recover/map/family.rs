@@ -32,33 +32,21 @@ pub(crate) enum Chance<const D: usize> {
 }
 
 impl<'a, const D: usize> Family<'a, D> {
-    /// The records of `released`, with the chance that goes with `lists`.
-    pub(crate) fn learn(released: &'a Released<D>, lists: &Neighborhoods) -> Self {
-        let slots_per_record = released.slots_per_record();
-        match released.obfuscation() {
-            Obfuscation::Lines(_) | Obfuscation::Rays(_) => {
-                let rows = line_rows(released);
-                let chance = chance::of_lines(&rows, lists, slots_per_record);
-                Self::Lines { rows, slots_per_record, chance }
-            }
-            Obfuscation::AxisPlanes(planes) => {
-                Self::Planes { planes, sorted: SortedPlanes::new(planes) }
-            }
-            Obfuscation::AxisCandidates(candidates) => {
-                let rows = candidates.position();
-                Self::Candidates { rows, chance: chance::of_candidates(rows, lists) }
-            }
-        }
-    }
-
-    /// The records of `released`, with a chance that was learned before.
-    ///
-    /// # Errors
-    /// When it is that of other records.
-    pub(crate) fn with_chance(released: &'a Released<D>, chance: Chance<D>) -> Result<Self, Error> {
+    /// The records of `released`, with a `chance` that was learned before, or else with the one that goes with `lists`.
+    /// Fails when the chance is that of other records.
+    pub(crate) fn new(
+        released: &'a Released<D>,
+        lists: &Neighborhoods,
+        chance: Option<Chance<D>>,
+    ) -> Result<Self, Error> {
         let slots_per_record = released.slots_per_record();
         match (released.obfuscation(), chance) {
-            (Obfuscation::Lines(_) | Obfuscation::Rays(_), Chance::Lines(chance)) => {
+            (Obfuscation::Lines(_) | Obfuscation::Rays(_), None) => {
+                let rows = line_rows(released);
+                let chance = chance::of_lines(&rows, lists, slots_per_record);
+                Ok(Self::Lines { rows, slots_per_record, chance })
+            }
+            (Obfuscation::Lines(_) | Obfuscation::Rays(_), Some(Chance::Lines(chance))) => {
                 let rows = line_rows(released);
                 let expected = n_fields(&rows);
                 if chance.len() != expected {
@@ -67,10 +55,14 @@ impl<'a, const D: usize> Family<'a, D> {
                 }
                 Ok(Self::Lines { rows, slots_per_record, chance })
             }
-            (Obfuscation::AxisPlanes(planes), Chance::Planes) => {
+            (Obfuscation::AxisPlanes(planes), None | Some(Chance::Planes)) => {
                 Ok(Self::Planes { planes, sorted: SortedPlanes::new(planes) })
             }
-            (Obfuscation::AxisCandidates(candidates), Chance::Candidates(chance)) => {
+            (Obfuscation::AxisCandidates(candidates), None) => {
+                let rows = candidates.position();
+                Ok(Self::Candidates { rows, chance: chance::of_candidates(rows, lists) })
+            }
+            (Obfuscation::AxisCandidates(candidates), Some(Chance::Candidates(chance))) => {
                 Ok(Self::Candidates { rows: candidates.position(), chance })
             }
             _ => Err(Error::new("model", "one of these records", "one of another family")),
@@ -143,13 +135,14 @@ impl<'a, const D: usize> Family<'a, D> {
                 if first.is_ray() { ray_extent(rows) } else { line_extent(rows) }
             }
             Self::Planes { sorted, .. } => sorted.extent(),
-            Self::Candidates { rows, .. } => (0..D)
-                .map(|axis| {
+            Self::Candidates { rows, .. } => {
+                let range = |axis: usize| {
                     let mut column: Vec<f32> = rows.iter().map(|row| row[axis]).collect();
                     column.sort_unstable_by(f32::total_cmp);
                     interquartile_range(&column)
-                })
-                .fold(0.0, f64::max),
+                };
+                (0..D).map(range).fold(0.0, f64::max)
+            }
         }
     }
 }
@@ -164,46 +157,37 @@ fn line_rows<const D: usize>(released: &Released<D>) -> Vec<LineRow<D>> {
     }
 }
 
-// What differs between maps and images: one table, a reason per row.
-//
-// Nothing else in recovery asks how many dimensions there are, but geometry (volumes and directions).
-
-/// What is set differently for the points of a map (3D) and the keypoints of an image (2D).
+/// What is set differently for the points of a map (3D) and the keypoints of an image (2D). Nothing else in recovery asks how
+/// many dimensions there are, but geometry (volumes and directions).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Settings {
-    /// Chunks of slots that are solved per delta, to choose it: of lines, rays and candidates. Fewer of an image, where
-    /// they are most of the time and few of all.
+    /// Chunks of slots that are solved per delta, to choose it. Fewer of an image, where they take most of the time.
     pub(crate) delta_chunks: usize,
     /// The same of planes: more, as their evidence hardly depends on delta, so that luck widens the plateau.
     pub(crate) delta_chunks_of_planes: usize,
-    /// A delta is too wide if a random candidate agrees with a typical place with this probability: its agreement tells
-    /// nothing. In an image both of a record's lines cross all of a small plane, so that at a delta as wide as
-    /// neighbors are apart a random record agrees more often.
+    /// A delta is too wide if a random candidate agrees with a typical place with this probability. In an image both of a
+    /// record's lines cross all of a small plane, so that random records agree more often.
     pub(crate) too_wide_of_candidates: f32,
     /// Whether that limit holds for the fine ladder, too. In a map it may reach beyond.
     pub(crate) candidates_keep_to_limit: bool,
-    /// Whether the share of all records that a list holds says which deltas are out of question. In an image
-    /// coordinates are few and bounds known: other limits hold there.
+    /// Whether the share of all records that a list holds limits delta. In an image bounds are known and limit it.
     pub(crate) limits_by_share: bool,
     /// Whether a narrow delta keeps near the lower edge of the plateau. In an image lines cross everywhere: that edge is
     /// one of chance.
     pub(crate) keeps_near_edge: bool,
-    /// The radius of the law of candidates is at most this many deltas. In an image records agree by chance at a
-    /// delta as wide as neighbors are apart: delta is narrower.
+    /// The radius of the distribution of neighbors of candidates is at most this many deltas: in an image delta is narrower.
     pub(crate) most_radius_of_candidates: f32,
-    /// Whether what lies far out tells how many wrong entries are near all the same. The neighbors of a keypoint, in units
-    /// of a small plane, reach as far out as these do.
+    /// Whether what lies far out tells how many wrong entries are near all the same. In an image neighbors reach as far out.
     pub(crate) tells_background: bool,
     /// Partners of exchanged coordinates are looked for within this many deltas: in an image delta is narrow and values
     /// are few.
     pub(crate) exact_reach: f64,
     /// Exchanges at least this probable are believed. In an image a wrong partner is near all the same.
     pub(crate) least_exchange: f32,
-    /// How often joint recovery of candidates goes on from exact coordinates. In an image they place their neighbors
-    /// better, whose partners are then found. In a map they hardly do (0.2 points), and it costs half as much time again.
+    /// How often joint recovery of candidates goes on from exact coordinates. In an image their neighbors are then placed
+    /// better. In a map they hardly are (0.2 points), and it costs half as much time again.
     pub(crate) feeds: usize,
-    /// Whether confidence is known: its constants come from maps, and nobody has compared them with what comes true in
-    /// images.
+    /// Whether confidence is known: it was never compared with what comes true in images.
     pub(crate) confidence: bool,
 }
 

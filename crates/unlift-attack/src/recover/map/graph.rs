@@ -4,12 +4,73 @@
 //! neighbors. Whether an edge is named by one end, by the other or by both tells how likely it is true,
 //! and so do the scores of a source: edges of one class share an inlier ratio, which recovery learns.
 
-use std::ops::Range;
-
 use rayon::prelude::*;
 
+use crate::RecordId;
 use crate::neighbors::Neighborhoods;
-use crate::{Error, RecordId};
+
+/// Which end of an edge names the other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Side {
+    /// The slot names the neighbor.
+    Forward,
+    /// The neighbor names the slot. On a paired line it may mean the other slot, nobody knows.
+    Reverse,
+    /// Each names the other.
+    Mutual,
+}
+
+/// Classes of scores per direction.
+const SCORE_CLASSES: usize = 1 << CLASS_BITS;
+/// Where score classes begin, as shares of all entries: finer at the top, where most neighbors are.
+const SCORE_RANKS: [f64; SCORE_CLASSES - 1] = [0.3, 0.55, 0.72, 0.84, 0.91, 0.955, 0.98];
+/// Scores are ranked by a sample of this many.
+const SCORES: usize = 1 << 16;
+/// Classes of edges at most.
+pub(crate) const CLASSES: usize = 3 * SCORE_CLASSES;
+/// Reverse entries of a row at most, as a multiple of the mean list: whoever is named by everyone is
+/// named by mistake.
+const MOST_REVERSE: usize = 3;
+
+/// The record of a slot: one or two make a record, so a shift does for a division.
+#[inline(always)]
+pub(crate) fn record_of(slot: usize, slots_per_record: usize) -> usize {
+    slot >> (slots_per_record - 1)
+}
+
+/// Whether an edge of this class says which record it leads to, but not which of its two slots: a list
+/// names records, while the slot that a list belongs to is known.
+#[inline(always)]
+pub(crate) fn either(class: u8, slots_per_record: usize) -> bool {
+    slots_per_record == 2 && side(class) != Side::Reverse
+}
+
+/// Who names whom in an edge of this class.
+#[inline(always)]
+pub(crate) fn side(class: u8) -> Side {
+    match usize::from(class) / SCORE_CLASSES {
+        0 => Side::Forward,
+        1 => Side::Reverse,
+        _ => Side::Mutual,
+    }
+}
+
+/// The least score of each class but the first; empty without scores.
+fn score_bounds(lists: &Neighborhoods) -> Vec<f32> {
+    let step = lists.records().len().div_ceil(SCORES).max(1);
+    let mut sample: Vec<f32> =
+        lists.scores().unwrap_or(&[]).iter().step_by(step).copied().collect();
+    sample.sort_unstable_by(f32::total_cmp);
+    let at = |share: &f64| sample.get((share * sample.len() as f64) as usize).copied();
+    SCORE_RANKS.iter().filter_map(at).collect()
+}
+
+/// The class of the entry at `at` of all entries, by its score.
+#[inline(always)]
+fn score_class(lists: &Neighborhoods, bounds: &[f32], at: usize) -> u8 {
+    let class = |score: f32| bounds.partition_point(|&bound| bound <= score) as u8;
+    lists.scores().map_or(0, |scores| class(scores[at]))
+}
 
 /// Rows of edges in order of their other ends, a class beside each.
 #[derive(Debug)]
@@ -25,38 +86,63 @@ impl Graph {
     /// The edges of `lists`, in both directions.
     pub(crate) fn new(lists: &Neighborhoods, slots_per_record: usize) -> Self {
         let n_slots = lists.n_slots();
-        let rule = EdgeRule::new(lists);
-        let score_class = |at| rule.class_at(lists.scores(), at);
-        let named_by = NamedBy::new(lists, slots_per_record, &score_class);
-        let rooms = rooms(lists, &named_by, slots_per_record);
-        let total = rooms.iter().map(|room| room.len).sum();
-        let (mut ends, mut class) = (vec![0; total], vec![0; total]);
-        let row_ends: Vec<Vec<u32>> = split(&rooms, &mut ends, &mut class)
+        let n_records = n_slots / slots_per_record;
+        let bounds = &score_bounds(lists);
+        let most = MOST_REVERSE * lists.records().len().div_ceil(n_slots.max(1)).max(1);
+        let n_blocks = n_records.div_ceil(BLOCK);
+        let transposed: Vec<Transposed> = (0..n_slots.div_ceil(BLOCK))
             .into_par_iter()
-            .zip(&rooms)
-            .enumerate()
-            .map_init(Block::default, |reverse, (block, (mut rows, room))| {
-                reverse.fill(&named_by, block);
-                let add = |slot: usize| {
-                    let all = reverse.of(record_of(slot - room.slots.start, slots_per_record));
-                    let first = lists.offsets()[slot] as usize;
-                    let class = |at| score_class(first + at);
-                    rows.add(lists.of(slot), all, slots_per_record, rule.most, class);
-                    rows.n as u32
-                };
-                room.slots.clone().map(add).collect()
-            })
+            .map(|part| Transposed::new(lists, part, n_blocks, bounds))
             .collect();
+        // A room for the rows of each block, as large as they could be. Memory that they do not need is hardly touched.
+        let slots_of = |block: usize| {
+            let records = block * BLOCK..((block + 1) * BLOCK).min(n_records);
+            records.start * slots_per_record..records.end * slots_per_record
+        };
+        let room = |block: usize| {
+            let slots = slots_of(block);
+            let n_listed = lists.offsets()[slots.end] - lists.offsets()[slots.start];
+            let n_reverse: usize = transposed.iter().map(|part| part.of_block(block).len()).sum();
+            n_listed as usize + slots_per_record * n_reverse
+        };
+        let rooms: Vec<usize> = (0..n_blocks).map(room).collect();
+        let total = rooms.iter().sum();
+        let (mut ends, mut class) = (vec![0; total], vec![0; total]);
+        let (mut free, mut free_class) = (&mut ends[..], &mut class[..]);
+        let mut rows = Vec::with_capacity(n_blocks);
+        for &len in &rooms {
+            let (Some(ends), Some(class)) =
+                (free.split_off_mut(..len), free_class.split_off_mut(..len))
+            else {
+                unreachable!("rooms are as long as the columns");
+            };
+            rows.push(Rows { ends, class, n: 0 });
+        }
+        let merged = |reverse: &mut Block, (block, mut rows): (usize, Rows<'_>)| {
+            reverse.fill(&transposed, block);
+            let slots = slots_of(block);
+            let first = slots.start;
+            let add = |slot: usize| {
+                let all = reverse.of(record_of(slot - first, slots_per_record));
+                let entry = lists.offsets()[slot] as usize;
+                let class = |at| score_class(lists, bounds, entry + at);
+                rows.add(lists.of(slot), all, slots_per_record, most, class);
+                rows.n
+            };
+            slots.map(add).collect::<Vec<usize>>()
+        };
+        let row_ends: Vec<Vec<usize>> =
+            rows.into_par_iter().enumerate().map_init(Block::default, merged).collect();
         // Blocks move together.
         let (mut from, mut to) = (0, 0);
         let mut offsets = Vec::with_capacity(n_slots + 1);
         offsets.push(0);
-        for (row_ends, room) in row_ends.iter().zip(&rooms) {
-            let n = row_ends.last().map_or(0, |&end| end as usize);
+        for (row_ends, room) in row_ends.iter().zip(rooms) {
+            let n = row_ends.last().copied().unwrap_or(0);
             ends.copy_within(from..from + n, to);
             class.copy_within(from..from + n, to);
-            offsets.extend(row_ends.iter().map(|&end| (to + end as usize) as u64));
-            (from, to) = (from + room.len, to + n);
+            offsets.extend(row_ends.iter().map(|end| (to + end) as u64));
+            (from, to) = (from + room, to + n);
         }
         ends.truncate(to);
         class.truncate(to);
@@ -99,205 +185,45 @@ impl Graph {
             }
             counts
         });
+        let sums = |mut a: Vec<u32>, b: Vec<u32>| {
+            a.iter_mut().zip(&b).for_each(|(a, b)| *a += b);
+            a
+        };
         counted.reduce_with(sums).unwrap_or(none)
     }
 
     /// The edges as neighborhoods (records with one slot each).
-    ///
-    /// # Errors
-    /// None: ends are ascending records.
-    pub(crate) fn neighborhoods(&self) -> Result<Neighborhoods, Error> {
+    pub(crate) fn neighborhoods(&self) -> Neighborhoods {
         let records = self.ends.iter().map(|&end| RecordId(end)).collect();
-        Neighborhoods::try_new(self.offsets.clone(), records, None, self.n_slots(), 1)
+        Neighborhoods::unchecked(self.offsets.clone(), records)
     }
 }
 
-fn sums(mut a: Vec<u32>, b: Vec<u32>) -> Vec<u32> {
-    a.iter_mut().zip(&b).for_each(|(a, b)| *a += b);
-    a
-}
-
-/// Where the rows of a block of slots go.
-struct Room {
-    slots: Range<usize>,
-    /// Edges that there could be. Memory of those that there are not is hardly touched.
-    len: usize,
-}
-
-/// A room for each block.
-fn rooms(lists: &Neighborhoods, named_by: &NamedBy, slots_per_record: usize) -> Vec<Room> {
-    let room = |(block, records): (usize, Range<usize>)| {
-        let slots = records.start * slots_per_record..records.end * slots_per_record;
-        let n_listed = lists.offsets()[slots.end] - lists.offsets()[slots.start];
-        let len = n_listed as usize + slots_per_record * named_by.n_entries(block);
-        Room { slots, len }
-    };
-    named_by.blocks().enumerate().map(room).collect()
-}
-
-/// Empty rows in the place of each room.
-fn split<'a>(rooms: &[Room], mut ends: &'a mut [u32], mut class: &'a mut [u8]) -> Vec<Rows<'a>> {
-    let rows = |room: &Room| {
-        let (own, rest) = std::mem::take(&mut ends).split_at_mut(room.len);
-        let (own_class, rest_of_class) = std::mem::take(&mut class).split_at_mut(room.len);
-        (ends, class) = (rest, rest_of_class);
-        Rows { ends: own, class: own_class, n: 0 }
-    };
-    rooms.iter().map(rows).collect()
-}
-
-// Kinds of edges: who names whom, and how high a source scores it.
-
-/// Which end of an edge names the other.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Side {
-    /// The slot names the neighbor.
-    Forward,
-    /// The neighbor names the slot. On a paired line it may mean the other slot, nobody knows.
-    Reverse,
-    /// Each names the other.
-    Mutual,
-}
-
-/// Classes of scores per direction.
-pub(super) const SCORE_CLASSES: usize = MOST_CLASSES;
-/// Where score classes begin, as shares of all entries: finer at the top, where most neighbors are.
-const SCORE_RANKS: [f64; SCORE_CLASSES - 1] = [0.3, 0.55, 0.72, 0.84, 0.91, 0.955, 0.98];
-/// Classes of edges at most.
-pub(crate) const CLASSES: usize = 3 * SCORE_CLASSES;
-
-/// The record of a slot: one or two make a record, so a shift does for a division.
-#[inline(always)]
-pub(crate) fn record_of(slot: usize, slots_per_record: usize) -> usize {
-    slot >> (slots_per_record - 1)
-}
-
-/// Whether an edge of this class says which record it leads to, but not which of its two slots: a list
-/// names records, while the slot that a list belongs to is known.
-#[inline(always)]
-pub(crate) fn either(class: u8, slots_per_record: usize) -> bool {
-    slots_per_record == 2 && side(class) != Side::Reverse
-}
-
-/// Who names whom in an edge of this class.
-#[inline(always)]
-pub(crate) fn side(class: u8) -> Side {
-    match usize::from(class) / SCORE_CLASSES {
-        0 => Side::Forward,
-        1 => Side::Reverse,
-        _ => Side::Mutual,
-    }
-}
-
-/// Reverse entries of a row at most, as a multiple of the mean list: whoever is named by everyone is
-/// named by mistake.
-const MOST_REVERSE: usize = 3;
-/// Scores are ranked by a sample of this many.
-const SCORES: usize = 1 << 16;
-
-/// The rule by which edges are made of lists.
-pub(super) struct EdgeRule {
-    /// Reverse entries of a row at most.
-    pub(super) most: usize,
-    /// The least score of each class but the first: equal shares of all entries, by rank. Empty without scores.
-    bounds: Vec<f32>,
-}
-
-impl EdgeRule {
-    /// The rule for `lists`.
-    pub(super) fn new(lists: &Neighborhoods) -> Self {
-        let n = lists.records().len();
-        let most = MOST_REVERSE * n.div_ceil(lists.n_slots().max(1)).max(1);
-        let step = n.div_ceil(SCORES).max(1);
-        let mut sample: Vec<f32> =
-            lists.scores().map_or_else(Vec::new, |all| all.iter().step_by(step).copied().collect());
-        sample.sort_unstable_by(f32::total_cmp);
-        let at = |share: &f64| sample.get((share * sample.len() as f64) as usize).copied();
-        Self { most, bounds: SCORE_RANKS.iter().filter_map(at).collect() }
-    }
-
-    /// The class of the entry at `at` of `scores`.
-    #[inline(always)]
-    pub(super) fn class_at(&self, scores: Option<&[f32]>, at: usize) -> u8 {
-        let class = |score: f32| self.bounds.partition_point(|&bound| bound <= score) as u8;
-        scores.map_or(0, |scores| class(scores[at]))
-    }
-}
-
-// Who names a record: lists turned around, a block of records at a time.
+// Who names a record: lists transposed, a block of records at a time.
 //
-// Entries first go to the blocks of the records they name, in four bytes each; a block is then put in order only where its
-// rows are made.
+// Entries first go to the blocks of the records they name, in four bytes each. A block is put in order only where its
+// rows are made, while it is in the cache: a plain counting sort takes twice the time (docs/decisions/joint.md).
 
-/// Records in a block, and slots whose entries are turned around by one thread at a time: what belongs to them stays in the
-/// cache.
-pub(super) const BLOCK: usize = 1 << BITS;
-/// Bits of a slot or a record within its block: 4,096.
+/// Records in a block, and slots whose lists one thread transposes at a time.
+const BLOCK: usize = 1 << BITS;
+/// Bits of a slot or a record within its block.
 const BITS: u32 = 12;
-/// Classes of scores are less than this.
-pub(super) const MOST_CLASSES: usize = 1 << CLASS_BITS;
-/// Bits of a class of scores: what two times twelve leave of an entry, and no more than serves.
+/// Bits of a class of scores.
 const CLASS_BITS: u32 = 3;
-/// A slot, a record and a class side by side.
+/// A slot, a record and a class fit side by side.
 const _: () = assert!(2 * BITS + CLASS_BITS <= u32::BITS);
 
-/// All entries by the block of the record that they name.
-pub(super) struct NamedBy {
-    parts: Vec<Part>,
-    n_records: usize,
-}
-
-/// The entries of the lists of [`BLOCK`] slots, in order of slot within each block.
-struct Part {
+/// The entries of the lists of [`BLOCK`] slots by the block of the record that they name, in order of slot within each block.
+struct Transposed {
+    first_slot: u32,
     /// Where blocks begin.
     offsets: Vec<u32>,
     /// From the highest bit: slot (of this part), record (of its block), class.
     entries: Vec<u32>,
 }
 
-impl NamedBy {
-    /// Turns `lists` around, with the class of each entry's score.
-    pub(super) fn new(
-        lists: &Neighborhoods,
-        slots_per_record: usize,
-        score_class: &(impl Fn(usize) -> u8 + Sync),
-    ) -> Self {
-        let n_records = lists.n_slots() / slots_per_record;
-        let n_blocks = n_records.div_ceil(BLOCK);
-        let parts = (0..lists.n_slots().div_ceil(BLOCK))
-            .into_par_iter()
-            .map(|part| Part::new(lists, part, n_blocks, score_class))
-            .collect();
-        Self { parts, n_records }
-    }
-
-    /// Records of each block in turn.
-    pub(super) fn blocks(&self) -> impl Iterator<Item = Range<usize>> {
-        let n = self.n_records;
-        (0..n.div_ceil(BLOCK)).map(move |block| block * BLOCK..((block + 1) * BLOCK).min(n))
-    }
-
-    /// Number of entries that name a record of `block`.
-    pub(super) fn n_entries(&self, block: usize) -> usize {
-        self.of_block(block).map(|(_, entries)| entries.len()).sum()
-    }
-
-    /// The parts' entries that name records of `block`, each with the first slot of its part.
-    fn of_block(&self, block: usize) -> impl Iterator<Item = (u32, &[u32])> {
-        self.parts.iter().enumerate().map(move |(part, Part { offsets, entries })| {
-            let range = offsets[block] as usize..offsets[block + 1] as usize;
-            ((part * BLOCK) as u32, &entries[range])
-        })
-    }
-}
-
-impl Part {
-    fn new(
-        lists: &Neighborhoods,
-        part: usize,
-        n_blocks: usize,
-        score_class: &impl Fn(usize) -> u8,
-    ) -> Self {
+impl Transposed {
+    fn new(lists: &Neighborhoods, part: usize, n_blocks: usize, bounds: &[f32]) -> Self {
         let slots = part * BLOCK..((part + 1) * BLOCK).min(lists.n_slots());
         let mut offsets = vec![0u32; n_blocks + 1];
         for record in slots.clone().flat_map(|slot| lists.of(slot)) {
@@ -314,17 +240,23 @@ impl Part {
                 let to = &mut next[record.index() / BLOCK];
                 let in_block = record.index() % BLOCK;
                 let packed = (in_part << BITS | in_block) << CLASS_BITS;
-                entries[*to as usize] = packed as u32 | u32::from(score_class(first + at));
+                let class = score_class(lists, bounds, first + at);
+                entries[*to as usize] = packed as u32 | u32::from(class);
                 *to += 1;
             }
         }
-        Self { offsets, entries }
+        Self { first_slot: (part * BLOCK) as u32, offsets, entries }
+    }
+
+    /// The entries that name records of `block`.
+    fn of_block(&self, block: usize) -> &[u32] {
+        &self.entries[self.offsets[block] as usize..self.offsets[block + 1] as usize]
     }
 }
 
 /// The entries that name the records of one block, in order of slot.
 #[derive(Default)]
-pub(super) struct Block {
+struct Block {
     offsets: Vec<u32>,
     /// The slot that names it, and the class of its score.
     by: Vec<(u32, u8)>,
@@ -332,24 +264,24 @@ pub(super) struct Block {
 
 impl Block {
     /// Puts the entries of `block` in order.
-    pub(super) fn fill(&mut self, named_by: &NamedBy, block: usize) {
+    fn fill(&mut self, transposed: &[Transposed], block: usize) {
         let record = |entry: u32| (entry >> CLASS_BITS) as usize % BLOCK;
         let Self { offsets, by } = self;
         // Starts are two places ahead and become ends of the rows before as rows fill.
         offsets.clear();
         offsets.resize(BLOCK + 2, 0);
-        for (_, entries) in named_by.of_block(block) {
-            entries.iter().for_each(|&entry| offsets[record(entry) + 2] += 1);
+        for part in transposed {
+            part.of_block(block).iter().for_each(|&entry| offsets[record(entry) + 2] += 1);
         }
         for r in 0..BLOCK {
             offsets[r + 2] += offsets[r + 1];
         }
         by.resize(offsets[BLOCK + 1] as usize, (0, 0));
-        for (first, entries) in named_by.of_block(block) {
-            for &entry in entries {
-                let slot = first + (entry >> (BITS + CLASS_BITS));
+        for part in transposed {
+            for &entry in part.of_block(block) {
+                let slot = part.first_slot + (entry >> (BITS + CLASS_BITS));
                 let to = &mut offsets[record(entry) + 1];
-                by[*to as usize] = (slot, (entry % MOST_CLASSES as u32) as u8);
+                by[*to as usize] = (slot, (entry % SCORE_CLASSES as u32) as u8);
                 *to += 1;
             }
         }
@@ -357,25 +289,22 @@ impl Block {
 
     /// The slots that name the record at a place of the block, and the class of each score.
     #[inline(always)]
-    pub(super) fn of(&self, record: usize) -> &[(u32, u8)] {
+    fn of(&self, record: usize) -> &[(u32, u8)] {
         &self.by[self.offsets[record] as usize..self.offsets[record + 1] as usize]
     }
 }
 
-// Rows of edges: the list of a slot and those who name its record, merged.
-
-/// The rows of one block, in a place that has room for all of them.
-pub(super) struct Rows<'a> {
-    pub(super) ends: &'a mut [u32],
-    pub(super) class: &'a mut [u8],
-    /// Edges so far.
-    pub(super) n: usize,
+/// The rows of one block, in a place that has room for all of them; so many edges so far.
+struct Rows<'a> {
+    ends: &'a mut [u32],
+    class: &'a mut [u8],
+    n: usize,
 }
 
 impl Rows<'_> {
-    /// Merges the `list` of a slot with `all` who name its record, of whom so many count at `most`; both are in ascending order. The
+    /// Merges the `list` of a slot with `all` who name its record, of whom about `most` count; both are in ascending order. The
     /// entry at a place of the list has a class of scores.
-    pub(super) fn add(
+    fn add(
         &mut self,
         list: &[RecordId],
         all: &[(u32, u8)],
@@ -425,8 +354,6 @@ impl Rows<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recover::map::graph::BLOCK;
-    use crate::recover::map::graph::{SCORE_CLASSES, Side};
     use crate::seed::{Draws, Stage};
 
     /// Everyone names record 7, nobody the last one, many each other, and every fifth slot nobody.
@@ -448,8 +375,8 @@ mod tests {
 
     /// The edges of each slot, found one by one.
     fn expected(lists: &Neighborhoods, slots_per_record: usize) -> Vec<Vec<(u32, u8)>> {
-        let rule = EdgeRule::new(lists);
-        let class = |at| rule.class_at(lists.scores(), at);
+        let bounds = score_bounds(lists);
+        let class = |at| score_class(lists, &bounds, at);
         let n_slots = lists.n_slots();
         let mut named_by = vec![Vec::new(); n_slots / slots_per_record];
         for slot in 0..n_slots {

@@ -1,7 +1,7 @@
 //! A dense grid over the part of space where a map lies: sums per cell, smoothed, looked up by place.
 
 use crate::Error;
-use crate::recover::map::bytes::{Reader, Writer};
+use crate::recover::map::bytes::{Reader, put};
 use crate::recover::map::graph::record_of;
 use crate::recover::map::places::Places;
 
@@ -18,10 +18,15 @@ pub(crate) struct Grid<const D: usize> {
     pub(crate) values: Vec<f32>,
 }
 
-/// From here on every number is whole.
+/// Every `f32` from here on is whole.
 const ROUNDING: f32 = 8_388_608.0;
 
 impl<const D: usize> Grid<D> {
+    fn new(low: [f32; D], cell: f32, dims: [usize; D], values: Vec<f32>) -> Self {
+        let last = dims.map(|n| (n - 1) as f32);
+        Self { low, cell, per_length: 1.0 / cell, dims, last, values }
+    }
+
     /// About `n_cells` empty cells over the box from `low` to `high`; an axis without extent gets one.
     pub(crate) fn over(low: [f32; D], high: [f32; D], n_cells: usize) -> Self {
         let extent: [f64; D] =
@@ -39,55 +44,43 @@ impl<const D: usize> Grid<D> {
 
     /// Empty cells of a given size over the box from `low` to `high`, larger ones if it takes more than
     /// `most`.
-    pub(crate) fn with_cell(low: [f32; D], high: [f32; D], cell: f32, most: usize) -> Self {
-        let cells =
-            (0..D).map(|c| f64::from((high[c] - low[c]) / cell).ceil().max(1.0)).product::<f64>();
-        if cells <= most as f64 {
-            Self::of_cells(low, high, cell)
-        } else {
-            Self::over(low, high, most)
+    fn with_cell(low: [f32; D], high: [f32; D], cell: f32, most: usize) -> Self {
+        let side = |c: usize| f64::from((high[c] - low[c]) / cell).ceil().max(1.0);
+        match (0..D).map(side).product::<f64>() <= most as f64 {
+            true => Self::of_cells(low, high, cell),
+            false => Self::over(low, high, most),
         }
     }
 
     fn of_cells(low: [f32; D], high: [f32; D], cell: f32) -> Self {
-        let dims: [usize; D] = std::array::from_fn(|c| {
-            (((high[c] - low[c]) / cell).ceil() as usize).clamp(1, 1 << 20)
-        });
-        let values = vec![0.0; dims.iter().product()];
-        let last = dims.map(|n| (n - 1) as f32);
-        Self { low, cell, per_length: 1.0 / cell, dims, last, values }
+        let side = |c: usize| (((high[c] - low[c]) / cell).ceil() as usize).clamp(1, 1 << 20);
+        let dims: [usize; D] = std::array::from_fn(side);
+        Self::new(low, cell, dims, vec![0.0; dims.iter().product()])
     }
 
     /// Appends the grid to `to`.
-    pub(crate) fn write(&self, to: &mut Writer) {
-        to.f32s(&self.low);
-        to.f32s(&[self.cell]);
-        self.dims.iter().for_each(|&n| to.u64(n as u64));
-        to.f32s(&self.values);
+    pub(crate) fn write(&self, to: &mut Vec<u8>) {
+        put(to, &self.low);
+        put(to, &[self.cell]);
+        self.dims.iter().for_each(|&n| to.extend((n as u64).to_le_bytes()));
+        put(to, &self.values);
     }
 
     /// The grid that [`write`](Self::write) appended.
-    ///
-    /// # Errors
-    /// When it is none, or has more than `most` cells.
+    /// Fails when the bytes hold none, or one with more than `most` cells.
     pub(crate) fn read(from: &mut Reader<'_>, most: usize) -> Result<Self, Error> {
-        let (mut low, mut dims) = ([0.0; D], [0; D]);
-        for x in &mut low {
-            *x = from.f32()?;
-        }
-        let cell = from.f32()?;
+        let mut dims = [0; D];
+        let box_of = from.f32s(D + 1)?;
         for n in &mut dims {
             *n = from.count(most)?.max(1);
         }
+        let cell = box_of[D];
         let n_cells = dims.iter().try_fold(1usize, |all, &n| all.checked_mul(n));
-        let n_cells = n_cells.filter(|&n| n <= most && cell > 0.0);
-        let Some(n_cells) = n_cells else {
+        let Some(n_cells) = n_cells.filter(|&n| n <= most && cell > 0.0) else {
             let expected = format!("a grid of at most {most} cells");
-            return Err(from.wrong(expected, format!("{dims:?}")));
+            return Err(Error::new("model", expected, format!("{dims:?}")));
         };
-        let last = dims.map(|n| (n - 1) as f32);
-        let values = from.f32s(n_cells)?;
-        Ok(Self { low, cell, per_length: 1.0 / cell, dims, last, values })
+        Ok(Self::new(std::array::from_fn(|c| box_of[c]), cell, dims, from.f32s(n_cells)?))
     }
 
     /// How long the sides of the box are, in whole cells.
@@ -100,10 +93,21 @@ impl<const D: usize> Grid<D> {
         self.cell
     }
 
+    /// The volume of a cell.
+    pub(crate) fn volume(&self) -> f32 {
+        (0..D).map(|_| self.cell).product()
+    }
+
     /// The cell of `place`; far places, infinite ones included, land in border cells.
     #[inline(always)]
     pub(crate) fn index(&self, place: &[f32; D]) -> usize {
         self.number(|c| place[c]) as usize
+    }
+
+    /// The value of the cell of `place`.
+    #[inline(always)]
+    pub(crate) fn at(&self, place: &[f32; D]) -> f32 {
+        self.values[self.index(place)]
     }
 
     /// The number of the cell of a place with these coordinates.
@@ -136,7 +140,7 @@ impl<const D: usize> Grid<D> {
 
     /// The cells of places in columns.
     #[inline(always)]
-    pub(crate) fn cells_of(&self, columns: &[&[f32]; D], cells: &mut [u32]) {
+    fn cells_of(&self, columns: &[&[f32]; D], cells: &mut [u32]) {
         let columns: [&[f32]; D] = columns.map(|column| &column[..cells.len()]);
         for (i, cell) in cells.iter_mut().enumerate() {
             *cell = self.number(|c| columns[c][i]);
@@ -187,13 +191,8 @@ impl<const D: usize> Grid<D> {
         (from < to).then_some((from, to))
     }
 
-    /// Replaces every value by the mean of its neighborhood, weights 1 2 1 along each axis.
-    pub(crate) fn smooth(&mut self) {
-        self.smooth_apart(1);
-    }
-
-    /// The same with neighbors so many cells apart.
-    pub(crate) fn smooth_apart(&mut self, apart: usize) {
+    /// Replaces every value by the mean of its neighborhood: weights 1 2 1 along each axis, with neighbors so many cells apart.
+    pub(crate) fn smooth(&mut self, apart: usize) {
         let mut stride = 1;
         let mut line = Vec::new();
         for c in (0..D).rev() {
@@ -239,7 +238,7 @@ impl<const D: usize> Density<D> {
     pub(crate) fn new(places: &Places<D>, listed: &[u32], radius: f32) -> Self {
         let n = places.len();
         let (low, high) = places.trimmed_box();
-        let mut grid = Grid::with_cell(low, high, radius * CELL, most_cells(n));
+        let mut grid = Grid::with_cell(low, high, radius * CELL, (4 * n).max(1 << 16));
         let slots_per_record = n / listed.len().max(1);
         let mut weight = 0.0f64;
         for slot in 0..n {
@@ -249,17 +248,16 @@ impl<const D: usize> Density<D> {
                 grid.spread(&places.of(slot), times);
             }
         }
-        grid.smooth();
-        let volume: f32 = (0..D).map(|_| grid.cell()).product();
+        grid.smooth(1);
         let mean_times = (weight / n.max(1) as f64) as f32;
         // Linear spreading and smoothing leave about 1 / 2^D of an estimate in its own cell.
         let least = LEAST * mean_times / (1 << (D * (1 + WIDER))) as f32;
         look_wider(&mut grid, ENOUGH * mean_times);
-        let scale = 1.0 / (weight.max(1.0) as f32 * volume);
+        let scale = 1.0 / (weight.max(1.0) as f32 * grid.volume());
         for value in &mut grid.values {
             *value = value.max(least) * scale;
         }
-        let mut sample: Vec<f32> = places.sample().map(|x| grid.values[grid.index(&x)]).collect();
+        let mut sample: Vec<f32> = places.sample().map(|x| grid.at(&x)).collect();
         let middle = sample.len() / 2;
         let typical = match sample.is_empty() {
             true => scale,
@@ -271,7 +269,7 @@ impl<const D: usize> Density<D> {
     /// The density at `x`.
     #[inline(always)]
     pub(crate) fn at(&self, x: &[f32; D]) -> f32 {
-        self.grid.values[self.grid.index(x)]
+        self.grid.at(x)
     }
 
     /// The densities at places in columns, with room for a cell each.
@@ -289,19 +287,13 @@ impl<const D: usize> Density<D> {
         libm::logf(self.typical / density)
     }
 
-    /// How much wider neighbors lie where the density is `density` than at a typical place: lists have
-    /// one length, so neighbors lie farther apart where points are sparse. Dense places count as
-    /// typical: how narrow they are is beyond what the grid resolves.
+    /// The local width: how much wider neighbors lie where the density is `density` than at a typical place, as lists have one
+    /// length. Dense places count as typical: how narrow they are is beyond what the grid resolves.
     #[inline(always)]
     pub(crate) fn width(&self, density: f32) -> f32 {
         let ratio = self.typical / density;
         if ratio > 1.0 { cube_root(ratio).min(WIDEST) } else { 1.0 }
     }
-}
-
-/// Cells at most, for so many slots.
-fn most_cells(n_slots: usize) -> usize {
-    (4 * n_slots).max(1 << 16)
 }
 
 /// Where a cell of `grid` holds less than `enough`, its value becomes that of a wider smoothing, the first of several
@@ -311,7 +303,7 @@ fn look_wider<const D: usize>(grid: &mut Grid<D>, enough: f32) {
     let mut open: Vec<u32> =
         (0..grid.values.len() as u32).filter(|&i| grid.values[i as usize] < enough).collect();
     for wider in 1..=WIDER {
-        wide.smooth_apart(1 << wider);
+        wide.smooth(1 << wider);
         let enough = enough / (1 << (D * wider)) as f32;
         open.retain(|&i| {
             grid.values[i as usize] = wide.values[i as usize];
@@ -391,7 +383,7 @@ mod crowding_tests {
             }
         }
         grid.spread(&[40.5, 40.5], 1.0);
-        grid.smooth();
+        grid.smooth(1);
         let before = grid.clone();
         look_wider(&mut grid, ENOUGH);
         let (dense, lone, beside) =

@@ -25,27 +25,23 @@ pub(crate) const NO_GROUP: u32 = u32::MAX;
 /// Squared sines below this count as parallel: such a record does not tell where along the line.
 const PARALLEL: f32 = 1e-6;
 
-/// All records as rows; within `bounds` about the released origin, where these are known: a chord starts
-/// where the line enters.
+/// Lines as rows. Within `bounds` about the released origin, where these are known, a chord starts where the line enters.
 pub(crate) fn from_lines<const D: usize>(
     lines: &Lines<D>,
     bounds: Option<&Bounds<D>>,
 ) -> Vec<LineRow<D>> {
-    let row = |(&foot, &direction): (&[f32; D], &[f32; D])| {
-        let clip = |bounds: &Bounds<D>| bounds.clip(&widen(&foot), &widen(&direction));
-        let (through, to) = match bounds.and_then(clip) {
-            Some((from, to)) => (
-                along(&widen(&foot), from, &widen(&direction)).map(|x| x as f32),
-                (to - from) as f32,
-            ),
-            None => (foot, f32::INFINITY),
+    let row = |(foot, &direction): (&[f32; D], &[f32; D])| {
+        let (at, toward) = (widen(foot), widen(&direction));
+        let (through, to) = match bounds.and_then(|bounds| bounds.clip(&at, &toward)) {
+            Some((from, to)) => (along(&at, from, &toward).map(|x| x as f32), (to - from) as f32),
+            None => (*foot, f32::INFINITY),
         };
         LineRow { through, direction, group: NO_GROUP, to }
     };
     lines.foot().iter().zip(lines.direction()).map(row).collect()
 }
 
-/// All records as rows; within the region of their center or else within `bounds`, where these are known.
+/// Rays as rows, within the region of their center or else within `bounds`, where these are known.
 pub(crate) fn from_rays<const D: usize>(
     rays: &Rays<D>,
     bounds: Option<&Bounds<D>>,
@@ -90,8 +86,7 @@ impl<const D: usize> LineRow<D> {
     /// The point of this line nearest to `other`; `None` when they are parallel or it lies behind a
     /// center.
     pub(crate) fn crossing(&self, other: &Self) -> Option<[f32; D]> {
-        let of_other = (other.through, other.direction, other.group);
-        let (t, miss2, _) = self.section(of_other);
+        let (t, miss2, _) = self.section((other.through, other.direction, other.group));
         (miss2 < NO_VOTE && t >= self.floor() && t <= self.to).then(|| self.at(t))
     }
 
@@ -135,21 +130,35 @@ impl<const D: usize> LineRow<D> {
     }
 }
 
+/// A column per coordinate.
+type Columns<const D: usize> = [Vec<f32>; D];
+
+/// Fills `columns` with a row for each item.
+#[inline(always)]
+pub(crate) fn fill<const D: usize, T>(
+    columns: &mut Columns<D>,
+    items: &[T],
+    row: impl Fn(&T) -> [f32; D],
+) {
+    columns.iter_mut().for_each(|column| column.resize(items.len(), 0.0));
+    let mut columns = columns.each_mut().map(|column| &mut column[..items.len()]);
+    for (j, item) in items.iter().enumerate() {
+        columns.iter_mut().zip(row(item)).for_each(|(column, x)| column[j] = x);
+    }
+}
+
 /// Neighbors gathered into one column per coordinate: the section loop then runs over whole vectors.
 #[derive(Clone, Debug)]
 pub(crate) struct LineColumns<const D: usize> {
-    through: [Vec<f32>; D],
-    direction: [Vec<f32>; D],
+    through: Columns<D>,
+    direction: Columns<D>,
     group: Vec<u32>,
 }
 
 impl<const D: usize> Default for LineColumns<D> {
     fn default() -> Self {
-        Self {
-            through: std::array::from_fn(|_| Vec::new()),
-            direction: std::array::from_fn(|_| Vec::new()),
-            group: Vec::new(),
-        }
+        let columns = || std::array::from_fn(|_| Vec::new());
+        Self { through: columns(), direction: columns(), group: Vec::new() }
     }
 }
 
@@ -157,22 +166,10 @@ impl<const D: usize> LineColumns<D> {
     /// Gathers `records` from `rows`.
     #[inline(always)]
     pub(crate) fn gather(&mut self, rows: &[LineRow<D>], records: &[RecordId]) {
-        let n = records.len();
-        for column in self.through.iter_mut().chain(&mut self.direction) {
-            column.resize(n, 0.0);
-        }
-        self.group.resize(n, NO_GROUP);
-        let through = self.through.each_mut().map(|column| &mut column[..n]);
-        let direction = self.direction.each_mut().map(|column| &mut column[..n]);
-        let group = &mut self.group[..n];
-        for j in 0..n {
-            let row = &rows[records[j].index()];
-            for c in 0..D {
-                through[c][j] = row.through[c];
-                direction[c][j] = row.direction[c];
-            }
-            group[j] = row.group;
-        }
+        fill(&mut self.through, records, |record| rows[record.index()].through);
+        fill(&mut self.direction, records, |record| rows[record.index()].direction);
+        self.group.clear();
+        self.group.extend(records.iter().map(|record| rows[record.index()].group));
     }
 
     /// How many of the gathered records are evidence for a point on `own`.
@@ -199,12 +196,10 @@ impl<const D: usize> LineColumns<D> {
     }
 }
 
-// Axis candidates: sections of listed records with one of a slot's own axis lines.
-
-/// Neighbors gathered into one column per coordinate.
+/// Axis candidates gathered into one column per coordinate.
 #[derive(Clone, Debug)]
 pub(crate) struct CandidateColumns<const D: usize> {
-    position: [Vec<f32>; D],
+    position: Columns<D>,
 }
 
 impl<const D: usize> Default for CandidateColumns<D> {
@@ -217,17 +212,12 @@ impl<const D: usize> CandidateColumns<D> {
     /// Gathers `records` from `rows`.
     #[inline(always)]
     pub(crate) fn gather(&mut self, rows: &[[f32; D]], records: &[RecordId]) {
-        let n = records.len();
-        for column in &mut self.position {
-            column.resize(n, 0.0);
-        }
-        let position = self.position.each_mut().map(|column| &mut column[..n]);
-        for j in 0..n {
-            let row = &rows[records[j].index()];
-            for c in 0..D {
-                position[c][j] = row[c];
-            }
-        }
+        fill(&mut self.position, records, |record| rows[record.index()]);
+    }
+
+    /// Number of gathered records.
+    pub(crate) fn len(&self) -> usize {
+        self.position[0].len()
     }
 
     /// The sections of the gathered records with the line through `own` along `axis`.
@@ -264,15 +254,12 @@ impl<const D: usize> CandidateColumns<D> {
     }
 }
 
-// Where listed records pass a feasible line: the common currency of all one-unknown families.
-//
-// Along `x(t)` the squared distance to record `j` is `miss2[j] + bend[j] (t - at[j])^2`: `at` is
-// the parameter of the closest approach, `miss2` the squared distance there, `bend` the squared
-// sine of the angle between the lines (1 when the record is seen square on, 0 when it agrees with
-// every `t` alike, as a parallel axis of a candidate does). Within `delta` of a
-// record is therefore an interval of `t`.
-
-/// Sections of one list of records with one feasible line, in columns.
+/// Where listed records pass one feasible line, in columns.
+///
+/// Along `x(t)` the squared distance to record `j` is `miss2[j] + bend[j] (t - at[j])^2`: `at` is
+/// the parameter of the closest approach, `miss2` the squared distance there, `bend` the squared
+/// sine of the angle between the lines (0 for a parallel axis of a candidate, which agrees with every `t` alike). Within
+/// `delta` of a record is therefore an interval of `t`.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Sections {
     pub(crate) at: Vec<f32>,
@@ -338,6 +325,16 @@ impl Sections {
     }
 }
 
+/// A position along a feasible line and why it was chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Peak {
+    pub(crate) t: f32,
+    /// Improbability by chance that so many records pass there, in nats.
+    pub(crate) evidence: f32,
+    /// Evidence and prior: what is maximized.
+    pub(crate) score: f32,
+}
+
 /// Intervals of `t` within delta of the records that pass there, in order of record.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Intervals {
@@ -345,15 +342,9 @@ pub(crate) struct Intervals {
     high: Vec<f32>,
     /// Records that are within delta everywhere.
     everywhere: u32,
-    at_starts: AtStarts,
-}
-
-/// What is looked at where each interval starts, in columns.
-#[derive(Clone, Debug, Default)]
-struct AtStarts {
-    /// How many intervals hold it.
+    /// Where each interval starts: how many hold it, the chance that a random record passes there, its cell,
+    /// and what follows from these.
     count: Vec<u32>,
-    /// The chance that a random record passes there.
     chance: Vec<f32>,
     cell: Vec<u32>,
     evidence: Vec<f32>,
@@ -363,7 +354,7 @@ struct AtStarts {
 impl Intervals {
     /// The intervals of `sections` at `delta`, as far as they lie between `floor` and `top`.
     #[inline(always)]
-    pub(crate) fn fill(&mut self, sections: &Sections, delta2: f32, floor: f32, top: f32) {
+    fn fill(&mut self, sections: &Sections, delta2: f32, floor: f32, top: f32) {
         let n = sections.len();
         self.low.resize(n, f32::INFINITY);
         self.high.resize(n, f32::NEG_INFINITY);
@@ -386,43 +377,38 @@ impl Intervals {
             everywhere += u32::from(start == f32::NEG_INFINITY);
         }
         self.everywhere = everywhere;
-        self.low.truncate(kept);
-        self.high.truncate(kept);
         let padded = kept.next_multiple_of(LANES);
-        self.low.resize(padded, f32::INFINITY);
-        self.high.resize(padded, f32::NEG_INFINITY);
+        for (column, nothing) in
+            [(&mut self.low, f32::INFINITY), (&mut self.high, f32::NEG_INFINITY)]
+        {
+            column.truncate(kept);
+            column.resize(padded, nothing);
+        }
     }
-}
 
-/// A position along a feasible line and why it was chosen.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Peak {
-    /// The position.
-    pub(crate) t: f32,
-    /// Improbability by chance that so many records pass there, in nats.
-    pub(crate) evidence: f32,
-    /// Evidence and prior: what is maximized.
-    pub(crate) score: f32,
-}
-
-impl Intervals {
-    /// The start of a listed interval that maximizes evidence plus prior. The number of agreeing records
-    /// changes only at interval ends and is largest at some start, so no position has more votes than the
-    /// starts looked at.
+    /// Where `sections` agree least probably by chance, between `floor` and `top` and at `delta`. The number of agreeing records
+    /// changes only at the ends of their intervals and is largest at some start, so only starts are looked at.
     ///
     /// `k` listed records could vote; `chances` adds to its last argument the chance that a random record
     /// passes at each start (of the first), with room for cells of a grid (in the second). The prior is the chance
-    /// itself: a point is likelier to lie where the map is dense, and chance measures density (without it the empty
-    /// parts of a map, where two votes are already improbable, win too often). Ties are won by the lower record.
+    /// itself: a point is likelier to lie where the map is dense, and chance measures density. Ties are won by the lower
+    /// record.
     #[inline(always)]
-    pub(crate) fn best_start(
+    pub(crate) fn peak(
         &mut self,
+        sections: &Sections,
+        (delta2, floor, top): (f32, f32, f32),
         k: usize,
         chances: impl Fn(&[f32], &mut [u32], &mut [f32]),
     ) -> Option<Peak> {
+        self.fill(sections, delta2, floor, top);
         let n = self.low.len();
-        self.at_starts.resize(n);
-        let AtStarts { count, chance, cell, evidence: nats, score } = &mut self.at_starts;
+        self.count.resize(n, 0);
+        self.cell.resize(n, 0);
+        for column in [&mut self.chance, &mut self.evidence, &mut self.score] {
+            column.resize(n, 0.0);
+        }
+        let Self { count, chance, evidence: nats, score, .. } = self;
         let (count, chance, nats, score) =
             (&mut count[..n], &mut chance[..n], &mut nats[..n], &mut score[..n]);
         // A vector of starts at a time is compared with every interval.
@@ -437,7 +423,7 @@ impl Intervals {
             *counts = sums;
         }
         chance.fill(0.0);
-        chances(&self.low, cell, chance);
+        chances(&self.low, &mut self.cell, chance);
         for i in 0..n {
             let p = chance[i].min(MOST_CHANCE);
             nats[i] = evidence(count[i] as i32 as f32, k as f32, p);
@@ -453,28 +439,12 @@ impl Intervals {
     }
 }
 
-impl AtStarts {
-    #[inline(always)]
-    fn resize(&mut self, n: usize) {
-        self.count.resize(n, 0);
-        self.cell.resize(n, 0);
-        for column in [&mut self.chance, &mut self.evidence, &mut self.score] {
-            column.resize(n, 0.0);
-        }
-    }
-}
-
-// How improbable an agreement is by chance (the evidence that decides between positions).
-//
-// Of `k` listed records `n` support a position, while a random one does with chance `p`. A wrong
-// position gets Bin(k, p) votes. The evidence is the Chernoff bound on the tail, `k KL(n/k || p)` nats:
-// it orders as the tail does, and has no branches.
-
 /// The chance that a random record agrees is taken for at most this: beyond, a density is no probability.
 pub(crate) const MOST_CHANCE: f32 = 0.5;
 
 /// Evidence in nats that `n` of `k` listed records agree where a random one does with probability
-/// `p`, above 0 and below 1; 0 when chance alone would give as many.
+/// `p`, above 0 and below 1; 0 when chance alone would give as many. A wrong position gets Bin(k, p) votes: this is the Chernoff
+/// bound on the tail, `k KL(n/k || p)`, which orders as the tail does.
 #[inline(always)]
 pub(crate) fn evidence(n: f32, k: f32, p: f32) -> f32 {
     let missed = k - n;
@@ -483,8 +453,6 @@ pub(crate) fn evidence(n: f32, k: f32, p: f32) -> f32 {
     // Just above chance the two terms cancel up to rounding.
     if n <= p * k { 0.0 } else { evidence.max(0.0) }
 }
-
-// Whole vectors at a time: what the hot loops share.
 
 /// Columns are padded to a multiple of this many entries that do not vote, so that every loop runs
 /// over whole vectors, with the same order of additions whatever the machine.

@@ -1,4 +1,4 @@
-//! The lists a solver reads: as given, or mixed to see what chance alone yields.
+//! Work on slots in fixed chunks, and lists that are mixed to see what chance alone yields.
 
 use std::ops::Range;
 
@@ -6,18 +6,66 @@ use rayon::prelude::*;
 
 use crate::RecordId;
 use crate::neighbors::Neighborhoods;
-use crate::recover::result::{Estimate, Status};
-use crate::simd::prefetch;
+use crate::recover::result::{Estimate, Status, stored_support};
 
-/// Lists as a solver reads them: as given, or with every entry replaced by one from another slot's list.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Lists<'a> {
-    /// As they are.
-    Given(&'a Neighborhoods),
-    /// Mixed; every record has one slot.
-    Mixed(&'a Neighborhoods),
-    /// Of a sample of slots.
-    Picked(&'a Picked),
+/// Slots per chunk: a fixed number, so that results do not depend on threads.
+pub(crate) const CHUNK: usize = 64;
+
+/// The slots that a run covers, in chunks of [`CHUNK`]; only the last one may be shorter.
+#[derive(Clone, Debug)]
+pub(crate) struct Slots {
+    /// The first slot of each chunk.
+    firsts: Vec<usize>,
+    n: usize,
+}
+
+impl Slots {
+    /// Slots one after the other.
+    pub(crate) fn range(slots: Range<usize>) -> Self {
+        Self { n: slots.len(), firsts: slots.step_by(CHUNK).collect() }
+    }
+
+    /// Some `chunks`, in ascending order, of a map of `n_slots`.
+    pub(crate) fn chunks(chunks: &[usize], n_slots: usize) -> Self {
+        let firsts: Vec<usize> = chunks.iter().map(|chunk| chunk * CHUNK).collect();
+        let n = firsts.iter().map(|first| CHUNK.min(n_slots - first)).sum();
+        Self { firsts, n }
+    }
+
+    /// All of them, in order.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = usize> {
+        self.firsts.iter().flat_map(|&first| first..first + CHUNK).take(self.n)
+    }
+}
+
+/// The estimate of a slot that was recovered.
+pub(crate) fn found<const D: usize>(
+    position: [f32; D],
+    support: u32,
+    axis: usize,
+    evidence: f32,
+) -> Estimate<D> {
+    let (status, support, axis) = (Status::Ok, stored_support(support), axis as u8);
+    Estimate { position, status, support, axis, evidence }
+}
+
+/// The estimate of a slot whose neighbors do not fix a point, of which `n` could say anything.
+pub(crate) fn not_fixed<const D: usize>(n: usize) -> Estimate<D> {
+    Estimate::lost(if n < 2 { Status::TooFewNeighbors } else { Status::Degenerate })
+}
+
+/// Calls `solve(scratch, first slot, estimates)` for every chunk; estimates come back in order of `slots`.
+pub(crate) fn solve_chunks<const D: usize, S: Send>(
+    slots: &Slots,
+    scratch: impl Fn() -> S + Sync + Send,
+    solve: impl Fn(&mut S, usize, &mut [Estimate<D>]) + Sync + Send,
+) -> Vec<Estimate<D>> {
+    let mut estimates = vec![Estimate::lost(Status::NoSupport); slots.n];
+    estimates
+        .par_chunks_mut(CHUNK)
+        .zip(&slots.firsts)
+        .for_each_init(scratch, |scratch, (out, &first)| solve(scratch, first, out));
+    estimates
 }
 
 /// Mixed lists take entries this share of all entries apart (the golden section spreads them
@@ -26,184 +74,37 @@ const SPREAD: f64 = 0.618_033_988_749_895;
 /// So many entries are looked at for each that a mixed list takes: enough wherever there are others to find.
 const TRIES: usize = 8;
 
-impl<'a> Lists<'a> {
-    /// Lists as long as these, with the same records listed as often, that tell nothing.
-    pub(crate) fn mixed(&self) -> Self {
-        match *self {
-            Self::Given(lists) => Self::Mixed(lists),
-            other => other,
-        }
-    }
-
-    /// The list of `slot`; `buffer` is where a mixed one is put together.
-    #[inline(always)]
-    pub(crate) fn of<'b>(&'b self, slot: usize, buffer: &'b mut Vec<RecordId>) -> &'b [RecordId] {
-        match self {
-            Self::Given(lists) => lists.of(slot),
-            Self::Picked(picked) => picked.of(slot),
-            Self::Mixed(lists) => mixed(lists, slot, buffer),
-        }
-    }
-
-    /// Brings the rows near that `slot` lists, if there is such a slot.
-    #[inline(always)]
-    pub(crate) fn prefetch<T>(&self, slot: usize, rows: &[T]) {
-        // The others are of small samples.
-        if let Self::Given(lists) = self
-            && slot < lists.n_slots()
-        {
-            for record in lists.of(slot) {
-                prefetch(rows, record.index());
+/// Lists that tell nothing, as long as those of some `slots` (in ascending order) and made of entries of other slots' lists.
+pub(crate) fn mixed(
+    lists: &Neighborhoods,
+    slots: impl Iterator<Item = usize>,
+    slots_per_record: usize,
+) -> Neighborhoods {
+    let step = (lists.records().len() as f64 * SPREAD) as usize;
+    let (mut offsets, mut records) = (vec![0], Vec::<RecordId>::new());
+    for slot in slots {
+        let first = records.len();
+        offsets.resize(slot + 1, first as u64);
+        let len = lists.of(slot).len();
+        let own = (slot / slots_per_record) as u32;
+        // Of a handful of records there are no other lists than these.
+        let few = 4 * len * slots_per_record > lists.n_slots();
+        let mut at = lists.offsets()[slot] as usize;
+        for _ in 0..TRIES * len {
+            at = (at + step) % lists.records().len();
+            let entry = lists.records()[at];
+            // A record that is listed twice would agree with itself.
+            if few || (entry.0 != own && !records[first..].contains(&entry)) {
+                records.push(entry);
+            }
+            if records.len() == first + len {
+                break;
             }
         }
+        offsets.push(records.len() as u64);
     }
-
-    /// Number of slots.
-    pub(crate) fn n_slots(&self) -> usize {
-        match self {
-            Self::Given(lists) | Self::Mixed(lists) => lists.n_slots(),
-            Self::Picked(picked) => picked.n_slots,
-        }
-    }
-}
-
-/// The list of `slot`, mixed, put together in `buffer`.
-#[inline(never)]
-fn mixed<'b>(lists: &Neighborhoods, slot: usize, buffer: &'b mut Vec<RecordId>) -> &'b [RecordId] {
-    mix(lists, slot, 1, buffer);
-    buffer
-}
-
-/// Puts a list in `buffer` that is as long as that of `slot` and made of entries of other lists.
-fn mix(lists: &Neighborhoods, slot: usize, slots_per_record: usize, buffer: &mut Vec<RecordId>) {
-    let (offsets, records) = (lists.offsets(), lists.records());
-    let n_slots = lists.n_slots();
-    let n_entries = records.len();
-    let len = lists.of(slot).len();
-    let step = (n_entries as f64 * SPREAD) as usize;
-    let mut at = offsets[slot] as usize;
-    buffer.clear();
-    let own = (slot / slots_per_record) as u32;
-    // Of a handful of records there are no other lists than these.
-    let few = 4 * len * slots_per_record > n_slots;
-    let mut tries = TRIES * len;
-    while buffer.len() < len && tries > 0 {
-        at = (at + step) % n_entries;
-        tries -= 1;
-        let entry = records[at];
-        // A record that is listed twice would agree with itself.
-        if few || (entry.0 != own && !buffer.contains(&entry)) {
-            buffer.push(entry);
-        }
-    }
-}
-
-/// The lists of some chunks of slots.
-#[derive(Debug)]
-pub(crate) struct Picked {
-    chunks: Vec<usize>,
-    n_slots: usize,
-    offsets: Vec<u32>,
-    records: Vec<RecordId>,
-}
-
-impl Picked {
-    /// The given `lists` of the slots in `chunks` (ascending).
-    pub(crate) fn given(lists: &Neighborhoods, chunks: &[usize]) -> Self {
-        let mut picked = Self::none(lists, chunks);
-        for &chunk in chunks {
-            for slot in picked.slots_of(chunk) {
-                picked.push(lists.of(slot));
-            }
-        }
-        picked
-    }
-
-    /// Lists as long, with the same records listed as often, that tell nothing.
-    pub(crate) fn mixed(lists: &Neighborhoods, chunks: &[usize], slots_per_record: usize) -> Self {
-        let mut picked = Self::none(lists, chunks);
-        let mut buffer = Vec::new();
-        for &chunk in chunks {
-            for slot in picked.slots_of(chunk) {
-                mix(lists, slot, slots_per_record, &mut buffer);
-                picked.push(&buffer);
-            }
-        }
-        picked
-    }
-
-    fn none(lists: &Neighborhoods, chunks: &[usize]) -> Self {
-        let (chunks, n_slots) = (chunks.to_vec(), lists.n_slots());
-        Self { chunks, n_slots, offsets: vec![0], records: Vec::new() }
-    }
-
-    fn slots_of(&self, chunk: usize) -> Range<usize> {
-        chunk * CHUNK..self.n_slots.min((chunk + 1) * CHUNK)
-    }
-
-    fn push(&mut self, row: &[RecordId]) {
-        self.records.extend_from_slice(row);
-        self.offsets.push(self.records.len() as u32);
-    }
-
-    /// The list of `slot`; empty where it was not picked. All chunks before the last one are whole.
-    // Out of line, as `mixed` is: solvers hardly ever ask for them in their loops.
-    #[inline(never)]
-    fn of(&self, slot: usize) -> &[RecordId] {
-        let Ok(chunk) = self.chunks.binary_search(&(slot / CHUNK)) else { return &[] };
-        let at = chunk * CHUNK + slot % CHUNK;
-        &self.records[self.offsets[at] as usize..self.offsets[at + 1] as usize]
-    }
-}
-
-// Work in fixed chunks of slots: any number of threads, the same result.
-
-/// Slots per chunk. Records are released in random order, so the slots of a chunk have nothing to
-/// do with each other.
-pub(crate) const CHUNK: usize = 64;
-
-/// The slots a run covers.
-#[derive(Clone, Debug)]
-pub(crate) enum Slots<'a> {
-    /// One after the other.
-    Range(Range<usize>),
-    /// Some chunks of [`CHUNK`] slots, for choosing parameters.
-    Chunks(&'a [usize]),
-}
-
-/// Calls `solve(scratch, first slot, estimates)` for every chunk; estimates come back in slot order
-/// (for [`Slots::Chunks`], the slots of those chunks end to end).
-pub(crate) fn solve_chunks<const D: usize, S: Send>(
-    n_slots: usize,
-    slots: Slots<'_>,
-    scratch: impl Fn() -> S + Sync + Send,
-    solve: impl Fn(&mut S, usize, &mut [Estimate<D>]) + Sync + Send,
-) -> Vec<Estimate<D>> {
-    let lost = Estimate::lost(Status::NoSupport);
-    match slots {
-        Slots::Range(slots) => {
-            let mut estimates = vec![lost; slots.len()];
-            estimates
-                .par_chunks_mut(CHUNK)
-                .enumerate()
-                .for_each_init(scratch, |scratch, (chunk, out)| {
-                    solve(scratch, slots.start + chunk * CHUNK, out)
-                });
-            estimates
-        }
-        Slots::Chunks(chosen) => {
-            let rows: Vec<Vec<Estimate<D>>> = chosen
-                .par_iter()
-                .map_init(scratch, |scratch, &chunk| {
-                    let first = chunk * CHUNK;
-                    let mut out = vec![lost; CHUNK.min(n_slots - first)];
-                    solve(scratch, first, &mut out);
-                    out
-                })
-                .collect();
-            rows.concat()
-        }
-    }
+    offsets.resize(lists.n_slots() + 1, records.len() as u64);
+    Neighborhoods::unchecked(offsets, records)
 }
 
 #[cfg(test)]
@@ -223,13 +124,9 @@ mod tests {
         }
         let offsets = (0..=n).map(|slot| (slot * k) as u64).collect();
         let lists = Neighborhoods::try_new(offsets, records, None, n, 1).unwrap();
-        let mut buffer = Vec::new();
-        let mixed = Lists::Given(&lists).mixed();
-        let picked = Picked::mixed(&lists, &[0], 1);
+        let mixed = mixed(&lists, Slots::chunks(&[0], n).iter(), 1);
         for slot in 0..n {
-            let of_picked = picked.of(slot);
-            let mut row: Vec<u32> = mixed.of(slot, &mut buffer).iter().map(|r| r.0).collect();
-            assert!(of_picked.iter().map(|r| r.0).eq(row.iter().copied()));
+            let mut row: Vec<u32> = mixed.of(slot).iter().map(|r| r.0).collect();
             assert_eq!(row.len(), k);
             assert!(!row.contains(&(slot as u32)), "slot {slot} is listed for itself");
             row.sort_unstable();

@@ -6,7 +6,6 @@ use crate::recover::map::graph::record_of;
 use crate::recover::map::lines::{LineRow, ln};
 use crate::recover::map::planes::SortedPlanes;
 use crate::released::AxisPlanes;
-use crate::simd::prefetch;
 
 /// A flat piece of a feasible set: a line, a half-line or a plane.
 #[derive(Clone, Copy, Debug)]
@@ -16,9 +15,9 @@ pub(crate) struct Piece<const D: usize> {
     /// The projector onto its directions.
     pub(crate) along: [[f32; D]; D],
     /// The sense of a half-line or a chord; zero for others.
-    pub(crate) sense: [f32; D],
+    sense: [f32; D],
     /// How far it reaches in that sense.
-    pub(crate) to: f32,
+    to: f32,
     /// Whether those of other slots end in `through`, too: what is near it is near all of them.
     pub(crate) from_center: bool,
 }
@@ -47,23 +46,21 @@ impl<const D: usize> Piece<D> {
 /// The feasible sets of a map.
 pub(crate) trait Pieces<const D: usize>: Sync {
     /// Pieces per slot.
-    const PER_SLOT: usize;
+    const PER_SLOT: usize = 1;
+    /// Whether pieces are planes with a normal, not lines with a direction.
+    const NORMAL: bool = false;
     /// How much an estimate counts along its own piece at most, against 1 across it: its record says nothing there.
-    const MOST_ALONG: f32;
+    const MOST_ALONG: f32 = 0.25;
     /// With more than so many votes over that share, it counts less: `ALONG / votes`.
-    const ALONG: f32;
-    /// An estimate that is so many times as likely a true neighbor's as one of chance counts half when a place is
-    /// made anew.
+    const ALONG: f32 = 2.0;
+    /// An estimate that is so many times as likely a true neighbor's as one of chance counts half in the refined place.
     const DOUBT: f32 = 1.0;
     /// Whether entries that are near without being neighbors are told from neighbors: they would draw a place into
     /// the middle of its region. Where a neighbor speaks about one coordinate, the more voices the better.
     const TELLS_REGION: bool = false;
-    /// The radius of the law is at most this many deltas: where most estimates are wrong, those that are
+    /// The radius of the distribution of neighbors is at most this many deltas: where most estimates are wrong, those that are
     /// near by accident would widen it without end.
     const MOST_RADIUS: f32 = 0.95;
-
-    /// Whether pieces are planes with a normal, not lines with a direction.
-    const NORMAL: bool = false;
 
     /// Slots per record.
     fn slots_per_record(&self) -> usize {
@@ -75,8 +72,6 @@ pub(crate) trait Pieces<const D: usize>: Sync {
     fn direction(&self, slot: usize, piece: usize) -> [f32; D];
     /// Whether a record near a place is evidence for a point of `slot`.
     fn may_vote(&self, slot: usize, record: usize) -> bool;
-    /// Brings the row of `record` near.
-    fn prefetch(&self, record: usize);
     /// Squared distance from `x` to where `record` may lie.
     fn record_distance2(&self, record: usize, x: &[f32; D]) -> f32;
     /// The chance that a random record that may vote for `slot` passes within delta of `x`.
@@ -119,7 +114,6 @@ impl<'a, const D: usize> LinePieces<'a, D> {
 }
 
 impl<const D: usize> Pieces<D> for LinePieces<'_, D> {
-    const PER_SLOT: usize = 1;
     const MOST_ALONG: f32 = 0.35;
     const ALONG: f32 = 50.0;
     const TELLS_REGION: bool = true;
@@ -147,16 +141,10 @@ impl<const D: usize> Pieces<D> for LinePieces<'_, D> {
     }
 
     #[inline(always)]
-    fn prefetch(&self, record: usize) {
-        prefetch(self.rows, record);
-    }
-
-    #[inline(always)]
     fn record_distance2(&self, record: usize, x: &[f32; D]) -> f32 {
         let row = &self.rows[record];
         let away: [f32; D] = std::array::from_fn(|c| x[c] - row.through[c]);
-        let t: f32 = away.iter().zip(&row.direction).map(|(a, d)| a * d).sum();
-        let t = row.clamp(t);
+        let t = row.clamp(away.iter().zip(&row.direction).map(|(a, d)| a * d).sum());
         away.iter().zip(&row.direction).map(|(a, d)| (a - t * d) * (a - t * d)).sum()
     }
 
@@ -194,36 +182,32 @@ pub(crate) struct PlanePieces<'a, const D: usize> {
 
 impl<'a, const D: usize> PlanePieces<'a, D> {
     pub(crate) fn new(planes: &'a AxisPlanes<D>, sorted: &SortedPlanes, delta: f32) -> Self {
-        let chance = sorted.typical_chance(delta);
-        Self { planes, chance }
+        Self { planes, chance: sorted.typical_chance(delta) }
+    }
+
+    #[inline(always)]
+    fn axis(&self, record: usize) -> usize {
+        usize::from(self.planes.axis()[record])
     }
 }
 
 impl<const D: usize> Pieces<D> for PlanePieces<'_, D> {
-    const PER_SLOT: usize = 1;
     const NORMAL: bool = true;
     // Two coordinates are open: where few neighbors are right, their estimates are all that tells.
     const DOUBT: f32 = 0.2;
-    const MOST_ALONG: f32 = 0.25;
-    const ALONG: f32 = 2.0;
 
     #[inline(always)]
     fn piece(&self, slot: usize, _: usize) -> Piece<D> {
-        let (own, offset) = (usize::from(self.planes.axis()[slot]), self.planes.offset()[slot]);
+        let (own, offset) = (self.axis(slot), self.planes.offset()[slot]);
         let at = |c: usize| if c == own { offset } else { 0.0 };
-        let along = |r: usize, c: usize| if r == c && r != own { 1.0 } else { 0.0 };
-        Piece {
-            through: std::array::from_fn(at),
-            along: std::array::from_fn(|r| std::array::from_fn(|c| along(r, c))),
-            sense: [0.0; D],
-            to: f32::INFINITY,
-            from_center: false,
-        }
+        let free = |r: usize| if r == own { [0.0; D] } else { unit(r) };
+        let along = std::array::from_fn(free);
+        Piece { along, ..Piece::line(std::array::from_fn(at), [0.0; D]) }
     }
 
     #[inline(always)]
     fn direction(&self, slot: usize, _: usize) -> [f32; D] {
-        unit(usize::from(self.planes.axis()[slot]))
+        unit(self.axis(slot))
     }
 
     #[inline(always)]
@@ -232,14 +216,8 @@ impl<const D: usize> Pieces<D> for PlanePieces<'_, D> {
     }
 
     #[inline(always)]
-    fn prefetch(&self, record: usize) {
-        prefetch(self.planes.offset(), record);
-    }
-
-    #[inline(always)]
     fn record_distance2(&self, record: usize, x: &[f32; D]) -> f32 {
-        let axis = usize::from(self.planes.axis()[record]);
-        let d = x[axis] - self.planes.offset()[record];
+        let d = x[self.axis(record)] - self.planes.offset()[record];
         d * d
     }
 
@@ -265,8 +243,6 @@ impl<'a, const D: usize> CandidatePieces<'a, D> {
 impl<const D: usize> Pieces<D> for CandidatePieces<'_, D> {
     const PER_SLOT: usize = D;
     const MOST_RADIUS: f32 = Settings::of_dimension::<D>().most_radius_of_candidates;
-    const MOST_ALONG: f32 = 0.25;
-    const ALONG: f32 = 2.0;
 
     #[inline(always)]
     fn piece(&self, slot: usize, piece: usize) -> Piece<D> {
@@ -281,11 +257,6 @@ impl<const D: usize> Pieces<D> for CandidatePieces<'_, D> {
     #[inline(always)]
     fn may_vote(&self, _: usize, _: usize) -> bool {
         true
-    }
-
-    #[inline(always)]
-    fn prefetch(&self, record: usize) {
-        prefetch(self.rows, record);
     }
 
     #[inline(always)]

@@ -73,10 +73,7 @@ impl<const D: usize> Places<D> {
 
     /// The corners of a box around the known places, without the farthest.
     pub(crate) fn trimmed_box(&self) -> ([f32; D], [f32; D]) {
-        let ends: [(f32, f32); D] = std::array::from_fn(|c| {
-            trimmed(&mut self.sample().map(|x| x[c]).collect::<Vec<f32>>())
-        });
-        (ends.map(|e| e.0), ends.map(|e| e.1))
+        trimmed_box(|c| self.sample().map(|x| x[c]).collect())
     }
 
     /// The piece of its feasible set that `slot` lies on.
@@ -89,14 +86,10 @@ impl<const D: usize> Places<D> {
     /// with `either` the nearer of it and the next.
     #[inline(always)]
     pub(crate) fn nearest(&self, end: u32, either: bool, x: &[f32; D]) -> (f32, usize) {
-        let one = distance2(&self.of(end as usize), x);
-        if either {
-            let other = distance2(&self.of(end as usize + 1), x);
-            if other < one {
-                return (other, end as usize + 1);
-            }
-        }
-        (one, end as usize)
+        let end = end as usize;
+        let one = distance2(&self.of(end), x);
+        let other = if either { distance2(&self.of(end + 1), x) } else { f32::INFINITY };
+        if other < one { (other, end + 1) } else { (one, end) }
     }
 }
 
@@ -116,6 +109,14 @@ pub(crate) fn trimmed(column: &mut [f32]) -> (f32, f32) {
     (low - margin, high + margin)
 }
 
+/// The corners of a box around most places, given as the column of each coordinate.
+pub(crate) fn trimmed_box<const D: usize>(
+    column: impl Fn(usize) -> Vec<f32>,
+) -> ([f32; D], [f32; D]) {
+    let ends: [(f32, f32); D] = std::array::from_fn(|c| trimmed(&mut column(c)));
+    (ends.map(|e| e.0), ends.map(|e| e.1))
+}
+
 /// The squared distance.
 #[inline(always)]
 pub(crate) fn distance2<const D: usize>(a: &[f32; D], b: &[f32; D]) -> f32 {
@@ -126,16 +127,12 @@ pub(crate) fn distance2<const D: usize>(a: &[f32; D], b: &[f32; D]) -> f32 {
     sum
 }
 
-// The order in which slots are looked at: neighbors one after the other.
-//
-// Records lie in random order, so each look at a neighbor is a cache miss on a large map. Slots that are
-// near each other share neighbors: looked at in turn, they find them in the cache. Results do not
-// depend on the order.
-
 /// Cells per axis, as a power of two: place on the curve and slot share 64 bits.
 const BITS: u32 = 10;
 
-/// All slots, along a curve that fills space; lost ones last.
+/// All slots, along a curve that fills space; lost ones last. Records lie in random order, so that each look at a neighbor is a
+/// cache miss on a large map. Slots near each other share neighbors: in this order they find them in the cache. Results do
+/// not depend on it.
 pub(crate) fn along_curve<const D: usize>(places: &Places<D>) -> Vec<u32> {
     let n = places.len();
     let (low, high) = places.trimmed_box();

@@ -1,4 +1,4 @@
-//! Axis planes: the free coordinates separate, each is the densest window of offsets.
+//! Axis planes: each free coordinate is found on its own, in the densest window of offsets.
 
 use crate::RecordId;
 use crate::geometry::vector::median;
@@ -18,7 +18,7 @@ struct Sorted {
     order: Vec<u32>,
     /// The distance between the quartiles of their offsets.
     quartiles: f64,
-    /// Their offsets where the map is in parts along this axis, so that quartiles say little; else none.
+    /// Their offsets, if the map is in parts along this axis, so that quartiles say little; else empty.
     in_parts: Vec<f32>,
 }
 
@@ -73,34 +73,25 @@ fn typical_share(offsets: &[f32], delta: f32) -> f32 {
     median(&mut shares) as f32
 }
 
-/// How likely a random plane of the same axis falls into the window that starts at each plane.
-#[derive(Clone, Debug)]
-pub(crate) struct WindowChance {
-    probability: Vec<f32>,
-}
-
-impl WindowChance {
-    /// Counts, per record, the planes of its axis with offsets in `[offset, offset + 2 delta]`:
-    /// exact, no sample is needed where chance has one dimension.
-    pub(crate) fn new<const D: usize>(
-        planes: &AxisPlanes<D>,
-        sorted: &SortedPlanes,
-        delta: f32,
-    ) -> Self {
-        let mut probability = vec![0.0; planes.len()];
-        for Sorted { order, .. } in &sorted.by_axis {
-            let mut end = 0;
-            for (start, &record) in order.iter().enumerate() {
-                let reach = planes.offset()[record as usize] + 2.0 * delta;
-                while end < order.len() && planes.offset()[order[end] as usize] <= reach {
-                    end += 1;
-                }
-                probability[record as usize] =
-                    ((end - start) as f32 - 0.5) / (order.len() as f32 + 1.0);
+/// Per record how likely a random plane of its axis has an offset in `[offset, offset + 2 delta]`: counted exactly, no sample is
+/// needed where chance has one dimension.
+pub(crate) fn window_chance<const D: usize>(
+    planes: &AxisPlanes<D>,
+    sorted: &SortedPlanes,
+    delta: f32,
+) -> Vec<f32> {
+    let mut chance = vec![0.0; planes.len()];
+    for Sorted { order, .. } in &sorted.by_axis {
+        let mut end = 0;
+        for (start, &record) in order.iter().enumerate() {
+            let reach = planes.offset()[record as usize] + 2.0 * delta;
+            while end < order.len() && planes.offset()[order[end] as usize] <= reach {
+                end += 1;
             }
+            chance[record as usize] = ((end - start) as f32 - 0.5) / (order.len() as f32 + 1.0);
         }
-        Self { probability }
     }
+    chance
 }
 
 /// The final mean runs over this many deltas on either side of the window's own: where the window
@@ -119,12 +110,12 @@ pub(crate) struct Window {
 }
 
 /// The window of width `2 delta` over the listed planes of one axis that maximizes evidence plus
-/// prior. `listed` holds (offset, record) of these planes and is sorted here.
-// In line: called, consensus on planes takes half as long again.
+/// prior. `listed` holds (offset, record) of these planes and is sorted here; `chance` is that of [`window_chance`].
+// Not inlined, consensus on planes takes half as long again.
 #[inline(always)]
 pub(crate) fn best_window(
     listed: &mut [(f32, RecordId)],
-    chance: &WindowChance,
+    chance: &[f32],
     delta: f32,
 ) -> Option<Window> {
     listed.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -134,7 +125,7 @@ pub(crate) fn best_window(
         while end < listed.len() && listed[end].0 <= listed[start].0 + 2.0 * delta {
             end += 1;
         }
-        let p = chance.probability[listed[start].1.index()];
+        let p = chance[listed[start].1.index()];
         let evidence = evidence((end - start) as f32, listed.len() as f32, p);
         let score = evidence + ln(p);
         if best.is_none_or(|b| score > b.0) {
