@@ -4,6 +4,20 @@ use std::fmt;
 
 use crate::line::OneLine;
 
+/// What kind of mistake an [`Error`] is about, for callers that do something about it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ErrorKind {
+    /// A value breaks a stated rule.
+    Invalid,
+    /// There are fewer points than lists of neighbors need.
+    TooFewPoints,
+    /// A source of neighbors cannot work on descriptors of this kind.
+    Descriptors,
+    /// The observer of an audit asked it to stop.
+    Stopped,
+}
+
 /// An argument or a set of columns that breaks a stated invariant.
 ///
 /// Prints as one line: `what: expected ..., found ...`, whatever they hold ([`OneLine`]). Files have their own error, with path and
@@ -11,6 +25,7 @@ use crate::line::OneLine;
 /// [`Status`](crate::recover::Status), not an error.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Error {
+    kind: ErrorKind,
     what: String,
     expected: String,
     found: String,
@@ -23,7 +38,19 @@ impl Error {
         expected: impl Into<String>,
         found: impl Into<String>,
     ) -> Self {
-        Self { what: what.into(), expected: expected.into(), found: found.into() }
+        let kind = ErrorKind::Invalid;
+        Self { kind, what: what.into(), expected: expected.into(), found: found.into() }
+    }
+
+    /// The same error as one of `kind`.
+    #[must_use]
+    pub fn of_kind(self, kind: ErrorKind) -> Self {
+        Self { kind, ..self }
+    }
+
+    /// What kind of mistake it is.
+    pub fn kind(&self) -> ErrorKind {
+        self.kind
     }
 
     /// The same error as part of something larger: `place: what: expected ..., found ...`.

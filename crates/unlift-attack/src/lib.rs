@@ -28,7 +28,7 @@ pub mod simd;
 
 pub use about::{About, Fingerprint, ListsBy, RowOrder};
 pub use descriptors::Descriptors;
-pub use error::Error;
+pub use error::{Error, ErrorKind};
 pub use ids::RecordId;
 pub use line::{OneLine, is_obeyed};
 pub use points::{PointSet, Unit};

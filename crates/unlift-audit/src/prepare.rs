@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use unlift::geometry::knn::Knn;
 use unlift::seed::{Draws, Stage};
 use unlift::truth::Original;
-use unlift::{Descriptors, Error, PointSet, Unit};
+use unlift::{Descriptors, Error, ErrorKind, PointSet, Unit};
 
 /// Statistical outlier removal.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,7 +91,8 @@ pub fn prepare<'a>(
     let k = preparation.k;
     if rows.len() <= k {
         let expected = format!("at least {} (K + 1)", k.saturating_add(1));
-        return Err(Error::new("points", expected, rows.len().to_string()));
+        let error = Error::new("points", expected, rows.len().to_string());
+        return Err(error.of_kind(ErrorKind::TooFewPoints));
     }
     let kept: Vec<[f64; 3]> = match rows.len() == n_read {
         true => positions.into_owned(),
@@ -128,7 +129,8 @@ fn without_outliers(points: &[[f64; 3]], filter: OutlierFilter) -> Result<Vec<u3
     let n = filter.neighbors;
     if points.len() <= n {
         let expected = format!("more than {n} for the outlier filter");
-        return Err(Error::new("points", expected, points.len().to_string()));
+        let error = Error::new("points", expected, points.len().to_string());
+        return Err(error.of_kind(ErrorKind::TooFewPoints));
     }
     let knn = Knn::new(points)?;
     let means = knn.per_row(n, |_, found| {

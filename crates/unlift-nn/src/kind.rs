@@ -2,7 +2,7 @@
 
 use unlift::descriptors::Values;
 use unlift::neighbors::{Overlap, Source};
-use unlift::{Descriptors, Error};
+use unlift::{Descriptors, Error, ErrorKind};
 
 /// Descriptors that networks are trained for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,7 +33,7 @@ impl DescriptorKind {
             (false, _, dim) => {
                 let expected = "descriptors of SIFT (128 values, none negative), ALIKED (128 floats) or SuperPoint (256 floats)";
                 let found = format!("{dim} {}", if floats { "floats" } else { "bytes" });
-                Err(Error::new(whose, expected, found))
+                Err(Error::new(whose, expected, found).of_kind(ErrorKind::Descriptors))
             }
         }
     }

@@ -57,8 +57,8 @@ pub mod truth;
 
 pub use truth::OriginalId;
 pub use unlift_attack::{
-    About, Descriptors, Error, Fingerprint, ListsBy, OneLine, PointSet, RecordId, RowOrder, Unit,
-    descriptors, geometry, is_obeyed, points, recover, released,
+    About, Descriptors, Error, ErrorKind, Fingerprint, ListsBy, OneLine, PointSet, RecordId,
+    RowOrder, Unit, descriptors, geometry, is_obeyed, points, recover, released,
 };
 #[doc(hidden)]
 pub use unlift_attack::{compiled, simd};

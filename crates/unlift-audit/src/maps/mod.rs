@@ -10,7 +10,7 @@ use std::time::Instant;
 use unlift::audit::{Outcome, Plan, Row, run, run_released};
 use unlift::released::Released;
 use unlift::truth::{Original, Secret};
-use unlift::{Descriptors, Unit};
+use unlift::{Descriptors, ErrorKind, Unit};
 use unlift_io::atomic::OutputSet;
 use unlift_io::hash::hash_input;
 use unlift_io::read;
@@ -161,7 +161,7 @@ pub fn open(
     check_scale(&input.positions, preparation.scale)?;
     let rows = descriptors.map(|file| read::descriptors(file, &input)).transpose()?;
     let mut prepared = prepare(&input.positions, rows.as_ref(), preparation).map_err(|error| {
-        let few = error.what() == "points" && input.positions.len() > 2;
+        let few = error.kind() == ErrorKind::TooFewPoints && input.positions.len() > 2;
         let error = Error::from(unlift_io::Error::core(path, error));
         if few { error.advise("a smaller --k, or more points") } else { error }
     })?;

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use serde_json::{Map, Value, json};
-use unlift::Descriptors;
 use unlift::audit::{NeighborsBy, Plan, Threshold};
 use unlift::neighbors::sources::Named;
 use unlift::neighbors::{Needs, Source};
 use unlift::recover::{Builtin, Solver};
+use unlift::{Descriptors, ErrorKind};
 
 use crate::args::AttackArgs;
 use crate::exit::{advise, usage};
@@ -121,7 +121,7 @@ pub fn check_fit<const D: usize>(
     source.takes(descriptors).map_err(|error| {
         let name = source.name();
         // What is wrong may be the source's model, of which the error tells the path.
-        if !error.what().starts_with("descriptors") {
+        if error.kind() != ErrorKind::Descriptors {
             return usage(format!("--neighbors {name}: {error}"));
         }
         let (expected, found) = (error.expected(), error.found());

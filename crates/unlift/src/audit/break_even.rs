@@ -32,6 +32,7 @@ impl Bound {
 /// The smallest inlier ratio, of all tested ones and those between them, at which half of the points come
 /// back within a threshold.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct BreakEven {
     /// Scheme name.
     pub scheme: String,

@@ -21,7 +21,7 @@ use crate::recover::Builtin;
 use crate::released::Released;
 use crate::seed::Key;
 use crate::truth::{Original, Secret};
-use crate::{Descriptors, Error};
+use crate::{Descriptors, Error, ErrorKind};
 
 /// The [metric](Row::metrics) of an attacker's own lists: the inlier ratio against as many true neighbors as the lists
 /// have records.
@@ -152,7 +152,8 @@ pub(super) fn attack<const D: usize>(
         let mut solved = Solved::new(plan, (&hidden.0, &made.lists), attacker);
         for (at, solver) in plan.solvers.iter().enumerate() {
             if !observer.goes_on() {
-                return Err(Error::new("audit", "to go on", "a request to stop"));
+                let error = Error::new("audit", "to go on", "a request to stop");
+                return Err(error.of_kind(ErrorKind::Stopped));
             }
             let what = format!("{scheme} at {:.2} {source}, {}", made.ratio, solver.name());
             each(observer, Some(what), None);

@@ -6,6 +6,7 @@ use crate::Error;
 
 /// Where the time went. Never part of results.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Seconds {
     /// Searching nearest neighbors of the originals.
     pub search: f64,
@@ -25,6 +26,7 @@ pub struct Seconds {
 
 /// Where the time of one row went.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct RowSeconds {
     /// Making its neighborhoods; 0 where another solver's row already has the time.
     pub neighbors: f64,

@@ -12,6 +12,7 @@ use crate::{Descriptors, Error};
 
 /// Everything known about one row of one repeat, for whoever writes clouds, draws pictures or measures more.
 #[derive(Clone, Copy)]
+#[non_exhaustive]
 pub struct Cell<'a, const D: usize = 3> {
     /// The name of the image, if it is one of many.
     pub name: Option<&'a str>,

@@ -9,7 +9,7 @@ use crate::neighbors::oracle::Noise;
 use crate::neighbors::{Needs, Source, lacks_descriptors};
 use crate::obfuscate::{SCHEMES, Scheme, SchemeOptions};
 use crate::recover::{Builtin, Delta, Solver};
-use crate::{Error, Unit};
+use crate::{Error, ErrorKind, Unit};
 
 /// Neighbors of every original, by row, as an owner lists them from any source.
 #[derive(Clone, Debug, PartialEq)]
@@ -206,7 +206,8 @@ impl<const D: usize> Plan<D> {
     pub fn check(&self, n_points: usize, has_descriptors: bool) -> Result<(), Error> {
         if n_points < self.k + 1 {
             let expected = format!("at least K + 1 = {}", self.k + 1);
-            return Err(Error::new("points", expected, n_points.to_string()));
+            let error = Error::new("points", expected, n_points.to_string());
+            return Err(error.of_kind(ErrorKind::TooFewPoints));
         }
         self.check_fields()?;
         if has_descriptors { Ok(()) } else { self.without_descriptors() }

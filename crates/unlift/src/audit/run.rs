@@ -16,6 +16,7 @@ use crate::{Descriptors, Error};
 
 /// What an audit found.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Outcome {
     /// One row per scheme, source, noise model, inlier ratio and solver, in this order; of many, over the points of all.
     pub rows: Vec<Row>,

@@ -4,7 +4,7 @@ use super::hypotheses::{BINS, CELLS, Cell, DIM, Hypotheses, Version};
 use crate::descriptors::Values;
 use crate::neighbors::compare::Likeness;
 use crate::simd::{self, BLOCK};
-use crate::{Descriptors, Error};
+use crate::{Descriptors, Error, ErrorKind};
 
 /// Length of a version in bytes' units. Rounding adds less than half of the square root of [`DIM`],
 /// so that no product of two exceeds 133 x 133.
@@ -32,7 +32,7 @@ pub struct Block {
 pub fn check(descriptors: &Descriptors) -> Result<(), Error> {
     let wrong = |found: String| {
         let expected = "SIFT descriptors (128 values each, none negative)";
-        Err(Error::new("descriptors for overlap", expected, found))
+        Err(Error::new("descriptors for overlap", expected, found).of_kind(ErrorKind::Descriptors))
     };
     if descriptors.dim() != DIM {
         return wrong(format!("{} values each", descriptors.dim()));
