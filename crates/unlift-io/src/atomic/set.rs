@@ -42,7 +42,8 @@ impl OutputSet {
         first: &[(&str, Kind)],
     ) -> Result<Self, Error> {
         let target = resolved(path)?;
-        if target.exists() && !target.is_dir() {
+        // Asked once: another program may make or remove the folder meanwhile.
+        if fs::metadata(&target).is_ok_and(|found| !found.is_dir()) {
             return Err(Error::new(path, "", "a folder, or nothing", "a file"));
         }
         for (name, kind) in first {
