@@ -67,16 +67,26 @@ def recall(document, schemes):
     if not classes:
         return
     names = ["objects_found", *(start + one for one in classes)]
-    yield "| found again, % | " + " | ".join(["all", *(one.replace("_", " ") for one in classes)]) + " |"
-    yield "|" + " --- |" * (len(names) + 1)
-    cells = lambda row, of="": " | ".join(f"{100 * row['metrics'][name + of]:.0f}" for name in names)
-    yield f"| true points | {cells(results[0], end)} |"
+    rows = [("true points", [100 * results[0]["metrics"][name + end] for name in names])]
     for scheme in schemes:
         for row in results:
             if row["scheme"] == scheme and (row["neighbors"] != "oracle" or row["inlier_ratio"] == 1.0):
                 given = "1.0" if row["neighbors"] == "oracle" else f"`{row['neighbors']}`"
-                yield f"| {scheme}, {given} | {cells(row)} |"
+                rows.append((f"{scheme}, {given}", [100 * row["metrics"][name] for name in names]))
+    words = ["all", *(one.replace("_", " ") for one in classes)]
+    shown = [at for at in range(len(names)) if at == 0 or any(round(shares[at]) for _, shares in rows)]
+    if not any(round(share) for _, shares in rows[1:] for share in shares):
+        found = ", ".join(f"{words[at]} {rows[0][1][at]:.0f} %" for at in shown)
+        yield from [f"Objects found again: none in any recovered picture; in pictures of the true points: {found}.", ""]
+        return
+    yield "| found again, % | " + " | ".join(words[at] for at in shown) + " |"
+    yield "|" + " --- |" * (len(shown) + 1)
+    for name, shares in rows:
+        yield f"| {name} | " + " | ".join(f"{shares[at]:.0f}" for at in shown) + " |"
     yield ""
+    never = [word for at, word in enumerate(words) if at not in shown]
+    if never:
+        yield from ["Never found again: " + ", ".join(never) + ".", ""]
 
 
 def tables(program, shared):
