@@ -184,7 +184,7 @@ pub(crate) fn baselines(document: &Document) -> Table {
         }));
     }
     let caption =
-        "Without neighborhoods: what neighborhoods give away is what exceeds the larger of both.";
+        "Attackers without lists of neighbors. Lists add what exceeds the larger of the two.";
     let columns = [labels(["scheme", "attacker"]), within_columns(document, "")].concat();
     // Rows of one scheme share their baselines: each is said once.
     Table::new("baselines", caption, columns, distinct(rows))

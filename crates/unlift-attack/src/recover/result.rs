@@ -156,18 +156,20 @@ impl Unknown {
     /// The reason in plain words, as half a sentence after "not known here: ".
     pub fn reason(self) -> &'static str {
         match self {
-            Self::NotAsked => "it was not asked for",
-            Self::NotGiven => "the recovered points come without it",
-            Self::OfImages => {
-                "it was fitted on maps and never compared with what comes true in images"
+            Self::NotAsked => "confidence was not requested",
+            Self::NotGiven => "the recovered points have no confidence values",
+            Self::OfImages => "the confidence model was fitted on maps and not tested on images",
+            Self::OtherSolver => "only the solver joint estimates confidence",
+            Self::RankedLists => {
+                "the confidence model was not fitted on lists that a source ranked"
             }
-            Self::OtherSolver => "nothing was fitted for solvers other than joint",
-            Self::RankedLists => "nothing was fitted on how lists err that a source ranked",
-            Self::GivenLists => "nothing was fitted on how lists err that the oracle did not make",
-            Self::Flat => "nothing was fitted on flat or thin maps, where records cross everywhere",
-            Self::Coincident => "nothing was fitted on maps of which most points fall together",
+            Self::GivenLists => "the confidence model was fitted on lists of the oracle only",
+            Self::Flat => "the confidence model was not fitted on flat or thin maps",
+            Self::Coincident => {
+                "the confidence model was not fitted on maps in which most points coincide"
+            }
             Self::SmallMap => {
-                "lists have more entries than a hundredth of all points, more than in any map that it was fitted on"
+                "the map is small: a list holds more than a hundredth of its points, and the confidence model was not fitted on such maps"
             }
         }
     }

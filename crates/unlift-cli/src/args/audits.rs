@@ -17,17 +17,17 @@ use crate::values::{self, NeighborSource};
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Attack")]
 pub struct AttackArgs {
-    /// Shares of true neighbors to try, by commas (oracle) [default: 1,0.75,0.5,0.3,0.2,0.1]
+    /// Inlier ratios of the oracle: shares of listed neighbors that are true ones, separated by commas [default: 1,0.75,0.5,0.3,0.2,0.1]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::ratio)]
     pub inlier_ratios: Vec<f64>,
     /// How the oracle errs, by commas or repeated: uniform (any record), near (the 2K-th to 10K-th
     /// nearest), clustered (wrong places that neighbors share, as of look-alike descriptors) [default: uniform]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::noise)]
     pub oracle_noise: Vec<Noise>,
-    /// Do not use rules that tie records together (cp: swaps are mutual; ray-voxel: parity)
+    /// Do not use constraints between records (cp: swaps are mutual; ray-voxel: parity)
     #[arg(long)]
     pub no_exact_constraints: bool,
-    /// Add a row per scheme for an attacker who is told where three true neighbors of every point are
+    /// Add a row per scheme for an attacker who knows the positions of three true neighbors of every point
     #[arg(long)]
     pub reference: bool,
     /// Records per list of an attacker's own sources [default: each source's own choice]
@@ -36,7 +36,7 @@ pub struct AttackArgs {
     /// Distance up to which a neighbor supports a position, in the unit of the audit
     #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto")]
     pub delta: Delta,
-    /// Average over this many seeds
+    /// Average over this many random seeds
     #[arg(long, value_name = "N", default_value = "1",
           value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub repeats: u32,
@@ -46,7 +46,7 @@ pub struct AttackArgs {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Result")]
 pub struct ResultArgs {
-    /// Fail (exit code 1) when more than this comes back; repeatable, see below
+    /// Fail with exit code 1 if an attacker recovers more than this; repeatable, see below
     #[arg(long, value_name = "GATE", value_parser = Gate::parse)]
     pub gate: Vec<Gate>,
     /// Also write how the gates ended as JUnit XML, as GitLab, Jenkins and others show it
@@ -88,11 +88,11 @@ pub struct RunArgs {
 #[derive(Clone, Debug, Args)]
 pub struct SolverArgs {
     /// Recovery methods, by commas or repeated: joint, joint-start, consensus, ransac, density, tomography
-    /// [default: joint, and joint-start, the pass that it begins with; consensus on maps of fewer than 150 K points]
+    /// [default: joint, and joint-start, the pass that it begins with; consensus on maps of fewer than 150 x K points (7,500 by default)]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::solver,
           help_heading = "Attack")]
     pub solver: Vec<Builtin>,
-    /// Leave out the second baseline: attacks on the released records alone, without neighborhoods and
+    /// Skip the second baseline: attacks on the released records alone, without neighbors and
     /// descriptors
     #[arg(long, help_heading = "Attack")]
     pub no_records_alone: bool,
@@ -102,7 +102,7 @@ pub struct SolverArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Input")]
 pub struct MapArgs {
-    /// Meters per unit of the map. Without it the unit is the usual distance to the K-th neighbor (the median)
+    /// Meters per unit of the map. Without it, lengths are in median distances to the K-th nearest neighbor
     #[arg(long, value_name = "METERS_PER_UNIT", value_parser = values::scale)]
     pub scale: Option<f64>,
     /// Descriptors of the points: a COLMAP database.db or hloc's features.h5 that the model was made of,
@@ -118,12 +118,12 @@ pub struct MapArgs {
     #[arg(long, value_name = "NEIGHBORS,RATIO", value_parser = values::outlier_filter,
           num_args = 0..=1, require_equals = true, default_missing_value = "20,2.0")]
     pub outlier_filter: Option<OutlierFilter>,
-    /// True neighbors per point; without --scale also what lengths are measured in: the usual distance to this one
+    /// True neighbors per point (K). Without --scale, the median distance to the K-th one is the unit of length
     #[arg(long, value_name = "K", default_value = "50",
           value_parser = clap::value_parser!(u16).range(1..))]
     pub k: u16,
-    /// The integer that all randomness comes from [default: 0 for audits; obfuscate uses a fresh key
-    /// of 256 bits instead, as whoever guesses the integer undoes the hiding]
+    /// Random seed [default: 0 for audits; obfuscate uses a fresh key of 256 bits, because whoever guesses
+    /// the seed can undo the hiding]
     #[arg(long, value_name = "INTEGER")]
     pub seed: Option<u64>,
 }
@@ -158,11 +158,11 @@ pub struct AuditMapArgs {
     pub path: PathBuf,
     #[command(flatten)]
     pub map: MapArgs,
-    /// A first look: random lines (olc) and paired lines (ppl) at half of the neighbors right, and lists by similarity
-    /// where there are descriptors
+    /// Run a small audit: random lines (olc) and paired lines (ppl) at inlier ratio 0.5, and lists by similarity if there are
+    /// descriptors
     #[arg(long, conflicts_with_all = ["schemes", "inlier_ratios", "neighbors"], help_heading = "Attack")]
     pub quick: bool,
-    /// Schemes to audit, by commas [default: all, see unlift schemes]
+    /// Schemes to audit, separated by commas [default: all, see unlift schemes]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::scheme,
           help_heading = "Attack")]
     pub schemes: Vec<&'static Entry>,
@@ -181,7 +181,7 @@ pub struct AuditMapArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::threshold,
           help_heading = "Result")]
     pub thresholds: Vec<Threshold>,
-    /// Paint what came back as the map's cameras see it, and compare with their photos: rows get ssim,
+    /// Paint the recovered points as the map's cameras see them, and compare with their photos: rows get ssim,
     /// psnr and lpips, and the report the pictures (of a COLMAP model with descriptors)
     #[arg(long, help_heading = "Result", requires = "photos")]
     pub invert: bool,
@@ -254,10 +254,10 @@ pub struct AuditImagesArgs {
     #[arg(long, value_name = "K", default_value = "20", help_heading = "Input",
           value_parser = clap::value_parser!(u16).range(1..))]
     pub k: u16,
-    /// The integer that all randomness comes from
+    /// Random seed
     #[arg(long, value_name = "INTEGER", default_value_t = 0, help_heading = "Input")]
     pub seed: u64,
-    /// Schemes to audit, by commas [default: lines2d,cp2d,dcl2d]
+    /// Schemes to audit, separated by commas [default: lines2d,cp2d,dcl2d]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::image_scheme,
           help_heading = "Attack")]
     pub schemes: Vec<&'static Entry>,
@@ -286,7 +286,7 @@ pub struct AuditImagesArgs {
     /// turned by EXIF only if the file says that its features are of upright photos
     #[arg(long, value_name = "DIR", help_heading = "Result")]
     pub photos: Option<PathBuf>,
-    /// Paint what came back and compare with the photos: rows get ssim, psnr and lpips, and the
+    /// Paint the recovered keypoints and compare with the photos: rows get ssim, psnr and lpips, and the
     /// report the pictures
     #[arg(long, help_heading = "Result")]
     pub invert: bool,

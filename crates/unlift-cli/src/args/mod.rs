@@ -25,7 +25,7 @@ pub use stages::{
     SplitArgs,
 };
 
-/// How much of a privacy-preserving ("obfuscated") SfM map or image comes back?
+/// Measure how much of a privacy-preserving ("obfuscated") map or image an attacker recovers
 #[derive(Debug, Parser)]
 #[command(
     name = "unlift",
@@ -33,11 +33,11 @@ pub use stages::{
     term_width = 100,
     after_help = "\
 Examples:
-  unlift demo                                  what comes back of two photos and a map; no data needed
+  unlift demo                                  protect and attack two photos and a map; no data needed
   unlift audit map PROJECT/sparse/0 --scale 1  audit a COLMAP map that is in meters
   unlift audit images photos                   audit the keypoints of photos
-  unlift check                                 the audits of unlift.toml, for a build
-  unlift schemes                               what can be audited
+  unlift check                                 run all audits of unlift.toml, for a build
+  unlift schemes                               list the schemes that can be audited
 
 Exit codes: 0 done, 1 a gate failed, 2 usage, 3 bad input.
 Recovered points are as private as the original map."
@@ -83,48 +83,48 @@ fn numbers_may_be_negative(command: clap::Command) -> clap::Command {
 pub enum Command {
     /// Protect two photos and a map, attack them, and show what comes back
     Demo(DemoArgs),
-    /// Audit what you have
+    /// Audit a map, images, or records of your own scheme
     #[command(subcommand)]
     Audit(AuditCommand),
-    /// The audits of a configuration, unlift.toml: a build needs one word
+    /// Run all audits of a configuration file, unlift.toml
     Check(CheckArgs),
-    /// Hide the points of a map, or the keypoints of images, by one scheme: a released file and a truth file
+    /// Hide the points of a map or the keypoints of images by one scheme; writes a released file and a truth file
     Obfuscate(ObfuscateArgs),
-    /// Make neighborhoods
+    /// List the neighbors of every hidden point, as an oracle or as an attacker
     #[command(subcommand)]
     Neighbors(NeighborsCommand),
-    /// Recover the points of an obfuscated map, from released files alone
+    /// Recover the points of an obfuscated map from released files alone
     Recover(RecoverArgs),
     /// Compare recovered points with the truth
     Evaluate(EvaluateArgs),
-    /// Released, recovered or true points as other programs read them: PLY, OBJ, a COLMAP model, nerfstudio
+    /// Export released, recovered or true points: PLY, OBJ, a COLMAP model, nerfstudio
     Export(ExportArgs),
-    /// A stage file as a folder of parts, for engines that read many files at once
+    /// Split a stage file into a folder of parts, for engines that read many files at once
     Split(SplitArgs),
-    /// The figures of an audit as a table for a paper, and as curves
+    /// Print the results of an audit as a table for a paper, or draw them as curves
     Table(TableArgs),
-    /// Two audits side by side: what leaks more
+    /// Compare two audits and fail if more leaks
     Compare(CompareArgs),
-    /// The paper's tables on its datasets, ours beside the published numbers
+    /// Reproduce the paper's tables on its datasets, beside the published numbers
     Paper(PaperArgs),
     /// Measure speed and memory
     #[command(subcommand)]
     Bench(BenchCommand),
-    /// Keypoints and descriptors of photos, or of a file of features, as hloc stores them
+    /// Extract keypoints and descriptors from photos, or copy them from a file of features (hloc's layout)
     Features(FeaturesArgs),
-    /// Paint keypoints, or what came back of images or a map, as somebody would who has the descriptors
+    /// Paint pictures from keypoints or recovered points and their descriptors
     Invert(InvertArgs),
-    /// How alike pictures are: SSIM, PSNR, LPIPS
+    /// Compare pictures by SSIM, PSNR and LPIPS
     Metrics(MetricsArgs),
     /// List the schemes: rule, what stays hidden, source, stated patents
     Schemes,
-    /// List the networks that can be used: purpose, licence, hash, owner, and whether they are here
+    /// List the networks: purpose, license, hash, owner, and whether they are installed
     Models(ModelsArgs),
-    /// What this machine and this program have: version, instructions, threads, memory, models
+    /// Print version, CPU features, threads, memory and models of this machine
     Doctor(DoctorArgs),
-    /// Print what completes command lines of unlift in a shell
+    /// Print a completion script for a shell
     Completions(CompletionsArgs),
-    /// Print the manual page of unlift, or of one of its commands
+    /// Print the manual page of unlift or of one command
     Man(ManArgs),
 }
 

@@ -146,7 +146,7 @@ pub struct PaperArgs {
     /// Points per map, a random subset, of which less comes back than of all [default: all]
     #[arg(long, value_parser = values::count, value_name = "N")]
     pub max_points: Option<NonZeroUsize>,
-    /// The integer that all randomness comes from
+    /// Random seed
     #[arg(long, value_name = "INTEGER", default_value_t = 0)]
     pub seed: u64,
     /// Folder for paper.json, paper.csv and the audits of scenes; whatever else is in it stays
@@ -207,7 +207,7 @@ pub struct BenchRecoverArgs {
     /// Also find out how sure every position is, as an audit does
     #[arg(long)]
     pub confidence: bool,
-    /// The integer that all randomness comes from
+    /// Random seed
     #[arg(long, value_name = "INTEGER", default_value_t = 0)]
     pub seed: u64,
     /// Threads to use [default: one per core]

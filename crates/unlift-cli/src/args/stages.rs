@@ -52,7 +52,7 @@ Examples:
 pub enum NeighborsCommand {
     /// From the truth, at a chosen inlier ratio: an attacker of stated quality
     Oracle(OracleArgs),
-    /// From a released map alone, as an attacker would
+    /// List neighbors from a released map alone, as an attacker does
     Find(FindArgs),
 }
 
@@ -75,7 +75,7 @@ pub struct FindArgs {
     /// Records per list [default: the source's own choice]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
     pub k: Option<u16>,
-    /// The integer that all randomness comes from
+    /// Random seed
     #[arg(long, value_name = "INTEGER", default_value_t = 0)]
     pub seed: u64,
     /// Threads to use; never changes a result [default: one per core]
@@ -112,7 +112,7 @@ pub struct OracleArgs {
     #[arg(long, value_name = "K", default_value = "50",
           value_parser = clap::value_parser!(u16).range(1..))]
     pub k: u16,
-    /// The integer that all randomness comes from
+    /// Random seed
     #[arg(long, value_name = "INTEGER", default_value_t = 0)]
     pub seed: u64,
     /// File to write
@@ -138,13 +138,13 @@ pub struct RecoverArgs {
     /// Recovery method: joint, joint-start, consensus, ransac, density or tomography
     #[arg(long, value_name = "SOLVER", value_parser = values::solver, default_value = "joint")]
     pub solver: Builtin,
-    /// Do not use rules that tie records together (cp: swaps are mutual; ray-voxel: parity)
+    /// Do not use constraints between records (cp: swaps are mutual; ray-voxel: parity)
     #[arg(long)]
     pub no_exact_constraints: bool,
     /// Distance up to which a neighbor supports a position, in the unit of the map
     #[arg(long, value_name = "auto|VALUE", value_parser = values::delta, default_value = "auto")]
     pub delta: Delta,
-    /// The integer that all randomness comes from
+    /// Random seed
     #[arg(long, value_name = "INTEGER", default_value_t = 0)]
     pub seed: u64,
     /// Threads to use; never changes a result [default: one per core]
