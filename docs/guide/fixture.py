@@ -1,4 +1,4 @@
-"""What a reader has and an example needs: PROJECT, a COLMAP project of the made-up room, with SIFT-like descriptors in its database."""
+"""Makes the folder PROJECT for the examples: a COLMAP project of the made-up room, with SIFT-like descriptors in its database."""
 
 import os
 import random
@@ -33,7 +33,7 @@ with open("PROJECT/sparse/0/points3D.txt", "w") as file:
 
 
 def descriptor(point):
-    """Bytes that change with the place, as those of a patch do: what is near looks alike."""
+    """Returns bytes that change with the position, so that near points have similar descriptors."""
     values = [max(0.0, sum(d * x for d, x in zip(direction, point)) % 2.0 - 1.0 + 0.15 * draw.gauss(0, 1)) for direction in DIRECTIONS]
     length = sum(x * x for x in values) ** 0.5 or 1.0
     return bytes(min(255, round(512 * x / length)) for x in values)

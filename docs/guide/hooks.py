@@ -1,4 +1,4 @@
-"""What pages get when the guide is built: the help texts of the program, so that they cannot drift."""
+"""Inserts the help texts of the program when the guide is built, so that they stay up to date."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ MARK = "<!-- the help of every command -->"
 
 
 def program() -> str | None:
-    """The program of this working tree, or the one that UNLIFT_PROGRAM names."""
+    """Returns the path of the program that UNLIFT_PROGRAM names, or else that of this working tree."""
     places = [os.environ.get("UNLIFT_PROGRAM"), ROOT / "target/debug/unlift", ROOT / "target/release/unlift"]
     return next((os.path.abspath(place) for place in places if place and os.access(place, os.X_OK)), None)
 
@@ -23,7 +23,7 @@ def help_of(binary: str, *command: str) -> str:
 
 
 def sections(binary: str, *command: str) -> list[str]:
-    """A heading and the help of a command, then those of its subcommands."""
+    """Returns a heading and the help of a command, followed by those of its subcommands."""
     text = help_of(binary, *command)
     name = " ".join(("unlift", *command))
     found = [f"## {name}\n\n```text\n{text}\n```\n"]
@@ -45,6 +45,6 @@ def on_page_markdown(markdown: str, **_: object) -> str:
 
 
 def on_page_content(html: str, **_: object) -> str:
-    """A figure and its percent sign stay on one line."""
+    """Keeps a number and its percent sign on one line."""
     parts = re.split(r"(<pre>.*?</pre>)", html, flags=re.DOTALL)
     return "".join(part if part.startswith("<pre>") else re.sub(r"(\d) %", r"\1&nbsp;%", part) for part in parts)

@@ -1,4 +1,4 @@
-"""Draws pages/pictures: per scheme a made-up scene, what is released of it, and what comes back. All made by unlift.
+"""Draws pages/pictures: for each scheme a made-up scene, what unlift releases of it, and what comes back.
 
     python3 docs/guide/make_pictures.py            # draws; needs unlift, matplotlib, pyarrow, and the program (UNLIFT_PROGRAM)
     python3 docs/guide/make_pictures.py --check    # compares the shares beside the pictures with those of today; draws nothing
@@ -30,13 +30,13 @@ STEPS = 5
 
 
 def room() -> np.ndarray:
-    """The room of the tutorial, (n, 3)."""
+    """Returns the points of the tutorial's room, (n, 3)."""
     text = subprocess.run([sys.executable, HERE / "pages" / "room.py"], check=True, capture_output=True, text=True).stdout
     return np.array([[float(x) for x in line.split(",")] for line in text.splitlines()[1:]])
 
 
 def drawing() -> np.ndarray:
-    """Keypoints of a made-up image of 640 x 480: edges of a house, a sun and a fence, (n, 2) in pixels."""
+    """Returns keypoints of a made-up image of 640 x 480: edges of a house, a sun and a fence, (n, 2) in pixels."""
     random = np.random.default_rng(SEED)
     corners = [(180, 400), (180, 220), (300, 130), (420, 220), (420, 400), (180, 400)]
     strokes = list(zip(corners, corners[1:]))
@@ -53,7 +53,7 @@ def drawing() -> np.ndarray:
 
 
 def of_map(scheme: str) -> dict:
-    """A scheme for maps, by the Python package."""
+    """Attacks a scheme for maps by the Python package."""
     import unlift
 
     hidden = unlift.obfuscate(unlift.Map(room(), scale=1.0), scheme, seed=SEED)
@@ -70,7 +70,7 @@ def of_map(scheme: str) -> dict:
 
 
 def of_image(scheme: str) -> dict:
-    """A scheme for images, by the program: keypoints go in as a COLMAP database."""
+    """Attacks a scheme for images by the program, with keypoints in a COLMAP database."""
     import pyarrow.parquet as pq
 
     def unlift(*arguments: str) -> str:
@@ -115,7 +115,7 @@ def of_image(scheme: str) -> dict:
 
 
 def seen(points: np.ndarray) -> np.ndarray:
-    """Where points of a map are drawn: from the open side of the room, a little from above. Keypoints stay where they are."""
+    """Projects points of a map, seen from the open side of the room and a little from above. Keypoints stay where they are."""
     if points.shape[1] == 2:
         return points * [1, -1]
     turn, lift = np.radians(-62), np.radians(28)
@@ -126,7 +126,7 @@ def seen(points: np.ndarray) -> np.ndarray:
 
 
 def segments(found: dict, some: np.ndarray, reach: float) -> list[np.ndarray]:
-    """Records as lines to draw, (m, dimension) each."""
+    """Converts records to lines to draw, (m, dimension) each."""
     columns, family = found["columns"], found["family"]
     drawn = []
     for record in some:

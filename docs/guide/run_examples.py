@@ -1,9 +1,9 @@
-"""Runs the examples of the guide as a reader would, and looks for every figure that a page quotes.
+"""Runs the examples of the guide as a reader would, and checks every number with decimals that a page quotes.
 
     python3 docs/guide/run_examples.py             # all but the slow ones
     python3 docs/guide/run_examples.py --slow      # the demo, too
 
-Each page has an empty folder. A block after
+Each page runs in an empty folder. A block after
 
     <!-- run -->              is run by `sh -e`, or, if it is Python, in one namespace for the page (skipped where unlift is not installed)
     <!-- run: exit 1 -->      must end in this exit code
@@ -11,7 +11,7 @@ Each page has an empty folder. A block after
     <!-- setup -->            anywhere on a page: its folder has PROJECT, a COLMAP project (fixture.py)
     <!-- output -->           must have been printed, line by line, by the block before it; a line of `...` stands for any lines
 
-Figures in the text of a page (with a decimal point, or before `%`) must have been printed by its examples, or stand in a document of the repository
+Numbers in the text of a page (with a decimal point, or before `%`) must be printed by its examples, or be in a document of the repository
 that the paragraph links to. Links to documents of the repository must lead to a file and a heading.
 """
 
@@ -40,7 +40,7 @@ FIGURE = re.compile(r"(?<![\w.@:=])\d+(?:\.\d+)?(?![\w.])(?=\s?%)|(?<![\w.@:=/])
 
 
 def anchor(heading: str) -> str:
-    """How GitHub names a heading in links."""
+    """Returns the name that GitHub gives a heading in links."""
     kept = "".join(c for c in heading.lstrip("#").strip().lower() if c.isalnum() or c in " -_")
     return kept.replace(" ", "-")
 

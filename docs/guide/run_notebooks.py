@@ -1,4 +1,4 @@
-"""Executes the notebooks as a reader would, in an empty folder each; nothing is written back."""
+"""Executes each notebook as a reader would, in an empty folder, and writes nothing back."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FOLDER = pathlib.Path(__file__).resolve().parent / "notebooks"
 
 
 def main() -> int:
-    os.environ["RUST_BACKTRACE"] = "0"  # a law that is broken on purpose says so in one line
+    os.environ["RUST_BACKTRACE"] = "0"  # a property test that fails on purpose prints one line
     failed = 0
     for path in sorted(FOLDER.glob("*.ipynb")):
         notebook = nbformat.read(path, as_version=4)

@@ -1,6 +1,6 @@
-"""How much of a privacy-preserving ("obfuscated") map or image comes back?
+"""unlift measures how much of a privacy-preserving ("obfuscated") map or image an attacker recovers.
 
-The pipeline, a function per arrow:
+Each arrow is a function:
 
     read -> obfuscate -> neighbors -> recover -> evaluate
       \\____________________ audit ____________________/
@@ -13,7 +13,7 @@ The pipeline, a function per arrow:
 >>> report.rows["scheme"]
 ['olc']
 
-Images are keypoints in pixels, by name:
+Images are keypoints in pixels, by name of the image:
 
 >>> keypoints = np.random.default_rng(2).uniform(0, [639, 479], (300, 2))
 >>> images = {"a.jpg": {"keypoints": keypoints, "width": 640, "height": 480}}

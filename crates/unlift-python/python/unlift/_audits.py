@@ -18,7 +18,7 @@ from ._unlift import audit_images as _audit_images
 
 T = TypeVar("T")
 
-#: Options that are lists.
+#: Options that take a list or a single item.
 SEVERAL = {
     "schemes",
     "neighbors",
@@ -30,11 +30,11 @@ SEVERAL = {
     "show",
 }
 
-#: A name of ours, or a function (`scheme`).
+#: A name in `SCHEMES`, or a function (`scheme`).
 Scheme = str | Callable[..., Records]
-#: A name of ours, or a function (`source`).
+#: A name in `SOURCES`, or a function (`source`).
 Source = str | Callable[..., Any]
-#: A name of ours, or a function of a Released and its Neighborhoods that returns positions.
+#: A name in `SOLVERS`, or a function of a Released and its Neighborhoods that returns positions.
 Solver = str | Callable[..., Any]
 
 
@@ -45,12 +45,12 @@ class _Keypoints(TypedDict):
 
 
 class Features(_Keypoints, total=False):
-    """What is known of an image.
+    """The keypoints of one image, and optional descriptors and scores.
 
-    keypoints: `(n, 2)`, x and y in pixels; the middle of the first pixel is (0, 0), as hloc has it (COLMAP: (0.5, 0.5)).
-    width, height: of the image in pixels.
-    descriptors: `(n, d)` uint8 or floats, a row per keypoint, or None; hloc's files have them the other way round.
-    scores: `(n,)`, as extractors give them, or None; no figure depends on them.
+    keypoints: `(n, 2)`, x and y in pixels; the middle of the first pixel is (0, 0), as in hloc (COLMAP: (0.5, 0.5)).
+    width, height: size of the image in pixels.
+    descriptors: `(n, d)` uint8 or floats, a row per keypoint, or None; files of hloc hold the transpose.
+    scores: `(n,)`, from the extractor, or None; no result depends on them.
     """
 
     descriptors: npt.ArrayLike | None
@@ -58,7 +58,7 @@ class Features(_Keypoints, total=False):
 
 
 class Named(Protocol):
-    """Images by name, looked up when their turn comes: a dict, or what reads them from a disk."""
+    """A mapping from names to images: a dict, or an object that reads each image from a disk when asked for it."""
 
     def keys(self) -> Iterable[str]: ...
     def __getitem__(self, name: str, /) -> Features: ...
@@ -87,30 +87,30 @@ def audit(
     threads: int | None = None,
     progress: bool | Callable[[int, int, str], object] = False,
 ) -> Report:
-    """How much of `map` comes back under each of `schemes`, attacked with each of `neighbors`.
+    """Hides `map` under each of `schemes`, attacks it with each of `neighbors`, and reports how much comes back.
 
-    map: points in meters (with a scale), else in the usual distance to the K-th neighbor.
-    schemes: names of `SCHEMES`, or functions (`scheme`); all of ours without it. Where several may stand, so may one.
-    neighbors: "oracle", names of `SOURCES`, or functions (`source`).
-    inlier_ratios: shares of true neighbors to try (oracle); six without it.
-    oracle_noise: how the oracle errs: "uniform", "near", "clustered".
-    solvers: names of `SOLVERS`, or functions; the strongest ones for this size without it. A function takes a Released and its
-        Neighborhoods, and a `numpy.random.Generator` if it has a third parameter. It returns positions `(n_slots, 3)` about
-        `released.origin`; a row of NaN says that a point was not recovered.
-    thresholds: errors up to which a point counts as recovered, in the unit of the map; texts are kept as written.
-    k: true neighbors per point. source_k: records per list of a source of ours, which chooses itself without it.
-    tile_points: cut a large map into tiles of at most so many points, and audit each as a map of its own. tile: only the tile with this
-        number, from 0, as a task of a cluster.
-    delta: the distance that decides support; the attack chooses without it.
-    exact_constraints: whether rules that tie records together are used.
-    records_alone: whether maps are also attacked without lists. reference: also with the neighbors' true places.
-    seed, repeats: of everything that is drawn; figures are means over repeats.
-    gates: bounds to hold, as in "olc@0.5:0.10<=20"; `Report.passed` says whether they did.
-    threads: never change a result.
-    progress: True for a bar (tqdm if it is there), or a function of done, total and what comes next.
+    map: the unprotected map. Lengths are in meters if it has a scale, else in the median distance to the K-th neighbor.
+    schemes: names in `SCHEMES`, or functions (`scheme`). Default: all names. Arguments that take several items also take one.
+    neighbors: what makes the neighbor lists: "oracle" (from the true points), names in `SOURCES`, or functions (`source`).
+    inlier_ratios: shares of true neighbors in the lists of the oracle. Default: six values.
+    oracle_noise: where wrong entries of the oracle lie: "uniform", "near", "clustered".
+    solvers: names in `SOLVERS`, or functions. Default: the strongest for the size of the map. A function takes a Released and its
+        Neighborhoods, and a `numpy.random.Generator` if it has a third parameter. It returns positions `(n_slots, 3)` relative to
+        `released.origin`; a row of NaN means that the point was not recovered.
+    thresholds: errors up to which a point counts as recovered, in the unit of the map. Strings are kept as written.
+    k: number of true neighbors per point. source_k: records per list of a named source. Default: the source chooses.
+    tile_points: cut a large map into tiles of at most this many points, and audit each as a map of its own. tile: audit only the tile
+        with this number, from 0, for tasks on a cluster.
+    delta: distance up to which a neighbor supports a position. Default: the attack chooses.
+    exact_constraints: whether to use rules that tie records together.
+    records_alone: whether to attack maps without neighbor lists, too. reference: also attack with the true positions of neighbors.
+    seed: random seed. repeats: number of seeds; results are means over them.
+    gates: bounds, such as "olc@0.5:0.10<=20"; `Report.passed` is True if all hold.
+    threads: number of threads; no result depends on it.
+    progress: True for a progress bar (tqdm if it is installed), or a function of done, total and the next item.
 
-    A scheme or source of your own that fails, and a scheme that breaks a law, has no row and is told by a warning. Raises UnliftError in one line, also where
-    no scheme has a row; KeyboardInterrupt at once.
+    If a scheme or source of your own fails, or a scheme fails a property test, it has no row and a warning names it. Raises UnliftError
+    for a wrong argument, or if no scheme has a row. KeyboardInterrupt takes effect at once.
     """
     asked = _asked(
         schemes=schemes,
@@ -166,29 +166,29 @@ def audit_images(
     threads: int | None = None,
     progress: bool | Callable[[int, int, str], object] = False,
 ) -> Report:
-    """How many keypoints of `images` come back under each of `schemes`, attacked with each of `neighbors`.
+    """Hides the keypoints of `images` under each of `schemes`, attacks them with each of `neighbors`, and reports how many come back.
 
-    images: a dict of names to `Features` (dicts of arrays), or pairs of both; or a path, as `unlift audit images` takes it: a
-        folder of photos, features of hloc (.h5), a database of COLMAP. The same features under the same names give the rows of
-        the command line, byte for byte.
-        A dict, or any object with `keys()` and `[name]`, is asked for an image when its turn comes, from other threads, a few
-        ahead, and again for those that the page draws: what reads them from a disk keeps memory small. Pairs, an iterator of
-        them too, are all taken before the audit begins, as it goes by sorted names; their arrays are not copied until then.
-    schemes: names of `IMAGE_SCHEMES`, or functions (`scheme`) of keypoints `(n, 2)` in pixels from the middle of the image, to
-        Lines, Rays or Candidates of as many columns; all of ours without it. Where several may stand, so may one.
-    neighbors: "oracle", names of `IMAGE_SOURCES`, or functions (`source`).
-    features, max_features, min_score: what is extracted from photos: "sift", "aliked", "superpoint"; how many; above which score.
-    max_images: use at most so many, evenly spaced over their sorted names.
-    show: names of images to draw, none where it is empty; the least, the median and the most recovered without it. photos: the folder of photos, where
-        `images` is none, to draw.
-    solvers: names of `IMAGE_SOLVERS`, or functions as `audit` takes them, with positions `(n_slots, 2)`.
+    images: a dict of names to `Features` (dicts of arrays), or pairs of both; or a path, as for `unlift audit images`: a folder of
+        photos, features of hloc (.h5), a database of COLMAP. The same features under the same names give rows that are
+        byte-identical to those of the command line.
+        To save memory, give an object with `keys()` and `[name]` that reads images from a disk. It is called from other threads
+        when an image is needed, a few images ahead, and again for those that the page draws. Pairs are all read before the audit
+        begins, because it goes by sorted names; their arrays are not copied until then.
+    schemes: names in `IMAGE_SCHEMES`, or functions (`scheme`) of keypoints `(n, 2)` in pixels from the middle of the image, to
+        Lines, Rays or Candidates of two columns. Default: all names. Arguments that take several items also take one.
+    neighbors: "oracle", names in `IMAGE_SOURCES`, or functions (`source`).
+    features: what to extract from photos: "sift", "aliked", "superpoint". max_features: how many. min_score: least score.
+    max_images: use at most this many, evenly spaced over their sorted names.
+    show: names of images to draw; none if empty. Default: those with the least, the median and the most recovered keypoints.
+    photos: the folder of photos to draw, if `images` is not one.
+    solvers: names in `IMAGE_SOLVERS`, or functions as for `audit`, with positions `(n_slots, 2)`.
     thresholds: errors in pixels up to which a keypoint counts as recovered.
-    k: true neighbors per keypoint.
-    progress: True for a bar, or a function of images done, all, and the one at work.
-    The others as `audit` has them. Nothing is painted: that is `unlift audit images --invert`.
+    k: number of true neighbors per keypoint.
+    progress: True for a progress bar, or a function of images done, all images, and the current image.
+    The other arguments are those of `audit`. To paint pictures, use `unlift audit images --invert`.
 
-    What cannot be used of arrays raises UnliftError in one line: which image, what was expected, what was found. An image of a
-    path that cannot be used is told by a warning and left out; `Report.passed` is False then. KeyboardInterrupt at once.
+    Raises UnliftError for wrong arrays; the message names the image, what was expected and what was found. If an image of a path cannot
+    be used, a warning names it, the audit leaves it out, and `Report.passed` is False. KeyboardInterrupt takes effect at once.
     """
     asked = _asked(
         schemes=schemes,
@@ -224,12 +224,12 @@ def audit_images(
 
 
 def _several(given: Any) -> list[Any]:
-    """What stands alone as a list: the letters of a name are none."""
+    """Returns `given` as a list: a string or a function becomes a list of one item."""
     return [given] if isinstance(given, str) or callable(given) else list(given)
 
 
 def _asked(**options: Any) -> dict[str, Any]:
-    """What an audit is asked for, as the native part takes it."""
+    """Returns the options in the form that the native module takes."""
     return {
         name: _several(given) if name in SEVERAL and given is not None else given
         for name, given in options.items()
@@ -241,7 +241,7 @@ def _told(
     progress: bool | Callable[[int, int, str], object],
     unit: str,
 ) -> T:
-    """What `audit` gives, which is told how to tell of its progress."""
+    """Runs `audit` with a callback for its progress, and returns its result."""
     if progress is True:
         with _Bar(unit) as bar:
             return audit(bar.tell)
@@ -249,7 +249,7 @@ def _told(
 
 
 class _Bar:
-    """Tells how far an audit is: by tqdm where it is installed, else in lines on stderr."""
+    """Shows the progress of an audit: by tqdm if it is installed, else in lines on stderr."""
 
     def __init__(self, unit: str) -> None:
         self._unit = unit

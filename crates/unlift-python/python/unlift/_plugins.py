@@ -1,4 +1,4 @@
-"""Schemes and sources that are functions."""
+"""Decorators that turn functions into schemes and sources."""
 
 from __future__ import annotations
 
@@ -14,9 +14,11 @@ def scheme(function: F) -> F: ...
 @overload
 def scheme(function: None = None, *, name: str | None = None) -> Callable[[F], F]: ...
 def scheme(function: Any = None, *, name: str | None = None) -> Any:
-    """Names a function as a scheme: of points `(n, 3)`, and a `numpy.random.Generator` if it takes two arguments, to Lines,
-    Rays, Planes or Candidates. All chance must come from that generator. Of images it is a function of keypoints `(n, 2)` in
-    pixels from the middle of the image, to records of two columns.
+    """Turns a function into a scheme.
+
+    The function takes points `(n, 3)`, and a `numpy.random.Generator` if it has two parameters. It returns Lines, Rays, Planes or
+    Candidates. All randomness must come from that generator. For images it takes keypoints `(n, 2)` in pixels from the middle of
+    the image, and returns records of two columns.
 
     >>> @scheme(name="upright")
     ... def lines(points):
@@ -48,11 +50,13 @@ def source(
     needs: Literal["descriptors", "nothing"] = "descriptors",
     k: int = 50,
 ) -> Any:
-    """Names a function as a source of neighborhoods: of a Released (of a map or an image), and a `numpy.random.Generator` if it takes two arguments, to
-    an array `(n_slots, k)` of records, likeliest first, padded by -1; or to this and scores; or to Neighborhoods.
+    """Turns a function into a source, which makes neighbor lists.
 
-    needs: "nothing" if it looks at records alone. Otherwise row i is about descriptor row i.
-    k: records of a list that are looked at.
+    The function takes a Released (of a map or an image), and a `numpy.random.Generator` if it has two parameters. It returns an array
+    `(n_slots, k)` of records, likeliest first, padded by -1; or this and scores; or Neighborhoods.
+
+    needs: "nothing" if the function uses records only. Otherwise row i belongs to descriptor row i.
+    k: number of records of a list that the attack uses.
     """
     if function is None:
         return functools.partial(source, name=name, needs=needs, k=k)

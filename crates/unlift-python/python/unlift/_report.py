@@ -1,4 +1,4 @@
-"""What an audit found: tables, plots, and the page in a notebook."""
+"""Results of an audit: tables, plots, and the page in a notebook."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from ._unlift import Rows, UnliftError
 
 #: Height of the page in a notebook, in pixels.
 HEIGHT = 720
-#: Rows that a table shows in a notebook at most.
+#: The most rows that a table shows in a notebook.
 ROWS = 100
 
 
 class Table:
-    """The rows of an audit, one column per figure, as Arrow: `polars.DataFrame(table)`, `pyarrow.table(table)`, DuckDB."""
+    """The rows of an audit as an Arrow table, one column per number: `polars.DataFrame(table)`, `pyarrow.table(table)`, DuckDB."""
 
     def __init__(self, rows: Rows) -> None:
         self._rows = rows
 
     @property
     def columns(self) -> list[str]:
-        """Names: those of the CSV of `unlift table` (`recovered_percent_within_0.10`).
+        """The names of the columns, as in the CSV of `unlift table` (`recovered_percent_within_0.10`).
 
-        What the CSV lacks has the name of `audit.json`, with a dot before what stands within.
+        Columns that the CSV lacks have their names of `audit.json`, with a dot between the levels.
         """
         return self._rows.columns
 
@@ -41,11 +41,11 @@ class Table:
         return self._rows.__arrow_c_stream__(requested_schema)
 
     def to_dict(self) -> dict[str, list[Any]]:
-        """Column by column."""
+        """Returns a dict of columns."""
         return {column: self._rows[column] for column in self.columns}
 
     def to_pandas(self) -> Any:
-        """A pandas DataFrame."""
+        """Returns a pandas DataFrame."""
         import pandas  # type: ignore[import-not-found,import-untyped,unused-ignore]
 
         return pandas.DataFrame(self.to_dict())
@@ -54,7 +54,7 @@ class Table:
         return repr(self._rows).replace("Rows", "Table")
 
     def _repr_html_(self) -> str:
-        """The first rows as a notebook shows them, without columns that are empty."""
+        """Returns the first rows for a notebook, without empty columns."""
         shown = {name: values for name, values in self.to_dict().items() if any(value is not None for value in values)}
         heads = "".join(f"<th>{html.escape(name)}</th>" for name in shown)
         rows = "".join(
@@ -66,47 +66,47 @@ class Table:
 
 
 class Report:
-    """What an audit found: figures, and a page that shows them."""
+    """The results of an audit: numbers, and a page that shows them."""
 
     def __init__(self, found: _Report) -> None:
         self._found = found
 
     @property
     def rows(self) -> Table:
-        """One row per scheme, source, inlier ratio and solver."""
+        """A table with one row per scheme, source, inlier ratio and solver."""
         return Table(self._found.rows)
 
     @property
     def document(self) -> dict[str, Any]:
-        """All figures, as `audit.json` has them."""
+        """All numbers, as in `audit.json`."""
         return self._found.document
 
     @property
     def passed(self) -> bool:
-        """Whether every gate held, and every image could be used."""
+        """True if every gate held and every image could be used."""
         return self._found.passed
 
     def json(self, *, share_safe: bool = False) -> str:
-        """The text of `audit.json`; `share_safe`: without paths, names, and what functions of yours raised."""
+        """Returns the text of `audit.json`; with `share_safe`, without paths, names and errors of your functions."""
         return self._found.json(share_safe=share_safe)
 
     def html(self, *, share_safe: bool = False) -> str:
-        """The page, one self-contained file; `share_safe`: figures only."""
+        """Returns the page as one self-contained file; with `share_safe`, numbers only."""
         return self._found.html(share_safe=share_safe)
 
     def save(
         self, out: str | os.PathLike[str], *, share_safe: bool = False, force: bool = False
     ) -> pathlib.Path:
-        """Writes `report.html` and `audit.json` into the folder `out`, both or none; returns the path of the page.
+        """Writes `report.html` and `audit.json` into the folder `out`, both or none, and returns the path of the page.
 
-        share_safe: figures only, no points. force: also over files that unlift did not write.
+        share_safe: write numbers only, no points. force: also replace files that unlift did not write.
         """
         return self._found.save(os.fspath(out), share_safe=share_safe, force=force)
 
     def plot(self, threshold: str | float | None = None, ax: Any = None) -> Any:
-        """Draws how much comes back over the inlier ratio, a curve per scheme, of the strongest solver; returns the axes.
+        """Draws the recovered share over the inlier ratio, a curve per scheme by its strongest solver, and returns the axes.
 
-        threshold: one of those of the audit, a number or a text; the first without it. Needs matplotlib.
+        threshold: one of the thresholds of the audit, as a number or a string. Default: the first. Needs matplotlib.
         """
         import matplotlib.pyplot  # type: ignore[import-not-found,import-untyped,unused-ignore]
 
@@ -141,13 +141,13 @@ class Report:
         return repr(self._found)
 
     def show(self) -> Any:
-        """The whole page, points too, for a notebook: what shows them is saved with it. Needs IPython."""
+        """Returns the whole page with points for a notebook, which stores them. Needs IPython."""
         from IPython.display import HTML  # type: ignore[import-not-found,unused-ignore]
 
         return HTML(_frame(self.html()))
 
     def _repr_html_(self) -> str:
-        """The page as a notebook shows and saves it: figures only, as notebooks are shared. `show` has the points, too."""
+        """Returns the page with numbers only, because notebooks are often shared. `show` also has the points."""
         return _frame(self.html(share_safe=True))
 
 

@@ -1,4 +1,4 @@
-"""The native part of unlift. Compared with what is there by `mypy.stubtest`."""
+"""The native module of unlift. `mypy.stubtest` compares these stubs with it."""
 
 import os
 import pathlib
@@ -57,7 +57,7 @@ SOURCES: list[str]
 SOLVERS: list[str]
 
 class UnliftError(ValueError):
-    """What is wrong with an argument, a file or a map, in one line: what, what was expected, what was found."""
+    """An error in an argument, a file or a map: one line that names it, what was expected and what was found."""
 
 @final
 class Map:
@@ -307,23 +307,22 @@ def audit_images(
     images: Any, asked: dict[str, Any], tell: Callable[[int, int, str], object] | None
 ) -> tuple[Report, list[str]]: ...
 def check_scheme(scheme: Callable[..., Records], *, images: bool = False) -> None:
-    """Whether a scheme hides every point, on its record, by its key alone, and in an order that tells nothing.
+    """Checks that a scheme hides every point, on its record, by its key alone, and in an order that reveals nothing.
 
-    It is called with 0, 1, 2, 3, 7, 120, 200, 300, 301, 600 and 700 points: of a made-up room, at random, many in one place. By
-    an exception it refuses points, which it may but for 200, 600 and 700 of a room. With `images` with keypoints `(n, 2)` in
-    their place.
+    It calls the scheme with 0, 1, 2, 3, 7, 120, 200, 300, 301, 600 and 700 points: of a made-up room, at random, many in one place;
+    with `images`, keypoints `(n, 2)`. A scheme may refuse points by an exception, except 200, 600 and 700 points of a room.
     """
 
 def check_solver(
     solver: Callable[..., Any], released: Released | Hidden, lists: Neighborhoods
 ) -> None:
-    """Checks that a solver answers for every hidden point of `released`, and gives the same positions again.
+    """Checks that a solver returns a row for every hidden point of `released`, and the same positions again.
 
-    It is called three times, the last time with empty lists.
+    It calls the solver three times, the last time with empty lists.
     """
 
 def check_source(source: Callable[..., Any], released: Released | Hidden) -> None:
-    """Whether a source gives every hidden point of `released` a list, of records of this map, by its seed alone.
+    """Checks that a source returns a list for every hidden point of `released`, of records of this map, by its seed alone.
 
-    It is called three times.
+    It calls the source three times.
     """

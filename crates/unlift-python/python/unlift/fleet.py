@@ -1,7 +1,7 @@
-"""Many maps or images, one after another: Arrow batches in, Arrow batches out (needs `pyarrow`).
+"""Audits of many maps or images: Arrow batches in, Arrow batches out (needs `pyarrow`).
 
-For engines that hand batches to a function: Spark (`unlift.spark`), Dask, Ray, Beam, or a pool of processes. Every row depends on its
-own item alone, so that it is the same wherever and in whatever company it is made.
+For engines that pass batches to a function: Spark (`unlift.spark`), Dask, Ray, Beam, or a pool of processes. Every row depends on its
+own item only, so it does not depend on the batch or the machine.
 
     tasks = pyarrow.RecordBatch.from_pydict({"path": ["office", "lab"], "scale": [1.0, 1.0]})
     rows = pyarrow.Table.from_batches(unlift.fleet.audit_maps([tasks], schemes=["olc"]))
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ROWS", "audit_images", "audit_maps", "schema"]
 
-#: What rows say: name, and type as Spark writes it.
+#: The columns of the rows: name, and type in Spark's notation.
 ROWS = {
     "item": "string",
     "tile": "bigint",
@@ -54,7 +54,7 @@ ROWS = {
 
 
 def schema() -> _pa.Schema:
-    """The schema of rows, as Arrow says it."""
+    """Returns the Arrow schema of the rows."""
     pa = _pyarrow()
     types = {
         "string": pa.string(),
@@ -67,15 +67,15 @@ def schema() -> _pa.Schema:
 
 
 def audit_maps(batches: Iterable[_pa.RecordBatch], **options: Any) -> Iterator[_pa.RecordBatch]:
-    """Audits the map of every row of `batches`: one row of figures per map, scheme, source, inlier ratio and solver.
+    """Audits the map of every row of `batches` and yields one row per map, scheme, source, inlier ratio and solver.
 
-    batches: with a column `path` (string), as `unlift.read` takes it; and, if they are there, `scale` (meters per unit) and
-        `descriptors` (a file of them), null for maps without; and `tile_points` and `tile`, to audit one tile of a large map in every
-        row, numbered from 0. A map of n points has `-(-n // tile_points)` tiles.
-    options: those of `unlift.audit`, the same for all maps. `threads=1` where an engine runs a task per core.
+    batches: with a column `path` (string), as for `unlift.read`. Optional columns, null for maps without them: `scale` (meters per
+        unit), `descriptors` (path of a file); `tile_points` and `tile`, to audit one tile of a large map per row. Tiles count from
+        0; a map of n points has `-(-n // tile_points)` tiles.
+    options: those of `unlift.audit`, the same for all maps. Use `threads=1` if an engine runs a task per core.
 
-    Yields a batch per map. A map that cannot be read or audited has one row, whose `error` says why in a line, and a scheme that
-    cannot be applied to it another; all other maps go on. Raises UnliftError where there is no `path`.
+    Yields a batch per map. A map that cannot be read or audited has one row with an `error`, and so has a scheme that cannot be
+    applied to it; the audit continues with the other maps. Raises UnliftError if there is no `path`.
     """
     from . import Map, audit, read
 
@@ -98,18 +98,18 @@ def audit_maps(batches: Iterable[_pa.RecordBatch], **options: Any) -> Iterator[_
 
 
 def audit_images(batches: Iterable[_pa.RecordBatch], **options: Any) -> Iterator[_pa.RecordBatch]:
-    """Audits the image of every row of `batches`: one row of figures per image, scheme, source, inlier ratio and solver.
+    """Audits the image of every row of `batches` and yields one row per image, scheme, source, inlier ratio and solver.
 
     batches: with the columns
-        `name` (string): randomness comes from it, so that no two images may share one;
+        `name` (string): must be unique, because randomness depends on it;
         `keypoints` (list of float): x and y in turns, in pixels, the middle of the first pixel at (0, 0);
-        `descriptors`, if it is there: binary, uint8, a row per keypoint after the other; or a list of floats in the same order;
+        `descriptors` (optional): binary, uint8, one keypoint after the other; or a list of floats in the same order;
         `width`, `height` (integers): in pixels.
-    options: those of `unlift.audit_images`, the same for all images; nothing is drawn. `threads=1` where an engine runs a task
+    options: those of `unlift.audit_images`, the same for all images; no image is drawn. Use `threads=1` if an engine runs a task
         per core.
 
-    Yields a batch per image, the same rows as an audit of the image alone. An image that cannot be used has one row, whose
-    `error` says why in a line; all others go on. Raises UnliftError where a column is missing.
+    Yields a batch per image, with the same rows as an audit of the image alone. An image that cannot be used has one row with an
+    `error`; the audit continues with the others. Raises UnliftError if a column is missing.
     """
     from . import audit_images as audit
 
@@ -128,7 +128,7 @@ def audit_images(batches: Iterable[_pa.RecordBatch], **options: Any) -> Iterator
 
 
 def _features(image: dict[str, Any]) -> Features:
-    """Arrays of an image as a row holds it."""
+    """Converts a row to the arrays of an image."""
     name = image["name"]
     if name is None:
         raise UnliftError("name: expected a text, found null")
@@ -147,7 +147,7 @@ def _features(image: dict[str, Any]) -> Features:
 
 
 def _rows_of(item: str, document: dict[str, Any], tile: int | None = None) -> _pa.RecordBatch:
-    """The rows of one audit, under the name of its item."""
+    """Returns the rows of one audit, with the name of its item."""
     notes = document.get("notes") or []
     rows = [{**_figures(row), "item": item, "tile": tile, "notes": notes} for row in document["results"]]
     missing = [

@@ -1,4 +1,6 @@
-"""Lists of near records: by an oracle who knows the truth, or from a released map alone.
+"""Neighbor lists: for every hidden point, the records whose points are said to be near.
+
+`oracle` makes them from the true points, the other functions from a released map alone, as an attacker does.
 
 >>> import numpy as np, unlift
 >>> points = np.random.default_rng(1).uniform(0, 4, (200, 3))
@@ -17,33 +19,33 @@ __all__ = ["descriptors", "find", "geometric", "learned", "oracle", "overlap", "
 def similarity(
     released: Released | Hidden, *, k: int | None = None, seed: int = 0, threads: int | None = None
 ) -> Neighborhoods:
-    """Records with the most similar descriptors, of any kind; of learned ones with a short walk."""
+    """Lists the records with the most similar descriptors, of any kind; learned ones also by a short random walk."""
     return find(released, "similarity", k=k, seed=seed, threads=threads)
 
 
 def overlap(
     released: Released | Hidden, *, k: int | None = None, seed: int = 0, threads: int | None = None
 ) -> Neighborhoods:
-    """Records whose SIFT patches overlap, and a short walk from these; no training."""
+    """Lists records whose SIFT patches overlap, and others by a short walk from these; needs no training."""
     return find(released, "overlap", k=k, seed=seed, threads=threads)
 
 
 def descriptors(
     released: Released | Hidden, *, k: int | None = None, seed: int = 0, threads: int | None = None
 ) -> Neighborhoods:
-    """The best that descriptors allow without training: overlap of SIFT, similarity of others."""
+    """Makes the best lists that descriptors allow without training: `overlap` for SIFT, `similarity` for others."""
     return find(released, "descriptors", k=k, seed=seed, threads=threads)
 
 
 def learned(
     released: Released | Hidden, *, k: int | None = None, seed: int = 0, threads: int | None = None
 ) -> Neighborhoods:
-    """Records that a network, trained on photos, takes for near ones; SIFT or ALIKED descriptors."""
+    """Lists records that a network, trained on photos, rates as near; needs SIFT or ALIKED descriptors."""
     return find(released, "learned", k=k, seed=seed, threads=threads)
 
 
 def geometric(
     released: Released | Hidden, *, k: int | None = None, seed: int = 0, threads: int | None = None
 ) -> Neighborhoods:
-    """Records that meet where records alone say that points are; no descriptors."""
+    """Lists records that meet where many records meet; needs no descriptors."""
     return find(released, "geometric", k=k, seed=seed, threads=threads)

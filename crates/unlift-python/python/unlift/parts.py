@@ -1,7 +1,8 @@
-"""One map in parts: Arrow batches of lists in, Arrow batches of positions out (needs `pyarrow`).
+"""Recovery of one map in parts: Arrow batches of neighbor lists in, Arrow batches of positions out (needs `pyarrow`).
 
-Where a slot is by consensus depends on all records, what was learned of the map (a `Model`) and its own list alone. So lists, which
-take most of the space, may be spread over machines; records are read by everybody. On one machine parts save no memory.
+A slot is the place of one hidden point on a record. The solver `consensus` places a slot by all records, a `Model` of the map, and the
+slot's own list. So lists, which take most of the space, may be spread over machines, while every machine reads all records. On one
+machine, parts save no memory.
 
 >>> import numpy as np, pyarrow, tempfile, unlift
 >>> points = np.random.default_rng(1).uniform(0, 4, (300, 3))
@@ -32,8 +33,8 @@ if TYPE_CHECKING:
 
 __all__ = ["COLUMNS", "join", "recover", "schema", "table"]
 
-#: What is found of a slot: name, and type as Spark writes it. `x`, `y`, `z` are about the origin of the released map, NaN where
-#: nothing was found; `status` is 0 where something was.
+#: The columns of a result: name, and type in Spark's notation. `x`, `y`, `z` are relative to the origin of the released map, NaN if
+#: the slot was not recovered; `status` is 0 if it was.
 COLUMNS = {
     "slot": "bigint",
     "x": "float",
@@ -46,20 +47,20 @@ COLUMNS = {
     "descriptor_row": "bigint",
 }
 
-#: Slots per batch that comes out.
+#: Slots per batch of results.
 _BATCH = 1 << 16
 
 
 def schema() -> _pa.Schema:
-    """The schema of what comes out."""
+    """Returns the schema of the results."""
     return _schema(COLUMNS)
 
 
 def table(lists: Neighborhoods) -> _pa.Table:
-    """Lists as a table, a row per slot: `slot`, and `records`, a list of them; beside it `scores`, if a source gave some."""
+    """Returns neighbor lists as a table with a row per slot: `slot`, `records`, and `scores` if there are any."""
     pa = _pyarrow()
     records = lists.records
-    # Engines know no numbers without a sign.
+    # Spark has no unsigned integers.
     kind = np.int32 if len(lists) < 2**31 else np.int64
     offsets = lists.offsets.astype(np.int64)
     columns = {"slot": np.arange(len(lists), dtype=np.int64)}
@@ -72,12 +73,12 @@ def table(lists: Neighborhoods) -> _pa.Table:
 def recover(
     batches: Iterable[_pa.RecordBatch], released: Released | Hidden, model: Model, *, threads: int | None = None
 ) -> Iterator[_pa.RecordBatch]:
-    """Solves a part of the slots, those between the first and the last in `batches`, by consensus.
+    """Recovers the slots between the first and the last in `batches` by the solver `consensus`.
 
-    batches: the lists of the part, in any order, with the columns `slot` (integer) and `records` (list of integers). A slot between
-        others without a row has an empty list. All slots of a record belong to the same part.
-    model: what `unlift.prepare` learned of `released` and all of its lists.
-    threads: 1 where an engine runs a task per core.
+    batches: the lists of the part, in any order, with the columns `slot` (integer) and `records` (list of integers). A missing slot
+        between others has an empty list. All slots of a record must be in the same part.
+    model: the result of `unlift.prepare` for `released` and all of its lists.
+    threads: use 1 if an engine runs a task per core.
 
     Yields rows of `COLUMNS`, in order of slots; none for a part without rows.
     """
@@ -97,9 +98,9 @@ def recover(
 
 
 def join(batches: Iterable[_pa.RecordBatch], released: Released | Hidden, model: Model) -> Recovered:
-    """What came back of the whole map: `unlift.recover(.., solver="consensus")`, bit for bit.
+    """Joins the results of all parts, bit for bit those of `unlift.recover(.., solver="consensus")`.
 
-    batches: what `recover` gave of all parts, in any order. A slot of which nothing was said had no list.
+    batches: the results of `recover` for all parts, in any order. A missing slot counts as one with an empty list.
     """
     pa = _pyarrow()
     rows = pa.Table.from_batches(list(batches), schema=schema())
@@ -107,12 +108,12 @@ def join(batches: Iterable[_pa.RecordBatch], released: Released | Hidden, model:
 
 
 def _columns(rows: _pa.Table, of_map: Released) -> dict[str, Any]:
-    """Rows of `COLUMNS` in any order as columns of all slots in order."""
+    """Converts rows of `COLUMNS` in any order to columns of all slots in order."""
     n = of_map.n_slots
     slots = rows["slot"].to_numpy()
     if len(slots) and not (0 <= slots.min() and slots.max() < n and len(np.unique(slots)) == len(slots)):
         raise UnliftError(f"slot: expected numbers below {n}, each once, found others")
-    # Too few neighbors, but for what was found.
+    # The default status, 1, means too few neighbors.
     columns: dict[str, Any] = {
         "position": np.full((n, 3), np.nan, dtype=np.float32),
         "status": np.ones(n, dtype=np.uint8),
@@ -146,7 +147,7 @@ def _batch(first: int, found: dict[str, Any], part: slice) -> _pa.RecordBatch:
 
 
 def _table(batches: Iterable[_pa.RecordBatch], *names: str) -> _pa.Table | None:
-    """Batches as a table that has these columns; None without rows."""
+    """Returns the batches as a table and checks its columns; None without rows."""
     given = [batch for batch in batches if len(batch)]
     if not given:
         return None
@@ -165,7 +166,7 @@ def _check(found: list[str], *names: str) -> None:
 
 
 def _span(table: _pa.Table, of_map: Released) -> tuple[int, int]:
-    """The first slot of the records that rows are about, and how many there are from there to the last."""
+    """Returns the first slot of the records in `table`, and the number of slots up to the last."""
     slots, per = table["slot"].to_numpy(), of_map.slots_per_record
     low, high = int(slots.min()), int(slots.max())
     if low < 0 or high >= of_map.n_slots:
@@ -175,8 +176,10 @@ def _span(table: _pa.Table, of_map: Released) -> tuple[int, int]:
 
 
 def _rows(given: _pa.Table | None, first: int, n: int, names: Sequence[str]) -> tuple[Any, dict[str, Any]]:
-    """Lists of `n` slots from `first` on: where they start, and columns end to end; None for one that is not there, nothing
-    without a table."""
+    """Returns the lists of `n` slots from `first` on: their offsets, and the joined columns.
+
+    A missing column is None. Without a table the lists are empty.
+    """
     pa = _pyarrow()
     lengths = np.zeros(n + 1, dtype=np.int64)
     if given is None:

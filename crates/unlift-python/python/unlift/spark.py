@@ -1,14 +1,14 @@
-"""The same on Apache Spark: DataFrames in, DataFrames out (`pip install 'unlift[spark]'`).
+"""Audits on Apache Spark: DataFrames in, DataFrames out (`pip install 'unlift[spark]'`).
 
     tasks = spark.createDataFrame([("maps/office", 1.0), ("maps/lab", 1.0)], "path string, scale double")
     rows = unlift.spark.audit_maps(tasks.repartition(8), schemes=["olc", "ppl"], inlier_ratios=[0.5])
     rows.where("recovered_percent['0.10'] > 20").show()
 
-One map whose lists are spread over the cluster (`unlift split` makes a folder of parts of a file):
+A recovery of one map whose neighbor lists are spread over the cluster (`unlift split` cuts a file into a folder of parts):
 
     found = unlift.spark.recover(spark.read.parquet("lists"), "released.parquet", model)
 
-Every executor needs this package. A task that is lost with its executor is run again by Spark, to the same rows.
+Every executor needs this package. If an executor fails, Spark runs its tasks again, with the same rows as result.
 """
 
 from __future__ import annotations
@@ -27,35 +27,36 @@ __all__ = ["audit_images", "audit_maps", "recover"]
 
 
 def audit_maps(maps: _DataFrame, **options: Any) -> _DataFrame:
-    """`unlift.fleet.audit_maps` on every partition of `maps`: columns `path`, and perhaps `scale`, `descriptors`,
-    `tile_points` and `tile`.
+    """Runs `unlift.fleet.audit_maps` on every partition of `maps`.
 
-    options: those of `unlift.audit`; `threads` is 1 unless it is said, as Spark runs a task per core.
+    maps: a DataFrame with the column `path`, and optional `scale`, `descriptors`, `tile_points` and `tile`.
+    options: those of `unlift.audit`. `threads` is 1 by default, because Spark runs a task per core.
     """
     return _over(maps, "audit_maps", options)
 
 
 def audit_images(images: _DataFrame, **options: Any) -> _DataFrame:
-    """`unlift.fleet.audit_images` on every partition of `images`: columns `name`, `keypoints`, `width`, `height`, and perhaps
-    `descriptors`.
+    """Runs `unlift.fleet.audit_images` on every partition of `images`.
 
-    options: those of `unlift.audit_images`; `threads` is 1 unless it is said.
+    images: a DataFrame with the columns `name`, `keypoints`, `width`, `height`, and optional `descriptors`.
+    options: those of `unlift.audit_images`. `threads` is 1 by default.
     """
     return _over(images, "audit_images", options)
 
 
 def recover(lists: _DataFrame, released: str, model: Model, *, n_parts: int | None = None) -> _DataFrame:
-    """`unlift.parts.recover` on every part of `lists`: columns `slot` and `records`, in any order and partitions.
+    """Runs `unlift.parts.recover` on every part of `lists`.
 
-    released: the file of the released map, where every executor reads it.
-    model: what `unlift.prepare` learned of it and all of its lists.
-    n_parts: how many parts; Spark's own number of shuffle partitions unless it is said. Each reads all records once.
+    lists: a DataFrame with the columns `slot` and `records`, in any order and partitions.
+    released: the path of the released map, which every executor must be able to read.
+    model: the result of `unlift.prepare` for this map and all of its lists.
+    n_parts: number of parts. Default: Spark's number of shuffle partitions. Each part reads all records once.
 
-    `unlift.parts.join(found.toArrow().to_batches(), ..)` makes of the rows what `unlift.recover` gives.
+    `unlift.parts.join(found.toArrow().to_batches(), ..)` turns the rows into the result of `unlift.recover`.
     """
     from pyspark.sql import functions
 
-    # Of lines through two points both are solved together.
+    # Both points of a line through two points are solved together.
     record = functions.floor(functions.col("slot") / Released.read(released).slots_per_record)
     ranged = lists.repartitionByRange(record) if n_parts is None else lists.repartitionByRange(n_parts, record)
     learned = model.to_bytes()

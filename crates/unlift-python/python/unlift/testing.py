@@ -1,7 +1,7 @@
-"""The laws that every scheme, source and solver keeps, for your tests: a broken one is an AssertionError that says which.
+"""Property tests for schemes, sources and solvers of your own: an AssertionError names the property that fails.
 
-A scheme is called with 0 to 700 points: of a made-up room, at random, many in one place. By an exception it refuses points, which
-it may but for 200, 600 and 700 of a room. With `images=True` with keypoints `(n, 2)` in their place.
+`check_scheme` calls a scheme with 0 to 700 points: of a made-up room, at random, many in one place; with `images=True`, keypoints
+`(n, 2)`. A scheme may refuse points by an exception, except 200, 600 and 700 points of a room.
 
 >>> import numpy, unlift
 >>> @unlift.scheme

@@ -1,10 +1,10 @@
-"""A recovery to walk through, as a recording for rerun (`pip install rerun-sdk`, which is needed only here).
+"""Writes a recovery as a recording for the viewer rerun (needs `pip install rerun-sdk`).
 
     lists = {ratio: unlift.neighbors.oracle(hidden, ratio) for ratio in (0.1, 0.3, 0.5)}
     recovered = {ratio: unlift.recover(hidden, each) for ratio, each in lists.items()}
     unlift.viewer.save_rerun("recovery.rrd", hidden, recovered)
 
-It shows points: whoever has the file has the map.
+The file contains points: it is as private as the map.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ __all__ = ["errors", "save_rerun", "segments"]
 
 _TIMELINE = "inlier ratio in percent"
 _GRAY = (150, 150, 150)
-# From what is found to what is not, told apart by those who see no red or green.
+# Colors from found to lost, safe for people who do not tell red from green.
 _FOUND, _LOST = np.array([0.0, 114.0, 178.0]), np.array([213.0, 94.0, 0.0])
 
 
@@ -39,14 +39,14 @@ def save_rerun(
 ) -> pathlib.Path:
     """Writes a recording: true points, released records, recovered points colored by their error.
 
-    path: the file to write, `.rrd`; one that is there is replaced with `force` alone.
-    recovered: of `hidden`; by inlier ratio (0 to 1) they become a timeline.
-    threshold: errors from 0 (blue) to so much (orange), in the unit of the map; a twentieth of its size without it.
+    path: the file to write, `.rrd`; an existing file is replaced only with `force`.
+    recovered: recovered points of `hidden`; a dict by inlier ratio (0 to 1) becomes a timeline.
+    threshold: colors go from error 0 (blue) to this error (orange), in the unit of the map. Default: a twentieth of its size.
     cameras: (N, 3) centers of cameras, in the unit of the map.
-    records: lines, rays and planes that are drawn at most, evenly over the map.
+    records: the most lines, rays or planes to draw, evenly over the map.
 
-    Lost points are not drawn. The file is its owner's alone (mode 0600) and appears whole or not at all.
-    Raises UnliftError where rerun is not installed, the file is there, or points are not those of `hidden`.
+    Lost points are not drawn. The write is atomic, and only the owner may read the file (mode 0600).
+    Raises UnliftError if rerun is not installed, the file exists, or the points are not those of `hidden`.
     """
     try:
         import rerun  # type: ignore[import-not-found,unused-ignore]
@@ -91,7 +91,7 @@ def save_rerun(
 
 
 def errors(hidden: Hidden, recovered: Recovered) -> npt.NDArray[np.float64]:
-    """How far each recovered point is from the true point of its record, the nearer of two: (slots,); inf where it is lost."""
+    """Returns the distance of each recovered point to the nearest true point of its record: (slots,); inf if it is lost."""
     truth, slots = hidden.truth.positions[hidden.truth.hidden], hidden.released.slots_per_record
     positions = recovered.positions
     if positions.shape != truth.shape:
@@ -105,8 +105,10 @@ def errors(hidden: Hidden, recovered: Recovered) -> npt.NDArray[np.float64]:
 def segments(
     released: Released, box: tuple[npt.ArrayLike, npt.ArrayLike], most: int = 2000
 ) -> npt.NDArray[np.float64]:
-    """What of released records lies in a box, as line segments (M, 2, 3): lines and rays, two diagonals of each plane's
-    part, a cross at each exchanged point. Of more than `most` records a part, evenly over the map."""
+    """Returns the parts of released records in a box as line segments (M, 2, 3).
+
+    A plane becomes two diagonals, an exchanged point a cross. At most `most` records are drawn, evenly over the map.
+    """
     low, high = (np.asarray(side, dtype=np.float64) for side in box)
     columns: dict[str, Any] = released.columns
     chosen = np.unique(np.linspace(0, max(len(released) - 1, 0), min(most, len(released))).astype(np.int64))
@@ -134,7 +136,7 @@ def _clipped(
     box: tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]],
     is_ray: bool,
 ) -> npt.NDArray[np.float64]:
-    """The parts of lines in a box; those that miss it are left out."""
+    """Returns the parts of lines in a box, without lines that miss it."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ends = np.stack([(side - through) / direction for side in box])
     # A line along a side divides by zero: it never leaves through that side.
