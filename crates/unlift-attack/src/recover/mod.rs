@@ -29,7 +29,7 @@ mod result;
 mod solver;
 
 #[doc(hidden)]
-pub use confidence::crowd::{Cues, Seen};
+pub use confidence::cues::{Cues, Seen};
 #[doc(hidden)]
 pub use confidence::{N_KINDS, N_TERMS, centered, terms};
 pub use model::Model;
@@ -129,7 +129,7 @@ fn with_start<const D: usize>(
 ) -> Result<(Recovered<D>, Recovered<D>), Error> {
     let problem = Problem::new(released, lists, Builtin::Joint, options)?;
     let start = problem.solve(0..problem.n_slots());
-    let (recovered, _) = problem.finish(problem.refine(start.clone()), false)?;
+    let (recovered, _) = problem.finish(problem.run_joint(start.clone()), false)?;
     let start = problem.finish_start(start, &recovered)?;
     Ok((recovered, start))
 }
@@ -163,9 +163,9 @@ fn solve<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
     options: &RecoverOptions,
-    is_asked: bool,
+    want_features: bool,
 ) -> Result<(Recovered<D>, Seen), Error> {
     let problem = Problem::new(released, lists, solver, options)?;
     let start = problem.solve(0..problem.n_slots());
-    problem.finish(problem.refine(start), is_asked)
+    problem.finish(problem.run_joint(start), want_features)
 }

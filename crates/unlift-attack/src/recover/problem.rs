@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::density::{Peaks, tomography};
 use crate::neighbors::Neighborhoods;
 use crate::recover::assignment::descriptor_rows;
-use crate::recover::confidence::crowd::{Seen, Solved};
+use crate::recover::confidence::cues::{Seen, Solved};
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::Graph;
 use crate::recover::map::lists::Slots;
@@ -143,7 +143,7 @@ impl<'a, const D: usize> Problem<'a, D> {
     }
 
     /// The estimates of all slots after joint recovery from `start`; `start` for other solvers.
-    pub(super) fn refine(&self, start: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
+    pub(super) fn run_joint(&self, start: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
         match &self.records {
             Records::Listed { family, graph: Some(graph), .. } if self.solver == Builtin::Joint => {
                 let (delta, seed) = (self.delta as f32, self.options.seed);
@@ -154,15 +154,15 @@ impl<'a, const D: usize> Problem<'a, D> {
     }
 
     /// Recovered points from the last estimates of all slots, with exact constraints and confidence. Beside it what confidence
-    /// is made of, if it `is_asked` for.
+    /// is made of, if it `want_features` for.
     /// Fails when there is not one estimate per slot.
     pub(super) fn finish(
         &self,
         estimates: Vec<Estimate<D>>,
-        is_asked: bool,
+        want_features: bool,
     ) -> Result<(Recovered<D>, Seen), Error> {
         let rows = descriptor_rows(self.released, self.lists, 0..self.released.n_records());
-        self.finish_with(estimates, rows, is_asked)
+        self.finish_with(estimates, rows, want_features)
     }
 
     /// [`finish`](Self::finish), where it is known which descriptor is whose.
@@ -170,7 +170,7 @@ impl<'a, const D: usize> Problem<'a, D> {
         &self,
         unsettled: Vec<Estimate<D>>,
         descriptor_row: Option<Vec<u32>>,
-        is_asked: bool,
+        want_features: bool,
     ) -> Result<(Recovered<D>, Seen), Error> {
         if unsettled.len() != self.n_slots() {
             let expected = format!("{}, one per slot", self.n_slots());
@@ -191,11 +191,11 @@ impl<'a, const D: usize> Problem<'a, D> {
             return nothing(recovered, Unknown::OtherSolver);
         };
         let unknown = confidence::unknown(self.released, self.lists, estimates);
-        if let (Some(unknown), false) = (unknown, is_asked) {
+        if let (Some(unknown), false) = (unknown, want_features) {
             return nothing(recovered, unknown);
         }
         let solved = Solved { estimates, unsettled: &unsettled, delta: self.delta as f32 };
-        let (sure, seen) = confidence::look(family, graph, self.released, &solved);
+        let (sure, seen) = confidence::predict(family, graph, self.released, &solved);
         let recovered = match unknown {
             Some(unknown) => recovered.without_confidence(unknown),
             None => recovered.with_confidence(sure)?,
@@ -234,8 +234,8 @@ impl<'a, const D: usize> Problem<'a, D> {
     fn settled(&self, estimates: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
         let mut settled = self.settle(estimates);
         if self.solver == Builtin::Joint {
-            for _ in 0..exact::feeds(self.released) {
-                settled = self.settle(self.refine(settled));
+            for _ in 0..exact::joint_reruns(self.released) {
+                settled = self.settle(self.run_joint(settled));
             }
         }
         settled

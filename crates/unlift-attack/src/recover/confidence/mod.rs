@@ -5,7 +5,7 @@
 //! come from synthetic rooms (`examples/fit_confidence.rs`), never from a real map.
 
 mod constants;
-pub(super) mod crowd;
+pub(super) mod cues;
 
 use rayon::prelude::*;
 
@@ -14,7 +14,7 @@ use crate::geometry::flatness::flatness;
 use crate::geometry::vector::widen;
 use crate::neighbors::Neighborhoods;
 use crate::recover::confidence::constants::{CENTER, MODELS, SPREAD};
-use crate::recover::confidence::crowd::{Cues, N_CUES, Seen, Solved};
+use crate::recover::confidence::cues::{Cues, N_CUES, Seen, Solved};
 use crate::recover::map::family::{Family, Settings};
 use crate::recover::map::graph::Graph;
 use crate::recover::map::pieces::{CandidatePieces, LinePieces, PlanePieces};
@@ -37,7 +37,7 @@ pub(super) fn not_asked<const D: usize>(
 }
 
 /// How sure the attacker is of every slot of joint recovery, and the cues that say so.
-pub(super) fn look<const D: usize>(
+pub(super) fn predict<const D: usize>(
     family: &Family<'_, D>,
     graph: &Graph,
     released: &Released<D>,
@@ -46,13 +46,13 @@ pub(super) fn look<const D: usize>(
     let (cues, radius) = match family {
         Family::Lines { rows, slots_per_record, chance } => {
             let pieces = LinePieces::new(rows, *slots_per_record, chance, solved.delta);
-            crowd::cues(&pieces, graph, solved)
+            cues::of_slots(&pieces, graph, solved)
         }
         Family::Planes { planes, sorted } => {
-            crowd::cues(&PlanePieces::new(planes, sorted, solved.delta), graph, solved)
+            cues::of_slots(&PlanePieces::new(planes, sorted, solved.delta), graph, solved)
         }
         Family::Candidates { rows, chance } => {
-            crowd::cues(&CandidatePieces::new(rows, chance, solved.delta), graph, solved)
+            cues::of_slots(&CandidatePieces::new(rows, chance, solved.delta), graph, solved)
         }
     };
     let kind = match released.obfuscation() {
@@ -62,7 +62,7 @@ pub(super) fn look<const D: usize>(
         Obfuscation::AxisCandidates(_) => 4,
     };
     let of_slot = |(estimate, cues): (&Estimate<D>, &Cues)| match estimate.status {
-        Status::Ok => judged(&MODELS[kind], cues, radius),
+        Status::Ok => predict_slot(&MODELS[kind], cues, radius),
         _ => Confidence::LOST,
     };
     let sure = solved.estimates.par_iter().zip(&cues).map(of_slot).collect();
@@ -70,7 +70,7 @@ pub(super) fn look<const D: usize>(
 }
 
 /// What `cues` say about one slot; lengths are multiples of `radius`.
-fn judged(model: &Model, cues: &Cues, radius: f32) -> Confidence {
+fn predict_slot(model: &Model, cues: &Cues, radius: f32) -> Confidence {
     let terms = centered(terms(cues), &CENTER, &SPREAD);
     let sum =
         |weights: &[f32; N_TERMS]| -> f32 { terms.iter().zip(weights).map(|(t, w)| t * w).sum() };
@@ -149,8 +149,19 @@ pub(super) struct Model {
 fn products(cues: &Cues) -> [f32; N_PRODUCTS] {
     let [evidence, _, ln_radius, record_evidence, _, _, _, of_members, sparsity, map_evidence, ..] =
         *cues;
-    let [.., map_share, map_record_share, _, _, voting_share, map_voting_share, settled, _, _, _] =
-        *cues;
+    let [
+        ..,
+        map_fraction,
+        map_record_fraction,
+        _,
+        _,
+        voting_fraction,
+        map_voting_fraction,
+        settled,
+        _,
+        _,
+        _,
+    ] = *cues;
     let [.., one_sided, map_one_sided] = *cues;
     [
         evidence * evidence,
@@ -163,15 +174,15 @@ fn products(cues: &Cues) -> [f32; N_PRODUCTS] {
         of_members * map_evidence,
         map_evidence * map_evidence,
         evidence * ln_radius,
-        map_share * map_share,
-        map_record_share * map_record_share,
-        evidence * map_share,
-        record_evidence * map_record_share,
+        map_fraction * map_fraction,
+        map_record_fraction * map_record_fraction,
+        evidence * map_fraction,
+        record_evidence * map_record_fraction,
         record_evidence * map_evidence,
-        voting_share * voting_share,
-        evidence * voting_share,
-        evidence * map_voting_share,
-        voting_share * map_voting_share,
+        voting_fraction * voting_fraction,
+        evidence * voting_fraction,
+        evidence * map_voting_fraction,
+        voting_fraction * map_voting_fraction,
         evidence * settled,
         map_evidence * settled,
         one_sided * one_sided,
@@ -179,7 +190,7 @@ fn products(cues: &Cues) -> [f32; N_PRODUCTS] {
         one_sided * map_one_sided,
         map_one_sided * map_one_sided,
         map_evidence * map_one_sided,
-        map_share * map_one_sided,
+        map_fraction * map_one_sided,
     ]
 }
 

@@ -17,9 +17,9 @@ pub(crate) fn can_settle<const D: usize>(released: &Released<D>) -> bool {
 }
 
 /// How often joint recovery of `released` goes on from what was settled.
-pub(crate) fn feeds<const D: usize>(released: &Released<D>) -> usize {
+pub(crate) fn joint_reruns<const D: usize>(released: &Released<D>) -> usize {
     match released.obfuscation() {
-        Obfuscation::AxisCandidates(_) => Settings::of_dimension::<D>().feeds,
+        Obfuscation::AxisCandidates(_) => Settings::of_dimension::<D>().joint_reruns,
         _ => 0,
     }
 }

@@ -17,13 +17,14 @@
 //! could change places for ever. So half of the slots hold still while the others move. Only the first iteration moves all:
 //! its start comes from records alone.
 
+mod input;
+mod least_squares;
 mod neighbor_distribution;
-mod refine;
 mod state;
 mod update;
 mod votes;
 
-use crate::recover::joint::neighbor_distribution::Input;
+use crate::recover::joint::input::Input;
 use crate::recover::joint::state::State;
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::Graph;
@@ -84,7 +85,7 @@ fn iterate<const D: usize, P: Pieces<D>>(
             break;
         }
     }
-    state.into_best()
+    state.into_accepted()
 }
 
 fn mean_evidence<const D: usize>(estimates: &[Estimate<D>]) -> f64 {

@@ -1,18 +1,18 @@
 //! How the estimates of true neighbors lie around a point: learned from the map itself.
 //!
 //! Listed records come from two populations: neighbors, whose estimates lie close, and others, which lie
-//! as dense as estimates do anywhere. The excess of close ones over chance tells the share of neighbors
+//! as dense as estimates do anywhere. The excess of close ones over chance tells the fraction of neighbors
 //! among the edges of each class and the radius within which half of them lie. Their density is taken
 //! as `(1 + r^2 / a^2)^-3`: flat where estimates are too uncertain to tell, with a heavy tail.
 
 use rayon::prelude::*;
 
+use crate::recover::joint::input::{Input, RANDOM, Sampled};
 use crate::recover::map::family::Settings;
-use crate::recover::map::graph::{CLASSES, Graph, Side, either, side};
+use crate::recover::map::graph::{CLASSES, Side, either, side};
 use crate::recover::map::grid::Density;
 use crate::recover::map::pieces::Pieces;
 use crate::recover::map::places::{Places, distance2};
-use crate::seed::{Draws, Stage};
 use crate::simd::{Kernel, dispatch};
 
 /// True neighbors are looked for within this many radii of their distribution: nearly all of its mass.
@@ -25,47 +25,13 @@ const OUTSIDE: usize = BINS / 4 * 3;
 const PART: usize = 256;
 /// Mutual edges tell the radius if so many of them are close (a median of fewer is noise),
 const ENOUGH: f64 = 250.0;
-/// and within this share of the radius of all.
+/// and within this fraction of the radius of all.
 const TIGHTER: f64 = 0.65;
-/// The share of the excess that is lost with the tail of true neighbors when the background is taken off: measured
+/// The fraction of the excess that is lost with the tail of true neighbors when the background is taken off: measured
 /// on maps whose wrong entries are anywhere.
 const TAIL: f64 = 0.1;
-/// The least and the largest share of neighbors in a class: odds of zero or infinity would never change again.
-const SHARE: (f64, f64) = (5e-4, 0.95);
-/// Random edges per slot of the sample: about as many as the edges that are counted.
-const RANDOM: usize = 24;
-/// Slots of the sample: about 100,000 edges of lists of 50.
-const SLOTS: usize = 1 << 11;
-
-/// What the iterations of joint recovery read and never change.
-pub(super) struct Input<'a, P> {
-    pub(super) pieces: P,
-    pub(super) graph: &'a Graph,
-    pub(super) delta: f32,
-    /// How often each record is listed.
-    pub(super) listed: Vec<u32>,
-    /// Slots spread evenly, from which the distribution of neighbors is learned.
-    sample: Vec<Sampled>,
-}
-
-/// A slot of the sample, with random edges of the whole graph: the other end and the class of each.
-struct Sampled {
-    slot: usize,
-    random: [(u32, u8); RANDOM],
-}
-
-impl<'a, P> Input<'a, P> {
-    pub(super) fn new(pieces: P, graph: &'a Graph, delta: f32, seed: u64) -> Self {
-        let n = if graph.len() == 0 { 0 } else { graph.n_slots() };
-        let row = |slot: usize| {
-            let mut draws = Draws::new(seed, Stage::NullSample, slot as u64);
-            let random = std::array::from_fn(|_| graph.edge(draws.below(graph.len() as u64)));
-            Sampled { slot, random }
-        };
-        let sample = (0..n).step_by(n.div_ceil(SLOTS).max(1)).map(row).collect();
-        Self { pieces, graph, delta, listed: graph.times_listed(), sample }
-    }
-}
+/// The least and the largest fraction of neighbors in a class: odds of zero or infinity would never change again.
+const FRACTION: (f64, f64) = (5e-4, 0.95);
 
 /// What is known about true neighbors.
 #[derive(Clone, Debug)]
@@ -74,16 +40,16 @@ pub(super) struct NeighborDistribution {
     pub(super) radius: f32,
     /// Per class: the odds of a true neighbor.
     pub(super) odds: [f32; CLASSES],
-    /// The share of true neighbors among the estimates at the other ends of edges.
-    pub(super) share: f32,
+    /// The fraction of true neighbors among the estimates at the other ends of edges.
+    pub(super) fraction: f32,
     /// `(1 + r^2 / a^2)^-3`: 1 / a^2, and the density at the center.
     pub(super) inverse_a2: f32,
-    pub(super) center: f32,
+    pub(super) density_at_zero: f32,
     /// The odds of a wrong entry that is near all the same, times its density: the same all over the reach.
-    pub(super) region: f32,
+    pub(super) background: f32,
     /// How many nats the edges in one direction may be ahead of those in the other beyond what mutual edges say; infinite
     /// where nothing bounds them.
-    pub(super) surplus: f32,
+    pub(super) most_imbalance: f32,
 }
 
 impl NeighborDistribution {
@@ -103,7 +69,7 @@ impl NeighborDistribution {
         parts.iter().for_each(|part| total.merge(part));
         let limits = (least_radius, P::MOST_RADIUS * input.delta);
         let distribution = total.distribution::<D, P>(&input.pieces, learning.reach, limits);
-        Self { surplus: learning.surplus(), ..distribution }
+        Self { most_imbalance: learning.most_imbalance(), ..distribution }
     }
 
     /// Per class: the odds that an edge leads to a true neighbor of this very slot, and 1 where it may as well be
@@ -161,14 +127,14 @@ impl<const D: usize, P: Pieces<D>> Learning<'_, D, P> {
             }
         }
         // Random edges stand for as many as the slot has.
-        let share = ends.len() as f64 / RANDOM as f64;
-        let share_mutual = n_mutual as f64 / RANDOM as f64;
+        let per_random = ends.len() as f64 / RANDOM as f64;
+        let per_random_mutual = n_mutual as f64 / RANDOM as f64;
         for &(end, class) in random {
             let of_kind = &mut tally.random[usize::from(either(class, slots_per_record))];
             of_kind[0] += 1;
             if let Some(bin) = close(end, class) {
-                tally.bins[0][bin].1 += share;
-                tally.bins[1][bin].1 += share_mutual;
+                tally.bins[0][bin].1 += per_random;
+                tally.bins[1][bin].1 += per_random_mutual;
                 of_kind[1] += 1;
             }
         }
@@ -180,7 +146,7 @@ impl<const D: usize, P: Pieces<D>> Learning<'_, D, P> {
     /// Where lists are wrong at random, a wrong entry stands alone. Where they are wrong together, as look-alike
     /// descriptors are, whoever lists a wrong entry also lists others beside it, and that place gathers as much evidence as
     /// the right one. But those there do not list back.
-    fn surplus(&self) -> f32 {
+    fn most_imbalance(&self) -> f32 {
         let places = self.places;
         let (mut entries, mut beside) = (0.0, 0.0);
         let mut own = Vec::new();
@@ -211,7 +177,7 @@ impl<const D: usize, P: Pieces<D>> Learning<'_, D, P> {
                 beside += found as f64 - (own.len() - 1) as f64 / RANDOM as f64 * by_chance as f64;
             }
         }
-        if beside > CROWD * entries { SURPLUS } else { f32::INFINITY }
+        if beside > LEAST_COMPANIONS * entries { MOST_IMBALANCE } else { f32::INFINITY }
     }
 }
 
@@ -223,9 +189,9 @@ const ENTRIES: usize = 2;
 const ELSEWHERE: f32 = 2.0;
 /// Lists are wrong together if an entry that does not list back has on average so many others of its list beside it elsewhere,
 /// beyond chance; entries that are not elsewhere count with none.
-const CROWD: f64 = 0.25;
+const LEAST_COMPANIONS: f64 = 0.25;
 /// The bound in nats then.
-const SURPLUS: f32 = 10.0;
+const MOST_IMBALANCE: f32 = 10.0;
 
 /// Some of the slots of a sample.
 struct Part<'a, const D: usize, P> {
@@ -272,7 +238,7 @@ impl Tally {
         random.for_each(|(a, b)| *a += b);
     }
 
-    /// Close edges beyond those expected by chance or merely in the same region, per bin, and their share of
+    /// Close edges beyond those expected by chance or merely in the same region, per bin, and their fraction of
     /// those beyond chance; of all edges or of mutual ones.
     fn excess<const D: usize>(&self, kind: usize) -> ([f64; BINS], f64) {
         let bins = &self.bins[kind];
@@ -281,77 +247,77 @@ impl Tally {
         let edges = f64::from(edges.max(1));
         let found: f64 = bins.iter().map(|b| f64::from(b.0)).sum();
         let by_chance: f64 = bins.iter().map(|b| b.1).sum();
-        let share = share_of(found / edges, by_chance / edges);
-        let excess = bins.map(|(found, by_chance)| f64::from(found) - (1.0 - share) * by_chance);
+        let fraction = true_fraction(found / edges, by_chance / edges);
+        let excess = bins.map(|(found, by_chance)| f64::from(found) - (1.0 - fraction) * by_chance);
         // Wrong entries that are near all the same lie as dense everywhere as they do far out.
         let volume = |bin: usize| ((bin + 1) as f64).powi(D as i32) - (bin as f64).powi(D as i32);
-        let outside = match Settings::of_dimension::<D>().tells_background {
+        let outside = match Settings::of_dimension::<D>().measures_background {
             true => excess[OUTSIDE..].iter().sum::<f64>().max(0.0),
             false => 0.0,
         };
         let density = outside / (OUTSIDE..BINS).map(volume).sum::<f64>();
         let neighbors = std::array::from_fn(|bin| (excess[bin] - density * volume(bin)).max(0.0));
-        let share = neighbors.iter().sum::<f64>() / excess.iter().sum::<f64>().max(1.0);
-        (neighbors, (share / (1.0 - TAIL)).min(1.0))
+        let fraction = neighbors.iter().sum::<f64>() / excess.iter().sum::<f64>().max(1.0);
+        (neighbors, (fraction / (1.0 - TAIL)).min(1.0))
     }
 
-    /// The distribution, but for the surplus.
+    /// The distribution, but for the most_imbalance.
     fn distribution<const D: usize, P: Pieces<D>>(
         &self,
         pieces: &P,
         reach: f32,
         (least_radius, most_radius): (f32, f32),
     ) -> NeighborDistribution {
-        let [(all, share_of_all), (mutual, share_of_mutual)] =
+        let [(all, fraction_of_all), (mutual, fraction_of_mutual)] =
             [0, 1].map(|kind| self.excess::<D>(kind));
-        let mut radius = middle(&all);
+        let mut radius = median_radius(&all);
         // Wrong entries that are near all the same are rarely mutual.
-        if mutual.iter().sum::<f64>() >= ENOUGH && middle(&mutual) < TIGHTER * radius {
-            radius = middle(&mutual);
+        if mutual.iter().sum::<f64>() >= ENOUGH && median_radius(&mutual) < TIGHTER * radius {
+            radius = median_radius(&mutual);
         }
         let radius = (radius as f32 * reach).min(most_radius).max(least_radius);
         let (median, mass) = profile(D);
         let a = radius / median;
-        let chance = self.random.map(share_found);
+        let chance = self.random.map(close_fraction);
         let mut odds = [0.0; CLASSES];
-        let (mut edges, mut ends, mut neighbors, mut in_region) = (0.0, 0.0, 0.0, 0.0);
+        let (mut edges, mut ends, mut neighbors, mut n_background) = (0.0, 0.0, 0.0, 0.0);
         for (class, of_class) in self.classes.iter().enumerate() {
             let either = either(class as u8, pieces.slots_per_record());
-            let close = share_of(share_found(*of_class), chance[usize::from(either)]);
+            let close = true_fraction(close_fraction(*of_class), chance[usize::from(either)]);
             let of_close = match side(class as u8) {
-                _ if !P::TELLS_REGION => 1.0,
-                Side::Mutual => share_of_mutual,
-                Side::Forward | Side::Reverse => share_of_all,
+                _ if !P::SUBTRACTS_BACKGROUND => 1.0,
+                Side::Mutual => fraction_of_mutual,
+                Side::Forward | Side::Reverse => fraction_of_all,
             };
-            let p = (close * of_close).max(SHARE.0);
+            let p = (close * of_close).max(FRACTION.0);
             odds[class] = (p / (1.0 - p)) as f32;
             let n = f64::from(of_class[0]);
             edges += n;
             // Of two ends where it is not known which, one may be a neighbor.
             ends += if either { 2.0 * n } else { n };
             neighbors += n * close;
-            in_region += n * close * (1.0 - of_close);
+            n_background += n * close * (1.0 - of_close);
         }
-        let region = (in_region / f64::max(edges, 1.0)).min(SHARE.1);
+        let background = (n_background / f64::max(edges, 1.0)).min(FRACTION.1);
         NeighborDistribution {
             radius,
-            share: (neighbors / f64::max(ends, 1.0)) as f32,
+            fraction: (neighbors / f64::max(ends, 1.0)) as f32,
             odds,
             inverse_a2: 1.0 / (a * a),
-            center: 1.0 / (mass * a.powi(D as i32)),
-            region: (region / (1.0 - region) / ball(D, reach)) as f32,
-            surplus: f32::INFINITY,
+            density_at_zero: 1.0 / (mass * a.powi(D as i32)),
+            background: (background / (1.0 - background) / ball_volume(D, reach)) as f32,
+            most_imbalance: f32::INFINITY,
         }
     }
 }
 
 /// Of so many edges, how many were close.
-fn share_found([edges, found]: [u32; 2]) -> f64 {
+fn close_fraction([edges, found]: [u32; 2]) -> f64 {
     f64::from(found) / f64::from(edges.max(1))
 }
 
-/// Where half of `excess` lies, as a share of the bins.
-fn middle(excess: &[f64; BINS]) -> f64 {
+/// Where half of `excess` lies, as a fraction of the bins.
+fn median_radius(excess: &[f64; BINS]) -> f64 {
     let half = 0.5 * excess.iter().sum::<f64>();
     let mut sum = 0.0;
     for (bin, e) in excess.iter().enumerate() {
@@ -363,14 +329,14 @@ fn middle(excess: &[f64; BINS]) -> f64 {
     0.5
 }
 
-/// The share of neighbors, where `found` of the edges are close and random ones with `chance`: all
+/// The fraction of neighbors, where `found` of the edges are close and random ones with `chance`: all
 /// neighbors are, and `chance` of the others.
-fn share_of(found: f64, chance: f64) -> f64 {
-    ((found - chance) / (1.0 - chance.min(0.99))).clamp(SHARE.0, SHARE.1)
+fn true_fraction(found: f64, chance: f64) -> f64 {
+    ((found - chance) / (1.0 - chance.min(0.99))).clamp(FRACTION.0, FRACTION.1)
 }
 
 /// The volume of a ball.
-fn ball(dimensions: usize, radius: f32) -> f64 {
+fn ball_volume(dimensions: usize, radius: f32) -> f64 {
     use std::f64::consts::PI;
     let unit = if dimensions == 2 { PI } else { 4.0 / 3.0 * PI };
     unit * f64::from(radius).powi(dimensions as i32)

@@ -1,7 +1,8 @@
 //! One slot in one iteration: candidates from the estimates of neighbors, the likeliest of them, refined.
 
-use crate::recover::joint::neighbor_distribution::{Input, NeighborDistribution};
-use crate::recover::joint::refine::{Directions, refined};
+use crate::recover::joint::input::Input;
+use crate::recover::joint::least_squares::{Directions, least_squares};
+use crate::recover::joint::neighbor_distribution::NeighborDistribution;
 use crate::recover::joint::votes::{Columns, Ends, Odds};
 use crate::recover::map::graph::{CLASSES, either, record_of};
 use crate::recover::map::grid::Density;
@@ -15,9 +16,9 @@ use crate::recover::result::{Estimate, Status};
 pub(super) const TUBE: f32 = 6.0;
 /// Estimates within this many radii of the center of a ray are near all of its rays. They would draw others there, as nothing
 /// tells them apart.
-const BLIND: f32 = 3.0;
+const CENTER_RADIUS: f32 = 3.0;
 /// Estimates enter the refined position within this many radii, less the farther they are.
-const KERNEL: f32 = 3.75;
+const LEAST_SQUARES_RADIUS: f32 = 3.75;
 /// Candidates per piece: about as many as hold so many true neighbors' estimates,
 const TRUE_CANDIDATES: f32 = 5.0;
 /// but so many at least and at most.
@@ -25,9 +26,9 @@ const CANDIDATES: (f32, f32) = (8.0, 16.0);
 /// Room for all candidates and the old estimate, in whole vectors.
 const ROOM: usize = 24;
 /// Records decide between the best candidates that lie within this many nats of each other.
-const DOUBT: f32 = 8.0;
+const TIE_MARGIN: f32 = 8.0;
 /// The share of neighbors whose estimate is taken to be wrong though their record is near: what a record may still add.
-const ASTRAY: f32 = 0.2;
+const WRONG_ESTIMATES: f32 = 0.2;
 /// The weight of the density prior: candidates are estimates, which already lie where density is large.
 const PRIOR: f32 = 0.5;
 /// So many places (8 MB) stay in the cache and need no prefetching.
@@ -80,7 +81,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         }
     }
 
-    /// The new estimate of `slot`, and how many nats its place is ahead of the best one elsewhere; the
+    /// The new estimate of `slot`, and how many nats its place is margin of the best one elsewhere; the
     /// old estimate when no neighbor says anything.
     #[inline(always)]
     pub(super) fn solve(
@@ -92,14 +93,15 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         let Input { pieces, graph, .. } = self.input;
         scratch.candidates.clear();
         scratch.all.gather(graph.of(slot), self.places, pieces.slots_per_record());
-        let (reach, blind) = (TUBE * self.neighbors.radius, BLIND * self.neighbors.radius);
+        let (reach, center_radius) =
+            (TUBE * self.neighbors.radius, CENTER_RADIUS * self.neighbors.radius);
         let odds = self.odds(slot);
         for piece in 0..P::PER_SLOT {
             let own = pieces.piece(slot, piece);
-            scratch.all.near(&own, reach, blind, &odds, &mut scratch.near[piece]);
+            scratch.all.near(&own, reach, center_radius, &odds, &mut scratch.near[piece]);
             self.propose(&own, (slot, piece), old, scratch);
         }
-        let Some((first, ahead)) = self.winner(slot, &scratch.candidates) else {
+        let Some((first, margin)) = self.winner(slot, &scratch.candidates) else {
             return (*old, 0.0);
         };
         let own = pieces.piece(slot, first.piece);
@@ -109,16 +111,17 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         }
         let at = |x: &[f32; D]| {
             let density = self.density.at(x);
-            let kernel = KERNEL * self.neighbors.radius * self.density.width(density);
-            let doubt = P::DOUBT * (1.0 + self.neighbors.region / self.volume(density) / density);
-            (1.0 / (kernel * kernel), self.distribution(density), doubt)
+            let reach = LEAST_SQUARES_RADIUS * self.neighbors.radius * self.density.width(density);
+            let half_weight_ratio = P::HALF_WEIGHT_RATIO
+                * (1.0 + self.neighbors.background / self.volume(density) / density);
+            (1.0 / (reach * reach), self.distribution(density), half_weight_ratio)
         };
         let near = (&*near, &mut scratch.directions);
-        let (x, support) = refined(pieces, self.places, &own, near, first.x, at);
+        let (x, support) = least_squares(pieces, self.places, &own, near, first.x, at);
         if !x.iter().all(|c| c.is_finite()) {
             return (*old, 0.0);
         }
-        (found(x, support, first.piece, (first.score - first.prior).max(0.0)), ahead)
+        (found(x, support, first.piece, (first.score - first.prior).max(0.0)), margin)
     }
 
     /// The odds of the edges of `slot`.
@@ -137,7 +140,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
     #[inline(always)]
     fn distribution(&self, density: f32) -> (f32, f32) {
         let width = self.density.width(density);
-        let gain = self.neighbors.center / (self.volume(density) * density);
+        let gain = self.neighbors.density_at_zero / (self.volume(density) * density);
         (gain, self.neighbors.inverse_a2 / (width * width))
     }
 
@@ -162,7 +165,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         scratch: &mut Scratch<D>,
     ) {
         let near = &scratch.near[piece];
-        let n_true = (self.neighbors.share * scratch.all.len() as f32).max(1.0);
+        let n_true = (self.neighbors.fraction * scratch.all.len() as f32).max(1.0);
         let most = TRUE_CANDIDATES / n_true * near.len() as f32;
         let step = near.len().div_ceil(most.clamp(CANDIDATES.0, CANDIDATES.1) as usize).max(1);
         let (mut tried, mut n) = ([[0.0; ROOM]; D], 0);
@@ -185,20 +188,20 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
             (gain[i], inverse_a2[i]) = self.distribution(density[i]);
             prior[i] = PRIOR * ln(density[i]);
         }
-        let surplus = self.neighbors.surplus;
+        let most_imbalance = self.neighbors.most_imbalance;
         for i in 0..n {
             let x = std::array::from_fn(|c| tried[c][i]);
             let prior = prior[i] + self.input.pieces.ln_spread(slot, &x);
             let distribution = (gain[i], inverse_a2[i]);
-            let likelihood = match surplus < f32::INFINITY {
-                true => near.two_sided(&x, distribution, surplus),
+            let likelihood = match most_imbalance < f32::INFINITY {
+                true => near.balanced_log_likelihood(&x, distribution, most_imbalance),
                 false => near.log_likelihood(&x, distribution),
             };
             scratch.candidates.push(Candidate { x, piece, score: prior + likelihood, prior });
         }
     }
 
-    /// The likeliest candidate, and how far it is ahead of the best one elsewhere. Where others come
+    /// The likeliest candidate, and how far it is margin of the best one elsewhere. Where others come
     /// close, records decide whose estimates are astray.
     #[inline(always)]
     fn winner(&self, slot: usize, candidates: &[Candidate<D>]) -> Option<(Candidate<D>, f32)> {
@@ -218,19 +221,19 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         let Some(second) = second else {
             return Some((best, best.score - best.prior));
         };
-        let ahead = best.score - second.score;
-        if ahead < DOUBT {
-            let [of_best, of_second] = self.by_records(slot, [best.x, second.x]);
+        let margin = best.score - second.score;
+        if margin < TIE_MARGIN {
+            let [of_best, of_second] = self.record_scores(slot, [best.x, second.x]);
             if second.score + of_second > best.score + of_best {
                 return Some((second, 0.0));
             }
         }
-        Some((best, ahead))
+        Some((best, margin))
     }
 
     /// What records near two places add where their estimates are elsewhere.
     #[inline(always)]
-    fn by_records(&self, slot: usize, x: [[f32; D]; 2]) -> [f32; 2] {
+    fn record_scores(&self, slot: usize, x: [[f32; D]; 2]) -> [f32; 2] {
         let Input { pieces, graph, delta, .. } = self.input;
         let slots_per_record = pieces.slots_per_record();
         let at =
@@ -251,7 +254,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
                 let either = either(class, slots_per_record);
                 let q = 1.0 / (1.0 + self.places.nearest(end, either, x).0 * inverse_a2);
                 let by_estimate = 1.0 + odds * gain * q * q * q;
-                sums[i] += ln(1.0 + ASTRAY * odds / chance / by_estimate);
+                sums[i] += ln(1.0 + WRONG_ESTIMATES * odds / chance / by_estimate);
             }
         }
         sums

@@ -3,10 +3,10 @@
 use crate::recover::map::graph::{CLASSES, Side, either, side};
 use crate::recover::map::lines::{LANES, Lanes, ln};
 use crate::recover::map::pieces::Piece;
-use crate::recover::map::places::{FAR, Places, distance2};
+use crate::recover::map::places::{Places, UNKNOWN_COORDINATE, distance2};
 
 /// Vectors are filled up with estimates this far away: beyond any reach, and still a number when squared.
-const BEYOND: f32 = 1e19;
+const PADDING_COORDINATE: f32 = 1e19;
 
 /// The odds that edges of a slot lead to true neighbors.
 pub(super) struct Odds<'a, const D: usize> {
@@ -83,13 +83,13 @@ impl<const D: usize> Ends<D> {
     }
 
     /// Puts the estimates within `reach` of `piece` into `near`, with the odds of each, but not those within
-    /// `blind` of a center.
+    /// `center_radius` of a center.
     #[inline(always)]
     pub(super) fn near(
         &mut self,
         piece: &Piece<D>,
         reach: f32,
-        blind: f32,
+        center_radius: f32,
         odds: &Odds<'_, D>,
         near: &mut Columns<D>,
     ) {
@@ -101,12 +101,13 @@ impl<const D: usize> Ends<D> {
             let x: [f32; D] = std::array::from_fn(|c| columns[c][i]);
             // An absurd delta reaches even lost slots.
             let d2 = distance2(&x, &piece.project(&x));
-            apart2[i] = if x[0] == FAR { f32::INFINITY } else { d2 };
+            apart2[i] = if x[0] == UNKNOWN_COORDINATE { f32::INFINITY } else { d2 };
         }
         if piece.from_center {
             for i in 0..n {
                 let d2 = distance2(&std::array::from_fn(|c| columns[c][i]), &piece.through);
-                apart2[i] = if d2 < blind * blind { f32::INFINITY } else { apart2[i] };
+                apart2[i] =
+                    if d2 < center_radius * center_radius { f32::INFINITY } else { apart2[i] };
             }
         }
         // Every number is written, and stays if it is near: no branch to guess.
@@ -123,7 +124,7 @@ impl<const D: usize> Ends<D> {
             let class = self.class[i];
             near.set(to, &x, (odds.of_class[usize::from(class)], side(class)), self.slot[i]);
         }
-        near.share(odds);
+        near.discount(odds);
         near.pad();
     }
 }
@@ -134,7 +135,7 @@ pub(super) struct Columns<const D: usize> {
     pub(super) x: [Vec<f32>; D],
     pub(super) odds: Vec<f32>,
     /// 1 where the edge may as well be the partner's.
-    shared: Vec<f32>,
+    may_be_partners: Vec<f32>,
     side: Vec<Side>,
     pub(super) slot: Vec<u32>,
 }
@@ -142,8 +143,8 @@ pub(super) struct Columns<const D: usize> {
 impl<const D: usize> Default for Columns<D> {
     fn default() -> Self {
         let x = std::array::from_fn(|_| Vec::new());
-        let (odds, shared) = (Vec::new(), Vec::new());
-        Self { x, odds, shared, side: Vec::new(), slot: Vec::new() }
+        let (odds, may_be_partners) = (Vec::new(), Vec::new());
+        Self { x, odds, may_be_partners, side: Vec::new(), slot: Vec::new() }
     }
 }
 
@@ -153,7 +154,7 @@ impl<const D: usize> Columns<D> {
     fn resize(&mut self, n: usize) {
         self.x.iter_mut().for_each(|column| column.resize(n, 0.0));
         self.odds.resize(n, 0.0);
-        self.shared.resize(n, 0.0);
+        self.may_be_partners.resize(n, 0.0);
         self.side.resize(n, Side::Mutual);
         self.slot.resize(n, 0);
     }
@@ -163,30 +164,30 @@ impl<const D: usize> Columns<D> {
         for (column, x) in self.x.iter_mut().zip(x) {
             column[i] = *x;
         }
-        (self.odds[i], self.shared[i]) = odds;
+        (self.odds[i], self.may_be_partners[i]) = odds;
         (self.side[i], self.slot[i]) = (side, slot);
     }
 
-    /// An edge that belongs to the partner as well as to this slot is shared: less of it is left the better the
+    /// An edge that belongs to the partner as well as to this slot is may_be_partners: less of it is left the better the
     /// partner's place explains it.
     #[inline(always)]
-    fn share(&mut self, of: &Odds<'_, D>) {
+    fn discount(&mut self, of: &Odds<'_, D>) {
         if of.gain == 0.0 {
             return;
         }
         let n = self.odds.len();
         let columns: [&[f32]; D] = std::array::from_fn(|c| &self.x[c][..n]);
-        let (odds, shared) = (&mut self.odds[..n], &self.shared[..n]);
+        let (odds, may_be_partners) = (&mut self.odds[..n], &self.may_be_partners[..n]);
         for i in 0..n {
             let r2 = distance2(&of.partner, &std::array::from_fn(|c| columns[c][i]));
             let q = 1.0 / (1.0 + r2 * of.inverse_a2);
-            odds[i] /= 1.0 + shared[i] * odds[i] * of.gain * q * q * q;
+            odds[i] /= 1.0 + may_be_partners[i] * odds[i] * of.gain * q * q * q;
         }
     }
 
     fn pad(&mut self) {
         let n = self.odds.len().next_multiple_of(LANES);
-        self.x.iter_mut().for_each(|column| column.resize(n, BEYOND));
+        self.x.iter_mut().for_each(|column| column.resize(n, PADDING_COORDINATE));
         self.odds.resize(n, 0.0);
         self.side.resize(n, Side::Mutual);
     }
@@ -203,12 +204,12 @@ impl<const D: usize> Columns<D> {
         std::array::from_fn(|c| self.x[c][i])
     }
 
-    /// Records of estimates within `1 / sqrt(inverse_kernel2)` of `x`, where records have two slots, which stand side by side.
+    /// Records of estimates within `1 / sqrt(inverse_reach2)` of `x`, where records have two slots, which stand side by side.
     #[inline(always)]
-    pub(super) fn n_pairs(&self, x: &[f32; D], inverse_kernel2: f32) -> u32 {
+    pub(super) fn n_pairs(&self, x: &[f32; D], inverse_reach2: f32) -> u32 {
         let (mut n, mut last) = (0, u32::MAX);
         for (i, slot) in self.slot.iter().enumerate() {
-            if 1.0 - distance2(&self.at(i), x) * inverse_kernel2 > 0.0 {
+            if 1.0 - distance2(&self.at(i), x) * inverse_reach2 > 0.0 {
                 n += u32::from(slot ^ 1 != last);
                 last = *slot;
             } else {
@@ -239,10 +240,15 @@ impl<const D: usize> Columns<D> {
         sums.iter().sum()
     }
 
-    /// The same, but forward and reverse edges may be ahead of each other by no more than `surplus` beyond what mutual
+    /// The same, but forward and reverse edges may be ahead of each other by no more than `most_imbalance` beyond what mutual
     /// edges say.
     #[inline(always)]
-    pub(super) fn two_sided(&self, x: &[f32; D], distribution: (f32, f32), surplus: f32) -> f32 {
+    pub(super) fn balanced_log_likelihood(
+        &self,
+        x: &[f32; D],
+        distribution: (f32, f32),
+        most_imbalance: f32,
+    ) -> f32 {
         let mut sums = [[0.0f32; LANES]; 3];
         let likelier = self.likelier(x, distribution);
         for (i, side) in self.side.as_chunks::<LANES>().0.iter().enumerate() {
@@ -255,7 +261,7 @@ impl<const D: usize> Columns<D> {
         }
         let [all, forward, reverse]: [f32; 3] = sums.map(|lanes| lanes.iter().sum());
         let of_both = all - forward - reverse;
-        all - ((forward - reverse).abs() - of_both - surplus).max(0.0)
+        all - ((forward - reverse).abs() - of_both - most_imbalance).max(0.0)
     }
 
     /// How much likelier the estimate in a lane of a vector is about a point at `x` than by chance.
@@ -302,7 +308,7 @@ mod tests {
         {
             let sides =
                 [(Side::Forward, forward), (Side::Reverse, reverse), (Side::Mutual, mutual)];
-            let found = columns(sides).two_sided(&[0.0; 3], DISTRIBUTION, 10.0);
+            let found = columns(sides).balanced_log_likelihood(&[0.0; 3], DISTRIBUTION, 10.0);
             let (less, more) =
                 (forward.min(reverse) as f32 * one, forward.max(reverse) as f32 * one);
             let of_both = mutual as f32 * one;
@@ -315,8 +321,10 @@ mod tests {
     fn no_estimate_counts_twice() {
         let columns = columns([(Side::Forward, 6), (Side::Reverse, 7), (Side::Mutual, 4)]);
         let x = [0.3, -0.1, 0.2];
-        let (sided, all) =
-            (columns.two_sided(&x, DISTRIBUTION, 1e9), columns.log_likelihood(&x, DISTRIBUTION));
+        let (sided, all) = (
+            columns.balanced_log_likelihood(&x, DISTRIBUTION, 1e9),
+            columns.log_likelihood(&x, DISTRIBUTION),
+        );
         assert!((sided - all).abs() < 1e-4 * all, "{sided} {all}");
     }
 
@@ -332,10 +340,10 @@ mod tests {
             gain: 0.0,
             inverse_a2: 1.0,
         };
-        columns.share(&odds);
+        columns.discount(&odds);
         assert_eq!(columns.odds, [0.5, 0.5], "nobody to share with");
         odds.gain = 16.0;
-        columns.share(&odds);
+        columns.discount(&odds);
         // 16 at the center is 2 at a distance of 1: even odds with the partner.
         assert_eq!(columns.odds, [0.25, 0.5]);
     }

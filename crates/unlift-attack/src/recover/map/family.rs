@@ -178,7 +178,7 @@ pub(crate) struct Settings {
     /// The radius of the distribution of neighbors of candidates is at most this many deltas: in an image delta is narrower.
     pub(crate) most_radius_of_candidates: f32,
     /// Whether what lies far out tells how many wrong entries are near all the same. In an image neighbors reach as far out.
-    pub(crate) tells_background: bool,
+    pub(crate) measures_background: bool,
     /// Partners of exchanged coordinates are looked for within this many deltas: in an image delta is narrow and values
     /// are few.
     pub(crate) exact_reach: f64,
@@ -186,7 +186,7 @@ pub(crate) struct Settings {
     pub(crate) least_exchange: f32,
     /// How often joint recovery of candidates goes on from exact coordinates. In an image their neighbors are then placed
     /// better. In a map they hardly are (0.2 points), and it costs half as much time again.
-    pub(crate) feeds: usize,
+    pub(crate) joint_reruns: usize,
     /// Whether confidence is known: it was never compared with what comes true in images.
     pub(crate) confidence: bool,
 }
@@ -200,10 +200,10 @@ const OF_MAPS: Settings = Settings {
     limits_by_share: true,
     keeps_near_edge: true,
     most_radius_of_candidates: 0.95,
-    tells_background: true,
+    measures_background: true,
     exact_reach: 1.0,
     least_exchange: 0.2,
-    feeds: 0,
+    joint_reruns: 0,
     confidence: true,
 };
 
@@ -216,10 +216,10 @@ const OF_IMAGES: Settings = Settings {
     limits_by_share: false,
     keeps_near_edge: false,
     most_radius_of_candidates: 3.0,
-    tells_background: false,
+    measures_background: false,
     exact_reach: 4.0,
     least_exchange: 0.05,
-    feeds: 2,
+    joint_reruns: 2,
     confidence: false,
 };
 

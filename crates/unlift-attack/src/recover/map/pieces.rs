@@ -33,9 +33,9 @@ impl<const D: usize> Piece<D> {
     #[inline(always)]
     pub(crate) fn project(&self, x: &[f32; D]) -> [f32; D] {
         let away: [f32; D] = std::array::from_fn(|c| x[c] - self.through[c]);
-        let ahead: f32 = away.iter().zip(&self.sense).map(|(a, s)| s * a).sum();
-        let keep = if ahead < 0.0 { 0.0 } else { 1.0 };
-        let keep = if ahead > self.to { self.to / ahead } else { keep };
+        let distance: f32 = away.iter().zip(&self.sense).map(|(a, s)| s * a).sum();
+        let keep = if distance < 0.0 { 0.0 } else { 1.0 };
+        let keep = if distance > self.to { self.to / distance } else { keep };
         std::array::from_fn(|r| {
             let moved: f32 = away.iter().zip(&self.along[r]).map(|(a, along)| along * a).sum();
             self.through[r] + keep * moved
@@ -54,10 +54,10 @@ pub(crate) trait Pieces<const D: usize>: Sync {
     /// With more than so many votes over that share, it counts less: `ALONG / votes`.
     const ALONG: f32 = 2.0;
     /// An estimate that is so many times as likely a true neighbor's as one of chance counts half in the refined place.
-    const DOUBT: f32 = 1.0;
+    const HALF_WEIGHT_RATIO: f32 = 1.0;
     /// Whether entries that are near without being neighbors are told from neighbors: they would draw a place into
     /// the middle of its region. Where a neighbor speaks about one coordinate, the more voices the better.
-    const TELLS_REGION: bool = false;
+    const SUBTRACTS_BACKGROUND: bool = false;
     /// The radius of the distribution of neighbors is at most this many deltas: where most estimates are wrong, those that are
     /// near by accident would widen it without end.
     const MOST_RADIUS: f32 = 0.95;
@@ -116,7 +116,7 @@ impl<'a, const D: usize> LinePieces<'a, D> {
 impl<const D: usize> Pieces<D> for LinePieces<'_, D> {
     const MOST_ALONG: f32 = 0.35;
     const ALONG: f32 = 50.0;
-    const TELLS_REGION: bool = true;
+    const SUBTRACTS_BACKGROUND: bool = true;
 
     fn slots_per_record(&self) -> usize {
         self.slots_per_record
@@ -194,7 +194,7 @@ impl<'a, const D: usize> PlanePieces<'a, D> {
 impl<const D: usize> Pieces<D> for PlanePieces<'_, D> {
     const NORMAL: bool = true;
     // Two coordinates are open: where few neighbors are right, their estimates are all that tells.
-    const DOUBT: f32 = 0.2;
+    const HALF_WEIGHT_RATIO: f32 = 0.2;
 
     #[inline(always)]
     fn piece(&self, slot: usize, _: usize) -> Piece<D> {

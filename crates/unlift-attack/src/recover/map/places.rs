@@ -15,7 +15,7 @@ struct Place<const D: usize> {
 }
 
 /// Lost slots lie this far away: near nothing, and still a number when squared.
-pub(crate) const FAR: f32 = 1e18;
+pub(crate) const UNKNOWN_COORDINATE: f32 = 1e18;
 
 /// Places that stand for all: quantiles and medians of so many are known to a percent.
 const SAMPLE: usize = 1 << 14;
@@ -31,7 +31,7 @@ impl<const D: usize> Places<D> {
     pub(crate) fn new(estimates: &[Estimate<D>]) -> Self {
         let place = |e: &Estimate<D>| match e.status {
             Status::Ok => Place { x: e.position, piece: u32::from(e.axis) },
-            _ => Place { x: [FAR; D], piece: 0 },
+            _ => Place { x: [UNKNOWN_COORDINATE; D], piece: 0 },
         };
         Self { rows: estimates.iter().map(place).collect() }
     }
@@ -44,7 +44,7 @@ impl<const D: usize> Places<D> {
     /// Whether `slot` has a place.
     #[inline(always)]
     pub(crate) fn is_known(&self, slot: usize) -> bool {
-        self.rows[slot].x[0] != FAR
+        self.rows[slot].x[0] != UNKNOWN_COORDINATE
     }
 
     /// The place of `slot`; far away if it has none.

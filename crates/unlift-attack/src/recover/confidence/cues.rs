@@ -1,6 +1,6 @@
 //! The cues of every slot: pure numbers that tell right estimates from wrong ones.
 //!
-//! Around a right estimate the estimates of listed records form a crowd, and more listed records pass than by chance. The same
+//! Around a right estimate the estimates of listed records form a cluster, and more listed records pass than by chance. The same
 //! measures over the whole map tell how well recovery went at all, which no slot shows alone: estimates that drifted
 //! together agree with each other.
 
@@ -13,13 +13,13 @@ use crate::recover::map::pieces::Pieces;
 use crate::recover::map::places::{Places, along_curve, distance2};
 use crate::recover::result::{Estimate, Status};
 
-/// A crowd reaches no farther than where chance expects this share of the listed estimates.
+/// A cluster reaches no farther than where chance expects this share of the listed estimates.
 const MOST_CHANCE: f32 = 0.3;
-/// The density of estimates is smoothed over this many deltas, so that it does not follow the crowds that it judges.
+/// The density of estimates is smoothed over this many deltas, so that it does not follow the clusters that it judges.
 const SMOOTH: f32 = 4.0;
 /// Ratios below this count as this: a logarithm needs a floor.
 const LEAST_RATIO: f32 = 1e-3;
-/// The typical radius is taken from about this many crowds.
+/// The typical radius is taken from about this many clusters.
 const RADII: usize = 1 << 14;
 
 /// Number of cues.
@@ -33,7 +33,7 @@ pub type Cues = [f32; N_CUES];
 pub struct Seen {
     /// Per slot.
     pub cues: Vec<Cues>,
-    /// The typical radius of crowds, in the unit of the map: errors scale with it.
+    /// The typical radius of clusters, in the unit of the map: errors scale with it.
     pub radius: f64,
     /// The kind of the records, below [`N_KINDS`](super::N_KINDS): each has a model of its own.
     pub kind: usize,
@@ -52,10 +52,10 @@ pub(crate) struct Solved<'a, const D: usize> {
     pub(crate) delta: f32,
 }
 
-/// The listed estimates that crowd around one estimate.
+/// The listed estimates that cluster around one estimate.
 #[derive(Clone, Copy, Debug, Default)]
-struct Crowd {
-    /// How improbable the crowd is by chance, in nats, at the radius that makes it least probable.
+struct Cluster {
+    /// How improbable the cluster is by chance, in nats, at the radius that makes it least probable.
     evidence: f32,
     radius: f32,
     /// Members beyond those expected by chance.
@@ -68,7 +68,7 @@ struct Crowd {
     /// Records that could have voted.
     listed: f32,
     /// The share of members whose records may vote.
-    voting_share: f32,
+    voting_fraction: f32,
     /// How far exact constraints moved the estimate, if they did.
     settled: Option<f32>,
     /// The mean of `ln(1 + evidence)` over the members.
@@ -80,8 +80,8 @@ struct Crowd {
     sparsity: f32,
 }
 
-/// The cues of every slot, and the typical radius of crowds, which scales predicted errors.
-pub(super) fn cues<const D: usize, P: Pieces<D>>(
+/// The cues of every slot, and the typical radius of clusters, which scales predicted errors.
+pub(super) fn of_slots<const D: usize, P: Pieces<D>>(
     pieces: &P,
     graph: &Graph,
     solved: &Solved<'_, D>,
@@ -91,83 +91,86 @@ pub(super) fn cues<const D: usize, P: Pieces<D>>(
     let density = Density::new(&places, &graph.times_listed(), SMOOTH * delta);
     let order = along_curve(&places);
     let around = Surroundings { pieces, graph, places, density, delta2: delta * delta };
-    let mut crowds = by_slot(&order, |near, slot| {
+    let mut clusters = by_slot(&order, |near, slot| {
         let estimate = &estimates[slot];
         if estimate.status != Status::Ok {
-            return Crowd::default();
+            return Cluster::default();
         }
-        let mut crowd = around.crowd(slot, estimate, near);
+        let mut cluster = around.cluster(slot, estimate, near);
         if unsettled[slot].status == Status::Ok {
             let moved2 = distance2(&unsettled[slot].position, &estimate.position);
-            crowd.settled = (moved2 > 0.0).then(|| moved2.sqrt());
+            cluster.settled = (moved2 > 0.0).then(|| moved2.sqrt());
         }
-        crowd
+        cluster
     });
-    let evidence: Vec<f32> = crowds.iter().map(|crowd| libm::log1pf(crowd.evidence)).collect();
-    crowds = by_slot(&order, |_, slot| around.with_members(slot, crowds[slot], &evidence));
-    of_map(&crowds, delta)
+    let evidence: Vec<f32> =
+        clusters.iter().map(|cluster| libm::log1pf(cluster.evidence)).collect();
+    clusters = by_slot(&order, |_, slot| around.with_members(slot, clusters[slot], &evidence));
+    of_map(&clusters, delta)
 }
 
-/// A crowd for each slot, in order of slots. They are made in a given order, in which neighbors find each other in the cache.
+/// A cluster for each slot, in order of slots. They are made in a given order, in which neighbors find each other in the cache.
 fn by_slot(
     order: &[u32],
-    of: impl Fn(&mut Vec<(u32, u32)>, usize) -> Crowd + Send + Sync,
-) -> Vec<Crowd> {
-    let in_order: Vec<Crowd> =
+    of: impl Fn(&mut Vec<(u32, u32)>, usize) -> Cluster + Send + Sync,
+) -> Vec<Cluster> {
+    let in_order: Vec<Cluster> =
         order.par_iter().map_init(Vec::new, |near, &slot| of(near, slot as usize)).collect();
-    let mut crowds = vec![Crowd::default(); order.len()];
-    for (crowd, &slot) in in_order.into_iter().zip(order) {
-        crowds[slot as usize] = crowd;
+    let mut clusters = vec![Cluster::default(); order.len()];
+    for (cluster, &slot) in in_order.into_iter().zip(order) {
+        clusters[slot as usize] = cluster;
     }
-    crowds
+    clusters
 }
 
-/// The cues of `crowds`, one per slot, and their typical radius.
-fn of_map(crowds: &[Crowd], delta: f32) -> (Vec<Cues>, f32) {
-    let sum = |of: fn(&Crowd) -> f32| crowds.iter().map(|crowd| f64::from(of(crowd))).sum::<f64>();
-    let mean = |of: fn(&Crowd) -> f32| (sum(of) / crowds.len().max(1) as f64) as f32;
-    let listed = sum(|crowd| crowd.listed).max(1.0);
+/// The cues of `clusters`, one per slot, and their typical radius.
+fn of_map(clusters: &[Cluster], delta: f32) -> (Vec<Cues>, f32) {
+    let sum = |of: fn(&Cluster) -> f32| {
+        clusters.iter().map(|cluster| f64::from(of(cluster))).sum::<f64>()
+    };
+    let mean = |of: fn(&Cluster) -> f32| (sum(of) / clusters.len().max(1) as f64) as f32;
+    let listed = sum(|cluster| cluster.listed).max(1.0);
     let ln = |x: f32| libm::logf(x.max(LEAST_RATIO));
-    let radius = typical_radius(crowds).unwrap_or(delta);
-    let map_evidence = mean(|crowd| libm::log1pf(crowd.evidence));
-    let map_share = ln((sum(|crowd| crowd.excess) / listed) as f32);
-    let map_record_share = ln((sum(|crowd| crowd.record_excess) / listed) as f32);
+    let radius = typical_radius(clusters).unwrap_or(delta);
+    let map_evidence = mean(|cluster| libm::log1pf(cluster.evidence));
+    let map_fraction = ln((sum(|cluster| cluster.excess) / listed) as f32);
+    let map_record_fraction = ln((sum(|cluster| cluster.record_excess) / listed) as f32);
     let map_ln_radius_per_delta = ln(radius / delta);
-    let map_voting_share = mean(|crowd| crowd.voting_share);
-    let map_one_sided = mean(|crowd| crowd.one_sided.abs());
-    let cues = |crowd: &Crowd| {
+    let map_voting_fraction = mean(|cluster| cluster.voting_fraction);
+    let map_one_sided = mean(|cluster| cluster.one_sided.abs());
+    let cues = |cluster: &Cluster| {
         [
-            libm::log1pf(crowd.evidence),
-            ln(crowd.excess.max(0.1)),
-            ln(crowd.radius / radius),
-            libm::log1pf(crowd.record_evidence),
-            ln(crowd.record_excess.max(0.1)),
-            crowd.off[0],
-            crowd.off[1],
-            crowd.of_members,
-            crowd.sparsity,
+            libm::log1pf(cluster.evidence),
+            ln(cluster.excess.max(0.1)),
+            ln(cluster.radius / radius),
+            libm::log1pf(cluster.record_evidence),
+            ln(cluster.record_excess.max(0.1)),
+            cluster.off[0],
+            cluster.off[1],
+            cluster.of_members,
+            cluster.sparsity,
             map_evidence,
-            map_share,
-            map_record_share,
+            map_fraction,
+            map_record_fraction,
             map_ln_radius_per_delta,
-            ln(crowd.listed.max(0.1)),
-            crowd.voting_share,
-            map_voting_share,
-            if crowd.settled.is_some() { 1.0 } else { 0.0 },
-            libm::log1pf(crowd.settled.unwrap_or(0.0) / radius),
-            crowd.one_sided,
+            ln(cluster.listed.max(0.1)),
+            cluster.voting_fraction,
+            map_voting_fraction,
+            if cluster.settled.is_some() { 1.0 } else { 0.0 },
+            libm::log1pf(cluster.settled.unwrap_or(0.0) / radius),
+            cluster.one_sided,
             map_one_sided,
         ]
     };
-    (crowds.par_iter().map(cues).collect(), radius)
+    (clusters.par_iter().map(cues).collect(), radius)
 }
 
-/// The median radius of crowds, each weighted by its evidence.
-fn typical_radius(crowds: &[Crowd]) -> Option<f32> {
-    let sample = crowds.iter().step_by(crowds.len().div_ceil(RADII).max(1));
+/// The median radius of clusters, each weighted by its evidence.
+fn typical_radius(clusters: &[Cluster]) -> Option<f32> {
+    let sample = clusters.iter().step_by(clusters.len().div_ceil(RADII).max(1));
     let mut radii: Vec<(f32, f32)> = sample
-        .filter(|crowd| crowd.evidence > 0.0 && crowd.radius > 0.0)
-        .map(|crowd| (crowd.radius, crowd.evidence))
+        .filter(|cluster| cluster.evidence > 0.0 && cluster.radius > 0.0)
+        .map(|cluster| (cluster.radius, cluster.evidence))
         .collect();
     radii.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let half = 0.5 * radii.iter().map(|one| f64::from(one.1)).sum::<f64>();
@@ -189,8 +192,8 @@ struct Surroundings<'a, const D: usize, P> {
 }
 
 impl<const D: usize, P: Pieces<D>> Surroundings<'_, D, P> {
-    /// The crowd of a slot; what its members say of themselves is still open. `near` is a buffer.
-    fn crowd(&self, slot: usize, own: &Estimate<D>, near: &mut Vec<(u32, u32)>) -> Crowd {
+    /// The cluster of a slot; what its members say of themselves is still open. `near` is a buffer.
+    fn cluster(&self, slot: usize, own: &Estimate<D>, near: &mut Vec<(u32, u32)>) -> Cluster {
         let x = own.position;
         let density = self.density.at(&x);
         // Chance expects `rate * r^D` of the listed estimates within r, for one or either slot of a record.
@@ -218,18 +221,18 @@ impl<const D: usize, P: Pieces<D>> Surroundings<'_, D, P> {
         let all = ends.len() as f32;
         let mean_rate = rates / all.max(1.0);
         let sparsity = self.density.sparsity(density);
-        let mut crowd = Crowd { listed: voting as f32, sparsity, ..Crowd::default() };
+        let mut cluster = Cluster { listed: voting as f32, sparsity, ..Cluster::default() };
         let mut members = 0;
         for at in 1..near.len() {
             let d2 = f32::from_bits(near[at].0);
             let is_last = near.get(at + 1).is_none_or(|next| f32::from_bits(next.0) > d2);
             let p = (mean_rate * power::<D>(d2)).clamp(1e-9, MOST_CHANCE);
             let nats = if is_last { evidence((at + 1) as f32, all, p) } else { 0.0 };
-            if nats > crowd.evidence {
+            if nats > cluster.evidence {
                 members = at + 1;
-                crowd.evidence = nats;
-                crowd.radius = d2.sqrt();
-                crowd.excess = (members as f32 - p * all).max(0.0);
+                cluster.evidence = nats;
+                cluster.radius = d2.sqrt();
+                cluster.excess = (members as f32 - p * all).max(0.0);
             }
         }
         let mut sum = [0.0f32; D];
@@ -240,33 +243,33 @@ impl<const D: usize, P: Pieces<D>> Surroundings<'_, D, P> {
             let record = record_of(at as usize, slots_per_record);
             voting_members += u32::from(self.pieces.may_vote(slot, record));
         }
-        crowd.voting_share = voting_members as f32 / members.max(1) as f32;
-        if members > 0 && crowd.radius > 0.0 {
+        cluster.voting_fraction = voting_members as f32 / members.max(1) as f32;
+        if members > 0 && cluster.radius > 0.0 {
             let piece = self.pieces.piece(slot, usize::from(own.axis));
-            let scale = 1.0 / (members as f32 * crowd.radius);
+            let scale = 1.0 / (members as f32 * cluster.radius);
             let (mut along2, mut all2) = (0.0, 0.0);
             for r in 0..D {
                 let along: f32 = (0..D).map(|c| piece.along[r][c] * sum[c]).sum();
                 along2 += along * along;
                 all2 += sum[r] * sum[r];
             }
-            crowd.off = [along2.sqrt() * scale, (all2 - along2).max(0.0).sqrt() * scale];
+            cluster.off = [along2.sqrt() * scale, (all2 - along2).max(0.0).sqrt() * scale];
         }
         let p = self.pieces.record_chance(slot, &x).clamp(1e-9, 0.5);
         if voting > 0 {
-            crowd.record_evidence = evidence(votes as f32, voting as f32, p);
+            cluster.record_evidence = evidence(votes as f32, voting as f32, p);
         }
-        crowd.record_excess = votes as f32 - p * voting as f32;
-        crowd
+        cluster.record_excess = votes as f32 - p * voting as f32;
+        cluster
     }
 
-    /// The `crowd` of a slot, with what its members say: `evidence` is that of all slots.
-    fn with_members(&self, slot: usize, mut crowd: Crowd, evidence: &[f32]) -> Crowd {
-        if crowd.evidence <= 0.0 {
-            return crowd;
+    /// The `cluster` of a slot, with what its members say: `evidence` is that of all slots.
+    fn with_members(&self, slot: usize, mut cluster: Cluster, evidence: &[f32]) -> Cluster {
+        if cluster.evidence <= 0.0 {
+            return cluster;
         }
         let x = self.places.of(slot);
-        let reach2 = crowd.radius * crowd.radius * (1.0 + 1e-6);
+        let reach2 = cluster.radius * cluster.radius * (1.0 + 1e-6);
         let (mut n, mut sum, mut listed, mut listing) = (0u32, 0.0, 0u32, 0u32);
         let (ends, class) = self.graph.of(slot);
         for (&end, &class) in ends.iter().zip(class) {
@@ -279,9 +282,9 @@ impl<const D: usize, P: Pieces<D>> Surroundings<'_, D, P> {
                 listing += u32::from(side(class) != Side::Forward);
             }
         }
-        crowd.of_members = sum / n.max(1) as f32;
-        crowd.one_sided = libm::logf((listed + 1) as f32 / (listing + 1) as f32);
-        crowd
+        cluster.of_members = sum / n.max(1) as f32;
+        cluster.one_sided = libm::logf((listed + 1) as f32 / (listing + 1) as f32);
+        cluster
     }
 }
 

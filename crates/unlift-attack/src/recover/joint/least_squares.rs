@@ -1,4 +1,4 @@
-//! A refined place: least squares to the records of the neighbors found near it.
+//! A least_squares place: least squares to the records of the neighbors found near it.
 
 use crate::recover::joint::votes::Columns;
 use crate::recover::map::lines::{LANES, Lanes, fill};
@@ -32,13 +32,13 @@ impl<const D: usize> Sums<D> {
         free: [[[0.0; LANES]; D]; D],
     };
 
-    /// Over the neighbors of `near` within `1 / sqrt(inverse_kernel2)` of `x`.
+    /// Over the neighbors of `near` within `1 / sqrt(inverse_reach2)` of `x`.
     #[inline(always)]
     fn new(
         near: &Columns<D>,
         directions: &Directions<D>,
         x: &[f32; D],
-        (inverse_kernel2, (gain, inverse_a2), doubt): (f32, (f32, f32), f32),
+        (inverse_reach2, (gain, inverse_a2), half_weight_ratio): (f32, (f32, f32), f32),
     ) -> Self {
         let mut sums = Self::ZERO;
         let odds = near.odds.as_chunks::<LANES>().0;
@@ -54,12 +54,12 @@ impl<const D: usize> Sums<D> {
                     r2 += away[c] * away[c];
                     along += toward[c] * away[c];
                 }
-                let closeness = (1.0 - r2 * inverse_kernel2).max(0.0);
+                let closeness = (1.0 - r2 * inverse_reach2).max(0.0);
                 let q = 1.0 / (1.0 + r2 * inverse_a2);
                 let likelier = odds[i][lane] * gain * (q * q * q);
                 sums.n[lane] += u32::from(closeness > 0.0);
                 // Estimates that are near by chance count less: on a small map half of all are near.
-                let closeness = closeness * likelier / (doubt + likelier);
+                let closeness = closeness * likelier / (half_weight_ratio + likelier);
                 sums.weight[lane] += closeness;
                 for r in 0..D {
                     let held = closeness * toward[r];
@@ -75,11 +75,11 @@ impl<const D: usize> Sums<D> {
     }
 }
 
-/// `x` moved along `own` to the least squares of the records of near neighbors, weighted by how near their
+/// `x` step along `own` to the least squares of the records of near neighbors, weighted by how near their
 /// estimates are, and the number of these records. Estimates hold fully across their own pieces, and
-/// a little along them. `at` tells the kernel, the distribution and the doubt at a place.
+/// a little along them. `at` tells the kernel, the distribution and the half_weight_ratio at a place.
 #[inline(always)]
-pub(super) fn refined<const D: usize, P: Pieces<D>>(
+pub(super) fn least_squares<const D: usize, P: Pieces<D>>(
     pieces: &P,
     places: &Places<D>,
     own: &Piece<D>,
@@ -99,14 +99,14 @@ pub(super) fn refined<const D: usize, P: Pieces<D>>(
             1 => n,
             _ => near.n_pairs(&x, weights.0),
         };
-        x = own.project(&moved::<D, P>(own, &x, &sums, n));
+        x = own.project(&step::<D, P>(own, &x, &sums, n));
     }
     (x, records)
 }
 
 /// One step of least squares.
 #[inline(always)]
-fn moved<const D: usize, P: Pieces<D>>(
+fn step<const D: usize, P: Pieces<D>>(
     own: &Piece<D>,
     x: &[f32; D],
     sums: &Sums<D>,
@@ -117,15 +117,15 @@ fn moved<const D: usize, P: Pieces<D>>(
     let mut pull = sums.pull.map(|lanes| total(&lanes));
     // The part of neighbors that is free along their pieces: lines, or all but the normals of planes.
     let (whole, sign) = if P::NORMAL { (1.0, -1.0) } else { (0.0, 1.0) };
-    let free_share = 1.0 - P::MOST_ALONG.min(P::ALONG / n.max(1) as f32);
+    let free_fraction = 1.0 - P::MOST_ALONG.min(P::ALONG / n.max(1) as f32);
     let mut hold = [[0.0f32; D]; D];
     for (r, row) in hold.iter_mut().enumerate() {
         for (c, value) in row.iter_mut().enumerate() {
             let free = sign * total(&sums.free[r.min(c)][r.max(c)]);
-            *value = -free_share * if r == c { free + whole * weight } else { free };
+            *value = -free_fraction * if r == c { free + whole * weight } else { free };
         }
         row[r] += weight;
-        pull[r] -= free_share * (whole * pull[r] + sign * total(&sums.free_pull[r]));
+        pull[r] -= free_fraction * (whole * pull[r] + sign * total(&sums.free_pull[r]));
     }
     solve_within(own, x, &hold, &pull, weight)
 }
