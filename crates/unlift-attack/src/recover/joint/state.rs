@@ -1,4 +1,4 @@
-//! What changes from iteration to iteration: estimates, and what is learned from them.
+//! The state of joint recovery: estimates, what is learned from them, and the rule that ends iterations.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -15,61 +15,62 @@ use crate::recover::map::places::{Places, distance2};
 use crate::recover::result::{Estimate, Status};
 use crate::simd::{Kernel, dispatch};
 
-/// The radius is at least this share of the largest coordinate: estimates of one place differ by rounding.
+/// Least radius, as a fraction of the largest coordinate: estimates of the same place differ by rounding.
 const ROUNDING: f32 = 8.0 * f32::EPSILON;
-/// The density of estimates is smoothed over this many radii, so that it does not follow the crowds that it judges.
+/// Smoothing width of the density of estimates, in radii: wide, so that a few estimates at one place hardly change it.
 const SMOOTH: f32 = 4.5;
-/// A slot that did not jump is updated again if its place is margin by at most this many nats per
-/// neighbor that did in one iteration. One jump can weigh more than that, but some speak for the place, too.
+/// A slot is updated again once its margin is below this many nats per jump of a neighbor. One jump can change the score by more,
+/// but some jumps confirm the place.
 const MARGIN_PER_JUMP: f32 = 2.0;
-/// Iterations end when fewer than this share of the slots jump farther than a radius: so few hardly change anything.
+/// Iterations end when fewer than this fraction of the slots jump.
 const SETTLED: f64 = 0.03;
-/// Distribution and density are learned again when more than this share of the slots jumped since. Learned once per
-/// iteration, maps of paired lines and of planes come back worse.
+/// Distribution and density are learned again after more than this fraction of the slots have jumped. Learning once per
+/// iteration makes maps of paired lines and of planes worse.
 const STALE: f64 = 0.02;
-/// Iterations end when this share of those that moved before move again: estimates go to and fro.
+/// Iterations end when the number of jumps exceeds this fraction of the number in the iteration before.
 const SLOW: f64 = 0.9;
-/// Iterations end when records agree by this share less than they did at best: a little less is noise.
+/// Iterations end when agreement falls by more than this fraction of its best value; smaller changes are noise.
 const WORSE: f64 = 0.08;
-/// Slots on which agreement is measured: the mean over so many is known better than the share by which it may fall.
+/// Number of slots on which agreement is measured.
 const AGREEMENT_SLOTS: usize = 1 << 12;
-/// Slots whose jumps one thread tells at a time: enough that sharing them out costs nothing.
+/// Least number of jumps per parallel task.
 const JUMPS_PER_THREAD: usize = 64;
 
-/// The state of joint recovery.
+/// Estimates of all slots and everything learned from them.
 pub(super) struct State<const D: usize> {
-    /// The best estimates of whole iterations.
+    /// Estimates of the last accepted iteration.
     accepted: Vec<Estimate<D>>,
-    /// The estimates of the iteration under way.
+    /// Estimates of the current iteration.
     estimates: Vec<Estimate<D>>,
-    /// Their places, in the form that updates read.
+    /// Places of `estimates`.
     places: Places<D>,
-    /// The density of estimates `p_random`, and the distribution of true neighbors about a slot.
+    /// `p_random`, and the distribution of true neighbors.
     density: Density<D>,
     neighbors: NeighborDistribution,
     least_radius: f32,
-    /// How many nats each place is margin of the best one elsewhere; 0 where a slot is to be updated in any case.
+    /// Per slot, [`Update::margin`]; 0 if the slot must be updated again.
     margin: Vec<f32>,
-    /// Per slot that is margin, how many jumps of neighbors concern it since it was last its turn.
+    /// Per slot with a margin, the number of relevant jumps of neighbors since its last update.
     jumps_near: Vec<AtomicU32>,
-    /// Slots that jumped in this iteration, in the one before, and since density and distribution were learned.
+    /// Number of jumps in this iteration, in the one before, and since the last learning.
     n_jumped: usize,
     n_jumped_before: usize,
     n_jumped_since_learning: usize,
-    /// How well records agreed at best.
+    /// Largest agreement of an accepted iteration.
     best_agreement: f64,
 }
 
-/// Where a slot goes.
+/// The new estimate of a slot.
 pub(super) struct Update<const D: usize> {
     slot: u32,
-    /// How far this place is margin of the best one elsewhere, in nats; 0 where none is known elsewhere to compare with.
+    /// Score of this place minus the score of the best candidate elsewhere, in nats; without such a candidate, the
+    /// log-likelihood ratio of this place. 0 if the place must be updated again.
     margin: f32,
     estimate: Estimate<D>,
 }
 
 impl<const D: usize> State<D> {
-    /// The state before the first iteration, at `start`.
+    /// Creates the state before the first iteration.
     pub(super) fn new<P: Pieces<D>>(input: &Input<'_, P>, start: Vec<Estimate<D>>) -> Self {
         let n = start.len();
         let places = Places::new(&start);
@@ -86,24 +87,24 @@ impl<const D: usize> State<D> {
             margin: vec![0.0; n],
             jumps_near: (0..n).map(|_| AtomicU32::new(0)).collect(),
             n_jumped: 0,
-            // Nothing is settled yet.
+            // As if all slots had jumped.
             n_jumped_before: n,
             n_jumped_since_learning: 0,
             best_agreement: f64::NEG_INFINITY,
         }
     }
 
-    /// The present places of all slots.
+    /// Current places of all slots.
     pub(super) fn places(&self) -> &Places<D> {
         &self.places
     }
 
-    /// The best estimates of whole iterations.
+    /// Returns the estimates of the last accepted iteration.
     pub(super) fn into_accepted(self) -> Vec<Estimate<D>> {
         self.accepted
     }
 
-    /// Learns density and distribution of the present places, if enough slots jumped since.
+    /// Learns density and distribution from the current places if enough slots have jumped.
     pub(super) fn learn_if_stale<P: Pieces<D>>(&mut self, input: &Input<'_, P>) {
         if self.n_jumped_since_learning as f64 <= STALE * self.estimates.len() as f64 {
             return;
@@ -112,13 +113,13 @@ impl<const D: usize> State<D> {
         (self.density, self.neighbors) =
             learn(input, &self.places, self.neighbors.radius, self.least_radius);
         if self.neighbors.most_imbalance != before {
-            // Leads found under another rule say nothing.
+            // Margins under another bound are not comparable.
             self.margin.fill(0.0);
         }
         self.n_jumped_since_learning = 0;
     }
 
-    /// Where `slots` go: the best of their candidates, refined.
+    /// Computes the new estimates of `slots`: the best of their candidates, refined.
     pub(super) fn propose_score_refine<P: Pieces<D>>(
         &self,
         input: &Input<'_, P>,
@@ -136,8 +137,8 @@ impl<const D: usize> State<D> {
         updates
     }
 
-    /// Moves slots to where they go, and counts for each slot the jumps that concern it: those from or to places near which it may
-    /// lie, of the slots whose edges lead to it.
+    /// Applies `updates`, and counts for each slot the relevant jumps of its neighbors: those from or to a place near the slot's
+    /// feasible set.
     pub(super) fn apply<P: Pieces<D>>(&mut self, input: &Input<'_, P>, updates: &[Update<D>]) {
         let Input { pieces, graph, .. } = input;
         let (radius, slots_per_record) = (self.neighbors.radius, pieces.slots_per_record());
@@ -146,7 +147,7 @@ impl<const D: usize> State<D> {
             let at = *slot as usize;
             let has_jumped = is_jump(&self.estimates[at], estimate, radius);
             self.estimates[at] = *estimate;
-            // Whoever jumped is updated again in any case.
+            // A slot that jumped is updated again in any case.
             self.margin[at] = if has_jumped { 0.0 } else { *margin };
             *self.jumps_near[at].get_mut() = 0;
             if has_jumped {
@@ -167,7 +168,7 @@ impl<const D: usize> State<D> {
             for (&end, &class) in ends.iter().zip(class) {
                 let end = end as usize;
                 let slots = end..=end + usize::from(either(class, slots_per_record));
-                // Both slots of a record lie on one piece. A slot that is not margin is updated in any case.
+                // Both slots of a record lie on one piece. A slot without a margin is updated in any case.
                 let concerns = slots.clone().any(|slot| self.margin[slot] > 0.0)
                     && (may_lie_near(end, &from) || may_lie_near(end, &to));
                 if concerns {
@@ -179,11 +180,11 @@ impl<const D: usize> State<D> {
         });
     }
 
-    /// Judges an iteration: whether it was the last one.
+    /// Accepts or rejects an iteration; returns whether it was the last one.
     pub(super) fn has_converged<P: Pieces<D>>(&mut self, input: &Input<'_, P>) -> bool {
         let n = self.estimates.len();
         if (self.n_jumped as f64) < SETTLED * n as f64 {
-            // So few hardly made it worse.
+            // So few jumps hardly change agreement.
             self.accepted.clone_from(&self.estimates);
             return true;
         }
@@ -202,7 +203,7 @@ impl<const D: usize> State<D> {
     }
 }
 
-/// Density and distribution of `places`, with neighbors looked for as if `radius` were that of the distribution.
+/// Learns density and distribution from `places`; neighbors are counted within a multiple of `radius`.
 fn learn<const D: usize, P: Pieces<D>>(
     input: &Input<'_, P>,
     places: &Places<D>,
@@ -214,7 +215,7 @@ fn learn<const D: usize, P: Pieces<D>>(
     (density, neighbors)
 }
 
-/// Whether a slot is elsewhere, farther than neighbors lie.
+/// Whether the move from `a` to `b` is a jump: farther than `radius`, or another status.
 fn is_jump<const D: usize>(a: &Estimate<D>, b: &Estimate<D>, radius: f32) -> bool {
     a.status != b.status || distance2(&a.position, &b.position) > radius * radius
 }
@@ -222,7 +223,7 @@ fn is_jump<const D: usize>(a: &Estimate<D>, b: &Estimate<D>, radius: f32) -> boo
 struct Chunk<'a, 'b, const D: usize, P> {
     context: &'a Context<'b, D, P>,
     state: &'a State<D>,
-    /// Slots with their old estimates, which become the new ones.
+    /// Slots with their old estimates, which are replaced by new ones.
     updates: &'a mut [Update<D>],
     scratch: &'a mut Scratch<D>,
 }
@@ -250,10 +251,10 @@ impl<const D: usize, P: Pieces<D>> Kernel for Chunk<'_, '_, D, P> {
     }
 }
 
-/// The mean number of records at the other ends of a slot's edges that pass near its estimate, less
-/// that expected by chance; over slots spread evenly.
+/// Returns the mean number of records at the ends of a slot's edges that pass within delta of its estimate, minus the number
+/// expected by chance.
 ///
-/// Estimates that agree with each other prove nothing: they may have drifted together. Records cannot drift.
+/// Agreement is measured on records, because neighboring estimates can drift together and still agree with each other.
 fn agreement<const D: usize, P: Pieces<D>>(input: &Input<'_, P>, estimates: &[Estimate<D>]) -> f64 {
     let Input { pieces, graph, delta, .. } = input;
     let of_slot = |&slot: &usize| {

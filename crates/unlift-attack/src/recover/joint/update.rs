@@ -1,4 +1,4 @@
-//! One slot in one iteration: candidates from the estimates of neighbors, the likeliest of them, refined.
+//! The update of one slot in one iteration: propose candidates, score them, refine the best one.
 
 use crate::recover::joint::input::Input;
 use crate::recover::joint::least_squares::{Directions, least_squares};
@@ -12,39 +12,39 @@ use crate::recover::map::pieces::{Piece, Pieces};
 use crate::recover::map::places::{Places, distance2};
 use crate::recover::result::{Estimate, Status};
 
-/// Estimates farther from a piece than this many radii of the distribution say nothing about it.
+/// Estimates farther from a piece than this many radii are ignored.
 pub(super) const TUBE: f32 = 6.0;
-/// Estimates within this many radii of the center of a ray are near all of its rays. They would draw others there, as nothing
-/// tells them apart.
+/// Estimates within this many radii of the center of a ray are ignored: they are close to all rays of that center, so that a few
+/// wrong ones would draw many slots there.
 const CENTER_RADIUS: f32 = 3.0;
-/// Estimates enter the refined position within this many radii, less the farther they are.
+/// Least squares uses estimates within this many radii, with less weight the farther they are.
 const LEAST_SQUARES_RADIUS: f32 = 3.75;
-/// Candidates per piece: about as many as hold so many true neighbors' estimates,
+/// Candidates per piece are chosen so that about this many are estimates of true neighbors.
 const TRUE_CANDIDATES: f32 = 5.0;
-/// but so many at least and at most.
+/// Least and largest number of such candidates per piece.
 const CANDIDATES: (f32, f32) = (8.0, 16.0);
-/// Room for all candidates and the old estimate, in whole vectors.
+/// Capacity for all candidates and the old estimate, in whole vectors.
 const ROOM: usize = 24;
-/// Records decide between the best candidates that lie within this many nats of each other.
+/// If the scores of the best two candidates differ by less than this many nats, their records decide.
 const TIE_MARGIN: f32 = 8.0;
-/// The share of neighbors whose estimate is taken to be wrong though their record is near: what a record may still add.
+/// Assumed fraction of true neighbors whose record passes near the point but whose estimate is wrong.
 const WRONG_ESTIMATES: f32 = 0.2;
-/// The weight of the density prior: candidates are estimates, which already lie where density is large.
+/// Weight of the density prior. It is below 1 because candidates are estimates, which already lie where density is large.
 const PRIOR: f32 = 0.5;
-/// So many places (8 MB) stay in the cache and need no prefetching.
+/// Largest number of places (8 MB) that stay in the cache and need no prefetching.
 const CACHED: usize = 1 << 19;
 
-/// Everything that an update of a slot reads.
+/// The data that an update reads.
 pub(super) struct Context<'a, const D: usize, P> {
     pub(super) input: &'a Input<'a, P>,
     pub(super) places: &'a Places<D>,
     pub(super) density: &'a Density<D>,
     pub(super) neighbors: &'a NeighborDistribution,
-    /// Per class, as in [`Odds`].
+    /// Per class, see [`Odds::of_class`].
     pub(super) odds: [(f32, f32); CLASSES],
 }
 
-/// A position that could win.
+/// A candidate position and its score.
 #[derive(Clone, Copy, Debug)]
 struct Candidate<const D: usize> {
     x: [f32; D],
@@ -56,7 +56,7 @@ struct Candidate<const D: usize> {
 /// Buffers of one thread.
 pub(super) struct Scratch<const D: usize> {
     all: Ends<D>,
-    /// Per piece.
+    /// One per piece.
     near: [Columns<D>; D],
     directions: Directions<D>,
     candidates: Vec<Candidate<D>>,
@@ -71,18 +71,18 @@ impl<const D: usize> Default for Scratch<D> {
 }
 
 impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
-    /// Prefetches the places that [`solve`](Self::solve) looks at.
+    /// Prefetches the places that [`solve`](Self::solve) reads.
     #[inline(always)]
     pub(super) fn prefetch(&self, slot: usize) {
         if self.places.len() > CACHED {
-            // The other slot of a record lies beside the one that is named.
+            // The other slot of a record is next to the one in the edge.
             let ends = self.input.graph.of(slot).0.iter();
             ends.for_each(|&end| self.places.prefetch(end as usize));
         }
     }
 
-    /// The new estimate of `slot`, and how many nats its place is margin of the best one elsewhere; the
-    /// old estimate when no neighbor says anything.
+    /// Returns the new estimate of `slot` and its margin in nats, see [`Update::margin`](super::state::Update). Without nearby
+    /// estimates it returns the old estimate and 0.
     #[inline(always)]
     pub(super) fn solve(
         &self,
@@ -124,7 +124,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         (found(x, support, first.piece, (first.score - first.prior).max(0.0)), margin)
     }
 
-    /// The odds of the edges of `slot`.
+    /// Returns the odds of the edges of `slot`.
     #[inline(always)]
     fn odds(&self, slot: usize) -> Odds<'_, D> {
         let (of_class, other) = (&self.odds, slot ^ 1);
@@ -136,7 +136,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         Odds { of_class, partner: [0.0; D], gain: 0.0, inverse_a2: 0.0 }
     }
 
-    /// The distribution of neighbors where the density is `density`: the gain of an estimate on the spot, and `1 / a^2`.
+    /// Returns the distribution of neighbors at a place of this density: `gain = p_true(0) / p_random`, and `1 / a^2`.
     #[inline(always)]
     fn distribution(&self, density: f32) -> (f32, f32) {
         let width = self.density.width(density);
@@ -144,7 +144,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         (gain, self.neighbors.inverse_a2 / (width * width))
     }
 
-    /// The volume of a cube of the local width.
+    /// Returns the volume of a cube whose edge is the local width.
     #[inline(always)]
     fn volume(&self, density: f32) -> f32 {
         let width = self.density.width(density);
@@ -155,7 +155,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         volume
     }
 
-    /// Adds the candidates of one piece: neighbors' estimates, and the old one.
+    /// Adds the candidates of one piece: projected estimates of neighbors, and the old estimate.
     #[inline(always)]
     fn propose(
         &self,
@@ -179,7 +179,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         if old.status == Status::Ok && usize::from(old.axis) == piece {
             add(old.position);
         }
-        // All of the room is computed: no remainder keeps the loop from running over whole vectors.
+        // All capacity is computed, so the loop runs over whole vectors.
         let (mut cells, mut density) = ([0; ROOM], [0.0; ROOM]);
         let columns = tried.each_ref().map(|column| &column[..n]);
         self.density.at_each(&columns, &mut cells[..n], &mut density[..n]);
@@ -201,8 +201,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         }
     }
 
-    /// The likeliest candidate, and how far it is margin of the best one elsewhere. Where others come
-    /// close, records decide whose estimates are astray.
+    /// Returns the best candidate and its margin. If the second best is close, the records decide between the two.
     #[inline(always)]
     fn winner(&self, slot: usize, candidates: &[Candidate<D>]) -> Option<(Candidate<D>, f32)> {
         let mut best = *candidates.first()?;
@@ -231,7 +230,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         Some((best, margin))
     }
 
-    /// What records near two places add where their estimates are elsewhere.
+    /// Returns what records add to the scores of two places: records pass within delta, but their estimates may be elsewhere.
     #[inline(always)]
     fn record_scores(&self, slot: usize, x: [[f32; D]; 2]) -> [f32; 2] {
         let Input { pieces, graph, delta, .. } = self.input;
