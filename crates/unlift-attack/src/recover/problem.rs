@@ -20,7 +20,6 @@ use crate::recover::{confidence, consensus, delta, exact, joint};
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, Fingerprint};
 
-/// A map to recover by one solver.
 pub(super) struct Problem<'a, const D: usize> {
     released: &'a Released<D>,
     map: Fingerprint,
@@ -32,7 +31,6 @@ pub(super) struct Problem<'a, const D: usize> {
     trials: TrialCounts,
 }
 
-/// The data that the solver reads.
 enum Records<'a, const D: usize> {
     /// For attacks on the records alone: the peak of each slot.
     Alone(Peaks),
@@ -107,8 +105,7 @@ impl<'a, const D: usize> Problem<'a, D> {
         Ok((delta, Records::Listed { family, graph, both_ways }))
     }
 
-    /// Returns what was learned of the map.
-    /// Fails when the solver is not one that reads lists.
+    /// Fails when the solver does not read lists.
     pub(super) fn model(&self) -> Result<Model<D>, Error> {
         let Records::Listed { family, .. } = &self.records else {
             return Err(Error::new(
@@ -121,7 +118,6 @@ impl<'a, const D: usize> Problem<'a, D> {
         Ok(Model { options: self.options, about: self.about(), map, delta, chance })
     }
 
-    /// Number of slots.
     pub(super) fn n_slots(&self) -> usize {
         self.released.n_slots()
     }

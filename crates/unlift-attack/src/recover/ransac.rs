@@ -25,18 +25,15 @@ const CONFIDENCE: f64 = 0.99;
 /// Records per sample and unknown coordinate.
 const SAMPLE: u32 = 2;
 
-/// The sampling loop over one map.
 pub(crate) struct Ransac<'a, const D: usize> {
     pub(crate) family: &'a Family<'a, D>,
     pub(crate) lists: &'a Neighborhoods,
     pub(crate) delta: f32,
     pub(crate) seed: u64,
-    /// Histogram of trials per slot.
     pub(crate) trials: &'a TrialCounts,
 }
 
 impl<const D: usize> Ransac<'_, D> {
-    /// Returns the estimates of `slots`, in order.
     pub(crate) fn solve(&self, slots: Range<usize>) -> Vec<Estimate<D>> {
         let axes = match self.family {
             Family::Candidates { rows, .. } => vote(rows, self.lists),

@@ -83,7 +83,6 @@ impl<'a, const D: usize> Placement<'a, D> {
         Self { rows, slots_per_record: released.slots_per_record(), lists, peaks }
     }
 
-    /// Returns the estimates of `slots`, in order.
     pub(super) fn solve(&self, slots: Range<usize>) -> Vec<Estimate<D>> {
         let reach = delta(self.peaks) as f32;
         let place = |slot: usize| {
@@ -99,7 +98,6 @@ impl<'a, const D: usize> Placement<'a, D> {
         slots.into_par_iter().map(place).collect()
     }
 
-    /// Returns the estimate at the peak of `slot`.
     fn peak(&self, slot: usize) -> Estimate<D> {
         let Some(peak) = self.peaks.of[slot] else {
             return Estimate::lost(Status::NoSupport);
@@ -117,7 +115,6 @@ impl<'a, const D: usize> Placement<'a, D> {
         cost(a, a) + cost(b, b) > cost(b, a) + cost(a, b)
     }
 
-    /// Returns the distances of `x` from the records that `slot` lists.
     fn distances(&self, slot: usize, x: &[f32; D]) -> impl Iterator<Item = f32> {
         self.lists.of(slot).iter().map(move |record| {
             let row = &self.rows[record.index()];

@@ -1,8 +1,8 @@
-//! The cues of every slot: pure numbers that tell right estimates from wrong ones.
+//! The cues of every slot: dimensionless features that separate right estimates from wrong ones.
 //!
-//! Around a right estimate the estimates of listed records form a cluster, and more listed records pass than by chance. The same
-//! measures over the whole map tell how well recovery went at all, which no slot shows alone: estimates that drifted
-//! together agree with each other.
+//! Around a right estimate, the estimates of listed records form a cluster, and more listed records pass than by chance. Means of
+//! these measures over the whole map are cues, too: estimates that drifted together agree with each other, which only the whole
+//! map shows.
 
 use rayon::prelude::*;
 
@@ -13,74 +13,73 @@ use crate::recover::map::pieces::Pieces;
 use crate::recover::map::places::{Places, along_curve, distance2};
 use crate::recover::result::{Estimate, Status};
 
-/// A cluster reaches no farther than where chance expects this share of the listed estimates.
+/// A cluster ends where the expected number of listed estimates by chance reaches this fraction.
 const MOST_CHANCE: f32 = 0.3;
-/// The density of estimates is smoothed over this many deltas, so that it does not follow the clusters that it judges.
+/// Smoothing width of the density of estimates, in deltas: wide, so that one cluster hardly changes it.
 const SMOOTH: f32 = 4.0;
-/// Ratios below this count as this: a logarithm needs a floor.
+/// Smaller ratios are raised to this before a logarithm.
 const LEAST_RATIO: f32 = 1e-3;
-/// The typical radius is taken from about this many clusters.
+/// Number of clusters from which the typical radius is computed.
 const RADII: usize = 1 << 14;
 
 /// Number of cues.
 pub const N_CUES: usize = 20;
 
-/// The cues of one slot, in the order in which the constants of the model were fitted.
+/// The cues of one slot, in the order in which the model was fitted.
 pub type Cues = [f32; N_CUES];
 
-/// What the attacker sees around every slot.
+/// The features of confidence of a recovered map.
 #[derive(Clone, Debug)]
 pub struct Seen {
-    /// Per slot.
+    /// Cues per slot.
     pub cues: Vec<Cues>,
-    /// The typical radius of clusters, in the unit of the map: errors scale with it.
+    /// Typical radius of clusters, in the unit of the map; errors scale with it.
     pub radius: f64,
-    /// The kind of the records, below [`N_KINDS`](super::N_KINDS): each has a model of its own.
+    /// Kind of records, below [`N_KINDS`](super::N_KINDS); each has its own model.
     pub kind: usize,
 }
 
 impl Seen {
-    /// Nobody looked.
+    /// The value where features were not computed.
     pub(crate) const NOTHING: Self = Self { cues: Vec::new(), radius: 1.0, kind: 0 };
 }
 
-/// What recovery found.
 pub(crate) struct Solved<'a, const D: usize> {
     pub(crate) estimates: &'a [Estimate<D>],
-    /// The estimates before exact constraints moved them.
+    /// Estimates before exact constraints moved them.
     pub(crate) unsettled: &'a [Estimate<D>],
     pub(crate) delta: f32,
 }
 
-/// The listed estimates that cluster around one estimate.
+/// The cluster of listed estimates (members) around one estimate.
 #[derive(Clone, Copy, Debug, Default)]
 struct Cluster {
-    /// How improbable the cluster is by chance, in nats, at the radius that makes it least probable.
+    /// Largest improbability by chance over all radii, in nats, and the radius where it is reached.
     evidence: f32,
     radius: f32,
-    /// Members beyond those expected by chance.
+    /// Number of members beyond chance.
     excess: f32,
-    /// How far its middle is off the estimate, along and across the piece, per radius.
+    /// Distance of the mean of the members from the estimate, along and across the piece, in radii.
     off: [f32; 2],
     /// Evidence and excess of listed records that pass within delta.
     record_evidence: f32,
     record_excess: f32,
-    /// Records that could have voted.
+    /// Number of listed records that may vote.
     listed: f32,
-    /// The share of members whose records may vote.
+    /// Fraction of the members whose records may vote.
     voting_fraction: f32,
-    /// How far exact constraints moved the estimate, if they did.
+    /// Distance by which exact constraints moved the estimate, if they did.
     settled: Option<f32>,
-    /// The mean of `ln(1 + evidence)` over the members.
+    /// Mean of `ln(1 + evidence)` over the members.
     of_members: f32,
-    /// The logarithm of how many more members the slot lists than list it: look-alikes agree on a wrong place, but
-    /// those who are there do not list back.
+    /// Logarithm of the number of members that the slot lists over the number that list it. Wrong members with similar descriptors
+    /// rarely list the slot.
     one_sided: f32,
-    /// The logarithm of how much sparser estimates are than at a typical place.
+    /// Logarithm of the typical density of estimates over the density here.
     sparsity: f32,
 }
 
-/// The cues of every slot, and the typical radius of clusters, which scales predicted errors.
+/// Returns the cues of every slot and the typical radius of clusters.
 pub(super) fn of_slots<const D: usize, P: Pieces<D>>(
     pieces: &P,
     graph: &Graph,
@@ -109,7 +108,7 @@ pub(super) fn of_slots<const D: usize, P: Pieces<D>>(
     of_map(&clusters, delta)
 }
 
-/// A cluster for each slot, in order of slots. They are made in a given order, in which neighbors find each other in the cache.
+/// Computes a cluster per slot, in the cache-friendly `order`; returns them in the order of slots.
 fn by_slot(
     order: &[u32],
     of: impl Fn(&mut Vec<(u32, u32)>, usize) -> Cluster + Send + Sync,
@@ -123,7 +122,7 @@ fn by_slot(
     clusters
 }
 
-/// The cues of `clusters`, one per slot, and their typical radius.
+/// Returns the cues of `clusters`, one per slot, and the typical radius.
 fn of_map(clusters: &[Cluster], delta: f32) -> (Vec<Cues>, f32) {
     let sum = |of: fn(&Cluster) -> f32| {
         clusters.iter().map(|cluster| f64::from(of(cluster))).sum::<f64>()
@@ -165,7 +164,7 @@ fn of_map(clusters: &[Cluster], delta: f32) -> (Vec<Cues>, f32) {
     (clusters.par_iter().map(cues).collect(), radius)
 }
 
-/// The median radius of clusters, each weighted by its evidence.
+/// Returns the median radius of clusters, weighted by evidence.
 fn typical_radius(clusters: &[Cluster]) -> Option<f32> {
     let sample = clusters.iter().step_by(clusters.len().div_ceil(RADII).max(1));
     let mut radii: Vec<(f32, f32)> = sample
@@ -182,7 +181,6 @@ fn typical_radius(clusters: &[Cluster]) -> Option<f32> {
     radii.iter().find(is_half).map(|one| one.0)
 }
 
-/// What slots are looked at with.
 struct Surroundings<'a, const D: usize, P> {
     pieces: &'a P,
     graph: &'a Graph,
@@ -192,11 +190,11 @@ struct Surroundings<'a, const D: usize, P> {
 }
 
 impl<const D: usize, P: Pieces<D>> Surroundings<'_, D, P> {
-    /// The cluster of a slot; what its members say of themselves is still open. `near` is a buffer.
+    /// Returns the cluster of a slot; [`with_members`](Self::with_members) adds the cues of its members.
     fn cluster(&self, slot: usize, own: &Estimate<D>, near: &mut Vec<(u32, u32)>) -> Cluster {
         let x = own.position;
         let density = self.density.at(&x);
-        // Chance expects `rate * r^D` of the listed estimates within r, for one or either slot of a record.
+        // By chance, the fraction `rate * r^D` of the listed estimates lies within r, per slot of a record.
         let rate = density * ball::<D>();
         let reach2 = libm::powf(MOST_CHANCE / rate, 2.0 / D as f32);
         near.clear();
@@ -208,7 +206,7 @@ impl<const D: usize, P: Pieces<D>> Surroundings<'_, D, P> {
             let (d2, at) = self.places.nearest(end, either, &x);
             rates += if either { 2.0 * rate } else { rate };
             if d2 < reach2 {
-                // The bits of a distance sort as it does; then by slot, so that the order is the same everywhere.
+                // The bits of a distance sort as the distance does; ties sort by slot.
                 near.push((d2.to_bits(), at as u32));
             }
             let record = record_of(end as usize, slots_per_record);
@@ -263,7 +261,7 @@ impl<const D: usize, P: Pieces<D>> Surroundings<'_, D, P> {
         cluster
     }
 
-    /// The `cluster` of a slot, with what its members say: `evidence` is that of all slots.
+    /// Adds the cues of the members to `cluster`; `evidence` has one value per slot.
     fn with_members(&self, slot: usize, mut cluster: Cluster, evidence: &[f32]) -> Cluster {
         if cluster.evidence <= 0.0 {
             return cluster;
@@ -288,13 +286,11 @@ impl<const D: usize, P: Pieces<D>> Surroundings<'_, D, P> {
     }
 }
 
-/// The volume of the unit ball.
 fn ball<const D: usize>() -> f32 {
     use std::f32::consts::PI;
     if D == 2 { PI } else { 4.0 / 3.0 * PI }
 }
 
-/// `r^D` from a squared radius.
 #[inline(always)]
 fn power<const D: usize>(d2: f32) -> f32 {
     if D == 2 { d2 } else { d2 * d2.sqrt() }

@@ -1,8 +1,8 @@
-//! How sure the attacker can be of each recovered point, from attacker-side data alone.
+//! Confidence: the probability that an estimate is right, predicted without ground truth.
 //!
-//! After joint recovery `crowd.rs` measures around every slot how much better than by chance estimates and records agree. A
-//! logistic model turns these cues into the probability that the right place was found, and a scale of its error. Its constants
-//! come from synthetic rooms (`examples/fit_confidence.rs`), never from a real map.
+//! After joint recovery, `cues.rs` measures around every slot how much better than by chance estimates and records agree. A logistic
+//! model turns these cues into the probability that the right place was found and into a scale of its error. Its constants
+//! were fitted on synthetic rooms (`examples/fit_confidence.rs`), never on a real map.
 
 mod constants;
 pub(super) mod cues;
@@ -23,7 +23,7 @@ use crate::recover::result::{Confidence, Estimate, Status, Unknown};
 use crate::recover::solver::Builtin;
 use crate::released::{Obfuscation, Rays, Released};
 
-/// Why nobody looks how sure the attacker is, if `options` or the kind of map say so.
+/// Returns why confidence is not computed, if options, solver or dimension say so.
 pub(super) fn not_asked<const D: usize>(
     solver: Builtin,
     options: &RecoverOptions,
@@ -36,7 +36,7 @@ pub(super) fn not_asked<const D: usize>(
     }
 }
 
-/// How sure the attacker is of every slot of joint recovery, and the cues that say so.
+/// Predicts the confidence of every slot after joint recovery; also returns the cues.
 pub(super) fn predict<const D: usize>(
     family: &Family<'_, D>,
     graph: &Graph,
@@ -69,7 +69,7 @@ pub(super) fn predict<const D: usize>(
     (sure, Seen { cues, radius: f64::from(radius), kind })
 }
 
-/// What `cues` say about one slot; lengths are multiples of `radius`.
+/// Predicts the confidence of one slot from its cues. Errors are in units of `radius`.
 fn predict_slot(model: &Model, cues: &Cues, radius: f32) -> Confidence {
     let terms = centered(terms(cues), &CENTER, &SPREAD);
     let sum =
@@ -78,20 +78,18 @@ fn predict_slot(model: &Model, cues: &Cues, radius: f32) -> Confidence {
     Confidence { found: 1.0 / (1.0 + libm::expf(-sum(&model.found))), scale }
 }
 
-/// A list has at most as many entries as this share of all hidden points in the maps that the model was fitted on.
+/// Longest mean list, as a fraction of all hidden points, in the maps on which the model was fitted.
 const MOST_LISTED: f64 = 0.01;
 
-/// A map is flat whose smallest extent is at most this share of its largest one.
+/// A map is flat if its smallest extent is at most this fraction of its largest one.
 const FLAT: f64 = 0.01;
 
-/// Points fall together where at least this share of all rays has another one in its place. Of points that differ this
-/// hardly ever happens by rounding.
+/// Points coincide if at least this fraction of all rays equals another ray. Different points hardly ever have equal rays.
 const COINCIDENT: f64 = 0.5;
 
-/// Why the model says nothing that comes true about maps recovered from `lists`, if so.
+/// Returns why the model does not apply to maps recovered from `lists`, if so.
 ///
-/// On smaller maps, on flat ones and on those of which most points fall together, and with lists that sources make, a tenth
-/// to nine tenths of those called 90 % sure were right.
+/// In these cases, one tenth to nine tenths of the estimates with a predicted probability of 90 % were right.
 pub(crate) fn unknown<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
@@ -109,14 +107,14 @@ pub(crate) fn unknown<const D: usize>(
         Some(Unknown::SmallMap)
     } else if matches!(released.obfuscation(), Obfuscation::Rays(rays) if twins(rays) >= COINCIDENT)
     {
-        // Records of other families are drawn anew for every point, or for a pair.
+        // Other records are drawn at random, so that coinciding points do not have equal records.
         Some(Unknown::Coincident)
     } else {
         (flatness(&places()) <= FLAT).then_some(Unknown::Flat)
     }
 }
 
-/// Share of the rays of which there is another one, bit for bit.
+/// Returns the fraction of rays that equal another ray bit for bit.
 fn twins<const D: usize>(rays: &Rays<D>) -> f64 {
     let bits = |row: usize| (rays.center()[row], rays.direction()[row].map(f32::to_bits));
     let mut rows: Vec<_> = (0..rays.len()).into_par_iter().map(bits).collect();
@@ -125,27 +123,25 @@ fn twins<const D: usize>(rays: &Rays<D>) -> f64 {
     same.sum::<usize>() as f64 / rays.len().max(1) as f64
 }
 
-/// Kinds of records that are calibrated apart: lines, paired lines, rays, axis planes, axis candidates.
+/// Kinds of records with separate models: lines, paired lines, rays, axis planes, axis candidates.
 pub const N_KINDS: usize = 5;
 
-/// Number of products of two cues that count too.
 const N_PRODUCTS: usize = 27;
 
-/// Number of terms: the constant, the cues, and the products.
+/// Number of terms: the constant, the cues and the products.
 pub const N_TERMS: usize = 1 + N_CUES + N_PRODUCTS;
 
-/// Terms farther than this many spreads from the center count as that far: nothing was seen there.
+/// Terms are clipped at this many standard deviations, because the fit saw no others.
 const FARTHEST: f32 = 4.0;
 
-/// The weights of one kind of record.
+/// Weights of the terms for one kind of records.
 pub(super) struct Model {
-    /// Of the logit of the right place.
+    /// For the logit of the probability that the estimate is right.
     pub(super) found: [f32; N_TERMS],
-    /// Of the logarithm of the error scale per typical radius of crowds.
+    /// For the logarithm of the error scale in units of the typical radius.
     pub(super) scale: [f32; N_TERMS],
 }
 
-/// The products of two cues that count too: what one says depends on the other, or bends.
 fn products(cues: &Cues) -> [f32; N_PRODUCTS] {
     let [evidence, _, ln_radius, record_evidence, _, _, _, of_members, sparsity, map_evidence, ..] =
         *cues;
@@ -194,7 +190,7 @@ fn products(cues: &Cues) -> [f32; N_PRODUCTS] {
     ]
 }
 
-/// A constant, the cues and their products, before they are centered.
+/// Returns the constant, the cues and their products, not yet centered.
 pub fn terms(cues: &Cues) -> [f32; N_TERMS] {
     let mut terms = [1.0; N_TERMS];
     terms[1..=N_CUES].copy_from_slice(cues);
@@ -202,7 +198,7 @@ pub fn terms(cues: &Cues) -> [f32; N_TERMS] {
     terms
 }
 
-/// Terms centered and scaled, none too far; the constant stays 1.
+/// Centers, scales and clips terms; the constant stays 1.
 pub fn centered(terms: [f32; N_TERMS], center: &[f32], spread: &[f32]) -> [f32; N_TERMS] {
     let far = |at: usize| ((terms[at] - center[at]) / spread[at]).clamp(-FARTHEST, FARTHEST);
     std::array::from_fn(|at| if at == 0 { 1.0 } else { far(at) })

@@ -106,7 +106,6 @@ pub(super) fn least_squares<const D: usize, P: Pieces<D>>(
     (x, records)
 }
 
-/// Returns `x` after one least-squares step.
 #[inline(always)]
 fn step<const D: usize, P: Pieces<D>>(
     own: &Piece<D>,

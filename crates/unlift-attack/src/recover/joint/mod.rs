@@ -38,7 +38,6 @@ use crate::recover::map::pieces::{CandidatePieces, LinePieces, Pieces, PlanePiec
 use crate::recover::map::places::along_curve;
 use crate::recover::result::Estimate;
 
-/// Largest number of iterations.
 const ITERATIONS: usize = 16;
 
 /// Rays whose centers have regions keep the estimates of consensus if the mean evidence is below this, in nats: then those

@@ -88,7 +88,6 @@ impl NeighborDistribution {
     }
 }
 
-/// The inputs of learning.
 struct Learning<'a, const D: usize, P> {
     input: &'a Input<'a, P>,
     places: &'a Places<D>,
@@ -98,7 +97,6 @@ struct Learning<'a, const D: usize, P> {
 }
 
 impl<const D: usize, P: Pieces<D>> Learning<'_, D, P> {
-    /// Distance from `x` within which true neighbors are counted.
     #[inline(always)]
     fn reach_at(&self, x: &[f32; D]) -> f32 {
         self.density.width(self.density.at(x)) * self.reach
@@ -182,7 +180,6 @@ impl<const D: usize, P: Pieces<D>> Learning<'_, D, P> {
 
 /// Every this many sampled slots, entries are checked for clusters.
 const EVERY: usize = 2;
-/// Entries that are checked per slot.
 const ENTRIES: usize = 2;
 /// An entry is far if its distance from the slot's estimate exceeds this many times the reach.
 const ELSEWHERE: f32 = 2.0;
@@ -192,7 +189,6 @@ const LEAST_COMPANIONS: f64 = 0.25;
 /// The bound for lists whose wrong entries form clusters, in nats.
 const MOST_IMBALANCE: f32 = 10.0;
 
-/// Sampled slots that are counted in one task.
 struct Part<'a, const D: usize, P> {
     rows: &'a [Sampled],
     learning: &'a Learning<'a, D, P>,
@@ -310,7 +306,6 @@ impl Tally {
     }
 }
 
-/// Returns the fraction of edges that are close.
 fn close_fraction([edges, found]: [u32; 2]) -> f64 {
     f64::from(found) / f64::from(edges.max(1))
 }
@@ -334,7 +329,6 @@ fn true_fraction(found: f64, chance: f64) -> f64 {
     ((found - chance) / (1.0 - chance.min(0.99))).clamp(FRACTION.0, FRACTION.1)
 }
 
-/// Returns the volume of a ball.
 fn ball_volume(dimensions: usize, radius: f32) -> f64 {
     use std::f64::consts::PI;
     let unit = if dimensions == 2 { PI } else { 4.0 / 3.0 * PI };

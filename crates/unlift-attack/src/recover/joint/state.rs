@@ -36,7 +36,6 @@ const AGREEMENT_SLOTS: usize = 1 << 12;
 /// Least number of jumps per parallel task.
 const JUMPS_PER_THREAD: usize = 64;
 
-/// Estimates of all slots and everything learned from them.
 pub(super) struct State<const D: usize> {
     /// Estimates of the last accepted iteration.
     accepted: Vec<Estimate<D>>,
@@ -70,7 +69,6 @@ pub(super) struct Update<const D: usize> {
 }
 
 impl<const D: usize> State<D> {
-    /// Creates the state before the first iteration.
     pub(super) fn new<P: Pieces<D>>(input: &Input<'_, P>, start: Vec<Estimate<D>>) -> Self {
         let n = start.len();
         let places = Places::new(&start);
@@ -94,7 +92,6 @@ impl<const D: usize> State<D> {
         }
     }
 
-    /// Current places of all slots.
     pub(super) fn places(&self) -> &Places<D> {
         &self.places
     }

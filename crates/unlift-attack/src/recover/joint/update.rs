@@ -34,7 +34,6 @@ const PRIOR: f32 = 0.5;
 /// Largest number of places (8 MB) that stay in the cache and need no prefetching.
 const CACHED: usize = 1 << 19;
 
-/// The data that an update reads.
 pub(super) struct Context<'a, const D: usize, P> {
     pub(super) input: &'a Input<'a, P>,
     pub(super) places: &'a Places<D>,
@@ -44,7 +43,6 @@ pub(super) struct Context<'a, const D: usize, P> {
     pub(super) odds: [(f32, f32); CLASSES],
 }
 
-/// A candidate position and its score.
 #[derive(Clone, Copy, Debug)]
 struct Candidate<const D: usize> {
     x: [f32; D],
@@ -53,7 +51,6 @@ struct Candidate<const D: usize> {
     prior: f32,
 }
 
-/// Buffers of one thread.
 pub(super) struct Scratch<const D: usize> {
     all: Ends<D>,
     /// One per piece.
@@ -124,7 +121,6 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         (found(x, support, first.piece, (first.score - first.prior).max(0.0)), margin)
     }
 
-    /// Returns the odds of the edges of `slot`.
     #[inline(always)]
     fn odds(&self, slot: usize) -> Odds<'_, D> {
         let (of_class, other) = (&self.odds, slot ^ 1);

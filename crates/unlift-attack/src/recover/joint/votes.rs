@@ -76,7 +76,6 @@ impl<const D: usize> Ends<D> {
         self.class.resize(n, 0);
     }
 
-    /// Number of estimates.
     pub(super) fn len(&self) -> usize {
         self.slot.len()
     }
@@ -190,13 +189,11 @@ impl<const D: usize> Columns<D> {
         self.side.resize(n, Side::Mutual);
     }
 
-    /// Number of estimates.
     #[inline(always)]
     pub(super) fn len(&self) -> usize {
         self.slot.len()
     }
 
-    /// The estimate in row `i`.
     #[inline(always)]
     pub(super) fn at(&self, i: usize) -> [f32; D] {
         std::array::from_fn(|c| self.x[c][i])
