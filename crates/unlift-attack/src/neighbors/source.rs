@@ -29,7 +29,7 @@ pub trait Source<const D: usize>: Debug + Send + Sync {
     /// Default number of records per list for this map: few if the first records of a ranking are much better than the rest.
     fn k(&self, released: &Released<D>) -> usize;
 
-    /// Returns lists of at most `k` records for every slot. If descriptors tell the slots of a record apart, rows are in the order
+    /// Returns lists of at most `k` records for every slot. If descriptors distinguish the slots of a record, rows are in the order
     /// of descriptors ([`RowOrder`](crate::RowOrder)); a source that reads records alone states [`RowOrder::Either`]. Scores, if
     /// any, are higher for likelier neighbors; recovery learns what they mean. All randomness comes from `seed`.
     ///

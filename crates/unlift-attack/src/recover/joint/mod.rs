@@ -5,7 +5,8 @@
 //! 1. proposes candidates on its own record: its old estimate, and projections of the estimates at the other ends of its edges,
 //!    at most 16 per piece of its feasible set. An edge leads to a record that the slot lists or that lists the slot's record;
 //! 2. scores each candidate `x` in nats by
-//!    `sum over edges j of ln(1 + odds_j * p_true(|x - x_j|) / p_random(x)) + 0.5 ln p_random(x) + ln p_range(x)`, see below;
+//!    `sum over edges j of ln(1 + odds_j * p_true(|x - x_j|) / p_random(x)) + 0.5 ln p_random(x) + ln p_range(x)`, see below. If the best candidate
+//!    elsewhere is nearly as good, the records that pass near the two decide;
 //! 3. refines the best candidate by weighted least squares (`least_squares`). Each nearby neighbor's estimate counts fully
 //!    across its own record and less along it.
 //!
@@ -14,7 +15,8 @@
 //! region of its own; it is 1 for other records. Where wrong entries form clusters, the sums of forward and of reverse
 //! edges may differ only up to a bound (`votes`).
 //!
-//! A slot *jumps* if it moves farther than the radius that holds half of its true neighbors, or if its status changes. `odds`,
+//! A slot *jumps* if it moves farther than one radius, which holds half of the true neighbors, or if its status changes. A slot whose
+//! best candidate leads by a clear margin is updated again only after enough neighbors have jumped nearby. `odds`,
 //! `p_true` and `p_random` are learned from the current estimates (`neighbor_distribution`, `map::grid`), and again after
 //! enough slots have jumped. Iterations end when few slots jump, when the number of jumps hardly falls, when fewer records pass
 //! near the estimates than before, or after 16 iterations (`state`).

@@ -180,6 +180,7 @@ impl<const D: usize, P: Pieces<D>> Learning<'_, D, P> {
 
 /// Every this many sampled slots, entries are checked for clusters.
 const EVERY: usize = 2;
+/// Number of entries that are checked per slot.
 const ENTRIES: usize = 2;
 /// An entry is far if its distance from the slot's estimate exceeds this many times the reach.
 const ELSEWHERE: f32 = 2.0;

@@ -27,7 +27,8 @@ const SETTLED: f64 = 0.03;
 /// Distribution and density are learned again after more than this fraction of the slots have jumped. Learning once per
 /// iteration makes maps of paired lines and of planes worse.
 const STALE: f64 = 0.02;
-/// Iterations end when the number of jumps exceeds this fraction of the number in the iteration before.
+/// Iterations end when fewer than half of the slots jump, but more than this fraction of the number in the iteration before.
+/// Both numbers count all jumps, whichever slots they are of.
 const SLOW: f64 = 0.9;
 /// Iterations end when agreement falls by more than this fraction of its best value; smaller changes are noise.
 const WORSE: f64 = 0.08;

@@ -37,7 +37,7 @@ impl<const D: usize> Default for Ends<D> {
 }
 
 impl<const D: usize> Ends<D> {
-    /// Gathers the estimates at the ends of edges; both estimates of a record where the edge does not say which slot.
+    /// Gathers the estimates at the ends of edges; both estimates of a record where the edge does not specify the slot.
     #[inline(always)]
     pub(super) fn gather(
         &mut self,

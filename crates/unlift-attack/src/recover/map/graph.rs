@@ -71,7 +71,7 @@ fn score_class(lists: &Neighborhoods, bounds: &[f32], at: usize) -> u8 {
 #[derive(Debug)]
 pub(crate) struct Graph {
     offsets: Vec<u64>,
-    /// Slots; the first slot of a record if the edge does not say which.
+    /// Slots; the first slot of a record if the edge does not specify which.
     ends: Vec<u32>,
     class: Vec<u8>,
     slots_per_record: usize,
