@@ -1,19 +1,19 @@
-//! What lists and positions are about: which released map, and what their rows are counted by.
+//! The released map and the row order of lists and positions.
 //!
-//! Both travel with the data, from a source of neighborhoods to the evaluation, so that nothing can be compared
-//! with the truth of another map or in another order.
+//! Both travel with the data from a source of neighborhoods to the evaluation, so that positions are not compared with the truth of
+//! another map or in another order.
 
 use std::fmt;
 
 use crate::Error;
 
-/// A released map, told by its content alone: whoever has the map can compute it, and it says nothing that the
-/// map does not. Made by [`Released::fingerprint`](crate::released::Released::fingerprint).
+/// The hash of a released map. It depends on the content of the map alone, and reveals nothing else. See
+/// [`Released::fingerprint`](crate::released::Released::fingerprint).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Fingerprint(pub [u8; 16]);
 
 impl Fingerprint {
-    /// Reads 32 hexadecimal digits; `None` when `text` is anything else.
+    /// Reads 32 hexadecimal digits; `None` for any other text.
     pub fn from_hex(text: &str) -> Option<Self> {
         let digits: Vec<u8> =
             text.chars().map(|c| c.to_digit(16).map(|d| d as u8)).collect::<Option<_>>()?;
@@ -25,10 +25,10 @@ impl Fingerprint {
         bytes.try_into().ok().map(Self)
     }
 
-    /// Refuses what is about another map than this one. What does not say is taken.
+    /// Rejects the fingerprint of another map. A missing one is accepted.
     ///
     /// # Errors
-    /// When `found` is another map.
+    /// When `found` is that of another map.
     pub fn expect(self, found: Option<Self>) -> Result<(), Error> {
         match found.filter(|found| *found != self) {
             None => Ok(()),
@@ -46,17 +46,16 @@ impl fmt::Display for Fingerprint {
     }
 }
 
-/// What rows are counted by. Only records that hide two points (paired lines) tell these apart.
+/// The order of rows. It matters only for records with two points (paired lines).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RowOrder {
-    /// Row `s` is slot `s` of the secret: the oracle, and lists that an owner gives by point.
+    /// Row `s` is slot `s` of the secret: lists of the oracle, and lists that an owner gives by point.
     Slots,
     /// Row `s` is descriptor row `s`: lists made by comparing descriptors.
     DescriptorRows,
-    /// The two rows of a record are its two points, and nobody can tell which is whose: lists made from records
-    /// alone.
+    /// The two rows of a record belong to its two points in unknown order: lists made from records alone.
     Either,
-    /// A file of somebody else that does not say.
+    /// Not stated, in a file of another program.
     #[default]
     Unstated,
 }
@@ -65,7 +64,7 @@ impl RowOrder {
     /// The orders that a file can state.
     pub const STATED: [RowOrder; 3] = [Self::Slots, Self::DescriptorRows, Self::Either];
 
-    /// The name used in files; `None` for what is not stated.
+    /// Name in files; `None` for an order that is not stated.
     pub fn name(self) -> Option<&'static str> {
         match self {
             Self::Slots => Some("slots"),
@@ -75,24 +74,24 @@ impl RowOrder {
         }
     }
 
-    /// The order called `name`, if there is one.
+    /// Returns the order called `name`, if there is one.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::STATED.into_iter().find(|order| order.name() == Some(name))
     }
 }
 
-/// Who made lists, as far as that tells how they err.
+/// The origin of lists, which decides the kind of their errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ListsBy {
-    /// The oracle: true neighbors, and wrong ones that were drawn.
+    /// The oracle: true neighbors, and wrong ones drawn at random.
     Oracle,
-    /// Anybody else, or a file that does not say.
+    /// Anything else, or a file that does not state it.
     #[default]
     Unstated,
 }
 
 impl ListsBy {
-    /// The name used in files; `None` for what is not stated.
+    /// Name in files; `None` if it is not stated.
     pub fn name(self) -> Option<&'static str> {
         match self {
             Self::Oracle => Some("oracle"),
@@ -101,14 +100,14 @@ impl ListsBy {
     }
 }
 
-/// What rows of lists, or of positions made from them, are about.
+/// The released map, row order and origin of lists, or of positions made from them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct About {
-    /// The released map; `None` where it is not known.
+    /// The released map, if it is known.
     pub map: Option<Fingerprint>,
-    /// What rows are counted by.
+    /// The order of rows.
     pub order: RowOrder,
-    /// Who made the lists.
+    /// The origin of the lists.
     pub lists_by: ListsBy,
 }
 

@@ -1,8 +1,8 @@
-//! Descriptors: one row per hidden point, kept in the clear by every geometric obfuscation.
+//! Descriptors: one row per hidden point. Every geometric obfuscation releases them unchanged.
 
 use crate::Error;
 
-/// No descriptor is longer: sums of as many squares of bytes still fit 32 bits.
+/// Largest number of columns, so that a sum of squares of bytes fits 32 bits.
 const MOST_COLUMNS: usize = 1 << 16;
 
 /// The values of a descriptor matrix, row-major.
@@ -10,7 +10,7 @@ const MOST_COLUMNS: usize = 1 << 16;
 pub enum Values {
     /// Bytes, as COLMAP stores SIFT (RootSIFT times 512).
     U8(Vec<u8>),
-    /// Floats, as learned features are stored.
+    /// Floats, as for learned features.
     F32(Vec<f32>),
 }
 
@@ -22,12 +22,11 @@ pub struct Descriptors {
 }
 
 impl Descriptors {
-    /// A matrix with `dim` columns.
+    /// Creates a matrix with `dim` columns.
     ///
     /// # Errors
-    /// When `dim` is 0, above 65,536 or does not divide the number of values, when a float is not finite,
-    /// or when the matrix carries no information: all zero, or every row the same (dummies, as some
-    /// exporters write them).
+    /// When `dim` is 0, above 65,536 or does not divide the number of values, a float is not finite, or the matrix has no information: it is
+    /// all zero, or all rows are equal (some exporters write such dummies).
     pub fn try_new(values: Values, dim: usize) -> Result<Self, Error> {
         let len = match &values {
             Values::U8(v) => v.len(),
@@ -89,7 +88,7 @@ impl Descriptors {
         &self.values
     }
 
-    /// The rows `order[0], order[1], ...` as a new matrix.
+    /// Returns the rows `order[0], order[1], ...` as a new matrix.
     ///
     /// # Panics
     /// When an index is out of range.
@@ -108,7 +107,7 @@ impl Descriptors {
         Self { values, dim: self.dim }
     }
 
-    /// Writes row `at` to `row`, which has one value per column.
+    /// Copies row `at` to `row`, which has one value per column.
     #[inline]
     pub fn read_row(&self, at: usize, row: &mut [f32]) {
         let range = at * self.dim..(at + 1) * self.dim;
@@ -118,14 +117,14 @@ impl Descriptors {
         }
     }
 
-    /// Squared Euclidean distance between rows `a` and `b`.
+    /// Returns the squared Euclidean distance between rows `a` and `b`.
     #[inline]
     pub fn squared_distance(&self, a: usize, b: usize) -> f32 {
         let dim = self.dim;
         match &self.values {
             Values::U8(v) => {
                 let (x, y) = (&v[a * dim..(a + 1) * dim], &v[b * dim..(b + 1) * dim]);
-                // Fits 32 bits: see MOST_COLUMNS.
+                // Fits 32 bits, see MOST_COLUMNS.
                 let square = |(&x, &y): (&u8, &u8)| u32::from(x.abs_diff(y)).pow(2);
                 let sum: u32 = x.iter().zip(y).map(square).sum();
                 sum as f32

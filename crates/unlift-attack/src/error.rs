@@ -1,10 +1,10 @@
-//! The library's error: what was wrong with a value a caller passed in.
+//! The error of the library: an argument with a wrong value.
 
 use std::fmt;
 
 use crate::line::OneLine;
 
-/// What kind of mistake an [`Error`] is about, for callers that do something about it.
+/// The kind of an [`Error`], for callers that handle some kinds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ErrorKind {
@@ -12,17 +12,16 @@ pub enum ErrorKind {
     Invalid,
     /// There are fewer points than lists of neighbors need.
     TooFewPoints,
-    /// A source of neighbors cannot work on descriptors of this kind.
+    /// A source of neighbors does not support descriptors of this kind.
     Descriptors,
     /// The observer of an audit asked it to stop.
     Stopped,
 }
 
-/// An argument or a set of columns that breaks a stated invariant.
+/// An argument or a set of columns that breaks a rule.
 ///
-/// Prints as one line: `what: expected ..., found ...`, whatever they hold ([`OneLine`]). Files have their own error, with path and
-/// place, in the crate that reads them; a point that cannot be recovered is a
-/// [`Status`](crate::recover::Status), not an error.
+/// It prints as one line: `what: expected ..., found ...` ([`OneLine`]). Errors of files have their own type, with path and place, in
+/// the crate that reads them. A point that cannot be recovered is a [`Status`](crate::recover::Status), not an error.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Error {
     kind: ErrorKind,
@@ -32,7 +31,7 @@ pub struct Error {
 }
 
 impl Error {
-    /// An error about `what` (a field, an option, a row), with the rule and the value that broke it.
+    /// Creates an error about `what` (a field, an option, a row), with the rule and the value that breaks it.
     pub fn new(
         what: impl Into<String>,
         expected: impl Into<String>,
@@ -42,18 +41,18 @@ impl Error {
         Self { kind, what: what.into(), expected: expected.into(), found: found.into() }
     }
 
-    /// The same error as one of `kind`.
+    /// Sets the kind.
     #[must_use]
     pub fn of_kind(self, kind: ErrorKind) -> Self {
         Self { kind, ..self }
     }
 
-    /// What kind of mistake it is.
+    /// Kind of the error.
     pub fn kind(&self) -> ErrorKind {
         self.kind
     }
 
-    /// The same error as part of something larger: `place: what: expected ..., found ...`.
+    /// Adds the place of the error: `place: what: expected ..., found ...`.
     #[must_use]
     pub fn within(self, place: &str) -> Self {
         Self { what: format!("{place}: {}", self.what), ..self }

@@ -1,18 +1,18 @@
-//! Indices as types, so that a slot and a record cannot be mixed up.
+//! Indices as types, so that slots and records are not confused.
 
-/// A row of the released map: what replaces one point (or two, for paired lines).
+/// A row of the released map. It replaces one point, or two for paired lines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 #[repr(transparent)]
 pub struct RecordId(pub u32);
 
 impl RecordId {
-    /// The id as an array index.
+    /// Returns the id as an array index.
     #[inline(always)]
     pub fn index(self) -> usize {
         self.0 as usize
     }
 
-    /// The id of row `index`.
+    /// Creates the id of row `index`.
     ///
     /// # Panics
     /// When `index` does not fit 32 bits; sizes are checked where points enter ([`crate::PointSet`]).

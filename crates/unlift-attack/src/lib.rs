@@ -1,12 +1,12 @@
-//! The attacker of `unlift`: what is released goes in, positions come out.
+//! The attacker's side of `unlift`: from a released map to recovered positions.
 //!
 //! ```text
 //! Released ──Source──> Neighborhoods
 //! Released, Neighborhoods ──recover──> Recovered
 //! ```
 //!
-//! The attacker never sees ground truth: this crate has no type that holds it, and depends on no crate that has. Originals,
-//! schemes, the oracle, evaluation and audits are in the crate `unlift`, which re-exports all of this one.
+//! This crate has no type for ground truth and depends on no crate that has one. Originals, schemes, the oracle, evaluation and
+//! audits are in the crate `unlift`, which re-exports this one.
 
 mod about;
 #[doc(hidden)]
@@ -22,7 +22,7 @@ pub mod points;
 pub mod recover;
 pub mod released;
 pub mod seed;
-// Not part of the interface: the loops of `unlift-features` are compiled through it, so that `unsafe` stays here.
+// Not part of the interface: `unlift-features` compiles its loops through it, so that all `unsafe` stays here.
 #[doc(hidden)]
 pub mod simd;
 

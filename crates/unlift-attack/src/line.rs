@@ -1,11 +1,11 @@
-//! Text of others within a line of ours.
+//! Text of unknown origin as one harmless line.
 
 use std::fmt::{self, Display, Write};
 
-/// Text as one line that a terminal shows and does not obey: what it would is escaped.
+/// Displays text as one line, with everything escaped that a terminal would obey.
 ///
-/// Names of files and images may hold anything: a newline that fakes a second line, a sequence that names the window
-/// or clears the screen, a mark that turns the direction of what follows. Text that was escaped stays as it is.
+/// Names of files and images may contain a newline that fakes a second line, a sequence that sets the window title or clears the
+/// screen, or a mark that changes the direction of text. Escaped text stays as it is.
 ///
 /// ```
 /// # use unlift_attack::OneLine;
@@ -14,8 +14,7 @@ use std::fmt::{self, Display, Write};
 #[derive(Clone, Copy, Debug)]
 pub struct OneLine<T>(pub T);
 
-/// Whether a terminal, or who reads a line of it, takes `c` for something else than a letter: C0, C1 and DEL, marks of
-/// direction, separators of lines.
+/// Whether a terminal or a reader of lines interprets `c`: C0, C1 and DEL, marks of direction, separators of lines.
 #[must_use]
 pub fn is_obeyed(c: char) -> bool {
     let directs = matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2066}'..='\u{2069}');

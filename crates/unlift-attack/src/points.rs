@@ -1,4 +1,4 @@
-//! Points with a unit: what every file becomes, and what only the owner of a map may read.
+//! Sets of points with a unit.
 
 use crate::Error;
 
@@ -14,7 +14,7 @@ pub enum Unit {
 }
 
 impl Unit {
-    /// The name used in files and reports.
+    /// Name in files and reports.
     pub fn name(self) -> &'static str {
         match self {
             Unit::Meter => "m",
@@ -23,7 +23,7 @@ impl Unit {
         }
     }
 
-    /// The unit called `name`, if there is one.
+    /// Returns the unit called `name`, if there is one.
     pub fn from_name(name: &str) -> Option<Self> {
         [Unit::Meter, Unit::Pixel, Unit::KthNeighbor].into_iter().find(|unit| unit.name() == name)
     }
@@ -39,7 +39,7 @@ pub struct PointSet<const D: usize> {
 impl<const D: usize> PointSet<D> {
     const DIMENSION_IS_2_OR_3: () = assert!(D == 2 || D == 3);
 
-    /// Points `(n, D)` in `unit`.
+    /// Creates the set from points `(n, D)` in `unit`.
     ///
     /// # Errors
     /// When a coordinate is not finite, or there are 2^31 points or more.
@@ -75,7 +75,7 @@ impl<const D: usize> PointSet<D> {
         self.unit
     }
 
-    /// The same points multiplied by `factor`, now in `unit`.
+    /// Returns the points multiplied by `factor`, in `unit`.
     ///
     /// # Errors
     /// When a scaled coordinate is not finite.

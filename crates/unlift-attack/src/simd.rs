@@ -1,13 +1,12 @@
-//! Run-time choice of vector instructions: the only module with `unsafe`.
+//! Vector instructions, chosen at run time. This is the only module with `unsafe`.
 //!
-//! A [`Kernel`] is plain scalar code, compiled twice: for the portable baseline and for AVX2. The
-//! compiler vectorizes both; it never fuses or reorders floating-point operations, so both give
-//! the same bits and tests compare them.
+//! A [`Kernel`] is plain scalar code, compiled twice: for the portable baseline and for AVX2. The compiler vectorizes both. It never
+//! fuses or reorders floating-point operations, so both give the same bits; tests compare them.
 
 #![allow(unsafe_code)]
 
-/// A loop worth compiling for several instruction sets. Implementations, and everything they call
-/// in the hot path, are `#[inline(always)]`: only inlined code inherits the instruction set.
+/// A loop to be compiled for several instruction sets. Implementations, and everything they call in the hot path, are
+/// `#[inline(always)]`: only inlined code gets the instruction set.
 pub trait Kernel {
     /// What the loop returns.
     type Output;
@@ -16,7 +15,7 @@ pub trait Kernel {
     fn run(self) -> Self::Output;
 }
 
-/// Runs `kernel` with the best instructions of this machine.
+/// Runs `kernel` with the best instruction set of this machine.
 #[inline]
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
@@ -29,7 +28,7 @@ pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     kernel.run()
 }
 
-/// The instructions that [`dispatch`] takes on this machine. They change no result.
+/// Returns the instruction set that [`dispatch`] uses on this machine. It changes no result.
 pub fn instructions() -> &'static str {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {
@@ -44,22 +43,22 @@ fn run_avx2<K: Kernel>(kernel: K) -> K::Output {
     kernel.run()
 }
 
-/// Asks for `row[at]` to be brought near, where the machine has an instruction for that: a slot is solved in the
-/// time that the records of the next take to come from memory. Changes no result.
+/// Prefetches `row[at]`, where the machine has an instruction for that. So the records of the next slot are loaded while the current slot
+/// is solved. It changes no result.
 #[inline(always)]
 pub(crate) fn prefetch<T>(rows: &[T], at: usize) {
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
         let row = rows.as_ptr().wrapping_add(at);
-        // SAFETY: every x86-64 has the instruction; it is a hint that reads nothing and faults nowhere.
+        // SAFETY: every x86-64 machine has the instruction; it is a hint that accesses no memory and never faults.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(row.cast()) };
     }
     #[cfg(not(target_arch = "x86_64"))]
     let _ = (rows, at);
 }
 
-/// Runs `kernel` with the baseline instructions only: the scalar twin for tests.
+/// Runs `kernel` with the baseline instructions only, for tests.
 #[cfg(test)]
 pub(crate) fn portable<K: Kernel>(kernel: K) -> K::Output {
     kernel.run()
@@ -67,20 +66,18 @@ pub(crate) fn portable<K: Kernel>(kernel: K) -> K::Output {
 
 /// Rows and columns of a block of [`raise_to_products`].
 pub(crate) const BLOCK: usize = 128;
-/// Columns that lie side by side in a packed right factor.
+/// Adjacent columns in a packed right factor.
 const PANEL: usize = 16;
-/// Values of one column that lie side by side in it.
+/// Adjacent values of one column in it.
 const QUAD: usize = 4;
 
 /// Raises `best[i][j]` to the product of row `i` of `left` with column `j` of `right`.
 ///
-/// `left` has [`BLOCK`] rows of `depth` values; `right` has [`BLOCK`] columns of `depth` values,
-/// each value where [`packed`] says; `best` is `(BLOCK, BLOCK)`, row-major. Integers, so the order of a sum does
-/// not matter. Two instructions of AVX2 do 32 multiplications here, which no loop that the compiler
-/// vectorizes gets near; it is the reason for intrinsics.
+/// `left` has [`BLOCK`] rows of `depth` values. `right` has [`BLOCK`] columns of `depth` values, each at the index that [`packed`] returns.
+/// `best` is `(BLOCK, BLOCK)`, row-major. Sums of integers do not depend on their order. Intrinsics are used because two AVX2
+/// instructions do 32 multiplications here, far more than vectorized loops.
 ///
-/// Values must be at most 127, and no product of two rows may exceed `i16::MAX`: for rows of length
-/// (Euclidean norm) below 181 it cannot.
+/// Values are at most 127, and no product of two rows may exceed `i16::MAX`, which rows of Euclidean norm below 181 never do.
 ///
 /// # Panics
 /// When a length does not fit, or `depth` is not a multiple of 4.
@@ -97,14 +94,14 @@ pub(crate) fn raise_to_products(left: &[u8], right: &[i8], depth: usize, best: &
     raise_portable(left, right, depth, best);
 }
 
-/// Where value `at` of column `column` stands in a packed right factor of `depth` values.
+/// Returns the index of value `at` of column `column` in a packed right factor of `depth` values.
 #[inline(always)]
 pub(crate) fn packed(column: usize, at: usize, depth: usize) -> usize {
     let panel = (column / PANEL) * PANEL * depth;
     panel + (at / QUAD) * PANEL * QUAD + (column % PANEL) * QUAD + at % QUAD
 }
 
-/// The scalar twin.
+/// The portable version of [`raise_to_products`].
 fn raise_portable(left: &[u8], right: &[i8], depth: usize, best: &mut [i16]) {
     for i in 0..BLOCK {
         let row = &left[i * depth..(i + 1) * depth];
@@ -136,8 +133,8 @@ unsafe fn raise_avx2(left: &[u8], right: &[i8], depth: usize, best: &mut [i16]) 
     for panel in 0..BLOCK / PANEL {
         for first in (0..BLOCK).step_by(ROWS) {
             let mut sums = [[_mm256_setzero_si256(); 2]; ROWS];
-            // SAFETY: panel, row and quad stay below BLOCK / PANEL, BLOCK and depth / QUAD, so every
-            // address lies in a slice whose length the caller asserted.
+            // SAFETY: panel, row and quad stay below BLOCK / PANEL, BLOCK and depth / QUAD, so every address lies in a slice whose length the
+            // caller asserted.
             unsafe {
                 let columns = right.as_ptr().add(panel * PANEL * depth);
                 let rows = left.as_ptr().add(first * depth);
@@ -148,7 +145,7 @@ unsafe fn raise_avx2(left: &[u8], right: &[i8], depth: usize, best: &mut [i16]) 
                     for (row, sums) in sums.iter_mut().enumerate() {
                         let four = rows.add(row * depth + quad * QUAD).cast::<i32>();
                         let four = _mm256_set1_epi32(four.read_unaligned());
-                        // Pairs of products fit 16 bits, and so do their sums: see the caller.
+                        // Pairs of products and their sums fit 16 bits, see the caller.
                         sums[0] = _mm256_add_epi16(sums[0], _mm256_maddubs_epi16(four, low));
                         sums[1] = _mm256_add_epi16(sums[1], _mm256_maddubs_epi16(four, high));
                     }
@@ -156,7 +153,7 @@ unsafe fn raise_avx2(left: &[u8], right: &[i8], depth: usize, best: &mut [i16]) 
                 for (row, sums) in sums.iter().enumerate() {
                     let low = _mm256_madd_epi16(sums[0], ones);
                     let high = _mm256_madd_epi16(sums[1], ones);
-                    // Packing interleaves the two halves of each register; the permutation undoes it.
+                    // Packing interleaves the two halves of each register; the permutation restores the order.
                     let sum =
                         _mm256_permute4x64_epi64(_mm256_packs_epi32(low, high), 0b11_01_10_00);
                     let at = best.as_mut_ptr().add((first + row) * BLOCK + panel * PANEL);
@@ -175,7 +172,7 @@ mod tests {
 
     #[test]
     fn both_twins_of_the_block_product_agree_with_plain_sums() {
-        // An interpreter takes minutes for more.
+        // Miri takes minutes for more.
         let depths: &[usize] = if cfg!(miri) { &[4, 8] } else { &[4, 24, 128] };
         for &depth in depths {
             let mut draws = Draws::new(1, Stage::Synthetic, depth as u64);

@@ -1,32 +1,32 @@
-//! Records as the lines on which their points can be.
+//! Records as the lines on which their points may lie.
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::geometry::vector::{along, distance, dot, median, sub, widen};
 use crate::released::{AxisCandidates, Obfuscation, Released};
 
-/// A line, or the part of it beyond `from`, that may hold a hidden point.
+/// A line, or the part of it beyond `from`, on which a hidden point may lie.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FeasibleLine {
     pub(crate) through: [f32; 3],
-    /// Of unit length.
+    /// Unit length.
     pub(crate) direction: [f32; 3],
-    /// Where it begins.
+    /// Parameter where it begins.
     pub(crate) from: f32,
-    /// How likely the point is on this line rather than on the record's others; any common factor.
+    /// Prior probability of this line among the lines of its record, up to a common factor.
     pub(crate) prior: f32,
-    /// Lines of one group meet trivially and say nothing about each other: the center of a ray.
+    /// Center of a ray. Lines of one group always meet there, so they are no evidence for each other.
     pub(crate) group: Option<u8>,
 }
 
-/// What a record hides, and so how likely a place on it is at a given density of points.
+/// What a record hides. It decides how the likelihood of a place depends on the density of points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Hides {
-    /// One point, of which the record is a projection along a random direction.
+    /// One point; the record is a random line through it.
     One,
-    /// Two points. Few pairs are close together: a pair `d` apart is as likely as `d` squared.
+    /// Two points. Few pairs are close together: a pair at distance `d` has a likelihood proportional to `d^2`.
     Two,
-    /// One point seen from a center: a ray meets the more points the farther it is.
+    /// One point seen from a center: a ray passes more points the farther it goes.
     OnRay,
     /// One point, on one of three axis lines.
     OnAxis,
@@ -36,17 +36,17 @@ pub(crate) enum Hides {
 #[derive(Debug)]
 pub(crate) struct Feasible {
     pub(crate) hides: Hides,
-    /// `per_record` rows per record.
+    /// Lines, `per_record` per record.
     pub(crate) lines: Vec<FeasibleLine>,
     pub(crate) per_record: usize,
     pub(crate) n_groups: usize,
 }
 
 impl Feasible {
-    /// The records of `released`; `None` for planes, whose points may be anywhere on a plane: three
-    /// sets of offsets are three histograms, and tell nothing about which offsets belong together.
+    /// Converts the records of `released`; `None` for planes, whose offsets are three histograms that do not show which offsets belong
+    /// together.
     pub(crate) fn new<const D: usize>(released: &Released<D>) -> Option<Self> {
-        // The only dimension these attacks know, in a function generic over it.
+        // These attacks work in three dimensions only, but the function is generic.
         let solid = |v: &[f32; D]| -> [f32; 3] { std::array::from_fn(|c| v[c % D]) };
         if D != 3 {
             return None;
@@ -86,7 +86,7 @@ impl Feasible {
                         let (mut through, mut direction) = (solid(position), [0.0; 3]);
                         through[axis] = 0.0;
                         direction[axis] = 1.0;
-                        // The value on an exchanged axis is anybody's: likelier where values abound.
+                        // The value on an exchanged axis is random, so it is more probable where values are dense.
                         lines.push(FeasibleLine {
                             prior: common[axis][row],
                             ..line(through, direction)
@@ -103,8 +103,8 @@ impl Feasible {
         self.lines.len() / self.per_record
     }
 
-    /// The same lines, counted from where they pass `middle`: the origin of a map is rounded, so that a
-    /// shifted or scaled map has its feet elsewhere. Rays keep their center.
+    /// Measures parameters from the point nearest to `middle`. The origin of a map is rounded, so a shifted or scaled map has other feet. Rays
+    /// keep their center.
     pub(crate) fn counted_from(mut self, middle: &[f64; 3]) -> Self {
         for line in self.lines.iter_mut().filter(|line| line.group.is_none()) {
             line.through = nearest(line, middle).map(|x| x as f32);
@@ -112,8 +112,7 @@ impl Feasible {
         self
     }
 
-    /// Where the map lies and a length of the order of its size, from the records alone; `None` when
-    /// they have no extent.
+    /// Returns the middle of the map and a length of the order of its size, from the records alone; `None` if they have no extent.
     pub(crate) fn middle(&self) -> Option<([f64; 3], f64)> {
         let (middle, extent) = match self.hides {
             Hides::OnRay => between_centers(&self.lines),
@@ -125,7 +124,7 @@ impl Feasible {
     }
 }
 
-/// The middle of the centers of rays, and the largest distance between two of them.
+/// Returns the mean of the centers of rays, and the largest distance between two of them.
 fn between_centers(lines: &[FeasibleLine]) -> Option<([f64; 3], f64)> {
     let mut centers: Vec<[f64; 3]> = Vec::new();
     for line in lines {
@@ -137,7 +136,7 @@ fn between_centers(lines: &[FeasibleLine]) -> Option<([f64; 3], f64)> {
     if centers.is_empty() {
         return None;
     }
-    // In an order of their own, not of the records.
+    // Sorted, so that the result does not depend on the order of records.
     centers.sort_unstable_by(|a, b| {
         let axes = a.iter().zip(b).map(|(x, y)| x.total_cmp(y));
         axes.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
@@ -149,14 +148,13 @@ fn between_centers(lines: &[FeasibleLine]) -> Option<([f64; 3], f64)> {
     Some((middle, extent))
 }
 
-/// Lines whose normal equations are this much flatter than those of random lines count as parallel.
+/// Lines are parallel if the determinant of their normal equations is below this fraction of that of random lines.
 const PARALLEL: f64 = 1e-5;
 
-/// The place that lines pass nearest in the mean square, and the median distance of the lines from it;
-/// `None` for parallel lines.
+/// Returns the least-squares intersection of lines, and the median distance of the lines from it; `None` for parallel lines.
 fn crossing(lines: &[FeasibleLine]) -> Option<([f64; 3], f64)> {
-    // The squared distance from a line is |(I - d d') (x - p)|^2: normal equations in x. All sums are
-    // of sorted terms, so that the order of records changes no bit.
+    // The squared distance from a line is |(I - d d') (x - p)|^2, which gives normal equations in x. Terms are sorted before they are summed,
+    // so that the order of records changes no bit.
     let across = |line: &FeasibleLine, row: usize, column: usize| {
         f64::from(u8::from(row == column))
             - f64::from(line.direction[row]) * f64::from(line.direction[column])
@@ -170,7 +168,7 @@ fn crossing(lines: &[FeasibleLine]) -> Option<([f64; 3], f64)> {
     let right = Vector3::from_fn(|row, _| {
         sum(&|line| (0..3).map(|c| across(line, row, c) * f64::from(line.through[c])).sum())
     });
-    // Directions are rounded, so that parallel lines are only nearly singular.
+    // Directions are rounded, so parallel lines are only nearly singular.
     let even = matrix.trace() / 3.0;
     if matrix.determinant() <= PARALLEL * even * even * even {
         return None;
@@ -187,16 +185,16 @@ fn crossing(lines: &[FeasibleLine]) -> Option<([f64; 3], f64)> {
     sound.then(|| (middle, median(&mut distances)))
 }
 
-/// The point of a line nearest `x`.
+/// Returns the point of a line nearest to `x`.
 fn nearest(line: &FeasibleLine, x: &[f64; 3]) -> [f64; 3] {
     let (through, direction) = (widen(&line.through), widen(&line.direction));
     along(&through, dot(&sub(x, &through), &direction), &direction)
 }
 
-/// Values to either side over which the density of the published values of an axis is measured.
+/// Number of values to either side over which the density of published values is measured.
 const REACH: usize = 50;
 
-/// Per axis and record, how dense the published values of that axis are around the record's.
+/// Returns, per axis and record, the density of the published values of that axis around the record's value.
 fn value_densities<const D: usize>(candidates: &AxisCandidates<D>) -> [Vec<f32>; 3] {
     let n = candidates.len();
     std::array::from_fn(|axis| {
@@ -204,7 +202,7 @@ fn value_densities<const D: usize>(candidates: &AxisCandidates<D>) -> [Vec<f32>;
         let mut order: Vec<u32> = (0..n as u32).collect();
         order.sort_by(|&a, &b| value(a).total_cmp(&value(b)));
         let reach = REACH.min(n / 4);
-        // Coincident values would have no width: the mean spacing is added.
+        // The mean spacing is added, because equal values have no width.
         let spacing = match n {
             0 | 1 => 1.0,
             _ => (value(order[n - 1]) - value(order[0])) / n as f32,

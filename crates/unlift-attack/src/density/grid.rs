@@ -1,21 +1,21 @@
-//! The density of hidden points on a grid, sampled along lines.
+//! The density of hidden points on a grid, and samples of it along lines.
 
 use rayon::prelude::*;
 
 use super::feasible::FeasibleLine;
 
-/// Mass per voxel in a box of cubes.
+/// Mass per cubic voxel in a box.
 #[derive(Clone, Debug)]
 pub(super) struct Grid {
     pub(super) low: [f32; 3],
-    /// The side of a voxel, and the distance between samples on a line.
+    /// Side of a voxel, and distance between samples on a line.
     pub(super) side: f32,
-    /// Voxels along x, y, z; x is the fastest.
+    /// Number of voxels along x, y, z; x varies fastest.
     pub(super) n: [usize; 3],
     pub(super) mass: Vec<f32>,
 }
 
-/// The samples of a line that lie in a grid: steps `first..end`; step `k` is at `(k + 1/2) side`.
+/// The samples of a line within a grid: steps `first..end`. Step `k` is at parameter `(k + 1/2) side`.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Span {
     pub(super) first: i32,
@@ -29,32 +29,32 @@ impl Span {
     }
 }
 
-/// What one smoothing moves to each of the two neighbors along an axis.
+/// Fraction that smoothing moves to each of the two neighbors along an axis.
 pub(super) const SMOOTHING: f32 = 0.25;
 
 impl Grid {
-    /// A box filled evenly.
+    /// Creates a box of uniform density.
     pub(super) fn even(low: [f32; 3], side: f32, n: [usize; 3]) -> Self {
         Self { low, side, n, mass: vec![1.0; n[0] * n[1] * n[2]] }
     }
 
-    /// The same box with other mass.
+    /// Returns the same box with other mass.
     pub(super) fn with(&self, mass: Vec<f32>) -> Self {
         Self { low: self.low, side: self.side, n: self.n, mass }
     }
 
-    /// Voxels in one layer of z.
+    /// Number of voxels in one layer of z.
     pub(super) fn layer(&self) -> usize {
         self.n[0] * self.n[1]
     }
 
-    /// The parameter of step `k`.
+    /// Returns the parameter of step `k`.
     #[inline(always)]
     pub(super) fn parameter(&self, k: i32) -> f32 {
         (k as f32 + 0.5) * self.side
     }
 
-    /// The samples of `line` in the box. A few at its ends may lie just outside.
+    /// Returns the samples of `line` in the box. A few at its ends may lie just outside.
     pub(super) fn span(&self, line: &FeasibleLine) -> Span {
         let (mut from, mut to) = (f64::from(line.from), f64::INFINITY);
         for c in 0..3 {
@@ -75,7 +75,7 @@ impl Grid {
     }
 
     fn steps(&self, from: f64, to: f64) -> Span {
-        // Farther away f32 parameters no longer tell neighboring steps apart.
+        // Farther away, f32 parameters of neighboring steps are equal.
         let far = f64::from(1 << 22) * f64::from(self.side);
         let inside = from < to && from.abs() < far && to.abs() < far;
         if !inside {
@@ -86,7 +86,7 @@ impl Grid {
         Span { first, end: ((to / side - 0.5).floor() as i32 + 1).max(first) }
     }
 
-    /// The part of `span` that can lie in the layers `from..to`, and a little more.
+    /// Returns the part of `span` that may lie in the layers `from..to`, slightly extended.
     pub(super) fn span_in_layers(
         &self,
         line: &FeasibleLine,
@@ -109,7 +109,7 @@ impl Grid {
         Span { first, end: span.end.min(end.saturating_add(2)).max(first) }
     }
 
-    /// The voxel of step `k` of `line`; `None` outside the box.
+    /// Returns the voxel of step `k` of `line`; `None` outside the box.
     #[inline(always)]
     pub(super) fn voxel(&self, line: &FeasibleLine, k: i32) -> Option<usize> {
         let t = self.parameter(k);
@@ -123,7 +123,7 @@ impl Grid {
         Some((at[2] * self.n[1] + at[1]) * self.n[0] + at[0])
     }
 
-    /// One round of binomial smoothing along every axis; mass at the walls stays inside.
+    /// Applies binomial smoothing along every axis once; mass at the walls stays inside.
     pub(super) fn smooth(&mut self) {
         let (nx, ny, nz, layer) = (self.n[0], self.n[1], self.n[2], self.layer());
         let mut out = vec![0.0f32; self.mass.len()];
@@ -155,11 +155,11 @@ impl Grid {
         }
     }
 
-    /// The same density in another box, linearly interpolated, up to a common factor.
+    /// Returns the density in another box, linearly interpolated, up to a common factor.
     pub(super) fn resampled(&self, low: [f32; 3], side: f32, n: [usize; 3]) -> Self {
         let mut finer = Self::even(low, side, n);
         let layer = finer.layer();
-        // Per axis and voxel: the lower of the two coarse voxels, and the share of the upper one.
+        // Per axis and voxel: the lower of the two coarse voxels, and the weight of the upper one.
         let places: [Vec<(usize, f32)>; 3] = std::array::from_fn(|c| {
             let last = (self.n[c] - 1) as f32;
             let place = |i: usize| {
@@ -195,7 +195,7 @@ impl Grid {
         sum
     }
 
-    /// The box that leaves a share `q` of the mass beyond each of its walls, and a voxel of margin.
+    /// Returns the box that leaves the fraction `q` of the mass beyond each wall, extended by a voxel.
     pub(super) fn bounds(&self, q: f64) -> ([f32; 3], [f32; 3]) {
         let (mut low, mut high) = ([0.0; 3], [0.0; 3]);
         for c in 0..3 {
@@ -222,7 +222,7 @@ fn smooth_row(here: &[f32], to: &mut [f32]) {
     }
 }
 
-/// How many leading entries add up to no more than `most`.
+/// Returns how many leading entries have a sum of at most `most`.
 fn count_below<'a>(entries: impl Iterator<Item = &'a f64>, most: f64) -> usize {
     let mut sum = 0.0;
     entries

@@ -1,15 +1,13 @@
-//! Attacks that need neither neighborhoods nor descriptors: the records alone tell where points are.
+//! Attacks on the records alone, without neighborhoods and descriptors.
 //!
-//! Every record is a line (a half-line, one of three lines) known to hold a hidden point, and points
-//! crowd on surfaces. [`tomography`] uses that: records are to the density of hidden points what coincidence lines are to the
-//! activity in positron emission tomography, so the density that makes all records likeliest is found
-//! by the same rounds (maximum likelihood by expectation maximization, Shepp and Vardi 1982, with
-//! smoothing, Silverman et al. 1990), and each point lies where its record meets most of it. The published
-//! attacks read the same [`feasible`] lines (`recover/baselines/density`).
+//! Every record is a line (a half-line, one of three lines) that contains a hidden point, and points are dense on surfaces.
+//! [`tomography`] uses that. Records relate to the density of hidden points as coincidence lines to the activity in positron emission
+//! tomography. So the same iterations find the density that makes all records likeliest: maximum likelihood by expectation maximization
+//! (Shepp and Vardi 1982) with smoothing (Silverman et al. 1990). Each point is placed where its record meets most of the
+//! density. The published attacks read the same [`feasible`] lines (`recover/published_density.rs`).
 //!
-//! This stage stands between `released` and its two users: `neighbors` lists records that end up close,
-//! `recover` takes the positions as they are. It is for three dimensions: in the plane all
-//! lines meet, and meeting tells nothing.
+//! Two modules use the result: `neighbors` lists records whose points are close, and `recover` takes the positions as they are.
+//! It works in three dimensions only: in a plane all lines meet.
 
 pub(crate) mod feasible;
 mod grid;
@@ -19,28 +17,28 @@ mod tomography;
 
 pub(crate) use tomography::tomography;
 
-/// What an attack says about one slot.
+/// The estimate of an attack for one slot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Peak {
-    /// About the released origin.
+    /// Position relative to the released origin.
     pub(crate) position: [f32; 3],
-    /// The axis the position was found along (axis candidates; else 0).
+    /// Axis along which the position was found (axis candidates; else 0).
     pub(crate) axis: u8,
-    /// How many times likelier the position is than one drawn blindly from the record, in nats.
+    /// Logarithm of the likelihood ratio of the position to a uniformly random one on the record, in nats.
     pub(crate) evidence: f32,
 }
 
-/// The answer of an attack: one entry per slot, `None` where it has nothing to say. Which of a paired
-/// line's two peaks belongs to which of its slots is not known; the order is that along the line.
+/// The result of an attack: one entry per slot, `None` without an estimate. The two peaks of a paired line are in order along the line,
+/// because it is unknown which slot each belongs to.
 #[derive(Clone, Debug)]
 pub(crate) struct Peaks {
     pub(crate) of: Vec<Option<Peak>>,
-    /// The length below which positions are not told apart, in the unit of the map; 0 without peaks.
+    /// Smallest distance at which positions differ, in the unit of the map; 0 without peaks.
     pub(crate) resolution: f64,
 }
 
 impl Peaks {
-    /// No answer for any of `n_slots`.
+    /// Creates a result without estimates.
     pub(crate) fn none(n_slots: usize) -> Self {
         Self { of: vec![None; n_slots], resolution: 0.0 }
     }

@@ -1,4 +1,4 @@
-//! From spread points to positions: where a record's point most probably is.
+//! Peaks: the most probable place of each record's point.
 
 use rayon::prelude::*;
 
@@ -7,10 +7,10 @@ use super::grid::Span;
 use super::spread::Spread;
 use super::{Peak, Peaks};
 
-/// Samples to either side that count as the same place: about what smoothing spreads.
+/// Samples to either side that count as the same place, about as many as smoothing reaches.
 const REACH: usize = 2;
 
-/// The most probable place of every slot's point.
+/// Returns the most probable place of every slot's point.
 pub(super) fn find(spread: &Spread<'_>) -> Peaks {
     let feasible = spread.feasible;
     let slots = if feasible.hides == Hides::Two { 2 } else { 1 };
@@ -35,7 +35,7 @@ pub(super) fn find(spread: &Spread<'_>) -> Peaks {
     Peaks { of, resolution: f64::from(spread.grid.side) }
 }
 
-/// The place with the most likelihood around it, on any of a record's lines.
+/// Returns the place with the largest likelihood around it on any line of a record.
 fn best(
     spread: &Spread<'_>,
     lines: std::ops::Range<usize>,
@@ -59,7 +59,7 @@ fn best(
     peak(&window, &spread.feasible.lines[at], at - lines.start, total, view.len())
 }
 
-/// The two places that are likeliest together: both likely, and apart, as pairs are.
+/// Returns the two places with the largest joint likelihood, which grows with their distance.
 fn best_pair(windows: &[Window]) -> Option<[Window; 2]> {
     let maxima: Vec<&Window> = (0..windows.len())
         .filter(|&at| {
@@ -81,7 +81,7 @@ fn best_pair(windows: &[Window]) -> Option<[Window; 2]> {
             }
         }
     }
-    // A line that meets one crowd only: both points are there.
+    // If there is only one maximum, both points are there.
     found.or_else(|| maxima.first().map(|&&only| [only; 2]))
 }
 
@@ -89,12 +89,12 @@ fn best_pair(windows: &[Window]) -> Option<[Window; 2]> {
 #[derive(Clone, Copy, Debug)]
 struct Window {
     likelihood: f32,
-    /// The mean parameter.
+    /// Mean parameter.
     t: f32,
 }
 
 impl Window {
-    /// One per sample of a line.
+    /// Computes one window per sample of a line.
     fn all(view: &[f32], span: Span, side: f32, out: &mut Vec<Self>) {
         out.clear();
         for at in 0..view.len() {

@@ -1,27 +1,27 @@
-//! One round of tomography: expectation and maximization on one grid.
+//! Expectation maximization on one grid.
 
 use rayon::prelude::*;
 
 use super::feasible::{Feasible, FeasibleLine, Hides};
 use super::grid::{Grid, SMOOTHING, Span};
 
-/// Rounds on each grid. Shares on the procedural rooms move by less than half a point from 4 to 20.
+/// Rounds on each grid. From 4 to 20 rounds, recovered fractions on procedural rooms change by less than half a point.
 const ROUNDS: usize = 4;
-/// A record's view of the density never falls below this share of it, however much of it is its own.
+/// Least density that a record sees after its own part is subtracted, as a fraction of the density.
 const LEAST_OTHERS: f32 = 1e-4;
 
-/// Every record's point spread over its feasible lines, and the density that results.
+/// The weights of every record's point along its lines, and the density that results.
 pub(super) struct Spread<'a> {
     pub(super) feasible: &'a Feasible,
-    /// Of all records, smoothed.
+    /// Density of all records, smoothed.
     pub(super) grid: Grid,
-    /// For rays, per center what rays of other centers brought; else empty.
+    /// For rays, the density from rays of other centers, per center; else empty.
     others: Vec<Grid>,
-    /// Per line.
+    /// Samples per line.
     pub(super) spans: Vec<Span>,
-    /// Where the weights of each record begin, and where the last ends.
+    /// Start of the weights of each record, and the end of the last.
     offsets: Vec<usize>,
-    /// The share of the record's point per sample, lines end to end; 0 at first.
+    /// Weight of the record's point per sample, line after line; 0 at first.
     weights: Vec<f32>,
 }
 
@@ -44,13 +44,13 @@ impl<'a> Spread<'a> {
         }
     }
 
-    /// The weights of record `record`, its lines end to end.
+    /// The weights of `record`, line after line.
     pub(super) fn weights_of(&self, record: usize) -> &[f32] {
         &self.weights[self.offsets[record]..self.offsets[record + 1]]
     }
 
-    /// The likelihood of each sample of `record` at the present density of other records' points, up to
-    /// a common factor, into `out`. For two points: of one of them, wherever the other is.
+    /// Computes the likelihood of each sample of `record` at the density of other records' points, up to a common factor, into `out`. For
+    /// two points it is the likelihood of one of them.
     pub(super) fn view(&self, record: usize, own: &[f32], out: &mut Vec<f32>) {
         let per_record = self.feasible.per_record;
         out.clear();
@@ -77,7 +77,7 @@ impl<'a> Spread<'a> {
         }
     }
 
-    /// The first half of a round.
+    /// Expectation: computes the weights from the density.
     fn expect(&mut self) {
         let mut weights = std::mem::take(&mut self.weights);
         let mut rows: Vec<&mut [f32]> = Vec::with_capacity(self.feasible.n_records());
@@ -104,11 +104,11 @@ impl<'a> Spread<'a> {
         self.weights = weights;
     }
 
-    /// From the likelihood of one point to that of one of two: points of a pair `d` apart are `d^2` times
-    /// as likely to have been paired along this very line.
+    /// Turns the likelihood of one point into that of one of two: a pair at distance `d` has `d^2` times the probability to be paired along
+    /// this line.
     fn pair_up(&self, record: usize, view: &mut [f32]) {
         let first = self.spans[record].first;
-        // About the middle of the span: no difference of large squares.
+        // Relative to the middle of the span, to avoid a difference of large squares.
         let middle = f64::from(first) + 0.5 * view.len() as f64;
         let place = |at: usize| f64::from(first) + at as f64 + 0.5 - middle;
         let mut moments = [0.0f64; 3];
@@ -125,7 +125,7 @@ impl<'a> Spread<'a> {
         }
     }
 
-    /// The second half of a round.
+    /// Maximization: computes the density from the weights.
     fn maximize(&mut self) {
         self.others.clear();
         for group in 0..self.feasible.n_groups {
@@ -137,8 +137,8 @@ impl<'a> Spread<'a> {
         self.grid.smooth();
     }
 
-    /// The weights of the lines that `admit` lets in, per voxel. Sums are of integers: they depend neither
-    /// on threads nor on the order of records. A slab of layers per task, and no two tasks share a voxel.
+    /// Sums the weights of the lines that `admit` accepts, per voxel. Sums are of integers, so they depend neither on threads nor on the
+    /// order of records. Each task has its own layers of voxels.
     fn deposit(&self, admit: impl Fn(&FeasibleLine) -> bool + Sync) -> Vec<f32> {
         const LAYERS: usize = 4;
         let (grid, per_record) = (&self.grid, self.feasible.per_record);
@@ -157,7 +157,7 @@ impl<'a> Spread<'a> {
                 }
                 let part = grid.span_in_layers(line, span, slab * LAYERS, (slab + 1) * LAYERS);
                 for k in part.first..part.end {
-                    // Voxels below the slab wrap around and are out of range as well.
+                    // Voxels below the slab wrap around and are out of range, too.
                     let voxel = grid.voxel(line, k).map(|voxel| voxel.wrapping_sub(begin));
                     if let Some(sum) = voxel.and_then(|voxel| out.get_mut(voxel)) {
                         let quantum = weights[(k - span.first) as usize] * QUANTA;
@@ -170,13 +170,12 @@ impl<'a> Spread<'a> {
     }
 }
 
-/// Units of weight per point in sums; up to 4,096 points fit a voxel, more count as so many.
+/// Units of weight per point in sums. A voxel holds up to 4,096 points; larger sums saturate.
 const QUANTA: f32 = 1_048_576.0;
 
-/// How much of the weight at a sample smoothing leaves there, and at samples one and two steps away on
-/// the same line.
+/// Returns the fraction of a sample's weight that smoothing leaves at the sample, and at samples one and two steps away on the line.
 fn self_kernel(line: &FeasibleLine) -> [f32; 3] {
-    // Linear between the taps of the binomial kernel: what a shift by a part of a voxel does.
+    // Linear between the taps of the binomial kernel, as for a shift by a part of a voxel.
     let tap = |x: f32| {
         let x = x.abs();
         let (here, beside) = (1.0 - 2.0 * SMOOTHING, SMOOTHING);

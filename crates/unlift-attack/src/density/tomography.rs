@@ -1,15 +1,13 @@
-//! The density of hidden points that makes the records likeliest, and the points where they meet it.
+//! Tomography: the density of hidden points that makes the records likeliest, and its peak on each record.
 //!
-//! A round has two halves. Given a density, each record spreads its point over its feasible line in
-//! proportion to the density there (expectation); given all records' spreads, the density is their sum
-//! (maximization), smoothed so that a voxel speaks for its surroundings. Grids go from coarse to fine:
-//! a coarse one cannot get lost in details, a fine one starts where the coarse one ended.
+//! A round of expectation maximization has two halves. The expectation spreads each record's point over its feasible line, in
+//! proportion to the density. The maximization sums these weights to the new density and smooths it. Grids go from coarse to
+//! fine: a coarse one avoids local optima, a fine one starts from its result.
 //!
-//! Two things keep a record from believing itself. The share of the density that a record brought itself is
-//! taken out before it is spread again, and rays are spread over what rays of *other* centers
-//! brought: rays of one center agree at any distance.
+//! A record must not confirm itself. So its own part of the density is subtracted before its point is spread again. Rays use
+//! the density from rays of *other* centers, because rays of one center agree at any distance.
 //!
-//! Cost: samples of all lines times rounds, linear in the records; about 1 kB per line on the finest grid.
+//! The cost is the number of samples of all lines times rounds. It is linear in the records, with about 1 kB per line on the finest grid.
 
 use super::Peaks;
 use super::feasible::{Feasible, Hides};
@@ -18,20 +16,19 @@ use super::peaks::find;
 use super::spread::Spread;
 use crate::released::Released;
 
-/// Half the side of the first box, in extents of the map, and its voxels along each axis.
+/// Half the side of the first box in extents of the map, and its voxels along each axis.
 const FIRST_BOX: (f64, usize) = (6.0, 64);
-/// The same for rays: the centers lie inside the map, and their distance is of the order of its size.
+/// First box for rays: their centers lie inside the map, at distances of the order of its size.
 const FIRST_BOX_OF_RAYS: (f64, usize) = (2.0, 64);
-/// Share of the points that may lie beyond each wall of the box that is looked at closely.
+/// Fraction of the points that may lie beyond each wall of the final box.
 const BEYOND: f64 = 0.01;
-/// Grids from the coarsest to the finest; each halves the voxels of the one before.
+/// Number of grids after the first. Each halves the voxels of the one before.
 const GRIDS: u32 = 3;
-/// Voxels along the longest side of the finest grid, for a map of a single point; points lie on surfaces,
-/// so it grows with their square root, up to a limit that keeps a grid below 150 MB.
+/// Voxels along the longest side of the finest grid, for a map of one point, and their largest number. Points lie on surfaces, so the
+/// number grows with the square root of the number of points. The limit keeps a grid below 150 MB.
 const FINEST: (f64, f64) = (1.8, 320.0);
 
-/// Where the points of `released` are, from its records alone. No answer for planes, rays of a single
-/// center, and maps that are not in three dimensions.
+/// Returns the points of `released` from its records alone. It supports neither planes, nor rays of a single center, nor 2D maps.
 pub(crate) fn tomography<const D: usize>(released: &Released<D>) -> Peaks {
     let n_slots = released.n_slots();
     let Some(feasible) = Feasible::new(released) else {

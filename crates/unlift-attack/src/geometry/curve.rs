@@ -1,6 +1,6 @@
-//! A curve that fills space: cells that are near each other lie near along it (Morton's).
+//! A space-filling curve (Morton's): cells that are near each other are mostly near along it.
 
-/// The place of `cell` along the curve; coordinates below `2^bits`, at most 64 bits in all.
+/// Returns the index of `cell` along the curve. Coordinates are below `2^bits`; all together have at most 64 bits.
 #[inline]
 pub(crate) fn along<const D: usize>(cell: &[u32; D], bits: u32) -> u64 {
     let mut place = 0;

@@ -1,18 +1,17 @@
-//! How flat or thin points lie.
+//! Flatness of a set of points.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::vector::{dot, quantile};
 
-/// Share of the points that say how thick a map is; the rest may lie anywhere.
+/// Fraction of the points that decide the thickness; the rest may be outliers.
 const KEPT: f64 = 0.9;
-/// How often the thinnest direction is looked for again among the points that are kept.
+/// Largest number of steps that search the thinnest direction among the kept points.
 const STEPS: usize = 8;
 
-/// The smallest extent of `points` as a share of the largest one: 0 on a plane or a line, near 1 in a ball. Extents are those of
-/// the middle nine tenths along the axes of the scatter of the nine tenths that are nearest to the best plane (least
-/// trimmed squares, by concentration steps: Rousseeuw and Van Driessen 1999), so that outliers make no map thick. Of fewer
-/// than two places 0.
+/// Returns the smallest extent of `points` divided by the largest one: 0 on a plane or a line, near 1 in a ball; 0 for fewer than two
+/// places. Extents are those of the middle 90 % along the principal axes of the 90 % nearest to the best plane, so that outliers do
+/// not count (least trimmed squares by concentration steps: Rousseeuw and Van Driessen 1999).
 pub fn flatness<const D: usize>(points: &[[f64; D]]) -> f64 {
     let mut kept: Vec<[f64; D]> = points.to_vec();
     let mut flattest = 1.0;
@@ -34,7 +33,7 @@ pub fn flatness<const D: usize>(points: &[[f64; D]]) -> f64 {
     flattest
 }
 
-/// Axes of the scatter around the mean, or nothing where lengths are too large for it.
+/// Returns the principal axes of the points; `None` if lengths overflow.
 fn axes<const D: usize>(points: &[[f64; D]]) -> Option<[[f64; D]; D]> {
     let n = points.len() as f64;
     let mean: [f64; D] = std::array::from_fn(|c| points.iter().map(|p| p[c]).sum::<f64>() / n);
@@ -47,12 +46,12 @@ fn axes<const D: usize>(points: &[[f64; D]]) -> Option<[[f64; D]; D]> {
     if !scatter.iter().all(|x| x.is_finite()) {
         return None;
     }
-    // A tolerance of 0 is not always reached, and whether it is depends on rounding.
+    // A tolerance of 0 is not always reached, depending on rounding.
     let eigen = SymmetricEigen::try_new(scatter, f64::EPSILON, 100)?;
     Some(std::array::from_fn(|axis| std::array::from_fn(|c| eigen.eigenvectors[(c, axis)])))
 }
 
-/// From the 5th to the 95th percent of `points` along `axis`.
+/// Returns the length from the 5th to the 95th percentile of `points` along `axis`.
 fn extent<const D: usize>(points: &[[f64; D]], axis: &[f64; D]) -> f64 {
     let along = sorted_along(points, axis);
     if along.is_empty() { 0.0 } else { quantile(&along, 0.95) - quantile(&along, 0.05) }
@@ -64,7 +63,7 @@ fn sorted_along<const D: usize>(points: &[[f64; D]], axis: &[f64; D]) -> Vec<f64
     along
 }
 
-/// The [`KEPT`] of `points` that are nearest to the plane across `axis` through the middle of `kept`, in their order.
+/// Returns the [`KEPT`] of `points` nearest to the plane across `axis` through the median of `kept`, in their order.
 fn nearest_to_plane<const D: usize>(
     points: &[[f64; D]],
     kept: &[[f64; D]],
@@ -94,7 +93,7 @@ mod tests {
         tilted.extend(outliers);
         assert!(flatness(&tilted) < 1e-6, "{}", flatness(&tilted));
         let cube: Vec<[f64; 3]> = (0..500).map(|_| std::array::from_fn(|_| unit())).collect();
-        // 0.72: a tenth is cut off where it is thinnest.
+        // 0.72, because a tenth is cut off along the thinnest direction.
         assert!(flatness(&cube) > 0.7, "{}", flatness(&cube));
         let line: Vec<[f64; 3]> = (0..500).map(|_| [unit(); 3]).collect();
         assert!(flatness(&line) < 1e-9);

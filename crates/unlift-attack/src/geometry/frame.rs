@@ -1,4 +1,4 @@
-//! Where a map lies and how far it reaches, robust to far outliers.
+//! Position and extent of a map, robust to outliers.
 
 use super::vector::{median, quantile, sub};
 use crate::Error;
@@ -13,8 +13,7 @@ pub struct Bounds<const D: usize> {
 }
 
 impl<const D: usize> Bounds<D> {
-    /// The box between the quantiles `q` and `1 - q` of each coordinate (the 1-99 % box of
-    /// `q = 0.01`); `None` without points.
+    /// Returns the box between the quantiles `q` and `1 - q` of each coordinate; `None` without points.
     pub fn quantiles(points: &[[f64; D]], q: f64) -> Option<Self> {
         if points.is_empty() {
             return None;
@@ -29,7 +28,7 @@ impl<const D: usize> Bounds<D> {
         Some(Self { low, high })
     }
 
-    /// The box from `low` to `high`.
+    /// Creates the box from `low` to `high`.
     ///
     /// # Errors
     /// When a corner is not finite, or the box has no extent along an axis.
@@ -42,28 +41,28 @@ impl<const D: usize> Bounds<D> {
         Ok(Self { low, high })
     }
 
-    /// Whether `point` lies in the box, its border included.
+    /// Whether `point` lies in the box or on its border.
     pub fn contains(&self, point: &[f64; D]) -> bool {
         (0..D).all(|c| (self.low[c]..=self.high[c]).contains(&point[c]))
     }
 
-    /// The same box about `origin`.
+    /// Returns the box relative to `origin`.
     #[must_use]
     pub fn about(&self, origin: &[f64; D]) -> Self {
         Self { low: sub(&self.low, origin), high: sub(&self.high, origin) }
     }
 
-    /// The middle of the box.
+    /// Middle of the box.
     pub fn center(&self) -> [f64; D] {
         std::array::from_fn(|c| 0.5 * (self.low[c] + self.high[c]))
     }
 
-    /// The longest side.
+    /// Longest side.
     pub fn longest_side(&self) -> f64 {
         (0..D).map(|c| self.high[c] - self.low[c]).fold(0.0, f64::max)
     }
 
-    /// The range of `t` for which `point + t direction` lies in the box; `None` when the line misses it.
+    /// Returns the range of `t` for which `point + t direction` lies in the box; `None` if the line misses it.
     pub fn clip(&self, point: &[f64; D], direction: &[f64; D]) -> Option<(f64, f64)> {
         let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
         for c in 0..D {
@@ -82,9 +81,8 @@ impl<const D: usize> Bounds<D> {
     }
 }
 
-/// The origin a map is released about: its coordinate-wise median, rounded so coarsely that it
-/// tells nothing about a single point (to a power of two near an eighth of the spread), and so
-/// close that `f32` coordinates about it are exact enough for georeferenced maps.
+/// Returns the origin for releasing a map: its median per coordinate, rounded to a power of two near an eighth of the spread. The rounding
+/// reveals nothing about a single point, and `f32` coordinates relative to it are exact enough for georeferenced maps.
 pub fn rounded_origin<const D: usize>(points: &[[f64; D]]) -> [f64; D] {
     let Some(bounds) = Bounds::quantiles(points, 0.1) else {
         return [0.0; D];
@@ -96,7 +94,7 @@ pub fn rounded_origin<const D: usize>(points: &[[f64; D]]) -> [f64; D] {
     })
 }
 
-/// The largest power of two not above `x`, or 1 when there is none.
+/// Returns the largest power of two that is at most `x`; 1 if there is none.
 fn power_of_two_below(x: f64) -> f64 {
     if !(x.is_normal() && x > 0.0) {
         return 1.0;

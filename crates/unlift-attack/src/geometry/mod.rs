@@ -1,4 +1,4 @@
-//! Pure mathematics on `[f64; D]` and `[f32; D]`: knows no stage of the pipeline.
+//! Geometry on `[f64; D]` and `[f32; D]`, independent of the pipeline.
 
 #[doc(hidden)]
 pub mod curve;

@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, SymmetricEigen};
 
-/// The unit normal of the plane through `center` that fits `neighbors` best: the direction in which
-/// their offsets from `center` spread least. `None` with fewer than two offsets that differ.
+/// Returns the unit normal of the plane through `center` that fits `neighbors` best: the direction of least variance of their
+/// offsets from `center`. `None` with fewer than two different offsets.
 pub fn local_normal(
     center: &[f64; 3],
     neighbors: impl Iterator<Item = [f64; 3]>,
@@ -13,12 +13,12 @@ pub fn local_normal(
         let offset = nalgebra::Vector3::from_fn(|c, _| neighbor[c] - center[c]);
         spread += offset * offset.transpose();
     }
-    // A tolerance of 0 is not always reached, and whether it is depends on rounding.
+    // A tolerance of 0 is not always reached, depending on rounding.
     let eigen = SymmetricEigen::try_new(spread, f64::EPSILON, 100)?;
     let order = |a: &usize, b: &usize| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]);
     let least = (0..3).min_by(order)?;
     let most = (0..3).max_by(order)?;
-    // A line or a single place has no normal.
+    // Points on a line or at one place have no normal.
     let second = 3 - least - most;
     if least == most || eigen.eigenvalues[second] <= eigen.eigenvalues[most] * 1e-12 {
         return None;
@@ -46,7 +46,7 @@ mod tests {
         use crate::seed::{Draws, Stage};
         let mut draws = Draws::new(1, Stage::Synthetic, 0);
         for patch in 0..500 {
-            // Every third patch lies exactly on a wall, every other third is a blob.
+            // Every patch lies exactly on a wall.
             let flat = patch % 3;
             let points: Vec<[f64; 3]> = (0..20)
                 .map(|_| std::array::from_fn(|c| if c == flat { 2.5 } else { draws.unit() }))

@@ -1,4 +1,4 @@
-//! The few vector operations everything is made of.
+//! Vector operations, median and quantile.
 
 /// Inner product.
 #[inline(always)]
@@ -39,13 +39,13 @@ pub fn distance<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
     squared_distance(a, b).sqrt()
 }
 
-/// `f32` coordinates in `f64`.
+/// Converts `f32` coordinates to `f64`.
 #[inline(always)]
 pub fn widen<const D: usize>(a: &[f32; D]) -> [f64; D] {
     a.map(f64::from)
 }
 
-/// The median of `values` (the lower one of an even number); reorders them.
+/// Returns the median of `values` (the lower one of an even number); reorders them.
 ///
 /// # Panics
 /// When `values` is empty or holds a NaN.
@@ -54,7 +54,7 @@ pub fn median(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// The value below which a share `q` in `[0, 1]` of `sorted` lies, linearly interpolated.
+/// Returns the value below which the fraction `q` in `[0, 1]` of `sorted` lies, linearly interpolated.
 ///
 /// # Panics
 /// When `sorted` is empty.

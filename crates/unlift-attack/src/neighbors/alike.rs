@@ -1,7 +1,7 @@
-//! An order of rows in which those that look alike stand together.
+//! An order in which similar descriptors are adjacent.
 //!
-//! Rows are halved at the median along the direction in which they differ most, and the halves again, until a
-//! part is one block. All parts but the last are full.
+//! Rows are split at the median along the direction of largest variance, recursively, until a part is one block. All parts but the
+//! last are full.
 
 use rayon::prelude::*;
 
@@ -9,12 +9,12 @@ use crate::descriptors::Values;
 use crate::simd::BLOCK;
 use crate::{Descriptors, Error};
 
-/// Rows that tell the direction of a cut.
+/// Number of rows from which the direction is computed.
 const SAMPLE: usize = 256;
-/// Power iterations: any direction near the first is as good.
+/// Number of power iterations. An approximate direction suffices.
 const ITERATIONS: usize = 8;
 
-/// `slots` in that order.
+/// Returns `slots` in that order.
 pub fn order(descriptors: &Descriptors, slots: &[u32]) -> Vec<u32> {
     let mut slots = slots.to_vec();
     halve(descriptors, &mut slots);
@@ -32,7 +32,7 @@ fn halve(descriptors: &Descriptors, slots: &mut [u32]) {
         (row.iter().zip(&direction).map(|(x, d)| x * d).sum(), slot)
     };
     let mut along: Vec<(f32, u32)> = slots.par_iter().map_init(scratch, product).collect();
-    // Whole blocks on the left. Rows that are equal keep to the order of slots.
+    // Whole blocks on the left. Equal rows stay in the order of slots.
     let left = (slots.len() / 2).next_multiple_of(BLOCK);
     let by_place = |a: &(f32, u32), b: &(f32, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
     along.par_sort_unstable_by(by_place);
@@ -42,7 +42,7 @@ fn halve(descriptors: &Descriptors, slots: &mut [u32]) {
     rayon::join(|| halve(descriptors, low), || halve(descriptors, high));
 }
 
-/// The direction in which rows differ most, from some of them.
+/// Returns the direction of largest variance of a sample of the rows.
 fn widest(descriptors: &Descriptors, slots: &[u32]) -> Vec<f32> {
     let every = slots.len().div_ceil(SAMPLE).max(1);
     let mut rows: Vec<Vec<f32>> =
@@ -53,7 +53,7 @@ fn widest(descriptors: &Descriptors, slots: &[u32]) -> Vec<f32> {
     for row in &mut rows {
         row.iter_mut().zip(&mean).for_each(|(x, mean)| *x -= mean);
     }
-    // From the row that is farthest from the middle.
+    // Start with the row farthest from the mean.
     let length2 = |row: &Vec<f32>| row.iter().map(|x| x * x).sum::<f32>();
     let farthest = rows.iter().max_by(|a, b| length2(a).total_cmp(&length2(b)));
     let mut direction = farthest.cloned().unwrap_or_default();
@@ -78,10 +78,10 @@ fn row(descriptors: &Descriptors, slot: u32) -> Vec<f32> {
     row
 }
 
-/// The mean row of each block of `slots`.
+/// Returns the mean row of each block of `slots`.
 ///
 /// # Errors
-/// When all of them are the same.
+/// When all of them are equal.
 pub fn means(descriptors: &Descriptors, slots: &[u32]) -> Result<Descriptors, Error> {
     let mean = |slots: &[u32]| {
         let mut sum = vec![0.0f32; descriptors.dim()];
@@ -114,7 +114,7 @@ mod tests {
         let mut sorted = order.clone();
         sorted.sort_unstable();
         assert_eq!(sorted, slots);
-        // Halves need not cut between kinds: a block holds few of them nevertheless.
+        // A split may cut through a kind, but a block holds only few kinds.
         let n_kinds = |block: &[u32]| {
             let mut kinds: Vec<usize> = block.iter().map(|&slot| kinds[slot as usize]).collect();
             kinds.sort_unstable();

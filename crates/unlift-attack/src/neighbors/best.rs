@@ -1,18 +1,18 @@
-//! The best few of a stream, whatever its order.
+//! The entries with the highest scores of a stream, independent of its order.
 
-/// What a row found.
+/// The result of comparing a row with others.
 #[derive(Clone, Debug, Default)]
 pub struct Found {
     /// The best rows of other records, best first; equal scores in row order.
     pub best: Vec<(f32, u32)>,
-    /// Mean of the scores with rows of other records, wherever they are; 0 unless they were counted.
+    /// Mean of the scores with rows of other records; 0 unless they were counted.
     pub mean: f64,
-    /// Their standard deviation; 0 unless they were counted.
+    /// Standard deviation of these scores; 0 unless they were counted.
     pub deviation: f64,
 }
 
-/// Keeps the entries with the highest scores; among equal scores those with the lowest ids. What is
-/// kept depends on the set of entries alone.
+/// Keeps the entries with the highest scores, and among equal scores those with the lowest ids. The result depends on the set
+/// of entries alone.
 #[derive(Clone, Debug)]
 pub struct Best {
     most: usize,
@@ -26,13 +26,13 @@ impl Best {
         Self { most, floor: f32::NEG_INFINITY, entries: Vec::new() }
     }
 
-    /// No entry below this score can be kept any more.
+    /// Entries with a lower score can no longer be kept.
     #[inline(always)]
     pub fn floor(&self) -> f32 {
         self.floor
     }
 
-    /// Offers an entry; each id once.
+    /// Adds an entry; each id at most once.
     #[inline]
     pub fn push(&mut self, score: f32, id: u32) {
         self.entries.push((score, id));
@@ -52,7 +52,7 @@ impl Best {
         }
     }
 
-    /// What was kept, highest score first, equal scores by id.
+    /// Returns the kept entries, highest score first, equal scores by id.
     pub fn into_sorted(mut self) -> Vec<(f32, u32)> {
         self.shrink();
         self.entries.sort_unstable_by(higher_first);
@@ -60,7 +60,7 @@ impl Best {
     }
 }
 
-/// The order of results: by score, high to low, then by id.
+/// Order of results: by score, high to low, then by id.
 pub fn higher_first(a: &(f32, u32), b: &(f32, u32)) -> std::cmp::Ordering {
     b.0.total_cmp(&a.0).then(a.1.cmp(&b.1))
 }

@@ -1,4 +1,4 @@
-//! The best that descriptors allow without training: one name for what an attacker would do with these.
+//! The source `descriptors`: the best method for the given descriptors that needs no training.
 
 use super::overlap::{Overlap, check, overlap};
 use super::similarity::{Similarity, similarity};
@@ -7,11 +7,11 @@ use super::{Neighborhoods, compare};
 use crate::released::Released;
 use crate::{Descriptors, Error};
 
-/// [`overlap`] of SIFT descriptors, [`similarity`] of others.
+/// Uses [`overlap`] for SIFT descriptors and [`similarity`] for others.
 #[derive(Clone, Copy, Debug)]
 pub struct ByDescriptors;
 
-/// Whether these are SIFT descriptors, whose patches can be laid over each other.
+/// Whether these are SIFT descriptors, whose patches can be compared.
 fn are_patches<const D: usize>(released: &Released<D>) -> bool {
     released.descriptors().is_some_and(|descriptors| check(descriptors).is_ok())
 }

@@ -1,4 +1,4 @@
-//! Descriptors compared block by block: memory grows with rows, never with pairs.
+//! Comparison of descriptors block by block: memory grows with the number of rows, not of pairs.
 
 use std::sync::Mutex;
 
@@ -11,10 +11,10 @@ use super::{alike, tiles};
 use crate::simd::BLOCK;
 use crate::{Descriptors, Error};
 
-/// Rows of which all pairs are compared at most: minutes on two cores. Of more, the blocks that look most alike.
+/// Largest number of rows of which all pairs are compared; this takes minutes on two cores. Of more rows, similar blocks are compared.
 pub const MOST_ROWS: usize = 1 << 17;
 
-/// What a user of the source called `name` should know about lists for more slots than that.
+/// Returns the note about inexact search for a source with this `name`, if there are too many slots.
 pub fn note(name: &str, n_slots: usize) -> Option<String> {
     (n_slots > MOST_ROWS).then(|| {
         format!(
@@ -24,38 +24,36 @@ pub fn note(name: &str, n_slots: usize) -> Option<String> {
     })
 }
 
-/// Rows that tell what scores are usual, where not all pairs are compared.
+/// Rows from which typical scores are computed, if not all pairs are compared.
 const USUAL: usize = 16 * BLOCK;
 
-/// Blocks that every block of a large map is compared with.
+/// Number of blocks that each block of a large map is compared with.
 const PARTNERS: usize = 64;
 
-/// How alike two descriptors are. The score of a pair does not depend on its order.
+/// A similarity of two descriptors. The score of a pair does not depend on its order.
 pub trait Likeness: Sync {
-    /// Scores are counted in whole multiples of it, whose sums are exact in any order.
+    /// Scores are rounded to multiples of this, so that their sums are exact in any order.
     const STEP: f32;
-    /// [`BLOCK`] rows, ready to be compared.
+    /// [`BLOCK`] rows, prepared for comparison.
     type Block: Send + Sync;
 
-    /// The rows of `slots`, at most [`BLOCK`].
+    /// Prepares the rows of `slots`, at most [`BLOCK`].
     fn block(&self, descriptors: &Descriptors, slots: &[u32]) -> Self::Block;
 
-    /// Whether it is asked what scores are usual.
+    /// Whether to compute mean and deviation of scores.
     fn counts(&self) -> bool {
         true
     }
 
-    /// Scores of all rows of `a` with all of `b`, `(BLOCK, BLOCK)`; what stands for rows beyond the last
-    /// has no meaning.
+    /// Computes the scores of all rows of `a` with all of `b`, `(BLOCK, BLOCK)`. Scores of rows beyond the last are undefined.
     fn scores(&self, a: &Self::Block, b: &Self::Block, scores: &mut [f32]);
 }
 
-/// The `most` best partners of every row among the rows of other records: exact up to `exact` rows. Beyond, rows
-/// are ordered anew so that those that look alike stand together, and every block meets the blocks whose mean rows
-/// are most like its own.
+/// Returns the `most` best partners of every row among the rows of other records. The search is exact up to `exact` rows. With more
+/// rows, similar rows are first made adjacent, and each block is compared with the blocks that have the most similar means.
 ///
 /// # Errors
-/// When there are more rows than that, and the mean rows of all blocks are the same.
+/// When there are more rows than `exact`, and the means of all blocks are equal.
 pub fn search<L: Likeness>(
     likeness: &L,
     rows: &mut Rows<'_>,
@@ -75,10 +73,10 @@ pub fn search<L: Likeness>(
     Ok(compare(likeness, rows, most, (&tiles::chosen(&alike), Some(every))))
 }
 
-/// Compares rows as far as `pairs` says; each keeps its `most` best partners of other records. What scores are usual
-/// is learned from all pairs, or from those with every `every`-th row.
+/// Compares rows according to `pairs`; each row keeps its `most` best partners of other records. Mean and deviation come from all
+/// pairs, or from those with every `every`-th row.
 ///
-/// The same bytes for any number of threads: what a row keeps depends on the set of its scores alone.
+/// What a row keeps depends on the set of its scores alone, so the result does not depend on the number of threads.
 fn compare<L: Likeness>(
     likeness: &L,
     rows: &Rows<'_>,
@@ -141,7 +139,7 @@ fn compare<L: Likeness>(
     rows.map(|row| row.found(L::STEP)).collect()
 }
 
-/// Rows from all over the map, which tell what scores are usual.
+/// Rows spread over the map, for mean and deviation of scores.
 struct Usual<B> {
     blocks: Vec<(B, Vec<u32>)>,
 }
@@ -175,7 +173,7 @@ impl<B> Usual<B> {
     }
 }
 
-/// A panic in another thread is passed on by rayon: the data behind a poisoned lock is not used.
+/// Locks a mutex. rayon propagates a panic of another thread, so data behind a poisoned lock is never used.
 fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     match mutex.lock() {
         Ok(guard) => guard,
@@ -197,12 +195,12 @@ impl Row {
 
     /// Counts the scores with rows of other records than `own`, in steps.
     fn count(&mut self, scores: &[f32], records: &[u32], own: u32, step: f32) {
-        // To the nearest whole number, without a call: beyond 2^23 floats have no fractions.
+        // Rounds to an integer without a call: beyond 2^23 floats are integers.
         const WHOLE: f32 = 1.5 * 8_388_608.0;
         let per_step = 1.0 / step;
         let (mut n, mut sum, mut squares) = (0u64, 0.0f64, 0.0f64);
         for (&score, &record) in scores.iter().zip(records) {
-            // Whole numbers far below 2^53 in total: exact.
+            // Integers whose sum is far below 2^53, so sums are exact.
             let score = (score * per_step + WHOLE) - WHOLE;
             let score = if record == own { 0.0 } else { f64::from(score) };
             n += u64::from(record != own);
@@ -223,7 +221,7 @@ impl Row {
     }
 }
 
-/// A block that others meet.
+/// A block whose rows are candidates for other rows.
 struct Met<'a> {
     first: usize,
     records: &'a [u32],
@@ -238,7 +236,7 @@ impl<'a> Met<'a> {
         Self { first, records, counts, step }
     }
 
-    /// Offers its rows to `rows` with these scores; `record_of` tells the record of each of `rows`.
+    /// Adds its rows to `rows` with these scores; `record_of` has the record of each of `rows`.
     fn offer(&self, rows: &mut [Row], scores: &[f32], record_of: &[u32]) {
         for (i, row) in rows.iter_mut().enumerate() {
             let scores = &scores[i * BLOCK..];

@@ -1,4 +1,4 @@
-//! Scores of all pairs of a few descriptors: what a network is fed.
+//! Scores of all pairs of a few descriptors: the input of a network.
 
 use rayon::prelude::*;
 
@@ -8,7 +8,7 @@ use super::similarity::Cosine;
 use crate::simd::BLOCK;
 use crate::{Descriptors, Error};
 
-/// Descriptors at most: matrices of all pairs take 800 MB.
+/// Largest number of descriptors, for which the matrices take 800 MB.
 const MOST: usize = 1 << 13;
 
 /// Scores of all pairs of `n` descriptors.
@@ -24,32 +24,32 @@ impl Dense {
         self.n
     }
 
-    /// Scores of a pair: [`REACHES`] of SIFT, 1 of others.
+    /// Number of scores per pair: [`REACHES`] for SIFT, 1 for others.
     pub fn reaches(&self) -> usize {
         self.scores.len() / (self.n * self.n)
     }
 
-    /// `(reaches, n, n)`: the best score of each reach in standard deviations above what the rows of the pair score
-    /// with others by the best of all reaches, mean of both rows. Symmetric; 0 between a descriptor and itself.
+    /// Scores `(reaches, n, n)`: the best score of each reach in standard deviations above the mean, averaged over both rows. Mean and
+    /// deviation are those of a row's best scores over all reaches. Symmetric; 0 between a descriptor and itself.
     pub fn scores(&self) -> &[f32] {
         &self.scores
     }
 
-    /// The same, handed over.
+    /// Returns [`scores`](Self::scores) by value.
     pub fn into_scores(self) -> Vec<f32> {
         self.scores
     }
 }
 
-/// How alike every two of `descriptors` are: of SIFT how well their patches overlap, by reach, of others their cosine.
+/// Computes the similarity of all pairs of `descriptors`: the overlap of their patches per reach for SIFT, the cosine for others.
 ///
-/// The largest of a pair's [`REACHES`] scores is what [`overlap`](super::overlap()) starts its walk from; which one is
-/// the largest says how far the patches lie apart. Deviations are those among the given descriptors, unless they are a part of
-/// something larger, which has others: then `usual` has mean and deviation of what each of them scores with those from
-/// everywhere ([`usual`](usual())). A part of look-alikes would take its own likeness for usual.
+/// The largest of a pair's [`REACHES`] scores is the one that [`overlap`](super::overlap()) starts its walk from; which one is the
+/// largest depends on the distance of the patches. Deviations are those among the given descriptors. For a part of a larger
+/// set, `usual` gives the mean and deviation of each descriptor's scores with all of the larger set ([`usual`](usual())),
+/// because within a part of similar descriptors scores are higher.
 ///
 /// # Errors
-/// When there are fewer than two descriptors or more than 8,192, or `usual` has not as many entries.
+/// When there are fewer than two descriptors or more than 8,192, or `usual` has another number of entries.
 pub fn dense(descriptors: &Descriptors, usual: Option<&[(f64, f64)]>) -> Result<Dense, Error> {
     let n = descriptors.len();
     check(n)?;
@@ -68,7 +68,7 @@ pub fn dense(descriptors: &Descriptors, usual: Option<&[(f64, f64)]>) -> Result<
     Ok(Dense { n, scores })
 }
 
-/// `(reaches, n, n)`, as they are compared.
+/// Returns `(reaches, n, n)` scores before standardization.
 fn raw(descriptors: &Descriptors) -> Vec<f32> {
     match Patches::of(descriptors) {
         Ok(patches) => {
@@ -84,10 +84,10 @@ fn raw(descriptors: &Descriptors) -> Vec<f32> {
     }
 }
 
-/// Mean and deviation of what each of `descriptors` scores with all others: what [`dense`] takes of a part of them.
+/// Returns mean and deviation of the scores of each descriptor with all others, for parts of these in [`dense`].
 ///
 /// # Errors
-/// As [`dense`].
+/// When [`dense`] fails.
 pub fn usual(descriptors: &Descriptors) -> Result<Vec<(f64, f64)>, Error> {
     check(descriptors.len())?;
     Ok(within(&raw(descriptors), descriptors.len()))
@@ -100,7 +100,7 @@ fn check(n: usize) -> Result<(), Error> {
     Err(Error::new("dense scores", format!("2 to {MOST} descriptors"), n.to_string()))
 }
 
-/// `(reaches, n, n)`, symmetric: what `score` says of two blocks, `(BLOCK, BLOCK)`, at each reach.
+/// Computes `(reaches, n, n)` symmetric scores; `score` compares two blocks, `(BLOCK, BLOCK)`, at a reach.
 fn all_pairs<L: Likeness>(
     likeness: &L,
     descriptors: &Descriptors,
@@ -133,7 +133,7 @@ fn all_pairs<L: Likeness>(
     scores
 }
 
-/// Mean and deviation of what every row scores with the others, by the best of all reaches.
+/// Returns mean and deviation of each row's scores with the others, by the best of all reaches.
 fn within(scores: &[f32], n: usize) -> Vec<(f64, f64)> {
     let reaches = scores.len() / (n * n);
     (0..n)
@@ -160,7 +160,7 @@ fn standardize(scores: &mut [f32], usual: &[(f64, f64)]) {
         let (mean, deviation) = usual[row];
         for (column, score) in line.iter_mut().enumerate() {
             let (other_mean, other_deviation) = usual[column];
-            // A blank descriptor is like none: no deviation.
+            // A blank descriptor has a deviation of 0.
             let own = (f64::from(*score) - mean) / deviation.max(1e-9);
             let others = (f64::from(*score) - other_mean) / other_deviation.max(1e-9);
             *score = if column == row { 0.0 } else { ((own + others) / 2.0) as f32 };
@@ -186,7 +186,7 @@ mod tests {
     #[test]
     fn a_shifted_copy_is_found_at_its_reach() {
         let mut all = patches(200);
-        // Patch 150 shows what patch 3 shows, a cell to the right; the cells that come in are new.
+        // Patch 150 shows the content of patch 3, one cell to the right.
         for row in 0..4 {
             for column in 0..3 {
                 let (from, to) = ((4 * row + column + 1) * 8, (4 * row + column) * 8);
@@ -226,10 +226,10 @@ mod tests {
         assert_eq!(best, Some(7));
         assert_eq!(of(0, 7), of(7, 0));
         assert_eq!(of(9, 9), 0.0);
-        // In deviations: of every row the mean of its own part of the scores is 0, so that of all is.
+        // Standardized scores of every row have mean 0, so all of them do.
         let mean = found.scores().iter().sum::<f32>() / 1600.0;
         assert!(mean.abs() < 1e-4, "{mean}");
-        // Twice the deviation, half the score.
+        // Twice the deviation gives half the score.
         let narrow = dense(&all, Some(&[(0.0, 1.0); 40])).unwrap();
         let wide = dense(&all, Some(&[(0.0, 2.0); 40])).unwrap();
         assert_eq!(narrow.scores()[7], 2.0 * wide.scores()[7]);

@@ -1,8 +1,7 @@
-//! Neighborhoods from where the records alone say that points are: no descriptors, no oracle.
+//! The source `geometric`: neighborhoods from tomography of the records alone, without descriptors.
 //!
-//! The attacker's counterpart of the neighbors by line-line distance of Chelani et al. (CVPR 2021), with
-//! the estimates of tomography in place of distances between lines: two lines pass each other closely
-//! for many reasons, two estimates end up close for one.
+//! Chelani et al. (CVPR 2021) list neighbors by distances between lines. An attacker can use the estimates of tomography: many lines
+//! pass close to each other, but two estimates are rarely close by chance.
 
 use rayon::prelude::*;
 
@@ -14,37 +13,34 @@ use crate::geometry::vector::{distance, dot, sub, widen};
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, RecordId, RowOrder};
 
-/// Estimates looked at per record listed: some share a record, some records pass too far away.
+/// Estimates searched per listed record: some belong to the same record, and some records pass too far away.
 const LOOK: usize = 3;
-/// Most estimates looked at per record listed. Only estimates of one center that coincide need as many, as they may not
-/// list each other.
+/// Largest number of estimates searched per listed record. Only coinciding estimates of rays of one center need that many, as
+/// these may not list each other.
 const MOST_LOOKED: usize = 64 * LOOK;
 
-/// Per slot the `k` records most likely to hide points near its own, with scores that are higher for
-/// likelier ones: the distance between estimates, plus the distance from the estimate to the record
-/// where that is known, in units of the resolution, negated. Slots whose record meets no density have an
-/// empty list.
+/// Lists, per slot, the `k` records most likely to hide points near its own. The score is the negative distance between estimates
+/// plus the distance from the estimate to the record (where known), in units of the resolution. The list of a slot without an estimate
+/// is empty.
 ///
-/// The slots of a paired line get the lists of its two estimates in the order of these along the line: which
-/// of its descriptors belongs to which is not known here. Rays list rays of other centers only; rays of
-/// one center are no evidence for each other.
+/// The slots of a paired line get the lists of its two estimates in their order along the line, because it is unknown which
+/// descriptor belongs to which. Rays list only rays of other centers, because rays of one center are no evidence for each other.
 ///
-/// Cost: tomography (linear in the records), then nearest neighbors of points.
+/// The cost is that of tomography (linear in the records) and of nearest neighbors of points.
 ///
 /// # Errors
-/// When `k` is 0, the map is not in three dimensions, or records of its family tell nothing by
-/// themselves (planes, rays of one center).
+/// When `k` is 0, the map is not in three dimensions, or its records alone give no positions (planes, rays of one center).
 pub fn geometric<const D: usize>(released: &Released<D>, k: usize) -> Result<Neighborhoods, Error> {
     check(released, k)?;
     geometric_by(released, k, &tomography(released))
 }
 
-/// [`geometric`] as a source.
+/// The function [`geometric`] as a source.
 #[derive(Clone, Copy, Debug)]
 pub struct Geometric;
 
 impl Geometric {
-    /// Records per list.
+    /// Default number of records per list.
     pub const K: usize = 50;
 }
 
@@ -70,10 +66,10 @@ impl Source<3> for Geometric {
     }
 }
 
-/// [`geometric`] from the estimates of tomography, for whoever has them.
+/// Makes the lists of [`geometric`] from given estimates of tomography.
 ///
 /// # Errors
-/// As there.
+/// When [`geometric`] fails.
 pub(crate) fn geometric_by<const D: usize>(
     released: &Released<D>,
     k: usize,
@@ -108,7 +104,7 @@ pub(crate) fn geometric_by<const D: usize>(
                         row.push((-(far as f32), record));
                     }
                 }
-                // Own partners, shared records and rays of the own center cost places.
+                // Own records and rays of the own center take up places.
                 if row.len() >= k || scratch.len() < look || look >= MOST_LOOKED * k {
                     row.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
                     row.truncate(k);
@@ -139,7 +135,7 @@ pub(crate) fn geometric_by<const D: usize>(
     }))
 }
 
-/// Whether records of this kind tell anything by themselves.
+/// Rejects records that alone give no positions.
 fn check<const D: usize>(released: &Released<D>, k: usize) -> Result<(), Error> {
     if k == 0 {
         return Err(Error::new("k", "at least 1", "0"));
@@ -159,8 +155,7 @@ fn check<const D: usize>(released: &Released<D>, k: usize) -> Result<(), Error> 
     }
 }
 
-/// The distance from `x` to the line of a record; 0 for axis candidates, of whose three lines any may be
-/// meant.
+/// Returns the distance from `x` to the line of a record; 0 for axis candidates, which have three lines.
 fn distance_to<const D: usize>(released: &Released<D>, record: RecordId, x: &[f64; 3]) -> f64 {
     let solid = |v: &[f32; D]| -> [f64; 3] { std::array::from_fn(|c| f64::from(v[c % D])) };
     let at = record.index();

@@ -1,7 +1,7 @@
-//! Neighborhoods: which records are said to hide points near the point of a slot.
+//! Neighborhoods: per slot, records that are likely to hide points near the slot's point.
 //!
-//! `oracle` makes them from the originals, for experiments. All others take what an attacker has, a
-//! released map: [`Source`] is what they have in common, and ours stand in [`sources::SOURCES`].
+//! The oracle makes them from the originals, for experiments. A [`Source`] makes them from a released map, as an attacker can.
+//! [`sources::SOURCES`] lists the sources of this crate.
 
 mod alike;
 mod best;

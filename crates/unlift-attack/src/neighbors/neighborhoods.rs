@@ -1,11 +1,10 @@
-//! The list of records per slot, in compressed rows.
+//! Lists of records per slot, in compressed rows.
 
 use crate::{About, Error, RecordId};
 
-/// Per slot the records said to hide its neighbors, in ascending order of record id: an order by
-/// nearness would tell more than a set does. Where the lists came from, and how many of them are
-/// right, is not stored here: the attacker does not know it. Which map they are of, and what rows are counted by, is:
-/// positions made from lists mean nothing without it.
+/// Per slot, the records that are said to hide its neighbors. They ascend by record id, because an order by distance would reveal more
+/// than a set. The source and the fraction of true neighbors are not stored, as the attacker does not have them. The
+/// released map and the order of rows are stored, because positions made from lists are meaningless without them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Neighborhoods {
     offsets: Vec<u64>,
@@ -15,12 +14,12 @@ pub struct Neighborhoods {
 }
 
 impl Neighborhoods {
-    /// Lists for all slots of a map with `n_records` records: slot `s` has
-    /// `records[offsets[s]..offsets[s + 1]]`, sorted here, with optional `scores` beside them.
+    /// Creates lists for all slots of a map with `n_records` records. Slot `s` has `records[offsets[s]..offsets[s + 1]]`, which is
+    /// sorted here, with optional `scores`.
     ///
     /// # Errors
-    /// When the offsets do not partition `records`, a record is out of range, is listed twice for a
-    /// slot or is the slot's own, a score is not finite, or columns differ in length.
+    /// When the offsets do not partition `records`, a record is out of range, twice in a list or the slot's own, a score is
+    /// not finite, or columns differ in length.
     pub fn try_new(
         offsets: Vec<u64>,
         mut records: Vec<RecordId>,
@@ -59,16 +58,16 @@ impl Neighborhoods {
         Ok(Self { offsets, records, scores, about: About::default() })
     }
 
-    /// Lists in the order given, which nothing checks: rows made of checked lists.
+    /// Creates lists from rows of checked lists, without checks.
     pub(crate) fn unchecked(offsets: Vec<u64>, records: Vec<RecordId>) -> Self {
         Self { offsets, records, scores: None, about: About::default() }
     }
 
-    /// Lists of some slots of a map, those from `first` on: as many as `offsets` has entries, less one. The lists of all others
-    /// are empty. `map` is its number of records and of slots per record.
+    /// Creates the lists of consecutive slots from `first` on, one fewer than `offsets` has entries. The lists of all other slots are
+    /// empty. `map` is the number of records of the map and of slots per record.
     ///
     /// # Errors
-    /// As of [`try_new`](Self::try_new), and when there are not as many slots.
+    /// When [`try_new`](Self::try_new) fails, or the map has fewer slots.
     pub fn of_slots(
         first: usize,
         offsets: &[u64],
@@ -91,13 +90,13 @@ impl Neighborhoods {
         Self::try_new(all, records, scores, n_records, slots_per_record)
     }
 
-    /// The same lists, said to be of a released map and counted in an order.
+    /// Sets the released map and the row order of the lists.
     #[must_use]
     pub fn with_about(self, about: About) -> Self {
         Self { about, ..self }
     }
 
-    /// Which released map the lists are of, and what their rows are counted by.
+    /// The released map and the row order of the lists.
     pub fn about(&self) -> About {
         self.about
     }
@@ -107,24 +106,24 @@ impl Neighborhoods {
         self.offsets.len() - 1
     }
 
-    /// The records listed for slot `slot`, ascending.
+    /// The records listed for `slot`, ascending.
     #[inline(always)]
     pub fn of(&self, slot: usize) -> &[RecordId] {
         &self.records[self.offsets[slot] as usize..self.offsets[slot + 1] as usize]
     }
 
-    /// The scores beside [`of`](Self::of), if the source gave any.
+    /// The scores of [`of`](Self::of), if the source gave any.
     pub fn scores_of(&self, slot: usize) -> Option<&[f32]> {
         let range = self.offsets[slot] as usize..self.offsets[slot + 1] as usize;
         self.scores.as_ref().map(|scores| &scores[range])
     }
 
-    /// All rows end to end.
+    /// All lists, one after another.
     pub fn records(&self) -> &[RecordId] {
         &self.records
     }
 
-    /// Where each row starts; one more entry than there are slots.
+    /// Start of each list; one more entry than there are slots.
     pub fn offsets(&self) -> &[u64] {
         &self.offsets
     }
@@ -134,13 +133,13 @@ impl Neighborhoods {
         self.scores.as_deref()
     }
 
-    /// The length of the longest list.
+    /// Length of the longest list.
     pub fn longest(&self) -> usize {
         self.offsets.windows(2).map(|w| (w[1] - w[0]) as usize).max().unwrap_or(0)
     }
 }
 
-/// Refuses scores, those from the entry `first` on, that are no numbers.
+/// Rejects scores that are not finite; `first` is the index of the first one.
 pub(super) fn check_scores(first: usize, scores: &[f32]) -> Result<(), Error> {
     match scores.iter().position(|x| !x.is_finite()) {
         Some(at) => {
@@ -151,7 +150,7 @@ pub(super) fn check_scores(first: usize, scores: &[f32]) -> Result<(), Error> {
     }
 }
 
-/// Refuses a sorted list that names a record twice, one that is not there, or the slot's own.
+/// Rejects a sorted list with a record twice, out of range, or the slot's own.
 pub(super) fn check_row(
     slot: usize,
     row: &[RecordId],
@@ -176,7 +175,7 @@ pub(super) fn check_row(
     Ok(())
 }
 
-/// Puts a list in ascending order of records, scores with it.
+/// Sorts a list by record, together with its scores.
 pub(super) fn sort_row(records: &mut [RecordId], scores: Option<&mut [f32]>) {
     match scores {
         None => records.sort_unstable(),

@@ -1,4 +1,4 @@
-//! Descriptor rows in an order of their own, and the way back from ranked rows to lists of records.
+//! Descriptor rows in a canonical order, and the conversion of rankings to lists of records.
 
 use rayon::prelude::*;
 
@@ -11,11 +11,11 @@ fn records_of(slots: &[u32], slots_per_record: usize) -> Vec<u32> {
     slots.iter().map(|&slot| slot / slots_per_record as u32).collect()
 }
 
-/// Descriptor rows sorted by content. Sums and ties then do not depend on the order in which a map
-/// was released: permuting its records permutes its lists (up to rows that are equal altogether).
+/// Descriptor rows sorted by content. So sums and ties do not depend on the order of the released map: permuting its records permutes
+/// its lists, except for equal rows.
 #[derive(Debug)]
 pub struct Rows<'a> {
-    /// All rows, by slot.
+    /// All descriptors, by slot.
     pub descriptors: &'a Descriptors,
     /// The slot of each row.
     pub slots: Vec<u32>,
@@ -27,7 +27,7 @@ pub struct Rows<'a> {
 }
 
 impl<'a> Rows<'a> {
-    /// The rows of a released map, for lists of `k` records.
+    /// Creates the rows of a released map, for lists of `k` records.
     ///
     /// # Errors
     /// When the map has no descriptors, `k` is 0, or there are fewer than `k` other records.
@@ -62,7 +62,7 @@ impl<'a> Rows<'a> {
         Ok(Self { descriptors, slots, records, n_records, slots_per_record, about })
     }
 
-    /// All rows of `descriptors` as they stand, each a record of its own.
+    /// Creates rows from `descriptors` in their order; each is a record.
     pub fn of_all(descriptors: &'a Descriptors) -> Self {
         let slots: Vec<u32> = (0..descriptors.len() as u32).collect();
         Self {
@@ -75,7 +75,7 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// Puts the rows in another order of slots.
+    /// Sets another order of slots.
     pub fn reorder(&mut self, slots: Vec<u32>) {
         self.records = records_of(&slots, self.slots_per_record);
         self.slots = slots;
@@ -86,15 +86,15 @@ impl<'a> Rows<'a> {
         self.slots.len()
     }
 
-    /// How many rows must be kept so that `k` records are among them: a record may take two places.
+    /// Returns how many rows to keep so that they contain `k` records: a record may have several rows.
     pub fn enough_for(&self, k: usize) -> usize {
         k * self.slots_per_record
     }
 
-    /// Lists of the first `k` records of each row's ranking; `ranked[row]` is best first.
+    /// Returns lists of the first `k` records of each row's ranking, `ranked[row]`, best first.
     ///
     /// # Errors
-    /// None that a ranking of other records' rows with finite scores can cause.
+    /// When a ranking contains own records or scores that are not finite.
     pub fn lists(&self, ranked: &[Vec<(f32, u32)>], k: usize) -> Result<Neighborhoods, Error> {
         let mut row_of = vec![0; self.len()];
         for (row, &slot) in self.slots.iter().enumerate() {

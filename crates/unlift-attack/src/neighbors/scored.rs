@@ -1,9 +1,9 @@
-//! Neighborhoods from scores of all pairs within sets of descriptors, whoever gives the scores: a network, say.
+//! Neighborhoods from a function, such as a network, that scores all pairs within sets of descriptors.
 //!
-//! A map of a few thousand points is one set. A larger one is cut into sets of points that may be near each other by
-//! what is known without training; every point is well inside several sets, and what these say of a pair is averaged.
-//! Of SIFT two short walks follow, one over the pairs that score best, one over those that are best without training: what
-//! the two get wrong is not the same. Learned descriptors see so far that their scores are the ranking.
+//! A map of a few thousand points is one set. A larger map is cut into sets of points that may be near each other by untrained
+//! scores. Every point is in the middle of several sets, and its scores are averaged over them. For SIFT, two short
+//! walks follow, one over the pairs with the best scores, one over the pairs with the best untrained scores, because their errors
+//! differ. Learned descriptors see a large area, so that their scores already are the ranking.
 
 use rayon::prelude::*;
 
@@ -18,34 +18,34 @@ use super::walk::{self, CANDIDATES};
 use crate::released::Released;
 use crate::{Descriptors, Error};
 
-/// Points of a map that is one set, at most.
+/// Largest number of points of a map that is one set.
 const WHOLE: usize = 3072;
-/// What a walk may reach, of as many as are wanted of two walks: what both reach late may come first of all.
+/// Rows that each walk may reach, as a multiple of those wanted: a row that both reach late may rank first.
 const REACHED: usize = 4;
 
 /// Partners of a row, best first.
 type Ranked = Vec<(f32, u32)>;
 
-/// Descriptors that are looked at together.
+/// Descriptors that are scored together.
 #[derive(Debug)]
 pub struct Part {
     /// One row per point.
     pub descriptors: Descriptors,
-    /// Where there are more points than these: mean and deviation of how alike each is to those from everywhere
+    /// For a part of a map: mean and deviation of each descriptor's similarity to all descriptors of the map
     /// ([`dense`](super::dense())).
     pub usual: Option<Vec<(f64, f64)>>,
 }
 
-/// Scores of all pairs of the `n` descriptors of a part, `(n, n)`, row-major: the natural logarithm of how likely a
-/// column's point is among the nearest of a row's, up to a constant per row. All finite; what stands between the points of one record is not read.
+/// Scores all pairs of the `n` descriptors of a part, `(n, n)`, row-major: the natural logarithm of the probability that the
+/// column's point is among the nearest of the row's, up to a constant per row. Scores are finite; those between points of one record are not read.
 pub type Scores<'a> = dyn Fn(&Part) -> Result<Vec<f32>, Error> + Sync + 'a;
 
-/// The `k` records that `scores` finds nearest each slot: of SIFT those that two short walks reach most likely, one over
-/// these records, one as that of [`overlap`](super::overlap()). Scores: log of the probability that a record is among the
-/// nearest, or of the (discounted) one to be reached, mean of both ends or walks.
+/// Lists the `k` records nearest to each slot by `scores`. For SIFT, lists those that two short walks are most likely to reach, one
+/// over these records and one as in [`overlap`](super::overlap()). The score is the logarithm of the probability that a record is among
+/// the nearest, or of the discounted probability to be reached; the mean over both ends or walks.
 ///
 /// # Errors
-/// Those of `scores`; when the map has no descriptors, or fewer than `k` other records.
+/// When `scores` fails, the map has no descriptors, or it has fewer than `k` other records.
 pub fn scored<const D: usize>(
     released: &Released<D>,
     k: usize,
@@ -87,7 +87,7 @@ pub fn scored<const D: usize>(
     let ranked: Vec<Ranked> = ranked.into_par_iter().map(merged).collect();
     let mut ranked = both_ways(ranked);
     if patches.is_none() {
-        // Who is scored best is right more often than whom a walk reaches.
+        // The best scores are right more often than the rows that a walk reaches.
         ranked.iter_mut().for_each(|row| row.truncate(enough));
         return rows.lists(&ranked, k);
     }
@@ -95,7 +95,7 @@ pub fn scored<const D: usize>(
     rows.lists(&mixed(&walked(&ranked), &walked(&untrained), enough), k)
 }
 
-/// The `most` rows that either of two walks reaches, with the mean of their probabilities.
+/// Returns the `most` rows with the largest mean probability over two walks.
 fn mixed(a: &[Ranked], b: &[Ranked], most: usize) -> Vec<Ranked> {
     let row = |(a, b): (&Ranked, &Ranked)| {
         let both = a.iter().chain(b).map(|&(log, row)| (row, libm::exp(f64::from(log)) / 2.0));
@@ -113,7 +113,7 @@ fn mixed(a: &[Ranked], b: &[Ranked], most: usize) -> Vec<Ranked> {
     a.par_iter().zip(b).map(row).collect()
 }
 
-/// Per row of a set its best partners by the mean of both rows' log probabilities.
+/// Returns the best partners per row of a set by the mean of both rows' log probabilities.
 fn within(
     rows: &Rows<'_>,
     Set { rows: set, inner }: &Set,
@@ -147,9 +147,9 @@ fn within(
     Ok((0..n).map(|i| if inner[i] { best(i) } else { Vec::new() }).collect())
 }
 
-/// One entry per partner, with the mean of what sets say of it; best first.
+/// Returns one entry per partner, with the mean of its scores over sets; best first.
 fn merged(mut pairs: Vec<(u32, f32)>) -> Ranked {
-    // Of one partner in the order of sets: sums are the same on any number of threads.
+    // A stable sort keeps the order of sets, so sums do not depend on threads.
     pairs.sort_by_key(|&(other, _)| other);
     let one = |pairs: &[(u32, f32)]| {
         let sum: f32 = pairs.iter().map(|&(_, score)| score).sum();
@@ -160,7 +160,7 @@ fn merged(mut pairs: Vec<(u32, f32)>) -> Ranked {
     ranked
 }
 
-/// The same score from either end: what a row keeps of a pair in more sets than its partner does, its partner gets.
+/// Makes scores symmetric: a pair may be in more sets of one row than of the other.
 fn both_ways(ranked: Vec<Ranked>) -> Vec<Ranked> {
     let score = |row: u32, other: u32| {
         ranked[row as usize].iter().find(|&&(_, at)| at == other).map(|&(score, _)| score)
@@ -184,7 +184,7 @@ mod tests {
     use crate::descriptors::Values;
     use crate::released::{Lines, Obfuscation};
 
-    /// Points along a closed curve; what they look like changes slowly.
+    /// Points along a closed curve, whose descriptors change slowly.
     fn released(n: usize) -> Released<3> {
         let points: Vec<[f64; 3]> = (0..n).map(|i| [i as f64, 0.0, (i % 7) as f64]).collect();
         let lines = Lines::through(&points, &vec![[0.0, 1.0, 0.5]; n]).unwrap();
@@ -200,7 +200,7 @@ mod tests {
     }
 
     fn alike(part: &Part) -> Result<Vec<f32>, Error> {
-        // Some of the values tell points apart, too.
+        // A few of the values suffice to tell points apart.
         let Values::U8(values) = part.descriptors.values() else { panic!("bytes") };
         let rows: Vec<&[u8]> = values.chunks_exact(128).map(|row| &row[..9]).collect();
         let apart = |a: &[u8], b: &[u8]| -> i32 {
@@ -211,7 +211,7 @@ mod tests {
         Ok(pairs.map(score).collect())
     }
 
-    /// Share of lists' entries that are no farther along the curve than half of `k`, and a few.
+    /// Fraction of entries at most `k / 2 + 3` steps away along the curve.
     fn right(lists: &Neighborhoods, n: usize, k: usize) -> f64 {
         let apart = |slot: usize, record: usize| {
             let steps = slot.abs_diff(record);
@@ -233,7 +233,7 @@ mod tests {
         }
     }
 
-    /// The scores of one set, where half a turn away is near.
+    /// Scores of one set in which opposite points are near.
     fn opposite(part: &Part) -> Result<Vec<f32>, Error> {
         let n = part.descriptors.len();
         let near = |i: usize, j: usize| -((i.abs_diff(j) as f32 - n as f32 / 2.0).abs());
@@ -243,7 +243,7 @@ mod tests {
     #[test]
     fn scores_decide_half_of_the_lists() {
         let map = released(300);
-        // Rows are in an order of their own content; which points are half of it apart, the scores know alone.
+        // Rows are sorted by content, so only these scores show which points are half the map apart.
         let (by_likeness, by_order) = (scored(&map, 10, &alike), scored(&map, 10, &opposite));
         let (by_likeness, by_order) =
             (right(&by_likeness.unwrap(), 300, 10), right(&by_order.unwrap(), 300, 10));

@@ -1,30 +1,30 @@
-//! Sets of rows that may be near each other: what is looked at together where all rows are too many.
+//! Sets of rows that may be near each other: a network scores each set, where all rows are too many.
 
 use std::collections::{BinaryHeap, HashMap};
 
 use super::best::higher_first;
 
-/// Rows of a set.
+/// Number of rows of a set.
 const SIZE: usize = 1024;
-/// Of these, rows from all over the map: what is usual must be seen, too.
+/// Number of these that are spread over the map, to give typical scores.
 const USUAL: usize = 256;
-/// Rows in the middle of a set, with most of their neighbors around them.
+/// Number of rows in the middle of a set; most of their neighbors are in the set.
 const INNER: usize = 384;
-/// Sets in whose middle every row is.
+/// Number of sets in whose middle each row is.
 const TIMES: usize = 2;
-/// Edges of a row along which a set grows.
+/// Number of edges per row along which a set grows.
 const EDGES: usize = 24;
 
-/// Rows that are looked at together.
+/// Rows that are scored together.
 pub struct Set {
-    /// In ascending order.
+    /// The rows, ascending.
     pub rows: Vec<u32>,
-    /// Whether a row is in the middle, and so has most of its neighbors in the set.
+    /// Whether each row is in the middle of the set.
     pub inner: Vec<bool>,
 }
 
-/// Sets that grow along the best pairs: `ranked` has each row's partners, best first, by scores in standard deviations.
-/// Every row is in the middle of as many sets as there are rounds.
+/// Grows sets along the best pairs. `ranked` has the partners of each row, best first, with scores in standard deviations. Every row is in
+/// the middle of [`TIMES`] sets.
 pub fn around(ranked: &[Vec<(f32, u32)>]) -> Vec<Set> {
     let n = ranked.len();
     let edges = edges(ranked);
@@ -37,7 +37,7 @@ pub fn around(ranked: &[Vec<(f32, u32)>]) -> Vec<Set> {
         loop {
             let mut growth = Growth::new(&edges);
             while growth.set.len() < INNER {
-                // Where a part of the graph that hangs together is used up, the next one goes on.
+                // After a connected part of the graph is used up, continue with the next one.
                 let next = growth.next(|row| !is_done[row as usize]);
                 let Some(row) = next.or_else(|| starts.find(|&row| !is_done[row as usize])) else {
                     break;
@@ -51,13 +51,13 @@ pub fn around(ranked: &[Vec<(f32, u32)>]) -> Vec<Set> {
             }
             sets.push(growth.filled(sets.len()));
         }
-        // What was at the edge of a middle is where the next round's start.
+        // Rows at the edge of a middle become starts in the next round.
         order.sort_by_key(|&row| std::cmp::Reverse(place[row as usize]));
     }
     sets
 }
 
-/// Edges with their weights, both ways.
+/// Returns the edges with their weights, in both directions.
 fn edges(ranked: &[Vec<(f32, u32)>]) -> Vec<Vec<(u32, f32)>> {
     let mut edges: Vec<Vec<(u32, f32)>> = vec![Vec::new(); ranked.len()];
     for (row, list) in ranked.iter().enumerate() {
@@ -74,11 +74,11 @@ fn edges(ranked: &[Vec<(f32, u32)>]) -> Vec<Vec<(u32, f32)>> {
     edges
 }
 
-/// A set, and what ties the rows around it to it.
+/// A set, and the weights that connect other rows to it.
 struct Growth<'a> {
     edges: &'a [Vec<(u32, f32)>],
     set: Vec<u32>,
-    /// Sums of weights; rows that are in have none any more.
+    /// Sum of weights per row; negative infinity for rows in the set.
     ties: HashMap<u32, f32>,
     heap: BinaryHeap<Tied>,
 }
@@ -88,10 +88,10 @@ impl<'a> Growth<'a> {
         Self { edges, set: Vec::new(), ties: HashMap::new(), heap: BinaryHeap::new() }
     }
 
-    /// The row that is tied most to those that are in, of those that `may` come in.
+    /// Returns the allowed row with the largest sum of weights.
     fn next(&mut self, may: impl Fn(u32) -> bool) -> Option<u32> {
         while let Some(Tied(tie, row)) = self.heap.pop() {
-            // What is out of date has a newer entry.
+            // Skip outdated entries.
             if self.ties.get(&row) == Some(&tie) && may(row) {
                 return Some(row);
             }
@@ -111,12 +111,12 @@ impl<'a> Growth<'a> {
         }
     }
 
-    /// The set whose middle this is, with what is tied to it most and rows from all over the map; the `at`-th one.
+    /// Completes the set around this middle with the most connected rows and with rows from all over the map; `at` is its index.
     fn filled(mut self, at: usize) -> Set {
         let n = self.edges.len();
         let mut inner = self.set.clone();
         inner.sort_unstable();
-        // Ring by ring: who only follows what is tied most leaves in one direction.
+        // Grow ring by ring. Always taking the most connected row would grow the set in one direction.
         while self.set.len() < SIZE - USUAL {
             let outside = self.ties.iter().filter(|&(_, &tie)| tie != f32::NEG_INFINITY);
             let mut ring: Vec<Tied> = outside.map(|(&row, &tie)| Tied(tie, row)).collect();
@@ -138,7 +138,7 @@ impl<'a> Growth<'a> {
     }
 }
 
-/// A row by how much ties it to a set; of equals the lower one first.
+/// A row and its sum of weights; among equal sums the lower row is first.
 #[derive(PartialEq)]
 struct Tied(f32, u32);
 
@@ -162,7 +162,7 @@ mod tests {
 
     #[test]
     fn every_row_is_in_with_its_best_partners() {
-        // A ring, of which every row knows the eight nearest.
+        // A ring in which every row lists its eight nearest.
         let n = 5000;
         let near = |row: usize| -> Vec<(f32, u32)> {
             let at = |step: usize, other: usize| (6.0 - step as f32 / 2.0, (other % n) as u32);

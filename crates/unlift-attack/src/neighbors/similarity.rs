@@ -1,4 +1,4 @@
-//! Neighborhoods from any descriptors: near points look alike more often than far ones.
+//! The source `similarity`: near points have similar descriptors of any kind.
 
 use super::Neighborhoods;
 use super::compare::{Likeness, MOST_ROWS, note, search};
@@ -10,18 +10,18 @@ use crate::released::Released;
 use crate::simd::{self, BLOCK, Kernel};
 use crate::{Descriptors, Error};
 
-/// How far a walk goes. The most similar are mostly right: more steps name more of the 20 nearest, but fewer of the
+/// Walk over learned descriptors. Most of the most similar are neighbors. More steps find more of the 20 nearest, but fewer of the
 /// very nearest (docs/decisions/sources.md).
 pub const WALK: Walk = Walk { steps: 2, decay: 0.2 };
 
-/// The `k` records with the most similar descriptors. Scores: cosine similarity; of a record with two
-/// descriptors the larger.
+/// Lists the `k` records with the most similar descriptors. The score is the cosine similarity; of a record with two
+/// descriptors, the larger one.
 ///
-/// Of learned descriptors, which see far around their point, those that a short walk over the most similar reaches
-/// first: whom they resemble is near, too. Scores: log of the (discounted) probability to be reached.
+/// For learned descriptors, which see a large area around their point, it lists the records that a short walk over the most similar
+/// ones reaches. The score is the logarithm of the discounted probability to be reached.
 ///
-/// Exact up to 131,072 slots (`MOST_ROWS`). Of more, each is compared with those that look
-/// alike on the whole.
+/// The search is exact up to 131,072 slots (`MOST_ROWS`). In a larger map, each block of descriptors is compared with the blocks
+/// that have the most similar means.
 ///
 /// # Errors
 /// When the map has no descriptors, or fewer than `k` other records.
@@ -42,12 +42,12 @@ pub fn similarity<const D: usize>(
     rows.lists(&walk::walk(&ranked, &rows.records, enough, WALK), k)
 }
 
-/// Whether descriptors come from a network: floats, and no histograms of gradients.
+/// Whether descriptors come from a network: floats that are no histograms of gradients.
 fn are_learned(descriptors: &Descriptors) -> bool {
     matches!(descriptors.values(), Values::F32(_)) && super::overlap::check(descriptors).is_err()
 }
 
-/// [`similarity`] as a source.
+/// The function [`similarity`] as a source.
 #[derive(Clone, Copy, Debug)]
 pub struct Similarity;
 
@@ -61,8 +61,8 @@ impl<const D: usize> Source<D> for Similarity {
     }
 
     fn k(&self, released: &Released<D>) -> usize {
-        // Of an image's fewer keypoints only the first of a ranking are near. Of learned descriptors the first are
-        // mostly right, and more would only add what is farther away.
+        // An image has fewer keypoints, so that only the first of a ranking are near. The first learned descriptors are mostly true
+        // neighbors, and further ones are farther away.
         match (D, released.descriptors().is_some_and(are_learned)) {
             (2, true) => 5,
             (2, false) => 10,
@@ -80,9 +80,9 @@ impl<const D: usize> Source<D> for Similarity {
     }
 }
 
-/// The cosine of two descriptors.
+/// Compares descriptors by their cosine.
 pub struct Cosine {
-    /// Whether it is asked which cosines are usual.
+    /// Whether to compute mean and deviation of the cosines.
     pub counts: bool,
 }
 
@@ -94,7 +94,7 @@ pub struct Units {
 }
 
 impl Likeness for Cosine {
-    /// Finer than any difference that tells neighbors from others.
+    /// Finer than any relevant difference.
     const STEP: f32 = 1.0 / 32_768.0;
     type Block = Units;
 
@@ -105,7 +105,7 @@ impl Likeness for Cosine {
         for (at, &slot) in slots.iter().enumerate() {
             descriptors.read_row(slot as usize, &mut row);
             let square = |&x: &f32| f64::from(x) * f64::from(x);
-            // A blank descriptor is like none other: its similarities are 0.
+            // A blank descriptor has similarity 0 to all others.
             let norm = row.iter().map(square).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
             for (c, &x) in row.iter().enumerate() {
                 let value = (f64::from(x) / norm) as f32;
@@ -126,8 +126,8 @@ impl Likeness for Cosine {
     }
 }
 
-/// Rows times columns. Each product is summed in the order of its values, so that it is the same
-/// whichever of its two rows comes first.
+/// Product of rows and columns. Values are summed in a fixed order, so that a product does not depend on which of its two rows is
+/// first.
 struct Product<'a> {
     rows: &'a [f32],
     columns: &'a [f32],
@@ -140,7 +140,7 @@ impl Kernel for Product<'_> {
 
     #[inline(always)]
     fn run(self) {
-        // Sums of 4 rows by 16 columns stay in registers.
+        // The sums of 4 rows by 16 columns fit in registers.
         const ROWS: usize = 4;
         const COLUMNS: usize = 16;
         let dim = self.dim;

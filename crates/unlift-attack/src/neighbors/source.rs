@@ -1,4 +1,4 @@
-//! Where an attacker gets neighborhoods from a released map alone: the seam that anybody may implement.
+//! The trait [`Source`]: it makes neighborhoods from a released map alone. You can implement it.
 
 use std::fmt::Debug;
 
@@ -6,52 +6,50 @@ use super::Neighborhoods;
 use crate::released::Released;
 use crate::{About, Descriptors, Error, RowOrder};
 
-/// What a source needs beside the records.
+/// The data that a source needs besides the records.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Needs {
-    /// Nothing: the records suffice.
+    /// Nothing.
     Nothing,
     /// The descriptors that are released with the records.
     Descriptors,
 }
 
-/// Makes lists of near records from what is released. Anybody may write one: what is audited is
-/// `Arc<dyn Source<D>>`, and [`SOURCES`](super::sources::SOURCES) only lists ours. What it has learned elsewhere
-/// (weights of a network) are fields of the type.
+/// Makes lists of near records from what is released. An audit takes `Arc<dyn Source<D>>`;
+/// [`SOURCES`](super::sources::SOURCES) lists the sources of this crate. What a source has learned elsewhere, such as the
+/// weights of a network, is in its fields.
 pub trait Source<const D: usize>: Debug + Send + Sync {
-    /// The name in rows, gates and reports: one word.
+    /// Name in rows, gates and reports: one word.
     fn name(&self) -> &str;
 
-    /// What it needs beside the records.
+    /// The data it needs besides the records.
     fn needs(&self) -> Needs;
 
-    /// Records per list for this map unless asked otherwise: the attack's own choice, few where the first of a
-    /// ranking are much better than the rest.
+    /// Default number of records per list for this map: few if the first records of a ranking are much better than the rest.
     fn k(&self, released: &Released<D>) -> usize;
 
-    /// Lists of at most `k` records for every slot, by descriptor row where slots of a record are told apart by
-    /// descriptors ([`RowOrder`](crate::RowOrder)); a source that looks at records alone says
-    /// [`RowOrder::Either`]. Scores, where there are some, are higher for likelier
-    /// neighbors; recovery learns what they are worth. All chance comes from `seed`, the attacker's.
+    /// Returns lists of at most `k` records for every slot. If descriptors distinguish the slots of a record, rows are in the order
+    /// of descriptors ([`RowOrder`](crate::RowOrder)); a source that reads records alone states [`RowOrder::Either`]. Scores, if
+    /// any, are higher for likelier neighbors; recovery learns what they mean. All randomness comes from `seed`.
     ///
     /// # Errors
     /// When this map allows no lists.
     fn lists(&self, released: &Released<D>, k: usize, seed: u64) -> Result<Neighborhoods, Error>;
 
-    /// Refuses descriptors of a kind that it cannot read.
+    /// Rejects descriptors that the source cannot read.
     ///
     /// # Errors
-    /// What it expects, and what it found.
+    /// States what kind of descriptors it expects, and what it found.
     fn takes(&self, descriptors: &Descriptors) -> Result<(), Error> {
         let _ = descriptors;
         Ok(())
     }
 
-    /// Refuses a map that it cannot work on, before anything is computed.
+    /// Rejects a map that the source cannot work on, before anything is computed.
     ///
     /// # Errors
-    /// What it expects of a map, and what it found.
+    /// States what it expects of a map, and what it found.
     fn supports(&self, released: &Released<D>) -> Result<(), Error> {
         match (self.needs(), released.descriptors()) {
             (Needs::Nothing, _) => Ok(()),
@@ -60,15 +58,14 @@ pub trait Source<const D: usize>: Debug + Send + Sync {
         }
     }
 
-    /// What a user should know about lists for `n_slots` hidden points, if anything.
+    /// Returns a note for users about lists for `n_slots` hidden points, if there is one.
     fn note(&self, n_slots: usize) -> Option<String> {
         let _ = n_slots;
         None
     }
 }
 
-/// The lists of `source`, as long as can be where there are fewer other records than a list has: empty ones of a single
-/// record. An attacker takes what there is.
+/// Returns the lists of `source`; shorter ones if there are fewer other records than a list has, and empty ones for a single record.
 ///
 /// # Errors
 /// When the source does not support this map.
@@ -89,7 +86,7 @@ pub fn of_what_there_is<const D: usize>(
     Ok(lists.with_about(About { map, order: RowOrder::DescriptorRows, ..About::default() }))
 }
 
-/// The error of a source that needs descriptors and has none.
+/// Creates the error of a source that needs descriptors for a map without them.
 pub fn lacks_descriptors(name: &str) -> Error {
     Error::new("descriptors", format!("some, as neighbors by {name} need them"), "none")
 }

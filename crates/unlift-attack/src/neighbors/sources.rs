@@ -1,4 +1,4 @@
-//! Sources by name: the registry.
+//! The registry of sources by name.
 
 use std::any::Any;
 use std::sync::Arc;
@@ -12,23 +12,23 @@ use super::source::{Needs, Source};
 use crate::released::Released;
 use crate::{Descriptors, Error};
 
-/// A source of ours as users choose it.
+/// A source of the registry.
 #[derive(Debug)]
 pub struct SourceEntry {
     /// Its name.
     pub name: &'static str,
-    /// What it does, in one line.
+    /// One line about how it works.
     pub summary: &'static str,
-    /// For images, where it is defined on them.
+    /// Creates the source for images, if it is defined on them.
     pub in_2d: Option<fn() -> Arc<dyn Source<2>>>,
-    /// For maps, where it is defined on them.
+    /// Creates the source for maps, if it is defined on them.
     pub in_3d: Option<fn() -> Arc<dyn Source<3>>>,
 }
 
 impl SourceEntry {
-    /// The source in `D` dimensions, if it is defined there.
+    /// Returns the source in `D` dimensions, if it is defined there.
     pub fn of_dimension<const D: usize>(&self) -> Option<Arc<dyn Source<D>>> {
-        // A constant cannot choose between two types; `Any` asks whether they are the same.
+        // A constant cannot select one of two types, so `Any` compares them.
         let of: &dyn Any = if D == 2 { &self.in_2d } else { &self.in_3d };
         let build = of.downcast_ref::<Option<fn() -> Arc<dyn Source<D>>>>().copied().flatten();
         build.map(|build| build())
@@ -41,7 +41,7 @@ impl PartialEq for SourceEntry {
     }
 }
 
-/// All sources of this crate; `unlift-audit` adds those that need a network.
+/// All sources of this crate. `unlift-audit` adds those that need a network.
 pub const SOURCES: &[SourceEntry] = &[
     SourceEntry {
         name: "similarity",
@@ -69,10 +69,10 @@ pub const SOURCES: &[SourceEntry] = &[
     },
 ];
 
-/// The source of `known` that is called `name`.
+/// Returns the source of `known` with this name.
 ///
 /// # Errors
-/// When there is none; the error lists the names.
+/// When there is none. The error lists the names.
 pub fn source(name: &str, known: &[&'static SourceEntry]) -> Result<&'static SourceEntry, Error> {
     known.iter().copied().find(|entry| entry.name == name).ok_or_else(|| {
         let names: Vec<&str> = known.iter().map(|entry| entry.name).collect();
@@ -80,7 +80,7 @@ pub fn source(name: &str, known: &[&'static SourceEntry]) -> Result<&'static Sou
     })
 }
 
-/// A source of the registry as a user names it, and how long its lists shall be.
+/// A source of the registry and the length of its lists.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Named {
     entry: &'static SourceEntry,
@@ -88,15 +88,15 @@ pub struct Named {
 }
 
 impl Named {
-    /// The source of [`SOURCES`] called `name`.
+    /// Returns the source of [`SOURCES`] with this name.
     ///
     /// # Errors
-    /// When there is none; the error lists the names.
+    /// When there is none. The error lists the names.
     pub fn parse(name: &str) -> Result<Self, Error> {
         Self::parse_among(name, &SOURCES.iter().collect::<Vec<_>>())
     }
 
-    /// The same from a registry that other crates have added to.
+    /// Returns the source with this name from a registry that other crates have extended.
     ///
     /// # Errors
     /// As [`parse`](Self::parse).
@@ -104,18 +104,18 @@ impl Named {
         Ok(Self { entry: source(name.trim(), known)?, k: None })
     }
 
-    /// The same source with `k` records per list, not as many as it chooses.
+    /// Sets the number of records per list, in place of the default of the source.
     #[must_use]
     pub fn with_k(self, k: usize) -> Self {
         Self { k: Some(k), ..self }
     }
 
-    /// Its name.
+    /// Name of the source.
     pub fn name(&self) -> &'static str {
         self.entry.name
     }
 
-    /// The source in `D` dimensions.
+    /// Returns the source in `D` dimensions.
     ///
     /// # Errors
     /// When it is not defined there.
@@ -128,7 +128,7 @@ impl Named {
     }
 }
 
-/// A source with lists of a length that may be chosen, whose errors name it.
+/// A source with a chosen list length; its errors contain its name.
 #[derive(Clone, Debug)]
 struct Chosen<const D: usize> {
     source: Arc<dyn Source<D>>,
@@ -173,7 +173,7 @@ mod tests {
     use crate::neighbors::compare::MOST_ROWS;
     use crate::released::{Lines, Obfuscation};
 
-    /// Two hidden points with these descriptors.
+    /// A map of two hidden points with these descriptors.
     fn map(values: Values) -> Released<3> {
         let lines = Lines::through(&[[0.0; 3], [1.0; 3]], &[[0.0, 1.0, 0.5]; 2]).unwrap();
         let dim = match &values {

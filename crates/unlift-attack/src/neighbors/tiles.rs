@@ -1,53 +1,53 @@
-//! Which blocks of rows are compared, in an order that holds few of them in memory.
+//! The pairs of blocks that are compared, in an order that keeps few blocks in memory.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use super::best::Found;
 
-/// Blocks held at a time where not all pairs are compared.
+/// Blocks in memory at a time if only some pairs are compared.
 const HELD: usize = 256;
 
-/// Pairs of blocks, tile by tile.
+/// Pairs of blocks, grouped in tiles.
 pub struct Pairs {
     tiles: Vec<Tile>,
 }
 
-/// Pairs with a range of blocks, which are held meanwhile.
+/// Pairs with a range of blocks, which stay in memory meanwhile.
 pub struct Tile {
-    /// The blocks that are held.
+    /// The blocks in memory.
     pub held: Range<usize>,
-    /// Who meets some of them.
+    /// The blocks that are compared with them.
     pub meetings: Vec<Meetings>,
 }
 
-/// One block and those held blocks that it meets.
+/// One block and the held blocks that it is compared with.
 pub struct Meetings {
-    /// The number of the block.
+    /// Index of the block.
     pub block: u32,
     /// Held blocks.
     pub with: Vec<u32>,
 }
 
 impl Pairs {
-    /// Every pair of `n` blocks.
+    /// Returns all pairs of `n` blocks.
     pub fn all(n: usize) -> Self {
-        // From itself downward: threads that take blocks in turn meet different ones at a time.
+        // Each list starts with the block itself and descends, so that parallel threads work on different blocks.
         let with = |block: u32| (0..=block).rev().collect();
         let meetings = (0..n as u32).rev().map(|block| Meetings { block, with: with(block) });
         Self { tiles: vec![Tile { held: 0..n, meetings: meetings.collect() }] }
     }
 
-    /// The tiles, one after the other.
+    /// The tiles, in order.
     pub fn tiles(&self) -> &[Tile] {
         &self.tiles
     }
 }
 
-/// Every block with itself and with the blocks that it found most alike.
+/// Returns the pairs of every block with itself and with the most similar blocks.
 pub fn chosen(alike: &[Found]) -> Pairs {
     let n = alike.len();
-    // Per pair, the lower number first.
+    // Each pair is stored under its lower index.
     let mut pairs: Vec<BTreeSet<u32>> =
         (0..n as u32).map(|block| BTreeSet::from([block])).collect();
     for (block, found) in alike.iter().enumerate() {

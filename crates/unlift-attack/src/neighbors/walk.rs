@@ -1,33 +1,32 @@
-//! A short walk over the graph of best matches: neighbors of neighbors are neighbors.
+//! A short random walk over the graph of best matches: neighbors of neighbors are neighbors.
 //!
-//! Two points near each other need not have patches that overlap, but a few steps over sure matches
-//! lead from one to the other.
+//! The patches of two near points need not overlap, but a few steps over reliable matches lead from one to the other.
 
 use rayon::prelude::*;
 
 use super::best::Found;
 use super::best::{Best, higher_first};
 
-/// Edges that a row keeps.
+/// Number of edges per row.
 const EDGES: usize = 6;
-/// Edge weight is `exp(SHARPNESS * (z - USUAL))`.
+/// The weight of an edge is `exp(SHARPNESS * (z - USUAL))`.
 const SHARPNESS: f64 = 2.0;
 const USUAL: f64 = 3.0;
-/// Partners that a row keeps for the walk, at least.
+/// Least number of partners that a row keeps for the walk.
 pub const CANDIDATES: usize = 64;
-/// How far a walk goes.
+/// Length of a walk.
 #[derive(Clone, Copy, Debug)]
 pub struct Walk {
-    /// Steps.
+    /// Number of steps.
     pub steps: usize,
     /// Weight of each further step.
     pub decay: f64,
 }
 
-/// Rows that a walk visits at most after each step; the rest is pruned.
+/// Largest number of rows that a walk keeps after each step, the most probable ones.
 const WIDEST: usize = 128;
 
-/// Scores of pairs in standard deviations above what their rows score otherwise, mean of both.
+/// Converts the scores of pairs to standard deviations above the mean score of their rows, averaged over both rows.
 pub fn standardized(found: &[Found]) -> Vec<Vec<(f32, u32)>> {
     let z = |row: usize, score: f32| {
         (f64::from(score) - found[row].mean) / found[row].deviation.max(1e-9)
@@ -43,8 +42,8 @@ pub fn standardized(found: &[Found]) -> Vec<Vec<(f32, u32)>> {
     (0..found.len()).into_par_iter().map(row).collect()
 }
 
-/// Ranks the rows that a walk from each row reaches, at most `most`, and after them those that stand
-/// in `ranked` (standardized scores or log probabilities, best first) but were not reached. Scores are natural logarithms.
+/// Ranks at most `most` rows that a walk from each row reaches, followed by the other rows in `ranked` (standardized scores or log
+/// probabilities, best first). Scores are natural logarithms.
 pub fn walk(
     ranked: &[Vec<(f32, u32)>],
     record_of: &[u32],
@@ -65,7 +64,7 @@ pub fn walk(
             }
             let mut list = best.into_sorted();
             let missing = most - list.len();
-            // Not reached is worse than reached, by a little for the best of them.
+            // Rows that are not reached rank below all others.
             let lowest = list.last().map_or(0.0, |&(score, _)| score);
             let top = ranked[row].first().map_or(0.0, |&(z, _)| z);
             let rest = ranked[row]
@@ -77,7 +76,7 @@ pub fn walk(
         .collect()
 }
 
-/// Probabilities of one step, per row in ascending order of the other row.
+/// Returns the probabilities of one step, per row in ascending order of the other row.
 fn graph(ranked: &[Vec<(f32, u32)>]) -> Vec<Vec<(u32, f64)>> {
     let mut steps: Vec<Vec<(u32, f64)>> = vec![Vec::new(); ranked.len()];
     for (row, list) in ranked.iter().enumerate() {
@@ -87,12 +86,12 @@ fn graph(ranked: &[Vec<(f32, u32)>]) -> Vec<Vec<(u32, f64)>> {
         }
     }
     steps.par_iter_mut().for_each(|row| {
-        // An edge that both ends keep is one edge: z is the same from either.
+        // An edge that both ends keep is one edge with the same score.
         row.sort_unstable_by_key(|&(other, _)| other);
         row.dedup_by_key(|&mut (other, _)| other);
         let weight = |z: f64, usual: f64| libm::exp(SHARPNESS * (z - usual));
         let total = |usual: f64| row.iter().map(|&(_, z)| weight(z, usual)).sum::<f64>();
-        // Rows without any spread score beyond what an exponential holds.
+        // Rows with a deviation of 0 may have scores beyond the range of an exponential.
         let top = row.iter().map(|&(_, z)| z).fold(f64::NEG_INFINITY, f64::max);
         let (usual, sum) = match total(USUAL) {
             sum if sum.is_normal() => (USUAL, sum),
@@ -111,8 +110,8 @@ struct Scratch {
 }
 
 impl Scratch {
-    /// The rows that a walk from `start` reaches, ascending, with the discounted sum of the
-    /// probabilities to be there after 1, 2, ... steps.
+    /// Returns the rows that a walk from `start` reaches, ascending, with the discounted sum of the probabilities to be there after
+    /// 1, 2, ... steps.
     fn reached(&mut self, steps: &[Vec<(u32, f64)>], start: usize, how: Walk) -> Vec<(u32, f64)> {
         let mut here = vec![(start as u32, 1.0)];
         let (mut touched, mut ever) = (Vec::new(), Vec::new());
@@ -141,7 +140,7 @@ impl Scratch {
                 here.select_nth_unstable_by(WIDEST - 1, by_probability);
                 here.truncate(WIDEST);
             }
-            // Sums in row order, whatever was pruned.
+            // Sums are in row order, independent of pruning.
             here.sort_unstable_by_key(|&(row, _)| row);
             discount *= how.decay;
         }

@@ -1,4 +1,4 @@
-//! Which of a paired line's two descriptors belongs to which of its points (supplement B).
+//! Assignment of the two descriptors of a paired line to its two points (supplement B).
 
 use std::ops::Range;
 
@@ -8,11 +8,11 @@ use crate::RecordId;
 use crate::neighbors::Neighborhoods;
 use crate::released::Released;
 
-/// Per slot of `records` the released descriptor row said to belong to it (supplement B); `None` unless records hide two points
-/// and have descriptors.
+/// Per slot of `records`, the released descriptor row that belongs to it (supplement B); `None` unless records have two slots and
+/// descriptors.
 ///
-/// The cheaper of the two bijections wins, where a descriptor and a neighborhood cost the sum of
-/// its distances to the listed records, each counted with the nearer of its two descriptors.
+/// The cheaper of the two assignments wins. The cost of a descriptor and a list is the sum of the distances from the descriptor to
+/// the listed records, each taken to the nearer of the record's two descriptors.
 pub(super) fn descriptor_rows<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,

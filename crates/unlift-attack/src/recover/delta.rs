@@ -1,9 +1,9 @@
-//! Delta from attacker-side data alone: the one whose consensus is least probable by chance.
+//! The automatic choice of delta: the length at which consensus agrees least probably by chance.
 //!
-//! Some slots are solved along a geometric ladder of deltas that starts at the extent of the records. A small delta makes
-//! chance agreement rare but loses true neighbors; a large one keeps them but agrees with everything. What counts is the mean
-//! evidence in excess of what the same slots yield with lists mixed from other slots': the number of places
-//! tried, uneven density and the noise of the null sample are in both.
+//! Consensus solves a sample of slots for a geometric ladder of deltas that starts at the extent of the records. At a small delta
+//! chance agreement is rare but true neighbors are lost; at a large one everything agrees. The score of a delta is the mean evidence
+//! minus the mean evidence of the same slots with mixed lists, made of entries of other slots' lists. Both means contain the
+//! effects of the number of places tried and of uneven density.
 
 use crate::neighbors::Neighborhoods;
 use crate::recover::consensus;
@@ -13,54 +13,55 @@ use crate::recover::map::places::trimmed;
 use crate::released::{Obfuscation, Released};
 use crate::seed::{Draws, Stage};
 
-/// The least delta tried within known bounds, as a share of the spacing of points. A fifth of the keypoints of an image have a
-/// twin at the same place, and coordinates may be whole numbers: such records agree exactly, so that
-/// the evidence of a few slots grows without end as delta shrinks.
+/// Least delta within known bounds, as a fraction of the spacing of points. A fifth of the keypoints of an image coincide with
+/// another, and coordinates may be integers: such records agree exactly, so that the evidence of a few slots keeps growing as
+/// delta shrinks.
 const LEAST_DELTA: f64 = 0.25;
-/// Bounds say nothing about a side that is so many times as long as the part of it that is filled.
+/// The bounds along an axis are ignored if they are this many times as long as the range of most points.
 const TOO_LARGE: f64 = 1.5;
-/// Delta for rays from anchors, as a share of the spacing of points: their evidence does not depend on delta.
+/// Delta for rays from centers with regions, as a fraction of the spacing of points. Their evidence does not depend on delta.
 const ANCHOR_DELTA: f64 = 1.75;
-/// Halvings of the extent that the coarse ladder spans: down to 1 / 16,384 of it,
+/// Halvings of the extent in the coarse ladder: down to 1 / 16,384 of it.
 const HALVINGS: u32 = 14;
-/// but so many below the first that is not too wide: a center far from all points makes the extent of rays as large as one likes.
+/// Halvings in the coarse ladder below the first delta that is not too wide: a center far from all points makes the extent of
+/// rays arbitrarily large.
 const HALVINGS_NOT_TOO_WIDE: u32 = 5;
-/// An extent is halved no more often than leaves something of it in 32 bits.
+/// Largest number of halvings, so that the result is positive in 32 bits.
 const MOST_HALVINGS: u32 = 100;
-/// Where a random record agrees with a typical place this often, its agreement tells nothing.
+/// A delta is too wide if a random record agrees with a typical place with this probability.
 const TOO_WIDE: f32 = 0.04;
-/// Steps per octave of the fine ladder: the maximum is flat, finer steps would tell nothing.
+/// Steps per octave of the fine ladder. The maximum is flat, so finer steps do not help.
 const FINE: i32 = 3;
-/// Deltas whose excess evidence reaches this share of the largest are as good: for a wide delta, and for a narrow one.
+/// Deltas form the plateau if their score reaches this fraction of the largest: for the wide choice, then for the narrow one.
 const AS_GOOD: (f64, f64) = (0.94, 0.95);
-/// How far across the plateau a narrow delta lies, as a share in logarithm: its very edge is a matter of luck.
+/// Position of the narrow choice on the plateau, as a fraction of its logarithmic width: the very edge is noisy.
 const ACROSS: f64 = 1.0 / 3.0;
-/// The same of planes: they leave two coordinates open, and estimates gain from a wider support.
+/// Position of the narrow choice for planes. They leave two coordinates open, so that a wider support helps.
 const ACROSS_OF_PLANES: f64 = 3.0 / 4.0;
-/// Below the lower edge of the plateau evidence grows by more than this factor per octave,
+/// Below the lower edge of the plateau, evidence grows by more than this factor per octave,
 const GROWTH: f64 = 1.2;
-/// or is less than this share of the best of the coarse ladder.
+/// or is less than this fraction of the best of the coarse ladder.
 const FAR_BELOW: f64 = 0.8;
-/// Steps below the best delta in which the edge is looked for: five octaves.
+/// Largest number of steps below the best delta in which the edge is searched: five octaves.
 const LOWEST: i32 = 15;
-/// A narrow delta is at most this many times the edge: wrong entries that are not far away keep wider ones evident.
+/// Largest narrow delta, as a multiple of the edge: wrong entries of the same region support wider ones.
 const BEYOND_EDGE: f64 = 2.25;
-/// The same where a source gives scores: its wrong entries look alike.
+/// Largest narrow delta for lists with scores, whose wrong entries have similar descriptors.
 const BEYOND_EDGE_OF_SCORED: f64 = 2.0;
 
-/// A delta of candidates was chosen by luck if the least one is more than this many times as wide. Partners of exchanges agree
-/// exactly, so that evidence hardly falls as delta shrinks, and on small maps or lattices nothing says how far.
+/// A chosen delta of candidates is replaced by the least one if that is more than this many times as wide. Partners of exchanges
+/// agree exactly, so that evidence hardly falls as delta shrinks, and on small maps or lattices the choice is arbitrary.
 const COLLAPSED: f64 = 4.0;
-/// The chance at that least delta, as a multiple of the share of all records that a list holds: if points lie on
-/// surfaces, one line passes as near as neighbors are with a chance of that share, and a record has three.
+/// Chance at the least delta of candidates, as a multiple of the fraction of all records in one list: if points lie on surfaces,
+/// one line passes as close as neighbors are with that probability, and a record has three lines.
 const LEAST_OF_CANDIDATES: f64 = 3.0;
-/// But no more than this: of a list that names a good part of all records it would be as wide as the map.
+/// Upper bound of that chance, for lists with a large fraction of all records.
 const MOST_OF_LEAST: f64 = 0.25;
-/// Their least delta in flat maps, as a share of the radius within which a list's neighbors are.
+/// Least delta of candidates in flat maps, as a fraction of the radius that holds a list's neighbors.
 const LEAST_OF_FLAT: f64 = 0.5;
 
-/// Delta for `released` as `family`, in the unit of the map. Its consensus reads `used`: the lists as `given`, or those of both
-/// directions. A `sharp` delta is for estimates that are to vote.
+/// Chooses delta for `released` as `family`, in the unit of the map. Consensus reads `used`: the lists as `given`, or those of
+/// both directions. With `sharp`, it chooses a narrow delta, for joint recovery.
 pub(super) fn learn<const D: usize>(
     released: &Released<D>,
     family: &Family<'_, D>,
@@ -85,14 +86,15 @@ pub(super) fn learn<const D: usize>(
     if COLLAPSED * chosen < least { least } else { chosen }
 }
 
-/// The least delta of the candidates of a map, where a list holds a `share` of all records; 0 of other families, and in images.
+/// Returns the least delta of axis candidates of a map, if a list holds the fraction `share` of all records; 0 for other families
+/// and for images.
 fn least_of_candidates<const D: usize>(family: &Family<'_, D>, share: f64) -> f64 {
     let is_of_candidates = matches!(family, Family::Candidates { .. });
     if !(is_of_candidates && Settings::of_dimension::<D>().limits_by_share) {
         return 0.0;
     }
     let least = (LEAST_OF_CANDIDATES * share).min(MOST_OF_LEAST) as f32;
-    // Chance grows with delta: bisection to more than 32 bits.
+    // Chance grows with delta: bisect to more than 32 bits.
     let (mut below, mut above) = (0.0, family.extent());
     for _ in 0..48 {
         let middle = 0.5 * (below + above);
@@ -106,8 +108,8 @@ fn least_of_candidates<const D: usize>(family: &Family<'_, D>, share: f64) -> f6
     f64::max(above, of_flat)
 }
 
-/// How far apart points would be if they were spread evenly over known bounds; 0 without bounds. Bounds may be declared much
-/// larger than where points are, whose coordinates candidates publish.
+/// Returns the spacing of points spread evenly over the known bounds; 0 without bounds. Axis candidates publish coordinates, which
+/// show whether the bounds are much larger than the range of the points.
 fn spacing<const D: usize>(released: &Released<D>) -> f64 {
     let Some(bounds) = released.bounds() else { return 0.0 };
     let mut sides: [f64; D] = std::array::from_fn(|c| bounds.high[c] - bounds.low[c]);
@@ -125,9 +127,9 @@ fn spacing<const D: usize>(released: &Released<D>) -> f64 {
     libm::pow(volume / released.n_slots().max(1) as f64, 1.0 / D as f64)
 }
 
-/// The delta with the best mean evidence, not below `least`, where a list as given holds a `share` of all records; `None` for an
-/// empty map or one without extent. The maximum is flat. The widest delta near it is taken, as a wider support is the steadier one;
-/// or a narrow one, at most `beyond_edge` times the lower edge: neighbors' estimates are sharper than records.
+/// Returns the delta with the best score, at least `least`; `None` for an empty map or one without extent. A list holds the
+/// fraction `share` of all records. The maximum is a plateau. By default the widest delta of it is taken, whose larger support is
+/// more stable; with `beyond_edge`, a narrow one, at most that many times its lower edge, because joint recovery sharpens it.
 fn choose<const D: usize>(
     family: &Family<'_, D>,
     lists: &Neighborhoods,
@@ -142,14 +144,14 @@ fn choose<const D: usize>(
     let base = if is_of_candidates { settings.too_wide_of_candidates } else { TOO_WIDE };
     let (wide, narrow) = limits(family, share);
     let too_wide = base.max(wide);
-    // Some steps of the ladder lie between the two.
+    // Keep some steps of the ladder between the two limits.
     let too_narrow = narrow.min(too_wide / 8.0);
-    // In a flat map two of a record's three lines cross all of it.
+    // In a flat map two of the three lines of a record run within the plane.
     let too_wide = match family.radius_if_flat(share) {
         Some(radius) => too_wide.max(chance(radius)),
         None => too_wide,
     };
-    // Few points are far apart: at least one halving lies between the two limits.
+    // If points are sparse, keep at least one halving between the two limits.
     let too_wide = too_wide.max(chance(2.0 * least));
     let extent = family.extent();
     if lists.n_slots() == 0 || !(extent.is_finite() && extent > 0.0) {
@@ -164,7 +166,7 @@ fn choose<const D: usize>(
         solved.iter().map(|e| f64::from(e.evidence)).sum::<f64>() / solved.len() as f64
     };
     let value = |delta: f64| mean_evidence(lists, delta) - mean_evidence(&mixed, delta);
-    // From large to small; once well below the maximum, smaller deltas only lose more neighbors.
+    // From large to small: far below the maximum, smaller deltas only lose more neighbors.
     let (mut coarse, mut most) = (extent, f64::NEG_INFINITY);
     let halved = |step: u32| extent * libm::exp2(-f64::from(step));
     let is_too_wide = |step: u32| chance(halved(step)) > too_wide;
@@ -181,7 +183,7 @@ fn choose<const D: usize>(
             break;
         }
     }
-    // The fine ladder reaches beyond the coarse one, but not where its limit is one of an image.
+    // The fine ladder may exceed the limit of the coarse one, except in images.
     let keeps_to_limit = is_of_candidates && settings.candidates_keep_to_limit;
     let most_chance = if keeps_to_limit { too_wide } else { f32::INFINITY };
     let fine: Vec<(f64, f64)> = (1 - FINE..2 * FINE)
@@ -202,17 +204,18 @@ fn choose<const D: usize>(
     })
 }
 
-/// A delta with more chance than the first is never too wide, whatever else; one with less than the second is too narrow.
+/// Returns two limits on chance: deltas with more chance than the first may be too wide, those with less than the second are too
+/// narrow.
 ///
-/// Where a list holds a share `s` of all records, neighbors are within a ball that holds as much of the map.
-/// A random line passes as near with a chance of `s^(2/3)` if points fill space and `s^2` if they lie on a curve; a
-/// random plane with `s^(1/3)` and `s`.
+/// If a list holds the fraction `s` of all records, its neighbors lie in a ball that holds this fraction of the map. A random line
+/// passes through that ball with probability `s^(2/3)` if points fill space and `s^2` if they lie on a curve; a random plane
+/// with `s^(1/3)` and `s`.
 fn limits<const D: usize>(family: &Family<'_, D>, share: f64) -> (f32, f32) {
     let power = |factor: f64, power: f64| (factor * libm::pow(share, power)) as f32;
     match family {
         _ if !Settings::of_dimension::<D>().limits_by_share => (0.0, 0.0),
         Family::Planes { .. } => (power(0.5, 0.5), power(1.0, 1.0)),
-        // Rays are dense near their centers, so that chance is large at a typical place.
+        // Rays are dense near their centers, so chance is large at a typical place.
         _ if family.is_of_rays() => (power(3.0, 2.0 / 3.0), power(1.0, 2.0)),
         Family::Lines { .. } | Family::Candidates { .. } => {
             (power(1.0, 2.0 / 3.0), power(1.0, 2.0))
@@ -220,10 +223,11 @@ fn limits<const D: usize>(family: &Family<'_, D>, share: f64) -> (f32, f32) {
     }
 }
 
-/// Where evidence begins to fall when delta shrinks below `coarse`, the best of the coarse ladder.
+/// Returns the lower edge of the plateau: where evidence begins to fall as delta shrinks below `coarse`, the best of the coarse
+/// ladder.
 ///
-/// Entries that are wrong but not far away keep evidence high up to deltas many times as wide as
-/// neighbors are apart: the plateau is not theirs alone, its lower edge is.
+/// Wrong entries of the same region keep evidence large up to deltas many times the distance of true neighbors. They raise the
+/// upper part of the plateau, but not its lower edge.
 fn edge(coarse: f64, value: &impl Fn(f64) -> f64) -> f64 {
     let at = |step: i32| coarse * libm::exp2(f64::from(-step) / f64::from(FINE));
     let mut values: Vec<f64> = (-FINE..=0).map(|step| value(at(step))).collect();

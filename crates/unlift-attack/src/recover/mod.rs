@@ -1,16 +1,17 @@
-//! The attacker: records and neighborhoods in, positions out. Never imports `truth`.
+//! Recovery: from released records and neighborhoods to positions. No code here imports `truth`.
 //!
-//! In order, a file or a folder per step, each of which imports only what stands above it and `map`:
+//! Modules, in an order in which each imports only modules above it and `map`:
 //!
-//! 1. `options`: what a user may choose; `result`: what comes out; `solver`: the trait that you implement for a solver of your own.
-//! 2. `map`: records, lists and places as solvers read them; `Settings` (in `map/family`) is all that differs between maps and images.
-//! 3. Solvers: `consensus` and `joint`; `ransac` and `published_density` are attacks as published, for comparison.
-//! 4. `delta`: the distance that decides support, chosen by how well consensus then does.
-//! 5. `exact`: coordinates that a rule of the scheme fixes. `confidence`: how sure the attacker is.
-//! 6. `problem`: a released map with its lists, solved and finished, at once or in parts by consensus. `model`: what parts must know of the
-//!    whole map. `records_alone`: attacks without neighborhoods.
+//! 1. `options`: options of recovery. `assignment`: descriptors of paired lines. `result`: recovered positions. `solver`: the
+//!    trait [`Solver`], which you can implement.
+//! 2. `map`: the data that all solvers read. `Settings` in `map/family` holds every constant that differs between maps and images.
+//! 3. `consensus` and `joint`: our solvers. `ransac` and `published_density`: published attacks, for comparison.
+//! 4. `delta`: the choice of the distance that decides support.
+//! 5. `exact`: coordinates that a rule of the scheme fixes. `confidence`: the probability that an estimate is right.
+//! 6. `model`: what consensus learns of a whole map. `problem`: solves a map at once, or in parts by consensus.
+//!    `records_alone`: attacks without neighborhoods.
 //!
-//! [`recover`] is the whole attack. [`prepare`] learns a [`Model`], with which parts of a map are solved elsewhere.
+//! [`recover`] runs the whole attack. [`prepare`] learns a [`Model`], with which other processes solve parts of a map.
 
 mod assignment;
 mod confidence;
@@ -29,7 +30,7 @@ mod result;
 mod solver;
 
 #[doc(hidden)]
-pub use confidence::crowd::{Cues, Seen};
+pub use confidence::cues::{Cues, Seen};
 #[doc(hidden)]
 pub use confidence::{N_KINDS, N_TERMS, centered, terms};
 pub use model::Model;
@@ -45,7 +46,7 @@ use crate::neighbors::Neighborhoods;
 use crate::released::Released;
 use problem::{Problem, check_lists};
 
-/// Learns what consensus must know of `released` and all of its `lists` before any point is placed.
+/// Learns the [`Model`] that consensus needs, from `released` and all of its `lists`.
 ///
 /// # Errors
 /// When options are out of range, or the lists do not have one row per slot.
@@ -57,12 +58,12 @@ pub fn prepare<const D: usize>(
     Problem::new(released, lists, Builtin::Consensus, options)?.model()
 }
 
-/// Recovers the hidden points of `released` with the help of `lists` by `solver`: `R` of Eq. (3).
+/// Recovers the hidden points of `released` from `lists` by `solver`: the map `R` of Eq. (3).
 ///
-/// The result depends on the records, the neighborhoods and the options alone, not on threads.
+/// The result depends on the arguments alone, not on the number of threads.
 ///
 /// # Errors
-/// When options are out of range, the lists do not have one row per slot, or the solver fails or does not answer for every slot.
+/// When options are out of range, the lists do not have one row per slot, the solver fails, or it does not return one position per slot.
 pub fn recover<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
@@ -100,8 +101,8 @@ impl<const D: usize> Solver<D> for Builtin {
     }
 }
 
-/// Recovers by [`Builtin::Joint`] and returns beside it the pass that it starts from: bit for bit what [`Builtin::JointStart`]
-/// gives, without a run of its own.
+/// Recovers by [`Builtin::Joint`] and also returns the estimates it starts from, which equal the result of
+/// [`Builtin::JointStart`] bit for bit.
 ///
 /// # Errors
 /// When options are out of range, or the lists do not have one row per slot.
@@ -129,12 +130,12 @@ fn with_start<const D: usize>(
 ) -> Result<(Recovered<D>, Recovered<D>), Error> {
     let problem = Problem::new(released, lists, Builtin::Joint, options)?;
     let start = problem.solve(0..problem.n_slots());
-    let (recovered, _) = problem.finish(problem.refine(start.clone()), false)?;
+    let (recovered, _) = problem.finish(problem.run_joint(start.clone()), false)?;
     let start = problem.finish_start(start, &recovered)?;
     Ok((recovered, start))
 }
 
-/// Recovers by [`Builtin::Joint`] and returns beside it what confidence is made of, for fitting it.
+/// Recovers by [`Builtin::Joint`] and also returns the features of confidence, to fit its model.
 ///
 /// # Errors
 /// When options are out of range, or the lists do not have one row per slot.
@@ -163,9 +164,9 @@ fn solve<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
     options: &RecoverOptions,
-    is_asked: bool,
+    want_features: bool,
 ) -> Result<(Recovered<D>, Seen), Error> {
     let problem = Problem::new(released, lists, solver, options)?;
     let start = problem.solve(0..problem.n_slots());
-    problem.finish(problem.refine(start), is_asked)
+    problem.finish(problem.run_joint(start), want_features)
 }

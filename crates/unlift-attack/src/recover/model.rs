@@ -1,4 +1,4 @@
-//! What recovery learns of a map before any point is placed.
+//! The model of a map: what consensus learns before it solves any slot.
 
 use crate::recover::map::bytes::Reader;
 use crate::recover::map::chance::{CandidateField, ChanceField, tube};
@@ -6,35 +6,35 @@ use crate::recover::map::family::Chance;
 use crate::recover::options::{Delta, RecoverOptions};
 use crate::{About, Error, Fingerprint, ListsBy, RowOrder};
 
-/// What consensus learns of one released map and all of its lists: delta, and how likely a random listed record passes near a place.
+/// What consensus learns of a released map and all of its lists: delta, and the chance that a random listed record passes
+/// near a place.
 ///
-/// It is small, whatever the size of the map (grids of 32,768 cells at most, one for lines, one per center of rays or per axis
-/// of candidates), so that whoever has the same map and the lists of some slots can solve these with it:
-/// [`solve_part`](Self::solve_part).
+/// With the model, the same map and the lists of some slots, [`solve_part`](Self::solve_part) solves these slots. The model is small
+/// for every map: one grid of at most 32,768 cells for lines, or one per center of rays or per axis of candidates.
 #[derive(Clone, Debug)]
 pub struct Model<const D: usize> {
     pub(super) options: RecoverOptions,
     pub(super) map: Fingerprint,
-    /// What the rows of the lists are counted by, hence those of what comes back.
+    /// The row order of the lists, and thus of the result.
     pub(super) about: About,
     pub(super) delta: f64,
     pub(super) chance: Chance<D>,
 }
 
-/// How a model begins as bytes.
+/// The first bytes of a stored model.
 const MAGIC: [u8; 8] = *b"unliftM4";
-/// An order of rows that is not stated.
+/// Code of an unstated row order.
 const UNSTATED: u8 = u8::MAX;
-/// Centers of rays at most: they are counted in a byte.
+/// Largest number of centers of rays, whose index is one byte.
 const MOST_FIELDS: usize = 256;
 
 impl<const D: usize> Model<D> {
-    /// The options that it was made with.
+    /// Options that the model was made with.
     pub fn options(&self) -> &RecoverOptions {
         &self.options
     }
 
-    /// The released map that it is about.
+    /// The released map of the model.
     pub fn map(&self) -> Fingerprint {
         self.map
     }
@@ -44,8 +44,8 @@ impl<const D: usize> Model<D> {
         self.delta
     }
 
-    /// The chance that a random listed record passes within delta of `x` (about the released origin), for a slot of
-    /// the center `group` of rays; of other records any group will do. `None` for planes, whose offsets are counted.
+    /// Chance that a random listed record passes within delta of `x` (relative to the released origin). For rays, the slot belongs to
+    /// the center `group`; for other records `group` is ignored. `None` for planes, whose offsets are counted exactly.
     pub fn chance(&self, group: usize, x: &[f32; D]) -> Option<f32> {
         let delta = self.delta as f32;
         let tube = tube(D, delta);
@@ -58,13 +58,13 @@ impl<const D: usize> Model<D> {
         }
     }
 
-    /// The model as bytes: a few hundred kilobytes at most, the same on every machine.
+    /// Encodes the model: a few hundred kilobytes at most, the same bytes on every machine.
     pub fn to_bytes(&self) -> Vec<u8> {
         let RecoverOptions { delta, seed, exact_constraints, .. } = self.options;
         let mut to = MAGIC.to_vec();
         to.extend([D as u8, u8::from(exact_constraints)]);
         to.extend(seed.to_le_bytes());
-        // No given delta is 0.
+        // 0 stands for an automatic delta.
         let given = if let Delta::Fixed(delta) = delta { delta } else { 0.0 };
         to.extend(given.to_le_bytes());
         to.extend(self.map.0);
@@ -87,10 +87,10 @@ impl<const D: usize> Model<D> {
         to
     }
 
-    /// The model that [`to_bytes`](Self::to_bytes) gave.
+    /// Decodes a model from the bytes of [`to_bytes`](Self::to_bytes).
     ///
     /// # Errors
-    /// When `bytes` are anything else, or a model in another number of dimensions.
+    /// When `bytes` are not a model of this version and dimension.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
         let wrong = |expected: &str, found: String| Error::new("model", expected, found);
         let mut from = Reader(bytes);

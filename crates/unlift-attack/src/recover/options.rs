@@ -1,13 +1,13 @@
-//! What a user may choose about recovery.
+//! Options of recovery.
 
 use crate::Error;
 
 /// The distance up to which a listed record supports a position, in the unit of the map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Delta {
-    /// Chosen from the released map and the neighborhoods alone.
+    /// Chosen automatically, from the released map and the neighborhoods.
     Auto,
-    /// Given.
+    /// A fixed length.
     Fixed(f64),
 }
 
@@ -16,12 +16,12 @@ pub enum Delta {
 pub struct RecoverOptions {
     /// The distance that decides support.
     pub delta: Delta,
-    /// The attacker's own seed: null samples and random trials.
+    /// The attacker's random seed, for null samples and random trials.
     pub seed: u64,
-    /// Whether rules that tie records together are used where they fix coordinates: `cp` exchanges
-    /// values that are still in the map, `ray-voxel` leaves every other voxel along a ray.
+    /// Whether to use rules of a scheme that fix coordinates: values that `cp` exchanged are still in the map, and `ray-voxel`
+    /// excludes every other voxel along a ray.
     pub exact_constraints: bool,
-    /// Whether every recovered point gets the probability that it is right; a few microseconds each.
+    /// Whether to compute the probability that each recovered point is right; it takes a few microseconds per point.
     pub confidence: bool,
 }
 

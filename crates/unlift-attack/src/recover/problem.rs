@@ -1,11 +1,11 @@
-//! A released map and its lists in the form that solvers read.
+//! One recovery problem: a released map, its lists, a solver and its options; and the steps that solve it.
 
 use std::ops::Range;
 
 use crate::density::{Peaks, tomography};
 use crate::neighbors::Neighborhoods;
 use crate::recover::assignment::descriptor_rows;
-use crate::recover::confidence::crowd::{Seen, Solved};
+use crate::recover::confidence::cues::{Seen, Solved};
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::Graph;
 use crate::recover::map::lists::Slots;
@@ -20,7 +20,6 @@ use crate::recover::{confidence, consensus, delta, exact, joint};
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, Fingerprint};
 
-/// One map to be recovered.
 pub(super) struct Problem<'a, const D: usize> {
     released: &'a Released<D>,
     map: Fingerprint,
@@ -32,23 +31,22 @@ pub(super) struct Problem<'a, const D: usize> {
     trials: TrialCounts,
 }
 
-/// Records as solvers read them.
 enum Records<'a, const D: usize> {
-    /// Where records alone say that points are.
+    /// For attacks on the records alone: the peak of each slot.
     Alone(Peaks),
-    /// Records with their lists.
+    /// For solvers that read lists.
     Listed {
         family: Family<'a, D>,
-        /// Who lists whom in both directions, for joint recovery.
+        /// For joint recovery: the edges of the lists in both directions.
         graph: Option<Graph>,
-        /// The graph as lists, where records have one slot.
+        /// The graph as lists, if records have one slot.
         both_ways: Option<Neighborhoods>,
     },
 }
 
 impl<'a, const D: usize> Problem<'a, D> {
-    /// `released` with its `lists`; what a model would say is learned here.
-    /// Fails when options are out of range, or the lists are of another map.
+    /// Prepares the problem and learns everything that a [`Model`] holds.
+    /// Fails when options are out of range, or the lists belong to another map.
     pub(super) fn new(
         released: &'a Released<D>,
         lists: &'a Neighborhoods,
@@ -58,7 +56,7 @@ impl<'a, const D: usize> Problem<'a, D> {
         Self::make(released, lists, solver, options, None)
     }
 
-    /// [`new`](Self::new), where the lists may be some of those that a `model` was made of.
+    /// Prepares the problem like [`new`](Self::new). With a `model`, nothing is learned, and `lists` may be a part of all lists.
     fn make(
         released: &'a Released<D>,
         lists: &'a Neighborhoods,
@@ -91,7 +89,7 @@ impl<'a, const D: usize> Problem<'a, D> {
         model: Option<&Model<D>>,
     ) -> Result<(f64, Records<'a, D>), Error> {
         let family = Family::new(released, lists, model.map(|model| model.chance.clone()))?;
-        // Joint recovery also asks who lists whom, from the first pass on.
+        // Joint recovery reads lists in both directions from its start on.
         let is_joint = matches!(solver, Builtin::Joint | Builtin::JointStart);
         let graph = is_joint.then(|| Graph::new(lists, released.slots_per_record()));
         let single = graph.as_ref().filter(|_| released.slots_per_record() == 1);
@@ -107,7 +105,6 @@ impl<'a, const D: usize> Problem<'a, D> {
         Ok((delta, Records::Listed { family, graph, both_ways }))
     }
 
-    /// What was learned of the map.
     /// Fails when the solver does not read lists.
     pub(super) fn model(&self) -> Result<Model<D>, Error> {
         let Records::Listed { family, .. } = &self.records else {
@@ -121,12 +118,11 @@ impl<'a, const D: usize> Problem<'a, D> {
         Ok(Model { options: self.options, about: self.about(), map, delta, chance })
     }
 
-    /// Number of slots.
     pub(super) fn n_slots(&self) -> usize {
         self.released.n_slots()
     }
 
-    /// The estimates of `slots`, in order, by the solver; of joint recovery those that it starts from.
+    /// Returns the estimates of `slots`, in order. For joint recovery these are the estimates it starts from.
     pub(super) fn solve(&self, slots: Range<usize>) -> Vec<Estimate<D>> {
         let (lists, delta) = (self.lists, self.delta as f32);
         match &self.records {
@@ -142,8 +138,8 @@ impl<'a, const D: usize> Problem<'a, D> {
         }
     }
 
-    /// The estimates of all slots after joint recovery from `start`; `start` for other solvers.
-    pub(super) fn refine(&self, start: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
+    /// Returns the estimates of all slots after joint recovery from `start`; for other solvers, `start`.
+    pub(super) fn run_joint(&self, start: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
         match &self.records {
             Records::Listed { family, graph: Some(graph), .. } if self.solver == Builtin::Joint => {
                 let (delta, seed) = (self.delta as f32, self.options.seed);
@@ -153,30 +149,30 @@ impl<'a, const D: usize> Problem<'a, D> {
         }
     }
 
-    /// Recovered points from the last estimates of all slots, with exact constraints and confidence. Beside it what confidence
-    /// is made of, if it `is_asked` for.
+    /// Applies exact constraints to the last estimates and adds confidence. Also returns the features of confidence;
+    /// `want_features` computes them even if the map gets no confidence.
     /// Fails when there is not one estimate per slot.
     pub(super) fn finish(
         &self,
         estimates: Vec<Estimate<D>>,
-        is_asked: bool,
+        want_features: bool,
     ) -> Result<(Recovered<D>, Seen), Error> {
         let rows = descriptor_rows(self.released, self.lists, 0..self.released.n_records());
-        self.finish_with(estimates, rows, is_asked)
+        self.finish_with(estimates, rows, want_features)
     }
 
-    /// [`finish`](Self::finish), where it is known which descriptor is whose.
+    /// Finishes like [`finish`](Self::finish), with a given assignment of descriptors.
     fn finish_with(
         &self,
         unsettled: Vec<Estimate<D>>,
         descriptor_row: Option<Vec<u32>>,
-        is_asked: bool,
+        want_features: bool,
     ) -> Result<(Recovered<D>, Seen), Error> {
         if unsettled.len() != self.n_slots() {
             let expected = format!("{}, one per slot", self.n_slots());
             return Err(Error::new("estimates", expected, unsettled.len().to_string()));
         }
-        // Most schemes settle nothing: a copy of all estimates would double their memory.
+        // Most schemes have no exact constraints: do not copy all estimates for them.
         let settled = self.is_settled().then(|| self.settled(unsettled.clone()));
         let estimates = settled.as_ref().unwrap_or(&unsettled);
         let trials = (self.solver == Builtin::Ransac).then(|| self.trials.histogram());
@@ -191,11 +187,11 @@ impl<'a, const D: usize> Problem<'a, D> {
             return nothing(recovered, Unknown::OtherSolver);
         };
         let unknown = confidence::unknown(self.released, self.lists, estimates);
-        if let (Some(unknown), false) = (unknown, is_asked) {
+        if let (Some(unknown), false) = (unknown, want_features) {
             return nothing(recovered, unknown);
         }
         let solved = Solved { estimates, unsettled: &unsettled, delta: self.delta as f32 };
-        let (sure, seen) = confidence::look(family, graph, self.released, &solved);
+        let (sure, seen) = confidence::predict(family, graph, self.released, &solved);
         let recovered = match unknown {
             Some(unknown) => recovered.without_confidence(unknown),
             None => recovered.with_confidence(sure)?,
@@ -203,7 +199,8 @@ impl<'a, const D: usize> Problem<'a, D> {
         Ok((recovered, seen))
     }
 
-    /// The first pass of joint recovery as [`Builtin::JointStart`] finishes it, beside the `last` one.
+    /// Finishes the estimates that joint recovery starts from, as [`Builtin::JointStart`] does. Takes the assignment of descriptors
+    /// from `last`.
     /// Fails when there is not one estimate per slot.
     pub(super) fn finish_start(
         &self,
@@ -215,14 +212,14 @@ impl<'a, const D: usize> Problem<'a, D> {
         Ok(recovered.without_confidence(Unknown::OtherSolver))
     }
 
-    /// Whether a rule of the scheme moves estimates. The paper's loop stays as published.
+    /// Whether exact constraints apply. The paper's sampling loop stays as published.
     fn is_settled(&self) -> bool {
         let asked = self.options.exact_constraints && self.solver != Builtin::Ransac;
         let listed = matches!(self.records, Records::Listed { .. });
         asked && listed && exact::can_settle(self.released)
     }
 
-    /// Estimates moved to where rules of the scheme allow them to be.
+    /// Moves estimates to where exact constraints allow them to be.
     fn settle(&self, estimates: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
         match self.is_settled() {
             true => exact::settle(self.released, estimates, self.delta),
@@ -230,18 +227,18 @@ impl<'a, const D: usize> Problem<'a, D> {
         }
     }
 
-    /// Estimates of which a rule of the scheme fixes coordinates; joint recovery goes on from there.
+    /// Applies exact constraints, and repeats joint recovery from the result where that helps.
     fn settled(&self, estimates: Vec<Estimate<D>>) -> Vec<Estimate<D>> {
         let mut settled = self.settle(estimates);
         if self.solver == Builtin::Joint {
-            for _ in 0..exact::feeds(self.released) {
-                settled = self.settle(self.refine(settled));
+            for _ in 0..exact::joint_reruns(self.released) {
+                settled = self.settle(self.run_joint(settled));
             }
         }
         settled
     }
 
-    /// Estimates in columns, by rows of descriptors where these are known.
+    /// Puts estimates in columns, with the rows of descriptors where they are known.
     fn in_columns(
         &self,
         estimates: &[Estimate<D>],
@@ -259,7 +256,7 @@ impl<'a, const D: usize> Problem<'a, D> {
     }
 }
 
-/// Refuses rays that are compared with all others of their anchor, which takes all lists.
+/// Rejects rays from centers with regions: consensus compares each of them with all others of its center.
 fn check_anchors<const D: usize>(released: &Released<D>) -> Result<(), Error> {
     match released.obfuscation() {
         Obfuscation::Rays(rays) if rays.regions().is_some() => {
@@ -269,7 +266,7 @@ fn check_anchors<const D: usize>(released: &Released<D>) -> Result<(), Error> {
     }
 }
 
-/// Refuses lists that are not of this map.
+/// Rejects lists that do not fit the map.
 pub(super) fn check_lists<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
@@ -278,7 +275,7 @@ pub(super) fn check_lists<const D: usize>(
         let expected = format!("{} rows, one per slot", released.n_slots());
         return Err(Error::new("neighborhoods", expected, lists.n_slots().to_string()));
     }
-    // Lists of another map may have as many rows.
+    // Lists of another map may have the same number of rows.
     let n_records = released.n_records();
     if let Some(record) = lists.records().iter().find(|record| record.index() >= n_records) {
         let expected = format!("records below {n_records}");
@@ -287,24 +284,24 @@ pub(super) fn check_lists<const D: usize>(
     Ok(())
 }
 
-// Consensus in parts, each with its own lists alone: what the machines of a cluster solve.
+// Consensus in parts, each with its own lists only: for the machines of a cluster.
 
-/// What came of some slots of a map, one after the other.
+/// Estimates of a contiguous range of slots.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part<const D: usize> {
     /// An estimate per slot.
     pub estimates: Vec<Estimate<D>>,
-    /// Per slot the descriptor row said to belong to it, if records hide two points and have descriptors.
+    /// Per slot, the row of its descriptor, if records have two slots and descriptors.
     pub descriptor_row: Option<Vec<u32>>,
 }
 
 impl<const D: usize> Model<D> {
-    /// Solves `slots` of `released` by consensus with the lists of these slots alone, made by
-    /// [`Neighborhoods::of_slots`]: whatever other lists say changes nothing. Reads all records once: parts should be large.
+    /// Solves `slots` of `released` by consensus. `lists` are those of these slots, made by [`Neighborhoods::of_slots`]; no other
+    /// lists matter. Every call reads all records, so parts should be large.
     ///
     /// # Errors
-    /// When the model is of another map, records are rays from anchors in regions (which are compared with each other), or `slots` are
-    /// not there or end within a record.
+    /// When the model belongs to another map, records are rays from centers with regions (which are compared with each other), or `slots`
+    /// is out of range or splits a record.
     pub fn solve_part(
         &self,
         released: &Released<D>,
@@ -326,11 +323,11 @@ impl<const D: usize> Model<D> {
         Ok(Part { estimates, descriptor_row })
     }
 
-    /// What came back of the whole map: `parts` in the order of their slots. The same as
-    /// [`recover`](crate::recover::recover), bit for bit.
+    /// Joins `parts`, in the order of their slots, to the recovered map. The result equals that of
+    /// [`recover`](crate::recover::recover) bit for bit.
     ///
     /// # Errors
-    /// As there, and when the parts are not those of all slots.
+    /// When the map is not the one of the model, or the parts do not cover all slots.
     pub fn join(
         &self,
         released: &Released<D>,

@@ -1,11 +1,11 @@
-//! The published density attacks, for comparison: constants as published, nothing read but the records.
+//! The published density attacks, for comparison. They read only the records and use the published constants.
 //!
-//! One point per line (Chelani et al., CVPR 2021): the nearest lines vote where they pass, the peak of the votes is the estimate,
-//! and lines near the estimates vote again. Two points per line (Lee et al., CVPR 2023): the two highest peaks of a kernel
-//! density of the votes. Rays (Moon et al., CVPR 2024): rays of other centers vote once.
+//! One point per line (Chelani et al., CVPR 2021): the nearest lines vote at their closest approach, the peak of the votes is
+//! the estimate, and lines near the estimates vote again. Two points per line (Lee et al., CVPR 2023): the two highest peaks
+//! of a kernel density of the votes. Rays (Moon et al., CVPR 2024): rays of other centers vote once.
 //!
-//! The published programs count votes from the true point and take ranges from true distances. Here votes are counted from the
-//! foot of the line, a line has no vote of its own, and ranges come from the votes.
+//! The published programs measure votes from the true point and take ranges from true distances. Here votes are measured from
+//! the foot of the line, a line does not vote for itself, and ranges come from the votes.
 
 use rayon::prelude::*;
 
@@ -15,21 +15,20 @@ use crate::geometry::vector::{dot, sub, widen};
 use crate::released::Released;
 use crate::simd::{Kernel, dispatch};
 
-/// Nearest lines that vote at first: at most so many, and at most this share of all.
+/// Nearest lines that vote first: the largest number, and the largest fraction of all lines.
 const COARSE: (usize, f64) = (500, 0.05);
-/// The same for paired points, of which a vote may mean either.
+/// Nearest lines that vote first for paired lines, of which a vote may mean either point.
 const COARSE_OF_PAIRS: (usize, f64) = (1000, 0.05);
-/// Rounds in which the voting lines are chosen anew.
+/// Rounds of refinement, each with new voting lines.
 const REFINEMENTS: usize = 3;
-/// Estimates nearest to a line, and lines nearest to its estimate, of which those in both vote.
+/// Number of estimates nearest to a line, and of lines nearest to its estimate; lines in both sets vote.
 const REFINE: usize = 100;
-/// Fewer than this in both are too few: then all lines of the near estimates vote.
+/// With fewer lines in both sets, all lines of the near estimates vote.
 const FEWEST: usize = 10;
-/// Larger maps let this many lines vote, spread evenly over the file: all pairs would be too many.
+/// Largest number of lines that vote, spread evenly over the file: all pairs of a larger map would be too many.
 const MOST_VOTERS: usize = 100_000;
 
-/// Where the published attacks put the points of `released`. No answer for planes, axis candidates and
-/// maps that are not in three dimensions.
+/// Returns the points that the published attacks find. They support neither planes, nor axis candidates, nor 2D maps.
 pub(crate) fn published<const D: usize>(released: &Released<D>) -> Peaks {
     let n_slots = released.n_slots();
     let Some(feasible) = Feasible::new(released) else {
@@ -51,8 +50,8 @@ pub(crate) fn published<const D: usize>(released: &Released<D>) -> Peaks {
         let near = near.iter().map(|&at| &lines[voters[at as usize] as usize]);
         let mut votes = passes(&lines[row], near);
         let found = match feasible.hides {
-            Hides::Two => two_crowds(&mut votes).map(|pair| pair.map(Some)),
-            _ => crowd(&mut votes).map(|t| [Some(t), None]),
+            Hides::Two => two_modes(&mut votes).map(|pair| pair.map(Some)),
+            _ => mode(&mut votes).map(|t| [Some(t), None]),
         };
         let peaks = found.unwrap_or_default().map(|t| t.and_then(|t| on(&lines[row], t)));
         (peaks, reach)
@@ -70,7 +69,7 @@ pub(crate) fn published<const D: usize>(released: &Released<D>) -> Peaks {
     Peaks { of, resolution }
 }
 
-/// One refinement: lines whose estimates are near a line and that pass near its estimate vote again.
+/// Refines once: lines vote that pass near the estimate of a line and whose own estimates are near that line.
 fn refine(
     lines: &[FeasibleLine],
     voters: &[u32],
@@ -96,12 +95,12 @@ fn refine(
         let chosen = if both.len() > FEWEST { &both } else { &near };
         let near = chosen.iter().map(|&at| &lines[voters[at as usize] as usize]);
         let mut votes = passes(&lines[row], near);
-        crowd(&mut votes).and_then(|t| on(&lines[row], t)).or(Some(estimate))
+        mode(&mut votes).and_then(|t| on(&lines[row], t)).or(Some(estimate))
     };
     (0..lines.len()).into_par_iter().map(step).collect()
 }
 
-/// Takes the votes, by their `distances`, of the line of `row` itself, or of all rays of its center.
+/// Removes votes, by their `distances`: that of the line of `row` itself, or those of all rays of its center.
 fn silence(distances: &mut [f32], row: usize, lines: &[FeasibleLine], voters: &[u32]) {
     let own = lines[row].group;
     if own.is_some() {
@@ -115,7 +114,7 @@ fn silence(distances: &mut [f32], row: usize, lines: &[FeasibleLine], voters: &[
     }
 }
 
-/// The parameters at which `line` is passed most closely by each of `others`; parallel ones do not tell.
+/// Returns the parameters at which `line` is passed most closely by `others`, except parallel ones.
 fn passes<'a>(line: &FeasibleLine, others: impl Iterator<Item = &'a FeasibleLine>) -> Vec<f64> {
     let (through, direction) = (widen(&line.through), widen(&line.direction));
     let pass = |other: &FeasibleLine| {
@@ -141,21 +140,21 @@ fn median(values: impl Iterator<Item = f32>) -> f64 {
     if values.is_empty() { 0.0 } else { crate::geometry::vector::median(&mut values) }
 }
 
-// Where votes along a line crowd: rules and constants of the published programs.
+// Peaks of the votes along a line: rules and constants of the published programs.
 
-/// Votes left out at either end before anything is counted.
+/// Votes dropped at either end.
 const CUT: usize = 5;
 /// Bins of the histogram of votes.
 const BINS: usize = 500;
-/// The crowd begins within this share of the range.
+/// The peak begins within this fraction of the range.
 const BEGINS_WITHIN: f64 = 0.9;
-/// A crowd is narrowed down while the votes differ from even ones by more than this (Kuiper's
-/// statistic), and while more than [`CUT`] are left.
+/// Narrowing continues while the votes differ from uniform ones by more than this (Kuiper's statistic) and more than
+/// [`CUT`] are left.
 const EVEN: f64 = 0.3;
 
-/// The middle of the crowd that `votes` (reordered) form, by Chelani et al.: where the cumulative votes
-/// rise most above even ones, again and again. `None` without votes.
-fn crowd(votes: &mut [f64]) -> Option<f64> {
+/// Returns the middle of the peak of `votes` (which are reordered), by Chelani et al.: repeatedly, the interval over which the
+/// cumulative votes rise most above uniform ones. `None` without votes.
+fn mode(votes: &mut [f64]) -> Option<f64> {
     votes.sort_unstable_by(f64::total_cmp);
     let all: &[f64] = votes;
     let mut left = if all.len() > 2 * CUT { &all[CUT..all.len() - CUT] } else { all };
@@ -181,7 +180,7 @@ fn crowd(votes: &mut [f64]) -> Option<f64> {
         let edge = |bin: usize| low + (bin + 1) as f64 * width;
         let inside = left.partition_point(|&vote| vote <= edge(begin))
             ..left.partition_point(|&vote| vote < edge(end));
-        // Nothing left out means nothing more to narrow down.
+        // The interval no longer shrinks.
         if inside.len() == left.len() {
             break;
         }
@@ -204,19 +203,19 @@ fn first_extreme(values: &[f64], beats: impl Fn(f64, f64) -> bool) -> usize {
     found
 }
 
-/// The kernel's standard deviation, in standard deviations of the votes.
+/// Standard deviation of the kernel, in standard deviations of the votes.
 const BANDWIDTH: f64 = 0.07;
-/// Places at which the density of votes is evaluated. (10,000 as published; the kernel spans many of these.)
+/// Places at which the density is evaluated. The published number is 10,000; the kernel spans many of these.
 const PLACES: usize = 1024;
-/// Share of the votes left out at either end: lines nearly parallel vote anywhere. (The published range
-/// comes from distances between true points.)
-const FAR: f64 = 0.01;
+/// Fraction of the votes dropped at either end, because nearly parallel lines vote anywhere. (The published range comes
+/// from distances between true points.)
+const TRIMMED: f64 = 0.01;
 
-/// The two highest peaks of the density of `votes` (reordered), in ascending order, by Lee et al.; twice
-/// the same if there is one peak. `None` without votes.
-fn two_crowds(votes: &mut [f64]) -> Option<[f64; 2]> {
+/// Returns the two highest peaks of the density of `votes` (which are reordered), ascending, by Lee et al.; one peak is
+/// returned twice. `None` without votes.
+fn two_modes(votes: &mut [f64]) -> Option<[f64; 2]> {
     votes.sort_unstable_by(f64::total_cmp);
-    let cut = (FAR * votes.len() as f64).ceil() as usize;
+    let cut = (TRIMMED * votes.len() as f64).ceil() as usize;
     let kept = votes.get(cut..votes.len().saturating_sub(cut)).filter(|kept| !kept.is_empty());
     let kept = kept.unwrap_or(votes);
     let (&low, &high) = (kept.first()?, kept.last()?);
@@ -254,9 +253,9 @@ fn two_crowds(votes: &mut [f64]) -> Option<[f64; 2]> {
     Some([pair[0].min(pair[1]), pair[0].max(pair[1])])
 }
 
-// Distances to all lines or estimates: the hot loops of the published attacks.
+// Distances to all lines or estimates: the inner loops of the published attacks.
 
-/// Rows of numbers with a column per number, so that a function of every row runs over whole vectors.
+/// Rows in columns, so that a function of every row runs over whole vectors.
 #[derive(Debug)]
 struct Columns<const N: usize>([Vec<f32>; N]);
 
@@ -272,7 +271,6 @@ impl<const N: usize> Columns<N> {
         Self(columns)
     }
 
-    /// The function `of` of each row.
     fn map(&self, of: impl Fn([f32; N]) -> f32) -> Vec<f32> {
         let mut out = vec![0.0; self.0[0].len()];
         dispatch(Map { columns: self, of, out: &mut out });
@@ -298,13 +296,13 @@ impl<const N: usize, F: Fn([f32; N]) -> f32> Kernel for Map<'_, N, F> {
     }
 }
 
-/// A line as a row: a point of it, then its direction.
+/// Returns a line as a row: a point of it, then its direction.
 fn row(line: &FeasibleLine) -> [f32; 6] {
     let ([x, y, z], [u, v, w]) = (line.through, line.direction);
     [x, y, z, u, v, w]
 }
 
-/// The squared distance between `line` and the one in a row; infinite for parallel ones.
+/// Returns the squared distance between `line` and the line of a row; infinite for parallel ones.
 #[inline(always)]
 fn between(line: &FeasibleLine, [x, y, z, u, v, w]: [f32; 6]) -> f32 {
     let (p, d) = (line.through, line.direction);
@@ -318,7 +316,7 @@ fn between(line: &FeasibleLine, [x, y, z, u, v, w]: [f32; 6]) -> f32 {
     if square < 1e-6 { f32::INFINITY } else { across * across / square }
 }
 
-/// The squared distance of `point` from the line through `through` along `direction`; infinite where there is no point.
+/// Returns the squared distance of `point` from a line; infinite if `point` is NaN.
 #[inline(always)]
 fn from_line(point: [f32; 3], through: [f32; 3], direction: [f32; 3]) -> f32 {
     let away: [f32; 3] = std::array::from_fn(|c| point[c] - through[c]);
@@ -326,7 +324,7 @@ fn from_line(point: [f32; 3], through: [f32; 3], direction: [f32; 3]) -> f32 {
     if square.is_nan() { f32::INFINITY } else { square }
 }
 
-/// The squared length of the part of `v` perpendicular to `d`: no difference of large squares.
+/// Returns the squared length of the component of `v` perpendicular to `d`, without a difference of large squares.
 #[inline(always)]
 fn square_across(v: &[f32; 3], d: &[f32; 3]) -> f32 {
     let along = v[0] * d[0] + v[1] * d[1] + v[2] * d[2];
@@ -338,9 +336,9 @@ fn square_across(v: &[f32; 3], d: &[f32; 3]) -> f32 {
     square
 }
 
-/// The places of the `k` smallest finite distances (ties by place), in no order; beside them the largest of these, not squared.
+/// Returns the indices of the `k` smallest finite distances (ties by index), unordered, and the largest of these, not squared.
 fn nearest(squared: &[f32], k: usize) -> (Vec<u32>, f32) {
-    // Distances are not negative, so their bits order as they do.
+    // Distances are not negative, so their bits sort as they do.
     let key = |(at, d): (usize, &f32)| u64::from(d.to_bits()) << 32 | at as u64;
     let finite = squared.iter().enumerate().filter(|(_, d)| d.is_finite());
     let mut keys: Vec<u64> = finite.map(key).collect();
@@ -359,30 +357,30 @@ mod tests {
     use crate::seed::{Draws, Stage};
     use crate::simd::portable;
 
-    fn votes(crowds: &[(f64, usize)], strays: usize) -> Vec<f64> {
+    fn votes(modes: &[(f64, usize)], strays: usize) -> Vec<f64> {
         let mut draws = Draws::new(8, Stage::Synthetic, 0);
         let mut votes: Vec<f64> = (0..strays).map(|_| draws.between(-10.0, 10.0)).collect();
-        for &(middle, n) in crowds {
+        for &(middle, n) in modes {
             votes.extend((0..n).map(|_| middle + 0.1 * draws.normal()));
         }
         votes
     }
 
     #[test]
-    fn one_crowd_is_found_among_strays() {
-        let t = crowd(&mut votes(&[(3.0, 150)], 350)).unwrap();
+    fn one_mode_is_found_among_strays() {
+        let t = mode(&mut votes(&[(3.0, 150)], 350)).unwrap();
         assert!((t - 3.0).abs() < 0.1, "{t}");
-        assert_eq!(crowd(&mut []), None);
-        assert_eq!(crowd(&mut [2.0]), Some(2.0));
-        assert_eq!(crowd(&mut [2.0; 40]), Some(2.0));
+        assert_eq!(mode(&mut []), None);
+        assert_eq!(mode(&mut [2.0]), Some(2.0));
+        assert_eq!(mode(&mut [2.0; 40]), Some(2.0));
     }
 
     #[test]
-    fn two_crowds_are_found_among_strays() {
-        let [a, b] = two_crowds(&mut votes(&[(4.0, 200), (-2.0, 300)], 500)).unwrap();
+    fn two_modes_are_found_among_strays() {
+        let [a, b] = two_modes(&mut votes(&[(4.0, 200), (-2.0, 300)], 500)).unwrap();
         assert!((a + 2.0).abs() < 0.2 && (b - 4.0).abs() < 0.2, "{a} {b}");
-        assert_eq!(two_crowds(&mut []), None);
-        assert_eq!(two_crowds(&mut [2.0; 9]), Some([2.0; 2]));
+        assert_eq!(two_modes(&mut []), None);
+        assert_eq!(two_modes(&mut [2.0; 9]), Some([2.0; 2]));
     }
 
     fn lines(n: usize) -> Vec<FeasibleLine> {
@@ -401,7 +399,7 @@ mod tests {
     fn distances_between_lines_are_the_least_over_their_points() {
         let lines = lines(40);
         for other in &lines[1..] {
-            // The nearest point of the first line, by golden steps of a convex function.
+            // The nearest point of the first line, by golden-section search.
             let at = |t: f32| {
                 let FeasibleLine { through, direction, .. } = lines[0];
                 let point = std::array::from_fn(|c| through[c] + t * direction[c]);

@@ -1,9 +1,9 @@
-//! The paper's sampling loop (section 4), for comparison.
+//! The sampling loop of the paper (section 4), for comparison.
 //!
-//! A few listed records are drawn and the least-squares position of Eq. (4) is computed from them. The position that the
-//! most listed records pass within delta is refined by least squares over these. The number of trials follows the largest
-//! support found so far (draws without replacement, 99 % confidence) and ends at 10,000. The paper leaves the size of a sample
-//! open: here it is two records per unknown coordinate (planes may draw one twice).
+//! Each trial draws a few listed records and computes their least-squares position, Eq. (4). The position with the largest support
+//! is refined by least squares over the supporting records. The number of trials follows the largest support so far (draws
+//! without replacement, 99 % confidence) and is at most 10,000. The paper does not give the sample size: here it is two records per
+//! unknown coordinate (for planes, one may be drawn twice).
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -20,23 +20,20 @@ use crate::released::AxisPlanes;
 use crate::seed::{Draws, Stage};
 use crate::simd::{Kernel, dispatch};
 
-/// The probability of having drawn a sample free of outliers at which the loop stops.
+/// The loop stops when a sample without outliers was drawn with this probability.
 const CONFIDENCE: f64 = 0.99;
 /// Records per sample and unknown coordinate.
 const SAMPLE: u32 = 2;
 
-/// The sampling loop over one map.
 pub(crate) struct Ransac<'a, const D: usize> {
     pub(crate) family: &'a Family<'a, D>,
     pub(crate) lists: &'a Neighborhoods,
     pub(crate) delta: f32,
     pub(crate) seed: u64,
-    /// Counts how many trials slots took.
     pub(crate) trials: &'a TrialCounts,
 }
 
 impl<const D: usize> Ransac<'_, D> {
-    /// The estimates of `slots`, in order.
     pub(crate) fn solve(&self, slots: Range<usize>) -> Vec<Estimate<D>> {
         let axes = match self.family {
             Family::Candidates { rows, .. } => vote(rows, self.lists),
@@ -47,7 +44,7 @@ impl<const D: usize> Ransac<'_, D> {
                 let slot = first + at;
                 let (solved, trials) = dispatch(Slot { ransac: self, axes: &axes, slot, scratch });
                 *estimate = solved;
-                // Slots that could not be tried at all are lost with a reason, not solved in no time.
+                // A slot without trials is not a slot that was solved quickly.
                 if trials > 0 {
                     self.trials.note(trials);
                 }
@@ -59,7 +56,7 @@ impl<const D: usize> Ransac<'_, D> {
 struct Scratch<const D: usize> {
     lines: LineColumns<D>,
     sections: Sections,
-    /// The sections that say anything.
+    /// The sections of records that may vote.
     votes: Sections,
     /// Listed offsets of planes, by axis.
     offsets: [Vec<f32>; D],
@@ -120,7 +117,8 @@ impl<const D: usize> Kernel for Slot<'_, D> {
     }
 }
 
-/// Trials after which a sample of `size` among `inliers` of `n` was drawn with [`CONFIDENCE`].
+/// Returns the number of trials after which a sample of `size` inliers, of `inliers` among `n`, was drawn with probability
+/// [`CONFIDENCE`].
 #[inline(always)]
 fn trials_needed(inliers: u32, n: u32, size: u32) -> u32 {
     let mut all_inliers = 1.0;
@@ -134,8 +132,8 @@ fn trials_needed(inliers: u32, n: u32, size: u32) -> u32 {
     (trials.ceil() as u32).clamp(1, MAX_TRIALS)
 }
 
-/// The parameter along a line with the largest support, after the final least squares, and that support; beside it the number of
-/// trials. Of the listed records so many `may_vote`.
+/// Returns the parameter along a line with the largest support, refined by least squares, its support, and the number of trials.
+/// `may_vote` is the number of listed records that may vote.
 #[inline(always)]
 fn on_line<const D: usize>(
     scratch: &mut Scratch<D>,
@@ -191,7 +189,7 @@ fn on_line<const D: usize>(
     (Ok((best_t + sum / weight, best)), trials)
 }
 
-/// The place on the plane of `slot` with the largest support, that support, and the number of trials. `offsets` is a buffer.
+/// Returns the place on the plane of `slot` with the largest support, its support, and the number of trials. `offsets` is a buffer.
 #[inline(always)]
 fn on_plane<const D: usize>(
     planes: &AxisPlanes<D>,
@@ -244,14 +242,13 @@ fn on_plane<const D: usize>(
     Ok((place, best, trials))
 }
 
-// Which coordinate of a permuted point was exchanged: the vote of supplement A.
+// The exchanged coordinate of permuted points (supplement A).
 
-/// The exchanged axis of every record, by majority over all neighborhoods it appears in.
+/// Returns the exchanged axis of every record, by majority vote over all neighborhoods that contain it.
 ///
-/// In a neighborhood (a slot's record and those listed for it), each member guesses the axis along
-/// which its summed distance to the others is largest. "Relatively larger" in the paper is undefined;
-/// sums are divided by their mean over the neighborhood, else every record votes for the long axis
-/// of an elongated map. Ties go to the lower axis.
+/// In a neighborhood (a slot's record and its listed records), each member votes for the axis with the largest sum of distances
+/// to the others. The paper does not define "relatively larger". Here sums are divided by their mean over the neighborhood;
+/// otherwise every record votes for the long axis of an elongated map. Ties go to the lower axis.
 fn vote<const D: usize>(rows: &[[f32; D]], lists: &Neighborhoods) -> Vec<u8> {
     let votes: Vec<[AtomicU32; D]> =
         rows.iter().map(|_| std::array::from_fn(|_| AtomicU32::new(0))).collect();
@@ -272,12 +269,12 @@ fn vote<const D: usize>(rows: &[[f32; D]], lists: &Neighborhoods) -> Vec<u8> {
     votes.into_iter().map(of).collect()
 }
 
-/// The axis with the largest value, the lowest of equals.
+/// Returns the axis with the largest value, the lowest of equal ones.
 fn largest<const D: usize>(value: impl Fn(usize) -> f32) -> u8 {
     (1..D).fold(0, |best, axis| if value(axis) > value(best) { axis } else { best }) as u8
 }
 
-/// Per member the sum of distances to the others along `axis`, divided by its mean.
+/// Returns, per member, the sum of distances to the others along `axis`, divided by the mean of these sums.
 fn relative_distances<const D: usize>(
     rows: &[[f32; D]],
     members: &[RecordId],
@@ -290,8 +287,8 @@ fn relative_distances<const D: usize>(
     if mean > 0.0 { sums.iter().map(|sum| sum / mean).collect() } else { sums }
 }
 
-/// The sections of listed records with the line of `slot`, each reduced to the one axis that the vote left it:
-/// perpendicular, or parallel and silent.
+/// Computes the sections of listed records with the line of `slot`. Each record is its line along its voted axis: perpendicular, or
+/// parallel, which does not vote.
 #[inline(always)]
 fn sections_of_voted<const D: usize>(
     rows: &[[f32; D]],
@@ -321,7 +318,7 @@ mod tests {
 
     #[test]
     fn trials_follow_the_hypergeometric_law() {
-        // All inliers: one trial. 5 of 50, pairs: ln 0.01 / ln(1 - 20/2450) = 562.
+        // All inliers need one trial. Pairs from 5 inliers of 50: ln 0.01 / ln(1 - 20/2450) = 562.
         assert_eq!(trials_needed(50, 50, 2), 1);
         assert_eq!(trials_needed(5, 50, 2), 562);
         assert_eq!(trials_needed(1, 50, 2), MAX_TRIALS);

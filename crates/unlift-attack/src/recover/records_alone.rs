@@ -1,4 +1,4 @@
-//! What the released records alone tell, without neighborhoods and descriptors.
+//! Attacks on the released records alone, without neighborhoods and descriptors.
 
 use std::ops::Range;
 
@@ -16,13 +16,12 @@ use crate::recover::solver::Builtin;
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, RowOrder};
 
-/// Our attacks on the records alone: the name of each, and what it recovers. A map of planes, or of rays from one center, gives
-/// nothing away by itself.
+/// Runs our attacks on the records alone; returns the name and the result of each. They recover nothing from a map of planes, or
+/// of rays from one center.
 ///
-/// The whole map is attacked: a sample of its records would make a sparser map, of which less comes back,
-/// and a baseline that is too low hides what a scheme gives away by itself. The published density attack is tried
-/// on rays only: of lines it brought back less than tomography on every map and within every distance
-/// (docs/benchmarks.md), at four times the cost.
+/// They read the whole map: a sample of its records is a sparser map, of which less is recovered, so that the baseline would be too low.
+/// The published density attack runs on rays only: on lines it recovered less than tomography on every map and at every
+/// threshold (docs/benchmarks.md), and took four times as long.
 ///
 /// # Errors
 /// When `options` are out of range.
@@ -36,7 +35,7 @@ pub fn records_alone<const D: usize>(
     }
     let peaks = tomography(released);
     attacks.push((Builtin::Tomography.name(), at(released, &peaks)?));
-    // Planes and rays from one center have no such lists.
+    // Planes and rays from one center have no geometric lists.
     if let Ok(lists) = geometric_by(released, Geometric::K, &peaks) {
         let options = RecoverOptions { confidence: false, ..*options };
         let (joint, start) = recover_with_start(released, &lists, &options)?;
@@ -46,7 +45,7 @@ pub fn records_alone<const D: usize>(
     Ok(attacks)
 }
 
-/// The positions at which `peaks` puts the hidden points: which of a paired line's is whose is not known.
+/// Returns the positions of `peaks`. For paired lines, the order of the two points is unknown.
 fn at<const D: usize>(released: &Released<D>, peaks: &Peaks) -> Result<Recovered<D>, Error> {
     let none = Neighborhoods::unchecked(vec![0; released.n_slots() + 1], Vec::new());
     let estimates = Placement::new(released, &none, peaks).solve(0..released.n_slots());
@@ -58,11 +57,10 @@ fn at<const D: usize>(released: &Released<D>, peaks: &Peaks) -> Result<Recovered
     Ok(Recovered::try_new(&estimates, with_axis, None, origin, unit, delta)?.with_about(about))
 }
 
-/// The hidden points of one map where `peaks` puts them.
+/// A solver that places each hidden point at its peak.
 ///
-/// Lists do not move a position. For paired lines they decide which of the two positions belongs to
-/// which slot, by the cheaper of the two bijections (cost: Eq. (4), distances to the listed records);
-/// with empty lists the order is that along the line.
+/// Lists do not change positions. For paired lines they decide which of the two positions belongs to which slot: the cheaper
+/// assignment wins, with the distances to the listed records (Eq. (4)) as cost. With empty lists the order is that along the line.
 pub(super) struct Placement<'a, const D: usize> {
     rows: Vec<LineRow<D>>,
     slots_per_record: usize,
@@ -70,7 +68,7 @@ pub(super) struct Placement<'a, const D: usize> {
     peaks: &'a Peaks,
 }
 
-/// The distance that decides support: the resolution of `peaks`, or any where there are no peaks.
+/// Returns the delta that decides support: the resolution of `peaks`, or 1 if there are no peaks.
 pub(super) fn delta(peaks: &Peaks) -> f64 {
     if peaks.resolution > 0.0 { peaks.resolution } else { 1.0 }
 }
@@ -85,7 +83,6 @@ impl<'a, const D: usize> Placement<'a, D> {
         Self { rows, slots_per_record: released.slots_per_record(), lists, peaks }
     }
 
-    /// The estimates of `slots`, in order.
     pub(super) fn solve(&self, slots: Range<usize>) -> Vec<Estimate<D>> {
         let reach = delta(self.peaks) as f32;
         let place = |slot: usize| {
@@ -101,17 +98,16 @@ impl<'a, const D: usize> Placement<'a, D> {
         slots.into_par_iter().map(place).collect()
     }
 
-    /// The estimate at the peak of `slot`.
     fn peak(&self, slot: usize) -> Estimate<D> {
         let Some(peak) = self.peaks.of[slot] else {
             return Estimate::lost(Status::NoSupport);
         };
-        // The attacks answer in three dimensions only.
+        // These attacks return positions in three dimensions only.
         let position = std::array::from_fn(|c| peak.position[c % 3]);
         found(position, 0, peak.axis.into(), peak.evidence)
     }
 
-    /// Whether the two peaks of `slot`'s record are better exchanged.
+    /// Whether exchanging the two peaks of the record of `slot` lowers the cost.
     fn is_crossed(&self, slot: usize) -> bool {
         let (a, b) = (slot & !1, slot | 1);
         let cost =
@@ -119,7 +115,6 @@ impl<'a, const D: usize> Placement<'a, D> {
         cost(a, a) + cost(b, b) > cost(b, a) + cost(a, b)
     }
 
-    /// The distances of the records that `slot` lists from `x`.
     fn distances(&self, slot: usize, x: &[f32; D]) -> impl Iterator<Item = f32> {
         self.lists.of(slot).iter().map(move |record| {
             let row = &self.rows[record.index()];

@@ -1,4 +1,4 @@
-//! What recovery says about one slot: a position or a reason.
+//! Results of recovery: estimates, confidence, and the recovered map.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -7,17 +7,17 @@ use crate::recover::assignment::descriptor_rows;
 use crate::released::{Obfuscation, Released};
 use crate::{About, Error, Unit};
 
-/// What became of a slot.
+/// Whether a slot was recovered, or why not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Status {
     /// Recovered.
     Ok = 0,
-    /// Fewer than two neighbors are listed that could say anything.
+    /// Fewer than two listed records can give evidence.
     TooFewNeighbors = 1,
-    /// The neighbors do not fix a point (parallel lines, a missing axis).
+    /// The listed records do not fix a point (parallel lines, or no plane of some axis).
     Degenerate = 2,
-    /// No position agrees with any neighbor.
+    /// No position agrees with any listed record.
     NoSupport = 3,
 }
 
@@ -26,7 +26,7 @@ impl Status {
     pub const ALL: [Status; 4] =
         [Self::Ok, Self::TooFewNeighbors, Self::Degenerate, Self::NoSupport];
 
-    /// The name used in files and reports.
+    /// Name in files and reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Ok => "ok",
@@ -36,57 +36,57 @@ impl Status {
         }
     }
 
-    /// The status called `name`, if there is one.
+    /// Returns the status called `name`, if there is one.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|status| status.name() == name)
     }
 }
 
-/// What recovery says about one slot, before it is put in columns.
+/// The estimate of one slot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate<const D: usize> {
-    /// Position about the released origin; NaN unless `status` is `Ok`.
+    /// Position relative to the released origin; NaN unless `status` is `Ok`.
     pub position: [f32; D],
-    /// What became of the slot.
+    /// Whether the slot was recovered, or why not.
     pub status: Status,
-    /// Listed records that the position was made of: within delta of it before the last refit (planes:
-    /// within 1.5 delta, summed over the free axes). Joint recovery: records listed by the slot or by
-    /// whose slots its own is, with an estimate near. Counts beyond 65,535 stay there.
+    /// Number of records that agree with the position. Consensus: listed records within delta before the last refit (planes: within
+    /// 1.5 delta, summed over the free axes). Joint recovery: records at the ends of the slot's edges with an estimate nearby.
+    /// The largest count is 65,535.
     pub support: u16,
-    /// The axis on which the hidden coordinate lies (axis candidates only, else 0).
+    /// Axis of the hidden coordinate (axis candidates; else 0).
     pub axis: u8,
-    /// Improbability of the support by chance, in nats (0 or more).
+    /// Improbability of the support by chance, in nats; not negative.
     pub evidence: f32,
 }
 
-/// A count as it is stored.
+/// Converts a count to the type in which it is stored.
 pub(crate) fn stored_support(count: u32) -> u16 {
     u16::try_from(count).unwrap_or(u16::MAX)
 }
 
 impl<const D: usize> Estimate<D> {
-    /// A slot that could not be recovered.
+    /// Creates the estimate of a slot that was not recovered.
     pub fn lost(status: Status) -> Self {
         Self { position: [f32::NAN; D], status, support: 0, axis: 0, evidence: 0.0 }
     }
 }
 
-// How sure the attacker is of one recovered point.
+// Confidence.
 
-/// How sure the attacker is of one slot.
+/// The attacker's confidence in the estimate of one slot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Confidence {
-    /// The probability that the right place was found, up to an error.
+    /// Probability that the estimate is right up to an error.
     pub found: f32,
-    /// The median of that error, in the unit of the map.
+    /// Median of that error, in the unit of the map.
     pub scale: f32,
 }
 
 impl Confidence {
-    /// What is said of a slot without a position.
+    /// Confidence of a slot without a position.
     pub const LOST: Self = Self { found: 0.0, scale: f32::INFINITY };
 
-    /// The probability that the true place is at most `threshold` away, in the unit of the map:
+    /// Returns the probability that the true point is within `threshold` (in the unit of the map):
     /// `found / (1 + (scale / threshold)^2)`.
     pub fn probability_within(&self, threshold: f64) -> f64 {
         let ratio = f64::from(self.scale) / threshold;
@@ -94,28 +94,28 @@ impl Confidence {
     }
 }
 
-// Why nobody can say how sure the attacker is.
+// Reasons why confidence is missing.
 
-/// Why a recovered map has no [`Confidence`]. Better none than one that does not come true.
+/// Why a recovered map has no [`Confidence`]: in these cases predicted probabilities were wrong or never tested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unknown {
-    /// It was not asked for.
+    /// The options turn confidence off.
     NotAsked,
-    /// The positions come from elsewhere, without it.
+    /// The positions were given without confidence.
     NotGiven,
-    /// The model was fitted on maps: in images nobody has compared it with what comes true.
+    /// The points are in 2D: the model was fitted and tested on 3D maps alone.
     OfImages,
-    /// The solver is not `joint`: nothing was fitted for others.
+    /// The solver is not `joint`, the only one that the model was fitted for.
     OtherSolver,
-    /// The lists have scores, as sources that rank give them: nothing was fitted on how those err.
+    /// The lists have scores. The model was not fitted on the errors of sources that rank.
     RankedLists,
-    /// Nobody says that the oracle made the lists: others err in ways on which nothing was fitted.
+    /// The lists are not known to come from the oracle. The model was not fitted on the errors of other lists.
     GivenLists,
-    /// What came back is flat or thin: records cross everywhere in a plane, and every crossing looks like a point.
+    /// The recovered map is flat or thin: lines in a plane cross everywhere, so that records agree at wrong places.
     Flat,
-    /// Most points fall together, so that their records agree at wrong places, too.
+    /// Most points coincide, so that their records agree at wrong places, too.
     Coincident,
-    /// Lists have more entries per hidden point than in any map that the model was fitted on.
+    /// Lists have more entries per hidden point than in all maps on which the model was fitted.
     SmallMap,
 }
 
@@ -133,7 +133,7 @@ impl Unknown {
         Self::SmallMap,
     ];
 
-    /// The name used in files.
+    /// Name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::NotAsked => "not_asked",
@@ -148,12 +148,12 @@ impl Unknown {
         }
     }
 
-    /// The reason called so.
+    /// Returns the reason called `name`.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|why| why.name() == name)
     }
 
-    /// The reason in plain words, as half a sentence after "not known here: ".
+    /// Returns the reason in words, to follow "not known here: ".
     pub fn reason(self) -> &'static str {
         match self {
             Self::NotAsked => "confidence was not requested",
@@ -175,49 +175,49 @@ impl Unknown {
     }
 }
 
-// How many trials the sampling loop took.
+// Trials of the sampling loop.
 
-/// Trials at most, as in the paper's timings.
+/// Largest number of trials, as in the paper's timings.
 pub(crate) const MAX_TRIALS: u32 = 10_000;
 
-/// How many slots took how many trials.
+/// Histogram of the number of trials per slot.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TrialHistogram {
     counts: [u64; TrialHistogram::UP_TO.len()],
 }
 
 impl TrialHistogram {
-    /// Upper ends (inclusive) of the bins.
+    /// Inclusive upper ends of the bins.
     pub const UP_TO: [u32; 9] = [1, 3, 10, 30, 100, 300, 1_000, 3_000, MAX_TRIALS];
 
-    /// (upper end, slots) per bin.
+    /// Returns (upper end, number of slots) per bin.
     pub fn bins(&self) -> impl Iterator<Item = (u32, u64)> {
         Self::UP_TO.into_iter().zip(self.counts)
     }
 }
 
-/// A histogram that threads add to. Sums of integers: the order in which they add does not matter.
+/// A histogram that threads fill concurrently. Sums of integers do not depend on the order.
 #[derive(Debug, Default)]
 pub(crate) struct TrialCounts {
     bins: [AtomicU64; TrialHistogram::UP_TO.len()],
 }
 
 impl TrialCounts {
-    /// One more slot took so many trials.
+    /// Counts a slot that took `trials` trials.
     pub(crate) fn note(&self, trials: u32) {
         let bin = TrialHistogram::UP_TO.partition_point(|&up_to| up_to < trials);
         self.bins[bin.min(self.bins.len() - 1)].fetch_add(1, Ordering::Relaxed);
     }
 
-    /// What was noted so far.
+    /// Returns the histogram so far.
     pub(crate) fn histogram(&self) -> TrialHistogram {
         TrialHistogram { counts: self.bins.each_ref().map(|bin| bin.load(Ordering::Relaxed)) }
     }
 }
 
-// The result of recovery, in columns.
+// The recovered map.
 
-/// Recovered positions, one row per slot.
+/// Recovered positions, one row per slot, in columns.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recovered<const D: usize> {
     origin: [f64; D],
@@ -235,12 +235,11 @@ pub struct Recovered<const D: usize> {
 }
 
 impl<const D: usize> Recovered<D> {
-    /// Columns from estimates in slot order. `with_axis` keeps the axis column (axis candidates);
-    /// `descriptor_row` is the assignment for paired lines, if one was made.
+    /// Creates columns from estimates in slot order. `with_axis` keeps the axis column (axis candidates); `descriptor_row` is the
+    /// assignment of descriptors of paired lines, if there is one.
     ///
     /// # Errors
-    /// When a position is NaN although its status is `Ok` (or the reverse), or `descriptor_row` has
-    /// another length.
+    /// When a position is finite although its status is not `Ok` (or the reverse), or `descriptor_row` has another length.
     pub fn try_new(
         estimates: &[Estimate<D>],
         with_axis: bool,
@@ -279,10 +278,10 @@ impl<const D: usize> Recovered<D> {
         })
     }
 
-    /// What a solver of your own returns: `positions` about the released origin, one per slot. A position that is not finite
-    /// stands for a point that could not be placed.
+    /// Creates the result of your own solver: `positions` relative to the released origin, one per slot. A position that is not
+    /// finite marks a slot that was not recovered.
     ///
-    /// Of axis candidates the hidden axis is taken to be the one along which a position is farthest from the published one.
+    /// For axis candidates, the hidden axis is the one along which the position is farthest from the published one.
     ///
     /// # Errors
     /// When there is not one position per slot.
@@ -320,14 +319,13 @@ impl<const D: usize> Recovered<D> {
             .map(|recovered| recovered.with_about(about).without_confidence(Unknown::OtherSolver))
     }
 
-    /// The same positions, said to be of a released map and counted in an order: that of the lists they were
-    /// made from.
+    /// Sets the released map and the row order of these positions: those of the lists they were made from.
     #[must_use]
     pub fn with_about(self, about: About) -> Self {
         Self { about, ..self }
     }
 
-    /// Which released map the positions are of, and what their rows are counted by.
+    /// The released map of these positions, and the order of their rows.
     pub fn about(&self) -> About {
         self.about
     }
@@ -337,14 +335,14 @@ impl<const D: usize> Recovered<D> {
         self.position.len()
     }
 
-    /// The position recovered for `slot` in the map's frame, if there is one.
+    /// Position of `slot` in the map's frame, if it was recovered.
     #[inline]
     pub fn position(&self, slot: usize) -> Option<[f64; D]> {
         (self.status[slot] == Status::Ok)
             .then(|| std::array::from_fn(|c| f64::from(self.position[slot][c]) + self.origin[c]))
     }
 
-    /// Positions about [`origin`](Self::origin), `(slots, D)`; NaN where the status is not `Ok`.
+    /// Positions relative to [`origin`](Self::origin), `(slots, D)`; NaN where the status is not `Ok`.
     pub fn positions(&self) -> &[[f32; D]] {
         &self.position
     }
@@ -354,59 +352,58 @@ impl<const D: usize> Recovered<D> {
         self.origin
     }
 
-    /// The unit of positions and of delta.
+    /// Unit of positions and of delta.
     pub fn unit(&self) -> Unit {
         self.unit
     }
 
-    /// The delta that decided support.
+    /// The distance that decided support.
     pub fn delta(&self) -> f64 {
         self.delta
     }
 
-    /// What became of each slot.
+    /// Status per slot.
     pub fn status(&self) -> &[Status] {
         &self.status
     }
 
-    /// Per slot the listed records that its position was made of.
+    /// Number of agreeing records per slot, see [`Estimate::support`].
     pub fn support(&self) -> &[u16] {
         &self.support
     }
 
-    /// Per slot how improbable the support is by chance, in nats.
+    /// Improbability of the support by chance per slot, in nats.
     pub fn evidence(&self) -> &[f32] {
         &self.evidence
     }
 
-    /// Per slot the axis said to be swapped (axis candidates only).
+    /// Predicted exchanged axis per slot (axis candidates only).
     pub fn axis(&self) -> Option<&[u8]> {
         self.axis.as_deref()
     }
 
-    /// Per slot the released descriptor row said to belong to it (paired lines with descriptors).
+    /// Predicted row of the released descriptors per slot (paired lines with descriptors).
     pub fn descriptor_row(&self) -> Option<&[u32]> {
         self.descriptor_row.as_deref()
     }
 
-    /// Per slot how sure the attacker is; `None` where that is not known, see
-    /// [`confidence_unknown`](Self::confidence_unknown).
+    /// Confidence per slot; `None` if it is not known, see [`confidence_unknown`](Self::confidence_unknown).
     pub fn confidence(&self) -> Option<&[Confidence]> {
         self.confidence.as_deref().ok()
     }
 
-    /// Why it is not known how sure the attacker is; `None` where it is.
+    /// Why confidence is not known; `None` if it is.
     pub fn confidence_unknown(&self) -> Option<Unknown> {
         self.confidence.as_ref().err().copied()
     }
 
-    /// The probability that the true place of `slot` is within `threshold` (in the unit of the map) of
-    /// the recovered one, as the attacker can tell; 0 for a lost slot, `None` where it is not known.
+    /// Predicted probability that the true point of `slot` is within `threshold` (in the unit of the map) of the recovered one; 0
+    /// for a slot that was not recovered, `None` if confidence is not known.
     pub fn probability_within(&self, slot: usize, threshold: f64) -> Option<f64> {
         self.confidence().map(|rows| rows[slot].probability_within(threshold))
     }
 
-    /// Adds how sure the attacker is of every slot.
+    /// Adds the confidence of every slot.
     ///
     /// # Errors
     /// When there is not one row per slot.
@@ -418,18 +415,18 @@ impl<const D: usize> Recovered<D> {
         Ok(Self { confidence: Ok(confidence), ..self })
     }
 
-    /// Says why it is not known how sure the attacker is; what was known is dropped.
+    /// Removes confidence and records the reason.
     #[must_use]
     pub fn without_confidence(self, unknown: Unknown) -> Self {
         Self { confidence: Err(unknown), ..self }
     }
 
-    /// How many trials the slots took (`ransac` only; not stored in files).
+    /// Histogram of trials per slot (`ransac` only; not stored in files).
     pub fn trials(&self) -> Option<&TrialHistogram> {
         self.trials.as_ref()
     }
 
-    /// Adds how many trials the slots took.
+    /// Adds the histogram of trials.
     #[must_use]
     pub(crate) fn with_trials(self, trials: Option<TrialHistogram>) -> Self {
         Self { trials, ..self }

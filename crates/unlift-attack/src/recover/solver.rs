@@ -1,4 +1,4 @@
-//! How hidden points are recovered from lists: the trait that anybody may implement, and the solvers of this crate.
+//! Solvers: the trait [`Solver`], which you can implement, and the solvers of this crate.
 
 use std::any::Any;
 use std::fmt::Debug;
@@ -10,20 +10,19 @@ use crate::Error;
 use crate::neighbors::Neighborhoods;
 use crate::released::Released;
 
-/// A recovery method: from released records and the lists of their neighbors to positions. Anybody may write one; an audit takes
-/// `Arc<dyn Solver<D>>`.
+/// A recovery method: it turns released records and lists of their neighbors into positions. An audit takes `Arc<dyn Solver<D>>`.
 ///
-/// [`Recovered::from_positions`] turns positions into what a solver returns.
+/// [`Recovered::from_positions`] makes the return value from positions.
 pub trait Solver<const D: usize>: Any + Debug + Send + Sync {
-    /// The name in rows and reports: one plain word, which no solver of this crate has.
+    /// Name in rows and reports: one plain word, different from the names in [`Builtin::ALL`].
     fn name(&self) -> &str;
 
-    /// Places the hidden point of every slot of `released`, or says why it cannot.
+    /// Recovers the hidden point of every slot of `released`.
     ///
-    /// The result depends on the arguments alone, not on threads; chance comes from `options.seed`.
+    /// The result depends on the arguments alone, not on the number of threads. Randomness comes from `options.seed`.
     ///
     /// # Errors
-    /// When the solver cannot work on this map or with these options.
+    /// When the solver does not support this map or these options.
     fn recover(
         &self,
         released: &Released<D>,
@@ -31,7 +30,7 @@ pub trait Solver<const D: usize>: Any + Debug + Send + Sync {
         options: &RecoverOptions,
     ) -> Result<Recovered<D>, Error>;
 
-    /// Whether positions depend on the lists. Without them, only the records are attacked.
+    /// Whether positions depend on the lists. Otherwise the solver attacks the records alone.
     fn reads_lists(&self) -> bool {
         true
     }
@@ -40,27 +39,26 @@ pub trait Solver<const D: usize>: Any + Debug + Send + Sync {
 /// A solver of this crate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Builtin {
-    /// The position that agrees with the listed records least probably by chance: exact, no
-    /// sampling, the same cost at every inlier ratio.
+    /// On each slot's record, the position whose support is least probable by chance. The search is exact, and its cost does not
+    /// depend on the inlier ratio.
     Consensus,
-    /// Consensus, then iterations in which the estimates of listed neighbors vote too.
+    /// Consensus, then iterations that also use the estimates of neighbors.
     Joint,
-    /// The consensus pass that joint recovery starts from, and no iteration more. It is not [`Self::Consensus`]:
-    /// with one point a record it reads every list in both directions (who lists, and who is listed by),
-    /// and its delta is a narrower one, so that estimates are sharp.
+    /// The consensus pass that joint recovery starts from. It differs from [`Self::Consensus`]: its delta is narrower, and for
+    /// records with one slot it reads lists in both directions.
     JointStart,
-    /// The paper's sampling loop (section 4), for comparison.
+    /// The sampling loop of the paper (section 4), for comparison.
     Ransac,
-    /// The published density attacks on the records alone (Chelani et al. 2021, Lee et al. 2023, Moon et
-    /// al. 2024), for comparison; recovers nothing from planes and axis candidates.
+    /// The published density attacks on the records alone (Chelani et al. 2021, Lee et al. 2023, Moon et al. 2024), for comparison.
+    /// They recover nothing from planes and axis candidates.
     Density,
-    /// The density of points that makes the records likeliest, and the points where they meet it: our
-    /// strongest attack without neighborhoods. Recovers nothing from planes.
+    /// Our strongest attack on the records alone: the density of points that makes the records likeliest, and its peak on each
+    /// record. It recovers nothing from planes.
     Tomography,
 }
 
 impl Builtin {
-    /// Every solver, in the order of help texts.
+    /// All solvers, in the order of help texts.
     pub const ALL: [Builtin; 6] = [
         Self::Joint,
         Self::JointStart,
@@ -70,12 +68,12 @@ impl Builtin {
         Self::Tomography,
     ];
 
-    /// The solvers that place points by their listed records. The others read the lists only to tell the
-    /// two slots of a paired line apart, and take no delta.
+    /// The solvers that compute positions from lists. The others have no delta, and use lists only to decide which point of a
+    /// paired line belongs to which slot.
     pub const FROM_LISTS: [Builtin; 4] =
         [Self::Joint, Self::JointStart, Self::Consensus, Self::Ransac];
 
-    /// The name users know it by.
+    /// Name of the solver on the command line.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Consensus => "consensus",
@@ -87,10 +85,10 @@ impl Builtin {
         }
     }
 
-    /// The solver called `name`.
+    /// Returns the solver called `name`.
     ///
     /// # Errors
-    /// When there is none; the message lists all.
+    /// When there is none. The message lists all names.
     pub fn from_name(name: &str) -> Result<Self, Error> {
         Self::ALL.into_iter().find(|solver| solver.name() == name).ok_or_else(|| {
             let names = Self::ALL.map(|solver| solver.name()).join(", ");
@@ -98,12 +96,12 @@ impl Builtin {
         })
     }
 
-    /// `solvers` as an audit takes them.
+    /// Converts `solvers` to the type that an audit takes.
     pub fn list<const D: usize>(solvers: &[Self]) -> Vec<Arc<dyn Solver<D>>> {
         solvers.iter().map(|&solver| Arc::new(solver) as Arc<dyn Solver<D>>).collect()
     }
 
-    /// The builtin solver that `solver` is, if it is one.
+    /// Returns the builtin solver behind `solver`, if it is one.
     pub fn of<const D: usize>(solver: &dyn Solver<D>) -> Option<Self> {
         let any: &dyn Any = solver;
         any.downcast_ref().copied()
@@ -114,7 +112,7 @@ impl Builtin {
 mod tests {
     use super::Builtin;
 
-    /// The next of all solvers: a new one does not compile here until it has a place.
+    /// Returns the solver after `solver` in [`Builtin::ALL`]. A new variant does not compile until it is added here.
     fn next(solver: Builtin) -> Option<Builtin> {
         match solver {
             Builtin::Joint => Some(Builtin::JointStart),
@@ -126,7 +124,7 @@ mod tests {
         }
     }
 
-    /// Whether it places points by their listed records.
+    /// Whether `solver` computes positions from lists.
     fn reads_lists(solver: Builtin) -> bool {
         match solver {
             Builtin::Joint | Builtin::JointStart | Builtin::Consensus | Builtin::Ransac => true,
@@ -134,7 +132,7 @@ mod tests {
         }
     }
 
-    /// What is in no list is run by no law.
+    /// Property tests run over these two lists, so no solver may be missing.
     #[test]
     fn lists_hold_every_solver() {
         let all: Vec<Builtin> =

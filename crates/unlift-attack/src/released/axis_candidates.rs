@@ -3,14 +3,14 @@
 use super::normal_form::finite_f32;
 use crate::Error;
 
-/// Published points; the hidden one lies on one of the `D` axis-parallel lines through each.
+/// Published points. Each hidden point lies on one of the `D` axis-parallel lines through its published point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisCandidates<const D: usize> {
     position: Vec<[f32; D]>,
 }
 
 impl<const D: usize> AxisCandidates<D> {
-    /// Published points, `(n, D)` about the released origin.
+    /// Creates records from published points, `(n, D)` relative to the released origin.
     ///
     /// # Errors
     /// When a coordinate is not finite in `f32`.
@@ -23,7 +23,7 @@ impl<const D: usize> AxisCandidates<D> {
         Ok(Self { position })
     }
 
-    /// The rows `order[0], order[1], ...`.
+    /// Returns the rows `order[0], order[1], ...`.
     pub fn select(&self, order: &[u32]) -> Self {
         Self { position: super::normal_form::rows(&self.position, order) }
     }

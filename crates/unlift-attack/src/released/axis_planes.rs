@@ -2,7 +2,7 @@
 
 use crate::Error;
 
-/// Planes perpendicular to an axis: `axis` in `0..D` and the coordinate on it.
+/// Planes perpendicular to an axis: the axis, in `0..D`, and the coordinate on it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisPlanes<const D: usize> {
     axis: Vec<u8>,
@@ -10,7 +10,7 @@ pub struct AxisPlanes<const D: usize> {
 }
 
 impl<const D: usize> AxisPlanes<D> {
-    /// Planes `x[axis[i]] = offset[i]`.
+    /// Creates planes `x[axis[i]] = offset[i]`.
     ///
     /// # Errors
     /// When the columns differ in length, an axis is not below `D`, or an offset is not finite.
@@ -35,7 +35,7 @@ impl<const D: usize> AxisPlanes<D> {
         Ok(Self { axis, offset })
     }
 
-    /// The rows `order[0], order[1], ...`.
+    /// Returns the rows `order[0], order[1], ...`.
     pub fn select(&self, order: &[u32]) -> Self {
         Self {
             axis: super::normal_form::rows(&self.axis, order),
@@ -53,12 +53,12 @@ impl<const D: usize> AxisPlanes<D> {
         self.axis.is_empty()
     }
 
-    /// Per plane the axis it is perpendicular to.
+    /// Axis that each plane is perpendicular to.
     pub fn axis(&self) -> &[u8] {
         &self.axis
     }
 
-    /// Per plane the coordinate on its axis.
+    /// Coordinate of each plane on its axis.
     pub fn offset(&self) -> &[f32] {
         &self.offset
     }

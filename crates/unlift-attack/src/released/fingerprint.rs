@@ -1,4 +1,4 @@
-//! A hash of all that is released: what tells one released map from another.
+//! The hash that identifies a released map.
 
 use sha2::{Digest, Sha256};
 
@@ -7,8 +7,8 @@ use crate::descriptors::Values;
 use crate::geometry::frame::Bounds;
 use crate::{Descriptors, Fingerprint, Unit};
 
-/// The first 16 bytes of the SHA-256 of everything in the map, in normal form and about its origin. It covers what
-/// an attacker holds and nothing else, so it may stand in every file made from the map.
+/// Returns the first 16 bytes of the SHA-256 of all map data, in normal form and relative to its origin. It covers only what an attacker
+/// has, so it may be in every file made from the map.
 pub(super) fn of<const D: usize>(
     obfuscation: &Obfuscation<D>,
     slots_per_record: usize,
@@ -49,7 +49,7 @@ pub(super) fn of<const D: usize>(
         hasher.update("bounds");
         corners(&mut hasher, &bounds);
     }
-    // A map without records has no descriptors in a file.
+    // A file of a map without records has no descriptors.
     if let Some(descriptors) = descriptors.filter(|_| !obfuscation.is_empty()) {
         hasher.update(format!("descriptors of {}", descriptors.dim()));
         match descriptors.values() {
@@ -67,7 +67,7 @@ fn corners<const D: usize>(hasher: &mut Sha256, bounds: &Bounds<D>) {
 }
 
 fn f32s(hasher: &mut Sha256, values: &[f32]) {
-    // In pieces: descriptors of a large map are hundreds of megabytes.
+    // In pieces, because descriptors of a large map take hundreds of megabytes.
     for piece in values.chunks(1 << 10) {
         let bytes: Vec<u8> = piece.iter().flat_map(|x| x.to_le_bytes()).collect();
         hasher.update(&bytes);

@@ -1,22 +1,22 @@
-//! Lines: unit direction with a fixed sign, and the foot (the point nearest the origin).
+//! Lines: a unit direction with a fixed sign, and the foot (the point nearest to the origin).
 
 use super::normal_form::{finite_f32, is_f32, unit_direction};
 use crate::Error;
 
-/// Lines in normal form, `(n, D)` columns of `f32` about the released origin.
+/// Lines in normal form, as `(n, D)` columns of `f32` relative to the released origin.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lines<const D: usize> {
     foot: Vec<[f32; D]>,
     direction: Vec<[f32; D]>,
 }
 
-/// A stored foot this close to perpendicular (relative to its length) stays as it is.
+/// A stored foot stays unchanged if its component along the line is below this fraction of its length.
 const FOOT_SLACK: f64 = 1e-6;
 
 impl<const D: usize> Lines<D> {
-    /// Lines through `points` along `directions`, brought to normal form in `f64`, then rounded.
+    /// Creates lines through `points` along `directions`: brought to normal form in `f64`, then rounded.
     ///
-    /// The sign rule: the first component of the stored direction that is not zero is positive.
+    /// The first nonzero component of the stored direction is positive.
     ///
     /// # Errors
     /// When the columns differ in length, or a row is not finite or has no direction.
@@ -33,14 +33,14 @@ impl<const D: usize> Lines<D> {
             if stored.iter().find(|x| **x != 0.0).is_some_and(|x| *x < 0.0) {
                 stored = stored.map(|x| -x);
             }
-            // No negative zeros: equal lines have equal bytes.
+            // No negative zeros, so that equal lines have equal bytes.
             direction.push(stored.map(|x| x + 0.0));
             foot.push(finite_f32(foot_of(point, &unit), "foot", row)?.map(|x| x + 0.0));
         }
         Ok(Self { foot, direction })
     }
 
-    /// The rows `order[0], order[1], ...`.
+    /// Returns the rows `order[0], order[1], ...`.
     pub fn select(&self, order: &[u32]) -> Self {
         Self {
             foot: super::normal_form::rows(&self.foot, order),
@@ -58,12 +58,12 @@ impl<const D: usize> Lines<D> {
         self.foot.is_empty()
     }
 
-    /// The point of each line nearest the origin.
+    /// Point of each line nearest to the origin.
     pub fn foot(&self) -> &[[f32; D]] {
         &self.foot
     }
 
-    /// The unit direction of each line.
+    /// Unit direction of each line.
     pub fn direction(&self) -> &[[f32; D]] {
         &self.direction
     }
@@ -76,7 +76,7 @@ fn foot_of<const D: usize>(point: &[f64; D], unit: &[f64; D]) -> [f64; D] {
     if stored && along * along <= FOOT_SLACK * FOOT_SLACK * length2 {
         return *point;
     }
-    // The stored unit vector is off by f32 rounding when it came from a file: divide by its length.
+    // A unit vector from a file has the rounding error of f32, so divide by its squared length.
     let norm2: f64 = unit.iter().map(|u| u * u).sum();
     std::array::from_fn(|c| point[c] - along / norm2 * unit[c])
 }

@@ -1,7 +1,7 @@
-//! The attacker's side: records, and nothing else.
+//! Released maps: the records, which are all that an attacker sees.
 //!
-//! One file per record family. Every family stores `f32` columns about a published origin in a
-//! normal form, so that moving an original along its own record changes no stored byte.
+//! One file per record family. Every family stores `f32` columns relative to a published origin in a normal form, so that moving an
+//! original along its own record changes no stored byte.
 
 mod axis_candidates;
 mod axis_planes;
@@ -33,9 +33,8 @@ pub struct Released<const D: usize> {
 }
 
 impl<const D: usize> Released<D> {
-    /// Records about `origin`, in `unit`; record `r` hides the points of slots
-    /// `r * slots_per_record ..`, and descriptor rows are counted likewise (which of a paired line's
-    /// two rows belongs to which of its slots is not known).
+    /// Creates a map from records relative to `origin`, in `unit`. Record `r` hides the points of slots `r * slots_per_record ..`.
+    /// Descriptor rows are in the same order, but which of a paired line's two rows belongs to which slot is unknown.
     ///
     /// # Errors
     /// When `slots_per_record` is not 1 (2 is allowed for lines), the origin is not finite, or the
@@ -81,8 +80,7 @@ impl<const D: usize> Released<D> {
         fingerprint::of(obfuscation, *slots_per_record, frame, descriptors.as_ref())
     }
 
-    /// The same map, every hidden point of which is known to lie within `bounds` (in the map's frame):
-    /// the size of an image is public.
+    /// Sets the box that contains all hidden points, in the map's frame; for an image it is the image itself.
     #[must_use]
     pub fn with_bounds(self, bounds: Option<Bounds<D>>) -> Self {
         let known = self.bounds.is_some() || bounds.is_some();
@@ -93,24 +91,22 @@ impl<const D: usize> Released<D> {
         }
     }
 
-    /// The box in which every hidden point is known to lie, in the map's frame; `None` where nothing is
-    /// known.
+    /// The box that contains all hidden points, in the map's frame, if it is known.
     pub fn bounds(&self) -> Option<Bounds<D>> {
         self.bounds
     }
 
-    /// What tells this map from others: a hash of all that is released. Lists and positions made from the map
-    /// carry it.
+    /// The hash of everything released, which identifies the map. Lists and positions made from the map carry it.
     pub fn fingerprint(&self) -> Fingerprint {
         self.fingerprint
     }
 
-    /// The records, about [`origin`](Self::origin).
+    /// The records, relative to [`origin`](Self::origin).
     pub fn obfuscation(&self) -> &Obfuscation<D> {
         &self.obfuscation
     }
 
-    /// How many hidden points each record has: 2 for paired lines, else 1.
+    /// Number of hidden points per record: 2 for paired lines, else 1.
     pub fn slots_per_record(&self) -> usize {
         self.slots_per_record
     }
@@ -125,17 +121,17 @@ impl<const D: usize> Released<D> {
         self.n_records() * self.slots_per_record
     }
 
-    /// The point of the map's frame that every record is stored about.
+    /// The point of the map's frame that is the origin of all records.
     pub fn origin(&self) -> [f64; D] {
         self.origin
     }
 
-    /// The unit of every length.
+    /// Unit of every length.
     pub fn unit(&self) -> Unit {
         self.unit
     }
 
-    /// One row per slot, in random order within a record.
+    /// Descriptors, one row per slot, in random order within a record.
     pub fn descriptors(&self) -> Option<&Descriptors> {
         self.descriptors.as_ref()
     }

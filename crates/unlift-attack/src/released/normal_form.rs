@@ -1,23 +1,23 @@
-//! The form in which records are stored: two times is the same as once.
+//! Normal forms of records, which are idempotent.
 
 use crate::Error;
 
-/// The rows `order[0], order[1], ...` of one column.
+/// Returns the rows `order[0], order[1], ...` of one column.
 pub(super) fn rows<T: Copy>(column: &[T], order: &[u32]) -> Vec<T> {
     order.iter().map(|&row| column[row as usize]).collect()
 }
 
-/// Stored directions closer to unit length than this (in squared length) stay as they are, so that
-/// normalizing twice changes no bit. `f32` rounding of a unit vector stays below it.
+/// Stored directions whose squared length differs from 1 by less than this stay unchanged, so that normalizing twice changes no bit. The
+/// `f32` rounding of a unit vector stays below it.
 const UNIT_SLACK: f64 = 6e-7;
 
-/// Whether `v` may have been stored before. Only then may a normal form keep it: a length near 1 or
-/// a point near its foot would otherwise show in the last bits.
+/// Whether `v` may come from a stored file. Only then may a normal form keep it; otherwise its last bits would show a length near 1 or
+/// a point near the foot.
 pub(super) fn is_f32<const D: usize>(v: &[f64; D]) -> bool {
     v.iter().all(|&x| f64::from(x as f32) == x)
 }
 
-/// The unit vector along `v`, as stored: left alone when it already is one up to `f32` rounding.
+/// Returns the unit vector along `v`; `v` itself if it is a stored unit vector.
 ///
 /// # Errors
 /// When `v` is not finite or has no length.
@@ -34,7 +34,7 @@ pub(super) fn unit_direction<const D: usize>(v: [f64; D], row: usize) -> Result<
     Ok(v.map(|x| x / norm))
 }
 
-/// `v` in `f32`, or an error that names the row.
+/// Rounds `v` to `f32`; the error names the row.
 pub(super) fn finite_f32<const D: usize>(
     v: [f64; D],
     what: &str,

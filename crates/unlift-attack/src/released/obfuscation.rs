@@ -1,11 +1,11 @@
-//! The records of a map, of whatever family.
+//! The records of a map, of any family.
 
 use super::axis_candidates::AxisCandidates;
 use super::axis_planes::AxisPlanes;
 use super::lines::Lines;
 use super::rays::Rays;
 
-/// The records of a map: what the set `O(x)` of Eq. (1) is for each hidden point.
+/// The records of a map. For each hidden point, its record is the set `O(x)` of Eq. (1).
 #[derive(Clone, Debug, PartialEq)]
 pub enum Obfuscation<const D: usize> {
     /// A line through the point, or through two points (`olc`, `ppl`, `ppl+`).
@@ -34,7 +34,7 @@ impl<const D: usize> Obfuscation<D> {
         self.len() == 0
     }
 
-    /// The records `order[0], order[1], ...`.
+    /// Returns the records `order[0], order[1], ...`.
     pub fn select(&self, order: &[u32]) -> Self {
         match self {
             Self::Lines(lines) => Self::Lines(lines.select(order)),
@@ -44,7 +44,7 @@ impl<const D: usize> Obfuscation<D> {
         }
     }
 
-    /// The family's name in files.
+    /// Name of the family in files.
     pub fn family(&self) -> &'static str {
         match self {
             Self::Lines(_) => "lines",

@@ -15,8 +15,7 @@ pub struct Rays<const D: usize> {
 }
 
 impl<const D: usize> Rays<D> {
-    /// Rays from `centers[center[i]]` along `direction[i]` (signed: it points from the center to the
-    /// hidden point).
+    /// Creates rays from `centers[center[i]]` along `direction[i]`, which points from the center to the hidden point.
     ///
     /// # Errors
     /// When there are no or more than 255 centers, the columns differ in length, a center index is
@@ -53,7 +52,7 @@ impl<const D: usize> Rays<D> {
         Ok(Self { centers, center, direction, voxel: None, regions: None })
     }
 
-    /// The rows `order[0], order[1], ...`.
+    /// Returns the rows `order[0], order[1], ...`.
     pub fn select(&self, order: &[u32]) -> Self {
         Self {
             centers: self.centers.clone(),
@@ -64,8 +63,8 @@ impl<const D: usize> Rays<D> {
         }
     }
 
-    /// The same rays, their centers given by the parity of a grid of voxels of this edge: a public
-    /// parameter of the scheme. Where the grid starts is not published.
+    /// Declares that the parity of a voxel grid with this edge decides the center of each ray. The edge is a public parameter of the
+    /// scheme; the origin of the grid is not published.
     ///
     /// # Errors
     /// When `edge` is not a positive length.
@@ -76,13 +75,13 @@ impl<const D: usize> Rays<D> {
         Ok(Self { voxel: Some(edge), ..self })
     }
 
-    /// The edge of the voxels whose parity gives the centers, in the unit of the map, if it is so.
+    /// Edge of the voxels whose parity decides the centers, in the unit of the map, if declared.
     pub fn voxel(&self) -> Option<f64> {
         self.voxel
     }
 
-    /// The same rays, where the center of a point follows from the region it lies in: per center the
-    /// box of its points, about the released origin. A public rule of the scheme.
+    /// Declares that the region of a point decides its center. `regions` has, per center, the box of its points, relative to the released
+    /// origin. It is a public rule of the scheme.
     ///
     /// # Errors
     /// When there is not one region per center.
@@ -94,7 +93,7 @@ impl<const D: usize> Rays<D> {
         Ok(Self { regions: Some(regions), ..self })
     }
 
-    /// Per center the box in which all of its points lie, about the released origin, if it is known.
+    /// Box of the points of each center, relative to the released origin, if declared.
     pub fn regions(&self) -> Option<&[Bounds<D>]> {
         self.regions.as_deref()
     }
@@ -114,12 +113,12 @@ impl<const D: usize> Rays<D> {
         &self.centers
     }
 
-    /// Per ray the index of its center: its group.
+    /// Index of the center of each ray, which is its group.
     pub fn center(&self) -> &[u8] {
         &self.center
     }
 
-    /// Per ray the unit direction away from its center.
+    /// Unit direction of each ray, away from its center.
     pub fn direction(&self) -> &[[f32; D]] {
         &self.direction
     }

@@ -1,17 +1,16 @@
-//! Randomness as a function: `draw(seed, stage, item, counter)`. Nothing carries state between items, so work
-//! can be split over any number of threads and one item can be replayed alone.
+//! Random draws as a function of seed, stage, item and counter. No state passes between items, so work can be split over threads, and
+//! one item can be computed again alone.
 //!
-//! There are two rules, and which one is used is a question of who sees the draws:
+//! There are two kinds of streams:
 //!
-//! - [`Draws::new`]: a counter through the SplitMix64 finalizer, for what nobody has to be kept from guessing:
-//!   synthetic rooms, the oracle of an experiment, the attacker's own choices. Three draws give its seed away.
-//! - `Key::draws` (of the owner, in `unlift`): ChaCha20 under a key of 256 bits, for everything that hides a point. Draws of a scheme are
-//!   published (a direction of `olc` is nothing else), so they must tell nothing about any other draw.
+//! - [`Draws::new`]: a counter through the SplitMix64 finalizer, for draws that need no secrecy: synthetic rooms, the oracle of an
+//!   experiment, the attacker's own choices. Three draws reveal its seed.
+//! - `Key::draws` (of the owner, in `unlift`): ChaCha20 under a key of 256 bits, for everything that hides a point. A scheme publishes some
+//!   of its draws (a direction of `olc` is one), so they must reveal nothing about other draws.
 //!
-//! Only integer operations and exact float conversions are used: the same bits everywhere.
+//! Only integer operations and exact float conversions are used, so the bits are the same on every machine.
 
-/// What a stream of draws is used for. Streams of different stages are unrelated: for a key nothing can be
-/// computed from one about another.
+/// The purpose of a stream of draws. Streams of different stages are independent; under a key, none can be computed from another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u64)]
 pub enum Stage {
@@ -43,15 +42,15 @@ pub enum Stage {
     Image = 13,
     /// The wrong places that look like a patch of a map.
     OracleLookAlikes = 20,
-    /// Copies of a map side by side, to measure on.
+    /// Copies of a map side by side, for measurements.
     Tiling = 21,
-    /// Simple shapes to try attacks on.
+    /// Simple shapes, to test attacks on.
     Shapes = 22,
 }
 
-/// Where random bits come from: a [`Counter`], or the cipher of the owner.
+/// A source of random bits: a [`Counter`], or the owner's cipher.
 pub trait Bits {
-    /// The next 64 random bits.
+    /// Returns the next 64 random bits.
     fn bits(&mut self) -> u64;
 }
 
@@ -64,7 +63,7 @@ fn mix(mut z: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// Bits by a counter through SplitMix64's finalizer: fast, and no secret. Every step can be undone.
+/// A counter through the finalizer of SplitMix64: fast but not secret, because every step can be inverted.
 #[derive(Clone, Debug)]
 pub struct Counter {
     key: u64,
@@ -79,15 +78,14 @@ impl Bits for Counter {
     }
 }
 
-/// The stream of draws that belongs to one item (a slot, a point, a restart) of one stage.
+/// The stream of draws for one item (a slot, a point, a restart) of one stage.
 #[derive(Clone, Debug)]
 pub struct Draws<B = Counter> {
     source: B,
 }
 
 impl Draws {
-    /// The stream of `item` in `stage` under `seed`, by the fast rule. Nothing that hides a point may come
-    /// from here: see `Key::draws`.
+    /// Creates the stream of `item` in `stage` under `seed`, by the fast rule. Draws that hide a point must come from `Key::draws`.
     #[inline(always)]
     pub fn new(seed: u64, stage: Stage, item: u64) -> Self {
         let key = mix(mix(mix(seed.wrapping_add(GOLDEN)) ^ (stage as u64).wrapping_mul(GOLDEN))
@@ -97,19 +95,19 @@ impl Draws {
 }
 
 impl<B: Bits> Draws<B> {
-    /// The stream of an item whose bits come from `source`.
+    /// Creates the stream of an item whose bits come from `source`.
     #[inline(always)]
     pub fn of(source: B) -> Self {
         Self { source }
     }
 
-    /// The next 64 random bits.
+    /// Returns the next 64 random bits.
     #[inline(always)]
     pub fn bits(&mut self) -> u64 {
         self.source.bits()
     }
 
-    /// Uniform in `0..n` without bias (Lemire's multiplication with rejection).
+    /// Returns a uniform number in `0..n` without bias (Lemire's multiplication with rejection).
     ///
     /// # Panics
     /// When `n` is 0.
@@ -125,23 +123,23 @@ impl<B: Bits> Draws<B> {
         }
     }
 
-    /// Uniform in `[0, 1)`, a multiple of 2^-53.
+    /// Returns a uniform number in `[0, 1)`, a multiple of 2^-53.
     #[inline(always)]
     pub fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
     }
 
-    /// Uniform in `[low, high)`.
+    /// Returns a uniform number in `[low, high)`.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 
-    /// Standard normal, by the sum of twelve uniforms: exact arithmetic only, tails end at 6.
+    /// Returns a standard normal number as the sum of twelve uniform ones: the arithmetic is exact, and tails end at 6.
     pub fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
     }
 
-    /// A direction uniform on the unit sphere of `D` dimensions, by rejection from the cube.
+    /// Returns a uniform direction on the unit sphere of `D` dimensions, by rejection from the cube.
     pub fn direction<const D: usize>(&mut self) -> [f64; D] {
         loop {
             let v: [f64; D] = std::array::from_fn(|_| self.between(-1.0, 1.0));
@@ -153,14 +151,14 @@ impl<B: Bits> Draws<B> {
         }
     }
 
-    /// Puts `items` in uniformly random order (Fisher-Yates).
+    /// Shuffles `items` uniformly (Fisher-Yates).
     pub fn shuffle<T>(&mut self, items: &mut [T]) {
         for i in (1..items.len()).rev() {
             items.swap(i, self.below(i as u64 + 1) as usize);
         }
     }
 
-    /// A uniformly random order of `0..n`.
+    /// Returns a uniformly random order of `0..n`.
     pub fn permutation(&mut self, n: usize) -> Vec<u32> {
         let mut order: Vec<u32> = (0..n as u32).collect();
         self.shuffle(&mut order);
@@ -185,8 +183,7 @@ mod tests {
 
     #[test]
     fn bits_are_pinned() {
-        // Golden: a change here changes every published figure. Computed apart, in integers of any
-        // size, not copied from this code.
+        // A change of these values changes every published figure. They were computed independently, in integers of any size.
         let take = |seed, stage, item| {
             let mut draws = Draws::new(seed, stage, item);
             [draws.bits(), draws.bits(), draws.below(1000), draws.unit().to_bits()]

@@ -1,21 +1,20 @@
-//! All queries of one leaf together: its points share nearly all of their neighbors.
+//! Nearest neighbors of all points of one leaf together, because they share most of them.
 //!
-//! Let `c` be the middle of the leaf, `R` the distance from `c` at which K + 1 points are found, and
-//! `r` that of the leaf's farthest point. By the triangle inequality a point of the leaf finds K
-//! others within `R + r` of itself, so all its neighbors lie within `R + 2 r` of `c`. These
-//! candidates are gathered once; each query then is a few passes over short columns.
+//! Let `c` be the middle of the leaf, `R` the distance from `c` within which K + 1 points lie, and `r` the distance of the leaf's
+//! farthest point. By the triangle inequality, a point of the leaf has K others within `R + r`, so all its neighbors lie within
+//! `R + 2 r` of `c`. These candidates are gathered once; then each query is a few passes over short columns.
 
 use super::tree::{Knn, canonical};
 use crate::geometry::vector::squared_distance;
 use crate::simd::{Kernel, dispatch};
 
-/// Rounding of distances, with a wide margin: a larger bound costs time, never exactness.
+/// Factor for rounding of distances, with a wide margin. A larger bound costs time but stays exact.
 const SLACK: f64 = 1.0 + 1e-9;
-/// How many times wider than a neighborhood a leaf may be.
+/// Largest width of a leaf, as a multiple of the neighborhood's.
 const WIDEST: f64 = 1.5;
-/// How many more points than asked for may be left to sort.
-const SURPLUS: usize = 6;
-/// Passes to narrow the bound at most.
+/// Largest number of points beyond those wanted that are sorted.
+const MOST_SURPLUS: usize = 6;
+/// Largest number of passes that narrow the bound.
 const MOST_PASSES: usize = 12;
 
 /// Buffers of one thread.
@@ -39,7 +38,7 @@ impl<const D: usize> Scratch<D> {
     }
 }
 
-/// Calls `of(number within the leaf, row, its k nearest)` for every point of `leaf`.
+/// Calls `of(index within the leaf, row, its k nearest)` for every point of `leaf`.
 pub(super) fn solve<const D: usize>(
     tree: &Knn<'_, D>,
     leaf: usize,
@@ -58,7 +57,7 @@ pub(super) fn solve<const D: usize>(
         Some(last) if scratch.found.len() > k => last.0.sqrt(),
         _ => f64::INFINITY,
     };
-    // Where a leaf is far wider than a neighborhood its points share little.
+    // The points of a leaf that is much wider than a neighborhood share few neighbors.
     if width > WIDEST * reach || reach == f64::INFINITY {
         for (at, place) in places.enumerate() {
             let row = tree.rows[place] as usize;
@@ -89,7 +88,7 @@ pub(super) fn solve<const D: usize>(
     }
 }
 
-/// Copies every point within `radius` of `middle` to the columns of `scratch`, of those that coincide at least the `most` with the
+/// Copies every point within `radius` of `middle` to the columns of `scratch`; of coinciding points, at least the `most` with the
 /// lowest rows.
 fn gather<const D: usize>(
     tree: &Knn<'_, D>,
@@ -113,15 +112,15 @@ fn gather<const D: usize>(
     });
 }
 
-/// The bits that number the candidates.
+/// Returns the mask of the bits that number the candidates.
 #[inline(always)]
 fn low_bits(candidates: &[u32]) -> u64 {
     candidates.len().next_power_of_two() as u64 - 1
 }
 
-/// Leaves in `keys` the k nearest of the candidates, and a few more, in no order: squared distances
-/// as integers, the lowest bits replaced by the candidate's number. Plain integers sort twice as fast as
-/// pairs; where the bits left tie, the order is repaired afterwards.
+/// Leaves in `keys` the k nearest candidates and a few more, unordered. A key is the squared distance as an integer, with the
+/// lowest bits replaced by the candidate's index. Integers sort twice as fast as pairs; where the remaining bits tie, the order
+/// is repaired afterwards.
 struct Query<'a, const D: usize> {
     query: [f64; D],
     row: u32,
@@ -139,7 +138,7 @@ impl<const D: usize> Kernel for Query<'_, D> {
         let Scratch { columns, rows, squared, keys, .. } = self.scratch;
         squared.clear();
         squared.resize(rows.len(), 0.0);
-        // The order of operations is that of `vector::squared_distance`: the same bits.
+        // The order of operations equals that of `vector::squared_distance`, so the bits are equal.
         for (column, center) in columns.iter().zip(&self.query) {
             for (sum, x) in squared.iter_mut().zip(column) {
                 let d = center - x;
@@ -158,20 +157,19 @@ impl<const D: usize> Kernel for Query<'_, D> {
     }
 }
 
-/// A bound, at most `high`, within which at least `wanted` of `squared` lie and few more. On
-/// surfaces the number within a squared distance is nearly proportional to it, so guesses converge fast;
-/// ties may keep them from it, which only costs time.
+/// Returns a bound of at most `high` within which at least `wanted` of `squared` lie, and few more. On surfaces, the number of points is
+/// nearly proportional to the squared distance, so guesses converge fast. Ties may prevent that, which only costs time.
 #[inline(always)]
 fn narrowed(squared: &[f64], mut high: f64, wanted: usize) -> f64 {
     let within = |bound: f64| squared.iter().map(|&s| u64::from(s <= bound)).sum::<u64>() as usize;
     let (mut low, mut below) = (0.0, 0);
     let mut above = within(high);
     for _ in 0..MOST_PASSES {
-        if above <= wanted + SURPLUS {
+        if above <= wanted + MOST_SURPLUS {
             break;
         }
-        // Halfway into the surplus allowed, between the bounds known.
-        let share = (wanted + SURPLUS / 2 - below) as f64 / (above - below) as f64;
+        // Aim for the middle of the allowed surplus.
+        let share = (wanted + MOST_SURPLUS / 2 - below) as f64 / (above - below) as f64;
         let guess = low + (high - low) * share;
         let count = within(guess);
         if count >= wanted {

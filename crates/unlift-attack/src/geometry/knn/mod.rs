@@ -1,13 +1,11 @@
-//! Exact K nearest neighbors with canonical ties: by distance, then by row.
+//! Exact K nearest neighbors. Ties are ordered by row.
 //!
-//! A balanced k-d tree over whole leaves. Points are stored leaf by leaf, a column per coordinate,
-//! so that a leaf is a few vector instructions and rows asked for one after the other in
-//! [`spatial_order`](Knn::spatial_order) find their neighbors in cache. Where a node lies in the
-//! columns follows from its number: only boxes are stored.
+//! The search tree is a balanced k-d tree. Points are stored leaf by leaf, one column per coordinate, so that a leaf takes a few vector
+//! instructions, and queries in [`spatial_order`](Knn::spatial_order) find their neighbors in the cache. The index of a node
+//! determines its place in the columns, so only boxes are stored.
 //!
-//! A query looks first at the smallest node around its point that holds enough others. The K-th
-//! distance found there bounds the true one, and every point within that bound is taken: ties
-//! cannot be missed. Who asks for every row is served leaf by leaf (`leaf`).
+//! A query first searches the smallest node around its point that holds enough others. The K-th distance found there is an upper bound.
+//! Then it takes every point within that bound, so that no tie is missed. Queries of all rows run leaf by leaf (`leaf`).
 
 mod leaf;
 mod tree;
@@ -17,9 +15,8 @@ pub use tree::Knn;
 use rayon::prelude::*;
 
 impl<const D: usize> Knn<'_, D> {
-    /// Calls `of(row, its k nearest, entry)` for every row, with `entries` in spatial order: several
-    /// times faster than one query after the other. The nearest are other rows, never the row itself, as (squared
-    /// distance, row), nearest first.
+    /// Calls `of(row, its k nearest, entry)` for every row, with `entries` in spatial order. It is several times faster than single
+    /// queries. The nearest are other rows, as (squared distance, row), nearest first.
     ///
     /// # Panics
     /// When there is not one entry per row.
@@ -42,7 +39,7 @@ impl<const D: usize> Knn<'_, D> {
         });
     }
 
-    /// `of(row, its k nearest)` for every row, in the order of rows; the nearest as [`each`](Self::each) gives them.
+    /// Returns `of(row, its k nearest)` for every row, in the order of rows, see [`each`](Self::each).
     pub fn per_row<T: Clone + Send>(
         &self,
         k: usize,
@@ -53,7 +50,7 @@ impl<const D: usize> Knn<'_, D> {
         self.places.iter().filter_map(|&place| by_place[place as usize].take()).collect()
     }
 
-    /// The distance of every row to its `k`-th nearest other row (to its last one in small sets).
+    /// Returns the distance of every row to its `k`-th nearest other row (to the last one in small sets).
     pub fn kth_distances(&self, k: usize) -> Vec<f64> {
         self.per_row(k, |_, found| found.last().map_or(0.0, |last| last.0.sqrt()))
     }

@@ -1,4 +1,4 @@
-//! Exact neighbors, compared with brute force.
+//! The tree is compared with brute force.
 
 use super::Knn;
 use super::tree::canonical;
@@ -50,7 +50,7 @@ fn equals_brute_force_with_many_ties() {
 fn equals_brute_force_at_every_size_and_density() {
     for n in [2, 23, 24, 25, 48, 49, 97, 300, 1000] {
         let mut draws = Draws::new(n, Stage::Synthetic, 0);
-        // Cubing makes the middle a million times denser than the rim.
+        // Cubing makes the middle a million times denser than the border.
         let mut points = |_| std::array::from_fn(|_| draws.between(-1.0, 1.0).powi(3) * 1e3);
         compare(&(0..n).map(&mut points).collect::<Vec<[f64; 3]>>());
         let flat: Vec<[f64; 2]> = (0..n).map(&mut points).map(|p: [f64; 3]| [p[0], p[1]]).collect();
@@ -66,14 +66,14 @@ fn coincident_points_are_found_by_row() {
     assert_eq!(found, [(0.0, 0), (0.0, 1), (0.0, 2)]);
 }
 
-/// Depth cameras write (0, 0, 0) for "nothing": piles of thousands among other points.
+/// Depth cameras write (0, 0, 0) for missing points, so that thousands coincide.
 #[test]
 fn piles_are_as_if_every_point_was_looked_at() {
     let mut draws = Draws::new(3, Stage::Synthetic, 0);
     for share in [0.3, 0.9] {
         let points: Vec<[f64; 3]> = (0..900)
             .map(|row| match draws.unit() < share {
-                // Zeros of both signs are one place.
+                // Zeros of both signs are equal.
                 true => [if row % 2 == 0 { 0.0 } else { -0.0 }, 0.0, 0.0],
                 false => std::array::from_fn(|_| draws.between(-1.0, 1.0)),
             })

@@ -1,25 +1,25 @@
-//! The tree, and one query after the other.
+//! The search tree and single queries.
 
 use crate::Error;
 use crate::simd::{Kernel, dispatch};
 
-/// Points per leaf at most: small enough to skip most, large enough to be worth a jump.
+/// Largest number of points per leaf.
 const LEAF: usize = 16;
-/// Points of a node that rayon is not worth asking for.
+/// Nodes with fewer points are split without parallelism.
 const ALONE: usize = 1 << 14;
 
-/// A search tree over points that are looked up by row.
+/// A search tree over points, which are identified by row.
 pub struct Knn<'a, const D: usize> {
     pub(super) points: &'a [[f64; D]],
     /// Number of levels below the root: there are `2^depth` leaves.
     pub(super) depth: u32,
-    /// Boxes of the nodes: the root is 1, node `i` has the halves `2 i` and `2 i + 1`.
+    /// Boxes of the nodes: the root is 1, the halves of node `i` are `2 i` and `2 i + 1`.
     pub(super) boxes: Vec<Bounds<D>>,
     /// Coordinates in leaf order.
     pub(super) columns: [Vec<f64>; D],
-    /// The row at each place of the leaf order.
+    /// Row at each place of the leaf order.
     pub(super) rows: Vec<u32>,
-    /// The place of each row.
+    /// Place of each row.
     pub(super) places: Vec<u32>,
 }
 
@@ -44,8 +44,8 @@ impl<const D: usize> Bounds<D> {
         points.fold(Self::EMPTY, |all, p| all.and(&Self { low: p, high: p }))
     }
 
-    /// At most the squared distance from `query` to any point inside, rounding included: every
-    /// operation is that of the distance itself, and each rounds monotonically.
+    /// Returns a lower bound, rounding included, of the squared distance from `query` to any point inside: every operation is that of the
+    /// distance itself, and each rounds monotonically.
     #[inline(always)]
     fn squared_distance(&self, query: &[f64; D]) -> f64 {
         let mut sum = 0.0;
@@ -58,7 +58,7 @@ impl<const D: usize> Bounds<D> {
 }
 
 impl<'a, const D: usize> Knn<'a, D> {
-    /// A tree over `points`.
+    /// Creates a tree over `points`.
     ///
     /// # Errors
     /// When there are no points, more than 2^32 of them, or one is not finite.
@@ -92,13 +92,13 @@ impl<'a, const D: usize> Knn<'a, D> {
         Ok(Self { points, depth, boxes, columns, rows, places })
     }
 
-    /// All rows, in an order in which near rows are near: queries in this order are fastest.
+    /// Returns all rows in an order in which near rows are adjacent; queries in this order are fastest.
     pub fn spatial_order(&self) -> &[u32] {
         &self.rows
     }
 
-    /// All rows in patches of near ones: halved along the longest side of their box until a patch
-    /// holds at most `most` (or as few as a leaf of the tree).
+    /// Returns all rows in patches of near ones: the box is split along its longest side until a patch holds at most `most` rows (but a
+    /// leaf is never split).
     pub fn patches(&self, most: usize) -> Vec<&[u32]> {
         let n = self.rows.len();
         let fits = |level: &u32| n.div_ceil(1 << level) <= most.max(1);
@@ -106,14 +106,13 @@ impl<'a, const D: usize> Knn<'a, D> {
         (1usize << level..2 << level).map(|node| &self.rows[self.range(node)]).collect()
     }
 
-    /// The `k` nearest other rows of row `row` (fewer when there are fewer), as (squared distance,
-    /// row) in canonical order, into `found`.
+    /// Finds the `k` nearest other rows of `row` (or all, if there are fewer) as (squared distance, row), sorted, into `found`.
     pub fn nearest(&self, row: usize, k: usize, found: &mut Vec<(f64, u32)>) {
         let place = self.places[row] as usize;
         self.search(self.points[row], Some(place), k, found);
     }
 
-    /// The `k` nearest rows of any position, in the same form.
+    /// Finds the `k` nearest rows of any position, in the same form.
     pub fn nearest_to(&self, position: [f64; D], k: usize, found: &mut Vec<(f64, u32)>) {
         self.search(position, None, k, found);
     }
@@ -123,7 +122,7 @@ impl<'a, const D: usize> Knn<'a, D> {
         if k == 0 {
             return;
         }
-        // Any place will do to start from; a position of its own has none, so it walks down.
+        // A row starts from its own leaf; another position walks down the tree.
         let leaf = match own {
             Some(place) => self.leaf_of(place),
             None => self.leaf_towards(&query),
@@ -146,8 +145,8 @@ impl<'a, const D: usize> Knn<'a, D> {
         node - (1 << self.depth)
     }
 
-    /// Calls `take` with the places of every leaf within the squared distance `bound`, those below
-    /// node `but` left out; of points that coincide with at least the `most` of them that have the lowest rows.
+    /// Calls `take` with the places of every leaf within the squared distance `bound`, except those below node `but`; of coinciding points,
+    /// with at least the `most` that have the lowest rows.
     #[inline(always)]
     pub(super) fn leaves_within(
         &self,
@@ -184,8 +183,8 @@ impl<'a, const D: usize> Knn<'a, D> {
         self.boxes[node].low == self.boxes[node].high
     }
 
-    /// The places of a node; of one whose points coincide the leaves that hold the `most` lowest rows, or a few more: of equal
-    /// distances no others can be among the nearest, however many there are.
+    /// Returns the places of a node. If its points coincide, returns only the leaves that hold the `most` lowest rows, because at equal
+    /// distances no others can be among the nearest.
     #[inline(always)]
     fn lowest(&self, node: usize, most: usize) -> std::ops::Range<usize> {
         let all = self.range(node);
@@ -197,13 +196,13 @@ impl<'a, const D: usize> Knn<'a, D> {
         all.start..self.range((1 << self.depth) + last).end
     }
 
-    /// The leaf that has a place.
+    /// Returns the leaf of a place.
     #[inline(always)]
     fn leaf_of(&self, place: usize) -> usize {
         (((place + 1) << self.depth) - 1) / self.rows.len()
     }
 
-    /// The places of a node.
+    /// Returns the places of a node.
     #[inline(always)]
     pub(super) fn range(&self, node: usize) -> std::ops::Range<usize> {
         let level = usize::BITS - 1 - node.leading_zeros();
@@ -214,14 +213,14 @@ impl<'a, const D: usize> Knn<'a, D> {
     }
 }
 
-/// Distance and row as one integer: the bits of numbers from 0 up are ordered as the numbers are.
+/// Packs distance and row into one integer. The bits of nonnegative numbers are ordered as the numbers are.
 #[inline(always)]
 pub(super) fn canonical(&(squared, row): &(f64, u32)) -> u128 {
     (u128::from(squared.to_bits()) << 32) | u128::from(row)
 }
 
-/// Puts `items`, the leaves from `first` on, in leaf order: halves along the longest side, `depth`
-/// times. `starts` is the place at which a leaf begins.
+/// Sorts `items`, the leaves from `first` on, into leaf order: splits along the longest side, `depth` times. `starts` returns the
+/// first place of a leaf.
 fn split<const D: usize>(
     items: &mut [([f64; D], u32)],
     depth: u32,
@@ -256,11 +255,11 @@ fn split<const D: usize>(
     }
 }
 
-/// Everything within the K-th distance, and a little more, in no order.
+/// Finds all points within the K-th distance, and a few more, unordered.
 struct Search<'a, 'b, const D: usize> {
     tree: &'a Knn<'b, D>,
     query: [f64; D],
-    /// The place that is no neighbor.
+    /// The query's own place, which is no neighbor.
     own: u32,
     leaf: usize,
     k: usize,
@@ -274,12 +273,12 @@ impl<const D: usize> Kernel for Search<'_, '_, D> {
     fn run(self) {
         let Self { tree, query, own, leaf, k, found } = self;
         let n_leaves = 1usize << tree.depth;
-        // The smallest node with so many others that its K-th is not far beyond the true one.
+        // The smallest node with so many others that their K-th distance is near the true one.
         let mut near = n_leaves + leaf;
         while near > 1 && tree.range(near).len() < 2 * k + 1 {
             near /= 2;
         }
-        // All that coincide with these, of which the lowest rows will do: one more, as the point itself may be among them.
+        // Extend to all points that coincide with these. The lowest rows suffice: one more than k, as the point itself may be one.
         while near > 1 && tree.is_pile(near / 2) {
             near /= 2;
         }
@@ -296,7 +295,7 @@ impl<const D: usize> Kernel for Search<'_, '_, D> {
     }
 }
 
-/// Appends the points at `places` that lie within the squared distance `bound` of `query`.
+/// Appends the points at `places` within the squared distance `bound` of `query`.
 #[inline(always)]
 fn take<const D: usize>(
     tree: &Knn<'_, D>,
@@ -310,7 +309,7 @@ fn take<const D: usize>(
     while at < places.end {
         let end = places.end.min(at + LEAF);
         let mut squared = [0.0; LEAF];
-        // The order of operations is that of `vector::squared_distance`: the same bits.
+        // The order of operations equals that of `vector::squared_distance`, so the bits are equal.
         for (column, center) in tree.columns.iter().zip(query) {
             for (sum, x) in squared.iter_mut().zip(&column[at..end]) {
                 let d = center - x;

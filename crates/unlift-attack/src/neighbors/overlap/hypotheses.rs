@@ -1,4 +1,4 @@
-//! How one patch may lie over another: a turn by a multiple of 45 degrees, then a shift by cells.
+//! Hypotheses about how two patches overlap: a turn by a multiple of 45 degrees, then a shift by cells.
 
 /// Cells along one side of a SIFT patch.
 pub const SIDE: usize = 4;
@@ -6,7 +6,7 @@ pub const SIDE: usize = 4;
 pub const CELLS: usize = SIDE * SIDE;
 /// Orientation bins of a cell, 45 degrees each.
 pub const BINS: usize = 8;
-/// Values of a SIFT descriptor: cell by cell, row by row, the bins of a cell side by side.
+/// Number of values of a SIFT descriptor: cells in row order, the bins of a cell side by side.
 pub const DIM: usize = CELLS * BINS;
 
 /// Shifts with `|dx| + |dy|` below 4 that keep at least six cells: 21 of them.
@@ -14,54 +14,54 @@ const FARTHEST: i32 = 4;
 /// The longest shift along one axis.
 const LONGEST: i32 = 2;
 
-/// What stands in one cell of a version of a patch: up to four cells of the patch, by share.
+/// Content of one cell of a version: up to four cells of the patch, with weights.
 pub type Cell = [(u8, f32); 4];
 
-/// One version of a patch: cells of it, turned and shifted, in the order in which they are compared.
+/// A version of a patch: its cells after a turn and a shift, in the order of comparison.
 #[derive(Clone, Debug)]
 pub struct Version {
-    /// The cells, by what they are made of.
+    /// The cells.
     pub cells: Vec<Cell>,
-    /// Bins by which orientations turn.
+    /// Number of bins by which orientations turn.
     pub turn: usize,
-    /// Square root of the weight of a hypothesis with so many cells: either side carries it.
+    /// Square root of the weight of hypotheses with this many cells; both versions carry it.
     pub root_weight: f32,
 }
 
-/// A pair of versions that are compared: one of each patch, of equally many cells.
+/// Two versions that are compared, one of each patch, with equally many cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pair {
     /// Index into [`Hypotheses::turned`].
     pub turned: usize,
     /// Index into [`Hypotheses::still`].
     pub still: usize,
-    /// Cells by which it shifts, along both axes together.
+    /// Length of the shift in cells, `|dx| + |dy|`.
     pub shift: usize,
-    /// Whether exchanging the patches gives other hypotheses: turns by odd multiples resample the
-    /// cells of the turned patch. Turns by even multiples come in pairs of a map and its inverse.
+    /// Whether exchanging the patches gives other hypotheses. Odd turns resample the cells of the turned patch. Even turns
+    /// come in pairs of a turn and its inverse.
     pub both_ways: bool,
 }
 
-/// All hypotheses that are tried.
+/// All hypotheses.
 #[derive(Clone, Debug)]
 pub struct Hypotheses {
     /// Versions of the patch that is turned and shifted.
     pub turned: Vec<Version>,
-    /// Versions of the patch that stays: without the cells outside the other.
+    /// Versions of the other patch: its cells that the turned one covers.
     pub still: Vec<Version>,
-    /// Which version is compared with which.
+    /// Versions that are compared.
     pub pairs: Vec<Pair>,
 }
 
 impl Hypotheses {
-    /// Eight turns by 21 shifts.
+    /// Creates the hypotheses: 8 turns by 21 shifts.
     pub fn new() -> Self {
         let mut all = Self { turned: Vec::new(), still: Vec::new(), pairs: Vec::new() };
         for dy in -LONGEST..=LONGEST {
             for dx in -LONGEST..=LONGEST {
                 if dx.abs() + dy.abs() < FARTHEST {
                     all.add_shift([dx, dy], &[0, 2, 4, 6], false);
-                    // Turns by 5 and 7 are those by 1 and 3 the other way.
+                    // Turns by 5 and 7 are the inverses of those by 3 and 1.
                     all.add_shift([dx, dy], &[1, 3], true);
                 }
             }
@@ -85,7 +85,7 @@ impl Hypotheses {
             let share = version.cells.len() as f64 / CELLS as f64;
             version.root_weight = libm::pow(share, 0.5 * WEIGHT_EXPONENT) as f32;
             kept.root_weight = version.root_weight;
-            // Turns by the same parity cover the same cells: one still version serves them all.
+            // Turns of the same parity cover the same cells, so they share one still version.
             if at == 0 {
                 self.still.push(kept);
             }
@@ -96,11 +96,11 @@ impl Hypotheses {
     }
 }
 
-/// Exponent of the share of cells that are compared.
+/// Exponent of the fraction of cells that are compared.
 const WEIGHT_EXPONENT: f64 = 0.06;
 
-/// What of a patch comes to lie in `cell` when it is turned by `turn` times 45 degrees about its
-/// middle and then shifted; `None` where that is outside the patch.
+/// Returns the content of `cell` after the patch is turned by `turn` times 45 degrees about its middle and then shifted; `None` if
+/// it is outside the patch.
 fn sources(cell: usize, turn: usize, shift: [i32; 2]) -> Option<Cell> {
     let middle = (SIDE - 1) as f64 / 2.0;
     let x = (cell % SIDE) as f64 - middle - f64::from(shift[0]);
@@ -119,7 +119,7 @@ fn sources(cell: usize, turn: usize, shift: [i32; 2]) -> Option<Cell> {
     ][turn % 8];
     let from = [cos * x + sin * y + middle, cos * y - sin * x + middle];
     let last = (SIDE - 1) as f64;
-    // Rounding of a half turn may leave the edge by a hair.
+    // Rounding may move a border cell slightly outside.
     if from.iter().any(|&c| c < -1e-9 || c > last + 1e-9) {
         return None;
     }

@@ -1,8 +1,7 @@
-//! Neighborhoods from SIFT descriptors alone: near keypoints describe overlapping pixels.
+//! The source `overlap`: the patches of near SIFT keypoints overlap. It needs no training.
 //!
-//! Two patches are compared by the cells that they share under a hypothesis, a turn and a shift; the
-//! best hypothesis counts. A short walk over the best matches reaches neighbors whose patches do not
-//! overlap. Nothing is trained.
+//! Two patches are compared on the cells that they share under a hypothesis, which is a turn and a shift. The best
+//! hypothesis counts. A short walk over the best matches reaches neighbors whose patches do not overlap.
 
 mod hypotheses;
 mod patches;
@@ -17,17 +16,17 @@ use super::walk::{self, Walk};
 use crate::released::Released;
 use crate::{Descriptors, Error};
 
-/// How far the best hypothesis shifts: not at all, by one cell, by more.
+/// Number of classes of shifts: 0 cells, 1 cell, more.
 pub const REACHES: usize = 3;
 
-/// Patches of near points need not overlap: neighbors are some steps apart.
+/// The walk over matches: patches of near points need not overlap, so neighbors are several steps apart.
 pub const WALK: Walk = Walk { steps: 5, decay: 0.7 };
 
-/// The `k` records whose patches overlap each slot's patch most, or that a short walk over such
-/// records reaches. Scores: log of the (discounted) probability to be reached.
+/// Lists the `k` records whose patches overlap each slot's patch most, or that a short walk over such records reaches. The score is
+/// the logarithm of the discounted probability to be reached.
 ///
-/// Exact up to 131,072 slots (`MOST_ROWS`). Of more, each is compared with those that look alike on the whole, which finds
-/// fewer of its partners.
+/// The search is exact up to 131,072 slots (`MOST_ROWS`). In a larger map, each block of descriptors is compared with the blocks
+/// that have the most similar means, which misses some partners.
 ///
 /// # Errors
 /// When the map has no SIFT descriptors, or fewer than `k` other records.
@@ -40,7 +39,7 @@ pub fn overlap<const D: usize>(released: &Released<D>, k: usize) -> Result<Neigh
     rows.lists(&walk::walk(&ranked, &rows.records, enough, WALK), k)
 }
 
-/// [`overlap`] as a source.
+/// The function [`overlap`] as a source.
 #[derive(Clone, Copy, Debug)]
 pub struct Overlap;
 
@@ -54,7 +53,7 @@ impl<const D: usize> Source<D> for Overlap {
     }
 
     fn k(&self, _: &Released<D>) -> usize {
-        // Of an image's fewer keypoints only the first of a ranking are near.
+        // An image has fewer keypoints, so that only the first of a ranking are near.
         if D == 2 { 10 } else { 35 }
     }
 

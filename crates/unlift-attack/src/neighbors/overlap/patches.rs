@@ -1,4 +1,4 @@
-//! Every version of every patch, as bytes of equal length, ready to be multiplied.
+//! All versions of patches as bytes of equal length, ready to be multiplied.
 
 use super::hypotheses::{BINS, CELLS, Cell, DIM, Hypotheses, Version};
 use crate::descriptors::Values;
@@ -6,29 +6,28 @@ use crate::neighbors::compare::Likeness;
 use crate::simd::{self, BLOCK};
 use crate::{Descriptors, Error, ErrorKind};
 
-/// Length of a version in bytes' units. Rounding adds less than half of the square root of [`DIM`],
-/// so that no product of two exceeds 133 x 133.
+/// Length of a version as a vector of bytes. Rounding adds less than half of the square root of [`DIM`], so that a product of two is
+/// at most 133 x 133.
 const LENGTH: f32 = 127.0;
 
-/// The norm below which shared cells count as blank: blank parts (the edge of an image) would match
-/// each other.
+/// Least norm of shared cells. With a smaller one, blank parts (at the border of an image) would match each other.
 const NORM_FLOOR: f32 = 0.05;
 
-/// How patches are compared.
+/// Compares patches by their overlap.
 pub struct Patches {
     hypotheses: Hypotheses,
 }
 
-/// The versions of [`BLOCK`] patches, one after the other; rows beyond the last patch are zero. About 10 KB a patch.
+/// The versions of [`BLOCK`] patches, one after another, about 10 KB per patch. Rows beyond the last patch are zero.
 pub struct Block {
     turned: Vec<u8>,
     still: Vec<i8>,
 }
 
-/// Refuses descriptors that are not SIFT: 128 columns, none negative; bytes, or floats of any norm.
+/// Rejects descriptors that are not SIFT: 128 columns of bytes or of floats that are not negative, with any norm.
 ///
 /// # Errors
-/// What a SIFT descriptor is, and what was found.
+/// States what a SIFT descriptor is, and what was found.
 pub fn check(descriptors: &Descriptors) -> Result<(), Error> {
     let wrong = |found: String| {
         let expected = "SIFT descriptors (128 values each, none negative)";
@@ -46,7 +45,7 @@ pub fn check(descriptors: &Descriptors) -> Result<(), Error> {
 }
 
 impl Patches {
-    /// For the patches of `descriptors`.
+    /// Creates the comparison for patches of `descriptors`.
     ///
     /// # Errors
     /// When they are not SIFT, see [`check`].
@@ -57,7 +56,7 @@ impl Patches {
 }
 
 impl Likeness for Patches {
-    /// Scores are whole numbers.
+    /// Scores are integers.
     const STEP: f32 = 1.0;
     type Block = Block;
 
@@ -65,14 +64,14 @@ impl Likeness for Patches {
         Block::new(&self.hypotheses, descriptors, slots)
     }
 
-    /// The best cosine of shared cells over all hypotheses, as a product of bytes.
+    /// Computes the best cosine of shared cells over all hypotheses, as a product of bytes.
     fn scores(&self, a: &Block, b: &Block, scores: &mut [f32]) {
         self.best(a, b, |_| true, scores);
     }
 }
 
 impl Patches {
-    /// The same over those hypotheses that shift by a number of cells that `counts`.
+    /// Computes the best cosine over the hypotheses whose shift `counts`.
     pub fn best(&self, a: &Block, b: &Block, counts: impl Fn(usize) -> bool, scores: &mut [f32]) {
         let mut forth = vec![0i16; BLOCK * BLOCK];
         let mut back = forth.clone();
@@ -98,7 +97,7 @@ impl Patches {
     }
 }
 
-/// Where each version starts within a block.
+/// Returns the start of each version within a block.
 fn starts(versions: &[Version]) -> Vec<usize> {
     let step = |at: &mut usize, version: &Version| {
         let start = *at;
@@ -142,7 +141,7 @@ impl Block {
     }
 }
 
-/// The gradient histogram behind a RootSIFT descriptor: its squares, of sum 1.
+/// Returns the gradient histogram behind a RootSIFT descriptor: the squares of its values, with sum 1.
 fn squares(descriptors: &Descriptors, slot: usize) -> [[f32; BINS]; CELLS] {
     let range = slot * DIM..(slot + 1) * DIM;
     let mut squares = [0.0f32; DIM];
@@ -163,12 +162,12 @@ fn squares(descriptors: &Descriptors, slot: usize) -> [[f32; BINS]; CELLS] {
     std::array::from_fn(|cell| std::array::from_fn(|bin| squares[cell * BINS + bin] / sum))
 }
 
-/// One version of a patch in bytes; histograms are mixed as histograms, and rooted after.
+/// Converts a version of a patch to bytes. Histograms are mixed before the square root.
 fn quantize(squares: &[[f32; BINS]; CELLS], version: &Version, bytes: &mut [u8; DIM]) {
     let mut mixed = [0.0f32; DIM];
     for (cell, mixed) in version.cells.iter().zip(mixed.chunks_exact_mut(BINS)) {
         for bin in 0..BINS {
-            // Orientations of a descriptor run against the grid.
+            // Orientations of a descriptor turn in the opposite sense of the grid.
             mixed[(bin + BINS - version.turn) % BINS] = mix(squares, cell, bin);
         }
     }

@@ -4,9 +4,8 @@
 
 use crate::recover::confidence::{Model, N_KINDS, N_TERMS};
 
-// A fitted weight may look like a constant of mathematics.
+// A fitted weight may resemble a mathematical constant.
 
-/// Means of terms.
 pub(super) const CENTER: [f32; N_TERMS] = [
     1.000e0, 4.162e0, 2.908e0, 1.149e-1, 2.638e0, 1.938e0, 1.082e-1, 2.763e-1, 4.269e0, 5.210e-2,
     4.144e0, -1.176e0, -1.882e0, 1.793e-2, 4.168e0, 7.613e-1, 7.582e-1, 7.380e-2, 3.056e-2,
@@ -15,7 +14,6 @@ pub(super) const CENTER: [f32; N_TERMS] = [
     6.616e-1, 3.239e-1, 3.222e-1, 3.648e-1, 3.678e-1, 4.267e-2, 1.750e-1, 1.548e0, -5.225e-1,
 ];
 
-/// Standard deviations of terms.
 pub(super) const SPREAD: [f32; N_TERMS] = [
     1.000e-3, 1.259e0, 1.131e0, 1.039e0, 1.461e0, 1.683e0, 1.169e-1, 1.791e-1, 1.158e0, 1.158e0,
     1.070e0, 1.031e0, 1.018e0, 6.305e-1, 7.697e-1, 3.257e-1, 2.903e-1, 2.614e-1, 1.670e-1,
@@ -24,7 +22,6 @@ pub(super) const SPREAD: [f32; N_TERMS] = [
     3.903e-1, 1.199e0, 1.179e0, 1.005e0, 2.326e0, 3.314e-1, 1.701e-1, 5.398e-1, 5.068e-1,
 ];
 
-/// Per kind of records.
 pub(super) const MODELS: [Model; N_KINDS] = [
     Model {
         found: [

@@ -1,11 +1,11 @@
-//! How sure the attacker can be of each recovered point, from attacker-side data alone.
+//! Confidence: the probability that an estimate is right, predicted without ground truth.
 //!
-//! After joint recovery `crowd.rs` measures around every slot how much better than by chance estimates and records agree. A
-//! logistic model turns these cues into the probability that the right place was found, and a scale of its error. Its constants
-//! come from synthetic rooms (`examples/fit_confidence.rs`), never from a real map.
+//! After joint recovery, `cues.rs` measures around every slot how much better than by chance estimates and records agree. A logistic
+//! model turns these cues into the probability that the right place was found and into a scale of its error. Its constants
+//! were fitted on synthetic rooms (`examples/fit_confidence.rs`), never on a real map.
 
 mod constants;
-pub(super) mod crowd;
+pub(super) mod cues;
 
 use rayon::prelude::*;
 
@@ -14,7 +14,7 @@ use crate::geometry::flatness::flatness;
 use crate::geometry::vector::widen;
 use crate::neighbors::Neighborhoods;
 use crate::recover::confidence::constants::{CENTER, MODELS, SPREAD};
-use crate::recover::confidence::crowd::{Cues, N_CUES, Seen, Solved};
+use crate::recover::confidence::cues::{Cues, N_CUES, Seen, Solved};
 use crate::recover::map::family::{Family, Settings};
 use crate::recover::map::graph::Graph;
 use crate::recover::map::pieces::{CandidatePieces, LinePieces, PlanePieces};
@@ -23,7 +23,7 @@ use crate::recover::result::{Confidence, Estimate, Status, Unknown};
 use crate::recover::solver::Builtin;
 use crate::released::{Obfuscation, Rays, Released};
 
-/// Why nobody looks how sure the attacker is, if `options` or the kind of map say so.
+/// Returns why confidence is not computed, if options, solver or dimension say so.
 pub(super) fn not_asked<const D: usize>(
     solver: Builtin,
     options: &RecoverOptions,
@@ -36,8 +36,8 @@ pub(super) fn not_asked<const D: usize>(
     }
 }
 
-/// How sure the attacker is of every slot of joint recovery, and the cues that say so.
-pub(super) fn look<const D: usize>(
+/// Predicts the confidence of every slot after joint recovery; also returns the cues.
+pub(super) fn predict<const D: usize>(
     family: &Family<'_, D>,
     graph: &Graph,
     released: &Released<D>,
@@ -46,13 +46,13 @@ pub(super) fn look<const D: usize>(
     let (cues, radius) = match family {
         Family::Lines { rows, slots_per_record, chance } => {
             let pieces = LinePieces::new(rows, *slots_per_record, chance, solved.delta);
-            crowd::cues(&pieces, graph, solved)
+            cues::of_slots(&pieces, graph, solved)
         }
         Family::Planes { planes, sorted } => {
-            crowd::cues(&PlanePieces::new(planes, sorted, solved.delta), graph, solved)
+            cues::of_slots(&PlanePieces::new(planes, sorted, solved.delta), graph, solved)
         }
         Family::Candidates { rows, chance } => {
-            crowd::cues(&CandidatePieces::new(rows, chance, solved.delta), graph, solved)
+            cues::of_slots(&CandidatePieces::new(rows, chance, solved.delta), graph, solved)
         }
     };
     let kind = match released.obfuscation() {
@@ -62,15 +62,15 @@ pub(super) fn look<const D: usize>(
         Obfuscation::AxisCandidates(_) => 4,
     };
     let of_slot = |(estimate, cues): (&Estimate<D>, &Cues)| match estimate.status {
-        Status::Ok => judged(&MODELS[kind], cues, radius),
+        Status::Ok => predict_slot(&MODELS[kind], cues, radius),
         _ => Confidence::LOST,
     };
     let sure = solved.estimates.par_iter().zip(&cues).map(of_slot).collect();
     (sure, Seen { cues, radius: f64::from(radius), kind })
 }
 
-/// What `cues` say about one slot; lengths are multiples of `radius`.
-fn judged(model: &Model, cues: &Cues, radius: f32) -> Confidence {
+/// Predicts the confidence of one slot from its cues. Errors are in units of `radius`.
+fn predict_slot(model: &Model, cues: &Cues, radius: f32) -> Confidence {
     let terms = centered(terms(cues), &CENTER, &SPREAD);
     let sum =
         |weights: &[f32; N_TERMS]| -> f32 { terms.iter().zip(weights).map(|(t, w)| t * w).sum() };
@@ -78,20 +78,18 @@ fn judged(model: &Model, cues: &Cues, radius: f32) -> Confidence {
     Confidence { found: 1.0 / (1.0 + libm::expf(-sum(&model.found))), scale }
 }
 
-/// A list has at most as many entries as this share of all hidden points in the maps that the model was fitted on.
+/// Longest mean list, as a fraction of all hidden points, in the maps on which the model was fitted.
 const MOST_LISTED: f64 = 0.01;
 
-/// A map is flat whose smallest extent is at most this share of its largest one.
+/// A map is flat if its smallest extent is at most this fraction of its largest one.
 const FLAT: f64 = 0.01;
 
-/// Points fall together where at least this share of all rays has another one in its place. Of points that differ this
-/// hardly ever happens by rounding.
+/// Points coincide if at least this fraction of all rays equals another ray. Different points hardly ever have equal rays.
 const COINCIDENT: f64 = 0.5;
 
-/// Why the model says nothing that comes true about maps recovered from `lists`, if so.
+/// Returns why the model does not apply to maps recovered from `lists`, if so.
 ///
-/// On smaller maps, on flat ones and on those of which most points fall together, and with lists that sources make, a tenth
-/// to nine tenths of those called 90 % sure were right.
+/// In these cases, one tenth to nine tenths of the estimates with a predicted probability of 90 % were right.
 pub(crate) fn unknown<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
@@ -109,14 +107,14 @@ pub(crate) fn unknown<const D: usize>(
         Some(Unknown::SmallMap)
     } else if matches!(released.obfuscation(), Obfuscation::Rays(rays) if twins(rays) >= COINCIDENT)
     {
-        // Records of other families are drawn anew for every point, or for a pair.
+        // Other records are drawn at random, so that coinciding points do not have equal records.
         Some(Unknown::Coincident)
     } else {
         (flatness(&places()) <= FLAT).then_some(Unknown::Flat)
     }
 }
 
-/// Share of the rays of which there is another one, bit for bit.
+/// Returns the fraction of rays that equal another ray bit for bit.
 fn twins<const D: usize>(rays: &Rays<D>) -> f64 {
     let bits = |row: usize| (rays.center()[row], rays.direction()[row].map(f32::to_bits));
     let mut rows: Vec<_> = (0..rays.len()).into_par_iter().map(bits).collect();
@@ -125,32 +123,41 @@ fn twins<const D: usize>(rays: &Rays<D>) -> f64 {
     same.sum::<usize>() as f64 / rays.len().max(1) as f64
 }
 
-/// Kinds of records that are calibrated apart: lines, paired lines, rays, axis planes, axis candidates.
+/// Kinds of records with separate models: lines, paired lines, rays, axis planes, axis candidates.
 pub const N_KINDS: usize = 5;
 
-/// Number of products of two cues that count too.
 const N_PRODUCTS: usize = 27;
 
-/// Number of terms: the constant, the cues, and the products.
+/// Number of terms: the constant, the cues and the products.
 pub const N_TERMS: usize = 1 + N_CUES + N_PRODUCTS;
 
-/// Terms farther than this many spreads from the center count as that far: nothing was seen there.
+/// Terms are clipped at this many standard deviations, because the fit saw no others.
 const FARTHEST: f32 = 4.0;
 
-/// The weights of one kind of record.
+/// Weights of the terms for one kind of records.
 pub(super) struct Model {
-    /// Of the logit of the right place.
+    /// For the logit of the probability that the estimate is right.
     pub(super) found: [f32; N_TERMS],
-    /// Of the logarithm of the error scale per typical radius of crowds.
+    /// For the logarithm of the error scale in units of the typical radius.
     pub(super) scale: [f32; N_TERMS],
 }
 
-/// The products of two cues that count too: what one says depends on the other, or bends.
 fn products(cues: &Cues) -> [f32; N_PRODUCTS] {
     let [evidence, _, ln_radius, record_evidence, _, _, _, of_members, sparsity, map_evidence, ..] =
         *cues;
-    let [.., map_share, map_record_share, _, _, voting_share, map_voting_share, settled, _, _, _] =
-        *cues;
+    let [
+        ..,
+        map_fraction,
+        map_record_fraction,
+        _,
+        _,
+        voting_fraction,
+        map_voting_fraction,
+        settled,
+        _,
+        _,
+        _,
+    ] = *cues;
     let [.., one_sided, map_one_sided] = *cues;
     [
         evidence * evidence,
@@ -163,15 +170,15 @@ fn products(cues: &Cues) -> [f32; N_PRODUCTS] {
         of_members * map_evidence,
         map_evidence * map_evidence,
         evidence * ln_radius,
-        map_share * map_share,
-        map_record_share * map_record_share,
-        evidence * map_share,
-        record_evidence * map_record_share,
+        map_fraction * map_fraction,
+        map_record_fraction * map_record_fraction,
+        evidence * map_fraction,
+        record_evidence * map_record_fraction,
         record_evidence * map_evidence,
-        voting_share * voting_share,
-        evidence * voting_share,
-        evidence * map_voting_share,
-        voting_share * map_voting_share,
+        voting_fraction * voting_fraction,
+        evidence * voting_fraction,
+        evidence * map_voting_fraction,
+        voting_fraction * map_voting_fraction,
         evidence * settled,
         map_evidence * settled,
         one_sided * one_sided,
@@ -179,11 +186,11 @@ fn products(cues: &Cues) -> [f32; N_PRODUCTS] {
         one_sided * map_one_sided,
         map_one_sided * map_one_sided,
         map_evidence * map_one_sided,
-        map_share * map_one_sided,
+        map_fraction * map_one_sided,
     ]
 }
 
-/// A constant, the cues and their products, before they are centered.
+/// Returns the constant, the cues and their products, not yet centered.
 pub fn terms(cues: &Cues) -> [f32; N_TERMS] {
     let mut terms = [1.0; N_TERMS];
     terms[1..=N_CUES].copy_from_slice(cues);
@@ -191,7 +198,7 @@ pub fn terms(cues: &Cues) -> [f32; N_TERMS] {
     terms
 }
 
-/// Terms centered and scaled, none too far; the constant stays 1.
+/// Centers, scales and clips terms; the constant stays 1.
 pub fn centered(terms: [f32; N_TERMS], center: &[f32], spread: &[f32]) -> [f32; N_TERMS] {
     let far = |at: usize| ((terms[at] - center[at]) / spread[at]).clamp(-FARTHEST, FARTHEST);
     std::array::from_fn(|at| if at == 0 { 1.0 } else { far(at) })

@@ -1,10 +1,10 @@
-//! Consensus for rays from anchors, each with its own region of an image: a range from the spread of bearings.
+//! Consensus for rays from anchors, which are centers with a region of the image each: ranges from the spread of bearings.
 //!
-//! Rays of one anchor meet only in the anchor, and rays of two anchors lie in different regions. What is left is
-//! perspective: neighbors within a distance `s` of a point at range `r` are seen from the anchor within
-//! an angle of `s / r`. The window of bearings that holds the listed rays least probably by chance
-//! gives that angle. `s` is unknown, but of two rays of about the same bearing the one with the narrower window is
-//! likely the longer one. Ranks of windows therefore give ranges, as points are spread evenly over the region.
+//! Rays of one anchor meet only in the anchor, and rays of two anchors lie in different regions, so records give no position.
+//! Perspective gives a range: from the anchor, neighbors within a distance `s` of a point at range `r` are seen within an
+//! angle of `s / r`. The angle is that of the window of bearings whose listed rays are least probable by chance. The
+//! distance `s` is unknown, but among rays of similar bearing those with narrow windows are likely long. Points are assumed to
+//! be uniform over the region, so that the rank of a window gives a range.
 
 use rayon::prelude::*;
 
@@ -13,18 +13,18 @@ use crate::recover::map::lines::{LineRow, evidence};
 use crate::recover::map::lists::{Slots, found, mixed};
 use crate::recover::result::{Estimate, Status};
 
-/// Slots whose lists are mixed to see what chance alone yields: a mean over so many is known to a few percent.
+/// Slots with mixed lists, to measure evidence by chance: a mean over so many has an error of a few percent.
 const SAMPLE: usize = 1 << 9;
-/// Only evidence beyond this many times the mean by chance counts: half of the slots exceed the mean by chance.
+/// Only evidence beyond this many times the mean by chance counts, because half of the slots exceed the mean.
 const CHANCE: f32 = 2.0;
-/// How often scores are averaged with those of neighbors: each time takes half of what is a slot's own.
+/// Number of times that scores are averaged with those of neighbors. Each time halves the weight of a slot's own score.
 const SMOOTHINGS: usize = 3;
-/// Ranges are compared on each side among this part of an anchor's rays (as a divisor): density differs by bearing.
+/// On each side, scores are compared with this part of the anchor's rays (a divisor), because density depends on bearing.
 const SECTORS: usize = 12;
-/// But among so many rays at least: ranks among fewer are coarse.
+/// Least number of rays compared on each side, because ranks among fewer are coarse.
 const LEAST_SECTOR: usize = 20;
 
-/// What the listed rays of a slot's own anchor say.
+/// A window of bearings around a slot's ray.
 #[derive(Clone, Copy, Debug)]
 struct Window {
     /// Sine of the half angle.
@@ -33,7 +33,6 @@ struct Window {
     evidence: f32,
 }
 
-/// Estimates for `slots`, one slot per record.
 pub(super) fn solve<const D: usize>(
     rows: &[LineRow<D>],
     lists: &Neighborhoods,
@@ -43,30 +42,29 @@ pub(super) fn solve<const D: usize>(
     let n = lists.n_slots();
     let windows: Vec<Option<Window>> =
         (0..n).into_par_iter().map(|slot| window(rows, &bearings, slot, lists)).collect();
-    // The best of several windows has some evidence whatever is listed.
+    // The best of several windows has some evidence even by chance.
     let sample = || (0..n).step_by(n.div_ceil(SAMPLE).max(1));
     let mixed = mixed(lists, sample(), 1);
     let by_chance: Vec<f32> =
         sample().filter_map(|slot| Some(window(rows, &bearings, slot, &mixed)?.evidence)).collect();
     let by_chance = CHANCE * by_chance.iter().sum::<f32>() / by_chance.len().max(1) as f32;
-    let shares = shares(rows, lists, &bearings, &windows);
+    let fractions = fractions_before(rows, lists, &bearings, &windows);
     let estimate = |slot: usize| {
         let Some(Window { count, evidence, .. }) = windows[slot] else {
             return Estimate::lost(Status::TooFewNeighbors);
         };
         let excess = (evidence - by_chance).max(0.0);
         let trust = excess / evidence.max(f32::MIN_POSITIVE);
-        // Without evidence half of the points lie before it.
-        let share = 0.5 + trust * (shares[slot] - 0.5);
-        let range = libm::powf(share, 1.0 / D as f32) * rows[slot].to;
+        // Without evidence, use the range with half of the points before it.
+        let fraction = 0.5 + trust * (fractions[slot] - 0.5);
+        let range = libm::powf(fraction, 1.0 / D as f32) * rows[slot].to;
         found(rows[slot].at(range), count, 0, excess)
     };
     slots.iter().map(estimate).collect()
 }
 
-/// Per slot the share of its ray's region that lies before its point: by how narrow its window is
-/// among rays of about the same bearing, as points are spread evenly over a region.
-fn shares<const D: usize>(
+/// Returns, per slot, the fraction of its ray's region before its point: the rank of its window among rays of similar bearing.
+fn fractions_before<const D: usize>(
     rows: &[LineRow<D>],
     lists: &Neighborhoods,
     bearings: &Bearings,
@@ -74,7 +72,7 @@ fn shares<const D: usize>(
 ) -> Vec<f32> {
     let known = |slot: usize| windows[slot].map(|window| -libm::logf(window.sine));
     let mut score: Vec<f32> = (0..rows.len()).map(|slot| known(slot).unwrap_or(f32::NAN)).collect();
-    // Neighbors lie at about the same range.
+    // Neighbors lie at similar ranges.
     for _ in 0..SMOOTHINGS {
         let smooth = |slot: usize| {
             let Some(window) = windows[slot] else { return score[slot] };
@@ -90,7 +88,7 @@ fn shares<const D: usize>(
         };
         score = (0..rows.len()).into_par_iter().map(smooth).collect();
     }
-    let share = |(at, &(group, _, slot)): (usize, &(u32, f64, u32))| {
+    let fraction = |(at, &(group, _, slot)): (usize, &(u32, f64, u32))| {
         let own = score[slot as usize];
         if own.is_nan() {
             return 0.5;
@@ -108,16 +106,15 @@ fn shares<const D: usize>(
         }
         below / all
     };
-    let in_order: Vec<f32> = bearings.par_iter().enumerate().map(share).collect();
-    let mut shares = vec![0.5; rows.len()];
-    for (&(_, _, slot), share) in bearings.iter().zip(in_order) {
-        shares[slot as usize] = share;
+    let in_order: Vec<f32> = bearings.par_iter().enumerate().map(fraction).collect();
+    let mut fractions = vec![0.5; rows.len()];
+    for (&(_, _, slot), fraction) in bearings.iter().zip(in_order) {
+        fractions[slot as usize] = fraction;
     }
-    shares
+    fractions
 }
 
-/// The window around `slot` that is least probable by chance; `None` with fewer than two listed rays of
-/// its anchor.
+/// Returns the window around `slot` that is least probable by chance; `None` with fewer than two listed rays of its anchor.
 fn window<const D: usize>(
     rows: &[LineRow<D>],
     bearings: &Bearings,
@@ -130,14 +127,14 @@ fn window<const D: usize>(
     let mut sines: Vec<f32> =
         others.filter(|row| row.group == own.group).map(|row| sine(own, row)).collect();
     sines.sort_unstable_by(f32::total_cmp);
-    // A window holds a few bearings of the map at least: narrower ones tell nothing.
+    // A window must be wide enough for a few bearings of the map.
     let finest = 4.0 / rows.len().max(4) as f32;
     let mut best: Option<Window> = None;
     for (at, &sine) in sines.iter().enumerate().skip(1) {
-        // Twins are seen in the very same direction, which tells no range.
+        // Points at the same place have the same bearing, which gives no range.
         let sine = sine.max(finest);
         let count = at + 1;
-        let chance = share_within(bearings, own, sine);
+        let chance = fraction_within(bearings, own, sine);
         let evidence = evidence(count as f32, listed.len() as f32, chance);
         if best.is_none_or(|b| evidence > b.evidence) {
             best = Some(Window { sine, count: count as u32, evidence });
@@ -146,10 +143,9 @@ fn window<const D: usize>(
     best
 }
 
-/// The sine of the angle between two rays of one anchor.
 fn sine<const D: usize>(a: &LineRow<D>, b: &LineRow<D>) -> f32 {
     let cosine: f32 = (0..D).map(|c| a.direction[c] * b.direction[c]).sum();
-    // Not 1 - cosine^2, which is rounded to nothing at small angles.
+    // Not 1 - cosine^2, which loses all digits at small angles.
     let across: f32 = (0..D).map(|c| b.direction[c] - cosine * a.direction[c]).map(|x| x * x).sum();
     if cosine > 0.0 { across.sqrt().min(1.0) } else { 1.0 }
 }
@@ -164,15 +160,15 @@ fn bearings<const D: usize>(rows: &[LineRow<D>]) -> Vec<(u32, f64, u32)> {
     bearings
 }
 
-/// The share of all records that are rays of the anchor of `own` within `sine` of it.
-fn share_within<const D: usize>(bearings: &Bearings, own: &LineRow<D>, sine: f32) -> f32 {
+/// Returns the fraction of all records that are rays of the anchor of `own` within `sine` of it.
+fn fraction_within<const D: usize>(bearings: &Bearings, own: &LineRow<D>, sine: f32) -> f32 {
     let (middle, half) = (angle(own), libm::asin(f64::from(sine)));
     let below = |at: f64| bearings.partition_point(|row| (row.0, row.1) < (own.group, at));
     let n = below(middle + half) - below(middle - half);
     ((n as f32 + 0.5) / (bearings.len() as f32 + 1.0)).min(0.5)
 }
 
-/// The angle of a ray in the plane of the first two coordinates.
+/// Returns the angle of a ray in the plane of the first two coordinates.
 fn angle<const D: usize>(row: &LineRow<D>) -> f64 {
     libm::atan2(f64::from(row.direction[1]), f64::from(row.direction[0]))
 }

@@ -1,5 +1,4 @@
-//! Exact consensus: on each slot's own record, the position whose agreement with the listed records
-//! is least probable by chance.
+//! Exact consensus: on each slot's own record, the position whose agreement with the listed records is least probable by chance.
 
 mod anchors;
 
@@ -14,7 +13,6 @@ use crate::recover::result::{Estimate, Status, stored_support};
 use crate::released::AxisPlanes;
 use crate::simd::{Kernel, dispatch, prefetch};
 
-/// Estimates for `slots` at a given `delta`.
 pub(crate) fn solve<const D: usize>(
     family: &Family<'_, D>,
     lists: &Neighborhoods,
@@ -40,7 +38,6 @@ pub(crate) fn solve<const D: usize>(
     }
 }
 
-/// Buffers of one thread.
 #[derive(Default)]
 struct Scratch<const D: usize> {
     lines: LineColumns<D>,
@@ -49,7 +46,7 @@ struct Scratch<const D: usize> {
     intervals: Intervals,
 }
 
-/// Slots on lines or on axis candidates: one unknown.
+/// Consecutive slots on lines or on axis candidates, which have one unknown.
 struct Chunk<'a, const D: usize> {
     family: &'a Family<'a, D>,
     lists: &'a Neighborhoods,
@@ -89,7 +86,6 @@ impl<const D: usize> Kernel for Chunk<'_, D> {
     }
 }
 
-/// Prefetches the rows that `slot` lists, if there is such a slot.
 #[inline(always)]
 fn prefetch_listed<T>(lists: &Neighborhoods, slot: usize, rows: &[T]) {
     if slot < lists.n_slots() {
@@ -97,7 +93,7 @@ fn prefetch_listed<T>(lists: &Neighborhoods, slot: usize, rows: &[T]) {
     }
 }
 
-/// The estimate on a line or ray from the gathered records.
+/// Returns the estimate on a line or ray from the gathered records.
 #[inline(always)]
 fn on_line<const D: usize>(
     own: &LineRow<D>,
@@ -124,8 +120,8 @@ fn on_line<const D: usize>(
     found(own.at(own.clamp(t)), support, 0, peak.evidence)
 }
 
-/// The best estimate on any of a slot's own axis lines from the gathered records. Chance decides between axes too: counts
-/// alone would favor the long axis of an elongated map, along which more records agree with anything.
+/// Returns the best estimate on any axis line of a slot from the gathered records. Axes are compared by evidence, not by counts: along
+/// the long axis of an elongated map more records agree by chance.
 #[inline(always)]
 fn on_candidates<const D: usize>(
     own: &[f32; D],
@@ -159,12 +155,11 @@ fn on_candidates<const D: usize>(
     best
 }
 
-/// Least squares over the records within delta of `t` (Eq. (4) with squared distances: on a line a
-/// weighted mean of the closest approaches), the support selected anew once. Returns the position
-/// and its support.
+/// Returns `t` after two least-squares steps over the records within delta, and its support. The step is Eq. (4) with squared
+/// distances: on a line, a weighted mean of the closest approaches.
 #[inline(always)]
 fn refit(sections: &Sections, t: f32, delta2: f32) -> (f32, u32) {
-    // The start of an interval is at delta up to rounding, of delta and of t: it counts as within.
+    // The start of an interval is at distance delta up to rounding, and must count as within.
     let reach = delta2.sqrt() * (1.0 + 5e-5) + 4.0 * f32::EPSILON * t.abs();
     let reach2 = reach * reach;
     let (shift, _) = sections.least_squares_step(t, reach2);
@@ -173,7 +168,7 @@ fn refit(sections: &Sections, t: f32, delta2: f32) -> (f32, u32) {
     (t + shift, support)
 }
 
-/// The estimate on a plane: each free coordinate on its own. `by_axis` is a buffer for listed planes, as (offset, record).
+/// Returns the estimate on a plane; free coordinates are independent. `by_axis` is a buffer for the listed planes, as (offset, record).
 fn on_plane<const D: usize>(
     planes: &AxisPlanes<D>,
     slot: usize,

@@ -1,10 +1,9 @@
-//! Exchanged coordinates: the hidden value of one record is published by another, and the reverse.
+//! Exchanged coordinates: each of two records publishes the hidden coordinate of the other.
 //!
-//! A pair explains two estimates at once: mine lies near what the partner published, the partner's near
-//! what I published. How near true partners lie is learned from all pairs together with their probabilities
-//! (expectation and maximization), per class of evidence. Every record is in at most one pair, so the probabilities come from
-//! belief propagation on the monomer-dimer model, one pass per round of learning. Fixing sure pairs one by one would be
-//! final; here a rival of either side keeps its share of every pair until the end.
+//! A pair of partners must explain two estimates: each estimate lies near the value that the other record published. The
+//! distribution of these distances is learned together with the probabilities of pairs (expectation maximization), per class of
+//! evidence. Every record is in at most one pair, so the probabilities come from belief propagation on the
+//! monomer-dimer model, with one pass per round. No pair is fixed before the last round, so rivals keep their probability.
 
 use rayon::prelude::*;
 
@@ -12,20 +11,20 @@ use crate::recover::exact::partners::{LOST, Partners, Side, by_part, side_by_sid
 use crate::recover::map::family::Settings;
 use crate::recover::result::{Estimate, Status};
 
-/// Rounds of learning: a fixed number, so that time does not depend on the map.
+/// Number of rounds: fixed, so that time does not depend on the map.
 const ROUNDS: usize = 6;
-/// Pairs less probable than this teach nothing: there are many, and together they weigh little.
-const NOTHING: f32 = 1e-3;
-/// Records are split by their evidence into this many classes of equal size: the better founded, the nearer.
+/// Pairs below this probability do not enter learning: they are many, but weigh little together.
+const LEAST_PROBABILITY: f32 = 1e-3;
+/// Number of classes of evidence, with equally many records each. More evidence means smaller distances.
 const CLASSES: usize = 8;
-/// Normal distributions in the mixture of distances, each half as wide as the one before: down to 1 / 512 of the reach.
+/// Normal distributions in the mixture of distances. Each is half as wide as the one before, down to 1 / 512 of the reach.
 const SCALES: usize = 9;
-/// The least and the largest share of good estimates in a class: a share of 0 or 1 would never change again.
-const SHARE: (f64, f64) = (0.02, 0.995);
-/// Steps from 0 to the reach in which distances are counted: as fine as the narrowest distribution.
+/// Bounds of the fraction of good estimates in a class: a fraction of 0 or 1 would never change again.
+const FRACTION: (f64, f64) = (0.02, 0.995);
+/// Bins of distances from 0 to the reach: as fine as the narrowest distribution.
 const STEPS: usize = 1 << 9;
 
-/// `estimates` with the exact coordinate wherever the partner is known.
+/// Replaces the hidden coordinate of estimates by the exact value where the partner is known.
 pub(super) fn settle<const D: usize>(
     published: &[[f32; D]],
     mut estimates: Vec<Estimate<D>>,
@@ -41,7 +40,7 @@ pub(super) fn settle<const D: usize>(
     estimates
 }
 
-/// The partner of every record, where it is known; always from both sides.
+/// Returns the partner of every record, where it is known. Partners are mutual.
 fn pairs<const D: usize>(
     published: &[[f32; D]],
     estimates: &[Estimate<D>],
@@ -66,7 +65,7 @@ fn pairs<const D: usize>(
     let class = classes(estimates);
     let class: Vec<usize> = order.iter().map(|&record| class[record as usize]).collect();
     let mut distances = Distances::new(partners.reach);
-    // How free a record is, as it tells the partner of an entry.
+    // Per entry, the message that the record is free of other partners.
     let mut messages = vec![0.5; partners.of.len()];
     let mut weight = Vec::new();
     for _ in 0..ROUNDS {
@@ -81,14 +80,14 @@ fn pairs<const D: usize>(
         let odds_of = |i: usize| partners.entries(i).map(move |e| odds(i, e));
         weight = by_part(n, |records| records.flat_map(odds_of).collect::<Vec<f32>>()).concat();
         let alone = distances.alone();
-        messages = sent(&messages, &partners, &weight, |i| alone[class[i]]);
+        messages = next_messages(&messages, &partners, &weight, |i| alone[class[i]]);
         let tallies = by_part(n, |records| {
             let mut tally = vec![[0.0; STEPS]; CLASSES];
             for i in records {
                 for e in partners.entries(i) {
                     let away = (sides[partners.of[e] as usize].published - sides[i].estimate).abs();
                     let p = probability(&messages, &partners, &weight, e);
-                    if p > NOTHING {
+                    if p > LEAST_PROBABILITY {
                         tally[class[i]][distances.step(away)] += f64::from(p);
                     }
                 }
@@ -122,9 +121,9 @@ fn pairs<const D: usize>(
     found
 }
 
-/// The next messages along all pairs. `weight` is that of each pair (the same from both sides), `alone` that of each record
+/// Returns the next messages of all pairs. `weight` is that of each pair (equal in both directions), `alone` that of a record
 /// without a partner.
-fn sent(
+fn next_messages(
     messages: &[f32],
     partners: &Partners,
     weight: &[f32],
@@ -134,22 +133,21 @@ fn sent(
     let of = |i: usize| {
         let alone = alone(i);
         let all: f32 = alone + partners.entries(i).map(offer).sum::<f32>();
-        // Never below what is there without any offer.
+        // Rounding must not take it below the weight without any pair.
         partners.entries(i).map(move |e| 1.0 / (all - offer(e)).max(alone))
     };
     let n = partners.n_records();
     by_part(n, |records| records.flat_map(of).collect::<Vec<f32>>()).concat()
 }
 
-/// The probability of the pair at entry `e`.
 #[inline(always)]
 fn probability(messages: &[f32], partners: &Partners, weight: &[f32], e: usize) -> f32 {
-    // The product of both messages first: the same from both sides to the last bit.
+    // This order of the product gives the same bits in both directions.
     let odds = weight[e] * (messages[e] * messages[partners.back[e] as usize]);
     odds / (1.0 + odds)
 }
 
-/// Per axis the probability that some other record on it is the partner, before anything is known.
+/// Returns, per axis, the prior probability that some other record of this axis is the partner.
 fn prior<const D: usize>(sides: &[Side]) -> [f64; D] {
     std::array::from_fn(|axis| {
         let n = sides.iter().filter(|side| side.axis == axis).count();
@@ -157,8 +155,8 @@ fn prior<const D: usize>(sides: &[Side]) -> [f64; D] {
     })
 }
 
-/// Per record the inverse of the density of values around its estimate: how much it says that a value is
-/// near.
+/// Returns, per record, the inverse density of published values around its estimate: where values are rare, a value nearby is
+/// strong evidence.
 fn rarity<const D: usize>(published: &[[f32; D]], sides: &[Side], reach: f32) -> Vec<f64> {
     let half = 0.5 * reach;
     let sorted: [Vec<f32>; D] = std::array::from_fn(|axis| {
@@ -177,7 +175,6 @@ fn rarity<const D: usize>(published: &[[f32; D]], sides: &[Side], reach: f32) ->
     sides.par_iter().map(of).collect()
 }
 
-/// Per record its class of evidence: equal shares of all records.
 fn classes<const D: usize>(estimates: &[Estimate<D>]) -> Vec<usize> {
     let mut sorted: Vec<f32> = estimates.iter().map(|e| e.evidence).collect();
     sorted.par_sort_unstable_by(f32::total_cmp);
@@ -186,23 +183,24 @@ fn classes<const D: usize>(estimates: &[Estimate<D>]) -> Vec<usize> {
     estimates.iter().map(|e| bounds.partition_point(|&bound| bound <= e.evidence)).collect()
 }
 
-/// How far estimates lie from the hidden coordinate: per class the share of good ones, and a mixture of normal distributions.
+/// The distribution of distances between estimates and hidden coordinates: per class, the fraction of good estimates and a
+/// mixture of normal distributions.
 struct Distances {
     good: [f64; CLASSES],
     weight: [[f64; SCALES]; CLASSES],
-    /// The density of each distribution in the middle of each step.
+    /// Density of each normal distribution in the middle of each bin.
     shapes: Vec<[f64; SCALES]>,
     reach: f32,
-    /// Density times share, per class and step.
+    /// Density times fraction of good estimates, per class and bin.
     table: Vec<[f64; STEPS]>,
 }
 
 impl Distances {
-    /// Before anything is known; partners are looked for within `reach`.
+    /// Creates the first guess; partners are searched within `reach`.
     fn new(reach: f32) -> Self {
         let shape = |step: usize, scale: usize| {
             let away = (step as f64 + 0.5) / STEPS as f64;
-            // In units of the reach; 1 / sqrt(2 pi).
+            // In units of the reach. The constant is 1 / sqrt(2 pi).
             let inverse = f64::from(2u32 << scale);
             let z = away * inverse;
             0.398_942_280_4 * inverse / f64::from(reach) * libm::exp(-0.5 * z * z)
@@ -227,7 +225,7 @@ impl Distances {
         distances
     }
 
-    /// The weighted density of each distribution of `class` in the middle of a step.
+    /// Returns the weighted density of each normal distribution of `class` in the middle of a bin.
     fn parts(&self, class: usize, step: usize) -> [f64; SCALES] {
         std::array::from_fn(|s| self.shapes[step][s] * self.weight[class][s])
     }
@@ -237,13 +235,13 @@ impl Distances {
         ((away / self.reach * STEPS as f32) as usize).min(STEPS - 1)
     }
 
-    /// The density of a good estimate's distance, times the share of good ones.
+    /// Returns the density of a good estimate's distance times the fraction of good ones.
     #[inline(always)]
     fn density(&self, class: usize, away: f32) -> f64 {
         self.table[class][self.step(away)]
     }
 
-    /// The weight of "no partner is known" for a record of each class.
+    /// Returns the weight of a record without a known partner, per class.
     fn alone(&self) -> [f32; CLASSES] {
         let others = self.mean_good();
         self.good.map(|good| (1.0 - good * others) as f32)
@@ -253,7 +251,7 @@ impl Distances {
         self.good.iter().sum::<f64>() / CLASSES as f64
     }
 
-    /// The distribution that the pairs `found` with this one suggest, per class and step. `class` is that of every record.
+    /// Returns the distribution estimated from `found`, the weight of pairs per class and bin. `class` has the class of every record.
     fn learned(self, found: &[[f64; STEPS]], class: &[usize]) -> Self {
         let (mut good, mut weight) = (self.good, self.weight);
         let others = self.mean_good().max(0.1);
@@ -271,8 +269,8 @@ impl Distances {
                 }
             }
             let total: f64 = scales.iter().sum();
-            good[one] = (total / records as f64 / others).clamp(SHARE.0, SHARE.1);
-            // One pair more, spread over all scales.
+            good[one] = (total / records as f64 / others).clamp(FRACTION.0, FRACTION.1);
+            // One prior pair, spread over all distributions.
             weight[one] = scales.map(|s| (s + 1.0 / SCALES as f64) / (total + 1.0));
         }
         Self::of(good, weight, self.shapes, self.reach)

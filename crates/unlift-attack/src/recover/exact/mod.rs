@@ -1,7 +1,7 @@
-//! Exact constraints: what a scheme's rule says about hidden coordinates beyond one record.
+//! Exact constraints: rules of a scheme that restrict hidden coordinates beyond their own record.
 //!
-//! Coordinates that were exchanged are still in the map, one in each of two records ([`exchanges`]). A center that follows from a
-//! voxel grid leaves only every other voxel along a ray ([`parity`]).
+//! An exchanged coordinate is published by another record ([`exchanges`]). If the center of a ray follows from a voxel grid, the point
+//! lies in every other voxel along the ray ([`parity`]).
 
 mod exchanges;
 mod parity;
@@ -11,20 +11,20 @@ use crate::recover::map::family::Settings;
 use crate::recover::result::Estimate;
 use crate::released::{Obfuscation, Released};
 
-/// Whether the rule of the family of `released` says more than its records.
+/// Whether the family of `released` has exact constraints.
 pub(crate) fn can_settle<const D: usize>(released: &Released<D>) -> bool {
     matches!(released.obfuscation(), Obfuscation::AxisCandidates(_) | Obfuscation::Rays(_))
 }
 
-/// How often joint recovery of `released` goes on from what was settled.
-pub(crate) fn feeds<const D: usize>(released: &Released<D>) -> usize {
+/// Returns how often joint recovery of `released` runs again after exact constraints moved its estimates.
+pub(crate) fn joint_reruns<const D: usize>(released: &Released<D>) -> usize {
     match released.obfuscation() {
-        Obfuscation::AxisCandidates(_) => Settings::of_dimension::<D>().feeds,
+        Obfuscation::AxisCandidates(_) => Settings::of_dimension::<D>().joint_reruns,
         _ => 0,
     }
 }
 
-/// Estimates of `released` moved to where the rule of their family allows them to be.
+/// Moves the estimates of `released` to where exact constraints allow them to be.
 pub(crate) fn settle<const D: usize>(
     released: &Released<D>,
     estimates: Vec<Estimate<D>>,

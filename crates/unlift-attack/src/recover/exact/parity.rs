@@ -1,29 +1,29 @@
-//! Voxel parity: where the center of a ray follows from a checkerboard, every other voxel along it is out.
+//! Voxel parity: if a checkerboard of voxels decides the center of a ray, its point lies in every other voxel along the ray.
 //!
-//! The edge of a voxel is published, where the grid starts is not. It is the one start (up to whole voxels) for which nearly all
-//! estimates lie in voxels of their own center.
+//! The edge of a voxel is published, the origin of the grid is not. The right origin (up to whole voxels) is the one for which nearly
+//! all estimates lie in voxels of their own center.
 
 use rayon::prelude::*;
 
 use crate::recover::result::{Estimate, Status};
 use crate::released::Rays;
 
-/// Starts tried per axis and voxel, at first and in each finer step: between two of them most voxels keep their parity.
+/// Origins tried per axis and voxel, at first and in each finer step. Between two of them most voxels keep their parity.
 const STARTS: usize = 16;
-/// Finer steps (each eight times as fine), each over the two intervals around the best start so far.
+/// Finer steps, each eight times as fine, over the two intervals around the best origin so far.
 const FINER: usize = 4;
-/// Sweeps over the axes in each finer step: the second one sees the other axes mended.
+/// Sweeps over the axes in each finer step. The second one profits from the other axes.
 const SWEEPS: usize = 2;
-/// Estimates looked at for the first start, of which there are thousands, and for finer ones.
+/// Estimates that are scored: for the thousands of first origins, and for the finer ones.
 const SAMPLE: (usize, usize) = (1 << 12, 1 << 15);
-/// The grid is believed when the estimates that agree exceed those that do not by this share of all,
+/// The grid is accepted if agreeing estimates outnumber disagreeing ones by this fraction of all,
 const LEAST: f64 = 0.1;
-/// and by this many standard deviations of what a wrong grid yields (the best of all starts reaches 4 or 5).
+/// and by this many standard deviations of the score of a wrong grid (the best of all wrong origins reaches 4 or 5).
 const SIGMAS: f64 = 8.0;
-/// An estimate is moved this far past the wall, in voxels: on it, rounding would decide.
+/// An estimate is moved this far past the wall, in voxels, so that rounding does not put it back.
 const INSIDE: f32 = 1e-3;
 
-/// A checkerboard: its start, and the center of the voxel there.
+/// A checkerboard: its origin, and the center of the first voxel.
 #[derive(Clone, Copy, Debug)]
 struct Checkerboard<const D: usize> {
     start: [f64; D],
@@ -32,12 +32,11 @@ struct Checkerboard<const D: usize> {
 }
 
 impl<const D: usize> Checkerboard<D> {
-    /// The center that belongs to a point at `x`.
     fn center(&self, x: &[f32; D]) -> u8 {
         self.first ^ u8::from(odd(x, &self.start, self.edge))
     }
 
-    /// How far along `direction` from `x` lies just beyond each wall of the voxel of `x`.
+    /// Returns the distances along `direction` from `x` to just beyond each wall of the voxel of `x`.
     fn steps_to_walls(&self, x: &[f32; D], direction: &[f32; D]) -> Vec<f32> {
         let mut steps = Vec::with_capacity(2 * D);
         for (c, &along) in direction.iter().enumerate() {
@@ -57,11 +56,11 @@ impl<const D: usize> Checkerboard<D> {
 #[inline(always)]
 fn odd<const D: usize>(x: &[f32; D], start: &[f64; D], edge: f64) -> bool {
     let cell = |c: usize| ((f64::from(x[c]) - start[c]) / edge).floor();
-    // The remainder by 2 of any float is exact.
+    // The remainder of a float by 2 is exact.
     (0..D).map(cell).sum::<f64>().rem_euclid(2.0) != 0.0
 }
 
-/// `estimates` in voxels of another center moved along their rays to the nearest one of their own.
+/// Moves estimates in voxels of another center along their rays to the nearest voxel of their own.
 pub(super) fn settle<const D: usize>(
     rays: &Rays<D>,
     mut estimates: Vec<Estimate<D>>,
@@ -73,7 +72,7 @@ pub(super) fn settle<const D: usize>(
         let (own, direction) = (rays.center()[i], &rays.direction()[i]);
         if estimate.status == Status::Ok && board.center(&estimate.position) != own {
             let center = &rays.centers()[usize::from(own)];
-            // Every wall along a ray changes the parity: the nearest one, before or behind, ends the wrong voxel.
+            // Every wall along a ray changes the parity, so the nearest wall, before or behind, ends the wrong voxel.
             let t: f32 = (0..D).map(|c| (estimate.position[c] - center[c]) * direction[c]).sum();
             let mut steps = board.steps_to_walls(&estimate.position, direction);
             steps.sort_unstable_by(|a, b| a.abs().total_cmp(&b.abs()));
@@ -87,7 +86,7 @@ pub(super) fn settle<const D: usize>(
     estimates
 }
 
-/// The checkerboard that the estimates show, if there are two centers and the edge is known.
+/// Finds the checkerboard that fits the estimates, if there are two centers and the edge is known.
 fn find<const D: usize>(rays: &Rays<D>, estimates: &[Estimate<D>]) -> Option<Checkerboard<D>> {
     let edge = rays.voxel()?;
     if rays.centers().len() != 2 {
@@ -101,7 +100,7 @@ fn find<const D: usize>(rays: &Rays<D>, estimates: &[Estimate<D>]) -> Option<Che
         known.iter().step_by(known.len().div_ceil(most).max(1)).copied().collect()
     };
     let (few, many) = (sample(SAMPLE.0), sample(SAMPLE.1));
-    // Starts a whole voxel apart differ in which center is first alone.
+    // Origins a whole voxel apart differ only in which center is first.
     let step = edge / STARTS as f64;
     let starts: Vec<[f64; D]> = (0..STARTS.pow(D as u32))
         .map(|at| std::array::from_fn(|c| (at / STARTS.pow(c as u32) % STARTS) as f64 * step))
@@ -122,7 +121,7 @@ fn find<const D: usize>(rays: &Rays<D>, estimates: &[Estimate<D>]) -> Option<Che
             let most = scores.iter().copied().max().unwrap_or(0);
             let first = scores.iter().position(|&s| s == most).unwrap_or(STARTS / 2);
             let last = scores.iter().rposition(|&s| s == most).unwrap_or(STARTS / 2);
-            // The middle of starts that are as good.
+            // The middle of equally good origins.
             start = tried((first + last) / 2);
         }
         width *= 2.0 / STARTS as f64;
@@ -137,7 +136,7 @@ fn find<const D: usize>(rays: &Rays<D>, estimates: &[Estimate<D>]) -> Option<Che
     })
 }
 
-/// How many more of the estimates have the parity of their center than have not.
+/// Returns how many more estimates agree with the parity of their center than disagree.
 fn score<const D: usize>(of: &[([f32; D], u8)], start: &[f64; D], edge: f64) -> i64 {
     of.iter().map(|(x, center)| if odd(x, start, edge) == (*center == 1) { 1 } else { -1 }).sum()
 }
@@ -152,7 +151,7 @@ mod tests {
         assert_eq!(score(&of, &[0.0; 3], 1.0), 4);
         assert_eq!(score(&of, &[1.0, 0.0, 0.0], 1.0), -4);
         assert_eq!(score(&of[..3], &[0.0; 3], 1.0), 3);
-        // In one cell, half of these have another parity.
+        // In one cell, half of these disagree.
         assert_eq!(score(&of, &[0.0; 3], 8.0), 0);
     }
 }

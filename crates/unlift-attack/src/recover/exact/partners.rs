@@ -1,4 +1,4 @@
-//! Who may have exchanged a coordinate with whom: pairs of records that would explain each other.
+//! Possible partners of an exchange: pairs of records that explain each other's estimates.
 
 use std::ops::Range;
 
@@ -6,20 +6,20 @@ use rayon::prelude::*;
 
 use crate::geometry::curve;
 
-/// Records that one thread works on at a time: a fixed number, so that sums do not depend on threads.
+/// Records per parallel task: fixed, so that sums do not depend on the number of threads.
 const PART: usize = 1 << 10;
-/// Mean number of partners per record: more are cut off by a shorter reach, so that time and memory stay linear in the map.
+/// Largest mean number of partners per record. A shorter reach enforces it, so that time and memory are linear in the map.
 const MOST: f64 = 16.0;
-/// Records on which the number of partners is counted: a mean needs no more.
+/// Records on which the number of partners is counted.
 const SAMPLE: usize = 1 << 12;
-/// Partners of one record where a shorter reach does not help: records with equal coordinates (a floor at 0, a few exact
-/// heights) would all be partners of each other.
+/// Largest number of partners of one record where a shorter reach does not help, because many records have equal coordinates
+/// (a floor at 0, a few exact heights).
 const MOST_OF_TIES: usize = 64;
 
-/// A record on the axis that it is believed to have exchanged.
+/// A record, on the axis that it is believed to have exchanged.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Side {
-    /// The axis; [`LOST`] where nothing was recovered.
+    /// The axis; [`LOST`] if the record was not recovered.
     pub(super) axis: usize,
     pub(super) published: f32,
     pub(super) estimate: f32,
@@ -28,25 +28,25 @@ pub(super) struct Side {
 /// The axis of a record that was not recovered.
 pub(super) const LOST: usize = usize::MAX;
 
-/// Possible partners of every record: each pair stands in the rows of both.
+/// Possible partners of every record. Each pair is in the rows of both records.
 pub(super) struct Partners {
     offsets: Vec<usize>,
     pub(super) of: Vec<u32>,
-    /// Where the same pair stands among the entries of the partner.
+    /// Index of the same pair in the row of the partner.
     pub(super) back: Vec<u32>,
-    /// Partners published farther from an estimate than this are not considered.
+    /// Largest distance between an estimate and the value that a partner published.
     pub(super) reach: f32,
 }
 
 impl Partners {
-    /// Pairs of `sides` on one axis whose estimates lie within `reach` of what the other published; within a
-    /// shorter reach where that would be too many. `None` if there are no such pairs.
+    /// Finds pairs of `sides` on one axis, each of whose estimates lies within `reach` of the value that the other published. Uses a shorter
+    /// reach if there are too many pairs. `None` if there are none.
     pub(super) fn find(sides: &[Side], reach: f32) -> Option<Self> {
         let mut strips = Strips::new(sides, reach);
         let found = strips.mean();
         let mut has_ties = false;
         if found > MOST {
-            // The number of partners goes with the area within reach.
+            // The number of partners is proportional to the square of the reach.
             strips = Strips::new(sides, reach * (MOST / found).sqrt() as f32);
             has_ties = strips.mean() > MOST_OF_TIES as f64;
         }
@@ -75,7 +75,7 @@ impl Partners {
         for i in 0..sides.len() {
             offsets[i + 1] += offsets[i];
         }
-        // Rows are in ascending order, so the pairs of record j are met in the order of its entries.
+        // Rows ascend, so the pairs of record j come in the order of its entries.
         let mut next = offsets.clone();
         let back = |&(_, j): &(u32, u32)| {
             next[j as usize] += 1;
@@ -90,30 +90,29 @@ impl Partners {
         self.offsets.len() - 1
     }
 
-    /// The entries of record `i`.
     pub(super) fn entries(&self, i: usize) -> Range<usize> {
         self.offsets[i]..self.offsets[i + 1]
     }
 }
 
-/// A result for each part of `n` records, in order.
+/// Returns a result for each part of `n` records, in order.
 pub(super) fn by_part<T: Send>(n: usize, of: impl Fn(Range<usize>) -> T + Send + Sync) -> Vec<T> {
     let part = |part: usize| of(part * PART..n.min((part + 1) * PART));
     (0..n.div_ceil(PART)).into_par_iter().map(part).collect()
 }
 
-/// Records by axis, by what they publish in steps of the reach, and by estimate within a step.
+/// Records sorted by axis, by published value in steps of about the reach, and by estimate within a step.
 struct Strips<'a> {
     sides: &'a [Side],
     /// (axis and step, estimate, record), sorted.
     rows: Vec<(u64, f32, u32)>,
     low: f64,
     reach: f64,
-    /// A little more than the reach, so that rounding treats both sides of a pair alike.
+    /// Slightly more than the reach, so that rounding treats both records of a pair alike.
     step: f64,
 }
 
-/// Steps along one axis at most: with the axis above them they fit a sorting key.
+/// Largest number of steps along one axis, so that axis and step fit into a sorting key.
 const MOST_STEPS: f64 = (1u64 << 40) as f64;
 
 impl<'a> Strips<'a> {
@@ -134,11 +133,10 @@ impl<'a> Strips<'a> {
 
     fn strip(&self, side: &Side, value: f32) -> u64 {
         let steps = ((f64::from(value) - self.low) / self.step).min(MOST_STEPS);
-        // The step below the lowest is looked at, too.
+        // Step 0 stays empty, because the step below the lowest one is searched, too.
         (side.axis as u64) << 48 | (steps as u64 + 1)
     }
 
-    /// The mean number of possible partners.
     fn mean(&self) -> f64 {
         let every = self.sides.len().div_ceil(SAMPLE).max(1);
         let looked: Vec<usize> = (0..self.sides.len()).step_by(every).collect();
@@ -146,7 +144,7 @@ impl<'a> Strips<'a> {
         found as f64 / looked.len().max(1) as f64
     }
 
-    /// The records of one step whose estimates are about what record `i` published, for each step about its estimate.
+    /// Returns, for each of the three steps around the estimate of record `i`, the records whose estimates are near its published value.
     fn about(&self, i: usize) -> impl Iterator<Item = &[(u64, f32, u32)]> {
         let own = &self.sides[i];
         let middle = (own.axis != LOST).then(|| self.strip(own, own.estimate));
@@ -161,24 +159,22 @@ impl<'a> Strips<'a> {
         })
     }
 
-    /// Whether records `i` and `j` are possible partners.
     fn fit(&self, i: usize, j: usize) -> bool {
         let near = |a: f32, b: f32| (f64::from(a) - f64::from(b)).abs() <= self.reach;
         let (own, other) = (&self.sides[i], &self.sides[j]);
         near(other.published, own.estimate) && near(other.estimate, own.published) && j != i
     }
 
-    /// The possible partners of record `i`.
     fn of(&self, i: usize) -> impl Iterator<Item = u32> {
         let records = self.about(i).flatten().map(|row| row.2);
         records.filter(move |&j| self.fit(i, j as usize))
     }
 
-    /// Some of the possible partners of record `i`: a few of each set of equal values, and other ones for every record.
+    /// Returns some of the possible partners of record `i`: a few from each step, different ones for each record.
     fn some_of(&self, i: usize) -> impl Iterator<Item = u32> {
         let some = self.about(i).flat_map(move |rows| {
             let n = rows.len().min(MOST_OF_TIES / 2);
-            // Evenly over all, from a start of the record's own: an odd multiple meets every remainder.
+            // Evenly spaced, from a start that differs by record: an odd multiplier reaches every remainder.
             let start = i.wrapping_mul(0x9e37_79b9) % rows.len().max(1);
             (0..n).map(move |at| rows[(start + at * rows.len() / n) % rows.len()].2)
         });
@@ -186,11 +182,11 @@ impl<'a> Strips<'a> {
     }
 }
 
-/// Cells per value, as a power of two: two of them and the axis make a key.
+/// Bits per value: two values and the axis make a key.
 const BITS: u32 = 20;
 
-/// All records in an order in which possible partners stand near each other: both have about the same two values. A partner
-/// in the cache costs a tenth; results do not depend on the order.
+/// Returns all records in an order in which possible partners are close in memory: two values of partners are nearly equal. A partner
+/// in the cache is read in a tenth of the time; results do not depend on the order.
 pub(super) fn side_by_side(sides: &[Side], reach: f32) -> Vec<u32> {
     let low = sides.iter().map(|side| side.published.min(side.estimate)).fold(f32::MAX, f32::min);
     let cell = |value: f32| ((value - low) / reach) as u32 & ((1 << BITS) - 1);
@@ -207,7 +203,7 @@ pub(super) fn side_by_side(sides: &[Side], reach: f32) -> Vec<u32> {
 mod tests {
     use super::*;
 
-    /// A floor at exactly 0: every record publishes what every other is believed to hide.
+    /// All records lie on a floor at exactly 0, so each is a possible partner of all others.
     #[test]
     fn equal_coordinates_have_as_many_partners_as_there_is_room_for() {
         let side = Side { axis: 2, published: 0.0, estimate: 0.0 };

@@ -1,29 +1,38 @@
-//! Joint recovery: the estimates of neighbors vote, too.
+//! Joint recovery: estimates of neighbors improve the estimate of every slot.
 //!
-//! Consensus asks of every listed record whether its line or plane passes near. Joint recovery starts there and
-//! iterates. In an iteration every slot
+//! Joint recovery starts from the estimates of consensus and iterates. In an iteration every slot
 //!
-//! 1. proposes candidates `x` on its own record: where the estimates of its listed neighbors project to (`update`);
-//! 2. scores them by the log-likelihood ratio (nats)
-//!    `sum over neighbors j of ln(1 + odds_j * p_true(|x - x_j|) / p_random(x)) + 0.5 ln p_random(x)`, where `odds_j` are the
-//!    odds that edge j leads to a true neighbor, `p_true` is the density of true neighbors at a distance and
-//!    `p_random` the density of estimates of all slots (`votes`);
-//! 3. refines the best one by weighted least squares to the records of the neighbors found near (`refine`).
+//! 1. proposes candidates on its own record: its old estimate, and projections of the estimates at the other ends of its edges,
+//!    at most 16 per piece of its feasible set. An edge leads to a record that the slot lists or that lists the slot's record;
+//! 2. scores each candidate `x` in nats by
+//!    `sum over edges j of ln(1 + odds_j * p_true(|x - x_j|) / p_random(x)) + 0.5 ln p_random(x) + ln p_range(x)`, see below. If the best candidate
+//!    elsewhere is nearly as good, the records that pass near the two decide;
+//! 3. refines the best candidate by weighted least squares (`least_squares`). Each nearby neighbor's estimate counts fully
+//!    across its own record and less along it.
 //!
-//! `odds`, `p_true` and `p_random` are learned from the present estimates (`neighbor_distribution`, `map::grid`) and again
-//! whenever enough slots jumped. Iterations end when few slots jump, or when fewer records pass near the estimates (`state`).
+//! `odds_j` are the odds that edge `j` leads to a true neighbor, `p_true` is the density of true neighbors at a distance, and
+//! `p_random` is the density of the estimates of all slots. `p_range` is the prior over ranges of rays whose center has an image
+//! region of its own; it is 1 for other records. Where wrong entries form clusters, the sums of forward and of reverse
+//! edges may differ only up to a bound (`votes`).
 //!
-//! Slots move from the old estimates, so that neither order nor threads matter. If all of them moved at once, two neighbors
-//! could change places for ever. So half of the slots hold still while the others move. Only the first iteration moves all:
-//! its start comes from records alone.
+//! A slot *jumps* if it moves farther than one radius, which holds half of the true neighbors, or if its status changes. A slot whose
+//! best candidate leads by a clear margin is updated again only after enough neighbors have jumped nearby. `odds`,
+//! `p_true` and `p_random` are learned from the current estimates (`neighbor_distribution`, `map::grid`), and again after
+//! enough slots have jumped. Iterations end when few slots jump, when the number of jumps hardly falls, when fewer records pass
+//! near the estimates than before, or after 16 iterations (`state`).
+//!
+//! All slots of a turn read the old estimates, so the result depends neither on order nor on threads. If all slots moved in one
+//! turn, two neighbors could exchange places forever. So even and odd slots take turns. Only the first iteration moves all
+//! slots in one turn, because it starts from estimates that depend on records alone.
 
+mod input;
+mod least_squares;
 mod neighbor_distribution;
-mod refine;
 mod state;
 mod update;
 mod votes;
 
-use crate::recover::joint::neighbor_distribution::Input;
+use crate::recover::joint::input::Input;
 use crate::recover::joint::state::State;
 use crate::recover::map::family::Family;
 use crate::recover::map::graph::Graph;
@@ -31,14 +40,13 @@ use crate::recover::map::pieces::{CandidatePieces, LinePieces, Pieces, PlanePiec
 use crate::recover::map::places::along_curve;
 use crate::recover::result::Estimate;
 
-/// Iterations at most: a bound for maps that never settle.
 const ITERATIONS: usize = 16;
 
-/// Rays from anchors are left where they are if their evidence is less than this in the mean, in nats: where
-/// bearings say hardly more than chance does, neighbors' estimates are those of chance, too.
+/// Rays whose centers have regions keep the estimates of consensus if the mean evidence is below this, in nats: then those
+/// estimates are hardly better than chance, and neighbors add nothing.
 const LEAST_EVIDENCE: f64 = 1.5;
 
-/// The estimates of all slots after the last iteration from `start`.
+/// Returns the estimates of all slots after joint recovery from `start`.
 pub(crate) fn recover<const D: usize>(
     family: &Family<'_, D>,
     graph: &Graph,
@@ -84,7 +92,7 @@ fn iterate<const D: usize, P: Pieces<D>>(
             break;
         }
     }
-    state.into_best()
+    state.into_accepted()
 }
 
 fn mean_evidence<const D: usize>(estimates: &[Estimate<D>]) -> f64 {

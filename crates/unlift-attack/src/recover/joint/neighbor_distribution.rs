@@ -1,94 +1,61 @@
-//! How the estimates of true neighbors lie around a point: learned from the map itself.
+//! The distribution of true neighbors' estimates around a point, learned from the map itself.
 //!
-//! Listed records come from two populations: neighbors, whose estimates lie close, and others, which lie
-//! as dense as estimates do anywhere. The excess of close ones over chance tells the share of neighbors
-//! among the edges of each class and the radius within which half of them lie. Their density is taken
-//! as `(1 + r^2 / a^2)^-3`: flat where estimates are too uncertain to tell, with a heavy tail.
+//! Edges lead to true neighbors, whose estimates lie close, and to other records, whose estimates are as dense as estimates are
+//! anywhere. The number of close edges beyond chance gives the fraction of true neighbors in each class of edges and the radius
+//! that holds half of them. Their density is modeled as proportional to `(1 + r^2 / a^2)^-3`, which has a heavy tail.
 
 use rayon::prelude::*;
 
+use crate::recover::joint::input::{Input, RANDOM, Sampled};
 use crate::recover::map::family::Settings;
-use crate::recover::map::graph::{CLASSES, Graph, Side, either, side};
+use crate::recover::map::graph::{CLASSES, Side, either, side};
 use crate::recover::map::grid::Density;
 use crate::recover::map::pieces::Pieces;
 use crate::recover::map::places::{Places, distance2};
-use crate::seed::{Draws, Stage};
 use crate::simd::{Kernel, dispatch};
 
-/// True neighbors are looked for within this many radii of their distribution: nearly all of its mass.
+/// True neighbors are counted within this many radii, which hold nearly all of them.
 const REACH: f32 = 4.0;
-/// Bins of the radius, up to the reach: a dozen within the radius.
+/// Number of bins of the distance, from 0 to the reach: 12 per radius.
 const BINS: usize = 48;
-/// Edges in this bin and beyond are too long for neighbors: three radii of the distribution.
+/// First bin of distances too large for true neighbors: three radii.
 const OUTSIDE: usize = BINS / 4 * 3;
-/// Slots counted by one thread at a time: a fixed number, so that sums do not depend on threads.
+/// Slots per parallel task. The number is fixed, so sums do not depend on the number of threads.
 const PART: usize = 256;
-/// Mutual edges tell the radius if so many of them are close (a median of fewer is noise),
+/// Least number of close mutual edges from which the radius may be taken.
 const ENOUGH: f64 = 250.0;
-/// and within this share of the radius of all.
+/// Mutual edges give the radius if theirs is below this fraction of the radius of all edges.
 const TIGHTER: f64 = 0.65;
-/// The share of the excess that is lost with the tail of true neighbors when the background is taken off: measured
-/// on maps whose wrong entries are anywhere.
+/// Fraction of true neighbors that is lost with their tail when the background is subtracted, measured on maps with uniform
+/// noise in the lists.
 const TAIL: f64 = 0.1;
-/// The least and the largest share of neighbors in a class: odds of zero or infinity would never change again.
-const SHARE: (f64, f64) = (5e-4, 0.95);
-/// Random edges per slot of the sample: about as many as the edges that are counted.
-const RANDOM: usize = 24;
-/// Slots of the sample: about 100,000 edges of lists of 50.
-const SLOTS: usize = 1 << 11;
+/// Bounds of the fraction of true neighbors in a class, so that odds are neither 0 nor infinite.
+const FRACTION: (f64, f64) = (5e-4, 0.95);
 
-/// What the iterations of joint recovery read and never change.
-pub(super) struct Input<'a, P> {
-    pub(super) pieces: P,
-    pub(super) graph: &'a Graph,
-    pub(super) delta: f32,
-    /// How often each record is listed.
-    pub(super) listed: Vec<u32>,
-    /// Slots spread evenly, from which the distribution of neighbors is learned.
-    sample: Vec<Sampled>,
-}
-
-/// A slot of the sample, with random edges of the whole graph: the other end and the class of each.
-struct Sampled {
-    slot: usize,
-    random: [(u32, u8); RANDOM],
-}
-
-impl<'a, P> Input<'a, P> {
-    pub(super) fn new(pieces: P, graph: &'a Graph, delta: f32, seed: u64) -> Self {
-        let n = if graph.len() == 0 { 0 } else { graph.n_slots() };
-        let row = |slot: usize| {
-            let mut draws = Draws::new(seed, Stage::NullSample, slot as u64);
-            let random = std::array::from_fn(|_| graph.edge(draws.below(graph.len() as u64)));
-            Sampled { slot, random }
-        };
-        let sample = (0..n).step_by(n.div_ceil(SLOTS).max(1)).map(row).collect();
-        Self { pieces, graph, delta, listed: graph.times_listed(), sample }
-    }
-}
-
-/// What is known about true neighbors.
+/// The learned distribution of true neighbors. Lengths are in units of the local width, [`Density::width`].
 #[derive(Clone, Debug)]
 pub(super) struct NeighborDistribution {
-    /// Half of the true neighbors' estimates lie within this radius (in units of local width).
+    /// Radius that holds half of the true neighbors' estimates.
     pub(super) radius: f32,
-    /// Per class: the odds of a true neighbor.
+    /// Odds that an edge leads to a true neighbor, per class.
     pub(super) odds: [f32; CLASSES],
-    /// The share of true neighbors among the estimates at the other ends of edges.
-    pub(super) share: f32,
-    /// `(1 + r^2 / a^2)^-3`: 1 / a^2, and the density at the center.
+    /// Fraction of true neighbors among the estimates at the ends of edges.
+    pub(super) fraction: f32,
+    /// `1 / a^2`, and the density of true neighbors at `r = 0`.
     pub(super) inverse_a2: f32,
-    pub(super) center: f32,
-    /// The odds of a wrong entry that is near all the same, times its density: the same all over the reach.
-    pub(super) region: f32,
-    /// How many nats the edges in one direction may be ahead of those in the other beyond what mutual edges say; infinite
-    /// where nothing bounds them.
-    pub(super) surplus: f32,
+    pub(super) density_at_zero: f32,
+    /// Odds times density of wrong entries that lie in the same region of the map; uniform within the reach.
+    pub(super) background: f32,
+    /// Bound on the imbalance of forward and reverse edges, in nats, see [`Columns::balanced_log_likelihood`]; infinite where
+    /// wrong entries form no clusters.
+    ///
+    /// [`Columns::balanced_log_likelihood`]: super::votes::Columns::balanced_log_likelihood
+    pub(super) most_imbalance: f32,
 }
 
 impl NeighborDistribution {
-    /// The distribution at the present `places`. Neighbors are looked for as if `radius` were that of the distribution; the
-    /// one learned is not below `least_radius`.
+    /// Learns the distribution from `places`. Neighbors are counted within [`REACH`] times `radius`; the learned radius is at
+    /// least `least_radius`.
     pub(super) fn learn<const D: usize, P: Pieces<D>>(
         input: &Input<'_, P>,
         places: &Places<D>,
@@ -103,16 +70,16 @@ impl NeighborDistribution {
         parts.iter().for_each(|part| total.merge(part));
         let limits = (least_radius, P::MOST_RADIUS * input.delta);
         let distribution = total.distribution::<D, P>(&input.pieces, learning.reach, limits);
-        Self { surplus: learning.surplus(), ..distribution }
+        Self { most_imbalance: learning.most_imbalance(), ..distribution }
     }
 
-    /// Per class: the odds that an edge leads to a true neighbor of this very slot, and 1 where it may as well be
-    /// one of the other slot of its record, 0 elsewhere.
+    /// Per class, the odds that an edge leads to a true neighbor of this slot, and a flag: 1 where the edge may belong to the
+    /// other slot of the record, else 0.
     pub(super) fn odds_of_slot(&self, slots_per_record: usize) -> [(f32, f32); CLASSES] {
         std::array::from_fn(|class| {
             let odds = self.odds[class];
             match class as u8 {
-                // Either of two slots is twice as likely to lie anywhere.
+                // The nearer of two slots is twice as likely to be close by chance.
                 class if either(class, slots_per_record) => (0.5 * odds, 0.0),
                 class if slots_per_record == 2 && side(class) == Side::Reverse => (odds, 1.0),
                 _ => (odds, 0.0),
@@ -121,17 +88,15 @@ impl NeighborDistribution {
     }
 }
 
-/// What the distribution is learned with.
 struct Learning<'a, const D: usize, P> {
     input: &'a Input<'a, P>,
     places: &'a Places<D>,
     density: &'a Density<D>,
-    /// True neighbors are looked for within this many local widths.
+    /// True neighbors are counted within this many local widths.
     reach: f32,
 }
 
 impl<const D: usize, P: Pieces<D>> Learning<'_, D, P> {
-    /// How far true neighbors are looked for about `x`.
     #[inline(always)]
     fn reach_at(&self, x: &[f32; D]) -> f32 {
         self.density.width(self.density.at(x)) * self.reach
@@ -160,27 +125,25 @@ impl<const D: usize, P: Pieces<D>> Learning<'_, D, P> {
                 of_class[1] += 1;
             }
         }
-        // Random edges stand for as many as the slot has.
-        let share = ends.len() as f64 / RANDOM as f64;
-        let share_mutual = n_mutual as f64 / RANDOM as f64;
+        // The few random edges get the total weight of the slot's own edges.
+        let per_random = ends.len() as f64 / RANDOM as f64;
+        let per_random_mutual = n_mutual as f64 / RANDOM as f64;
         for &(end, class) in random {
             let of_kind = &mut tally.random[usize::from(either(class, slots_per_record))];
             of_kind[0] += 1;
             if let Some(bin) = close(end, class) {
-                tally.bins[0][bin].1 += share;
-                tally.bins[1][bin].1 += share_mutual;
+                tally.bins[0][bin].1 += per_random;
+                tally.bins[1][bin].1 += per_random_mutual;
                 of_kind[1] += 1;
             }
         }
     }
 
-    /// How many nats one direction may be ahead of the other beyond what mutual edges say; infinite where lists are
-    /// not wrong together.
+    /// Returns the bound on the imbalance of forward and reverse edges, in nats; infinite where wrong entries form no clusters.
     ///
-    /// Where lists are wrong at random, a wrong entry stands alone. Where they are wrong together, as look-alike
-    /// descriptors are, whoever lists a wrong entry also lists others beside it, and that place gathers as much evidence as
-    /// the right one. But those there do not list back.
-    fn surplus(&self) -> f32 {
+    /// Uniformly wrong entries stand alone. Records with similar descriptors are wrong together: a list with one of them holds
+    /// others beside it, so that their place gathers as much evidence as the right one. But those records do not list back.
+    fn most_imbalance(&self) -> f32 {
         let places = self.places;
         let (mut entries, mut beside) = (0.0, 0.0);
         let mut own = Vec::new();
@@ -211,23 +174,22 @@ impl<const D: usize, P: Pieces<D>> Learning<'_, D, P> {
                 beside += found as f64 - (own.len() - 1) as f64 / RANDOM as f64 * by_chance as f64;
             }
         }
-        if beside > CROWD * entries { SURPLUS } else { f32::INFINITY }
+        if beside > LEAST_COMPANIONS * entries { MOST_IMBALANCE } else { f32::INFINITY }
     }
 }
 
-/// Of the sample, every so many slots are looked at to see whether lists are wrong together,
+/// Every this many sampled slots, entries are checked for clusters.
 const EVERY: usize = 2;
-/// and so many entries of each.
+/// Number of entries that are checked per slot.
 const ENTRIES: usize = 2;
-/// An entry is elsewhere when it is farther from the estimate than this many times its reach.
+/// An entry is far if its distance from the slot's estimate exceeds this many times the reach.
 const ELSEWHERE: f32 = 2.0;
-/// Lists are wrong together if an entry that does not list back has on average so many others of its list beside it elsewhere,
-/// beyond chance; entries that are not elsewhere count with none.
-const CROWD: f64 = 0.25;
-/// The bound in nats then.
-const SURPLUS: f32 = 10.0;
+/// Wrong entries form clusters if the mean number of other forward entries near a far forward entry exceeds this, beyond
+/// chance. The mean is over all checked entries; entries that are not far count as 0.
+const LEAST_COMPANIONS: f64 = 0.25;
+/// The bound for lists whose wrong entries form clusters, in nats.
+const MOST_IMBALANCE: f32 = 10.0;
 
-/// Some of the slots of a sample.
 struct Part<'a, const D: usize, P> {
     rows: &'a [Sampled],
     learning: &'a Learning<'a, D, P>,
@@ -247,11 +209,11 @@ impl<const D: usize, P: Pieces<D>> Kernel for Part<'_, D, P> {
 }
 
 struct Tally {
-    /// Close edges per bin, and close random ones; of all edges, and of mutual ones.
+    /// Per bin, the number of close edges and of close random edges (weighted); for all edges, then for mutual ones.
     bins: [[(u32, f64); BINS]; 2],
-    /// Edges and close ones, per class.
+    /// Per class, the number of edges and of close edges.
     classes: [[u32; 2]; CLASSES],
-    /// Random edges that lead to one slot or to either of two, and close ones.
+    /// The number of random edges and of close ones: those that lead to one slot, then those that lead to either of two.
     random: [[u32; 2]; 2],
 }
 
@@ -272,8 +234,8 @@ impl Tally {
         random.for_each(|(a, b)| *a += b);
     }
 
-    /// Close edges beyond those expected by chance or merely in the same region, per bin, and their share of
-    /// those beyond chance; of all edges or of mutual ones.
+    /// Returns close edges beyond chance and background per bin, and their fraction among close edges beyond chance. `kind` is 0
+    /// for all edges, 1 for mutual ones.
     fn excess<const D: usize>(&self, kind: usize) -> ([f64; BINS], f64) {
         let bins = &self.bins[kind];
         let of_kind = |class: &usize| kind == 0 || side(*class as u8) == Side::Mutual;
@@ -281,77 +243,76 @@ impl Tally {
         let edges = f64::from(edges.max(1));
         let found: f64 = bins.iter().map(|b| f64::from(b.0)).sum();
         let by_chance: f64 = bins.iter().map(|b| b.1).sum();
-        let share = share_of(found / edges, by_chance / edges);
-        let excess = bins.map(|(found, by_chance)| f64::from(found) - (1.0 - share) * by_chance);
-        // Wrong entries that are near all the same lie as dense everywhere as they do far out.
+        let fraction = true_fraction(found / edges, by_chance / edges);
+        let excess = bins.map(|(found, by_chance)| f64::from(found) - (1.0 - fraction) * by_chance);
+        // Wrong entries in the same region are uniform: their density is the one measured in the outer bins.
         let volume = |bin: usize| ((bin + 1) as f64).powi(D as i32) - (bin as f64).powi(D as i32);
-        let outside = match Settings::of_dimension::<D>().tells_background {
+        let outside = match Settings::of_dimension::<D>().measures_background {
             true => excess[OUTSIDE..].iter().sum::<f64>().max(0.0),
             false => 0.0,
         };
         let density = outside / (OUTSIDE..BINS).map(volume).sum::<f64>();
         let neighbors = std::array::from_fn(|bin| (excess[bin] - density * volume(bin)).max(0.0));
-        let share = neighbors.iter().sum::<f64>() / excess.iter().sum::<f64>().max(1.0);
-        (neighbors, (share / (1.0 - TAIL)).min(1.0))
+        let fraction = neighbors.iter().sum::<f64>() / excess.iter().sum::<f64>().max(1.0);
+        (neighbors, (fraction / (1.0 - TAIL)).min(1.0))
     }
 
-    /// The distribution, but for the surplus.
+    /// Computes the distribution, without the bound on imbalance.
     fn distribution<const D: usize, P: Pieces<D>>(
         &self,
         pieces: &P,
         reach: f32,
         (least_radius, most_radius): (f32, f32),
     ) -> NeighborDistribution {
-        let [(all, share_of_all), (mutual, share_of_mutual)] =
+        let [(all, fraction_of_all), (mutual, fraction_of_mutual)] =
             [0, 1].map(|kind| self.excess::<D>(kind));
-        let mut radius = middle(&all);
-        // Wrong entries that are near all the same are rarely mutual.
-        if mutual.iter().sum::<f64>() >= ENOUGH && middle(&mutual) < TIGHTER * radius {
-            radius = middle(&mutual);
+        let mut radius = median_radius(&all);
+        // Wrong entries in the same region are rarely mutual.
+        if mutual.iter().sum::<f64>() >= ENOUGH && median_radius(&mutual) < TIGHTER * radius {
+            radius = median_radius(&mutual);
         }
         let radius = (radius as f32 * reach).min(most_radius).max(least_radius);
         let (median, mass) = profile(D);
         let a = radius / median;
-        let chance = self.random.map(share_found);
+        let chance = self.random.map(close_fraction);
         let mut odds = [0.0; CLASSES];
-        let (mut edges, mut ends, mut neighbors, mut in_region) = (0.0, 0.0, 0.0, 0.0);
+        let (mut edges, mut ends, mut neighbors, mut n_background) = (0.0, 0.0, 0.0, 0.0);
         for (class, of_class) in self.classes.iter().enumerate() {
             let either = either(class as u8, pieces.slots_per_record());
-            let close = share_of(share_found(*of_class), chance[usize::from(either)]);
+            let close = true_fraction(close_fraction(*of_class), chance[usize::from(either)]);
             let of_close = match side(class as u8) {
-                _ if !P::TELLS_REGION => 1.0,
-                Side::Mutual => share_of_mutual,
-                Side::Forward | Side::Reverse => share_of_all,
+                _ if !P::SUBTRACTS_BACKGROUND => 1.0,
+                Side::Mutual => fraction_of_mutual,
+                Side::Forward | Side::Reverse => fraction_of_all,
             };
-            let p = (close * of_close).max(SHARE.0);
+            let p = (close * of_close).max(FRACTION.0);
             odds[class] = (p / (1.0 - p)) as f32;
             let n = f64::from(of_class[0]);
             edges += n;
-            // Of two ends where it is not known which, one may be a neighbor.
+            // Of the two slots of a record, only one can be a neighbor.
             ends += if either { 2.0 * n } else { n };
             neighbors += n * close;
-            in_region += n * close * (1.0 - of_close);
+            n_background += n * close * (1.0 - of_close);
         }
-        let region = (in_region / f64::max(edges, 1.0)).min(SHARE.1);
+        let background = (n_background / f64::max(edges, 1.0)).min(FRACTION.1);
         NeighborDistribution {
             radius,
-            share: (neighbors / f64::max(ends, 1.0)) as f32,
+            fraction: (neighbors / f64::max(ends, 1.0)) as f32,
             odds,
             inverse_a2: 1.0 / (a * a),
-            center: 1.0 / (mass * a.powi(D as i32)),
-            region: (region / (1.0 - region) / ball(D, reach)) as f32,
-            surplus: f32::INFINITY,
+            density_at_zero: 1.0 / (mass * a.powi(D as i32)),
+            background: (background / (1.0 - background) / ball_volume(D, reach)) as f32,
+            most_imbalance: f32::INFINITY,
         }
     }
 }
 
-/// Of so many edges, how many were close.
-fn share_found([edges, found]: [u32; 2]) -> f64 {
+fn close_fraction([edges, found]: [u32; 2]) -> f64 {
     f64::from(found) / f64::from(edges.max(1))
 }
 
-/// Where half of `excess` lies, as a share of the bins.
-fn middle(excess: &[f64; BINS]) -> f64 {
+/// Returns the distance that splits `excess` in half, as a fraction of the reach.
+fn median_radius(excess: &[f64; BINS]) -> f64 {
     let half = 0.5 * excess.iter().sum::<f64>();
     let mut sum = 0.0;
     for (bin, e) in excess.iter().enumerate() {
@@ -363,20 +324,19 @@ fn middle(excess: &[f64; BINS]) -> f64 {
     0.5
 }
 
-/// The share of neighbors, where `found` of the edges are close and random ones with `chance`: all
-/// neighbors are, and `chance` of the others.
-fn share_of(found: f64, chance: f64) -> f64 {
-    ((found - chance) / (1.0 - chance.min(0.99))).clamp(SHARE.0, SHARE.1)
+/// Returns the fraction of true neighbors among edges. All true neighbors are close, and of other edges the fraction `chance`;
+/// `found` is the fraction of all edges that are close.
+fn true_fraction(found: f64, chance: f64) -> f64 {
+    ((found - chance) / (1.0 - chance.min(0.99))).clamp(FRACTION.0, FRACTION.1)
 }
 
-/// The volume of a ball.
-fn ball(dimensions: usize, radius: f32) -> f64 {
+fn ball_volume(dimensions: usize, radius: f32) -> f64 {
     use std::f64::consts::PI;
     let unit = if dimensions == 2 { PI } else { 4.0 / 3.0 * PI };
     unit * f64::from(radius).powi(dimensions as i32)
 }
 
-/// Of `(1 + r^2)^-3` in so many dimensions: the radius that holds half of its mass, and the mass.
+/// Returns the radius that holds half of the mass of `(1 + r^2)^-3`, and the mass.
 fn profile(dimensions: usize) -> (f32, f32) {
     use std::f32::consts::PI;
     match dimensions {

@@ -1,7 +1,8 @@
-//! One slot in one iteration: candidates from the estimates of neighbors, the likeliest of them, refined.
+//! The update of one slot in one iteration: propose candidates, score them, refine the best one.
 
-use crate::recover::joint::neighbor_distribution::{Input, NeighborDistribution};
-use crate::recover::joint::refine::{Directions, refined};
+use crate::recover::joint::input::Input;
+use crate::recover::joint::least_squares::{Directions, least_squares};
+use crate::recover::joint::neighbor_distribution::NeighborDistribution;
 use crate::recover::joint::votes::{Columns, Ends, Odds};
 use crate::recover::map::graph::{CLASSES, either, record_of};
 use crate::recover::map::grid::Density;
@@ -11,39 +12,37 @@ use crate::recover::map::pieces::{Piece, Pieces};
 use crate::recover::map::places::{Places, distance2};
 use crate::recover::result::{Estimate, Status};
 
-/// Estimates farther from a piece than this many radii of the distribution say nothing about it.
+/// Estimates farther from a piece than this many radii are ignored.
 pub(super) const TUBE: f32 = 6.0;
-/// Estimates within this many radii of the center of a ray are near all of its rays. They would draw others there, as nothing
-/// tells them apart.
-const BLIND: f32 = 3.0;
-/// Estimates enter the refined position within this many radii, less the farther they are.
-const KERNEL: f32 = 3.75;
-/// Candidates per piece: about as many as hold so many true neighbors' estimates,
+/// Estimates within this many radii of the center of a ray are ignored: they are close to all rays of that center, so that a few
+/// wrong ones would draw many slots there.
+const CENTER_RADIUS: f32 = 3.0;
+/// Least squares uses estimates within this many radii, with less weight the farther they are.
+const LEAST_SQUARES_RADIUS: f32 = 3.75;
+/// Candidates per piece are chosen so that about this many are estimates of true neighbors.
 const TRUE_CANDIDATES: f32 = 5.0;
-/// but so many at least and at most.
+/// Least and largest number of such candidates per piece.
 const CANDIDATES: (f32, f32) = (8.0, 16.0);
-/// Room for all candidates and the old estimate, in whole vectors.
+/// Capacity for all candidates and the old estimate, in whole vectors.
 const ROOM: usize = 24;
-/// Records decide between the best candidates that lie within this many nats of each other.
-const DOUBT: f32 = 8.0;
-/// The share of neighbors whose estimate is taken to be wrong though their record is near: what a record may still add.
-const ASTRAY: f32 = 0.2;
-/// The weight of the density prior: candidates are estimates, which already lie where density is large.
+/// If the scores of the best two candidates differ by less than this many nats, their records decide.
+const TIE_MARGIN: f32 = 8.0;
+/// Assumed fraction of true neighbors whose record passes near the point but whose estimate is wrong.
+const WRONG_ESTIMATES: f32 = 0.2;
+/// Weight of the density prior. It is below 1 because candidates are estimates, which already lie where density is large.
 const PRIOR: f32 = 0.5;
-/// So many places (8 MB) stay in the cache and need no prefetching.
+/// Largest number of places (8 MB) that stay in the cache and need no prefetching.
 const CACHED: usize = 1 << 19;
 
-/// Everything that an update of a slot reads.
 pub(super) struct Context<'a, const D: usize, P> {
     pub(super) input: &'a Input<'a, P>,
     pub(super) places: &'a Places<D>,
     pub(super) density: &'a Density<D>,
     pub(super) neighbors: &'a NeighborDistribution,
-    /// Per class, as in [`Odds`].
+    /// Per class, see [`Odds::of_class`].
     pub(super) odds: [(f32, f32); CLASSES],
 }
 
-/// A position that could win.
 #[derive(Clone, Copy, Debug)]
 struct Candidate<const D: usize> {
     x: [f32; D],
@@ -52,10 +51,9 @@ struct Candidate<const D: usize> {
     prior: f32,
 }
 
-/// Buffers of one thread.
 pub(super) struct Scratch<const D: usize> {
     all: Ends<D>,
-    /// Per piece.
+    /// One per piece.
     near: [Columns<D>; D],
     directions: Directions<D>,
     candidates: Vec<Candidate<D>>,
@@ -70,18 +68,18 @@ impl<const D: usize> Default for Scratch<D> {
 }
 
 impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
-    /// Prefetches the places that [`solve`](Self::solve) looks at.
+    /// Prefetches the places that [`solve`](Self::solve) reads.
     #[inline(always)]
     pub(super) fn prefetch(&self, slot: usize) {
         if self.places.len() > CACHED {
-            // The other slot of a record lies beside the one that is named.
+            // The other slot of a record is next to the one in the edge.
             let ends = self.input.graph.of(slot).0.iter();
             ends.for_each(|&end| self.places.prefetch(end as usize));
         }
     }
 
-    /// The new estimate of `slot`, and how many nats its place is ahead of the best one elsewhere; the
-    /// old estimate when no neighbor says anything.
+    /// Returns the new estimate of `slot` and its margin in nats, see [`Update::margin`](super::state::Update). Without nearby
+    /// estimates it returns the old estimate and 0.
     #[inline(always)]
     pub(super) fn solve(
         &self,
@@ -92,14 +90,15 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         let Input { pieces, graph, .. } = self.input;
         scratch.candidates.clear();
         scratch.all.gather(graph.of(slot), self.places, pieces.slots_per_record());
-        let (reach, blind) = (TUBE * self.neighbors.radius, BLIND * self.neighbors.radius);
+        let (reach, center_radius) =
+            (TUBE * self.neighbors.radius, CENTER_RADIUS * self.neighbors.radius);
         let odds = self.odds(slot);
         for piece in 0..P::PER_SLOT {
             let own = pieces.piece(slot, piece);
-            scratch.all.near(&own, reach, blind, &odds, &mut scratch.near[piece]);
+            scratch.all.near(&own, reach, center_radius, &odds, &mut scratch.near[piece]);
             self.propose(&own, (slot, piece), old, scratch);
         }
-        let Some((first, ahead)) = self.winner(slot, &scratch.candidates) else {
+        let Some((first, margin)) = self.winner(slot, &scratch.candidates) else {
             return (*old, 0.0);
         };
         let own = pieces.piece(slot, first.piece);
@@ -109,19 +108,19 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         }
         let at = |x: &[f32; D]| {
             let density = self.density.at(x);
-            let kernel = KERNEL * self.neighbors.radius * self.density.width(density);
-            let doubt = P::DOUBT * (1.0 + self.neighbors.region / self.volume(density) / density);
-            (1.0 / (kernel * kernel), self.distribution(density), doubt)
+            let reach = LEAST_SQUARES_RADIUS * self.neighbors.radius * self.density.width(density);
+            let half_weight_ratio = P::HALF_WEIGHT_RATIO
+                * (1.0 + self.neighbors.background / self.volume(density) / density);
+            (1.0 / (reach * reach), self.distribution(density), half_weight_ratio)
         };
         let near = (&*near, &mut scratch.directions);
-        let (x, support) = refined(pieces, self.places, &own, near, first.x, at);
+        let (x, support) = least_squares(pieces, self.places, &own, near, first.x, at);
         if !x.iter().all(|c| c.is_finite()) {
             return (*old, 0.0);
         }
-        (found(x, support, first.piece, (first.score - first.prior).max(0.0)), ahead)
+        (found(x, support, first.piece, (first.score - first.prior).max(0.0)), margin)
     }
 
-    /// The odds of the edges of `slot`.
     #[inline(always)]
     fn odds(&self, slot: usize) -> Odds<'_, D> {
         let (of_class, other) = (&self.odds, slot ^ 1);
@@ -133,15 +132,15 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         Odds { of_class, partner: [0.0; D], gain: 0.0, inverse_a2: 0.0 }
     }
 
-    /// The distribution of neighbors where the density is `density`: the gain of an estimate on the spot, and `1 / a^2`.
+    /// Returns the distribution of neighbors at a place of this density: `gain = p_true(0) / p_random`, and `1 / a^2`.
     #[inline(always)]
     fn distribution(&self, density: f32) -> (f32, f32) {
         let width = self.density.width(density);
-        let gain = self.neighbors.center / (self.volume(density) * density);
+        let gain = self.neighbors.density_at_zero / (self.volume(density) * density);
         (gain, self.neighbors.inverse_a2 / (width * width))
     }
 
-    /// The volume of a cube of the local width.
+    /// Returns the volume of a cube whose edge is the local width.
     #[inline(always)]
     fn volume(&self, density: f32) -> f32 {
         let width = self.density.width(density);
@@ -152,7 +151,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         volume
     }
 
-    /// Adds the candidates of one piece: neighbors' estimates, and the old one.
+    /// Adds the candidates of one piece: projected estimates of neighbors, and the old estimate.
     #[inline(always)]
     fn propose(
         &self,
@@ -162,7 +161,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         scratch: &mut Scratch<D>,
     ) {
         let near = &scratch.near[piece];
-        let n_true = (self.neighbors.share * scratch.all.len() as f32).max(1.0);
+        let n_true = (self.neighbors.fraction * scratch.all.len() as f32).max(1.0);
         let most = TRUE_CANDIDATES / n_true * near.len() as f32;
         let step = near.len().div_ceil(most.clamp(CANDIDATES.0, CANDIDATES.1) as usize).max(1);
         let (mut tried, mut n) = ([[0.0; ROOM]; D], 0);
@@ -176,7 +175,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         if old.status == Status::Ok && usize::from(old.axis) == piece {
             add(old.position);
         }
-        // All of the room is computed: no remainder keeps the loop from running over whole vectors.
+        // All capacity is computed, so the loop runs over whole vectors.
         let (mut cells, mut density) = ([0; ROOM], [0.0; ROOM]);
         let columns = tried.each_ref().map(|column| &column[..n]);
         self.density.at_each(&columns, &mut cells[..n], &mut density[..n]);
@@ -185,21 +184,20 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
             (gain[i], inverse_a2[i]) = self.distribution(density[i]);
             prior[i] = PRIOR * ln(density[i]);
         }
-        let surplus = self.neighbors.surplus;
+        let most_imbalance = self.neighbors.most_imbalance;
         for i in 0..n {
             let x = std::array::from_fn(|c| tried[c][i]);
             let prior = prior[i] + self.input.pieces.ln_spread(slot, &x);
             let distribution = (gain[i], inverse_a2[i]);
-            let likelihood = match surplus < f32::INFINITY {
-                true => near.two_sided(&x, distribution, surplus),
+            let likelihood = match most_imbalance < f32::INFINITY {
+                true => near.balanced_log_likelihood(&x, distribution, most_imbalance),
                 false => near.log_likelihood(&x, distribution),
             };
             scratch.candidates.push(Candidate { x, piece, score: prior + likelihood, prior });
         }
     }
 
-    /// The likeliest candidate, and how far it is ahead of the best one elsewhere. Where others come
-    /// close, records decide whose estimates are astray.
+    /// Returns the best candidate and its margin. If the second best is close, the records decide between the two.
     #[inline(always)]
     fn winner(&self, slot: usize, candidates: &[Candidate<D>]) -> Option<(Candidate<D>, f32)> {
         let mut best = *candidates.first()?;
@@ -218,19 +216,19 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
         let Some(second) = second else {
             return Some((best, best.score - best.prior));
         };
-        let ahead = best.score - second.score;
-        if ahead < DOUBT {
-            let [of_best, of_second] = self.by_records(slot, [best.x, second.x]);
+        let margin = best.score - second.score;
+        if margin < TIE_MARGIN {
+            let [of_best, of_second] = self.record_scores(slot, [best.x, second.x]);
             if second.score + of_second > best.score + of_best {
                 return Some((second, 0.0));
             }
         }
-        Some((best, ahead))
+        Some((best, margin))
     }
 
-    /// What records near two places add where their estimates are elsewhere.
+    /// Returns what records add to the scores of two places: records pass within delta, but their estimates may be elsewhere.
     #[inline(always)]
-    fn by_records(&self, slot: usize, x: [[f32; D]; 2]) -> [f32; 2] {
+    fn record_scores(&self, slot: usize, x: [[f32; D]; 2]) -> [f32; 2] {
         let Input { pieces, graph, delta, .. } = self.input;
         let slots_per_record = pieces.slots_per_record();
         let at =
@@ -251,7 +249,7 @@ impl<const D: usize, P: Pieces<D>> Context<'_, D, P> {
                 let either = either(class, slots_per_record);
                 let q = 1.0 / (1.0 + self.places.nearest(end, either, x).0 * inverse_a2);
                 let by_estimate = 1.0 + odds * gain * q * q * q;
-                sums[i] += ln(1.0 + ASTRAY * odds / chance / by_estimate);
+                sums[i] += ln(1.0 + WRONG_ESTIMATES * odds / chance / by_estimate);
             }
         }
         sums

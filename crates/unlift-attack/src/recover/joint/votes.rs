@@ -1,30 +1,30 @@
-//! Columns of neighbors' estimates, and how likely they are about a place.
+//! Estimates at the ends of a slot's edges, in columns, and their likelihood for a place.
 
 use crate::recover::map::graph::{CLASSES, Side, either, side};
 use crate::recover::map::lines::{LANES, Lanes, ln};
 use crate::recover::map::pieces::Piece;
-use crate::recover::map::places::{FAR, Places, distance2};
+use crate::recover::map::places::{Places, UNKNOWN_COORDINATE, distance2};
 
-/// Vectors are filled up with estimates this far away: beyond any reach, and still a number when squared.
-const BEYOND: f32 = 1e19;
+/// Coordinate of padding: beyond any reach, and finite when squared.
+const PADDING_COORDINATE: f32 = 1e19;
 
-/// The odds that edges of a slot lead to true neighbors.
+/// Odds that the edges of a slot lead to true neighbors of this slot.
 pub(super) struct Odds<'a, const D: usize> {
-    /// Per class: the odds, and 1 where the edge may as well be the partner's, 0 elsewhere.
+    /// Per class, the odds, and 1 where the edge may belong to the other slot of the record, else 0.
     pub(super) of_class: &'a [(f32, f32); CLASSES],
-    /// Where the other slot of a paired line lies.
+    /// Place of the other slot of a paired line.
     pub(super) partner: [f32; D],
-    /// The distribution of neighbors there; a gain of 0 without a partner.
+    /// The distribution of neighbors at that place; `gain` is 0 if there is no other slot.
     pub(super) gain: f32,
     pub(super) inverse_a2: f32,
 }
 
-/// The estimates at the other ends of a slot's edges, in columns.
+/// The estimates at the ends of a slot's edges, in columns.
 pub(super) struct Ends<const D: usize> {
     x: [Vec<f32>; D],
     slot: Vec<u32>,
     class: Vec<u8>,
-    /// Buffers: squared distances to a piece, and which rows are near it.
+    /// Buffers: squared distances to a piece, and the rows near it.
     apart2: Vec<f32>,
     kept: Vec<u32>,
 }
@@ -37,8 +37,7 @@ impl<const D: usize> Default for Ends<D> {
 }
 
 impl<const D: usize> Ends<D> {
-    /// The places of the slots at the other ends of edges, each of a class: of both slots of a record
-    /// where it is not known which.
+    /// Gathers the estimates at the ends of edges; both estimates of a record where the edge does not specify the slot.
     #[inline(always)]
     pub(super) fn gather(
         &mut self,
@@ -61,7 +60,7 @@ impl<const D: usize> Ends<D> {
             };
             set(n, end);
             if slots_per_record == 2 {
-                // Written in any case: the next row covers it unless it stays.
+                // Always written; the next row overwrites it if it is not kept.
                 set(n + 1, end | 1);
                 n += usize::from(either(class, slots_per_record));
             }
@@ -77,19 +76,18 @@ impl<const D: usize> Ends<D> {
         self.class.resize(n, 0);
     }
 
-    /// Number of estimates.
     pub(super) fn len(&self) -> usize {
         self.slot.len()
     }
 
-    /// Puts the estimates within `reach` of `piece` into `near`, with the odds of each, but not those within
-    /// `blind` of a center.
+    /// Copies the estimates within `reach` of `piece` to `near`, with their odds, except those within `center_radius` of the
+    /// center of a ray.
     #[inline(always)]
     pub(super) fn near(
         &mut self,
         piece: &Piece<D>,
         reach: f32,
-        blind: f32,
+        center_radius: f32,
         odds: &Odds<'_, D>,
         near: &mut Columns<D>,
     ) {
@@ -99,17 +97,18 @@ impl<const D: usize> Ends<D> {
         let apart2 = &mut self.apart2[..n];
         for i in 0..n {
             let x: [f32; D] = std::array::from_fn(|c| columns[c][i]);
-            // An absurd delta reaches even lost slots.
+            // A very large delta would reach even slots without an estimate.
             let d2 = distance2(&x, &piece.project(&x));
-            apart2[i] = if x[0] == FAR { f32::INFINITY } else { d2 };
+            apart2[i] = if x[0] == UNKNOWN_COORDINATE { f32::INFINITY } else { d2 };
         }
         if piece.from_center {
             for i in 0..n {
                 let d2 = distance2(&std::array::from_fn(|c| columns[c][i]), &piece.through);
-                apart2[i] = if d2 < blind * blind { f32::INFINITY } else { apart2[i] };
+                apart2[i] =
+                    if d2 < center_radius * center_radius { f32::INFINITY } else { apart2[i] };
             }
         }
-        // Every number is written, and stays if it is near: no branch to guess.
+        // Every index is written and kept only if it is near, without a branch.
         self.kept.resize(n, 0);
         let (kept, mut n_kept) = (&mut self.kept[..n], 0);
         for (i, apart2) in apart2.iter().enumerate() {
@@ -123,18 +122,18 @@ impl<const D: usize> Ends<D> {
             let class = self.class[i];
             near.set(to, &x, (odds.of_class[usize::from(class)], side(class)), self.slot[i]);
         }
-        near.share(odds);
+        near.discount(odds);
         near.pad();
     }
 }
 
-/// Estimates near a piece with the odds that they are a true neighbor's, in columns.
+/// Estimates near a piece, and the odds that each is a true neighbor's, in columns.
 pub(super) struct Columns<const D: usize> {
-    /// Padded to whole vectors with estimates that say nothing, as are the odds and sides.
+    /// Padded to whole vectors with rows of no effect, as are `odds` and `side`.
     pub(super) x: [Vec<f32>; D],
     pub(super) odds: Vec<f32>,
-    /// 1 where the edge may as well be the partner's.
-    shared: Vec<f32>,
+    /// 1 where the edge may belong to the other slot of the record.
+    may_be_partners: Vec<f32>,
     side: Vec<Side>,
     pub(super) slot: Vec<u32>,
 }
@@ -142,18 +141,18 @@ pub(super) struct Columns<const D: usize> {
 impl<const D: usize> Default for Columns<D> {
     fn default() -> Self {
         let x = std::array::from_fn(|_| Vec::new());
-        let (odds, shared) = (Vec::new(), Vec::new());
-        Self { x, odds, shared, side: Vec::new(), slot: Vec::new() }
+        let (odds, may_be_partners) = (Vec::new(), Vec::new());
+        Self { x, odds, may_be_partners, side: Vec::new(), slot: Vec::new() }
     }
 }
 
 impl<const D: usize> Columns<D> {
-    /// `n` rows, to be [`set`](Self::set).
+    /// Resizes to `n` rows, which [`set`](Self::set) must fill.
     #[inline(always)]
     fn resize(&mut self, n: usize) {
         self.x.iter_mut().for_each(|column| column.resize(n, 0.0));
         self.odds.resize(n, 0.0);
-        self.shared.resize(n, 0.0);
+        self.may_be_partners.resize(n, 0.0);
         self.side.resize(n, Side::Mutual);
         self.slot.resize(n, 0);
     }
@@ -163,52 +162,49 @@ impl<const D: usize> Columns<D> {
         for (column, x) in self.x.iter_mut().zip(x) {
             column[i] = *x;
         }
-        (self.odds[i], self.shared[i]) = odds;
+        (self.odds[i], self.may_be_partners[i]) = odds;
         (self.side[i], self.slot[i]) = (side, slot);
     }
 
-    /// An edge that belongs to the partner as well as to this slot is shared: less of it is left the better the
-    /// partner's place explains it.
+    /// Discounts the odds of edges that may belong to the other slot of the record, by how well that slot's place explains them.
     #[inline(always)]
-    fn share(&mut self, of: &Odds<'_, D>) {
+    fn discount(&mut self, of: &Odds<'_, D>) {
         if of.gain == 0.0 {
             return;
         }
         let n = self.odds.len();
         let columns: [&[f32]; D] = std::array::from_fn(|c| &self.x[c][..n]);
-        let (odds, shared) = (&mut self.odds[..n], &self.shared[..n]);
+        let (odds, may_be_partners) = (&mut self.odds[..n], &self.may_be_partners[..n]);
         for i in 0..n {
             let r2 = distance2(&of.partner, &std::array::from_fn(|c| columns[c][i]));
             let q = 1.0 / (1.0 + r2 * of.inverse_a2);
-            odds[i] /= 1.0 + shared[i] * odds[i] * of.gain * q * q * q;
+            odds[i] /= 1.0 + may_be_partners[i] * odds[i] * of.gain * q * q * q;
         }
     }
 
     fn pad(&mut self) {
         let n = self.odds.len().next_multiple_of(LANES);
-        self.x.iter_mut().for_each(|column| column.resize(n, BEYOND));
+        self.x.iter_mut().for_each(|column| column.resize(n, PADDING_COORDINATE));
         self.odds.resize(n, 0.0);
         self.side.resize(n, Side::Mutual);
     }
 
-    /// Number of estimates.
     #[inline(always)]
     pub(super) fn len(&self) -> usize {
         self.slot.len()
     }
 
-    /// The estimate in row `i`.
     #[inline(always)]
     pub(super) fn at(&self, i: usize) -> [f32; D] {
         std::array::from_fn(|c| self.x[c][i])
     }
 
-    /// Records of estimates within `1 / sqrt(inverse_kernel2)` of `x`, where records have two slots, which stand side by side.
+    /// Counts the records with an estimate within `1 / sqrt(inverse_reach2)` of `x`. Records have two slots, in adjacent rows.
     #[inline(always)]
-    pub(super) fn n_pairs(&self, x: &[f32; D], inverse_kernel2: f32) -> u32 {
+    pub(super) fn n_pairs(&self, x: &[f32; D], inverse_reach2: f32) -> u32 {
         let (mut n, mut last) = (0, u32::MAX);
         for (i, slot) in self.slot.iter().enumerate() {
-            if 1.0 - distance2(&self.at(i), x) * inverse_kernel2 > 0.0 {
+            if 1.0 - distance2(&self.at(i), x) * inverse_reach2 > 0.0 {
                 n += u32::from(slot ^ 1 != last);
                 last = *slot;
             } else {
@@ -218,14 +214,14 @@ impl<const D: usize> Columns<D> {
         n
     }
 
-    /// The logarithm of how much likelier these estimates are about a point at `x` than by chance, where the distribution has
-    /// this gain and `1 / a^2`: the sum of `ln(1 + odds * gain * (1 + r^2 / a^2)^-3)`.
+    /// Returns the log-likelihood ratio, against chance, of these estimates for a point at `x`:
+    /// the sum of `ln(1 + odds * gain * (1 + r^2 / a^2)^-3)`.
     #[inline(always)]
     pub(super) fn log_likelihood(&self, x: &[f32; D], distribution: (f32, f32)) -> f32 {
         let mut sums = [0.0f32; LANES];
         let likelier = self.likelier(x, distribution);
         let n = self.odds.len() / LANES;
-        // One logarithm of two at a time: no product comes near the end of `f32`.
+        // One logarithm for the product of two ratios, which stays within the range of `f32`.
         for i in 0..n / 2 {
             for (lane, sum) in sums.iter_mut().enumerate() {
                 *sum += ln(likelier(2 * i, lane) * likelier(2 * i + 1, lane));
@@ -239,10 +235,15 @@ impl<const D: usize> Columns<D> {
         sums.iter().sum()
     }
 
-    /// The same, but forward and reverse edges may be ahead of each other by no more than `surplus` beyond what mutual
-    /// edges say.
+    /// Returns the log-likelihood ratio with a bound: the sums of forward and of reverse edges differ by at most `most_imbalance`
+    /// plus the sum of mutual edges; the rest is cut off.
     #[inline(always)]
-    pub(super) fn two_sided(&self, x: &[f32; D], distribution: (f32, f32), surplus: f32) -> f32 {
+    pub(super) fn balanced_log_likelihood(
+        &self,
+        x: &[f32; D],
+        distribution: (f32, f32),
+        most_imbalance: f32,
+    ) -> f32 {
         let mut sums = [[0.0f32; LANES]; 3];
         let likelier = self.likelier(x, distribution);
         for (i, side) in self.side.as_chunks::<LANES>().0.iter().enumerate() {
@@ -255,10 +256,10 @@ impl<const D: usize> Columns<D> {
         }
         let [all, forward, reverse]: [f32; 3] = sums.map(|lanes| lanes.iter().sum());
         let of_both = all - forward - reverse;
-        all - ((forward - reverse).abs() - of_both - surplus).max(0.0)
+        all - ((forward - reverse).abs() - of_both - most_imbalance).max(0.0)
     }
 
-    /// How much likelier the estimate in a lane of a vector is about a point at `x` than by chance.
+    /// Returns the likelihood ratio of the estimate in a lane of a vector for a point at `x`.
     #[inline(always)]
     fn likelier(
         &self,
@@ -283,7 +284,7 @@ mod tests {
 
     const DISTRIBUTION: (f32, f32) = (100.0, 4.0);
 
-    /// Estimates at the origin: so many of each side, with odds of 1.
+    /// Estimates at the origin with odds of 1; `of_each` gives their number per side.
     fn columns(of_each: [(Side, usize); 3]) -> Columns<3> {
         let mut columns = Columns::default();
         let sides = of_each.iter().flat_map(|&(side, n)| std::iter::repeat_n(side, n));
@@ -302,7 +303,7 @@ mod tests {
         {
             let sides =
                 [(Side::Forward, forward), (Side::Reverse, reverse), (Side::Mutual, mutual)];
-            let found = columns(sides).two_sided(&[0.0; 3], DISTRIBUTION, 10.0);
+            let found = columns(sides).balanced_log_likelihood(&[0.0; 3], DISTRIBUTION, 10.0);
             let (less, more) =
                 (forward.min(reverse) as f32 * one, forward.max(reverse) as f32 * one);
             let of_both = mutual as f32 * one;
@@ -315,8 +316,10 @@ mod tests {
     fn no_estimate_counts_twice() {
         let columns = columns([(Side::Forward, 6), (Side::Reverse, 7), (Side::Mutual, 4)]);
         let x = [0.3, -0.1, 0.2];
-        let (sided, all) =
-            (columns.two_sided(&x, DISTRIBUTION, 1e9), columns.log_likelihood(&x, DISTRIBUTION));
+        let (sided, all) = (
+            columns.balanced_log_likelihood(&x, DISTRIBUTION, 1e9),
+            columns.log_likelihood(&x, DISTRIBUTION),
+        );
         assert!((sided - all).abs() < 1e-4 * all, "{sided} {all}");
     }
 
@@ -332,11 +335,11 @@ mod tests {
             gain: 0.0,
             inverse_a2: 1.0,
         };
-        columns.share(&odds);
+        columns.discount(&odds);
         assert_eq!(columns.odds, [0.5, 0.5], "nobody to share with");
         odds.gain = 16.0;
-        columns.share(&odds);
-        // 16 at the center is 2 at a distance of 1: even odds with the partner.
+        columns.discount(&odds);
+        // At a distance of 1 the gain is 16 / 8 = 2, so the odds are halved.
         assert_eq!(columns.odds, [0.25, 0.5]);
     }
 }

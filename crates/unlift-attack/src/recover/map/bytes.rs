@@ -1,13 +1,13 @@
-//! Numbers of a model as bytes, little-endian, and back.
+//! Encoding of a model's numbers as little-endian bytes.
 
 use crate::Error;
 
-/// Appends numbers, but not how many there are.
+/// Appends numbers without their count.
 pub(crate) fn put(to: &mut Vec<u8>, numbers: &[f32]) {
     numbers.iter().for_each(|x| to.extend(x.to_le_bytes()));
 }
 
-/// Takes numbers off the front of a model's bytes.
+/// Reads numbers from the front of a model's bytes.
 #[derive(Debug)]
 pub(crate) struct Reader<'a>(pub(crate) &'a [u8]);
 
@@ -21,14 +21,12 @@ impl<'a> Reader<'a> {
         Ok(front)
     }
 
-    /// The next `N` bytes.
     pub(crate) fn array<const N: usize>(&mut self) -> Result<[u8; N], Error> {
         let mut array = [0; N];
         array.copy_from_slice(self.bytes(N)?);
         Ok(array)
     }
 
-    /// A whole number that counts something, at most `most`.
     pub(crate) fn count(&mut self, most: usize) -> Result<usize, Error> {
         let n = u64::from_le_bytes(self.array()?);
         usize::try_from(n)
@@ -37,7 +35,6 @@ impl<'a> Reader<'a> {
             .ok_or_else(|| Error::new("model", format!("a count of at most {most}"), n.to_string()))
     }
 
-    /// So many numbers.
     pub(crate) fn f32s(&mut self, n: usize) -> Result<Vec<f32>, Error> {
         let (rows, _) = self.bytes(n.saturating_mul(4))?.as_chunks::<4>();
         Ok(rows.iter().map(|&bytes| f32::from_le_bytes(bytes)).collect())

@@ -1,8 +1,8 @@
-//! How likely a random listed record passes near a place.
+//! The chance that a random listed record passes near a place.
 //!
-//! A line passes within `delta` of a place `x` with probability `density(x) * tube(delta)`: the expected length of line per
-//! volume, times the volume of the tube per length. Each record counts as often as it is listed. The density
-//! varies over the size of a room, not over `delta`, so a coarse grid serves for every delta.
+//! A line passes within `delta` of a place `x` with probability `density(x) * tube(delta)`: the expected length of lines per
+//! volume, times the volume per length of a tube of radius `delta`. Each record counts as often as it is listed. The density varies
+//! over the size of a room, not over `delta`, so a coarse grid suffices for every delta.
 
 use rayon::prelude::*;
 
@@ -15,25 +15,25 @@ use crate::recover::map::lines::{LineRow, MOST_CHANCE};
 use crate::recover::map::places::trimmed_box;
 use crate::simd::{Kernel, dispatch};
 
-/// Cells of a grid at most: 32 per axis, as density varies over the size of a room.
+/// Largest number of cells of a grid: 32 per axis, because density varies over the size of a room.
 const CELLS: usize = 1 << 15;
-/// Records whose density is summed, one per cell; of a larger map a part, spread over the file.
+/// Largest number of records whose density is summed, about one per cell; they are spread over the file.
 const RECORDS: usize = 1 << 15;
-/// Slots whose crossings with listed records tell where the map lies: enough for a quantile of 3 %.
+/// Slots whose crossings with listed records give the box of the map: enough for a quantile of 3 %.
 const CROSSINGS: usize = 1 << 12;
-/// Every place has at least this share of the mean density: where no record was counted one vote would prove all.
+/// Least density, as a fraction of the mean: with chance near 0, a single vote would decide.
 const FLOOR: f32 = 0.05;
-/// A map is flat if neighborhoods are more than so many times as wide as it is thin.
+/// A map is flat if the radius of neighborhoods exceeds this many times its thickness.
 const FLAT: f64 = 2.0;
 
-/// The density of records, per cell.
+/// Density of records per cell.
 #[derive(Clone, Debug)]
 pub(crate) struct ChanceField<const D: usize> {
     grid: Grid<D>,
 }
 
 impl<const D: usize> ChanceField<D> {
-    /// `grid` holds sums of weighted length per cell; `weight` is that of all records.
+    /// Creates the field from sums of weighted length per cell; `weight` is the weight of all records.
     fn new(mut grid: Grid<D>, weight: f32) -> Self {
         grid.smooth(1);
         let scale = 1.0 / (weight * grid.volume()).max(f32::MIN_POSITIVE);
@@ -44,19 +44,18 @@ impl<const D: usize> ChanceField<D> {
         Self { grid }
     }
 
-    /// Appends the field to `to`.
     pub(crate) fn write(&self, to: &mut Vec<u8>) {
         self.grid.write(to);
     }
 
-    /// The field that [`write`](Self::write) appended.
-    /// Fails when the bytes hold none.
+    /// Reads the field that [`write`](Self::write) appended.
+    /// Fails when the bytes are not a field.
     pub(crate) fn read(from: &mut Reader<'_>) -> Result<Self, Error> {
-        // Grids of boxes without extent along an axis may exceed the number of cells asked for.
+        // The grid of a box without extent along an axis may have more cells than asked for.
         Grid::read(from, 8 * CELLS).map(|grid| Self { grid })
     }
 
-    /// The density at a typical place: the mean over places weighted by density.
+    /// Returns the density at a typical place: the mean over places weighted by density.
     pub(crate) fn typical(&self) -> f32 {
         let values = self.grid.values.iter().map(|&x| f64::from(x));
         let add = |(sum, squares): (f64, f64), x: f64| (sum + x, squares + x * x);
@@ -64,13 +63,13 @@ impl<const D: usize> ChanceField<D> {
         (squares / sum) as f32
     }
 
-    /// The chance that a random record passes through a region of volume-per-length `tube` about `x`.
+    /// Returns the chance that a random record passes through a tube about `x`; `tube` is its volume per length.
     #[inline(always)]
     pub(crate) fn at(&self, x: &[f32; D], tube: f32) -> f32 {
         (self.grid.at(x) * tube).min(MOST_CHANCE)
     }
 
-    /// Adds the same, without its limit, at each `t` of a line to `chance`. `cells` is a buffer of as many.
+    /// Adds the chance, without its limit, at each `t` of a line to `chance`. `cells` is a buffer of the same length.
     #[inline(always)]
     pub(crate) fn add_along(
         &self,
@@ -86,7 +85,7 @@ impl<const D: usize> ChanceField<D> {
     }
 }
 
-/// Volume per length of the tube of radius `delta` around a line in `D` dimensions.
+/// Returns the volume per length of the tube of radius `delta` around a line.
 pub(crate) fn tube(dimensions: usize, delta: f32) -> f32 {
     // The volume of the unit ball in D - 1 dimensions.
     match dimensions {
@@ -96,7 +95,7 @@ pub(crate) fn tube(dimensions: usize, delta: f32) -> f32 {
     }
 }
 
-/// Fields for lines (one) or rays (one per center: those of the other centers).
+/// Returns the fields of lines (one) or of rays (one per center, from the rays of the other centers).
 pub(crate) fn of_lines<const D: usize>(
     rows: &[LineRow<D>],
     lists: &Neighborhoods,
@@ -114,7 +113,7 @@ pub(crate) fn of_lines<const D: usize>(
         let lengths = |records: &[usize]| {
             dispatch(Lengths { grid: total.clone(), rows, counts: &counts, records })
         };
-        // Eight parts however many threads there are: the order of sums is the same.
+        // Eight parts for any number of threads, so that the order of sums is fixed.
         let parts: Vec<Grid<D>> =
             chosen.par_chunks(chosen.len().div_ceil(8).max(1)).map(lengths).collect();
         for part in &parts {
@@ -125,12 +124,11 @@ pub(crate) fn of_lines<const D: usize>(
     (0..n_groups.unwrap_or(1)).map(field).collect()
 }
 
-/// Centers of rays, counted up to the last that any ray comes from; `None` of lines.
+/// Returns the number of centers up to the last one that has a ray; `None` for lines.
 fn n_groups<const D: usize>(rows: &[LineRow<D>]) -> Option<u32> {
     rows.iter().filter(|row| row.is_ray()).map(|row| row.group + 1).max()
 }
 
-/// The number of fields that [`of_lines`] makes.
 pub(crate) fn n_fields<const D: usize>(rows: &[LineRow<D>]) -> usize {
     n_groups(rows).unwrap_or(1) as usize
 }
@@ -168,14 +166,13 @@ impl<const D: usize> Kernel for Lengths<'_, D> {
     }
 }
 
-/// How often each record is listed.
 fn times_listed(lists: &Neighborhoods, n_records: usize) -> Vec<u32> {
     let mut counts = vec![0; n_records];
     lists.records().iter().for_each(|record| counts[record.index()] += 1);
     counts
 }
 
-/// The box that holds most places where records pass nearest to slots that list them.
+/// Returns a box around most places where records pass closest to slots that list them.
 fn box_of_crossings<const D: usize>(
     rows: &[LineRow<D>],
     lists: &Neighborhoods,
@@ -184,7 +181,7 @@ fn box_of_crossings<const D: usize>(
     let every = lists.n_slots().div_ceil(CROSSINGS).max(1);
     let crossings = |slot: usize| {
         let own = &rows[slot / slots_per_record];
-        // Any entry will do: lists are in order of record, which is random.
+        // Lists are in order of record, which is random, so any entries will do.
         let listed = lists.of(slot).iter().take(2);
         listed.filter_map(|record| own.crossing(&rows[record.index()]))
     };
@@ -193,7 +190,7 @@ fn box_of_crossings<const D: usize>(
     trimmed_box(|c| places.iter().map(|place| place[c]).collect())
 }
 
-/// One field for axis candidates: the density of the records' lines along all axes.
+/// Returns the field of axis candidates: the density of their lines along each axis.
 pub(crate) fn of_candidates<const D: usize>(
     rows: &[[f32; D]],
     lists: &Neighborhoods,
@@ -205,7 +202,7 @@ pub(crate) fn of_candidates<const D: usize>(
         let (mut low, mut high) = (low, high);
         (low[axis], high[axis]) = (0.0, 0.0);
         let mut grid = Grid::over(low, high, CELLS / 8);
-        // The line lies in the one cell along its own axis: it is as long there as the cell.
+        // The grid has one cell along this axis, in which the line is as long as the cell.
         let length = grid.cell();
         for (row, &n) in rows.iter().zip(&counts) {
             let cell = grid.index(row);
@@ -216,20 +213,19 @@ pub(crate) fn of_candidates<const D: usize>(
     CandidateField { along }
 }
 
-/// The density of the lines through published points, per axis along which they run.
+/// The density of the lines through published points, one field per axis of the lines.
 #[derive(Clone, Debug)]
 pub(crate) struct CandidateField<const D: usize> {
     along: [ChanceField<D>; D],
 }
 
 impl<const D: usize> CandidateField<D> {
-    /// Appends the fields to `to`.
     pub(crate) fn write(&self, to: &mut Vec<u8>) {
         self.along.iter().for_each(|field| field.write(to));
     }
 
-    /// The fields that [`write`](Self::write) appended.
-    /// Fails when the bytes do not hold as many.
+    /// Reads the fields that [`write`](Self::write) appended.
+    /// Fails when the bytes are not one field per axis.
     pub(crate) fn read(from: &mut Reader<'_>) -> Result<Self, Error> {
         let fields = (0..D).map(|_| ChanceField::read(from)).collect::<Result<Vec<_>, _>>()?;
         let along =
@@ -237,7 +233,7 @@ impl<const D: usize> CandidateField<D> {
         Ok(Self { along })
     }
 
-    /// How likely a random record agrees with a place where records are, within `delta`.
+    /// Returns the chance that a random record passes within `delta` of a typical place.
     pub(crate) fn typical_chance(&self, delta: f32) -> f32 {
         let tubes = self.tubes(delta);
         if tubes.iter().all(|&one| one == tubes[0]) {
@@ -246,10 +242,10 @@ impl<const D: usize> CandidateField<D> {
         self.along.iter().zip(&tubes).map(|(field, tube)| field.typical() * tube).sum()
     }
 
-    /// The radius of the disc that holds a `share` of a flat map, whose box is much thinner than neighborhoods are wide; `None` of
-    /// other maps.
+    /// For a flat map, whose box is much thinner than neighborhoods are wide, returns the radius of the disc that holds the fraction
+    /// `share` of it; `None` for other maps.
     pub(crate) fn radius_if_flat(&self, share: f64) -> Option<f64> {
-        // Each field lacks the extent along its own axis.
+        // Each field has no extent along its own axis.
         let side = |c: usize| f64::from(self.along[(c + 1) % D].grid.sides()[c]);
         let mut sides: [f64; D] = std::array::from_fn(side);
         sides.sort_unstable_by(f64::total_cmp);
@@ -258,7 +254,7 @@ impl<const D: usize> CandidateField<D> {
         (FLAT * thin < radius && 2.0 * radius <= middle).then_some(radius)
     }
 
-    /// The volume per length within `delta` of a line along each axis, as far as it lies in the box of the map.
+    /// Returns, per axis, the volume per length within `delta` of a line along it and within the box of the map.
     pub(crate) fn tubes(&self, delta: f32) -> [f32; D] {
         std::array::from_fn(|axis| {
             let sides = self.along[axis].grid.sides();
@@ -268,14 +264,14 @@ impl<const D: usize> CandidateField<D> {
         })
     }
 
-    /// The chance that any of a random record's lines passes through a tube about `x`.
+    /// Returns the chance that any line of a random record passes through a tube about `x`.
     #[inline(always)]
     pub(crate) fn at(&self, x: &[f32; D], tubes: &[f32; D]) -> f32 {
         let along = self.along.iter().zip(tubes);
         along.map(|(field, &tube)| field.at(x, tube)).sum::<f32>().min(MOST_CHANCE)
     }
 
-    /// Adds the same, without its limit, at each `t` of the line through `own` along `axis` to `chance`.
+    /// Adds the chance, without its limit, at each `t` of the line through `own` along `axis` to `chance`.
     #[inline(always)]
     pub(crate) fn add_along(
         &self,
@@ -292,12 +288,11 @@ impl<const D: usize> CandidateField<D> {
     }
 }
 
-// A length of the order of the map's size, from the records alone.
+// The extent of a map, from the records alone.
 
-/// A map is in parts where its quartiles are this many times as far apart as one part is wide.
+/// A map has separate parts if its quartiles are this many times as far apart as one part is wide.
 const FAR_APART: f64 = 4.0;
 
-/// The distance between the quartiles of sorted values.
 pub(crate) fn interquartile_range(sorted: &[f32]) -> f64 {
     let Some(last) = sorted.len().checked_sub(1) else {
         return 0.0;
@@ -305,8 +300,8 @@ pub(crate) fn interquartile_range(sorted: &[f32]) -> f64 {
     f64::from(sorted[last - last / 4]) - f64::from(sorted[last / 4])
 }
 
-/// Whether sorted values lie in parts far from one another. The quartiles of evenly spread values are four times as far apart as
-/// an eighth of the values is wide.
+/// Whether sorted values have separate parts. For evenly spread values, the distance of the quartiles is four times the width of
+/// an eighth of the values.
 pub(crate) fn are_in_parts(sorted: &[f32]) -> bool {
     let many = sorted.len() / 8;
     if many == 0 {
@@ -317,13 +312,13 @@ pub(crate) fn are_in_parts(sorted: &[f32]) -> bool {
     FAR_APART * 4.0 * median(&mut widths) < interquartile_range(sorted)
 }
 
-/// Lines, and iterations (each leaves a third of the error), in which [`line_extent`] looks for the middle of a map.
+/// Number of lines, and of iterations (each leaves a third of the error), with which [`line_extent`] finds the middle of a map.
 const MIDDLE: (usize, usize) = (1000, 60);
 
-/// The median distance of the lines from their middle. Distances from the origin would not do: it is
-/// rounded, so that a shifted or scaled map has it elsewhere.
+/// Returns the median distance of the lines from their middle. Distances from the origin would depend on how a shifted or
+/// scaled map rounds its origin.
 pub(crate) fn line_extent<const D: usize>(rows: &[LineRow<D>]) -> f64 {
-    // Spread over the file: a third party's map need not be in random order.
+    // Spread over the file: a given map need not be in random order.
     let every = rows.len().div_ceil(MIDDLE.0).max(1);
     let rows: Vec<&LineRow<D>> = rows.iter().step_by(every).collect();
     let offset = |row: &LineRow<D>, from: &[f64; D]| {
@@ -331,8 +326,8 @@ pub(crate) fn line_extent<const D: usize>(rows: &[LineRow<D>]) -> f64 {
         let away = sub(&through, from);
         along(&away, -dot(&away, &direction), &direction)
     };
-    // Each iteration moves to the mean of the lines' nearest points. What is left of the start shrinks
-    // by the mean squared cosine with the lines, about a third.
+    // Each iteration moves to the mean of the lines' nearest points. The remaining error shrinks by the mean squared cosine with the
+    // lines, about a third.
     let mut middle = [0.0; D];
     for _ in 0..MIDDLE.1 {
         let mut step = [0.0; D];
@@ -345,7 +340,6 @@ pub(crate) fn line_extent<const D: usize>(rows: &[LineRow<D>]) -> f64 {
     median(&mut rows.iter().map(|row| length(offset(row, &middle))).collect::<Vec<f64>>())
 }
 
-/// The largest distance between centers.
 pub(crate) fn ray_extent<const D: usize>(rows: &[LineRow<D>]) -> f64 {
     let mut centers: Vec<&LineRow<D>> = Vec::new();
     for row in rows {
@@ -365,7 +359,7 @@ pub(crate) fn ray_extent<const D: usize>(rows: &[LineRow<D>]) -> f64 {
 mod tests {
     use crate::recover::map::lines::{MOST_CHANCE, evidence};
 
-    /// ln P(X >= n) for X ~ Bin(k, p), by summation.
+    /// Returns ln P(X >= n) for X ~ Bin(k, p), by summation.
     fn ln_tail(n: usize, k: usize, p: f64) -> f64 {
         let mut term = (1.0 - p).powi(k as i32);
         let mut tail = 0.0;
@@ -382,11 +376,11 @@ mod tests {
     fn evidence_bounds_the_binomial_tail_and_orders_like_it() {
         for (n, p) in [(26, 0.4), (4, 0.005), (10, 0.035), (50, 0.2), (1, 0.005), (49, 0.5)] {
             let evidence = f64::from(evidence(n as f32, 50.0, p as f32));
-            // Chernoff: P(X >= n) <= exp(-k KL); tight up to a polynomial factor.
+            // Chernoff: P(X >= n) <= exp(-k KL), tight up to a polynomial factor.
             assert!(evidence <= -ln_tail(n, 50, p) + 1e-3, "n {n} p {p}");
             assert!(evidence >= -ln_tail(n, 50, p) - 4.0, "n {n} p {p}");
         }
-        // 26 votes where 20 are expected are far likelier than 4 where 0.25 are.
+        // 26 votes with 20 expected by chance are much more probable than 4 with 0.25 expected.
         assert!(evidence(26.0, 50.0, 0.4) < evidence(4.0, 50.0, 0.005));
     }
 
@@ -419,7 +413,7 @@ mod lanes_tests {
 
     #[test]
     fn logarithm_is_near_the_exact_one() {
-        // Every exponent, and mantissas all over.
+        // All exponents, with mantissas over the whole range.
         for exponent in -126..127 {
             for step in 0..1000 {
                 let y = (exponent as f32).exp2() * (1.0 + step as f32 / 1000.0);

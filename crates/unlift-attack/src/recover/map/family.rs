@@ -1,4 +1,4 @@
-//! A released map prepared for solving: one row per record, whatever its family.
+//! A released map prepared for solving, with one row per record.
 
 use crate::Error;
 use crate::neighbors::Neighborhoods;
@@ -9,31 +9,40 @@ use crate::recover::map::lines::{LineRow, from_lines, from_rays};
 use crate::recover::map::planes::SortedPlanes;
 use crate::released::{AxisPlanes, Obfuscation, Released};
 
-/// Records in the form the solvers read.
+/// Records of one family in the form that solvers read.
 #[derive(Debug)]
 pub(crate) enum Family<'a, const D: usize> {
-    /// Lines, one or two slots each; rays, told apart by their group.
-    Lines { rows: Vec<LineRow<D>>, slots_per_record: usize, chance: Vec<ChanceField<D>> },
-    /// Axis planes, with the order of their offsets.
-    Planes { planes: &'a AxisPlanes<D>, sorted: SortedPlanes },
-    /// Axis candidates.
-    Candidates { rows: &'a [[f32; D]], chance: CandidateField<D> },
+    /// Lines with one or two slots each, or rays, which have a group.
+    Lines {
+        rows: Vec<LineRow<D>>,
+        slots_per_record: usize,
+        chance: Vec<ChanceField<D>>,
+    },
+    /// Axis planes, sorted by their offsets.
+    Planes {
+        planes: &'a AxisPlanes<D>,
+        sorted: SortedPlanes,
+    },
+    Candidates {
+        rows: &'a [[f32; D]],
+        chance: CandidateField<D>,
+    },
 }
 
-/// How likely a random listed record agrees with a place: what is learned of a map before anything is solved.
+/// The chance that a random listed record passes near a place, learned before any slot is solved.
 #[derive(Clone, Debug)]
 pub(crate) enum Chance<const D: usize> {
-    /// Of lines one field, of rays one per center.
+    /// One field for lines, or one per center of rays.
     Lines(Vec<ChanceField<D>>),
-    /// Counted exactly from the planes themselves.
+    /// Nothing, because offsets of planes are counted exactly.
     Planes,
-    /// A field per axis.
+    /// One field per axis.
     Candidates(CandidateField<D>),
 }
 
 impl<'a, const D: usize> Family<'a, D> {
-    /// The records of `released`, with a `chance` that was learned before, or else with the one that goes with `lists`.
-    /// Fails when the chance is that of other records.
+    /// Prepares the records of `released`. Without a learned `chance`, learns it from `lists`.
+    /// Fails when `chance` belongs to other records.
     pub(crate) fn new(
         released: &'a Released<D>,
         lists: &Neighborhoods,
@@ -69,7 +78,6 @@ impl<'a, const D: usize> Family<'a, D> {
         }
     }
 
-    /// What was learned of the map.
     pub(crate) fn chance(&self) -> Chance<D> {
         match self {
             Self::Lines { chance, .. } => Chance::Lines(chance.clone()),
@@ -78,7 +86,6 @@ impl<'a, const D: usize> Family<'a, D> {
         }
     }
 
-    /// Slots per record.
     pub(crate) fn slots_per_record(&self) -> usize {
         match self {
             Self::Lines { slots_per_record, .. } => *slots_per_record,
@@ -86,7 +93,6 @@ impl<'a, const D: usize> Family<'a, D> {
         }
     }
 
-    /// Whether these are rays.
     pub(crate) fn is_of_rays(&self) -> bool {
         match self {
             Self::Lines { rows, .. } => rows.first().is_some_and(LineRow::is_ray),
@@ -94,8 +100,7 @@ impl<'a, const D: usize> Family<'a, D> {
         }
     }
 
-    /// Whether these are rays of which it is known where each center's points lie: one ray says nothing
-    /// about another of its center, and rays of two centers do not meet.
+    /// Whether these are rays whose centers have regions. Such rays of one center meet only there, and rays of two centers do not meet.
     pub(crate) fn has_regions(&self) -> bool {
         match self {
             Self::Lines { rows, .. } => rows.iter().any(|row| row.is_ray() && row.to.is_finite()),
@@ -103,7 +108,7 @@ impl<'a, const D: usize> Family<'a, D> {
         }
     }
 
-    /// Of candidates in a flat map: the radius about a place within which a `share` of the points are.
+    /// For axis candidates in a flat map, returns the radius about a place that holds the fraction `share` of the points.
     pub(crate) fn radius_if_flat(&self, share: f64) -> Option<f64> {
         match self {
             Self::Candidates { chance, .. } => chance.radius_if_flat(share),
@@ -111,7 +116,7 @@ impl<'a, const D: usize> Family<'a, D> {
         }
     }
 
-    /// How likely a random record agrees with a place where records are, at `delta`.
+    /// Returns the chance that a random record passes within `delta` of a typical place.
     pub(crate) fn typical_chance(&self, delta: f32) -> f32 {
         match self {
             Self::Lines { chance, .. } => {
@@ -122,10 +127,10 @@ impl<'a, const D: usize> Family<'a, D> {
         }
     }
 
-    /// A length of the order of the map's size, from the records alone; 0 for an empty map.
+    /// Returns a length of the order of the map's size, from the records alone; 0 for an empty map.
     ///
-    /// Lines: their median distance from the place they pass nearest. Rays: the largest distance between
-    /// centers. Planes and candidates: the largest interquartile range over the axes.
+    /// Lines: their median distance from their middle. Rays: the largest distance between centers. Planes and candidates: the largest
+    /// interquartile range over the axes.
     pub(crate) fn extent(&self) -> f64 {
         match self {
             Self::Lines { rows, .. } => {
@@ -147,7 +152,7 @@ impl<'a, const D: usize> Family<'a, D> {
     }
 }
 
-/// Lines and rays as rows, within the bounds where these are known; none of other families.
+/// Returns lines and rays as rows, cut at the bounds where these are known; no rows for other families.
 fn line_rows<const D: usize>(released: &Released<D>) -> Vec<LineRow<D>> {
     let bounds = released.bounds().map(|bounds| bounds.about(&released.origin()));
     match released.obfuscation() {
@@ -157,41 +162,41 @@ fn line_rows<const D: usize>(released: &Released<D>) -> Vec<LineRow<D>> {
     }
 }
 
-/// What is set differently for the points of a map (3D) and the keypoints of an image (2D). Nothing else in recovery asks how
-/// many dimensions there are, but geometry (volumes and directions).
+/// Constants that differ between maps (3D) and images (2D). No other code of recovery depends on the dimension, except geometry
+/// (volumes and directions).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Settings {
-    /// Chunks of slots that are solved per delta, to choose it. Fewer of an image, where they take most of the time.
+    /// Chunks of slots that are solved per delta to choose it. Fewer in images, where this takes most of the time.
     pub(crate) delta_chunks: usize,
-    /// The same of planes: more, as their evidence hardly depends on delta, so that luck widens the plateau.
+    /// Such chunks for planes: more, because their evidence hardly depends on delta, so that noise widens the plateau.
     pub(crate) delta_chunks_of_planes: usize,
-    /// A delta is too wide if a random candidate agrees with a typical place with this probability. In an image both of a
-    /// record's lines cross all of a small plane, so that random records agree more often.
+    /// A delta is too wide if a random candidate passes a typical place with this probability. In an image, both lines of a record cross
+    /// the whole plane, so random records agree more often.
     pub(crate) too_wide_of_candidates: f32,
-    /// Whether that limit holds for the fine ladder, too. In a map it may reach beyond.
+    /// Whether that limit also holds for the fine ladder.
     pub(crate) candidates_keep_to_limit: bool,
-    /// Whether the share of all records that a list holds limits delta. In an image bounds are known and limit it.
+    /// Whether the fraction of all records in one list limits delta. In images, the known bounds limit it.
     pub(crate) limits_by_share: bool,
-    /// Whether a narrow delta keeps near the lower edge of the plateau. In an image lines cross everywhere: that edge is
-    /// one of chance.
+    /// Whether a narrow delta stays near the lower edge of the plateau. In an image, lines cross everywhere, so that this edge is
+    /// noise.
     pub(crate) keeps_near_edge: bool,
-    /// The radius of the distribution of neighbors of candidates is at most this many deltas: in an image delta is narrower.
+    /// Largest radius of the distribution of neighbors of candidates, in deltas. Delta is narrower in images.
     pub(crate) most_radius_of_candidates: f32,
-    /// Whether what lies far out tells how many wrong entries are near all the same. In an image neighbors reach as far out.
-    pub(crate) tells_background: bool,
-    /// Partners of exchanged coordinates are looked for within this many deltas: in an image delta is narrow and values
-    /// are few.
+    /// Whether edges in the outer bins measure the background. In images, true neighbors reach those bins.
+    pub(crate) measures_background: bool,
+    /// Distance within which partners of exchanged coordinates are searched, in deltas. In images, delta is narrow and values are
+    /// few.
     pub(crate) exact_reach: f64,
-    /// Exchanges at least this probable are believed. In an image a wrong partner is near all the same.
+    /// Least probability of accepted exchanges. In an image, even a wrong partner is close.
     pub(crate) least_exchange: f32,
-    /// How often joint recovery of candidates goes on from exact coordinates. In an image their neighbors are then placed
-    /// better. In a map they hardly are (0.2 points), and it costs half as much time again.
-    pub(crate) feeds: usize,
-    /// Whether confidence is known: it was never compared with what comes true in images.
+    /// How often joint recovery of candidates runs again from exact coordinates. This improves images. On maps it gains
+    /// 0.2 points and takes half as long again.
+    pub(crate) joint_reruns: usize,
+    /// Whether confidence is computed. Its probabilities were never tested on images.
     pub(crate) confidence: bool,
 }
 
-/// Chosen on RedKitchen and Castle.
+/// Settings of maps, chosen on RedKitchen and Castle.
 const OF_MAPS: Settings = Settings {
     delta_chunks: 12,
     delta_chunks_of_planes: 24,
@@ -200,14 +205,14 @@ const OF_MAPS: Settings = Settings {
     limits_by_share: true,
     keeps_near_edge: true,
     most_radius_of_candidates: 0.95,
-    tells_background: true,
+    measures_background: true,
     exact_reach: 1.0,
     least_exchange: 0.2,
-    feeds: 0,
+    joint_reruns: 0,
     confidence: true,
 };
 
-/// Chosen on six photos of RedKitchen.
+/// Settings of images, chosen on six photos of RedKitchen.
 const OF_IMAGES: Settings = Settings {
     delta_chunks: 4,
     delta_chunks_of_planes: 4,
@@ -216,15 +221,15 @@ const OF_IMAGES: Settings = Settings {
     limits_by_share: false,
     keeps_near_edge: false,
     most_radius_of_candidates: 3.0,
-    tells_background: false,
+    measures_background: false,
     exact_reach: 4.0,
     least_exchange: 0.05,
-    feeds: 2,
+    joint_reruns: 2,
     confidence: false,
 };
 
 impl Settings {
-    /// The settings of maps, or of images in two dimensions.
+    /// Returns the settings of images for `D == 2`, else those of maps.
     pub(crate) const fn of_dimension<const D: usize>() -> Self {
         if D == 2 { OF_IMAGES } else { OF_MAPS }
     }

@@ -1,51 +1,46 @@
-//! The neighborhood graph as evidence: who lists whom, in both directions.
+//! The neighborhood graph: which slots list which records, in both directions.
 //!
-//! A slot's own list names some of its neighbors; those who name its record are as likely to be
-//! neighbors. Whether an edge is named by one end, by the other or by both tells how likely it is true,
-//! and so do the scores of a source: edges of one class share an inlier ratio, which recovery learns.
+//! A slot has edges to the records that it lists, and to the slots that list its record: both are likely neighbors. Edges fall in
+//! classes by direction (one end lists the other, or both do) and by the score of the source. Edges of one class share
+//! an inlier ratio, which recovery learns.
 
 use rayon::prelude::*;
 
 use crate::RecordId;
 use crate::neighbors::Neighborhoods;
 
-/// Which end of an edge names the other.
+/// Which end of an edge lists the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Side {
-    /// The slot names the neighbor.
     Forward,
-    /// The neighbor names the slot. On a paired line it may mean the other slot, nobody knows.
+    /// The neighbor lists the slot's record. Of a paired line, it may mean the other slot.
     Reverse,
-    /// Each names the other.
     Mutual,
 }
 
-/// Classes of scores per direction.
 const SCORE_CLASSES: usize = 1 << CLASS_BITS;
-/// Where score classes begin, as shares of all entries: finer at the top, where most neighbors are.
+/// Quantiles of all scores at which classes begin: finer at the top, where most true neighbors are.
 const SCORE_RANKS: [f64; SCORE_CLASSES - 1] = [0.3, 0.55, 0.72, 0.84, 0.91, 0.955, 0.98];
-/// Scores are ranked by a sample of this many.
+/// Number of scores from which these quantiles are computed.
 const SCORES: usize = 1 << 16;
-/// Classes of edges at most.
 pub(crate) const CLASSES: usize = 3 * SCORE_CLASSES;
-/// Reverse entries of a row at most, as a multiple of the mean list: whoever is named by everyone is
-/// named by mistake.
+/// Largest number of reverse edges of a slot, as a multiple of the mean list length: a record in very many lists is in most of
+/// them by mistake.
 const MOST_REVERSE: usize = 3;
 
-/// The record of a slot: one or two make a record, so a shift does for a division.
+/// Returns the record of a slot. Records have one or two slots, so a shift replaces a division.
 #[inline(always)]
 pub(crate) fn record_of(slot: usize, slots_per_record: usize) -> usize {
     slot >> (slots_per_record - 1)
 }
 
-/// Whether an edge of this class says which record it leads to, but not which of its two slots: a list
-/// names records, while the slot that a list belongs to is known.
+/// Whether an edge of this class leads to a record without saying which of its two slots: lists have records as entries, while
+/// the slot that owns a list is known.
 #[inline(always)]
 pub(crate) fn either(class: u8, slots_per_record: usize) -> bool {
     slots_per_record == 2 && side(class) != Side::Reverse
 }
 
-/// Who names whom in an edge of this class.
 #[inline(always)]
 pub(crate) fn side(class: u8) -> Side {
     match usize::from(class) / SCORE_CLASSES {
@@ -55,7 +50,7 @@ pub(crate) fn side(class: u8) -> Side {
     }
 }
 
-/// The least score of each class but the first; empty without scores.
+/// Returns the least score of each class but the first; empty without scores.
 fn score_bounds(lists: &Neighborhoods) -> Vec<f32> {
     let step = lists.records().len().div_ceil(SCORES).max(1);
     let mut sample: Vec<f32> =
@@ -65,25 +60,25 @@ fn score_bounds(lists: &Neighborhoods) -> Vec<f32> {
     SCORE_RANKS.iter().filter_map(at).collect()
 }
 
-/// The class of the entry at `at` of all entries, by its score.
+/// Returns the score class of the entry with index `at` among all entries.
 #[inline(always)]
 fn score_class(lists: &Neighborhoods, bounds: &[f32], at: usize) -> u8 {
     let class = |score: f32| bounds.partition_point(|&bound| bound <= score) as u8;
     lists.scores().map_or(0, |scores| class(scores[at]))
 }
 
-/// Rows of edges in order of their other ends, a class beside each.
+/// Edges per slot, in order of their ends, with the class of each.
 #[derive(Debug)]
 pub(crate) struct Graph {
     offsets: Vec<u64>,
-    /// Slots; the first of a record's where it is not known which.
+    /// Slots; the first slot of a record if the edge does not specify which.
     ends: Vec<u32>,
     class: Vec<u8>,
     slots_per_record: usize,
 }
 
 impl Graph {
-    /// The edges of `lists`, in both directions.
+    /// Creates the edges of `lists` in both directions.
     pub(crate) fn new(lists: &Neighborhoods, slots_per_record: usize) -> Self {
         let n_slots = lists.n_slots();
         let n_records = n_slots / slots_per_record;
@@ -94,7 +89,7 @@ impl Graph {
             .into_par_iter()
             .map(|part| Transposed::new(lists, part, n_blocks, bounds))
             .collect();
-        // A room for the rows of each block, as large as they could be. Memory that they do not need is hardly touched.
+        // Each block gets space for the largest possible size of its rows. Unused memory is hardly touched.
         let slots_of = |block: usize| {
             let records = block * BLOCK..((block + 1) * BLOCK).min(n_records);
             records.start * slots_per_record..records.end * slots_per_record
@@ -133,7 +128,7 @@ impl Graph {
         };
         let row_ends: Vec<Vec<usize>> =
             rows.into_par_iter().enumerate().map_init(Block::default, merged).collect();
-        // Blocks move together.
+        // Close the gaps between blocks.
         let (mut from, mut to) = (0, 0);
         let mut offsets = Vec::with_capacity(n_slots + 1);
         offsets.push(0);
@@ -151,32 +146,31 @@ impl Graph {
         Self { offsets, ends, class, slots_per_record }
     }
 
-    /// The other ends of the edges of `slot`, and the class of each.
+    /// Returns the ends of the edges of `slot`, and the class of each.
     #[inline(always)]
     pub(crate) fn of(&self, slot: usize) -> (&[u32], &[u8]) {
         let range = self.offsets[slot] as usize..self.offsets[slot + 1] as usize;
         (&self.ends[range.clone()], &self.class[range])
     }
 
-    /// The other end and the class of the edge at `at` of all edges.
+    /// Returns the end and the class of the edge with index `at` among all edges.
     pub(crate) fn edge(&self, at: u64) -> (u32, u8) {
         (self.ends[at as usize], self.class[at as usize])
     }
 
-    /// Number of slots.
     pub(crate) fn n_slots(&self) -> usize {
         self.offsets.len() - 1
     }
 
-    /// Number of edges, both directions counted.
+    /// Number of edges, with both directions counted.
     pub(crate) fn len(&self) -> usize {
         self.ends.len()
     }
 
-    /// How often each record is at the other end of an edge.
+    /// Returns how many edges lead to each record.
     pub(crate) fn times_listed(&self) -> Vec<u32> {
         let none = vec![0; self.n_slots() / self.slots_per_record];
-        // Sums of integers: the same however threads share the work.
+        // Sums of integers do not depend on how threads split the work.
         let part = self.ends.len().div_ceil(rayon::current_num_threads()).max(1);
         let counted = self.ends.par_chunks(part).map(|ends| {
             let mut counts = none.clone();
@@ -192,33 +186,32 @@ impl Graph {
         counted.reduce_with(sums).unwrap_or(none)
     }
 
-    /// The edges as neighborhoods (records with one slot each).
+    /// Returns the edges as neighborhoods, for records with one slot.
     pub(crate) fn neighborhoods(&self) -> Neighborhoods {
         let records = self.ends.iter().map(|&end| RecordId(end)).collect();
         Neighborhoods::unchecked(self.offsets.clone(), records)
     }
 }
 
-// Who names a record: lists transposed, a block of records at a time.
+// Transposed lists: which slots list a record, one block of records at a time.
 //
-// Entries first go to the blocks of the records they name, in four bytes each. A block is put in order only where its
-// rows are made, while it is in the cache: a plain counting sort takes twice the time (docs/decisions/joint.md).
+// Entries are first distributed over the blocks of their records, in four bytes each. A block is sorted only when its rows
+// are made, while it is in the cache: a plain counting sort takes twice the time (docs/decisions/joint.md).
 
-/// Records in a block, and slots whose lists one thread transposes at a time.
+/// Number of records in a block, and of slots whose lists one task transposes.
 const BLOCK: usize = 1 << BITS;
 /// Bits of a slot or a record within its block.
 const BITS: u32 = 12;
-/// Bits of a class of scores.
 const CLASS_BITS: u32 = 3;
-/// A slot, a record and a class fit side by side.
+// A slot, a record and a class fit into one entry.
 const _: () = assert!(2 * BITS + CLASS_BITS <= u32::BITS);
 
-/// The entries of the lists of [`BLOCK`] slots by the block of the record that they name, in order of slot within each block.
+/// The entries of the lists of [`BLOCK`] slots, by block of their record and then in order of slot.
 struct Transposed {
     first_slot: u32,
-    /// Where blocks begin.
+    /// Offset of each block.
     offsets: Vec<u32>,
-    /// From the highest bit: slot (of this part), record (of its block), class.
+    /// From the highest bit: slot (within this part), record (within its block), class.
     entries: Vec<u32>,
 }
 
@@ -248,26 +241,24 @@ impl Transposed {
         Self { first_slot: (part * BLOCK) as u32, offsets, entries }
     }
 
-    /// The entries that name records of `block`.
     fn of_block(&self, block: usize) -> &[u32] {
         &self.entries[self.offsets[block] as usize..self.offsets[block + 1] as usize]
     }
 }
 
-/// The entries that name the records of one block, in order of slot.
+/// The entries whose records are in one block, sorted by record and slot.
 #[derive(Default)]
 struct Block {
     offsets: Vec<u32>,
-    /// The slot that names it, and the class of its score.
+    /// The slot that owns the entry, and the class of its score.
     by: Vec<(u32, u8)>,
 }
 
 impl Block {
-    /// Puts the entries of `block` in order.
     fn fill(&mut self, transposed: &[Transposed], block: usize) {
         let record = |entry: u32| (entry >> CLASS_BITS) as usize % BLOCK;
         let Self { offsets, by } = self;
-        // Starts are two places ahead and become ends of the rows before as rows fill.
+        // Offsets are shifted by two places; filling the rows moves them to their ends.
         offsets.clear();
         offsets.resize(BLOCK + 2, 0);
         for part in transposed {
@@ -287,14 +278,14 @@ impl Block {
         }
     }
 
-    /// The slots that name the record at a place of the block, and the class of each score.
+    /// Returns the slots that list a record of the block, and the score class of each.
     #[inline(always)]
     fn of(&self, record: usize) -> &[(u32, u8)] {
         &self.by[self.offsets[record] as usize..self.offsets[record + 1] as usize]
     }
 }
 
-/// The rows of one block, in a place that has room for all of them; so many edges so far.
+/// The rows of one block, in a buffer with space for all of them; `n` is the number of edges so far.
 struct Rows<'a> {
     ends: &'a mut [u32],
     class: &'a mut [u8],
@@ -302,8 +293,8 @@ struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// Merges the `list` of a slot with `all` who name its record, of whom about `most` count; both are in ascending order. The
-    /// entry at a place of the list has a class of scores.
+    /// Merges the `list` of a slot with `all` slots that list its record; both are ascending. About `most` of `all` are used.
+    /// `score_class` returns the class of an entry of the list.
     fn add(
         &mut self,
         list: &[RecordId],
@@ -312,7 +303,7 @@ impl Rows<'_> {
         most: usize,
         score_class: impl Fn(usize) -> u8,
     ) {
-        // Slots are in random order: every so many of them are as good as any.
+        // Slots are in random order, so evenly spaced ones are a fair sample.
         let every = all.len().div_ceil(most).max(1);
         let n_reverse = all.len().div_ceil(every);
         let class = |side: Side, of_score: u8| (side as usize * SCORE_CLASSES) as u8 + of_score;
@@ -324,18 +315,18 @@ impl Rows<'_> {
             (ends[to], classes[to]) = (end, class);
             to += usize::from(stays);
         };
-        // Which of two lists goes on is anyone's guess: steps are added, not branched on.
+        // Branches would be unpredictable, so steps are added instead.
         let (mut at, mut reverse, mut mutual) = (0, 0, u32::MAX);
         while at < list.len() && reverse < n_reverse {
             let (mine, (by, of_score)) = (list[at].0, all[reverse * every]);
-            // One or two slots make a record.
+            // Records have one or two slots.
             let theirs = by >> (own - 1);
             let (is_mine, is_theirs) = (mine <= theirs, theirs <= mine);
             let side = if is_theirs { Side::Mutual } else { Side::Forward };
             let of_mine = class(side, score_class(at));
             let of_theirs = class(Side::Reverse, of_score);
             let end = if is_mine { mine * own } else { by };
-            // The other slot of a record that is mutual already says nothing new.
+            // If a record is mutual already, its other slot adds nothing.
             put(end, if is_mine { of_mine } else { of_theirs }, is_mine | (theirs != mutual));
             mutual = if is_mine & is_theirs { theirs } else { mutual };
             at += usize::from(is_mine);
@@ -356,7 +347,7 @@ mod tests {
     use super::*;
     use crate::seed::{Draws, Stage};
 
-    /// Everyone names record 7, nobody the last one, many each other, and every fifth slot nobody.
+    /// Random lists: all slots list record 7, none lists the last record, many list each other, and every fifth list is empty.
     fn lists(n_records: usize, slots_per_record: usize) -> Neighborhoods {
         let mut draws = Draws::new(5, Stage::NullSample, 0);
         let (mut offsets, mut records, mut scores) = (vec![0], Vec::new(), Vec::new());
@@ -373,7 +364,7 @@ mod tests {
         Neighborhoods::try_new(offsets, records, Some(scores), n_records, slots_per_record).unwrap()
     }
 
-    /// The edges of each slot, found one by one.
+    /// Returns the edges of each slot, computed one by one.
     fn expected(lists: &Neighborhoods, slots_per_record: usize) -> Vec<Vec<(u32, u8)>> {
         let bounds = score_bounds(lists);
         let class = |at| score_class(lists, &bounds, at);

@@ -1,24 +1,23 @@
-//! A dense grid over the part of space where a map lies: sums per cell, smoothed, looked up by place.
+//! A dense grid over the box of a map, and the density of estimates on it.
 
 use crate::Error;
 use crate::recover::map::bytes::{Reader, put};
 use crate::recover::map::graph::record_of;
 use crate::recover::map::places::Places;
 
-/// Axis-parallel cells of one size over a box. Places outside belong to the nearest cell.
+/// Cubic cells over a box. Places outside belong to the nearest cell.
 #[derive(Clone, Debug)]
 pub(crate) struct Grid<const D: usize> {
     low: [f32; D],
     cell: f32,
-    /// Cells per length.
     per_length: f32,
     dims: [usize; D],
-    /// The last cell along each axis, as places are compared with it.
+    /// Index of the last cell along each axis, as a float.
     last: [f32; D],
     pub(crate) values: Vec<f32>,
 }
 
-/// Every `f32` from here on is whole.
+/// Every `f32` from here on is an integer.
 const ROUNDING: f32 = 8_388_608.0;
 
 impl<const D: usize> Grid<D> {
@@ -27,7 +26,7 @@ impl<const D: usize> Grid<D> {
         Self { low, cell, per_length: 1.0 / cell, dims, last, values }
     }
 
-    /// About `n_cells` empty cells over the box from `low` to `high`; an axis without extent gets one.
+    /// Creates about `n_cells` empty cells over the box from `low` to `high`; an axis without extent gets one cell.
     pub(crate) fn over(low: [f32; D], high: [f32; D], n_cells: usize) -> Self {
         let extent: [f64; D] =
             std::array::from_fn(|c| (f64::from(high[c]) - f64::from(low[c])).max(0.0));
@@ -42,8 +41,7 @@ impl<const D: usize> Grid<D> {
         Self::of_cells(low, high, cell as f32)
     }
 
-    /// Empty cells of a given size over the box from `low` to `high`, larger ones if it takes more than
-    /// `most`.
+    /// Creates empty cells of a given size over the box from `low` to `high`; larger cells if there would be more than `most`.
     fn with_cell(low: [f32; D], high: [f32; D], cell: f32, most: usize) -> Self {
         let side = |c: usize| f64::from((high[c] - low[c]) / cell).ceil().max(1.0);
         match (0..D).map(side).product::<f64>() <= most as f64 {
@@ -58,7 +56,6 @@ impl<const D: usize> Grid<D> {
         Self::new(low, cell, dims, vec![0.0; dims.iter().product()])
     }
 
-    /// Appends the grid to `to`.
     pub(crate) fn write(&self, to: &mut Vec<u8>) {
         put(to, &self.low);
         put(to, &[self.cell]);
@@ -66,8 +63,8 @@ impl<const D: usize> Grid<D> {
         put(to, &self.values);
     }
 
-    /// The grid that [`write`](Self::write) appended.
-    /// Fails when the bytes hold none, or one with more than `most` cells.
+    /// Reads the grid that [`write`](Self::write) appended.
+    /// Fails when the bytes are not a grid of at most `most` cells.
     pub(crate) fn read(from: &mut Reader<'_>, most: usize) -> Result<Self, Error> {
         let mut dims = [0; D];
         let box_of = from.f32s(D + 1)?;
@@ -83,48 +80,45 @@ impl<const D: usize> Grid<D> {
         Ok(Self::new(std::array::from_fn(|c| box_of[c]), cell, dims, from.f32s(n_cells)?))
     }
 
-    /// How long the sides of the box are, in whole cells.
+    /// Returns the sides of the box, in whole cells.
     pub(crate) fn sides(&self) -> [f32; D] {
         self.dims.map(|n| n as f32 * self.cell)
     }
 
-    /// The edge of a cell.
     pub(crate) fn cell(&self) -> f32 {
         self.cell
     }
 
-    /// The volume of a cell.
     pub(crate) fn volume(&self) -> f32 {
         (0..D).map(|_| self.cell).product()
     }
 
-    /// The cell of `place`; far places, infinite ones included, land in border cells.
+    /// Returns the index of the cell of `place`. Places outside, even infinite ones, get border cells.
     #[inline(always)]
     pub(crate) fn index(&self, place: &[f32; D]) -> usize {
         self.number(|c| place[c]) as usize
     }
 
-    /// The value of the cell of `place`.
     #[inline(always)]
     pub(crate) fn at(&self, place: &[f32; D]) -> f32 {
         self.values[self.index(place)]
     }
 
-    /// The number of the cell of a place with these coordinates.
+    /// Returns the index of the cell of a place with these coordinates.
     #[inline(always)]
     fn number(&self, x: impl Fn(usize) -> f32) -> u32 {
         let mut number = 0;
         for c in 0..D {
             let at = ((x(c) - self.low[c]) * self.per_length - 0.5).max(0.0).min(self.last[c]);
-            // Rounded to a whole number by running out of digits: a cast that minds infinities is no vector
-            // instruction. What is exactly between two cells belongs to either.
+            // Adding a large number rounds to an integer: a cast that handles infinities is no vector instruction. A place exactly between
+            // two cells may get either.
             let whole = (at + ROUNDING).to_bits() - ROUNDING.to_bits();
             number = number * self.dims[c] as u32 + whole;
         }
         number
     }
 
-    /// The cells of the places `through + t direction`.
+    /// Computes the cells of the places `through + t direction`.
     #[inline(always)]
     pub(crate) fn cells_along(
         &self,
@@ -138,7 +132,6 @@ impl<const D: usize> Grid<D> {
         }
     }
 
-    /// The cells of places in columns.
     #[inline(always)]
     fn cells_of(&self, columns: &[&[f32]; D], cells: &mut [u32]) {
         let columns: [&[f32]; D] = columns.map(|column| &column[..cells.len()]);
@@ -147,7 +140,7 @@ impl<const D: usize> Grid<D> {
         }
     }
 
-    /// Adds `weight` at `place`, shared linearly among the cells around it.
+    /// Adds `weight` at `place`, distributed linearly over the cells around it.
     pub(crate) fn spread(&mut self, place: &[f32; D], weight: f32) {
         let mut first = [0usize; D];
         let mut share = [0.0f32; D];
@@ -168,7 +161,7 @@ impl<const D: usize> Grid<D> {
         }
     }
 
-    /// The part `[from, to]` of the line `through + t direction` that lies inside, if any.
+    /// Returns the part `[from, to]` of the line `through + t direction` inside the box, if any.
     pub(crate) fn clip(
         &self,
         through: &[f32; D],
@@ -191,7 +184,7 @@ impl<const D: usize> Grid<D> {
         (from < to).then_some((from, to))
     }
 
-    /// Replaces every value by the mean of its neighborhood: weights 1 2 1 along each axis, with neighbors so many cells apart.
+    /// Smooths with weights 1 2 1 along each axis, with neighbors `apart` cells away.
     pub(crate) fn smooth(&mut self, apart: usize) {
         let mut stride = 1;
         let mut line = Vec::new();
@@ -215,26 +208,25 @@ impl<const D: usize> Grid<D> {
     }
 }
 
-// How dense estimates of listed records lie: the votes a place gets by chance.
+// The density of estimates: `p_random` of joint recovery.
 
-/// Estimates per volume, as a share of all, each counted as often as its record is listed.
+/// Density of estimates as a fraction of all per volume. Each estimate is weighted by the number of edges to its record.
 pub(crate) struct Density<const D: usize> {
     grid: Grid<D>,
     typical: f32,
 }
 
-/// A cell has at least the density of this part of one estimate: no place is without chance.
+/// Least density of a cell, as a fraction of that of one widely smoothed estimate, so that chance is never 0.
 const LEAST: f32 = 0.5;
-/// Cells with less than this many estimates, which is noise, take their density from a wider neighborhood,
+/// Cells with less than this many estimates take their density from a wider neighborhood.
 const ENOUGH: f32 = 0.25;
-/// twice as wide at most this many times over.
+/// Number of times that the neighborhood doubles.
 const WIDER: usize = 3;
-/// Sparse places are taken as so much wider at most: the farthest points have no neighbors worth the name.
+/// Largest local width, because the farthest points hardly have true neighbors.
 const WIDEST: f32 = 2.5;
 
 impl<const D: usize> Density<D> {
-    /// The density of `places`, weighted by how often each slot's record is `listed`, smooth over
-    /// about `radius`.
+    /// Computes the density of `places`, smoothed over about `radius`; `listed` is the number of edges to each record.
     pub(crate) fn new(places: &Places<D>, listed: &[u32], radius: f32) -> Self {
         let n = places.len();
         let (low, high) = places.trimmed_box();
@@ -250,7 +242,7 @@ impl<const D: usize> Density<D> {
         }
         grid.smooth(1);
         let mean_times = (weight / n.max(1) as f64) as f32;
-        // Linear spreading and smoothing leave about 1 / 2^D of an estimate in its own cell.
+        // Linear distribution and smoothing leave about 1 / 2^D of an estimate in its own cell.
         let least = LEAST * mean_times / (1 << (D * (1 + WIDER))) as f32;
         look_wider(&mut grid, ENOUGH * mean_times);
         let scale = 1.0 / (weight.max(1.0) as f32 * grid.volume());
@@ -266,13 +258,12 @@ impl<const D: usize> Density<D> {
         Self { grid, typical }
     }
 
-    /// The density at `x`.
     #[inline(always)]
     pub(crate) fn at(&self, x: &[f32; D]) -> f32 {
         self.grid.at(x)
     }
 
-    /// The densities at places in columns, with room for a cell each.
+    /// Computes the densities at places in columns; `cells` is a buffer.
     #[inline(always)]
     pub(crate) fn at_each(&self, x: &[&[f32]; D], cells: &mut [u32], densities: &mut [f32]) {
         self.grid.cells_of(x, cells);
@@ -281,14 +272,14 @@ impl<const D: usize> Density<D> {
         }
     }
 
-    /// The logarithm of how much sparser estimates are where the density is `density` than at a
-    /// typical place.
+    /// Returns the logarithm of the typical density over `density`.
     pub(crate) fn sparsity(&self, density: f32) -> f32 {
         libm::logf(self.typical / density)
     }
 
-    /// The local width: how much wider neighbors lie where the density is `density` than at a typical place, as lists have one
-    /// length. Dense places count as typical: how narrow they are is beyond what the grid resolves.
+    /// Returns the local width: how much larger the distance to neighbors is than at a typical place. Lists are equally long
+    /// everywhere, so neighbors lie farther away where the density is low. Dense places get 1, because the grid does not resolve them.
+    /// The formula is that of three dimensions, and is used in two dimensions as well.
     #[inline(always)]
     pub(crate) fn width(&self, density: f32) -> f32 {
         let ratio = self.typical / density;
@@ -296,8 +287,8 @@ impl<const D: usize> Density<D> {
     }
 }
 
-/// Where a cell of `grid` holds less than `enough`, its value becomes that of a wider smoothing, the first of several
-/// under which as many estimates stand behind it.
+/// In cells of `grid` with less than `enough`, replaces the value by that of the narrowest wider smoothing with as many estimates
+/// in its neighborhood.
 fn look_wider<const D: usize>(grid: &mut Grid<D>, enough: f32) {
     let mut wide = grid.clone();
     let mut open: Vec<u32> =
@@ -312,11 +303,11 @@ fn look_wider<const D: usize>(grid: &mut Grid<D>, enough: f32) {
     }
 }
 
-/// Cells per radius: linear spreading, smoothing and lookup by cell together spread an estimate as far
-/// (in variance) as the kernel `1 - r^2 / radius^2` in three dimensions.
+/// Edge of a cell in radii. Linear distribution, smoothing and lookup by cell together have the variance of the kernel
+/// `1 - r^2 / radius^2` in three dimensions.
 const CELL: f32 = 0.436;
 
-/// The cube root of a number above 1, to 1e-3: two Newton steps from an exponent divided by three.
+/// Returns the cube root of a number above 1, to 1e-3: two Newton steps from an exponent divided by three.
 #[inline(always)]
 fn cube_root(x: f32) -> f32 {
     let mut y = f32::from_bits(x.to_bits() / 3 + 709_921_077);
@@ -331,11 +322,11 @@ mod tests {
     use super::*;
     use crate::seed::{Draws, Stage};
 
-    /// The cell of a place, counted in another way.
+    /// Returns the index of the cell of a place, computed in another way.
     fn counted(grid: &Grid<3>, place: &[f32; 3]) -> usize {
         (0..3).fold(0, |number, c| {
             let at = f64::from(place[c] - grid.low[c]) / f64::from(grid.cell);
-            // Not a number is nowhere, and nowhere is the first cell.
+            // NaN belongs to the first cell.
             let whole = if at.is_nan() { 0.0 } else { at.floor() };
             number * grid.dims[c] + whole.clamp(0.0, (grid.dims[c] - 1) as f64) as usize
         })

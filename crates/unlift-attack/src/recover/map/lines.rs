@@ -1,31 +1,31 @@
-//! Lines and rays as rows of one table, and their sections with a feasible line.
+//! Lines and rays as rows of one table, their sections with a feasible line, and the evidence of agreement.
 
 use crate::RecordId;
 use crate::geometry::frame::Bounds;
 use crate::geometry::vector::{along, widen};
 use crate::released::{Lines, Rays};
 
-/// One line or ray: half a cache line, so that a neighbor costs one memory access.
+/// A line or ray. A row is half a cache line, so that a neighbor costs one memory access.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
 pub(crate) struct LineRow<const D: usize> {
-    /// A point of the line: the foot, or the center of a ray.
+    /// A point of the line: its foot, the entry into known bounds, or the center of a ray.
     pub(crate) through: [f32; D],
-    /// Unit direction; signed for rays.
+    /// Unit direction; rays extend in this direction.
     pub(crate) direction: [f32; D],
     /// The center of a ray, or [`NO_GROUP`].
     pub(crate) group: u32,
-    /// Where it ends: infinite, except within known bounds.
+    /// Parameter where the row ends: infinite without known bounds.
     pub(crate) to: f32,
 }
 
-/// The group of lines, which all may vote for each other.
+/// The group of lines, which may all vote for each other.
 pub(crate) const NO_GROUP: u32 = u32::MAX;
 
-/// Squared sines below this count as parallel: such a record does not tell where along the line.
+/// Lines with a smaller squared sine are parallel, so that they give no position along each other.
 const PARALLEL: f32 = 1e-6;
 
-/// Lines as rows. Within `bounds` about the released origin, where these are known, a chord starts where the line enters.
+/// Converts lines to rows. `bounds`, relative to the released origin, cut lines to chords that start where the line enters.
 pub(crate) fn from_lines<const D: usize>(
     lines: &Lines<D>,
     bounds: Option<&Bounds<D>>,
@@ -41,7 +41,7 @@ pub(crate) fn from_lines<const D: usize>(
     lines.foot().iter().zip(lines.direction()).map(row).collect()
 }
 
-/// Rays as rows, within the region of their center or else within `bounds`, where these are known.
+/// Converts rays to rows, cut at the region of their center or else at `bounds`, where these are known.
 pub(crate) fn from_rays<const D: usize>(
     rays: &Rays<D>,
     bounds: Option<&Bounds<D>>,
@@ -50,7 +50,7 @@ pub(crate) fn from_rays<const D: usize>(
         let through = rays.centers()[usize::from(center)];
         let region = rays.regions().map(|regions| &regions[usize::from(center)]).or(bounds);
         let clip = |region: &Bounds<D>| region.clip(&widen(&through), &widen(&direction));
-        // A ray that leaves its region at once is a file's fault: nothing is known about it.
+        // A ray that leaves its region at once is an error of the file; it is not cut.
         let to = region.and_then(clip).map(|(_, to)| to as f32).filter(|&to| to > 0.0);
         let to = to.unwrap_or(f32::INFINITY);
         LineRow { through, direction, group: u32::from(center), to }
@@ -59,43 +59,39 @@ pub(crate) fn from_rays<const D: usize>(
 }
 
 impl<const D: usize> LineRow<D> {
-    /// Whether this is a half-line.
     #[inline(always)]
     pub(crate) fn is_ray(&self) -> bool {
         self.group != NO_GROUP
     }
 
-    /// Whether this record is evidence for a point on `own`: rays of one center meet trivially.
+    /// Whether this record is evidence for a point on `own`: rays of one center always meet there.
     #[inline(always)]
     pub(crate) fn may_vote_for(&self, own: &Self) -> bool {
         !own.is_ray() || self.group != own.group
     }
 
-    /// Where half-lines and chords begin to count.
+    /// Returns the parameter where the row begins: 0 for rays and chords.
     #[inline(always)]
     pub(crate) fn floor(&self) -> f32 {
         if self.group == NO_GROUP && self.to == f32::INFINITY { f32::NEG_INFINITY } else { 0.0 }
     }
 
-    /// `t` moved to where the record is.
+    /// Returns the parameter of the row nearest to `t`.
     #[inline(always)]
     pub(crate) fn clamp(&self, t: f32) -> f32 {
         t.max(self.floor()).min(self.to)
     }
 
-    /// The point of this line nearest to `other`; `None` when they are parallel or it lies behind a
-    /// center.
+    /// Returns the point of this line nearest to `other`; `None` if they are parallel or the point is not on the row.
     pub(crate) fn crossing(&self, other: &Self) -> Option<[f32; D]> {
         let (t, miss2, _) = self.section((other.through, other.direction, other.group));
         (miss2 < NO_VOTE && t >= self.floor() && t <= self.to).then(|| self.at(t))
     }
 
-    /// Where the record with this point, direction and group passes nearest, how far away (squared) and
-    /// at which angle (squared sine).
+    /// Returns where a record passes nearest (parameter), its squared distance there, and the squared sine of the angle.
     ///
-    /// With `v` and `u` the parts of `self.through - through` and `self.direction` perpendicular to
-    /// the record, the squared distance is `|v + t u|^2`: no difference of large squares, so that
-    /// `f32` suffices far from the origin.
+    /// Let `v` and `u` be the components of `self.through - through` and `self.direction` perpendicular to the record. Then the squared
+    /// distance is `|v + t u|^2`. It is no difference of large squares, so `f32` suffices far from the origin.
     #[inline(always)]
     fn section(&self, (through, direction, group): ([f32; D], [f32; D], u32)) -> (f32, f32, f32) {
         let (mut w_e, mut d_e) = (0.0, 0.0);
@@ -117,23 +113,21 @@ impl<const D: usize> LineRow<D> {
             let m = v(c) + t * u(c);
             miss += m * m;
         }
-        // Rays of one center meet trivially; a closest approach behind a center is none.
+        // Rays of one center always meet there; a closest approach behind a center does not count.
         let behind = self.is_ray() & ((group == self.group) | (w_e + t * d_e <= 0.0));
         let miss2 = if parallel | behind { NO_VOTE } else { miss };
         (t, miss2, if parallel { 1.0 } else { u_u })
     }
 
-    /// The point at parameter `t`.
     #[inline(always)]
     pub(crate) fn at(&self, t: f32) -> [f32; D] {
         std::array::from_fn(|c| self.through[c] + t * self.direction[c])
     }
 }
 
-/// A column per coordinate.
 type Columns<const D: usize> = [Vec<f32>; D];
 
-/// Fills `columns` with a row for each item.
+/// Fills `columns` with one row per item.
 #[inline(always)]
 pub(crate) fn fill<const D: usize, T>(
     columns: &mut Columns<D>,
@@ -147,7 +141,7 @@ pub(crate) fn fill<const D: usize, T>(
     }
 }
 
-/// Neighbors gathered into one column per coordinate: the section loop then runs over whole vectors.
+/// Listed lines in columns, so that the loop over sections runs over whole vectors.
 #[derive(Clone, Debug)]
 pub(crate) struct LineColumns<const D: usize> {
     through: Columns<D>,
@@ -163,7 +157,6 @@ impl<const D: usize> Default for LineColumns<D> {
 }
 
 impl<const D: usize> LineColumns<D> {
-    /// Gathers `records` from `rows`.
     #[inline(always)]
     pub(crate) fn gather(&mut self, rows: &[LineRow<D>], records: &[RecordId]) {
         fill(&mut self.through, records, |record| rows[record.index()].through);
@@ -172,14 +165,14 @@ impl<const D: usize> LineColumns<D> {
         self.group.extend(records.iter().map(|record| rows[record.index()].group));
     }
 
-    /// How many of the gathered records are evidence for a point on `own`.
+    /// Returns how many gathered records are evidence for a point on `own`.
     #[inline(always)]
     pub(crate) fn n_that_may_vote(&self, own: &LineRow<D>) -> usize {
         let strange = |&&group: &&u32| !own.is_ray() || group != own.group;
         self.group.iter().filter(strange).count()
     }
 
-    /// The sections of the gathered records with `own`.
+    /// Computes the sections of the gathered records with `own`.
     #[inline(always)]
     pub(crate) fn sections(&self, own: &LineRow<D>, out: &mut Sections) {
         let n = self.group.len();
@@ -196,7 +189,7 @@ impl<const D: usize> LineColumns<D> {
     }
 }
 
-/// Axis candidates gathered into one column per coordinate.
+/// Listed axis candidates in columns.
 #[derive(Clone, Debug)]
 pub(crate) struct CandidateColumns<const D: usize> {
     position: Columns<D>,
@@ -209,23 +202,20 @@ impl<const D: usize> Default for CandidateColumns<D> {
 }
 
 impl<const D: usize> CandidateColumns<D> {
-    /// Gathers `records` from `rows`.
     #[inline(always)]
     pub(crate) fn gather(&mut self, rows: &[[f32; D]], records: &[RecordId]) {
         fill(&mut self.position, records, |record| rows[record.index()]);
     }
 
-    /// Number of gathered records.
     pub(crate) fn len(&self) -> usize {
         self.position[0].len()
     }
 
-    /// The sections of the gathered records with the line through `own` along `axis`.
+    /// Computes the sections of the gathered records with the line through `own` along `axis`.
     ///
-    /// A record stands for its `D` axis lines and counts once, with the nearest of them. Its line
-    /// along `axis` is parallel to mine: if it passes within delta it agrees with every `t` (it
-    /// tells nothing about the position, but it does tell about the axis). Of the others the
-    /// nearest is the one whose free coordinate is that of the largest difference.
+    /// A record has `D` axis lines and counts once, by the nearest of them. Its line along `axis` is parallel to the own one: within
+    /// delta it agrees with every `t`, which is evidence for the axis but not for the position. Of the other lines, the nearest
+    /// is free along the coordinate with the largest difference.
     #[inline(always)]
     pub(crate) fn sections(&self, own: &[f32; D], axis: usize, delta2: f32, out: &mut Sections) {
         let n = self.position[0].len();
@@ -247,19 +237,18 @@ impl<const D: usize> CandidateColumns<D> {
             at[j] = along[j] * free;
             bend[j] = free;
             let miss = crossing + (1.0 - free) * (sum - crossing);
-            // Beyond the range of f32 the difference is no number, and no vote.
+            // On overflow the sum is infinite and the record does not vote.
             let near = (crossing <= delta2) & (sum < f32::INFINITY);
             miss2[j] = if near { miss } else { NO_VOTE };
         }
     }
 }
 
-/// Where listed records pass one feasible line, in columns.
+/// Where listed records pass a feasible line, in columns.
 ///
-/// Along `x(t)` the squared distance to record `j` is `miss2[j] + bend[j] (t - at[j])^2`: `at` is
-/// the parameter of the closest approach, `miss2` the squared distance there, `bend` the squared
-/// sine of the angle between the lines (0 for a parallel axis of a candidate, which agrees with every `t` alike). Within
-/// `delta` of a record is therefore an interval of `t`.
+/// The squared distance from `x(t)` to record `j` is `miss2[j] + bend[j] (t - at[j])^2`: `at` is the parameter of the closest
+/// approach, `miss2` the squared distance there, and `bend` the squared sine of the angle between the lines (0 for a parallel
+/// line of an axis candidate, which agrees with every `t`). So the places within `delta` of a record form an interval of `t`.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Sections {
     pub(crate) at: Vec<f32>,
@@ -267,11 +256,11 @@ pub(crate) struct Sections {
     pub(crate) bend: Vec<f32>,
 }
 
-/// `miss2` of a record that says nothing here (parallel, same center, behind it).
+/// `miss2` of a record that does not vote: parallel, of the same center, or behind it.
 pub(crate) const NO_VOTE: f32 = f32::INFINITY;
 
 impl Sections {
-    /// Makes room for `n` sections, of which the first `n` must then be written; the padding is silent.
+    /// Resizes to `n` sections, all of which must then be written. The padding does not vote.
     #[inline(always)]
     pub(crate) fn resize(&mut self, n: usize) {
         let padded = n.next_multiple_of(LANES);
@@ -283,27 +272,27 @@ impl Sections {
         self.bend[n..].fill(1.0);
     }
 
-    /// Number of sections, padding included.
+    /// Number of sections, with padding.
     #[inline(always)]
     pub(crate) fn len(&self) -> usize {
         self.at.len()
     }
 
-    /// How many records say anything at all.
+    /// Number of records that vote.
     #[inline(always)]
     pub(crate) fn n_voting(&self) -> usize {
         self.miss2.iter().map(|&miss2| usize::from(miss2 < NO_VOTE)).sum()
     }
 
-    /// Squared distance from `x(t)` to record `j`.
+    /// Returns the squared distance from `x(t)` to record `j`.
     #[inline(always)]
     pub(crate) fn squared_distance(&self, j: usize, t: f32) -> f32 {
         let d = t - self.at[j];
         self.miss2[j] + self.bend[j] * d * d
     }
 
-    /// One step of least squares over the records within `reach2` (squared) of `x(t)`: the shift of
-    /// `t` and the number of these records; no shift when none of them tells where.
+    /// Returns the shift of `t` by one least-squares step over the records within `reach2` (squared) of `x(t)`, and their number. The shift
+    /// is 0 if all of them are parallel.
     #[inline(always)]
     pub(crate) fn least_squares_step(&self, t: f32, reach2: f32) -> (f32, u32) {
         let (mut weight, mut sum, mut n) = ([0.0f32; LANES], [0.0f32; LANES], [0u32; LANES]);
@@ -325,25 +314,25 @@ impl Sections {
     }
 }
 
-/// A position along a feasible line and why it was chosen.
+/// The best position along a feasible line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Peak {
     pub(crate) t: f32,
-    /// Improbability by chance that so many records pass there, in nats.
+    /// Improbability by chance of the agreement, in nats.
     pub(crate) evidence: f32,
-    /// Evidence and prior: what is maximized.
+    /// Evidence plus prior, which is maximized.
     pub(crate) score: f32,
 }
 
-/// Intervals of `t` within delta of the records that pass there, in order of record.
+/// Intervals of `t` within delta of each record, in order of record.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Intervals {
     low: Vec<f32>,
     high: Vec<f32>,
-    /// Records that are within delta everywhere.
+    /// Number of records within delta for every `t`.
     everywhere: u32,
-    /// Where each interval starts: how many hold it, the chance that a random record passes there, its cell,
-    /// and what follows from these.
+    /// For the start of each interval: the number of intervals that contain it, the chance that a random record passes there, its
+    /// cell of the grid, evidence and score.
     count: Vec<u32>,
     chance: Vec<f32>,
     cell: Vec<u32>,
@@ -352,7 +341,7 @@ pub(crate) struct Intervals {
 }
 
 impl Intervals {
-    /// The intervals of `sections` at `delta`, as far as they lie between `floor` and `top`.
+    /// Computes the intervals of `sections`, cut to `floor..=top`.
     #[inline(always)]
     fn fill(&mut self, sections: &Sections, delta2: f32, floor: f32, top: f32) {
         let n = sections.len();
@@ -368,7 +357,7 @@ impl Intervals {
             low[j] = if empty { f32::INFINITY } else { start.max(floor) };
             high[j] = end;
         }
-        // Every row is written, and stays if it begins somewhere: no branch to guess.
+        // Every row is written and kept only if it is not empty, without a branch.
         let (mut kept, mut everywhere) = (0, 0);
         for j in 0..n {
             let start = low[j];
@@ -386,13 +375,12 @@ impl Intervals {
         }
     }
 
-    /// Where `sections` agree least probably by chance, between `floor` and `top` and at `delta`. The number of agreeing records
-    /// changes only at the ends of their intervals and is largest at some start, so only starts are looked at.
+    /// Returns the position between `floor` and `top` where the agreement of `sections` is least probable by chance. The number of
+    /// agreeing records is largest at the start of some interval, so only starts are tried.
     ///
-    /// `k` listed records could vote; `chances` adds to its last argument the chance that a random record
-    /// passes at each start (of the first), with room for cells of a grid (in the second). The prior is the chance
-    /// itself: a point is likelier to lie where the map is dense, and chance measures density. Ties are won by the lower
-    /// record.
+    /// `k` listed records may vote. `chances` gets the starts, a buffer for cells, and a column to which it adds the chance that a
+    /// random record passes there. The prior is proportional to that chance, because points are denser where records are. The
+    /// lower record wins ties.
     #[inline(always)]
     pub(crate) fn peak(
         &mut self,
@@ -439,36 +427,34 @@ impl Intervals {
     }
 }
 
-/// The chance that a random record agrees is taken for at most this: beyond, a density is no probability.
+/// Upper bound of chance: a density can give values that are no probability.
 pub(crate) const MOST_CHANCE: f32 = 0.5;
 
-/// Evidence in nats that `n` of `k` listed records agree where a random one does with probability
-/// `p`, above 0 and below 1; 0 when chance alone would give as many. A wrong position gets Bin(k, p) votes: this is the Chernoff
-/// bound on the tail, `k KL(n/k || p)`, which orders as the tail does.
+/// Returns the evidence in nats that `n` of `k` listed records agree where a random one does with probability `p` (between 0 and 1,
+/// both excluded). It is 0 if `n` is at most the mean by chance. At a wrong position, `n` follows Bin(k, p); the evidence is
+/// the Chernoff bound on the tail, `k KL(n/k || p)`, which orders as the tail does.
 #[inline(always)]
 pub(crate) fn evidence(n: f32, k: f32, p: f32) -> f32 {
     let missed = k - n;
-    // The logarithm of 0 is some number here, and counts for nothing.
+    // `ln(0)` is finite here and is multiplied by 0.
     let evidence = n * (ln(n) - ln(k * p)) + missed * (ln(missed) - ln(k * (1.0 - p)));
-    // Just above chance the two terms cancel up to rounding.
+    // Just above chance the two terms cancel except for rounding.
     if n <= p * k { 0.0 } else { evidence.max(0.0) }
 }
 
-/// Columns are padded to a multiple of this many entries that do not vote, so that every loop runs
-/// over whole vectors, with the same order of additions whatever the machine.
+/// Columns are padded to a multiple of this length with entries that do not vote. So every loop runs over whole vectors, and the
+/// order of additions is the same on every machine.
 pub(crate) const LANES: usize = 8;
 
-/// One vector.
 pub(crate) type Lanes = [f32; LANES];
 
-/// The logarithm of a positive number, to 2e-6: exponent plus a polynomial of the mantissa, without
-/// branches.
+/// Returns the logarithm of a positive number, to 2e-6, without branches: the exponent plus a polynomial of the mantissa.
 #[inline(always)]
 pub(crate) fn ln(y: f32) -> f32 {
     let bits = y.to_bits();
     let exponent = (bits >> 23) as i32 - 127;
     let m = f32::from_bits(bits & 0x007f_ffff | 0x3f80_0000) - 1.0;
-    // ln(1 + m) on [0, 1), zero at 0, fitted for the smallest largest error.
+    // ln(1 + m) on [0, 1), exact at 0, fitted for the least maximum error.
     let p = m * (0.317_648_7 + m * (-0.193_760_2 + m * (0.085_569_24 - m * 0.018_338_63)));
     exponent as f32 * std::f32::consts::LN_2 + m * (0.999_901_65 + m * (-0.497_875 + p))
 }
@@ -479,7 +465,7 @@ mod tests {
     use crate::seed::{Draws, Stage};
     use crate::simd::{Kernel, dispatch, portable};
 
-    /// Sections of a list with a line: a kernel whose rounding could differ between instruction sets.
+    /// Computes sections of a list with a line; tests compare its bits between instruction sets.
     struct SectionBits<'a> {
         rows: &'a [LineRow<3>],
         own: usize,

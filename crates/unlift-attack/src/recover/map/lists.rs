@@ -1,4 +1,4 @@
-//! Work on slots in fixed chunks, and lists that are mixed to see what chance alone yields.
+//! Chunks of slots, and mixed lists, which measure chance.
 
 use std::ops::Range;
 
@@ -8,37 +8,34 @@ use crate::RecordId;
 use crate::neighbors::Neighborhoods;
 use crate::recover::result::{Estimate, Status, stored_support};
 
-/// Slots per chunk: a fixed number, so that results do not depend on threads.
+/// Slots per chunk: fixed, so that results do not depend on the number of threads.
 pub(crate) const CHUNK: usize = 64;
 
-/// The slots that a run covers, in chunks of [`CHUNK`]; only the last one may be shorter.
+/// The slots of a run, in chunks of [`CHUNK`]. Only the last chunk may be shorter.
 #[derive(Clone, Debug)]
 pub(crate) struct Slots {
-    /// The first slot of each chunk.
+    /// First slot of each chunk.
     firsts: Vec<usize>,
     n: usize,
 }
 
 impl Slots {
-    /// Slots one after the other.
     pub(crate) fn range(slots: Range<usize>) -> Self {
         Self { n: slots.len(), firsts: slots.step_by(CHUNK).collect() }
     }
 
-    /// Some `chunks`, in ascending order, of a map of `n_slots`.
+    /// Creates the slots of some `chunks`, in ascending order, of a map of `n_slots`.
     pub(crate) fn chunks(chunks: &[usize], n_slots: usize) -> Self {
         let firsts: Vec<usize> = chunks.iter().map(|chunk| chunk * CHUNK).collect();
         let n = firsts.iter().map(|first| CHUNK.min(n_slots - first)).sum();
         Self { firsts, n }
     }
 
-    /// All of them, in order.
     pub(crate) fn iter(&self) -> impl Iterator<Item = usize> {
         self.firsts.iter().flat_map(|&first| first..first + CHUNK).take(self.n)
     }
 }
 
-/// The estimate of a slot that was recovered.
 pub(crate) fn found<const D: usize>(
     position: [f32; D],
     support: u32,
@@ -49,12 +46,12 @@ pub(crate) fn found<const D: usize>(
     Estimate { position, status, support, axis, evidence }
 }
 
-/// The estimate of a slot whose neighbors do not fix a point, of which `n` could say anything.
+/// Creates the estimate of a slot whose neighbors do not fix a point; `n` of them may vote.
 pub(crate) fn not_fixed<const D: usize>(n: usize) -> Estimate<D> {
     Estimate::lost(if n < 2 { Status::TooFewNeighbors } else { Status::Degenerate })
 }
 
-/// Calls `solve(scratch, first slot, estimates)` for every chunk; estimates come back in order of `slots`.
+/// Calls `solve(scratch, first slot, estimates)` for every chunk; returns the estimates in order of `slots`.
 pub(crate) fn solve_chunks<const D: usize, S: Send>(
     slots: &Slots,
     scratch: impl Fn() -> S + Sync + Send,
@@ -68,13 +65,13 @@ pub(crate) fn solve_chunks<const D: usize, S: Send>(
     estimates
 }
 
-/// Mixed lists take entries this share of all entries apart (the golden section spreads them
-/// evenly), so that no two of them come from one list.
+/// Distance between the entries of a mixed list, as a fraction of all entries. The golden section spreads them evenly, so that
+/// no two come from one list.
 const SPREAD: f64 = 0.618_033_988_749_895;
-/// So many entries are looked at for each that a mixed list takes: enough wherever there are others to find.
+/// Entries tried per entry of a mixed list.
 const TRIES: usize = 8;
 
-/// Lists that tell nothing, as long as those of some `slots` (in ascending order) and made of entries of other slots' lists.
+/// Returns lists without information for some `slots` (ascending): as long as their own lists, but with entries of other lists.
 pub(crate) fn mixed(
     lists: &Neighborhoods,
     slots: impl Iterator<Item = usize>,
@@ -87,13 +84,13 @@ pub(crate) fn mixed(
         offsets.resize(slot + 1, first as u64);
         let len = lists.of(slot).len();
         let own = (slot / slots_per_record) as u32;
-        // Of a handful of records there are no other lists than these.
+        // If lists hold a large part of all records, own entries are allowed.
         let few = 4 * len * slots_per_record > lists.n_slots();
         let mut at = lists.offsets()[slot] as usize;
         for _ in 0..TRIES * len {
             at = (at + step) % lists.records().len();
             let entry = lists.records()[at];
-            // A record that is listed twice would agree with itself.
+            // A record in a list twice would agree with itself.
             if few || (entry.0 != own && !records[first..].contains(&entry)) {
                 records.push(entry);
             }
@@ -114,7 +111,7 @@ mod tests {
 
     #[test]
     fn mixed_lists_name_others_and_each_once() {
-        // So few records that a careless draw repeats itself.
+        // So few records that random draws often repeat.
         let (n, k) = (60usize, 15usize);
         let mut records = Vec::new();
         for slot in 0..n {

@@ -1,8 +1,8 @@
-//! A map as the solvers read it: what several of them share.
+//! The data that solvers share, made from a released map and its lists.
 //!
-//! From the bottom up: a grid of cells and the density of estimates on it (`grid`); rows of each kind of record and where they pass a
-//! feasible line (`lines`, `planes`); how likely a random record passes near a place (`chance`); all of it for one released map
-//! (`family`); lists, and who lists whom (`lists`, `graph`); where slots are believed to be and where they may be (`places`, `pieces`).
+//! From the bottom up: a grid of cells and the density of estimates on it (`grid`); rows per record and their sections with a
+//! feasible line (`lines`, `planes`); the chance that a random record passes near a place (`chance`); all of these for one map
+//! (`family`); lists and the neighborhood graph (`lists`, `graph`); estimates per slot and feasible sets (`places`, `pieces`).
 
 pub(crate) mod bytes;
 pub(crate) mod chance;

@@ -1,4 +1,4 @@
-//! Where a slot may lie, as flat pieces: all that joint recovery knows of a record family.
+//! Feasible sets of slots as flat pieces: the only part of joint recovery that depends on the record family.
 
 use crate::recover::map::chance::{CandidateField, ChanceField, tube};
 use crate::recover::map::family::Settings;
@@ -7,35 +7,34 @@ use crate::recover::map::lines::{LineRow, ln};
 use crate::recover::map::planes::SortedPlanes;
 use crate::released::AxisPlanes;
 
-/// A flat piece of a feasible set: a line, a half-line or a plane.
+/// A flat piece of a feasible set: a line, a chord, a half-line or a plane.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Piece<const D: usize> {
-    /// A point of it; the end of a half-line.
+    /// A point of the piece; the end of a half-line.
     pub(crate) through: [f32; D],
-    /// The projector onto its directions.
+    /// Projection matrix onto the directions of the piece.
     pub(crate) along: [[f32; D]; D],
-    /// The sense of a half-line or a chord; zero for others.
+    /// Direction of a half-line or a chord; zero for other pieces.
     sense: [f32; D],
-    /// How far it reaches in that sense.
+    /// Length in that direction.
     to: f32,
-    /// Whether those of other slots end in `through`, too: what is near it is near all of them.
+    /// Whether the piece is a ray: a point near `through` is near all rays of that center.
     pub(crate) from_center: bool,
 }
 
 impl<const D: usize> Piece<D> {
-    /// A whole line.
     fn line(through: [f32; D], direction: [f32; D]) -> Self {
         let along = std::array::from_fn(|r| std::array::from_fn(|c| direction[r] * direction[c]));
         Self { through, along, sense: [0.0; D], to: f32::INFINITY, from_center: false }
     }
 
-    /// The place of the piece nearest to `x`.
+    /// Returns the point of the piece nearest to `x`.
     #[inline(always)]
     pub(crate) fn project(&self, x: &[f32; D]) -> [f32; D] {
         let away: [f32; D] = std::array::from_fn(|c| x[c] - self.through[c]);
-        let ahead: f32 = away.iter().zip(&self.sense).map(|(a, s)| s * a).sum();
-        let keep = if ahead < 0.0 { 0.0 } else { 1.0 };
-        let keep = if ahead > self.to { self.to / ahead } else { keep };
+        let distance: f32 = away.iter().zip(&self.sense).map(|(a, s)| s * a).sum();
+        let keep = if distance < 0.0 { 0.0 } else { 1.0 };
+        let keep = if distance > self.to { self.to / distance } else { keep };
         std::array::from_fn(|r| {
             let moved: f32 = away.iter().zip(&self.along[r]).map(|(a, along)| along * a).sum();
             self.through[r] + keep * moved
@@ -43,57 +42,52 @@ impl<const D: usize> Piece<D> {
     }
 }
 
-/// The feasible sets of a map.
+/// The feasible sets of a map, and constants of joint recovery that depend on the family.
 pub(crate) trait Pieces<const D: usize>: Sync {
-    /// Pieces per slot.
     const PER_SLOT: usize = 1;
     /// Whether pieces are planes with a normal, not lines with a direction.
     const NORMAL: bool = false;
-    /// How much an estimate counts along its own piece at most, against 1 across it: its record says nothing there.
+    /// Largest weight of an estimate along its own piece in least squares, relative to 1 across it.
     const MOST_ALONG: f32 = 0.25;
-    /// With more than so many votes over that share, it counts less: `ALONG / votes`.
+    /// With `n` estimates, the weight along the own piece is at most `ALONG / n`.
     const ALONG: f32 = 2.0;
-    /// An estimate that is so many times as likely a true neighbor's as one of chance counts half in the refined place.
-    const DOUBT: f32 = 1.0;
-    /// Whether entries that are near without being neighbors are told from neighbors: they would draw a place into
-    /// the middle of its region. Where a neighbor speaks about one coordinate, the more voices the better.
-    const TELLS_REGION: bool = false;
-    /// The radius of the distribution of neighbors is at most this many deltas: where most estimates are wrong, those that are
-    /// near by accident would widen it without end.
+    /// In least squares, an estimate has half weight at this likelihood ratio of a true neighbor against chance.
+    const HALF_WEIGHT_RATIO: f32 = 1.0;
+    /// Whether wrong entries of the same region count as background and not as true neighbors: along a line they would draw a place
+    /// into the middle of its region. Planes and candidates use them, because each fixes only one or two coordinates.
+    const SUBTRACTS_BACKGROUND: bool = false;
+    /// Largest radius of the distribution of neighbors, in deltas: where most estimates are wrong, it would grow without limit.
     const MOST_RADIUS: f32 = 0.95;
 
-    /// Slots per record.
     fn slots_per_record(&self) -> usize {
         1
     }
-    /// One piece of a slot.
     fn piece(&self, slot: usize, piece: usize) -> Piece<D>;
-    /// The unit direction of a piece, or its normal.
+    /// Returns the unit direction of a piece, or its normal.
     fn direction(&self, slot: usize, piece: usize) -> [f32; D];
     /// Whether a record near a place is evidence for a point of `slot`.
     fn may_vote(&self, slot: usize, record: usize) -> bool;
-    /// Squared distance from `x` to where `record` may lie.
+    /// Returns the squared distance from `x` to the feasible set of `record`.
     fn record_distance2(&self, record: usize, x: &[f32; D]) -> f32;
-    /// The chance that a random record that may vote for `slot` passes within delta of `x`.
+    /// Returns the chance that a random record that may vote for `slot` passes within delta of `x`.
     fn record_chance(&self, slot: usize, x: &[f32; D]) -> f32;
-    /// The logarithm of how much of its feasible set `slot` has per length at `x`, where that differs.
+    /// Returns the logarithm of the range prior at `x`, `p_range` of joint recovery; 0 where the prior is uniform.
     #[inline(always)]
     fn ln_spread(&self, _: usize, _: &[f32; D]) -> f32 {
         0.0
     }
 }
 
-/// Lines and rays.
 pub(crate) struct LinePieces<'a, const D: usize> {
     rows: &'a [LineRow<D>],
     slots_per_record: usize,
     chance: &'a [ChanceField<D>],
     tube: f32,
-    /// Whether these are rays from anchors, each with a region of its own.
+    /// Whether these are rays whose centers have regions.
     anchored: bool,
 }
 
-/// Ranges below this share of a ray are as unlikely as this one: a logarithm needs a floor.
+/// Least range in the range prior, as a fraction of the ray.
 const LEAST_RANGE: f32 = 1e-3;
 
 impl<'a, const D: usize> LinePieces<'a, D> {
@@ -116,7 +110,7 @@ impl<'a, const D: usize> LinePieces<'a, D> {
 impl<const D: usize> Pieces<D> for LinePieces<'_, D> {
     const MOST_ALONG: f32 = 0.35;
     const ALONG: f32 = 50.0;
-    const TELLS_REGION: bool = true;
+    const SUBTRACTS_BACKGROUND: bool = true;
 
     fn slots_per_record(&self) -> usize {
         self.slots_per_record
@@ -155,8 +149,8 @@ impl<const D: usize> Pieces<D> for LinePieces<'_, D> {
         field.at(x, self.tube)
     }
 
-    // Points are spread over the region of an anchor, and its rays diverge: without this term estimates
-    // drift to where all bearings meet.
+    // Points are uniform over the region and rays diverge, so the prior grows with the range. Without it, estimates drift to where all
+    // bearings meet.
     #[inline(always)]
     fn ln_spread(&self, slot: usize, x: &[f32; D]) -> f32 {
         if !self.anchored {
@@ -168,13 +162,11 @@ impl<const D: usize> Pieces<D> for LinePieces<'_, D> {
     }
 }
 
-/// The direction of an axis.
 #[inline(always)]
 fn unit<const D: usize>(axis: usize) -> [f32; D] {
     std::array::from_fn(|c| if c == axis { 1.0 } else { 0.0 })
 }
 
-/// Axis planes.
 pub(crate) struct PlanePieces<'a, const D: usize> {
     planes: &'a AxisPlanes<D>,
     chance: f32,
@@ -193,8 +185,8 @@ impl<'a, const D: usize> PlanePieces<'a, D> {
 
 impl<const D: usize> Pieces<D> for PlanePieces<'_, D> {
     const NORMAL: bool = true;
-    // Two coordinates are open: where few neighbors are right, their estimates are all that tells.
-    const DOUBT: f32 = 0.2;
+    // Two coordinates are free: where few neighbors are true, their estimates are the only evidence.
+    const HALF_WEIGHT_RATIO: f32 = 0.2;
 
     #[inline(always)]
     fn piece(&self, slot: usize, _: usize) -> Piece<D> {
@@ -227,7 +219,6 @@ impl<const D: usize> Pieces<D> for PlanePieces<'_, D> {
     }
 }
 
-/// Axis candidates.
 pub(crate) struct CandidatePieces<'a, const D: usize> {
     rows: &'a [[f32; D]],
     chance: &'a CandidateField<D>,

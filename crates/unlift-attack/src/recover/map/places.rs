@@ -1,4 +1,4 @@
-//! Where slots are believed to be, in the form that joint recovery reads.
+//! Current places of all slots.
 
 use rayon::prelude::*;
 
@@ -6,7 +6,7 @@ use crate::geometry::curve;
 use crate::recover::result::{Estimate, Status};
 use crate::simd::prefetch;
 
-/// A slot's estimate: one memory access.
+/// The place of a slot; it costs one memory access.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(16))]
 struct Place<const D: usize> {
@@ -14,76 +14,71 @@ struct Place<const D: usize> {
     piece: u32,
 }
 
-/// Lost slots lie this far away: near nothing, and still a number when squared.
-pub(crate) const FAR: f32 = 1e18;
+/// Coordinate of slots without a place: far from everything, and finite when squared.
+pub(crate) const UNKNOWN_COORDINATE: f32 = 1e18;
 
-/// Places that stand for all: quantiles and medians of so many are known to a percent.
+/// Number of places in samples: quantiles of so many have an error of about a percent.
 const SAMPLE: usize = 1 << 14;
 
-/// One place per slot.
 #[derive(Clone, Debug)]
 pub(crate) struct Places<const D: usize> {
     rows: Vec<Place<D>>,
 }
 
 impl<const D: usize> Places<D> {
-    /// From estimates in slot order.
     pub(crate) fn new(estimates: &[Estimate<D>]) -> Self {
         let place = |e: &Estimate<D>| match e.status {
             Status::Ok => Place { x: e.position, piece: u32::from(e.axis) },
-            _ => Place { x: [FAR; D], piece: 0 },
+            _ => Place { x: [UNKNOWN_COORDINATE; D], piece: 0 },
         };
         Self { rows: estimates.iter().map(place).collect() }
     }
 
-    /// Number of slots.
     pub(crate) fn len(&self) -> usize {
         self.rows.len()
     }
 
-    /// Whether `slot` has a place.
     #[inline(always)]
     pub(crate) fn is_known(&self, slot: usize) -> bool {
-        self.rows[slot].x[0] != FAR
+        self.rows[slot].x[0] != UNKNOWN_COORDINATE
     }
 
-    /// The place of `slot`; far away if it has none.
+    /// Returns the place of `slot`; [`UNKNOWN_COORDINATE`] if it has none.
     #[inline(always)]
     pub(crate) fn of(&self, slot: usize) -> [f32; D] {
         self.rows[slot].x
     }
 
-    /// Brings the place of `slot` near.
     #[inline(always)]
     pub(crate) fn prefetch(&self, slot: usize) {
         prefetch(&self.rows, slot);
     }
 
-    /// The largest coordinate of a known place, without its sign.
+    /// Returns the largest absolute coordinate of a known place.
     pub(crate) fn farthest(&self) -> f32 {
         let known = (0..self.len()).filter(|&slot| self.is_known(slot));
         known.flat_map(|slot| self.of(slot)).fold(0.0, |most, x| most.max(x.abs()))
     }
 
-    /// Some of the known places, evenly over the slots.
+    /// Returns a sample of the known places, evenly over the slots.
     pub(crate) fn sample(&self) -> impl Iterator<Item = [f32; D]> + '_ {
         let every = self.len().div_ceil(SAMPLE).max(1);
         (0..self.len()).step_by(every).filter(|&slot| self.is_known(slot)).map(|slot| self.of(slot))
     }
 
-    /// The corners of a box around the known places, without the farthest.
+    /// Returns the corners of a box around most known places.
     pub(crate) fn trimmed_box(&self) -> ([f32; D], [f32; D]) {
         trimmed_box(|c| self.sample().map(|x| x[c]).collect())
     }
 
-    /// The piece of its feasible set that `slot` lies on.
+    /// Returns the piece of its feasible set on which `slot` lies.
     #[inline(always)]
     pub(crate) fn piece(&self, slot: usize) -> usize {
         self.rows[slot].piece as usize
     }
 
-    /// The squared distance from `x` to the slot at the other end of an edge, and that slot: `end`, or
-    /// with `either` the nearer of it and the next.
+    /// Returns the squared distance from `x` to the end of an edge, and that slot: `end`, or with `either` the nearer of `end` and the
+    /// next slot.
     #[inline(always)]
     pub(crate) fn nearest(&self, end: u32, either: bool, x: &[f32; D]) -> (f32, usize) {
         let end = end as usize;
@@ -93,10 +88,10 @@ impl<const D: usize> Places<D> {
     }
 }
 
-/// The share of values left out at either end of a range: those of wrong entries may lie anywhere.
+/// Fraction of values dropped at either end of a range, which may be those of wrong entries.
 const TRIM: f64 = 0.03;
 
-/// The range of a column without its ends, widened a little.
+/// Returns the range of a column without its ends, slightly widened.
 pub(crate) fn trimmed(column: &mut [f32]) -> (f32, f32) {
     if column.is_empty() {
         return (0.0, 0.0);
@@ -109,7 +104,7 @@ pub(crate) fn trimmed(column: &mut [f32]) -> (f32, f32) {
     (low - margin, high + margin)
 }
 
-/// The corners of a box around most places, given as the column of each coordinate.
+/// Returns the corners of a box around most places; `column` returns all values of a coordinate.
 pub(crate) fn trimmed_box<const D: usize>(
     column: impl Fn(usize) -> Vec<f32>,
 ) -> ([f32; D], [f32; D]) {
@@ -117,7 +112,6 @@ pub(crate) fn trimmed_box<const D: usize>(
     (ends.map(|e| e.0), ends.map(|e| e.1))
 }
 
-/// The squared distance.
 #[inline(always)]
 pub(crate) fn distance2<const D: usize>(a: &[f32; D], b: &[f32; D]) -> f32 {
     let mut sum = 0.0;
@@ -127,12 +121,12 @@ pub(crate) fn distance2<const D: usize>(a: &[f32; D], b: &[f32; D]) -> f32 {
     sum
 }
 
-/// Cells per axis, as a power of two: place on the curve and slot share 64 bits.
+/// Bits per coordinate on the curve: the index on the curve and the slot share 64 bits.
 const BITS: u32 = 10;
 
-/// All slots, along a curve that fills space; lost ones last. Records lie in random order, so that each look at a neighbor is a
-/// cache miss on a large map. Slots near each other share neighbors: in this order they find them in the cache. Results do
-/// not depend on it.
+/// Returns all slots in order along a space-filling curve; slots without a place are last. Records are in random order, so that
+/// each access to a neighbor misses the cache on a large map. Nearby slots share neighbors, so in this order they are often cached.
+/// Results do not depend on the order.
 pub(crate) fn along_curve<const D: usize>(places: &Places<D>) -> Vec<u32> {
     let n = places.len();
     let (low, high) = places.trimmed_box();

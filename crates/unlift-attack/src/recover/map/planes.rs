@@ -1,4 +1,4 @@
-//! Axis planes: each free coordinate is found on its own, in the densest window of offsets.
+//! Axis planes: each free coordinate is solved on its own, as the densest window of offsets.
 
 use crate::RecordId;
 use crate::geometry::vector::median;
@@ -6,27 +6,25 @@ use crate::recover::map::chance::{are_in_parts, interquartile_range};
 use crate::recover::map::lines::{evidence, ln};
 use crate::released::AxisPlanes;
 
-/// The planes of each axis in order of their offsets.
+/// The planes of each axis, in order of their offsets.
 #[derive(Clone, Debug)]
 pub(crate) struct SortedPlanes {
     by_axis: Vec<Sorted>,
 }
 
-/// The planes of one axis.
 #[derive(Clone, Debug)]
 struct Sorted {
     order: Vec<u32>,
-    /// The distance between the quartiles of their offsets.
+    /// Distance between the quartiles of the offsets.
     quartiles: f64,
-    /// Their offsets, if the map is in parts along this axis, so that quartiles say little; else empty.
+    /// Sorted offsets if the map has separate parts along this axis, else empty.
     in_parts: Vec<f32>,
 }
 
-/// Places at which planes are counted to learn what is typical.
+/// Number of places at which planes are counted to find a typical chance.
 const PLACES: usize = 1 << 10;
 
 impl SortedPlanes {
-    /// Sorts the planes of each axis.
     pub(crate) fn new<const D: usize>(planes: &AxisPlanes<D>) -> Self {
         let mut by_axis = vec![Vec::new(); D];
         for (record, &axis) in planes.axis().iter().enumerate() {
@@ -45,15 +43,15 @@ impl SortedPlanes {
         Self { by_axis: by_axis.into_iter().map(sorted).collect() }
     }
 
-    /// The largest interquartile range of the offsets of an axis.
+    /// Returns the largest interquartile range of the offsets of an axis.
     pub(crate) fn extent(&self) -> f64 {
         self.by_axis.iter().map(|axis| axis.quartiles).fold(0.0, f64::max)
     }
 
-    /// How likely a random plane of any axis passes within `delta` of a typical place.
+    /// Returns the chance that a random plane of any axis passes within `delta` of a typical place.
     pub(crate) fn typical_chance(&self, delta: f32) -> f32 {
         let of_axis = |axis: &Sorted| match axis.in_parts.is_empty() {
-            // Half of the planes lie between their quartiles.
+            // Half of the planes lie between the quartiles.
             true => (f64::from(delta) / axis.quartiles.max(f64::from(f32::MIN_POSITIVE))) as f32,
             false => typical_share(&axis.in_parts, delta),
         };
@@ -61,7 +59,7 @@ impl SortedPlanes {
     }
 }
 
-/// The share of sorted `offsets` within `delta` of a typical one of them.
+/// Returns the fraction of sorted `offsets` within `delta` of a typical one.
 fn typical_share(offsets: &[f32], delta: f32) -> f32 {
     let within = |&at: &f32| {
         let low = offsets.partition_point(|&offset| offset < at - delta);
@@ -73,8 +71,7 @@ fn typical_share(offsets: &[f32], delta: f32) -> f32 {
     median(&mut shares) as f32
 }
 
-/// Per record how likely a random plane of its axis has an offset in `[offset, offset + 2 delta]`: counted exactly, no sample is
-/// needed where chance has one dimension.
+/// Returns, per record, the chance that a random plane of its axis has an offset in `[offset, offset + 2 delta]`. It is counted exactly.
 pub(crate) fn window_chance<const D: usize>(
     planes: &AxisPlanes<D>,
     sorted: &SortedPlanes,
@@ -94,24 +91,23 @@ pub(crate) fn window_chance<const D: usize>(
     chance
 }
 
-/// The final mean runs over this many deltas on either side of the window's own: where the window
-/// is sharp (few neighbors are needed to name it), a wider mean is steadier.
+/// Half width of the final mean in deltas. The window is already sharp, and a wider mean is more stable.
 const REFIT: f32 = 1.5;
 
-/// The window of one axis and why it was chosen.
+/// The best window of one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Window {
-    /// Mean of the offsets in the window, after one re-selection.
+    /// Mean of the offsets in the window, after the window was centered anew.
     pub(crate) offset: f32,
-    /// How many offsets support it.
+    /// Number of offsets that support it.
     pub(crate) count: u32,
     /// Improbability of the agreement by chance, in nats.
     pub(crate) evidence: f32,
 }
 
-/// The window of width `2 delta` over the listed planes of one axis that maximizes evidence plus
-/// prior. `listed` holds (offset, record) of these planes and is sorted here; `chance` is that of [`window_chance`].
-// Not inlined, consensus on planes takes half as long again.
+/// Returns the window of width `2 delta` over the listed planes of one axis with the largest evidence plus prior. `listed` has the
+/// (offset, record) of these planes and gets sorted; `chance` is that of [`window_chance`].
+// Without inlining, consensus on planes takes half as long again.
 #[inline(always)]
 pub(crate) fn best_window(
     listed: &mut [(f32, RecordId)],
@@ -133,7 +129,7 @@ pub(crate) fn best_window(
         }
     }
     let (_, evidence, start, end) = best?;
-    // Offsets are summed from the first, so that far maps lose no digits.
+    // Offsets are summed relative to the first, so that maps far from the origin lose no digits.
     let mean = |rows: &[(f32, RecordId)]| {
         rows[0].0 + rows.iter().map(|r| r.0 - rows[0].0).sum::<f32>() / rows.len() as f32
     };

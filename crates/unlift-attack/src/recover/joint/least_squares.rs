@@ -1,25 +1,25 @@
-//! A refined place: least squares to the records of the neighbors found near it.
+//! The last step of an update: weighted least squares over the estimates of nearby neighbors.
 
 use crate::recover::joint::votes::Columns;
 use crate::recover::map::lines::{LANES, Lanes, fill};
 use crate::recover::map::pieces::{Piece, Pieces};
 use crate::recover::map::places::Places;
 
-/// Least squares steps: the second one weighs neighbors from where the first one led.
+/// Number of least-squares steps. The second one recomputes the weights.
 const STEPS: usize = 2;
 
-/// The directions of the pieces that neighbors lie on, in columns.
+/// Unit directions (for planes: normals) of the records of neighbors, one column per coordinate.
 pub(super) type Directions<const D: usize> = [Vec<f32>; D];
 
-/// Sums over neighbors near a place, each weighted by how near it is; one per lane.
+/// Weighted sums over nearby neighbors, one per vector lane.
 #[derive(Clone, Copy)]
 struct Sums<const D: usize> {
     n: [u32; LANES],
     weight: Lanes,
-    /// Differences to the place, and their parts along the directions of the neighbors' pieces.
+    /// Differences to the place, and their components along the directions.
     pull: [Lanes; D],
     free_pull: [Lanes; D],
-    /// Products of the coordinates of these directions; the upper half of a symmetric matrix.
+    /// Outer products of the directions; only the upper triangle is filled.
     free: [[Lanes; D]; D],
 }
 
@@ -32,13 +32,13 @@ impl<const D: usize> Sums<D> {
         free: [[[0.0; LANES]; D]; D],
     };
 
-    /// Over the neighbors of `near` within `1 / sqrt(inverse_kernel2)` of `x`.
+    /// Sums over the neighbors of `near` within `1 / sqrt(inverse_reach2)` of `x`.
     #[inline(always)]
     fn new(
         near: &Columns<D>,
         directions: &Directions<D>,
         x: &[f32; D],
-        (inverse_kernel2, (gain, inverse_a2), doubt): (f32, (f32, f32), f32),
+        (inverse_reach2, (gain, inverse_a2), half_weight_ratio): (f32, (f32, f32), f32),
     ) -> Self {
         let mut sums = Self::ZERO;
         let odds = near.odds.as_chunks::<LANES>().0;
@@ -54,12 +54,12 @@ impl<const D: usize> Sums<D> {
                     r2 += away[c] * away[c];
                     along += toward[c] * away[c];
                 }
-                let closeness = (1.0 - r2 * inverse_kernel2).max(0.0);
+                let closeness = (1.0 - r2 * inverse_reach2).max(0.0);
                 let q = 1.0 / (1.0 + r2 * inverse_a2);
                 let likelier = odds[i][lane] * gain * (q * q * q);
                 sums.n[lane] += u32::from(closeness > 0.0);
-                // Estimates that are near by chance count less: on a small map half of all are near.
-                let closeness = closeness * likelier / (doubt + likelier);
+                // Estimates that are close by chance get less weight: on a small map half of all are close.
+                let closeness = closeness * likelier / (half_weight_ratio + likelier);
                 sums.weight[lane] += closeness;
                 for r in 0..D {
                     let held = closeness * toward[r];
@@ -75,11 +75,13 @@ impl<const D: usize> Sums<D> {
     }
 }
 
-/// `x` moved along `own` to the least squares of the records of near neighbors, weighted by how near their
-/// estimates are, and the number of these records. Estimates hold fully across their own pieces, and
-/// a little along them. `at` tells the kernel, the distribution and the doubt at a place.
+/// Moves `x` along `own` by weighted least squares; returns the place and the number of records within reach.
+///
+/// The residual of a neighbor is the difference to its estimate: with full weight across its own record, with less weight
+/// along it. `at` returns, for a place, `1 / reach^2`, the distribution of neighbors (`gain`, `1 / a^2`) and the likelihood ratio
+/// at which an estimate has half weight.
 #[inline(always)]
-pub(super) fn refined<const D: usize, P: Pieces<D>>(
+pub(super) fn least_squares<const D: usize, P: Pieces<D>>(
     pieces: &P,
     places: &Places<D>,
     own: &Piece<D>,
@@ -99,14 +101,13 @@ pub(super) fn refined<const D: usize, P: Pieces<D>>(
             1 => n,
             _ => near.n_pairs(&x, weights.0),
         };
-        x = own.project(&moved::<D, P>(own, &x, &sums, n));
+        x = own.project(&step::<D, P>(own, &x, &sums, n));
     }
     (x, records)
 }
 
-/// One step of least squares.
 #[inline(always)]
-fn moved<const D: usize, P: Pieces<D>>(
+fn step<const D: usize, P: Pieces<D>>(
     own: &Piece<D>,
     x: &[f32; D],
     sums: &Sums<D>,
@@ -115,22 +116,22 @@ fn moved<const D: usize, P: Pieces<D>>(
     let total = |lanes: &Lanes| lanes.iter().sum::<f32>();
     let weight = total(&sums.weight);
     let mut pull = sums.pull.map(|lanes| total(&lanes));
-    // The part of neighbors that is free along their pieces: lines, or all but the normals of planes.
+    // The component along a record: the direction of a line, or all but the normal of a plane.
     let (whole, sign) = if P::NORMAL { (1.0, -1.0) } else { (0.0, 1.0) };
-    let free_share = 1.0 - P::MOST_ALONG.min(P::ALONG / n.max(1) as f32);
+    let free_fraction = 1.0 - P::MOST_ALONG.min(P::ALONG / n.max(1) as f32);
     let mut hold = [[0.0f32; D]; D];
     for (r, row) in hold.iter_mut().enumerate() {
         for (c, value) in row.iter_mut().enumerate() {
             let free = sign * total(&sums.free[r.min(c)][r.max(c)]);
-            *value = -free_share * if r == c { free + whole * weight } else { free };
+            *value = -free_fraction * if r == c { free + whole * weight } else { free };
         }
         row[r] += weight;
-        pull[r] -= free_share * (whole * pull[r] + sign * total(&sums.free_pull[r]));
+        pull[r] -= free_fraction * (whole * pull[r] + sign * total(&sums.free_pull[r]));
     }
     solve_within(own, x, &hold, &pull, weight)
 }
 
-/// `x` plus the step along `own` that solves `hold step = pull` within it.
+/// Returns `x` plus the step along `own` that solves `hold step = pull`.
 #[inline(always)]
 fn solve_within<const D: usize>(
     own: &Piece<D>,
@@ -139,7 +140,7 @@ fn solve_within<const D: usize>(
     pull: &[f32; D],
     weight: f32,
 ) -> [f32; D] {
-    // P hold P + weight (1 - P): the part across the piece is decoupled and stays 0.
+    // P hold P + weight (1 - P): the component across `own` is decoupled and stays 0.
     let p = &own.along;
     let (mut half, mut full, mut right) = ([[0.0f32; D]; D], [[0.0f32; D]; D], [0.0f32; D]);
     for r in 0..D {
@@ -165,7 +166,7 @@ fn solve_within<const D: usize>(
     std::array::from_fn(|c| x[c] + right[c])
 }
 
-/// Solves `a x = b` for a symmetric positive `a`; `b` becomes `x`. `false` when it is singular.
+/// Solves `a x = b` for a symmetric positive definite `a`; `b` becomes `x`. Returns `false` if `a` is singular.
 #[inline(always)]
 fn solve_symmetric<const D: usize>(a: &mut [[f32; D]; D], b: &mut [f32; D]) -> bool {
     for i in 0..D {

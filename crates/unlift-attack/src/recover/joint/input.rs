@@ -1,0 +1,39 @@
+//! The data that every iteration of joint recovery reads and none changes.
+
+use crate::recover::map::graph::Graph;
+use crate::seed::{Draws, Stage};
+
+/// Random edges per sampled slot: about as many as the slot has edges of its own.
+pub(super) const RANDOM: usize = 24;
+/// Largest number of sampled slots: with lists of 50 they have about 100,000 edges.
+const SAMPLED_SLOTS: usize = 1 << 11;
+
+/// The map, the neighborhood graph and the sample from which joint recovery learns.
+pub(super) struct Input<'a, P> {
+    pub(super) pieces: P,
+    pub(super) graph: &'a Graph,
+    pub(super) delta: f32,
+    /// How many edges lead to each record.
+    pub(super) listed: Vec<u32>,
+    /// Evenly spaced slots from which the distribution of true neighbors is learned.
+    pub(super) sample: Vec<Sampled>,
+}
+
+/// A sampled slot, and edges drawn at random from the whole graph: the end and the class of each.
+pub(super) struct Sampled {
+    pub(super) slot: usize,
+    pub(super) random: [(u32, u8); RANDOM],
+}
+
+impl<'a, P> Input<'a, P> {
+    pub(super) fn new(pieces: P, graph: &'a Graph, delta: f32, seed: u64) -> Self {
+        let n = if graph.len() == 0 { 0 } else { graph.n_slots() };
+        let row = |slot: usize| {
+            let mut draws = Draws::new(seed, Stage::NullSample, slot as u64);
+            let random = std::array::from_fn(|_| graph.edge(draws.below(graph.len() as u64)));
+            Sampled { slot, random }
+        };
+        let sample = (0..n).step_by(n.div_ceil(SAMPLED_SLOTS).max(1)).map(row).collect();
+        Self { pieces, graph, delta, listed: graph.times_listed(), sample }
+    }
+}
