@@ -204,8 +204,8 @@ fn choose<const D: usize>(
     })
 }
 
-/// Returns two limits on chance: deltas with more chance than the first may be too wide, those with less than the second are too
-/// narrow.
+/// Returns two limits on chance: a delta with less chance than the first is never too wide, and one with less than the second is
+/// too narrow.
 ///
 /// If a list holds the fraction `s` of all records, its neighbors lie in a ball that holds this fraction of the map. A random line
 /// passes through that ball with probability `s^(2/3)` if points fill space and `s^2` if they lie on a curve; a random plane

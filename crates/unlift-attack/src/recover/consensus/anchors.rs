@@ -1,6 +1,6 @@
 //! Consensus for rays from anchors, which are centers with a region of the image each: ranges from the spread of bearings.
 //!
-//! Rays of one anchor meet only in the anchor, and rays of two anchors lie in different regions, so records give no position.
+//! Rays of one anchor meet only in the anchor, and rays of two anchors lie in different regions, so crossings give no position.
 //! Perspective gives a range: from the anchor, neighbors within a distance `s` of a point at range `r` are seen within an
 //! angle of `s / r`. The angle is that of the window of bearings whose listed rays are least probable by chance. The
 //! distance `s` is unknown, but among rays of similar bearing those with narrow windows are likely long. Points are assumed to

@@ -25,7 +25,7 @@ const TRUE_CANDIDATES: f32 = 5.0;
 const CANDIDATES: (f32, f32) = (8.0, 16.0);
 /// Capacity for all candidates and the old estimate, in whole vectors.
 const ROOM: usize = 24;
-/// If the scores of the best two candidates differ by less than this many nats, their records decide.
+/// If the scores of the best candidate and the best one elsewhere differ by less than this many nats, the records near them decide.
 const TIE_MARGIN: f32 = 8.0;
 /// Assumed fraction of true neighbors whose record passes near the point but whose estimate is wrong.
 const WRONG_ESTIMATES: f32 = 0.2;

@@ -336,10 +336,10 @@ mod tests {
             inverse_a2: 1.0,
         };
         columns.discount(&odds);
-        assert_eq!(columns.odds, [0.5, 0.5], "nobody to share with");
+        assert_eq!(columns.odds, [0.5, 0.5], "no other slot");
         odds.gain = 16.0;
         columns.discount(&odds);
-        // At a distance of 1 the gain is 16 / 8 = 2, so the odds are halved.
+        // At a distance of 1 the gain is 16 / 8 = 2. Times odds of 0.5 it is 1, so the odds are halved.
         assert_eq!(columns.odds, [0.25, 0.5]);
     }
 }

@@ -13,20 +13,11 @@ use crate::released::{AxisPlanes, Obfuscation, Released};
 #[derive(Debug)]
 pub(crate) enum Family<'a, const D: usize> {
     /// Lines with one or two slots each, or rays, which have a group.
-    Lines {
-        rows: Vec<LineRow<D>>,
-        slots_per_record: usize,
-        chance: Vec<ChanceField<D>>,
-    },
+    Lines { rows: Vec<LineRow<D>>, slots_per_record: usize, chance: Vec<ChanceField<D>> },
     /// Axis planes, sorted by their offsets.
-    Planes {
-        planes: &'a AxisPlanes<D>,
-        sorted: SortedPlanes,
-    },
-    Candidates {
-        rows: &'a [[f32; D]],
-        chance: CandidateField<D>,
-    },
+    Planes { planes: &'a AxisPlanes<D>, sorted: SortedPlanes },
+    /// Axis candidates.
+    Candidates { rows: &'a [[f32; D]], chance: CandidateField<D> },
 }
 
 /// The chance that a random listed record passes near a place, learned before any slot is solved.

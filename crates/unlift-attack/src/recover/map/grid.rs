@@ -279,7 +279,7 @@ impl<const D: usize> Density<D> {
 
     /// Returns the local width: how much larger the distance to neighbors is than at a typical place. Lists are equally long
     /// everywhere, so neighbors lie farther away where the density is low. Dense places get 1, because the grid does not resolve them.
-    /// The formula is that of three dimensions, and is used in two dimensions as well.
+    /// The cube root is right in three dimensions; two dimensions use it, too.
     #[inline(always)]
     pub(crate) fn width(&self, density: f32) -> f32 {
         let ratio = self.typical / density;

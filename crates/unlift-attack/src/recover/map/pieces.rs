@@ -54,9 +54,9 @@ pub(crate) trait Pieces<const D: usize>: Sync {
     /// In least squares, an estimate has half weight at this likelihood ratio of a true neighbor against chance.
     const HALF_WEIGHT_RATIO: f32 = 1.0;
     /// Whether wrong entries of the same region count as background and not as true neighbors: along a line they would draw a place
-    /// into the middle of its region. Planes and candidates use them, because each fixes only one or two coordinates.
+    /// into the middle of its region. Planes and candidates keep them, because a neighbor fixes few coordinates and more are better.
     const SUBTRACTS_BACKGROUND: bool = false;
-    /// Largest radius of the distribution of neighbors, in deltas: where most estimates are wrong, it would grow without limit.
+    /// Largest radius of the distribution of neighbors, in deltas. Without it, the radius would grow where most estimates are wrong.
     const MOST_RADIUS: f32 = 0.95;
 
     fn slots_per_record(&self) -> usize {
