@@ -381,7 +381,7 @@ impl Document {
     pub fn to_json(&self) -> Result<String, Error> {
         self.check()?;
         let mut value = serde_json::to_value(self)?;
-        for field in ["results", "break_even", "gates", "images", "run"] {
+        for field in ["results", "break_even", "gates", "images", "tiles", "run"] {
             if let Some(part) = value.get_mut(field) {
                 round_floats(part);
             }
