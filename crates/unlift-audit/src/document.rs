@@ -10,7 +10,7 @@ use unlift::recover::Delta;
 use unlift_report::Given;
 use unlift_report::document as report;
 
-use crate::maps::Tile;
+use crate::tiles::Tile;
 
 /// What an outcome does not know about itself.
 pub struct Provenance {

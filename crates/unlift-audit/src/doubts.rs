@@ -9,7 +9,7 @@ use unlift::released::Released;
 use unlift::truth::{Original, Secret};
 
 use crate::lengths::short;
-use crate::maps::Tile;
+use crate::tiles::Tile;
 
 /// On RedKitchen and Castle delta is 0.1 (`density`) to 4.8 times (`consensus`, noise that is near) the median distance to the
 /// K-th neighbor, whatever scheme, solver, source and noise. Beyond these times the quartiles of that distance the attack has not
@@ -37,12 +37,14 @@ pub(crate) struct Doubts {
     pub(crate) notes: Vec<String>,
 }
 
-/// Looks at the figures `rows` of a map, whose points are as far apart as `spread` says; `hidden` is what was released of it, where that was given and not made here, and `of_file`
-/// what speaks against the points.
+/// Finds what speaks against the figures of a map.
+///
+/// `spread` says how far apart its points are, `hidden` is what was released of it if that was given and not made here, and `of_file`
+/// holds what speaks against the points. Each tile has rows of its own: a mean of delta over tiles would hide a tile whose delta collapsed.
 pub(crate) fn doubts(
     (original, spread): (&Original<3>, Spread),
     hidden: Option<&(Released<3>, Secret)>,
-    (plan, rows): (&Plan<3>, &[Row]),
+    (plan, rows, tile_rows): (&Plan<3>, &[Row], &[Vec<Row>]),
     of_file: &[String],
 ) -> Doubts {
     let Spread { low, middle, high, n_points } = spread;
@@ -62,13 +64,17 @@ pub(crate) fn doubts(
         ));
     }
     for row in rows {
-        let is_usual = (NARROW * low..=WIDE * high).contains(&row.delta);
-        let of_delta = (row.solver != REFERENCE && row.delta > 0.0 && !is_usual).then(|| {
+        let of_tiles = tile_rows.iter().flatten().filter(|of_tile| of_tile.is_same_cell(row));
+        let mut deltas = std::iter::once(row).chain(of_tiles).map(|row| row.delta);
+        let unusual = deltas
+            .find(|&delta| delta > 0.0 && !(NARROW * low..=WIDE * high).contains(&delta))
+            .filter(|_| row.solver != REFERENCE);
+        let of_delta = unusual.map(|delta| {
             format!(
                 "{}: delta, {}, is far from the usual distance to the K-th neighbor, {} to {}, so that less may have come back \
                  than could (try --delta, --outlier-filter, or parts of the map by themselves)",
                 row.scheme,
-                in_unit(row.delta, unit),
+                in_unit(delta, unit),
                 short(low),
                 in_unit(high, unit)
             )
@@ -95,7 +101,7 @@ pub(crate) struct Spread {
 }
 
 impl Spread {
-    /// That of a map, from a sample of its points.
+    /// Measures the spread of a map on a sample of its points.
     ///
     /// # Errors
     /// When points cannot be searched.
@@ -103,7 +109,7 @@ impl Spread {
         Ok(Self::of_distances(distances(points, k, SAMPLE)?, points.len()))
     }
 
-    /// That of a map in tiles, whose points have no neighbors beyond their tile.
+    /// Measures the spread of a map in tiles. Points have no neighbors beyond their tile.
     ///
     /// # Errors
     /// When points cannot be searched.
@@ -198,5 +204,31 @@ fn in_unit(length: f64, unit: Unit) -> String {
         Unit::Meter => format!("{} m", short(length)),
         Unit::Pixel => format!("{} px", short(length)),
         Unit::KthNeighbor => short(length),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use unlift::audit::{Silent, run};
+    use unlift::recover::Builtin;
+    use unlift::{PointSet, synthetic};
+
+    #[test]
+    fn a_tile_whose_delta_collapsed_is_a_doubt_though_the_mean_is_usual() {
+        let set = PointSet::try_new(synthetic::room(4, 600).points, Unit::Meter).unwrap();
+        let original = Original::new(set);
+        let mut plan = Plan::<3>::new(Unit::Meter);
+        plan.schemes.truncate(1);
+        (plan.k, plan.inlier_ratios, plan.records_alone) = (10, vec![1.0], false);
+        plan.solvers = Builtin::list(&[Builtin::Consensus]);
+        let rows = run(&original, None, &plan, &mut Silent).unwrap().rows;
+        let of = |tile_rows: &[Vec<Row>]| {
+            let spread = Spread::of(original.reveal().positions(), plan.k).unwrap();
+            doubts((&original, spread), None, (&plan, &rows, tile_rows), &[]).of_rows
+        };
+        assert_eq!(of(std::slice::from_ref(&rows)), [None]);
+        let collapsed = vec![Row { delta: 1e-6, ..rows[0].clone() }];
+        assert!(of(&[rows.clone(), collapsed])[0].is_some());
     }
 }

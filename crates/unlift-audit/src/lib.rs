@@ -55,6 +55,7 @@ mod prepare;
 mod progress;
 mod scene;
 pub mod sources;
+mod tiles;
 
 pub use audited::{Audited, Finished};
 pub use checked::Checked;

@@ -324,7 +324,7 @@ pub struct Distinct {
     pub n_places: u64,
     /// Percent of the places recovered within each threshold.
     pub recovered_percent: ByThreshold,
-    /// The same for an attacker without neighborhoods.
+    /// Percentage recovered by an attacker without neighborhoods.
     pub blind_percent: ByThreshold,
 }
 
@@ -344,7 +344,7 @@ pub struct ImageFigures {
 pub struct ImageRow {
     /// Percent of the image's keypoints recovered within each threshold.
     pub recovered_percent: ByThreshold,
-    /// The same of its distinct places.
+    /// Percent of the distinct places of the image recovered within each threshold.
     pub distinct_percent: ByThreshold,
     /// Share of true neighbors in this image, as requested or measured.
     pub inlier_ratio: f64,

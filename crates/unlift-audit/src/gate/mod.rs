@@ -67,7 +67,7 @@ pub struct Candidate<'a> {
     pub threshold: f64,
     /// Percent recovered within the threshold.
     pub recovered_percent: f64,
-    /// The same for an attacker without neighborhoods.
+    /// Percentage recovered by an attacker without neighborhoods.
     pub baseline_percent: f64,
 }
 

@@ -1,6 +1,5 @@
 //! One audit from a prepared map to the files in its folder: what `audit map` and `demo` share.
 
-mod tiles;
 mod watcher;
 
 use std::path::{Path, PathBuf};
@@ -15,7 +14,7 @@ use unlift_io::atomic::OutputSet;
 use unlift_io::hash::hash_input;
 use unlift_io::read;
 use unlift_report::RenderOptions;
-use unlift_report::document::{Input, TileFigures};
+use unlift_report::document::Input;
 use unlift_report::inversions::Inversion as Sheet;
 use unlift_report::scene::Scene3d;
 
@@ -31,7 +30,8 @@ use crate::lengths::{check_lengths_of_gates, check_scale};
 use crate::prepare::{Preparation, Prepared, prepare};
 use crate::progress::{Progress, Quiet};
 use crate::scene::Pictures;
-pub use tiles::{Tile, Tiles};
+use crate::tiles;
+pub use crate::tiles::{Tile, Tiles};
 pub use watcher::curves_of;
 use watcher::{Watcher, drawn};
 
@@ -229,14 +229,13 @@ fn find_with(
     let whole = (job.original, job.descriptors);
     let cut = |asked: Tiles| asked.of(job.original.reveal().positions(), job.up);
     let cut = job.tiles.map(cut).transpose()?;
-    let Ran { outcome, scene, curves, sheets, of_tiles, note } = match &cut {
+    let Ran { outcome, scene, curves, sheets, tile_rows, note } = match &cut {
         Some(tiles) => {
             let found = tiles::run(whole, tiles, &job.plan, job.progress)
                 .map_err(|error| of_file(error).advise("a larger --tile-points"))?;
-            let (rows, curves) = (found.rows, found.curves.shares());
-            let of_tiles = document::tiles(tiles, &rows, &found.outcome.rows, &job.plan.thresholds);
+            let (tile_rows, curves) = (found.rows, found.curves.shares());
             let outcome = found.outcome;
-            Ran { outcome, scene: None, curves, sheets: Vec::new(), of_tiles, note: None }
+            Ran { outcome, scene: None, curves, sheets: Vec::new(), tile_rows, note: None }
         }
         None => {
             let mut watcher = watcher(&job, journal, out);
@@ -253,7 +252,7 @@ fn find_with(
             let scene = watcher.pictures.map(|p| p.into_scene(&job.cameras, job.up));
             let note = watcher.journal.as_ref().and_then(|journal| journal.note());
             let (curves, sheets) = (watcher.curves, watcher.sheets);
-            Ran { outcome, scene, curves, sheets, of_tiles: Vec::new(), note }
+            Ran { outcome, scene, curves, sheets, tile_rows: Vec::new(), note }
         }
     };
     let spread = match &cut {
@@ -261,8 +260,12 @@ fn find_with(
         None => Spread::of(job.original.reveal().positions(), job.plan.k),
     };
     let spread = spread.map_err(of_file)?;
-    let mut doubts =
-        doubts((job.original, spread), job.hidden, (&job.plan, &outcome.rows), &job.doubts);
+    let mut doubts = doubts(
+        (job.original, spread),
+        job.hidden,
+        (&job.plan, &outcome.rows, &tile_rows),
+        &job.doubts,
+    );
     doubts.notes.extend(note);
     for note in doubts.notes.iter().filter(|note| !job.doubts.contains(note)) {
         job.progress.say(&format!("note: {note}"));
@@ -293,7 +296,9 @@ fn find_with(
         seconds: &outcome.seconds,
     };
     let mut document = document::document(&job.plan, &found, provenance);
-    document.tiles = of_tiles;
+    if let Some(tiles) = &cut {
+        document.tiles = document::tiles(tiles, &tile_rows, &outcome.rows, &job.plan.thresholds);
+    }
     let drawn = RenderOptions {
         error_cdf: curves_of(curves, &outcome.rows),
         inversions: sheets,
@@ -308,7 +313,8 @@ struct Ran {
     scene: Option<Scene3d>,
     curves: Vec<(Row, Vec<(f64, f64)>)>,
     sheets: Vec<Sheet>,
-    of_tiles: Vec<TileFigures>,
+    /// The rows of every tile, where the map is cut.
+    tile_rows: Vec<Vec<Row>>,
     /// What the journal says.
     note: Option<String>,
 }

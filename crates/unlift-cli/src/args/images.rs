@@ -96,7 +96,7 @@ pub struct InvertArgs {
     /// What came back of the released images or map
     #[arg(long, value_name = "FILE")]
     pub recovered: Option<PathBuf>,
-    /// Of a map: a COLMAP model whose cameras see it
+    /// COLMAP model whose cameras see the map; for maps only
     #[arg(long, value_name = "MODEL", requires = "recovered", requires = "scale")]
     pub cameras: Option<PathBuf>,
     /// Units of the released map per unit of that model: the --scale it was obfuscated with

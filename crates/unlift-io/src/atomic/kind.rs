@@ -47,7 +47,7 @@ const CLOUD_MARKS: [&str; 2] =
 /// The first line of the files of a model.
 pub(crate) const MODEL_MARK: &str = "# unlift model";
 const JUNIT_MARK: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"unlift\"";
-/// Of a table: the columns that CSV begins with, or a comment.
+/// A table begins with these columns (CSV) or with a comment.
 const TABLE_MARKS: [&str; 3] =
     ["scheme,neighbors,oracle_noise,inlier_ratio,", "% unlift ", "<!-- unlift "];
 const CURVES_MARK: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?><!-- unlift ";

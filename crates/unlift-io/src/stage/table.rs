@@ -144,7 +144,7 @@ impl<'a> Table<'a> {
         named && (self.n_rows() == 0 || !self.is_all_null(name))
     }
 
-    /// Those of `columns` that are there with a value.
+    /// Selects the `columns` that are present with a value.
     pub(super) fn present<'c>(&self, columns: &[(&'c str, Type)]) -> Vec<(&'c str, Type)> {
         columns.iter().copied().filter(|(name, _)| self.has(name)).collect()
     }

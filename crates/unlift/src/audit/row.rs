@@ -89,7 +89,7 @@ pub struct Distinct {
     pub n_places: usize,
     /// Percentage recovered within each threshold, in the plan's order.
     pub recovered_percent: Vec<f64>,
-    /// The same for an attacker without neighborhoods.
+    /// Percentage recovered by an attacker without neighborhoods.
     pub blind_percent: Vec<f64>,
 }
 

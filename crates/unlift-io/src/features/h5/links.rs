@@ -8,7 +8,7 @@
 pub(super) enum Target {
     /// To a path in the file.
     Path(String),
-    /// The same in a group of the old form, whose names the library cannot list then.
+    /// The link stands in a group of the old form, whose names the library cannot list.
     Old(String),
     /// To another file.
     Elsewhere,

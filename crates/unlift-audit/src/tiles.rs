@@ -124,18 +124,18 @@ fn bounds(positions: &[[f64; 3]], rows: &[u32]) -> [[f64; 3]; 2] {
 }
 
 /// What is found of the tiles of a map.
-pub(super) struct Found<'a> {
-    pub(super) outcome: Outcome,
+pub(crate) struct Found<'a> {
+    pub(crate) outcome: Outcome,
     /// The rows of every tile.
-    pub(super) rows: Vec<Vec<Row>>,
-    pub(super) curves: Curves<'a>,
+    pub(crate) rows: Vec<Vec<Row>>,
+    pub(crate) curves: Curves<'a>,
 }
 
 /// Runs `plan` on every tile of a map, one after the other.
 ///
 /// # Errors
 /// When the plan does not fit a tile, or `progress` says stop.
-pub(super) fn run<'a>(
+pub(crate) fn run<'a>(
     (original, descriptors): (&Original<3>, Option<&Descriptors>),
     tiles: &[Tile],
     plan: &Plan<3>,
