@@ -77,8 +77,9 @@ fn pairs<const D: usize>(
             let j = partners.of[e] as usize;
             (likelier(i, j) * likelier(j, i) * prior[sides[i].axis]) as f32
         };
-        let odds_of = |i: usize| partners.entries(i).map(move |e| odds(i, e));
-        weight = by_part(n, |records| records.flat_map(odds_of).collect::<Vec<f32>>()).concat();
+        weight = partners.column(|i, row| {
+            row.iter_mut().zip(partners.entries(i)).for_each(|(to, e)| *to = odds(i, e));
+        });
         let alone = distances.alone();
         messages = next_messages(&messages, &partners, &weight, |i| alone[class[i]]);
         let tallies = by_part(n, |records| {
@@ -130,14 +131,13 @@ fn next_messages(
     alone: impl Fn(usize) -> f32 + Sync,
 ) -> Vec<f32> {
     let offer = |e: usize| weight[e] * messages[partners.back[e] as usize];
-    let of = |i: usize| {
+    partners.column(|i, row| {
         let alone = alone(i);
         let all: f32 = alone + partners.entries(i).map(offer).sum::<f32>();
         // Rounding must not take it below the weight without any pair.
-        partners.entries(i).map(move |e| 1.0 / (all - offer(e)).max(alone))
-    };
-    let n = partners.n_records();
-    by_part(n, |records| records.flat_map(of).collect::<Vec<f32>>()).concat()
+        let message = |e: usize| 1.0 / (all - offer(e)).max(alone);
+        row.iter_mut().zip(partners.entries(i)).for_each(|(to, e)| *to = message(e));
+    })
 }
 
 #[inline(always)]

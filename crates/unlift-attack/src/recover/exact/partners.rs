@@ -50,44 +50,38 @@ impl Partners {
             strips = Strips::new(sides, reach * (MOST / found).sqrt() as f32);
             has_ties = strips.mean() > MOST_OF_TIES as f64;
         }
-        let row = |i: usize| {
-            let mut row: Vec<(u32, u32)> = if has_ties {
-                strips.some_of(i).flat_map(|j| [(i as u32, j), (j, i as u32)]).collect()
-            } else {
-                strips.of(i).map(|j| (i as u32, j)).collect()
-            };
-            row.sort_unstable();
-            row
-        };
-        let rows = |records: Range<usize>| records.flat_map(row).collect::<Vec<_>>();
-        let mut pairs = by_part(sides.len(), rows).concat();
-        if has_ties {
-            pairs.par_sort_unstable();
-            pairs.dedup();
-        }
-        if pairs.is_empty() || pairs.len() > u32::MAX as usize {
+        let (offsets, of) = if has_ties { strips.some_rows() } else { strips.rows() };
+        if of.is_empty() || of.len() > u32::MAX as usize {
             return None;
-        }
-        let mut offsets = vec![0; sides.len() + 1];
-        for (i, _) in &pairs {
-            offsets[*i as usize + 1] += 1;
-        }
-        for i in 0..sides.len() {
-            offsets[i + 1] += offsets[i];
         }
         // Rows ascend, so the pairs of record j come in the order of its entries.
         let mut next = offsets.clone();
-        let back = |&(_, j): &(u32, u32)| {
+        let back = |&j: &u32| {
             next[j as usize] += 1;
             next[j as usize] as u32 - 1
         };
-        let back = pairs.iter().map(back).collect();
-        let of = pairs.into_iter().map(|(_, j)| j).collect();
+        let back = of.iter().map(back).collect();
         Some(Self { offsets, of, back, reach: strips.reach as f32 })
     }
 
-    pub(super) fn n_records(&self) -> usize {
-        self.offsets.len() - 1
+    /// Returns a value per entry; `of` writes those of one record.
+    pub(super) fn column(&self, of: impl Fn(usize, &mut [f32]) + Sync) -> Vec<f32> {
+        let (n, mut column) = (self.offsets.len() - 1, vec![0.0; self.of.len()]);
+        let (mut parts, mut rest) = (Vec::new(), &mut column[..]);
+        for first in (0..n).step_by(PART) {
+            let last = n.min(first + PART);
+            let part;
+            (part, rest) = rest.split_at_mut(self.offsets[last] - self.offsets[first]);
+            parts.push((first..last, part));
+        }
+        parts.into_par_iter().for_each(|(records, mut part)| {
+            for i in records {
+                let row;
+                (row, part) = part.split_at_mut(self.entries(i).len());
+                of(i, row);
+            }
+        });
+        column
     }
 
     pub(super) fn entries(&self, i: usize) -> Range<usize> {
@@ -96,7 +90,7 @@ impl Partners {
 }
 
 /// Returns a result for each part of `n` records, in order.
-pub(super) fn by_part<T: Send>(n: usize, of: impl Fn(Range<usize>) -> T + Send + Sync) -> Vec<T> {
+pub(super) fn by_part<T: Send>(n: usize, of: impl Fn(Range<usize>) -> T + Sync) -> Vec<T> {
     let part = |part: usize| of(part * PART..n.min((part + 1) * PART));
     (0..n.div_ceil(PART)).into_par_iter().map(part).collect()
 }
@@ -105,7 +99,7 @@ pub(super) fn by_part<T: Send>(n: usize, of: impl Fn(Range<usize>) -> T + Send +
 struct Strips<'a> {
     sides: &'a [Side],
     /// (axis and step, estimate, record), sorted.
-    rows: Vec<(u64, f32, u32)>,
+    sorted: Vec<(u64, f32, u32)>,
     low: f64,
     reach: f64,
     /// Slightly more than the reach, so that rounding treats both records of a pair alike.
@@ -120,12 +114,12 @@ impl<'a> Strips<'a> {
         let known = || sides.iter().enumerate().filter(|(_, side)| side.axis != LOST);
         let lower = known().map(|(_, side)| side.published.min(side.estimate));
         let (low, reach) = (f64::from(lower.fold(f32::MAX, f32::min)), f64::from(reach));
-        let mut strips = Self { sides, rows: Vec::new(), low, reach, step: 1.01 * reach };
+        let mut strips = Self { sides, sorted: Vec::new(), low, reach, step: 1.01 * reach };
         let row = |(i, side): (usize, &Side)| {
             (strips.strip(side, side.published), side.estimate, i as u32)
         };
-        strips.rows = known().map(row).collect();
-        strips.rows.par_sort_unstable_by(|a, b| {
+        strips.sorted = known().map(row).collect();
+        strips.sorted.par_sort_unstable_by(|a, b| {
             a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2))
         });
         strips
@@ -153,8 +147,8 @@ impl<'a> Strips<'a> {
         let strips = middle.into_iter().flat_map(|middle| middle - 1..=middle + 1);
         strips.map(move |strip| {
             let is_below = |row: &(u64, f32, u32)| row.0 == strip && f64::from(row.1) < low;
-            let from = self.rows.partition_point(|row| row.0 < strip || is_below(row));
-            let rows = &self.rows[from..];
+            let from = self.sorted.partition_point(|row| row.0 < strip || is_below(row));
+            let rows = &self.sorted[from..];
             &rows[..rows.partition_point(|row| row.0 == strip && f64::from(row.1) <= high)]
         })
     }
@@ -168,6 +162,43 @@ impl<'a> Strips<'a> {
     fn of(&self, i: usize) -> impl Iterator<Item = u32> {
         let records = self.about(i).flatten().map(|row| row.2);
         records.filter(move |&j| self.fit(i, j as usize))
+    }
+
+    /// Returns all possible partners of all records: offsets of the rows, and the partners in ascending order.
+    fn rows(&self) -> (Vec<usize>, Vec<u32>) {
+        let part = |records: Range<usize>| {
+            let (mut ends, mut of) = (Vec::with_capacity(records.len()), Vec::new());
+            for i in records {
+                let start = of.len();
+                of.extend(self.of(i));
+                of[start..].sort_unstable();
+                ends.push(of.len());
+            }
+            (ends, of)
+        };
+        let (mut offsets, mut all) = (vec![0], Vec::new());
+        for (ends, of) in by_part(self.sides.len(), part) {
+            offsets.extend(ends.iter().map(|end| all.len() + end));
+            all.extend(of);
+        }
+        (offsets, all)
+    }
+
+    /// Returns [`rows`](Self::rows) with some of the possible partners only.
+    fn some_rows(&self) -> (Vec<usize>, Vec<u32>) {
+        let both = |i: usize| self.some_of(i).flat_map(move |j| [(i as u32, j), (j, i as u32)]);
+        let part = |records: Range<usize>| records.flat_map(both).collect::<Vec<_>>();
+        let mut pairs = by_part(self.sides.len(), part).concat();
+        pairs.par_sort_unstable();
+        pairs.dedup();
+        let mut offsets = vec![0; self.sides.len() + 1];
+        for (i, _) in &pairs {
+            offsets[*i as usize + 1] += 1;
+        }
+        for i in 0..self.sides.len() {
+            offsets[i + 1] += offsets[i];
+        }
+        (offsets, pairs.into_iter().map(|(_, j)| j).collect())
     }
 
     /// Returns some of the possible partners of record `i`: a few from each step, different ones for each record.

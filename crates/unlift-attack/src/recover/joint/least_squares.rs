@@ -93,14 +93,16 @@ pub(super) fn least_squares<const D: usize, P: Pieces<D>>(
     fill(directions, &near.slot, of);
     directions.iter_mut().for_each(|column| column.resize(near.odds.len(), 0.0));
     let mut records = 0;
-    for _ in 0..STEPS {
+    for step_at in 1..=STEPS {
         let weights = at(&x);
         let sums = Sums::new(near, directions, &x, weights);
         let n: u32 = sums.n.iter().sum();
-        records = match pieces.slots_per_record() {
-            1 => n,
-            _ => near.n_pairs(&x, weights.0),
-        };
+        if step_at == STEPS {
+            records = match pieces.slots_per_record() {
+                1 => n,
+                _ => near.n_pairs(&x, weights.0),
+            };
+        }
         x = own.project(&step::<D, P>(own, &x, &sums, n));
     }
     (x, records)

@@ -202,16 +202,17 @@ impl<const D: usize> Columns<D> {
     /// Counts the records with an estimate within `1 / sqrt(inverse_reach2)` of `x`. Records have two slots, in adjacent rows.
     #[inline(always)]
     pub(super) fn n_pairs(&self, x: &[f32; D], inverse_reach2: f32) -> u32 {
-        let (mut n, mut last) = (0, u32::MAX);
-        for (i, slot) in self.slot.iter().enumerate() {
-            if 1.0 - distance2(&self.at(i), x) * inverse_reach2 > 0.0 {
-                n += u32::from(slot ^ 1 != last);
-                last = *slot;
-            } else {
-                last = u32::MAX;
-            }
-        }
-        n
+        let n = self.len();
+        let columns: [&[f32]; D] = std::array::from_fn(|c| &self.x[c][..n]);
+        let is_near = |i: usize| {
+            let d2 = distance2(&std::array::from_fn(|c| columns[c][i]), x);
+            u32::from(1.0 - d2 * inverse_reach2 > 0.0)
+        };
+        // Two sums without branches, which are vectorized.
+        let slots: u32 = (0..n).map(is_near).sum();
+        let is_pair = |i: usize| u32::from(self.slot[i] ^ 1 == self.slot[i - 1]);
+        let pairs: u32 = (1..n).map(|i| is_near(i - 1) & is_near(i) & is_pair(i)).sum();
+        slots - pairs
     }
 
     /// Returns the log-likelihood ratio, against chance, of these estimates for a point at `x`:
