@@ -289,7 +289,7 @@ impl Scheme<3> for Beside {
 fn a_scheme_that_breaks_a_law_has_no_row() {
     let room = room(600);
     for (off, law) in
-        [(1.0, "on their own records, found 600 of 600"), (0.0, "the same of one key")]
+        [(1.0, "on their own records, found 600 of 600"), (0.0, "the same for the same key")]
     {
         let mut plan = plan(&["olc"]);
         plan.records_alone = false;

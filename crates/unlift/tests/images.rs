@@ -271,7 +271,8 @@ fn what_is_not_for_images_is_refused() {
         neighbors: Vec::new(),
         scores: None,
     })];
-    let expected = "neighbors: expected the oracle or one that works on each alone, found file";
+    let expected =
+        "neighbors: expected the oracle, or a source that works on single items, found file";
     assert_eq!(message(&given), expected);
     // What is defined on maps alone has no type that a plan of images could hold.
     let geometric = Named::parse("geometric").unwrap().of_dimension::<2>().unwrap_err();

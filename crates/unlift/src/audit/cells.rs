@@ -157,7 +157,7 @@ pub(super) fn attack<const D: usize>(
         let mut solved = Solved::new(plan, (&hidden.0, &made.lists), attacker);
         for (at, solver) in plan.solvers.iter().enumerate() {
             if !observer.goes_on() {
-                let error = Error::new("audit", "to go on", "a request to stop");
+                let error = Error::new("audit", "to run to the end", "a request to stop");
                 return Err(error.of_kind(ErrorKind::Stopped));
             }
             let what = format!("{scheme} at {:.2} {source}, {}", made.ratio, solver.name());

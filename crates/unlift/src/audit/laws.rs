@@ -30,12 +30,12 @@ pub fn check_laws<const D: usize>(
     let most = farthest_for_rounding(released, original, secret);
     if farthest > most {
         let off = away.iter().filter(|&&away| away > most).count();
-        let found = format!("{off} of {} off theirs, by up to {farthest:.2e}", away.len());
+        let found = format!("{off} of {} away from them, by up to {farthest:.2e}", away.len());
         return Err(Error::new("hidden points", "on their own records", found));
     }
     let (again, secret_again) = obfuscate(scheme, original, None, key)?;
     if again.obfuscation() != released.obfuscation() || secret_again.hidden() != secret.hidden() {
-        return Err(Error::new("records", "the same of one key", "others the second time"));
+        return Err(Error::new("records", "the same for the same key", "different ones"));
     }
     Ok(())
 }

@@ -50,7 +50,7 @@ impl NotAudited {
             let most = why.into_iter().max_by_key(|(_, n)| *n).map_or("", |(why, _)| why.name());
             let most = most.replace('_', " ");
             reason.push_str(&format!(
-                " ({scheme} leaves out {left} of {all} points, most as {most})"
+                " ({scheme} leaves out {left} of {all} points, most of them as {most})"
             ));
         }
         Self {

@@ -231,7 +231,7 @@ impl<const D: usize> Plan<D> {
         }
         let given = self.neighbors.iter().find(|by| matches!(by, NeighborsBy::Given(_)));
         if let Some(given) = given {
-            let expected = "the oracle or one that works on each alone";
+            let expected = "the oracle, or a source that works on single items";
             return Err(Error::new("neighbors", expected, given.name()));
         }
         Ok(())

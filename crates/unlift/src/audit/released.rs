@@ -25,11 +25,11 @@ impl<const D: usize> Scheme<D> for Unknown {
     }
 
     fn facts(&self) -> Facts {
-        Facts { summary: "records that somebody else made", ..Facts::default() }
+        Facts { summary: "records of another program", ..Facts::default() }
     }
 
     fn lift(&self, _: &[[f64; D]], _: Option<&Bounds<D>>, _: &Key) -> Result<Lifted<D>, Error> {
-        Err(Error::new("scheme", "one of our own", "one of somebody else"))
+        Err(Error::new("scheme", "one that unlift can apply", "a scheme of another program"))
     }
 }
 
