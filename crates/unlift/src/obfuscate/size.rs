@@ -34,7 +34,7 @@ pub(super) fn check<const D: usize>(points: &[[f64; D]]) -> Result<(), Error> {
         return Err(Error::new("map", expected, format!("{size:.1e}")));
     }
     if size < STEPS * step {
-        let expected = "coordinates nearer to the origin, where doubles are precise enough";
+        let expected = "coordinates nearer to the origin: doubles there are too coarse for a map";
         return Err(Error::new(
             "map",
             expected,
