@@ -12,13 +12,11 @@ use super::bytes::Bytes;
 /// Maximum number of images to read from a file of features, because they are similar.
 const IMAGES: usize = 8;
 
-/// Returns the temporary folder of this process.
 fn folder() -> &'static Path {
     static FOLDER: OnceLock<tempfile::TempDir> = OnceLock::new();
     FOLDER.get_or_init(|| tempfile::tempdir().expect("a folder for files")).path()
 }
 
-/// Writes a file with these bytes.
 fn file(name: &str, bytes: &[u8]) -> PathBuf {
     let path = folder().join(name);
     std::fs::write(&path, bytes).expect("a file is written");

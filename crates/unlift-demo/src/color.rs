@@ -5,7 +5,6 @@ use crate::noise::hashed;
 /// Reflected shares of red, green and blue light.
 pub(crate) type Color = [f64; 3];
 
-/// Chooses a color by a hash.
 pub(crate) fn one_of(colors: &[Color], parts: [u64; 3]) -> Color {
     colors[(hashed(parts) % colors.len() as u64) as usize]
 }

@@ -89,7 +89,6 @@ fn mapped(seed: u64, size: [usize; 2], wanted: impl Fn(usize) -> bool) -> Result
     Ok(Mapped { points, descriptors, cameras })
 }
 
-/// Returns the middle of a sheet.
 fn middle(sheet: &Sheet) -> [f64; 3] {
     let half = scale(add(sheet.u, sheet.v), 0.5);
     add(sheet.corner, half)

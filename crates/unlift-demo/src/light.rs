@@ -28,7 +28,6 @@ struct Lamp {
 pub(crate) struct Lights(Vec<Lamp>);
 
 impl Lights {
-    /// Creates the lights of a room with a window.
     pub(crate) fn of(sheets: &[Sheet]) -> Self {
         let top = sheets.iter().map(|sheet| middle(sheet)[2]).fold(0.0, f64::max);
         let mut lamps = vec![Lamp::new([-0.7, 0.45, top - 0.25], [0.95, 0.86, 0.72], 1.6, sheets)];
@@ -39,7 +38,6 @@ impl Lights {
         Self(lamps)
     }
 
-    /// Returns the red, green and blue light at a surface at `point`.
     pub(crate) fn reaching(&self, point: [f64; 3], normal: [f64; 3]) -> [f64; 3] {
         let up = 0.5 + 0.5 * normal[2];
         let ambient = AMBIENT[0] * (1.0 - up) + AMBIENT[1] * up;

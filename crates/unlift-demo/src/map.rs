@@ -9,7 +9,6 @@ use crate::pinhole::Pinhole;
 use crate::raster::{Facing, NONE, Seen};
 use unlift::synthetic::vectors::{add, dot, norm, scale, sub, unit};
 
-/// Number of values of a descriptor, and its norm.
 const COLUMNS: usize = 128;
 const LENGTH: f64 = 512.0;
 /// Maximum distance in pixels between a keypoint and the projected place.
@@ -26,7 +25,6 @@ const MOST_PX: f64 = 4.0;
 /// Side of a grid cell for keypoints, in pixels.
 const CELL: f64 = 8.0;
 
-/// Keypoints of a photo and their surface points.
 pub(crate) struct Sighted {
     features: Features,
     /// Surface point of each keypoint, or NaN.
@@ -63,7 +61,6 @@ impl Sighted {
         [keypoint.x, keypoint.y].map(f64::from)
     }
 
-    /// Returns the keypoints in the cells around `place`.
     fn around(&self, place: [f64; 2]) -> impl Iterator<Item = u32> {
         let (columns, rows) = (self.columns, self.cells.len() / self.columns);
         let [x, y] = place.map(|x| (x / CELL) as usize);

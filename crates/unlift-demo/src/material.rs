@@ -7,7 +7,6 @@ use crate::noise::{hashed, of_cell, rough, smooth, unit};
 use crate::prints::print;
 use unlift::synthetic::vectors::norm;
 
-/// Appearance of a place on a surface.
 pub(crate) struct Shade {
     pub(crate) color: Color,
     /// True if its brightness does not depend on light.
@@ -47,7 +46,6 @@ pub(crate) fn shade(sheet: &Sheet, index: u32, on: [f64; 2]) -> Shade {
     Shade { color, glows: false }
 }
 
-/// Returns paint with stains, dents and nail holes.
 fn paint([x, y]: [f64; 2], part: u64) -> Color {
     let base = one_of(&WALLS, [part, 1, 4]);
     let mut tone = 0.97 + 0.06 * rough(x * 3.0, y * 3.0, part);
@@ -109,7 +107,6 @@ fn boards([x, y]: [f64; 2], own: u64) -> Color {
     toned(color, 1.0 - 0.7 * gap)
 }
 
-/// Returns a coarse fabric with worn places.
 fn fabric([x, y]: [f64; 2], own: u64, base: Color) -> Color {
     let weave = of_cell(x * 160.0, y * 160.0, own);
     let knots = rough(x * 28.0, y * 28.0, own ^ 1);
@@ -151,7 +148,6 @@ fn pattern([x, y]: [f64; 2], part: u64) -> Color {
     )
 }
 
-/// Returns a green leaf with a rib and veins.
 fn leaf([s, t]: [f64; 2], own: u64) -> Color {
     let green = mixed([0.1, 0.3, 0.06], [0.25, 0.42, 0.1], unit([own, 1, 1]));
     let rib = within(t - 0.5, 0.05, 0.04);

@@ -1,6 +1,5 @@
 //! Noise: pseudorandom numbers as a function of position.
 
-/// Returns a pseudorandom number for the inputs.
 pub(crate) fn hashed([a, b, c]: [u64; 3]) -> u64 {
     let mut state = a
         .wrapping_mul(0x9e37_79b9_7f4a_7c15)

@@ -13,13 +13,11 @@ pub(crate) struct Pinhole {
     pub(crate) center: [f64; 3],
     /// Rows: right, down, forward.
     pub(crate) rotation: [[f64; 3]; 3],
-    /// Focal length in pixels.
     pub(crate) focal: f64,
     pub(crate) size: [usize; 2],
 }
 
 impl Pinhole {
-    /// Creates an upright camera.
     pub(crate) fn handheld(camera: &Camera, size: [usize; 2]) -> Self {
         let right = unit(cross(camera.look, [0.0, 0.0, 1.0]));
         let rotation = [right, cross(camera.look, right), camera.look];

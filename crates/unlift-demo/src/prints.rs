@@ -16,7 +16,6 @@ const INKS: [Color; 10] = [
     [0.66, 0.44, 0.4],
 ];
 
-/// Number of shapes on a print.
 const SHAPES: u64 = 11;
 
 /// Returns the color at `(x, y)`, in meters from the corner of a print with these sides. `x` goes

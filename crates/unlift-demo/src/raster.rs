@@ -11,7 +11,6 @@ const NEAREST: f64 = 0.02;
 /// Value of a pixel without a sheet.
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// Visible sheet and depth of every pixel.
 pub(crate) struct Seen {
     /// Sheet of each pixel or [`NONE`], `(height, width)`, row-major.
     pub(crate) sheets: Vec<u32>,

@@ -50,7 +50,6 @@ fn on<const D: usize>(
     recovered.unwrap_or_else(|error| panic!("{} cannot recover the map: {error}", solver.name()))
 }
 
-/// Returns true if the positions are bit-identical.
 fn same<const D: usize>(a: &Recovered<D>, b: &Recovered<D>) -> bool {
     let bits = |recovered: &Recovered<D>| -> Vec<[u32; D]> {
         recovered.positions().iter().map(|x| x.map(f32::to_bits)).collect()

@@ -34,7 +34,6 @@ const LEAST_RIGHT: f64 = 85.0;
 /// Differences in percentage points from which on `consensus` counts as ahead.
 const AHEAD: [f64; 3] = [1.0, 3.0, 10.0];
 
-/// Numbers of cells over all maps and sources.
 #[derive(Default)]
 struct Totals {
     /// Number of pairs of `joint` and `consensus`.
@@ -61,7 +60,6 @@ impl Totals {
     }
 }
 
-/// Maps and options of a run.
 struct Suite {
     maps: Vec<String>,
     schemes: Option<Vec<String>>,

@@ -29,7 +29,6 @@ const MAP: &str =
 /// Maximum number of points for `ransac`, which takes minutes per cell on larger maps.
 const MOST_SAMPLED: usize = 100_000;
 
-/// Sizes and options of a run.
 struct Sizes {
     points: Vec<usize>,
     schemes: Vec<&'static Entry>,

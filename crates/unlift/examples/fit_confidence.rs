@@ -29,14 +29,12 @@ mod likelihood;
 
 use likelihood::{Row, fit};
 
-/// A map for the fit.
 struct Scene {
     shape: Shape,
     seed: u64,
     n: usize,
     /// Factor of the stretch `1 + stretch r^2` from the origin.
     stretch: f64,
-    /// Number of neighbors per slot.
     k: usize,
 }
 
@@ -60,13 +58,11 @@ const SCENES: [Scene; 12] = [
     scene(Shape::LongRoom, 116, 8_000, 0.0, 50),
     scene(Shape::RoomWithOutliers, 117, 10_000, 0.0, 50),
 ];
-/// Noise models with their inlier ratios.
 const RATIOS: [(Noise, &[f64]); 3] = [
     (Noise::Uniform, &[1.0, 0.75, 0.5, 0.3, 0.2, 0.15, 0.1, 0.06]),
     (Noise::Near, &[0.5, 0.2]),
     (Noise::Clustered, &[0.5, 0.2, 0.1]),
 ];
-/// Number of slots used of each recovered map.
 const SLOTS: usize = 400;
 
 fn main() -> Result<(), Error> {
@@ -89,7 +85,6 @@ fn main() -> Result<(), Error> {
     Ok(())
 }
 
-/// Returns the points of a scene.
 fn points(scene: &Scene) -> Result<PointSet<3>, Error> {
     let mut points = shape(scene.shape, scene.seed, scene.n);
     for point in &mut points {
@@ -133,7 +128,6 @@ fn of_scheme(
     Ok(rows)
 }
 
-/// Returns the constants as a Rust file.
 fn constants(rows: &[Vec<Row>]) -> String {
     let all: Vec<[f32; N_TERMS]> = rows.iter().flatten().map(|row| terms(&row.cues)).collect();
     let n = all.len() as f64;

@@ -57,7 +57,6 @@ fn all_files(folder: &Path, found: &mut Vec<PathBuf>) {
     found.sort();
 }
 
-/// Returns the Rust files in a folder of a crate, with their text.
 fn sources(name: &str, folder: &str) -> Vec<(PathBuf, String)> {
     let mut files = Vec::new();
     all_files(&Path::new(CORE).join("..").join(name).join(folder), &mut files);
@@ -65,7 +64,6 @@ fn sources(name: &str, folder: &str) -> Vec<(PathBuf, String)> {
     files.into_iter().map(|path| (path.clone(), fs::read_to_string(path).unwrap())).collect()
 }
 
-/// Returns the lines of code in `text`, without comments and unit tests.
 fn code(text: &str) -> impl Iterator<Item = &str> {
     let bottom = text.find("#[cfg(test)]\nmod tests").unwrap_or(text.len());
     text[..bottom].lines().map(str::trim_start).filter(|line| !line.starts_with("//"))
@@ -152,7 +150,6 @@ fn files_that_are_named_exist() {
     assert!(names.len() > 200 && found.is_empty(), "\n{}", found.join("\n"));
 }
 
-/// File endings that are checked.
 const ENDINGS: [&str; 4] = [".md", ".rs", ".py", ".svg"];
 
 /// Returns the comments of a Rust file, line by line, or all lines of any other file.

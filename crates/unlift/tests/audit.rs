@@ -21,7 +21,6 @@ fn room(n: usize) -> Original<3> {
     original(synthetic::room(3, n).points)
 }
 
-/// Returns a small plan of `schemes` with inlier ratio 0.5.
 fn plan(schemes: &[&str]) -> Plan<3> {
     let mut plan = Plan::new(Unit::Meter);
     plan.schemes.retain(|scheme| schemes.contains(&scheme.name()));

@@ -71,7 +71,6 @@ fn draws() -> Draws {
     Draws::new(11, Stage::Synthetic, 77)
 }
 
-/// Returns the shares within the smaller threshold, by scheme and ratio.
 fn shares(rows: &[Row]) -> Vec<f64> {
     rows.iter().map(|row| row.recovered_percent[0]).collect()
 }

@@ -32,11 +32,9 @@ const RATIO_AT_K: &str = "inlier_ratio_at_k";
 #[derive(Clone, Copy)]
 pub(super) struct Owned<'a, const D: usize> {
     pub(super) original: &'a Original<D>,
-    /// One row per original.
     pub(super) descriptors: Option<&'a Descriptors>,
     /// The released map and its secret if the points are already hidden; no scheme is applied then.
     pub(super) hidden: Option<&'a (Released<D>, Secret)>,
-    /// Nearest-neighbor search over the originals.
     pub(super) search: &'a Knn<'a, D>,
     /// Name of the item, if the audit has several.
     pub(super) name: Option<&'a str>,
@@ -54,7 +52,6 @@ impl<const D: usize> Owned<'_, D> {
 #[derive(Clone, Copy)]
 pub(super) struct Run<'a, const D: usize> {
     pub(super) plan: &'a Plan<D>,
-    /// The name of the scheme.
     pub(super) scheme: &'a str,
     pub(super) repeat: u32,
     /// Seed of the oracle. Released data does not depend on it.

@@ -47,7 +47,6 @@ pub(super) struct Clock {
 }
 
 impl Clock {
-    /// Runs `work` and adds its time to a stage.
     pub(super) fn time<T>(
         &mut self,
         stage: impl Fn(&mut Seconds) -> &mut f64,

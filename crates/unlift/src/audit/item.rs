@@ -19,7 +19,6 @@ pub(super) struct Rows {
     pub(super) rows: Vec<Row>,
     /// Seconds per row, summed over repeats.
     pub(super) seconds: Vec<RowSeconds>,
-    /// Cells without a row.
     pub(super) not_audited: Vec<NotAudited>,
 }
 
@@ -81,7 +80,6 @@ pub(super) fn of_item<const D: usize>(
     Ok(found)
 }
 
-/// Returns the key of obfuscation and the oracle's seed.
 fn seeds(seed: u64, name: Option<&str>) -> (Key, u64) {
     let key = Key::from_seed(seed);
     match name {

@@ -135,7 +135,6 @@ impl<'a, const D: usize> Lists<'a, D> {
         Ok(Made { lists, ratio, k, ratio_at_k })
     }
 
-    /// Makes lists of the oracle with `k` records each.
     fn oracle(&mut self, variant: &Variant<'_, D>, k: usize) -> Result<Neighborhoods, Error> {
         let (noise, ratio) =
             (variant.noise.unwrap_or(Noise::Uniform), variant.inlier_ratio.unwrap_or(1.0));

@@ -125,7 +125,6 @@ pub fn run_many<const D: usize, E: From<Error>>(
     Ok(Outcome { rows, not_audited, break_even, n_items, n_too_small, seconds })
 }
 
-/// Sums over items.
 #[derive(Default)]
 struct Sums {
     /// Cells in the order of the first item's rows.
@@ -136,18 +135,15 @@ struct Sums {
     clock: Clock,
 }
 
-/// Sums of one row over items.
 struct CellSums {
     /// Row of the first item.
     row: Row,
-    /// One pool per repeat.
     pools: Vec<Pool>,
     n_items: usize,
     seconds: RowSeconds,
 }
 
 impl Sums {
-    /// Adds the sums of the next item.
     fn merge(&mut self, more: Self) {
         self.clock.merge(&more.clock);
         self.n_pooled += more.n_pooled;

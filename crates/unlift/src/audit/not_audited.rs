@@ -23,7 +23,6 @@ pub struct NotAudited {
 }
 
 impl NotAudited {
-    /// Returns the entry of a scheme that cannot hide the points.
     pub(super) fn scheme(scheme: &str, error: &Error) -> Self {
         Self {
             scheme: scheme.to_owned(),
@@ -34,8 +33,6 @@ impl NotAudited {
         }
     }
 
-    /// Returns the entry of a variant without lists. `secret` contains the points that the scheme
-    /// left out.
     pub(super) fn variant<const D: usize>(
         scheme: &str,
         variant: &Variant<'_, D>,

@@ -28,7 +28,6 @@ pub(super) struct Pool {
     n_points: usize,
     within: Vec<usize>,
     blind_within: Vec<usize>,
-    /// Number of slots recovered exactly.
     exact: Option<usize>,
     /// Percentage of slots whose axis was identified, times slots.
     axis: Option<f64>,
@@ -55,7 +54,6 @@ pub(super) struct Pool {
 }
 
 impl Pool {
-    /// Returns an empty pool for rows like `row`.
     pub(super) fn new(row: &Row, thresholds: &[Threshold]) -> Self {
         let n = thresholds.len();
         Self {
@@ -84,7 +82,6 @@ impl Pool {
         }
     }
 
-    /// Adds the row of one image.
     pub(super) fn add(&mut self, finished: &Finished<'_>, thresholds: &[Threshold]) {
         let Finished { row, accuracy, baseline, weights, whole, n_listed, .. } = finished;
         let n = accuracy.n_points();
@@ -186,7 +183,6 @@ impl Pool {
         }
     }
 
-    /// Returns the row over all added images.
     pub(super) fn row(&self, thresholds: &[Threshold]) -> Row {
         let n = self.n_points.max(1) as f64;
         let percent = |counts: &[usize]| counts.iter().map(|&c| 100.0 * c as f64 / n).collect();

@@ -139,7 +139,6 @@ impl Row {
             && (self.oracle_noise.is_none() || self.inlier_ratio == other.inlier_ratio)
     }
 
-    /// Returns the smallest value of `thresholds`.
     pub(super) fn smallest(thresholds: &[Threshold]) -> f64 {
         thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min)
     }
@@ -187,7 +186,6 @@ impl Row {
         });
     }
 
-    /// Returns the mean of a row over several seeds.
     pub(super) fn mean(rows: &[Row]) -> Row {
         let mut mean = rows[0].clone();
         if rows.len() < 2 {

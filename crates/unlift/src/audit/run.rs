@@ -92,7 +92,6 @@ pub(super) fn every_cell<const D: usize>(
     Ok(Outcome { rows, not_audited, break_even, n_items: 1, n_too_small: 0, seconds })
 }
 
-/// Returns the error of an audit without rows; `first` gives the reason.
 pub(super) fn none_applies(first: &NotAudited) -> Error {
     let found = format!("none: {}: {}", first.scheme, first.reason);
     Error::new("schemes", "one that can be applied to this map", found)

@@ -15,7 +15,6 @@ use super::joined;
 pub struct Accuracy {
     /// Error per slot in the unit of the points; infinite if not recovered.
     errors: Vec<f64>,
-    /// Errors in ascending order.
     sorted: Vec<f64>,
     /// Slots that could not be recovered, by reason.
     pub lost: BTreeMap<Status, usize>,

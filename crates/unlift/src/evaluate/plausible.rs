@@ -48,7 +48,6 @@ pub fn are_strangers((nearer, n): (usize, usize)) -> bool {
     n >= FEW && nearer as f64 <= 0.5 * n as f64 + (n as f64).sqrt()
 }
 
-/// Returns the number of true values and the number of all values.
 fn count(nearer: impl Iterator<Item = bool>) -> (usize, usize) {
     nearer.fold((0, 0), |(nearer, n), is_nearer| (nearer + usize::from(is_nearer), n + 1))
 }
@@ -83,15 +82,12 @@ pub fn belongs<const D: usize>(
     let (nearer, n) = nearer_to_own_record(released, n, point_of(original, secret));
     if are_strangers((nearer, n)) {
         let expected = "points nearer to their own records than to others";
-        let found = format!(
-            "{nearer} of {n} (the truth is of another map, in another frame, or in another order of slots)"
-        );
+        let found = format!("{nearer} of {n} (the truth of another map, frame or order of slots)");
         return Err(Error::new("truth", expected, found));
     }
     Ok(())
 }
 
-/// Returns a function from slots to their hidden points.
 fn point_of<const D: usize>(
     original: &Original<D>,
     secret: &Secret,
@@ -156,7 +152,6 @@ pub fn recovered_away<const D: usize>(
     away(released, n, |slot| recovered.position(slot))
 }
 
-/// Returns the distances of the places of `n` slots to their own records.
 fn away<const D: usize>(
     released: &Released<D>,
     n: usize,

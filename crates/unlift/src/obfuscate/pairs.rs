@@ -53,7 +53,6 @@ pub(super) fn refused_last(
     refused.len()
 }
 
-/// Returns both points of each pair as dropped for `reason`.
 pub(super) fn drop_pairs(pairs: &[[OriginalId; 2]], reason: DropReason) -> Vec<Dropped> {
     pairs.as_flattened().iter().map(|&original| Dropped { original, reason }).collect()
 }

@@ -82,7 +82,6 @@ fn separate(
     dropped
 }
 
-/// Returns the lines through `pairs`, two slots each.
 pub(super) fn lines_through(
     points: &[[f64; 3]],
     pairs: &[[OriginalId; 2]],

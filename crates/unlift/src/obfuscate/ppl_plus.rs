@@ -34,7 +34,6 @@ pub const ENTRY: Entry = Entry {
     in_3d: Some(|_| Arc::new(PplPlus)),
 };
 
-/// Maximum number of re-pairing rounds.
 const MAX_ROUNDS: usize = 1000;
 /// Re-pairing ends when fewer pairs than this are refused.
 const FEW_PAIRS: usize = 10;

@@ -102,7 +102,6 @@ pub(super) fn desk(scene: &mut Scene, place: &Place, width: f64, draws: &mut Dra
     objects::scatter(scene, &surface, [x + 0.48, 0.05], [width - 0.02, depth - 0.05], 2, draws);
 }
 
-/// Adds a sofa with cushions.
 pub(super) fn sofa(scene: &mut Scene, place: &Place, width: f64, draws: &mut Draws) {
     let depth = 0.85;
     let parts = [
@@ -166,14 +165,12 @@ pub(super) fn table(scene: &mut Scene, place: &Place, length: f64, depth: f64, d
     objects::scatter(scene, &surface, [0.06 - x, 0.05 - y], [x - 0.06, y - 0.05], count, draws);
 }
 
-/// Adds a rug.
 pub(super) fn rug(scene: &mut Scene, place: &Place, draws: &mut Draws) {
     let (x, y) = (draws.between(1.0, 1.25), draws.between(0.75, 0.95));
     let (low, high) = ([-x, -y, 0.0], [x, y, 0.008]);
     scene.shell(place, low, high, Faces::Standing, Texture::PATTERN);
 }
 
-/// Adds a floor lamp.
 pub(super) fn floor_lamp(scene: &mut Scene, place: &Place, draws: &mut Draws) {
     let height = draws.between(1.35, 1.6);
     scene.tube(place, [0.0; 3], 0.15, 0.15, 0.025, Texture::SMOOTH);
@@ -189,7 +186,6 @@ pub(super) fn pendant(scene: &mut Scene, place: &Place, ceiling: f64) {
     scene.tube(place, [0.0, 0.0, foot + 0.2], 0.008, 0.008, cord, Texture::SMOOTH);
 }
 
-/// Adds a plant in a pot.
 pub(super) fn plant(scene: &mut Scene, place: &Place, draws: &mut Draws) {
     scene.tube(place, [0.0; 3], 0.13, 0.17, 0.3, Texture::SMOOTH);
     let soil = ([-0.15, -0.15, 0.29], [0.3, 0.0, 0.0], [0.0, 0.3, 0.0]);
@@ -225,7 +221,6 @@ pub(super) fn pictures(
     }
 }
 
-/// Adds a paneled door with its frame.
 pub(super) fn door(scene: &mut Scene, place: &Place, width: f64) {
     let leaf = ([0.05, 0.0, 0.0], [width - 0.05, 0.03, 2.02]);
     scene.shell(place, leaf.0, leaf.1, Faces::FrontAndTop, Texture::SMOOTH);

@@ -2,7 +2,6 @@
 
 use crate::seed::{Draws, Stage};
 
-/// Purpose of a stream of random numbers.
 #[derive(Clone, Copy)]
 pub(super) enum Purpose {
     Layout = 0,

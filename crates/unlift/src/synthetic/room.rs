@@ -10,7 +10,6 @@ use crate::seed::Draws;
 /// Free space at the ends of a short wall, for the furniture of the long walls.
 const CORNER: f64 = 0.85;
 
-/// Creates the furnished room of `seed`.
 pub(super) fn furnished(seed: u64) -> Scene {
     let mut draws = draws(seed, Purpose::Layout, 0);
     let size = [draws.between(4.8, 5.3), draws.between(3.8, 4.2), draws.between(2.5, 2.7)];
@@ -95,7 +94,6 @@ fn desk_wall(scene: &mut Scene, wall: &Place, length: f64, draws: &mut Draws) {
     piece::chair(scene, &place.then(chair, [-1.0, 0.0]), draws);
 }
 
-/// Adds a sofa with pictures above it.
 fn sofa_wall(scene: &mut Scene, wall: &Place, length: f64, draws: &mut Draws) {
     let width = draws.between(1.7, 2.0);
     let start = draws.between(CORNER, length - CORNER - width);

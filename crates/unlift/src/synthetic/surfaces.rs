@@ -29,7 +29,6 @@ impl Place {
     }
 }
 
-/// Box that occludes what is behind it.
 #[derive(Clone, Copy, Debug)]
 struct Blocker {
     place: Place,
@@ -60,7 +59,6 @@ impl Blocker {
     }
 }
 
-/// Sampled faces of a box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Faces {
     /// All but the bottom.
@@ -84,7 +82,6 @@ pub(super) struct Scene {
 }
 
 impl Scene {
-    /// An empty scene.
     pub(super) fn new(size: [f64; 3]) -> Self {
         Self { size, surfaces: Vec::new(), blockers: Vec::new(), n_pieces: 0, n_parts: 0 }
     }
@@ -114,7 +111,6 @@ impl Scene {
         self.outlined(place, corner, u, v, Outline::Full, texture);
     }
 
-    /// Adds a flat surface with the given outline.
     pub(super) fn outlined(
         &mut self,
         place: &Place,

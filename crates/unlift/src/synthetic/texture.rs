@@ -79,7 +79,6 @@ impl Texture {
     pub(super) const GLASS: Self = Self::new(Material::Glass, [6.0, 60.0, 0.0, 0.0, 0.02]);
 }
 
-/// Outline of a flat surface within its parallelogram.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Outline {
     /// Whole parallelogram.
@@ -131,7 +130,6 @@ impl Surface {
         }
     }
 
-    /// Returns the unit normal.
     pub(super) fn normal(&self) -> [f64; 3] {
         let n = cross(self.u, self.v);
         scale(n, 1.0 / norm(n))

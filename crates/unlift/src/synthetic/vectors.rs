@@ -10,7 +10,6 @@ pub(super) fn turn(t: f64) -> Turn {
     [(1.0 - t * t) / norm, 2.0 * t / norm]
 }
 
-/// Rotates `v` about `z`.
 pub(super) fn rotate([cos, sin]: Turn, v: [f64; 3]) -> [f64; 3] {
     [cos * v[0] - sin * v[1], sin * v[0] + cos * v[1], v[2]]
 }

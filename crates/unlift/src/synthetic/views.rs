@@ -14,7 +14,6 @@ pub struct Camera {
     pub look: [f64; 3],
 }
 
-/// Number of photos.
 const N_CAMERAS: usize = 72;
 
 /// Cosine of half the field of view (about 35 degrees).

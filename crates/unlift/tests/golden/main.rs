@@ -42,7 +42,6 @@ fn redkitchen() -> Option<Vec<[f64; 3]>> {
     Some(points)
 }
 
-/// Computes a row per cell of `floors` and solver.
 fn rows(points: Vec<[f64; 3]>, k: usize, floors: &[Floor]) -> Vec<Row> {
     let original = Original::new(PointSet::try_new(points, Unit::Meter).unwrap());
     let mut ratios: Vec<f64> = floors.iter().map(|&(_, ratio, _)| ratio).collect();

@@ -50,7 +50,6 @@ fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
     (scale > 1e-12 * n).then(|| product(&a, &b) / scale * (n - 1.0).sqrt())
 }
 
-/// Returns the last bit of a released number.
 fn last_bit(x: f32) -> f64 {
     f64::from(x.to_bits() & 1)
 }

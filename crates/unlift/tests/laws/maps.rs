@@ -13,7 +13,6 @@ use unlift::truth::{Original, Secret};
 use unlift::{About, Error, PointSet, RecordId, RowOrder, Unit};
 pub use unlift_testkit::{distance_to_record, dot, norm, piles, room, uniform};
 
-/// Default seed of the cases of property tests.
 const SEED: u64 = 25;
 
 /// Returns the configuration of property tests: `n` cases, equal in every run.
@@ -162,7 +161,6 @@ pub fn solve<const D: usize>(
     recover(released, lists, &solver, &options).unwrap()
 }
 
-/// Appends the bits of rows of floats.
 fn push_rows<const D: usize>(bytes: &mut Vec<u8>, rows: &[[f32; D]]) {
     bytes.extend(rows.as_flattened().iter().flat_map(|x| x.to_bits().to_le_bytes()));
 }

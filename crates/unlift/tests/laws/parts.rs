@@ -7,7 +7,6 @@ use unlift::released::Obfuscation;
 
 use crate::maps::*;
 
-/// Options of the tests in this file.
 const CONSENSUS: RecoverOptions =
     RecoverOptions { delta: Delta::Auto, seed: 0, exact_constraints: true, confidence: false };
 
@@ -17,7 +16,6 @@ fn cuts(n: usize) -> Vec<std::ops::Range<usize>> {
     at.windows(2).map(|pair| pair[0]..pair[1]).collect()
 }
 
-/// Solves each part with only its own lists.
 fn lists_of_others_change_nothing<const D: usize>(name: &str, scheme: &Entry) {
     let hidden = hide::<D>(scheme, &room(61, 500), 6);
     let lists = hidden.lists(15, 0.5, 6);

@@ -43,7 +43,6 @@ fn originals_lie_on_their_records<const D: usize>(
     }
 }
 
-/// Normalizing stored records changes no bit.
 fn normal_form_is_idempotent<const D: usize>(name: &str, scheme: &Entry, n: usize, seed: u64) {
     let hidden = hide::<D>(scheme, &room(seed, n), seed);
     let stored = hidden.released.obfuscation();
@@ -100,7 +99,6 @@ fn every_original_is_accounted_for<const D: usize>(
     }
 }
 
-/// The same seed gives the same bytes for any number of threads.
 fn threads_change_no_byte<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     let points = room(seed, 700);
     let run = || {
@@ -124,7 +122,6 @@ fn threads_change_no_byte<const D: usize>(name: &str, scheme: &Entry, seed: u64)
     assert!(one == on(2) && one == on(8), "{name}: threads changed a byte");
 }
 
-/// Another seed gives another released map.
 fn seeds_matter<const D: usize>(name: &str, scheme: &Entry) {
     let points = room(1, 200);
     let bytes = |seed| released_bytes(&hide::<D>(scheme, &points, seed).released);

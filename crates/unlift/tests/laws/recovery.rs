@@ -212,7 +212,6 @@ fn bounded_influence<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     }
 }
 
-/// The order of entries in a list does not change the result.
 fn order_tells_nothing<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     let hidden = hide::<D>(scheme, &room(seed, 300), seed);
     let lists = hidden.lists(15, 0.6, seed);
@@ -263,7 +262,6 @@ fn no_hidden_input<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     assert!(before == after, "{name}");
 }
 
-/// Lists of another map are an error.
 fn foreign_lists_are_refused<const D: usize>(name: &str, scheme: &Entry) {
     let one = hide::<D>(scheme, &room(1, 100), 1);
     let other = hide::<D>(scheme, &room(1, 160), 1);

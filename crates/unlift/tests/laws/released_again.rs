@@ -75,7 +75,6 @@ fn again<const D: usize>(
     }
 }
 
-/// Returns the lists for the new records.
 fn lists_again(lists: &Neighborhoods, order: &[usize], per: usize) -> Neighborhoods {
     let mut new_of = vec![0; order.len()];
     order.iter().enumerate().for_each(|(new, &old)| new_of[old] = new as u32);

@@ -26,7 +26,7 @@ fn is_best(found: &[f64], options: &[Choice], tolerance: f64) -> Result<f64, Str
     }
 }
 
-/// Checks that a lost slot has no candidate. Returns its evidence, 0. Returns 0, its evidence.
+/// Checks that a lost slot has no candidate. Returns its evidence, 0.
 fn none_left(options: &[Choice]) -> Result<f64, String> {
     if options.is_empty() { Ok(0.0) } else { Err(format!("lost, but {options:?}")) }
 }

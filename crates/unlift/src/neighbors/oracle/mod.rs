@@ -120,7 +120,6 @@ impl TrueNeighbors {
         &self.records[slot * self.k..(slot + 1) * self.k]
     }
 
-    /// Returns the record of slot `slot`.
     fn own(&self, slot: usize) -> RecordId {
         RecordId::from_index(slot / self.slots_per_record)
     }
@@ -151,7 +150,6 @@ impl TrueNeighbors {
     }
 }
 
-/// Checks that there are at least `k` other records.
 fn check_k(k: usize, n_records: usize) -> Result<(), Error> {
     if k > 0 && n_records > k {
         return Ok(());
@@ -164,7 +162,6 @@ fn check_k(k: usize, n_records: usize) -> Result<(), Error> {
     Err(Error::new("k", expected, k.to_string()))
 }
 
-/// Describes lists of the oracle for one released map.
 fn about(map: Option<Fingerprint>) -> About {
     About { map, order: RowOrder::Slots, lists_by: ListsBy::Oracle }
 }

@@ -63,7 +63,6 @@ impl<'a, const D: usize> Nearness<'a, D> {
         }
     }
 
-    /// Returns the record that hides `original`; `None` for dropped points.
     pub(super) fn record_of(&self, original: usize) -> Option<RecordId> {
         self.record_of[original]
     }

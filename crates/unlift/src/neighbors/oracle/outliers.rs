@@ -56,7 +56,6 @@ impl Noise {
 const RING: (usize, usize) = (2, 10);
 /// Maximum number of originals in a patch of [`Noise::Clustered`], in multiples of K.
 const PATCH: usize = 2;
-/// Number of wrong places per patch.
 const PLACES: usize = 2;
 /// Maximum number of draws for a far place; small maps may have none.
 const MOST_DRAWS: usize = 64;
