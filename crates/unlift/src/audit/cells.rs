@@ -106,7 +106,7 @@ pub(super) fn cells<const D: usize>(
 ///
 /// # Errors
 /// For images, whose rows are pooled, any failure of a source or solver. For maps, failures of
-/// built-in solvers only. Also when the observer stops the audit.
+/// built-in solvers and of measures only. Also when the observer stops the audit.
 pub(super) fn attack<const D: usize>(
     owned: &Owned<'_, D>,
     run: &Run<'_, D>,
