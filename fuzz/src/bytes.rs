@@ -1,22 +1,22 @@
-//! Bytes of a fuzzer, taken from the front. What is missing is 0, so that every input means something.
+//! Bytes of a fuzzer, read from the front. Missing bytes are 0, so that every input is valid.
 
-/// The rest of an input.
+/// Rest of an input.
 pub struct Bytes<'a>(pub &'a [u8]);
 
 impl<'a> Bytes<'a> {
-    /// The next byte.
+    /// Returns the next byte.
     pub fn byte(&mut self) -> u8 {
         let Some((&first, rest)) = self.0.split_first() else { return 0 };
         self.0 = rest;
         first
     }
 
-    /// The next number of two bytes.
+    /// Returns the next number of two bytes.
     pub fn short(&mut self) -> u16 {
         u16::from_le_bytes([self.byte(), self.byte()])
     }
 
-    /// A number: mostly small ones, at times any bits of a float.
+    /// Returns a number, usually small, sometimes with any bits of a float.
     pub fn number(&mut self) -> f64 {
         match self.byte() {
             0 => {
@@ -27,7 +27,7 @@ impl<'a> Bytes<'a> {
         }
     }
 
-    /// The next `n` bytes, or as many as there are.
+    /// Returns the next `n` bytes, or as many as remain.
     pub fn take(&mut self, n: usize) -> &'a [u8] {
         let (taken, rest) = self.0.split_at(n.min(self.0.len()));
         self.0 = rest;

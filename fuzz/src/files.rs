@@ -1,4 +1,4 @@
-//! Readers of files.
+//! Fuzz targets for readers of files.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -9,23 +9,21 @@ use unlift_io::stage::{self, ImageFile, Kind};
 
 use super::bytes::Bytes;
 
-/// Images of a file of features that are read at most: they are alike.
+/// Maximum number of images to read from a file of features, because they are similar.
 const IMAGES: usize = 8;
 
-/// A folder of this process.
 fn folder() -> &'static Path {
     static FOLDER: OnceLock<tempfile::TempDir> = OnceLock::new();
     FOLDER.get_or_init(|| tempfile::tempdir().expect("a folder for files")).path()
 }
 
-/// A file with these bytes.
 fn file(name: &str, bytes: &[u8]) -> PathBuf {
     let path = folder().join(name);
     std::fs::write(&path, bytes).expect("a file is written");
     path
 }
 
-/// A point cloud; the first byte says of which kind.
+/// Reads a point cloud. The first byte chooses the format.
 pub fn points(bytes: &[u8]) {
     const NAMES: [&str; 10] = [
         "p.ply",
@@ -48,7 +46,8 @@ pub fn points(bytes: &[u8]) {
     }
 }
 
-/// E57 with right checksums, CRC-32C of each page of 1024 bytes in its last four: else nothing behind them would be reached.
+/// Returns an E57 file with correct checksums, so that the code behind them is reached: CRC-32C of
+/// each page of 1024 bytes in its last four.
 fn sealed(bytes: &[u8]) -> Vec<u8> {
     let mut file = bytes.to_vec();
     for page in file.chunks_exact_mut(1024) {
@@ -61,7 +60,8 @@ fn sealed(bytes: &[u8]) -> Vec<u8> {
     file
 }
 
-/// A COLMAP model: the first byte says which files there are and whether they are text, two bytes how long each is.
+/// Reads a COLMAP model. The first byte chooses the files and whether they are text; two bytes give
+/// the length of each.
 pub fn model_folder(bytes: &[u8]) {
     const NAMES: [&str; 5] = ["cameras", "images", "points3D", "rigs", "frames"];
     let mut bytes = Bytes(bytes);
@@ -82,7 +82,7 @@ pub fn model_folder(bytes: &[u8]) {
     }
 }
 
-/// Descriptors of five points.
+/// Reads descriptors of five points.
 pub fn descriptors(bytes: &[u8]) {
     let input = Input {
         positions: (0..5).map(|at| [f64::from(at), 0.0, 0.0]).collect(),
@@ -95,7 +95,7 @@ pub fn descriptors(bytes: &[u8]) {
     }
 }
 
-/// Features of images: HDF5 as hloc writes it, or COLMAP's database.
+/// Reads features of images: HDF5 as hloc writes it, or COLMAP's database.
 pub fn features(bytes: &[u8]) {
     let path = file("f.h5", bytes);
     let Ok(source) = FeatureSource::open(&path) else { return };
@@ -107,7 +107,7 @@ pub fn features(bytes: &[u8]) {
     }
 }
 
-/// Parquet between stages, read as every kind.
+/// Reads a Parquet file between stages as every kind.
 pub fn stages(bytes: &[u8]) {
     let path = file("s.parquet", bytes);
     let _ = stage::peek(&path);
@@ -144,7 +144,7 @@ pub fn stages(bytes: &[u8]) {
     }
 }
 
-/// A photo.
+/// Decodes a photo.
 pub fn photo(bytes: &[u8]) {
     if let Ok(image) = unlift_features::load::decode(bytes, "a photo") {
         assert!(image.width() > 0 && image.height() > 0);
@@ -154,7 +154,8 @@ pub fn photo(bytes: &[u8]) {
     }
 }
 
-/// An `audit.json`; what is accepted is written, and that read and written is the same: writing rounds.
+/// Reads an `audit.json`. An accepted one is written, read and written again, which must not change
+/// it: the first writing rounds.
 pub fn document(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     let Ok(document) = unlift_report::Document::from_json(text) else { return };
@@ -163,7 +164,7 @@ pub fn document(bytes: &[u8]) {
     assert_eq!(again.to_json().expect("and written again"), written);
 }
 
-/// A network that its user supplies: such a file has no hash.
+/// Loads a network of a user, whose file has no hash.
 pub fn network(bytes: &[u8]) {
     let path = file("n.onnx", bytes);
     let entry = unlift_nn::entry("superpoint").expect("an entry");

@@ -1,4 +1,4 @@
-//! Recovery from records and lists that nobody made: whatever is accepted comes out finite or lost with a reason.
+//! Recovery from arbitrary records and lists: each point is finite or lost with a reason.
 
 use unlift::neighbors::Neighborhoods;
 use unlift::recover::{Builtin, Delta, RecoverOptions, Status, recover};
@@ -7,7 +7,7 @@ use unlift::{About, Error, ListsBy, RecordId, Unit};
 
 use super::bytes::Bytes;
 
-/// Records, lists and options; two bytes say which dimension, family and solver.
+/// Recovers from records, lists and options. Two bytes choose dimension, family and solver.
 pub fn recovery(bytes: &[u8]) {
     let mut bytes = Bytes(bytes);
     if bytes.byte().is_multiple_of(4) { of::<2>(&mut bytes) } else { of::<3>(&mut bytes) }

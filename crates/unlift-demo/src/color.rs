@@ -1,11 +1,10 @@
-//! Colors, and how they are mixed.
+//! Colors and their mixtures.
 
 use crate::noise::hashed;
 
-/// Red, green and blue, the share of the light that comes back.
+/// Reflected shares of red, green and blue light.
 pub(crate) type Color = [f64; 3];
 
-/// One of several, by a hash.
 pub(crate) fn one_of(colors: &[Color], parts: [u64; 3]) -> Color {
     colors[(hashed(parts) % colors.len() as u64) as usize]
 }
@@ -18,7 +17,7 @@ pub(crate) fn mixed(a: Color, b: Color, share: f64) -> Color {
     std::array::from_fn(|c| a[c] * (1.0 - share) + b[c] * share)
 }
 
-/// How far into a band around 0 a value is, with soft sides: 1 in the middle, 0 outside.
+/// Returns the weight of a value in a band around 0 with soft edges: 1 in the middle, 0 outside.
 pub(crate) fn within(x: f64, half: f64, soft: f64) -> f64 {
     ((half - x.abs()) / soft + 0.5).clamp(0.0, 1.0)
 }

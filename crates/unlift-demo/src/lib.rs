@@ -1,12 +1,12 @@
-//! What the demo attacks: two photographs that may be shown to anybody, and the map of a room that nobody lives in.
+//! Data of the demo: two CC0 photos, and the map of a synthetic room.
 //!
-//! The map is made as structure from motion makes one, from rendered photos of the room:
+//! The map is made like one from structure from motion, from rendered photos of the room:
 //!
 //! ```text
 //! sheets ──> raster ──> material x light ──> photos ──> SIFT ──> tracks ──> points with descriptors
 //! ```
 //!
-//! Only `+ - * /` and `sqrt` make the photos, so a seed gives the same bytes on every platform.
+//! Only `+ - * /` and `sqrt` are used for the photos, so they are byte-identical on all platforms.
 
 mod color;
 mod light;
@@ -31,13 +31,13 @@ use unlift_features::Sift;
 use crate::light::Lights;
 use crate::pinhole::Pinhole;
 
-/// File names and bytes of the two photographs: JPEG, CC0; photos/README.md has the authors.
+/// File names and bytes of the two photos: JPEG, CC0. photos/README.md lists the authors.
 pub static PHOTOS: [(&str, &[u8]); 2] = [
     ("cat.jpg", include_bytes!("../photos/cat.jpg")),
     ("coffee.jpg", include_bytes!("../photos/coffee.jpg")),
 ];
 
-/// Writes the two photographs into `folder`, which must exist.
+/// Writes the two photos into `folder`, which must exist.
 ///
 /// # Errors
 /// When a file cannot be written.
@@ -48,26 +48,26 @@ pub fn write_photos(folder: &Path) -> io::Result<()> {
 /// Width and height of the rendered photos in pixels.
 const SIZE: [usize; 2] = [480, 360];
 
-/// A map as structure from motion makes it, in meters.
+/// A map like one from structure from motion, in meters.
 pub struct Mapped {
     /// Positions, `(n, 3)`.
     pub points: Vec<[f64; 3]>,
-    /// One SIFT descriptor per point, `(n, 128)`: the mean over its track, as maps have them.
+    /// SIFT descriptors, `(n, 128)`: the mean over each point's track, as in real maps.
     pub descriptors: Descriptors,
-    /// Where the cameras stood, `(m, 3)`.
+    /// Centers of the cameras, `(m, 3)`.
     pub cameras: Vec<[f64; 3]>,
 }
 
-/// The map of the furnished room of `seed`.
+/// Creates the map of the furnished room of `seed`.
 ///
 /// # Errors
-/// Never, unless this crate is wrong.
+/// Only if this crate has a bug.
 pub fn room(seed: u64) -> Result<Mapped, Error> {
-    // Neighbors on the walk see much the same, and every photo takes half a second.
+    // Neighboring photos on the walk are similar, and each takes half a second.
     mapped(seed, SIZE, |at| at % 3 == 0)
 }
 
-/// The map of those photos of the walk that are `wanted`.
+/// Creates the map from those photos of the walk that `wanted` selects by number.
 fn mapped(seed: u64, size: [usize; 2], wanted: impl Fn(usize) -> bool) -> Result<Mapped, Error> {
     let room = synthetic::room(seed, 0);
     let cameras: Vec<Pinhole> = (room.cameras.iter().enumerate())
@@ -89,7 +89,6 @@ fn mapped(seed: u64, size: [usize; 2], wanted: impl Fn(usize) -> bool) -> Result
     Ok(Mapped { points, descriptors, cameras })
 }
 
-/// The middle of a sheet.
 fn middle(sheet: &Sheet) -> [f64; 3] {
     let half = scale(add(sheet.u, sheet.v), 0.5);
     add(sheet.corner, half)
@@ -127,7 +126,7 @@ mod tests {
             let Some((place, depth)) = camera.project(point) else { continue };
             let (sheet, before) = seen.at(place);
             assert_ne!(sheet, NONE, "a closed room");
-            // Those behind something are for other cameras.
+            // Points behind another surface are skipped.
             if depth < f64::from(before) * 1.02 {
                 let ray = camera.ray(place);
                 let (far, _) = Facing::new(&camera, &room.sheets[sheet as usize]).hit(ray);

@@ -1,4 +1,4 @@
-//! A lamp below the ceiling, and the day behind the window.
+//! Illumination by a lamp below the ceiling and by daylight from the window.
 
 use unlift::synthetic::{Material, Sheet};
 
@@ -7,27 +7,27 @@ use crate::pinhole::Pinhole;
 use crate::raster::{Seen, in_the_way};
 use unlift::synthetic::vectors::{add, cross, dot, norm, scale, sub, unit};
 
-/// Pixels a side of what a lamp sees of one of the six directions.
+/// Width and height in pixels of a lamp's depth image in one of six directions.
 const SIDE: usize = 384;
-/// How far before a surface its shadows are looked up, in meters: a surface does not shade itself.
+/// Distance in meters in front of a surface at which shadows are looked up, so that it does not
+/// shade itself.
 const SLACK: f64 = 0.03;
-/// Light from everywhere, on what looks down and on what looks up.
+/// Ambient light on surfaces that face down and up.
 const AMBIENT: [f64; 2] = [0.28, 0.42];
 
-/// Sends light into all directions.
+/// Point light that shines in all directions.
 struct Lamp {
     at: [f64; 3],
     color: [f64; 3],
-    /// In meters: how near one must be for it to be clearly brighter.
+    /// Distance in meters within which surfaces are clearly brighter.
     reach: f64,
-    /// What it sees along `x`, `y`, `z`, and against them.
+    /// Depth images along `x`, `y`, `z` and against them.
     around: Vec<(Pinhole, Seen)>,
 }
 
 pub(crate) struct Lights(Vec<Lamp>);
 
 impl Lights {
-    /// Of a room with a window.
     pub(crate) fn of(sheets: &[Sheet]) -> Self {
         let top = sheets.iter().map(|sheet| middle(sheet)[2]).fold(0.0, f64::max);
         let mut lamps = vec![Lamp::new([-0.7, 0.45, top - 0.25], [0.95, 0.86, 0.72], 1.6, sheets)];
@@ -38,7 +38,6 @@ impl Lights {
         Self(lamps)
     }
 
-    /// Red, green and blue that reach a surface at `point`.
     pub(crate) fn reaching(&self, point: [f64; 3], normal: [f64; 3]) -> [f64; 3] {
         let up = 0.5 + 0.5 * normal[2];
         let ambient = AMBIENT[0] * (1.0 - up) + AMBIENT[1] * up;
@@ -59,7 +58,7 @@ impl Lamp {
                 axis[(side + c) % 3] = if side < 3 { 1.0 } else { -1.0 };
                 axis
             });
-            // To the right, down, ahead: cameras see no mirrored world, lamps do not mind.
+            // These axes may be mirrored, which does not matter for depth images.
             let camera = Pinhole {
                 center: at,
                 rotation: [y, z, x],
@@ -84,7 +83,8 @@ impl Lamp {
         slope / (1.0 + near * near) * self.unshaded(add(point, scale(normal, SLACK))) * 2.0
     }
 
-    /// The share of the lamp that is seen from `point`: of nine places around it in the lamp's picture.
+    /// Returns the visible share of the lamp from `point`, from nine pixels around it in the depth
+    /// image.
     fn unshaded(&self, point: [f64; 3]) -> f64 {
         let found = self.around.iter().find_map(|(camera, seen)| {
             let (place, depth) = camera.project(point)?;

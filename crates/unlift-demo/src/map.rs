@@ -1,4 +1,4 @@
-//! Keypoints of several photos that show the same place, and where that is.
+//! Tracks of keypoints that show the same place in several photos, and triangulation.
 
 use unlift::descriptors::Values;
 use unlift::synthetic::Sheet;
@@ -9,34 +9,33 @@ use crate::pinhole::Pinhole;
 use crate::raster::{Facing, NONE, Seen};
 use unlift::synthetic::vectors::{add, dot, norm, scale, sub, unit};
 
-/// Values of a descriptor, and its length.
 const COLUMNS: usize = 128;
 const LENGTH: f64 = 512.0;
-/// How far from where it should be a keypoint of the same place may be, in pixels.
+/// Maximum distance in pixels between a keypoint and the projected place.
 const NEAR_PX: f64 = 2.5;
-/// How far apart the surfaces may be that two keypoints lie on, of the distance from the camera.
+/// Maximum distance between the surface points of two keypoints, as a fraction of the camera
+/// distance.
 const NEAR: f64 = 0.01;
-/// The squared distance of descriptors of the same place, of 2 x 512^2 between strangers.
+/// Maximum squared distance of descriptors of the same place; unrelated ones have about 2 x 512^2.
 const ALIKE: u32 = 110_000;
-/// Cosine of the smallest angle from which a point is seen: 1.5 degrees, as COLMAP.
+/// Cosine of the minimum triangulation angle: 1.5 degrees, as in COLMAP.
 const WIDEST_COSINE: f64 = 0.999_657;
-/// How far from its keypoints a point may project, in pixels, as COLMAP.
+/// Maximum reprojection error in pixels, as in COLMAP.
 const MOST_PX: f64 = 4.0;
-/// Pixels of a cell in which keypoints are looked up.
+/// Side of a grid cell for keypoints, in pixels.
 const CELL: f64 = 8.0;
 
-/// The keypoints of a photo and what they lie on.
 pub(crate) struct Sighted {
     features: Features,
-    /// Where the surface is that each one shows, or NaN.
+    /// Surface point of each keypoint, or NaN.
     hits: Vec<[f64; 3]>,
-    /// Keypoints by cells of the photo.
+    /// Keypoints of each grid cell of the photo.
     cells: Vec<Vec<u32>>,
     columns: usize,
 }
 
 impl Sighted {
-    /// Of what `camera` has `seen`.
+    /// Finds the surface points of the keypoints of a photo that `camera` took.
     pub(crate) fn new(camera: &Pinhole, sheets: &[Sheet], seen: &Seen, features: Features) -> Self {
         let hit = |place: [f64; 2]| {
             let (sheet, _) = seen.at(place);
@@ -62,7 +61,6 @@ impl Sighted {
         [keypoint.x, keypoint.y].map(f64::from)
     }
 
-    /// Keypoints in the cells around `place`.
     fn around(&self, place: [f64; 2]) -> impl Iterator<Item = u32> {
         let (columns, rows) = (self.columns, self.cells.len() / self.columns);
         let [x, y] = place.map(|x| (x / CELL) as usize);
@@ -77,10 +75,10 @@ fn cell(place: [f64; 2], columns: usize) -> usize {
     (place[1] / CELL) as usize * columns + (place[0] / CELL) as usize
 }
 
-/// A keypoint: which photo's, and which.
+/// A keypoint: photo and index.
 type Keypoint = (u32, u32);
 
-/// Points that several photos show, and their descriptors.
+/// Triangulates points that several photos show, with their descriptors.
 pub(crate) fn triangulated(
     cameras: &[Pinhole],
     photos: &[Sighted],
@@ -95,7 +93,7 @@ pub(crate) fn triangulated(
     Ok((points, Descriptors::try_new(Values::U8(bytes), COLUMNS)?))
 }
 
-/// Keypoints that match, at most one of every photo, those most alike first.
+/// Joins matching keypoints to tracks, at most one per photo, best matches first.
 fn tracks(cameras: &[Pinhole], photos: &[Sighted]) -> Vec<Vec<Keypoint>> {
     let mut matches = Vec::new();
     for (a, photo) in photos.iter().enumerate() {
@@ -151,7 +149,7 @@ fn tracks(cameras: &[Pinhole], photos: &[Sighted]) -> Vec<Vec<Keypoint>> {
     tracks
 }
 
-/// The keypoint of `photo` that shows what is at `hit`, and how unlike the descriptors are.
+/// Returns the keypoint of `photo` that shows the place `hit`, and the distance of the descriptors.
 fn best(
     photo: &Sighted,
     place: [f64; 2],
@@ -171,7 +169,7 @@ fn best(
     near.map(|other| (unlike(other), other)).min().filter(|(unlike, _)| *unlike <= ALIKE)
 }
 
-/// Where the rays through the keypoints of a track meet, if they do.
+/// Triangulates a track; `None` if its rays do not meet.
 fn seen_from(cameras: &[Pinhole], photos: &[Sighted], track: &[Keypoint]) -> Option<[f64; 3]> {
     let rays: Vec<([f64; 3], [f64; 3])> = track
         .iter()
@@ -212,7 +210,7 @@ fn seen_from(cameras: &[Pinhole], photos: &[Sighted], track: &[Keypoint]) -> Opt
     fits.then_some(point)
 }
 
-/// Cramer's rule.
+/// Solves a linear system by Cramer's rule.
 fn solved(rows: [[f64; 3]; 3], right: [f64; 3]) -> Option<[f64; 3]> {
     let det =
         |rows: [[f64; 3]; 3]| dot(rows[0], unlift::synthetic::vectors::cross(rows[1], rows[2]));
@@ -226,7 +224,7 @@ fn solved(rows: [[f64; 3]; 3], right: [f64; 3]) -> Option<[f64; 3]> {
     })
 }
 
-/// The mean of a track's descriptors, of their length.
+/// Returns the mean of a track's descriptors, scaled to their norm.
 fn mean(photos: &[Sighted], track: &[Keypoint]) -> [u8; COLUMNS] {
     let mut sums = [0.0; COLUMNS];
     for &(photo, at) in track {

@@ -1,4 +1,4 @@
-//! The color of a place on a surface.
+//! Colors of surfaces by material.
 
 use unlift::synthetic::{Material, Sheet};
 
@@ -7,10 +7,9 @@ use crate::noise::{hashed, of_cell, rough, smooth, unit};
 use crate::prints::print;
 use unlift::synthetic::vectors::norm;
 
-/// How a place looks.
 pub(crate) struct Shade {
     pub(crate) color: Color,
-    /// Whether it is as bright in the dark.
+    /// True if its brightness does not depend on light.
     pub(crate) glows: bool,
 }
 
@@ -22,12 +21,12 @@ const SMOOTHS: [Color; 4] =
     [[0.62, 0.6, 0.56], [0.08, 0.08, 0.09], [0.48, 0.5, 0.5], [0.7, 0.68, 0.62]];
 const WALLS: [Color; 3] = [[0.66, 0.62, 0.54], [0.4, 0.49, 0.5], [0.66, 0.62, 0.54]];
 
-/// How `sheet`, which is the one at `index`, looks at `on` (both coordinates 0 to 1).
+/// Returns the appearance of `sheet`, with number `index`, at `on` (both coordinates 0 to 1).
 pub(crate) fn shade(sheet: &Sheet, index: u32, on: [f64; 2]) -> Shade {
     let sides = [norm(sheet.u), norm(sheet.v)];
     let [x, y] = [0, 1].map(|c| on[c] * sides[c]);
     let (part, piece) = (u64::from(sheet.part), u64::from(sheet.piece));
-    // The longer side of a board is that of its tree.
+    // Grain runs along the longer side.
     let [along, across] = if sides[0] > sides[1] { [x, y] } else { [y, x] };
     let own = hashed([part, u64::from(index), 7]);
     let color = match sheet.material {
@@ -47,7 +46,6 @@ pub(crate) fn shade(sheet: &Sheet, index: u32, on: [f64; 2]) -> Shade {
     Shade { color, glows: false }
 }
 
-/// Paint with stains, dents and nail holes.
 fn paint([x, y]: [f64; 2], part: u64) -> Color {
     let base = one_of(&WALLS, [part, 1, 4]);
     let mut tone = 0.97 + 0.06 * rough(x * 3.0, y * 3.0, part);
@@ -55,7 +53,6 @@ fn paint([x, y]: [f64; 2], part: u64) -> Color {
     let (i, j) = ((x / CELL).floor(), (y / CELL).floor());
     let seed = |at: u64| [i as i64 as u64, j as i64 as u64, part ^ (at << 32)];
     if unit(seed(1)) < 0.4 {
-        // A stain somewhere in the cell.
         let [dx, dy] =
             [(x, i, 2), (y, j, 3)].map(|(x, i, at)| x - (i + 0.2 + 0.6 * unit(seed(at))) * CELL);
         let size = 0.006 + 0.03 * unit(seed(4)) * unit(seed(5));
@@ -66,7 +63,7 @@ fn paint([x, y]: [f64; 2], part: u64) -> Color {
     toned(base, tone)
 }
 
-/// Grain along the first coordinate, with knots.
+/// Returns wood with grain along the first coordinate and knots.
 fn wood([along, across]: [f64; 2], own: u64, base: Color) -> Color {
     const CELL: [f64; 2] = [0.5, 0.16];
     let (i, j) = ((along / CELL[0]).floor(), (across / CELL[1]).floor());
@@ -77,7 +74,7 @@ fn wood([along, across]: [f64; 2], own: u64, base: Color) -> Color {
     );
     let size = 0.004 + 0.014 * unit(seed(3));
     let from_knot = (0.3 * dx * dx + dy * dy).sqrt();
-    // Fibers go around a knot.
+    // Fibers bend around a knot.
     let bend = dy * size * 3.0 / (from_knot + size);
     let warp = 0.03 * smooth(along * 2.5, across * 6.0, own ^ 1);
     let fibers = rough(along * 4.0, (across + bend + warp) * 70.0, own);
@@ -89,7 +86,7 @@ fn wood([along, across]: [f64; 2], own: u64, base: Color) -> Color {
     toned(base, tone)
 }
 
-/// Planks of 12 cm, none as its neighbor.
+/// Returns planks 12 cm wide, each different from its neighbors.
 fn boards([x, y]: [f64; 2], own: u64) -> Color {
     const WIDTH: f64 = 0.12;
     const LENGTH: f64 = 1.1;
@@ -110,7 +107,6 @@ fn boards([x, y]: [f64; 2], own: u64) -> Color {
     toned(color, 1.0 - 0.7 * gap)
 }
 
-/// Coarse weave, worn here and there.
 fn fabric([x, y]: [f64; 2], own: u64, base: Color) -> Color {
     let weave = of_cell(x * 160.0, y * 160.0, own);
     let knots = rough(x * 28.0, y * 28.0, own ^ 1);
@@ -118,7 +114,7 @@ fn fabric([x, y]: [f64; 2], own: u64, base: Color) -> Color {
     toned(base, 0.5 + 0.25 * weave + 0.6 * knots + 0.35 * worn)
 }
 
-/// Tiles of one of several shapes in three colors.
+/// Returns tiles of one of several shapes in three colors.
 fn pattern([x, y]: [f64; 2], part: u64) -> Color {
     const DYES: [Color; 8] = [
         [0.5, 0.1, 0.07],
@@ -152,7 +148,6 @@ fn pattern([x, y]: [f64; 2], part: u64) -> Color {
     )
 }
 
-/// Green, with a rib and veins.
 fn leaf([s, t]: [f64; 2], own: u64) -> Color {
     let green = mixed([0.1, 0.3, 0.06], [0.25, 0.42, 0.1], unit([own, 1, 1]));
     let rib = within(t - 0.5, 0.05, 0.04);
@@ -162,7 +157,7 @@ fn leaf([s, t]: [f64; 2], own: u64) -> Color {
     toned(green, tone * (1.0 + 0.6 * rib + 0.3 * veins))
 }
 
-/// Trees before a sky.
+/// Returns trees in front of a sky.
 fn outside([s, t]: [f64; 2], own: u64) -> Color {
     let crowns = 0.32 + 0.3 * rough(t * 3.0, 0.0, own);
     let tree = within(s, crowns + 0.06 * (rough(s * 12.0, t * 12.0, own) - 0.5), 0.03);

@@ -1,28 +1,27 @@
-//! Numbers that look random and are a function of where they are.
+//! Noise: pseudorandom numbers as a function of position.
 
-/// A number that looks unrelated for inputs that differ in anything.
 pub(crate) fn hashed([a, b, c]: [u64; 3]) -> u64 {
     let mut state = a
         .wrapping_mul(0x9e37_79b9_7f4a_7c15)
         .wrapping_add(b.rotate_left(32).wrapping_mul(0xd6e8_feb8_6659_fd93))
         .wrapping_add(c.wrapping_mul(0xa076_1d64_78bd_642f));
-    // The last part of SplitMix64, Steele and others 2014.
+    // The finalizer of SplitMix64 (Steele et al. 2014).
     state = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     state = (state ^ (state >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     state ^ (state >> 31)
 }
 
-/// 0 to 1.
+/// Returns a pseudorandom number from 0 to 1.
 pub(crate) fn unit(parts: [u64; 3]) -> f64 {
     (hashed(parts) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// Of a cell of a grid in the plane, 0 to 1.
+/// Returns the number of a grid cell in the plane, 0 to 1.
 pub(crate) fn of_cell(x: f64, y: f64, seed: u64) -> f64 {
     unit([x.floor() as i64 as u64, y.floor() as i64 as u64, seed])
 }
 
-/// Smooth between the corners of cells of side 1, 0 to 1.
+/// Returns smooth noise between the corners of cells of side 1, 0 to 1.
 pub(crate) fn smooth(x: f64, y: f64, seed: u64) -> f64 {
     let eased = |x: f64| x * x * (3.0 - 2.0 * x);
     let (a, b) = (eased(x - x.floor()), eased(y - y.floor()));
@@ -32,7 +31,7 @@ pub(crate) fn smooth(x: f64, y: f64, seed: u64) -> f64 {
     low * (1.0 - b) + high * b
 }
 
-/// The sum of four octaves of [`smooth`], 0 to 1.
+/// Returns the sum of four octaves of [`smooth`], 0 to 1.
 pub(crate) fn rough(x: f64, y: f64, seed: u64) -> f64 {
     let octave = |at: u64| {
         let fine = (1_u64 << at) as f64;

@@ -1,4 +1,4 @@
-//! A photo: what is seen, in its color and light.
+//! Rendering of photos: visible surfaces with color and light.
 
 use unlift::Error;
 use unlift::synthetic::Sheet;
@@ -11,12 +11,12 @@ use crate::pinhole::Pinhole;
 use crate::raster::{Facing, NONE, seen};
 use unlift::synthetic::vectors::{add, cross, scale, unit};
 
-/// Looks per pixel and side.
+/// Samples per pixel and axis.
 const FINER: usize = 2;
-/// Deviation of what the sensor adds, of 255.
+/// Amplitude of sensor noise, of 255.
 const GRAIN: f64 = 4.0;
 
-/// What `camera` takes of `sheets`, with grain that depends on `seed`.
+/// Renders `sheets` as seen by `camera`, with noise that depends on `seed`.
 pub(crate) fn photo(
     camera: &Pinhole,
     sheets: &[Sheet],
@@ -50,7 +50,7 @@ pub(crate) fn photo(
         let sum = looks.fold([0.0; 3], add);
         for (c, sum) in sum.into_iter().enumerate() {
             let grain = random([seed, (y * width + x) as u64, c as u64]) - 0.5;
-            // The square root is close to how screens brighten dark values.
+            // The square root approximates the gamma of screens.
             let value = (sum / (FINER * FINER) as f64).min(1.0).sqrt() * 255.0;
             pixels.push((value + grain * GRAIN + 0.5) as u8);
         }

@@ -1,4 +1,4 @@
-//! Printed things: spines, covers, posters, packages.
+//! Printed surfaces: spines, covers, posters, packages.
 
 use crate::color::{Color, mixed, one_of, toned, within};
 use crate::noise::{of_cell, rough, unit};
@@ -16,10 +16,10 @@ const INKS: [Color; 10] = [
     [0.66, 0.44, 0.4],
 ];
 
-/// Shapes of a print.
 const SHAPES: u64 = 11;
 
-/// The color at `(x, y)`, in meters from the corner of a print with these sides: `x` goes up spines and posters.
+/// Returns the color at `(x, y)`, in meters from the corner of a print with these sides. `x` goes
+/// up spines and posters.
 pub(crate) fn print([x, y]: [f64; 2], sides: [f64; 2], own: u64) -> Color {
     let ink = |at: u64| one_of(&INKS, [own, at, 21]);
     let shade = 0.8 + 0.4 * rough(x * 16.0, y * 16.0, own);
@@ -40,12 +40,12 @@ pub(crate) fn print([x, y]: [f64; 2], sides: [f64; 2], own: u64) -> Color {
     lettered(color, [x, y], sides, own, ink(3))
 }
 
-/// Lines of what looks like letters on a part of the print.
+/// Adds lines of letter-like marks to a part of the print.
 fn lettered(ground: Color, [x, y]: [f64; 2], sides: [f64; 2], own: u64, ink: Color) -> Color {
     let of = |at: u64| unit([own, at, 50]);
     let large = sides[0].min(sides[1]);
     let high = (0.12 * large).clamp(0.006, 0.03) * (0.7 + 0.6 * of(1));
-    // On spines letters run along, else across.
+    // Letters run along spines, but across other prints.
     let (run, line, length, lines) = match sides[0] > 3.0 * sides[1] {
         true => (x, y, sides[0], sides[1]),
         false => (y, x, sides[1], sides[0]),
@@ -60,7 +60,7 @@ fn lettered(ground: Color, [x, y]: [f64; 2], sides: [f64; 2], own: u64, ink: Col
     if run / length < first - 0.2 || run / length > last + 0.2 || !(0.2..0.8).contains(&in_row) {
         return ground;
     }
-    // Strokes: cells of a third of a letter, of which half are inked; words end here and there.
+    // Strokes are cells of a third of a letter, about half of them inked. Gaps separate words.
     let stroke = of_cell(run / (0.25 * high), line / (0.3 * high), own ^ 3);
     let word = of_cell(run / (1.6 * high), row, own ^ 4);
     match stroke < 0.55 && word < 0.8 {

@@ -1,27 +1,26 @@
-//! Which surface is seen in which pixel.
+//! Visible surface of each pixel of a photo.
 
 use unlift::synthetic::Sheet;
 
 use crate::pinhole::Pinhole;
 use unlift::synthetic::vectors::{add, cross, dot, scale, sub};
 
-/// Nothing is seen nearer than this, in meters.
+/// Minimum depth in meters.
 const NEAREST: f64 = 0.02;
 
-/// No sheet.
+/// Value of a pixel without a sheet.
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// What every pixel of a photo shows.
 pub(crate) struct Seen {
-    /// `(height, width)`, row-major: the sheet, or [`NONE`].
+    /// Sheet of each pixel or [`NONE`], `(height, width)`, row-major.
     pub(crate) sheets: Vec<u32>,
-    /// How far ahead of the camera it is there, in meters; infinite without a sheet.
+    /// Depth of each pixel in meters; infinite without a sheet.
     pub(crate) depths: Vec<f32>,
     pub(crate) size: [usize; 2],
 }
 
 impl Seen {
-    /// What is at a place in pixels, the corner of the photo at (0, 0).
+    /// Returns sheet and depth at a place in pixels. The corner of the photo is (0, 0).
     pub(crate) fn at(&self, place: [f64; 2]) -> (u32, f32) {
         let [x, y] = [0, 1].map(|c| (place[c].max(0.0) as usize).min(self.size[c] - 1));
         let at = y * self.size[0] + x;
@@ -29,11 +28,12 @@ impl Seen {
     }
 }
 
-/// A sheet as a camera sees it.
+/// A sheet in the camera frame.
 pub(crate) struct Facing {
     corner: [f64; 3],
     normal: [f64; 3],
-    /// Gives the first coordinate of a point relative to the corner.
+    /// Vector whose dot product with a point, relative to the corner, is the point's first
+    /// coordinate on the sheet.
     along_u: [f64; 3],
     along_v: [f64; 3],
     u: [f64; 3],
@@ -58,12 +58,13 @@ impl Facing {
         }
     }
 
-    /// Whether the camera is on its visible side.
+    /// Returns true if the camera is on the sheet's visible side.
     fn is_front(&self) -> bool {
         dot(self.normal, self.corner) < 0.0
     }
 
-    /// How far along `ray` the sheet's plane is, and where on the sheet (both 0 to 1 on it).
+    /// Returns the distance along `ray` to the sheet's plane, and the coordinates on the sheet (0
+    /// to 1 within it).
     pub(crate) fn hit(&self, ray: [f64; 3]) -> (f64, [f64; 2]) {
         let far = dot(self.normal, self.corner) / dot(self.normal, ray);
         let from_corner = sub(scale(ray, far), self.corner);
@@ -76,7 +77,7 @@ impl Facing {
         within && (!self.round || x * x + y * y <= 1.0)
     }
 
-    /// First and last column and row that it may reach, if any.
+    /// Returns the first and last column and row that the sheet may cover, if any.
     fn bounds(&self, camera: &Pinhole) -> Option<[(usize, usize); 2]> {
         let corners = [
             self.corner,
@@ -111,12 +112,12 @@ impl Facing {
     }
 }
 
-/// What `camera` sees of `sheets`.
+/// Renders the sheets whose visible side faces `camera`.
 pub(crate) fn seen(camera: &Pinhole, sheets: &[Sheet]) -> Seen {
     drawn(camera, sheets, Facing::is_front)
 }
 
-/// What lies before `camera`: light does not pass from behind either.
+/// Renders all sheets, because the back of a sheet blocks light, too.
 pub(crate) fn in_the_way(camera: &Pinhole, sheets: &[Sheet]) -> Seen {
     drawn(camera, sheets, |_| true)
 }
@@ -156,7 +157,7 @@ mod tests {
     use super::*;
 
     fn sheet(x: f64, side: f64) -> Sheet {
-        // Across the way, seen by somebody who looks along x.
+        // A square perpendicular to x, visible from a camera that looks along x.
         let corner = [x, -0.5 * side, -0.5 * side];
         let (u, v) = ([0.0, 0.0, side], [0.0, side, 0.0]);
         Sheet { corner, u, v, round: false, material: Material::Paint, piece: 0, part: 0 }
@@ -177,14 +178,15 @@ mod tests {
         assert!(all.sheets.iter().all(|&sheet| sheet == 0 || sheet == 1));
         assert_eq!(all.at([50.0, 40.0]), (1, 2.0));
         assert_eq!(all.at([5.0, 5.0]), (0, 4.0));
-        // 0.42 m at 2 m, 85 pixels of focal length: 17.85 pixels around the middle of the photo.
+        // 0.42 m at 2 m with a focal length of 85 pixels: 17.85 pixels around the middle of the
+        // photo.
         assert_eq!(all.sheets.iter().filter(|&&sheet| sheet == 1).count(), 18 * 18);
         assert_eq!(in_the_way(&camera(), &sheets).at([50.0, 40.0]).0, 2);
     }
 
     #[test]
     fn what_is_beside_and_behind_is_clipped() {
-        // The floor, which reaches from far behind the camera to far ahead.
+        // The floor reaches from far behind the camera to far ahead.
         let floor = Sheet {
             corner: [-5.0, -5.0, -1.0],
             u: [10.0, 0.0, 0.0],
@@ -192,7 +194,7 @@ mod tests {
             ..sheet(0.0, 1.0)
         };
         let all = seen(&camera(), &[floor, sheet(-1.0, 1.0)]);
-        // The lower part of the photo, below the line that is 5 m away: 40 + 85 / 5.
+        // The floor begins below the line that is 5 m away: 40 + 85 / 5.
         assert_eq!(all.at([50.0, 56.5]).0, NONE);
         assert_eq!(all.at([50.0, 57.5]).0, 0);
         assert!(all.sheets.iter().all(|&sheet| sheet == 0 || sheet == NONE));

@@ -192,7 +192,7 @@ def test_what_a_function_raises_is_the_cause(small):
     def careless(points):
         return unlift.Lines(points, np.random.default_rng().normal(size=points.shape))
 
-    with pytest.raises(unlift.UnliftError, match="careless: records: expected the same of one key"):
+    with pytest.raises(unlift.UnliftError, match="careless: records: expected the same for the same key"):
         cheap(small, [careless])
 
 

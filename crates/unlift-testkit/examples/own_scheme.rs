@@ -1,7 +1,7 @@
-//! A scheme that is not ours, audited: `cargo run --release -p unlift-testkit --example own_scheme`.
+//! Audit of a custom scheme: `cargo run --release -p unlift-testkit --example own_scheme`.
 //!
-//! Records are of four families (lines, rays, axis planes, axis candidates): that is what the attacks know. These are lines
-//! that are all nearly upright. Is that safer than lines in all directions?
+//! The attacks support four families of records (lines, rays, axis planes, axis candidates). This
+//! scheme publishes almost upright lines. Is it safer than lines in all directions?
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use unlift::{Error, PointSet, Unit, synthetic};
 /// A line through every point, tilted from the vertical by a random direction.
 #[derive(Debug)]
 struct Tilted {
-    /// The tangent of the tilt, at most.
+    /// Maximum tangent of the tilt.
     most: f64,
 }
 
@@ -53,7 +53,8 @@ impl Scheme<3> for Tilted {
 }
 
 fn main() -> Result<(), Error> {
-    // In a test of your crate: that it hides every point, on its record, by its key alone.
+    // Call this in a test of your crate. It checks that the scheme hides every point, on its
+    // record, and depends only on the key.
     unlift_testkit::scheme_laws(&Tilted { most: 0.5 });
 
     let room = Original::new(PointSet::try_new(synthetic::room(1, 3_000).points, Unit::Meter)?);
@@ -62,7 +63,7 @@ fn main() -> Result<(), Error> {
         inlier_ratios: vec![0.5, 0.1],
         ..Plan::new(Unit::Meter)
     };
-    // As the command line does: on small maps by more solvers, of which the strongest is the answer.
+    // On small maps the audit adds a solver, as the command line does.
     let k = plan.k;
     let plan = plan.for_map(3_000, k);
     println!("scheme   right  within 0.10 and 0.25 m, by the strongest attack");

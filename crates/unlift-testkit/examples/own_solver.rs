@@ -1,7 +1,8 @@
-//! A solver that is not ours, audited: `cargo run --release -p unlift-testkit --example own_solver`.
+//! Audit of a custom solver: `cargo run --release -p unlift-testkit --example own_solver`.
 //!
-//! Every listed line comes nearest to a slot's own line somewhere. The solver puts the hidden point at the median of these places.
-//! It needs most of the listed lines to belong to true neighbors, so it fails at low inlier ratios, where `joint` does not.
+//! Each listed line has a nearest point on the slot's own line. The solver returns the median of
+//! these points. Most listed lines must belong to true neighbors, so it fails at low inlier ratios,
+//! where `joint` does not.
 
 use std::sync::Arc;
 
@@ -14,7 +15,7 @@ use unlift::released::{Obfuscation, Released};
 use unlift::truth::Original;
 use unlift::{Error, PointSet, Unit, synthetic};
 
-/// The median of the places where listed lines come nearest.
+/// The median of the nearest points to the listed lines.
 #[derive(Debug)]
 struct Median;
 
@@ -30,10 +31,10 @@ impl Solver<3> for Median {
         _: &RecoverOptions,
     ) -> Result<Recovered<3>, Error> {
         let Obfuscation::Lines(lines) = released.obfuscation() else {
-            // What is wrong, what was expected, what was found.
+            // An error states the place, what was expected and what was found.
             return Err(Error::new("records", "lines", released.obfuscation().family()));
         };
-        // Feet, directions and positions are about `released.origin()`.
+        // Feet, directions and positions are relative to `released.origin()`.
         let position = |slot: usize| {
             let own = slot / released.slots_per_record();
             let (foot, direction) = (lines.foot()[own], lines.direction()[own]);
@@ -43,7 +44,7 @@ impl Solver<3> for Median {
             });
             let mut places: Vec<f32> = places.filter(|t| t.is_finite()).collect();
             places.sort_unstable_by(f32::total_cmp);
-            // A position that is not finite says that the point was not recovered.
+            // A position that is not finite means that the point was not recovered.
             let t = places.get(places.len() / 2).copied().unwrap_or(f32::NAN);
             std::array::from_fn(|c| foot[c] + t * direction[c])
         };
@@ -52,7 +53,8 @@ impl Solver<3> for Median {
     }
 }
 
-/// How far along the line through `a` the line through `b` comes nearest. Directions `u` and `v` have length 1.
+/// Returns the parameter on the line through `a` of the point nearest to the line through `b`. The
+/// directions `u` and `v` have length 1.
 fn nearest(a: [f32; 3], u: [f32; 3], b: [f32; 3], v: [f32; 3]) -> f32 {
     let dot = |x: [f32; 3], y: [f32; 3]| x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
     let between: [f32; 3] = std::array::from_fn(|c| b[c] - a[c]);
@@ -61,12 +63,13 @@ fn nearest(a: [f32; 3], u: [f32; 3], b: [f32; 3], v: [f32; 3]) -> f32 {
 }
 
 fn main() -> Result<(), Error> {
-    // In a test of your crate: an answer for every slot, the same on any number of threads.
+    // Call this in a test of your crate. It checks for a result for every slot that does not depend
+    // on the number of threads.
     let (original, released, secret) = unlift_testkit::described_map(&Olc, 1_000);
     let lists = TrueNeighbors::new(&search(&original)?, &secret, 1, 20)?.at_inlier_ratio(0.5, 1)?;
     unlift_testkit::solver_laws(&Median, &released, &lists);
 
-    // Large enough for lists of 50: of smaller maps `joint` is not the strongest attack.
+    // The map is large enough for K = 50. On smaller maps `joint` is not the strongest attack.
     let room = Original::new(PointSet::try_new(synthetic::room(1, 10_000).points, Unit::Meter)?);
     let plan = Plan {
         schemes: vec![Arc::new(Olc)],

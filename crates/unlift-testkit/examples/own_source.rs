@@ -1,7 +1,8 @@
-//! A source of neighborhoods that is not ours, audited: `cargo run --release -p unlift-testkit --example own_source`.
+//! Audit of a custom source of neighborhoods: `cargo run --release -p unlift-testkit --example
+//! own_source`.
 //!
-//! An attacker sorts the released records by the mean of their descriptors and takes the next ones in that order for
-//! neighbors. That is a poor attack; yours may have learned its weights elsewhere and carry them as fields.
+//! The source sorts records by the mean of their descriptors and lists the next ones in this order.
+//! This is a weak attack. Your source may contain trained weights as fields.
 
 use std::sync::Arc;
 
@@ -11,7 +12,7 @@ use unlift::obfuscate::olc::Olc;
 use unlift::released::Released;
 use unlift::{About, Error, RecordId, RowOrder, Unit};
 
-/// Records whose descriptors are as bright.
+/// Lists records with similar brightness.
 #[derive(Debug)]
 struct Brightness;
 
@@ -56,7 +57,7 @@ impl Source<3> for Brightness {
             records.extend(near.map(|other| RecordId::from_index(order[other])));
             offsets.push(records.len() as u64);
         }
-        // Rows are descriptor rows; with one point a record these are the slots.
+        // Rows are descriptor rows. With one point per record these are the slots.
         let about = About {
             map: Some(released.fingerprint()),
             order: RowOrder::DescriptorRows,
@@ -71,11 +72,12 @@ fn lacking() -> Error {
 }
 
 fn main() -> Result<(), Error> {
-    // In a test of your crate: one list per slot, the same on any number of threads, of this map.
+    // Call this in a test of your crate. It checks for one list per slot that states its map and
+    // does not depend on the number of threads.
     let (original, released, secret) = unlift_testkit::described_map(&Olc, 1_500);
     unlift_testkit::source_laws(&Brightness, &released);
 
-    // An audit hides the map by itself, with one descriptor per original.
+    // An audit needs one descriptor per original, because it hides the map itself.
     let mut row_of = vec![0; original.len()];
     for (slot, id) in secret.hidden().iter().enumerate() {
         row_of[id.index()] = slot as u32;

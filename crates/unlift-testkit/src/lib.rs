@@ -1,13 +1,14 @@
-//! Laws that every scheme, every source of neighborhoods and every solver keeps: call them in the test of yours.
+//! Property tests for schemes, sources of neighborhoods and solvers. Call them in the tests of your
+//! crate.
 //!
 //! ```
 //! use unlift::obfuscate::olc::Olc;
 //!
-//! // In `#[test] fn laws() { .. }`, with your scheme in place of this one.
+//! // In `#[test] fn laws() { .. }`, with your scheme:
 //! unlift_testkit::scheme_laws::<3>(&Olc);
 //! ```
 //!
-//! A law that is broken panics with a line that says which, on which points, and what was found.
+//! A test that fails panics with one line: the property, the points and the values.
 
 mod points;
 mod schemes;

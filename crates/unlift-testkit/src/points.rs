@@ -1,9 +1,10 @@
-//! Points to hide, and how far they are from what hides them.
+//! Points for tests, and their distances to records.
 
 use unlift::released::Obfuscation;
 use unlift::seed::{Draws, Stage};
 
-/// Points of a room: walls, uneven clusters, scatter, and 3 % that coincide with another point.
+/// Returns points of a room: walls, uneven clusters, scatter, and 3 % that coincide with another
+/// point.
 pub fn room<const D: usize>(seed: u64, n: usize) -> Vec<[f64; D]> {
     let mut draws = Draws::new(seed, Stage::Synthetic, 1);
     let size: [f64; D] = std::array::from_fn(|c| [6.0, 4.0, 2.5][c]);
@@ -30,13 +31,13 @@ pub fn room<const D: usize>(seed: u64, n: usize) -> Vec<[f64; D]> {
     points
 }
 
-/// Points uniform in a box.
+/// Returns uniform points in a box.
 pub fn uniform<const D: usize>(seed: u64, n: usize) -> Vec<[f64; D]> {
     let mut draws = Draws::new(seed, Stage::Synthetic, 2);
     (0..n).map(|_| std::array::from_fn(|c| draws.between(0.0, [6.0, 4.0, 3.0][c]))).collect()
 }
 
-/// `copies` points at each of `places` random places, each moved by up to `spread`.
+/// Returns `copies` points at each of `places` random places, each moved by up to `spread`.
 pub fn piles<const D: usize>(
     seed: u64,
     places: usize,
@@ -50,7 +51,7 @@ pub fn piles<const D: usize>(
         .collect()
 }
 
-/// The distance of `point` from what `record` leaves open.
+/// Returns the distance of `point` to the feasible set of `record`.
 pub fn distance_to_record<const D: usize>(
     obfuscation: &Obfuscation<D>,
     record: usize,
@@ -86,12 +87,12 @@ pub fn distance_to_record<const D: usize>(
     }
 }
 
-/// Inner product.
+/// Returns the inner product.
 pub fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
-/// Euclidean length.
+/// Returns the Euclidean length.
 pub fn norm<const D: usize>(a: &[f64; D]) -> f64 {
     dot(a, a).sqrt()
 }

@@ -1,4 +1,4 @@
-//! What a scheme owes its users, whatever its rule.
+//! Property tests of schemes.
 
 use std::collections::BTreeSet;
 
@@ -11,28 +11,28 @@ use unlift::{Error, PointSet, Unit};
 
 use crate::points::{distance_to_record, piles, room, uniform};
 
-/// Records are stored in `f32`: a few units in the last place of the largest coordinate involved, in meters.
+/// Records are stored in `f32`: a few units in the last place of the largest coordinate, in meters.
 const TOLERANCE: f64 = 4e-6;
-/// Of so many originals, hardly more than this many may stay where they were.
+/// Maximum share of originals that keep their row.
 const MOST_IN_PLACE: f64 = 0.05;
 
-/// Checks all laws of a scheme:
+/// Checks all properties of a scheme:
 ///
-/// 1. its name is one plain word;
-/// 2. every original has one slot or is dropped with a reason, on rooms, on piles of coincident points and on maps
-///    of hardly any points; maps that it refuses it refuses with an error;
-/// 3. every hidden point lies on its record, near the origin and a thousand kilometers off;
-/// 4. one key gives the same records on any number of threads, another key gives others;
-/// 5. the order of records tells nothing about that of the originals.
+/// 1. Its name is one plain word.
+/// 2. Every original has one slot or is dropped with a reason: in rooms, piles of coincident points
+///    and maps of few points. A map that cannot be hidden gives an error.
+/// 3. Every hidden point lies on its record, near the origin and 1000 km away.
+/// 4. The same key gives the same records for any number of threads; another key gives others.
+/// 5. The order of records does not reveal the order of the originals.
 ///
-/// In the plane, points are keypoints of an image.
+/// In 2D, points are keypoints of an image.
 ///
 /// # Panics
-/// When a law is broken.
+/// When a property does not hold.
 pub fn scheme_laws<const D: usize>(scheme: &dyn Scheme<D>) {
     let name = scheme.name();
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-+_.".contains(c);
-    assert!(!name.is_empty() && name.chars().all(is_plain), "{name:?} is no plain name");
+    assert!(!name.is_empty() && name.chars().all(is_plain), "{name:?} is not a plain name");
     for n in [0, 1, 2, 3, 7] {
         accounts_for_all(scheme, &uniform(9, n));
         accounts_for_all(scheme, &piles(9, 1, n, 0.0));
@@ -62,7 +62,7 @@ fn hide<const D: usize>(
     Ok((original, released, secret))
 }
 
-/// The image that `points` are keypoints of: whole units around them.
+/// Returns image bounds around `points`, in whole units.
 fn image<const D: usize>(points: &[[f64; D]]) -> Bounds<D> {
     if points.is_empty() {
         return Bounds { low: [0.0; D], high: [1.0; D] };
@@ -82,8 +82,8 @@ fn accounts_for_all<const D: usize>(scheme: &dyn Scheme<D>, points: &[[f64; D]])
         seen[id.index()] += 1;
     }
     let wrong = seen.iter().position(|&times| times != 1);
-    assert_eq!(wrong, None, "{name}: of {n} originals one is not in one slot or dropped once");
-    assert_eq!(secret.n_slots(), released.n_slots(), "{name}: slots of {n} originals");
+    assert_eq!(wrong, None, "{name}: an original of {n} is not in one slot or dropped once");
+    assert_eq!(secret.n_slots(), released.n_slots(), "{name}: slot counts differ, n = {n}");
 }
 
 fn points_lie_on_their_records<const D: usize>(
@@ -93,7 +93,7 @@ fn points_lie_on_their_records<const D: usize>(
 ) {
     let name = scheme.name();
     let (original, released, secret) =
-        hide(scheme, points, 3).unwrap_or_else(|e| panic!("{name} refuses a room: {e}"));
+        hide(scheme, points, 3).unwrap_or_else(|e| panic!("{name} cannot hide a room: {e}"));
     for (slot, id) in secret.hidden().iter().enumerate() {
         let point = original.reveal().positions()[id.index()];
         let local: [f64; D] = std::array::from_fn(|c| point[c] - released.origin()[c]);
@@ -111,9 +111,9 @@ fn keys_decide_alone<const D: usize>(scheme: &dyn Scheme<D>) {
         (released, secret)
     };
     let (name, one) = (scheme.name(), on(1, 7));
-    assert!(one == on(1, 7), "{name}: one key, two maps");
-    assert!(one == on(3, 7), "{name}: another number of threads, another map");
-    assert!(one.0 != on(1, 8).0, "{name}: two keys, one map");
+    assert!(one == on(1, 7), "{name}: the same key gives different maps");
+    assert!(one == on(3, 7), "{name}: the number of threads changes the map");
+    assert!(one.0 != on(1, 8).0, "{name}: different keys give the same map");
 }
 
 fn order_tells_nothing<const D: usize>(scheme: &dyn Scheme<D>) {
@@ -121,7 +121,7 @@ fn order_tells_nothing<const D: usize>(scheme: &dyn Scheme<D>) {
     let in_place = secret.hidden().iter().enumerate().filter(|(slot, id)| id.index() == *slot);
     let share = in_place.count() as f64 / secret.n_slots().max(1) as f64;
     let name = scheme.name();
-    assert!(share <= MOST_IN_PLACE, "{name}: {share:.2} of the points are in the owner's order");
+    assert!(share <= MOST_IN_PLACE, "{name}: {share:.2} of the points keep their row");
     let distinct: BTreeSet<usize> = secret.hidden().iter().map(|id| id.index()).collect();
     assert_eq!(distinct.len(), secret.n_slots(), "{name}: an original is hidden twice");
 }

@@ -1,4 +1,4 @@
-//! What a source of neighborhoods owes its users.
+//! Property tests of sources of neighborhoods.
 
 use unlift::descriptors::Values;
 use unlift::neighbors::{Neighborhoods, Source};
@@ -10,32 +10,33 @@ use unlift::{Descriptors, PointSet, Unit};
 
 use crate::points::room;
 
-/// Checks all laws of a source on a map that it supports:
+/// Checks all properties of a source on a map that it supports:
 ///
-/// 1. its name is one word, and it chooses at least one record;
-/// 2. one list per slot, of at most as many records as asked for, finite scores or none;
-/// 3. lists say of which map they are;
-/// 4. the same lists on any number of threads;
-/// 5. a map without records, and lists longer than there are records, are refused by an error or answered by
-///    shorter lists, not by a panic.
+/// 1. Its name is one plain word, and it chooses at least one record.
+/// 2. It makes one list per slot with at most the requested number of records, and finite scores or
+///    none.
+/// 3. Lists state their map.
+/// 4. Lists do not depend on the number of threads.
+/// 5. A map without records, or lists longer than the number of records, give an error or shorter
+///    lists, but no panic.
 ///
 /// # Panics
-/// When a law is broken, or the source does not support the map.
+/// When a property does not hold, or the source does not support the map.
 pub fn source_laws<const D: usize>(source: &dyn Source<D>, released: &Released<D>) {
     let name = source.name();
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-+_.".contains(c);
-    assert!(!name.is_empty() && name.chars().all(is_plain), "{name:?} is no plain name");
-    assert!(source.k(released) > 0, "{name}: lists of no record");
+    assert!(!name.is_empty() && name.chars().all(is_plain), "{name:?} is not a plain name");
+    assert!(source.k(released) > 0, "{name}: k is 0");
     if let Err(error) = source.supports(released) {
         panic!("{name} does not support this map: {error}");
     }
     let lists = on(1, source, released, 6);
-    assert_eq!(lists.n_slots(), released.n_slots(), "{name}: one list per slot");
-    assert!(lists.longest() <= 6, "{name}: a list of {} where 6 were asked for", lists.longest());
+    assert_eq!(lists.n_slots(), released.n_slots(), "{name}: not one list per slot");
+    assert!(lists.longest() <= 6, "{name}: a list has {} records, not at most 6", lists.longest());
     let finite = lists.scores().is_none_or(|scores| scores.iter().all(|score| score.is_finite()));
-    assert!(finite, "{name}: a score is no number");
-    assert_eq!(lists.about().map, Some(released.fingerprint()), "{name}: of which map?");
-    assert!(lists == on(3, source, released, 6), "{name}: another number of threads, other lists");
+    assert!(finite, "{name}: a score is not finite");
+    assert_eq!(lists.about().map, Some(released.fingerprint()), "{name}: wrong map");
+    assert!(lists == on(3, source, released, 6), "{name}: the number of threads changes lists");
     if let Ok(lists) = source.lists(released, released.n_records() + 1, 0) {
         assert!(lists.longest() < released.n_records(), "{name}: a record lists itself");
     }
@@ -52,11 +53,11 @@ fn on<const D: usize>(
     made.unwrap_or_else(|error| panic!("{} makes no lists: {error}", source.name()))
 }
 
-/// A room hidden by `scheme`, with SIFT-like descriptors (128 bytes) that change slowly over the room; and its
-/// secret, to measure lists by.
+/// Returns a room hidden by `scheme`, with SIFT-like descriptors (128 bytes) that change slowly
+/// over the room, and the secret, with which you can measure lists.
 ///
 /// # Panics
-/// When the scheme refuses a room of `n` points.
+/// When the scheme cannot hide a room of `n` points.
 pub fn described_map(scheme: &dyn Scheme<3>, n: usize) -> (Original<3>, Released<3>, Secret) {
     let points: Vec<[f64; 3]> = room(4, n);
     let value = |point: &[f64; 3], bin: usize| {
@@ -68,6 +69,6 @@ pub fn described_map(scheme: &dyn Scheme<3>, n: usize) -> (Original<3>, Released
     let descriptors = Descriptors::try_new(Values::U8(bytes), 128).expect("128 bytes a point");
     let original = Original::new(PointSet::try_new(points, Unit::Meter).expect("finite points"));
     let (released, secret) = obfuscate(scheme, &original, Some(&descriptors), &Key::from_seed(1))
-        .unwrap_or_else(|error| panic!("{} refuses a room: {error}", scheme.name()));
+        .unwrap_or_else(|error| panic!("{} cannot hide a room: {error}", scheme.name()));
     (original, released, secret)
 }

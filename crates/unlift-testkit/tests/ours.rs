@@ -1,4 +1,4 @@
-//! The laws on all of ours, and on ones that break them.
+//! Property tests of all built-in implementations, and of some with bugs.
 
 use unlift::geometry::frame::Bounds;
 use unlift::neighbors::oracle::{TrueNeighbors, search};
@@ -43,7 +43,7 @@ fn our_solvers() {
     }
 }
 
-/// Answers for the first half of the slots.
+/// A solver that returns results for half of the slots only.
 #[derive(Debug)]
 struct Half;
 
@@ -71,7 +71,7 @@ fn a_solver_that_answers_for_some_slots_is_found_out() {
     solver_laws(&Half, &released, &lists);
 }
 
-/// Draws nothing: all lines are level, whatever the key.
+/// A scheme that ignores the key: all lines have the same direction.
 #[derive(Debug)]
 struct Keyless;
 
@@ -86,7 +86,7 @@ impl Scheme<3> for Keyless {
         _: Option<&Bounds<3>>,
         _: &Key,
     ) -> Result<Lifted<3>, Error> {
-        // A hand's breadth beside the point.
+        // 10 cm beside the point.
         let beside: Vec<[f64; 3]> = points.iter().map(|p| [p[0], p[1], p[2] + 0.1]).collect();
         let lines = Lines::through(&beside, &vec![[1.0, 0.0, 0.0]; points.len()])?;
         Ok(Lifted::one_each(Obfuscation::Lines(lines)))
@@ -99,7 +99,7 @@ fn a_scheme_that_loses_its_points_is_found_out() {
     scheme_laws(&Keyless);
 }
 
-/// Lists of no map.
+/// A source whose lists state no map.
 #[derive(Debug)]
 struct Nameless;
 
@@ -123,7 +123,7 @@ impl Source<3> for Nameless {
 }
 
 #[test]
-#[should_panic(expected = "of which map?")]
+#[should_panic(expected = "wrong map")]
 fn a_source_that_hides_its_map_is_found_out() {
     let (_, released, _) = described_map(&Olc, 50);
     source_laws(&Nameless, &released);

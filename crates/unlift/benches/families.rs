@@ -1,13 +1,14 @@
-//! Small and odd maps: is joint recovery ever weaker than the pass it starts from, and is "sure" ever
-//! not sure?
+//! Benchmark on small and unusual maps: compares `joint` with `consensus`, and checks confidence.
 //!
-//! `cargo bench -p unlift --bench families -- [NAME=LIST ..]` prints, per map, the worst difference in points
-//! of percent between `joint` and `consensus` (at each threshold) and the least share of points called
-//! 90 % sure that are right, over every scheme, noise model, inlier ratio and source; at the end, in how many of all cells
-//! either is the case. Names: `maps` (`room`, `line`, ... or `redkitchen`, `castle`, each `:POINTS`; `image:KEYPOINTS`), `schemes`,
-//! `ratios`, `noise`, `sources`, `seeds`, `k`; `cells=1` prints every cell; `solver=NAME` compares another one
-//! with consensus. The real maps are
-//! looked for beside the repository and left out, with a line, where they are not.
+//! `cargo bench -p unlift --bench families -- [NAME=LIST ..]` prints for each map the worst
+//! difference in percentage points between `joint` and `consensus` (at each threshold), and the
+//! smallest correct share of points that are reported as 90 % sure, over all schemes, noise models,
+//! inlier ratios and sources. At the end it prints the number of cells with a problem.
+//!
+//! Names: `maps` (`room`, `line`, ... or `redkitchen`, `castle`, each `:POINTS`;
+//! `image:KEYPOINTS`), `schemes`, `ratios`, `noise`, `sources`, `seeds`, `k`. `cells=1` prints
+//! every cell; `solver=NAME` compares another solver with consensus. Real maps must be beside the
+//! repository; missing ones are skipped with a message.
 
 use std::path::PathBuf;
 
@@ -25,24 +26,23 @@ use unlift::truth::Original;
 use unlift::{Descriptors, Error, PointSet, Unit, descriptors::Values};
 
 const IMAGE: [f64; 2] = [640.0, 480.0];
-/// Points called sure count in a verdict on "sure" from this share of a cell on, in percent.
+/// Minimum percentage of sure points in a cell for a verdict on "sure".
 const LEAST_SURE: f64 = 1.0;
 
-/// "Sure" is wrong in a cell where fewer are right, in percent.
+/// Minimum percentage of correct points among the sure ones.
 const LEAST_RIGHT: f64 = 85.0;
-/// By how many points of percent `consensus` may be ahead before it is counted.
+/// Differences in percentage points from which on `consensus` counts as ahead.
 const AHEAD: [f64; 3] = [1.0, 3.0, 10.0];
 
-/// In how many cells, over all maps and sources.
 #[derive(Default)]
 struct Totals {
-    /// Pairs of `joint` and `consensus`.
+    /// Number of pairs of `joint` and `consensus`.
     n: usize,
-    /// Those in which `consensus` is [`AHEAD`] within any threshold.
+    /// Number of pairs in which `consensus` is [`AHEAD`] at any threshold.
     behind: [usize; AHEAD.len()],
-    /// Rows, of either, with enough points that are called sure.
+    /// Number of rows with enough sure points.
     n_sure: usize,
-    /// Those in which too few of these are right.
+    /// Number of these rows with too few correct points.
     wrong: usize,
 }
 
@@ -60,7 +60,6 @@ impl Totals {
     }
 }
 
-/// What is tried.
 struct Suite {
     maps: Vec<String>,
     schemes: Option<Vec<String>>,
@@ -75,7 +74,7 @@ struct Suite {
 
 impl Suite {
     fn read() -> Self {
-        // `cargo test --benches` asks for a quick check that the bench still runs.
+        // `cargo test --benches` requests a quick check that the benchmark runs.
         let quick = std::env::args().any(|a| a == "--test");
         let mut maps = Vec::new();
         for name in ["redkitchen", "castle", "room"] {
@@ -121,7 +120,7 @@ impl Suite {
         suite
     }
 
-    /// The plan for maps or images of `unit`, with one source.
+    /// Returns the plan for maps or images of `unit` with one source.
     fn plan<const D: usize>(&self, unit: Unit, by: NeighborsBy<D>) -> Plan<D> {
         let mut usual = Plan::new(unit);
         let of_images = unit == Unit::Pixel;
@@ -181,7 +180,7 @@ fn main() {
     totals.print();
 }
 
-/// A solver, `joint` unless another one is asked for, beside consensus, cell by cell.
+/// Prints the comparison of a solver, by default `joint`, with consensus for each cell.
 fn table(suite: &Suite, map: &str, source: &str, rows: &[Row], totals: &mut Totals) {
     let cell = |row: &Row| {
         let noise = row.oracle_noise.unwrap_or("");
@@ -250,7 +249,7 @@ fn table(suite: &Suite, map: &str, source: &str, rows: &[Row], totals: &mut Tota
     );
 }
 
-/// The rows of one map and source; `None` where they do not go together or the map is not there.
+/// Returns the rows of one map and source; `None` if they do not fit or the map is missing.
 fn rows(suite: &Suite, map: &str, source: &str) -> Result<Option<Vec<Row>>, Error> {
     let (name, n) = map.split_once(':').unwrap_or((map, "2000"));
     let n: usize = number(n);
@@ -289,7 +288,7 @@ fn rows(suite: &Suite, map: &str, source: &str) -> Result<Option<Vec<Row>>, Erro
     Ok(Some(audit::run(&original, descriptors.as_ref(), &plan, &mut Silent)?.rows))
 }
 
-/// `n` points of a map, with descriptors where it has some.
+/// Returns `n` points of a map, with descriptors if it has some.
 fn points(name: &str, n: usize) -> Option<(Vec<[f64; 3]>, Option<Descriptors>)> {
     if let Some(shape) = Shape::ALL.into_iter().find(|shape| shape.name() == name) {
         return Some((synthetic::shape(shape, 1, n), None));
@@ -300,7 +299,6 @@ fn points(name: &str, n: usize) -> Option<(Vec<[f64; 3]>, Option<Descriptors>)> 
     let mut order = Draws::new(0, Stage::Subset, 0).permutation(all.len());
     order.truncate(n);
     let points = order.iter().map(|&i| all[i as usize].1).collect();
-    // Joined by id.
     let descriptors = rows.and_then(|rows| {
         let n_all = u64_at(&rows, 8) as usize;
         let id = |row: usize| u64_at(&rows, 24 + 8 * row);
@@ -322,7 +320,7 @@ fn u64_at(bytes: &[u8], at: usize) -> u64 {
     u64::from_le_bytes(bytes[at..at + 8].try_into().expect("8 bytes"))
 }
 
-/// Ids and points of a COLMAP `points3D.bin`.
+/// Returns ids and points of a COLMAP `points3D.bin`.
 fn colmap_points(bytes: &[u8]) -> Vec<(u64, [f64; 3])> {
     let mut points = Vec::new();
     let mut at = 8;

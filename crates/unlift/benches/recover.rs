@@ -1,11 +1,12 @@
-//! Recovery in one run: a bare gather of the listed records, then every solver, as microseconds of
-//! one core per hidden point, as multiples of that gather (machines are noisy, ratios within one
-//! run less so) and as points per second on one and two threads.
+//! Benchmark of recovery: a plain gather of the listed records, then every solver.
 //!
-//! `cargo bench -p unlift --bench recover -- [NAME=LIST ..]` with the names of [`Sizes`], for example
-//! `points=10000 schemes=olc ratios=0.5,0.1 solvers=consensus`. Fixed delta, K = 50. The map is
-//! RedKitchen where it is beside the repository (`map=FILE` for another `points3D.bin`), else the
-//! procedural room: thinned out or tiled to the number of points.
+//! Prints microseconds of one core per hidden point, multiples of the gather (these vary less on
+//! noisy machines), and points per second on one and two threads.
+//!
+//! `cargo bench -p unlift --bench recover -- [NAME=LIST ..]` with the names of [`Sizes`], for
+//! example `points=10000 schemes=olc ratios=0.5,0.1 solvers=consensus`. Delta is fixed, K = 50. The
+//! map is RedKitchen if it is beside the repository (`map=FILE` for another `points3D.bin`),
+//! otherwise the synthetic room, thinned out or tiled to the number of points.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -25,10 +26,9 @@ const K: usize = 50;
 const DELTA: f64 = 0.08;
 const MAP: &str =
     concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/redkitchen/model/points3D.bin");
-/// Beyond so many points the sampling loop is not asked: it takes minutes per cell.
+/// Maximum number of points for `ransac`, which takes minutes per cell on larger maps.
 const MOST_SAMPLED: usize = 100_000;
 
-/// What is measured.
 struct Sizes {
     points: Vec<usize>,
     schemes: Vec<&'static Entry>,
@@ -36,13 +36,13 @@ struct Sizes {
     solvers: Vec<Builtin>,
     threads: Vec<usize>,
     map: String,
-    /// Of so many runs of a cell the fastest counts.
+    /// Number of runs per cell, of which the fastest counts.
     runs: usize,
 }
 
 impl Sizes {
     fn read() -> Self {
-        // `cargo test --benches` asks for a quick check that the bench still runs.
+        // `cargo test --benches` requests a quick check that the benchmark runs.
         let quick = std::env::args().any(|a| a == "--test");
         let mut sizes = Self {
             points: if quick { vec![1_000] } else { vec![10_000, 100_000, 700_000, 5_000_000] },
@@ -168,7 +168,7 @@ fn row(
     println!();
 }
 
-/// The least seconds of `work` on each pool.
+/// Returns the shortest time of `work` in seconds on each pool.
 fn seconds<T: Send>(
     sizes: &Sizes,
     pools: &[ThreadPool],
@@ -183,7 +183,7 @@ fn seconds<T: Send>(
     pools.iter().map(least).collect()
 }
 
-/// Records as rows of one cache line or less, as a solver must read them.
+/// Records as rows of at most one cache line, as a solver reads them.
 enum Rows {
     Wide(Vec<[f32; 8]>),
     Narrow(Vec<[f32; 4]>),
@@ -212,7 +212,7 @@ impl Rows {
         }
     }
 
-    /// Reads every listed record of every slot, in order, and does next to nothing with it.
+    /// Reads every listed record of every slot, in order, with almost no computation.
     fn gather(&self, lists: &Neighborhoods) -> f32 {
         match self {
             Self::Wide(rows) => gathered(rows, lists),
@@ -234,8 +234,8 @@ fn gathered<const W: usize>(rows: &[[f32; W]], lists: &Neighborhoods) -> f32 {
     (0..lists.n_slots()).into_par_iter().with_min_len(64).map(slot).sum()
 }
 
-/// The points of a COLMAP `points3D.bin`. The core reads no formats; these lines keep its benches
-/// free of the crate that does.
+/// Reads the points of a COLMAP `points3D.bin`. The core must not depend on the readers in
+/// `unlift-io`.
 fn colmap_points(bytes: &[u8]) -> Vec<[f64; 3]> {
     let u64_at = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().expect("8 bytes"));
     let mut points = Vec::new();
@@ -248,12 +248,12 @@ fn colmap_points(bytes: &[u8]) -> Vec<[f64; 3]> {
     points
 }
 
-/// Starts the peak anew, where the system lets us (Linux).
+/// Resets the peak memory, where the system supports it (Linux).
 fn forget_peak() {
     let _ = std::fs::write("/proc/self/clear_refs", "5");
 }
 
-/// The largest resident set of this process since then, where the system tells.
+/// Returns the largest resident set of this process since the reset, where the system reports it.
 fn peak_memory_mib() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;

@@ -1,14 +1,15 @@
-//! Fits the constants of confidence on synthetic maps, and prints them as Rust.
+//! Fits the constants of confidence on synthetic maps and prints them as Rust.
 //!
 //! ```text
 //! cargo run --release -p unlift --example fit_confidence > constants.rs
-//! mv constants.rs crates/unlift/src/recover/confidence/ && cargo fmt
+//! mv constants.rs crates/unlift-attack/src/recover/confidence/ && cargo fmt
 //! ```
 //!
-//! Every scheme, noise model and ratio is recovered by `joint` in rooms and other shapes of several sizes, some of them
-//! stretched so that points thin out with distance, as outdoors. The likelihood of "the error is within
-//! t", for thresholds t around the typical distance of the K-th neighbor, is maximized by damped Newton
-//! steps. The same constants come out on every machine and for any number of threads.
+//! `joint` recovers every scheme, noise model and ratio in rooms and other shapes of several sizes.
+//! Some are stretched, so that density falls with distance, as outdoors. Damped Newton steps
+//! maximize the likelihood of "the error is within t" for thresholds t around the typical distance
+//! of the K-th neighbor. The constants are identical on every machine and for any number of
+//! threads.
 
 use std::fmt::Write;
 
@@ -28,14 +29,12 @@ mod likelihood;
 
 use likelihood::{Row, fit};
 
-/// A map to fit on.
 struct Scene {
     shape: Shape,
     seed: u64,
     n: usize,
-    /// Points are pushed outward by `1 + stretch r^2`.
+    /// Factor of the stretch `1 + stretch r^2` from the origin.
     stretch: f64,
-    /// Neighbors per slot.
     k: usize,
 }
 
@@ -43,7 +42,7 @@ const fn scene(shape: Shape, seed: u64, n: usize, stretch: f64, k: usize) -> Sce
     Scene { shape, seed, n, stretch, k }
 }
 
-/// No sphere, no line, no two densities: they judge, beside the real maps.
+/// Maps for the fit. Spheres, lines and two densities are kept for validation, with the real maps.
 const SCENES: [Scene; 12] = [
     scene(Shape::Room, 101, 6_000, 0.0, 50),
     scene(Shape::Room, 103, 5_000, 0.3, 50),
@@ -51,7 +50,7 @@ const SCENES: [Scene; 12] = [
     scene(Shape::Room, 106, 4_000, 0.05, 20),
     scene(Shape::Room, 107, 5_000, 3.0, 50),
     scene(Shape::Room, 112, 12_000, 1.0, 50),
-    // On large maps planes come back even at 0.1.
+    // On large maps `plane` is recovered even at 0.1.
     scene(Shape::Room, 109, 20_000, 0.1, 50),
     scene(Shape::Cube, 113, 8_000, 0.0, 50),
     scene(Shape::Clusters, 114, 8_000, 0.0, 50),
@@ -59,13 +58,11 @@ const SCENES: [Scene; 12] = [
     scene(Shape::LongRoom, 116, 8_000, 0.0, 50),
     scene(Shape::RoomWithOutliers, 117, 10_000, 0.0, 50),
 ];
-/// Every noise model with its inlier ratios.
 const RATIOS: [(Noise, &[f64]); 3] = [
     (Noise::Uniform, &[1.0, 0.75, 0.5, 0.3, 0.2, 0.15, 0.1, 0.06]),
     (Noise::Near, &[0.5, 0.2]),
     (Noise::Clustered, &[0.5, 0.2, 0.1]),
 ];
-/// Slots used of each recovered map.
 const SLOTS: usize = 400;
 
 fn main() -> Result<(), Error> {
@@ -88,7 +85,6 @@ fn main() -> Result<(), Error> {
     Ok(())
 }
 
-/// The points of a scene.
 fn points(scene: &Scene) -> Result<PointSet<3>, Error> {
     let mut points = shape(scene.shape, scene.seed, scene.n);
     for point in &mut points {
@@ -98,7 +94,7 @@ fn points(scene: &Scene) -> Result<PointSet<3>, Error> {
     PointSet::try_new(points, Unit::Meter)
 }
 
-/// Rows of one scheme in one scene, each with the kind of its records.
+/// Returns the rows of one scheme in one scene, each with the kind of its records.
 fn of_scheme(
     original: &Original<3>,
     entry: &Entry,
@@ -132,7 +128,6 @@ fn of_scheme(
     Ok(rows)
 }
 
-/// The constants as a Rust file.
 fn constants(rows: &[Vec<Row>]) -> String {
     let all: Vec<[f32; N_TERMS]> = rows.iter().flatten().map(|row| terms(&row.cues)).collect();
     let n = all.len() as f64;

@@ -1,4 +1,4 @@
-//! What panics becomes an error: code of others, on data of others.
+//! Turns panics of third-party code into errors.
 
 use std::any::Any;
 use std::cell::Cell;
@@ -9,15 +9,13 @@ thread_local! {
     static GUARDED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Runs `step`, whose panic is silent.
-///
-/// Panics of other threads, and of this one outside `step`, are reported as ever.
+/// Runs `step` without printing its panic. Other panics are reported as usual.
 ///
 /// # Errors
-/// What the panic says.
+/// The message of the panic.
 pub fn caught<T>(step: impl FnOnce() -> T) -> Result<T, String> {
     static QUIET: Once = Once::new();
-    // Once and for all: a hook that is set and taken back would be one of all threads in the meantime.
+    // The hook is global: setting and restoring it for each call would affect other threads.
     QUIET.call_once(|| {
         let report = take_hook();
         set_hook(Box::new(move |panic| {
@@ -32,7 +30,7 @@ pub fn caught<T>(step: impl FnOnce() -> T) -> Result<T, String> {
     result.map_err(|panic| told(&*panic))
 }
 
-/// What a panic says.
+/// Returns the message of a panic.
 pub fn told(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<String>().cloned();
     text.or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).to_owned()))

@@ -1,12 +1,12 @@
-//! How much of a privacy-preserving ("obfuscated") map comes back?
+//! Measures how much of a privacy-preserving ("obfuscated") map an attacker can recover.
 //!
-//! The pipeline, one module per stage, a type per arrow:
+//! Each stage of the pipeline is a module, each arrow a type:
 //!
 //! ```text
 //! read ──> obfuscate ──> neighbors ──> recover ──> evaluate ──> report
 //! ```
 //!
-//! Is my scheme safe? Implement [`Scheme`](obfuscate::Scheme), and audit a map under it:
+//! To test your own scheme, implement [`Scheme`](obfuscate::Scheme) and audit a map with it:
 //!
 //! ```
 //! use std::sync::Arc;
@@ -42,11 +42,13 @@
 //! # Ok::<(), Error>(())
 //! ```
 //!
-//! A source of neighborhoods is a [`neighbors::Source`]; `unlift-testkit` has the laws of both, and an example of each. Audits of files, with figures and a page, are calls of `unlift-audit`.
+//! Custom sources of neighborhoods implement [`neighbors::Source`]. The crate `unlift-testkit` has
+//! property tests for both, and an example of each. The crate `unlift-audit` audits files and
+//! writes reports.
 
 pub mod audit;
 pub mod evaluate;
-// Not part of the interface: for crates that run code of others.
+// Not public: for crates that run third-party code.
 #[doc(hidden)]
 pub mod guard;
 pub mod neighbors;

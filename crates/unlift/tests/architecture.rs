@@ -1,12 +1,13 @@
-//! What the compiler does not check: which crates may depend on which, what a file may be like, and that what documents name exists.
+//! Rules that the compiler does not check: dependencies between crates, size of files, and file
+//! names in documents.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 const CORE: &str = env!("CARGO_MANIFEST_DIR");
 
-/// The crates of this workspace, from the bottom up, and those of them that each may depend on. The attacker's crate knows none: no
-/// type that holds ground truth can reach it.
+/// Crates of this workspace, from the bottom up, and the crates that each may depend on. The
+/// attacker's crate depends on none, so no type with ground truth can reach it.
 const CRATES: &[(&str, &[&str])] = &[
     ("unlift-attack", &[]),
     ("unlift", &["unlift-attack"]),
@@ -36,13 +37,13 @@ const CRATES: &[(&str, &[&str])] = &[
     ),
 ];
 
-/// What the two crates at the bottom may take from outside: light, and known for long.
+/// External dependencies allowed for the two core crates.
 const DEPENDENCIES: &[&str] = &["libm", "rayon", "nalgebra", "sha2", "chacha20", "getrandom"];
 
-/// Lines of a file at most, its unit tests not counted.
+/// Maximum number of lines of a file, without unit tests.
 const MOST_LINES: usize = 800;
 
-/// All files under `folder`, but for what builds leave and what git keeps.
+/// Collects all files under `folder`, without build outputs and git data.
 fn all_files(folder: &Path, found: &mut Vec<PathBuf>) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for entry in entries {
@@ -56,7 +57,6 @@ fn all_files(folder: &Path, found: &mut Vec<PathBuf>) {
     found.sort();
 }
 
-/// The Rust files under a folder of a crate, with their text.
 fn sources(name: &str, folder: &str) -> Vec<(PathBuf, String)> {
     let mut files = Vec::new();
     all_files(&Path::new(CORE).join("..").join(name).join(folder), &mut files);
@@ -64,7 +64,6 @@ fn sources(name: &str, folder: &str) -> Vec<(PathBuf, String)> {
     files.into_iter().map(|path| (path.clone(), fs::read_to_string(path).unwrap())).collect()
 }
 
-/// Lines of code in `text`: neither comments nor the unit tests at its bottom.
 fn code(text: &str) -> impl Iterator<Item = &str> {
     let bottom = text.find("#[cfg(test)]\nmod tests").unwrap_or(text.len());
     text[..bottom].lines().map(str::trim_start).filter(|line| !line.starts_with("//"))
@@ -99,7 +98,7 @@ fn unsafe_code_is_in_one_file() {
     }
 }
 
-/// The command line has one place each for what goes to stdout and stderr.
+/// Only one place each in the command line writes to stdout and stderr.
 #[test]
 fn libraries_print_nothing() {
     let macros = ["print!(", "println!(", "eprint!(", "eprintln!(", "dbg!("];
@@ -151,21 +150,20 @@ fn files_that_are_named_exist() {
     assert!(names.len() > 200 && found.is_empty(), "\n{}", found.join("\n"));
 }
 
-/// Endings of names that are looked up.
 const ENDINGS: [&str; 4] = [".md", ".rs", ".py", ".svg"];
 
-/// What comments of a Rust file say, line by line; of any other file all of it. A comment ends with its line.
+/// Returns the comments of a Rust file, line by line, or all lines of any other file.
 fn prose<'a>(path: &str, text: &'a str) -> Vec<&'a str> {
     let is_rust = path.ends_with(".rs");
     let comment = |line: &'a str| {
-        // Not of a web address.
+        // The slashes of a web address start no comment.
         let mut starts = line.match_indices("//").filter(|&(at, _)| !line[..at].ends_with(':'));
         starts.next().map_or("", |(at, _)| &line[at..])
     };
     text.lines().map(|line| if is_rust { comment(line) } else { line }).collect()
 }
 
-/// File names in `line`: longest runs of the characters of paths that end as files do. No web address.
+/// Returns the file names in `line`, without web addresses.
 fn named(line: &str) -> impl Iterator<Item = &str> {
     let of_path = |c: char| c.is_ascii_alphanumeric() || "_-./:".contains(c);
     let runs = line.split(move |c| !of_path(c)).map(|run| run.trim_end_matches(['.', ':', '/']));
@@ -175,8 +173,8 @@ fn named(line: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// Names in the prose of `path` that no file of the repository has, with their lines. A name may leave out folders it
-/// is in; `files` are paths from the root.
+/// Returns names in the prose of `path` that no file of the repository has, with their lines. A
+/// name may omit leading folders; `files` are paths from the root.
 fn dangling(path: &str, text: &str, files: &[String]) -> Vec<String> {
     let exists = |name: &str| {
         let mut bare = name;

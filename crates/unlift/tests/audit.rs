@@ -1,4 +1,4 @@
-//! Rows of an audit: the strongest attack, two baselines, and what could not be audited.
+//! Tests of an audit: the strongest attack, two baselines, and parts that cannot be audited.
 
 use std::sync::Arc;
 
@@ -21,7 +21,6 @@ fn room(n: usize) -> Original<3> {
     original(synthetic::room(3, n).points)
 }
 
-/// A small plan of `schemes` at half of the neighbors right.
 fn plan(schemes: &[&str]) -> Plan<3> {
     let mut plan = Plan::new(Unit::Meter);
     plan.schemes.retain(|scheme| schemes.contains(&scheme.name()));
@@ -41,7 +40,7 @@ fn a_usual_audit_has_a_row_for_what_joint_recovery_starts_from() {
     let usual = audit(&room, &plan);
     let solvers: Vec<&str> = usual.rows.iter().map(|row| &*row.solver).collect();
     assert_eq!(solvers, ["joint", "joint-start"].repeat(4));
-    // The by-product is what the solver gives by itself, in either order.
+    // `joint-start` gives the same rows with and without `joint`, in either order.
     for solvers in [
         Builtin::list(&[Builtin::JointStart]),
         Builtin::list(&[Builtin::JointStart, Builtin::Joint]),
@@ -60,7 +59,7 @@ fn a_usual_audit_has_a_row_for_what_joint_recovery_starts_from() {
     }
 }
 
-/// The percentages of an attack on the records alone, made by hand.
+/// Computes the percentages of an attack on the records alone without `run`.
 fn by_hand(original: &Original<3>, name: &str, solver: Builtin, plan: &Plan<3>) -> Vec<f64> {
     let entry = scheme(name).unwrap();
     let scheme = entry.of_dimension::<3>(&SchemeOptions { voxel: 0.5 }).unwrap();
@@ -95,7 +94,7 @@ fn the_best_attack_on_the_records_alone_is_the_second_baseline() {
         assert_eq!(named("tomography").unwrap().percent, alone, "{}", row.scheme);
         assert!(named("geometric, joint").is_some(), "{}", row.scheme);
     }
-    // Lines of a room are broken by themselves: a guess is no measure of what neighbors add.
+    // Records alone recover much of a room from `olc`, so the blind baseline is too weak.
     let olc = &outcome.rows[0];
     assert!(olc.baseline_percent(1) > olc.blind_percent[1] + 20.0, "{olc:?}");
 }
@@ -108,7 +107,8 @@ fn the_second_baseline_is_averaged_over_seeds() {
     plan.seed = 1;
     let second = of(&plan);
     (plan.seed, plan.repeats) = (0, 2);
-    // The attacker's seed counts with the repeat, and no attack on records alone draws from it but delta.
+    // The attacker's seed increases with the repeat. Of the attacks on records alone, only the
+    // choice of delta uses it.
     let mean = of(&plan);
     let tomography = |all: &[unlift::audit::Alone]| {
         all.iter().find(|alone| alone.name == "tomography").unwrap().percent.clone()
@@ -126,7 +126,7 @@ fn break_even_takes_the_strongest_attack_at_every_ratio() {
     plan.solvers.push(Arc::new(Builtin::Ransac));
     let outcome = audit(&room, &plan);
     let mut rows = outcome.rows.clone();
-    // As if another attack won at each ratio.
+    // Different solvers win at the two ratios.
     for row in rows.iter_mut().filter(|row| row.scheme == "olc") {
         row.recovered_percent[0] = match (&*row.solver, row.inlier_ratio) {
             ("joint", 0.5) | ("ransac", 0.1) => 60.0,
@@ -147,7 +147,7 @@ fn break_even_takes_the_strongest_attack_at_every_ratio() {
     assert!(alone.iter().all(|b| b.solver == "joint"), "one attack has no strongest");
 }
 
-/// Points of one plane: a scheme that avoids lines within surfaces finds none.
+/// Returns points of one plane, for which a scheme that avoids lines within surfaces finds no line.
 fn flat(n: usize) -> Original<3> {
     let place = |i: usize| [0.01 * ((i * 7919) % 1000) as f64, 0.01 * ((i * 104_729) % 997) as f64];
     original((0..n).map(|i| [place(i)[0], place(i)[1], 1.0]).collect())
@@ -212,7 +212,8 @@ fn a_map_too_small_for_wrong_neighbors_loses_these_rows_alone() {
     assert_eq!((missing.inlier_ratio, missing.oracle_noise), (Some(0.1), Some("uniform")));
 }
 
-/// On a flat map a blind guess within a meter beat every list: its break-even read "above".
+/// On a flat map the blind guess within a meter was better than every list, but break-even was
+/// reported as "above".
 #[test]
 fn what_needs_no_neighborhoods_counts_in_break_even() {
     let mut plan = plan(&["ray", "cp"]);
@@ -236,7 +237,7 @@ fn what_needs_no_neighborhoods_counts_in_break_even() {
     }
 }
 
-/// `olc`, with a mistake: it says that its records hide points in another order than they do.
+/// `olc` with a bug: it reports the hidden points in the wrong order.
 #[derive(Debug)]
 struct Mistaken;
 
@@ -259,7 +260,7 @@ impl Scheme<3> for Mistaken {
     }
 }
 
-/// Lines a meter beside their points, or, where `off` is zero, other lines in every call.
+/// Lines one meter beside their points, or different lines in every call if `off` is zero.
 #[derive(Debug, Default)]
 struct Beside {
     off: f64,
@@ -284,12 +285,12 @@ impl Scheme<3> for Beside {
     }
 }
 
-/// Next to nothing came back of lines a meter beside their points, and the gate held.
+/// Regression: almost nothing was recovered from such lines, so a gate held.
 #[test]
 fn a_scheme_that_breaks_a_law_has_no_row() {
     let room = room(600);
     for (off, law) in
-        [(1.0, "on their own records, found 600 of 600"), (0.0, "the same of one key")]
+        [(1.0, "on their own records, found 600 of 600"), (0.0, "the same for the same key")]
     {
         let mut plan = plan(&["olc"]);
         plan.records_alone = false;
@@ -304,7 +305,7 @@ fn a_scheme_that_breaks_a_law_has_no_row() {
     }
 }
 
-/// Next to nothing came back of it, and a gate held.
+/// Regression: almost nothing was recovered, so a gate held.
 #[test]
 fn a_scheme_whose_records_are_not_where_its_points_are_has_no_row() {
     let (room, mut plan) = (room(900), plan(&["olc"]));
@@ -317,7 +318,7 @@ fn a_scheme_whose_records_are_not_where_its_points_are_has_no_row() {
     assert!(missing.reason.contains("points nearer to their own records"), "{}", missing.reason);
 }
 
-/// Knows nothing but lines, and puts every point at the foot of its line.
+/// A solver for lines only. It returns the foot of each line.
 #[derive(Debug)]
 struct AtFoot(&'static str);
 
@@ -353,7 +354,7 @@ fn a_solver_of_ones_own_has_rows_and_loses_those_that_it_fails_on() {
     assert_eq!((&*missing.scheme, missing.neighbors.as_deref()), ("plane", Some("oracle")));
     let expected = "solver foot: records: expected lines, found";
     assert!(missing.reason.starts_with(expected), "{}", missing.reason);
-    // A report says of `joint` what is true of ours.
+    // Reports describe `joint` as the built-in solver.
     plan.solvers = vec![Arc::new(AtFoot("joint"))];
     let error = run(&room(400), None, &plan, &mut Silent).unwrap_err();
     let expected = "solver: expected a name that no solver of unlift has, found joint";

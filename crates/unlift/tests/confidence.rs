@@ -1,4 +1,4 @@
-//! What the attacker says about its own success, on rooms that no constant was fitted on.
+//! Tests of confidence on rooms that were not used to fit constants.
 
 use unlift::evaluate::{Reliability, evaluate, reliability};
 use unlift::geometry::knn::Knn;
@@ -12,7 +12,7 @@ use unlift::synthetic::room;
 use unlift::truth::{Original, Secret};
 use unlift::{About, ListsBy, PointSet, Unit};
 
-/// A room and its typical distance of the 50th neighbor.
+/// Returns a room and its median distance to the 50th neighbor.
 fn scene(seed: u64, n: usize, scale: f64) -> (Original<3>, f64) {
     let points: Vec<[f64; 3]> = room(seed, n).points.iter().map(|p| p.map(|x| scale * x)).collect();
     let typical = median(&mut Knn::new(&points).unwrap().kth_distances(50));
@@ -36,7 +36,7 @@ fn recovered(
     (recover(&released, &lists, &solver, &options).unwrap(), secret)
 }
 
-/// The distance from the diagonal, a mean over points, in percent.
+/// Returns the mean distance from the diagonal over points, in percent.
 fn off_diagonal(reliability: &Reliability) -> f64 {
     let n: usize = reliability.bins.iter().map(|bin| bin.n).sum();
     let off = reliability.bins.iter().map(|bin| (bin.expected - bin.within as f64).abs());
@@ -71,7 +71,7 @@ const CASES: [(Noise, f64); 5] = [
 #[test]
 fn what_is_said_comes_true_as_often_as_said() {
     let schemes = ["olc", "ppl", "ppl+", "ray", "ray-voxel", "plane", "cp"];
-    // 1.9 points off; sure of 43.8 %, of which 98.0 % are right.
+    // Measured: 1.9 points off the diagonal; sure of 43.8 %, of which 98.0 % are correct.
     let found = judge(&schemes, &CASES);
     let off = off_diagonal(&found);
     assert!(off <= 3.8, "{off:.1} points off the diagonal, {:?}", found.bins);
@@ -91,7 +91,7 @@ fn the_unit_of_the_map_changes_nothing() {
             let q = b.probability_within(slot, large.1).unwrap();
             (p - q).abs() > 0.01
         });
-        // Rounding tips a few slots to another place: a thousandth of them with this key, up to 2 % with others.
+        // Rounding moves a few slots to another place: 0.1 % with this key, up to 2 % with others.
         let off = off.count();
         assert!(off * 50 < a.n_slots(), "{name}: {off} of {}", a.n_slots());
     }
@@ -127,14 +127,15 @@ fn crowds_that_do_not_list_back_are_not_believed() {
     let of_good = sure_percent((Noise::Uniform, 0.3));
     let of_shared = sure_percent((Noise::Clustered, 0.2));
     assert!(of_good > 67.0, "sure of {of_good} % where lists are good");
-    // None today.
+    // Measured: 0.
     assert!(of_shared < 2.0, "sure of {of_shared} % where wrong entries share a place");
 }
 
 #[test]
 fn crowds_that_do_not_list_back_are_not_followed() {
     let scene = scene(207, 6_000, 1.0);
-    // Two points below what comes back, and above what did when they were followed (89, 75, 72).
+    // Two points below the measured share, and above that of an attack that followed the shared
+    // places (89, 75, 72).
     for (name, least) in [("olc", 90.9), ("ppl", 84.3), ("ray", 79.7)] {
         let (recovered, secret) = recovered(&scene, name, Builtin::Joint, (Noise::Clustered, 0.15));
         let accuracy = evaluate(&recovered, &scene.0, &secret).unwrap();
@@ -158,7 +159,8 @@ fn nothing_is_said_where_nothing_was_fitted() {
     }
 }
 
-/// Lists of `overlap` from a file, without their scores: 68 % of Castle's `ray` were called sure, 59 % of those were right.
+/// Regression: with lists of `overlap` from a file, without their scores, 68 % of Castle's `ray`
+/// were reported as sure, of which 59 % were correct.
 #[test]
 fn lists_that_do_not_come_from_the_oracle_say_nothing_about_certainty() {
     let (original, typical) = scene(3, 3_000, 1.0);

@@ -1,5 +1,5 @@
-//! Maps at the limits of geometry and of numbers, audited under every scheme: counted losses or a reason, never a NaN,
-//! never "sure" of what is wrong.
+//! Audits of maps at the limits of geometry and of numbers: counted losses or a reason, never a
+//! NaN, never "sure" of wrong positions.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use unlift::seed::{Draws, Stage};
 use unlift::truth::Original;
 use unlift::{Error, PointSet, Unit, synthetic};
 
-/// All schemes, the solver that says how sure it is and the one it starts from; within 0.1 and 0.25 times `unit`.
+/// Audits all schemes with `joint` and `joint-start`, within 0.1 and 0.25 times `unit`.
 fn audit(points: Vec<[f64; 3]>, unit: f64, k: usize) -> Outcome {
     try_audit(points, unit, k).unwrap()
 }
@@ -27,7 +27,7 @@ fn try_audit(points: Vec<[f64; 3]>, unit: f64, k: usize) -> Result<Outcome, Erro
     run(&original, None, &plan, &mut Silent)
 }
 
-/// What must hold of any map; returns the rows of `joint`.
+/// Checks conditions that hold for any map. Returns the rows of `joint`.
 fn checked(what: &str, outcome: Outcome) -> Vec<Row> {
     let schemes = outcome.rows.iter().map(|row| row.scheme.as_str());
     let refused = outcome.not_audited.iter().map(|not| not.scheme.as_str());
@@ -71,7 +71,6 @@ fn draws() -> Draws {
     Draws::new(11, Stage::Synthetic, 77)
 }
 
-/// Within the smaller length, by scheme and ratio.
 fn shares(rows: &[Row]) -> Vec<f64> {
     rows.iter().map(|row| row.recovered_percent[0]).collect()
 }
@@ -82,7 +81,7 @@ fn a_scaled_map_comes_back_as_the_map_does() {
     for scale in [1e-9, 1e9] {
         let points = room(3_000).into_iter().map(|p| p.map(|x| x * scale)).collect();
         let scaled = checked(&format!("times {scale:e}"), audit(points, scale, 20));
-        // Voxels have a length, so of `ray-voxel` nothing is compared.
+        // The voxel size does not scale with the map, so `ray-voxel` is not compared.
         let pairs = usual.iter().zip(&scaled).filter(|(row, _)| row.scheme != "ray-voxel");
         for (row, scaled) in pairs {
             assert_eq!(row.scheme, scaled.scheme);
@@ -104,12 +103,13 @@ fn far_from_the_origin_a_map_comes_back_as_far_as_its_numbers_reach() {
     for (usual, far) in usual.iter().zip(far) {
         assert!((usual - far).abs() < 4.0, "{usual}, {far}");
     }
-    // Doubles are 0.125 apart there: points fall together.
+    // Doubles are 0.125 apart there, so points coincide.
     let error = try_audit(moved(room(600), 1e15), 1.0, 20).unwrap_err().to_string();
     assert!(error.contains("too coarse for a map"), "{error}");
 }
 
-/// Volumes of such maps are no floats: a part of the points came back, and nobody was told.
+/// Regression: `f32` cannot represent volumes of such maps, so only a part of the points was
+/// recovered, without a warning.
 #[test]
 fn maps_too_small_or_large_for_floats_are_refused_with_a_reason() {
     for scale in [1e-30, 1e-12, 1e13, 1e30, 1e37] {

@@ -1,4 +1,4 @@
-//! Audits of images: pooled rows, twins, images with hardly any keypoints.
+//! Tests of audits of images: pooled rows, coincident keypoints, images with few keypoints.
 
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ fn image_of(name: &str, points: Vec<[f64; 2]>) -> Item<2> {
     Item { name: name.to_owned(), original, descriptors: Some(descriptors) }
 }
 
-/// Keypoints in clusters; of `twins` percent there is a second one at the same place.
+/// Returns keypoints in clusters; `twins` percent have a second keypoint at the same place.
 fn keypoints(seed: u64, n: usize, twins: u64) -> Vec<[f64; 2]> {
     let mut draws = Draws::new(seed, Stage::Synthetic, 0);
     let mut points: Vec<[f64; 2]> = Vec::new();
@@ -79,7 +79,7 @@ fn keypoints_come_back() {
     assert!(row("lines2d").exact_percent.is_none());
 }
 
-/// The pooled row of one image is its own row; that of two lies between theirs.
+/// The pooled row of one image equals its own row. That of two images lies between theirs.
 #[test]
 fn rows_are_pooled_over_keypoints() {
     #[derive(Default)]
@@ -118,7 +118,7 @@ fn rows_are_pooled_over_keypoints() {
         let slack = 1.0 + 1e-3;
         assert!(median(row) >= low / slack && median(row) <= high * slack, "{}", row.scheme);
     }
-    // Neither the order of images nor threads matter, nor do the other images.
+    // Rows depend neither on the order of images, nor on threads, nor on other images.
     let turned = run(&[images[1].clone(), images[0].clone()], &plan).rows;
     let shares = |rows: &[Row]| -> Vec<Vec<f64>> {
         rows.iter().map(|row| row.recovered_percent.clone()).collect()
@@ -131,8 +131,8 @@ fn rows_are_pooled_over_keypoints() {
     assert_eq!(on(1), on(3));
 }
 
-/// An image with no more keypoints than a list is long is attacked with shorter lists: keypoints that nobody tried
-/// to recover would pass for protected.
+/// Images with at most K keypoints are attacked with shorter lists. Otherwise these keypoints would
+/// look protected.
 #[test]
 fn images_with_few_keypoints_are_attacked() {
     let mut plan = plan();
@@ -149,7 +149,7 @@ fn images_with_few_keypoints_are_attacked() {
                 row.scheme, row.neighbors, row.solver, row.inlier_ratio
             );
             assert!(row.k == plan.k || row.neighbors != "oracle", "{what}");
-            // Of four keypoints with wrong neighbors all may be lost.
+            // All of four keypoints with wrong neighbors may be lost.
             let sure = n > 4 && row.inlier_ratio >= 0.5 && row.solver != "ransac";
             assert!(!sure || 2 * row.n_lost() < row.n_points, "{what}: {:?}", row.lost);
         }
@@ -159,7 +159,8 @@ fn images_with_few_keypoints_are_attacked() {
     }
 }
 
-/// Whoever watches hears every row of every image, not only when the next images begin.
+/// An observer receives every row of every image when it is finished, not only when the next images
+/// begin.
 #[test]
 fn images_tell_how_far_they_are() {
     #[derive(Default)]
@@ -200,14 +201,14 @@ fn images_tell_how_far_they_are() {
             let mut seen: Vec<usize> = heard.iter().map(|&(done, _)| done).collect();
             seen.dedup();
             assert_eq!(total, rows, "{}", image.name);
-            // Rows of references are made at once, so that they are told with what follows.
+            // Rows of the reference take no time, so they appear only with the next progress.
             assert!(seen.len() > plan.inlier_ratios.len() * plan.schemes.len() * 2, "{seen:?}");
         }
     }
 }
 
-/// Images without, with one, two or few keypoints, all at one place or on one line: every keypoint is
-/// counted, as lost where need be.
+/// Images with no, one, two or few keypoints, all at one place or on one line: every keypoint is
+/// counted, if necessary as lost.
 #[test]
 fn images_with_hardly_any_keypoints_are_counted() {
     let line = |n: usize| (0..n).map(|i| [10.0 + 3.0 * i as f64, 50.0]).collect();
@@ -242,7 +243,7 @@ fn images_with_hardly_any_keypoints_are_counted() {
     }
 }
 
-/// Twins agree exactly; that must not make delta shrink to nothing.
+/// Coincident keypoints agree exactly. This must not make delta collapse.
 #[test]
 fn twins_do_not_shrink_delta() {
     for (name, twins) in [("lines2d", 0), ("lines2d", 35), ("cp2d", 0), ("cp2d", 35)] {
@@ -271,9 +272,10 @@ fn what_is_not_for_images_is_refused() {
         neighbors: Vec::new(),
         scores: None,
     })];
-    let expected = "neighbors: expected the oracle or one that works on each alone, found file";
+    let expected =
+        "neighbors: expected the oracle, or a source that works on single items, found file";
     assert_eq!(message(&given), expected);
-    // What is defined on maps alone has no type that a plan of images could hold.
+    // Sources for maps only have no type for a plan of images.
     let geometric = Named::parse("geometric").unwrap().of_dimension::<2>().unwrap_err();
     let expected = "source: expected one that is defined in 2 dimensions, found geometric";
     assert_eq!(geometric.to_string(), expected);

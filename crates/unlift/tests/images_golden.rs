@@ -1,6 +1,5 @@
-//! The figures of synthetic images, where no data set is at hand: keypoints as SIFT spreads them,
-//! K = 20, everything automatic, joint recovery. Floors are two points below what came back, or less: they guard
-//! against losses and claim nothing.
+//! Golden tests of synthetic images with SIFT-like keypoints: K = 20, automatic options, joint
+//! recovery. Floors are at most two points below the measured shares; they only detect losses.
 
 use std::sync::Arc;
 
@@ -15,7 +14,8 @@ use unlift::{Error, PointSet, Unit};
 const SIZE: [f64; 2] = [640.0, 480.0];
 const KEYPOINTS: usize = 1200;
 
-/// Keypoints along edges of objects, some strewn over the image; a fifth have a twin at the same place.
+/// Returns keypoints along edges of objects and some anywhere; a fifth have another at the same
+/// place.
 fn image(seed: u64) -> Item<2> {
     let mut draws = Draws::new(seed, Stage::Synthetic, 0);
     let mut points: Vec<[f64; 2]> = Vec::new();
@@ -40,7 +40,8 @@ fn image(seed: u64) -> Item<2> {
     Item { name: format!("image {seed}"), original, descriptors: None }
 }
 
-/// (inlier ratio, scheme, percent within 5, 10 and 25 px) at least; `dcl2d` against blind instead.
+/// (Inlier ratio, scheme, minimum percentages within 5, 10 and 25 px). `dcl2d` is compared with the
+/// blind baseline instead.
 const FLOORS: &[(f64, &str, [f64; 3])] = &[
     (1.0, "lines2d", [44.7, 71.4, 93.6]),
     (0.3, "lines2d", [40.0, 66.5, 92.5]),
@@ -78,8 +79,9 @@ fn lines_and_permutations_come_back() {
     assert!(missed.is_empty(), "{missed:#?}");
 }
 
-/// Convergent lines hide much, but lists tell more than none: 1.5 to 1.8 times what a blind attacker gets. With a tenth of
-/// right entries they tell nothing (3.2, 6.6 and 16.7 % beside 3.4, 6.4 and 16.3), and must not lead astray.
+/// Lists recover 1.5 to 1.8 times the share of the blind baseline under `dcl2d`. At inlier ratio
+/// 0.1 they add nothing (3.2, 6.6 and 16.7 % compared with 3.4, 6.4 and 16.3), but must not do
+/// harm.
 #[test]
 fn convergent_lines_are_never_worse_than_blind() {
     for row in rows(&["dcl2d"], &[1.0, 0.5, 0.3, 0.1]) {

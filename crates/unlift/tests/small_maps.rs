@@ -1,7 +1,8 @@
-//! Maps that are small or no room: a part of the suite that `cargo bench -p unlift --bench families` runs whole.
+//! Tests of small maps and of shapes other than rooms. `cargo bench -p unlift --bench families`
+//! runs the whole suite.
 //!
-//! Joint recovery begins with a pass of consensus. On maps whose lists hold a good part of all records it used to lose what
-//! that pass had found.
+//! Regression: on maps whose lists contain a large part of all records, joint recovery lost what
+//! its first pass, consensus, had found.
 
 use std::sync::Arc;
 
@@ -13,7 +14,8 @@ use unlift::synthetic::{Shape, shape};
 use unlift::truth::Original;
 use unlift::{PointSet, Unit};
 
-/// Percent of `n` points within 1.0 and 2.5 usual distances, by joint recovery and by consensus.
+/// Returns the percentages of `n` points within 1.0 and 2.5 typical distances, by joint recovery
+/// and by consensus.
 fn both(of: Shape, n: usize, name: &str, ratio: f64) -> ([f64; 2], [f64; 2]) {
     let points = shape(of, 1, n);
     let typical = median(&mut Knn::new(&points).unwrap().kth_distances(50));
@@ -34,7 +36,7 @@ fn both(of: Shape, n: usize, name: &str, ratio: f64) -> ([f64; 2], [f64; 2]) {
 
 #[test]
 fn joint_recovery_keeps_what_its_first_pass_found() {
-    // With what came back within 1.0 before: 67, 50 (within 2.5; consensus 88), 72, 57.
+    // Shares within 1.0 before the fix: 67, 50 (within 2.5; consensus 88), 72, 57.
     for (of, name, ratio, margin) in [
         (Shape::Cube, "ppl", 0.3, 3.0),
         (Shape::Cube, "ray", 0.1, 1.0),
@@ -53,7 +55,7 @@ fn joint_recovery_keeps_what_its_first_pass_found() {
     }
 }
 
-/// What comes back by `cp` with the delta that the attack chooses, and with a given one: percent within 0.25 m.
+/// Returns the percentage within 0.25 m under `cp` for the given delta.
 fn cp(points: &[[f64; 3]], k: usize, delta: Delta) -> f64 {
     let original = Original::new(PointSet::try_new(points.to_vec(), Unit::Meter).unwrap());
     let mut plan = Plan { k, delta, records_alone: false, ..Plan::new(Unit::Meter) };
@@ -62,8 +64,9 @@ fn cp(points: &[[f64; 3]], k: usize, delta: Delta) -> f64 {
     run(&original, None, &plan, &mut Silent).unwrap().rows[0].recovered_percent[1]
 }
 
-/// Exchanged coordinates agree exactly with those of their partners, at any delta: of a few hundred points luck chose a
-/// tenth of the right one, and in a flat map, all of which a record's lines cross, a wide one was out of question.
+/// Regression: exchanged coordinates agree exactly with those of their partners at any delta. On a
+/// few hundred points chance led to a tenth of the right delta; in a flat map, which a record's
+/// lines cross completely, wide ones were excluded.
 #[test]
 fn deltas_of_exchanged_coordinates_do_not_collapse() {
     let room = shape(Shape::Room, 3, 800);
@@ -79,7 +82,8 @@ fn deltas_of_exchanged_coordinates_do_not_collapse() {
 
 #[test]
 fn automatic_delta_does_not_collapse_where_little_is_right() {
-    // Chance chose a delta of a thousandth of the usual distance: 2 and 20 % came back within 2.5, 52 and 54 do now.
+    // Before the fix chance led to a thousandth of the typical distance, and shares within 2.5 were
+    // 2 and 20 %; now 52 and 54.
     for (name, least) in [("ppl+", 50.2), ("cp", 52.8)] {
         let (joint, consensus) = both(Shape::Room, 1_000, name, 0.1);
         let found = joint[1].min(consensus[1]);

@@ -1,4 +1,4 @@
-//! Laws of every source that makes neighborhoods from a released map, and what each is for.
+//! Properties of all sources that compare descriptors, and of each source's purpose.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use unlift::seed::{Draws, Key, Stage};
 use unlift::truth::Original;
 use unlift::{About, Descriptors, PointSet, RecordId, RowOrder, Unit};
 
-/// A picture around a keypoint: blobs of gradients, each at a place, in a direction.
+/// Synthetic image patch around a keypoint: gradients, each with a place and a direction.
 struct Picture(Vec<([f64; 2], f64)>);
 
 impl Picture {
@@ -25,8 +25,8 @@ impl Picture {
         Self((0..24).map(|_| blob()).collect())
     }
 
-    /// Its SIFT-like descriptor after the picture is turned (from x towards y) and shifted: 4 x 4
-    /// cells of 8 bins, orientations counted against the grid.
+    /// Returns a SIFT-like descriptor of the patch after rotation (from x towards y) and shift: 4 x
+    /// 4 cells of 8 bins, with orientations relative to the grid.
     fn descriptor(&self, degrees: f64, shift: [f64; 2]) -> Vec<u8> {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let mut squares = Vec::new();
@@ -49,7 +49,7 @@ impl Picture {
     }
 }
 
-/// Lines that tell nothing, with the given descriptors.
+/// Returns arbitrary lines with the given descriptors.
 fn released(rows: &[Vec<u8>], slots_per_record: usize) -> Released<3> {
     let n = rows.len() / slots_per_record;
     let points: Vec<[f64; 3]> = (0..n).map(|i| [i as f64, 0.0, (i % 7) as f64]).collect();
@@ -89,7 +89,7 @@ fn a_patch_that_is_turned_or_shifted_is_found_again() {
         assert_eq!(best(&lists, item), RecordId(300 + item as u32), "{change:?}");
         assert_eq!(best(&lists, 300 + item), RecordId(item as u32), "{change:?}");
     }
-    // The test can fail: similarity sees none of this but the smallest turn or shift.
+    // `similarity` fails for all but the smallest rotation or shift, so the test can fail.
     let plain = similarity(&map, 5).unwrap();
     let found = (0..changes.len()).filter(|&i| best(&plain, i) == RecordId(300 + i as u32)).count();
     assert!(found < changes.len(), "{found}");
@@ -115,15 +115,15 @@ fn similarity_is_the_cosine() {
         nearest.sort_unstable();
         assert_eq!(lists.of(slot), nearest);
         for (record, score) in lists.of(slot).iter().zip(lists.scores_of(slot).unwrap()) {
-            // Sums of 128 products in f32.
+            // Scores are sums of 128 products in `f32`.
             let exact = cosine(&rows[slot], &rows[record.index()]);
             assert!((f64::from(*score) - exact).abs() < 1e-5);
         }
     }
 }
 
-/// Every source that compares descriptors; the laws of lists by records alone are with
-/// those of the density.
+/// Returns all sources that compare descriptors. Sources from records alone are tested with the
+/// density.
 fn sources() -> Vec<Arc<dyn Source<3>>> {
     let names = SOURCES.iter().map(|entry| entry.name);
     let sources = names.map(of_name);
@@ -139,7 +139,7 @@ fn lists_have_k_other_records_each_once_also_for_paired_lines() {
     for slots_per_record in [1, 2] {
         let map = released(&random_map(200), slots_per_record);
         for source in sources() {
-            // `try_new` refuses the own record and repeats.
+            // `try_new` rejects the own record and repeats.
             let lists = source.lists(&map, 6, 0).unwrap();
             assert_eq!(lists.n_slots(), 200);
             for slot in 0..200 {
@@ -228,7 +228,7 @@ fn blank_and_equal_descriptors_are_no_trouble() {
     }
 }
 
-/// Positions made from lists mean nothing where nobody knows of which map the lists are, and in which order.
+/// Lists must state their map and row order, because positions depend on both.
 #[test]
 fn lists_say_what_they_are_about() {
     for slots_per_record in [1, 2] {
@@ -245,7 +245,7 @@ fn lists_say_what_they_are_about() {
     }
 }
 
-/// Lists of a small K, of a room whose points share lines in pairs.
+/// Returns lists for a small K, of a room with paired lines.
 fn near(k: usize) -> TrueNeighbors {
     let points = unlift::synthetic::room(2, 120).points;
     let original = Original::new(PointSet::try_new(points, Unit::Meter).unwrap());
@@ -261,7 +261,8 @@ fn a_ratio_above_zero_is_not_zero() {
     assert_eq!([0.0, 0.05, 0.1, 0.25, 0.5].map(measured), [0.0, 0.25, 0.25, 0.25, 0.5]);
 }
 
-/// Lists of which nobody knows the order are as good as in the better one: half of right lists must not look wrong.
+/// If the order of lists is unknown, the better order counts: otherwise half of the correct lists
+/// would count as wrong.
 #[test]
 fn the_ratio_of_lists_in_either_order_is_that_of_the_better_one() {
     let near = near(9);

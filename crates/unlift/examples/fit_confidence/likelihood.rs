@@ -1,17 +1,17 @@
-//! The likelihood of errors within thresholds, maximized.
+//! Maximum likelihood of errors within thresholds.
 
 use nalgebra::{DMatrix, DVector};
 use unlift::recover::{Cues, N_TERMS};
 
-/// One slot: what is seen of it and what is true, in typical radii of crowds.
+/// One slot: its cues and its true error, in typical radii of crowds.
 pub struct Row {
     pub cues: Cues,
     pub error: f64,
-    /// The typical distance of the K-th neighbor.
+    /// Typical distance of the K-th neighbor.
     pub typical: f64,
 }
 
-/// The weights of one model.
+/// Fitted weights of one model.
 pub struct Fitted {
     pub n: usize,
     pub loss: f64,
@@ -21,19 +21,19 @@ pub struct Fitted {
 
 /// Thresholds, in typical distances of the K-th neighbor.
 const THRESHOLDS: [f64; 5] = [0.4, 0.7, 1.0, 1.5, 2.5];
-/// Weights are drawn to zero by this, per row and threshold.
+/// Ridge penalty of weights, per row and threshold.
 const RIDGE: f64 = 1e-5;
 const STEPS: usize = 40;
-/// Probabilities are at least so far from 0 and 1.
+/// Minimum distance of probabilities from 0 and 1.
 const MARGIN: f64 = 1e-6;
 
 struct Prepared {
     terms: [f32; N_TERMS],
-    /// Per threshold its logarithm, and whether the error is within.
+    /// For each threshold, its logarithm and whether the error is within it.
     within: [(f64, bool); THRESHOLDS.len()],
 }
 
-/// Weights that make the errors of `rows` likeliest, starting from none.
+/// Returns the maximum likelihood weights for the errors of `rows`, starting from zero.
 pub fn fit(rows: &[Row], terms: impl Fn(&Cues) -> [f32; N_TERMS]) -> Fitted {
     let prepare = |row: &Row| Prepared {
         terms: terms(&row.cues),
@@ -72,7 +72,8 @@ pub fn fit(rows: &[Row], terms: impl Fn(&Cues) -> [f32; N_TERMS]) -> Fitted {
     Fitted { n: rows.len(), loss: now, found: rounded(0), scale: rounded(N_TERMS) }
 }
 
-/// The probabilities of the right place, and of an error within each threshold given that.
+/// Returns the probability of the right place, and the conditional probabilities of an error within
+/// each threshold.
 fn parts(row: &Prepared, weights: &DVector<f64>) -> (f64, [f64; THRESHOLDS.len()]) {
     let (mut logit, mut ln_scale) = (0.0, 0.0);
     for (t, &x) in row.terms.iter().enumerate() {
@@ -99,7 +100,7 @@ fn loss(rows: &[Prepared], weights: &DVector<f64>) -> f64 {
     sum / (rows.len() * THRESHOLDS.len()) as f64 + 0.5 * RIDGE * weights.norm_squared()
 }
 
-/// The gradient of the log-likelihood and its expected information.
+/// Returns the gradient of the log-likelihood and its expected information.
 fn newton(rows: &[Prepared], weights: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
     let scale = 1.0 / (rows.len() * THRESHOLDS.len()) as f64;
     let mut gradient = -RIDGE * weights;

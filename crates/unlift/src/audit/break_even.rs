@@ -1,25 +1,24 @@
-//! One number per scheme that a reader remembers: how bad may neighborhoods be so that half of the
-//! points still come back?
+//! Break-even ratio of a scheme: the lowest inlier ratio at which half of the points come back.
 
 use super::plan::Plan;
 use super::row::Row;
 
-/// The share of points, in percent, that the ratio is about.
+/// Percentage of recovered points at break-even.
 const HALF: f64 = 50.0;
 
-/// How sure the ratio is.
+/// Relation of a break-even ratio to the tested inlier ratios.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bound {
     /// Interpolated between two tested ratios.
     Interpolated,
-    /// Half or more come back even at the lowest tested ratio, which is given.
+    /// Half or more come back even at the lowest tested ratio, which is stated.
     BelowTested,
-    /// Fewer than half come back at every tested ratio, the highest of which is given.
+    /// Fewer than half come back at every tested ratio; the highest is stated.
     AboveTested,
 }
 
 impl Bound {
-    /// The name used in files.
+    /// Returns the name used in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Interpolated => "interpolated",
@@ -29,8 +28,8 @@ impl Bound {
     }
 }
 
-/// The smallest inlier ratio, of all tested ones and those between them, at which half of the points come
-/// back within a threshold.
+/// The lowest inlier ratio, among the tested ones and those between them, at which half of the
+/// points come back within a threshold.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct BreakEven {
@@ -38,22 +37,25 @@ pub struct BreakEven {
     pub scheme: String,
     /// Solver name, or [`STRONGEST`].
     pub solver: String,
-    /// How the oracle erred.
+    /// Noise model of the oracle.
     pub oracle_noise: &'static str,
     /// Threshold label.
     pub threshold: String,
     /// The ratio, linearly interpolated, or the tested ratio that bounds it.
     pub inlier_ratio: f64,
-    /// What the ratio means.
+    /// Relation of the ratio to the tested ones.
     pub bound: Bound,
 }
 
-/// Stands for a solver's name: at every ratio the attack that got most.
+/// Name in place of a solver's name: the strongest attack at each ratio.
 pub const STRONGEST: &str = "strongest";
 
-/// Break-even ratios within the headline threshold, for every scheme and noise model with oracle rows: of the
-/// strongest attack at every ratio where there are several, then of every solver. Attacks without neighborhoods (a blind
-/// guess, the records alone) are among them: whoever knows neighbors need not use them.
+/// Computes break-even ratios within the headline threshold for every scheme and every noise model
+/// with oracle rows.
+///
+/// The first is that of the strongest attack at each ratio, if there are several attacks; then one
+/// per solver. The strongest attack includes the two baselines (blind, records alone), because an
+/// attacker with lists need not use them.
 pub fn break_even<const D: usize>(plan: &Plan<D>, rows: &[Row]) -> Vec<BreakEven> {
     let mut result = Vec::new();
     for scheme in &plan.schemes {
@@ -85,19 +87,20 @@ pub fn break_even<const D: usize>(plan: &Plan<D>, rows: &[Row]) -> Vec<BreakEven
     result
 }
 
-/// (ratio, largest share at it) of `rows`, falling in ratio.
+/// Returns (ratio, largest share at this ratio) of `rows`, in descending order of the ratio.
 fn curve(rows: &[&Row], share: &dyn Fn(&Row) -> f64) -> Vec<(f64, f64)> {
     let mut curve: Vec<(f64, f64)> =
         rows.iter().map(|row| (row.inlier_ratio, share(row))).collect();
-    // Of one ratio the largest share first, which stays.
+    // `dedup_by` keeps the first of equal ratios: the one with the largest share.
     curve.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(b.1.total_cmp(&a.1)));
     curve.dedup_by(|later, kept| later.0 == kept.0);
     curve
 }
 
-/// The lowest ratio at which the curve, linear between tested ratios, still reaches one half. `curve` falls in
-/// ratio. A curve may cross one half several times (chance moves shares by a few points): the lowest crossing
-/// counts, as any other would call a map safer than it was found to be.
+/// Returns the lowest ratio at which the curve, linear between tested ratios, reaches one half.
+///
+/// `curve` descends in ratio. It may cross one half several times, because shares vary by a few
+/// points between random seeds. Any higher crossing would overstate safety.
 fn crossing(curve: &[(f64, f64)]) -> Option<(f64, Bound)> {
     let (first, last) = (curve.first()?, curve.last()?);
     let Some(at) = curve.iter().rposition(|(_, share)| *share >= HALF) else {
@@ -130,7 +133,8 @@ mod tests {
         assert_eq!(crossing(&[]), None);
     }
 
-    /// `ray-voxel` by `consensus` on a real map: less comes back at the highest ratio than below it.
+    /// Shares of `ray-voxel` by `consensus` on a real map: the highest ratio gives a smaller share
+    /// than a lower one.
     #[test]
     fn every_tested_ratio_counts_not_only_the_highest() {
         let curve = [(1.0, 48.1), (0.75, 52.3), (0.5, 50.0)];

@@ -1,4 +1,5 @@
-//! The pipeline on one map or image, chained in memory: every row of one scheme and one repeat.
+//! Cells of an audit: the rows of one scheme and one repeat on one map or image, computed in
+//! memory.
 
 use std::time::Instant;
 
@@ -23,60 +24,58 @@ use crate::seed::Key;
 use crate::truth::{Original, Secret};
 use crate::{Descriptors, Error, ErrorKind};
 
-/// The [metric](Row::metrics) of an attacker's own lists: the inlier ratio against as many true neighbors as the lists
-/// have records.
+/// [Metric](Row::metrics) of an attacker's own lists: the inlier ratio with as many true neighbors
+/// as the lists have records.
 const RATIO_AT_K: &str = "inlier_ratio_at_k";
 
-/// A map or an image as its owner holds it.
+/// A map or an image with its ground truth.
 #[derive(Clone, Copy)]
 pub(super) struct Owned<'a, const D: usize> {
     pub(super) original: &'a Original<D>,
-    /// One row per original.
     pub(super) descriptors: Option<&'a Descriptors>,
-    /// What is released of them and the secret, where they are hidden already: no scheme is applied then.
+    /// The released map and its secret if the points are already hidden; no scheme is applied then.
     pub(super) hidden: Option<&'a (Released<D>, Secret)>,
-    /// A search over the originals.
     pub(super) search: &'a Knn<'a, D>,
-    /// Its name, if it is one of many, of which some may have fewer points than a list is long: theirs are shorter.
+    /// Name of the item, if the audit has several.
     pub(super) name: Option<&'a str>,
 }
 
 impl<const D: usize> Owned<'_, D> {
-    /// Whether it may have fewer points than a list is long: images may, the tiles of a map do not.
+    /// Returns true if the item may have fewer points than a list has entries. Images may; tiles of
+    /// a map do not.
     fn may_be_small(&self) -> bool {
         self.name.is_some() && D == 2
     }
 }
 
-/// Which rows are wanted, and how chance falls.
+/// Plan, scheme, repeat and seed of a group of rows.
 #[derive(Clone, Copy)]
 pub(super) struct Run<'a, const D: usize> {
     pub(super) plan: &'a Plan<D>,
-    /// The name of the scheme.
     pub(super) scheme: &'a str,
     pub(super) repeat: u32,
-    /// The oracle's seed. It has no part in what is released.
+    /// Seed of the oracle. Released data does not depend on it.
     pub(super) oracle_seed: u64,
 }
 
-/// One finished row, with what a pool of many needs.
+/// A finished row with the data that pooling needs.
 pub(super) struct Finished<'a> {
     pub(super) row: Row,
     pub(super) accuracy: &'a Accuracy,
     pub(super) baseline: &'a Accuracy,
-    /// Per slot the weight that makes distinct places count once.
+    /// Weight of each slot, such that each distinct place counts once.
     pub(super) weights: &'a [f64],
-    /// Names of the metrics that are about an image as a whole.
+    /// Names of the metrics that describe an image as a whole.
     pub(super) whole: &'a [String],
-    /// Entries of all lists.
+    /// Number of entries of all lists.
     pub(super) n_listed: usize,
     pub(super) seconds: RowSeconds,
 }
 
-/// Hides the points by `scheme`, everything drawn under `key`, and runs every cell.
+/// Hides the points with `scheme` under `key` and computes every cell.
 ///
 /// # Errors
-/// As [`attack`], and in one of many when the scheme cannot hide these points.
+/// Those of [`attack`]. For images also when the scheme cannot hide the points.
 pub(super) fn cells<const D: usize>(
     owned: &Owned<'_, D>,
     run: &Run<'_, D>,
@@ -100,11 +99,14 @@ pub(super) fn cells<const D: usize>(
     }
 }
 
-/// Runs every cell of one scheme and repeat on `hidden`, what is released and its secret; `each` hears what comes
-/// next and gets every row. Returns what has no row, as a source cannot make lists for it.
+/// Computes every cell of one scheme and repeat for `hidden`, the released map and its secret.
+///
+/// Calls `each` with a label before each step and with every finished row. Returns the cells
+/// without a row, for which a source or a custom solver failed.
 ///
 /// # Errors
-/// In one of many, what would have no row: rows of all are pooled.
+/// For images, whose rows are pooled, any failure of a source or solver. For maps, failures of
+/// built-in solvers and of measures only. Also when the observer stops the audit.
 pub(super) fn attack<const D: usize>(
     owned: &Owned<'_, D>,
     run: &Run<'_, D>,
@@ -115,12 +117,12 @@ pub(super) fn attack<const D: usize>(
 ) -> Result<Vec<NotAudited>, Error> {
     let Run { plan, scheme, repeat, oracle_seed } = *run;
     let original = owned.original;
-    // The same integer as the owner's, by the counter: what is released comes from a key, and no attack may
-    // make keys: its crate has none.
+    // The attacker's crate has no keys, so its seed is the integer of the repeat. Released data
+    // depends on a key.
     let attacker = plan.seed.wrapping_add(u64::from(repeat));
     let of_scheme = |error: Error| error.within(scheme);
     let baseline = clock.time(|s| &mut s.evaluate, || Ok(blind(&hidden.0, original, &hidden.1)))?;
-    // In the plane all lines meet: records alone tell nothing there.
+    // In the plane all lines meet, so records alone contain no information.
     let alone = match plan.records_alone && D == 3 {
         true => clock
             .time(|s| &mut s.records_alone, || records_alone(hidden, original, plan, attacker))?,
@@ -152,13 +154,13 @@ pub(super) fn attack<const D: usize>(
         let mut solved = Solved::new(plan, (&hidden.0, &made.lists), attacker);
         for (at, solver) in plan.solvers.iter().enumerate() {
             if !observer.goes_on() {
-                let error = Error::new("audit", "to go on", "a request to stop");
+                let error = Error::new("audit", "to run to the end", "a request to stop");
                 return Err(error.of_kind(ErrorKind::Stopped));
             }
             let what = format!("{scheme} at {:.2} {source}, {}", made.ratio, solver.name());
             each(observer, Some(what), None);
             let (recovered, took) = match solved.by(at, observer) {
-                // A solver of somebody's own may not know these records: it costs its rows alone.
+                // The failure of a custom solver costs only its own rows.
                 Err(error) if Builtin::of(&**solver).is_none() && !owned.may_be_small() => {
                     let error = error.within(&format!("solver {}", solver.name()));
                     missing.push(NotAudited::variant(scheme, variant, &error, &hidden.1));
@@ -166,7 +168,7 @@ pub(super) fn attack<const D: usize>(
                 }
                 solved => solved?,
             };
-            // Lists are made once for all solvers: the first one's row has the time.
+            // All solvers share the lists. The first solver's row has the time of making them.
             let making = if at == 0 { making } else { 0.0 };
             clock.seconds.recover += took;
             let blind = Some(&baseline);
@@ -236,12 +238,12 @@ pub(super) fn attack<const D: usize>(
     Ok(missing)
 }
 
-/// What makes distinct places count once; asked of images alone.
+/// Returns weights with which distinct places count once; empty for maps.
 fn places<const D: usize>(owned: &Owned<'_, D>, secret: &Secret) -> Vec<f64> {
     if owned.may_be_small() { distinct_weights(owned.original, secret) } else { Vec::new() }
 }
 
-/// The row of an attacker who is told where three true neighbors of every point are.
+/// Returns the row of an attacker with three true neighbors of every point and their positions.
 fn reference_row<const D: usize>(
     scheme: &str,
     (released, secret): &(Released<D>, Secret),
@@ -267,5 +269,5 @@ fn reference_row<const D: usize>(
     (row, accuracy)
 }
 
-/// The name of that attacker: as a source and as a solver, though it is neither.
+/// Name of the reference attacker, in place of a source and of a solver.
 pub const REFERENCE: &str = "reference";

@@ -1,36 +1,36 @@
-//! Where the time of an audit went, stage by stage.
+//! Time that an audit takes, per stage.
 
 use std::time::Instant;
 
 use crate::Error;
 
-/// Where the time went. Never part of results.
+/// Seconds per stage. They are not part of the results.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Seconds {
-    /// Searching nearest neighbors of the originals.
+    /// Search of the originals' nearest neighbors.
     pub search: f64,
-    /// Obfuscating, over all schemes and repeats.
+    /// Obfuscation, over all schemes and repeats.
     pub obfuscate: f64,
-    /// Making neighborhoods.
+    /// Making of neighborhoods.
     pub neighbors: f64,
-    /// Recovering.
+    /// Recovery.
     pub recover: f64,
-    /// Attacking the records alone, evaluated.
+    /// Attacks on the records alone, with their evaluation.
     pub records_alone: f64,
-    /// Evaluating, the blind attacker included.
+    /// Evaluation, including the blind baseline.
     pub evaluate: f64,
-    /// Per row, summed over repeats.
+    /// Seconds per row, summed over repeats.
     pub rows: Vec<RowSeconds>,
 }
 
-/// Where the time of one row went.
+/// Seconds of one row.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct RowSeconds {
-    /// Making its neighborhoods; 0 where another solver's row already has the time.
+    /// Making of its neighborhoods; 0 if another solver's row contains this time.
     pub neighbors: f64,
-    /// Recovering; 0 for what joint recovery started from, as the row of `joint` has the time.
+    /// Recovery; 0 for `joint-start` after `joint`, whose row contains this time.
     pub recover: f64,
 }
 
@@ -47,7 +47,6 @@ pub(super) struct Clock {
 }
 
 impl Clock {
-    /// Does `work` on the time of a stage.
     pub(super) fn time<T>(
         &mut self,
         stage: impl Fn(&mut Seconds) -> &mut f64,
@@ -59,7 +58,7 @@ impl Clock {
         result
     }
 
-    /// Adds the time of another clock, but not that of its rows.
+    /// Adds the stages of another clock, without the seconds per row.
     pub(super) fn merge(&mut self, more: &Self) {
         let (to, more) = (&mut self.seconds, &more.seconds);
         to.search += more.search;

@@ -1,4 +1,4 @@
-//! One map or image, every scheme and every repeat: the loop that audits of one and of many share.
+//! The loop over schemes and repeats for one map or image. Audits of one item and of many share it.
 
 use super::cells::{Finished, Owned, Run, cells};
 use super::chance::{key_of, oracle_seed};
@@ -11,21 +11,21 @@ use super::row::Row;
 use crate::Error;
 use crate::seed::Key;
 
-/// What one map or image gave.
+/// Result of one map or image.
 #[derive(Default)]
 pub(super) struct Rows {
-    /// One row per scheme, source, noise model, inlier ratio and solver, in this order: means over repeats.
+    /// One row per scheme, source, noise model, inlier ratio and solver, in this order; means over
+    /// repeats.
     pub(super) rows: Vec<Row>,
-    /// Per row, summed over repeats.
+    /// Seconds per row, summed over repeats.
     pub(super) seconds: Vec<RowSeconds>,
-    /// What has no row.
     pub(super) not_audited: Vec<NotAudited>,
 }
 
-/// The rows of `owned`. `finished` hears of every row of every repeat.
+/// Computes the rows of `owned`. Calls `finished` with every row of every repeat.
 ///
 /// # Errors
-/// As [`cells`].
+/// Those of [`cells`].
 pub(super) fn of_item<const D: usize>(
     owned: &Owned<'_, D>,
     plan: &Plan<D>,
@@ -65,7 +65,7 @@ pub(super) fn of_item<const D: usize>(
         }
         for (row, _) in &by_repeat[0] {
             let same = by_repeat.iter().map(|rows| rows.iter().find(|(r, _)| r.is_same_cell(row)));
-            // A mean over those seeds that went well would be no mean over seeds.
+            // A mean over only the seeds that succeeded would be biased.
             let Some(same) = same.collect::<Option<Vec<_>>>() else { continue };
             let mut seconds = RowSeconds::default();
             same.iter().for_each(|(_, more)| seconds.add(more));
@@ -80,7 +80,6 @@ pub(super) fn of_item<const D: usize>(
     Ok(found)
 }
 
-/// What everything that hides the points is drawn under, and the oracle's seed.
 fn seeds(seed: u64, name: Option<&str>) -> (Key, u64) {
     let key = Key::from_seed(seed);
     match name {

@@ -1,4 +1,4 @@
-//! Laws of schemes that an audit holds before any row of a scheme stands.
+//! Laws of schemes that an audit checks before it reports a row.
 
 use crate::Error;
 use crate::evaluate::{away_from_own, belongs, farthest_for_rounding};
@@ -7,13 +7,14 @@ use crate::released::Released;
 use crate::seed::Key;
 use crate::truth::{Original, Secret};
 
-/// Refuses what a scheme made of `original` under `key` where it breaks a law: every hidden point lies on its own record, and
-/// one key gives one map. Next to nothing comes back of a scheme with a mistake, and that reads as "safe".
+/// Checks two laws of schemes for what a scheme made of `original` under `key`: every hidden point
+/// lies on its own record, and the same key gives the same map.
 ///
-/// Schemes of ours keep both laws in tests. Those of others are applied a second time.
+/// Little can be recovered from a scheme with a bug, so a report would wrongly call it safe. Tests
+/// check the built-in schemes; custom schemes are applied a second time here.
 ///
 /// # Errors
-/// The first law that is broken.
+/// The first law that does not hold.
 pub fn check_laws<const D: usize>(
     scheme: &dyn Scheme<D>,
     original: &Original<D>,
@@ -29,12 +30,12 @@ pub fn check_laws<const D: usize>(
     let most = farthest_for_rounding(released, original, secret);
     if farthest > most {
         let off = away.iter().filter(|&&away| away > most).count();
-        let found = format!("{off} of {} off theirs, by up to {farthest:.2e}", away.len());
+        let found = format!("{off} of {} away from them, by up to {farthest:.2e}", away.len());
         return Err(Error::new("hidden points", "on their own records", found));
     }
     let (again, secret_again) = obfuscate(scheme, original, None, key)?;
     if again.obfuscation() != released.obfuscation() || secret_again.hidden() != secret.hidden() {
-        return Err(Error::new("records", "the same of one key", "others the second time"));
+        return Err(Error::new("records", "the same for the same key", "different ones"));
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! The neighborhoods of one obfuscation, from every source of a plan.
+//! Neighborhoods of one obfuscation, from every source of a plan.
 
 use super::plan::{NeighborsBy, Plan, Variant};
 use crate::geometry::knn::Knn;
@@ -8,37 +8,37 @@ use crate::released::Released;
 use crate::truth::Secret;
 use crate::{About, Error, RowOrder};
 
-/// Lists, and how good they are.
+/// Lists and their quality.
 #[derive(Debug)]
 pub struct Made {
     /// The lists.
     pub lists: Neighborhoods,
-    /// The inlier ratio, as requested or measured.
+    /// Inlier ratio, as requested or measured.
     pub ratio: f64,
     /// Records per list.
     pub k: usize,
-    /// The inlier ratio of an attacker's own lists against as many true neighbors as they have records, where
-    /// `ratio` is against those of the plan.
+    /// Inlier ratio of an attacker's own lists, with as many true neighbors as they have records.
+    /// `ratio` uses the K of the plan instead.
     pub ratio_at_k: Option<f64>,
 }
 
-/// Makes lists for one obfuscation. True neighborhoods are searched when first needed, and kept.
+/// Makes lists for one obfuscation. Searches true neighborhoods on first use and keeps them.
 pub struct Lists<'a, const D: usize> {
     plan: &'a Plan<D>,
     search: &'a Knn<'a, D>,
     released: &'a Released<D>,
     secret: &'a Secret,
     by_row: &'a Secret,
-    /// Of the oracle, and of the attacker.
+    /// Seeds of the oracle and of the attacker.
     seeds: (u64, u64),
     near: Vec<((usize, bool), TrueNeighbors)>,
-    /// Those of the last variant, and its K: variants of one noise model follow each other.
+    /// Outliers of the last variant, and its K: variants with the same noise model are consecutive.
     outliers: Option<(usize, Outliers)>,
 }
 
 impl<'a, const D: usize> Lists<'a, D> {
-    /// Lists for `hidden`, whose secret by descriptor row is `by_row`; `seeds` are the owner's and
-    /// the attacker's.
+    /// Prepares lists for `hidden`. `by_row` is its secret by descriptor row; `seeds` are those of
+    /// the oracle and of the attacker.
     pub fn new(
         plan: &'a Plan<D>,
         search: &'a Knn<'a, D>,
@@ -50,10 +50,10 @@ impl<'a, const D: usize> Lists<'a, D> {
         Self { plan, search, released, secret, by_row, seeds, near: Vec::new(), outliers: None }
     }
 
-    /// The lists of one variant of the plan.
+    /// Makes the lists of one variant of the plan.
     ///
     /// # Errors
-    /// When the source cannot make them for this obfuscation.
+    /// When the source cannot make lists for this obfuscation.
     pub fn make(&mut self, variant: &Variant<'_, D>) -> Result<Made, Error> {
         let slots = self.released.slots_per_record();
         match variant.by {
@@ -72,7 +72,7 @@ impl<'a, const D: usize> Lists<'a, D> {
                 Ok(Made { lists, ratio, k, ratio_at_k: None })
             }
             NeighborsBy::Source(source) => {
-                // The list of slot s is that of descriptor row s.
+                // Lists of such sources are in the order of descriptor rows, not of slots.
                 source.supports(self.released)?;
                 let k = source.k(self.released);
                 let lists = source.lists(self.released, k, self.seeds.1)?;
@@ -83,11 +83,11 @@ impl<'a, const D: usize> Lists<'a, D> {
         }
     }
 
-    /// The same where there may be too few records for lists as long as asked for: lists are then as long as can
-    /// be. An attacker takes what there is; only a record without others has an empty list.
+    /// Makes the lists of one variant, shorter than requested where there are too few records. A
+    /// record has an empty list only if it is the only one.
     ///
     /// # Errors
-    /// As [`make`](Self::make), on maps that are large enough.
+    /// Those of [`make`](Self::make), if the map is large enough.
     pub fn make_of_what_there_is(&mut self, variant: &Variant<'_, D>) -> Result<Made, Error> {
         let others = self.released.n_records().saturating_sub(1);
         match variant.by {
@@ -105,7 +105,8 @@ impl<'a, const D: usize> Lists<'a, D> {
             }
             NeighborsBy::Source(_) => self.make(variant),
             NeighborsBy::Oracle => {
-                // Wrong entries must be there as well.
+                // Wrong entries need records, too, so the longest possible list can be shorter than
+                // `others`.
                 let lengths = (1..=self.plan.k.min(others)).rev();
                 let mut made = lengths.map(|k| self.oracle(variant, k).ok());
                 let Some(lists) = made.find_map(|lists| lists) else {
@@ -125,7 +126,8 @@ impl<'a, const D: usize> Lists<'a, D> {
         let map = Some(self.released.fingerprint());
         let lists = lists.with_about(About { map, order: RowOrder::Slots, ..About::default() });
         let (k, ratio_at_k) = match variant.by {
-            // Nothing listed, nothing right: over images, whose figures are means, one more point that counts.
+            // The metric is a mean over all points of all images, so an empty list counts with
+            // ratio 0.
             NeighborsBy::Source(source) => (source.k(self.released), Some(0.0)),
             NeighborsBy::Oracle | NeighborsBy::Given(_) => (self.plan.k, None),
         };
@@ -133,7 +135,6 @@ impl<'a, const D: usize> Lists<'a, D> {
         Ok(Made { lists, ratio, k, ratio_at_k })
     }
 
-    /// Of the oracle, `k` records per list.
     fn oracle(&mut self, variant: &Variant<'_, D>, k: usize) -> Result<Neighborhoods, Error> {
         let (noise, ratio) =
             (variant.noise.unwrap_or(Noise::Uniform), variant.inlier_ratio.unwrap_or(1.0));
@@ -149,10 +150,10 @@ impl<'a, const D: usize> Lists<'a, D> {
         lists
     }
 
-    /// The `k` true neighbors of every slot, as slots or as descriptor rows are counted.
+    /// Returns the `k` true neighbors of every slot, in the order of slots or of descriptor rows.
     fn near(&mut self, k: usize, by_row: bool) -> Result<&TrueNeighbors, Error> {
         let slots = self.released.slots_per_record();
-        // With one point a record both count alike: one search serves both.
+        // With one slot per record the two orders are equal.
         let by_row = by_row && slots > 1;
         if let Some(at) = self.near.iter().position(|(of, _)| *of == (k, by_row)) {
             return Ok(&self.near[at].1);

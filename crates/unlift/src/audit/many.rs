@@ -1,4 +1,5 @@
-//! An audit of many images, or of the tiles of a large map: their points pooled, a few items in memory at a time.
+//! Audit of many images, or of the tiles of a large map. Points are pooled; a few items are in
+//! memory at a time.
 
 use rayon::prelude::*;
 
@@ -17,11 +18,11 @@ use crate::neighbors::oracle;
 use crate::truth::Original;
 use crate::{Descriptors, Error};
 
-/// An image, or a tile of a map, as its owner holds it.
+/// An image or a tile of a map with its ground truth.
 #[derive(Clone, Debug)]
 pub struct Item<const D: usize> {
-    /// Its name: in reports, and what its randomness comes from, so that an item's rows do not depend on
-    /// the others. Two items should not have the same.
+    /// Unique name, used in reports. Random seeds depend on it, so the rows of an item do not
+    /// depend on other items.
     pub name: String,
     /// Keypoints of an image, in pixels, within its bounds ([`Original::within`]); points of a tile.
     pub original: Original<D>,
@@ -29,25 +30,27 @@ pub struct Item<const D: usize> {
     pub descriptors: Option<Descriptors>,
 }
 
-/// Hears how an audit of many goes.
+/// Receives the progress and the rows of an audit of many items.
 ///
-/// Several images are at work at the same time: what is seen of one is collected on its own, and handed
-/// over when its turn comes.
+/// Several images are processed at the same time. Each has its own observer, which
+/// [`item`](Self::item) returns in the order of the items.
 pub trait Watcher<const D: usize> {
-    /// What is collected of one item. It hears the progress of that item, from a thread of its own.
+    /// Observer of one item. It runs on a thread of its own.
     type OfItem: Observer<D> + Send;
 
-    /// Before an item is begun.
+    /// Returns the observer of the next item.
     fn begin(&mut self) -> Self::OfItem;
 
-    /// `done` of `total` items are finished, as far as their number is known; `what` comes next.
+    /// Called when `done` of `total` items are finished, if the total is known; `what` comes next.
     fn progress(&mut self, done: usize, total: usize, what: &str) {
         let _ = (done, total, what);
     }
 
-    /// One item is finished, in the order of the items. `rows` has one per scheme, source, noise model,
-    /// inlier ratio and solver, in this order, but for tiles those that could not be audited; none for an image without
-    /// keypoints.
+    /// Called for each finished item, in order.
+    ///
+    /// `rows` has one row per scheme, source, noise model, inlier ratio and solver, in this order.
+    /// Rows of a tile that could not be audited are missing. An image without keypoints has no
+    /// rows.
     fn item(&mut self, name: &str, rows: &[Row], seen: Self::OfItem) {
         let _ = (name, rows, seen);
     }
@@ -61,18 +64,20 @@ impl<const D: usize> Watcher<D> for Silent {
     }
 }
 
-/// Images at work per thread: while a large one is finished the others' threads are not idle.
+/// Images in progress per thread: other images keep threads busy while a large one finishes.
 const AT_WORK: usize = 2;
 
-/// Runs `plan` on all `items`: a few images at a time, tiles one by one, as all threads work on each.
+/// Runs `plan` on all `items`: a few images at a time; tiles one by one, because each uses all
+/// threads.
 ///
-/// Rows depend on the items, their names and the plan alone: the same bytes for any number of threads.
-/// Memory does not grow with the number of items. Seconds are summed over items that are at work
-/// at the same time. What could not be audited in one tile has no row: a share of some tiles is none of the map.
+/// Rows depend only on the items, their names and the plan: byte-identical for any number of
+/// threads. Memory does not grow with the number of items. Seconds are summed over items, also over
+/// items in progress at the same time. A cell that failed in one tile has no row, because a share
+/// of some tiles is not a share of the map.
 ///
 /// # Errors
-/// When the plan is for one item alone, an item cannot be read, has no descriptors that are needed, or is an image without bounds; or
-/// when no scheme can be applied to the tiles.
+/// When the plan is for a single item, when an item cannot be read, lacks required descriptors or
+/// is an image without bounds, or when no scheme can be applied to the tiles.
 pub fn run_many<const D: usize, E: From<Error>>(
     items: impl IntoIterator<Item = Result<Item<D>, E>>,
     plan: &Plan<D>,
@@ -120,29 +125,25 @@ pub fn run_many<const D: usize, E: From<Error>>(
     Ok(Outcome { rows, not_audited, break_even, n_items, n_too_small, seconds })
 }
 
-/// What is summed over items.
 #[derive(Default)]
 struct Sums {
-    /// In the order of the first item's rows.
+    /// Cells in the order of the first item's rows.
     cells: Vec<CellSums>,
     not_audited: Vec<NotAudited>,
-    /// Items with points.
+    /// Number of items with points.
     n_pooled: usize,
     clock: Clock,
 }
 
-/// What is summed of one row.
 struct CellSums {
-    /// Of one item.
+    /// Row of the first item.
     row: Row,
-    /// One per repeat.
     pools: Vec<Pool>,
     n_items: usize,
     seconds: RowSeconds,
 }
 
 impl Sums {
-    /// Adds the sums of the next item.
     fn merge(&mut self, more: Self) {
         self.clock.merge(&more.clock);
         self.n_pooled += more.n_pooled;
@@ -169,7 +170,7 @@ type One<const D: usize> =
 
 static ONE: Both<One<2>, One<3>> = Both(one::<2>, one::<3>);
 
-/// The rows of one item, and its sums; nothing without points.
+/// Returns the rows of one item and its sums; both are empty without points.
 fn one<const D: usize>(
     item: &Item<D>,
     plan: &Plan<D>,
@@ -197,7 +198,7 @@ fn one<const D: usize>(
     let found = of_item(&owned, plan, &mut sums.clock, seen, &mut each)?;
     let Rows { rows, seconds, not_audited } = found;
     for (row, seconds) in rows.iter().zip(seconds) {
-        // A cell that failed under another seed has no row.
+        // A cell that failed in another repeat has no row.
         if let Some(at) = pools.iter().position(|(other, _)| other.is_same_cell(row)) {
             let (row, pools) = pools.swap_remove(at);
             sums.cells.push(CellSums { row, pools, n_items: 1, seconds });
@@ -207,7 +208,7 @@ fn one<const D: usize>(
     Ok((rows, sums))
 }
 
-/// What [`Plan::check_for_many`] cannot know.
+/// Checks an item for conditions that [`Plan::check_for_many`] cannot check.
 fn check<const D: usize>(item: &Item<D>, plan: &Plan<D>) -> Result<(), Error> {
     if D == 2 && item.original.bounds().is_none() {
         return Err(Error::new("image size", "known", "none"));

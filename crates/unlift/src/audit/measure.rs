@@ -1,4 +1,4 @@
-//! All figures of one recovery: what a row of an audit says beside its name, and what `evaluate` prints.
+//! Figures of one recovery, as in a row of an audit and in the output of `evaluate`.
 
 use std::collections::BTreeMap;
 
@@ -9,12 +9,14 @@ use crate::recover::Recovered;
 use crate::truth::{DropReason, Original, Secret};
 use crate::{Error, Unit};
 
-/// The row of `recovered` without its name: scheme, source, inlier ratio, K and solver are for the caller to fill
-/// in. `secret` is that of the obfuscation, as it was made; `blind` the errors of an attacker without
-/// neighborhoods, whose figures are missing without it.
+/// Computes the row of `recovered` and its errors. The caller fills in scheme, source, inlier
+/// ratio, K and solver.
+///
+/// `secret` is the secret that the obfuscation returned. `blind` contains the errors of the blind
+/// baseline; without it, the row has no blind figures.
 ///
 /// # Errors
-/// When the three do not belong together, as [`evaluate`] tells it.
+/// When the three do not belong together, see [`evaluate`].
 pub fn measure<const D: usize>(
     recovered: &Recovered<D>,
     original: &Original<D>,
@@ -32,7 +34,7 @@ pub fn measure<const D: usize>(
     Ok((row, accuracy))
 }
 
-/// A row of which only the obfuscation is known.
+/// Returns a row with the figures of the obfuscation only.
 pub(super) fn unmeasured(unit: Unit, secret: &Secret) -> Row {
     let mut dropped = BTreeMap::new();
     for reason in DropReason::ALL {

@@ -1,7 +1,8 @@
-//! One whole audit as a value: a plan in, rows out. The only module that sees the whole pipeline.
+//! Audits: rows for every combination of scheme, source, inlier ratio and solver of a plan. Only
+//! this module uses all stages.
 //!
-//! [`run`](fn@run) audits a map, [`run_many`] many images or the tiles of a map; both go through the same loop and the same cells.
-//! Schemes, sources of neighborhoods and measures of a [`Plan`] may be anybody's.
+//! [`run`](fn@run) audits one map, [`run_many`] many images or the tiles of a map. A [`Plan`] can
+//! contain custom schemes, sources, solvers and measures.
 
 mod break_even;
 mod cells;

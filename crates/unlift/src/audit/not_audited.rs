@@ -1,29 +1,28 @@
-//! What a plan asked for and a map does not allow.
+//! Parts of a plan that could not be audited.
 
 use super::plan::Variant;
 use crate::Error;
 use crate::neighbors::oracle::Noise;
 use crate::truth::{DropReason, Secret};
 
-/// A scheme that cannot be applied to a map, or one source of neighborhoods for it. It has no row: nothing
-/// is known of it, least of all that little comes back.
+/// A scheme, or a scheme with one source, that could not be audited. It has no row, because an
+/// unknown value must not look like a small one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NotAudited {
-    /// The scheme.
+    /// Scheme name.
     pub scheme: String,
-    /// The source without lists, as [`Row::neighbors`](super::Row::neighbors); `None` when the scheme has
-    /// no rows at all.
+    /// Source without lists, as in [`Row::neighbors`](super::Row::neighbors); `None` if the scheme
+    /// has no rows at all.
     pub neighbors: Option<String>,
-    /// The noise model of the oracle, where that was the source.
+    /// Noise model, if the source is the oracle.
     pub oracle_noise: Option<&'static str>,
-    /// The inlier ratio that was asked of the oracle.
+    /// Inlier ratio requested of the oracle.
     pub inlier_ratio: Option<f64>,
-    /// Why: what was expected and what was found.
+    /// Error message: what was expected and what was found.
     pub reason: String,
 }
 
 impl NotAudited {
-    /// A scheme that cannot hide the points.
     pub(super) fn scheme(scheme: &str, error: &Error) -> Self {
         Self {
             scheme: scheme.to_owned(),
@@ -34,7 +33,6 @@ impl NotAudited {
         }
     }
 
-    /// A variant without lists for points that are hidden as `secret` says.
     pub(super) fn variant<const D: usize>(
         scheme: &str,
         variant: &Variant<'_, D>,
@@ -49,7 +47,7 @@ impl NotAudited {
             let most = why.into_iter().max_by_key(|(_, n)| *n).map_or("", |(why, _)| why.name());
             let most = most.replace('_', " ");
             reason.push_str(&format!(
-                " ({scheme} leaves out {left} of {all} points, most as {most})"
+                " ({scheme} leaves out {left} of {all} points, most of them as {most})"
             ));
         }
         Self {
@@ -61,7 +59,7 @@ impl NotAudited {
         }
     }
 
-    /// Whether both are about the same scheme and variant, for whatever reason.
+    /// Returns true if both have the same scheme and variant. Reasons are not compared.
     pub(super) fn is_same_cell(&self, other: &Self) -> bool {
         self.scheme == other.scheme
             && self.neighbors == other.neighbors
@@ -70,8 +68,8 @@ impl NotAudited {
     }
 }
 
-/// `missing` of one scheme, as short as it can be told: a scheme without any row, always for one reason,
-/// is told once.
+/// Shortens `missing` of one scheme: a scheme without rows that failed for a single reason becomes
+/// one entry.
 pub(super) fn told(missing: Vec<NotAudited>, has_rows: bool) -> Vec<NotAudited> {
     match missing.first() {
         Some(first) if !has_rows && missing.iter().all(|m| m.reason == first.reason) => {

@@ -1,4 +1,4 @@
-//! Who hears how an audit goes, and what they see of every row.
+//! Interfaces for progress, rows and additional measures of an audit.
 
 use std::fmt::Debug;
 
@@ -10,69 +10,71 @@ use crate::released::Released;
 use crate::truth::{Original, Secret};
 use crate::{Descriptors, Error};
 
-/// Everything known about one row of one repeat, for whoever writes clouds, draws pictures or measures more.
+/// All data of one row of one repeat, for observers and measures.
 #[derive(Clone, Copy)]
 #[non_exhaustive]
 pub struct Cell<'a, const D: usize = 3> {
-    /// The name of the image, if it is one of many.
+    /// Name of the image or tile, if the audit has several.
     pub name: Option<&'a str>,
     /// The row of this repeat.
     pub row: &'a Row,
-    /// Which repeat, from 0.
+    /// Number of the repeat, from 0.
     pub repeat: u32,
-    /// The truth.
+    /// Ground truth.
     pub original: &'a Original<D>,
-    /// Descriptors of the originals, one row each, where they are at hand.
+    /// Descriptors of the originals, one row each, if present.
     pub descriptors: Option<&'a Descriptors>,
-    /// The secret of this obfuscation, its slots counted as the rows of `recovered` are.
+    /// Secret of this obfuscation, with slots in the order of `recovered`.
     pub secret: &'a Secret,
-    /// What the attacker saw.
+    /// Released map.
     pub released: &'a Released<D>,
-    /// The lists it was recovered from: one per slot, by descriptor row for an attacker's own sources.
+    /// Lists used for recovery: one per slot, in the order of descriptor rows for an attacker's own
+    /// sources.
     pub lists: &'a Neighborhoods,
-    /// What the attacker got.
+    /// Recovered points.
     pub recovered: &'a Recovered<D>,
-    /// Error per slot.
+    /// Error of each slot.
     pub accuracy: &'a Accuracy,
 }
 
-/// Everything that recovered points follow from.
+/// All inputs that determine recovered points.
 #[derive(Clone, Copy, Debug)]
 pub struct Recovery<'a, const D: usize = 3> {
-    /// What the attacker sees.
+    /// Released map.
     pub released: &'a Released<D>,
-    /// Its lists.
+    /// Lists.
     pub lists: &'a Neighborhoods,
     /// The solver.
     pub solver: &'a dyn Solver<D>,
-    /// How it works.
+    /// Options of the recovery.
     pub options: &'a RecoverOptions,
 }
 
-/// Hears how an audit goes.
+/// Receives progress and rows of an audit, and can stop it.
 pub trait Observer<const D: usize = 3> {
-    /// `done` of `total` cells are finished; `what` comes next.
+    /// Called when `done` of `total` cells are finished; `what` comes next.
     fn progress(&mut self, done: usize, total: usize, what: &str) {
         let _ = (done, total, what);
     }
 
-    /// Whether the audit shall go on; asked between cells.
+    /// Returns false to stop the audit. Called between cells.
     fn goes_on(&self) -> bool {
         true
     }
 
-    /// One cell is finished.
+    /// Called for each finished cell.
     fn cell(&mut self, cell: &Cell<'_, D>) {
         let _ = cell;
     }
 
-    /// What was recovered of the same before, bit for bit; `None` has it done now, and [kept](Self::keep).
+    /// Returns the stored result of an identical recovery. If `None`, the audit recovers now and
+    /// calls [`keep`](Self::keep).
     fn recall(&mut self, recovery: &Recovery<'_, D>) -> Option<Recovered<D>> {
         let _ = recovery;
         None
     }
 
-    /// What was recovered now.
+    /// Called with each new result, to store it.
     fn keep(&mut self, recovery: &Recovery<'_, D>, recovered: &Recovered<D>) {
         let _ = (recovery, recovered);
     }
@@ -84,26 +86,28 @@ pub struct Silent;
 
 impl<const D: usize> Observer<D> for Silent {}
 
-/// What counts once in the mean of a figure over many images.
+/// Weighting of a figure in a mean over many images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Counts {
-    /// Every point, so that an image counts by how many it has.
+    /// Every point counts once, so an image counts by its number of points.
     Points,
-    /// Every image, of those that have the figure: it is about an image as a whole.
+    /// Every image that has the figure counts once: the figure describes an image as a whole.
     Images,
 }
 
-/// Something to be measured of every row beside errors: anybody may write one.
+/// A custom figure of every row, besides errors.
 pub trait Measure<const D: usize>: Debug + Send + Sync {
-    /// What counts once in a mean over images.
+    /// Returns the weighting in a mean over images.
     fn counts(&self) -> Counts {
         Counts::Points
     }
 
-    /// Figures by name. The same names for every cell: a figure that some repeats lack is left out, and one that counts
-    /// points and some images lack.
+    /// Returns figures by name.
+    ///
+    /// The names must be the same for every cell. A figure that is missing in some repeats is
+    /// omitted, and so is one that counts points and is missing in some images.
     ///
     /// # Errors
-    /// When it cannot be measured.
+    /// When the figures cannot be computed.
     fn measure(&self, cell: &Cell<'_, D>) -> Result<Vec<(String, f64)>, Error>;
 }

@@ -1,4 +1,4 @@
-//! What is to be audited.
+//! Plan of an audit.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -11,32 +11,32 @@ use crate::obfuscate::{SCHEMES, Scheme, SchemeOptions};
 use crate::recover::{Builtin, Delta, Solver};
 use crate::{Error, ErrorKind, Unit};
 
-/// Neighbors of every original, by row, as an owner lists them from any source.
+/// Neighbors of every original, by row, from any source that the owner chooses.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointNeighbors {
     /// The name of the source in reports.
     pub name: String,
-    /// Where each point's list starts; one more entry than there are points.
+    /// Start of each point's list; one more entry than there are points.
     pub offsets: Vec<u64>,
     /// Rows of originals.
     pub neighbors: Vec<u32>,
-    /// Confidence per entry, if the source gave any.
+    /// Confidence of each entry, if the source gives any.
     pub scores: Option<Vec<f32>>,
 }
 
-/// Where the attacker's neighborhoods come from.
+/// Source of the attacker's neighborhoods.
 #[derive(Clone, Debug)]
 pub enum NeighborsBy<const D: usize> {
-    /// From the originals, at each inlier ratio of the plan.
+    /// Ground truth, at each inlier ratio of the plan.
     Oracle,
-    /// Given; the inlier ratio is measured.
+    /// Given lists; their inlier ratio is measured.
     Given(PointNeighbors),
-    /// From the released map alone, as an attacker would; the inlier ratio is measured.
+    /// A source that reads only the released map, like an attacker; its inlier ratio is measured.
     Source(Arc<dyn Source<D>>),
 }
 
 impl<const D: usize> NeighborsBy<D> {
-    /// The name in reports.
+    /// Returns the name used in reports.
     pub fn name(&self) -> &str {
         match self {
             Self::Oracle => "oracle",
@@ -45,12 +45,12 @@ impl<const D: usize> NeighborsBy<D> {
         }
     }
 
-    /// Whether it is the oracle.
+    /// Returns true for the oracle.
     pub fn is_oracle(&self) -> bool {
         matches!(self, Self::Oracle)
     }
 
-    /// The attacker's own source, if it is one.
+    /// Returns the attacker's own source, if it is one.
     pub fn source(&self) -> Option<&dyn Source<D>> {
         match self {
             Self::Source(source) => Some(&**source),
@@ -59,59 +59,61 @@ impl<const D: usize> NeighborsBy<D> {
     }
 }
 
-/// What tells the rows of one scheme and solver apart.
+/// Source, noise model and inlier ratio of a row.
 #[derive(Clone, Copy, Debug)]
 pub struct Variant<'a, const D: usize> {
-    /// Where neighborhoods come from.
+    /// Source of the neighborhoods.
     pub by: &'a NeighborsBy<D>,
-    /// How the oracle errs; `None` for other sources.
+    /// Noise model of the oracle; `None` for other sources.
     pub noise: Option<Noise>,
-    /// The inlier ratio; `None` where it will be measured.
+    /// Requested inlier ratio; `None` if it will be measured.
     pub inlier_ratio: Option<f64>,
 }
 
-/// A plan: every combination of scheme, source, noise model, inlier ratio and solver becomes a row.
+/// Plan of an audit: every combination of scheme, source, noise model, inlier ratio and solver
+/// becomes a row.
 #[derive(Clone, Debug)]
 pub struct Plan<const D: usize> {
-    /// Schemes to audit, ours or anybody's.
+    /// Schemes to audit, built-in or custom.
     pub schemes: Vec<Arc<dyn Scheme<D>>>,
-    /// Where neighborhoods come from; each has its own rows.
+    /// Sources of neighborhoods.
     pub neighbors: Vec<NeighborsBy<D>>,
-    /// How the oracle errs; a row each.
+    /// Noise models of the oracle.
     pub oracle_noise: Vec<Noise>,
-    /// Shares of true neighbors (oracle).
+    /// Inlier ratios of the oracle.
     pub inlier_ratios: Vec<f64>,
-    /// True neighbors per slot: of the oracle, and where the inlier ratio of an attacker's own lists
-    /// is measured. For given lists, the longest list decides.
+    /// True neighbors per slot, for the oracle and for the measured inlier ratio of an attacker's
+    /// own lists. Given lists use the length of the longest list instead.
     pub k: usize,
-    /// Solvers, ours or anybody's: a row each. [`Builtin::JointStart`] after [`Builtin::Joint`] takes no run of its own.
+    /// Solvers, built-in or custom. [`Builtin::JointStart`] after [`Builtin::Joint`] costs no extra
+    /// run.
     pub solvers: Vec<Arc<dyn Solver<D>>>,
-    /// Whether maps are also attacked by their records alone, the second baseline.
+    /// If true, maps are also attacked by records alone, the second baseline.
     pub records_alone: bool,
-    /// Whether each scheme also gets a row for an attacker who is told the true neighbors' places.
+    /// If true, each scheme gets a row of an attacker with the positions of true neighbors.
     pub reference: bool,
-    /// The distance that decides support.
+    /// Distance within which a listed record supports a position.
     pub delta: Delta,
-    /// Whether rules that tie records together fix coordinates.
+    /// If true, coordinates that a rule of the scheme fixes are set exactly.
     pub exact_constraints: bool,
-    /// What is measured beside errors: figures by name.
+    /// Additional figures besides errors.
     pub measures: Vec<Arc<dyn Measure<D>>>,
-    /// When a point counts as recovered.
+    /// Errors below which a point counts as recovered.
     pub thresholds: Vec<Threshold>,
-    /// Which of the thresholds break-even ratios are about.
+    /// Index of the threshold that break-even ratios use.
     pub headline: usize,
-    /// The seed of the first repeat; the others count up.
+    /// Seed of the first repeat; each further repeat adds 1.
     pub seed: u64,
-    /// How many seeds are averaged.
+    /// Number of seeds to average.
     pub repeats: u32,
 }
 
-/// A map is small if it has fewer points than this many lists have entries.
+/// A map is small if it has fewer points than this number times K.
 const SMALL: usize = 150;
 
 impl<const D: usize> Plan<D> {
-    /// The plan of a default audit of points in `unit`: all schemes of the registry that are defined on them, six
-    /// inlier ratios; of maps at K = 50, of images (pixels) at K = 20.
+    /// Returns the default plan for points in `unit`: all built-in schemes of that dimension, six
+    /// inlier ratios, and K = 50 for maps or K = 20 for images (pixels).
     pub fn new(unit: Unit) -> Self {
         let thresholds: &[&str] = match unit {
             Unit::Meter => &["0.10", "0.25"],
@@ -130,7 +132,7 @@ impl<const D: usize> Plan<D> {
             oracle_noise: vec![Noise::Uniform],
             inlier_ratios: vec![1.0, 0.75, 0.5, 0.3, 0.2, 0.1],
             k: if of_images { 20 } else { 50 },
-            // What joint recovery starts from costs nothing more, and is at times the stronger attack.
+            // `joint-start` costs no extra run and is sometimes the stronger attack.
             solvers: vec![Arc::new(Builtin::Joint), Arc::new(Builtin::JointStart)],
             records_alone: true,
             reference: false,
@@ -144,8 +146,8 @@ impl<const D: usize> Plan<D> {
         }
     }
 
-    /// The same for a map of `n_points` with lists of `k`: where a list holds more than a 150th of the points, `joint`
-    /// can come out weaker than plain `consensus`, which then has a row of its own.
+    /// Adds the solver `consensus` for a map of `n_points` with fewer than 150 points per list
+    /// entry, where `joint` can be weaker.
     #[must_use]
     pub fn for_map(mut self, n_points: usize, k: usize) -> Self {
         if n_points < SMALL * k && !self.has_solver(Builtin::Consensus) {
@@ -154,23 +156,23 @@ impl<const D: usize> Plan<D> {
         self
     }
 
-    /// Whether the plan has this solver of ours.
+    /// Returns true if the plan contains this built-in solver.
     pub fn has_solver(&self, builtin: Builtin) -> bool {
         self.solvers.iter().any(|solver| Builtin::of(&**solver) == Some(builtin))
     }
 
-    /// Whether the oracle is among the sources.
+    /// Returns true if the oracle is among the sources.
     pub fn asks_oracle(&self) -> bool {
         self.neighbors.iter().any(NeighborsBy::is_oracle)
     }
 
-    /// The attacker's own sources.
+    /// Returns the attacker's own sources.
     pub fn own_sources(&self) -> impl Iterator<Item = &dyn Source<D>> {
         self.neighbors.iter().filter_map(NeighborsBy::source)
     }
 
-    /// The rows of one scheme and solver, source by source; those of the oracle noise model by
-    /// noise model.
+    /// Returns the variants of each scheme and solver, source by source; those of the oracle noise
+    /// model by noise model.
     pub fn variants(&self) -> Vec<Variant<'_, D>> {
         let mut variants = Vec::new();
         for by in &self.neighbors {
@@ -194,15 +196,15 @@ impl<const D: usize> Plan<D> {
         variants
     }
 
-    /// Rows per scheme.
+    /// Returns the number of rows per scheme.
     pub fn rows_per_scheme(&self) -> usize {
         self.variants().len() * self.solvers.len() + usize::from(self.reference)
     }
 
-    /// Checks every field against the one map that it is meant for.
+    /// Checks the plan for a single map.
     ///
     /// # Errors
-    /// Names the first field out of range.
+    /// The first field out of range.
     pub fn check(&self, n_points: usize, has_descriptors: bool) -> Result<(), Error> {
         if n_points < self.k + 1 {
             let expected = format!("at least K + 1 = {}", self.k + 1);
@@ -213,15 +215,15 @@ impl<const D: usize> Plan<D> {
         if has_descriptors { Ok(()) } else { self.without_descriptors() }
     }
 
-    /// Checks every field for a set of many, before any of them is looked at.
+    /// Checks the plan for many items, before the first one is read.
     ///
     /// # Errors
-    /// Names the first field out of range, or that is for one map alone.
+    /// The first field out of range, or that needs a single map.
     pub fn check_for_many(&self) -> Result<(), Error> {
         self.check_fields()?;
         let lone = self.solvers.iter().find(|solver| !solver.reads_lists());
         if let (2, Some(solver)) = (D, lone) {
-            // In the plane all lines meet: records alone tell nothing.
+            // In the plane all lines meet, so records alone contain no information.
             return Err(Error::new("solver", "one that recovers from lists", solver.name()));
         }
         if self.k == 0 {
@@ -229,13 +231,13 @@ impl<const D: usize> Plan<D> {
         }
         let given = self.neighbors.iter().find(|by| matches!(by, NeighborsBy::Given(_)));
         if let Some(given) = given {
-            let expected = "the oracle or one that works on each alone";
+            let expected = "the oracle, or a source that works on single items";
             return Err(Error::new("neighbors", expected, given.name()));
         }
         Ok(())
     }
 
-    /// Refuses a source that needs descriptors, where there are none.
+    /// Returns an error if a source needs descriptors, for use where there are none.
     pub(super) fn without_descriptors(&self) -> Result<(), Error> {
         let needy = self.own_sources().find(|source| source.needs() == Needs::Descriptors);
         needy.map_or(Ok(()), |source| Err(lacks_descriptors(source.name())))
@@ -246,7 +248,7 @@ impl<const D: usize> Plan<D> {
         check_names("solver", self.solvers.iter().map(|solver| solver.name()))?;
         let own = self.solvers.iter().filter(|solver| Builtin::of(&***solver).is_none());
         if let Some(solver) = own.into_iter().find(|one| Builtin::from_name(one.name()).is_ok()) {
-            // A report would say of it what is true of ours.
+            // Reports describe built-in solvers by their names.
             let expected = "a name that no solver of unlift has";
             return Err(Error::new("solver", expected, solver.name()));
         }
@@ -276,7 +278,7 @@ impl<const D: usize> Plan<D> {
     }
 }
 
-/// Refuses names that are not plain words, as they become parts of gates and of file names, and names that occur twice.
+/// Checks that names are unique plain words, because they become parts of gates and file names.
 fn check_names<'a>(what: &str, names: impl Iterator<Item = &'a str>) -> Result<(), Error> {
     let mut seen = BTreeSet::new();
     for name in names {

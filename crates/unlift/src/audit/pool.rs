@@ -1,4 +1,4 @@
-//! One row over the points of many images or tiles: sums, and a histogram of errors of bounded size.
+//! Sums and a histogram of errors, of bounded size, for one row over many images or tiles.
 
 use std::collections::BTreeMap;
 
@@ -8,45 +8,44 @@ use super::threshold::Threshold;
 use crate::evaluate::{Accuracy, Reliability};
 use crate::recover::Unknown;
 
-/// Bits of the mantissa of an `f32` that are left out of an error's bin: bins are 0.05 % wide.
+/// Bits of the mantissa of an `f32` that the histogram of errors ignores: bins are 0.05 % wide.
 const DROPPED_BITS: u32 = 12;
 
-/// A figure times what counts once, and of how many of these it is known.
+/// Weighted sum of a figure, and the weight of the points or images that have it.
 #[derive(Clone, Copy, Debug, Default)]
 struct Figure {
     sum: f64,
     known: usize,
-    /// Whether images count once, not points.
+    /// True if images count once, not points.
     of_images: bool,
 }
 
-/// Sums over images; no share is rounded before the end.
+/// Sums over images. Shares are computed at the end, so rounding errors do not add up.
 #[derive(Debug)]
 pub(super) struct Pool {
-    /// The first image's row, which names the cell.
+    /// Row of the first image, which identifies the cell.
     cell: Row,
     n_points: usize,
     within: Vec<usize>,
     blind_within: Vec<usize>,
-    /// Slots recovered exactly.
     exact: Option<usize>,
-    /// Slots whose axis was named.
+    /// Percentage of slots whose axis was identified, times slots.
     axis: Option<f64>,
     n_places: f64,
     places_within: Vec<f64>,
     blind_places_within: Vec<f64>,
     metrics: BTreeMap<String, Figure>,
-    /// Deltas times slots.
+    /// Delta times slots.
     delta: f64,
-    /// True entries of lists, and all.
+    /// Number of true entries of lists.
     hits: f64,
     n_listed: usize,
     lost: BTreeMap<&'static str, usize>,
     dropped: BTreeMap<&'static str, usize>,
     trials: Option<BTreeMap<u32, u64>>,
-    /// Per attack on the records alone, percentages times points.
+    /// Percentages times points, for each attack on the records alone.
     alone: BTreeMap<&'static str, Vec<f64>>,
-    /// Descriptors given to their own point, in percent, times points.
+    /// Percentage of descriptors assigned to their own point, times points.
     assignment: Option<f64>,
     reliability: Option<Reliability>,
     sure_unknown: Option<Unknown>,
@@ -55,7 +54,6 @@ pub(super) struct Pool {
 }
 
 impl Pool {
-    /// A pool for rows like `row`.
     pub(super) fn new(row: &Row, thresholds: &[Threshold]) -> Self {
         let n = thresholds.len();
         Self {
@@ -84,7 +82,6 @@ impl Pool {
         }
     }
 
-    /// Adds the row of one image.
     pub(super) fn add(&mut self, finished: &Finished<'_>, thresholds: &[Threshold]) {
         let Finished { row, accuracy, baseline, weights, whole, n_listed, .. } = finished;
         let n = accuracy.n_points();
@@ -136,7 +133,7 @@ impl Pool {
         self.blind_errors.add(baseline);
     }
 
-    /// Adds everything added to `more`, a pool of the same row.
+    /// Adds the sums of `more`, a pool of the same row.
     pub(super) fn merge(&mut self, more: &Self) {
         self.n_points += more.n_points;
         let counts = |to: &mut [usize], more: &[usize]| {
@@ -166,7 +163,7 @@ impl Pool {
         self.hits += more.hits;
         self.n_listed += more.n_listed;
         for (name, more) in &more.alone {
-            // An attack that cannot be tried on an item gets nothing there.
+            // An attack that cannot run on an item recovers nothing there.
             sums(self.alone.entry(name).or_insert_with(|| vec![0.0; more.len()]), more);
         }
         if let Some(more) = more.assignment {
@@ -175,7 +172,7 @@ impl Pool {
         if let (Some(all), Some(more)) = (&mut self.reliability, &more.reliability) {
             all.merge(more);
         }
-        // Known of some is not known of all.
+        // Confidence counts only if it is known for all items.
         self.sure_unknown = self.sure_unknown.or(more.sure_unknown);
         merge_counts(&mut self.lost, &more.lost);
         merge_counts(&mut self.dropped, &more.dropped);
@@ -186,7 +183,6 @@ impl Pool {
         }
     }
 
-    /// The row over everything added.
     pub(super) fn row(&self, thresholds: &[Threshold]) -> Row {
         let n = self.n_points.max(1) as f64;
         let percent = |counts: &[usize]| counts.iter().map(|&c| 100.0 * c as f64 / n).collect();
@@ -194,7 +190,7 @@ impl Pool {
         let of_places = |sums: &[f64]| sums.iter().map(|sum| 100.0 * sum / places).collect();
         debug_assert_eq!(self.within.len(), thresholds.len());
         Row {
-            // A requested ratio is a name; a measured one is that of all entries.
+            // A requested ratio identifies the cell. A measured one is a mean over entries.
             inlier_ratio: match self.cell.oracle_noise {
                 None if self.n_listed > 0 => self.hits / self.n_listed as f64,
                 _ => self.cell.inlier_ratio,
@@ -242,7 +238,7 @@ impl Pool {
     }
 }
 
-/// Finite errors, counted by their leading bits.
+/// Histogram of finite errors by their leading bits.
 #[derive(Debug, Default)]
 struct Errors(BTreeMap<u32, usize>);
 
@@ -253,15 +249,15 @@ impl Errors {
         }
     }
 
-    /// The error that `percent` of `of` keypoints do not exceed, to the width of a bin; `None` when that
-    /// many were not recovered.
+    /// Returns the error that `percent` of `of` keypoints do not exceed, to the width of a bin;
+    /// `None` if fewer were recovered.
     fn percentile(&self, percent: f64, of: usize) -> Option<f64> {
         let rank = ((percent / 100.0 * of as f64).ceil() as usize).max(1);
         let mut below = 0;
         for (&bin, &count) in &self.0 {
             below += count;
             if below >= rank {
-                // The middle of the bin; errors of 0 are exact.
+                // Errors of exactly 0 stay 0; other bins return their middle.
                 let half = if bin == 0 { 0 } else { 1 << (DROPPED_BITS - 1) };
                 return Some(f64::from(f32::from_bits(bin << DROPPED_BITS | half)));
             }

@@ -1,4 +1,5 @@
-//! The second baseline: what the released records alone tell, without neighborhoods and descriptors.
+//! The second baseline: attacks on the released records alone, without neighborhoods or
+//! descriptors.
 
 use super::plan::Plan;
 use super::row::Alone;
@@ -9,7 +10,7 @@ use crate::recover::{self, RecoverOptions};
 use crate::released::Released;
 use crate::truth::{Original, Secret};
 
-/// The attacks on the records alone that place any point of `hidden`, measured.
+/// Runs and measures all attacks on the records alone. Omits those that place no point of `hidden`.
 pub(super) fn records_alone<const D: usize>(
     (released, secret): &(Released<D>, Secret),
     original: &Original<D>,

@@ -1,4 +1,4 @@
-//! An audit of a map that somebody else hid.
+//! Audit of a map that another program obfuscated.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::released::Released;
 use crate::seed::Key;
 use crate::truth::{Original, Secret};
 
-/// The rule by which somebody else hid points: nobody here knows it.
+/// A scheme whose rule is unknown, because another program hid the points.
 #[derive(Debug)]
 struct Unknown {
     name: String,
@@ -25,25 +25,28 @@ impl<const D: usize> Scheme<D> for Unknown {
     }
 
     fn facts(&self) -> Facts {
-        Facts { summary: "records that somebody else made", ..Facts::default() }
+        Facts { summary: "records of another program", ..Facts::default() }
     }
 
     fn lift(&self, _: &[[f64; D]], _: Option<&Bounds<D>>, _: &Key) -> Result<Lifted<D>, Error> {
-        Err(Error::new("scheme", "one of our own", "one of somebody else"))
+        Err(Error::new("scheme", "one that unlift can apply", "a scheme of another program"))
     }
 }
 
-/// What stands for the scheme called `name` in a plan for [`run_released`].
+/// Returns a placeholder for the scheme called `name` in a plan for [`run_released`].
 pub fn scheme_called<const D: usize>(name: &str) -> Arc<dyn Scheme<D>> {
     Arc::new(Unknown { name: name.to_owned() })
 }
 
-/// Runs `plan`, whose one scheme is what [`scheme_called`] gives, on records and their secret, which are of the points
-/// `original` and in their frame and unit. Repeats differ in the oracle and the attacker alone.
+/// Runs `plan` on given records and their secret. The plan's only scheme comes from
+/// [`scheme_called`].
+///
+/// The records must be of the points `original`, in the same frame and unit. Repeats differ only in
+/// the seeds of the oracle and the attacker.
 ///
 /// # Errors
-/// When the plan does not fit the map, or the three do not belong together: the figures would be next to nothing,
-/// and read as "safe".
+/// When the plan does not fit the map, or when the three do not belong together: wrong ground truth
+/// would make the map look safe.
 pub fn run_released(
     original: &Original<3>,
     hidden: &(Released<3>, Secret),

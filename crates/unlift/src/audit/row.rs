@@ -1,4 +1,4 @@
-//! One result: a scheme, a source of neighborhoods, an inlier ratio and a solver.
+//! One row of an audit: its scheme, source, inlier ratio and solver, and its figures.
 
 use std::collections::BTreeMap;
 
@@ -7,10 +7,10 @@ use crate::Unit;
 use crate::evaluate::{Accuracy, Reliability};
 use crate::recover::Unknown;
 
-/// Percentiles of the error that a row keeps.
+/// Percentiles of the error in a row.
 pub const PERCENTILES: [f64; 5] = [50.0, 75.0, 90.0, 95.0, 99.0];
 
-/// A row of an audit. Means over repeats, where there are several; counts are of the first repeat.
+/// A row of an audit. Figures are means over repeats; counts are those of the first repeat.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     /// Scheme name.
@@ -19,77 +19,80 @@ pub struct Row {
     pub neighbors: String,
     /// Noise model of the oracle; `None` for other sources.
     pub oracle_noise: Option<&'static str>,
-    /// As requested (oracle) or measured.
+    /// Inlier ratio, requested (oracle) or measured.
     pub inlier_ratio: f64,
-    /// Records per list: of the oracle, the longest of given lists, or the attacker's choice. The
-    /// ratio of given lists is measured against as many true neighbors; that of an attacker's own
-    /// lists against those of the plan, so that a short list is not judged by a stricter rule.
+    /// Records per list: requested of the oracle, the longest of given lists, or chosen by an
+    /// attacker's own source.
+    ///
+    /// The inlier ratio of given lists uses this many true neighbors. That of an attacker's own
+    /// lists uses the K of the plan, so that short lists are not measured by a stricter rule.
     pub k: usize,
     /// Solver name.
     pub solver: String,
-    /// The distance that decided support, in the unit of the points.
+    /// Distance within which a listed record supports a position, in the unit of the points.
     pub delta: f64,
     /// The unit of lengths.
     pub unit: Unit,
-    /// Released points.
+    /// Number of released points.
     pub n_points: usize,
     /// Points that could not be recovered, by reason.
     pub lost: BTreeMap<&'static str, usize>,
-    /// Points the scheme left out, by reason.
+    /// Points that the scheme left out, by reason.
     pub dropped: BTreeMap<&'static str, usize>,
     /// Percentage recovered within each threshold, in the plan's order.
     pub recovered_percent: Vec<f64>,
-    /// The same for a blind guess: no neighborhoods, and no look at more than one record.
+    /// Percentage that the blind baseline recovers: no neighborhoods, one record at a time.
     pub blind_percent: Vec<f64>,
-    /// What attacks on the released records alone got, without neighborhoods and descriptors; the same in
-    /// all rows of a scheme, empty where there is none.
+    /// Results of attacks on the released records alone, without neighborhoods or descriptors.
+    /// Equal in all rows of a scheme; empty if there are none.
     pub records_alone: Vec<Alone>,
-    /// Share of exchanged axes named (`cp`).
+    /// Percentage of exchanged axes that were identified (`cp`).
     pub axis_accuracy_percent: Option<f64>,
-    /// Percentage recovered exactly, that is with the very value that another record publishes (`cp`, `cp2d`):
-    /// all coordinates equal those of the original as `f32` about the released origin.
+    /// Percentage recovered exactly, with the very value that another record publishes (`cp`,
+    /// `cp2d`): all coordinates equal the original's as `f32` relative to the released origin.
     pub exact_percent: Option<f64>,
-    /// Share of descriptors given to their own point (paired lines with descriptors).
+    /// Percentage of descriptors assigned to their own point (paired lines with descriptors).
     pub assignment_accuracy_percent: Option<f64>,
-    /// `inlier_ratio_at_k` of an attacker's own lists, against as many true neighbors as they have records; and figures
-    /// of the plan's [measures](super::Measure), by name; means over repeats and, weighted by points, over
-    /// images.
+    /// Figures of the plan's [measures](super::Measure) by name, and `inlier_ratio_at_k` of an
+    /// attacker's own lists, which uses as many true neighbors as they have records. Means over
+    /// repeats; over images, weighted by points.
     pub metrics: BTreeMap<String, f64>,
-    /// Errors at [`PERCENTILES`]; `None` where that many points were lost.
+    /// Errors at [`PERCENTILES`]; `None` if fewer points were recovered.
     pub error_percentiles: Vec<Option<f64>>,
-    /// Median error of an attacker without neighborhoods.
+    /// Median error of the blind baseline.
     pub blind_median_error: Option<f64>,
-    /// Whether the attacker's probabilities to lie within the smallest threshold came true, over all
-    /// repeats; `None` for solvers that give none.
+    /// Reliability of the attacker's probabilities to lie within the smallest threshold, over all
+    /// repeats; `None` for solvers without probabilities.
     pub reliability: Option<Reliability>,
-    /// Why there are no such probabilities; `None` where there are, and for a row that is no attack.
+    /// Reason why there are no such probabilities; `None` if there are, and for a row that is no
+    /// attack.
     pub sure_unknown: Option<Unknown>,
-    /// (trials at most, slots) of the sampling loop (`ransac`).
+    /// (Upper bound of trials, number of slots) of the sampling loop (`ransac`).
     pub ransac_trials: Option<Vec<(u32, u64)>>,
     /// Spread over repeats, if there are several.
     pub repeats: Option<Repeats>,
-    /// The shares over distinct places (images only).
+    /// Shares of distinct places (images only).
     pub distinct: Option<Distinct>,
 }
 
-/// An attack on the records alone, and how much it got.
+/// Result of an attack on the records alone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Alone {
-    /// The solver, or source and solver: `tomography`, `geometric, joint`.
+    /// Solver, or source and solver: `tomography`, `geometric, joint`.
     pub name: &'static str,
     /// Percentage recovered within each threshold, in the plan's order.
     pub percent: Vec<f64>,
 }
 
-/// Shares over distinct places: a fifth of the keypoints of an image have a twin at the same place, and
-/// every place counts once here. Of twins with different fates each counts half.
+/// Shares of distinct places, each counted once: a fifth of the keypoints of an image share their
+/// place with another. Keypoints at the same place have equal weights that sum to 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Distinct {
-    /// Places.
+    /// Number of distinct places.
     pub n_places: usize,
     /// Percentage recovered within each threshold, in the plan's order.
     pub recovered_percent: Vec<f64>,
-    /// Percentage recovered by an attacker without neighborhoods.
+    /// Percentage recovered by the blind baseline.
     pub blind_percent: Vec<f64>,
 }
 
@@ -100,33 +103,34 @@ pub struct Repeats {
     pub n: u32,
     /// Standard deviation of each recovered percentage (with n - 1).
     pub recovered_percent_std: Vec<f64>,
-    /// The same of each blind percentage.
+    /// Standard deviation of each blind percentage.
     pub blind_percent_std: Vec<f64>,
-    /// The same of the median error; `None` where it is not known in every repeat.
+    /// Standard deviation of the median error; `None` if it is unknown in any repeat.
     pub median_error_std: Option<f64>,
 }
 
 impl Row {
-    /// Points that could not be recovered.
+    /// Returns the number of points that could not be recovered.
     pub fn n_lost(&self) -> usize {
         self.lost.values().sum()
     }
 
-    /// The best attack on the records alone within the threshold numbered `at`: its name, and the percentage.
+    /// Returns the name and the percentage of the best attack on the records alone within threshold
+    /// `at`.
     pub fn best_alone(&self, at: usize) -> Option<(&'static str, f64)> {
         let found = self.records_alone.iter().map(|alone| (alone.name, alone.percent[at]));
         found.reduce(|best, other| if other.1 > best.1 { other } else { best })
     }
 
-    /// What an attacker without neighborhoods gets within the threshold numbered `at`, in percent: the
-    /// larger of a blind guess and the best attack on the records alone.
+    /// Returns the larger baseline within threshold `at`, in percent: the blind guess or the best
+    /// attack on the records alone.
     pub fn baseline_percent(&self, at: usize) -> f64 {
         let blind = self.blind_percent[at];
         self.best_alone(at).map_or(blind, |(_, alone)| blind.max(alone))
     }
 
-    /// Whether both are of the same scheme, source, noise model, requested inlier ratio and solver. A
-    /// measured ratio tells nothing apart: it differs from seed to seed.
+    /// Returns true if both have the same scheme, source, noise model, requested inlier ratio and
+    /// solver. Measured ratios are not compared, because they differ between seeds.
     pub fn is_same_cell(&self, other: &Self) -> bool {
         self.scheme == other.scheme
             && self.neighbors == other.neighbors
@@ -135,7 +139,6 @@ impl Row {
             && (self.oracle_noise.is_none() || self.inlier_ratio == other.inlier_ratio)
     }
 
-    /// The smallest of `thresholds`.
     pub(super) fn smallest(thresholds: &[Threshold]) -> f64 {
         thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min)
     }
@@ -160,7 +163,7 @@ impl Row {
         self.blind_median_error = blind.and_then(|blind| blind.percentile(50.0));
     }
 
-    /// Adds the shares over distinct places; `weights` are those of the slots.
+    /// Adds the shares of distinct places; `weights` has one entry per slot.
     pub(super) fn fill_distinct(
         &mut self,
         accuracy: &Accuracy,
@@ -183,7 +186,6 @@ impl Row {
         });
     }
 
-    /// The mean of the same row over several seeds.
     pub(super) fn mean(rows: &[Row]) -> Row {
         let mut mean = rows[0].clone();
         if rows.len() < 2 {
@@ -230,7 +232,7 @@ impl Row {
         }
         mean.blind_median_error = average(&|r| r.blind_median_error);
         mean.delta = average(&|r| Some(r.delta)).unwrap_or(mean.delta);
-        // A requested ratio is a name, not a measurement: a mean would change its last bit.
+        // A requested ratio identifies the row; averaging would change its last bit.
         if mean.oracle_noise.is_none() {
             mean.inlier_ratio = known(average(&|r| Some(r.inlier_ratio)));
         }
@@ -247,7 +249,7 @@ impl Row {
                 all.merge(more);
             }
         }
-        // Known in some repeats is not known: those may be the ones that went well.
+        // Confidence counts only if it is known in all repeats; a part of them would be biased.
         mean.sure_unknown = rows.iter().find_map(|row| row.sure_unknown);
         if mean.sure_unknown.is_some() {
             mean.reliability = None;

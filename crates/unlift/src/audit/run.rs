@@ -1,4 +1,4 @@
-//! An audit of one map.
+//! Audit of one map.
 
 use super::break_even::{BreakEven, break_even};
 use super::cells::Owned;
@@ -14,31 +14,30 @@ use crate::released::Released;
 use crate::truth::{Original, Secret};
 use crate::{Descriptors, Error};
 
-/// What an audit found.
+/// Result of an audit.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Outcome {
-    /// One row per scheme, source, noise model, inlier ratio and solver, in this order; of many, over the points of all.
+    /// One row per scheme, source, noise model, inlier ratio and solver, in this order. Rows of
+    /// many items are over the points of all.
     pub rows: Vec<Row>,
-    /// What the plan asked for and has no row: schemes that cannot be applied to the map, and sources
-    /// that have no lists for a scheme.
+    /// Parts of the plan without a row: schemes that cannot be applied to the map, and sources
+    /// without lists for a scheme.
     pub not_audited: Vec<NotAudited>,
-    /// The ratio at which half of the points come back, per scheme, noise model and solver.
+    /// Break-even ratios per scheme, noise model and solver.
     pub break_even: Vec<BreakEven>,
-    /// Maps or images, those without points included.
+    /// Number of maps or images, including those without points.
     pub n_items: usize,
-    /// Those of them with no more points than a neighborhood has: their lists are shorter.
+    /// Number of items with at most K points: their lists are shorter than K.
     pub n_too_small: usize,
-    /// Where the time went.
+    /// Time per stage.
     pub seconds: Seconds,
 }
 
-/// Runs `plan` on the owner's map. `descriptors` has one row per original.
+/// Runs `plan` on a map. `descriptors` has one row per original.
 ///
-/// Rows depend on the map, the descriptors and the plan alone: the same bytes for any number of
-/// threads.
-///
-/// A scheme that cannot be applied to the map has no rows and is told in
+/// Rows depend only on the map, the descriptors and the plan: byte-identical for any number of
+/// threads. A scheme that cannot be applied to the map has no rows and is listed in
 /// [`not_audited`](Outcome::not_audited).
 ///
 /// # Errors
@@ -72,7 +71,8 @@ fn one<const D: usize>(
     every_cell((original, descriptors), None, plan, observer)
 }
 
-/// The same for a map that is `hidden` already, if so for the one scheme of the plan.
+/// Runs every cell of `plan`. If `hidden` is given, it is the obfuscation for the plan's only
+/// scheme.
 pub(super) fn every_cell<const D: usize>(
     (original, descriptors): (&Original<D>, Option<&Descriptors>),
     hidden: Option<&(Released<D>, Secret)>,
@@ -92,7 +92,6 @@ pub(super) fn every_cell<const D: usize>(
     Ok(Outcome { rows, not_audited, break_even, n_items: 1, n_too_small: 0, seconds })
 }
 
-/// The error of an audit without rows, for the reason of the `first` that is missing.
 pub(super) fn none_applies(first: &NotAudited) -> Error {
     let found = format!("none: {}: {}", first.scheme, first.reason);
     Error::new("schemes", "one that can be applied to this map", found)

@@ -1,4 +1,4 @@
-//! What the solvers of a plan recover from the same lists: done now, or recalled.
+//! Results of a plan's solvers for one set of lists, computed or recalled from the observer.
 
 use std::time::Instant;
 
@@ -9,13 +9,13 @@ use crate::neighbors::Neighborhoods;
 use crate::recover::{Builtin, RecoverOptions, Recovered, Solver, recover, recover_with_start};
 use crate::released::Released;
 
-/// A released map and lists, on which a plan's solvers are run in order.
+/// A released map with lists, on which the solvers of a plan run in order.
 pub(super) struct Solved<'a, const D: usize> {
     plan: &'a Plan<D>,
     released: &'a Released<D>,
     lists: &'a Neighborhoods,
     seed: u64,
-    /// The pass that joint recovery started from, for the solver that is this pass.
+    /// Estimates that joint recovery started from, kept for the solver `joint-start`.
     start: Option<Recovered<D>>,
 }
 
@@ -28,10 +28,10 @@ impl<'a, const D: usize> Solved<'a, D> {
         Self { plan, released, lists, seed, start: None }
     }
 
-    /// What the solver numbered `at` recovers, and in how many seconds.
+    /// Returns the result of the solver numbered `at`, and its seconds.
     ///
     /// # Errors
-    /// As [`recover`].
+    /// Those of [`recover`].
     pub(super) fn by(
         &mut self,
         at: usize,

@@ -1,5 +1,5 @@
-//! The stages of one image at a time, chained by whoever has files: with the randomness, the lists and the sums of
-//! an audit of images.
+//! Stages of an audit of images for callers that process files one image at a time, with the same
+//! seeds, lists and sums.
 
 pub use super::chance::{key_of, oracle_seed};
 
@@ -19,11 +19,11 @@ use crate::released::Released;
 use crate::truth::{DropReason, Original, Secret};
 use crate::{Error, Unit};
 
-/// Lists of `k` records at `ratio`, or as long as can be in an image with fewer; `seed` is that of the image
-/// ([`oracle_seed`]).
+/// Makes lists of `k` records at inlier ratio `ratio`, shorter in an image with too few points.
+/// `seed` comes from [`oracle_seed`].
 ///
 /// # Errors
-/// When the secret is not of these points.
+/// When the secret does not belong to these points.
 pub fn oracle_lists(
     original: &Original<2>,
     hidden: &(Released<2>, Secret),
@@ -34,34 +34,33 @@ pub fn oracle_lists(
     let search = oracle::search(original)?;
     let by = &NeighborsBy::Oracle;
     let variant = Variant { by, noise: Some(noise), inlier_ratio: Some(ratio) };
-    // The attacker's seed has no part in the oracle's lists.
+    // The oracle's lists do not depend on the attacker's seed.
     let mut lists = Lists::new(&plan, &search, hidden, &hidden.1, (seed, 0));
     Ok(lists.make_of_what_there_is(&variant)?.lists)
 }
 
-/// A row over many images, one added after the other: that of an audit of images. Memory does not grow with their
-/// number.
+/// A row over many images, added one by one. Memory does not grow with their number.
 #[derive(Debug)]
 pub struct Pooled {
     pool: Option<Pool>,
     thresholds: Vec<Threshold>,
-    /// Whether a blind attacker's figures are known of every image.
+    /// True if the blind figures of every image are known.
     with_blind: bool,
-    /// Points that were not released, of images of which nothing was.
+    /// Dropped points of images of which nothing was released.
     dropped: Vec<(DropReason, usize)>,
 }
 
 impl Pooled {
-    /// Nothing yet, to be measured within these thresholds.
+    /// Returns an empty sum with these thresholds.
     pub fn new(thresholds: &[Threshold]) -> Self {
         let thresholds = thresholds.to_vec();
         Self { pool: None, thresholds, with_blind: true, dropped: Vec::new() }
     }
 
-    /// Adds what came back of one image; without its released map there are no figures of a blind attacker.
+    /// Adds the result of one image. Without its released map the row has no blind figures.
     ///
     /// # Errors
-    /// When these do not belong together.
+    /// When the arguments do not belong together.
     pub fn add(
         &mut self,
         recovered: &Recovered<2>,
@@ -100,7 +99,7 @@ impl Pooled {
         self.dropped.extend(DropReason::ALL.map(|reason| (reason, count(reason))));
     }
 
-    /// The row over all images, without its name; `None` when nothing was released of any.
+    /// Returns the row over all images, without its name; `None` if no image released a point.
     pub fn row(&self) -> Option<Row> {
         let mut row = self.pool.as_ref()?.row(&self.thresholds);
         for &(reason, n) in self.dropped.iter().filter(|(_, n)| *n > 0) {

@@ -1,18 +1,18 @@
-//! When a point counts as recovered.
+//! Thresholds for recovered points.
 
 use crate::Error;
 
 /// An error below which a point counts as recovered.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Threshold {
-    /// As the user typed it: the key in reports.
+    /// Text as the user typed it; the key in reports.
     pub label: String,
-    /// In the unit of the points.
+    /// Value in the unit of the points.
     pub value: f64,
 }
 
 impl Threshold {
-    /// Reads a positive number and keeps its text.
+    /// Parses a positive number and keeps its text.
     ///
     /// # Errors
     /// When `text` is not a positive number.

@@ -1,4 +1,4 @@
-//! The share of points that came back, and how far off the others are.
+//! Shares of recovered points, and error percentiles.
 
 use std::collections::BTreeMap;
 
@@ -9,33 +9,34 @@ use crate::{Error, OriginalId, RowOrder};
 
 use super::joined;
 
-/// How much of a map came back. Shares are over *all* released points: lost ones are misses.
+/// Errors of a recovery. Shares are of *all* released points; a point that was not recovered is a
+/// miss.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Accuracy {
-    /// Error per slot in the unit of the points; infinite where nothing was recovered.
+    /// Error per slot in the unit of the points; infinite if not recovered.
     errors: Vec<f64>,
-    /// The same, ascending.
     sorted: Vec<f64>,
     /// Slots that could not be recovered, by reason.
     pub lost: BTreeMap<Status, usize>,
-    /// Slots recovered exactly (schemes that exchange coordinates; else `None`): all coordinates are, as `f32` about
-    /// the released origin, those of the original. The exchanged one is then the very value that another record
-    /// publishes.
+    /// Number of slots recovered exactly; `None` unless the scheme exchanges coordinates. All
+    /// coordinates then equal the original's as `f32` relative to the released origin, so the
+    /// exchanged one is the very value that another record publishes.
     pub n_exact: Option<usize>,
-    /// Share of slots whose exchanged axis was named, in percent (`cp`).
+    /// Percentage of slots whose exchanged axis was identified (`cp`).
     pub axis_percent: Option<f64>,
-    /// Share of slots that were given their own descriptor, in percent (paired lines).
+    /// Percentage of slots with the correct descriptor (paired lines).
     pub assignment_percent: Option<f64>,
 }
 
-/// Compares `recovered` with the truth, row by row, in the order that `recovered` is counted in ([`joined`]). `secret`
-/// is that of the obfuscation, as it was made.
+/// Compares `recovered` with the ground truth, row by row, in the row order of `recovered`
+/// ([`joined`]). `secret` is the secret that the obfuscation returned.
 ///
-/// Positions that do not say how they are counted are compared, where records hide two points, with the nearer of
-/// the two: at least as much as any order would show.
+/// For paired lines in an unstated order, each position is compared with the nearer of the record's
+/// two points. No order gives a larger share.
 ///
 /// # Errors
-/// When the three do not belong together: another released map, another unit, other numbers of slots or points.
+/// When the three do not belong together: different released map, unit, number of slots or number
+/// of points.
 pub fn evaluate<const D: usize>(
     recovered: &Recovered<D>,
     original: &Original<D>,
@@ -46,15 +47,15 @@ pub fn evaluate<const D: usize>(
         map.expect(recovered.about().map)?;
     }
     if recovered.unit() != points.unit() {
-        let expected = format!("lengths in {}, as in the truth", points.unit().name());
+        let expected = format!("lengths in {}, as in the ground truth", points.unit().name());
         return Err(Error::new("unit", expected, recovered.unit().name()));
     }
     if recovered.n_slots() != secret.n_slots() {
-        let expected = format!("{} slots, as the truth has", secret.n_slots());
+        let expected = format!("{} slots, as in the ground truth", secret.n_slots());
         return Err(Error::new("recovered map", expected, recovered.n_slots().to_string()));
     }
     if secret.n_originals() != points.len() {
-        let expected = format!("{} originals, as the secret says", secret.n_originals());
+        let expected = format!("{} originals, as in the secret", secret.n_originals());
         return Err(Error::new("original points", expected, points.len().to_string()));
     }
     let accuracy = compare(recovered, original, &joined(recovered, original, secret));
@@ -74,7 +75,7 @@ pub fn evaluate<const D: usize>(
     })
 }
 
-/// The same with every row compared with the original in its slot of `secret`.
+/// Compares every row with the original in its slot of `secret`.
 fn compare<const D: usize>(
     recovered: &Recovered<D>,
     original: &Original<D>,
@@ -95,7 +96,7 @@ fn compare<const D: usize>(
     let origin = recovered.origin();
     let is_exact = |(slot, original): (usize, &OriginalId)| {
         let stored = sub(&positions[original.index()], &origin).map(|x| x as f32);
-        // Lost points are NaN, which is equal to nothing.
+        // Positions of lost points are NaN, so they are never equal.
         recovered.positions()[slot] == stored
     };
     let n_exact = secret.swapped_axis().map(|_| hidden().filter(|slot| is_exact(*slot)).count());
@@ -125,45 +126,46 @@ impl Accuracy {
         Self { errors, sorted, lost, n_exact: None, axis_percent, assignment_percent }
     }
 
-    /// Number of released points.
+    /// Returns the number of released points.
     pub fn n_points(&self) -> usize {
         self.errors.len()
     }
 
-    /// Number of points that could not be recovered at all.
+    /// Returns the number of points that could not be recovered.
     pub fn n_lost(&self) -> usize {
         self.lost.values().sum()
     }
 
-    /// Error per slot in the unit of the points; infinite where nothing was recovered.
+    /// Returns the error per slot in the unit of the points; infinite if not recovered.
     pub fn errors(&self) -> &[f64] {
         &self.errors
     }
 
-    /// Percentage of points recovered exactly, where that is counted; `None` without points.
+    /// Returns the percentage of points recovered exactly, if counted; `None` without points.
     pub fn exact_percent(&self) -> Option<f64> {
         let n = self.n_points();
         self.n_exact.filter(|_| n > 0).map(|exact| 100.0 * exact as f64 / n as f64)
     }
 
-    /// Number of points with an error of at most `threshold`.
+    /// Returns the number of points with an error of at most `threshold`.
     pub fn n_within(&self, threshold: f64) -> usize {
         self.sorted.partition_point(|&error| error <= threshold)
     }
 
-    /// Percentage of points with an error of at most `threshold`; 0 without points.
+    /// Returns the percentage of points with an error of at most `threshold`; 0 without points.
     pub fn percent_within(&self, threshold: f64) -> f64 {
         let (within, n) = (self.n_within(threshold), self.sorted.len());
         if n == 0 { 0.0 } else { 100.0 * within as f64 / n as f64 }
     }
 
-    /// The sum of `weights` (one per slot) over the points with an error of at most `threshold`.
+    /// Returns the sum of `weights` (one per slot) over the points with an error of at most
+    /// `threshold`.
     pub fn weight_within(&self, threshold: f64, weights: &[f64]) -> f64 {
         let within = self.errors.iter().zip(weights).filter(|(error, _)| **error <= threshold);
         within.map(|(_, weight)| weight).sum()
     }
 
-    /// The error that `percent` of the points do not exceed; `None` when that many were not
+    /// Returns the error that `percent` of the points do not exceed; `None` if fewer were
     /// recovered.
     pub fn percentile(&self, percent: f64) -> Option<f64> {
         let n = self.sorted.len();

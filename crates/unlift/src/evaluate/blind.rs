@@ -1,4 +1,4 @@
-//! What an attacker gets without any neighborhood: the baseline a leak must exceed.
+//! The blind baseline: an attack without neighborhoods. Only what exceeds it is a leak.
 
 use std::collections::BTreeMap;
 
@@ -8,16 +8,17 @@ use crate::geometry::vector::{along, distance, dot, sub, widen};
 use crate::released::{Obfuscation, Released};
 use crate::truth::{Original, Secret};
 
-/// The errors of a blind attacker, who knows the records and the box in which points lie: that of an
-/// image, else the 1-99 % box of the originals (more than an attacker would: the baseline is generous).
+/// Computes the errors of the blind baseline, which guesses from one record at a time and the box
+/// that contains the points: the image, or else the 1-99 % box of the originals. The latter makes
+/// the baseline generous, because an attacker does not have it.
 ///
-/// One rule per family:
-/// - lines: the middle of the line's segment in the box; the point of the line nearest the box's
-///   center when it misses the box;
-/// - rays: the same on the half-line; where every center has a region of its own, the range that half of
-///   an even density lies within, r_max / sqrt 2 in an image;
-/// - axis planes: the box's center, moved onto the plane;
-/// - axis candidates: the published point itself.
+/// The guess depends on the family:
+/// - lines: the middle of the segment in the box, or the point nearest to the box's center if the
+///   line misses the box;
+/// - rays: likewise on the half-line. If each center has a region of its own, the guess is the
+///   median range under uniform density, r_max / sqrt 2 in an image;
+/// - axis planes: the box's center, projected onto the plane;
+/// - axis candidates: the published point.
 pub fn blind<const D: usize>(
     released: &Released<D>,
     original: &Original<D>,
@@ -42,7 +43,7 @@ pub fn blind<const D: usize>(
     Accuracy::new(errors, BTreeMap::new(), None, None)
 }
 
-/// One guess per record, about the released origin.
+/// Returns one guess per record, relative to the released origin.
 fn guesses<const D: usize>(released: &Released<D>, bounds: &Bounds<D>) -> Vec<[f64; D]> {
     let center = bounds.center();
     match released.obfuscation() {
@@ -59,7 +60,7 @@ fn guesses<const D: usize>(released: &Released<D>, bounds: &Bounds<D>) -> Vec<[f
             .map(|(&c, d)| {
                 let (center, d) = (widen(&rays.centers()[usize::from(c)]), widen(d));
                 match rays.regions().and_then(|of| of[usize::from(c)].clip(&center, &d)) {
-                    // Of an even density the share within r grows as r^D.
+                    // Under uniform density the share within r is proportional to r^D.
                     Some((_, to)) => along(&center, to * libm::pow(0.5, 1.0 / D as f64), &d),
                     None => middle(bounds, &center, &d, 0.0),
                 }
@@ -81,7 +82,7 @@ fn guesses<const D: usize>(released: &Released<D>, bounds: &Bounds<D>) -> Vec<[f
     }
 }
 
-/// The middle of what the box leaves of a line from parameter `from` on.
+/// Returns the middle of the part of a line in the box, from parameter `from` on.
 fn middle<const D: usize>(
     bounds: &Bounds<D>,
     point: &[f64; D],

@@ -1,13 +1,14 @@
-//! Points at one place: keypoints found twice, with two orientations.
+//! Weights of keypoints at the same place, such as one keypoint with two orientations.
 
 use crate::truth::{Original, Secret};
 
-/// Per slot 1 / the number of slots whose points lie at exactly the same place: summed with these
-/// weights, every place counts once, however many keypoints it has. Their sum is the number of places.
+/// Returns for each slot 1 / the number of slots whose points have exactly the same place.
+///
+/// With these weights every place counts once. They sum to the number of places.
 pub fn distinct_weights<const D: usize>(original: &Original<D>, secret: &Secret) -> Vec<f64> {
     let positions = original.reveal().positions();
     let place = |slot: &usize| {
-        // Zeros of both signs are one place.
+        // Adding 0.0 turns -0.0 into 0.0.
         positions[secret.hidden()[*slot].index()].map(|x| (x + 0.0).to_bits())
     };
     let mut order: Vec<usize> = (0..secret.n_slots()).collect();

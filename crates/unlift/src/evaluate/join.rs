@@ -1,7 +1,7 @@
-//! Which original every row of a recovered map is compared with: the one place that decides it.
+//! Assignment of originals to the rows of a recovered map. No other code decides it.
 //!
-//! Rows of positions are counted as the lists were that they came from ([`RowOrder`]). Of records that hide two
-//! points this decides what is right and what is a miss.
+//! Rows of positions have the order of the lists that they were recovered from ([`RowOrder`]). For
+//! records with two points this order decides which positions are correct.
 
 use std::borrow::Cow;
 
@@ -10,12 +10,12 @@ use crate::geometry::vector::distance;
 use crate::recover::Recovered;
 use crate::truth::{Original, Secret};
 
-/// `secret` with slots counted as the rows of `recovered` are.
+/// Returns `secret` with slots in the row order of `recovered`.
 ///
-/// - [`RowOrder::Slots`]: as it is;
+/// - [`RowOrder::Slots`]: unchanged;
 /// - [`RowOrder::DescriptorRows`]: by [`Secret::by_descriptor_row`];
-/// - [`RowOrder::Either`], and [`RowOrder::Unstated`] where one secret must be named: the two points of every record
-///   in the order that fits better, since an attacker who has no descriptors cannot know it. The published
+/// - [`RowOrder::Either`] and [`RowOrder::Unstated`]: each record's two points in the order with
+///   the smaller error, because an attacker without descriptors cannot know it. The published
 ///   attacks on paired lines are evaluated this way.
 pub fn joined<'a, const D: usize>(
     recovered: &Recovered<D>,
@@ -34,7 +34,7 @@ pub fn joined<'a, const D: usize>(
     }
 }
 
-/// `secret` with the two points of every record in the order that fits `recovered` better.
+/// Returns `secret` with the two points of every record in the order with the smaller error.
 fn in_better_order<const D: usize>(
     recovered: &Recovered<D>,
     original: &Original<D>,

@@ -1,4 +1,4 @@
-//! Recovered positions against the truth: numbers, no opinions.
+//! Evaluation of recovered positions against the ground truth.
 
 mod accuracy;
 mod blind;

@@ -1,4 +1,4 @@
-//! Whether positions or points that do not say which map they are of can be of this one.
+//! Plausibility checks: does data without a fingerprint belong to this map?
 
 use crate::Error;
 use crate::geometry::vector::{distance, dot, sub};
@@ -6,12 +6,13 @@ use crate::recover::Recovered;
 use crate::released::{Obfuscation, Released};
 use crate::truth::{Original, Secret};
 
-/// Counts how many recovered positions lie nearer to their own record than to another one, half a map away, and how many
-/// were looked at. Without the released map, it counts how many lie nearer to a true point of their own record.
+/// Counts the recovered positions that are nearer to their own record than to another one, half a
+/// map away. Returns this count and the number of compared positions. Without the released map,
+/// distances to the records' true points are compared.
 ///
-/// Records stand in random order. So about half of the positions pass if they are of another map or in another order.
-/// An attacker who knows nothing but the records has nearly all positions on their own records, and clearly more than
-/// half nearer to their own points.
+/// Records are in random order, so about half of the positions pass if they are of another map or
+/// in another order. An attack on records alone places nearly all positions on their own records,
+/// and clearly more than half nearer to their own points.
 pub fn nearer_to_own<const D: usize>(
     recovered: &Recovered<D>,
     original: &Original<D>,
@@ -33,27 +34,26 @@ pub fn nearer_to_own<const D: usize>(
     count((0..n).filter_map(|slot| {
         let (position, record) = (recovered.position(slot)?, slot / slots);
         let other = (record + n_records.div_ceil(2)) % n_records;
-        // Points that coincide are equally near.
+        // Points at the same place are equally near.
         Some(nearest(&position, record) <= nearest(&position, other))
     }))
 }
 
-/// Fewer slots than this are too few to judge.
+/// Minimum number of slots for a decision.
 const FEW: usize = 30;
 
-/// Whether as few of all are nearer to their own as if they were strangers.
+/// Returns true if the share of nearer ones is not above chance.
 pub fn are_strangers((nearer, n): (usize, usize)) -> bool {
-    // Of strangers half are nearer; two standard deviations on top.
+    // Chance is one half; the margin is two standard deviations.
     n >= FEW && nearer as f64 <= 0.5 * n as f64 + (n as f64).sqrt()
 }
 
-/// How many of `nearer` are true, and how many there are.
 fn count(nearer: impl Iterator<Item = bool>) -> (usize, usize) {
     nearer.fold((0, 0), |(nearer, n), is_nearer| (nearer + usize::from(is_nearer), n + 1))
 }
 
-/// Refuses a truth that is not that of the released map: of another unit, number of points or fingerprint, or, by
-/// where its points lie, of another map. What comes back would be next to nothing, and read as "safe".
+/// Checks that ground truth and released map belong together: unit, number of points, fingerprint,
+/// and positions of the points. With the wrong ground truth, a map would wrongly look safe.
 ///
 /// # Errors
 /// When the three do not belong together.
@@ -64,7 +64,7 @@ pub fn belongs<const D: usize>(
 ) -> Result<(), Error> {
     let (unit, found) = (original.reveal().unit(), released.unit());
     if unit != found {
-        let expected = format!("{}, as of the originals", unit.name());
+        let expected = format!("{}, the unit of the originals", unit.name());
         return Err(Error::new("unit of the released map", expected, found.name()));
     }
     for (what, expected, found) in [
@@ -82,15 +82,12 @@ pub fn belongs<const D: usize>(
     let (nearer, n) = nearer_to_own_record(released, n, point_of(original, secret));
     if are_strangers((nearer, n)) {
         let expected = "points nearer to their own records than to others";
-        let found = format!(
-            "{nearer} of {n} (of another map, in another frame, or in another order of slots)"
-        );
+        let found = format!("{nearer} of {n} (the truth of another map, frame or order of slots)");
         return Err(Error::new("truth", expected, found));
     }
     Ok(())
 }
 
-/// The point that a slot hides.
 fn point_of<const D: usize>(
     original: &Original<D>,
     secret: &Secret,
@@ -99,7 +96,8 @@ fn point_of<const D: usize>(
     |slot| Some(points[secret.hidden()[slot].index()])
 }
 
-/// Counts how many of `n` slots lie nearer to their own record than to one half a map away, and how many have a position.
+/// Counts the slots that are nearer to their own record than to one half a map away, and the slots
+/// with a position.
 fn nearer_to_own_record<const D: usize>(
     released: &Released<D>,
     n: usize,
@@ -111,13 +109,14 @@ fn nearer_to_own_record<const D: usize>(
         let record = slot / slots;
         let other = (record + n_records.div_ceil(2)) % n_records;
         let away = |record: usize| to_record(released.obfuscation(), record, &point);
-        // Points that coincide are as near to each other's records, but for rounding.
+        // Points at the same place have equal distances up to rounding.
         Some(away(record) <= away(other) + rounding(released.obfuscation(), record, &point))
     }))
 }
 
-/// How far every hidden point lies from its own record, in the unit of the map: next to nothing, if the truth is that of the
-/// released map. Points farther away than a threshold cannot come back within it, whatever the scheme protects.
+/// Returns the distance of every hidden point to its own record, in the unit of the map. It is
+/// almost 0 if ground truth and released map belong together. A point farther away than a threshold
+/// cannot be recovered within it.
 pub fn away_from_own<const D: usize>(
     released: &Released<D>,
     original: &Original<D>,
@@ -127,7 +126,8 @@ pub fn away_from_own<const D: usize>(
     away(released, n, point_of(original, secret))
 }
 
-/// How far a hidden point can lie from its own record because records are held in `f32`, in the unit of the map.
+/// Returns the largest distance of a hidden point to its own record that rounding to `f32`
+/// explains, in the unit of the map.
 pub fn farthest_for_rounding<const D: usize>(
     released: &Released<D>,
     original: &Original<D>,
@@ -142,8 +142,8 @@ pub fn farthest_for_rounding<const D: usize>(
     (0..n).filter_map(of_slot).fold(0.0, f64::max)
 }
 
-/// How far every recovered position lies from its own record: next to nothing, if rows are in the order of the released map.
-/// Slots without a position are left out.
+/// Returns the distances of recovered positions to their own records; almost 0 if rows have the
+/// order of the released map. Omits slots without a position.
 pub fn recovered_away<const D: usize>(
     released: &Released<D>,
     recovered: &Recovered<D>,
@@ -152,7 +152,6 @@ pub fn recovered_away<const D: usize>(
     away(released, n, |slot| recovered.position(slot))
 }
 
-/// How far the places of `n` slots lie from their own records.
 fn away<const D: usize>(
     released: &Released<D>,
     n: usize,
@@ -166,7 +165,7 @@ fn away<const D: usize>(
     (0..n).filter_map(of_slot).collect()
 }
 
-/// How far from its record, held in `f32`, a point can be for that reason alone.
+/// Returns the distance between a point and its record that rounding to `f32` explains.
 fn rounding<const D: usize>(obfuscation: &Obfuscation<D>, record: usize, point: &[f64; D]) -> f64 {
     let held = match obfuscation {
         Obfuscation::Lines(_) | Obfuscation::AxisPlanes(_) => [0.0; D],
@@ -177,7 +176,7 @@ fn rounding<const D: usize>(obfuscation: &Obfuscation<D>, record: usize, point: 
     8.0 * f64::from(f32::EPSILON) * (size(point) + size(&held.map(f64::from)))
 }
 
-/// The distance from `point`, about the released origin, to a record.
+/// Returns the distance from `point`, relative to the released origin, to a record.
 fn to_record<const D: usize>(obfuscation: &Obfuscation<D>, record: usize, point: &[f64; D]) -> f64 {
     let to_line = |from: [f32; D], direction: [f32; D], least: f64| {
         let (from, direction) = (from.map(f64::from), direction.map(f64::from));

@@ -1,7 +1,7 @@
-//! What an attacker would get who is told where the three nearest neighbors of every point are.
+//! The reference attacker: has the positions of the three true nearest neighbors of every point.
 //!
-//! Not an attack, and not a bound (an exchanged coordinate can be recovered exactly): it says how
-//! much of what is missing lies in the map, where points have no neighbor near.
+//! It is neither a real attack nor a bound (an exchanged coordinate can be recovered exactly). It
+//! shows how much of the missing points is due to the map, where points have no near neighbor.
 
 use std::collections::BTreeMap;
 
@@ -11,11 +11,11 @@ use crate::geometry::vector::{along, distance, dot, sub, widen};
 use crate::released::{Obfuscation, Released};
 use crate::truth::{Original, Secret};
 
-/// Neighbors whose mean is the guess.
+/// Number of neighbors whose mean is the guess.
 const NEAREST: usize = 3;
 
-/// The errors of the mean of the three nearest originals, moved onto what each record allows. `knn` is
-/// a search over the originals.
+/// Returns the errors of this guess: the mean of the three nearest originals, projected onto the
+/// record. `knn` is a search over the originals.
 pub fn reference<const D: usize>(
     released: &Released<D>,
     original: &Original<D>,
@@ -42,7 +42,7 @@ pub fn reference<const D: usize>(
     Accuracy::new(errors, BTreeMap::new(), None, None)
 }
 
-/// The place nearest to `x` that the record of `slot` allows (axis candidates: on the true axis).
+/// Projects `x` onto the record of `slot` (axis candidates: onto the true axis).
 fn onto_record<const D: usize>(
     released: &Released<D>,
     secret: &Secret,

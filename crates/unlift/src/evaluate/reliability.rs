@@ -1,18 +1,18 @@
-//! Whether an attacker who says "I am 90 % sure" is right nine times out of ten.
+//! Reliability of the attacker's probabilities: calibration against observed shares.
 
 use super::Accuracy;
 use crate::recover::{Recovered, Status};
 
-/// Bins of the predicted probability.
+/// Number of bins of the predicted probability.
 pub const BINS: usize = 10;
 
-/// A point with at least this probability is one the attacker is sure of.
+/// Probability from which on the attacker is sure of a point.
 pub const SURE: f64 = 0.9;
 
-/// Predicted probabilities against what came true, over the recovered points.
+/// Predicted probabilities and observed results, over the recovered points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reliability {
-    /// Released points, lost ones included.
+    /// Number of released points, including lost ones.
     pub n_points: usize,
     /// Bins of equal width from 0 to 1.
     pub bins: [Bin; BINS],
@@ -20,14 +20,14 @@ pub struct Reliability {
     pub sure: Bin,
 }
 
-/// Points of similar probability.
+/// Points with similar probabilities.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bin {
-    /// How many.
+    /// Number of points.
     pub n: usize,
-    /// The sum of their probabilities.
+    /// Sum of their probabilities.
     pub expected: f64,
-    /// How many are within the threshold.
+    /// Number of points within the threshold.
     pub within: usize,
 }
 
@@ -44,24 +44,24 @@ impl Bin {
         self.within += other.within;
     }
 
-    /// The mean probability; `None` without points.
+    /// Returns the mean probability; `None` without points.
     pub fn predicted(&self) -> Option<f64> {
         (self.n > 0).then(|| self.expected / self.n as f64)
     }
 
-    /// The share that is within the threshold; `None` without points.
+    /// Returns the share within the threshold; `None` without points.
     pub fn observed(&self) -> Option<f64> {
         (self.n > 0).then(|| self.within as f64 / self.n as f64)
     }
 }
 
 impl Reliability {
-    /// The percentage of the released points that the attacker is sure of.
+    /// Returns the percentage of released points with a probability of at least [`SURE`].
     pub fn sure_percent(&self) -> f64 {
         if self.n_points == 0 { 0.0 } else { 100.0 * self.sure.n as f64 / self.n_points as f64 }
     }
 
-    /// The percentage of those that are within the threshold; `None` without any.
+    /// Returns the percentage of these points within the threshold; `None` without any.
     pub fn sure_correct_percent(&self) -> Option<f64> {
         self.sure.observed().map(|share| 100.0 * share)
     }
@@ -74,8 +74,9 @@ impl Reliability {
     }
 }
 
-/// How well the probabilities of `recovered` to lie within `threshold` (unit of the map) came true;
-/// `None` where it has none. `accuracy` must be of the same points.
+/// Compares the probabilities of `recovered` to lie within `threshold` (unit of the map) with
+/// `accuracy`, which must be of the same points. Returns `None` if `recovered` has no
+/// probabilities.
 pub fn reliability<const D: usize>(
     recovered: &Recovered<D>,
     accuracy: &Accuracy,

@@ -1,7 +1,7 @@
-//! Neighborhoods: which records are said to hide points near the point of a slot.
+//! Neighborhoods: for each slot, records that probably hide points near its point.
 //!
-//! `oracle` makes them from the originals, for experiments. What an attacker makes from a released map alone is in `unlift_attack::neighbors`
-//! and re-exported here.
+//! `oracle` makes them from ground truth, for experiments. An attacker's sources are re-exported
+//! from `unlift_attack::neighbors`.
 
 pub mod oracle;
 

@@ -1,4 +1,4 @@
-//! `cp`: random pairs exchange one coordinate.
+//! Scheme `cp`: random pairs exchange one coordinate.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::seed::{Key, Stage};
 #[derive(Clone, Copy, Debug)]
 pub struct Cp;
 
-/// The registry row.
+/// Registry entry.
 pub const ENTRY: Entry = Entry {
     name: "cp",
     facts: Facts {

@@ -1,7 +1,6 @@
-//! `cp2d`: random pairs of keypoints exchange one coordinate.
+//! Scheme `cp2d`: random pairs of keypoints of an image exchange one coordinate.
 //!
-//! The rule of `cp` in the plane, where an image is protected by itself: partners are keypoints of the
-//! same image.
+//! It applies `cp` to each image separately.
 
 use std::sync::Arc;
 
@@ -15,7 +14,7 @@ use crate::seed::Key;
 #[derive(Clone, Copy, Debug)]
 pub struct Cp2d;
 
-/// The registry row.
+/// Registry entry.
 pub const ENTRY: Entry = Entry {
     name: "cp2d",
     facts: Facts {

@@ -1,14 +1,16 @@
-//! `dcl2d`: lines through one of two anchors, by the half of the image a keypoint lies in.
+//! Scheme `dcl2d`: lines through one of two anchors, chosen by the half of the image that contains
+//! the keypoint.
 //!
-//! The authors have published no code. What follows is the rule as described, with these assumptions:
+//! The authors have published no code. This implementation follows the paper, with these
+//! assumptions:
 //!
-//! - the split is vertical, at half of the width; the anchors are the two ends of the split: the left
-//!   half belongs to the upper one, the right half to the lower one (their distance, the height of the
-//!   image, is the one recommended);
-//! - a keypoint on the split belongs to the right half;
-//! - a keypoint on its anchor has no line and is dropped;
-//! - which anchor a line belongs to, and so in which half its keypoint lies, can be seen from the line:
-//!   it is released as a ray from the anchor.
+//! - The split is vertical, at half of the width. The anchors are the two ends of the split: the
+//!   upper one for the left half, the lower one for the right half. Their distance, the image
+//!   height, is the one recommended.
+//! - A keypoint on the split belongs to the right half.
+//! - A keypoint on its anchor has no line and is dropped.
+//! - The line reveals its anchor, and so the half with its keypoint. It is therefore released as a
+//!   ray from the anchor.
 
 use std::sync::Arc;
 
@@ -23,7 +25,7 @@ use crate::seed::Key;
 #[derive(Clone, Copy, Debug)]
 pub struct Dcl2d;
 
-/// The registry row.
+/// Registry entry.
 pub const ENTRY: Entry = Entry {
     name: "dcl2d",
     facts: Facts {
@@ -52,7 +54,7 @@ impl Scheme<2> for Dcl2d {
         _: &Key,
     ) -> Result<Lifted<2>, Error> {
         let Some(image) = bounds else {
-            return Err(Error::new("image size", "known, as anchors lie on its border", "none"));
+            return Err(Error::new("image size", "known: anchors lie on its border", "none"));
         };
         let split = image.center()[0];
         let anchors = [[split, image.low[1]], [split, image.high[1]]];

@@ -1,4 +1,4 @@
-//! From originals and a scheme to what is released, and the secret: what every scheme needs to be free of truth.
+//! Obfuscation: applies a scheme, then the steps that all schemes share (origin, shuffling).
 
 use super::scheme::Scheme;
 use super::size;
@@ -9,11 +9,13 @@ use crate::seed::{Key, Stage};
 use crate::truth::{Original, Secret};
 use crate::{Descriptors, Error};
 
-/// Hides `original` by `scheme`: what is released, and the secret beside it. `descriptors` has one
-/// row per original. All chance comes from `key`: [`Key::fresh`] for a map that is released.
+/// Hides `original` with `scheme`. Returns the released map and the secret. `descriptors` has one
+/// row per original. All randomness comes from `key`; use [`Key::fresh`] for a map that is
+/// released.
 ///
 /// # Errors
-/// When rows disagree, the scheme cannot hide these points, or their numbers are too small, too large or too coarse.
+/// When numbers of rows differ, the scheme cannot hide these points, or coordinates are too small,
+/// too large or too coarse.
 pub fn obfuscate<const D: usize>(
     scheme: &dyn Scheme<D>,
     original: &Original<D>,
@@ -28,7 +30,7 @@ pub fn obfuscate<const D: usize>(
         return Err(Error::new("descriptors", expected, descriptors.len().to_string()));
     }
     size::check(points.positions())?;
-    // The middle of known bounds tells nothing about the points.
+    // The center of known bounds reveals nothing about the points.
     let bounds = original.bounds();
     let origin = match &bounds {
         Some(bounds) => bounds.center(),

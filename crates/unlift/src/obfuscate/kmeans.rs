@@ -1,15 +1,18 @@
-//! k-means with several restarts, as ray clouds choose their centers.
+//! k-means with several restarts, for the centers of ray clouds.
 
 use rayon::prelude::*;
 
 use crate::geometry::vector::squared_distance;
 use crate::seed::{Key, Stage};
 
-/// Lloyd rounds before a restart gives up converging (scikit-learn's default).
+/// Maximum number of Lloyd iterations per restart (scikit-learn's default).
 const MAX_ROUNDS: usize = 300;
 
-/// The `k` centers of the best of `restarts` runs of Lloyd's algorithm, each from a k-means++ start.
-/// Deterministic in `key` (where centers started from is as secret as the points); restarts run in parallel, sums inside one run in row order.
+/// Returns the `k` centers of the best of `restarts` runs of Lloyd's algorithm with k-means++
+/// initialization.
+///
+/// The result depends only on `key`, which keeps the initial centers secret. Restarts run in
+/// parallel; sums within a run are in row order.
 ///
 /// # Panics
 /// When `points` is empty or `k` or `restarts` is 0.
@@ -31,7 +34,7 @@ pub fn kmeans<const D: usize>(
         }
     }
     let mut centers = runs[best].1.clone();
-    // An order of the centers that does not depend on which restart won.
+    // The order of the centers must not depend on which restart won.
     centers.sort_unstable_by(|a, b| {
         a.iter()
             .zip(b)
@@ -42,8 +45,8 @@ pub fn kmeans<const D: usize>(
     centers
 }
 
-/// k-means++: each further center is drawn with probability proportional to its squared distance
-/// from the centers so far.
+/// Chooses initial centers with k-means++: with probability proportional to the squared distance to
+/// the nearest center so far.
 fn spread_start<const D: usize>(
     points: &[[f64; D]],
     k: usize,
@@ -95,7 +98,7 @@ fn lloyd<const D: usize>(points: &[[f64; D]], mut centers: Vec<[f64; D]>) -> (f6
     (cost, centers)
 }
 
-/// Index of the nearest center (the first of equals) and the squared distance to it.
+/// Returns the index of the nearest center (the first of equals) and the squared distance to it.
 fn nearest<const D: usize>(point: &[f64; D], centers: &[[f64; D]]) -> (usize, f64) {
     let mut best = (0, f64::INFINITY);
     for (at, center) in centers.iter().enumerate() {

@@ -1,7 +1,7 @@
-//! `lines2d`: a random line through every keypoint of an image.
+//! Scheme `lines2d`: a random line through every keypoint of an image.
 //!
-//! The rule of `olc` in the plane: the angle is uniform. Scale and orientation of keypoints are not
-//! released. The size of the image is, so that the hidden point lies on a chord.
+//! It applies `olc` in the plane, with a uniform angle. The image size is released, so a hidden
+//! point lies on a chord. Scale and orientation of keypoints are not released.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use crate::seed::Key;
 #[derive(Clone, Copy, Debug)]
 pub struct Lines2d;
 
-/// The registry row.
+/// Registry entry.
 pub const ENTRY: Entry = Entry {
     name: "lines2d",
     facts: Facts {

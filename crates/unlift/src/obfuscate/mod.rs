@@ -1,7 +1,7 @@
-//! The owner's side: originals in, released records and a secret out. One scheme per file.
+//! Obfuscation: computes released records and a secret from originals. One scheme per file.
 //!
-//! A scheme only states its rule ([`Scheme::lift`]), here or in a crate of somebody else; what every scheme needs to be free of truth
-//! (the origin, the normal form, the order of records, slots and descriptors) happens here, once.
+//! A scheme, built-in or custom, implements only its rule ([`Scheme::lift`]). This module does the
+//! rest for all: origin, normal form, order of records, slots and descriptors.
 
 mod hide;
 mod kmeans;
@@ -25,8 +25,8 @@ pub use scheme::{Build, Entry, Facts, Lifted, Scheme, SchemeOptions};
 
 use crate::Error;
 
-/// All schemes, in the order of the paper's tables. A file that is missing here fails
-/// `tests/architecture`.
+/// All built-in schemes, in the order of the paper's tables. `tests/architecture` fails if a
+/// scheme's file is missing here.
 pub const SCHEMES: &[Entry] = &[
     olc::ENTRY,
     ppl::ENTRY,
@@ -40,10 +40,10 @@ pub const SCHEMES: &[Entry] = &[
     dcl2d::ENTRY,
 ];
 
-/// The scheme users call `name`.
+/// Returns the built-in scheme called `name`.
 ///
 /// # Errors
-/// When there is none; the message lists all.
+/// When there is no such scheme; the message lists all.
 pub fn scheme(name: &str) -> Result<&'static Entry, Error> {
     SCHEMES.iter().find(|entry| entry.name == name).ok_or_else(|| {
         let names: Vec<&str> = SCHEMES.iter().map(|entry| entry.name).collect();

@@ -1,4 +1,4 @@
-//! `olc`: a uniformly random line through every point.
+//! Scheme `olc`: a uniformly random line through every point.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use crate::seed::{Key, Stage};
 #[derive(Clone, Copy, Debug)]
 pub struct Olc;
 
-/// The registry row.
+/// Registry entry.
 pub const ENTRY: Entry = Entry {
     name: "olc",
     facts: Facts {

@@ -1,11 +1,11 @@
-//! Random pairings, shared by the schemes that hide two points together.
+//! Random pairings, for schemes that hide two points together.
 
 use crate::OriginalId;
 use crate::seed::{Cipher, Draws};
 use crate::truth::{DropReason, Dropped};
 
-/// A uniformly random pairing of `0..n`: consecutive entries of a random permutation, and the odd
-/// one out (a random one, not the last of the file as in published code).
+/// Returns a uniformly random pairing of `0..n`: consecutive entries of a random permutation. The
+/// point that remains for odd `n` is random, too; in published code it is the last of the file.
 pub(super) fn random_pairs(
     n: usize,
     draws: &mut Draws<Cipher>,
@@ -20,8 +20,8 @@ pub(super) fn random_pairs(
     (pairs, dropped)
 }
 
-/// Takes the pairs that `accept` refuses, pools their points and pairs them anew.
-/// Returns how many pairs are still refused; those stand at the end of `pairs`.
+/// Pairs the points of the last `refused` pairs again. Returns the number of pairs that `accept`
+/// still refuses and moves them to the end.
 pub(super) fn pair_again(
     pairs: &mut [[OriginalId; 2]],
     refused: usize,
@@ -41,7 +41,7 @@ pub(super) fn pair_again(
     still_refused.len()
 }
 
-/// Moves the pairs that `accept` refuses to the end and counts them.
+/// Moves the pairs that `accept` refuses to the end and returns their number.
 pub(super) fn refused_last(
     pairs: &mut Vec<[OriginalId; 2]>,
     accept: impl Fn(&[OriginalId; 2]) -> bool,
@@ -53,7 +53,6 @@ pub(super) fn refused_last(
     refused.len()
 }
 
-/// Both points of each pair, dropped for `reason`.
 pub(super) fn drop_pairs(pairs: &[[OriginalId; 2]], reason: DropReason) -> Vec<Dropped> {
     pairs.as_flattened().iter().map(|&original| Dropped { original, reason }).collect()
 }

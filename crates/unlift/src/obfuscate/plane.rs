@@ -1,4 +1,4 @@
-//! `plane`: of every point one coordinate is kept, on one of three servers.
+//! Scheme `plane`: keeps one coordinate of every point, on one of three servers.
 
 use std::sync::Arc;
 
@@ -8,11 +8,12 @@ use crate::geometry::frame::Bounds;
 use crate::released::{AxisPlanes, Obfuscation};
 use crate::seed::{Key, Stage};
 
-/// Partial localization: random thirds, one per axis. The attacker holds all three.
+/// Partial localization: random thirds, one per axis. The attacker has the data of all three
+/// servers.
 #[derive(Clone, Copy, Debug)]
 pub struct Plane;
 
-/// The registry row.
+/// Registry entry.
 pub const ENTRY: Entry = Entry {
     name: "plane",
     facts: Facts {

@@ -1,4 +1,4 @@
-//! `ppl`: a line through every pair of a random pairing.
+//! Scheme `ppl`: a line through each pair of a random pairing.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use crate::{Error, OriginalId};
 #[derive(Clone, Copy, Debug)]
 pub struct Ppl;
 
-/// The registry row.
+/// Registry entry.
 pub const ENTRY: Entry = Entry {
     name: "ppl",
     facts: Facts {
@@ -28,7 +28,7 @@ pub const ENTRY: Entry = Entry {
     in_3d: Some(|_| Arc::new(Ppl)),
 };
 
-/// How often coincident pairs are paired anew before they are dropped.
+/// Maximum number of re-pairings of coincident points before they are dropped.
 const RE_DRAWS: usize = 100;
 
 impl Scheme<3> for Ppl {
@@ -54,14 +54,14 @@ impl Scheme<3> for Ppl {
     }
 }
 
-/// Whether two points are far enough apart to define a line in `f64`.
+/// Returns true if two points are far enough apart to define a line in `f64`.
 pub(super) fn apart(points: &[[f64; 3]], pair: &[OriginalId; 2]) -> bool {
     let [a, b] = pair.map(|id| points[id.index()]);
     let size2 = a.iter().chain(&b).map(|x| x * x).fold(0.0, f64::max);
     squared_distance(&a, &b) > size2 * 1e-24
 }
 
-/// Pairs coincident points anew; removes and returns those that stay coincident.
+/// Pairs coincident points again. Removes and returns those that stay coincident.
 fn separate(
     points: &[[f64; 3]],
     pairs: &mut Vec<[OriginalId; 2]>,
@@ -72,7 +72,7 @@ fn separate(
         if refused == 0 {
             break;
         }
-        // A coincident pair needs strangers to part it: as many accepted pairs join the pool.
+        // Coincident points need other partners, so as many accepted pairs join the pool.
         let pool = (2 * refused).min(pairs.len());
         refused = pair_again(pairs, pool, draws, |pair| apart(points, pair));
     }
@@ -82,7 +82,6 @@ fn separate(
     dropped
 }
 
-/// The lines through `pairs`, two slots each.
 pub(super) fn lines_through(
     points: &[[f64; 3]],
     pairs: &[[OriginalId; 2]],

@@ -1,8 +1,8 @@
-//! `ppl+`: paired-point lifting that avoids lines within local surfaces.
+//! Scheme `ppl+`: paired-point lifting that avoids lines within local surfaces.
 //!
-//! Deviation from the published code, on purpose: there the normal is computed from a row of the
-//! wrong matrix and depends on the orientation of the map; here it is the direction in which the
-//! neighbors spread least, which is the rule the authors describe.
+//! The published code takes the normal from a row of the wrong matrix, so it depends on the
+//! orientation of the map. This implementation follows the paper: the normal is the direction of
+//! least spread of the neighbors.
 
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ use crate::{Error, OriginalId};
 #[derive(Clone, Copy, Debug)]
 pub struct PplPlus;
 
-/// The registry row.
+/// Registry entry.
 pub const ENTRY: Entry = Entry {
     name: "ppl+",
     facts: Facts {
@@ -34,13 +34,12 @@ pub const ENTRY: Entry = Entry {
     in_3d: Some(|_| Arc::new(PplPlus)),
 };
 
-/// Re-pairing rounds at most.
 const MAX_ROUNDS: usize = 1000;
-/// Fewer refused pairs than this end the re-pairing.
+/// Re-pairing ends when fewer pairs than this are refused.
 const FEW_PAIRS: usize = 10;
-/// Rounds before a stall is looked for, and the rounds without change that make one.
+/// Re-pairing stalls after this many rounds, if this many rounds in a row changed nothing.
 const STALL: (usize, usize) = (100, 50);
-/// sin(20 degrees): a line closer to the surface than 20 degrees is refused.
+/// sin(20 degrees). A line is refused if its angle to the surface is at most 20 degrees.
 const SIN_20_DEGREES: f64 = 0.342_020_143_325_668_7;
 
 impl Scheme<3> for PplPlus {
@@ -93,8 +92,8 @@ impl Scheme<3> for PplPlus {
     }
 }
 
-/// Per point the normal of the surface through its K = min(1 % of the points, 100) nearest
-/// neighbors, K even and at least 4.
+/// Returns for each point the normal of the surface through its K = min(1 % of the points, 100)
+/// nearest neighbors, with K even and at least 4.
 fn normals(points: &[[f64; 3]]) -> Result<Vec<Option<[f64; 3]>>, Error> {
     if points.is_empty() {
         return Ok(Vec::new());

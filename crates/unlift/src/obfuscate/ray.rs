@@ -1,4 +1,4 @@
-//! `ray`: a half-line from one of two centers, chosen at random for every point.
+//! Scheme `ray`: a half-line from one of two centers, chosen at random for every point.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use crate::{Error, OriginalId};
 #[derive(Clone, Copy, Debug)]
 pub struct Ray;
 
-/// The registry row.
+/// Registry entry.
 pub const ENTRY: Entry = Entry {
     name: "ray",
     facts: Facts {
@@ -51,7 +51,7 @@ impl Scheme<3> for Ray {
     }
 }
 
-/// The rays from two k-means centers to every point; `choose` gives the center of a row.
+/// Returns rays from two k-means centers to every point. `choose` returns the center of a row.
 pub(super) fn from_centers(
     points: &[[f64; 3]],
     key: &Key,
@@ -63,13 +63,13 @@ pub(super) fn from_centers(
     rays_from(&kmeans(points, 2, RESTARTS, key), points, choose)
 }
 
-/// The rays from `centers` to every point; `choose` gives the center of a row.
+/// Returns rays from `centers` to every point. `choose` returns the center of a row.
 pub(super) fn rays_from<const D: usize>(
     centers: &[[f64; D]],
     points: &[[f64; D]],
     choose: impl Fn(usize, &[f64; D]) -> usize,
 ) -> Result<Lifted<D>, Error> {
-    // What is stored is the center in f32; the ray starts there.
+    // Rays start at the stored center, which is rounded to `f32`.
     let centers: Vec<[f64; D]> = centers.iter().map(|c| c.map(|x| f64::from(x as f32))).collect();
     let (mut hidden, mut dropped) = (Vec::new(), Vec::new());
     let (mut center, mut direction) = (Vec::new(), Vec::new());

@@ -1,4 +1,4 @@
-//! `ray-voxel`: as `ray`, the center decided by a 3D checkerboard.
+//! Scheme `ray-voxel`: ray clouds whose centers are chosen by a 3D checkerboard.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ pub struct RayVoxel {
     pub voxel: f64,
 }
 
-/// The registry row.
+/// Registry entry.
 pub const ENTRY: Entry = Entry {
     name: "ray-voxel",
     facts: Facts {
@@ -51,7 +51,8 @@ impl Scheme<3> for RayVoxel {
         if !(self.voxel.is_finite() && self.voxel > 0.0) {
             return Err(Error::new("voxel", "a positive length", self.voxel.to_string()));
         }
-        // The grid of the authors' code (Open3D): it starts half a voxel below the smallest coordinates.
+        // The grid starts half a voxel below the smallest coordinates, as in the authors' code
+        // (Open3D).
         let mut low = [f64::INFINITY; 3];
         for point in points {
             low = std::array::from_fn(|c| low[c].min(point[c]));

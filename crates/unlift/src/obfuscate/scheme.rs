@@ -1,4 +1,4 @@
-//! What a scheme is: the seam that anybody may implement, and a row of the registry of ours.
+//! Interface of schemes, and entries of the registry.
 
 use std::any::Any;
 use std::fmt::Debug;
@@ -12,49 +12,49 @@ use crate::seed::Stage;
 use crate::truth::Dropped;
 use crate::{Error, OriginalId, Unit};
 
-/// A row of the registry: a scheme of ours, and how it is made.
+/// An entry of the registry: a built-in scheme and its constructors.
 #[derive(Debug)]
 pub struct Entry {
-    /// The name users know it by.
+    /// Name that users type.
     pub name: &'static str,
-    /// What is known about it.
+    /// Facts for reports.
     pub facts: Facts,
-    /// The scheme on keypoints, if it is defined there.
+    /// Constructor for keypoints, if the scheme is defined there.
     pub in_2d: Option<Build<2>>,
-    /// The scheme on map points, if it is defined there.
+    /// Constructor for map points, if the scheme is defined there.
     pub in_3d: Option<Build<3>>,
 }
 
-/// Makes a scheme with the parameters that it has.
+/// Constructor of a scheme from options.
 pub type Build<const D: usize> = fn(&SchemeOptions) -> Arc<dyn Scheme<D>>;
 
 impl Entry {
-    /// The scheme on points of `D` dimensions, if it is defined there.
+    /// Returns the scheme for points of `D` dimensions, if it is defined there.
     pub fn of_dimension<const D: usize>(
         &self,
         options: &SchemeOptions,
     ) -> Option<Arc<dyn Scheme<D>>> {
-        // A constant cannot choose between two types; `Any` asks whether they are the same.
+        // `Any` compares the types at run time, because a constant cannot choose between two types.
         let of: &dyn Any = if D == 2 { &self.in_2d } else { &self.in_3d };
         let build = of.downcast_ref::<Option<Build<D>>>().copied().flatten();
         build.map(|build| build(options))
     }
 }
 
-/// What is known about a scheme; empty where nothing is.
+/// Facts about a scheme; empty if unknown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Facts {
-    /// The rule in one line.
+    /// Rule in one line.
     pub summary: &'static str,
-    /// Where it was published.
+    /// Publication.
     pub source: &'static str,
-    /// What of a point stays secret.
+    /// Part of a point that stays secret.
     pub hidden: &'static str,
-    /// Patents its authors state (facts, no legal advice).
+    /// Patents that its authors state (not legal advice).
     pub patents: &'static str,
 }
 
-/// Parameters of the schemes of the registry, in the unit of the points.
+/// Parameters of the built-in schemes, in the unit of the points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SchemeOptions {
     /// Edge of a voxel of `ray-voxel`. The paper's authors use 0.5 m.
@@ -62,7 +62,7 @@ pub struct SchemeOptions {
 }
 
 impl SchemeOptions {
-    /// The usual ones for points in `unit`.
+    /// Returns the default parameters for points in `unit`.
     pub fn usual(unit: Unit) -> Self {
         let voxel = match unit {
             Unit::Meter => 0.5,
@@ -74,29 +74,30 @@ impl SchemeOptions {
     }
 }
 
-/// A rule for hiding points. Anybody may write one: what is audited is `Arc<dyn Scheme<D>>`, and the registry
-/// only lists ours. Parameters are fields of the type.
+/// A rule for hiding points, built-in or custom. Parameters are fields of the type.
 pub trait Scheme<const D: usize>: Debug + Send + Sync {
-    /// The name in rows, gates and reports: one word, told apart from those of other schemes of a plan.
+    /// Returns the name in rows, gates and reports: one word, unique in a plan.
     fn name(&self) -> &str;
 
-    /// What is known about it.
+    /// Returns facts about the scheme.
     fn facts(&self) -> Facts {
         Facts::default()
     }
 
-    /// Its parameters, by name, for the record. Lengths are in the unit of the points.
+    /// Returns the parameters by name, for reports. Lengths are in the unit of the points.
     fn parameters(&self) -> Vec<(&'static str, f64)> {
         Vec::new()
     }
 
-    /// Hides `points`, given about the released origin, as are the `bounds` in which all of them are
-    /// publicly known to lie (an image's). All chance comes from `key`, by [`Stage::Scheme`]: what is drawn
-    /// is released. Every original ends up in exactly one slot
-    /// or among the dropped ones, with a reason; no record is empty.
+    /// Hides `points`. Coordinates are relative to the released origin, as are `bounds`, the public
+    /// bounds of an image.
+    ///
+    /// All randomness must come from `key` with [`Stage::Scheme`], because these draws are
+    /// released. Every original must be in exactly one slot, or dropped with a reason. No record
+    /// may be empty.
     ///
     /// # Errors
-    /// When the points cannot be hidden by this rule at all, or a parameter is out of range.
+    /// When the rule cannot hide the points, or a parameter is out of range.
     fn lift(
         &self,
         points: &[[f64; D]],
@@ -105,23 +106,23 @@ pub trait Scheme<const D: usize>: Debug + Send + Sync {
     ) -> Result<Lifted<D>, Error>;
 }
 
-/// What a scheme makes of the originals, before anything is shuffled.
+/// Result of a scheme, before shuffling.
 #[derive(Clone, Debug)]
 pub struct Lifted<const D: usize> {
-    /// The records.
+    /// Records.
     pub obfuscation: Obfuscation<D>,
-    /// Hidden points per record: 2 for paired lines, else 1.
+    /// Hidden points per record: 2 for paired lines, otherwise 1.
     pub slots_per_record: usize,
-    /// The original of each slot, record by record.
+    /// Original of each slot, record by record.
     pub hidden: Vec<OriginalId>,
-    /// Per slot the exchanged axis (`cp`).
+    /// Exchanged axis of each slot (`cp`).
     pub swapped_axis: Option<Vec<u8>>,
-    /// Originals in no record.
+    /// Originals that are in no record.
     pub dropped: Vec<Dropped>,
 }
 
 impl<const D: usize> Lifted<D> {
-    /// Of a scheme that gives every original a record of its own, in order.
+    /// Creates the result of a scheme that gives every original its own record, in order.
     pub fn one_each(obfuscation: Obfuscation<D>) -> Self {
         let hidden = (0..obfuscation.len()).map(OriginalId::from_index).collect();
         let (swapped_axis, dropped) = (None, Vec::new());

@@ -1,16 +1,16 @@
-//! Whether the numbers of a map can be worked with at all.
+//! Check of the size and precision of a map's coordinates.
 
 use crate::Error;
 use crate::geometry::vector::quantile;
 
-/// How large a map may be, in its own unit: single floats, in which records are released, hold the cubes of its lengths, and
-/// of a thousandth of them.
+/// Allowed size of a map in its own unit. Records are released as `f32`, which must represent the
+/// cubes of lengths, and of thousandths of them.
 const SIZES: std::ops::RangeInclusive<f64> = 1e-10..=1e12;
-/// Steps at least between neighboring doubles across a map.
+/// Minimum size of a map, in steps between adjacent doubles.
 const STEPS: f64 = 1e4;
 
-/// Refuses maps whose numbers are too small, too large or too coarse: next to nothing would come back of them, and that is no
-/// protection.
+/// Rejects maps whose coordinates are too small, too large or too coarse. Little could be recovered
+/// from them, which is not protection.
 pub(super) fn check<const D: usize>(points: &[[f64; D]]) -> Result<(), Error> {
     let (mut size, mut step) = (0.0f64, 0.0f64);
     for axis in 0..D {
@@ -19,18 +19,18 @@ pub(super) fn check<const D: usize>(points: &[[f64; D]]) -> Result<(), Error> {
             return Ok(());
         }
         values.sort_unstable_by(f64::total_cmp);
-        // A few outliers make no map large.
+        // Quantiles ignore a few outliers.
         size = size.max(quantile(&values, 0.95) - quantile(&values, 0.05));
         step = step.max(quantile(&values, 0.5).abs() * f64::EPSILON);
     }
-    // Points that all coincide have no size, whatever rounding makes of it.
+    // Coincident points differ by rounding only.
     if size <= 4.0 * step {
         return Ok(());
     }
     if !SIZES.contains(&size) {
         let (least, most) = (SIZES.start(), SIZES.end());
         let expected =
-            format!("a size between {least:e} and {most:e} units (another unit, or scale)");
+            format!("a size between {least:e} and {most:e} units (use another unit or scale)");
         return Err(Error::new("map", expected, format!("{size:.1e}")));
     }
     if size < STEPS * step {

@@ -1,17 +1,17 @@
-//! The randomness that hides points: a key of 256 bits and the streams of a cipher under it.
+//! Keys: the randomness that hides points, as 256-bit keys and streams of a cipher.
 //!
-//! **Why a cipher.** Part of what a scheme draws is released with the map: three draws are a line of `olc`, two the
-//! axis and the partners of `cp`. Whoever computes the key from them undoes the order of the records, knows which
-//! file row every record came from, and rows beside each other are neighbors. ChaCha20 is believed to give nothing
-//! away: its streams cannot be told from random bits for less than 2^256 trials, however many are seen.
+//! **Why a cipher.** Part of a scheme's draws is released with the map: a line of `olc` is three
+//! draws, axis and partners of `cp` are two. A generator whose state follows from its output would
+//! reveal the order of the records, and with it neighbors, which are often adjacent in the file. No
+//! attack on ChaCha20 distinguishes its output from random bits with less than 2^256 trials.
 //!
-//! **Why streams of their own.** A stage's key is the cipher's output under the key (no draws of any
-//! item come from there), and an item's stream is numbered by the item. So the order of records (`Shuffle`), of slots
-//! and of descriptors have nothing in common with published draws (`Scheme`) that could be computed.
+//! **Why separate streams.** A stage's key is output of the cipher under the main key, and an
+//! item's stream is numbered by the item. So published draws (`Scheme`) do not reveal the order of
+//! records (`Shuffle`), slots or descriptors.
 //!
-//! **What is left.** A key that comes from an integer is as good as the integer is hard to guess: every record
-//! confirms a guess at the cost of one block. [`Key::from_seed`] is for experiments, [`Key::fresh`] for a map that
-//! leaves the house.
+//! **Limits.** A key from an integer is only as safe as the integer is hard to guess: each guess
+//! can be checked with one block. Use [`Key::from_seed`] for experiments and [`Key::fresh`] for a
+//! map that is released.
 
 use chacha20::ChaCha20Rng;
 use chacha20::rand_core::{Rng, SeedableRng};
@@ -19,18 +19,19 @@ use chacha20::rand_core::{Rng, SeedableRng};
 use crate::Error;
 use unlift_attack::seed::{Bits, Draws, Stage};
 
-/// A key of 256 bits: all that hides a map comes from it. Part of the secret; it is not printed.
+/// A 256-bit key for all random numbers that hide a map. It is part of the secret and is not
+/// printed.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Key([u8; 32]);
 
-/// Says that a key was made from an integer. Fresh keys begin otherwise, but for a chance of 2^-192.
+/// Prefix of keys made from an integer. A fresh key has it with probability 2^-192.
 const FROM_SEED: &[u8; 24] = b"unlift: an integer seed.";
 
 impl Key {
-    /// A key from the operating system's randomness: for maps that are released.
+    /// Creates a key from the randomness of the operating system, for maps that are released.
     ///
     /// # Errors
-    /// When the system has no randomness to give.
+    /// When the system provides no random bytes.
     pub fn fresh() -> Result<Self, Error> {
         let mut key = [0; 32];
         getrandom::fill(&mut key).map_err(|error| {
@@ -39,7 +40,7 @@ impl Key {
         Ok(Self(key))
     }
 
-    /// The key of an experiment that others can repeat. Whoever guesses the integer has the key.
+    /// Creates the key of a repeatable experiment. It is as easy to guess as the integer.
     pub fn from_seed(seed: u64) -> Self {
         let mut key = [0; 32];
         key[..24].copy_from_slice(FROM_SEED);
@@ -47,36 +48,37 @@ impl Key {
         Self(key)
     }
 
-    /// The key of one `item` of `stage` (one image among many), from which neither this key nor that of
-    /// another item can be computed.
+    /// Returns the key of one `item` of `stage`, such as one image. It reveals neither this key nor
+    /// that of another item.
     pub fn of_item(&self, stage: Stage, item: u64) -> Self {
         Self(first_bytes(&mut self.stage(stage).stream(item)))
     }
 
-    /// The stream of `item` in `stage`. For many items of a stage, [`stage`](Self::stage) is faster.
+    /// Returns the random stream of `item` in `stage`. For many items of a stage,
+    /// [`stage`](Self::stage) is faster.
     pub fn draws(&self, stage: Stage, item: u64) -> Draws<Cipher> {
         self.stage(stage).draws(item)
     }
 
-    /// The key of a stage: what its items' streams are drawn under.
+    /// Returns the key of a stage, for the streams of its items.
     pub fn stage(&self, stage: Stage) -> StageKey {
         StageKey(first_bytes(&mut stream(&self.0, stage as u64)))
     }
 }
 
-/// A key does not end up in a log.
+/// Hides the key, so that it is not logged.
 impl std::fmt::Debug for Key {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("Key(..)")
     }
 }
 
-/// The key of one stage. Streams of its items are computed when first drawn from.
+/// The key of one stage. Streams of items are computed on demand.
 #[derive(Clone)]
 pub struct StageKey([u8; 32]);
 
 impl StageKey {
-    /// The stream of `item`.
+    /// Returns the random stream of `item`.
     pub fn draws(&self, item: u64) -> Draws<Cipher> {
         Draws::of(Cipher(self.stream(item)))
     }
@@ -92,7 +94,7 @@ impl std::fmt::Debug for StageKey {
     }
 }
 
-/// Bits by ChaCha20.
+/// Random bits from ChaCha20.
 #[derive(Debug)]
 pub struct Cipher(ChaCha20Rng);
 
@@ -121,7 +123,7 @@ mod tests {
 
     #[test]
     fn the_cipher_is_chacha20() {
-        // The first block of the all-zero key and nonce: RFC 8439, appendix A.1, test vector 1.
+        // First block of the all-zero key and nonce: RFC 8439, appendix A.1, test vector 1.
         let block = [
             0x76, 0xb8, 0xe0, 0xad, 0xa0, 0xf1, 0x3d, 0x90, 0x40, 0x5d, 0x6a, 0xe5, 0x53, 0x86,
             0xbd, 0x28, 0xbd, 0xd2, 0x19, 0xb8, 0xa0, 0x8d, 0xed, 0x1a, 0xa8, 0x36, 0xef, 0xcc,
@@ -134,8 +136,9 @@ mod tests {
 
     #[test]
     fn bits_are_pinned() {
-        // Golden: a change here changes every published figure. Computed apart, by a ChaCha20 written in
-        // Python from the RFC: stage key = first half block of (key, stage), then (stage key, item).
+        // A change here changes every published figure. The values come from an independent
+        // ChaCha20 in Python after the RFC: stage key = first half block of (key, stage), then
+        // (stage key, item).
         let take = |key: &Key, stage, item| {
             let mut draws = key.draws(stage, item);
             [draws.bits(), draws.bits(), draws.below(1000), draws.unit().to_bits()]

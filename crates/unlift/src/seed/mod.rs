@@ -1,4 +1,4 @@
-//! Randomness as a function, and the key of everything that hides a point.
+//! Random numbers as a function of a seed, and keys for the randomness that hides points.
 
 mod key;
 

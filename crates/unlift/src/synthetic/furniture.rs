@@ -1,12 +1,12 @@
-//! Pieces of furniture. Those along a wall stand at the left end of their back (`x` along the wall,
-//! `y` into the room); those in the room stand around their middle.
+//! Pieces of furniture. The origin of a piece is the left end of its back if it stands along a wall
+//! (`x` along the wall, `y` into the room), otherwise its middle.
 
 use super::objects;
 use super::surfaces::{Faces, Place, Scene};
 use super::texture::{Outline, Texture};
 use crate::seed::Draws;
 
-/// A board shelf, 1.8 to 2.1 m high, filled with books and boxes.
+/// Adds a bookshelf, 1.8 to 2.1 m high, filled with books and boxes.
 pub(super) fn bookshelf(scene: &mut Scene, place: &Place, width: f64, draws: &mut Draws) {
     const BOARD: f64 = 0.022;
     const DEPTH: f64 = 0.3;
@@ -15,7 +15,7 @@ pub(super) fn bookshelf(scene: &mut Scene, place: &Place, width: f64, draws: &mu
     let pitch = (height - 0.1) / n_levels as f64;
     let n_bays = 2;
     let bay = (width - BOARD) / n_bays as f64;
-    // Only the panel's front is seen; its depth hides what is behind the books.
+    // Only the panel's front is visible; its depth hides the space behind the books.
     let panel = [width, 0.08, height];
     scene.block(place, [0.0; 3], panel, Faces::FrontAndTop, Texture::SMOOTH);
     for i in 0..=n_bays {
@@ -40,7 +40,7 @@ pub(super) fn bookshelf(scene: &mut Scene, place: &Place, width: f64, draws: &mu
     objects::scatter(scene, &top, [0.1, 0.06], [width - 0.1, DEPTH], count, draws);
 }
 
-/// A cabinet with two doors, up to 2 m.
+/// Adds a cabinet with two doors, up to 2 m high.
 pub(super) fn tall_cabinet(scene: &mut Scene, place: &Place, width: f64, draws: &mut Draws) {
     let (depth, height) = (draws.between(0.42, 0.55), draws.between(1.5, 2.0));
     let body = [width, depth, height];
@@ -59,7 +59,7 @@ pub(super) fn tall_cabinet(scene: &mut Scene, place: &Place, width: f64, draws: 
     objects::scatter(scene, &top, [0.05, 0.05], [width - 0.05, depth - 0.05], count, draws);
 }
 
-/// A low cabinet with drawers and things on top.
+/// Adds a low cabinet with drawers, and objects on top.
 pub(super) fn sideboard(scene: &mut Scene, place: &Place, width: f64, draws: &mut Draws) {
     let (depth, height) = (draws.between(0.38, 0.48), draws.between(0.7, 0.9));
     let body = [width, depth, height];
@@ -82,7 +82,7 @@ pub(super) fn sideboard(scene: &mut Scene, place: &Place, width: f64, draws: &mu
     objects::scatter(scene, &top, [0.05, 0.05], [width - 0.05, depth - 0.03], count, draws);
 }
 
-/// A desk with a screen, a keyboard and clutter.
+/// Adds a desk with a screen, a keyboard and objects.
 pub(super) fn desk(scene: &mut Scene, place: &Place, width: f64, draws: &mut Draws) {
     let (depth, height) = (draws.between(0.6, 0.7), 0.74);
     let top = [width, depth, height];
@@ -102,7 +102,6 @@ pub(super) fn desk(scene: &mut Scene, place: &Place, width: f64, draws: &mut Dra
     objects::scatter(scene, &surface, [x + 0.48, 0.05], [width - 0.02, depth - 0.05], 2, draws);
 }
 
-/// A sofa with cushions.
 pub(super) fn sofa(scene: &mut Scene, place: &Place, width: f64, draws: &mut Draws) {
     let depth = 0.85;
     let parts = [
@@ -121,12 +120,12 @@ pub(super) fn sofa(scene: &mut Scene, place: &Place, width: f64, draws: &mut Dra
         let (low, high) = ([x, y, 0.43], [x + side, y + 0.13, 0.42 + side]);
         scene.block(place, low, high, Faces::Standing, Texture::PATTERN);
     }
-    // A blanket over an arm.
+    // Blanket over an armrest.
     let blanket = ([width - 0.2, 0.4, 0.45], [width + 0.01, 0.72, 0.612]);
     scene.shell(place, blanket.0, blanket.1, Faces::Standing, Texture::PATTERN);
 }
 
-/// A chair; the sitter looks along `y`.
+/// Adds a chair that faces `y`.
 pub(super) fn chair(scene: &mut Scene, place: &Place, draws: &mut Draws) {
     let (half, seat) = (0.21, 0.45);
     let back = draws.between(0.85, 0.98);
@@ -147,7 +146,7 @@ pub(super) fn chair(scene: &mut Scene, place: &Place, draws: &mut Draws) {
     }
 }
 
-/// A table with a runner and things on it.
+/// Adds a table with a runner and objects on it.
 pub(super) fn table(scene: &mut Scene, place: &Place, length: f64, depth: f64, draws: &mut Draws) {
     let height = 0.75;
     let (x, y) = (0.5 * length, 0.5 * depth);
@@ -166,14 +165,12 @@ pub(super) fn table(scene: &mut Scene, place: &Place, length: f64, depth: f64, d
     objects::scatter(scene, &surface, [0.06 - x, 0.05 - y], [x - 0.06, y - 0.05], count, draws);
 }
 
-/// A rug under the table.
 pub(super) fn rug(scene: &mut Scene, place: &Place, draws: &mut Draws) {
     let (x, y) = (draws.between(1.0, 1.25), draws.between(0.75, 0.95));
     let (low, high) = ([-x, -y, 0.0], [x, y, 0.008]);
     scene.shell(place, low, high, Faces::Standing, Texture::PATTERN);
 }
 
-/// A floor lamp.
 pub(super) fn floor_lamp(scene: &mut Scene, place: &Place, draws: &mut Draws) {
     let height = draws.between(1.35, 1.6);
     scene.tube(place, [0.0; 3], 0.15, 0.15, 0.025, Texture::SMOOTH);
@@ -181,7 +178,7 @@ pub(super) fn floor_lamp(scene: &mut Scene, place: &Place, draws: &mut Draws) {
     scene.tube(place, [0.0, 0.0, height], 0.21, 0.14, 0.28, Texture::FABRIC);
 }
 
-/// A lamp hanging over the table.
+/// Adds a lamp that hangs over the table.
 pub(super) fn pendant(scene: &mut Scene, place: &Place, ceiling: f64) {
     let foot = ceiling - 0.95;
     scene.tube(place, [0.0, 0.0, foot], 0.22, 0.06, 0.2, Texture::PATTERN);
@@ -189,7 +186,6 @@ pub(super) fn pendant(scene: &mut Scene, place: &Place, ceiling: f64) {
     scene.tube(place, [0.0, 0.0, foot + 0.2], 0.008, 0.008, cord, Texture::SMOOTH);
 }
 
-/// A plant in a pot.
 pub(super) fn plant(scene: &mut Scene, place: &Place, draws: &mut Draws) {
     scene.tube(place, [0.0; 3], 0.13, 0.17, 0.3, Texture::SMOOTH);
     let soil = ([-0.15, -0.15, 0.29], [0.3, 0.0, 0.0], [0.0, 0.3, 0.0]);
@@ -202,7 +198,7 @@ pub(super) fn plant(scene: &mut Scene, place: &Place, draws: &mut Draws) {
     }
 }
 
-/// Two to four framed prints of different size, their middle `height` m above the floor.
+/// Adds two to four framed prints of different sizes, about `height` m above the floor.
 pub(super) fn pictures(
     scene: &mut Scene,
     place: &Place,
@@ -225,7 +221,6 @@ pub(super) fn pictures(
     }
 }
 
-/// A paneled door in its frame.
 pub(super) fn door(scene: &mut Scene, place: &Place, width: f64) {
     let leaf = ([0.05, 0.0, 0.0], [width - 0.05, 0.03, 2.02]);
     scene.shell(place, leaf.0, leaf.1, Faces::FrontAndTop, Texture::SMOOTH);
@@ -241,7 +236,7 @@ pub(super) fn door(scene: &mut Scene, place: &Place, width: f64) {
     scene.shell(place, handle.0, handle.1, Faces::All, Texture::PRINT);
 }
 
-/// A window with cross bars and curtains, around `middle` along the wall.
+/// Adds a window with cross bars and curtains, centered at `middle` along the wall.
 pub(super) fn window(scene: &mut Scene, wall: &Place, middle: f64, draws: &mut Draws) {
     let (half, foot, height) = (draws.between(0.55, 0.75), 0.95, 1.25);
     let place = wall.then([middle - half, 0.0, foot], [1.0, 0.0]);

@@ -1,9 +1,10 @@
-//! A procedural room: a metric indoor map to try every stage on, without anybody's photos.
+//! Procedural maps: a furnished room in meters, and other shapes, for experiments without real
+//! data.
 //!
-//! [`room`] furnishes a room (`room.rs`, `furniture.rs`, `objects.rs`), walks cameras through it and
-//! samples the surfaces they see (`views.rs`, `sampling.rs`) the way structure from motion does:
-//! dense on texture, sparse on plain walls, noisier with distance, with far outliers and coincident
-//! points. Only `+ - * /` and `sqrt` are used, so a seed gives the same bits on every platform.
+//! [`room`] furnishes a room (`room.rs`, `furniture.rs`, `objects.rs`), moves cameras through it
+//! and samples visible surfaces (`views.rs`, `sampling.rs`) like structure from motion: dense on
+//! texture, sparse on plain walls, noisier with distance, with far outliers and coincident points.
+//! Only `+ - * /` and `sqrt` are used, so results are bit-identical on all platforms.
 
 mod furniture;
 mod objects;
@@ -25,26 +26,26 @@ pub use texture::{Material, Sheet};
 pub use tiled::tiled;
 pub use views::Camera;
 
-/// The number of points of the demo's room.
+/// Number of points of the demo's room.
 pub const DEFAULT_N_POINTS: usize = 20_000;
 
-/// Tangent of half the angle (17.06 degrees) by which walls are turned against the frame's axes: no
-/// real map is aligned with its walls, and axis-wise schemes must not profit from one that is.
+/// Tangent of half the angle (17.06 degrees) between walls and axes. Real maps are not aligned with
+/// their walls, and axis-wise schemes must not benefit from alignment.
 const HALF_YAW_TANGENT: f64 = 0.15;
 
-/// A map of a furnished room, in meters; `z` points up and the origin is the middle of the floor.
+/// Map of a furnished room in meters; `z` points up, and the origin is the middle of the floor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Room {
-    /// The points, `(n, 3)`, in random order.
+    /// Points, `(n, 3)`, in random order.
     pub points: Vec<[f64; 3]>,
-    /// The photos, in the order of the walk.
+    /// Cameras of the photos, in the order of the walk.
     pub cameras: Vec<Camera>,
-    /// All that can be seen.
+    /// Visible surfaces.
     pub sheets: Vec<Sheet>,
 }
 
-/// The room of `seed`, with `n_points` points. Every seed is another room: size (about 5 x 4 x 2.6
-/// m), arrangement, objects and photos differ.
+/// Creates the room of `seed` with `n_points` points. Size (about 5 x 4 x 2.6 m), arrangement,
+/// objects and cameras depend on the seed.
 ///
 /// ```
 /// let room = unlift::synthetic::room(0, 1_000);
@@ -75,7 +76,7 @@ mod tests {
     use super::*;
     use std::collections::HashSet;
 
-    /// Points in the room's own axes, from its middle.
+    /// Returns the points relative to the room's middle, with axes along its walls.
     fn along_walls(room: &Room) -> Vec<[f64; 3]> {
         let [cos, sin] = vectors::turn(HALF_YAW_TANGENT);
         room.points.iter().map(|&p| rotate([cos, -sin], p)).collect()
@@ -89,7 +90,7 @@ mod tests {
 
     #[test]
     fn bits_are_pinned() {
-        // Golden: a change here changes every published figure of the demo.
+        // A change here changes every published figure of the demo.
         let sum = room(0, 300)
             .points
             .iter()

@@ -1,12 +1,12 @@
-//! Small things that stand on furniture, each around the middle of its foot.
+//! Small objects on furniture. The origin of an object is the middle of its foot.
 
 use super::surfaces::{Faces, Place, Scene};
 use super::texture::Texture;
 use super::vectors::turn;
 use crate::seed::Draws;
 
-/// Puts up to `count` random things on the rectangle from `low` to `high` (at `z = 0` of `place`),
-/// one per cell of a grid, so that none stands in another.
+/// Places up to `count` random objects on the rectangle from `low` to `high` (at `z = 0` of
+/// `place`), at most one per grid cell, so that they do not overlap.
 pub(super) fn scatter(
     scene: &mut Scene,
     place: &Place,
@@ -15,7 +15,7 @@ pub(super) fn scatter(
     count: usize,
     draws: &mut Draws,
 ) {
-    /// Side of a cell, and with it the widest thing, in meters.
+    /// Side of a cell, and largest width of an object, in meters.
     const CELL: f64 = 0.22;
     let fits = |c: usize| ((high[c] - low[c]) / CELL) as usize;
     let (columns, rows) = (fits(0), fits(1));
@@ -33,7 +33,7 @@ pub(super) fn scatter(
     }
 }
 
-/// A random thing within a square of 20 cm.
+/// Adds a random object within a square of 20 cm.
 fn thing(scene: &mut Scene, place: &Place, draws: &mut Draws) {
     match draws.below(7) {
         0 => {
@@ -55,14 +55,14 @@ fn thing(scene: &mut Scene, place: &Place, draws: &mut Draws) {
             scene.block(place, [-x, -y, 0.0], high, Faces::Standing, Texture::PRINT);
         }
         5 => {
-            // A framed photo, leaning back a little.
+            // Framed photo that leans back.
             let (w, h) = (draws.between(0.1, 0.18), draws.between(0.12, 0.2));
             let lean = [0.0, -0.25 * h, h];
             let corner = [-0.5 * w, 0.02, 0.0];
             scene.sheet(place, corner, lean, [w, 0.0, 0.0], Texture::PRINT);
         }
         _ => {
-            // A magazine lying open.
+            // Open magazine.
             let high = [0.1, 0.08, 0.01];
             scene.block(place, [-0.1, -0.08, 0.0], high, Faces::Standing, Texture::PRINT);
         }
@@ -87,7 +87,7 @@ fn flowers(scene: &mut Scene, place: &Place, height: f64, draws: &mut Draws) {
     }
 }
 
-/// A leaf of side `size` around `at`, in any direction, seen from both sides.
+/// Adds a leaf of side `size` around `at`, in random direction, visible from both sides.
 pub(super) fn leaf(scene: &mut Scene, place: &Place, at: [f64; 3], size: f64, draws: &mut Draws) {
     let u: [f64; 3] = draws.direction();
     let other: [f64; 3] = draws.direction();
@@ -97,7 +97,7 @@ pub(super) fn leaf(scene: &mut Scene, place: &Place, at: [f64; 3], size: f64, dr
     scene.sheet(place, corner, v, u, Texture::LEAVES);
 }
 
-/// A computer screen on its foot, 53 cm wide.
+/// Adds a computer screen with its foot, 53 cm wide.
 pub(super) fn screen(scene: &mut Scene, place: &Place) {
     let foot = ([0.0, -0.05, 0.0], [0.25, 0.1, 0.015]);
     scene.block(place, foot.0, foot.1, Faces::Standing, Texture::SMOOTH);
@@ -110,7 +110,8 @@ pub(super) fn screen(scene: &mut Scene, place: &Place) {
     scene.sheet(place, [-0.13, 0.061, 0.13], u, v, Texture::PATTERN);
 }
 
-/// A row of books, boxes and vases, `width` wide under a clear height, fronts near `depth`.
+/// Adds a row of books, boxes and vases, `width` wide, below height `clear`, with fronts near
+/// `depth`.
 pub(super) fn shelf_row(
     scene: &mut Scene,
     place: &Place,
@@ -132,9 +133,9 @@ pub(super) fn shelf_row(
             break;
         }
         match kind {
-            // A gap.
+            // Gap.
             0 => {}
-            // A storage box.
+            // Storage box.
             1 => {
                 let high = [x + w, depth - 0.02, clear * draws.between(0.5, 0.8)];
                 scene.block(place, [x, 0.08, 0.0], high, Faces::Standing, Texture::PATTERN);
@@ -144,7 +145,7 @@ pub(super) fn shelf_row(
                 let middle = [x + 0.07, depth - 0.1, 0.0];
                 scene.tube(place, middle, 0.045, 0.06, height, Texture::PATTERN);
             }
-            // A book; neighbors hide its covers.
+            // Book; its neighbors hide the covers.
             _ => {
                 let front = depth - draws.between(0.015, 0.06);
                 let high = [x + w - 0.001, front, clear * draws.between(0.62, 0.93)];

@@ -1,8 +1,7 @@
-//! Streams of draws: no two decisions share one.
+//! Streams of random numbers, a separate one for each purpose.
 
 use crate::seed::{Draws, Stage};
 
-/// What a stream of draws decides, so that no two decisions share one.
 #[derive(Clone, Copy)]
 pub(super) enum Purpose {
     Layout = 0,

@@ -1,4 +1,4 @@
-//! The room: its shell, and what stands where.
+//! Layout of the room: walls, floor, ceiling, and positions of furniture.
 
 use super::furniture as piece;
 use super::purpose::{Purpose, draws};
@@ -7,17 +7,16 @@ use super::texture::Texture;
 use super::vectors::turn;
 use crate::seed::Draws;
 
-/// Free space kept at the ends of a short wall, where the long walls' furniture stands.
+/// Free space at the ends of a short wall, for the furniture of the long walls.
 const CORNER: f64 = 0.85;
 
-/// The furnished room of `seed`.
 pub(super) fn furnished(seed: u64) -> Scene {
     let mut draws = draws(seed, Purpose::Layout, 0);
     let size = [draws.between(4.8, 5.3), draws.between(3.8, 4.2), draws.between(2.5, 2.7)];
     let mut scene = Scene::new(size);
     let walls = shell(&mut scene);
 
-    // Which of two opposite walls gets which furniture differs from room to room.
+    // Furniture is assigned to one of two opposite walls at random.
     let mut long = [0, 2];
     let mut short = [1, 3];
     draws.shuffle(&mut long);
@@ -30,8 +29,8 @@ pub(super) fn furnished(seed: u64) -> Scene {
     scene
 }
 
-/// Floor, ceiling and walls; returns a place per wall, at the left end of its foot as one faces it
-/// from behind (so that `x` runs along it and `y` into the room).
+/// Adds floor, ceiling and walls. Returns one place per wall, with `x` along the wall and `y` into
+/// the room.
 fn shell(scene: &mut Scene) -> [Place; 4] {
     let [l, w, h] = scene.size;
     let wall = |origin, turn| Place { origin, turn };
@@ -53,7 +52,7 @@ fn shell(scene: &mut Scene) -> [Place; 4] {
     walls
 }
 
-/// Bookshelf, tall cabinet and a plant, in any order.
+/// Adds bookshelf, tall cabinet and plant in random order.
 fn storage_wall(scene: &mut Scene, wall: &Place, length: f64, draws: &mut Draws) {
     let widths = [draws.between(1.5, 1.9), draws.between(0.85, 1.1), draws.between(0.4, 0.5)];
     let starts = side_by_side(widths, 0.08, length - 0.08, draws);
@@ -66,7 +65,7 @@ fn storage_wall(scene: &mut Scene, wall: &Place, length: f64, draws: &mut Draws)
     piece::plant(scene, &wall.then([starts[2] + 0.5 * widths[2], 0.3, 0.0], [1.0, 0.0]), draws);
 }
 
-/// Sideboard with pictures above, door and floor lamp, in any order.
+/// Adds sideboard with pictures above it, door and floor lamp in random order.
 fn door_wall(scene: &mut Scene, wall: &Place, length: f64, draws: &mut Draws) {
     let widths = [draws.between(1.4, 1.8), 0.95, 0.45];
     let starts = side_by_side(widths, 0.08, length - 0.08, draws);
@@ -81,7 +80,7 @@ fn door_wall(scene: &mut Scene, wall: &Place, length: f64, draws: &mut Draws) {
     piece::floor_lamp(scene, &wall.then([starts[2] + 0.22, 0.28, 0.0], [1.0, 0.0]), draws);
 }
 
-/// Window, and a desk with its chair before it.
+/// Adds a window, and a desk with a chair in front of it.
 fn desk_wall(scene: &mut Scene, wall: &Place, length: f64, draws: &mut Draws) {
     let width = draws.between(1.2, 1.6);
     let start = draws.between(CORNER, length - CORNER - width);
@@ -91,11 +90,10 @@ fn desk_wall(scene: &mut Scene, wall: &Place, length: f64, draws: &mut Draws) {
     scene.begin_piece();
     piece::desk(scene, &place, width, draws);
     let chair = [0.5 * width, 0.95, 0.0];
-    // Half a turn (a half angle of 90 degrees) more: the sitter faces the desk.
+    // Turns the chair by 180 degrees (half angle 90 degrees), so that it faces the desk.
     piece::chair(scene, &place.then(chair, [-1.0, 0.0]), draws);
 }
 
-/// Sofa below pictures.
 fn sofa_wall(scene: &mut Scene, wall: &Place, length: f64, draws: &mut Draws) {
     let width = draws.between(1.7, 2.0);
     let start = draws.between(CORNER, length - CORNER - width);
@@ -106,7 +104,7 @@ fn sofa_wall(scene: &mut Scene, wall: &Place, length: f64, draws: &mut Draws) {
     piece::pictures(scene, &place, width, 1.3, draws);
 }
 
-/// Rug, table, chairs and a pendant lamp in the middle.
+/// Adds rug, table, chairs and pendant lamp in the middle.
 fn dining(scene: &mut Scene, size: [f64; 3], draws: &mut Draws) {
     let middle = Place {
         origin: [
@@ -122,7 +120,7 @@ fn dining(scene: &mut Scene, size: [f64; 3], draws: &mut Draws) {
     scene.begin_piece();
     piece::table(scene, &middle, length, depth, draws);
     for (x, side) in [(-0.25, -1.0), (0.25, -1.0), (-0.25, 1.0), (0.25, 1.0)] {
-        // Pushed in by a different amount and never quite straight.
+        // Chairs differ in distance and are not quite straight.
         let y = side * (0.5 * depth + draws.between(0.0, 0.22));
         let small = turn(draws.between(-0.12, 0.12));
         let towards = [-side * small[0], -side * small[1]];
@@ -137,8 +135,8 @@ fn straight(wall: &Place, x: f64) -> Place {
     wall.then([x, 0.0, 0.0], [1.0, 0.0])
 }
 
-/// Where pieces of these widths begin when they stand in random order between `from` and `to`, the
-/// free space split at random.
+/// Returns the starts of pieces with these widths, in random order and with random gaps between
+/// `from` and `to`.
 fn side_by_side(widths: [f64; 3], from: f64, to: f64, draws: &mut Draws) -> [f64; 3] {
     let slack = (to - from - widths.iter().sum::<f64>()).max(0.0);
     let gaps: [f64; 4] = std::array::from_fn(|_| 0.2 + draws.unit());

@@ -1,4 +1,4 @@
-//! Points on the surfaces as structure from motion finds them, with its noise and its mistakes.
+//! Sampling of surface points with the noise and the outliers of structure from motion.
 
 use super::purpose::{Purpose, draws};
 use super::surfaces::Scene;
@@ -12,15 +12,15 @@ pub const COINCIDENT_SHARE: f64 = 0.03;
 /// Share of points that lie far from any surface.
 pub const OUTLIER_SHARE: f64 = 0.015;
 
-/// Photos that must see a point.
+/// Minimum number of photos that see a point.
 const MIN_VIEWS: usize = 2;
 
-/// Tries per point; a scene in which this many fail is a mistake of ours, not of the seed.
+/// Maximum number of tries per point. If all fail, the scene has a bug.
 const MOST_TRIES: usize = 10_000;
 
-/// `n` points in random order: copies, outliers, and points on surfaces.
+/// Returns `n` points in random order: copies, outliers, and points on surfaces.
 pub(super) fn points(seed: u64, n: usize, scene: &Scene, cameras: &[Camera]) -> Vec<[f64; 3]> {
-    // A single point has nothing to be a copy of.
+    // A single point has no other to copy.
     let n_copies = if n < 2 { 0 } else { share(n, COINCIDENT_SHARE) };
     let n_outliers = share(n, OUTLIER_SHARE);
     let sources = Sources::new(seed, scene);
@@ -43,14 +43,14 @@ fn share(n: usize, share: f64) -> usize {
     (n as f64 * share).round() as usize
 }
 
-/// A true surface point and the photos that see it.
+/// A true surface point, and the photos that see it.
 struct Seen {
     point: [f64; 3],
     track: Track,
 }
 
-/// Triangulation error: along the viewing ray it grows with the square of the distance, across it
-/// linearly; one point in ten has a bad match among its views.
+/// Adds triangulation error. It grows quadratically with the distance along the viewing ray,
+/// linearly across it. One point in ten has a bad match.
 fn noisy(seen: Seen, draws: &mut Draws) -> [f64; 3] {
     let ray = sub(seen.point, seen.track.center);
     let distance = norm(ray);
@@ -62,11 +62,11 @@ fn noisy(seen: Seen, draws: &mut Draws) -> [f64; 3] {
     add(seen.point, add(depth, jitter))
 }
 
-/// A wrong match: beyond the room on a viewing ray, or anywhere within several rooms.
+/// Returns a wrong match: beyond the room on a viewing ray, or anywhere within several rooms.
 fn outlier(seen: Seen, scene: &Scene, draws: &mut Draws) -> [f64; 3] {
     if draws.unit() < 0.6 {
         let ray = sub(seen.point, seen.track.center);
-        // 1 / u has the heavy tail of depths from nearly parallel rays.
+        // 1 / u has a heavy tail, like depths from nearly parallel rays.
         let stretch = 1.8 / draws.between(0.3, 1.0);
         let reach = 1.0 + scene.size[0] * (0.3 + stretch) / norm(ray);
         return add(seen.track.center, scale(ray, reach));
@@ -74,7 +74,7 @@ fn outlier(seen: Seen, scene: &Scene, draws: &mut Draws) -> [f64; 3] {
     std::array::from_fn(|c| scene.size[c] * (0.5 + draws.between(-2.5, 2.5)))
 }
 
-/// Something that yields points: a surface, its outline, or a patch of texture on it.
+/// A source of points: a surface, its outline, or a textured patch.
 struct Source {
     surface: usize,
     kind: Kind,
@@ -98,7 +98,7 @@ impl Sources {
             let texture = surface.texture;
             let area = surface.area();
             let around = 2.0 * (norm(surface.u) + norm(surface.v));
-            // No two prints are alike: contrast varies from surface to surface.
+            // Contrast varies between surfaces.
             let contrast = 0.3 + 2.0 * draws.unit() * draws.unit();
             sources.push(index, Kind::Even, contrast * texture.even * area);
             sources.push(index, Kind::Outline, contrast * texture.outline * around);
@@ -118,7 +118,8 @@ impl Sources {
         self.0.push(Source { surface, kind, cumulated });
     }
 
-    /// A surface point that enough photos see; the more see it, the likelier.
+    /// Returns a visible surface point. The probability grows with the number of photos that see
+    /// it.
     fn seen_point(&self, scene: &Scene, cameras: &[Camera], draws: &mut Draws) -> Seen {
         let total = self.0.last().map_or(0.0, |s| s.cumulated);
         for _ in 0..MOST_TRIES {
@@ -149,7 +150,8 @@ impl Sources {
     }
 }
 
-/// `(s, t)` within some millimeters of the outline of a parallelogram with these sides.
+/// Returns a random `(s, t)` within some millimeters of the outline of a parallelogram with these
+/// side lengths.
 fn on_outline(u: f64, v: f64, draws: &mut Draws) -> (f64, f64) {
     let inset = draws.unit() * draws.unit() * 0.012;
     let far = draws.unit() < 0.5;

@@ -1,42 +1,42 @@
-//! Maps that are not rooms: simple shapes on which an attack must hold its own, too.
+//! Simple shapes as maps, for tests beyond rooms.
 //!
-//! Rooms are surfaces in all directions, with more points than neighbors by far. These are not: a line has one
-//! dimension, a cube three; clusters leave most of space empty; a lattice has neighbors at equal
-//! distances; of two densities no one length fits both.
+//! A room consists of surfaces in all directions. A line has one dimension, a cube three; clusters
+//! leave most of space empty; a lattice has neighbors at equal distances; two densities have no
+//! common length scale.
 
 use super::room;
 use super::sampling::COINCIDENT_SHARE;
 use crate::seed::{Draws, Stage};
 
-/// A shape of points.
+/// Shape of a map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Shape {
-    /// A straight line with a little noise.
+    /// Straight line with a little noise.
     Line,
-    /// A flat square with a little noise, askew to the axes.
+    /// Flat square with a little noise, not parallel to the axes.
     Plane,
-    /// The surface of a ball.
+    /// Surface of a ball.
     Sphere,
-    /// Evenly spread in a cube.
+    /// Uniform in a cube.
     Cube,
     /// Twenty clusters in a cube.
     Clusters,
-    /// Two clusters, one ten times as wide as the other, with as many points.
+    /// Two clusters with equally many points, one ten times as wide as the other.
     TwoDensities,
-    /// A cubic lattice, as much of it as there are points.
+    /// The first points of a cubic lattice.
     Lattice,
-    /// A room with 30 % of the points anywhere in a box twice as large.
+    /// Room with 30 % of the points anywhere in a box twice as large.
     RoomWithOutliers,
-    /// A room ten times as long as it was.
+    /// Room stretched to ten times its length.
     LongRoom,
-    /// A room whose points thin out with distance, as outdoors.
+    /// Room whose density falls with distance, as outdoors.
     Outdoors,
-    /// A corridor of rooms: a room and its copies in a row.
+    /// Furnished room.
     Room,
 }
 
 impl Shape {
-    /// All of them.
+    /// All shapes.
     pub const ALL: [Self; 11] = [
         Self::Line,
         Self::Plane,
@@ -51,7 +51,7 @@ impl Shape {
         Self::Room,
     ];
 
-    /// The name used on command lines.
+    /// Returns the name used on command lines.
     pub fn name(self) -> &'static str {
         match self {
             Self::Line => "line",
@@ -69,10 +69,10 @@ impl Shape {
     }
 }
 
-/// Noise of shapes, as a share of their size.
+/// Noise as a fraction of the size.
 const NOISE: f64 = 0.005;
 
-/// `n` points of `shape`, each about one unit to some meters in size. Every seed is another draw.
+/// Returns `n` points of `shape`, with a size from about one unit to some meters.
 ///
 /// ```
 /// use unlift::synthetic::{Shape, shape};
@@ -139,8 +139,8 @@ fn noisy(center: [f64; 3], sigma: f64, draws: &mut Draws) -> [f64; 3] {
     center.map(|x| x + sigma * draws.normal())
 }
 
-/// `n` keypoints of an image of `size` pixels: some evenly spread, most in clumps as corners of things are, a
-/// few of them twins.
+/// Returns `n` keypoints of an image of `size` pixels: some uniform, most in clusters, a few at the
+/// place of another keypoint.
 ///
 /// ```
 /// let keypoints = unlift::synthetic::keypoints(0, 200, [640.0, 480.0]);
@@ -154,7 +154,7 @@ pub fn keypoints(seed: u64, n: usize, size: [f64; 2]) -> Vec<[f64; 2]> {
     let mut keypoints: Vec<[f64; 2]> = Vec::with_capacity(n);
     while keypoints.len() < n {
         let point = match draws.unit() {
-            // A second orientation at the same place.
+            // Second keypoint at the same place.
             u if u < 4.0 * COINCIDENT_SHARE && !keypoints.is_empty() => {
                 keypoints[draws.below(keypoints.len() as u64) as usize]
             }

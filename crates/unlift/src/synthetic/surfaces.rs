@@ -1,9 +1,10 @@
-//! What a scene is made of: textured surfaces to sample, and boxes that hide what is behind them.
+//! Textured surfaces of a scene, and boxes that occlude them.
 
 use super::texture::{Outline, Surface, Texture};
 use super::vectors::{Turn, add, norm, rotate, scale, sub, turn};
 
-/// Where a piece stands: its own axes are right along a wall (x), into the room (y) and up (z).
+/// Position and rotation of a piece. Its axes are: right along a wall (x), into the room (y), up
+/// (z).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     pub(super) origin: [f64; 3],
@@ -11,24 +12,23 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// The place at `offset` of this one, turned further by `turn`.
+    /// Returns the place at `offset` in this one, rotated further by `turn`.
     pub(super) fn then(&self, offset: [f64; 3], turn: Turn) -> Self {
         let ([a, b], [c, d]) = (self.turn, turn);
         Self { origin: self.point(offset), turn: [a * c - b * d, b * c + a * d] }
     }
 
-    /// A point of the piece in the room.
+    /// Converts a point of the piece to the room's frame.
     pub(super) fn point(&self, p: [f64; 3]) -> [f64; 3] {
         add(self.origin, rotate(self.turn, p))
     }
 
-    /// A direction of the piece in the room.
+    /// Converts a direction of the piece to the room's frame.
     pub(super) fn direction(&self, v: [f64; 3]) -> [f64; 3] {
         rotate(self.turn, v)
     }
 }
 
-/// A box that hides what is behind it.
 #[derive(Clone, Copy, Debug)]
 struct Blocker {
     place: Place,
@@ -37,7 +37,7 @@ struct Blocker {
 }
 
 impl Blocker {
-    /// Whether the segment from `from` to `to` passes through the box.
+    /// Returns true if the segment from `from` to `to` intersects the box.
     fn blocks(&self, from: [f64; 3], to: [f64; 3]) -> bool {
         let back = [self.place.turn[0], -self.place.turn[1]];
         let start = rotate(back, sub(from, self.place.origin));
@@ -59,18 +59,18 @@ impl Blocker {
     }
 }
 
-/// Which faces of a block are worth sampling.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Faces {
     /// All but the bottom.
     Standing,
     /// All six.
     All,
-    /// The one into the room and the top: things that stand side by side.
+    /// Front and top, for objects side by side.
     FrontAndTop,
 }
 
-/// Surfaces and blockers of a room whose corner is the origin, walls along the axes.
+/// Surfaces and occluding boxes of a room. Its corner is the origin, and its walls are parallel to
+/// the axes.
 #[derive(Clone, Debug)]
 pub(super) struct Scene {
     /// Length, width and height in meters.
@@ -82,25 +82,24 @@ pub(super) struct Scene {
 }
 
 impl Scene {
-    /// An empty scene.
     pub(super) fn new(size: [f64; 3]) -> Self {
         Self { size, surfaces: Vec::new(), blockers: Vec::new(), n_pieces: 0, n_parts: 0 }
     }
 
-    /// What is added from here on belongs together and has one finish.
+    /// Starts a piece: surfaces added from here on have one piece number.
     pub(super) fn begin_piece(&mut self) {
         self.n_pieces += 1;
     }
 
-    /// Whether something stands between a camera and a surface point.
+    /// Returns true if a box occludes `point` from `camera`.
     pub(super) fn hides(&self, camera: [f64; 3], point: [f64; 3]) -> bool {
-        // Stop a centimeter short, so that a surface does not hide itself.
+        // The segment ends 1 cm before the point, so that a surface does not occlude itself.
         let ray = sub(camera, point);
         let to = add(point, scale(ray, 0.01 / norm(ray)));
         self.blockers.iter().any(|b| b.blocks(camera, to))
     }
 
-    /// Adds the parallelogram at `corner` of `place`, seen from the side of `u x v`.
+    /// Adds a parallelogram at `corner` of `place`, visible from the side of `u x v`.
     pub(super) fn sheet(
         &mut self,
         place: &Place,
@@ -112,7 +111,6 @@ impl Scene {
         self.outlined(place, corner, u, v, Outline::Full, texture);
     }
 
-    /// Adds a flat surface with an outline.
     pub(super) fn outlined(
         &mut self,
         place: &Place,
@@ -126,7 +124,7 @@ impl Scene {
         self.face(place, [corner, u, v], outline, texture);
     }
 
-    /// Adds a surface of the part at hand.
+    /// Adds a surface of the current part.
     fn face(
         &mut self,
         place: &Place,
@@ -145,7 +143,7 @@ impl Scene {
         });
     }
 
-    /// Adds a solid box between two corners, which hides what is behind it.
+    /// Adds a solid box between two corners that occludes what is behind it.
     pub(super) fn block(
         &mut self,
         place: &Place,
@@ -158,7 +156,7 @@ impl Scene {
         self.blockers.push(Blocker { place: *place, low, high });
     }
 
-    /// Adds the faces of a box that hides next to nothing: flat against something, or one of many.
+    /// Adds the faces of a box that occludes almost nothing.
     pub(super) fn shell(
         &mut self,
         place: &Place,
@@ -184,8 +182,8 @@ impl Scene {
         }
     }
 
-    /// Adds an upright tube of twelve sides around `middle` (of its foot), `radius` at the foot and
-    /// `top_radius` at the top.
+    /// Adds an upright tube of twelve sides around `middle` (of its foot), with `radius` at the
+    /// foot and `top_radius` at the top.
     pub(super) fn tube(
         &mut self,
         place: &Place,
@@ -202,7 +200,7 @@ impl Scene {
             let [x, y, _] = rotate(step, [on_circle[i - 1][0], on_circle[i - 1][1], 0.0]);
             on_circle[i] = [x, y];
         }
-        // The seams between the twelve sides are no edges that a detector would find.
+        // Edges between the twelve sides are not visible edges of the object.
         let side = Texture { outline: texture.outline / 8.0, ..texture };
         self.n_parts += 1;
         for pair in on_circle.windows(2) {
@@ -218,7 +216,7 @@ impl Scene {
         let corner = add(middle, [-top_radius, -top_radius, height]);
         let (u, v) = ([2.0 * top_radius, 0.0, 0.0], [0.0, 2.0 * top_radius, 0.0]);
         self.face(place, [corner, u, v], Outline::Ellipse, texture);
-        // The box inside the tube hides enough.
+        // A box inside the tube is a sufficient occluder.
         let inner = 0.7 * radius.max(top_radius);
         self.blockers.push(Blocker {
             place: *place,

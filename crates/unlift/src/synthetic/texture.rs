@@ -1,8 +1,8 @@
-//! What surfaces are like: what they are made of, what a feature detector finds on them, and their outline.
+//! Materials, textures and outlines of surfaces.
 
 use super::vectors::{Turn, add, cross, norm, rotate, scale, sub};
 
-/// What something is made of.
+/// Material of a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Material {
     /// Painted walls and ceilings.
@@ -25,26 +25,26 @@ pub enum Material {
     Glass,
 }
 
-/// A flat surface in a room, seen from the side of `u x v` alone.
+/// Flat surface in a room, visible only from the side of `u x v`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sheet {
-    /// One corner of the parallelogram, `(3,)`, in meters.
+    /// Corner of the parallelogram, `(3,)`, in meters.
     pub corner: [f64; 3],
-    /// Its one side.
+    /// First side.
     pub u: [f64; 3],
-    /// Its other side.
+    /// Second side.
     pub v: [f64; 3],
-    /// Whether it is the ellipse in the parallelogram only.
+    /// If true, only the ellipse within the parallelogram.
     pub round: bool,
-    /// What it is made of.
+    /// Material.
     pub material: Material,
-    /// The piece of furniture that it belongs to; what a table stands with has the same.
+    /// Number of the piece of furniture. A table and its chairs share one.
     pub piece: u32,
-    /// The thing that it is a side of: a book, a board.
+    /// Number of the object, such as a book or a board.
     pub part: u32,
 }
 
-/// How many points a surface attracts, in relative numbers: what a feature detector finds there.
+/// Relative density of the features that a detector finds on a surface.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Texture {
     pub(super) material: Material,
@@ -68,36 +68,26 @@ impl Texture {
         Self { material, even, outline, patches, per_patch, patch_radius }
     }
 
-    /// Painted walls and ceilings.
     pub(super) const PAINT: Self = Self::new(Material::Paint, [1.5, 2.5, 0.4, 16.0, 0.03]);
-    /// Smooth furniture: mostly its edges are seen.
     pub(super) const SMOOTH: Self = Self::new(Material::Smooth, [10.0, 18.0, 1.5, 22.0, 0.025]);
-    /// Grained wood.
     pub(super) const WOOD: Self = Self::new(Material::Wood, [22.0, 24.0, 7.0, 36.0, 0.03]);
-    /// Floor boards.
     pub(super) const FLOOR: Self = Self::new(Material::Boards, [5.0, 3.0, 1.5, 24.0, 0.04]);
-    /// Upholstery.
     pub(super) const FABRIC: Self = Self::new(Material::Fabric, [45.0, 14.0, 8.0, 50.0, 0.035]);
-    /// Woven patterns: rugs, cushions.
     pub(super) const PATTERN: Self = Self::new(Material::Pattern, [150.0, 50.0, 26.0, 80.0, 0.035]);
-    /// Printed things: spines, covers, pictures, packages.
     pub(super) const PRINT: Self = Self::new(Material::Print, [2_100.0, 70.0, 150.0, 26.0, 0.016]);
-    /// Leaves.
     pub(super) const LEAVES: Self = Self::new(Material::Leaves, [2_000.0, 150.0, 0.0, 0.0, 0.02]);
-    /// Glass and screens: next to nothing but the frame.
     pub(super) const GLASS: Self = Self::new(Material::Glass, [6.0, 60.0, 0.0, 0.0, 0.02]);
 }
 
-/// The outline of a flat surface within its parallelogram.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Outline {
-    /// The whole parallelogram.
+    /// Whole parallelogram.
     Full,
-    /// The ellipse that touches the middle of each edge.
+    /// Ellipse that touches the middle of each edge.
     Ellipse,
 }
 
-/// A flat surface that is seen from the side of its normal, `u x v`.
+/// Flat surface, visible from the side of its normal `u x v`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Surface {
     pub(super) corner: [f64; 3],
@@ -110,12 +100,12 @@ pub(super) struct Surface {
 }
 
 impl Surface {
-    /// The point at `(s, t)`, both 0 to 1.
+    /// Returns the point at `(s, t)`, both 0 to 1.
     pub(super) fn at(&self, s: f64, t: f64) -> [f64; 3] {
         add(self.corner, add(scale(self.u, s), scale(self.v, t)))
     }
 
-    /// Whether `(s, t)` lies on the surface.
+    /// Returns true if `(s, t)` lies on the surface.
     pub(super) fn holds(&self, s: f64, t: f64) -> bool {
         let within = (0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t);
         match self.outline {
@@ -127,7 +117,7 @@ impl Surface {
         }
     }
 
-    /// As seen in a frame whose origin is `middle`, turned by `turn`.
+    /// Returns the surface in a frame with the origin `middle`, rotated by `turn`.
     pub(super) fn in_frame(&self, middle: [f64; 3], turn: Turn) -> Sheet {
         Sheet {
             corner: rotate(turn, sub(self.corner, middle)),
@@ -140,18 +130,17 @@ impl Surface {
         }
     }
 
-    /// The unit normal.
     pub(super) fn normal(&self) -> [f64; 3] {
         let n = cross(self.u, self.v);
         scale(n, 1.0 / norm(n))
     }
 
-    /// Square meters.
+    /// Returns the area in square meters.
     pub(super) fn area(&self) -> f64 {
         let full = norm(cross(self.u, self.v));
         match self.outline {
             Outline::Full => full,
-            // pi / 4, of which three digits are enough for a density.
+            // pi / 4; three digits are enough for a density.
             Outline::Ellipse => 0.785 * full,
         }
     }

@@ -1,16 +1,16 @@
-//! A map of any size from a small one, to measure speed and memory on.
+//! Maps of any size made from a small one, for measurements of speed and memory.
 
 use crate::geometry::vector::quantile;
 use crate::seed::{Draws, Stage};
 
-/// Jitter in shares of a tile's longest side: copies differ, neighborhoods stay as they are.
+/// Jitter as a fraction of a tile's longest side: copies differ, neighborhoods do not.
 const JITTER: f64 = 1e-3;
-/// Shares of the points below and above which a tile's sides do not count: outliers.
+/// Share of points at each end that a tile's sides ignore as outliers.
 const TAIL: f64 = 0.01;
 
-/// `n_points` points like those of `base`: a random part of it, or copies side by side on a square
-/// along the two longest sides, each but the first with a jitter of its own. Density, and with it
-/// the distance to the K-th neighbor, is that of `base`; memory access is that of a large map.
+/// Returns `n_points` points: a random part of `base`, or copies of it side by side on a square
+/// along its two longest sides. Each copy has its own jitter. Density and distance to the K-th
+/// neighbor equal those of `base`.
 pub fn tiled(base: &[[f64; 3]], n_points: usize, seed: u64) -> Vec<[f64; 3]> {
     let n = base.len();
     if n == 0 {

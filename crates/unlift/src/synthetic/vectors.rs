@@ -1,51 +1,50 @@
-//! Vectors of three, and turns about `z`, by exact arithmetic and square roots alone.
+//! Vectors of three, and rotations about `z`, with exact arithmetic and square roots only.
 
-/// Cosine and sine of a turn about `z`.
+/// Cosine and sine of a rotation about `z`.
 pub(super) type Turn = [f64; 2];
 
-/// The turn whose half angle has the tangent `t`: exact arithmetic in place of `sin` and `cos`,
-/// which differ between platforms.
+/// Returns the rotation whose half angle has the tangent `t`. `sin` and `cos` differ between
+/// platforms, this does not.
 pub(super) fn turn(t: f64) -> Turn {
     let norm = 1.0 + t * t;
     [(1.0 - t * t) / norm, 2.0 * t / norm]
 }
 
-/// `v` turned about `z`.
 pub(super) fn rotate([cos, sin]: Turn, v: [f64; 3]) -> [f64; 3] {
     [cos * v[0] - sin * v[1], sin * v[0] + cos * v[1], v[2]]
 }
 
-/// a + b.
+/// Returns a + b.
 pub fn add(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|c| a[c] + b[c])
 }
 
-/// a - b.
+/// Returns a - b.
 pub fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|c| a[c] - b[c])
 }
 
-/// s a.
+/// Returns s a.
 pub fn scale(a: [f64; 3], s: f64) -> [f64; 3] {
     a.map(|x| x * s)
 }
 
-/// The dot product.
+/// Returns the dot product.
 pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// The length.
+/// Returns the length.
 pub fn norm(a: [f64; 3]) -> f64 {
     dot(a, a).sqrt()
 }
 
-/// a x b.
+/// Returns a x b.
 pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// `a` at length 1.
+/// Returns `a` scaled to length 1.
 pub fn unit(a: [f64; 3]) -> [f64; 3] {
     scale(a, 1.0 / norm(a))
 }

@@ -1,35 +1,34 @@
-//! Who sees what: a walk of handheld cameras, and the views of a surface point.
+//! Cameras on a walk through the room, and their views of surface points.
 
 use super::purpose::{Purpose, draws};
 use super::surfaces::Scene;
 use super::texture::Surface;
 use super::vectors::{dot, norm, scale, sub};
 
-/// Where a photo was taken, in meters.
+/// Camera of a photo, in meters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// The center of projection.
+    /// Center of projection.
     pub center: [f64; 3],
-    /// The viewing direction, of unit length.
+    /// Viewing direction, of unit length.
     pub look: [f64; 3],
 }
 
-/// Photos of one walk.
 const N_CAMERAS: usize = 72;
 
 /// Cosine of half the field of view (about 35 degrees).
 const HALF_FIELD_COSINE: f64 = 0.82;
 
-/// A surface seen flatter than this (cosine to its normal) yields no features.
+/// Minimum cosine between viewing ray and normal for features to be found.
 const FLATTEST_COSINE: f64 = 0.22;
 
-/// Photos searched for a point: a point that this many candidates do not see is not triangulated.
+/// Maximum number of candidate photos that are tested per point.
 const MOST_CANDIDATES: usize = 16;
 
-/// Views from which on more make no difference.
+/// Number of views from which on more make no difference.
 pub(super) const MANY_VIEWS: usize = 6;
 
-/// A closed walk around the middle of the room, looking across it and at the walls by turns.
+/// Returns a closed walk around the middle of the room.
 pub(super) fn walk(seed: u64, scene: &Scene) -> Vec<Camera> {
     let mut draws = draws(seed, Purpose::Walk, 0);
     let [length, width, _] = scene.size;
@@ -43,7 +42,7 @@ pub(super) fn walk(seed: u64, scene: &Scene) -> Vec<Camera> {
                 middle[1] + across * y + draws.between(-0.12, 0.12),
                 draws.between(1.25, 1.75),
             ];
-            // Across the room two times of three, else at the nearest wall.
+            // Two of three photos look across the room, the third at the nearest wall.
             let sign = if i % 3 == 2 { 1.0 } else { -1.0 };
             let aim = [
                 sign * x * length + draws.between(-1.5, 1.5),
@@ -56,7 +55,7 @@ pub(super) fn walk(seed: u64, scene: &Scene) -> Vec<Camera> {
         .collect()
 }
 
-/// The point at share `t` of the way around the square of half side 1.
+/// Returns the point at share `t` of the way around the square of half side 1.
 fn on_square(t: f64) -> [f64; 2] {
     let side = t * 4.0;
     let at = 2.0 * (side - side.floor()) - 1.0;
@@ -68,16 +67,16 @@ fn on_square(t: f64) -> [f64; 2] {
     }
 }
 
-/// The photos that see a point: how many, and where a typical one was taken.
+/// Views of a point: their number, and the center of one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Track {
-    /// Photos that see the point among the first candidates, counted up to [`MANY_VIEWS`].
+    /// Number of photos among the candidates that see the point, at most [`MANY_VIEWS`].
     pub(super) n_views: usize,
-    /// Center of one of them.
+    /// Center of the first photo that sees the point.
     pub(super) center: [f64; 3],
 }
 
-/// The views of `point` on `surface`; candidates are taken from photo `first` on, around the walk.
+/// Finds the views of `point` on `surface`. Candidates start at photo `first` and follow the walk.
 pub(super) fn track(
     scene: &Scene,
     cameras: &[Camera],

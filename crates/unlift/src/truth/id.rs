@@ -1,4 +1,4 @@
-//! The index of an original as a type, so that it cannot be mixed up with a slot or a record.
+//! Index of an original as a type, so that it cannot be confused with a slot or a record.
 
 /// A row of the original points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
@@ -6,16 +6,16 @@
 pub struct OriginalId(pub u32);
 
 impl OriginalId {
-    /// The id as an array index.
+    /// Returns the id as an array index.
     #[inline(always)]
     pub fn index(self) -> usize {
         self.0 as usize
     }
 
-    /// The id of row `index`.
+    /// Returns the id of row `index`.
     ///
     /// # Panics
-    /// When `index` does not fit 32 bits; sizes are checked where points enter ([`crate::PointSet`]).
+    /// When `index` exceeds 32 bits. [`crate::PointSet`] checks sizes, so this does not happen.
     #[inline(always)]
     pub fn from_index(index: usize) -> Self {
         Self(u32::try_from(index).expect("sizes are checked where points enter"))

@@ -1,6 +1,5 @@
-//! The owner's side: what recovery must never see.
-//!
-//! Only the owner opens it: the attacker's crate, `unlift-attack`, does not know this one.
+//! Ground truth: originals and secrets, for the owner only. The attacker's crate, `unlift-attack`,
+//! does not depend on this one.
 
 mod id;
 mod original;

@@ -1,10 +1,10 @@
-//! The original points, behind one grep-able call.
+//! Original points, accessible only through `reveal`, which is easy to search for.
 
 use crate::geometry::frame::Bounds;
 use crate::{Error, PointSet};
 
-/// The true points of a map. They must be opened with [`reveal`](Self::reveal), and recovery takes
-/// no argument from which they can be reached:
+/// The true points of a map. Only [`reveal`](Self::reveal) returns them, and recovery takes no
+/// argument that contains them:
 ///
 /// ```compile_fail
 /// use unlift::{recover, truth::Original};
@@ -19,16 +19,16 @@ pub struct Original<const D: usize> {
 }
 
 impl<const D: usize> Original<D> {
-    /// Declares `points` to be the truth.
+    /// Creates ground truth from `points`.
     pub fn new(points: PointSet<D>) -> Self {
         Self { points, bounds: None }
     }
 
-    /// Declares `points`, all of them within `bounds`, to be the truth: the keypoints of an image of
-    /// known size. Unlike the points, the bounds are no secret.
+    /// Creates ground truth from the keypoints of an image of known size. All `points` must lie
+    /// within `bounds`, which are not secret.
     ///
     /// # Errors
-    /// When a point lies outside.
+    /// When a point lies outside `bounds`.
     pub fn within(points: PointSet<D>, bounds: Bounds<D>) -> Result<Self, Error> {
         if let Some(row) = points.positions().iter().position(|point| !bounds.contains(point)) {
             let expected = format!("between {:?} and {:?}", bounds.low, bounds.high);
@@ -38,22 +38,22 @@ impl<const D: usize> Original<D> {
         Ok(Self { points, bounds: Some(bounds) })
     }
 
-    /// The box that is known to hold every point (of an image), if there is one. Not a secret.
+    /// Returns the public bounds of the points (of an image), if known.
     pub fn bounds(&self) -> Option<Bounds<D>> {
         self.bounds
     }
 
-    /// The points. Called on the owner's side only: obfuscation, oracle, evaluation.
+    /// Returns the points. Only obfuscation, oracle and evaluation call this.
     pub fn reveal(&self) -> &PointSet<D> {
         &self.points
     }
 
-    /// Number of points (not a secret: the released map tells it).
+    /// Returns the number of points. It is not secret, because the released map reveals it.
     pub fn len(&self) -> usize {
         self.points.len()
     }
 
-    /// Whether there are no points.
+    /// Returns true if there are no points.
     pub fn is_empty(&self) -> bool {
         self.points.is_empty()
     }

@@ -1,28 +1,28 @@
-//! What an obfuscation hides: which original sits in which slot, and by which choice.
+//! The secret of an obfuscation: the original in each slot, and random choices of the scheme.
 
 use crate::{Error, Fingerprint, OriginalId};
 
-/// Why a scheme's rule left a point out of the released map.
+/// Reason why a scheme left a point out of the released map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum DropReason {
-    /// The odd one out of a pairing.
+    /// One point remains in a pairing of an odd number.
     OddPoint,
-    /// Its only partners lie at the same place, so no line is defined.
+    /// All possible partners lie at the same place, so no line is defined.
     CoincidentPair,
-    /// Its line stayed within the local surface after all re-pairings (`ppl+`).
+    /// Its line stayed within the local surface in all re-pairings (`ppl+`).
     RejectedPair,
-    /// It lies on a center of a ray cloud or an anchor of an image, so its ray has no direction.
+    /// It lies on the center of a ray cloud or the anchor of an image, so its ray has no direction.
     OnCenter,
-    /// A scheme of somebody else left it out, for a reason of its own.
+    /// A custom scheme left it out.
     Other,
 }
 
 impl DropReason {
-    /// Every reason.
+    /// All reasons.
     pub const ALL: [DropReason; 5] =
         [Self::OddPoint, Self::CoincidentPair, Self::RejectedPair, Self::OnCenter, Self::Other];
 
-    /// The name used in files and reports.
+    /// Returns the name used in files and reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::OddPoint => "odd_point",
@@ -33,22 +33,22 @@ impl DropReason {
         }
     }
 
-    /// The reason called `name`, if there is one.
+    /// Returns the reason called `name`, if there is one.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|reason| reason.name() == name)
     }
 }
 
-/// A point that is in no record, and why.
+/// A point that is in no record, and the reason.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Dropped {
     /// The point.
     pub original: OriginalId,
-    /// Why it was left out.
+    /// Reason why it was left out.
     pub reason: DropReason,
 }
 
-/// The secret of one obfuscation: per slot the original it hides and the choices made for it.
+/// The secret of one obfuscation: the original in each slot and the choices for it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Secret {
     hidden: Vec<OriginalId>,
@@ -61,9 +61,11 @@ pub struct Secret {
 }
 
 impl Secret {
-    /// Columns over slots: `hidden` (the original in each slot), `swapped_axis` (`cp` only),
-    /// `descriptor_row` (the released descriptor row that belongs to the slot), and the dropped points. Records are
-    /// taken to hide two points each where a descriptor row is not its slot's own.
+    /// Creates a secret from columns over slots: `hidden` (the original in each slot),
+    /// `swapped_axis` (`cp` only) and `descriptor_row` (the released descriptor row of each slot),
+    /// and the dropped points.
+    ///
+    /// Records are assumed to hide two points each if any descriptor row differs from its slot.
     ///
     /// # Errors
     /// When columns differ in length, or an original is neither in exactly one slot nor dropped
@@ -95,7 +97,7 @@ impl Secret {
                 Some(seen @ false) => *seen = true,
                 Some(_) => {
                     let what = format!("original {}", id.0);
-                    return Err(Error::new(what, "one slot or one drop", "two"));
+                    return Err(Error::new(what, "in one slot or dropped once", "two entries"));
                 }
                 None => {
                     let expected = format!("originals below {n_originals}");
@@ -106,7 +108,7 @@ impl Secret {
         if let Some(missing) = seen.iter().position(|seen| !seen) {
             return Err(Error::new(
                 format!("original {missing}"),
-                "one slot or one drop",
+                "in one slot or dropped once",
                 "neither",
             ));
         }
@@ -124,17 +126,17 @@ impl Secret {
         })
     }
 
-    /// The same secret, of the released map `map` whose records hide `slots_per_record` points each.
+    /// Sets the released map and the number of points per record.
     ///
     /// # Errors
-    /// When slots do not fill the records, or a record's descriptor rows are not its own.
+    /// When slots do not fill the records, or a record's descriptor rows belong to another record.
     pub fn of_map(self, map: Option<Fingerprint>, slots_per_record: usize) -> Result<Self, Error> {
         let whole = slots_per_record > 0 && self.n_slots().is_multiple_of(slots_per_record);
         if !whole {
             let expected = format!("a number that divides {} slots", self.n_slots());
             return Err(Error::new("slots per record", expected, slots_per_record.to_string()));
         }
-        // Rows that are not a record's own, or twice, would join positions with strangers.
+        // A wrong or repeated row would join positions with unrelated points.
         for (record, rows) in self.descriptor_row.chunks(slots_per_record).enumerate() {
             let is_own = |row: u32| row as usize / slots_per_record == record;
             let wrong = |at: &usize| !is_own(rows[*at]) || rows[..*at].contains(&rows[*at]);
@@ -147,44 +149,43 @@ impl Secret {
         Ok(Self { map, slots_per_record, ..self })
     }
 
-    /// The released map that this is the secret of; `None` where it is not known.
+    /// Returns the fingerprint of the released map; `None` if unknown.
     pub fn map(&self) -> Option<Fingerprint> {
         self.map
     }
 
-    /// Hidden points per record.
+    /// Returns the number of hidden points per record.
     pub fn slots_per_record(&self) -> usize {
         self.slots_per_record
     }
 
-    /// Number of slots.
+    /// Returns the number of slots.
     pub fn n_slots(&self) -> usize {
         self.hidden.len()
     }
 
-    /// Number of original points, dropped ones included.
+    /// Returns the number of original points, including dropped ones.
     pub fn n_originals(&self) -> usize {
         self.n_originals
     }
 
-    /// The original in each slot.
+    /// Returns the original in each slot.
     pub fn hidden(&self) -> &[OriginalId] {
         &self.hidden
     }
 
-    /// Per slot the axis whose coordinate was exchanged (`cp` only).
+    /// Returns the axis of each slot whose coordinate was exchanged (`cp` only).
     pub fn swapped_axis(&self) -> Option<&[u8]> {
         self.swapped_axis.as_deref()
     }
 
-    /// Per slot the released descriptor row that belongs to its point.
+    /// Returns the released descriptor row of each slot.
     pub fn descriptor_row(&self) -> &[u32] {
         &self.descriptor_row
     }
 
-    /// The same secret with slots counted as descriptor rows are: slot `s` hides the point of
-    /// descriptor row `s`. Which slot of a record comes first is arbitrary; who makes lists from
-    /// descriptors counts this way, having no other.
+    /// Returns the secret with slots in the order of descriptor rows: slot `s` hides the point of
+    /// descriptor row `s`. Lists made from descriptors have this order.
     #[must_use]
     pub fn by_descriptor_row(&self) -> Self {
         let mut by_row = self.clone();
@@ -199,8 +200,8 @@ impl Secret {
         by_row
     }
 
-    /// The same secret with the points of two slots exchanged wherever `exchange` says so of the first
-    /// slot of a pair.
+    /// Returns the secret with the two points of a record exchanged if `exchange` returns true for
+    /// the record's first slot.
     #[must_use]
     pub fn exchanged(&self, exchange: impl Fn(usize) -> bool) -> Self {
         let mut exchanged = self.clone();
@@ -211,7 +212,7 @@ impl Secret {
         exchanged
     }
 
-    /// Points that are in no record.
+    /// Returns the points that are in no record.
     pub fn dropped(&self) -> &[Dropped] {
         &self.dropped
     }

@@ -1,11 +1,11 @@
-//! How much must come back: two points below what did.
+//! Floors of recovered shares: two points below the measured ones.
 
 use unlift::recover::Builtin;
 
-/// The columns of a [`Floor`].
+/// Columns of a [`Floor`].
 pub const SOLVERS: [Builtin; 3] = [Builtin::Joint, Builtin::Consensus, Builtin::Ransac];
 
-/// A scheme, an inlier ratio, and per solver the least percentages within 10 and 25 cm.
+/// A scheme, an inlier ratio, and for each solver the minimum percentages within 10 and 25 cm.
 pub type Floor = (&'static str, f64, [[f64; 2]; 3]);
 
 /// `synthetic::room(1, 4_000)`, K = 20.

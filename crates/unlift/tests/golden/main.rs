@@ -1,5 +1,5 @@
-//! What comes back, held against what came back before: of a furnished room made by code, so that every clone tests
-//! something, and of a real map where it is at hand. Everything automatic, seed 0.
+//! Golden tests of recovered shares: on a synthetic room, and on a real map if it is present. All
+//! options are automatic; the seed is 0.
 
 mod floors;
 
@@ -14,8 +14,8 @@ use unlift::{PointSet, Unit};
 const POINTS: &str =
     concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/redkitchen/model/points3D.bin");
 
-/// The points of a COLMAP `points3D.bin`, by ascending id. The core reads no formats (the crate
-/// `unlift-io` does); these few lines keep its tests free of it.
+/// Reads the points of a COLMAP `points3D.bin`, by ascending id. The core must not depend on the
+/// readers in `unlift-io`.
 fn colmap_points(bytes: &[u8]) -> Vec<[f64; 3]> {
     let u64_at = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
     let mut points = Vec::new();
@@ -31,7 +31,7 @@ fn colmap_points(bytes: &[u8]) -> Vec<[f64; 3]> {
     points.into_iter().map(|(_, position)| position).collect()
 }
 
-/// The map, or a message that the test is skipped.
+/// Returns the map, or prints that the test is skipped.
 fn redkitchen() -> Option<Vec<[f64; 3]>> {
     let Ok(bytes) = std::fs::read(Path::new(POINTS)) else {
         eprintln!("skipped: the data set redkitchen is not beside the repository");
@@ -42,7 +42,6 @@ fn redkitchen() -> Option<Vec<[f64; 3]>> {
     Some(points)
 }
 
-/// A row per cell of `floors`, by every solver.
 fn rows(points: Vec<[f64; 3]>, k: usize, floors: &[Floor]) -> Vec<Row> {
     let original = Original::new(PointSet::try_new(points, Unit::Meter).unwrap());
     let mut ratios: Vec<f64> = floors.iter().map(|&(_, ratio, _)| ratio).collect();
@@ -60,7 +59,7 @@ fn rows(points: Vec<[f64; 3]>, k: usize, floors: &[Floor]) -> Vec<Row> {
     rows
 }
 
-/// Every row stands on its floor. What was found is printed as the floors are written.
+/// Checks every row against its floor. Prints the results in the form of the floors.
 fn stand(rows: &[Row], floors: &[Floor]) {
     let mut missed = Vec::new();
     for &(scheme, ratio, least) in floors {
@@ -98,8 +97,8 @@ fn a_real_map_comes_back_as_far_as_before() {
     ransac_is_no_straw_man(&rows);
 }
 
-/// The paper's loop is within two points of consensus where half of the entries and more are right, but for `cp`, whose
-/// axis its vote fails to tell, and `ray-voxel`.
+/// Checks that `ransac` is within two points of `consensus` at inlier ratios from 0.5 on.
+/// Exceptions: `cp`, where its vote on the axis fails, and `ray-voxel`.
 fn ransac_is_no_straw_man(rows: &[Row]) {
     let mut missed = Vec::new();
     let judged =

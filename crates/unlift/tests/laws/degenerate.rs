@@ -1,4 +1,5 @@
-//! Inputs that fix nothing: a status, never a NaN, never a panic.
+//! Properties of recovery from inputs that determine no points: a status, never a NaN, never a
+//! panic.
 
 use std::collections::BTreeSet;
 
@@ -12,7 +13,7 @@ use unlift::seed::{Draws, Stage};
 
 use crate::maps::*;
 
-/// The solvers that read lists; deltas from absurdly small to absurdly large.
+/// Returns the solvers that read lists, with extremely small and large deltas.
 fn harsh_options() -> Vec<Options> {
     let mut options = all_options();
     for solver in Builtin::FROM_LISTS {
@@ -24,7 +25,8 @@ fn harsh_options() -> Vec<Options> {
     options
 }
 
-/// Per slot the records that it lists or that list its own: whom joint recovery asks.
+/// Returns for each slot the records that it lists or that list its own, as joint recovery uses
+/// them.
 fn both_ways<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
@@ -40,7 +42,7 @@ fn both_ways<const D: usize>(
     rows
 }
 
-/// Solves with all options and checks what a result may look like; returns the statuses.
+/// Solves with all options and checks the results. Returns the statuses.
 fn statuses<const D: usize>(
     what: &str,
     released: &Released<D>,
@@ -101,7 +103,8 @@ fn short_lists<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
         let lists = hidden.lists_of(&(0..n).map(row).collect::<Vec<_>>());
         let what = format!("{name}, lists of {length}");
         let got = statuses(&what, &hidden.released, &lists, &harsh_options());
-        // Joint recovery also asks who lists a record: lists of one may make two.
+        // Joint recovery uses lists in both directions, so a slot with a list of one may have two
+        // neighbors.
         let both_ways = [Builtin::Joint, Builtin::JointStart];
         let by_lists = |options: &Options| !both_ways.contains(&options.0) || length == 0;
         let told = harsh_options().iter().flat_map(|o| vec![by_lists(o); n]).collect::<Vec<_>>();
@@ -124,7 +127,7 @@ fn coincident_maps<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     }
 }
 
-/// Every record lists every other one.
+/// Returns lists in which every record lists all others.
 fn everyone<const D: usize>(obfuscation: Obfuscation<D>) -> (Released<D>, Neighborhoods) {
     let n = obfuscation.len();
     let rows: Vec<Vec<u32>> =

@@ -1,4 +1,4 @@
-//! Attacks on the records alone: what must hold for them besides the laws of degenerate maps.
+//! Properties of attacks on the records alone, in addition to those of degenerate maps.
 
 use unlift::neighbors::{Neighborhoods, geometric};
 use unlift::obfuscate::{Entry, scheme};
@@ -19,12 +19,14 @@ fn alone<const D: usize>(released: &Released<D>, solver: Builtin) -> Recovered<D
     solve(released, &empty_lists(released), (solver, RecoverOptions::default()))
 }
 
-/// The furnished room, denser than the one other laws use: crowds are what these attacks see.
+/// Returns a furnished room, denser than in other property tests, because these attacks depend on
+/// density.
 fn furnished(n: usize) -> Vec<[f64; 3]> {
     unlift::synthetic::room(1, n).points
 }
 
-/// The share of points within `reach`, in percent; a paired line's two positions are one set.
+/// Returns the percentage of points within `reach`. The two positions of a paired line are compared
+/// as a set.
 fn percent_within(hidden: &Hidden<3>, recovered: &Recovered<3>, reach: f64) -> f64 {
     let off = |at: usize, slot: usize| {
         let point = hidden.original.reveal().positions()[hidden.secret.hidden()[slot].index()];
@@ -68,7 +70,8 @@ fn density_determinism() {
     over_schemes!(threads_change_no_byte);
 }
 
-/// Points on a wall, lines in all directions: the wall comes back (67.2 and 67.8 %; tomography 68 or 69 over six other keys).
+/// Points on a wall are recovered from random lines (67.2 and 67.8 %; tomography 68 or 69 with six
+/// other keys).
 #[test]
 fn a_wall_comes_back_from_random_lines() {
     let mut draws = Draws::new(2, Stage::Synthetic, 0);
@@ -81,8 +84,8 @@ fn a_wall_comes_back_from_random_lines() {
     }
 }
 
-/// Floors: shares within 25 cm, two points below what comes back or less. Nobody published an attack on candidates, and
-/// none is made up.
+/// Floors are shares within 25 cm, at most two points below the measured ones. No attack on
+/// candidates is published, so none is tested.
 #[test]
 fn a_room_comes_back_from_its_records() {
     let floors = [
@@ -118,8 +121,8 @@ fn a_scaled_map_has_the_same_shares() {
         for solver in ALONE {
             let one = percent_within(&one, &alone(&one.released, solver), 0.25);
             let other = percent_within(&other, &alone(&other.released, solver), 7.3 * 0.25);
-            // Records are rounded to f32 after scaling: a sample on the border of two voxels may change sides. Two of
-            // 1,500 points; none today.
+            // Records are rounded to `f32` after scaling, so a sample on the border of two voxels
+            // may change sides. The tolerance is two of 1,500 points; measured: 0.
             assert!((one - other).abs() <= 0.14, "{name}, {solver:?}: {one} and {other}");
         }
     }
@@ -147,7 +150,7 @@ fn permuted_records_give_permuted_positions() {
     }
 }
 
-/// Lists hold far more neighbors than chance would, are full and leave out rays of the own center.
+/// Lists contain far more neighbors than by chance, are full, and exclude rays of the same center.
 #[test]
 fn geometric_lists_hold_neighbors() {
     let points = furnished(3000);
@@ -167,7 +170,7 @@ fn geometric_lists_hold_neighbors() {
     }
 }
 
-/// Maps that fix little or nothing: a status, never a NaN, never a panic.
+/// Maps that determine little or nothing: a status, never a NaN, never a panic.
 fn odd_maps_are_answered<const D: usize>(name: &str, scheme: &Entry) {
     let far = [vec![[1e6; D]; 3], uniform(1, 60)].concat();
     let maps = [piles(3, 1, 40, 0.0), piles(3, 2, 40, 1e-7), uniform(3, 2), uniform(3, 9), far];

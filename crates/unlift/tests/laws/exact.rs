@@ -1,4 +1,4 @@
-//! Laws of exact constraints: what they fix is right, from both sides, and nothing else moves.
+//! Properties of exact constraints: fixed coordinates are correct, and no others move.
 
 use unlift::obfuscate::scheme;
 use unlift::recover::{Builtin, RecoverOptions, Recovered};
@@ -20,7 +20,7 @@ fn options(exact_constraints: bool) -> Options {
     (Builtin::Joint, options)
 }
 
-/// The share of slots within `most` of the truth.
+/// Returns the share of slots within `most` of ground truth.
 fn share(hidden: &Hidden<3>, recovered: &Recovered<3>, most: f64) -> f64 {
     let n = hidden.released.n_slots();
     let off = |slot: usize| {
@@ -46,8 +46,8 @@ fn exchanged_coordinates_come_back_exactly_and_none_is_lost() {
     assert_eq!(with.axis(), without.axis());
 }
 
-/// Where the assignment moved a slot, its coordinate is one that another slot publishes on that axis, and
-/// that slot has this one's: pairs, never chains.
+/// If a slot takes a coordinate that another slot publishes on that axis, the other slot takes the
+/// coordinate of this one.
 #[test]
 fn who_takes_a_coordinate_gives_its_own() {
     let hidden = hidden("cp", 1.0);
@@ -63,7 +63,7 @@ fn who_takes_a_coordinate_gives_its_own() {
     assert!(moved.len() > n / 20 && moved.len() < n);
     let value = |slot: usize| with.positions()[slot][usize::from(axis[slot])].to_bits();
     let gives = |slot: usize| records.position()[slot][usize::from(axis[slot])].to_bits();
-    // Of all slots: one that was there to the bit already, on a wall at a round coordinate, has not moved.
+    // All slots count: a slot whose estimate was exact already has not moved.
     let mut given: Vec<_> = (0..n).map(|s| (axis[s], gives(s), value(s))).collect();
     given.sort_unstable();
     let count = |sorted: &[(u8, u32, u32)], x: &(u8, u32, u32)| {
@@ -78,8 +78,8 @@ fn who_takes_a_coordinate_gives_its_own() {
     }
 }
 
-/// The grid's start is not published: it is found from the estimates, and then no recovered point
-/// lies clearly within a voxel of the other center.
+/// The grid's start is not published and is found from the estimates. Then no recovered point lies
+/// clearly within a voxel of the other center.
 #[test]
 fn recovered_rays_end_in_voxels_of_their_center() {
     let hidden = hidden("ray-voxel", 1.0);
@@ -92,7 +92,8 @@ fn recovered_rays_end_in_voxels_of_their_center() {
         let low = points.iter().map(|p| p[c]).fold(f64::INFINITY, f64::min);
         low - hidden.released.origin()[c] - 0.5 * edge
     });
-    // Walls are found up to where the estimates lie: this share of a voxel counts as on the wall.
+    // Voxel borders are found only as precisely as the estimates. Points within this share of a
+    // voxel count as on the border.
     const SLACK: f64 = 0.03;
     let clearly_wrong = |recovered: &Recovered<3>| {
         let wrong = |slot: &usize| {
@@ -135,7 +136,7 @@ fn threads_change_nothing_and_scale_hardly_anything() {
     }
 }
 
-/// Without the rule there is nothing to find: rays whose centers were drawn stay as they are.
+/// Without voxels there is no rule: rays with randomly chosen centers do not change.
 #[test]
 fn rays_without_voxels_stay_where_they_are() {
     let hidden = hide::<3>(scheme("ray").unwrap(), &room(5, 500), 5);

@@ -1,6 +1,6 @@
-//! The stored form is free of truth: with pairing, centers, planes and grids held
-//! fixed, moving an original along its own record changes no stored byte. Axis candidates are
-//! exempt: the hidden value is published on the partner.
+//! Released data is independent of the hidden value: if pairs, centers, planes and grids are fixed,
+//! moving an original along its own record changes no stored byte. Axis candidates are exempt,
+//! because the partner publishes the hidden value.
 
 use proptest::prelude::*;
 use unlift::Error;
@@ -49,12 +49,13 @@ fn a_ray_forgets_its_range<const D: usize>(seed: u64, n: usize) {
     }
 }
 
-/// Whether all that `scheme` makes of points stays the same when every point keeps the coordinate of its plane only.
+/// Returns true if the result of `scheme` does not change when every point keeps only the
+/// coordinate of its plane.
 fn keeps_one_coordinate(scheme: &dyn Scheme<3>, seed: u64) -> bool {
     let (points, others) = (uniform::<3>(seed, 60), uniform::<3>(seed ^ 1, 60));
     let lift = |points: &[[f64; 3]]| {
         let lifted = scheme.lift(points, None, &Key::from_seed(seed)).unwrap();
-        // All fields, whatever they are: bytes written here would be those that are known.
+        // The debug output contains all fields, including those added later.
         (format!("{lifted:?}"), lifted.obfuscation)
     };
     let (said, Obfuscation::AxisPlanes(planes)) = lift(&points) else { panic!("planes") };
@@ -68,7 +69,7 @@ fn keeps_one_coordinate(scheme: &dyn Scheme<3>, seed: u64) -> bool {
     lift(&moved).0 == said
 }
 
-/// `plane`, but the order of two coordinates decides the axis.
+/// `plane` with a leak: the order of two coordinates decides the axis.
 #[derive(Debug)]
 struct Telling;
 
@@ -115,7 +116,7 @@ proptest! {
     }
 }
 
-/// A point close to its own foot is where a shortcut of the normal form could show.
+/// Points close to their own foot, where a shortcut of the normal form could leak.
 #[test]
 fn lines_forget_points_near_the_foot() {
     let mut draws = Draws::new(1, Stage::Synthetic, 9);
@@ -132,7 +133,7 @@ fn lines_forget_points_near_the_foot() {
     }
 }
 
-/// Two points nearly one unit apart are where a shortcut of normalization could show.
+/// Points nearly one unit apart, where a shortcut of normalization could leak.
 #[test]
 fn directions_forget_lengths_near_one() {
     let mut draws = Draws::new(1, Stage::Synthetic, 10);
@@ -151,8 +152,8 @@ fn directions_forget_lengths_near_one() {
     }
 }
 
-/// Two clouds, each symmetric about its middle: moving opposite points by the same factor leaves
-/// the mean, and with it the centers of a ray cloud, where they are.
+/// Returns two clouds, each symmetric about its middle. If opposite points move by the same factor,
+/// the mean and the centers of a ray cloud do not change.
 fn symmetric_clouds<const D: usize>(seed: u64) -> Vec<[f64; D]> {
     let mut draws = Draws::new(seed, Stage::Synthetic, 11);
     let mut points = Vec::new();
@@ -166,10 +167,10 @@ fn symmetric_clouds<const D: usize>(seed: u64) -> Vec<[f64; D]> {
     points
 }
 
-/// End to end: obfuscate, move one original (or an opposite pair) along its record, obfuscate again.
+/// Obfuscates, moves one original (or an opposite pair) along its record, and obfuscates again.
 fn moving_along_the_record_changes_no_byte<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     let points = symmetric_clouds::<D>(seed);
-    // One voxel holds everything: the grid is fixed.
+    // One voxel contains all points, so the grid is fixed.
     let voxel = 1e3;
     let before = try_hide::<D>(scheme, &points, voxel, seed).unwrap();
     let origin = before.released.origin();
@@ -183,7 +184,7 @@ fn moving_along_the_record_changes_no_byte<const D: usize>(name: &str, scheme: &
         let by = draws.between(0.6, 1.4);
         match before.released.obfuscation() {
             Obfuscation::Lines(lines) if before.released.slots_per_record() == 1 => {
-                // The exact direction: what a scheme of single lines draws for a point.
+                // The exact direction that a scheme of single lines draws for the point.
                 let direction =
                     Key::from_seed(seed).draws(Stage::Scheme, id as u64).direction::<D>();
                 let stored = lines.direction()[slot].map(f64::from);
@@ -198,7 +199,7 @@ fn moving_along_the_record_changes_no_byte<const D: usize>(name: &str, scheme: &
                 moved[id] = along(&partner, by, &sub(&points[id], &partner));
             }
             Obfuscation::Rays(rays) if rays.regions().is_some() => {
-                // Anchors do not follow the points.
+                // Anchors do not depend on the points.
                 let center = rays.centers()[usize::from(rays.center()[slot])].map(f64::from);
                 let center = std::array::from_fn(|c| center[c] + origin[c]);
                 moved[id] = along(&center, by, &sub(&points[id], &center));

@@ -1,5 +1,5 @@
-//! Released columns that must tell nothing of the truth, by statistics over many keys: the order of records, of slots and of
-//! list entries, choices drawn at random, the last bits of rounded numbers.
+//! Statistical tests of leaks over many keys: the order of records, slots and list entries, random
+//! choices, and the last bits of rounded numbers must not correlate with ground truth.
 
 use unlift::geometry::frame::Bounds;
 use unlift::obfuscate::Entry;
@@ -9,15 +9,17 @@ use crate::maps::*;
 
 const KEYS: u64 = 60;
 const POINTS: usize = 150;
-/// Deviations of the mean over all keys that chance does not reach: 3 in 10 million, of some hundred statistics.
+/// Limit of the mean over all keys in standard deviations. Chance exceeds it in 6 of 10 million
+/// cases; there are some hundred statistics.
 const MOST: f64 = 5.0;
 
-/// A pair of columns and how they go together, over many keys.
+/// Correlations of released columns with ground truth, over many keys.
 #[derive(Default)]
 struct Together(Vec<(String, f64, usize)>);
 
 impl Together {
-    /// Adds the correlation of `told` with `truth`, in its deviations by chance: 1 / sqrt(n - 1), whatever the values are.
+    /// Adds the correlation of `told` with `truth` in standard deviations, 1 / sqrt(n - 1) for any
+    /// values.
     fn add(&mut self, what: String, told: &[f64], truth: &[f64]) {
         let Some(deviations) = correlation(told, truth) else { return };
         match self.0.iter_mut().find(|(name, ..)| *name == what) {
@@ -26,7 +28,7 @@ impl Together {
         }
     }
 
-    /// The columns that go together more than by chance.
+    /// Returns the columns that correlate more than by chance.
     fn telling(&self) -> Vec<(&str, f64)> {
         let of_mean =
             |(name, sum, n): &'_ (String, f64, usize)| (name.clone(), sum / (*n as f64).sqrt());
@@ -35,7 +37,7 @@ impl Together {
     }
 }
 
-/// `None` where a column is constant.
+/// Returns the correlation; `None` if a column is constant.
 fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
     let n = a.len() as f64;
     let centered = |values: &[f64]| -> Vec<f64> {
@@ -48,12 +50,11 @@ fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
     (scale > 1e-12 * n).then(|| product(&a, &b) / scale * (n - 1.0).sqrt())
 }
 
-/// The last bit of a released number.
 fn last_bit(x: f32) -> f64 {
     f64::from(x.to_bits() & 1)
 }
 
-/// What is released of a record that is drawn at random or a remnant of rounding, by name.
+/// Returns the released values of a record that are random or result from rounding, by name.
 fn drawn<const D: usize>(scheme: &str, records: &Obfuscation<D>, at: usize) -> Vec<(String, f64)> {
     let bits = |what: &'static str, row: &[f32; D]| -> Vec<(String, f64)> {
         (0..D).map(|c| (format!("last bit of {what} {c}"), last_bit(row[c]))).collect()
@@ -64,7 +65,7 @@ fn drawn<const D: usize>(scheme: &str, records: &Obfuscation<D>, at: usize) -> V
         }
         Obfuscation::Rays(rays) => {
             let mut told = bits("direction", &rays.direction()[at]);
-            // Elsewhere the place decides which center it is.
+            // In other schemes the position decides the center.
             if scheme == "ray" {
                 told.push(("center".to_owned(), f64::from(rays.center()[at])));
             }
@@ -81,11 +82,11 @@ fn drawn<const D: usize>(scheme: &str, records: &Obfuscation<D>, at: usize) -> V
 fn columns_tell_nothing<const D: usize>(name: &str, scheme: &Entry) {
     let mut together = Together::default();
     for key in 0..KEYS {
-        // Other points with every key: last bits of points are what they are.
+        // Points differ for every key, because last bits depend on the points.
         let points = room::<D>(key, POINTS);
         let hidden = hide(scheme, &points, 1_000 + key);
         let per = hidden.released.slots_per_record();
-        // The truth of a record is that of its first slot.
+        // Each record is compared with the original of its first slot.
         let slots: Vec<usize> =
             (0..hidden.released.n_records()).map(|record| record * per).collect();
         let original = |slot: &usize| f64::from(hidden.secret.hidden()[*slot].0);
@@ -115,7 +116,7 @@ fn columns_tell_nothing<const D: usize>(name: &str, scheme: &Entry) {
             }
         }
         if per == 2 {
-            // Which of a record's two points comes first: told by nothing that orders points.
+            // The order of a record's two slots must not depend on the order of its points.
             let first: Vec<f64> = slots
                 .iter()
                 .map(|&slot| if original(&slot) < original(&(slot + 1)) { 1.0 } else { -1.0 })
@@ -151,14 +152,15 @@ fn released_columns_tell_nothing_of_the_truth() {
     over_schemes!(columns_tell_nothing);
 }
 
-/// What the law above would say of a scheme that forgot to shuffle, or rounded toward its point.
+/// Two schemes with leaks, one without shuffling and one with biased rounding, must fail the test
+/// above.
 #[test]
 fn what_tells_is_found() {
     let points = room::<3>(8, POINTS);
     let column = |c: usize| -> Vec<f64> { points.iter().map(|p| p[c]).collect() };
     let box_of = Bounds::quantiles(&points, 0.0).unwrap();
     let middle = (box_of.low[0] + box_of.high[0]) / 2.0;
-    // One in four records has a bit that says on which side its point lies.
+    // One in four records has a bit that depends on the side of its point.
     let bit = |at: usize| {
         if at.is_multiple_of(4) { f64::from(points[at][0] > middle) } else { (at / 4 % 2) as f64 }
     };

@@ -1,6 +1,5 @@
-//! Laws as property tests over all schemes (STYLE.md, habit 13): one body per law, run on every row
-//! of the registry, in every dimension it is defined for. A scheme is tested the moment it is
-//! registered; nobody writes copies per scheme.
+//! Property tests over all schemes (STYLE.md, rule 13): each runs on every entry of the registry,
+//! in every dimension of the scheme. New schemes are tested automatically.
 
 /// Runs `law(name, scheme, arguments..)` on every scheme in every dimension.
 macro_rules! over_schemes {

@@ -1,4 +1,4 @@
-//! Maps, lists and bytes that the laws share.
+//! Maps, lists and bytes for property tests.
 
 use proptest::prelude::ProptestConfig;
 use proptest::test_runner::RngSeed;
@@ -13,11 +13,12 @@ use unlift::truth::{Original, Secret};
 use unlift::{About, Error, PointSet, RecordId, RowOrder, Unit};
 pub use unlift_testkit::{distance_to_record, dot, norm, piles, room, uniform};
 
-/// What the cases of property tests are drawn from, unless other ones are asked for.
 const SEED: u64 = 25;
 
-/// Few cases, the same in every run; with `UNLIFT_RANDOM_TESTS=1` others in every run, as many as `PROPTEST_CASES` says, and
-/// with `PROPTEST_RNG_SEED` those of that seed. A failure prints its arguments and leaves no file.
+/// Returns the configuration of property tests: `n` cases, equal in every run.
+///
+/// With `UNLIFT_RANDOM_TESTS=1` cases differ in every run; `PROPTEST_CASES` sets their number and
+/// `PROPTEST_RNG_SEED` their seed. A failure prints its arguments and writes no file.
 pub fn cases(n: u32) -> ProptestConfig {
     let asked = ProptestConfig::default();
     let is_set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
@@ -31,14 +32,14 @@ pub fn cases(n: u32) -> ProptestConfig {
     }
 }
 
-/// A hidden map with everything around it.
+/// A released map with its ground truth.
 pub struct Hidden<const D: usize> {
     pub original: Original<D>,
     pub released: Released<D>,
     pub secret: Secret,
 }
 
-/// The image that `points` are keypoints of: whole voxels around them.
+/// Returns image bounds around `points`, in whole voxels.
 fn image<const D: usize>(points: &[[f64; D]], voxel: f64) -> Bounds<D> {
     let column = |c: usize| points.iter().map(move |p| p[c]);
     let low = |c: usize| column(c).fold(f64::INFINITY, f64::min).min(f64::MAX);
@@ -52,7 +53,7 @@ fn image<const D: usize>(points: &[[f64; D]], voxel: f64) -> Bounds<D> {
     }
 }
 
-/// Hides `points` with voxels of `voxel`; in the plane they are keypoints of an image.
+/// Hides `points` with voxels of size `voxel`. In 2D they are keypoints of an image.
 pub fn try_hide<const D: usize>(
     scheme: &Entry,
     points: &[[f64; D]],
@@ -69,41 +70,41 @@ pub fn try_hide<const D: usize>(
     Ok(Hidden { original, released, secret })
 }
 
-/// [`try_hide`] with half-meter voxels.
+/// Calls [`try_hide`] with half-meter voxels.
 pub fn hide<const D: usize>(scheme: &Entry, points: &[[f64; D]], seed: u64) -> Hidden<D> {
     try_hide(scheme, points, 0.5, seed).unwrap()
 }
 
 impl<const D: usize> Hidden<D> {
-    /// The original of `slot`, about the released origin.
+    /// Returns the original of `slot`, relative to the released origin.
     pub fn local(&self, slot: usize) -> [f64; D] {
         let point = self.original.reveal().positions()[self.secret.hidden()[slot].index()];
         std::array::from_fn(|c| point[c] - self.released.origin()[c])
     }
 
-    /// True neighborhoods of size `k`.
+    /// Returns the true neighborhoods of size `k`.
     pub fn near(&self, k: usize) -> TrueNeighbors {
         let search = oracle::search(&self.original).unwrap();
         TrueNeighbors::new(&search, &self.secret, self.released.slots_per_record(), k).unwrap()
     }
 
-    /// Oracle lists.
+    /// Returns lists of the oracle.
     pub fn lists(&self, k: usize, inlier_ratio: f64, seed: u64) -> Neighborhoods {
         self.near(k).at_inlier_ratio(inlier_ratio, seed).unwrap()
     }
 
-    /// Lists as given, row by row.
+    /// Returns the given lists, row by row.
     pub fn lists_of(&self, rows: &[Vec<u32>]) -> Neighborhoods {
         lists_of(rows, self.released.n_records(), self.released.slots_per_record())
     }
 
-    /// The distance of `point` (about the origin) from the feasible set of `record`.
+    /// Returns the distance of `point` (relative to the origin) to the feasible set of `record`.
     pub fn distance(&self, record: usize, point: &[f64; D]) -> f64 {
         distance_to_record(self.released.obfuscation(), record, point)
     }
 }
 
-/// Lists as given, row by row, in any order.
+/// Returns the given lists, row by row, in any order.
 pub fn lists_of(rows: &[Vec<u32>], n_records: usize, slots_per_record: usize) -> Neighborhoods {
     let mut offsets = vec![0];
     let mut records = Vec::new();
@@ -115,7 +116,7 @@ pub fn lists_of(rows: &[Vec<u32>], n_records: usize, slots_per_record: usize) ->
     lists.unwrap().with_about(About { map: None, order: RowOrder::Slots, ..About::default() })
 }
 
-/// Uniformly random lists of `k` records: neighborhoods that tell nothing.
+/// Returns uniformly random lists of `k` records.
 pub fn random_lists<const D: usize>(hidden: &Hidden<D>, k: usize, seed: u64) -> Neighborhoods {
     let (n, per) = (hidden.released.n_records(), hidden.released.slots_per_record());
     let row = |slot: usize| {
@@ -132,15 +133,15 @@ pub fn random_lists<const D: usize>(hidden: &Hidden<D>, k: usize, seed: u64) -> 
     hidden.lists_of(&(0..hidden.released.n_slots()).map(row).collect::<Vec<_>>())
 }
 
-/// A solver and how it works.
+/// A solver with its options.
 pub type Options = (Builtin, RecoverOptions);
 
-/// Joint recovery as it is by default.
+/// Returns joint recovery with default options.
 pub fn joint() -> Options {
     (Builtin::Joint, RecoverOptions::default())
 }
 
-/// The solvers that read lists, both ways to choose delta.
+/// Returns the solvers that read lists, with automatic and fixed delta.
 pub fn all_options() -> Vec<Options> {
     let mut options = Vec::new();
     for solver in Builtin::FROM_LISTS {
@@ -151,7 +152,7 @@ pub fn all_options() -> Vec<Options> {
     options
 }
 
-/// Recovery that must not fail.
+/// Runs recovery, which must not fail.
 pub fn solve<const D: usize>(
     released: &Released<D>,
     lists: &Neighborhoods,
@@ -160,12 +161,11 @@ pub fn solve<const D: usize>(
     recover(released, lists, &solver, &options).unwrap()
 }
 
-/// Bits of rows of floats.
 fn push_rows<const D: usize>(bytes: &mut Vec<u8>, rows: &[[f32; D]]) {
     bytes.extend(rows.as_flattened().iter().flat_map(|x| x.to_bits().to_le_bytes()));
 }
 
-/// Every stored bit of a family of records.
+/// Returns every stored bit of a family of records.
 pub fn record_bytes<const D: usize>(obfuscation: &Obfuscation<D>) -> Vec<u8> {
     let mut bytes = Vec::new();
     match obfuscation {
@@ -187,7 +187,7 @@ pub fn record_bytes<const D: usize>(obfuscation: &Obfuscation<D>) -> Vec<u8> {
     bytes
 }
 
-/// Every bit of a released map (without descriptors).
+/// Returns every bit of a released map, without descriptors.
 pub fn released_bytes<const D: usize>(released: &Released<D>) -> Vec<u8> {
     let mut bytes = record_bytes(released.obfuscation());
     bytes.extend(released.origin().iter().flat_map(|x| x.to_bits().to_le_bytes()));
@@ -195,7 +195,7 @@ pub fn released_bytes<const D: usize>(released: &Released<D>) -> Vec<u8> {
     bytes
 }
 
-/// Every bit of a recovered map.
+/// Returns every bit of a recovered map.
 pub fn recovered_bytes<const D: usize>(recovered: &Recovered<D>) -> Vec<u8> {
     let mut bytes = recovered.delta().to_bits().to_le_bytes().to_vec();
     push_rows(&mut bytes, recovered.positions());

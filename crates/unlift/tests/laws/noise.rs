@@ -1,4 +1,4 @@
-//! Laws of the oracle's noise models, on maps of one and of two points per record.
+//! Properties of the oracle's noise models, for records with one and with two points.
 
 use std::collections::BTreeSet;
 
@@ -34,7 +34,7 @@ impl Oracle {
         self.near.lists(ratio, &self.outliers(noise, seed), seed).unwrap()
     }
 
-    /// All other records of a slot, the nearest first, by looking at every point.
+    /// Returns all other records of a slot, nearest first, by brute force.
     fn by_nearness(&self, slot: usize) -> Vec<RecordId> {
         let points = self.hidden.original.reveal().positions();
         let per = self.hidden.released.slots_per_record();
@@ -110,7 +110,7 @@ fn near_outliers_lie_between_the_2k_th_and_the_10k_th_nearest() {
                 ranks.insert(rank);
             }
         }
-        // The whole ring is drawn from, to both ends.
+        // Outliers come from the whole range of ranks.
         assert!(ranks.len() > 7 * K, "{} of {} ranks", ranks.len(), 8 * K);
     }
 }
@@ -121,7 +121,7 @@ fn clustered_outliers_are_shared_by_neighbors_and_lie_in_two_far_places() {
         let oracle = Oracle::new(scheme);
         let nearest = oracle.near.at_inlier_ratio(1.0, 2).unwrap();
         let per = oracle.hidden.released.slots_per_record();
-        // The share of a slot's outliers that a slot on its nearest listed records lists, too.
+        // Share of a slot's outliers that a slot on its nearest listed records lists, too.
         let shared = |noise: Noise| {
             let lists = oracle.lists(noise, 0.0, 2);
             let (mut both, mut all) = (0, 0);
@@ -140,7 +140,7 @@ fn clustered_outliers_are_shared_by_neighbors_and_lie_in_two_far_places() {
         };
         let (clustered, uniform) = (shared(Noise::Clustered), shared(Noise::Uniform));
         assert!(clustered > 0.5 && uniform < 0.25, "{clustered:.2} {uniform:.2}");
-        // Twenty records, K about either place, serve a patch: its lists hold no others.
+        // All outliers of a patch are the K records near either of two places.
         let lists = oracle.lists(Noise::Clustered, 0.0, 2);
         let mut far = 0;
         for slot in (0..lists.n_slots()).step_by(41) {
@@ -149,7 +149,7 @@ fn clustered_outliers_are_shared_by_neighbors_and_lie_in_two_far_places() {
             far += usize::from(lists.of(slot).iter().filter(|r| rank(r) >= 2 * K).count() == K);
         }
         let slots = lists.n_slots().div_ceil(41);
-        // A record of a pair may be near by its other point.
+        // A record of a pair may be near because of its other point.
         assert!(10 * far >= 8 * slots, "{far} of {slots}");
     }
 }

@@ -1,4 +1,4 @@
-//! Consensus in parts, each with its own lists alone, gives what it gives at once, bit for bit.
+//! Consensus in parts, each with only its own lists, gives byte-identical results.
 
 use unlift::neighbors::Neighborhoods;
 use unlift::obfuscate::Entry;
@@ -7,17 +7,15 @@ use unlift::released::Obfuscation;
 
 use crate::maps::*;
 
-/// Everything else as usual.
 const CONSENSUS: RecoverOptions =
     RecoverOptions { delta: Delta::Auto, seed: 0, exact_constraints: true, confidence: false };
 
-/// Where slots are cut: parts of all sizes, one of them empty, none at the end of a chunk.
+/// Returns parts of different sizes, one of them empty; none ends at the end of a chunk.
 fn cuts(n: usize) -> Vec<std::ops::Range<usize>> {
     let at = [0, n / 7, n / 7, n / 3 + 1, n - 1, n];
     at.windows(2).map(|pair| pair[0]..pair[1]).collect()
 }
 
-/// Each part with its own lists alone: nothing of the others is there.
 fn lists_of_others_change_nothing<const D: usize>(name: &str, scheme: &Entry) {
     let hidden = hide::<D>(scheme, &room(61, 500), 6);
     let lists = hidden.lists(15, 0.5, 6);
@@ -103,7 +101,7 @@ fn other_bytes_are_no_model() {
     }
     assert!(Model::<3>::from_bytes(&[&bytes[..], &[0]].concat()).is_err());
     assert!(Model::<2>::from_bytes(&bytes).is_err());
-    // A broken byte is an error or another model, but no panic.
+    // A broken byte gives an error or another model, but no panic.
     for at in 0..80 {
         let mut broken = bytes.clone();
         broken[at] ^= 0xff;

@@ -1,20 +1,20 @@
-//! Golden bytes: a change here changes every published figure. The numbers hold on every platform,
-//! since only exact operations and a portable logarithm feed them. A change on purpose is blessed by
-//! copying what the failing test prints, and shows in the diff.
+//! Golden bytes: a change here changes every published figure. They hold on every platform, because
+//! only exact operations and a portable logarithm are used. After an intended change, copy the
+//! output of the failing test.
 
 use unlift::obfuscate::{Entry, SCHEMES};
 use unlift::recover::{Builtin, Delta, RecoverOptions, recover};
 
 use crate::maps::*;
 
-/// FNV-1a, 64 bits.
+/// Hashes `bytes` with 64-bit FNV-1a.
 fn hash(bytes: &[u8]) -> u64 {
     bytes
         .iter()
         .fold(0xCBF2_9CE4_8422_2325, |h, &b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01B3))
 }
 
-/// (scheme, hash of the released map, hash of what consensus makes of it).
+/// (Scheme, hash of the released map, hash of its recovery by consensus).
 const PINS: &[(&str, u64, u64)] = &[
     ("olc", 0xf4c87654de904dd7, 0x56234fb2c8707356),
     ("ppl", 0x1e1970c5753fd1e8, 0x9bf32ecf478ec42c),
@@ -47,7 +47,7 @@ fn bytes_are_pinned() {
     assert!(found == PINS, "the bytes are now\n{}", printed.join("\n"));
 }
 
-/// (scheme, dimensions, hash of what joint recovery makes of it with everything on automatic).
+/// (Scheme, dimension, hash of joint recovery with automatic options).
 const JOINT: &[(&str, usize, u64)] = &[
     ("olc", 3, 0x12ace5151c708ef2),
     ("ppl", 3, 0xbed8cc3ed2969408),
@@ -68,8 +68,8 @@ fn joint_bytes<const D: usize>(entry: &Entry) -> (&'static str, usize, u64) {
     (entry.name, D, hash(&recovered_bytes(&recovered)))
 }
 
-/// Joint recovery with delta on automatic runs through nearly all of `recover`: delta, consensus, graph, law,
-/// rounds and exact constraints.
+/// Joint recovery with automatic delta covers nearly all of `recover`: delta, consensus, graph,
+/// distribution of neighbors, iterations and exact constraints.
 #[test]
 fn bytes_of_joint_recovery_are_pinned() {
     let mut found = Vec::new();
@@ -83,7 +83,7 @@ fn bytes_of_joint_recovery_are_pinned() {
     assert!(found == JOINT, "the bytes are now\n{}", printed.join("\n"));
 }
 
-/// (scheme, hash of how sure the attacker is of each point).
+/// (Scheme, hash of the confidence of each point).
 const SURE: &[(&str, u64)] = &[
     ("olc", 0x89c24f02502d4f1c),
     ("ppl", 0xb5aaae98eeeba3a5),
@@ -92,7 +92,7 @@ const SURE: &[(&str, u64)] = &[
     ("cp", 0xd71c546c5895710b),
 ];
 
-/// On a map large enough for it to be said.
+/// The map is large enough for confidence to be known.
 #[test]
 fn bytes_of_confidence_are_pinned() {
     let points = room::<3>(2028, 2100);
@@ -109,7 +109,7 @@ fn bytes_of_confidence_are_pinned() {
     assert!(found == SURE, "the bytes are now\n{}", printed.join("\n"));
 }
 
-/// (solver, scheme, hash of what it makes of it).
+/// (Solver, scheme, hash of the recovery).
 const BASELINES: &[(&str, &str, u64)] = &[
     ("joint-start", "olc", 0xaf63f5032f96a9d9),
     ("joint-start", "ppl", 0x46e1864ebd342411),
@@ -142,7 +142,7 @@ fn bytes_of_other_solvers_are_pinned() {
             let hidden = hide(unlift::obfuscate::scheme(name).unwrap(), &points, 0);
             let options = RecoverOptions { seed: 4, ..RecoverOptions::default() };
             let lists = hidden.lists(20, 0.5, 0);
-            // Not every attack on records alone knows every family.
+            // Some attacks on records alone do not support every family.
             let Ok(recovered) = recover(&hidden.released, &lists, &solver, &options) else {
                 continue;
             };

@@ -1,4 +1,4 @@
-//! What a released map holds: containment, normal form, shape, determinism.
+//! Properties of released maps: points on records, normal form, shape, determinism.
 
 use proptest::prelude::*;
 use unlift::evaluate::{away_from_own, belongs};
@@ -10,7 +10,7 @@ use unlift::{PointSet, Unit};
 
 use crate::maps::*;
 
-/// Records are stored in `f32`: a few units in the last place of the largest coordinate involved.
+/// Records are stored in `f32`: a few units in the last place of the largest coordinate.
 const F32: f64 = 5e-7;
 
 /// Each original lies on its record; for axis candidates also on the line of the exchanged axis.
@@ -43,7 +43,6 @@ fn originals_lie_on_their_records<const D: usize>(
     }
 }
 
-/// Normalizing what is stored changes no bit.
 fn normal_form_is_idempotent<const D: usize>(name: &str, scheme: &Entry, n: usize, seed: u64) {
     let hidden = hide::<D>(scheme, &room(seed, n), seed);
     let stored = hidden.released.obfuscation();
@@ -67,7 +66,7 @@ fn normal_form_is_idempotent<const D: usize>(name: &str, scheme: &Entry, n: usiz
     assert!(record_bytes(stored) == record_bytes(&again), "{name}: normal form is not stable");
 }
 
-/// Every original has one slot or one reason; records are full; nothing else is released.
+/// Every original has one slot or one reason. Records are full, and nothing else is released.
 fn every_original_is_accounted_for<const D: usize>(
     name: &str,
     scheme: &Entry,
@@ -76,7 +75,7 @@ fn every_original_is_accounted_for<const D: usize>(
 ) {
     let hidden = match try_hide::<D>(scheme, points, 0.5, seed) {
         Ok(hidden) => hidden,
-        // Too few points is bad input, in one line that names it.
+        // Too few points are an error.
         Err(error) => {
             assert!(points.len() < 2, "{name} refuses {} points: {error}", points.len());
             return;
@@ -100,7 +99,6 @@ fn every_original_is_accounted_for<const D: usize>(
     }
 }
 
-/// The same seed gives the same bytes on any number of threads.
 fn threads_change_no_byte<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     let points = room(seed, 700);
     let run = || {
@@ -124,7 +122,6 @@ fn threads_change_no_byte<const D: usize>(name: &str, scheme: &Entry, seed: u64)
     assert!(one == on(2) && one == on(8), "{name}: threads changed a byte");
 }
 
-/// Another seed hides differently.
 fn seeds_matter<const D: usize>(name: &str, scheme: &Entry) {
     let points = room(1, 200);
     let bytes = |seed| released_bytes(&hide::<D>(scheme, &points, seed).released);
@@ -165,7 +162,7 @@ fn determinism() {
     over_schemes!(seeds_matter);
 }
 
-/// Each is as near to the record of any other as to its own, but for rounding.
+/// Every point is equally near to all records up to rounding.
 #[test]
 fn points_that_fall_together_belong_to_their_map() {
     let together = vec![[1.3, 0.7, 2.1]; 200];
@@ -185,7 +182,7 @@ fn a_truth_in_another_frame_is_not_that_of_the_map() {
         let (released, secret) = (&hidden.released, &hidden.secret);
         assert!(belongs(&hidden.original, released, secret).is_ok(), "{name}");
         assert!(belongs(&moved, released, secret).is_err(), "{name}");
-        // A point lies on its record, but for rounding.
+        // A point lies on its record up to rounding.
         let away = away_from_own(released, &hidden.original, secret);
         assert!(away.iter().all(|&away| away < 1e-4), "{name}");
     }

@@ -1,4 +1,4 @@
-//! What recovery does with lists: exact limit, bounded influence, order, hidden input.
+//! Properties of recovery from lists: exact limit, bounded influence, order of entries, inputs.
 
 use proptest::prelude::*;
 use unlift::neighbors::Neighborhoods;
@@ -10,10 +10,11 @@ use unlift::{PointSet, RecordId, Unit};
 
 use crate::maps::*;
 
-/// How well the listed records fix a point on the slot's own: the sine of the best angle under which
-/// one of them crosses it, which rounding of the records is divided by; 1 where coordinates are
-/// read off. `None` when they fix none: fewer than `least` records of another center or of an axis,
-/// or a published point that explains the neighbors itself, so that every axis does.
+/// Returns how well the listed records determine a point on the slot's own record: the sine of the
+/// best crossing angle, by which rounding errors are divided, or 1 if coordinates are read off.
+///
+/// Returns `None` if they do not determine it: fewer than `least` records of another center or
+/// axis, or a published point that explains the neighbors itself, such that every axis does.
 fn fixed_by<const D: usize>(
     hidden: &Hidden<D>,
     slot: usize,
@@ -46,7 +47,7 @@ fn fixed_by<const D: usize>(
             let published = candidates.position()[own].map(f64::from);
             let local = hidden.local(slot);
             let off = norm(&std::array::from_fn::<f64, D, _>(|c| published[c] - local[c]));
-            // Neighbors exchanged on the same axis agree with the published point too.
+            // Neighbors exchanged on the same axis agree with the published point, too.
             let there = listed().filter(|&r| hidden.distance(r, &published) <= 2.0 * delta).count();
             let clear = off > 2.0 * delta && 3 * there <= listed().count();
             (listed().count() >= least && clear).then_some(1.0)
@@ -54,12 +55,12 @@ fn fixed_by<const D: usize>(
     }
 }
 
-/// If all of a slot's neighbors hide at its original and their records fix a point, recovery
-/// returns it within rounding.
+/// If all neighbors of a slot hide at its original and their records determine a point, recovery
+/// returns it up to rounding.
 fn exact_limit<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     const COPIES: usize = 16;
-    // Piles are nearer than the delta of exchanged coordinates may be in a map of few points (85 of 480 are fixed in one of 30): there
-    // the law holds in a larger one.
+    // In a small map the delta of exchanged coordinates may exceed the distance between piles (85
+    // of 480 are determined in one of 30), so `cp` uses a larger one.
     let n_piles = if D == 3 && name == "cp" { 90 } else { 30 };
     let hidden = hide::<D>(scheme, &piles(seed, n_piles, COPIES, 0.0), seed);
     let per = hidden.released.slots_per_record();
@@ -73,7 +74,7 @@ fn exact_limit<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
         row
     };
     let lists = hidden.lists_of(&(0..n).map(row).collect::<Vec<_>>());
-    // About votes: piles of equal points share all values, which an assignment may exchange.
+    // Points of a pile share all values, which exact constraints may exchange.
     for options in all_options()
         .into_iter()
         .map(|(solver, o)| (solver, RecoverOptions { exact_constraints: false, ..o }))
@@ -84,9 +85,9 @@ fn exact_limit<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
             let delta = recovered.delta();
             let Some(sine) = fixed_by(&hidden, slot, &lists, 2, delta) else { continue };
             fixed += 1;
-            // The paper's loop for candidates first settles every axis by a vote that may err: nothing
-            // is promised where the slot's own is wrong or its neighbors' leave parallel lines only,
-            // and a refit with wrong neighbors is off by what support allows.
+            // `ransac` for candidates first chooses every axis by a vote that may be wrong. No
+            // result is guaranteed if the slot's own axis is wrong or its neighbors leave parallel
+            // lines only. A refit with wrong neighbors is off by up to delta.
             let status = recovered.status()[slot];
             let mut tolerance = 4e-6 / sine;
             if options.0 == Builtin::Ransac
@@ -98,11 +99,13 @@ fn exact_limit<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
                 }
                 tolerance = delta;
             }
-            // Joint recovery is re-made from all estimates within reach, so a pile close by pulls a little.
+            // Joint recovery uses all estimates within reach, so a nearby pile has a small
+            // influence.
             if options.0 == Builtin::Joint {
                 tolerance = tolerance.max(0.05 * delta);
             }
-            // Else: a few units in the last place at 6 m, over the sine of the best crossing.
+            // Otherwise: a few units in the last place at 6 m, divided by the sine of the best
+            // crossing.
             assert_eq!(status, Status::Ok, "{name}, {options:?}: slot {slot}");
             let found = recovered.positions()[slot].map(f64::from);
             let local = hidden.local(slot);
@@ -113,8 +116,9 @@ fn exact_limit<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
                  (sine of the best crossing {sine}, delta {delta})"
             );
         }
-        // Coincident points share a voxel or region, hence a center: these rays never fix them, and the law says nothing
-        // of them. Of candidates in a small plane it says little, as chance lies near most places: 25 of 480 and more.
+        // Coincident points share a voxel or region, and so a center: such rays never determine
+        // them. Candidates in a small plane are rarely determined, because chance lies near most
+        // places: 25 of 480 and more.
         let obfuscation = hidden.released.obfuscation();
         let of_places = matches!(obfuscation, Obfuscation::Rays(rays)
             if rays.voxel().is_some() || rays.regions().is_some());
@@ -124,25 +128,26 @@ fn exact_limit<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     }
 }
 
-/// Sending one of K agreeing neighbors arbitrarily far leaves the result where the other K - 1
-/// alone put it (consensus, fixed delta).
+/// Moving one of K agreeing neighbors arbitrarily far does not change the result of the other K - 1
+/// (consensus, fixed delta).
 fn bounded_influence<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     const PILES: usize = 60;
     const COPIES: usize = 21;
     const DELTA: f64 = 0.05;
     let mut points = piles(seed, PILES, COPIES, 0.004);
-    // The far ones, from 10 m to 10 km away.
+    // Far points, from 10 m to 10 km away.
     let mut draws = Draws::new(seed, Stage::Synthetic, 20);
     for i in 0..80 {
         let far = 10.0 * [1.0, 10.0, 100.0, 1000.0][i % 4];
         points.push(draws.direction().map(|x: f64| 3.0 + far * x));
     }
-    // Voxels smaller than a pile, so that its points have rays from both centers.
+    // Voxels are smaller than a pile, so its points have rays from both centers.
     let hidden = try_hide::<D>(scheme, &points, 0.004, seed).unwrap();
     if let Obfuscation::Rays(rays) = hidden.released.obfuscation()
         && rays.regions().is_some()
     {
-        // Rays that meet nowhere fix no point: a range comes from all bearings together.
+        // Rays that do not cross determine no single point; their ranges come from all bearings
+        // together.
         return;
     }
     let per = hidden.released.slots_per_record();
@@ -164,7 +169,7 @@ fn bounded_influence<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     let options = RecoverOptions {
         delta: Delta::Fixed(DELTA),
         seed: 3,
-        // About votes: an assignment looks at the whole map.
+        // Exact constraints depend on the whole map.
         exact_constraints: false,
         ..RecoverOptions::default()
     };
@@ -180,7 +185,7 @@ fn bounded_influence<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
         }
         assert_eq!(alone.status()[slot], Status::Ok, "{name}: slot {slot}");
         let result = alone.positions()[slot].map(f64::from);
-        // A record is far when it passes far from the result, wherever its point is.
+        // A record is far if it passes far from the result, wherever its point is.
         let stranger = (0..200).map(|_| draws.below(n as u64) as usize).find(|&s| {
             let record = s / per;
             is_far(s)
@@ -193,7 +198,8 @@ fn bounded_influence<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
             replaced[slot] = true;
         }
     }
-    // Both lines of a candidate cross all of the plane: some draws have few that pass far away, 45 of 1,340.
+    // Both lines of a candidate cross all of the plane, so few pass far away in some draws (45 of
+    // 1,340).
     let least = if D == 2 { n / 100 } else { n / 5 };
     let replacing = replaced.iter().filter(|&&r| r).count();
     assert!(replacing > least, "{name}: {replacing} far records for {n} slots");
@@ -206,7 +212,6 @@ fn bounded_influence<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     }
 }
 
-/// The order in which a list is given changes no result.
 fn order_tells_nothing<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     let hidden = hide::<D>(scheme, &room(seed, 300), seed);
     let lists = hidden.lists(15, 0.6, seed);
@@ -225,8 +230,7 @@ fn order_tells_nothing<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     }
 }
 
-/// Recovery reads nothing but the released map and the lists: columns copied out of them, after
-/// everything else is gone, give the same bytes.
+/// Recovery reads only the released map and the lists: copies of their columns give the same bytes.
 fn no_hidden_input<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     let hidden = hide::<D>(scheme, &room(seed, 300), seed);
     let lists = hidden.lists(15, 0.6, seed);
@@ -258,7 +262,6 @@ fn no_hidden_input<const D: usize>(name: &str, scheme: &Entry, seed: u64) {
     assert!(before == after, "{name}");
 }
 
-/// Lists for another map are refused, not misread.
 fn foreign_lists_are_refused<const D: usize>(name: &str, scheme: &Entry) {
     let one = hide::<D>(scheme, &room(1, 100), 1);
     let other = hide::<D>(scheme, &room(1, 160), 1);
@@ -271,7 +274,7 @@ fn foreign_lists_are_refused<const D: usize>(name: &str, scheme: &Entry) {
     assert!(error.unwrap_err().to_string().contains("one per slot"), "{name}");
     let n = one.released.n_slots();
     if one.released.n_records() < n {
-        // As many rows, but of a map with one slot per record.
+        // The number of rows matches, but the map has one slot per record.
         let next = (0..n).map(|slot| RecordId::from_index((slot + 1) % n)).collect();
         let lists = Neighborhoods::try_new((0..=n as u64).collect(), next, None, n, 1).unwrap();
         let error = recover(&one.released, &lists, &Builtin::Joint, &RecoverOptions::default());
@@ -309,7 +312,8 @@ fn lists_belong_to_a_map() {
     assert!(PointSet::try_new(vec![[0.0, f64::NAN]], Unit::Meter).is_err());
 }
 
-/// Where neighbors coincide, estimates differ by rounding alone: a law narrower than that once tore a pile apart.
+/// Regression: where neighbors coincide, estimates differ by rounding only, and a narrower learned
+/// distribution split a pile.
 #[test]
 fn rounding_is_no_distance() {
     const SEED: u64 = 7_442_521_786_000_528_742;

@@ -1,5 +1,5 @@
-//! What is the same map, written otherwise, gives the same shares: records in another order, lines turned around and through another
-//! of their points, centers in another order.
+//! The same map in another form gives the same shares: records in another order, lines reversed and
+//! through another of their points, centers in another order.
 
 use unlift::neighbors::Neighborhoods;
 use unlift::obfuscate::Entry;
@@ -9,16 +9,16 @@ use unlift::seed::{Draws, Stage};
 
 use crate::maps::*;
 
-/// Points a map has, and how often it is released again.
+/// Number of points of a map, and number of times that it is released again.
 const POINTS: usize = 400;
 const TIMES: u64 = 8;
-/// How near a point must come, of a room whose sides have a few meters.
+/// Distance within which a point is correct, in a room with sides of a few meters.
 const NEAR: f64 = 0.1;
-/// Deviations of the mean difference that chance does not reach, and a share that is not worth asking for.
+/// Limit of the mean difference in standard deviations, and a share that is too small to compare.
 const MOST: f64 = 4.0;
 const LITTLE: f64 = 0.01;
 
-/// Where each record of the new map was in the old one.
+/// Returns the old position of each new record.
 fn shuffled(n: usize, draws: &mut Draws) -> Vec<usize> {
     let mut order: Vec<usize> = (0..n).collect();
     for at in (1..n).rev() {
@@ -27,7 +27,7 @@ fn shuffled(n: usize, draws: &mut Draws) -> Vec<usize> {
     order
 }
 
-/// The records in `order`, each written otherwise.
+/// Returns the records in `order`, each in another form.
 fn again<const D: usize>(
     records: &Obfuscation<D>,
     order: &[usize],
@@ -75,7 +75,6 @@ fn again<const D: usize>(
     }
 }
 
-/// The lists of the old slots, about the new records.
 fn lists_again(lists: &Neighborhoods, order: &[usize], per: usize) -> Neighborhoods {
     let mut new_of = vec![0; order.len()];
     order.iter().enumerate().for_each(|(new, &old)| new_of[old] = new as u32);
@@ -88,7 +87,7 @@ fn lists_again(lists: &Neighborhoods, order: &[usize], per: usize) -> Neighborho
     lists_of(&rows.collect::<Vec<_>>(), order.len(), per)
 }
 
-/// The share of points that came back near where they were, of the old map in `order`.
+/// Returns the share of correct points, of the old map in `order`.
 fn right<const D: usize>(
     hidden: &Hidden<D>,
     released: &Released<D>,

@@ -1,4 +1,4 @@
-//! What a released map tells about the randomness that made it: nothing, unless the key is an integer.
+//! Released maps reveal nothing about their key, unless the key comes from an integer.
 
 use unlift::obfuscate::olc::Olc;
 use unlift::obfuscate::{Entry, SchemeOptions, obfuscate};
@@ -14,12 +14,12 @@ fn olc(key: &Key, n: usize) -> (Released<3>, Secret) {
     obfuscate(&Olc, &Original::new(points), None, key).unwrap()
 }
 
-/// An attacker who knows this code guesses integers: the line of the first file row confirms a guess, and the
-/// order of the records is undone. Returns the guessed file row of every record.
+/// Guesses integer keys: the line of the first file row confirms a guess, which reveals the order
+/// of the records. Returns the file row of every record.
 fn undone(released: &Released<3>, guesses: u64) -> Option<Vec<u32>> {
     let Obfuscation::Lines(lines) = released.obfuscation() else { panic!("olc gives lines") };
     let is_released = |direction: [f64; 3]| {
-        // A line has no sense; what is released is rounded to f32.
+        // Lines have no orientation, and released numbers are rounded to `f32`.
         let off = |d: &[f32; 3], sense: f64| {
             (0..3).map(|c| (f64::from(d[c]) - sense * direction[c]).abs()).fold(0.0, f64::max)
         };
@@ -54,7 +54,7 @@ fn fresh_keys_hide_differently<const D: usize>(name: &str, scheme: &Entry) {
     assert!(hide(&one) == hide(&one), "{name}: the same key, other bytes");
     let ((one, first), (other, second)) = (hide(&one), hide(&other));
     assert!(one != other, "{name}: other keys, the same bytes");
-    // Of 300 places one is right by chance.
+    // By chance, 1 of 300 originals has the same slot.
     let same = first.hidden().iter().zip(second.hidden()).filter(|(a, b)| a == b).count();
     assert!(same < 12, "{name}: {same} originals in the same slot");
 }

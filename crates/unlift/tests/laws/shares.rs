@@ -1,4 +1,5 @@
-//! Laws about shares of a whole map: equivariance, and random lists against the blind attacker.
+//! Properties of shares of a whole map: equivariance, and random lists compared with the blind
+//! baseline.
 
 use unlift::evaluate::{blind, evaluate};
 use unlift::obfuscate::Entry;
@@ -9,7 +10,7 @@ use unlift::{About, RowOrder};
 
 use crate::maps::*;
 
-/// Shares within 1 and 2.5 units of `scale` after recovery with everything on automatic.
+/// Returns the shares within 1 and 2.5 units of `scale` with automatic options.
 fn shares<const D: usize>(
     scheme: &Entry,
     points: &[[f64; D]],
@@ -24,8 +25,8 @@ fn shares<const D: usize>(
     [0.10, 0.25].map(|threshold| accuracy.percent_within(threshold * scale))
 }
 
-/// Shifting and scaling a map, its frame and its thresholds changes no share by more than `most`
-/// points: rounding decides some slots differently.
+/// Shifting and scaling a map with its frame and thresholds changes shares by at most `most`
+/// points. Rounding changes some slots.
 fn shifted_and_scaled_maps_leak_the_same<const D: usize>(
     name: &str,
     scheme: &Entry,
@@ -49,8 +50,9 @@ fn shifted_and_scaled_maps_leak_the_same<const D: usize>(
     }
 }
 
-/// What must come back for the law to say anything: two points below the least of all schemes, `plane`; of an image more than a blind attacker gets, as rays
-/// from anchors give back little.
+/// Returns the minimum shares for a meaningful test: two points below `plane`, the lowest of all
+/// schemes. For images, more than the blind baseline, because little is recovered from rays with
+/// anchors.
 fn least_shares<const D: usize>(
     name: &str,
     scheme: &Entry,
@@ -63,12 +65,12 @@ fn least_shares<const D: usize>(
     let hidden = try_hide::<D>(scheme, points, 0.5, 7).unwrap();
     let blind = blind(&hidden.released, &hidden.original, &hidden.secret).percent_within(0.25);
     assert!(blind < 30.0, "{name}: {blind} % within reach of a blind attacker");
-    // `dcl2d`: blind 21, recovered by consensus 22.1 (22.2 to 23.9 over seven other keys), by joint recovery 25.4.
+    // `dcl2d`: blind 21, consensus 22.1 (22.2 to 23.9 with seven other keys), joint 25.4.
     [0.0, if solver == Builtin::Joint { 1.1 * blind } else { 1.03 * blind }]
 }
 
-/// With lists that tell nothing, nothing scores above the blind attacker beyond noise. On a map of
-/// even density: where density differs, the records themselves tell it.
+/// With random lists no solver exceeds the blind baseline by more than noise. The map has uniform
+/// density, because other records reveal the density.
 fn random_lists_tell_nothing<const D: usize>(name: &str, scheme: &Entry) {
     let n = 3000;
     let hidden = hide::<D>(scheme, &uniform(41, n), 7);
@@ -82,9 +84,9 @@ fn random_lists_tell_nothing<const D: usize>(name: &str, scheme: &Entry) {
             let blind = baseline.percent_within(threshold);
             // Four standard deviations of a difference of two binomial shares, and one slot.
             let p = (blind / 100.0).clamp(0.001, 0.999);
-            // Where a line meets the others is a better guess for two points on it than the one place of the
-            // blind attacker: `ppl` over nine keys is ahead by 2.2 in the mean, with lists that tell nothing, and pairs
-            // with this key by up to 0.4 more than noise.
+            // For paired lines, crossings with other lines are a better guess than the single place
+            // of the blind baseline. With random lists `ppl` is ahead by 2.2 on average over nine
+            // keys, and by up to 0.4 more than noise with this key.
             let pairs = if hidden.released.slots_per_record() == 2 { 1.0 } else { 0.0 };
             let noise = 400.0 * (2.0 * p * (1.0 - p) / n as f64).sqrt() + 100.0 / n as f64;
             assert!(
@@ -95,20 +97,20 @@ fn random_lists_tell_nothing<const D: usize>(name: &str, scheme: &Entry) {
     }
 }
 
-/// Ten slots of 4,000 (eight of `ray-voxel` with the present key, one of all others together).
+/// Ten slots of 4,000. Measured: eight of `ray-voxel`, one of all others together.
 #[test]
 fn equivariance() {
     over_schemes!(shifted_and_scaled_maps_leak_the_same, Builtin::Consensus, 0.25);
 }
 
-/// What differs in one round spreads in the next: sixteen slots of `dcl2d` with the present key, three of any other.
+/// Differences grow over iterations. Measured: sixteen slots of `dcl2d`, three of any other scheme.
 #[test]
 fn equivariance_of_joint_recovery() {
     over_schemes!(shifted_and_scaled_maps_leak_the_same, Builtin::Joint, 0.5);
 }
 
-/// The same records in another order, each row with the same number of slots; `None` where regions or voxels
-/// belong to them.
+/// Returns the records in another order, each with the same slots; `None` for records with regions
+/// or voxels.
 fn in_order<const D: usize>(released: &Released<D>, order: &[u32]) -> Option<Released<D>> {
     let wide = |rows: &[[f32; D]]| -> Vec<[f64; D]> {
         order.iter().map(|&at| rows[at as usize].map(f64::from)).collect()
@@ -138,8 +140,8 @@ fn in_order<const D: usize>(released: &Released<D>, order: &[u32]) -> Option<Rel
     Some(released_again.with_bounds(released.bounds()))
 }
 
-/// Joint recovery looks at samples and takes turns by number, so the order of records is no matter of bytes. But nearly all
-/// points come back at the same place.
+/// Joint recovery uses samples and takes turns by slot number, so results depend on the order of
+/// records. But nearly all points are recovered at the same place.
 fn order_of_records_hardly_matters<const D: usize>(name: &str, scheme: &Entry) {
     let hidden = hide::<D>(scheme, &room(35, 2000), 7);
     let (lists, per) = (hidden.lists(30, 0.6, 7), hidden.released.slots_per_record());
@@ -175,7 +177,7 @@ fn random_lists_yield_no_more_than_none() {
     over_schemes!(random_lists_tell_nothing);
 }
 
-/// Which slot of a paired line comes first must not matter to an attack that cannot know.
+/// The order of a record's slots must not matter to an attack that cannot know it.
 #[test]
 fn pairs_in_better_order_do_not_depend_on_the_order() {
     let points: Vec<[f64; 3]> = room(33, 1000);
@@ -193,7 +195,7 @@ fn pairs_in_better_order_do_not_depend_on_the_order() {
     let better = |secret| percent(RowOrder::Either, secret);
     assert_eq!(better(&turned), better(&hidden.secret));
     assert!(better(&turned) >= by_slot(&hidden.secret));
-    // Who does not say how rows are counted is never credited with less than by any order.
+    // An unstated row order gives at least the share of any order.
     let unstated = percent(RowOrder::Unstated, &turned);
     assert_eq!(unstated, percent(RowOrder::Unstated, &hidden.secret));
     for order in RowOrder::STATED {

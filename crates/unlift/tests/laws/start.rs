@@ -1,4 +1,4 @@
-//! The pass that joint recovery starts from is the same whether it is asked for or left over.
+//! `joint-start` gives the same result alone and as a part of `joint`.
 
 use unlift::obfuscate::Entry;
 use unlift::recover::{Builtin, RecoverOptions, Unknown, recover, recover_with_start};

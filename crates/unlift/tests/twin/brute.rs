@@ -1,6 +1,6 @@
-//! The twin itself: all choices a slot has, with what decides between them.
+//! Brute-force consensus: all candidate positions of a slot with their scores.
 
-/// A position that could win, and what decides.
+/// A candidate position and its score.
 #[derive(Debug)]
 pub(super) struct Choice {
     pub(super) position: Vec<f64>,
@@ -8,7 +8,7 @@ pub(super) struct Choice {
     pub(super) evidence: f64,
 }
 
-/// `k KL(n / k || p)` nats above chance, else 0.
+/// Returns `k KL(n / k || p)` nats if above chance, else 0.
 pub(super) fn evidence(n: f64, k: f64, p: f64) -> f64 {
     let term = |hits: f64, chance: f64| {
         if hits == 0.0 { 0.0 } else { hits * (hits / (k * chance)).ln() }
@@ -16,9 +16,10 @@ pub(super) fn evidence(n: f64, k: f64, p: f64) -> f64 {
     if n <= p * k { 0.0 } else { term(n, p) + term(k - n, 1.0 - p) }
 }
 
-/// What one record says along a feasible line: the squared distance from the point at `t`.
+/// The vote of a record along a feasible line: its squared distance to the point at `t`.
 pub(super) struct Vote {
-    /// Squared distance at the closest approach, its place, and how fast it grows.
+    /// For each line: squared distance at the closest approach, parameter of this point, and growth
+    /// of the distance.
     terms: Vec<(f64, f64, f64)>,
 }
 
@@ -28,12 +29,12 @@ impl Vote {
         self.terms.iter().map(at).fold(f64::INFINITY, f64::min)
     }
 
-    /// Whether it agrees with every position.
+    /// Returns true if the record agrees with every position.
     fn is_everywhere(&self, delta: f64) -> bool {
         self.terms.iter().any(|&(miss2, _, bend)| bend == 0.0 && miss2 <= delta * delta)
     }
 
-    /// Where the vote begins to count, if it does not count everywhere.
+    /// Returns the start of the interval in which the vote counts, if it does not count everywhere.
     fn start(&self, delta: f64) -> Option<f64> {
         if self.is_everywhere(delta) {
             return None;
@@ -44,7 +45,7 @@ impl Vote {
         self.terms.iter().filter(crossing).map(start).reduce(f64::min)
     }
 
-    /// The place and weight with which it enters a refit: none if it agrees with every position.
+    /// Returns place and weight for a refit; 0 if the record agrees with every position.
     fn refit_term(&self, t: f64, delta: f64) -> (f64, f64) {
         if self.is_everywhere(delta) {
             return (0.0, 0.0);
@@ -55,7 +56,7 @@ impl Vote {
     }
 }
 
-/// Every start of an interval with its score and the position least squares makes of it.
+/// Returns every start of an interval with its score and refitted position.
 pub(super) fn options_along(
     listed: &[Vote],
     k: usize,
@@ -64,7 +65,7 @@ pub(super) fn options_along(
     at: impl Fn(f64) -> [f64; 3],
     chance: impl Fn(&[f64; 3]) -> f64,
 ) -> Vec<Choice> {
-    // A start counts for itself: rounding of a square root must not decide that.
+    // A start must count for its own interval despite rounding of the square root.
     let slack = delta * delta * (1.0 + 1e-9);
     let count = |votes: &[Vote], t: f64| {
         votes.iter().filter(|vote| vote.squared_distance(t) <= slack).count() as f64
@@ -98,10 +99,10 @@ pub(super) fn options_along(
         .collect()
 }
 
-/// A line or ray in `f64`: through, direction, group.
+/// A line or ray in `f64`: point, direction, group.
 pub(super) type Line = ([f64; 3], [f64; 3], Option<u8>);
 
-/// The section of `other` with `own`; `None` when it says nothing.
+/// Returns the vote of `other` along `own`; `None` if it has none.
 pub(super) fn section(own: &Line, other: &Line) -> Option<Vote> {
     let dot = |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|c| a[c] * b[c]).sum::<f64>();
     let (p, d, group) = own;
@@ -129,7 +130,7 @@ pub(super) fn section(own: &Line, other: &Line) -> Option<Vote> {
     Some(Vote { terms: vec![(miss.iter().map(|x| x * x).sum(), t, bend)] })
 }
 
-/// The options of a slot on `own`, given the lines listed for it and the chance of a place.
+/// Returns the candidates of a slot on `own` for its listed lines and the chance of a place.
 pub(super) fn line_options(
     rows: &[Line],
     own: usize,
@@ -150,7 +151,7 @@ pub(super) fn line_options(
     options_along(&votes_of_listed, k, delta, floor, at, chance)
 }
 
-/// The options of an axis candidate: each own axis against all lines of every record.
+/// Returns the candidates of an axis candidate: each own axis with all lines of every record.
 pub(super) fn candidate_options(
     rows: &[[f64; 3]],
     own: usize,
@@ -178,8 +179,8 @@ pub(super) fn candidate_options(
     options
 }
 
-/// The options of one free axis of a plane: every window that starts at a listed offset. Position
-/// is the one coordinate.
+/// Returns the candidates of one free axis of a plane: every window that starts at a listed offset.
+/// The position is this coordinate only.
 pub(super) fn window_options(
     axes: &[u8],
     offsets: &[f64],

@@ -1,5 +1,5 @@
-//! A brute-force twin of consensus: `f64` throughout, every interval start and every window tried,
-//! nothing reused, nothing pruned. Only the chance of a place is shared: it is data to both, and part of the model.
+//! Comparison of consensus with a brute-force version in `f64` that tries every interval and
+//! window. Both share only the chance of a place, which is part of the model.
 
 mod brute;
 
@@ -12,7 +12,8 @@ use unlift::{Error, RecordId, Unit};
 
 const SEED: u64 = 5;
 
-/// Whether `found` is the best option: at its position, or at that of another whose score is equal.
+/// Returns the evidence of the candidate at `found` if its score is the best one. Otherwise returns an
+/// error.
 fn is_best(found: &[f64], options: &[Choice], tolerance: f64) -> Result<f64, String> {
     let best = options.iter().map(|o| o.score).fold(f64::NEG_INFINITY, f64::max);
     let here = |option: &&Choice| {
@@ -25,7 +26,7 @@ fn is_best(found: &[f64], options: &[Choice], tolerance: f64) -> Result<f64, Str
     }
 }
 
-/// A slot may be lost only when there is no option.
+/// Checks that a lost slot has no candidate. Returns its evidence, 0.
 fn none_left(options: &[Choice]) -> Result<f64, String> {
     if options.is_empty() { Ok(0.0) } else { Err(format!("lost, but {options:?}")) }
 }
@@ -34,14 +35,14 @@ fn released(obfuscation: Obfuscation<3>) -> Released<3> {
     Released::try_new(obfuscation, 1, [0.0; 3], Unit::Meter, None).unwrap()
 }
 
-/// Random points in clusters, so that some neighbors agree and some do not.
+/// Returns random points in clusters, so that some neighbors agree and some do not.
 fn points(n: usize, draws: &mut Draws) -> Vec<[f64; 3]> {
     let centers: Vec<[f64; 3]> =
         (0..9).map(|_| std::array::from_fn(|_| draws.between(-3.0, 3.0))).collect();
     (0..n).map(|i| centers[i % 9].map(|x| x + 0.2 * draws.normal())).collect()
 }
 
-/// Half of a list from the slot's own cluster, half from anywhere.
+/// Returns lists with half of the entries from the slot's own cluster and half from anywhere.
 fn lists(n: usize, draws: &mut Draws) -> Neighborhoods {
     let (mut offsets, mut records) = (vec![0], Vec::new());
     for slot in 0..n {
@@ -72,7 +73,7 @@ fn check(
     let released = released(obfuscation.unwrap());
     let options = RecoverOptions {
         delta: Delta::Fixed(delta),
-        // About votes alone.
+        // Only votes are compared.
         exact_constraints: false,
         confidence: false,
         ..RecoverOptions::default()
@@ -92,7 +93,7 @@ fn check(
             Err(why) => wrong.push(format!("slot {slot}, {status:?}: {why}")),
         }
     }
-    // A record within rounding of delta may count in f32 and not in f64.
+    // A record at a distance of almost delta may count in `f32` and not in `f64`.
     assert!(wrong.len() * 200 <= N, "{what}: {} of {N} differ, {:?}", wrong.len(), wrong.first());
 }
 

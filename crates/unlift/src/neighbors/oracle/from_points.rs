@@ -1,15 +1,15 @@
-//! Lists that an owner gives by point, translated to the records of one obfuscation.
+//! Translation of an owner's lists from points to the records of one obfuscation.
 
 use super::nearness::record_of_originals;
 use crate::neighbors::Neighborhoods;
 use crate::truth::Secret;
 use crate::{About, Error, RecordId, RowOrder};
 
-/// Translates neighbors given by original row (as an owner lists them) to the records of one
-/// obfuscation: dropped points, own records and repeats fall away.
+/// Translates neighbors given by original row to the records of one obfuscation. Omits dropped
+/// points, the slot's own record and repeats.
 ///
 /// # Errors
-/// When the lists do not have one row per original, or name an original out of range.
+/// When the lists do not have one row per original, or contain an original out of range.
 pub fn from_points(
     offsets: &[u64],
     neighbors: &[u32],

@@ -1,6 +1,6 @@
-//! Neighborhoods from the originals, at a chosen inlier ratio (paper, section 6).
+//! The oracle: neighborhoods from ground truth at a chosen inlier ratio (paper, section 6).
 //!
-//! The one module of this stage that reveals: it stands for an attacker of stated quality.
+//! It simulates an attacker of known quality. No other source reads ground truth.
 
 mod from_points;
 mod nearness;
@@ -19,22 +19,22 @@ use crate::seed::{Draws, Stage};
 use crate::truth::{Original, Secret};
 use crate::{About, Error, Fingerprint, ListsBy, RecordId, RowOrder};
 
-/// The true neighborhoods of every slot: the first K records met by going outward from its
-/// original in order of (distance, original id). Never the slot's own, each once (a paired line may
-/// hide two near points), dropped points skipped.
+/// The true neighborhoods of every slot: the K records nearest to its original, by (distance,
+/// original id). They exclude the slot's own record and dropped points, and contain each record
+/// once (a paired line may hide two near points).
 #[derive(Clone, Debug)]
 pub struct TrueNeighbors {
     k: usize,
     n_records: usize,
     slots_per_record: usize,
     map: Option<Fingerprint>,
-    /// K records per slot, in order of nearness: never released in this order.
+    /// K records per slot, nearest first. This order is never released.
     records: Vec<RecordId>,
 }
 
 impl TrueNeighbors {
-    /// The true neighborhoods of size `k` under the obfuscation that `secret` belongs to. `knn` must
-    /// be a search over the original positions.
+    /// Finds true neighborhoods of size `k` for the obfuscation of `secret`. `knn` must be a search
+    /// over the original positions.
     ///
     /// # Errors
     /// When `k` is 0 or fewer than `k` other records exist.
@@ -54,9 +54,9 @@ impl TrueNeighbors {
         Ok(Self { k, n_records, slots_per_record, map: secret.map(), records })
     }
 
-    /// Neighborhoods of which `round(inlier_ratio * K)` entries (one at least above 0) are true neighbors, uniformly
-    /// chosen, and the others are `outliers`. Both are nested: a lower ratio keeps a subset of
-    /// the true neighbors and a superset of the others.
+    /// Makes lists with `round(inlier_ratio * K)` true neighbors, but at least one above ratio 0.
+    /// They are a uniformly random choice; the other entries come from `outliers`. Lists are
+    /// nested: a lower ratio keeps a subset of the true neighbors and a superset of the outliers.
     ///
     /// # Errors
     /// When the ratio is not in `[0, 1]`, or there are too few outliers.
@@ -74,12 +74,12 @@ impl TrueNeighbors {
         Ok(lists.with_about(about(self.map)))
     }
 
-    /// How many true neighbors a list keeps at an inlier ratio.
+    /// Returns the number of true neighbors per list at an inlier ratio.
     fn kept(&self, inlier_ratio: f64, outliers: &Outliers) -> Result<usize, Error> {
         if !(0.0..=1.0).contains(&inlier_ratio) {
             return Err(Error::new("inlier ratio", "0 to 1", inlier_ratio.to_string()));
         }
-        // A ratio above 0 keeps one at least: lists without any would pass for lists with a few.
+        // Lists without any true neighbor must not pass for lists with a few.
         let keep = (inlier_ratio * self.k as f64).round() as usize;
         let keep = keep.max(usize::from(inlier_ratio > 0.0));
         let wanted = self.k - keep;
@@ -92,7 +92,8 @@ impl TrueNeighbors {
         Ok(keep)
     }
 
-    /// The lists of its slots end to end, each of K records in ascending order of which so many are true neighbors.
+    /// Returns all lists end to end: K records each in ascending order, `keep` of them true
+    /// neighbors.
     fn rows(&self, keep: usize, outliers: &Outliers, seed: u64) -> Vec<RecordId> {
         let mut records = vec![RecordId(0); self.records.len()];
         records.par_chunks_mut(self.k).enumerate().for_each_init(Vec::new, |order, (slot, row)| {
@@ -106,26 +107,26 @@ impl TrueNeighbors {
         records
     }
 
-    /// [`lists`](Self::lists) with uniformly random outliers.
+    /// Makes [`lists`](Self::lists) with uniformly random outliers.
     ///
     /// # Errors
-    /// As there.
+    /// Those of [`lists`](Self::lists).
     pub fn at_inlier_ratio(&self, inlier_ratio: f64, seed: u64) -> Result<Neighborhoods, Error> {
         self.lists(inlier_ratio, &Outliers::uniform(), seed)
     }
 
-    /// The true neighbors of `slot`, the nearest first.
+    /// Returns the true neighbors of `slot`, nearest first.
     fn of(&self, slot: usize) -> &[RecordId] {
         &self.records[slot * self.k..(slot + 1) * self.k]
     }
 
-    /// The record that slot `slot` sits on.
     fn own(&self, slot: usize) -> RecordId {
         RecordId::from_index(slot / self.slots_per_record)
     }
 
-    /// The share of listed entries that are true neighbors, over all slots with a list. Where nobody knows which
-    /// of a record's two lists is whose, the order with more true neighbors counts, as it does in evaluation.
+    /// Returns the share of listed entries that are true neighbors, over all slots with a list. If
+    /// the order of a record's two lists is unknown, the order with more true neighbors counts, as
+    /// in evaluation.
     pub fn measured_inlier_ratio(&self, lists: &Neighborhoods) -> f64 {
         let hits = |slot: usize, of: usize| {
             let near = self.of(of);
@@ -149,7 +150,6 @@ impl TrueNeighbors {
     }
 }
 
-/// Refuses a K of which there are not so many other records.
 fn check_k(k: usize, n_records: usize) -> Result<(), Error> {
     if k > 0 && n_records > k {
         return Ok(());
@@ -162,12 +162,11 @@ fn check_k(k: usize, n_records: usize) -> Result<(), Error> {
     Err(Error::new("k", expected, k.to_string()))
 }
 
-/// Lists by the oracle of one released map.
 fn about(map: Option<Fingerprint>) -> About {
     About { map, order: RowOrder::Slots, lists_by: ListsBy::Oracle }
 }
 
-/// A search over the originals, for [`TrueNeighbors::new`]; built once per map.
+/// Builds a search over the originals for [`TrueNeighbors::new`], once per map.
 ///
 /// # Errors
 /// When there are no points.

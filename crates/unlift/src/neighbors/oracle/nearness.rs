@@ -1,16 +1,17 @@
-//! Records in order of nearness to an original.
+//! Records in the order of their distance to an original.
 
 use crate::RecordId;
 use crate::geometry::knn::Knn;
 use crate::truth::Secret;
 
-/// Own partner, shared records and dropped points cost places: how much further is looked at once.
+/// Additional originals to search, because own partners, shared records and dropped points do not
+/// count.
 const MARGIN: usize = 8;
 
-/// What is made of a slot: its nearest records in order, and the row to fill.
+/// Callback with a slot, its nearest records in order, and the row to fill.
 pub(super) type Make<'a> = dyn Fn(usize, &mut [RecordId], &mut [RecordId]) + Sync + 'a;
 
-/// A search over originals, read as a search over records.
+/// A search over originals that returns records.
 pub(super) struct Nearness<'a, const D: usize> {
     knn: &'a Knn<'a, D>,
     secret: &'a Secret,
@@ -24,12 +25,12 @@ impl<'a, const D: usize> Nearness<'a, D> {
         Self { knn, secret, record_of, slots_per_record }
     }
 
-    /// Calls `make(slot, the first n records from its original, row)` for every slot; `rows` holds
-    /// rows of one length, slot by slot. So many other records must exist.
+    /// Calls `make(slot, the n records nearest to its original, row)` for every slot. `rows` holds
+    /// rows of equal length, slot by slot. At least `n` other records must exist.
     pub(super) fn each(&self, n: usize, rows: &mut [RecordId], make: &Make<'_>) {
         let hidden = self.secret.hidden();
         let length = (rows.len() / hidden.len().max(1)).max(1);
-        // In spatial order, so that one slot finds the neighbors of the last one in cache.
+        // Spatial order keeps the neighbors of consecutive slots in the cache.
         let mut of_original: Vec<_> = (0..self.secret.n_originals()).map(|_| None).collect();
         for ((slot, row), original) in rows.chunks_mut(length).enumerate().zip(hidden) {
             of_original[original.index()] = Some((slot as u32, row));
@@ -48,7 +49,7 @@ impl<'a, const D: usize> Nearness<'a, D> {
         });
     }
 
-    /// The first `n` records from `original` (fewer when there are fewer), into `records`.
+    /// Writes the `n` records nearest to `original` (fewer if there are fewer) to `records`.
     pub(super) fn from(&self, original: usize, n: usize, records: &mut Vec<RecordId>) {
         let mut found = Vec::new();
         let mut reach = n + MARGIN;
@@ -62,12 +63,12 @@ impl<'a, const D: usize> Nearness<'a, D> {
         }
     }
 
-    /// The record that hides `original`; `None` for dropped ones.
     pub(super) fn record_of(&self, original: usize) -> Option<RecordId> {
         self.record_of[original]
     }
 
-    /// The first `n` records that hide one of `found`: never that of `original`, each once.
+    /// Keeps the first `n` records that hide one of `found`, each once, without the record of
+    /// `original`.
     fn keep_records(
         &self,
         original: usize,
@@ -92,7 +93,7 @@ impl<'a, const D: usize> Nearness<'a, D> {
     }
 }
 
-/// The record that hides each original; `None` for dropped ones.
+/// Returns the record that hides each original; `None` for dropped points.
 pub(super) fn record_of_originals(
     secret: &Secret,
     slots_per_record: usize,
@@ -104,7 +105,8 @@ pub(super) fn record_of_originals(
     record_of
 }
 
-/// Whether `records` holds `record`: looks at all of them, which is faster than to stop at a hit.
+/// Returns true if `records` contains `record`. Comparing all of them is faster than stopping
+/// early.
 #[inline(always)]
 pub(super) fn listed(records: &[RecordId], record: RecordId) -> bool {
     records.iter().fold(false, |hit, &other| hit | (other == record))

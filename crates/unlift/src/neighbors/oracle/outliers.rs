@@ -1,7 +1,7 @@
-//! Which records an oracle lists in place of true neighbors.
+//! Noise models: the wrong entries in the oracle's lists.
 //!
-//! Learned neighborhoods do not err at random: they list points a little too far away, and points
-//! of other places that look alike. Each model here is one such way to err, alone.
+//! Learned neighborhoods contain points that are slightly too far away, and similar-looking points
+//! of other places. Each model simulates one kind of error.
 
 use super::TrueNeighbors;
 use super::nearness::{Nearness, listed};
@@ -10,29 +10,28 @@ use crate::seed::{Draws, Stage};
 use crate::truth::Secret;
 use crate::{Error, RecordId};
 
-/// How an oracle errs.
+/// Noise model of the oracle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Noise {
-    /// Outliers are uniformly random among all records that are no true neighbors.
+    /// Outliers are uniformly random records that are no true neighbors.
     Uniform,
-    /// Outliers are uniformly random among the 2K-th to 10K-th nearest records: right about the
-    /// region, wrong about the place.
+    /// Outliers are uniformly random among the 2K-th to 10K-th nearest records: in the right
+    /// region, at the wrong place.
     Near,
-    /// Outliers share wrong places, as those of look-alike descriptors do.
+    /// Nearby points share their outliers, as with similar-looking descriptors.
     ///
-    /// The originals are halved along the longest side of their box until a patch holds at most 2K
-    /// of them. Each patch has two wrong places: random originals, none of them among the 10K
-    /// nearest of one point of the patch. The K records nearest to either place look like the patch:
-    /// outliers of all its points are drawn from these 2K records, and from all records where they
-    /// do not suffice.
+    /// The originals are split in half along the longest side of their box until a patch holds at
+    /// most 2K of them. Each patch has two wrong places: random originals outside the 10K nearest
+    /// of one point of the patch. The outliers of its points come from the K records nearest to
+    /// each place, and from all records if these are too few.
     Clustered,
 }
 
 impl Noise {
-    /// Every model.
+    /// All models.
     pub const ALL: [Noise; 3] = [Self::Uniform, Self::Near, Self::Clustered];
 
-    /// The name used in files and on the command line.
+    /// Returns the name used in files and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Uniform => "uniform",
@@ -41,10 +40,10 @@ impl Noise {
         }
     }
 
-    /// The model called `name`.
+    /// Returns the model called `name`.
     ///
     /// # Errors
-    /// When there is none.
+    /// When there is no such model; the message lists all.
     pub fn from_name(name: &str) -> Result<Self, Error> {
         Self::ALL.into_iter().find(|noise| noise.name() == name).ok_or_else(|| {
             let names: Vec<&str> = Self::ALL.iter().map(|noise| noise.name()).collect();
@@ -53,37 +52,36 @@ impl Noise {
     }
 }
 
-/// Ranks of nearness between which [`Noise::Near`] draws, in multiples of K.
+/// Range of ranks from which [`Noise::Near`] draws, in multiples of K.
 const RING: (usize, usize) = (2, 10);
-/// Originals of a patch of [`Noise::Clustered`] at most, in multiples of K.
+/// Maximum number of originals in a patch of [`Noise::Clustered`], in multiples of K.
 const PATCH: usize = 2;
-/// Wrong places of a patch.
 const PLACES: usize = 2;
-/// Draws for a far place; small maps may have none.
+/// Maximum number of draws for a far place; small maps may have none.
 const MOST_DRAWS: usize = 64;
 
-/// What an oracle lists in place of true neighbors: one noise model, made ready for one obfuscation.
+/// Outliers of one noise model, prepared for one obfuscation.
 #[derive(Clone, Debug)]
 pub struct Outliers {
     noise: Noise,
-    /// `near`: rows of `per_slot` outliers in random order, slot by slot. `clustered`: the records
-    /// that look like each patch, end to end.
+    /// For `near`, rows of `per_slot` outliers in random order, slot by slot. For `clustered`, the
+    /// outliers of each patch, end to end.
     records: Vec<RecordId>,
     per_slot: usize,
-    /// `clustered`: where the records of each patch start, and the patch of each slot.
+    /// For `clustered`: the start of each patch in `records`, and the patch of each slot.
     starts: Vec<usize>,
     patch_of: Vec<u32>,
 }
 
 impl Outliers {
-    /// Uniformly random outliers need nothing.
+    /// Returns uniformly random outliers, which need no preparation.
     pub(super) fn uniform() -> Self {
         let (records, starts, patch_of) = Default::default();
         Self { noise: Noise::Uniform, records, per_slot: 0, starts, patch_of }
     }
 
-    /// Outliers of model `noise` for the neighborhoods of `truth`, which `secret` and `knn` must be
-    /// those of.
+    /// Prepares outliers of the model `noise` for the neighborhoods `truth`. `secret` and `knn`
+    /// must be those of `truth`.
     ///
     /// # Errors
     /// When `secret` belongs to another obfuscation.
@@ -168,12 +166,12 @@ impl Outliers {
         Self { noise: Noise::Clustered, records, per_slot: 0, starts, patch_of }
     }
 
-    /// The model.
+    /// Returns the noise model.
     pub fn noise(&self) -> Noise {
         self.noise
     }
 
-    /// How many outliers every slot can have.
+    /// Returns the number of outliers that every slot can have.
     pub(super) fn most(&self, truth: &TrueNeighbors) -> usize {
         match self.noise {
             Noise::Near => self.per_slot,
@@ -181,7 +179,7 @@ impl Outliers {
         }
     }
 
-    /// What [`most`](Self::most) counts, for messages.
+    /// Describes the records that [`most`](Self::most) counts, for error messages.
     pub(super) fn meaning(&self) -> &'static str {
         match self.noise {
             Noise::Near => "between the 2K-th and the 10K-th nearest",
@@ -189,8 +187,8 @@ impl Outliers {
         }
     }
 
-    /// Fills `row` with outliers of `slot`: the first ones of an order that depends on the seed and
-    /// the slot alone, so that a longer row begins with a shorter one.
+    /// Fills `row` with outliers of `slot`. Their order depends only on the seed and the slot, so a
+    /// shorter row is a prefix of a longer one.
     #[inline(always)]
     pub(super) fn fill(
         &self,
