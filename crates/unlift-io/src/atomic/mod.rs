@@ -1,9 +1,10 @@
-//! Outputs that appear whole or not at all, and that never cost anybody a file.
+//! Atomic outputs: a file is written completely or not at all, and no file of another program is
+//! lost.
 //!
-//! Everything is built under a temporary name (`unfinished`) beside its place and renamed when it is whole. What
-//! stands at the place is replaced only if it is of the kind that is written there ([`Kind`], by content), and never
-//! if it is an input of the same run ([`Rules`]). Nothing else is touched: a folder that is written to may hold
-//! anything.
+//! Every output is built under a temporary name (`unfinished`) beside its place, and renamed when
+//! it is complete. An existing file is replaced only if its content is of the kind that is written
+//! ([`Kind`]), and never if it is an input of the same run ([`Rules`]). Other files in the output
+//! folder are not touched.
 
 mod file;
 mod kind;
@@ -27,19 +28,20 @@ pub use set::OutputSet;
 pub(crate) use unfinished::final_place;
 pub use unfinished::{abandon, sweep};
 
-/// Who may read what is written.
+/// The permissions of outputs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
-    /// As any new file or folder.
+    /// The default permissions of a new file or folder.
     Usual,
-    /// Its owner alone: truth, recovered points, pages that show them. Unix: files 0600, folders 0700.
+    /// Only the owner can read it: ground truth, recovered points, pages that show them. Unix:
+    /// files 0600, folders 0700.
     Private,
 }
 
-/// Makes `folder` and its missing parents, to stay.
+/// Creates `folder` and its missing parents.
 ///
 /// # Errors
-/// When one cannot be made.
+/// When a folder cannot be created.
 pub fn make_folders(folder: &Path, access: Access) -> Result<(), Error> {
     let mut made = unfinished::Unfinished::default();
     made.make_folders(folder, access).map_err(|source| Error::write(folder, source))?;
@@ -47,10 +49,10 @@ pub fn make_folders(folder: &Path, access: Access) -> Result<(), Error> {
     Ok(())
 }
 
-/// Waits until no other run puts files in their places in `folder`, and keeps others out until the result is dropped.
+/// Locks `folder` against other runs that replace files in it, until the result is dropped.
 ///
-/// `None` where folders cannot be locked, or where the lock (`flock`) is held for seconds, as by `flock(1)` around a
-/// command: the work goes on without.
+/// Returns `None` if folders cannot be locked, or if another process holds the lock (`flock`) for 5
+/// seconds, as `flock(1)` around a command does. Work then continues without the lock.
 #[must_use]
 pub fn alone_in(folder: &Path) -> Option<File> {
     const PATIENCE: Duration = Duration::from_secs(5);
@@ -67,7 +69,7 @@ pub fn alone_in(folder: &Path) -> Option<File> {
     }
 }
 
-/// Where a symbolic link points, or the path itself.
+/// Resolves a symbolic link. Other paths are returned unchanged.
 fn resolved(path: &Path) -> Result<PathBuf, Error> {
     let named = path.file_name().is_some();
     if !path.is_symlink() && (named || !path.exists()) {
@@ -82,7 +84,7 @@ fn resolved(path: &Path) -> Result<PathBuf, Error> {
     })
 }
 
-/// Makes the names in `folder` outlast a loss of power, where folders can be flushed.
+/// Flushes the names in `folder` to disk, on systems that can flush folders.
 fn flush_names(folder: &Path) {
     if cfg!(unix) {
         let _ = File::open(folder).and_then(|folder| folder.sync_all());
@@ -96,7 +98,7 @@ fn parent_of(path: &Path) -> &Path {
     }
 }
 
-/// The names in a folder, sorted.
+/// The sorted names in a folder.
 #[cfg(test)]
 fn entries(folder: &Path) -> Vec<String> {
     let name = |entry: io::Result<fs::DirEntry>| entry.unwrap().file_name().into_string().unwrap();

@@ -1,4 +1,4 @@
-//! hloc's layout: a group per image, an array per kind of feature.
+//! Reads features in hloc's layout: a group per image, an array per kind of feature.
 
 use std::path::Path;
 
@@ -35,7 +35,7 @@ impl Hloc {
         }
     }
 
-    /// What is no image, one error each.
+    /// One error for each link that leads to no image.
     pub fn refused(&self) -> &[Error] {
         self.0.broken()
     }
@@ -44,7 +44,7 @@ impl Hloc {
         self.0.paths()
     }
 
-    /// Whether the keypoints of the first image are in pixels of the upright photo.
+    /// Returns true if the keypoints of the first image are in pixels of the upright photo.
     pub fn is_upright(&self) -> bool {
         !self.0.paths().is_empty() && is_upright(&self.0, 0).unwrap_or(false)
     }
@@ -54,10 +54,10 @@ impl Hloc {
     }
 }
 
-/// The one image of a file that [`encode`](super::encode) made.
+/// Reads the one image of a file that [`encode`](super::encode) made.
 ///
 /// # Errors
-/// When `path` cannot be read, is cut off, or does not hold exactly the image `name`.
+/// When `path` cannot be read, is truncated, or does not contain exactly the image `name`.
 pub fn decode(path: &Path, name: &str) -> Result<ImageFeatures, Error> {
     let store = FeatureStore::open(path)?;
     match store.paths() {
@@ -69,7 +69,8 @@ pub fn decode(path: &Path, name: &str) -> Result<ImageFeatures, Error> {
     }
 }
 
-/// What the file says; in files of the first version of unlift, which did not say it, what it extracted was upright.
+/// Returns true if keypoints are in pixels of the upright photo. unlift's first version wrote
+/// upright features without this attribute.
 fn is_upright(store: &FeatureStore, at: usize) -> Result<bool, Error> {
     let number = |key: &str| store.number(at, "keypoints", key);
     Ok(match number(UPRIGHT)? {
@@ -117,14 +118,14 @@ fn image(store: &FeatureStore, at: usize) -> Result<ImageFeatures, Error> {
     })
 }
 
-/// What was expected and what was found.
+/// The expected and the found value.
 type Wrong = (String, String);
 
-/// Rows of at least two columns; what follows x and y is not read.
+/// Reads rows of at least two columns. Columns after x and y are ignored.
 fn keypoints(array: &Array) -> Result<Vec<[f64; 2]>, Wrong> {
     let columns = match array.shape[..] {
         [_, columns] if columns >= 2 => columns as usize,
-        // An image without keypoints, as some exporters write it.
+        // Some exporters write an image without keypoints like this.
         [0] | [0, _] | [2, 0] => return Ok(Vec::new()),
         _ => return Err(("shape (N, 2)".to_owned(), shape_text(&array.shape))),
     };
@@ -140,11 +141,11 @@ fn keypoints(array: &Array) -> Result<Vec<[f64; 2]>, Wrong> {
     }
 }
 
-/// `(D, N)` as rows of `D`.
+/// Converts a `(D, N)` array to rows of `D` values.
 fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
     let expected = || format!("shape (D, N) with N = {n}, one column per keypoint");
     let dim = match array.shape[..] {
-        // Of an image without keypoints, written in any way.
+        // Without keypoints, any shape is accepted.
         ref sides if n == 0 && array.values.len() == 0 => {
             sides.iter().copied().max().unwrap_or(0).max(1) as usize
         }
@@ -155,7 +156,7 @@ fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
         }
         _ => return Err((expected(), shape_text(&array.shape))),
     };
-    // Columns of points, which are wanted as rows.
+    // Points are columns in the file and rows in memory.
     let floats = |values: Vec<f32>| Values::F32(transposed(&values, dim));
     let values = match array.values {
         Numbers::U8(bytes) => Values::U8(transposed(&bytes, dim)),
@@ -170,7 +171,7 @@ fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
         .map_err(|error| (error.expected().to_owned(), describe(&error)))
 }
 
-/// What was found, with the row and value it stands in.
+/// Formats the found value with its row and column.
 fn describe(error: &unlift::Error) -> String {
     match error.what() {
         "descriptors" => error.found().to_owned(),

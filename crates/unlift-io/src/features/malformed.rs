@@ -1,5 +1,8 @@
-//! Malformed features: the exact line each is refused with, and no panic for any cut or changed byte.
-//! In here because the files are made with the writer's inside: from outside it writes good ones only.
+//! Tests of malformed features: the exact error line of each, and no panic for any cut or changed
+//! byte.
+//!
+//! They are in the crate because they use the internal writer. The public one writes only valid
+//! files.
 
 use std::fs;
 use std::io::Cursor;
@@ -9,10 +12,10 @@ use super::h5::{Array, Numbers, Writer};
 use super::{FeatureSource, encode};
 use crate::features::ImageFeatures;
 
-/// An array under a name of the image `a.jpg`.
+/// An array of the image `a.jpg`: name, shape, values.
 type Made = (&'static str, Vec<u64>, Numbers);
 
-/// A file with the image `a.jpg`, which has these arrays, and the good image `b.jpg`.
+/// Creates a file with the image `a.jpg`, which has these arrays, and the valid image `b.jpg`.
 fn file(arrays: Vec<Made>) -> Vec<u8> {
     let mut out = Cursor::new(Vec::new());
     let mut writer = Writer::start(&mut out).unwrap();
@@ -34,7 +37,7 @@ fn descriptors() -> Made {
     ("descriptors", vec![4, 3], Numbers::U8((0..12).collect()))
 }
 
-/// The error of opening `bytes` or of its first image, without the folder.
+/// Returns the error of opening `bytes` or of the first image, without the folder, or "good".
 fn line(bytes: &[u8]) -> String {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("f");
@@ -42,7 +45,7 @@ fn line(bytes: &[u8]) -> String {
     let error = match FeatureSource::open(&path) {
         Err(error) => error,
         Ok(source) => {
-            // The other image is not lost.
+            // The other image is still readable.
             if let Some(at) = source.names().iter().position(|name| name == "b.jpg") {
                 assert_eq!(source.get(at).unwrap().keypoints.len(), 3);
             }
@@ -202,7 +205,7 @@ fn no_cut_and_no_changed_byte_makes_a_panic() {
         }
     };
     for file in &files {
-        // Every length and every byte of a small file; of the others a part, to stay within seconds.
+        // Small files: every length and every byte. Others: a part, to finish within seconds.
         let step = file.len().div_ceil(500);
         (0..file.len()).step_by(step).for_each(|at| visit(&file[..at]));
         for at in (0..file.len()).step_by(step) {

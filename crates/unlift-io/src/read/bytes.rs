@@ -1,4 +1,4 @@
-//! Binary files: buffered, and never trusting a declared size before the file is known to hold it.
+//! Reads binary files with a buffer, and checks declared sizes against the length of the file.
 
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -7,20 +7,20 @@ use std::path::{Path, PathBuf};
 use crate::error::{Error, Place};
 use crate::input::{self, Budget};
 
-/// A little-endian reader that knows where it is and how much is left.
+/// A little-endian reader that tracks its offset and the remaining bytes.
 ///
-/// Every error names the part of the file that was being read, and the byte.
+/// Every error names the current part of the file and the byte.
 pub(crate) struct Bytes {
     path: PathBuf,
     reader: BufReader<File>,
     part: Part,
-    /// Where the value that was read last begins.
+    /// The offset of the last value.
     value_at: u64,
     at: u64,
     len: u64,
 }
 
-/// What is being read; formatted only when something is wrong.
+/// The current part of the file, formatted only for errors.
 enum Part {
     Header,
     Record(u64),
@@ -28,13 +28,14 @@ enum Part {
 }
 
 impl Bytes {
-    /// A reader at the start of `path`.
+    /// Opens `path` at its start.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let (file, len) = input::open(path)?;
         Ok(Self::continuing(path, BufReader::new(file), 0, len))
     }
 
-    /// Whether what is left is zeros, up to a page of memory: PCL's writer stretched its files so far. Reads it, if it is so short.
+    /// Reads the rest and returns true if it is at most 64 KiB of zeros. PCL's writer pads files up
+    /// to a page of memory.
     pub fn is_padding(&mut self) -> Result<bool, Error> {
         let n = self.remaining();
         if n > 1 << 16 {
@@ -45,48 +46,50 @@ impl Bytes {
         Ok(rest.iter().all(|&byte| byte == 0))
     }
 
-    /// A reader of a file of `len` bytes of which `at` were already read from `reader`.
+    /// Creates a reader of a file of `len` bytes of which `at` bytes were already read from
+    /// `reader`.
     pub fn continuing(path: &Path, reader: BufReader<File>, at: u64, len: u64) -> Self {
         Self { path: path.to_owned(), reader, part: Part::Header, value_at: at, at, len }
     }
 
-    /// Errors from here on name record `number`, counted from 1.
+    /// Makes later errors name record `number`, counted from 1.
     pub fn record(&mut self, number: u64) {
         self.part = Part::Record(number);
     }
 
-    /// An empty list with room for `n` entries of what stands at `place`, within the budget of the file.
+    /// Returns an empty vector with capacity for `n` entries of `place`, within the memory budget
+    /// of the file.
     ///
     /// # Errors
-    /// When there is not so much memory.
+    /// When the memory does not suffice.
     pub fn room<T>(&self, place: impl Into<Place> + Clone, n: u64) -> Result<Vec<T>, Error> {
         Budget::new(&self.path, self.len).room(place, n)
     }
 
-    /// Whether `bytes` fit into the budget of the file, which what stands at `place` is about to take.
+    /// Checks that `bytes` for `place` are within the memory budget of the file.
     ///
     /// # Errors
-    /// When they do not.
+    /// When they are not.
     pub fn admit(&self, place: &str, bytes: u64) -> Result<(), Error> {
         Budget::new(&self.path, self.len).admit(place, bytes)
     }
 
-    /// Where the next byte is.
+    /// The offset of the next byte.
     pub fn at(&self) -> u64 {
         self.at
     }
 
-    /// Bytes between here and the end of the file.
+    /// The number of bytes up to the end of the file.
     pub fn remaining(&self) -> u64 {
         self.len.saturating_sub(self.at)
     }
 
-    /// An error in the value that was read last.
+    /// Returns an error about the last value.
     pub fn error(&self, expected: impl Into<String>, found: impl Into<String>) -> Error {
         self.error_at(self.value_at, expected, found)
     }
 
-    /// An error in what follows.
+    /// Returns an error about the next value.
     pub fn error_ahead(&self, expected: impl Into<String>, found: impl Into<String>) -> Error {
         self.error_at(self.at, expected, found)
     }
@@ -100,7 +103,8 @@ impl Bytes {
         Error::new(&self.path, Place::Byte { what, at }, expected, found)
     }
 
-    /// Refuses `n` rows of `stride` bytes that are more than is left; how many bytes they are.
+    /// Returns the size of `n` rows of `stride` bytes, or an error if the file has fewer bytes
+    /// left.
     pub fn expect_rows(&self, n: u64, what: &str, stride: u64) -> Result<u64, Error> {
         let size = n.checked_mul(stride).filter(|&size| size <= self.remaining());
         size.ok_or_else(|| {
@@ -123,7 +127,7 @@ impl Bytes {
         Err(self.error_ahead(format!("{bytes} {unit} of {what}"), found))
     }
 
-    /// Fills `buffer` with the next bytes, which are the `what` of this part.
+    /// Fills `buffer` with the next bytes. Errors name them `what`.
     pub fn fill(&mut self, buffer: &mut [u8], what: &str) -> Result<(), Error> {
         self.check(buffer.len() as u64, what)?;
         self.value_at = self.at;
@@ -132,7 +136,7 @@ impl Bytes {
         Ok(())
     }
 
-    /// Skips `bytes`, which are the `what` of this part.
+    /// Skips `bytes`. Errors name them `what`.
     pub fn skip(&mut self, bytes: u64, what: &str) -> Result<(), Error> {
         self.check(bytes, what)?;
         let offset = i64::try_from(bytes).expect("bounded by the size of the file");
@@ -148,27 +152,27 @@ impl Bytes {
         Ok(buffer)
     }
 
-    /// The next byte.
+    /// Reads a byte.
     pub fn u8(&mut self, what: &str) -> Result<u8, Error> {
         Ok(self.array::<1>(what)?[0])
     }
 
-    /// The next little-endian `u32`.
+    /// Reads a little-endian `u32`.
     pub fn u32(&mut self, what: &str) -> Result<u32, Error> {
         self.array(what).map(u32::from_le_bytes)
     }
 
-    /// The next little-endian `i32`.
+    /// Reads a little-endian `i32`.
     pub fn i32(&mut self, what: &str) -> Result<i32, Error> {
         self.array(what).map(i32::from_le_bytes)
     }
 
-    /// The next little-endian `u64`.
+    /// Reads a little-endian `u64`.
     pub fn u64(&mut self, what: &str) -> Result<u64, Error> {
         self.array(what).map(u64::from_le_bytes)
     }
 
-    /// The next `N` little-endian doubles.
+    /// Reads `N` little-endian doubles.
     pub fn doubles<const N: usize>(&mut self, what: &str) -> Result<[f64; N], Error> {
         self.check(8 * N as u64, what)?;
         let start = self.at;
@@ -180,7 +184,7 @@ impl Bytes {
         Ok(values)
     }
 
-    /// Bytes up to the next zero byte, which is not part of them.
+    /// Reads bytes up to the next zero byte, which is not included.
     pub fn zero_terminated(&mut self, what: &str) -> Result<Vec<u8>, Error> {
         let start = self.at;
         let mut bytes = Vec::new();
@@ -196,10 +200,11 @@ impl Bytes {
         }
     }
 
-    /// The next `u64`, the number of `what` that follow, each of at least `bytes_each` bytes.
+    /// Reads a `u64` count of `what`, each of at least `bytes_each` bytes.
     ///
     /// # Errors
-    /// When the rest of the file cannot hold that many: so nothing is allocated for a false count.
+    /// When the rest of the file is too short for that many, so that nothing is allocated for a
+    /// false count.
     pub fn count(&mut self, what: &str, bytes_each: u64) -> Result<u64, Error> {
         if self.remaining() < 8 {
             self.check(8, &format!("the number of {what}"))?;
@@ -208,7 +213,7 @@ impl Bytes {
         self.check_count(count, what, bytes_each)
     }
 
-    /// The same for a count stored as `u32`.
+    /// Reads a count like [`count`](Self::count), stored as `u32`.
     pub fn count_u32(&mut self, what: &str, bytes_each: u64) -> Result<u64, Error> {
         if self.remaining() < 4 {
             self.check(4, &format!("the number of {what}"))?;
@@ -231,8 +236,10 @@ impl Bytes {
         Err(self.error(expected, count.to_string()))
     }
 
+    /// Checks that the file ends here.
+    ///
     /// # Errors
-    /// When something follows.
+    /// When bytes remain.
     pub fn end(&mut self) -> Result<(), Error> {
         self.part = Part::End;
         match self.remaining() {

@@ -1,4 +1,4 @@
-//! An HDF5 file as a stream: arrays as they come, then the tree of their names, then the superblock.
+//! Writes an HDF5 file as a stream: arrays, then the tree of their names, then the superblock.
 
 use std::collections::BTreeMap;
 use std::io::{self, Seek, SeekFrom, Write};
@@ -10,7 +10,8 @@ use crate::atomic::FEATURES_MARK;
 
 const SUPERBLOCK_BYTES: u64 = 96;
 
-/// The first bytes of a file of `len` bytes, whose root group has its header, tree and heap there.
+/// Returns the superblock of a file of `len` bytes with a root group at these addresses: its
+/// header, and its tree and heap.
 pub(super) fn superblock(len: u64, header: u64, group: [u64; 2]) -> Vec<u8> {
     let mut bytes = b"\x89HDF\r\n\x1a\n\0\0\0\0\0\x08\x08\0".to_vec();
     bytes.extend(tree::LEAF.to_le_bytes());
@@ -29,26 +30,27 @@ enum Member {
     Group(BTreeMap<String, Member>),
 }
 
-/// Writes arrays under paths; only names and addresses stay in memory.
+/// Writes arrays by path. Only names and addresses stay in memory.
 ///
-/// The same arrays in the same order give the same bytes: nothing of the machine or the time is stored.
+/// The same arrays in the same order give the same bytes.
 pub(crate) struct Writer {
     at: u64,
     root: BTreeMap<String, Member>,
 }
 
 impl Writer {
-    /// Starts at the beginning of `out`. A file without its end is no HDF5 file: the signature is
-    /// written last.
+    /// Starts a file at the beginning of `out`. The signature is written last, so an unfinished
+    /// file is not valid HDF5.
     pub fn start(out: &mut impl Write) -> io::Result<Self> {
         out.write_all(&[0; SUPERBLOCK_BYTES as usize])?;
-        // Nothing refers to it: readers of HDF5 pass it over.
+        // HDF5 readers skip it, because nothing refers to it.
         out.write_all(FEATURES_MARK)?;
         let at = SUPERBLOCK_BYTES + FEATURES_MARK.len() as u64;
         Ok(Self { at, root: BTreeMap::new() })
     }
 
-    /// Whether the group `path` can be made: nothing is there yet, and no array stands in its way.
+    /// Returns true if the group `path` can be created: it does not exist, and no array is in its
+    /// way.
     pub fn is_free(&self, path: &str) -> bool {
         let mut members = &self.root;
         for name in path.split('/') {
@@ -61,7 +63,8 @@ impl Writer {
         !members.values().any(|member| matches!(member, Member::Dataset(_)))
     }
 
-    /// Writes `array` as the dataset `name` of the group `path`, which slashes lead to.
+    /// Writes `array` as the dataset `name` of the group `path`, whose parts are separated by
+    /// slashes.
     pub fn array(
         &mut self,
         out: &mut impl Write,
@@ -98,7 +101,7 @@ impl Writer {
         out.write_all(bytes)
     }
 
-    /// Writes all groups and the superblock: now it is a file.
+    /// Writes all groups and the superblock.
     pub fn finish(mut self, out: &mut (impl Write + Seek)) -> io::Result<()> {
         let root = std::mem::take(&mut self.root);
         let (header, group) = self.group(out, &root)?;
@@ -106,7 +109,8 @@ impl Writer {
         out.write_all(&superblock(self.at, header, group))
     }
 
-    /// Writes a group after its members; the addresses of its header and of its names.
+    /// Writes the members of a group, then the group. Returns the addresses of its header, and of
+    /// its tree and heap.
     fn group(
         &mut self,
         out: &mut impl Write,

@@ -1,4 +1,4 @@
-//! The binary form: little-endian, each file a count and that many records.
+//! Reads COLMAP's binary files: little-endian, a count and that many records per file.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use super::model::{Camera, Image, Points, Tracks, place};
 use crate::error::Error;
 use crate::read::bytes::Bytes;
 
-/// Smallest record of each kind, in bytes: what bounds a declared count.
+/// The smallest size of each record in bytes, which limits a declared count.
 const CAMERA_BYTES: u64 = 4 + 4 + 8 + 8 + 2 * 8;
 const IMAGE_BYTES: u64 = 4 + 7 * 8 + 4 + 1 + 8;
 const POINT2D_BYTES: u64 = 8 + 8 + 8;
