@@ -1,4 +1,4 @@
-//! The first stage: a map in somebody else's format becomes positions, ids and camera centers.
+//! Reads maps in many formats as positions, ids and camera centers.
 
 pub(crate) mod bytes;
 pub mod colmap;
@@ -29,14 +29,15 @@ use crate::input;
 use crate::seen::Seen;
 use models::Model;
 
-/// Reads the map at `path`: a COLMAP model folder or a project folder that holds one (of several, the
-/// one with the most points; `notes` says which), a map of OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler or VisualSFM (NVM),
-/// or a point cloud: see `EXPECTED` for the endings.
+/// Reads the map at `path`.
 ///
-/// Points whose coordinates are not finite are left out and counted.
+/// `path` is a COLMAP model folder, a project folder that contains one (of several, the one with
+/// the most points, named in `notes`), a map of OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler or
+/// VisualSFM (NVM), or a point cloud; `EXPECTED` lists the extensions. Points whose coordinates are
+/// not finite are left out and counted.
 ///
 /// # Errors
-/// When nothing readable is there, a file is malformed, or no point has a place.
+/// When nothing readable is there, a file is malformed, or no point has finite coordinates.
 pub fn open(path: &Path) -> Result<Input, Error> {
     let metadata = std::fs::metadata(path).map_err(|e| Error::read(path, e))?;
     let input = if metadata.is_dir() {
@@ -58,16 +59,16 @@ pub fn open(path: &Path) -> Result<Input, Error> {
     Ok(input)
 }
 
-/// Whether `path` is a folder in which [`open`] finds a map.
+/// Returns true if `path` is a folder in which [`open`] finds a map.
 pub fn is_project(path: &Path) -> bool {
     path.is_dir() && (matches!(Model::find(path), Ok(Some(_))) || others::in_folder(path).is_some())
 }
 
-/// What is read, for people.
+/// The supported formats, for error messages.
 const EXPECTED: &str = "a COLMAP folder, a map of OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler or NVM, or a .ply, \
                         .csv, .xyz, .txt, .asc, .pts, .npy, .npz, .las, .pcd, .e57 or .splat file";
 
-/// What a file is that is not read, and what makes one of it that is.
+/// Describes an unsupported file, and how to convert it.
 fn not_read(extension: &str) -> String {
     let more = match extension {
         "" => return "a file without extension".to_owned(),
@@ -82,7 +83,7 @@ fn not_read(extension: &str) -> String {
     format!("a .{extension} file{more}")
 }
 
-/// A table, or COLMAP's points under another name.
+/// Reads a table, or COLMAP's points under another name.
 fn table_of(path: &Path) -> Result<Input, Error> {
     match table::read(path)? {
         Some(input) => Ok(input),
@@ -90,7 +91,7 @@ fn table_of(path: &Path) -> Result<Input, Error> {
     }
 }
 
-/// Refuses what Git LFS leaves in the place of a file that it did not fetch.
+/// Returns an error if `path` is a Git LFS pointer instead of the file.
 fn check_fetched(path: &Path) -> Result<(), Error> {
     const POINTER: &[u8] = b"version https://git-lfs";
     let mut head = Vec::new();
@@ -133,7 +134,7 @@ fn file(path: &Path) -> Result<Input, Error> {
     Ok(input)
 }
 
-/// The points of a COLMAP model given by themselves.
+/// Reads the points of a COLMAP model without its folder.
 fn colmap_points(path: &Path) -> Result<Input, Error> {
     let points = colmap::read_points(path, false)?;
     Ok(Input {
@@ -179,7 +180,7 @@ fn colmap_model(model: &Model) -> Result<Input, Error> {
     input.files.push(model.points.clone());
     input.seen = Seen::new(&input.files);
 
-    // Nothing an audit needs is in cameras, rigs and frames, so that a fault in them is told but not fatal.
+    // An audit needs nothing from cameras, rigs and frames, so their errors are notes.
     let mut told = |error: Error| input.notes.push(error.to_string());
     let cameras = cameras.and_then(|path| colmap::read_cameras(&path).map_err(&mut told).ok());
     for check in

@@ -1,4 +1,4 @@
-//! Bundler's `bundle.out`: a line with counts, five lines per camera, three per point.
+//! Reads Bundler's `bundle.out`: a line with counts, five lines per camera, three per point.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use crate::read::map_input::Input;
 use crate::read::pose::{UPWARD, camera};
 use crate::read::undeclared::undeclared;
 
-/// Exactly `N` numbers in the current line.
+/// Parses the first `N` words of the current line as numbers.
 fn numbers<const N: usize>(lines: &Lines, what: &str) -> Result<[f64; N], Error> {
     let mut values = [0.0; N];
     let mut words = words(lines.line());
@@ -65,7 +65,7 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     while lines.advance_to_data()? {
         more += 1;
     }
-    // Three lines a point.
+    // A point has three lines.
     found.doubts.extend(undeclared(*n_points, more / 3));
     Ok(found)
 }
