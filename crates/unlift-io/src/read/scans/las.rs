@@ -1,7 +1,7 @@
-//! LAS 1.0 to 1.4, uncompressed: a head that says where points begin, how long each is and what its integers are multiplied by.
+//! Reads LAS 1.0 to 1.4, uncompressed.
 //!
-//! A reader of our own rather than the crate `las`: that takes as much memory as a record behind the points says that it
-//! has, so that all heads would have to be read before it is asked; behind them, positions are three integers.
+//! This is our own reader: the crate `las` allocates the size that a record after the points
+//! declares, so all headers would have to be checked first, and a position is just three integers.
 //!
 //! Source: ASPRS, "LAS Specification 1.4 - R15".
 
@@ -14,23 +14,24 @@ use crate::read::lines::quoted;
 use crate::read::map_input::Input;
 use crate::read::undeclared::undeclared;
 
-/// Bytes of the heads of all versions up to the numbers that positions are made with.
+/// The size in bytes of the common part of all headers, up to scale and offset of positions.
 const HEAD: usize = 179;
-/// Where version 1.4 has the number of points, and the bytes of its head.
+/// The offset of the number of points in version 1.4, and the size of its header.
 const COUNT_1_4: usize = 247;
 const HEAD_1_4: usize = 375;
-/// Bytes of a point at least, by format.
+/// The minimum size of a point in bytes, by point format.
 const LEAST: [u16; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
-/// Where the heads of versions 1.3 and 1.4 say that waveforms begin, and that of 1.4 more records.
+/// The header offsets of two offsets: of waveforms (versions 1.3 and 1.4), and of extended records
+/// (1.4).
 const WAVES: usize = 227;
 const EXTENDED_1_4: usize = 235;
-/// Formats have these bits where a program compressed the points.
+/// The bits of the point format that are set in compressed files.
 const COMPRESSED: u8 = 0b1100_0000;
 
 /// Reads the positions.
 ///
 /// # Errors
-/// When the file is none, is compressed, or is cut off.
+/// When the file is not LAS, is compressed, or is truncated.
 pub fn read(path: &Path) -> Result<Input, Error> {
     let mut bytes = Bytes::open(path)?;
     let mut head = [0; HEAD_1_4];
@@ -77,7 +78,7 @@ pub fn read(path: &Path) -> Result<Input, Error> {
         let expected = format!("points behind the head of {at} bytes");
         return Err(bytes.error(expected, format!("at byte {start}")));
     }
-    // What may stand behind the points.
+    // The offsets of data that may follow the points.
     let behind = match at > HEAD as u64 {
         true => [wide(&head, WAVES), wide(&head, EXTENDED_1_4)],
         false => [0; 2],
@@ -104,7 +105,8 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     let end = bytes.at();
     let next = behind.into_iter().filter(|&next| next >= end).min();
     let more = next.map_or(bytes.remaining(), |next| next - end) / u64::from(record);
-    // Of 1.3 the head does not say where waveforms are.
+    // The position of waveforms in version 1.3 is not read, so data after the points is not a
+    // doubt.
     let doubts = undeclared(n, more).filter(|_| version.1 != 3).into_iter().collect();
     let (gap, number) = (behind[1].checked_sub(end), long(&head, EXTENDED_1_4 + 8));
     if let Some(gap) = gap.filter(|&gap| number > 0 && gap <= bytes.remaining()) {
@@ -116,7 +118,7 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     Ok(Input { positions, format: "LAS", is_geographic, doubts, ..Input::default() })
 }
 
-/// What records of a file say of its coordinate system.
+/// Statements of records about the coordinate system.
 #[derive(Default)]
 struct System {
     wkt: Option<bool>,
@@ -124,10 +126,12 @@ struct System {
 }
 
 impl System {
-    /// Looks through at most `number` records in `left` bytes; records behind the points are `long`. One that is
-    /// cut off is the last: points do not depend on it.
+    /// Reads at most `number` records in `left` bytes. Records after the points are `long`.
+    ///
+    /// A truncated record ends the search without an error, because points do not depend on
+    /// records.
     fn look(&mut self, bytes: &mut Bytes, number: u64, left: u64, long: bool) -> Result<(), Error> {
-        /// Text is shorter.
+        /// Descriptions of coordinate systems are shorter.
         const LONGEST: u64 = 1 << 20;
         let mut head = [0; 60];
         let head = if long { &mut head[..] } else { &mut head[..54] };
@@ -162,13 +166,13 @@ impl System {
         Ok(())
     }
 
-    /// Text is newer than keys, and goes first.
+    /// WKT is newer than GeoTIFF keys and has priority.
     fn is_geographic(&self) -> bool {
         self.wkt.or(self.keys).unwrap_or(false)
     }
 }
 
-/// Whether GeoTIFF's directory of keys says that coordinates are degrees.
+/// Returns true if GeoTIFF's key directory states that coordinates are degrees.
 fn is_geographic_by_keys(directory: &[u8]) -> bool {
     const MODEL: u16 = 1024;
     const GEOGRAPHIC_SYSTEM: u16 = 2048;

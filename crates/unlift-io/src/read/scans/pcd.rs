@@ -1,6 +1,7 @@
-//! PCD, as the Point Cloud Library writes it: `ascii`, `binary` and `binary_compressed`.
+//! Reads PCD files of the Point Cloud Library: `ascii`, `binary` and `binary_compressed`.
 //!
-//! A reader of our own: the crate `pcd-rs` takes what the head declares, and knows no compressed files.
+//! This is our own reader: the crate `pcd-rs` allocates what the header declares, and does not
+//! support compressed files.
 //!
 //! Source: PCL's documentation, "The PCD (Point Cloud Data) file format", version 0.7.
 
@@ -15,16 +16,16 @@ use crate::read::map_input::Input;
 use crate::read::scalar::Scalar;
 use crate::read::undeclared::undeclared;
 
-/// One column, or several of a name.
+/// A field: one column, or several with one name.
 #[derive(Clone, Copy, Debug)]
 struct Field {
-    /// Bytes of a value.
+    /// The size of a value in bytes.
     size: u64,
-    /// Values in it.
+    /// The number of values.
     count: u64,
 }
 
-/// A coordinate: the number of its value in a line, its byte in a row, and how it is stored.
+/// A coordinate: its index among the values of a line, its offset in a binary row, and its type.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
     value: u64,
@@ -35,9 +36,9 @@ struct Axis {
 #[derive(Debug)]
 struct Header {
     axes: [Axis; 3],
-    /// Values of a point.
+    /// The number of values of a point.
     n_values: u64,
-    /// Bytes of a point.
+    /// The size of a point in bytes.
     stride: u64,
     n: u64,
     data: Vec<u8>,
@@ -46,13 +47,13 @@ struct Header {
 /// Reads the positions.
 ///
 /// # Errors
-/// When the file is malformed, has no `x`, `y` and `z`, or is cut off.
+/// When the file is malformed, has no `x`, `y` and `z`, or is truncated.
 pub fn read(path: &Path) -> Result<Input, Error> {
     let mut lines = Lines::open(path)?;
     let header = header(path, &mut lines)?;
     let mut doubt = None;
     let (positions, format) = match &*header.data {
-        // Nothing says how much there is to read.
+        // Without points, the file size limits nothing.
         _ if header.n == 0 => (Vec::new(), "PCD"),
         b"ascii" => (ascii(lines, &header)?, "PCD ascii"),
         b"binary" => {
@@ -65,7 +66,7 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     Ok(Input { positions, format, doubts: doubt.into_iter().collect(), ..Input::default() })
 }
 
-/// The lines up to `DATA`, each a word and its values.
+/// Parses the header lines up to `DATA`.
 fn header(path: &Path, lines: &mut Lines) -> Result<Header, Error> {
     let (mut names, mut sizes, mut kinds, mut counts) = (Vec::new(), Vec::new(), Vec::new(), None);
     let (mut width, mut height, mut points) = (None, 1, None);
@@ -136,7 +137,7 @@ fn header(path: &Path, lines: &mut Lines) -> Result<Header, Error> {
             let expected = format!("one value of type F, I or U for {name}");
             refuse(&expected, format!("{kind} {} {}", field.size, field.count))
         })?;
-        // What all of them come to was counted above.
+        // The sums cannot overflow, because the totals were checked above.
         let before = &fields[..at];
         let value = before.iter().map(|field| field.count).sum();
         Ok(Axis { value, byte: before.iter().map(bytes).sum(), scalar })
@@ -181,7 +182,7 @@ fn ascii(mut lines: Lines, header: &Header) -> Result<Vec<[f64; 3]>, Error> {
     Ok(positions)
 }
 
-/// The points, and how many more there is room for behind them.
+/// Reads the points, and returns how many more points fit into the rest of the file.
 fn binary(mut bytes: Bytes, header: &Header) -> Result<(Vec<[f64; 3]>, u64), Error> {
     let (n, stride) = (header.n, header.stride);
     bytes.expect_rows(n, "points", stride)?;
@@ -196,7 +197,8 @@ fn binary(mut bytes: Bytes, header: &Header) -> Result<(Vec<[f64; 3]>, u64), Err
     Ok((positions, if bytes.is_padding()? { 0 } else { more }))
 }
 
-/// All values of a field stand together, field by field, and the whole is compressed.
+/// Reads compressed points. The decompressed data has all values of the first field, then of the
+/// next one.
 fn compressed(mut bytes: Bytes, header: &Header) -> Result<Vec<[f64; 3]>, Error> {
     let packed = u64::from(bytes.u32("the size of the compressed points")?);
     let size = u64::from(bytes.u32("the size of the points")?);
