@@ -1,11 +1,11 @@
-//! Files as people have them: inputs beside the repository, where they are at hand, with the right answer for each.
+//! Tests real inputs of users, if they are present, against the right result of each.
 
 use std::path::{Path, PathBuf};
 
 use unlift_io::features::FeatureSource;
 use unlift_io::read::{self, Input};
 
-/// The folder of the inputs, or a message that the test is skipped.
+/// Returns the folder of the inputs, or prints that the test is skipped.
 fn field() -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/field");
     if !path.is_dir() {
@@ -15,7 +15,7 @@ fn field() -> Option<PathBuf> {
     Some(path)
 }
 
-/// Whether `found` are `n` of the `expected` points, in any order.
+/// Returns true if `found` are `n` of the `expected` points, in any order.
 fn same(found: &[[f64; 3]], expected: &[[f64; 3]], n: usize, tolerance: f64) -> bool {
     let near =
         |a: &[f64; 3], b: &[f64; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= tolerance);
@@ -30,7 +30,7 @@ fn maps_are_read_as_their_makers_meant_them() {
     let expected = read::open(&field.join("expected.npy")).unwrap().positions;
     assert_eq!(expected.len(), 300);
     let millimeters: Vec<[f64; 3]> = expected.iter().map(|p| p.map(|x| 1000.0 * x)).collect();
-    // What is read, how many points and cameras, how exactly, and what a note says.
+    // Input, number of points and of cameras, tolerance, text of a note.
     let rows: &[(&str, usize, usize, f64, &str)] = &[
         ("f02-named-in-comment/hash_id_first.txt", 300, 0, 1e-4, ""),
         ("f02-named-in-comment/hash_normals_first.txt", 300, 0, 1e-4, ""),

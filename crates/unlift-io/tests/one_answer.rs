@@ -1,6 +1,7 @@
-//! One answer: the stages through files, and the audit in memory, give the same row, bit for bit.
+//! Tests that stages through files and an audit in memory give the same row, bit for bit.
 //!
-//! Every scheme with every source. What files do not keep (the trials of `ransac`) is left out.
+//! Covers every scheme with every source. The trials of `ransac`, which files do not store, are
+//! left out.
 
 use std::sync::Arc;
 
@@ -24,10 +25,11 @@ use unlift::{Descriptors, PointSet, Unit};
 use unlift_io::atomic::{Access, OutputFile};
 use unlift_io::stage::{self, ImageFile, ImageWriter, Kind};
 
-/// A seed that is no default anywhere: all stages are given it.
+/// A seed that is nowhere the default. All stages use it.
 const SEED: u64 = 7;
 
-/// SIFT-like bytes that change slowly over the map: waves of several lengths in every direction.
+/// Creates SIFT-like bytes that change slowly over the map: waves of several lengths in every
+/// direction.
 fn descriptors<const D: usize>(points: &[[f64; D]], extent: f64) -> Descriptors {
     let value = |point: &[f64; D], bin: usize| {
         let mut draws = Draws::new(99, Stage::Synthetic, bin as u64);
@@ -38,7 +40,8 @@ fn descriptors<const D: usize>(points: &[[f64; D]], extent: f64) -> Descriptors 
     Descriptors::try_new(Values::U8(bytes.collect()), 128).unwrap()
 }
 
-/// Every source: the oracle at two ratios with three kinds of noise, all that work alone, and lists by point.
+/// All sources: the oracle at two ratios with three kinds of noise, and those that need no other
+/// input.
 fn sources<const D: usize>(k: usize) -> Vec<NeighborsBy<D>> {
     let names = ["similarity", "overlap", "geometric"];
     let named = names.map(|name| Named::parse(name).unwrap().with_k(k));
@@ -58,7 +61,8 @@ fn given(n: usize) -> NeighborsBy<3> {
     NeighborsBy::Given(PointNeighbors { name: "file".into(), offsets, neighbors, scores: None })
 }
 
-/// The rows of the stages, one per variant and solver: every arrow between two stages goes through a file.
+/// Returns the rows of the stages, one per variant and solver. All data between two stages goes
+/// through a file.
 fn staged<const D: usize>(
     folder: &Path,
     scheme: &dyn Scheme<D>,
@@ -94,7 +98,7 @@ fn staged<const D: usize>(
     rows
 }
 
-/// The lists of one variant, made from files alone.
+/// Makes the lists of one variant from files only.
 fn lists<const D: usize>(
     folder: &Path,
     variant: &Variant<'_, D>,
@@ -119,7 +123,7 @@ fn lists<const D: usize>(
     }
 }
 
-/// `row` without what a file of recovered points cannot say.
+/// Removes the fields of `row` that a file of recovered points does not store.
 fn without_name(row: &Row) -> Row {
     Row {
         scheme: String::new(),
@@ -129,18 +133,18 @@ fn without_name(row: &Row) -> Row {
         k: 0,
         solver: String::new(),
         distinct: None,
-        // Of the lists alone, as their ratio and K.
+        // These depend on the lists only.
         metrics: Default::default(),
         ..row.clone()
     }
 }
 
-/// The plan of the scheme called `name`.
+/// Returns the plan of the scheme `name`.
 fn plan<const D: usize>(unit: Unit, name: &str, sources: Vec<NeighborsBy<D>>) -> Plan<D> {
     let mut plan = Plan::new(unit);
     plan.schemes.retain(|scheme| scheme.name() == name);
     plan.neighbors = sources;
-    // Planes alone tell nothing.
+    // Records of planes alone say nothing about neighbors.
     plan.neighbors.retain(|by| name != "plane" || !by.name().contains("geometric"));
     plan.k = 8;
     plan.oracle_noise = vec![Noise::Uniform, Noise::Near, Noise::Clustered];
@@ -189,7 +193,7 @@ fn maps() {
     }
 }
 
-/// Keeps nothing: rows come with the image.
+/// An observer that stores nothing: rows come with the image.
 struct Unseen;
 
 impl Observer<2> for Unseen {
@@ -210,7 +214,7 @@ impl audit::Watcher<2> for Rows {
     }
 }
 
-/// Random keypoints in a picture of 640 x 480.
+/// Creates random keypoints in a picture of 640 x 480.
 fn keypoints(seed: u64, n: usize) -> (Original<2>, Descriptors) {
     let mut draws = Draws::new(seed, Stage::Synthetic, 1);
     let points: Vec<[f64; 2]> =
@@ -221,8 +225,9 @@ fn keypoints(seed: u64, n: usize) -> (Original<2>, Descriptors) {
     (Original::within(set, bounds).unwrap(), descriptors)
 }
 
-/// Many images in one file of each kind, read and written image by image: the pooled row of the audit. One image has
-/// fewer records than a list, one a single keypoint, which some schemes do not release.
+/// Many images in one file of each kind, read and written image by image, give the pooled row of
+/// the audit. One image has fewer records than a list has entries, one has a single keypoint, which
+/// some schemes do not release.
 #[test]
 fn many_images_in_one_file() {
     let folder = tempfile::tempdir().unwrap();
@@ -247,7 +252,7 @@ fn many_images_in_one_file() {
         let audited =
             audit::run_many::<2, unlift::Error>(of_audit, &plan, &mut audit::Silent).unwrap();
         for (row, source) in audited.rows.iter().zip(["oracle", "overlap"]) {
-            // Hidden.
+            // Obfuscate.
             let mut truth = OutputFile::create(&path("truth"), Access::Private).unwrap();
             let mut released = OutputFile::create(&path("released"), Access::Usual).unwrap();
             let mut truths = ImageWriter::start(&mut truth, Kind::Truth);
@@ -263,7 +268,7 @@ fn many_images_in_one_file() {
             maps.finish().unwrap();
             truth.commit().unwrap();
             released.commit().unwrap();
-            // Listed.
+            // Make lists.
             let (truth, released) = (path("truth"), path("released"));
             assert!(stage::has_images(&truth).unwrap());
             let mut truths = ImageFile::open(&truth, Kind::Truth).unwrap();
@@ -288,7 +293,7 @@ fn many_images_in_one_file() {
             }
             lists.finish().unwrap();
             output.commit().unwrap();
-            // Recovered.
+            // Recover.
             let lists = path("lists");
             let mut lists = ImageFile::open(&lists, Kind::Neighborhoods).unwrap();
             let mut maps = ImageFile::open(&released, Kind::Released).unwrap();
@@ -305,7 +310,7 @@ fn many_images_in_one_file() {
             }
             back.finish().unwrap();
             output.commit().unwrap();
-            // Evaluated.
+            // Evaluate.
             let back = path("back");
             let mut back = ImageFile::open(&back, Kind::Recovered).unwrap();
             let mut truths = ImageFile::open(&truth, Kind::Truth).unwrap();
@@ -343,7 +348,7 @@ fn images() {
         };
         let mut audited = Rows(Vec::new());
         audit::run_many::<2, unlift::Error>([Ok(image)], &plan, &mut audited).unwrap();
-        // The randomness of an image is that of its name: FNV-1a of no bytes.
+        // The seed of an image depends on its name: FNV-1a of no bytes.
         let name = 0xCBF2_9CE4_8422_2325;
         let key = Key::from_seed(SEED).of_item(Stage::Image, name);
         let owner = (&key, Draws::new(SEED, Stage::Image, name).bits());

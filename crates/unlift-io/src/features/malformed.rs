@@ -65,7 +65,7 @@ fn shown(dir: &Path, line: &str) -> String {
 }
 
 #[test]
-#[rustfmt::skip] // A row is read as a row.
+#[rustfmt::skip] // One row per line.
 fn every_malformed_file_of_features_is_refused_with_its_line() {
     let floats = |shape: &[u64], value: f32| {
         let n = shape.iter().product::<u64>() as usize;
@@ -130,7 +130,7 @@ fn every_malformed_file_of_features_is_refused_with_its_line() {
 }
 
 #[test]
-#[rustfmt::skip] // A row is read as a row.
+#[rustfmt::skip] // One row per line.
 fn every_malformed_database_is_refused_with_its_line() {
     let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/project/database.db");
     let filled = "INSERT INTO keypoints SELECT image_id, 8, 2, zeroblob(64) FROM images; ";

@@ -1,13 +1,13 @@
-//! Rows that say which slot or point they are about may stand in any order.
+//! Sorts rows that state their slot or point.
 
 use crate::Error;
 use std::path::Path;
 
-/// The row of each key from 0 to `n - 1`, where row `r` has key `keys[r]`; `None` where no row has
-/// it.
+/// Returns the row of each key from 0 to `n - 1`, where row `r` has key `keys[r]`, or `None` for a
+/// key without a row.
 ///
 /// # Errors
-/// When two rows have the same key. `column` names the keys in the message; keys are below `n`.
+/// When two rows have the same key. `column` names the keys in the error; keys are below `n`.
 pub(super) fn rows_by_key(
     path: &Path,
     column: &str,
@@ -28,10 +28,10 @@ pub(super) fn rows_by_key(
     Ok(rows)
 }
 
-/// The row of each of as many keys as there are rows.
+/// Returns the row of each key, where each of the keys 0 to `keys.len() - 1` has one row.
 ///
 /// # Errors
-/// As [`rows_by_key`]; then no key is missing either.
+/// When [`rows_by_key`] fails. Otherwise no key is missing.
 pub(super) fn permutation(path: &Path, column: &str, keys: &[u32]) -> Result<Vec<u32>, Error> {
     let rows = rows_by_key(path, column, keys, keys.len())?;
     Ok(rows.into_iter().flatten().collect())

@@ -1,4 +1,4 @@
-//! The rows of a stage file: of one Parquet file, or of a folder of them, part after part.
+//! Reads the rows of a stage file: one Parquet file, or a folder of parts.
 
 use super::file::{self, ParquetFile};
 use super::manifest::Manifest;
@@ -11,15 +11,16 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The ending of a part. What else is in a folder, and names that begin with `_` or a dot, are no rows: engines leave them there.
+/// The extension of a part. Other files, and names that begin with `_` or a dot, are skipped:
+/// engines write them.
 pub(super) const ENDING: &str = "parquet";
 
-/// One open Parquet file, or all of a folder in the order of their names; at least one.
+/// One open Parquet file, or all parts of a folder in the order of their names. At least one.
 #[derive(Debug)]
 pub(super) struct Parts<'a> {
     path: &'a Path,
     files: Vec<Arc<ParquetFile>>,
-    /// The metadata of unlift, as the parts or the manifest have it.
+    /// unlift's metadata, from the manifest or the parts.
     meta_text: Option<String>,
 }
 
@@ -27,7 +28,8 @@ impl<'a> Parts<'a> {
     /// Opens the file or folder `path` and reads its footers.
     ///
     /// # Errors
-    /// When a part is no Parquet file, has other columns or metadata than the first, or is not as the manifest has it.
+    /// When a part is not a Parquet file, has other columns or metadata than the first, or differs
+    /// from the manifest.
     pub(super) fn open(path: &'a Path) -> Result<Self, Error> {
         if !path.is_dir() {
             let file = ParquetFile::open(path)?;
@@ -72,27 +74,29 @@ impl<'a> Parts<'a> {
         Ok(parts)
     }
 
-    /// Number of rows, as the footers declare it.
+    /// The number of rows that the footers declare.
     pub(super) fn n_rows(&self) -> u64 {
         self.files.iter().map(|file| file.n_rows()).sum()
     }
 
-    /// The columns, as their Parquet types say.
+    /// The columns, by their Parquet types.
     pub(super) fn schema(&self) -> &SchemaRef {
         self.files[0].schema()
     }
 
-    /// The text under the metadata key of unlift, if there is any.
+    /// The text under unlift's metadata key, if there is one.
     pub(super) fn meta_text(&self) -> Option<&str> {
         self.meta_text.as_deref()
     }
 
-    /// Whether the files themselves say that no row has a value in the column `name`, which is no list.
+    /// Returns true if statistics in the files show that the column `name`, which is no list, has
+    /// only nulls.
     pub(super) fn is_all_null(&self, name: &str) -> bool {
         self.files.iter().all(|file| file.n_rows() == 0 || file.is_all_null(name))
     }
 
-    /// Starts to decode the columns at `roots`, in order; what is decoded will `stay` in memory so long.
+    /// Starts decoding the columns at `roots`, in order. `stay` states how long decoded data stays
+    /// in memory.
     pub(super) fn batches(&self, roots: &[usize], stay: Stay) -> Result<Batches, Error> {
         let names: Vec<&str> =
             roots.iter().map(|&root| self.schema().field(root).name().as_str()).collect();
@@ -101,7 +105,7 @@ impl<'a> Parts<'a> {
             for name in &names {
                 file.check_codec(name)?;
             }
-            // Every part has these columns, in whatever order.
+            // Every part has these columns, in any order.
             let at = names.iter().filter_map(|name| file.schema().index_of(name).ok());
             of_files.push(at.collect::<Vec<usize>>());
         }
@@ -116,18 +120,18 @@ impl<'a> Parts<'a> {
     }
 }
 
-/// Rows as they are decoded, some thousand at a time.
+/// An iterator over decoded batches of rows.
 pub(super) struct Batches {
-    /// The last one is next.
+    /// The files to read, in reverse order.
     waiting: Vec<(Arc<ParquetFile>, Vec<usize>)>,
     current: Option<file::Batches>,
     most_rows: usize,
-    /// Rows that were given back.
+    /// Rows that [`take`](Self::take) has returned to the iterator.
     rest: Option<RecordBatch>,
 }
 
 impl Batches {
-    /// The next rows; `None` at the end, where there were as many as the footers say.
+    /// Returns the next rows, or `None` at the end. A wrong number of rows is an error.
     pub(super) fn next(&mut self) -> Result<Option<RecordBatch>, Error> {
         if let Some(rest) = self.rest.take() {
             return Ok(Some(rest));
@@ -143,7 +147,8 @@ impl Batches {
         }
     }
 
-    /// The first `n` of `rows`; the others, if there are any, come next.
+    /// Returns the first `n` of `rows`. The others are returned by the next call of
+    /// [`next`](Self::next).
     pub(super) fn take(&mut self, rows: RecordBatch, n: usize) -> RecordBatch {
         if n < rows.num_rows() {
             self.rest = Some(rows.slice(n, rows.num_rows() - n));
@@ -152,7 +157,7 @@ impl Batches {
     }
 }
 
-/// The files of which a stage file is made: itself or, of a folder, its parts in order.
+/// Returns the files of a stage file: itself, or the parts of a folder in order.
 ///
 /// # Errors
 /// When the folder cannot be read.
@@ -163,7 +168,7 @@ pub fn part_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(names_in(path)?.into_iter().map(|name| path.join(name)).collect())
 }
 
-/// The names of the parts in a folder, in order.
+/// Returns the names of the parts in a folder, in order.
 pub(super) fn names_in(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     let failed = |source| Error::read(folder, source);
     let mut names = Vec::new();
@@ -178,7 +183,7 @@ pub(super) fn names_in(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(names)
 }
 
-/// Refuses a part whose columns are not those of the first.
+/// Returns an error if a part has other columns than the first.
 fn same_columns(first: &ParquetFile, other: &ParquetFile) -> Result<(), Error> {
     let columns = |file: &ParquetFile| {
         let fields = file.schema().fields().iter();

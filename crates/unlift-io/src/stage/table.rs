@@ -1,4 +1,5 @@
-//! A table of one kind: from a Parquet file or a folder of its parts, or the rows of one image in it.
+//! A table of one kind: from a Parquet file or a folder of its parts, or the rows of one image in
+//! it.
 
 use super::column::{Batch, Type};
 use super::header::{Kind, Meta};
@@ -10,7 +11,7 @@ use arrow_schema::SchemaRef;
 use std::path::Path;
 use unlift::Unit;
 
-/// A table whose columns are asked for by name.
+/// A table with columns that are read by name.
 #[derive(Debug)]
 pub(super) struct Table<'a> {
     path: &'a Path,
@@ -18,11 +19,11 @@ pub(super) struct Table<'a> {
     meta: Meta<'a>,
 }
 
-/// Where the rows of a table are.
+/// The source of the rows of a table.
 #[derive(Debug)]
 enum Rows<'a> {
     Stored(Parts<'a>),
-    /// In memory: those of one image, at least one batch.
+    /// The rows of one image, in memory. At least one batch.
     Held(Vec<RecordBatch>),
 }
 
@@ -34,17 +35,17 @@ impl<'a> Table<'a> {
         Ok(Self { path, rows: Rows::Stored(parts), meta })
     }
 
-    /// The rows of one image, which were read already.
+    /// Creates a table of the rows of one image, which were read already.
     pub(super) fn held(path: &'a Path, meta: Meta<'a>, held: Vec<RecordBatch>) -> Self {
         Self { path, rows: Rows::Held(held), meta }
     }
 
-    /// Opens `path`, which should hold `kind`.
+    /// Opens `path`, which must be of `kind`.
     pub(super) fn open_kind(path: &'a Path, kind: Kind) -> Result<Self, Error> {
         let table = Self::open(path)?;
         let found = match table.meta.kind()? {
             Some(found) => found,
-            // What could be several kinds is the one that is asked for.
+            // An ambiguous table is taken for the requested kind.
             None => table.kind_by_columns().unwrap_or(kind),
         };
         if found == kind {
@@ -54,13 +55,13 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// What the file holds: by its metadata or, where it does not say, by its columns.
+    /// The kind of the table, by its metadata, else by its columns.
     pub(super) fn kind(&self) -> Result<Kind, Error> {
         let kind = self.meta.kind()?.or_else(|| self.kind_by_columns());
         kind.ok_or_else(|| Error::new(self.path, "", "a stage file of unlift", NO_METADATA))
     }
 
-    /// What only one kind has columns for; `None` where it could be several kinds, or none.
+    /// Returns the kind that is the only one with such columns, or `None` if there is no such kind.
     fn kind_by_columns(&self) -> Option<Kind> {
         let any = |names: &[&str]| names.iter().any(|name| self.has(name));
         if self.has("point") && self.has("neighbors") {
@@ -78,12 +79,12 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The file, for errors.
+    /// The path of the file, for errors.
     pub(super) fn path(&self) -> &'a Path {
         self.path
     }
 
-    /// The error about values that the core refused.
+    /// Returns an error about values that the core library refused.
     pub(super) fn refused(&self, source: unlift::Error) -> Error {
         Error::core(self.path, source)
     }
@@ -93,7 +94,7 @@ impl<'a> Table<'a> {
         &self.meta
     }
 
-    /// 2 or 3, as declared or as the columns have it.
+    /// The dimension, 2 or 3, by the metadata, else by the columns.
     pub(super) fn dimension(&self) -> Result<usize, Error> {
         if let Some(declared) = self.meta.dimension()? {
             return Ok(declared);
@@ -109,7 +110,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Refuses a table of another dimension than `D`.
+    /// Returns an error if the dimension is not `D`.
     pub(super) fn expect_dimension<const D: usize>(&self) -> Result<(), Error> {
         let found = self.dimension()?;
         if found == D {
@@ -122,14 +123,14 @@ impl<'a> Table<'a> {
         Err(Error::new(self.path, "", format!("{D} dimensions"), found))
     }
 
-    /// The unit of every length, as declared or `usual`; in the plane it is pixels.
+    /// The unit of all lengths: as declared, else `usual`, else pixels in 2D.
     pub(super) fn unit<const D: usize>(&self, usual: Option<Unit>) -> Result<Unit, Error> {
         let in_plane = (D == 2).then_some(Unit::Pixel);
         let unit = self.meta.unit()?.or(usual).or(in_plane);
         unit.ok_or_else(|| self.meta.wrong_unit())
     }
 
-    /// Number of rows.
+    /// The number of rows.
     pub(super) fn n_rows(&self) -> u64 {
         match &self.rows {
             Rows::Stored(parts) => parts.n_rows(),
@@ -137,25 +138,27 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Whether there is a column called `name` with a value in it, as far as can be told without reading it.
+    /// Returns true if there is a column `name` that may have a value, as far as file metadata
+    /// shows.
     pub(super) fn has(&self, name: &str) -> bool {
         let field = self.schema().column_with_name(name);
         let named = field.is_some_and(|(_, field)| !field.data_type().is_null());
         named && (self.n_rows() == 0 || !self.is_all_null(name))
     }
 
-    /// Selects the `columns` that are present with a value.
+    /// Selects the `columns` that are present and may have a value.
     pub(super) fn present<'c>(&self, columns: &[(&'c str, Type)]) -> Vec<(&'c str, Type)> {
         columns.iter().copied().filter(|(name, _)| self.has(name)).collect()
     }
 
-    /// Whether the column `name` is there and of type `class`.
+    /// Returns true if the column `name` exists and has the type `class`.
     pub(super) fn is(&self, name: &str, class: Type) -> bool {
         let field = self.schema().column_with_name(name);
         field.is_some_and(|(_, field)| class.admits(field.data_type()))
     }
 
-    /// Decodes `columns`, a few thousand rows at a time, and hands them to `each` in row order.
+    /// Decodes `columns`, a few thousand rows at a time, and passes them to `each` in the order of
+    /// rows.
     pub(super) fn read(
         &self,
         columns: &[(&str, Type)],
@@ -185,10 +188,11 @@ impl<'a> Table<'a> {
         Ok(())
     }
 
-    /// Whether the column `name`, of which `n_null` rows were passed over as whole batches of nulls, has no value.
+    /// Returns true if the column `name` has no values. `n_null` is the number of rows in batches
+    /// that are all null.
     ///
     /// # Errors
-    /// When some rows have one and others do not.
+    /// When some rows have values and others do not.
     pub(super) fn is_without(&self, name: &str, n_null: usize) -> Result<bool, Error> {
         if n_null == 0 || n_null as u64 == self.n_rows() {
             return Ok(n_null > 0);
@@ -215,7 +219,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The index of the column `name`, which must be there once and be of type `class`.
+    /// Returns the index of the column `name`, which must exist once and have the type `class`.
     fn find(&self, name: &str, class: Type) -> Result<usize, Error> {
         let wrong = |found: String| {
             Error::new(self.path, format!("column {name}"), class.to_string(), found)

@@ -1,4 +1,4 @@
-//! Clouds of scanners.
+//! Malformed scans.
 
 #[path = "../made/mod.rs"]
 mod made;
@@ -17,7 +17,7 @@ pub fn e57_file() -> Vec<u8> {
     std::fs::read(&path).unwrap()
 }
 
-/// E57 of points in steps of a half, which may only be 7: a bit each, or none.
+/// E57 of points in steps of a half whose value is 7 to `most`: a bit per coordinate, or none.
 fn of_steps(most: i64) -> Vec<u8> {
     use e57::{E57Writer, Record, RecordDataType, RecordName, RecordValue};
     let dir = tempfile::tempdir().unwrap();
@@ -35,7 +35,7 @@ fn of_steps(most: i64) -> Vec<u8> {
     made::e57_with(file, "maximum=\"8\"", &format!("maximum=\"{most}\""))
 }
 
-/// Writes every kind of scan into `folder`; their names.
+/// Writes every kind of scan into `folder` and returns their names.
 pub fn write_all(folder: &Path) -> [&'static str; 5] {
     let put = |name: &str, bytes: Vec<u8>| std::fs::write(folder.join(name), bytes).unwrap();
     put("a.las", made::las(2, 20));
@@ -46,7 +46,7 @@ pub fn write_all(folder: &Path) -> [&'static str; 5] {
     ["a.las", "ascii.pcd", "binary.pcd", "compressed.pcd", "a.e57"]
 }
 
-#[rustfmt::skip] // A row is read as a row.
+#[rustfmt::skip] // One row per line.
 pub fn las() -> Vec<Row> {
     let file = || made::las(2, 20);
     let las = |what, bytes: Vec<u8>, line| alone(what, "a.las", bytes, line);
@@ -72,7 +72,7 @@ pub fn las() -> Vec<Row> {
     ]
 }
 
-#[rustfmt::skip] // A row is read as a row.
+#[rustfmt::skip] // One row per line.
 pub fn pcd() -> Vec<Row> {
     let head = |from: &str, to: &str, data: &str| made::pcd_head(2, data).replace(from, to);
     let pcd = |what, text: String, line| alone(what, "a.pcd", text, line);
@@ -124,7 +124,7 @@ pub fn pcd() -> Vec<Row> {
     ]
 }
 
-#[rustfmt::skip] // A row is read as a row.
+#[rustfmt::skip] // One row per line.
 pub fn e57() -> Vec<Row> {
     let e57 = |what, bytes: Vec<u8>, line| alone(what, "a.e57", bytes, line);
     let file = e57_file;

@@ -1,4 +1,5 @@
-//! How people's files deviate from what formats say: read as meant, or refused with what they are.
+//! Tests files that deviate from their format in common ways: they are read as intended, or the
+//! error explains what they are.
 
 use std::fs;
 use std::path::Path;
@@ -21,7 +22,7 @@ fn refused(name: &str, contents: impl AsRef<[u8]>) -> String {
     line.replace(&format!("{}/", dir.path().display()), "")
 }
 
-/// Rows of three numbers and what `more` adds around each.
+/// A table of three numbers per row, formatted by `row`, after `head`.
 fn table(head: &str, row: impl Fn(usize, [f64; 3]) -> String) -> String {
     let rows = POINTS.iter().enumerate().map(|(at, &point)| row(at, point) + "\n");
     head.to_owned() + &rows.collect::<String>()
@@ -44,7 +45,7 @@ fn comments_name_the_columns_of_a_table() {
         let input = open("a.asc", table(head, plain));
         assert_eq!((&input.positions[..], input.doubts.len()), (&POINTS[..], 0), "{head}");
     }
-    // As many words as columns, and nobody knows of what: read, but no gate holds.
+    // The comment has as many words as columns but no known names: read with a doubt.
     let input = open("a.xyz", table("# my first room\n", plain));
     assert!(
         input.doubts[0].starts_with("columns: the first three are taken"),
@@ -133,7 +134,7 @@ fn points_without_a_place_are_left_out_and_counted() {
         assert_eq!(input.notes, ["1 of 40 points have no place"]);
         assert!(input.doubts.is_empty());
     }
-    // More than one in twenty: of what map the figures are nobody knows.
+    // More than 5 % of the points are a doubt.
     let text =
         table("", |at, [x, y, z]| if at == 0 { "nan 1 2".into() } else { format!("{x} {y} {z}") });
     let input = open("a.xyz", text);
@@ -277,7 +278,7 @@ fn pcd_is_spelled_in_many_ways() {
     }
 }
 
-/// An array of NumPy.
+/// Creates a NumPy array.
 fn npy(descr: &str, shape: &str, values: &[u8]) -> Vec<u8> {
     let text = format!("{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}\n");
     let head = [b"\x93NUMPY\x01\0".as_slice(), &(text.len() as u16).to_le_bytes(), text.as_bytes()];
@@ -335,7 +336,7 @@ fn arrays_may_have_more_columns_or_names() {
     );
 }
 
-/// NumPy's archive of these arrays, every second one compressed.
+/// Creates a NumPy archive of these arrays, every second one compressed.
 fn archive(arrays: &[(&str, Vec<u8>)]) -> Vec<u8> {
     use std::io::Write;
     use zip::write::{SimpleFileOptions, ZipWriter};
@@ -378,7 +379,7 @@ fn cameras_are_not_needed_for_points() {
             "SPHERICAL",
             "expected a camera model of COLMAP for camera",
         ),
-        // A pose that is no number, and one of zeros.
+        // A pose with NaN, and one of zeros.
         ("images.txt", "\n3 0.2448454332437206 ", "\n3 nan ", "1 of 20 cameras have no place"),
         (
             "images.txt",
@@ -417,7 +418,7 @@ fn models_of_undistorted_images_are_found_where_there_is_no_other() {
     }
 }
 
-/// OpenSfM's features: place, size and angle of keypoints beside their descriptors.
+/// OpenSfM stores position, size and angle of keypoints beside their descriptors.
 #[test]
 fn an_archive_of_features_is_no_map() {
     let array = |shape: [usize; 2]| {
@@ -441,11 +442,11 @@ fn points3d_of_others_are_a_table() {
         });
         assert_eq!(open("points3D.txt", text.join("\n")).positions, POINTS);
     }
-    // A row of COLMAP's that is damaged is not read as a point.
+    // A damaged row of COLMAP must not be read as a point.
     assert!(refused("points3D.txt", "1 0.5 0.5 0.5\n").contains("points3D.txt:1: expected"));
 }
 
-/// Python's writer of JSON knows numbers that JSON does not.
+/// Python writes NaN and Infinity, which JSON does not allow.
 #[test]
 fn json_with_numbers_that_are_none_has_points_left_out() {
     let point = |x: &str| format!(r#"{{"coordinates": [{x}, 2.0, 3.0]}}"#);
@@ -484,7 +485,7 @@ fn a_file_that_was_not_fetched_is_told() {
     }
 }
 
-/// PCL's writer of binary files left zeros behind the points.
+/// PCL's writer of binary files left zeros after the points.
 #[test]
 fn zeros_behind_the_points_of_a_pcd_are_no_points() {
     let head = "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 3\nHEIGHT 1\nPOINTS 3\nDATA binary\n";

@@ -1,4 +1,4 @@
-//! Where in a project its model and its database are, and what is said of all else.
+//! Tests where the model and the database of a project are found, and the notes about others.
 
 use std::fs;
 use std::path::Path;
@@ -7,7 +7,7 @@ use unlift_io::read;
 
 use super::data;
 
-/// A copy of the fixture `from` at `to` in `root`.
+/// Copies the fixture `from` to `to` in `root`.
 fn copy(from: &str, root: &Path, to: &str) {
     let to = root.join(to);
     fs::create_dir_all(&to).unwrap();
@@ -81,7 +81,7 @@ fn models_are_found_where_programs_put_them() {
 
 #[test]
 fn of_several_models_the_largest_is_read_and_told() {
-    // As hloc leaves models that it did not choose, and COLMAP models that it could not join.
+    // hloc leaves models that it did not choose, and COLMAP models that it could not merge.
     let dir = tempfile::tempdir().unwrap();
     copy("project/sparse/0", dir.path(), "sparse/0");
     copy("rig-txt", dir.path(), "sparse/10");
@@ -97,7 +97,8 @@ fn of_several_models_the_largest_is_read_and_told() {
             "models/2: another model (6 points), give its path to read it",
         ]
     );
-    // The folder that was named is meant, be it smaller: hloc's best one stands there.
+    // The folder that was named has priority, even if its model is smaller: hloc's best model is
+    // there.
     copy("project/sparse/0", dir.path(), "");
     let input = read::open(dir.path()).unwrap();
     assert_eq!(input.positions.len(), 6);

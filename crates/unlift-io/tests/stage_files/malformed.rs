@@ -1,4 +1,4 @@
-//! Every way a released map can differ from docs/formats.md, and the line that says so.
+//! Tests all deviations of a released map from docs/formats.md, and their error lines.
 
 use crate::tables::{
     Columns, check, check_columns, float_lists, floats, ints, lists, maybe, message, texts, with,
@@ -98,7 +98,7 @@ fn metadata() {
     ]);
 }
 
-/// A file whose content is not what its fingerprint says was changed; without one it is taken as it is.
+/// A fingerprint that differs from the content is an error; without one the file is accepted.
 #[test]
 fn a_changed_map_is_told() {
     let folder = tempfile::tempdir().unwrap();

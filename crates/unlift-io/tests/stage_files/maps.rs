@@ -1,4 +1,4 @@
-//! Values of every kind, drawn from a seed.
+//! Random values of every kind, from a seed.
 
 use unlift::descriptors::Values;
 use unlift::neighbors::Neighborhoods;
@@ -59,7 +59,7 @@ pub fn released<const D: usize>(seed: u64, n: usize) -> Vec<Released<D>> {
     families.into_iter().map(with_rest).collect()
 }
 
-/// A truth with `n` slots and a few dropped points; `swapped_axis` for every second seed.
+/// A ground truth with `n` slots and a few dropped points; `swapped_axis` for every second seed.
 pub fn truth<const D: usize>(seed: u64, n: usize) -> (Original<D>, Secret) {
     let mut draws = draws(seed);
     let n_all = n + draws.below(6) as usize;
