@@ -17,7 +17,6 @@ use crate::error::Error;
 use crate::input::{self, Budget};
 use crate::read::lines::quoted;
 
-/// The storage type of one image's descriptors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Bytes,
@@ -25,7 +24,7 @@ pub(crate) enum Kind {
     Floats,
 }
 
-/// A matrix of one image: `n` rows of `row_bytes` bytes each, stored in `data`.
+/// A matrix of one image: `n` rows of `row_bytes` bytes each.
 pub(crate) struct Rows {
     pub kind: Kind,
     pub n: usize,
@@ -33,9 +32,8 @@ pub(crate) struct Rows {
     pub data: Vec<u8>,
 }
 
-/// The tables that are read.
 const TABLES: [&str; 4] = ["images", "cameras", "keypoints", "descriptors"];
-/// The number of SQLite steps between two checks of the limit.
+/// SQLite steps between two checks of the limit.
 const STEPS_AT_A_TIME: u64 = 1000;
 /// The step limit of one query is `LEAST_STEPS`, plus `STEPS_PER_BYTE` for every byte of the file.
 /// A row takes about ten steps.
@@ -47,17 +45,13 @@ pub(crate) struct Database {
     path: PathBuf,
     connection: Connection,
     image_ids: HashMap<Vec<u8>, i64>,
-    /// True if `descriptors` has a column `type` for the extractor (COLMAP 4 and later).
+    /// True if a column `type` states the extractor (COLMAP 4 and later).
     has_type: bool,
-    /// The steps that the current query has taken.
     steps: Arc<AtomicU64>,
 }
 
 impl Database {
     /// Opens `path` for reading.
-    ///
-    /// # Errors
-    /// When it is not a regular file or not a database, or a table is a view or a virtual table.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI;
         let (_, len) = input::open(path)?;
@@ -75,14 +69,12 @@ impl Database {
         Ok(Self { path: path.to_owned(), connection, image_ids, has_type, steps })
     }
 
-    /// Returns the names of all images, sorted by bytes.
     pub fn names(&self) -> Vec<Vec<u8>> {
         let mut names: Vec<Vec<u8>> = self.image_ids.keys().cloned().collect();
         names.sort_unstable();
         names
     }
 
-    /// Returns an error about one image.
     pub fn error(
         &self,
         name: &[u8],
@@ -97,14 +89,13 @@ impl Database {
         found.ok_or_else(|| self.error(name, "this image of the model", "no such image"))
     }
 
-    /// Returns the descriptors of the image `name`.
     pub fn descriptors(&self, name: &[u8]) -> Result<Rows, Error> {
         let found = self.matrix(name, "descriptors")?;
         found.ok_or_else(|| self.error(name, "descriptors", "none"))
     }
 
-    /// Returns the descriptors or the keypoints (floats) of the image `name`, or `None` if `table`
-    /// has no row for it.
+    /// Returns the descriptors or the keypoints (floats) of an image, or `None` if `table` has no
+    /// row for it.
     pub fn matrix(&self, name: &[u8], table: &str) -> Result<Option<Rows>, Error> {
         let image_id = self.image_id(name)?;
         let of_keypoints = table == "keypoints";
@@ -116,7 +107,7 @@ impl Database {
             Ok((n, cols, kind, data.unwrap_or_default().to_vec()))
         })?;
         let Some((n, cols, kind, data)) = found else { return Ok(None) };
-        // -1 is a database without types, 0 is SIFT, others are learned descriptors in floats.
+        // -1 is a database without types, 0 is SIFT, others are learned descriptors.
         let kind = if kind <= 0 && !of_keypoints { Kind::Bytes } else { Kind::Floats };
         // `cols` counts values of keypoints, but bytes of descriptors.
         let bytes_each = if of_keypoints { 4 } else { 1 };
@@ -138,7 +129,6 @@ impl Database {
         Ok(Some(Rows { kind, n, row_bytes, data }))
     }
 
-    /// Applies `read` to the row that `query` finds for `image_id`, if there is one.
     fn row<T>(
         &self,
         query: &str,
@@ -153,7 +143,7 @@ impl Database {
         found.map_err(|error| refuse(&self.path, place, &error))
     }
 
-    /// Returns width and height in pixels of the image `name`, if its camera states them.
+    /// Returns width and height in pixels of an image, if its camera states them.
     pub fn size(&self, name: &[u8]) -> Result<Option<[u32; 2]>, Error> {
         let query = "SELECT cameras.width, cameras.height FROM images JOIN cameras \
                      ON images.camera_id = cameras.camera_id WHERE image_id = ?";
@@ -174,8 +164,8 @@ fn refuse(path: &Path, place: &str, error: &rusqlite::Error) -> Error {
     Error::new(path, place, "a COLMAP database", found)
 }
 
-/// Limits what a database can do: no trusted views, triggers or computed columns, no value larger
-/// than the memory budget, and a step limit per query that depends on the length of the file.
+/// Limits what a database can do: no trusted views, triggers or computed columns, values within the
+/// memory budget, and a step limit per query.
 fn confine(
     connection: &mut Connection,
     budget: &Budget,
@@ -200,7 +190,6 @@ fn confine(
     connection.progress_handler(STEPS_AT_A_TIME as i32, Some(is_over))
 }
 
-/// Returns an error if `table` exists and is not a table.
 fn check_table(connection: &Connection, path: &Path, table: &str) -> Result<(), Error> {
     let query = "SELECT type, rootpage FROM sqlite_master WHERE name = ? COLLATE NOCASE \
                  AND type IN ('table', 'view')";
@@ -213,7 +202,6 @@ fn check_table(connection: &Connection, path: &Path, table: &str) -> Result<(), 
         .map_err(|e| refuse(path, &place, &e))?;
     match found {
         Some((kind, _)) if kind == "view" => Err(Error::new(path, place, "a table", "a view")),
-        // A module of SQLite computes the rows of virtual tables.
         Some((_, 0)) => Err(Error::new(path, place, "a table", "a virtual table")),
         _ => Ok(()),
     }
@@ -241,9 +229,8 @@ fn image_ids(
 
 /// Returns the URI of a database that is opened read-only, without writing a journal.
 ///
-/// `immutable` opens a database in write-ahead mode in a folder without write permission. It must
-/// not be used while a journal of either kind exists: rows would be missing, or rows of an
-/// unfinished transaction would be read.
+/// `immutable` opens a database in write-ahead mode in a folder without write permission. While a
+/// journal exists, it would miss rows or read uncommitted ones.
 fn uri(path: &Path) -> OsString {
     let mut uri = "file:".to_owned();
     let bytes = path.as_os_str().as_encoded_bytes();
@@ -294,7 +281,6 @@ mod tests {
         let error = refuse(Path::new("f"), "", &count(i64::MAX).unwrap_err());
         let line = "f: expected a COLMAP database, found a query without end";
         assert_eq!(error.to_string(), line);
-        // Each query has its own count.
         assert!((0..300).all(|_| count(1000).is_ok()));
     }
 }

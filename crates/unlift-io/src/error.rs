@@ -1,5 +1,3 @@
-//! The error of this crate: one line about a file that cannot be used.
-
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -33,7 +31,6 @@ impl From<&str> for Place {
 }
 
 impl From<String> for Place {
-    /// Creates a named place. The empty name means the whole file.
     fn from(name: String) -> Self {
         if name.is_empty() { Self::Whole } else { Self::Named(name) }
     }
@@ -42,8 +39,7 @@ impl From<String> for Place {
 /// A file that cannot be read or written, or whose content is wrong.
 ///
 /// Prints as one line: `points.txt:17: expected 3 coordinates, found 2`, or `points3D.bin: record
-/// 12 (byte 4711): expected 8 bytes, found end of file`. Control characters in names and values are
-/// escaped, so that it is always one line.
+/// 12 (byte 4711): expected 8 bytes, found end of file`. Control characters are escaped.
 #[derive(Debug)]
 pub struct Error {
     path: PathBuf,
@@ -62,7 +58,7 @@ impl Error {
     /// Creates an error about the content of `path`: what was expected at `place`, and what was
     /// found.
     ///
-    /// An empty string as `place` means the whole file.
+    /// An empty `place` means the whole file.
     pub fn new(
         path: impl Into<PathBuf>,
         place: impl Into<Place>,
@@ -79,8 +75,7 @@ impl Error {
         }
     }
 
-    /// Creates an error for a `path` that cannot be read: missing, a folder, no permission, or a
-    /// disk failure.
+    /// Creates an error for a `path` that cannot be read.
     pub fn read(path: impl Into<PathBuf>, source: io::Error) -> Self {
         Self { path: path.into(), kind: Kind::Read(source) }
     }
@@ -180,8 +175,7 @@ fn write_cause(kind: io::ErrorKind) -> Option<&'static str> {
 }
 
 impl std::error::Error for Error {
-    // The text already contains the cause, so a caller who prints the chain does not print it
-    // twice.
+    // The text already contains the cause.
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         None
     }

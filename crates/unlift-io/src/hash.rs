@@ -32,9 +32,8 @@ pub fn hash_file(path: &Path) -> Result<String, Error> {
 
 /// Returns one SHA-256, as 64 hexadecimal digits, over the names and contents of `paths`.
 ///
-/// It is the SHA-256 of the lines `HASH  NAME\n`, one per file, sorted by bytes of the name without
-/// folders, then by hash. `sha256sum` prints these lines in the folder of the files, in the C
-/// locale:
+/// It is the SHA-256 of the lines `HASH  NAME\n`, sorted by bytes of the name without folders, then
+/// by hash. In the folder of the files, in the C locale, this is
 ///
 /// ```sh
 /// sha256sum cameras.bin images.bin points3D.bin | sha256sum
@@ -80,10 +79,9 @@ pub fn hash_list(mut named: Vec<(String, String)>) -> String {
     hex(hasher)
 }
 
-/// Returns the SHA-256 of the features that an audit uses.
-///
-/// It covers width and height as little-endian `u32` (0 if unknown), the coordinates of keypoints
-/// in order as `f64`, and the values of descriptors row by row, as bytes or `f32`.
+/// Returns the SHA-256 of the features that an audit uses: width and height as little-endian `u32`
+/// (0 if unknown), the coordinates of keypoints as `f64`, and the values of descriptors row by row,
+/// as bytes or `f32`.
 pub fn hash_features(features: &ImageFeatures) -> String {
     let mut hasher = Sha256::new();
     for side in features.size.unwrap_or([0; 2]) {
@@ -102,7 +100,7 @@ pub fn hash_features(features: &ImageFeatures) -> String {
     hex(hasher)
 }
 
-/// Returns the SHA-256 of positions in memory: their coordinates in order, as little-endian `f64`.
+/// Returns the SHA-256 of positions as little-endian `f64`.
 pub fn hash_positions(positions: &[[f64; 3]]) -> String {
     let mut hasher = Sha256::new();
     for coordinate in positions.as_flattened() {

@@ -9,8 +9,8 @@ use crate::error::{Error, Place};
 /// Opens `path` for reading and returns it with its length in bytes.
 ///
 /// # Errors
-/// When it is missing, cannot be read, or is a folder, a pipe, a socket or a device. Those have no
-/// length, and reading them may never end.
+/// When it is missing, cannot be read, or is a folder, a pipe, a socket or a device, which may
+/// never end.
 pub fn open(path: &Path) -> Result<(File, u64), Error> {
     let failed = |source| Error::read(path, source);
     // Checked before opening, because opening a pipe without a writer blocks forever.
@@ -29,10 +29,10 @@ fn regular(path: &Path, metadata: &fs::Metadata) -> Result<(), Error> {
     Err(Error::new(path, "", "a file", found))
 }
 
-/// The least budget of a file, because small files may repeat or compress data.
+/// The least budget, because small files may repeat or compress data.
 const LEAST: u64 = 256 << 20;
 /// Bytes of memory per byte of the file. Decoding widens values by up to eight times, and real
-/// features and lists hardly compress.
+/// features hardly compress.
 const MULTIPLE: u64 = 64;
 
 static LIMIT: AtomicU64 = AtomicU64::new(u64::MAX);
@@ -47,8 +47,8 @@ pub fn limit() -> Option<u64> {
     Some(LIMIT.load(Relaxed)).filter(|&bytes| bytes < u64::MAX)
 }
 
-/// The memory that decoding one file may use at a time: 64 times its size, at least 256 MiB, and at
-/// most the limit of [`limit_memory`].
+/// The memory that decoding one file may use: 64 times its size, at least 256 MiB, and at most the
+/// limit of [`limit_memory`].
 #[derive(Clone, Debug)]
 pub struct Budget {
     path: PathBuf,

@@ -8,11 +8,10 @@ use crate::error::Error;
 use crate::stage::part_files;
 
 /// Metadata of files before they were read: length, time of the last change and, on Unix, the
-/// inode. The content is not compared.
+/// inode.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Seen(Vec<(PathBuf, Option<Stamp>)>);
 
-/// The metadata of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Stamp {
     len: u64,

@@ -1,5 +1,4 @@
-//! Tests features of images: files of h5py and pycolmap are read, and written files are read back
-//! equal.
+//! Tests features of images: files of h5py and pycolmap, and round trips.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -26,7 +25,6 @@ fn floats(image: &ImageFeatures) -> &[f32] {
     }
 }
 
-/// Creates an image with every column. Values depend on `n`.
 fn made(name: &str, n: usize) -> ImageFeatures {
     let values = |factor: f32| (0..n).map(|at| factor * at as f32).collect();
     let descriptors = (0..n * 128).map(|at| (at * 7 % 251) as u8).collect();
@@ -132,7 +130,6 @@ fn names_and_columns_that_do_not_fit_are_refused() {
     }
 }
 
-/// The database of the fixture, with keypoints of `columns` columns.
 fn database(columns: usize) -> (tempfile::TempDir, PathBuf) {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("database.db");
@@ -181,7 +178,6 @@ fn a_database_in_floats_is_read_as_floats() {
     assert_eq!(images[0].keypoints[0], [-0.5, -0.5]);
 }
 
-/// Returns a file of the optional data, or prints that the test is skipped.
 fn shared(name: &str) -> Option<PathBuf> {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/redkitchen");
     let path = Path::new(folder).join(name);

@@ -1,11 +1,10 @@
-//! Tests real inputs of users, if they are present, against the right result of each.
+//! Tests real inputs of users, if they are present, against the right result.
 
 use std::path::{Path, PathBuf};
 
 use unlift_io::features::FeatureSource;
 use unlift_io::read::{self, Input};
 
-/// Returns the folder of the inputs, or prints that the test is skipped.
 fn field() -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/field");
     if !path.is_dir() {

@@ -1,7 +1,7 @@
-//! Tests that stages through files and an audit in memory give the same row, bit for bit.
+//! Tests that stages through files and an audit in memory give the same row, bit for bit, for every
+//! scheme and source.
 //!
-//! Covers every scheme with every source. The trials of `ransac`, which files do not store, are
-//! left out.
+//! The trials of `ransac`, which files do not store, are left out.
 
 use std::sync::Arc;
 
@@ -25,11 +25,10 @@ use unlift::{Descriptors, PointSet, Unit};
 use unlift_io::atomic::{Access, OutputFile};
 use unlift_io::stage::{self, ImageFile, ImageWriter, Kind};
 
-/// A seed that is nowhere the default. All stages use it.
+/// A seed that is nowhere the default.
 const SEED: u64 = 7;
 
-/// Creates SIFT-like bytes that change slowly over the map: waves of several lengths in every
-/// direction.
+/// Creates SIFT-like bytes that change slowly over the map.
 fn descriptors<const D: usize>(points: &[[f64; D]], extent: f64) -> Descriptors {
     let value = |point: &[f64; D], bin: usize| {
         let mut draws = Draws::new(99, Stage::Synthetic, bin as u64);
@@ -40,8 +39,6 @@ fn descriptors<const D: usize>(points: &[[f64; D]], extent: f64) -> Descriptors 
     Descriptors::try_new(Values::U8(bytes.collect()), 128).unwrap()
 }
 
-/// All sources: the oracle at two ratios with three kinds of noise, and those that need no other
-/// input.
 fn sources<const D: usize>(k: usize) -> Vec<NeighborsBy<D>> {
     let names = ["similarity", "overlap", "geometric"];
     let named = names.map(|name| Named::parse(name).unwrap().with_k(k));
@@ -61,8 +58,7 @@ fn given(n: usize) -> NeighborsBy<3> {
     NeighborsBy::Given(PointNeighbors { name: "file".into(), offsets, neighbors, scores: None })
 }
 
-/// Returns the rows of the stages, one per variant and solver. All data between two stages goes
-/// through a file.
+/// Returns the rows of the stages. All data between two stages goes through a file.
 fn staged<const D: usize>(
     folder: &Path,
     scheme: &dyn Scheme<D>,
@@ -98,7 +94,6 @@ fn staged<const D: usize>(
     rows
 }
 
-/// Makes the lists of one variant from files only.
 fn lists<const D: usize>(
     folder: &Path,
     variant: &Variant<'_, D>,
@@ -139,7 +134,6 @@ fn without_name(row: &Row) -> Row {
     }
 }
 
-/// Returns the plan of the scheme `name`.
 fn plan<const D: usize>(unit: Unit, name: &str, sources: Vec<NeighborsBy<D>>) -> Plan<D> {
     let mut plan = Plan::new(unit);
     plan.schemes.retain(|scheme| scheme.name() == name);
@@ -193,7 +187,6 @@ fn maps() {
     }
 }
 
-/// An observer that stores nothing: rows come with the image.
 struct Unseen;
 
 impl Observer<2> for Unseen {
@@ -214,7 +207,6 @@ impl audit::Watcher<2> for Rows {
     }
 }
 
-/// Creates random keypoints in a picture of 640 x 480.
 fn keypoints(seed: u64, n: usize) -> (Original<2>, Descriptors) {
     let mut draws = Draws::new(seed, Stage::Synthetic, 1);
     let points: Vec<[f64; 2]> =
@@ -225,9 +217,8 @@ fn keypoints(seed: u64, n: usize) -> (Original<2>, Descriptors) {
     (Original::within(set, bounds).unwrap(), descriptors)
 }
 
-/// Many images in one file of each kind, read and written image by image, give the pooled row of
-/// the audit. One image has fewer records than a list has entries, one has a single keypoint, which
-/// some schemes do not release.
+/// One image has fewer records than a list has entries, one has a single keypoint, which some
+/// schemes do not release.
 #[test]
 fn many_images_in_one_file() {
     let folder = tempfile::tempdir().unwrap();
@@ -252,7 +243,6 @@ fn many_images_in_one_file() {
         let audited =
             audit::run_many::<2, unlift::Error>(of_audit, &plan, &mut audit::Silent).unwrap();
         for (row, source) in audited.rows.iter().zip(["oracle", "overlap"]) {
-            // Obfuscate.
             let mut truth = OutputFile::create(&path("truth"), Access::Private).unwrap();
             let mut released = OutputFile::create(&path("released"), Access::Usual).unwrap();
             let mut truths = ImageWriter::start(&mut truth, Kind::Truth);
@@ -268,7 +258,6 @@ fn many_images_in_one_file() {
             maps.finish().unwrap();
             truth.commit().unwrap();
             released.commit().unwrap();
-            // Make lists.
             let (truth, released) = (path("truth"), path("released"));
             assert!(stage::has_images(&truth).unwrap());
             let mut truths = ImageFile::open(&truth, Kind::Truth).unwrap();
@@ -293,7 +282,6 @@ fn many_images_in_one_file() {
             }
             lists.finish().unwrap();
             output.commit().unwrap();
-            // Recover.
             let lists = path("lists");
             let mut lists = ImageFile::open(&lists, Kind::Neighborhoods).unwrap();
             let mut maps = ImageFile::open(&released, Kind::Released).unwrap();
@@ -310,7 +298,6 @@ fn many_images_in_one_file() {
             }
             back.finish().unwrap();
             output.commit().unwrap();
-            // Evaluate.
             let back = path("back");
             let mut back = ImageFile::open(&back, Kind::Recovered).unwrap();
             let mut truths = ImageFile::open(&truth, Kind::Truth).unwrap();
@@ -334,7 +321,6 @@ fn many_images_in_one_file() {
     }
 }
 
-/// One image in one file, without its name.
 #[test]
 fn images() {
     let folder = tempfile::tempdir().unwrap();

@@ -18,7 +18,6 @@ use unlift::truth::Original;
 use unlift::{PointSet, Unit};
 use unlift_io::read;
 
-/// Returns the folder of a data set, or prints that the test is skipped.
 fn dataset(name: &str) -> Option<PathBuf> {
     let data = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data");
     let path = Path::new(data).join(name);

@@ -11,8 +11,8 @@ use crate::Error;
 /// Writes the file `path` with `fill` and keeps the old file until the new one is complete.
 ///
 /// # Errors
-/// When the folder does not exist, `path` is a folder or a device, `fill` fails, or the disk fails.
-/// No temporary file is left then.
+/// When the folder does not exist, `path` is a folder or a device, or writing fails. No temporary
+/// file is left then.
 pub fn write_file(
     path: &Path,
     access: Access,
@@ -23,11 +23,11 @@ pub fn write_file(
     output.commit()
 }
 
-/// An output file that is written as a temporary file and renamed by [`commit`](Self::commit).
+/// A file that is written under a temporary name in its folder and renamed by
+/// [`commit`](Self::commit).
 ///
-/// The temporary file is in the same folder. `commit` flushes it, renames it, and flushes the
-/// folder. If `path` is a symbolic link, the file that it leads to is replaced. Dropping the value
-/// without a commit removes the temporary file.
+/// The target of a symbolic link is replaced, not the link. Dropping the value without a commit
+/// removes the temporary file.
 #[derive(Debug)]
 pub struct OutputFile {
     path: PathBuf,
@@ -37,7 +37,7 @@ pub struct OutputFile {
 }
 
 impl OutputFile {
-    /// Starts the output file `path`. An existing file stays unchanged until the commit.
+    /// Starts the output file `path`.
     ///
     /// # Errors
     /// When the folder does not exist, `path` is a folder or a device, or the disk fails.
@@ -49,8 +49,7 @@ impl OutputFile {
         Ok(Self { path: path.to_owned(), target, writer, unfinished })
     }
 
-    /// Returns the place of an output file at `path`, with links resolved, or an error if no file
-    /// can be written there.
+    /// Returns the place of an output file at `path`, with links resolved.
     pub(super) fn check(path: &Path) -> Result<PathBuf, Error> {
         let target = resolved(path)?;
         match fs::metadata(&target) {
@@ -78,7 +77,7 @@ impl OutputFile {
         &mut self.writer
     }
 
-    /// Moves the temporary file to its final place.
+    /// Moves the file to its place.
     ///
     /// # Errors
     /// When the disk fails. An existing file is unchanged then.

@@ -1,4 +1,4 @@
-//! Recognizes files that unlift wrote by their content, because a name proves nothing.
+//! Recognizes files that unlift wrote by their content.
 
 use std::fmt;
 use std::fs::File;
@@ -34,36 +34,34 @@ pub enum Kind {
     Junit,
     /// SARIF whose first run is by unlift.
     Sarif,
-    /// A table of figures: CSV that begins with the columns of `TABLE_MARKS`, or LaTeX or Markdown
-    /// that begins with a comment that names unlift.
+    /// A table of figures: CSV with the columns of `TABLE_MARKS`, or LaTeX or Markdown with a
+    /// comment that names unlift.
     Table,
     /// An SVG whose first line has a comment that names unlift.
     Curves,
 }
 
-/// The comment in PLY and OBJ files.
 pub(crate) const CLOUD_COMMENT: &str = "unlift";
 const CLOUD_MARKS: [&str; 2] =
     ["ply\nformat binary_little_endian 1.0\ncomment unlift\n", "# unlift\n"];
 /// The first line of each file of a COLMAP model.
 pub(crate) const MODEL_MARK: &str = "# unlift model";
 const JUNIT_MARK: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"unlift\"";
-/// The beginnings of tables: columns (CSV), or a comment (LaTeX, Markdown).
 const TABLE_MARKS: [&str; 3] =
     ["scheme,neighbors,oracle_noise,inlier_ratio,", "% unlift ", "<!-- unlift "];
 const CURVES_MARK: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?><!-- unlift ";
-/// The generator in the head of a page. The head ends before the style.
+/// The head of a page ends before the style.
 const PAGE_MARK: &str = "<meta name=\"generator\" content=\"unlift\">";
 const PAGE_HEAD: usize = 2048;
-/// The mark between the superblock and the first array of features. No HDF5 structure refers to it.
+/// A mark after the superblock. No HDF5 structure refers to it.
 pub(crate) const FEATURES_MARK: &[u8; 32] = b"unlift features, format 1\0\0\0\0\0\0\0";
 const SUPERBLOCK: usize = 96;
 /// A PNG chunk: length, the text "Software: unlift", checksum.
 const PICTURE_MARK: &[u8; 27] = b"\0\0\0\x0ftEXtSoftware\0unlift\xfe\xc8\xcb\xd5";
-/// Length in bytes of the signature and first chunk of a PNG. Other chunks follow.
+/// Bytes of the signature and first chunk of a PNG.
 const PNG_HEAD: usize = 33;
 
-/// Returns the bytes of a PNG with the mark that [`Kind::Picture`] looks for.
+/// Adds the mark of [`Kind::Picture`] to the bytes of a PNG.
 #[must_use]
 pub fn marked_picture(png: &[u8]) -> Vec<u8> {
     let (head, rest) = png.split_at(PNG_HEAD.min(png.len()));
@@ -119,7 +117,7 @@ impl fmt::Display for Kind {
     }
 }
 
-/// Returns the first `n` bytes of a file: fewer if it is shorter, none if it cannot be read.
+/// Returns the first `n` bytes of a file, or fewer if it is shorter or cannot be read.
 fn start(path: &Path, n: usize) -> Vec<u8> {
     let mut head = Vec::new();
     let _ = File::open(path).and_then(|file| file.take(n as u64).read_to_end(&mut head));
@@ -162,7 +160,6 @@ mod tests {
         "",
         "{}",
         r#"["unlift", "schema", "parts"]"#,
-        // A short output of `npm audit --json`.
         r#"{"auditReportVersion": 2, "vulnerabilities": {}, "metadata": {}}"#,
         r#"{"frames": [], "ply_file_path": "sparse_pc.ply"}"#,
         r#"{"version": "2.1.0", "runs": [{"tool": {"driver": {"name": "other"}}}]}"#,

@@ -1,10 +1,9 @@
 //! Atomic outputs: a file is written completely or not at all, and no file of another program is
 //! lost.
 //!
-//! Every output is built under a temporary name (`unfinished`) beside its place, and renamed when
-//! it is complete. An existing file is replaced only if its content is of the kind that is written
-//! ([`Kind`]), and never if it is an input of the same run ([`Rules`]). Other files in the output
-//! folder are not touched.
+//! An output is built under a temporary name (`unfinished`) and renamed when it is complete. It
+//! replaces an existing file only if that is of the same kind ([`Kind`]) and no input of the run
+//! ([`Rules`]).
 
 mod file;
 mod kind;
@@ -33,8 +32,8 @@ pub use unfinished::{abandon, sweep};
 pub enum Access {
     /// The default permissions of a new file or folder.
     Usual,
-    /// Only the owner can read it: ground truth, recovered points, pages that show them. Unix:
-    /// files 0600, folders 0700.
+    /// Only the owner can read it: ground truth, recovered points, pages that show them (Unix:
+    /// 0600, folders 0700).
     Private,
 }
 
@@ -51,8 +50,8 @@ pub fn make_folders(folder: &Path, access: Access) -> Result<(), Error> {
 
 /// Locks `folder` against other runs that replace files in it, until the result is dropped.
 ///
-/// Returns `None` if folders cannot be locked, or if another process holds the lock (`flock`) for 5
-/// seconds, as `flock(1)` around a command does. Work then continues without the lock.
+/// Returns `None` if folders cannot be locked, or another process holds the lock (`flock`) for 5
+/// seconds. Work then continues without the lock.
 #[must_use]
 pub fn alone_in(folder: &Path) -> Option<File> {
     const PATIENCE: Duration = Duration::from_secs(5);
@@ -84,7 +83,6 @@ fn resolved(path: &Path) -> Result<PathBuf, Error> {
     })
 }
 
-/// Flushes the names in `folder` to disk, on systems that can flush folders.
 fn flush_names(folder: &Path) {
     if cfg!(unix) {
         let _ = File::open(folder).and_then(|folder| folder.sync_all());
@@ -98,7 +96,6 @@ fn parent_of(path: &Path) -> &Path {
     }
 }
 
-/// The sorted names in a folder.
 #[cfg(test)]
 fn entries(folder: &Path) -> Vec<String> {
     let name = |entry: io::Result<fs::DirEntry>| entry.unwrap().file_name().into_string().unwrap();

@@ -1,5 +1,4 @@
-//! Rules for replacing files: never an input of the same run, and a file of another program only
-//! with `force`.
+//! Rules for replacing files.
 
 use std::collections::{HashMap, HashSet, VecDeque};
 use std::fs;
@@ -18,9 +17,9 @@ pub struct Rules {
     force: bool,
 }
 
-/// The maximum depth of the search for inputs in folders, enough for a project's models and photos.
+/// The maximum depth of the search for inputs in folders.
 const DEPTH: usize = 8;
-/// Extensions of files that are read from folders: models, databases, photos, parts of stage files.
+/// Extensions of models, databases, photos and parts of stage files.
 const READ_FROM_FOLDERS: [&str; 10] =
     ["bin", "txt", "db", "jpg", "jpeg", "jpe", "jfif", "png", "webp", "parquet"];
 
@@ -28,7 +27,7 @@ impl Rules {
     /// Creates the rules of a run that reads `inputs`: files, and folders with the models,
     /// databases and photos below them.
     ///
-    /// `force` permits replacing files of other programs. Inputs are never replaced.
+    /// `force` permits replacing files of other programs, but never inputs.
     pub fn new<'a>(inputs: impl IntoIterator<Item = &'a Path>, force: bool) -> Self {
         let inputs = inputs.into_iter().map(Path::to_owned).collect();
         Self { inputs, files: Arc::default(), force }
@@ -38,8 +37,8 @@ impl Rules {
     /// resolved.
     ///
     /// # Errors
-    /// When no file can be written there, the place is an input (under any name), or it has a file
-    /// of another kind and `force` is not set.
+    /// When no file can be written there, the place is an input, or it has a file of another kind
+    /// and `force` is not set.
     pub fn check(&self, path: &Path, kind: Kind) -> Result<PathBuf, Error> {
         let target = OutputFile::check(path)?;
         if !target.exists() {
@@ -56,8 +55,7 @@ impl Rules {
         Ok(target)
     }
 
-    /// Checks the file `name` of a folder like [`check`](Self::check). The folder may not exist
-    /// yet.
+    /// Checks the file `name` of a folder that may not exist yet.
     pub(super) fn check_in(&self, folder: &Path, name: &Path, kind: Kind) -> Result<(), Error> {
         let place = folder.join(name);
         if place.exists() || place.is_symlink() {
@@ -66,15 +64,15 @@ impl Rules {
         Ok(())
     }
 
-    /// Returns the input that is the same file as `target`, under any path or link.
+    /// Returns the input that is the same file as `target`, under any path.
     pub fn input_at(&self, target: &Path) -> Option<&Path> {
         let files = self.files.get_or_init(|| files(&self.inputs));
         files.get(&identity(target)?).map(PathBuf::as_path)
     }
 }
 
-/// Finds the files among `inputs` and in folders below them. Each folder is visited once, even if
-/// several links lead to it.
+/// Finds the files among and below `inputs`. Each folder is visited once, even if several links
+/// lead to it.
 fn files(inputs: &[PathBuf]) -> HashMap<Identity, PathBuf> {
     let (mut files, mut folders) = (HashMap::new(), HashSet::new());
     let mut waiting: VecDeque<(PathBuf, usize)> =
@@ -94,9 +92,8 @@ fn files(inputs: &[PathBuf]) -> HashMap<Identity, PathBuf> {
     files
 }
 
-/// Returns a path that is equal for all names of one place, even if nothing exists there yet.
-///
-/// It is absolute, without links and without `..`.
+/// Returns an absolute path, without links and `..`, that is equal for all names of one place, even
+/// if nothing exists there yet.
 pub fn place_of(path: &Path) -> PathBuf {
     let mut place = std::path::absolute(Path::new(".")).unwrap_or_default();
     for step in path.components() {
@@ -105,7 +102,6 @@ pub fn place_of(path: &Path) -> PathBuf {
             Component::CurDir => {}
             step => place.push(step),
         }
-        // A path that does not exist cannot be a link.
         place = fs::canonicalize(&place).unwrap_or(place);
     }
     place
@@ -116,7 +112,6 @@ fn is_read_from_folders(path: &Path) -> bool {
     ending.is_some_and(|ending| READ_FROM_FOLDERS.contains(&ending.as_str()))
 }
 
-/// Identifies a file independently of its path.
 #[cfg(unix)]
 type Identity = (u64, u64);
 #[cfg(not(unix))]
@@ -150,7 +145,6 @@ mod tests {
         let rule = "expected nothing, or an audit.json of an earlier run (else --force), found another file";
         assert!(error.ends_with(rule), "{error}");
         assert!(told("missing", true).is_ok());
-        // Earlier outputs in an input folder are not inputs.
         assert!(told(".", true).is_ok());
         fs::hard_link(at("audit.json"), at("link")).unwrap();
         fs::create_dir_all(at("deep/er")).unwrap();

@@ -1,5 +1,3 @@
-//! Several outputs in one folder that may contain other files.
-
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -10,13 +8,12 @@ use crate::Error;
 
 /// Several output files of one folder that [`commit`](Self::commit) moves to their places together.
 ///
-/// Only these files are written or replaced. All checks precede the first rename, and each file is
-/// complete before it. Dropping the value without a commit removes the temporary files.
+/// All checks precede the first rename. Dropping the value without a commit removes the temporary
+/// files.
 #[derive(Debug)]
 pub struct OutputSet {
     /// The folder as the caller gave it, for errors.
     path: PathBuf,
-    /// The folder with links resolved.
     target: PathBuf,
     rules: Rules,
     access: Access,
@@ -26,11 +23,11 @@ pub struct OutputSet {
     made: Unfinished,
 }
 
-/// A replaced file: its place, and a second name of the file that was there before.
+/// A place, and a second name of the file that was there before.
 type Replaced = (PathBuf, Option<PathBuf>);
 
 impl OutputSet {
-    /// Starts outputs in the folder `path`, which is created with its missing parents.
+    /// Starts outputs in the folder `path`, which is created if missing.
     ///
     /// `first` are files that will be written: they are checked now, before hours of work.
     ///
@@ -43,7 +40,7 @@ impl OutputSet {
         first: &[(&str, Kind)],
     ) -> Result<Self, Error> {
         let target = resolved(path)?;
-        // Checked once: another program may create or remove the folder in the meantime.
+        // Checked once: another program may create or remove the folder meanwhile.
         if fs::metadata(&target).is_ok_and(|found| !found.is_dir()) {
             return Err(Error::new(path, "", "a folder, or nothing", "a file"));
         }
@@ -68,7 +65,7 @@ impl OutputSet {
     /// Returns the temporary path for the output `name` of this kind. `name` may contain slashes.
     ///
     /// # Errors
-    /// When [`Rules::check`] refuses the place, or a folder for it cannot be created.
+    /// When [`Rules::check`] refuses the place, or a folder cannot be created.
     pub fn stage(&mut self, name: &str, kind: Kind) -> Result<PathBuf, Error> {
         let name = PathBuf::from(name);
         self.rules.check_in(&self.target, &name, kind)?;
@@ -89,15 +86,14 @@ impl OutputSet {
     /// Moves all files to their places, in the order of [`stage`](Self::stage).
     ///
     /// # Errors
-    /// When another file has appeared at a place in the meantime, or a rename fails. Files that
-    /// were already replaced are restored then.
+    /// When another file has appeared at a place, or a rename fails. Replaced files are restored
+    /// then.
     pub fn commit(mut self) -> Result<(), Error> {
         for (name, kind) in &self.files {
             self.rules.check_in(&self.target, name, *kind)?;
             let made = self.made.make_folders(parent_of(&self.target.join(name)), self.access);
             made.map_err(|source| Error::write(&self.path, source))?;
         }
-        // The lock prevents a mix of files of two runs.
         let alone = alone_in(&self.target);
         self.replace_all()?;
         drop((alone, self.staging));
@@ -109,7 +105,6 @@ impl OutputSet {
         Ok(())
     }
 
-    /// Moves all files to their places, or none of them.
     fn replace_all(&self) -> Result<(), Error> {
         let _undisturbed = live();
         let mut done = Vec::new();
@@ -137,7 +132,7 @@ impl OutputSet {
         let place = resolved(&self.target.join(name))?;
         if !place.exists() {
             match fs::hard_link(&staged, &place) {
-                // Another program has created the file in the meantime.
+                // Another program has just created the file.
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
                     return Err(failed(error));
                 }
@@ -161,7 +156,7 @@ impl OutputSet {
     }
 }
 
-/// Creates the folder if it is missing, sweeps it, and creates a temporary folder in it.
+/// Creates the folder, sweeps it, and creates a temporary folder in it.
 fn begin(target: &Path, access: Access) -> io::Result<(Unfinished, Unfinished)> {
     let mut made = Unfinished::default();
     made.make_folders(target, access)?;
@@ -192,7 +187,6 @@ mod tests {
         let mut set = create(&target).unwrap();
         write(&mut set, "audit.json", "1");
         write(&mut set, "other.json", "1");
-        // A file of another program has appeared in the meantime.
         fs::write(target.join("other.json"), "mine").unwrap();
         assert!(set.commit().is_err());
         assert_eq!(entries(&target), ["other.json"]);

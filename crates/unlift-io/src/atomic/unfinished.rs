@@ -1,9 +1,8 @@
 //! Temporary files and folders: removed by their owner, on a signal, or by a later run.
 //!
-//! A temporary file is beside its place, as `.NAME.unlift-xxxxxx.partial`. The process that builds
-//! it holds a lock on it (`flock`), which the system releases when the process ends in any way. So
-//! a later run can remove temporary files of dead processes only, on all machines that share the
-//! disk and its locks.
+//! A temporary file is beside its place, as `.NAME.unlift-xxxxxx.partial`. Its process holds a lock
+//! on it (`flock`), which the system releases when the process ends. So a later run can remove the
+//! files of dead processes only, on all machines that share the disk and its locks.
 
 use std::fs::{self, File, OpenOptions};
 use std::io;
@@ -14,21 +13,18 @@ use super::{Access, flush_names, parent_of};
 
 const SIGN: &str = ".unlift-";
 const ENDING: &str = ".partial";
-/// The number of random letters in a temporary name.
 const RANDOM: usize = 6;
 
-/// A file in every temporary folder, created first and removed last. It proves that unlift made the
-/// folder and all that is in it.
+/// A file in every temporary folder, created first and removed last, which proves that unlift made
+/// the folder.
 pub(super) const MARK: &str = ".unlift-unfinished";
 
-/// The temporary files of this process, and the folders that it created for them, in order of
-/// creation.
+/// The temporary files of this process, and the folders created for them, in order of creation.
 ///
 /// Code that creates, renames or removes one holds the lock, so that [`abandon`] finds complete
 /// steps only.
 static LIVE: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// Locks the list of temporary files. [`abandon`] waits until it is released.
 pub(super) fn live() -> MutexGuard<'static, Vec<PathBuf>> {
     // A panic cannot leave a list of paths in a bad state.
     LIVE.lock().unwrap_or_else(PoisonError::into_inner)
@@ -36,8 +32,6 @@ pub(super) fn live() -> MutexGuard<'static, Vec<PathBuf>> {
 
 /// Removes all temporary files of this process and blocks new ones. Call it when the process is
 /// about to end.
-///
-/// Files that were already moved to their places stay.
 pub fn abandon() {
     let mut live = live();
     for path in live.drain(..).rev() {
@@ -47,8 +41,7 @@ pub fn abandon() {
     std::mem::forget(live);
 }
 
-/// Removes the temporary files in `folder` that dead processes left. Those of running processes
-/// stay.
+/// Removes the temporary files in `folder` that dead processes left.
 ///
 /// A file is recognized by its name and the missing lock, a folder also by its mark.
 pub fn sweep(folder: &Path) {
@@ -70,7 +63,7 @@ pub fn sweep(folder: &Path) {
     }
 }
 
-/// Removes a temporary file, a temporary folder with its content, or another folder if it is empty.
+/// Removes a temporary file, a temporary folder with its content, or an empty folder.
 fn remove(path: &Path) {
     let is_ours = is_partial_name(path);
     let is_folder = fs::symlink_metadata(path).is_ok_and(|found| found.is_dir());
@@ -88,7 +81,7 @@ fn remove(path: &Path) {
     }
 }
 
-/// Removes a temporary folder. The mark is last, so that a later run can continue after a kill.
+/// Removes the mark last, so that a later run can continue after a kill.
 fn remove_marked(folder: &Path) -> io::Result<()> {
     let entries: Vec<_> = fs::read_dir(folder)?.collect::<Result<_, _>>()?;
     for entry in entries.iter().filter(|entry| entry.file_name() != MARK) {
@@ -101,7 +94,6 @@ fn remove_marked(folder: &Path) -> io::Result<()> {
     fs::remove_dir(folder)
 }
 
-/// Returns true if the last component of `path` is a temporary name.
 fn is_partial_name(path: &Path) -> bool {
     let Some(name) = path.file_name().and_then(|name| name.to_str()) else { return false };
     let random = name.strip_suffix(ENDING).and_then(|name| name.rsplit_once(SIGN));
@@ -111,8 +103,7 @@ fn is_partial_name(path: &Path) -> bool {
         })
 }
 
-/// Returns the final place of what is built at `path`, for errors: the path without temporary
-/// folders.
+/// Removes temporary folders from a path, for errors.
 pub(crate) fn final_place(path: PathBuf) -> PathBuf {
     if !path.ancestors().any(is_partial_name) {
         return path;
@@ -124,7 +115,6 @@ pub(crate) fn final_place(path: PathBuf) -> PathBuf {
 #[derive(Debug, Default)]
 pub(super) struct Unfinished {
     paths: Vec<PathBuf>,
-    /// Holds the lock.
     _locked: Option<File>,
 }
 
@@ -143,7 +133,7 @@ impl Unfinished {
         })
     }
 
-    /// Creates a temporary folder in `folder` that only its owner can read.
+    /// Creates a private temporary folder in `folder`.
     pub fn folder(folder: &Path) -> io::Result<Self> {
         let made = make(folder, "output", |path| {
             make_folder(path, Access::Private)?;
@@ -156,7 +146,6 @@ impl Unfinished {
         made.map(|(folder, _)| folder)
     }
 
-    /// The path of the temporary file or folder.
     pub fn path(&self) -> &Path {
         &self.paths[0]
     }
@@ -172,7 +161,7 @@ impl Unfinished {
                     live.push(path.to_owned());
                     self.paths.push(path.to_owned());
                 }
-                // Another program created it in the meantime, so it must not be removed.
+                // Another program created it, so it must not be removed.
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(error),
             }
@@ -180,7 +169,6 @@ impl Unfinished {
         Ok(())
     }
 
-    /// Keeps all paths: they are final, or were renamed.
     pub fn keep(mut self) {
         let kept = std::mem::take(&mut self.paths);
         live().retain(|path| !kept.contains(path));
@@ -204,7 +192,7 @@ fn make(
     name: &str,
     mut new: impl FnMut(&Path) -> io::Result<File>,
 ) -> io::Result<(Unfinished, File)> {
-    // File names have at most 255 bytes, and the temporary name is longer than `name`.
+    // File names have at most 255 bytes.
     let prefix = format!(".{}{SIGN}", name.chars().take(40).collect::<String>());
     let mut builder = tempfile::Builder::new();
     builder.prefix(&prefix).suffix(ENDING).rand_bytes(RANDOM);
@@ -214,7 +202,6 @@ fn make(
         let path = path.keep().map_err(|refused| refused.error)?;
         // Errors show the path as the user wrote it; tempfile makes it absolute.
         let path = path.file_name().map_or(path.clone(), |name| folder.join(name));
-        // Without locks nothing is swept.
         let to_lock = if cfg!(unix) { File::open(&path).ok() } else { None };
         let _locked = to_lock.filter(|file| file.lock().is_ok());
         // Another run may have swept it before it was locked.

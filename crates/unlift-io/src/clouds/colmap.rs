@@ -1,8 +1,6 @@
-//! Points, cameras and images as a COLMAP model in text: `cameras.txt`, `images.txt`,
-//! `points3D.txt`.
+//! Points, cameras and images as a COLMAP model in text, without observations.
 //!
-//! Source: COLMAP's documentation, "Output Format". The files contain no observations, because
-//! recovered points have none.
+//! Source: COLMAP's documentation, "Output Format".
 
 use std::io::Write;
 use std::path::Path;
@@ -69,7 +67,6 @@ pub fn write_model_points(path: &Path, points: &[Option<[f64; 3]>]) -> Result<()
         writeln!(w, "{MODEL_MARK}\n# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]")?;
         for (row, point) in points.iter().enumerate() {
             if let Some([x, y, z]) = point {
-                // COLMAP counts from 1.
                 writeln!(w, "{} {x} {y} {z} 128 128 128 0", row + 1)?;
             }
         }
@@ -83,7 +80,7 @@ fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
 
 /// Returns the unit quaternion (w, x, y, z) of a rotation, with `w >= 0`.
 fn quaternion(r: &[[f64; 3]; 3]) -> [f64; 4] {
-    // Four times the square of each component. Dividing by the largest is the most exact.
+    // Four times the square of each component.
     let squares = [
         1.0 + r[0][0] + r[1][1] + r[2][2],
         1.0 + r[0][0] - r[1][1] - r[2][2],

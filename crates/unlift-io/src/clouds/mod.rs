@@ -1,5 +1,4 @@
-//! Exports of points and lines: PLY clouds colored by error, OBJ lines in a box, COLMAP models,
-//! cameras for nerfstudio.
+//! Exports of points and lines for other programs.
 
 mod colmap;
 mod color;

@@ -1,7 +1,7 @@
-//! Cameras as nerfstudio's `transforms.json`, which names a point cloud in the same folder.
+//! Cameras as nerfstudio's `transforms.json`.
 //!
 //! Source: nerfstudio's documentation, "Data conventions". Its cameras look along -z with y up.
-//! Poses map from camera to world; world coordinates are unchanged.
+//! Poses map from camera to world.
 
 use std::io::Write;
 use std::path::Path;
@@ -12,7 +12,7 @@ use crate::Error;
 use crate::atomic::{self, Access};
 use crate::read::colmap::{Camera, Image};
 
-/// The name of the point cloud beside the cameras, as nerfstudio's own programs use it.
+/// The name of the point cloud beside the cameras, as in nerfstudio's own programs.
 pub const NERFSTUDIO_CLOUD: &str = "sparse_pc.ply";
 
 /// Writes `transforms.json` for these images and their `cameras`. The point cloud is a separate
@@ -62,8 +62,7 @@ pub fn write_transforms(path: &Path, cameras: &[Camera], images: &[Image]) -> Re
     atomic::write_file(path, Access::Private, |w| writeln!(w, "{text}"))
 }
 
-/// Returns nerfstudio's camera model and its parameters by name, or `None` if nerfstudio has no
-/// such model.
+/// Returns nerfstudio's camera model and its parameters by name, if it has such a model.
 fn lens(camera: &Camera) -> Option<(&'static str, Map<String, Value>)> {
     let p = &camera.params;
     // Focal lengths and principal point, then k1, k2, p1, p2, or k1 to k4 of a fisheye.

@@ -1,14 +1,10 @@
-//! Line segments as OBJ.
-
 use super::{Segment, finite};
 use crate::Error;
 use crate::atomic::{self, Access, CLOUD_COMMENT};
 use std::io::Write;
 use std::path::Path;
 
-/// Writes `segments` as an OBJ file: two `v` records and one `l` record each.
-///
-/// Coordinates have enough digits to be read back exactly. In 2D, z is 0.
+/// Writes `segments` as an OBJ file: two `v` records and one `l` record each. In 2D, z is 0.
 ///
 /// # Errors
 /// When a coordinate is not finite, or the file cannot be written.

@@ -1,5 +1,3 @@
-//! Point clouds as binary PLY.
-
 use super::{error_color, finite};
 use crate::Error;
 use crate::atomic::{self, Access, CLOUD_COMMENT};

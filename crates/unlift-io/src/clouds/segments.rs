@@ -1,5 +1,3 @@
-//! Segments of infinite lines inside a box.
-
 use unlift::geometry::frame::Bounds;
 use unlift::released::{Obfuscation, Released};
 
@@ -10,7 +8,7 @@ pub type Segment<const D: usize> = [[f64; D]; 2];
 /// record order.
 ///
 /// Coordinates are in the map's frame (the origin is added). Records that miss the box are left
-/// out. The result is empty for other families.
+/// out. Other families have no segments.
 pub fn record_segments<const D: usize>(
     released: &Released<D>,
     low: &[f64; D],
@@ -38,14 +36,12 @@ pub fn record_segments<const D: usize>(
     }
 }
 
-/// The parameter where a line and a ray begin, in lengths of the direction from the point.
+/// The start of a line and of a ray, in lengths of the direction.
 const LINE: f64 = f64::NEG_INFINITY;
 const RAY: f64 = 0.0;
 
-/// Returns the segment of the line or ray through `point` along `direction` inside the box from
-/// `low` to `high`.
-///
-/// Returns `None` if it misses the box, only touches it, or has no direction.
+/// Returns the segment of the line or ray through `point` along `direction` inside the box, or
+/// `None` if it misses the box, only touches it, or has no direction.
 fn clip<const D: usize>(
     point: &[f64; D],
     direction: &[f64; D],
@@ -60,7 +56,7 @@ fn clip<const D: usize>(
     if !(from < to && is_box && finite(point) && finite(direction)) {
         return None;
     }
-    // Rounding may leave the box by an ulp, so the ends are clamped.
+    // Rounding may leave the box by an ulp.
     let at = |t: f64| std::array::from_fn(|c| (point[c] + t * direction[c]).clamp(low[c], high[c]));
     Some([at(from), at(to)])
 }

@@ -10,7 +10,6 @@ use super::image::ImageFeatures;
 use crate::database::{Database, Kind, Rows};
 use crate::error::Error;
 
-/// An open `database.db`.
 pub(super) struct Colmap {
     // A connection cannot be used by two threads at once.
     database: Mutex<Database>,
@@ -19,7 +18,6 @@ pub(super) struct Colmap {
 }
 
 impl Colmap {
-    /// Opens `path` and lists its images.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let database = Database::open(path)?;
         let raw = database.names();

@@ -11,11 +11,9 @@ use super::writer::UPRIGHT;
 use crate::atomic::Kind;
 use crate::error::Error;
 
-/// An open file of features.
 pub(super) struct Hloc(FeatureStore);
 
 impl Hloc {
-    /// Opens `path` and lists its images.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let store = FeatureStore::open(path)?;
         let wrong = |found: &str| {
@@ -35,7 +33,6 @@ impl Hloc {
         }
     }
 
-    /// One error for each link that leads to no image.
     pub fn refused(&self) -> &[Error] {
         self.0.broken()
     }
@@ -44,7 +41,6 @@ impl Hloc {
         self.0.paths()
     }
 
-    /// Returns true if the keypoints of the first image are in pixels of the upright photo.
     pub fn is_upright(&self) -> bool {
         !self.0.paths().is_empty() && is_upright(&self.0, 0).unwrap_or(false)
     }
@@ -57,7 +53,7 @@ impl Hloc {
 /// Reads the one image of a file that [`encode`](super::encode) made.
 ///
 /// # Errors
-/// When `path` cannot be read, is truncated, or does not contain exactly the image `name`.
+/// When `path` cannot be read, or does not contain exactly the image `name`.
 pub fn decode(path: &Path, name: &str) -> Result<ImageFeatures, Error> {
     let store = FeatureStore::open(path)?;
     match store.paths() {
@@ -69,8 +65,7 @@ pub fn decode(path: &Path, name: &str) -> Result<ImageFeatures, Error> {
     }
 }
 
-/// Returns true if keypoints are in pixels of the upright photo. unlift's first version wrote
-/// upright features without this attribute.
+/// unlift's first version wrote upright features without this attribute.
 fn is_upright(store: &FeatureStore, at: usize) -> Result<bool, Error> {
     let number = |key: &str| store.number(at, "keypoints", key);
     Ok(match number(UPRIGHT)? {
@@ -121,7 +116,7 @@ fn image(store: &FeatureStore, at: usize) -> Result<ImageFeatures, Error> {
 /// The expected and the found value.
 type Wrong = (String, String);
 
-/// Reads rows of at least two columns. Columns after x and y are ignored.
+/// Columns after x and y are ignored.
 fn keypoints(array: &Array) -> Result<Vec<[f64; 2]>, Wrong> {
     let columns = match array.shape[..] {
         [_, columns] if columns >= 2 => columns as usize,
@@ -145,7 +140,6 @@ fn keypoints(array: &Array) -> Result<Vec<[f64; 2]>, Wrong> {
 fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
     let expected = || format!("shape (D, N) with N = {n}, one column per keypoint");
     let dim = match array.shape[..] {
-        // Without keypoints, any shape is accepted.
         ref sides if n == 0 && array.values.len() == 0 => {
             sides.iter().copied().max().unwrap_or(0).max(1) as usize
         }
@@ -156,7 +150,6 @@ fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
         }
         _ => return Err((expected(), shape_text(&array.shape))),
     };
-    // Points are columns in the file and rows in memory.
     let floats = |values: Vec<f32>| Values::F32(transposed(&values, dim));
     let values = match array.values {
         Numbers::U8(bytes) => Values::U8(transposed(&bytes, dim)),
@@ -171,7 +164,6 @@ fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
         .map_err(|error| (error.expected().to_owned(), describe(&error)))
 }
 
-/// Formats the found value with its row and column.
 fn describe(error: &unlift::Error) -> String {
     match error.what() {
         "descriptors" => error.found().to_owned(),

@@ -1,5 +1,3 @@
-//! The features of one image, independent of the file format.
-
 use std::path::{Path, PathBuf};
 
 use half::f16;
@@ -8,7 +6,7 @@ use unlift::Descriptors;
 use crate::error::Error;
 use crate::read::lines::quoted;
 
-/// Features of one image.
+/// Features of one image, independent of the file format.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ImageFeatures {
     /// Path relative to the folder of photos, with slashes.
@@ -17,9 +15,8 @@ pub struct ImageFeatures {
     pub size: Option<[u32; 2]>,
     /// `n` finite coordinates `(x, y)` in pixels. The center of the first pixel is `(0, 0)`.
     pub keypoints: Vec<[f64; 2]>,
-    /// `(n, dim)` descriptors: bytes are RootSIFT times 512, floats are from a network. Never
-    /// placeholders such as all zeros. `None` when the source has none; see
-    /// [`described`](Self::described).
+    /// `(n, dim)` descriptors: bytes are RootSIFT times 512, floats are from a network. `None` when
+    /// the source has none; see [`described`](Self::described).
     pub descriptors: Option<Descriptors>,
     /// `n` confidences of the detector.
     pub scores: Option<Vec<f32>>,
@@ -30,14 +27,14 @@ pub struct ImageFeatures {
     /// Standard deviation of a keypoint's position in pixels, as stated by the detector.
     pub uncertainty_px: Option<f64>,
     /// True if keypoints are in pixels of the photo rotated upright by its EXIF orientation. COLMAP
-    /// and hloc use the photo as stored (false).
+    /// and hloc use the photo as stored.
     pub upright: bool,
     /// The path of the photo, if the source is a folder of photos.
     pub photo: Option<PathBuf>,
 }
 
 impl ImageFeatures {
-    /// Returns the descriptors, or an error if there are none.
+    /// Returns the descriptors.
     ///
     /// # Errors
     /// When there are none: one line that names `source` (the file) and the image.
@@ -48,8 +45,8 @@ impl ImageFeatures {
     }
 }
 
-/// Rounds descriptors of a network to half floats, so that memory and files, which hloc stores as
-/// half floats, have equal values.
+/// Rounds descriptors of a network to half floats, as hloc stores them, so that memory and files
+/// have equal values.
 pub fn round_to_half(values: &mut [f32]) {
     values.iter_mut().for_each(|value| *value = f16::from_f32(*value).to_f32());
 }

@@ -1,8 +1,7 @@
 //! Tests of malformed features: the exact error line of each, and no panic for any cut or changed
 //! byte.
 //!
-//! They are in the crate because they use the internal writer. The public one writes only valid
-//! files.
+//! They use the internal writer, because the public one writes only valid files.
 
 use std::fs;
 use std::io::Cursor;
@@ -12,7 +11,7 @@ use super::h5::{Array, Numbers, Writer};
 use super::{FeatureSource, encode};
 use crate::features::ImageFeatures;
 
-/// An array of the image `a.jpg`: name, shape, values.
+/// A name, a shape, values.
 type Made = (&'static str, Vec<u64>, Numbers);
 
 /// Creates a file with the image `a.jpg`, which has these arrays, and the valid image `b.jpg`.
@@ -37,7 +36,6 @@ fn descriptors() -> Made {
     ("descriptors", vec![4, 3], Numbers::U8((0..12).collect()))
 }
 
-/// Returns the error of opening `bytes` or of the first image, without the folder, or "good".
 fn line(bytes: &[u8]) -> String {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("f");
@@ -45,7 +43,6 @@ fn line(bytes: &[u8]) -> String {
     let error = match FeatureSource::open(&path) {
         Err(error) => error,
         Ok(source) => {
-            // The other image is still readable.
             if let Some(at) = source.names().iter().position(|name| name == "b.jpg") {
                 assert_eq!(source.get(at).unwrap().keypoints.len(), 3);
             }
@@ -205,7 +202,7 @@ fn no_cut_and_no_changed_byte_makes_a_panic() {
         }
     };
     for file in &files {
-        // Small files: every length and every byte. Others: a part, to finish within seconds.
+        // A part of the bytes of large files, to finish within seconds.
         let step = file.len().div_ceil(500);
         (0..file.len()).step_by(step).for_each(|at| visit(&file[..at]));
         for at in (0..file.len()).step_by(step) {

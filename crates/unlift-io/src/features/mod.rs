@@ -38,8 +38,7 @@ pub use hloc::decode;
 pub use image::{ImageFeatures, round_to_half};
 pub use writer::{FeatureWriter, encode};
 
-/// An open file of features that is read one image at a time, so memory does not grow with the
-/// number of images.
+/// An open file of features that is read one image at a time.
 ///
 /// Several threads may call [`get`](Self::get) at once.
 pub struct FeatureSource {

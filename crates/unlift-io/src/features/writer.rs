@@ -1,5 +1,3 @@
-//! Writes features in hloc's layout, one image at a time.
-
 use std::io::{self, Cursor, Seek, Write};
 use std::path::Path;
 
@@ -12,10 +10,11 @@ use crate::atomic::{Access, OutputFile};
 use crate::error::Error;
 use crate::read::lines::quoted;
 
-/// The attribute of keypoints that is 1 if they are in pixels of upright photos, else 0.
+/// 1 if keypoints are in pixels of upright photos, else 0.
 pub(super) const UPRIGHT: &str = "upright";
 
-/// A feature file that is written image by image, and moved to its place when it is complete.
+/// A feature file in hloc's layout that is written image by image, and moved to its place when it
+/// is complete.
 ///
 /// Each image is a group with `keypoints` `(N, 2)` and, if present, `descriptors` `(D, N)`,
 /// `scores`, `scales` and `oris` `(N,)` and `image_size` `(2,)`; see `docs/formats.md`. Only names
@@ -39,8 +38,8 @@ impl FeatureWriter {
     /// Checks that an image can be written.
     ///
     /// # Errors
-    /// When a part of the name is empty, `.` or `..`, the name exists already or is inside another
-    /// image, or the number of rows of a column is not the number of keypoints.
+    /// When a part of the name is empty, `.` or `..`, the name exists or is inside another image,
+    /// or a column has not one row per keypoint.
     pub fn check(&self, image: &ImageFeatures) -> Result<(), Error> {
         check(&self.writer, image, self.output.path())
     }
@@ -55,7 +54,7 @@ impl FeatureWriter {
         write(&mut self.writer, self.output.writer(), image).map_err(|e| Error::write(&path, e))
     }
 
-    /// Completes the file and moves it to its place.
+    /// Moves the file to its place.
     ///
     /// # Errors
     /// When the disk fails. No temporary file is left then.
@@ -70,7 +69,7 @@ impl FeatureWriter {
 /// Returns the bytes of a file with one image.
 ///
 /// # Errors
-/// When [`FeatureWriter::append`] would fail. Errors name `path` as the place of the file.
+/// When [`FeatureWriter::append`] would fail. Errors name `path`.
 pub fn encode(image: &ImageFeatures, path: &Path) -> Result<Vec<u8>, Error> {
     let failed = |e| Error::write(path, e);
     let mut out = Cursor::new(Vec::new());

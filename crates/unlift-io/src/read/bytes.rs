@@ -1,5 +1,3 @@
-//! Reads binary files with a buffer, and checks declared sizes against the length of the file.
-
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -7,20 +5,18 @@ use std::path::{Path, PathBuf};
 use crate::error::{Error, Place};
 use crate::input::{self, Budget};
 
-/// A little-endian reader that tracks its offset and the remaining bytes.
-///
-/// Every error names the current part of the file and the byte.
+/// A little-endian reader of binary files. It checks declared sizes against the remaining bytes,
+/// and errors name the current part of the file and the byte.
 pub(crate) struct Bytes {
     path: PathBuf,
     reader: BufReader<File>,
     part: Part,
-    /// The offset of the last value.
     value_at: u64,
     at: u64,
     len: u64,
 }
 
-/// The current part of the file, formatted only for errors.
+/// Formatted only for errors.
 enum Part {
     Header,
     Record(u64),
@@ -28,14 +24,13 @@ enum Part {
 }
 
 impl Bytes {
-    /// Opens `path` at its start.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let (file, len) = input::open(path)?;
         Ok(Self::continuing(path, BufReader::new(file), 0, len))
     }
 
-    /// Reads the rest and returns true if it is at most 64 KiB of zeros. PCL's writer pads files up
-    /// to a page of memory.
+    /// Reads the rest and returns true if it is at most 64 KiB of zeros, which PCL's writer
+    /// appends.
     pub fn is_padding(&mut self) -> Result<bool, Error> {
         let n = self.remaining();
         if n > 1 << 16 {
@@ -46,8 +41,7 @@ impl Bytes {
         Ok(rest.iter().all(|&byte| byte == 0))
     }
 
-    /// Creates a reader of a file of `len` bytes of which `at` bytes were already read from
-    /// `reader`.
+    /// Creates a reader of a file of `len` bytes of which `at` were already read.
     pub fn continuing(path: &Path, reader: BufReader<File>, at: u64, len: u64) -> Self {
         Self { path: path.to_owned(), reader, part: Part::Header, value_at: at, at, len }
     }
@@ -57,29 +51,18 @@ impl Bytes {
         self.part = Part::Record(number);
     }
 
-    /// Returns an empty vector with capacity for `n` entries of `place`, within the memory budget
-    /// of the file.
-    ///
-    /// # Errors
-    /// When the memory does not suffice.
     pub fn room<T>(&self, place: impl Into<Place> + Clone, n: u64) -> Result<Vec<T>, Error> {
         Budget::new(&self.path, self.len).room(place, n)
     }
 
-    /// Checks that `bytes` for `place` are within the memory budget of the file.
-    ///
-    /// # Errors
-    /// When they are not.
     pub fn admit(&self, place: &str, bytes: u64) -> Result<(), Error> {
         Budget::new(&self.path, self.len).admit(place, bytes)
     }
 
-    /// The offset of the next byte.
     pub fn at(&self) -> u64 {
         self.at
     }
 
-    /// The number of bytes up to the end of the file.
     pub fn remaining(&self) -> u64 {
         self.len.saturating_sub(self.at)
     }
@@ -127,7 +110,6 @@ impl Bytes {
         Err(self.error_ahead(format!("{bytes} {unit} of {what}"), found))
     }
 
-    /// Fills `buffer` with the next bytes. Errors name them `what`.
     pub fn fill(&mut self, buffer: &mut [u8], what: &str) -> Result<(), Error> {
         self.check(buffer.len() as u64, what)?;
         self.value_at = self.at;
@@ -136,7 +118,6 @@ impl Bytes {
         Ok(())
     }
 
-    /// Skips `bytes`. Errors name them `what`.
     pub fn skip(&mut self, bytes: u64, what: &str) -> Result<(), Error> {
         self.check(bytes, what)?;
         let offset = i64::try_from(bytes).expect("bounded by the size of the file");
@@ -152,27 +133,22 @@ impl Bytes {
         Ok(buffer)
     }
 
-    /// Reads a byte.
     pub fn u8(&mut self, what: &str) -> Result<u8, Error> {
         Ok(self.array::<1>(what)?[0])
     }
 
-    /// Reads a little-endian `u32`.
     pub fn u32(&mut self, what: &str) -> Result<u32, Error> {
         self.array(what).map(u32::from_le_bytes)
     }
 
-    /// Reads a little-endian `i32`.
     pub fn i32(&mut self, what: &str) -> Result<i32, Error> {
         self.array(what).map(i32::from_le_bytes)
     }
 
-    /// Reads a little-endian `u64`.
     pub fn u64(&mut self, what: &str) -> Result<u64, Error> {
         self.array(what).map(u64::from_le_bytes)
     }
 
-    /// Reads `N` little-endian doubles.
     pub fn doubles<const N: usize>(&mut self, what: &str) -> Result<[f64; N], Error> {
         self.check(8 * N as u64, what)?;
         let start = self.at;
@@ -202,9 +178,8 @@ impl Bytes {
 
     /// Reads a `u64` count of `what`, each of at least `bytes_each` bytes.
     ///
-    /// # Errors
-    /// When the rest of the file is too short for that many, so that nothing is allocated for a
-    /// false count.
+    /// A count that the rest of the file cannot hold is an error, so that nothing is allocated for
+    /// it.
     pub fn count(&mut self, what: &str, bytes_each: u64) -> Result<u64, Error> {
         if self.remaining() < 8 {
             self.check(8, &format!("the number of {what}"))?;
@@ -213,7 +188,7 @@ impl Bytes {
         self.check_count(count, what, bytes_each)
     }
 
-    /// Reads a count like [`count`](Self::count), stored as `u32`.
+    /// Reads a `u32` count like [`count`](Self::count).
     pub fn count_u32(&mut self, what: &str, bytes_each: u64) -> Result<u64, Error> {
         if self.remaining() < 4 {
             self.check(4, &format!("the number of {what}"))?;
@@ -236,10 +211,6 @@ impl Bytes {
         Err(self.error(expected, count.to_string()))
     }
 
-    /// Checks that the file ends here.
-    ///
-    /// # Errors
-    /// When bytes remain.
     pub fn end(&mut self) -> Result<(), Error> {
         self.part = Part::End;
         match self.remaining() {

@@ -1,13 +1,9 @@
-//! Finds the columns x, y and z of points, and parses coordinates.
-
 use super::lines::{Lines, number, quoted};
 use super::scalar::Scalar;
 use crate::error::Error;
 
-/// Finds the columns `x`, `y` and `z` among names. Case, quotes and a unit in brackets are ignored.
-///
-/// # Errors
-/// The name of the first missing column.
+/// Finds the columns `x`, `y` and `z` among names, or returns the first missing one. Case, quotes
+/// and a unit in brackets are ignored.
 pub fn axes<'a>(names: impl Iterator<Item = &'a [u8]> + Clone) -> Result<[usize; 3], &'static str> {
     let find = |axis: &'static str| {
         names.clone().position(|name| is_called(name, axis.as_bytes())).ok_or(axis)
@@ -15,7 +11,6 @@ pub fn axes<'a>(names: impl Iterator<Item = &'a [u8]> + Clone) -> Result<[usize;
     Ok([find("x")?, find("y")?, find("z")?])
 }
 
-/// Returns true if a column has the name `wanted`, compared like in [`axes`].
 pub fn is_called(name: &[u8], wanted: &[u8]) -> bool {
     plain(name).eq_ignore_ascii_case(wanted)
 }
@@ -28,7 +23,7 @@ pub fn plain(name: &[u8]) -> &[u8] {
     name.strip_suffix(b"\"").unwrap_or(name)
 }
 
-/// Parses a coordinate. The usual words for a missing value are NaN.
+/// Parses a coordinate. Common words for a missing value are NaN.
 pub fn coordinate(word: &[u8]) -> Option<f64> {
     const NONE: [&[u8]; 7] = [b"", b"null", b"none", b"na", b"n/a", b"nan(ind)", b"nan(snan)"];
     let none = |word: &[u8]| {
@@ -40,9 +35,6 @@ pub fn coordinate(word: &[u8]) -> Option<f64> {
 }
 
 /// Parses the next `N` of the `words` of a line as coordinates. Errors name them `what`.
-///
-/// # Errors
-/// When there are fewer words, or one is not a number.
 pub fn coordinates<'a, const N: usize>(
     lines: &Lines,
     words: &mut impl Iterator<Item = &'a [u8]>,
@@ -64,10 +56,6 @@ pub struct Field {
 }
 
 impl Field {
-    /// Reads the number.
-    ///
-    /// # Panics
-    /// When the row is too short.
     pub fn of(self, row: &[u8], big: bool) -> f64 {
         self.scalar.read(&row[self.at..self.at + self.scalar.size()], big)
     }

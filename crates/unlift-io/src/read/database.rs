@@ -1,6 +1,3 @@
-//! Descriptors of points: means over their observations in COLMAP's `database.db` or hloc's
-//! features.
-
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -17,11 +14,10 @@ use crate::read::map_input::Input;
 /// L2 norm of the descriptors that COLMAP stores as bytes.
 const BYTE_NORM: f64 = 512.0;
 
-/// The descriptors of an image, row-major, and their dimension.
+/// Row-major descriptors and their dimension.
 type Stored = (Values, usize);
 
-/// Reads descriptors for every point of `input`, which must be a COLMAP model, from the database at
-/// `path`.
+/// Reads descriptors for every point of `input`, a COLMAP model, from the database at `path`.
 ///
 /// Source: COLMAP's documentation, "Database Format".
 pub fn of_database(path: &Path, input: &Input) -> Result<Descriptors, Error> {
@@ -39,10 +35,8 @@ pub fn of_database(path: &Path, input: &Input) -> Result<Descriptors, Error> {
     })
 }
 
-/// Reads descriptors for every point of `input` from hloc's features at `path`, as the mean over
-/// each track.
-///
-/// Keypoints must have the same indices as the 2D points of the model.
+/// Reads descriptors for every point of `input`, a COLMAP model, from hloc's features at `path`.
+/// Keypoints must have the indices of the model's 2D points.
 pub fn of_features(path: &Path, input: &Input) -> Result<Descriptors, Error> {
     let features = FeatureSource::open(path)?;
     mean(path, input, |image| {
@@ -61,8 +55,8 @@ pub fn of_features(path: &Path, input: &Input) -> Result<Descriptors, Error> {
     })
 }
 
-/// Returns the mean over the observations of each point of `input`. `stored` reads the descriptors
-/// of an image.
+/// Returns the mean over the observations of each point. `stored` reads the descriptors of an
+/// image.
 fn mean(
     path: &Path,
     input: &Input,
@@ -82,8 +76,8 @@ fn mean(
     let images = points_path.with_file_name("images").with_extension(extension);
     let images = colmap::read_images(&images)?;
     let row_of_id: HashMap<u64, usize> = points.ids.iter().copied().zip(0..).collect();
-    // Sorted by image, so that one image's descriptors are in memory at a time, and by id, so that
-    // sums of floats are deterministic.
+    // Sorted by image, so that one image is in memory at a time, and by id, so that sums of floats
+    // are deterministic.
     let mut observations = Vec::new();
     for (out, id) in input.ids.iter().enumerate() {
         let place = || format!("point {id}");
@@ -153,7 +147,7 @@ fn add<T: Copy + Into<f64>>(sums: &mut [f64], values: &[T]) {
     sums.iter_mut().zip(values).for_each(|(sum, &value)| *sum += value.into());
 }
 
-/// Scales every row to an L2 norm, so that a sum equals a mean. Zero rows stay zero.
+/// Scales every row to an L2 norm, so that a sum equals a mean.
 fn normalize(rows: &mut [f64], dim: usize, norm: f64) {
     for row in rows.chunks_mut(dim) {
         let length = row.iter().map(|x| x * x).sum::<f64>().sqrt();

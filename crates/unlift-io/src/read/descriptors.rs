@@ -1,6 +1,3 @@
-//! Reads descriptors of the points of a map: from the format `P3DESC01`, a NumPy array, a COLMAP
-//! database or hloc's features.
-
 use std::collections::HashMap;
 use std::fs::File;
 use std::io::Read;
@@ -26,16 +23,15 @@ const HDF5: &[u8; 8] = b"\x89HDF\r\n\x1a\n";
 /// `path` is one of
 ///
 /// - a file of the format `P3DESC01` (joined by point id), with bytes or floats;
-/// - an `.npy` array `(n, dim)` with a row per point in the order of `input`: by ascending point id
-///   for a COLMAP model, else in the order of the file;
-/// - a COLMAP `database.db`, or hloc's `features.h5`: a point's row is the mean of the descriptors
-///   of its observations, found through the model's tracks, with images joined by name. Bytes are
-///   scaled to L2 norm 512, rounded and clipped to 0..=255; floats are scaled to norm 1.
+/// - an `.npy` array `(n, dim)` with a row per point: by ascending point id for a COLMAP model,
+///   else in the order of the file;
+/// - a COLMAP `database.db`, or hloc's `features.h5`: a row is the mean of the descriptors in the
+///   point's track, with images joined by name. Bytes are scaled to L2 norm 512, rounded and
+///   clipped to 0..=255; floats are scaled to norm 1.
 ///
 /// # Errors
-/// When the file cannot be read, is of another format, is malformed, lacks a point or an
-/// observation (the error names the first), or contains placeholders (all zero, or every row the
-/// same).
+/// When the file cannot be read, is malformed or of another format, lacks a point or an observation
+/// (the error names the first), or contains placeholders (all zero, or every row the same).
 pub fn descriptors(path: &Path, input: &Input) -> Result<Descriptors, Error> {
     let mut magic = [0; 8];
     let (mut file, len) = input::open(path)?;
@@ -105,8 +101,7 @@ fn binary(path: &Path, input: &Input) -> Result<Descriptors, Error> {
             Err(Error::new(path, format!("point {id}"), "a descriptor", found))
         }
     };
-    // With more points than rows, one point has no row and the loop ends with an error. So the file
-    // limits the memory.
+    // With more points than rows, the loop ends with an error, so the file limits the memory.
     let n_values = input.ids.len().min(n as usize) * dim;
     let values = if scalar == Scalar::U8 {
         let mut values = Vec::with_capacity(n_values);

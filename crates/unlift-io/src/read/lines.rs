@@ -1,5 +1,3 @@
-//! Reads text files line by line.
-
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -8,26 +6,22 @@ use super::bytes::Bytes;
 use crate::error::{Error, Place};
 use crate::input::{self, Budget};
 
-/// The maximum length of a line in bytes, enough for the track of a point in a million photos. It
-/// stops reading a file of one endless line.
+/// The maximum length of a line in bytes, enough for the track of a point in a million photos.
 pub(crate) const LONGEST_LINE: u64 = 16 << 20;
-/// The maximum length of a header in bytes. It allows long comments, and stops reading a file of
-/// comments only.
+/// The maximum length of a header in bytes, enough for long comments.
 const LONGEST_HEADER: u64 = 1 << 20;
 
-/// A reader of lines, counted from 1, as bytes: names need not be UTF-8.
+/// A reader of text lines, counted from 1, as bytes: names need not be UTF-8.
 pub(crate) struct Lines {
     path: PathBuf,
     reader: BufReader<File>,
     line: Vec<u8>,
     number: u64,
-    /// The offset of the next line.
     at: u64,
     len: u64,
 }
 
 impl Lines {
-    /// Opens `path` at its start.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let (file, len) = input::open(path)?;
         let reader = BufReader::new(file);
@@ -39,18 +33,12 @@ impl Lines {
         Bytes::continuing(&self.path, self.reader, self.at, self.len)
     }
 
-    /// Returns an empty vector with capacity for `n` entries of `place`, within the memory budget
-    /// of the file.
-    ///
-    /// # Errors
-    /// When the memory does not suffice.
     pub fn room<T>(&self, place: impl Into<Place> + Clone, n: u64) -> Result<Vec<T>, Error> {
         Budget::new(&self.path, self.len).room(place, n)
     }
 
-    /// Returns an error if `n` rows of `n_values` values cannot fit into the rest of the file.
-    ///
-    /// A value takes at least a digit and a separator; the last one of the file needs no separator.
+    /// Returns an error if `n` rows of `n_values` values, with a digit and a separator each, exceed
+    /// the rest of the file.
     pub fn expect_room(&self, n: u64, what: &str, n_values: u64) -> Result<(), Error> {
         let most = (self.len.saturating_sub(self.at) + 1) / n_values.saturating_mul(2);
         if n <= most {
@@ -71,11 +59,8 @@ impl Lines {
         Ok(())
     }
 
-    /// Reads the next line. Returns false at the end of the file.
-    ///
-    /// # Errors
-    /// When the line contains a zero byte (the file is not text), or is longer than
-    /// [`LONGEST_LINE`].
+    /// Reads the next line. Returns false at the end of the file. A zero byte or a line over
+    /// [`LONGEST_LINE`] is an error.
     pub fn advance(&mut self) -> Result<bool, Error> {
         self.line.clear();
         let mut limited = self.reader.by_ref().take(LONGEST_LINE + 1);
@@ -111,7 +96,6 @@ impl Lines {
         Ok(false)
     }
 
-    /// The current line without surrounding whitespace.
     pub fn line(&self) -> &[u8] {
         self.line.trim_ascii()
     }
@@ -122,7 +106,6 @@ impl Lines {
         line.strip_suffix(b"\r").unwrap_or(line)
     }
 
-    /// Returns an error in the current line.
     pub fn error(&self, expected: impl Into<String>, found: impl Into<String>) -> Error {
         Error::new(&self.path, Place::Line(self.number), expected, found)
     }
@@ -134,17 +117,14 @@ impl Lines {
     }
 }
 
-/// Splits a line into words at whitespace.
 pub(crate) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
 }
 
-/// Parses `word` as a number.
 pub(crate) fn number<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
     std::str::from_utf8(word).ok()?.parse().ok()
 }
 
-/// Formats a word for an error: quoted, and truncated to 40 characters.
 pub(crate) fn quoted(word: &[u8]) -> String {
     const LONGEST: usize = 40;
     let text = String::from_utf8_lossy(word);

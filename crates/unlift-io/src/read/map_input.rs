@@ -1,5 +1,3 @@
-//! The result of all readers: points, cameras, and facts about them.
-
 use std::path::PathBuf;
 
 use crate::seen::Seen;
@@ -12,15 +10,14 @@ pub struct Input {
     pub positions: Vec<[f64; 3]>,
     /// Ids `(n,)`, ascending: those of COLMAP, else rows of the file, counted from 0.
     pub ids: Vec<u64>,
-    /// Rows of points that are left out because a coordinate is not finite. Ascending, among all
-    /// points in the order of `positions`.
+    /// Rows of points that are left out because a coordinate is not finite, among all points in the
+    /// order of `positions`.
     pub left_out: Vec<u64>,
     /// Camera centers `(m, 3)`. Empty if the format has none.
     pub cameras: Vec<[f64; 3]>,
     /// The number of cameras that are left out because they have no finite pose.
     pub n_unplaced: usize,
-    /// The mean up direction of the photos, of unit length, which estimates up in the world. `None`
-    /// without cameras.
+    /// The mean up direction of the photos, of unit length. `None` without cameras.
     pub up: Option<[f64; 3]>,
     /// All files that were read, for hashes in a report.
     pub files: Vec<PathBuf>,
@@ -29,15 +26,15 @@ pub struct Input {
     pub seen: Seen,
     /// The format, as shown to users: `COLMAP binary`, `ply ascii`.
     pub format: &'static str,
-    /// Notes for readers of the results, one line each, such as data that was found but not used.
+    /// Notes for readers of the results, one line each.
     pub notes: Vec<String>,
     /// Reasons why results may be wrong. No gate holds with one.
     pub doubts: Vec<String>,
     /// True if the file states that coordinates are degrees of longitude and latitude.
     pub is_geographic: bool,
-    /// The folder of the COLMAP model, if the input is one. Its tracks lead to descriptors.
+    /// The folder of the COLMAP model, if the input is one.
     pub model: Option<PathBuf>,
-    /// The COLMAP database of the project, if one is in a usual place.
+    /// The COLMAP database of the project, if one is found.
     pub database: Option<PathBuf>,
 }
 
@@ -53,7 +50,7 @@ impl Input {
         self.positions.len() + self.left_out.len()
     }
 
-    /// Adds a camera, given as its center and up direction, or `None` if it has no pose.
+    /// Adds a camera: its center and up direction, or `None` without a pose.
     pub(crate) fn camera(&mut self, pose: Option<([f64; 3], [f64; 3])>) {
         let is_finite = |x: &[f64; 3]| x.iter().all(|x| x.is_finite());
         match pose.filter(|(center, up)| is_finite(center) && is_finite(up)) {
@@ -66,8 +63,7 @@ impl Input {
         }
     }
 
-    /// Completes the input of any reader: leaves out and counts points without finite coordinates,
-    /// and adds notes and doubts.
+    /// Leaves out points without finite coordinates, and adds notes and doubts for all formats.
     pub(crate) fn settle(mut self) -> Self {
         let n = self.positions.len();
         if self.ids.is_empty() {
@@ -127,7 +123,7 @@ pub(crate) fn most_at_one_place(positions: &[[f64; 3]]) -> Option<(usize, [f64; 
     hashes.sort_unstable();
     let most = hashes.chunk_by(|a, b| a == b).max_by_key(|same| same.len())?[0];
     let place = *positions.iter().find(|position| mix(bits(position)) == most)?;
-    // Compared by bits, because two positions may have the same hash.
+    // Two positions may have the same hash.
     let n = positions.iter().filter(|position| bits(position) == bits(&place)).count();
     Some((n, place))
 }

@@ -32,9 +32,9 @@ use models::Model;
 /// Reads the map at `path`.
 ///
 /// `path` is a COLMAP model folder, a project folder that contains one (of several, the one with
-/// the most points, named in `notes`), a map of OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler or
-/// VisualSFM (NVM), or a point cloud; `EXPECTED` lists the extensions. Points whose coordinates are
-/// not finite are left out and counted.
+/// the most points), a map of OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler or VisualSFM (NVM),
+/// or a point cloud; `EXPECTED` lists the extensions. Points whose coordinates are not finite are
+/// left out and counted.
 ///
 /// # Errors
 /// When nothing readable is there, a file is malformed, or no point has finite coordinates.
@@ -64,7 +64,6 @@ pub fn is_project(path: &Path) -> bool {
     path.is_dir() && (matches!(Model::find(path), Ok(Some(_))) || others::in_folder(path).is_some())
 }
 
-/// The supported formats, for error messages.
 const EXPECTED: &str = "a COLMAP folder, a map of OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler or NVM, or a .ply, \
                         .csv, .xyz, .txt, .asc, .pts, .npy, .npz, .las, .pcd, .e57 or .splat file";
 
@@ -83,7 +82,6 @@ fn not_read(extension: &str) -> String {
     format!("a .{extension} file{more}")
 }
 
-/// Reads a table, or COLMAP's points under another name.
 fn table_of(path: &Path) -> Result<Input, Error> {
     match table::read(path)? {
         Some(input) => Ok(input),
@@ -91,7 +89,6 @@ fn table_of(path: &Path) -> Result<Input, Error> {
     }
 }
 
-/// Returns an error if `path` is a Git LFS pointer instead of the file.
 fn check_fetched(path: &Path) -> Result<(), Error> {
     const POINTER: &[u8] = b"version https://git-lfs";
     let mut head = Vec::new();
@@ -134,7 +131,6 @@ fn file(path: &Path) -> Result<Input, Error> {
     Ok(input)
 }
 
-/// Reads the points of a COLMAP model without its folder.
 fn colmap_points(path: &Path) -> Result<Input, Error> {
     let points = colmap::read_points(path, false)?;
     Ok(Input {
@@ -180,7 +176,7 @@ fn colmap_model(model: &Model) -> Result<Input, Error> {
     input.files.push(model.points.clone());
     input.seen = Seen::new(&input.files);
 
-    // An audit needs nothing from cameras, rigs and frames, so their errors are notes.
+    // An audit needs nothing from these files, so their errors are notes.
     let mut told = |error: Error| input.notes.push(error.to_string());
     let cameras = cameras.and_then(|path| colmap::read_cameras(&path).map_err(&mut told).ok());
     for check in

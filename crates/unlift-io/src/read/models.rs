@@ -1,5 +1,3 @@
-//! Finds the COLMAP model of a folder: in the usual places, the largest of several.
-
 use std::fs;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -8,37 +6,28 @@ use super::ply;
 use crate::error::Error;
 use crate::input;
 
-/// The places of models, in the folder itself or in numbered subfolders: COLMAP's `sparse`, hloc's
-/// `models` (the best model is in the folder itself), nerfstudio's `colmap/sparse`.
+/// Places of models, themselves or in numbered subfolders: COLMAP's `sparse`, hloc's `models` (its
+/// best model is in the folder itself), nerfstudio's `colmap/sparse`.
 const PLACES: [&str; 6] = ["", "sparse", "model", "models", "colmap", "colmap/sparse"];
-/// The place of undistorted models: in `sparse` of this folder, or of numbered subfolders. They are
-/// read only if there is no other model.
+/// The place of undistorted models: `sparse` in it or in its numbered subfolders. They are read
+/// only if there is no other model.
 const UNDISTORTED: &str = "dense";
-/// The places of a database in the folder that was given.
 const DATABASES: [&str; 2] = ["database.db", "colmap/database.db"];
-/// The places of a database if the folder that was given is the model itself.
+/// Places of a database if the folder that was given is the model itself.
 const DATABASES_ABOVE: [&str; 2] = ["../database.db", "../../database.db"];
 
-/// A model in a folder.
 pub(super) struct Model {
-    /// The folder of the model.
     pub folder: PathBuf,
-    /// The form that is read: `bin` or `txt`.
+    /// `bin` or `txt`.
     pub extension: &'static str,
     /// The file of its points, which may be a PLY.
     pub points: PathBuf,
-    /// Notes for the user about other models and forms.
     pub notes: Vec<String>,
 }
 
 impl Model {
     /// Finds the model in `path`: the one in the folder itself, else the one with the most points.
     /// Ties go to the first in the order of [`PLACES`] and of numbers.
-    ///
-    /// Returns `None` if there is none.
-    ///
-    /// # Errors
-    /// When there are several, and the points of one cannot be counted.
     pub fn find(path: &Path) -> Result<Option<Self>, Error> {
         let found = candidates(path);
         let Some(first) = found.first() else { return Ok(None) };
@@ -83,13 +72,11 @@ pub(super) fn database(path: &Path, model: &Path) -> Option<PathBuf> {
     places.map(|place| path.join(place)).find(|file| file.is_file())
 }
 
-/// The places that are searched, for error messages.
 pub(super) const EXPECTED: &str = "points3D.bin or points3D.txt in it, or in sparse, model, models, colmap/sparse \
                                    or a numbered folder of these";
 
-/// A folder that contains a model.
 struct Candidate {
-    /// The path relative to the folder that was given, with slashes. Empty for that folder.
+    /// Relative to the folder that was given, with slashes. Empty for that folder.
     name: String,
     folder: PathBuf,
     extension: &'static str,
@@ -97,7 +84,6 @@ struct Candidate {
 }
 
 impl Candidate {
-    /// Returns the model in `folder`, if there is one.
     fn in_folder(name: String, folder: PathBuf) -> Option<Self> {
         let file = |stem: &str, extension: &str| folder.join(format!("{stem}.{extension}"));
         let there = |extension: &&str| file("points3D", extension).is_file();
@@ -135,7 +121,7 @@ impl Candidate {
     }
 }
 
-/// Counts lines that are neither blank nor comments, without storing a line.
+/// Counts lines that are neither blank nor comments.
 fn n_lines(mut file: impl BufRead) -> io::Result<u64> {
     let mut n = 0;
     let mut is_start = true;
@@ -187,7 +173,6 @@ fn candidates(path: &Path) -> Vec<Candidate> {
     found
 }
 
-/// Returns the subfolders of `parent` whose names are numbers, in ascending order.
 fn numbered(parent: &Path) -> Vec<u32> {
     let Ok(entries) = fs::read_dir(parent) else { return Vec::new() };
     let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());

@@ -1,7 +1,6 @@
 //! Reads positions and descriptors from NumPy arrays.
 //!
-//! This is our own reader, because only a few types are needed, and a header that declares 2^62
-//! rows must be an error instead of an overflow.
+//! Our own reader: few types are needed, and a header that declares 2^62 rows must be an error.
 
 use std::path::Path;
 
@@ -14,10 +13,9 @@ use super::scalar::Scalar;
 use crate::error::Error;
 use crate::read::map_input::Input;
 
-/// The first bytes of every array.
 pub(crate) const MAGIC: &[u8; 6] = b"\x93NUMPY";
 
-/// The maximum number of columns of an array of points. Wider arrays are descriptors.
+/// The maximum number of columns of points. Wider arrays are descriptors.
 const MOST_COLUMNS: u64 = 16;
 /// Names of arrays, or of fields of three values, that contain all coordinates.
 pub(super) const PLACES: [&str; 7] =
@@ -28,17 +26,12 @@ const TELLING: usize = 10;
 
 /// Reads positions from an `.npy` file, in either byte and memory order.
 ///
-/// The array has the shape `(n, 3)`, or more columns of which the first three are x, y and z, or is
-/// structured with fields of these names.
-///
-/// # Errors
-/// When the file cannot be read, is malformed, has another type or shape, or its first column is
-/// the row number.
+/// The array has the shape `(n, 3)`, or more columns of which the first three are x, y and z, or
+/// fields of these names. A first column of row numbers is an error.
 pub fn positions(path: &Path) -> Result<Input, Error> {
     of_points(&mut Bytes::open(path)?, "npy")
 }
 
-/// Reads positions from the array at the start of `bytes`.
 pub(super) fn of_points(bytes: &mut Bytes, format: &'static str) -> Result<Input, Error> {
     let header = Header::read(bytes)?;
     let mut found = Input { format, ..Input::default() };
@@ -88,7 +81,6 @@ pub(super) fn of_points(bytes: &mut Bytes, format: &'static str) -> Result<Input
     Ok(found)
 }
 
-/// The places of the coordinates in an array.
 pub(super) enum Layout {
     Matrix {
         columns: u64,
@@ -122,11 +114,8 @@ fn size_of(text: &str) -> Option<u64> {
 /// Reads descriptors `(n, dim)` from an `.npy` file of bytes or of floats of 2, 4 or 8 bytes, in
 /// either byte and memory order.
 ///
-/// Returns the row-major values and `dim`. Floats of 8 bytes are rounded to 4.
-///
-/// # Errors
-/// When the file cannot be read, is malformed, has another type, its number of rows is not one of
-/// `counts`, or a value is not finite as a float of 4 bytes.
+/// Returns the row-major values and `dim`. Floats of 8 bytes are rounded to 4. The number of rows
+/// must be one of `counts`.
 pub fn descriptors(path: &Path, counts: [usize; 2]) -> Result<(Values, usize), Error> {
     let mut bytes = Bytes::open(path)?;
     let header = Header::read(&mut bytes)?;
@@ -186,10 +175,6 @@ struct Array {
 }
 
 impl Array {
-    /// Checks the size of the rest of the file.
-    ///
-    /// # Errors
-    /// When it is not the size that the header declares.
     fn check(&self, bytes: &Bytes) -> Result<(), Error> {
         check_size(bytes, self.rows, self.columns.checked_mul(self.scalar.size() as u64))
     }
@@ -215,7 +200,6 @@ impl Array {
     }
 }
 
-/// Returns an error if the rest of the file is not `rows` of `row` bytes.
 fn check_size(bytes: &Bytes, rows: u64, row: Option<u64>) -> Result<(), Error> {
     if row.and_then(|row| rows.checked_mul(row)) == Some(bytes.remaining()) {
         return Ok(());
@@ -229,7 +213,6 @@ fn check_size(bytes: &Bytes, rows: u64, row: Option<u64>) -> Result<(), Error> {
 pub(super) struct Header(Vec<u8>);
 
 impl Header {
-    /// Reads the header.
     pub(super) fn read(bytes: &mut Bytes) -> Result<Self, Error> {
         let mut magic = [0; 8];
         bytes.fill(&mut magic, "magic and version")?;
@@ -254,15 +237,14 @@ impl Header {
         Ok(Self(header))
     }
 
-    /// Returns the text of the value of `key`.
     fn value(&self, key: &str) -> Option<&str> {
         let header = std::str::from_utf8(&self.0).ok()?;
         let at = [format!("'{key}'"), format!("\"{key}\"")]
             .iter()
             .find_map(|key| header.find(key).map(|at| at + key.len()))?;
         let text = header[at..].trim_start().strip_prefix(':')?.trim_start();
-        // A tuple ends with its parenthesis, a list with its bracket, other values with a comma or
-        // the end of the dictionary.
+        // A tuple or a list ends with its bracket, other values with a comma or the end of the
+        // dictionary.
         let end = match text.as_bytes().first()? {
             b'(' => text.find(')')? + 1,
             b'[' => text.find(']')? + 1,
@@ -275,7 +257,6 @@ impl Header {
         self.value("descr").unwrap_or_default().trim_matches(['\'', '"']).as_bytes()
     }
 
-    /// Returns how a value is stored, and true if it is big-endian.
     fn scalar(&self) -> Option<(Scalar, bool)> {
         stored(std::str::from_utf8(self.type_text()).ok()?)
     }
@@ -284,8 +265,8 @@ impl Header {
         self.type_text().starts_with(b"[")
     }
 
-    /// Returns the number of points and the places of their coordinates, or `None` if the array
-    /// cannot be points.
+    /// Returns the number of points and the places of their coordinates, if the array can be
+    /// points.
     pub(super) fn points(&self) -> Option<(u64, Layout)> {
         if !self.is_structured() {
             let [rows, columns] = self.sides().filter(|_| self.scalar().is_some())?;
@@ -344,7 +325,6 @@ impl Header {
         quoted(self.value("shape").unwrap_or_default().as_bytes())
     }
 
-    /// Returns the rows and columns of an array of two dimensions.
     fn sides(&self) -> Option<[u64; 2]> {
         let inner = self.value("shape")?.strip_prefix('(')?.strip_suffix(')')?;
         let mut parts = inner.split(',').map(str::trim);

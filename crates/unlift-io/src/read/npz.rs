@@ -1,5 +1,3 @@
-//! Reads positions from NumPy archives of arrays.
-
 use std::io::{self, BufReader, Read, Seek};
 use std::path::Path;
 
@@ -15,17 +13,14 @@ use crate::guard::without_panic;
 use crate::input::{self, Budget};
 use crate::read::map_input::Input;
 
-/// Reads positions from the array of points in an `.npz` archive.
-///
-/// # Errors
-/// When the file is not such an archive, or several arrays or none may be points.
+/// Reads positions from the array of points in a NumPy archive. Several or none are an error.
 pub fn positions(path: &Path) -> Result<Input, Error> {
     let damaged = || Error::new(path, "", "an archive of NumPy arrays", "a damaged one");
     without_panic(|| in_archive(path)).unwrap_or_else(|| Err(damaged()))
 }
 
 fn in_archive(path: &Path) -> Result<Input, Error> {
-    /// The maximum size in bytes of the header of an array.
+    /// The maximum size of an array header.
     const HEADER: u64 = 1 << 16;
     let (file, len) = input::open(path)?;
     let wrong =
@@ -53,8 +48,7 @@ fn in_archive(path: &Path) -> Result<Input, Error> {
         all.push(name);
     }
     let has = |start: &str| all.iter().any(|name| name.starts_with(start));
-    // Some programs store position, size and angle of keypoints in one array, beside an array of
-    // descriptors.
+    // Some programs store position, size and angle of keypoints in one array, beside descriptors.
     let beside_descriptors = has("descriptors") && n_columns.iter().all(|&n| n > 3);
     if has("keypoints") || has("OPENSFM_FEATURES") || beside_descriptors {
         return Err(Error::new(path, "", "points of a map", "features of an image"));

@@ -1,5 +1,4 @@
-//! Reads PLY point clouds: the positions of the element `vertex`, ascii or binary, and the centers
-//! of splats.
+//! Reads the vertices of PLY point clouds, and the centers of splats.
 
 use std::path::Path;
 
@@ -77,11 +76,7 @@ struct Header {
     elements: Vec<Element>,
 }
 
-/// Reads the positions of the vertices, of any numeric type. Other properties and elements are
-/// skipped.
-///
-/// # Errors
-/// When the file cannot be read, is malformed, or does not contain the declared number of vertices.
+/// Reads the positions of the vertices, of any numeric type.
 pub fn read(path: &Path) -> Result<Input, Error> {
     let mut lines = Lines::open(path)?;
     let header = header(path, &mut lines)?;
@@ -96,7 +91,6 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     }
     let mut rows = match header.encoding {
         Encoding::Ascii => {
-            // A value takes at least a digit and a separator.
             lines.expect_room(element.count, "vertices", element.properties.len() as u64)?;
             Rows::Ascii(lines)
         }
@@ -137,7 +131,6 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     })
 }
 
-/// The note about Gaussian splats.
 const SPLATS: &str = "Gaussian splats: only their centers are read";
 /// The number of packed splats that share a box, and the corners of that box.
 const PER_BOX: u64 = 256;
@@ -152,8 +145,8 @@ fn unpacked(packed: u32, sides: &[f64; 6]) -> [f64; 3] {
     })
 }
 
-/// Reads the centers of splats in the format of antimatter15's web viewer: 32 bytes each, which
-/// begin with three floats.
+/// Reads the centers of splats in antimatter15's format: 32 bytes each, which begin with three
+/// floats.
 pub fn splats(path: &Path) -> Result<Input, Error> {
     const SPLAT: u64 = 32;
     let mut bytes = Bytes::open(path)?;
@@ -231,7 +224,6 @@ fn header(path: &Path, lines: &mut Lines) -> Result<Header, Error> {
     Ok(Header { encoding, elements })
 }
 
-/// A reader of rows, one element after the other.
 enum Rows {
     Ascii(Lines),
     /// True if the file is big-endian.
@@ -239,8 +231,7 @@ enum Rows {
 }
 
 impl Rows {
-    /// Reads the values of the properties `wanted` in every row of `element`. The result is empty
-    /// if none are wanted.
+    /// Reads the values of the properties `wanted` in every row of `element`.
     fn read<const N: usize>(
         &mut self,
         element: &Element,
@@ -252,11 +243,8 @@ impl Rows {
         }
     }
 
-    /// Returns how many undeclared vertices fit into the rest of the file, given the elements
-    /// `behind` `vertex`.
-    ///
-    /// # Errors
-    /// When `vertex` is the last element and anything follows.
+    /// Returns how many undeclared vertices fit into the rest of the file, given the elements after
+    /// `vertex`. If there are none, the file must end.
     fn more(&mut self, vertex: &Element, behind: &[Element]) -> Result<u64, Error> {
         match self {
             Self::Ascii(lines) => {

@@ -1,7 +1,5 @@
-//! Camera poses, for all formats.
-
-/// Returns the center `-R^T t` of a camera with the pose `x_cam = R x + t`, and `up_cam` of its
-/// frame as a direction in the world.
+/// Returns the center `-R^T t` of a camera with the pose `x_cam = R x + t`, and the direction
+/// `up_cam` of its frame in the world.
 pub fn camera(
     rotation: &[[f64; 3]; 3],
     translation: &[f64; 3],
@@ -13,8 +11,7 @@ pub fn camera(
     (transposed(translation).map(|x| -x), transposed(&up_cam))
 }
 
-/// Returns the rotation of a quaternion (w, x, y, z) of any norm, times the squared norm, and the
-/// squared norm.
+/// Returns the rotation of a quaternion (w, x, y, z) times its squared norm, and the squared norm.
 pub fn scaled_rotation([w, x, y, z]: [f64; 4]) -> ([[f64; 3]; 3], f64) {
     let rows = [
         [w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
@@ -24,9 +21,9 @@ pub fn scaled_rotation([w, x, y, z]: [f64; 4]) -> ([[f64; 3]; 3], f64) {
     (rows, w * w + x * x + y * y + z * z)
 }
 
-/// The up direction in the frame of a camera whose y axis points down.
+/// Up in the frame of a camera whose y axis points down.
 pub const DOWNWARD: [f64; 3] = [0.0, -1.0, 0.0];
-/// The up direction in the frame of a camera whose y axis points up.
+/// Up in the frame of a camera whose y axis points up.
 pub const UPWARD: [f64; 3] = [0.0, 1.0, 0.0];
 
 #[cfg(test)]

@@ -1,8 +1,6 @@
-//! The numeric types of arrays.
-
 use half::f16;
 
-/// The type of a number in a file: a float, or a signed or unsigned integer.
+/// The type of a number in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Scalar {
     /// `f`, `i` or `u`.
@@ -16,8 +14,8 @@ impl Scalar {
     pub const F32: Self = Self { kind: b'f', size: 4 };
     pub const F64: Self = Self { kind: b'f', size: 8 };
 
-    /// Returns the type of `size` bytes and a kind: `f` float, `i` signed integer, `u` unsigned
-    /// integer, in either case.
+    /// Returns a type by its size in bytes and kind: `f` float, `i` signed, `u` unsigned, in either
+    /// case.
     pub fn of_kind(kind: u8, size: u64) -> Option<Self> {
         let kind = kind.to_ascii_lowercase();
         let sizes: &[u64] = match kind {
@@ -28,15 +26,11 @@ impl Scalar {
         sizes.contains(&size).then_some(Self { kind, size: size as usize })
     }
 
-    /// The size in bytes.
     pub fn size(self) -> usize {
         self.size
     }
 
     /// Reads a number from the first [`size`](Self::size) `bytes`, big-endian if `big` is set.
-    ///
-    /// # Panics
-    /// When there are fewer.
     pub fn read(self, bytes: &[u8], big: bool) -> f64 {
         let mut little = [0; 8];
         little[..self.size].copy_from_slice(&bytes[..self.size]);
@@ -47,7 +41,6 @@ impl Scalar {
         match (self.kind, self.size) {
             (b'u', _) => u64::from_le_bytes(little) as f64,
             (b'i', size) => {
-                // Extends the sign.
                 let unused = 64 - 8 * size;
                 (i64::from_le_bytes(little) << unused >> unused) as f64
             }

@@ -1,5 +1,3 @@
-//! Reads text tables with a point per line. Names of columns, if present, select x, y and z.
-
 use std::path::Path;
 
 use super::columns::{axes, coordinate, is_called, plain};
@@ -37,9 +35,9 @@ impl Separator {
     }
 }
 
-/// The maximum number of bytes of comments before the first point that are searched for names.
+/// The maximum number of bytes of comments that are searched for names.
 const COMMENTS: usize = 1 << 16;
-/// The number of columns before the tracks in COLMAP's points.
+/// Columns before the tracks in COLMAP's points.
 const COLMAP_COLUMNS: usize = 8;
 /// The least number of points at which a column of row numbers is an error. Fewer may match by
 /// accident.
@@ -49,13 +47,9 @@ const TELLING: usize = 10;
 /// `None` for the points of a COLMAP model in text.
 ///
 /// The first three columns are x, y and z, unless the first line or a comment (`#` or `//`) before
-/// it names the columns: then those with the names `x`, `y` and `z` (in either case). A line of one
-/// number before points is their count, as in Leica's PTS and in CloudCompare. Other columns, blank
-/// lines and comments are skipped.
-///
-/// # Errors
-/// When the file cannot be read, a line does not contain three numbers, columns have other names,
-/// or rows are camera poses or begin with the row number.
+/// it names columns `x`, `y` and `z` (in either case). A line of one number before points is their
+/// count, as in Leica's PTS and in CloudCompare. Rows that are camera poses or begin with the row
+/// number are an error.
 pub fn read(path: &Path) -> Result<Option<Input>, Error> {
     let mut lines = Lines::open(path)?;
     let mut positions = Vec::new();
@@ -131,7 +125,6 @@ pub fn read(path: &Path) -> Result<Option<Input>, Error> {
     Ok(Some(Input { positions, format: "table", doubts, ..Input::default() }))
 }
 
-/// Returns an error if the number of points differs from the count before them.
 fn check_count(lines: &Lines, announced: Option<(u64, u64)>, n: u64) -> Result<(), Error> {
     match announced {
         Some((of, before)) if n - before != of => {
@@ -142,7 +135,6 @@ fn check_count(lines: &Lines, announced: Option<(u64, u64)>, n: u64) -> Result<(
     }
 }
 
-/// The columns of x, y and z.
 #[derive(Debug)]
 struct Columns {
     at: [usize; 3],
@@ -153,7 +145,6 @@ struct Columns {
 const FIRST: Columns = Columns { at: [0, 1, 2], named: false, doubt: None };
 
 impl Columns {
-    /// Finds the columns by the names in the first line.
     fn of_header(lines: &Lines, names: &[&[u8]]) -> Result<Self, Error> {
         match axes(names.iter().copied()) {
             Ok(at) => Ok(Self { at, named: true, ..FIRST }),
@@ -203,8 +194,7 @@ impl Columns {
     }
 }
 
-/// Splits a comment into names of columns: by the separators of the table, or into words. Text
-/// before a colon and units in brackets are removed.
+/// Splits a comment into names of columns, without text before a colon and units in brackets.
 fn names(comment: &[u8], n: usize) -> Vec<&[u8]> {
     let start = comment.iter().rposition(|&byte| byte == b':').map_or(0, |at| at + 1);
     let list = comment[start..].trim_ascii();
@@ -216,8 +206,6 @@ fn names(comment: &[u8], n: usize) -> Vec<&[u8]> {
     words.filter(|word| !word.is_empty() && !b"[(".contains(&word[0])).map(plain).collect()
 }
 
-/// Returns true if a word may name a column: not a number, and only letters, digits and joining
-/// characters.
 fn is_name(word: &[u8]) -> bool {
     let joins =
         |byte: &u8| byte.is_ascii_alphanumeric() || b"_-./ ".contains(byte) || *byte >= 0x80;
@@ -232,7 +220,6 @@ fn is_quantity(name: &[u8]) -> bool {
     NAMES.split(' ').any(|known| is_called(name, known.as_bytes()))
 }
 
-/// Returns a description if columns with these names are camera poses.
 fn of_poses(names: &[&[u8]]) -> Option<String> {
     let has = |starts: [&str; 2]| {
         names.iter().any(|name| {
@@ -245,11 +232,8 @@ fn of_poses(names: &[&[u8]]) -> Option<String> {
 
 const POSES: &str = "a trajectory, poses of cameras";
 
-/// Returns true if the first row has three coordinates, and is not a row of COLMAP's points that is
-/// truncated after its id and two coordinates.
-///
-/// # Errors
-/// When the file cannot be read.
+/// Returns true if the first row has three coordinates, and is not a truncated row of COLMAP's
+/// points (id and two coordinates).
 pub(super) fn has_three_columns(path: &Path) -> Result<bool, Error> {
     let mut lines = Lines::open(path)?;
     if !lines.advance_to_data()? {
@@ -261,23 +245,22 @@ pub(super) fn has_three_columns(path: &Path) -> Result<bool, Error> {
     Ok(fields.len() == 3 && !begins_with_id)
 }
 
-/// Returns true if a comment names the columns of COLMAP's points.
 fn is_colmap_header(comment: &[u8]) -> bool {
     let comment = comment.to_ascii_uppercase();
     let has = |word: &[u8]| comment.windows(word.len()).any(|part| part == word);
     has(b"POINT3D_ID") && has(b"TRACK")
 }
 
-/// Properties of rows without named columns that hold for all rows so far.
+/// Properties that hold for all rows so far.
 #[derive(Debug)]
 struct Form {
     n: usize,
-    /// Rows are COLMAP's points: an id, a position, a color, an error, a track.
+    /// COLMAP's points: an id, a position, a color, an error, a track.
     colmap: bool,
     has_track: bool,
     ascending: bool,
-    /// Rows are a trajectory: a time, a position and a unit quaternion, or the three rows of a
-    /// rotation and a position.
+    /// A trajectory: a time, a position and a unit quaternion, or the three rows of a rotation and
+    /// a position.
     pose: bool,
     time: f64,
     /// The first value is the row number, counted from 0 or from 1.
@@ -337,8 +320,7 @@ impl Form {
         }
     }
 
-    /// Returns true if rows are the points of a COLMAP model: with tracks, or at least with
-    /// ascending ids.
+    /// Returns true if rows are COLMAP's points: with tracks, or at least with ascending ids.
     fn is_colmap(&self) -> bool {
         self.n > 0 && self.colmap && (self.has_track || self.ascending)
     }

@@ -1,5 +1,3 @@
-//! Converts columns of third-party files to the types that are used here.
-
 use crate::Error;
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
@@ -19,11 +17,8 @@ pub(super) enum Type {
     Float,
     /// Signed or unsigned integers.
     Integer,
-    /// Text.
     Text,
-    /// Lists of floats.
     Floats,
-    /// Lists of integers.
     Integers,
     /// Lists of integers or floats.
     Numbers,
@@ -33,8 +28,7 @@ impl Type {
     pub(super) fn admits(self, found: &DataType) -> bool {
         let float = DataType::is_floating;
         match (self, found) {
-            // Whole numbers are accepted in either type: some tables have no decimals, and pandas
-            // converts integers with nulls to floats.
+            // Some tables have no decimals, and pandas converts integers with nulls to floats.
             (Self::Float | Self::Integer, found) => float(found) || found.is_integer(),
             (Self::Text, found) => *found == DataType::Utf8,
             (Self::Floats | Self::Numbers, DataType::List(of)) => {
@@ -72,7 +66,6 @@ pub(super) fn coordinate_names<const D: usize>(prefix: &str) -> [String; D] {
 #[derive(Debug)]
 pub(super) struct Batch<'a> {
     path: &'a Path,
-    /// The columns that were read.
     columns: &'a [(&'a str, Type)],
     batch: &'a RecordBatch,
     first_row: u64,
@@ -87,12 +80,11 @@ impl<'a> Batch<'a> {
         Self { path, columns, batch, first_row }
     }
 
-    /// The number of rows in this batch.
     pub(super) fn len(&self) -> usize {
         self.batch.num_rows()
     }
 
-    /// Returns an error about `row` (of this batch) of the column `name`.
+    /// Returns an error about `row` of this batch.
     pub(super) fn wrong(
         &self,
         name: &str,
@@ -104,7 +96,6 @@ impl<'a> Batch<'a> {
         Error::new(self.path, place, expected, found)
     }
 
-    /// Returns finite floats.
     pub(super) fn floats(&self, name: &str) -> Result<Vec<f64>, Error> {
         self.no_null(name, FINITE)?;
         let values = self.widened(name)?;
@@ -141,15 +132,15 @@ impl<'a> Batch<'a> {
         Ok(())
     }
 
-    /// Returns integers from 0 to below `below` (at most 2^32).
+    /// Returns integers below `below` (at most 2^32).
     pub(super) fn integers(&self, name: &str, below: u64) -> Result<Vec<u32>, Error> {
         let values = self.optional_integers(name, below)?.into_iter().enumerate();
         let null = |row| self.wrong(name, row, whole_below(below), "null");
         values.map(|(row, x)| x.ok_or_else(|| null(row))).collect()
     }
 
-    /// Returns integers from 0 to below `below` (at most 2^32). Null, NaN in float columns, and
-    /// columns that were not read are `None`.
+    /// Returns integers below `below` (at most 2^32). Null, NaN in float columns, and columns that
+    /// were not read are `None`.
     pub(super) fn optional_integers(
         &self,
         name: &str,
@@ -175,14 +166,13 @@ impl<'a> Batch<'a> {
         checked.collect()
     }
 
-    /// Returns texts or null. All are null if the column was not read.
     pub(super) fn texts(&self, name: &str) -> Vec<Option<&'a str>> {
         let Some(column) = self.found(name) else { return vec![None; self.len()] };
         column.as_string::<i32>().iter().collect()
     }
 
-    /// Reads lists of integers from 0 to below `below` (at most 2^32). Appends values to `to`, and
-    /// the end of each list to `offsets`.
+    /// Appends lists of integers below `below` (at most 2^32) to `to`, and the end of each list to
+    /// `offsets`.
     ///
     /// Null is an empty list. Lists longer than `most` are an error before they are copied.
     pub(super) fn integer_lists(
@@ -205,7 +195,7 @@ impl<'a> Batch<'a> {
         Ok(())
     }
 
-    /// Reads lists of finite floats. Appends values to `to`, and returns the length of each list.
+    /// Appends lists of finite floats to `to`, and returns the length of each list.
     ///
     /// Null is an empty list. Lists longer than `most` are an error before they are copied.
     pub(super) fn float_lists(
@@ -237,7 +227,6 @@ impl<'a> Batch<'a> {
         Ok(lengths)
     }
 
-    /// Returns true if the column `name` is null in every row of this batch.
     pub(super) fn is_null(&self, name: &str) -> bool {
         self.column(name).null_count() == self.len()
     }
@@ -258,7 +247,6 @@ impl<'a> Batch<'a> {
         exact.collect()
     }
 
-    /// Returns a column, if it was read.
     fn found(&self, name: &str) -> Option<&'a ArrayRef> {
         let was_read = self.columns.iter().any(|(column, _)| *column == name);
         self.batch.column_by_name(name).filter(|_| was_read)
@@ -326,7 +314,6 @@ fn whole_below(below: u64) -> String {
 /// memory of bytes.
 type Values<'a, T> = Box<dyn Fn(usize) -> T + 'a>;
 
-/// Converts the values of an array of one of these types to one wider type.
 macro_rules! widened {
     ($array:expr, $wide:ident, $null:expr, $($variant:ident => $of:ty),*) => {
         match $array.data_type() {
@@ -334,14 +321,13 @@ macro_rules! widened {
                 let values = $array.as_primitive::<$of>().values();
                 Box::new(move |at| $wide::from(values[at]))
             })*
-            // The array contains only nulls.
             DataType::Null => Box::new(|_| $null),
             other => unreachable!("the type {other} was checked"),
         }
     };
 }
 
-/// Returns the values of an array of integers. Values at nulls are undefined.
+/// Values at nulls are undefined.
 fn integers(array: &ArrayRef) -> Values<'_, i128> {
     widened!(
         array, i128, 0,
@@ -350,7 +336,7 @@ fn integers(array: &ArrayRef) -> Values<'_, i128> {
     )
 }
 
-/// Returns the values of an array of floats. Values at nulls are undefined.
+/// Values at nulls are undefined.
 fn floats(array: &ArrayRef) -> Values<'_, f64> {
     widened!(
         array, f64, f64::NAN,

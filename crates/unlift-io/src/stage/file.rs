@@ -1,5 +1,3 @@
-//! Opens and checks a Parquet file, and decodes it in batches.
-
 use super::footer;
 use super::header::KEY;
 use crate::Error;
@@ -19,14 +17,13 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-/// The number of rows of a batch: 1 MiB for descriptors of 128 bytes, 128 MiB for 4096 floats.
+/// Rows of a batch: 1 MiB for descriptors of 128 bytes, 128 MiB for 4096 floats.
 const BATCH_ROWS: usize = 1 << 13;
 
 /// The maximum number of rows per byte of a file. Even equal rows, run-length encoded in pages of
 /// 20,000, take more space.
 const ROWS_PER_BYTE: u64 = 1000;
 
-/// An open Parquet file whose footer was read.
 #[derive(Debug)]
 pub(super) struct ParquetFile {
     path: PathBuf,
@@ -37,19 +34,18 @@ pub(super) struct ParquetFile {
 }
 
 impl ParquetFile {
-    /// Opens `path` and reads its footer.
     pub(super) fn open(path: &Path) -> Result<Self, Error> {
         let (mut file, n_bytes) = input::open(path)?;
         check_magic(path, &mut file, n_bytes)?;
         footer::check(path, &mut file, n_bytes)?;
-        // The embedded Arrow schema is ignored, so that large, fixed-size and dictionary columns
-        // need no special code.
+        // Without the embedded Arrow schema, large, fixed-size and dictionary columns need no
+        // special code.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
         let parquet = guarded(path, || ArrowReaderMetadata::load(&file, options))?;
         let footer = parquet.metadata().file_metadata();
         let most = (i32::MAX as u64).min(n_bytes.saturating_mul(ROWS_PER_BYTE));
         let mut groups = parquet.metadata().row_groups().iter().map(|group| group.num_rows());
-        // Each number is checked, because negative ones could make the right sum.
+        // Negative numbers could make the right sum.
         let in_groups = groups.try_fold(0_u64, |sum, n| sum.checked_add(u64::try_from(n).ok()?));
         let n_rows = match u64::try_from(footer.num_rows()) {
             Ok(n_rows) if n_rows <= most && in_groups == Some(n_rows) => n_rows,
@@ -66,17 +62,15 @@ impl ParquetFile {
         Ok(Self { path: path.to_owned(), file, n_bytes, parquet, n_rows })
     }
 
-    /// The number of rows that the footer declares.
     pub(super) fn n_rows(&self) -> u64 {
         self.n_rows
     }
 
-    /// The columns, by their Parquet types.
     pub(super) fn schema(&self) -> &SchemaRef {
         self.parquet.schema()
     }
 
-    /// The text under unlift's metadata key, if there is one.
+    /// The text under unlift's metadata key.
     pub(super) fn meta_text(&self) -> Option<&str> {
         let entries = self.parquet.metadata().file_metadata().key_value_metadata();
         let entry = entries.and_then(|all| all.iter().find(|entry| entry.key == KEY));
@@ -95,30 +89,24 @@ impl ParquetFile {
         })
     }
 
-    /// The path of the file.
     pub(super) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The length of the file in bytes.
     pub(super) fn n_bytes(&self) -> u64 {
         self.n_bytes
     }
 
-    /// The metadata of the footer.
     pub(super) fn metadata(&self) -> &ParquetMetaData {
         self.parquet.metadata()
     }
 
-    /// Returns a second handle of the open file.
     pub(super) fn handle(&self) -> Result<File, Error> {
         self.file.try_clone().map_err(|source| Error::read(&self.path, source))
     }
 
-    /// Starts decoding the columns at `roots`, in the order of the file, at most `most_rows` at a
-    /// time.
-    ///
-    /// The sizes that the columns declare were [checked](super::pages::check).
+    /// Starts decoding the columns at `roots`, at most `most_rows` at a time.
+    /// [`pages::check`](super::pages::check) has checked their sizes.
     pub(super) fn batches(&self, roots: &[usize], most_rows: usize) -> Result<Batches, Error> {
         let file = self.handle()?;
         let reader = guarded(&self.path, || {
@@ -151,7 +139,6 @@ impl ParquetFile {
     }
 }
 
-/// An iterator over decoded batches of rows.
 pub(super) struct Batches {
     path: PathBuf,
     reader: ParquetRecordBatchReader,
@@ -175,7 +162,7 @@ impl Batches {
     }
 }
 
-/// Distinguishes files that are not Parquet from truncated ones, the most common mistakes.
+/// Distinguishes files that are not Parquet from truncated ones.
 fn check_magic(path: &Path, file: &mut File, n_bytes: u64) -> Result<(), Error> {
     let failed = |source| Error::read(path, source);
     let wrong = |found: String| Err(Error::new(path, "", "a Parquet file", found));
@@ -199,8 +186,7 @@ fn check_magic(path: &Path, file: &mut File, n_bytes: u64) -> Result<(), Error> 
     Ok(())
 }
 
-/// Runs a step of the `parquet` crate on untrusted bytes. An error or a panic becomes an error
-/// about the file.
+/// Runs a step of the `parquet` crate on untrusted bytes. A panic becomes an error about the file.
 fn guarded<T, E: Into<ParquetError>>(
     path: &Path,
     step: impl FnOnce() -> Result<T, E>,

@@ -1,5 +1,5 @@
-//! Checks the footer of a Parquet file before the `parquet` crate reads it, because the crate
-//! recurses and allocates as the footer declares.
+//! Checks the footer of a Parquet file first, because the `parquet` crate recurses and allocates as
+//! it declares.
 
 use super::thrift::{Field, Walk, Wrong};
 use crate::Error;
@@ -7,19 +7,16 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// The maximum depth of nested columns. A list of numbers has three levels.
+/// A list of numbers has three levels.
 const DEEPEST: usize = 32;
-/// The maximum number of schema elements: two for a column, four for a column of lists.
+/// Two elements for a column, four for a column of lists.
 const MOST_ELEMENTS: u64 = 1 << 16;
 /// The number of row groups that Parquet can count.
 const MOST_GROUPS: u64 = 1 << 15;
-/// The size of the end of the file: the length of the footer, and `PAR1`.
+/// The length of the footer, and `PAR1`.
 const TAIL: u64 = 8;
 
 /// Checks the footer of the Parquet file `path` of `n_bytes` bytes.
-///
-/// # Errors
-/// When it is not inside the file, is malformed, or its schema is deeper or larger than the limits.
 pub(super) fn check(path: &Path, file: &mut File, n_bytes: u64) -> Result<(), Error> {
     let failed = |source| Error::read(path, source);
     let mut tail = [0; TAIL as usize];

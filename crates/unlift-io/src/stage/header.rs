@@ -7,7 +7,6 @@ use std::path::Path;
 use unlift::geometry::frame::Bounds;
 use unlift::{About, Fingerprint, ListsBy, RowOrder, Unit};
 
-/// The Parquet key-value metadata key of the JSON object.
 pub(super) const KEY: &str = "unlift";
 
 /// The version that is written, and the only one that is read.
@@ -67,7 +66,6 @@ impl fmt::Display for Kind {
     }
 }
 
-/// The metadata object of a file, with the path for errors.
 #[derive(Debug)]
 pub(super) struct Meta<'a> {
     path: &'a Path,
@@ -91,19 +89,17 @@ impl<'a> Meta<'a> {
         Ok(Self { path, object })
     }
 
-    /// Adds the metadata `text` of one image. Its keys replace those of the file.
+    /// Adds the metadata `text` of one image, which replaces that of the file.
     pub(super) fn of_image(&self, text: Option<&str>) -> Result<Self, Error> {
         let mut object = self.object.clone();
         object.extend(Self::parse(self.path, text)?.object);
         Ok(Self { path: self.path, object })
     }
 
-    /// Returns the JSON object.
     pub(super) fn into_object(self) -> Map<String, Value> {
         self.object
     }
 
-    /// Applies `read` to the value of `key`, if it is given.
     fn given<T>(
         &self,
         key: &str,
@@ -114,7 +110,6 @@ impl<'a> Meta<'a> {
         read(value).map(Some).ok_or_else(|| self.wrong(key, expected))
     }
 
-    /// The kind of the file, if declared.
     pub(super) fn kind(&self) -> Result<Option<Kind>, Error> {
         let is_known = |version: &Value| (version.as_u64() == Some(VERSION)).then_some(());
         self.given("version", VERSION.to_string(), is_known)?;
@@ -122,18 +117,15 @@ impl<'a> Meta<'a> {
         self.given("kind", expected, |kind| Kind::from_name(kind.as_str()?))
     }
 
-    /// The dimension, 2 or 3, if declared.
     pub(super) fn dimension(&self) -> Result<Option<usize>, Error> {
         let known = |value: &Value| [2, 3].into_iter().find(|&d| value.as_u64() == Some(d as u64));
         self.given("dimension", "2 or 3", known)
     }
 
-    /// The unit of all lengths, if declared.
     pub(super) fn unit(&self) -> Result<Option<Unit>, Error> {
         self.given("unit", UNITS, |unit| Unit::from_name(unit.as_str()?))
     }
 
-    /// Returns an error about a missing unit.
     pub(super) fn wrong_unit(&self) -> Error {
         self.wrong("unit", UNITS)
     }
@@ -144,7 +136,6 @@ impl<'a> Meta<'a> {
         Ok(origin.unwrap_or([0.0; D]))
     }
 
-    /// The centers of a ray cloud.
     pub(super) fn centers<const D: usize>(&self) -> Result<Vec<[f64; D]>, Error> {
         let expected = format!("a list of lists of {D} numbers");
         let rows = |value: &Value| value.as_array()?.iter().map(vector).collect();
@@ -152,18 +143,17 @@ impl<'a> Meta<'a> {
         centers.ok_or_else(|| self.wrong("centers", expected))
     }
 
-    /// The bounding box of all hidden points in the frame of the map, if given.
+    /// The bounding box of all hidden points in the frame of the map.
     pub(super) fn bounds<const D: usize>(&self) -> Result<Option<Bounds<D>>, Error> {
         self.given("bounds", rule_of_corners::<D>(), corners)
     }
 
-    /// The bounding box of the points of each center, relative to the origin, if given.
+    /// The bounding box of the points of each center, relative to the origin.
     pub(super) fn regions<const D: usize>(&self) -> Result<Option<Vec<Bounds<D>>>, Error> {
         let expected = format!("per center {}", rule_of_corners::<D>());
         self.given("regions", expected, |rows| rows.as_array()?.iter().map(corners).collect())
     }
 
-    /// The fingerprint of the released map that the file belongs to, if given.
     pub(super) fn fingerprint(&self) -> Result<Option<Fingerprint>, Error> {
         let expected = "32 hexadecimal digits, the fingerprint of a released map";
         self.given("fingerprint", expected, |value| Fingerprint::from_hex(value.as_str()?))
@@ -190,19 +180,17 @@ impl<'a> Meta<'a> {
         self.object.get(key).and_then(Value::as_str)
     }
 
-    /// Returns the text of `key`, if given.
     pub(super) fn optional_text(&self, key: &str) -> Result<Option<String>, Error> {
         self.given(key, "text", |value| value.as_str().map(str::to_owned))
     }
 
-    /// Returns a whole number of at least 1, if given.
+    /// Returns a whole number of at least 1.
     pub(super) fn count(&self, key: &str) -> Result<Option<usize>, Error> {
         self.given(key, "a whole number of at least 1", |value| {
             usize::try_from(value.as_u64()?).ok().filter(|&n| n >= 1)
         })
     }
 
-    /// Returns a number, if given.
     pub(super) fn number(&self, key: &str) -> Result<Option<f64>, Error> {
         self.given(key, "a number", Value::as_f64)
     }
@@ -214,7 +202,6 @@ impl<'a> Meta<'a> {
         Ok(number.unwrap_or(0.0))
     }
 
-    /// Returns an error about `key`.
     pub(super) fn wrong(&self, key: &str, expected: impl Into<String>) -> Error {
         let found = self.object.get(key).map_or("nothing".into(), short);
         Error::new(self.path, format!("metadata unlift, {key}"), expected, found)
@@ -237,7 +224,6 @@ fn rule_of_corners<const D: usize>() -> String {
     format!("a low and a high corner of {D} numbers")
 }
 
-/// Returns the first 60 characters of a JSON value.
 fn short(value: &Value) -> String {
     let text = value.to_string();
     match text.char_indices().nth(60) {
@@ -246,7 +232,6 @@ fn short(value: &Value) -> String {
     }
 }
 
-/// Creates the common metadata of a file of `kind`.
 pub(super) fn new_meta(kind: Kind) -> Map<String, Value> {
     let mut object = Map::new();
     object.insert("kind".into(), json!(kind.name()));
@@ -254,20 +239,18 @@ pub(super) fn new_meta(kind: Kind) -> Map<String, Value> {
     object
 }
 
-/// Adds the fingerprint of the released map that a file belongs to, if given.
 pub(super) fn insert_fingerprint(meta: &mut Map<String, Value>, map: Option<Fingerprint>) {
     meta.extend(map.map(|map| ("fingerprint".to_owned(), json!(map.to_string()))));
 }
 
-/// Adds the released map, the order of rows, and the author of lists, as far as stated.
 pub(super) fn insert_about(meta: &mut Map<String, Value>, about: About) {
     insert_fingerprint(meta, about.map);
     meta.extend(about.order.name().map(|name| ("rows_by".to_owned(), json!(name))));
     meta.extend(about.lists_by.name().map(|name| ("lists_by".to_owned(), json!(name))));
 }
 
-/// Formats `meta` as text. Keys are sorted, so that equal values make equal bytes with any map type
-/// of `serde_json`.
+/// Formats `meta` with sorted keys, so that equal values make equal bytes with any map type of
+/// `serde_json`.
 pub(super) fn to_text(meta: Map<String, Value>) -> String {
     let mut entries: Vec<(String, Value)> = meta.into_iter().collect();
     entries.sort_by(|a, b| a.0.cmp(&b.0));

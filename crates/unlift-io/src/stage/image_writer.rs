@@ -1,5 +1,3 @@
-//! Writes many images to one stage file.
-
 use super::header::{Kind, to_text};
 use super::images::{IMAGE, IMAGE_META};
 use super::write::{Written, properties, to_io, writer};
@@ -21,20 +19,20 @@ use unlift::recover::Recovered;
 use unlift::released::Released;
 use unlift::truth::{Original, Secret};
 
-/// The number of rows of a row group: up to about 8 MB of descriptors are in memory.
+/// Rows of a row group: up to about 8 MB of descriptors are in memory.
 const GROUP_ROWS: usize = 1 << 16;
 
-/// The metadata keys of the file. All other keys are stored per image.
+/// Metadata keys of the file. All others are stored per image.
 const OF_ALL: [&str; 6] = ["kind", "version", "dimension", "unit", "family", "slots_per_record"];
 
 /// A writer of a stage file of images, into an [`OutputFile`] that the caller commits.
 ///
-/// Memory holds one row group, independent of the number of images. The same images in the same
-/// order give the same bytes. Images without rows are not stored.
+/// Memory holds one row group. The same images in the same order give the same bytes. Images
+/// without rows are not stored.
 pub struct ImageWriter<'a> {
     path: PathBuf,
     kind: Kind,
-    /// The file, until the first image defines the columns.
+    /// Until the first image defines the columns.
     file: Option<&'a mut BufWriter<File>>,
     started: Option<Started<'a>>,
 }
@@ -143,8 +141,8 @@ impl<'a> ImageWriter<'a> {
 }
 
 impl<'a> Started<'a> {
-    /// Starts a file with the columns of the first image, and the optional columns that only some
-    /// images have.
+    /// Starts a file with the columns of the first image, and the columns that only some images
+    /// have.
     fn with(
         file: &'a mut BufWriter<File>,
         path: &Path,

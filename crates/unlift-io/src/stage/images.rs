@@ -1,5 +1,3 @@
-//! Many images in one stage file. The rows of an image are contiguous, and are read image by image.
-
 use super::header::{Kind, Meta};
 use super::neighborhoods::neighborhoods_of;
 use super::pages::Stay;
@@ -38,17 +36,15 @@ pub fn has_images(path: &Path) -> Result<bool, Error> {
     Ok(Table::open(path)?.has(IMAGE))
 }
 
-/// A reader of a stage file of images, in the order of the file. One image and a few thousand rows
+/// A reader of a stage file of images, whose rows are contiguous. One image and a few thousand rows
 /// are in memory.
 pub struct ImageFile<'a> {
     path: &'a Path,
-    /// Its metadata applies to all images.
     whole: Table<'a>,
     kind: Kind,
     batches: Batches,
-    /// The number of rows that were returned.
     n_taken: u64,
-    /// Hashes of the names so far, to detect an image whose rows are not contiguous.
+    /// Hashes of the names so far, to detect rows that are not contiguous.
     seen: HashSet<u64>,
 }
 
@@ -112,7 +108,7 @@ impl<'a> ImageFile<'a> {
         Ok(Some(ImageRows { name, path: self.path, meta, held }))
     }
 
-    /// Reads the next image, which must be `name` as in the file `of` that is read in parallel.
+    /// Reads the next image, which must be `name` as in the file `of`.
     ///
     /// # Errors
     /// When [`next_image`](Self::next_image) fails, or the image is another one.
@@ -127,10 +123,10 @@ impl<'a> ImageFile<'a> {
         }
     }
 
-    /// Checks that no image follows.
+    /// Checks that no image follows, as in the file `of`.
     ///
     /// # Errors
-    /// When one follows. `of` is the file that has no more images.
+    /// When one follows.
     pub fn expect_end(&mut self, of: &Path) -> Result<(), Error> {
         match self.next_image()? {
             None => Ok(()),
@@ -146,7 +142,6 @@ impl<'a> ImageFile<'a> {
         self.kind
     }
 
-    /// Reads the next batch that is not empty.
     fn rows(&mut self) -> Result<Option<RecordBatch>, Error> {
         loop {
             match self.batches.next()? {
@@ -178,7 +173,6 @@ impl<'a> ImageFile<'a> {
         Ok(texts.map(|texts| texts.value(0).to_owned()))
     }
 
-    /// Counts the rows from the first on that belong to the image `name`.
     fn n_of(&self, rows: &RecordBatch, name: &str) -> Result<usize, Error> {
         let names = self.texts(rows, IMAGE)?;
         let is_other = |row: &usize| {

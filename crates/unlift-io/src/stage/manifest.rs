@@ -1,5 +1,3 @@
-//! The manifest `_manifest.json` of a folder of parts. It detects missing and changed parts.
-
 use super::header::to_text;
 use crate::{Error, input};
 use serde_json::{Map, Value, json};
@@ -7,17 +5,14 @@ use std::collections::BTreeSet;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
-/// The manifest in a folder of parts. Engines skip names that begin with `_`.
+/// The manifest of a folder of parts, which detects missing and changed parts. Engines skip names
+/// that begin with `_`.
 pub(super) const MANIFEST: &str = "_manifest.json";
 
-/// An entry of the manifest.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Part {
-    /// The name of the file.
     pub(super) file: String,
-    /// The number of rows.
     pub(super) n_rows: u64,
-    /// The length in bytes.
     pub(super) n_bytes: u64,
 }
 
@@ -33,10 +28,7 @@ impl Manifest {
         Self { meta, parts }
     }
 
-    /// Reads the manifest of a folder. Returns `None` if there is none.
-    ///
-    /// # Errors
-    /// When it is malformed.
+    /// Reads the manifest of a folder, if there is one.
     pub(super) fn read(folder: &Path) -> Result<Option<Self>, Error> {
         let path = folder.join(MANIFEST);
         if !path.exists() {
@@ -70,7 +62,6 @@ impl Manifest {
         Ok(Some(Self { meta, parts }))
     }
 
-    /// The metadata, as text like in the parts.
     pub(super) fn meta_text(&self) -> String {
         to_text(self.meta.clone())
     }
@@ -94,7 +85,6 @@ impl Manifest {
         }
     }
 
-    /// Returns an error if part `at`, in order of names, has another number of rows or bytes.
     pub(super) fn check_part(
         &self,
         at: usize,

@@ -1,13 +1,13 @@
-//! Stage files: the Parquet tables that commands exchange.
+//! Stage files: the Parquet tables that commands exchange, each of one kind, or a folder of its
+//! parts.
 //!
-//! A file has one kind; a folder of its parts is equivalent. `docs/formats.md` describes them for
-//! writers in other languages. Released maps, neighborhoods and recovered points contain nothing of
-//! the ground truth: no ids, names or times of their source. Equal values make equal bytes.
+//! `docs/formats.md` describes them for writers in other languages. Released maps, neighborhoods
+//! and recovered points contain nothing of the ground truth: no ids, names or times of their
+//! source. Equal values make equal bytes.
 //!
-//! Readers are lenient if nothing is lost: they accept numbers of any width, lists of any type,
-//! null or NaN for missing values, and missing metadata and columns that can be inferred. Any other
-//! deviation is one line that names the file, the column and row (counted from 0), what was
-//! expected and what was found.
+//! Readers accept numbers of any width, lists of any type, null or NaN for missing values, and
+//! missing metadata and columns that can be inferred. Any other deviation is one line that names
+//! the file, the column and row (counted from 0), what was expected and what was found.
 
 mod column;
 mod file;

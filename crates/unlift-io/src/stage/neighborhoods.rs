@@ -13,8 +13,8 @@ use std::path::Path;
 use unlift::RecordId;
 use unlift::neighbors::Neighborhoods;
 
-/// Lists of original points, one per point: the neighborhoods of a map before its obfuscation
-/// assigns points to records.
+/// Lists of original points, one per point: neighborhoods before an obfuscation assigns points to
+/// records.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointNeighborhoods {
     offsets: Vec<u64>,
@@ -28,7 +28,7 @@ impl PointNeighborhoods {
         self.offsets.len() - 1
     }
 
-    /// The rows of the original points in the list of `point`, in the order of the file.
+    /// The rows of the original points in the list of `point`.
     ///
     /// # Panics
     /// When there is no such point.
@@ -61,13 +61,11 @@ pub fn write_neighborhoods(path: &Path, neighborhoods: &Neighborhoods) -> Result
     write_table((path, Access::Private), &written(neighborhoods))
 }
 
-/// Creates the table of neighborhoods.
 pub(super) fn written(neighborhoods: &Neighborhoods) -> Written<'_> {
     let mut meta = new_meta(Kind::Neighborhoods);
     insert_about(&mut meta, neighborhoods.about());
     let mut written = Written::new(meta, neighborhoods.n_slots());
     written.numbers::<UInt32Type>("slot", |slot| slot as u32);
-    // The range of the lists of some slots, and the length of each list.
     let lists = |slots: Range<usize>| {
         let offsets = &neighborhoods.offsets()[slots.start..=slots.end];
         let lengths = offsets.windows(2).map(|w| (w[1] - w[0]) as usize).collect();
@@ -90,11 +88,11 @@ pub(super) fn written(neighborhoods: &Neighborhoods) -> Written<'_> {
 /// each.
 ///
 /// Rows are in the order of slots, or in any order if there is a column `slot`. Every slot has a
-/// row; its list may be empty or null. Metadata may be missing, but must not declare another kind.
+/// row; its list may be empty or null.
 ///
 /// # Errors
-/// When the file differs from `docs/formats.md`: another number of rows than slots, or a list with
-/// a record that is out of range, listed twice or the slot's own.
+/// When the file differs from `docs/formats.md`, such as another number of rows than slots, or a
+/// list with a record that is out of range, listed twice or the slot's own.
 pub fn read_neighborhoods(
     path: &Path,
     n_records: usize,
@@ -103,7 +101,6 @@ pub fn read_neighborhoods(
     neighborhoods_of(&Table::open_kind(path, Kind::Neighborhoods)?, n_records, slots_per_record)
 }
 
-/// Reads the neighborhoods of a table.
 pub(super) fn neighborhoods_of(
     table: &Table<'_>,
     n_records: usize,
@@ -133,12 +130,11 @@ pub(super) fn neighborhoods_of(
 /// Reads neighborhoods in the point form: columns `point`, `neighbors` (both rows of the `n_points`
 /// original points) and, optionally, `scores`.
 ///
-/// Rows may be in any order; points without a row have an empty list. Metadata may be missing, but
-/// must not declare another kind.
+/// Rows may be in any order; points without a row have an empty list.
 ///
 /// # Errors
-/// When the file differs from `docs/formats.md`: a point that is out of range or has two rows, or a
-/// list with a point that is out of range, listed twice or the list's own.
+/// When the file differs from `docs/formats.md`, such as a point that is out of range or has two
+/// rows, or a list with a point that is out of range, listed twice or the list's own.
 pub fn read_point_neighborhoods(path: &Path, n_points: usize) -> Result<PointNeighborhoods, Error> {
     let table = Table::open_kind(path, Kind::PointNeighborhoods)?;
     if table.n_rows() > n_points as u64 {
@@ -155,7 +151,6 @@ pub fn read_point_neighborhoods(path: &Path, n_points: usize) -> Result<PointNei
     Ok(PointNeighborhoods { offsets: lists.offsets, neighbors: lists.ids, scores: lists.scores })
 }
 
-/// Lists in the order of the file.
 struct Lists {
     keys: Vec<u32>,
     offsets: Vec<u64>,
@@ -165,7 +160,7 @@ struct Lists {
 
 impl Lists {
     /// Reads the lists of ids below `n_ids` in `column`, the keys below `n_keys` in the column
-    /// `key`, if given, and `scores`, if present.
+    /// `key`, and `scores`, if present.
     fn read(
         table: &Table,
         key: Option<&str>,
@@ -190,8 +185,7 @@ impl Lists {
                 n_unscored += batch.len();
                 return Ok(());
             }
-            // Lists of scores need no limit, because their lengths are compared with the limited
-            // lists.
+            // Their lengths are compared with the lists, which are limited.
             let lengths = batch.float_lists("scores", u64::MAX, &mut scores)?;
             for (row, (length, ends)) in lengths.iter().zip(offsets[first..].windows(2)).enumerate()
             {

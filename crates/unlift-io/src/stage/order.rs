@@ -1,13 +1,8 @@
-//! Sorts rows that state their slot or point.
-
 use crate::Error;
 use std::path::Path;
 
-/// Returns the row of each key from 0 to `n - 1`, where row `r` has key `keys[r]`, or `None` for a
-/// key without a row.
-///
-/// # Errors
-/// When two rows have the same key. `column` names the keys in the error; keys are below `n`.
+/// Returns the row of each key from 0 to `n - 1`, where row `r` has key `keys[r]` below `n`, or
+/// `None` for a key without a row. Two rows with the same key are an error, which names `column`.
 pub(super) fn rows_by_key(
     path: &Path,
     column: &str,
@@ -29,9 +24,6 @@ pub(super) fn rows_by_key(
 }
 
 /// Returns the row of each key, where each of the keys 0 to `keys.len() - 1` has one row.
-///
-/// # Errors
-/// When [`rows_by_key`] fails. Otherwise no key is missing.
 pub(super) fn permutation(path: &Path, column: &str, keys: &[u32]) -> Result<Vec<u32>, Error> {
     let rows = rows_by_key(path, column, keys, keys.len())?;
     Ok(rows.into_iter().flatten().collect())

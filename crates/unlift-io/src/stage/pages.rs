@@ -1,5 +1,5 @@
-//! Checks the counts and sizes that the columns of a Parquet file declare, in the footer and in
-//! page headers, before they are decoded.
+//! Checks the counts and sizes that columns declare, in the footer and in page headers, before they
+//! are decoded.
 
 use super::file::ParquetFile;
 use super::thrift::{Walk, Wrong};
@@ -12,10 +12,10 @@ use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 use std::sync::Arc;
 
-/// The size in memory of a repetition and a definition level.
+/// Bytes of a repetition and a definition level in memory.
 const LEVELS: u64 = 4;
-/// The accepted encodings of text: plain, and by dictionary. Other encodings declare counts inside
-/// compressed data, where they cannot be checked.
+/// Encodings of text: plain, and by dictionary. Others declare counts inside compressed data, where
+/// they cannot be checked.
 const OF_TEXT: [i64; 3] = [0, 2, 8];
 
 /// How long decoded data stays in memory.
@@ -27,19 +27,15 @@ pub(super) enum Stay {
     Rows,
 }
 
-/// Checks the columns at `roots` of `files`, the parts of one table. Returns the maximum size in
-/// bytes of one text.
-///
-/// # Errors
-/// When data is outside the file, columns declare more values or bytes than the budget allows for
-/// as long as they stay, or pages differ from the footer.
+/// Checks the columns at `roots` of `files`, the parts of one table, against the files and the
+/// budget. Returns the maximum size in bytes of one text.
 pub(super) fn check(
     files: &[Arc<ParquetFile>],
     roots: &[Vec<usize>],
     (budget, stay): (&Budget, Stay),
 ) -> Result<u64, Error> {
     let mut longest = 0;
-    // The indices of the values of a column; lists have nested ones.
+    // Lists have nested values.
     let leaves = |file: &ParquetFile, root: usize| -> Vec<usize> {
         let schema = file.metadata().file_metadata().schema_descr();
         let leaves = 0..schema.num_columns();
@@ -58,7 +54,6 @@ pub(super) fn check(
                 longest: 0,
             };
             for (file, roots) in files.iter().zip(roots) {
-                // Every part has the same columns.
                 let Some(&leaf) = leaves(file, roots[wanted]).get(at) else { continue };
                 column.path = file.path();
                 let mut handle = file.handle()?;
@@ -66,7 +61,7 @@ pub(super) fn check(
                     if stay == Stay::Rows {
                         (column.n_values, column.n_bytes) = (0, 0);
                     }
-                    // The crate has checked that a row group has every column of the schema.
+                    // The crate has checked that a row group has every column.
                     if let Some(chunk) = group.columns().get(leaf) {
                         column.chunk(&mut handle, file.n_bytes(), chunk)?;
                         if chunk.column_type() == Type::BYTE_ARRAY {
@@ -80,7 +75,6 @@ pub(super) fn check(
     Ok(longest)
 }
 
-/// A column in all row groups of all parts.
 struct Column<'a> {
     path: &'a Path,
     place: String,
@@ -92,7 +86,6 @@ struct Column<'a> {
     longest: u64,
 }
 
-/// The header of a page.
 #[derive(Default)]
 struct Header {
     is_dictionary: bool,
@@ -143,7 +136,7 @@ impl Column<'_> {
             return Err(self.wrong(expected, format!("{length} bytes from byte {at}")));
         }
         let mut left = n_values;
-        // Ends, because every page has a header of a few bytes.
+        // Ends, because every page has a header.
         while at < end {
             let (header, length) = self.header(file, at, end)?;
             at += length;

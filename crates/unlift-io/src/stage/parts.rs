@@ -1,5 +1,3 @@
-//! Reads the rows of a stage file: one Parquet file, or a folder of parts.
-
 use super::file::{self, ParquetFile};
 use super::manifest::Manifest;
 use super::pages::{self, Stay};
@@ -20,16 +18,12 @@ pub(super) const ENDING: &str = "parquet";
 pub(super) struct Parts<'a> {
     path: &'a Path,
     files: Vec<Arc<ParquetFile>>,
-    /// unlift's metadata, from the manifest or the parts.
     meta_text: Option<String>,
 }
 
 impl<'a> Parts<'a> {
-    /// Opens the file or folder `path` and reads its footers.
-    ///
-    /// # Errors
-    /// When a part is not a Parquet file, has other columns or metadata than the first, or differs
-    /// from the manifest.
+    /// Opens the file or folder `path` and reads its footers. All parts must have the same columns
+    /// and metadata, as in the manifest.
     pub(super) fn open(path: &'a Path) -> Result<Self, Error> {
         if !path.is_dir() {
             let file = ParquetFile::open(path)?;
@@ -74,29 +68,23 @@ impl<'a> Parts<'a> {
         Ok(parts)
     }
 
-    /// The number of rows that the footers declare.
     pub(super) fn n_rows(&self) -> u64 {
         self.files.iter().map(|file| file.n_rows()).sum()
     }
 
-    /// The columns, by their Parquet types.
     pub(super) fn schema(&self) -> &SchemaRef {
         self.files[0].schema()
     }
 
-    /// The text under unlift's metadata key, if there is one.
     pub(super) fn meta_text(&self) -> Option<&str> {
         self.meta_text.as_deref()
     }
 
-    /// Returns true if statistics in the files show that the column `name`, which is no list, has
-    /// only nulls.
     pub(super) fn is_all_null(&self, name: &str) -> bool {
         self.files.iter().all(|file| file.n_rows() == 0 || file.is_all_null(name))
     }
 
-    /// Starts decoding the columns at `roots`, in order. `stay` states how long decoded data stays
-    /// in memory.
+    /// Starts decoding the columns at `roots`, in order.
     pub(super) fn batches(&self, roots: &[usize], stay: Stay) -> Result<Batches, Error> {
         let names: Vec<&str> =
             roots.iter().map(|&root| self.schema().field(root).name().as_str()).collect();
@@ -105,7 +93,7 @@ impl<'a> Parts<'a> {
             for name in &names {
                 file.check_codec(name)?;
             }
-            // Every part has these columns, in any order.
+            // Parts may have another order of columns.
             let at = names.iter().filter_map(|name| file.schema().index_of(name).ok());
             of_files.push(at.collect::<Vec<usize>>());
         }
@@ -120,18 +108,16 @@ impl<'a> Parts<'a> {
     }
 }
 
-/// An iterator over decoded batches of rows.
 pub(super) struct Batches {
-    /// The files to read, in reverse order.
+    /// In reverse order.
     waiting: Vec<(Arc<ParquetFile>, Vec<usize>)>,
     current: Option<file::Batches>,
     most_rows: usize,
-    /// Rows that [`take`](Self::take) has returned to the iterator.
+    /// Rows that [`take`](Self::take) has put back.
     rest: Option<RecordBatch>,
 }
 
 impl Batches {
-    /// Returns the next rows, or `None` at the end. A wrong number of rows is an error.
     pub(super) fn next(&mut self) -> Result<Option<RecordBatch>, Error> {
         if let Some(rest) = self.rest.take() {
             return Ok(Some(rest));
@@ -147,8 +133,7 @@ impl Batches {
         }
     }
 
-    /// Returns the first `n` of `rows`. The others are returned by the next call of
-    /// [`next`](Self::next).
+    /// Returns the first `n` of `rows`, and puts the others back.
     pub(super) fn take(&mut self, rows: RecordBatch, n: usize) -> RecordBatch {
         if n < rows.num_rows() {
             self.rest = Some(rows.slice(n, rows.num_rows() - n));
@@ -168,7 +153,6 @@ pub fn part_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(names_in(path)?.into_iter().map(|name| path.join(name)).collect())
 }
 
-/// Returns the names of the parts in a folder, in order.
 pub(super) fn names_in(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     let failed = |source| Error::read(folder, source);
     let mut names = Vec::new();
@@ -183,7 +167,6 @@ pub(super) fn names_in(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(names)
 }
 
-/// Returns an error if a part has other columns than the first.
 fn same_columns(first: &ParquetFile, other: &ParquetFile) -> Result<(), Error> {
     let columns = |file: &ParquetFile| {
         let fields = file.schema().fields().iter();

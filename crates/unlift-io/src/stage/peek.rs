@@ -1,5 +1,3 @@
-//! Reads the description of a stage file without its columns.
-
 use super::header::Kind;
 use super::table::Table;
 use crate::Error;
@@ -16,11 +14,11 @@ pub struct Header {
     pub n_rows: u64,
 }
 
-/// Reads kind, dimension and number of rows of the stage file `path`. They decide which reader and
-/// which `D` to call.
+/// Reads kind, dimension and number of rows of the stage file `path`, which decide the reader and
+/// `D`.
 ///
 /// # Errors
-/// When the file is not a Parquet file, or not a stage file of a known kind and version.
+/// When the file is not a stage file of a known kind and version.
 pub fn peek(path: &Path) -> Result<Header, Error> {
     let table = Table::open(path)?;
     let kind = table.kind()?;
@@ -32,8 +30,8 @@ pub fn peek(path: &Path) -> Result<Header, Error> {
     Ok(Header { kind, dimension, n_rows })
 }
 
-/// Returns the kind that the metadata of the file at `path` declares, or `None` if it declares none
-/// or is no stage file.
+/// Returns the kind that the metadata of the file at `path` declares, if it is a stage file and
+/// declares one.
 pub fn declared_kind(path: &Path) -> Option<Kind> {
     Table::open(path).ok()?.meta().kind().ok()?
 }

@@ -1,5 +1,3 @@
-//! Recovered points: per slot a position, or the reason why there is none.
-
 use super::column::{Batch, Type, coordinate_names};
 use super::header::{Kind, insert_about, new_meta};
 use super::order::permutation;
@@ -17,7 +15,7 @@ use std::sync::Arc;
 use unlift::Unit;
 use unlift::recover::{Confidence, Estimate, Recovered, Status, Unknown};
 
-/// The metadata key with the reason why confidence is unknown.
+/// The reason why confidence is unknown.
 const WHY_UNKNOWN: &str = "confidence_unknown";
 
 /// Writes recovered points, one row per slot. Positions are in the map's frame (the origin is
@@ -32,10 +30,6 @@ pub fn write_recovered<const D: usize>(path: &Path, recovered: &Recovered<D>) ->
     write_table((path, Access::Private), &written(path, recovered)?)
 }
 
-/// Creates the table of recovered points.
-///
-/// # Errors
-/// When an evidence or delta is not finite. `path` is for the error.
 pub(super) fn written<'a, const D: usize>(
     path: &Path,
     recovered: &'a Recovered<D>,
@@ -98,8 +92,7 @@ pub fn read_recovered<const D: usize>(path: &Path) -> Result<Recovered<D>, Error
     recovered_of(&table, None)
 }
 
-/// Reads recovered points like [`read_recovered`], with `unit` (that of the map they are compared
-/// with) as the default unit.
+/// Reads recovered points like [`read_recovered`], with `unit` as the default unit.
 ///
 /// # Errors
 /// When [`read_recovered`] would fail for another reason than a missing unit.
@@ -108,7 +101,6 @@ pub fn read_recovered_in<const D: usize>(path: &Path, unit: Unit) -> Result<Reco
     recovered_of(&table, Some(unit))
 }
 
-/// Reads the recovered points of a table.
 pub(super) fn recovered_of<const D: usize>(
     table: &Table<'_>,
     usual: Option<Unit>,
@@ -179,7 +171,7 @@ pub(super) fn recovered_of<const D: usize>(
         .map_err(|source| table.refused(source))
 }
 
-/// Appends the confidence of one batch to `to`. It may be null for lost points (see `estimates`).
+/// Appends the confidence of one batch to `to`. It may be null for lost points.
 fn read_confidence<const D: usize>(
     batch: &Batch<'_>,
     estimates: &[Estimate<D>],
@@ -204,7 +196,6 @@ fn read_confidence<const D: usize>(
     Ok(())
 }
 
-/// Appends the estimates of one batch to `to`.
 fn read_estimates<const D: usize>(
     table: &Table<'_>,
     batch: &Batch<'_>,

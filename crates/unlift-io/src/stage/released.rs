@@ -1,5 +1,3 @@
-//! Released maps: records by family, and descriptors.
-
 use super::column::{Batch, Type, coordinate_names};
 use super::header::{Kind, insert_fingerprint, new_meta};
 use super::table::Table;
@@ -15,10 +13,10 @@ use unlift::descriptors::Values;
 use unlift::geometry::frame::Bounds;
 use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
 
-/// The maximum length of a descriptor. Known ones have up to 4,096 values.
+/// Known descriptors have up to 4,096 values.
 const MOST_VALUES: u64 = 1 << 16;
 
-/// Writes a released map, one row per record, in the order of `released`.
+/// Writes a released map, one row per record.
 ///
 /// It contains nothing of the ground truth: no ids, names or times.
 ///
@@ -28,7 +26,6 @@ pub fn write_released<const D: usize>(path: &Path, released: &Released<D>) -> Re
     write_table((path, Access::Usual), &written(released))
 }
 
-/// Creates the table of a released map.
 pub(super) fn written<const D: usize>(released: &Released<D>) -> Written<'_> {
     let obfuscation = released.obfuscation();
     let per_record = released.slots_per_record();
@@ -89,7 +86,6 @@ pub(super) fn written<const D: usize>(released: &Released<D>) -> Written<'_> {
     written
 }
 
-/// Adds a column per axis.
 fn vectors<'a, const D: usize>(written: &mut Written<'a>, prefix: &str, rows: &'a [[f32; D]]) {
     for (axis, name) in coordinate_names::<D>(prefix).into_iter().enumerate() {
         written.numbers::<Float32Type>(name, move |row| rows[row][axis]);
@@ -109,11 +105,10 @@ fn cut<T: Copy>(
 /// Reads a released map of dimension `D` (see [`peek`](super::peek)).
 ///
 /// Directions need not have unit length, and feet need not be nearest to the origin: records are
-/// normalized. A map without records has no descriptors. Missing metadata is inferred from the
-/// columns where possible.
+/// normalized. Missing metadata is inferred from the columns where possible.
 ///
 /// # Errors
-/// When the file is not a released map of this dimension according to `docs/formats.md`.
+/// When the file differs from `docs/formats.md`, or has another dimension.
 pub fn read_released<const D: usize>(path: &Path) -> Result<Released<D>, Error> {
     released_of(&Table::open_kind(path, Kind::Released)?)
 }
@@ -128,7 +123,6 @@ pub fn scheme_name(path: &Path) -> Result<Option<String>, Error> {
     table.meta().optional_text("scheme")
 }
 
-/// Reads the released map of a table.
 pub(super) fn released_of<const D: usize>(table: &Table<'_>) -> Result<Released<D>, Error> {
     let core = |source| table.refused(source);
     let meta = table.meta();
@@ -162,7 +156,6 @@ pub(super) fn released_of<const D: usize>(table: &Table<'_>) -> Result<Released<
     }
 }
 
-/// The families of records.
 enum Family {
     Lines,
     Rays,
@@ -170,7 +163,6 @@ enum Family {
     AxisCandidates,
 }
 
-/// Returns the family that the metadata declares, else the one that the columns match.
 fn family(table: &Table<'_>) -> Result<Family, Error> {
     let names = "lines, rays, axis_planes or axis_candidates";
     match table.meta().text("family") {
@@ -187,13 +179,10 @@ fn family(table: &Table<'_>) -> Result<Family, Error> {
     }
 }
 
-/// Formats a box for the metadata: its low and its high corner.
 fn corners<const D: usize>(bounds: &Bounds<D>) -> Value {
     json!([bounds.low.to_vec(), bounds.high.to_vec()])
 }
 
-/// Returns the names of descriptor columns: `descriptor`, or one per slot: `descriptor_0`,
-/// `descriptor_1`.
 fn descriptor_names(per_record: usize) -> impl Iterator<Item = String> {
     (0..per_record).map(move |slot| match per_record {
         1 => "descriptor".into(),
@@ -244,7 +233,6 @@ fn read_axis_planes<const D: usize>(table: &Table<'_>) -> Result<Obfuscation<D>,
     planes.map(Obfuscation::AxisPlanes).map_err(|source| table.refused(source))
 }
 
-/// Reads vector columns by their prefixes.
 fn read_vectors<const D: usize, const N: usize>(
     table: &Table<'_>,
     prefixes: [&str; N],
@@ -262,15 +250,14 @@ fn read_vectors<const D: usize, const N: usize>(
     Ok(vectors)
 }
 
-/// Reads the descriptor columns, if there are any: integers as bytes, floats as `f32`.
+/// Reads the descriptor columns: integers as bytes, floats as `f32`.
 fn read_descriptors(table: &Table<'_>, per_record: usize) -> Result<Option<Descriptors>, Error> {
     let names: Vec<String> = descriptor_names(per_record).collect();
     if !names.iter().any(|name| table.has(name)) || table.n_rows() == 0 {
         return Ok(None);
     }
     let bytes = table.is(&names[0], Type::Integers);
-    // If the first column is neither, either type is accepted; the second column must have the type
-    // of the first.
+    // Either type is accepted; the second column must have the type of the first.
     let class = match bytes {
         true => Type::Integers,
         false if table.is(&names[0], Type::Floats) => Type::Floats,

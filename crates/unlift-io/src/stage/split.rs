@@ -1,5 +1,3 @@
-//! Splits a stage file into a folder of parts, for engines that read many files in parallel.
-
 use super::header::{Kind, Meta};
 use super::manifest::{MANIFEST, Manifest, Part};
 use super::pages::Stay;
@@ -12,11 +10,11 @@ use arrow_schema::Field;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// A stage file (or folder of parts) that is written as parts of a fixed number of rows and a
-/// manifest.
+/// A stage file (or folder of parts) that is split into parts and a manifest, for engines that read
+/// many files in parallel.
 ///
-/// The last part may be shorter. The order of rows and the types of columns do not change. Every
-/// part has the metadata of the whole.
+/// The order of rows and the types of columns do not change. Every part has the metadata of the
+/// whole.
 #[derive(Debug)]
 pub struct Split<'a> {
     path: &'a Path,
@@ -77,7 +75,7 @@ impl<'a> Split<'a> {
     /// memory.
     ///
     /// # Errors
-    /// When rows cannot be read, or parts cannot be written. No temporary file is left then.
+    /// When reading or writing fails. No temporary file is left then.
     pub fn write(self, mut outputs: OutputSet) -> Result<(), Error> {
         let access = self.access();
         let Self { path, parts, kind, rows, names } = self;
@@ -119,7 +117,6 @@ impl<'a> Split<'a> {
     }
 }
 
-/// Returns an error if a folder contains parts that are not in `names`.
 fn refuse_others(out: &Path, names: &[String]) -> Result<(), Error> {
     if !out.is_dir() {
         return Ok(());

@@ -19,23 +19,20 @@ pub(super) struct Table<'a> {
     meta: Meta<'a>,
 }
 
-/// The source of the rows of a table.
 #[derive(Debug)]
 enum Rows<'a> {
     Stored(Parts<'a>),
-    /// The rows of one image, in memory. At least one batch.
+    /// The rows of one image. At least one batch.
     Held(Vec<RecordBatch>),
 }
 
 impl<'a> Table<'a> {
-    /// Opens `path`, a file or a folder of parts, and reads its footers.
     pub(super) fn open(path: &'a Path) -> Result<Self, Error> {
         let parts = Parts::open(path)?;
         let meta = Meta::parse(path, parts.meta_text())?;
         Ok(Self { path, rows: Rows::Stored(parts), meta })
     }
 
-    /// Creates a table of the rows of one image, which were read already.
     pub(super) fn held(path: &'a Path, meta: Meta<'a>, held: Vec<RecordBatch>) -> Self {
         Self { path, rows: Rows::Held(held), meta }
     }
@@ -55,13 +52,13 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The kind of the table, by its metadata, else by its columns.
+    /// The kind by the metadata, else by the columns.
     pub(super) fn kind(&self) -> Result<Kind, Error> {
         let kind = self.meta.kind()?.or_else(|| self.kind_by_columns());
         kind.ok_or_else(|| Error::new(self.path, "", "a stage file of unlift", NO_METADATA))
     }
 
-    /// Returns the kind that is the only one with such columns, or `None` if there is no such kind.
+    /// Returns the kind, if only one has such columns.
     fn kind_by_columns(&self) -> Option<Kind> {
         let any = |names: &[&str]| names.iter().any(|name| self.has(name));
         if self.has("point") && self.has("neighbors") {
@@ -79,22 +76,19 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The path of the file, for errors.
     pub(super) fn path(&self) -> &'a Path {
         self.path
     }
 
-    /// Returns an error about values that the core library refused.
     pub(super) fn refused(&self, source: unlift::Error) -> Error {
         Error::core(self.path, source)
     }
 
-    /// The metadata object.
     pub(super) fn meta(&self) -> &Meta<'a> {
         &self.meta
     }
 
-    /// The dimension, 2 or 3, by the metadata, else by the columns.
+    /// The dimension by the metadata, else by the columns.
     pub(super) fn dimension(&self) -> Result<usize, Error> {
         if let Some(declared) = self.meta.dimension()? {
             return Ok(declared);
@@ -110,7 +104,6 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Returns an error if the dimension is not `D`.
     pub(super) fn expect_dimension<const D: usize>(&self) -> Result<(), Error> {
         let found = self.dimension()?;
         if found == D {
@@ -130,7 +123,6 @@ impl<'a> Table<'a> {
         unit.ok_or_else(|| self.meta.wrong_unit())
     }
 
-    /// The number of rows.
     pub(super) fn n_rows(&self) -> u64 {
         match &self.rows {
             Rows::Stored(parts) => parts.n_rows(),
@@ -146,12 +138,10 @@ impl<'a> Table<'a> {
         named && (self.n_rows() == 0 || !self.is_all_null(name))
     }
 
-    /// Selects the `columns` that are present and may have a value.
     pub(super) fn present<'c>(&self, columns: &[(&'c str, Type)]) -> Vec<(&'c str, Type)> {
         columns.iter().copied().filter(|(name, _)| self.has(name)).collect()
     }
 
-    /// Returns true if the column `name` exists and has the type `class`.
     pub(super) fn is(&self, name: &str, class: Type) -> bool {
         let field = self.schema().column_with_name(name);
         field.is_some_and(|(_, field)| class.admits(field.data_type()))
@@ -189,10 +179,7 @@ impl<'a> Table<'a> {
     }
 
     /// Returns true if the column `name` has no values. `n_null` is the number of rows in batches
-    /// that are all null.
-    ///
-    /// # Errors
-    /// When some rows have values and others do not.
+    /// that are all null. Values in some rows only are an error.
     pub(super) fn is_without(&self, name: &str, n_null: usize) -> Result<bool, Error> {
         if n_null == 0 || n_null as u64 == self.n_rows() {
             return Ok(n_null > 0);

@@ -1,27 +1,23 @@
 //! Parses Thrift's compact protocol, the encoding of Parquet's footer and page headers.
 //!
 //! The `parquet` crate recurses and allocates as these declare, and gives no access to page
-//! headers, so they are checked here first.
+//! headers.
 
-/// The maximum depth of nested values. Parquet itself has seven levels.
+/// Parquet itself has seven levels.
 const DEEPEST: u32 = 32;
 
-/// Type numbers. A boolean field is stored in its type alone.
+/// A boolean field is stored in its type alone.
 const BOOLS: [u8; 2] = [1, 2];
 const LIST: u8 = 9;
 const STRUCT: u8 = 12;
 
-/// An error of parsing.
 #[derive(Debug)]
 pub(super) enum Wrong {
-    /// The bytes end within a value.
     End,
-    /// A description of what was found.
     Content(String),
 }
 
 impl Wrong {
-    /// The text for the `found` part of an error.
     pub(super) fn found(self) -> String {
         match self {
             Self::End => "one that is cut off".to_owned(),
@@ -33,12 +29,11 @@ impl Wrong {
 /// The number and the type of a struct field.
 pub(super) type Field = (i64, u8);
 
-/// Returns an error for a wrong type, because its values would be misread.
+/// Values of a wrong type would be misread.
 fn expect(is_right: bool, kind: u8) -> Result<(), Wrong> {
     if is_right { Ok(()) } else { Err(Wrong::Content(format!("a value of type {kind}"))) }
 }
 
-/// A parser of bytes.
 pub(super) struct Walk<'a> {
     rest: &'a [u8],
 }
@@ -48,7 +43,6 @@ impl<'a> Walk<'a> {
         Self { rest: bytes }
     }
 
-    /// The number of bytes that are left.
     pub(super) fn remaining(&self) -> usize {
         self.rest.len()
     }
@@ -82,14 +76,12 @@ impl<'a> Walk<'a> {
         Ok((value >> 1) as i64 ^ -((value & 1) as i64))
     }
 
-    /// Parses the integer in a field of type `kind`.
     pub(super) fn integer(&mut self, kind: u8) -> Result<i64, Wrong> {
         expect((4..=6).contains(&kind), kind)?;
         self.signed()
     }
 
-    /// Starts a list of structs in a field of type `kind` and returns their number, at most `most`.
-    /// Errors name them `what`.
+    /// Starts a list of at most `most` structs and returns their number. Errors name them `what`.
     pub(super) fn structs(&mut self, kind: u8, most: u64, what: &str) -> Result<u64, Wrong> {
         expect(kind == LIST, kind)?;
         let (kind, n) = self.list()?;
@@ -100,8 +92,7 @@ impl<'a> Walk<'a> {
         Ok(n)
     }
 
-    /// Starts a list and returns the type and the number of its values, which cannot exceed the
-    /// number of remaining bytes.
+    /// Returns the type and the number of values of a list. The remaining bytes limit the number.
     fn list(&mut self) -> Result<(u8, u64), Wrong> {
         let head = self.byte()?;
         let n = match head >> 4 {
@@ -114,7 +105,6 @@ impl<'a> Walk<'a> {
         Ok((head & 15, n))
     }
 
-    /// Parses the struct in a field of type `kind` like [`fields`](Self::fields).
     pub(super) fn structure(
         &mut self,
         kind: u8,

@@ -30,10 +30,6 @@ pub fn write_truth<const D: usize>(
     write_table((path, Access::Private), &written(path, original, secret)?)
 }
 
-/// Creates the table of the ground truth.
-///
-/// # Errors
-/// When `secret` has another number of points. `path` is for the error.
 pub(super) fn written<'a, const D: usize>(
     path: &Path,
     original: &'a Original<D>,
@@ -75,8 +71,7 @@ pub(super) fn written<'a, const D: usize>(
     Ok(written)
 }
 
-/// Reads the ground truth of an obfuscation of dimension `D` (see [`peek`](super::peek)), on the
-/// owner's side only.
+/// Reads the ground truth of an obfuscation of dimension `D` (see [`peek`](super::peek)).
 ///
 /// Some columns are optional: `slot` and `original` if they equal the order of rows, `dropped` if
 /// every point is in a record, `descriptor_row` if records have one slot.
@@ -87,7 +82,6 @@ pub fn read_truth<const D: usize>(path: &Path) -> Result<(Original<D>, Secret), 
     truth_of(&Table::open_kind(path, Kind::Truth)?)
 }
 
-/// The rows of a ground truth, in the order of the file.
 #[derive(Default)]
 struct Rows<const D: usize> {
     originals: Vec<u32>,
@@ -100,7 +94,6 @@ struct Rows<const D: usize> {
     dropped: Vec<Dropped>,
 }
 
-/// Reads the ground truth of a table.
 pub(super) fn truth_of<const D: usize>(table: &Table<'_>) -> Result<(Original<D>, Secret), Error> {
     let path = table.path();
     let core = |source| table.refused(source);
@@ -143,14 +136,12 @@ pub(super) fn truth_of<const D: usize>(table: &Table<'_>) -> Result<(Original<D>
         n_rows as usize,
     );
     let secret = secret.map_err(core)?;
-    // Files of earlier versions do not state the number of slots; crossed descriptor rows imply
-    // two.
+    // Earlier versions did not state the number of slots; crossed descriptor rows imply two.
     let slots = declared.unwrap_or(secret.slots_per_record());
     let secret = secret.of_map(table.meta().fingerprint()?, slots).map_err(core)?;
     Ok((Original::new(points), secret))
 }
 
-/// Appends the slots and secret choices of one batch to `to`.
 fn read_rows<const D: usize>(
     table: &Table<'_>,
     batch: &Batch<'_>,

@@ -1,5 +1,3 @@
-//! Writes columns to a Parquet file. Equal values make equal bytes.
-
 use super::header::to_text;
 use crate::Error;
 use crate::atomic::{self, Access};
@@ -20,7 +18,7 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
-/// The number of rows that are converted at a time.
+/// Rows that are converted at a time.
 const CHUNK_ROWS: usize = 1 << 14;
 
 /// The maximum number of rows of a row group, so that an engine can distribute groups to machines.
@@ -29,11 +27,9 @@ pub(super) const GROUP_ROWS: usize = 1 << 20;
 /// The maximum size of a row group in bytes, because a group is in memory until it is complete.
 const GROUP_BYTES: usize = 256 << 20;
 
-/// A table to write: its metadata, and its columns.
+/// A table to write. Equal values make equal bytes.
 pub(super) struct Written<'a> {
-    /// The complete metadata.
     pub(super) meta: Map<String, Value>,
-    /// The number of rows.
     pub(super) n_rows: usize,
     fields: Vec<Field>,
     columns: Vec<Column<'a>>,
@@ -43,18 +39,15 @@ pub(super) struct Written<'a> {
 type Column<'a> = Box<dyn Fn(Range<usize>) -> ArrayRef + 'a>;
 
 impl<'a> Written<'a> {
-    /// Creates a table without columns.
     pub(super) fn new(meta: Map<String, Value>, n_rows: usize) -> Self {
         Self { meta, n_rows, fields: Vec::new(), columns: Vec::new() }
     }
 
-    /// Adds a column.
     pub(super) fn column(&mut self, field: Field, rows: impl Fn(Range<usize>) -> ArrayRef + 'a) {
         self.fields.push(field);
         self.columns.push(Box::new(rows));
     }
 
-    /// Adds a column of numbers without nulls, by row.
     pub(super) fn numbers<T: ArrowPrimitiveType>(
         &mut self,
         name: impl Into<String>,
@@ -65,7 +58,6 @@ impl<'a> Written<'a> {
         });
     }
 
-    /// Adds a column of numbers and nulls, by row.
     pub(super) fn optional_numbers<T: ArrowPrimitiveType>(
         &mut self,
         name: impl Into<String>,
@@ -76,9 +68,8 @@ impl<'a> Written<'a> {
         });
     }
 
-    /// Adds a column of lists without nulls.
-    ///
-    /// `lists` returns the values of some rows, concatenated, and the length of each list.
+    /// Adds a column of lists. `lists` returns the values of some rows, concatenated, and the
+    /// length of each list.
     pub(super) fn lists<T: ArrowPrimitiveType>(
         &mut self,
         name: impl Into<String>,
@@ -93,18 +84,15 @@ impl<'a> Written<'a> {
         });
     }
 
-    /// The columns.
     pub(super) fn fields(&self) -> &[Field] {
         &self.fields
     }
 
-    /// Returns some rows of all columns, in the order of [`fields`](Self::fields).
     pub(super) fn rows(&self, rows: &Range<usize>) -> Vec<ArrayRef> {
         self.columns.iter().map(|column| column(rows.clone())).collect()
     }
 }
 
-/// Writes a table to a path with the permissions of an `Access`.
 pub(super) fn write_table(to: (&Path, Access), written: &Written<'_>) -> Result<(), Error> {
     let properties = properties(to_text(written.meta.clone()), &written.fields, GROUP_ROWS);
     let schema = Arc::new(Schema::new(written.fields.clone()));
@@ -124,7 +112,7 @@ pub(super) fn write_batches(
     properties: WriterProperties,
     mut next: impl FnMut() -> Result<Option<RecordBatch>, Error>,
 ) -> Result<(), Error> {
-    // An error of reading is returned as it is, not as an error of writing.
+    // An error of reading is returned as it is.
     let mut unread = None;
     let done = atomic::write_file(path, access, |file| {
         let mut writer = writer(file, schema, properties).map_err(to_io)?;
@@ -143,7 +131,6 @@ pub(super) fn write_batches(
     unread.map_or(done, Err)
 }
 
-/// Starts a Parquet file.
 pub(super) fn writer<W: io::Write + Send>(
     file: W,
     schema: SchemaRef,
@@ -156,11 +143,9 @@ pub(super) fn writer<W: io::Write + Send>(
     ArrowWriter::try_new_with_options(file, schema, options)
 }
 
-/// Returns the properties of a file with this metadata and these columns, in row groups of at most
-/// `group_rows` rows.
 pub(super) fn properties(meta: String, fields: &[Field], group_rows: usize) -> WriterProperties {
     let mut properties = WriterProperties::builder()
-        // A fixed name, so that a new version of the crate does not change bytes.
+        // A new version of the crate must not change bytes.
         .set_created_by("unlift version 1".into())
         .set_compression(Compression::SNAPPY)
         .set_max_row_group_row_count(Some(group_rows))

@@ -1,14 +1,13 @@
 //! Creates scans in the formats of other programs: three points, and one without coordinates if the
 //! format allows it.
 
-// Every test program includes this file and uses a part of it.
+// Every test program uses a part of this file.
 #![allow(dead_code)]
 
-/// The points. LAS and `f32` formats round them.
 pub const POINTS: [[f64; 3]; 3] = [[0.5, -1.25, 3.0], [1000.0, 2.0, -0.0625], [0.125, 0.25, 0.375]];
 
-/// Creates LAS of version `1.minor`: a header, a record before the points, and points of format 0
-/// in `record` bytes.
+/// Creates LAS of version `1.minor`, with a record before the points, and points of format 0 in
+/// `record` bytes.
 pub fn las(minor: u8, record: u16) -> Vec<u8> {
     let head: u16 = if minor == 4 { 375 } else { 227 };
     let mut file = vec![0; usize::from(head)];
@@ -19,7 +18,7 @@ pub fn las(minor: u8, record: u16) -> Vec<u8> {
     put(96, &(u32::from(head) + 60).to_le_bytes());
     put(100, &1u32.to_le_bytes());
     put(105, &record.to_le_bytes());
-    // Version 1.4 has another field for the number of points, and may omit this one.
+    // Version 1.4 has another field for the number of points.
     let n = POINTS.len() as u64;
     match minor {
         4 => put(247, &n.to_le_bytes()),
@@ -80,7 +79,6 @@ pub fn pcd_head(n: usize, data: &str) -> String {
     )
 }
 
-/// The size in bytes of such a point.
 pub const PCD_STRIDE: usize = 4 + 4 + 8 + 4 + 2 * 2;
 
 fn pcd_fields(x: f64, y: f64, z: f64) -> [Vec<u8>; 5] {
@@ -93,7 +91,7 @@ fn pcd_fields(x: f64, y: f64, z: f64) -> [Vec<u8>; 5] {
     ]
 }
 
-/// Creates PCD in one of its three forms. The second point has no coordinates.
+/// Creates a PCD. The second point has no coordinates.
 pub fn pcd(data: &str) -> Vec<u8> {
     let [a, b, c] = POINTS;
     let points = [a, [f64::NAN; 3], b, c];
@@ -126,8 +124,8 @@ pub fn pcd(data: &str) -> Vec<u8> {
     file
 }
 
-/// Creates E57 with a scan in Cartesian and a scan in spherical coordinates. The second is rotated
-/// by 90 degrees about z and shifted, and has two points, one of them without a return.
+/// Creates E57 with a scan in Cartesian and one in spherical coordinates. The second is rotated by
+/// 90 degrees about z and shifted, and one of its two points is a beam without a return.
 pub fn e57(path: &std::path::Path) {
     use e57::{
         E57Writer, Quaternion, Record, RecordDataType, RecordName, RecordValue, Transform,
@@ -184,8 +182,7 @@ pub fn e57(path: &std::path::Path) {
     writer.finalize().unwrap();
 }
 
-/// Replaces `from` in the XML of an E57 file by `to` of the same length, and updates the checksums
-/// of pages.
+/// Replaces `from` in the XML of an E57 file by `to` of the same length, and updates the checksums.
 pub fn e57_with(mut file: Vec<u8>, from: &str, to: &str) -> Vec<u8> {
     assert_eq!(from.len(), to.len());
     // Text that crosses a page contains a checksum and is not found.

@@ -2,19 +2,17 @@
 
 use super::{MANY, Row, alone, appended, fixture, patched, row};
 
-/// The model without rigs and frames, whose files the rows cut and change.
+/// The model without rigs and frames.
 pub const MODEL: &str = "project/sparse/0";
 
 fn model_file(name: &str) -> Vec<u8> {
     fixture(&format!("{MODEL}/{name}"))
 }
 
-/// The first `n` bytes of a file of the model.
 fn cut(name: &str, n: usize) -> Vec<u8> {
     model_file(name)[..n].to_vec()
 }
 
-/// The model with one file replaced.
 fn in_model(what: &'static str, name: &'static str, bytes: Vec<u8>, line: &'static str) -> Row {
     let mut files: Vec<_> = ["cameras.bin", "images.bin", "points3D.bin"]
         .into_iter()
@@ -104,7 +102,7 @@ pub fn binary() -> Vec<Row> {
 }
 
 /// The last record of each file, cut inside every field. Cuts in earlier records are errors of the
-/// count or of the next record (see `sweeps`).
+/// count or of the next record.
 #[rustfmt::skip] // One row per line.
 pub fn last_record_cuts() -> Vec<Row> {
     let files = [

@@ -1,4 +1,4 @@
-//! Malformed files of descriptors: the binary format, arrays and databases.
+//! Malformed files of descriptors.
 
 use std::fs;
 
@@ -7,7 +7,7 @@ use unlift_io::read;
 
 use super::{MANY, appended, fixture, fixtures, patched, shown};
 
-/// A malformed input: the bytes of a file, or a statement that is run on the database.
+/// The bytes of a file, or a statement that is run on the database.
 enum Wrong {
     Bytes(Vec<u8>),
     Sql(&'static str),

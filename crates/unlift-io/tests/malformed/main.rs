@@ -20,7 +20,6 @@ fn fixture(name: &str) -> Vec<u8> {
     fs::read(fixtures().join(name)).unwrap()
 }
 
-/// Replaces bytes of a file at `at`.
 fn patched(mut file: Vec<u8>, at: usize, bytes: &[u8]) -> Vec<u8> {
     file[at..at + bytes.len()].copy_from_slice(bytes);
     file
@@ -52,7 +51,6 @@ fn row(
     Row { what, files, open, line }
 }
 
-/// Creates a row with a single file.
 fn alone(
     what: &'static str,
     name: &'static str,
@@ -62,7 +60,6 @@ fn alone(
     row(what, vec![(name, bytes.as_ref().to_vec())], name, line)
 }
 
-/// Creates the files of a row in `dir` and returns the path to open.
 fn make(dir: &Path, row: &Row) -> PathBuf {
     for (name, bytes) in &row.files {
         let path = dir.join(name);
@@ -76,7 +73,6 @@ fn make(dir: &Path, row: &Row) -> PathBuf {
     if row.open.is_empty() { dir.to_owned() } else { dir.join(row.open) }
 }
 
-/// Returns the error without the temporary folder.
 fn shown(dir: &Path, error: &unlift_io::Error) -> String {
     let dir = dir.to_str().unwrap();
     let line = error.to_string();
@@ -133,7 +129,7 @@ fn a_file_that_may_not_be_read_is_refused() {
     );
 }
 
-/// A pipe without a writer, and an endless device, are errors before they are opened.
+/// They must be an error before they are opened.
 #[cfg(unix)]
 #[test]
 fn what_is_no_regular_file_is_refused() {
@@ -178,7 +174,6 @@ fn what_is_no_regular_file_is_refused() {
     assert_eq!(shown(dir.path(), &unlift_io::stage::peek(&pipe).unwrap_err()), line);
 }
 
-/// A file of one line is an error after 16 MiB.
 #[test]
 fn a_line_without_end_is_refused() {
     let dir = tempfile::tempdir().unwrap();

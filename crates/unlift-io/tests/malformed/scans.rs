@@ -9,7 +9,6 @@ pub use made::sealed;
 
 use super::{MANY, Row, alone, patched};
 
-/// An E57 file.
 pub fn e57_file() -> Vec<u8> {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.e57");
@@ -35,7 +34,6 @@ fn of_steps(most: i64) -> Vec<u8> {
     made::e57_with(file, "maximum=\"8\"", &format!("maximum=\"{most}\""))
 }
 
-/// Writes every kind of scan into `folder` and returns their names.
 pub fn write_all(folder: &Path) -> [&'static str; 5] {
     let put = |name: &str, bytes: Vec<u8>| std::fs::write(folder.join(name), bytes).unwrap();
     put("a.las", made::las(2, 20));

@@ -10,8 +10,7 @@ use unlift_io::read;
 use super::colmap::MODEL;
 use super::{fixture, fixtures, patched, scans, shown};
 
-/// Opens `path` and returns true on success. An error must be one line that begins with a path in
-/// `dir`.
+/// Returns true on success. An error must be one line that begins with a path in `dir`.
 fn opens_or_one_line(dir: &Path, path: &Path) -> bool {
     match read::open(path) {
         Ok(_) => true,
@@ -44,7 +43,6 @@ fn sweep(folder: &str, name: &str, mut check: impl FnMut(&Path, &Path, &Path, &[
     check(dir.path(), opened, &path, &original);
 }
 
-/// All files that can be opened.
 const FIXTURES: [(&str, &str); 17] = [
     (MODEL, "cameras.bin"),
     (MODEL, "images.bin"),
@@ -65,7 +63,7 @@ const FIXTURES: [(&str, &str); 17] = [
     ("", "f4-big-endian.npy"),
 ];
 
-/// A file that is cut and changed in place, because rewriting it each time is slow.
+/// Rewriting a file for each change is slow.
 struct InPlace(File);
 
 impl InPlace {

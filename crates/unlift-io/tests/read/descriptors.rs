@@ -1,4 +1,4 @@
-//! Tests descriptors of an input's points: binary files, arrays, databases and features.
+//! Tests descriptors of an input's points.
 
 use std::fs;
 
@@ -33,7 +33,6 @@ fn descriptors_follow_the_ids_of_the_input() {
     }
 }
 
-/// The descriptor of keypoint `at` of the image `id`.
 fn row(id: u32, at: u32) -> [f32; 3] {
     [id as f32, at as f32 - 2.0, 1.0]
 }
@@ -89,7 +88,6 @@ fn unit_floats(input: &Input) -> Vec<f32> {
     bytes.iter().map(|&byte| f32::from(byte) / 512.0).collect()
 }
 
-/// Creates the header of a `P3DESC01` file for points `ids` in this order.
 fn p3desc(ids: &[u64], dtype: u32) -> Vec<u8> {
     let mut file = b"P3DESC01".to_vec();
     file.extend((ids.len() as u64).to_le_bytes());
@@ -199,8 +197,7 @@ fn a_database_in_write_ahead_mode_is_read_whole() {
     assert!(error.contains("no such image"), "the journal counts: {error}");
 }
 
-/// The writer was killed in a transaction: the file contains uncommitted rows, and the journal
-/// beside it the rows to restore.
+/// The file contains uncommitted rows, and the journal beside it the rows to restore.
 #[test]
 fn a_database_with_a_transaction_that_was_not_done_is_refused() {
     let dir = tempfile::tempdir().unwrap();

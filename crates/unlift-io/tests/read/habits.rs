@@ -22,7 +22,6 @@ fn refused(name: &str, contents: impl AsRef<[u8]>) -> String {
     line.replace(&format!("{}/", dir.path().display()), "")
 }
 
-/// A table of three numbers per row, formatted by `row`, after `head`.
 fn table(head: &str, row: impl Fn(usize, [f64; 3]) -> String) -> String {
     let rows = POINTS.iter().enumerate().map(|(at, &point)| row(at, point) + "\n");
     head.to_owned() + &rows.collect::<String>()
@@ -278,7 +277,6 @@ fn pcd_is_spelled_in_many_ways() {
     }
 }
 
-/// Creates a NumPy array.
 fn npy(descr: &str, shape: &str, values: &[u8]) -> Vec<u8> {
     let text = format!("{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}\n");
     let head = [b"\x93NUMPY\x01\0".as_slice(), &(text.len() as u16).to_le_bytes(), text.as_bytes()];
@@ -336,7 +334,6 @@ fn arrays_may_have_more_columns_or_names() {
     );
 }
 
-/// Creates a NumPy archive of these arrays, every second one compressed.
 fn archive(arrays: &[(&str, Vec<u8>)]) -> Vec<u8> {
     use std::io::Write;
     use zip::write::{SimpleFileOptions, ZipWriter};

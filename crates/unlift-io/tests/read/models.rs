@@ -1,4 +1,4 @@
-//! Tests the files of a COLMAP model: cameras, images, points, rigs and frames, binary and text.
+//! Tests the files of a COLMAP model, binary and text.
 
 use std::fs;
 use std::path::Path;

@@ -5,8 +5,7 @@ use std::path::Path;
 
 use unlift_io::read::{self, Input};
 
-/// The first camera is at (0, 0, -5) and looks along z. The second is at (1, 2, -5), rotated by 90
-/// degrees about its viewing direction.
+/// The first camera looks along z. The second is rotated by 90 degrees about its viewing direction.
 const CENTERS: [[f64; 3]; 2] = [[0.0, 0.0, -5.0], [1.0, 2.0, -5.0]];
 const POINTS: [[f64; 3]; 3] = [[0.5, -1.25, 3.0], [1e3, 2.0, -0.0625], [0.1, 0.2, 0.3]];
 
@@ -202,7 +201,6 @@ fn every_form_gives_the_same_points_and_cameras() {
     let input = read::open(&put("nerf/transforms.json", &nerfstudio("\"sparse_pc.ply\""))).unwrap();
     same(&input, "nerfstudio");
     assert_eq!(input.files.len(), 2);
-    // The same maps given as folders.
     for (name, format) in
         [("bundler", "Bundler"), ("sfm", "OpenSfM"), ("mvg", "OpenMVG"), ("nerf", "nerfstudio")]
     {
@@ -283,8 +281,6 @@ fn doubts(name: &str, text: String, all: &str, few: &str) -> [Vec<String>; 2] {
     })
 }
 
-/// A file that declares fewer points than it contains is read in part, so results are about a part
-/// of the map.
 #[test]
 fn files_with_more_points_than_they_declare_are_doubted() {
     let faces = "element face 1\nproperty list uchar int vertex_indices\nend_header";

@@ -1,4 +1,4 @@
-//! Tests where the model and the database of a project are found, and the notes about others.
+//! Tests which model and database of a project are found.
 
 use std::fs;
 use std::path::Path;
@@ -7,7 +7,6 @@ use unlift_io::read;
 
 use super::data;
 
-/// Copies the fixture `from` to `to` in `root`.
 fn copy(from: &str, root: &Path, to: &str) {
     let to = root.join(to);
     fs::create_dir_all(&to).unwrap();

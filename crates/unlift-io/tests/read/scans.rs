@@ -109,7 +109,6 @@ fn degrees_of_las_are_told() {
     }
 }
 
-/// A smaller declared number: the rest of the points is not read.
 #[test]
 fn files_with_more_points_than_they_declare_are_doubted() {
     let doubts = |name: &str, bytes: Vec<u8>| {
@@ -137,14 +136,14 @@ fn files_with_more_points_than_they_declare_are_doubted() {
     assert!(less[0].starts_with("2 points are declared, and 2 more seem to follow"), "{less:?}");
 }
 
-/// A sparse file may have any length and must not allocate memory of that size.
+/// It must not allocate memory of that size.
 #[test]
 fn a_file_with_holes_is_one_line() {
     let head = "ply\nformat binary_little_endian 1.0\nelement vertex 200000000000\nproperty float x\n\
                 property float y\nproperty float z\nend_header\n";
     let (_dir, path) = write("a.ply", head);
     let file = std::fs::OpenOptions::new().write(true).open(&path).unwrap();
-    // Some file systems do not support files of that size.
+    // Some file systems do not support such files.
     if file.set_len(head.len() as u64 + 12 * 200_000_000_000).is_ok() {
         let error = read::open(&path).unwrap_err().to_string();
         assert!(error.contains("expected as much as fits into memory, found "), "{error}");

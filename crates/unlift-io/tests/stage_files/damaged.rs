@@ -10,7 +10,6 @@ const N: usize = 60;
 
 type Read = fn(&Path) -> Result<(), Error>;
 
-/// A valid file of every kind and family, with its reader.
 fn valid_files(folder: &Path) -> Vec<(PathBuf, Read)> {
     let mut files: Vec<(PathBuf, Read)> = Vec::new();
     for (at, released) in maps::released::<3>(8, N).iter().enumerate() {

@@ -22,7 +22,7 @@ photos = {f"{n}.jpg": ((640, 480), np.full((n, 2), 9.0 * n), np.ones((n, 2))) fo
 found = np.where(np.arange(10)[:, None] % 5 == 4, np.nan, points[hidden])
 "#;
 
-/// Returns the Python of the document: the part that writes and the part that reads.
+/// The part that writes and the part that reads.
 fn snippets() -> (String, String) {
     let document = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/formats.md");
     let document = std::fs::read_to_string(document).unwrap();

@@ -9,7 +9,6 @@ use std::fs;
 use std::sync::Arc;
 use unlift_io::stage;
 
-/// Encodes a number for Thrift.
 fn unsigned(mut value: u64) -> Vec<u8> {
     let mut bytes = Vec::new();
     while value >= 0x80 {

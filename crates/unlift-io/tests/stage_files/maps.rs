@@ -102,7 +102,6 @@ pub fn neighborhoods(seed: u64, n_records: usize, slots_per_record: usize) -> Ne
     lists.unwrap().with_about(about(seed))
 }
 
-/// Every order, and a fingerprint for two of three seeds.
 fn about(seed: u64) -> About {
     let mut orders = RowOrder::STATED.to_vec();
     orders.push(RowOrder::Unstated);

@@ -1,4 +1,4 @@
-//! Tests that a folder of parts equals the file, by any writer, and that missing parts are errors.
+//! Tests that a folder of parts equals the file, and that missing parts are errors.
 
 use crate::maps;
 use std::fs;

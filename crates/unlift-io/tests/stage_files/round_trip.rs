@@ -14,7 +14,6 @@ use unlift_io::stage::{self, Kind};
 
 const SIZES: [usize; 5] = [2, 3, 40, 1000, 20_000];
 
-/// Writes twice, compares the bytes, and returns them.
 fn written_twice(folder: &Path, write: impl Fn(&Path)) -> Vec<u8> {
     let paths = [folder.join("a.parquet"), folder.join("b.parquet")];
     for path in &paths {

@@ -58,7 +58,6 @@ pub fn float_lists(rows: &[&[f64]]) -> ArrayRef {
     Arc::new(ListArray::from_iter_primitive::<Float64Type, _, _>(rows))
 }
 
-/// Replaces the column `name` in `columns`, or removes it.
 pub fn with(columns: Columns, name: &'static str, column: Option<ArrayRef>) -> Columns {
     let mut columns: Columns = columns.into_iter().filter(|(other, _)| *other != name).collect();
     columns.extend(column.map(|column| (name, column)));
@@ -73,7 +72,6 @@ pub fn message<T>(path: &Path, result: Result<T, Error>) -> String {
     text.strip_prefix(&prefix).expect("the file comes first").to_owned()
 }
 
-/// Compares lines with the expected ones and shows all that differ.
 pub fn check(table: Vec<(String, &str)>) {
     let wrong: Vec<String> = table
         .into_iter()

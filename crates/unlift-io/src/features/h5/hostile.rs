@@ -1,5 +1,5 @@
 //! Tests of files that list, declare or compress far more than they contain, and of large valid
-//! files, which must open in time.
+//! files.
 
 use std::fs;
 use std::io::Cursor;
@@ -11,7 +11,6 @@ use super::tree::{self, Entry};
 use super::write::superblock;
 use super::{Array, FeatureStore, Numbers, Writer};
 
-/// Creates a file of `n` images without keypoints.
 fn images(n: usize) -> Vec<u8> {
     let mut out = Cursor::new(Vec::new());
     let mut writer = Writer::start(&mut out).unwrap();
@@ -23,7 +22,6 @@ fn images(n: usize) -> Vec<u8> {
     out.into_inner()
 }
 
-/// Opens `bytes` as a feature file, or returns the error line.
 fn opened(bytes: &[u8]) -> Result<FeatureStore, String> {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("f");
@@ -35,7 +33,6 @@ fn shown(path: &Path, error: &crate::Error) -> String {
     error.to_string().replace(path.to_str().unwrap(), "f")
 }
 
-/// A file that is built piece by piece.
 struct Pieces(Vec<u8>);
 
 impl Pieces {
@@ -49,7 +46,7 @@ impl Pieces {
         at
     }
 
-    /// Adds a group with its header, tree and heap. `members` are names and header offsets.
+    /// Adds a group. `members` are names and header offsets.
     fn group(&mut self, members: &[(&str, u64)]) -> (u64, [u64; 2]) {
         let entry = |&(name, header)| Entry { name, header, group: None };
         let entries: Vec<Entry<'_>> = members.iter().map(entry).collect();
@@ -64,7 +61,6 @@ impl Pieces {
         self.0
     }
 
-    /// Adds an image of one keypoint.
     fn image(&mut self) -> u64 {
         let array = Array { shape: vec![1, 2], values: Numbers::F32(vec![1.0, 2.0]) };
         let values = self.put(&array.values.bytes());
@@ -149,7 +145,6 @@ fn a_list_whose_nodes_are_the_same_again_and_again_is_refused() {
         let (bytes, [_, heap]) = tree::names(&[entry], file.0.len() as u64);
         file.put(&bytes);
         let mut leaf = b"SNOD\x01\0\x08\0".to_vec();
-        // The name comes after the empty one.
         (0..8).for_each(|_| leaf.extend(Entry { name: "", header: image, group: None }.bytes(8)));
         let mut child = file.put(&leaf);
         for level in 0..levels {

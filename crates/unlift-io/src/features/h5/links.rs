@@ -1,18 +1,15 @@
-//! Finds links by path in a group. The HDF5 library skips them, or fails.
+//! Finds links by path in a group, which the HDF5 library skips, or fails on.
 //!
 //! Source: HDF5 File Format Specification 3.0, IV.A (object headers), IV.A.2.g (the link message),
-//! and III.A to III.D (groups of the old form). Links of large groups, which are stored in a
-//! separate heap, are not searched.
+//! and III.A to III.D (groups of the old form). Links of large groups, in a separate heap, are not
+//! searched.
 
-/// The target of a link.
 #[derive(Debug, PartialEq)]
 pub(super) enum Target {
     /// A path in the file.
     Path(String),
-    /// A path in the file. The link is in a group of the old form, whose names the library cannot
-    /// list.
+    /// A path in the file. The link is in a group of the old form, which the library cannot list.
     Old(String),
-    /// Another file.
     Elsewhere,
 }
 
@@ -22,17 +19,15 @@ const CONTINUATION: u16 = 0x10;
 /// The maximum number of header bytes that are searched.
 const MOST: u64 = 1 << 20;
 
-/// Returns names and targets of the links by path in the object header at `address`.
-///
-/// `read(offset, length)` returns bytes of the file. The result is `None` or empty if there is no
-/// valid header.
+/// Returns names and targets of the links by path in the object header at `address`. `read(offset,
+/// length)` returns bytes of the file.
 pub(super) fn links(
     read: impl Fn(u64, u64) -> Option<Vec<u8>>,
     address: u64,
 ) -> Option<Vec<(String, Target)>> {
     let start = read(address, 16)?;
     let is_new = start.starts_with(b"OHDR");
-    // A flag states that messages of the new form have numbers.
+    // A flag states that messages have numbers.
     let (first, numbers) = if is_new {
         let flags = start[5];
         let before =
@@ -71,7 +66,7 @@ pub(super) fn links(
     Some(found)
 }
 
-/// Parses a link message. Returns `None` if the link is not a path.
+/// Parses a link message, if it is a path.
 fn link(body: &[u8]) -> Option<(String, Target)> {
     let flags = *body.get(1)?;
     let kind = if flags & 8 != 0 { *body.get(2)? } else { 0 };
@@ -95,8 +90,7 @@ fn link(body: &[u8]) -> Option<(String, Target)> {
     }
 }
 
-/// Returns the links of a group of the old form, whose names are in the tree and heap at these
-/// addresses.
+/// Returns the links of a group of the old form with its tree and heap at these addresses.
 fn old_links(
     read: &impl Fn(u64, u64) -> Option<Vec<u8>>,
     tree: u64,
@@ -133,7 +127,6 @@ fn old_links(
     Some(found)
 }
 
-/// Parses a little-endian number of up to eight bytes.
 fn number(bytes: &[u8]) -> u64 {
     bytes.iter().rev().fold(0, |number, &byte| number << 8 | u64::from(byte))
 }

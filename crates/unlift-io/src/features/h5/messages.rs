@@ -1,4 +1,4 @@
-//! Writes HDF5 object headers: for groups, and for arrays with their type and shape.
+//! Writes HDF5 object headers of groups and arrays.
 //!
 //! Source: HDF5 File Format Specification 3.0, IV.A, headers of version 1, which every reader
 //! supports.
@@ -8,7 +8,6 @@ use super::{Array, Numbers};
 /// The undefined address or length.
 pub(super) const UNDEFINED: u64 = u64::MAX;
 
-/// Appends zeros up to a multiple of eight.
 pub(super) fn pad(bytes: &mut Vec<u8>) {
     bytes.resize(bytes.len().next_multiple_of(8), 0);
 }
@@ -21,7 +20,6 @@ fn message(header: &mut Vec<u8>, kind: u16, mut body: Vec<u8>) {
     header.extend(body);
 }
 
-/// Writes a header of version 1 with its messages.
 fn header(messages: u16, body: &[u8]) -> Vec<u8> {
     let mut bytes = vec![1, 0];
     bytes.extend(messages.to_le_bytes());
@@ -32,7 +30,7 @@ fn header(messages: u16, body: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Writes the header of a group whose names are in the tree and heap at these addresses.
+/// Writes the header of a group with its tree and heap at these addresses.
 pub(super) fn group(tree: u64, heap: u64) -> Vec<u8> {
     let mut body = Vec::new();
     let addresses = [tree.to_le_bytes(), heap.to_le_bytes()].concat();
@@ -40,8 +38,7 @@ pub(super) fn group(tree: u64, heap: u64) -> Vec<u8> {
     header(1, &body)
 }
 
-/// Writes the header of a dataset with `len` bytes at `address`, and with attributes that are
-/// doubles.
+/// Writes the header of a dataset with `len` bytes at `address` and with `f64` attributes.
 pub(super) fn dataset(
     array: &Array,
     address: u64,
@@ -99,7 +96,6 @@ fn float(size: u32, mantissa: u8, exponent: u8, bias: u32) -> Vec<u8> {
     bytes
 }
 
-/// Writes a scalar attribute of version 1.
 fn attribute(name: &str, value: f64) -> Vec<u8> {
     let mut parts =
         [[name.as_bytes(), &[0]].concat(), datatype(&Numbers::F64(Vec::new())), dataspace(&[])];

@@ -1,8 +1,8 @@
-//! Reads and writes arrays by path in an HDF5 file. No other module depends on HDF5.
+//! Reads and writes arrays by path in an HDF5 file.
 //!
-//! A library reads ([`FeatureStore`]; only `read` and `source` use it). Our own code writes
-//! ([`Writer`]), because feature files can exceed memory: the library's writer keeps the whole file
-//! in memory or rewrites a group's list of names at every addition, which is quadratic in images.
+//! A library reads ([`FeatureStore`]). Our own code writes ([`Writer`]): the library's writer keeps
+//! the whole file in memory, or rewrites a group's list of names at every addition, which is
+//! quadratic in images.
 
 #[cfg(test)]
 mod hostile;
@@ -28,7 +28,6 @@ pub(crate) enum Numbers {
     I64(Vec<i64>),
 }
 
-/// An array and its shape.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Array {
     pub shape: Vec<u64>,
@@ -36,7 +35,6 @@ pub(crate) struct Array {
 }
 
 impl Numbers {
-    /// The number of values.
     pub fn len(&self) -> usize {
         match self {
             Self::U8(v) => v.len(),
@@ -47,7 +45,6 @@ impl Numbers {
         }
     }
 
-    /// The values as little-endian bytes.
     fn bytes(&self) -> Vec<u8> {
         match self {
             Self::U8(v) => v.clone(),
@@ -58,7 +55,6 @@ impl Numbers {
         }
     }
 
-    /// The values as doubles.
     pub fn to_f64(&self) -> Vec<f64> {
         match self {
             Self::U8(v) => v.iter().map(|&x| f64::from(x)).collect(),
@@ -70,7 +66,6 @@ impl Numbers {
     }
 }
 
-/// Returns the transpose of a matrix of `rows` rows.
 pub(crate) fn transposed<T: Copy>(values: &[T], rows: usize) -> Vec<T> {
     let columns = values.len().checked_div(rows).unwrap_or(0);
     let mut transposed = Vec::with_capacity(values.len());

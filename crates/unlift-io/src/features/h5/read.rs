@@ -1,4 +1,4 @@
-//! Reads HDF5. Only this module and `source` use the library `hdf5_pure`.
+//! Reads HDF5 with the library `hdf5_pure`.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -16,12 +16,11 @@ use crate::guard::without_panic;
 use crate::input::{Budget, size};
 use crate::read::lines::quoted;
 
-/// The maximum number of values of an array. A header can declare any size in a few bytes.
+/// A header can declare any size in a few bytes.
 const MOST_VALUES: u64 = 1 << 28;
 /// The maximum depth of groups, because links may form cycles.
 pub(crate) const DEEPEST: usize = 64;
-/// The least memory in bytes for a group besides its path, a chunk besides its bytes, and a value
-/// that was read.
+/// The least memory in bytes for a group besides its path, a chunk besides its bytes, and a value.
 const PER_GROUP: u64 = 256;
 const PER_CHUNK: u64 = 128;
 const PER_VALUE: u64 = 8;
@@ -29,31 +28,25 @@ const PER_VALUE: u64 = 8;
 /// Groups with their paths, broken links, arrays outside groups.
 type Listed = (Vec<(String, Group)>, Vec<Error>, Vec<String>);
 
-/// Joins the group `path` and `name`.
 fn within(path: &str, name: &str) -> String {
     if path.is_empty() { name.to_owned() } else { format!("{path}/{name}") }
 }
 
-/// An open HDF5 file: groups that contain arrays, and the arrays. Reads one array at a time.
+/// An open HDF5 file, which is read one array at a time.
 pub(crate) struct FeatureStore {
     path: PathBuf,
     len: u64,
     budget: Budget,
-    /// Sorted by bytes.
     paths: Vec<String>,
     /// Open handles: finding a group by path searches all names of the groups above it.
     groups: Vec<Group>,
-    /// Errors about links that lead to no group of the file.
+    /// Errors about links that lead to no group.
     broken: Vec<Error>,
-    /// Names of arrays outside groups.
     alone: Vec<String>,
 }
 
 impl FeatureStore {
     /// Opens `path` and finds its groups.
-    ///
-    /// # Errors
-    /// When it cannot be read, is not an HDF5 file, is truncated, or its groups form a cycle.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let (source, len) = Bounded::open(path)?;
         let mut store = Self {
@@ -90,7 +83,7 @@ impl FeatureStore {
         let raw = Bounded::open(&self.path)?.0;
         let raw = |at: u64, n: u64| raw.read_exact_at(at, usize::try_from(n).ok()?).ok();
         let mut waiting = vec![(String::new(), root, 0)];
-        // Two flags by header address: the group contains arrays, and it contains groups.
+        // By header address: the group contains arrays, and it contains groups.
         let mut seen: HashMap<u64, [bool; 2]> = HashMap::new();
         let mut memory = 0;
         while let Some((path, group, depth)) = waiting.pop() {
@@ -103,7 +96,7 @@ impl FeatureStore {
             memory += PER_GROUP + 2 * path.len() as u64;
             self.budget.admit("list of groups", memory)?;
             let refuse = |error| self.refuse(&path, "", error);
-            // The empty name is the group itself. Opening it reads its header only, which gives the
+            // Opening the empty name, the group itself, reads its header only, which gives the
             // address.
             let (itself, address) = source::first_read(|| group.group(""));
             itself.map_err(refuse)?;
@@ -156,7 +149,7 @@ impl FeatureStore {
         Ok((found, broken, alone))
     }
 
-    /// Returns the group that a link of `group` leads to, or a description of the broken link.
+    /// Returns the group that a link leads to, or a description of the broken link.
     fn target(&self, file: &File, group: &Group, target: &Target) -> Result<Group, String> {
         let (Target::Path(to) | Target::Old(to)) = target else {
             return Err("a link to another file".to_owned());
@@ -169,18 +162,15 @@ impl FeatureStore {
         self.error(path, "", "features of an image", found)
     }
 
-    /// One error for each link that leads to no group of the file.
     pub fn broken(&self) -> &[Error] {
         &self.broken
     }
 
-    /// Names of arrays outside groups.
     pub fn alone(&self) -> &[String] {
         &self.alone
     }
 
-    /// Runs `step` on the array `name` of `path`, limits how much it reads, and turns a panic of
-    /// the library into an error.
+    /// Runs `step`, limits how much it reads, and turns a panic of the library into an error.
     fn step<T>(
         &self,
         path: &str,
@@ -191,7 +181,6 @@ impl FeatureStore {
         source::bounded(self.len, || without_panic(step).unwrap_or_else(panicked))
     }
 
-    /// The path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -201,7 +190,6 @@ impl FeatureStore {
         &self.paths
     }
 
-    /// Returns the sorted names of the arrays of the group `at` of [`paths`](Self::paths).
     pub fn names(&self, at: usize) -> Result<Vec<String>, Error> {
         let path = &self.paths[at];
         let mut names = self.step(path, "", || {
@@ -212,10 +200,6 @@ impl FeatureStore {
     }
 
     /// Reads the array `name` of the group `at`: floats of 16, 32 or 64 bits, or integers.
-    ///
-    /// # Errors
-    /// When it is truncated, not numeric, has more than 2^28 values, or exceeds the memory budget
-    /// of the file.
     pub fn array(&self, at: usize, name: &str) -> Result<Array, Error> {
         self.step(&self.paths[at], name, || self.read(at, name))
     }
@@ -235,7 +219,6 @@ impl FeatureStore {
         }
         let datatype = dataset.datatype().map_err(refuse)?;
         let values = match dataset.dtype().map_err(refuse)? {
-            // An empty array stores no values.
             DType::U8 if count == 0 => Numbers::U8(Vec::new()),
             _ if count == 0 => Numbers::F32(Vec::new()),
             DType::F32 => Numbers::F32(dataset.read_f32().map_err(refuse)?),
@@ -266,8 +249,7 @@ impl FeatureStore {
         Ok(Array { shape, values })
     }
 
-    /// Checks the memory for the array and for decoding it. It may be compressed, or not stored at
-    /// all.
+    /// Checks the memory for the array and for decoding it.
     fn admit(&self, at: usize, name: &str, dataset: &Dataset, shape: &[u64]) -> Result<(), Error> {
         let path = &self.paths[at];
         let refuse = |error| self.refuse(path, name, error);
@@ -300,7 +282,6 @@ impl FeatureStore {
         Ok(())
     }
 
-    /// Returns the attribute `key` of the array `name` if it is a number.
     pub fn number(&self, at: usize, name: &str, key: &str) -> Result<Option<f64>, Error> {
         let path = &self.paths[at];
         self.step(path, name, || {
@@ -320,7 +301,7 @@ impl FeatureStore {
         self.error(path, name, "readable HDF5", error.to_string())
     }
 
-    /// Returns an error about the image `path` and its array `name` (empty: the image as a whole).
+    /// Returns an error about the image `path` and its array `name`, which may be empty.
     pub fn error(
         &self,
         path: &str,
@@ -340,7 +321,7 @@ impl FeatureStore {
     }
 }
 
-/// Returns the function that decodes two bytes of `datatype`, if it is the IEEE float of 16 bits.
+/// Returns the decoder of `datatype` if it is the IEEE float of 16 bits.
 fn half_order(datatype: &Datatype) -> Option<fn([u8; 2]) -> f16> {
     let Datatype::FloatingPoint { size: 2, byte_order, layout } = datatype else { return None };
     let bits = (layout.exponent_location, layout.exponent_size, layout.mantissa_size);

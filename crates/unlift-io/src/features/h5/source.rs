@@ -1,7 +1,7 @@
-//! Reads the bytes of an HDF5 file, with a limit on how many one step may read.
+//! Reads the bytes of an HDF5 file, with a limit per step.
 //!
-//! Nodes of a tree of names may repeat, and a chunk may be listed a million times. Limiting the
-//! bytes that the library reads also limits its time and memory.
+//! Nodes of a tree may repeat, and a chunk may be listed a million times. Limiting the bytes that
+//! the library reads also limits its time and memory.
 
 use std::cell::Cell;
 use std::fs::File;
@@ -14,7 +14,7 @@ use hdf5_pure::{FormatError, Source};
 use crate::error::Error;
 use crate::input;
 
-/// Small reads are served from cached pages, because the library reads a header in a dozen pieces.
+/// The library reads a header in a dozen pieces, so pages are cached.
 const PAGE: u64 = 8 << 10;
 const PAGES: u64 = 64;
 /// The cost of a read besides its bytes.
@@ -30,7 +30,6 @@ thread_local! {
     static LONGEST_NAME: Cell<u64> = const { Cell::new(0) };
 }
 
-/// A file that many threads can read at any offset.
 pub(super) struct Bounded {
     pages: Mutex<Pages>,
     len: u64,
@@ -38,12 +37,11 @@ pub(super) struct Bounded {
 
 struct Pages {
     file: File,
-    /// The number of a page and its bytes, at index number modulo [`PAGES`].
+    /// Page numbers and bytes, at index number modulo [`PAGES`].
     held: Vec<(u64, Vec<u8>)>,
 }
 
 impl Bounded {
-    /// Opens the regular file `path` and returns it with its length.
     pub fn open(path: &Path) -> Result<(Self, u64), Error> {
         let (file, len) = input::open(path)?;
         let held = (0..PAGES).map(|_| (u64::MAX, Vec::new())).collect();
@@ -51,7 +49,6 @@ impl Bounded {
     }
 }
 
-/// Runs `step` with the read limit for a file of length `len`.
 pub(super) fn bounded<T>(len: u64, step: impl FnOnce() -> T) -> T {
     let outer = LEFT.replace(most(len));
     let result = step();
@@ -59,12 +56,10 @@ pub(super) fn bounded<T>(len: u64, step: impl FnOnce() -> T) -> T {
     result
 }
 
-/// The maximum number of bytes that one step may read.
 pub(super) fn most(len: u64) -> u64 {
     len.saturating_mul(MULTIPLE).max(LEAST)
 }
 
-/// Returns true if the current step has used up its read limit.
 pub(super) fn is_spent() -> bool {
     LEFT.get() == 0
 }
@@ -78,7 +73,6 @@ pub(super) fn first_read<T>(step: impl FnOnce() -> T) -> (T, Option<u64>) {
 
 #[cfg(test)]
 thread_local! {
-    /// The cost of all reads of this thread.
     pub(super) static READ_SO_FAR: Cell<u64> = const { Cell::new(0) };
 }
 
@@ -109,9 +103,8 @@ impl Source for Bounded {
 
     fn read_metadata_at(&self, offset: u64, len: usize) -> Result<Vec<u8>, FormatError> {
         let bytes = self.read_exact_at(offset, len)?;
-        // The library copies the name of each entry (40 bytes) of a list, and all entries may share
-        // one long name. So each entry costs as much as the longest name of the heap that was read
-        // before.
+        // The library copies the name of each entry (40 bytes), and all entries may share one long
+        // name. So each entry costs the longest name of the heap read before.
         if bytes.starts_with(b"SNOD") {
             charge(len as u64 / 40 * LONGEST_NAME.get())?;
         } else if !bytes.starts_with(b"TREE") {
@@ -145,7 +138,6 @@ impl Pages {
     fn page(&mut self, number: u64) -> io::Result<&[u8]> {
         let (held, bytes) = &mut self.held[(number % PAGES) as usize];
         if *held != number {
-            // A failed read leaves no page.
             *held = u64::MAX;
             bytes.clear();
             self.file.seek(SeekFrom::Start(number * PAGE))?;

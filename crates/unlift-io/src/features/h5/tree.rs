@@ -1,15 +1,15 @@
-//! Writes the names of a group: a heap with the names, and a tree that finds them.
+//! Writes the names of a group: a heap, and a tree that finds them.
 //!
 //! Source: HDF5 File Format Specification 3.0, III.A, III.B and III.D. Every reader supports this
-//! old form of groups, and finds one name of ten thousand in a few steps.
+//! old form of groups.
 
 use super::messages::{UNDEFINED, pad};
 
-/// Half of the names in a leaf, and half of the children of a node, as the HDF5 library has them.
+/// Half of the names in a leaf, and half of the children of a node, as in the HDF5 library.
 pub(super) const LEAF: u16 = 4;
 pub(super) const NODE: u16 = 16;
 
-/// A name, the address of its object header, and for a group the addresses of its tree and heap.
+/// A name, the address of its object header, and for a group those of its tree and heap.
 pub(super) struct Entry<'a> {
     pub name: &'a str,
     pub header: u64,
@@ -84,7 +84,6 @@ pub(super) fn names(entries: &[Entry<'_>], start: u64) -> (Vec<u8>, [u64; 2]) {
 
 const NODE_BYTES: usize = 24 + (4 * NODE as usize + 1) * 8;
 
-/// Returns a node over `children`, given as address and last name.
 pub(super) fn node(level: u8, children: &[(u64, u64)], lower: u64, siblings: [u64; 2]) -> Vec<u8> {
     let mut bytes = b"TREE\0".to_vec();
     bytes.push(level);

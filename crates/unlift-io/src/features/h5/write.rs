@@ -1,5 +1,3 @@
-//! Writes an HDF5 file as a stream: arrays, then the tree of their names, then the superblock.
-
 use std::collections::BTreeMap;
 use std::io::{self, Seek, SeekFrom, Write};
 
@@ -10,8 +8,7 @@ use crate::atomic::FEATURES_MARK;
 
 const SUPERBLOCK_BYTES: u64 = 96;
 
-/// Returns the superblock of a file of `len` bytes with a root group at these addresses: its
-/// header, and its tree and heap.
+/// Returns the superblock of a file of `len` bytes with its root group at these addresses.
 pub(super) fn superblock(len: u64, header: u64, group: [u64; 2]) -> Vec<u8> {
     let mut bytes = b"\x89HDF\r\n\x1a\n\0\0\0\0\0\x08\x08\0".to_vec();
     bytes.extend(tree::LEAF.to_le_bytes());
@@ -23,24 +20,22 @@ pub(super) fn superblock(len: u64, header: u64, group: [u64; 2]) -> Vec<u8> {
     bytes
 }
 
-/// A member of a group.
 enum Member {
     /// The address of its header.
     Dataset(u64),
     Group(BTreeMap<String, Member>),
 }
 
-/// Writes arrays by path. Only names and addresses stay in memory.
+/// Writes an HDF5 file as a stream: arrays, then the tree of their names, then the superblock.
 ///
-/// The same arrays in the same order give the same bytes.
+/// Only names and addresses stay in memory. The same arrays in the same order give the same bytes.
 pub(crate) struct Writer {
     at: u64,
     root: BTreeMap<String, Member>,
 }
 
 impl Writer {
-    /// Starts a file at the beginning of `out`. The signature is written last, so an unfinished
-    /// file is not valid HDF5.
+    /// Starts a file. The signature is written last, so an unfinished file is not valid HDF5.
     pub fn start(out: &mut impl Write) -> io::Result<Self> {
         out.write_all(&[0; SUPERBLOCK_BYTES as usize])?;
         // HDF5 readers skip it, because nothing refers to it.
@@ -49,8 +44,7 @@ impl Writer {
         Ok(Self { at, root: BTreeMap::new() })
     }
 
-    /// Returns true if the group `path` can be created: it does not exist, and no array is in its
-    /// way.
+    /// Returns true if the group `path` does not exist and no array is in its way.
     pub fn is_free(&self, path: &str) -> bool {
         let mut members = &self.root;
         for name in path.split('/') {
@@ -63,8 +57,7 @@ impl Writer {
         !members.values().any(|member| matches!(member, Member::Dataset(_)))
     }
 
-    /// Writes `array` as the dataset `name` of the group `path`, whose parts are separated by
-    /// slashes.
+    /// Writes `array` as the dataset `name` of the group `path`, with slashes.
     pub fn array(
         &mut self,
         out: &mut impl Write,
@@ -101,7 +94,6 @@ impl Writer {
         out.write_all(bytes)
     }
 
-    /// Writes all groups and the superblock.
     pub fn finish(mut self, out: &mut (impl Write + Seek)) -> io::Result<()> {
         let root = std::mem::take(&mut self.root);
         let (header, group) = self.group(out, &root)?;

@@ -1,4 +1,4 @@
-//! Reads COLMAP's binary files: little-endian, a count and that many records per file.
+//! Reads COLMAP's binary files.
 
 use std::path::Path;
 
@@ -99,7 +99,7 @@ pub fn rigs(path: &Path) -> Result<u64, Error> {
         let n_sensors = bytes.count_u32("sensors", SENSOR_BYTES)?;
         for sensor in 0..n_sensors {
             bytes.skip(SENSOR_BYTES, "sensor")?;
-            // The first sensor is the reference of the rig: it has no pose and no flag for one.
+            // The first sensor is the reference of the rig, without a pose and its flag.
             if sensor > 0 && bytes.u8("pose flag")? != 0 {
                 bytes.skip(7 * 8, "sensor pose")?;
             }

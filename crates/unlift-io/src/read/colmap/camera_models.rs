@@ -1,5 +1,3 @@
-//! The camera models of COLMAP: ids, names and numbers of parameters.
-
 /// A camera model as files store it. Audits of points do not need its projection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CameraModel {

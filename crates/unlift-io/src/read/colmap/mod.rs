@@ -1,7 +1,7 @@
 //! Reads COLMAP models: `cameras`, `images` and `points3D`, as `.bin` or `.txt`.
 //!
-//! Models of COLMAP 3.12 and later also have `rigs` and `frames`. They repeat the poses of
-//! `images`, so they are checked ([`check_rigs`], [`check_frames`]) but not used.
+//! Models of COLMAP 3.12 and later also have `rigs` and `frames`, which repeat the poses of
+//! `images`. They are checked ([`check_rigs`], [`check_frames`]) but not used.
 //!
 //! Source: COLMAP's documentation, "Output Format".
 
@@ -17,7 +17,6 @@ pub use model::{Camera, Image, Points, Tracks};
 
 use crate::error::Error;
 
-/// Returns true if `path` is text, by its extension.
 fn is_text(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("txt"))
 }
@@ -44,12 +43,12 @@ pub fn read_images(path: &Path) -> Result<Vec<Image>, Error> {
     Ok(images)
 }
 
-/// Reads the cameras and images of the model in the folder `model`: the binary form if it exists,
-/// else text, like [`super::open`].
+/// Reads the cameras and images of the model in the folder `model`, in the form that
+/// [`super::open`] reads.
 ///
 /// # Errors
-/// When [`read_cameras`] or [`read_images`] fails, an image names a missing camera, or an image has
-/// no pose.
+/// When [`read_cameras`] or [`read_images`] fails, or an image names a missing camera or has no
+/// pose.
 pub fn read_views(model: &Path) -> Result<(Vec<Camera>, Vec<Image>), Error> {
     let extension = if model.join("images.bin").is_file() { "bin" } else { "txt" };
     let cameras = read_cameras(&model.join(format!("cameras.{extension}")))?;
@@ -118,7 +117,7 @@ fn refuse_repeated(
     Ok(())
 }
 
-/// Sorts points by id. Older COLMAP versions write them in the order of a hash map.
+/// Older COLMAP versions write points in the order of a hash map.
 fn sorted(points: Points) -> Points {
     if points.ids.is_sorted() {
         return points;

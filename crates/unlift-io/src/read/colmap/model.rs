@@ -1,5 +1,3 @@
-//! The parts of a COLMAP model that an audit needs.
-
 use super::camera_models::CameraModel;
 use crate::read::pose::scaled_rotation;
 
@@ -29,8 +27,8 @@ pub struct Image {
     pub camera_id: u32,
     /// The camera center in the world, in units of the model. Not finite if the file has no pose.
     pub center: [f64; 3],
-    /// The rotation from world to camera: a world point `x` is at `rotation (x - center)`. The axes
-    /// of the camera point right, down and forward.
+    /// The rotation from world to camera: a world point `x` is at `rotation (x - center)`. Camera
+    /// axes point right, down and forward.
     pub rotation: [[f64; 3]; 3],
     /// The number of 2D points, triangulated or not.
     pub n_points2d: u64,
@@ -86,9 +84,7 @@ impl Tracks {
 }
 
 /// Returns the center `-R^T t` and the rotation `R` of a camera with the pose `x_cam = R x + t`,
-/// given as a quaternion (w, x, y, z) and `t`.
-///
-/// The result is not finite if an input is not, or the quaternion is zero.
+/// given as a quaternion (w, x, y, z) and `t`. Not finite for a zero quaternion.
 pub(super) fn place(quaternion: [f64; 4], t: [f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
     // Divides by the squared norm, because files contain norms such as 0.9999999.
     let (r, norm2) = scaled_rotation(quaternion);

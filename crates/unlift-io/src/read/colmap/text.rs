@@ -1,5 +1,4 @@
-//! Reads COLMAP's text files: a line per record (two for images), words separated by spaces,
-//! comments with `#`.
+//! Reads COLMAP's text files.
 
 use std::path::Path;
 
@@ -9,7 +8,6 @@ use crate::error::Error;
 use crate::read::columns::coordinates;
 use crate::read::lines::{Lines, number, quoted, words};
 
-/// Parses the next word of the line as a number. Errors name it `what`.
 fn next<'a, T: std::str::FromStr>(
     lines: &Lines,
     words: &mut impl Iterator<Item = &'a [u8]>,
@@ -124,7 +122,6 @@ pub fn frames(path: &Path) -> Result<u64, Error> {
     ids(path, "a frame id", "a rig id")
 }
 
-/// Checks the first two numbers of every line and returns the number of lines.
 fn ids(path: &Path, first: &str, second: &str) -> Result<u64, Error> {
     let mut lines = Lines::open(path)?;
     let mut n = 0;

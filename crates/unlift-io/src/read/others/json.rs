@@ -1,7 +1,5 @@
-//! Reads maps in JSON, distinguished by their keys: OpenSfM, OpenMVG's `sfm_data.json`, Meshroom's
-//! `.sfm`, nerfstudio's `transforms.json`.
-//!
-//! A file is read as a stream: only points and poses stay in memory.
+//! Reads maps in JSON as a stream, distinguished by their keys: OpenSfM, OpenMVG's `sfm_data.json`,
+//! Meshroom's `.sfm`, nerfstudio's `transforms.json`.
 
 use std::fmt;
 use std::io::{self, BufRead, BufReader, Read};
@@ -17,11 +15,7 @@ use crate::read::map_input::Input;
 use crate::read::ply;
 use crate::read::pose::{DOWNWARD, camera};
 
-/// Reads points and cameras. Of several reconstructions, the largest is read.
-///
-/// # Errors
-/// When the file is not JSON, is none of these maps, or the point cloud that nerfstudio's file
-/// names cannot be read.
+/// Reads points and cameras of the largest reconstruction.
 pub fn read(path: &Path) -> Result<Input, Error> {
     let (file, _) = input::open(path)?;
     let mut json = serde_json::Deserializer::from_reader(Strict::new(BufReader::new(file)));
@@ -30,7 +24,6 @@ pub fn read(path: &Path) -> Result<Input, Error> {
         if error.is_io() {
             return Error::read(path, error.into());
         }
-        // The place of the error has the line number already.
         let text = error.to_string();
         let what = text.split(" at line ").next().unwrap_or_default().to_owned();
         let (expected, what) = match error.is_data() {
@@ -70,7 +63,6 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     Ok(found)
 }
 
-/// The supported maps, for error messages.
 const MAPS: &str = "a map of OpenSfM, OpenMVG, Meshroom or nerfstudio";
 
 /// A reader that replaces `NaN` and `Infinity`, which other programs write, by an empty string.
@@ -111,7 +103,6 @@ impl<R: BufRead> Strict<R> {
         Ok(Some(byte))
     }
 
-    /// Skips the remaining `n` letters and returns an empty string instead.
     fn no_number(&mut self, n: usize) -> io::Result<Option<u8>> {
         for _ in 0..n {
             self.bytes.next().transpose()?;
@@ -133,7 +124,7 @@ impl<R: BufRead> Read for Strict<R> {
     }
 }
 
-/// Adds the points of the point cloud that nerfstudio's file at `path` names.
+/// Adds the points of the point cloud that nerfstudio's file names.
 fn with_cloud(path: &Path, found: &mut Input, cloud: Option<PathBuf>) -> Result<(), Error> {
     let Some(cloud) = cloud else {
         let expected = "ply_file_path, a point cloud beside the cameras";
@@ -152,14 +143,12 @@ fn with_cloud(path: &Path, found: &mut Input, cloud: Option<PathBuf>) -> Result<
     Ok(())
 }
 
-/// The content of a file: an object, or OpenSfM's list of objects, of which the one with the most
-/// points is kept.
+/// An object, or OpenSfM's list of objects, of which the one with the most points is kept.
 enum Top {
     One(Object),
     Several(Object, usize),
 }
 
-/// The data that is kept of an object.
 #[derive(Default)]
 struct Object {
     names: Vec<String>,
@@ -169,7 +158,6 @@ struct Object {
 }
 
 impl Object {
-    /// Returns the program that writes objects with such keys.
     fn format(&self) -> Option<&'static str> {
         let has = |name: &str| self.names.iter().any(|its| its == name);
         Some(match () {

@@ -1,4 +1,4 @@
-//! Reads points and cameras of maps of other programs, in COLMAP's conventions.
+//! Reads maps of other programs, in COLMAP's conventions.
 
 pub mod bundler;
 pub mod json;
@@ -16,7 +16,6 @@ const IN_FOLDERS: [&str; 6] = [
     "bundle/bundle.out",
 ];
 
-/// Finds the file of another program's map in the folder `path`.
 pub(super) fn in_folder(path: &Path) -> Option<PathBuf> {
     IN_FOLDERS.map(|name| path.join(name)).into_iter().find(|file| file.is_file())
 }

@@ -1,5 +1,4 @@
-//! Reads VisualSFM's NVM, version 3: models with a line per camera and a line per point, of which
-//! the largest is read.
+//! Reads VisualSFM's NVM, version 3: models with a line per camera and a line per point.
 
 use std::path::Path;
 
@@ -10,7 +9,6 @@ use crate::read::map_input::Input;
 use crate::read::pose::{DOWNWARD, camera, scaled_rotation};
 use crate::read::undeclared::undeclared;
 
-/// Parses the count in the current line.
 fn count(lines: &Lines, what: &str) -> Result<u64, Error> {
     number(lines.line()).ok_or_else(|| lines.error(what, quoted(lines.line())))
 }
@@ -29,9 +27,6 @@ fn pose(lines: &Lines, what: &str) -> Result<([f64; 3], [f64; 3]), Error> {
 }
 
 /// Reads points and cameras of the largest model.
-///
-/// # Errors
-/// When the file is not NVM, or is truncated.
 pub fn read(path: &Path) -> Result<Input, Error> {
     let mut lines = Lines::open(path)?;
     // NVM_V3_R9T, with matrices instead of quaternions, is another format.

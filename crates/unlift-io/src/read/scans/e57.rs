@@ -1,7 +1,7 @@
 //! Reads E57: scans, each in its own frame, which are transformed to the common frame.
 //!
-//! The crate `e57` decodes. Its memory is limited by checking the length of the XML, the number of
-//! points of each scan, and the number of values per byte before it reads.
+//! The crate `e57` decodes. Its memory is limited by checks of the length of the XML, the number of
+//! points, and the number of values per byte.
 //!
 //! Source: ASTM E2807.
 
@@ -24,22 +24,17 @@ use crate::input::{self, Budget};
 use crate::read::map_input::Input;
 use crate::read::pose::scaled_rotation;
 
-/// The size of the header, and the offset of the length of the XML in it.
+/// The size of the header, and the offset of the XML's length.
 const HEAD: usize = 48;
 const XML_LENGTH: usize = 32;
-/// Bytes of memory per byte of XML. The shortest element has four bytes and becomes a node of a
-/// tree.
+/// Bytes of memory per byte of XML. The shortest element has four bytes and becomes a node.
 const TREE: u64 = 32;
-/// The maximum number of bytes that are read before a point is complete. Four packets fit, and each
-/// has values of every field; only damaged files need more.
+/// The maximum number of bytes read per point. Four packets fit, and each has values of every
+/// field; only damaged files need more.
 const AHEAD: u64 = 1 << 18;
-/// Bytes of memory per value, in a list that has grown.
+/// Bytes of memory per value.
 const VALUE: u64 = 32;
 
-/// Reads the points of all scans.
-///
-/// # Errors
-/// When the file is damaged, or would exceed the memory budget of its size.
 pub fn read(path: &Path) -> Result<Input, Error> {
     let damaged = || Error::new(path, "", "an E57 file", "a damaged one");
     without_panic(|| scans(path)).unwrap_or_else(|| Err(damaged()))
@@ -78,8 +73,7 @@ fn scans(path: &Path) -> Result<Input, Error> {
         });
         left.set(AHEAD);
         let fields = Fields::of(cloud);
-        // Raw values, because the crate converts spherical coordinates with functions that differ
-        // between machines.
+        // The crate converts spherical coordinates with functions that differ between machines.
         let points = reader.pointcloud_raw(cloud);
         for values in points.map_err(|error| wrong(path, place(), &error))? {
             let values = values.map_err(|error| wrong(path, place(), &error))?;
@@ -108,8 +102,7 @@ fn check(path: &Path, cloud: &PointCloud, budget: &Budget, place: Place) -> Resu
     budget.admit(place, (8 * AHEAD / least).saturating_mul(VALUE * lists))
 }
 
-/// The indices of the values that contain the position of a point, and of the flags that state if
-/// it is valid.
+/// Indices of the values with the position of a point, and of the flags that it is invalid.
 struct Fields {
     cartesian: Option<[usize; 3]>,
     cartesian_state: Option<usize>,
@@ -149,7 +142,6 @@ impl Fields {
     }
 }
 
-/// A transformation from the frame of a scan to the common frame.
 struct Frame {
     rotation: [[f64; 3]; 3],
     translation: [f64; 3],
@@ -158,13 +150,12 @@ struct Frame {
 const UPRIGHT: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 impl Frame {
-    /// Returns the pose of `cloud` without its rotation.
     fn shifted(cloud: &PointCloud) -> Self {
         let t = cloud.transform.as_ref().map(|pose| &pose.translation);
         Self { rotation: UPRIGHT, translation: t.map_or([0.0; 3], |t| [t.x, t.y, t.z]) }
     }
 
-    /// Returns the pose of `cloud`. Its quaternion may have any norm; `None` if the norm is zero.
+    /// Returns the pose of `cloud`, unless its quaternion is zero.
     fn of(cloud: &PointCloud) -> Option<Self> {
         let shifted = Self::shifted(cloud);
         let Some(pose) = &cloud.transform else { return Some(shifted) };
@@ -182,7 +173,6 @@ impl Frame {
     }
 }
 
-/// The number of bits of a value in the file.
 fn bits(kind: &RecordDataType) -> u64 {
     match kind {
         RecordDataType::Single { .. } => 32,
@@ -194,7 +184,6 @@ fn bits(kind: &RecordDataType) -> u64 {
     }
 }
 
-/// Converts an error of the crate `e57`. Its text includes its causes.
 fn wrong(path: &Path, place: Place, error: &e57::Error) -> Error {
     Error::new(path, place, "an E57 file", error.to_string())
 }

@@ -1,7 +1,7 @@
 //! Reads LAS 1.0 to 1.4, uncompressed.
 //!
-//! This is our own reader: the crate `las` allocates the size that a record after the points
-//! declares, so all headers would have to be checked first, and a position is just three integers.
+//! Our own reader: the crate `las` allocates what records after the points declare, and a position
+//! is just three integers.
 //!
 //! Source: ASPRS, "LAS Specification 1.4 - R15".
 
@@ -14,24 +14,18 @@ use crate::read::lines::quoted;
 use crate::read::map_input::Input;
 use crate::read::undeclared::undeclared;
 
-/// The size in bytes of the common part of all headers, up to scale and offset of positions.
+/// The common part of all headers, up to scale and offset of positions.
 const HEAD: usize = 179;
 /// The offset of the number of points in version 1.4, and the size of its header.
 const COUNT_1_4: usize = 247;
 const HEAD_1_4: usize = 375;
 /// The minimum size of a point in bytes, by point format.
 const LEAST: [u16; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
-/// The header offsets of two offsets: of waveforms (versions 1.3 and 1.4), and of extended records
-/// (1.4).
+/// Header offsets: where waveforms start (1.3, 1.4), and where extended records start (1.4).
 const WAVES: usize = 227;
 const EXTENDED_1_4: usize = 235;
-/// The bits of the point format that are set in compressed files.
 const COMPRESSED: u8 = 0b1100_0000;
 
-/// Reads the positions.
-///
-/// # Errors
-/// When the file is not LAS, is compressed, or is truncated.
 pub fn read(path: &Path) -> Result<Input, Error> {
     let mut bytes = Bytes::open(path)?;
     let mut head = [0; HEAD_1_4];
@@ -105,8 +99,7 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     let end = bytes.at();
     let next = behind.into_iter().filter(|&next| next >= end).min();
     let more = next.map_or(bytes.remaining(), |next| next - end) / u64::from(record);
-    // The position of waveforms in version 1.3 is not read, so data after the points is not a
-    // doubt.
+    // The start of waveforms in version 1.3 is not read, so data after the points is not a doubt.
     let doubts = undeclared(n, more).filter(|_| version.1 != 3).into_iter().collect();
     let (gap, number) = (behind[1].checked_sub(end), long(&head, EXTENDED_1_4 + 8));
     if let Some(gap) = gap.filter(|&gap| number > 0 && gap <= bytes.remaining()) {
@@ -118,7 +111,6 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     Ok(Input { positions, format: "LAS", is_geographic, doubts, ..Input::default() })
 }
 
-/// Statements of records about the coordinate system.
 #[derive(Default)]
 struct System {
     wkt: Option<bool>,
@@ -126,10 +118,8 @@ struct System {
 }
 
 impl System {
-    /// Reads at most `number` records in `left` bytes. Records after the points are `long`.
-    ///
-    /// A truncated record ends the search without an error, because points do not depend on
-    /// records.
+    /// Reads at most `number` records in `left` bytes. Records after the points are `long`. Points
+    /// do not depend on records, so a truncated one is not an error.
     fn look(&mut self, bytes: &mut Bytes, number: u64, left: u64, long: bool) -> Result<(), Error> {
         /// Descriptions of coordinate systems are shorter.
         const LONGEST: u64 = 1 << 20;
@@ -166,13 +156,12 @@ impl System {
         Ok(())
     }
 
-    /// WKT is newer than GeoTIFF keys and has priority.
+    /// WKT is newer than GeoTIFF keys.
     fn is_geographic(&self) -> bool {
         self.wkt.or(self.keys).unwrap_or(false)
     }
 }
 
-/// Returns true if GeoTIFF's key directory states that coordinates are degrees.
 fn is_geographic_by_keys(directory: &[u8]) -> bool {
     const MODEL: u16 = 1024;
     const GEOGRAPHIC_SYSTEM: u16 = 2048;

@@ -1,10 +1,8 @@
-//! LZF, the compression of PCD files: runs of literal bytes, and copies of earlier bytes.
+//! LZF, the compression of PCD files: literal runs, and copies of earlier bytes.
 
-/// The largest control byte of a literal run.
 const LITERAL: u8 = 31;
 
-/// Decompresses `packed` to exactly `n` bytes. Returns `None` if the size differs, or a copy starts
-/// before the output.
+/// Decompresses `packed` to exactly `n` bytes, or returns `None`.
 pub fn unpacked(mut packed: &[u8], n: usize) -> Option<Vec<u8>> {
     let mut out: Vec<u8> = Vec::with_capacity(n);
     while let Some((&control, rest)) = packed.split_first() {
@@ -17,7 +15,7 @@ pub fn unpacked(mut packed: &[u8], n: usize) -> Option<Vec<u8>> {
             packed = rest;
             continue;
         }
-        // Three bits of length. The value seven means that another length byte follows.
+        // The length seven means that another length byte follows.
         let (longer, rest) = match control >> 5 {
             7 => rest.split_first().map(|(&longer, rest)| (usize::from(longer), rest))?,
             _ => (0, rest),
@@ -29,7 +27,7 @@ pub fn unpacked(mut packed: &[u8], n: usize) -> Option<Vec<u8>> {
         if length > n - out.len() {
             return None;
         }
-        // Byte by byte, because a copy may overlap its own output.
+        // A copy may overlap its own output.
         for at in start..start + length {
             out.push(out[at]);
         }

@@ -1,12 +1,11 @@
-//! Reads positions from point clouds of scanners and related programs: LAS, PCD, E57.
+//! Reads positions from point clouds of scanners.
 
 pub mod e57;
 pub mod las;
 mod lzf;
 pub mod pcd;
 
-/// Returns true if a coordinate system in well-known text has coordinates in degrees of longitude
-/// and latitude.
+/// Returns true if a coordinate system in well-known text is in degrees of longitude and latitude.
 fn is_geographic(wkt: &str) -> bool {
     let wkt: String = wkt.chars().filter(|c| !c.is_whitespace()).collect::<String>().to_uppercase();
     // A projected system contains the geographic one that it is based on. A geocentric system is in

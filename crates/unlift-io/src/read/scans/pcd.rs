@@ -1,7 +1,7 @@
-//! Reads PCD files of the Point Cloud Library: `ascii`, `binary` and `binary_compressed`.
+//! Reads PCD files of the Point Cloud Library.
 //!
-//! This is our own reader: the crate `pcd-rs` allocates what the header declares, and does not
-//! support compressed files.
+//! Our own reader: the crate `pcd-rs` allocates what the header declares, and does not support
+//! compression.
 //!
 //! Source: PCL's documentation, "The PCD (Point Cloud Data) file format", version 0.7.
 
@@ -16,16 +16,14 @@ use crate::read::map_input::Input;
 use crate::read::scalar::Scalar;
 use crate::read::undeclared::undeclared;
 
-/// A field: one column, or several with one name.
 #[derive(Clone, Copy, Debug)]
 struct Field {
-    /// The size of a value in bytes.
+    /// Bytes per value.
     size: u64,
-    /// The number of values.
     count: u64,
 }
 
-/// A coordinate: its index among the values of a line, its offset in a binary row, and its type.
+/// A coordinate: its index in a line, its offset in a binary row, and its type.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
     value: u64,
@@ -36,18 +34,14 @@ struct Axis {
 #[derive(Debug)]
 struct Header {
     axes: [Axis; 3],
-    /// The number of values of a point.
+    /// Values per point.
     n_values: u64,
-    /// The size of a point in bytes.
+    /// Bytes per point.
     stride: u64,
     n: u64,
     data: Vec<u8>,
 }
 
-/// Reads the positions.
-///
-/// # Errors
-/// When the file is malformed, has no `x`, `y` and `z`, or is truncated.
 pub fn read(path: &Path) -> Result<Input, Error> {
     let mut lines = Lines::open(path)?;
     let header = header(path, &mut lines)?;
@@ -66,7 +60,6 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     Ok(Input { positions, format, doubts: doubt.into_iter().collect(), ..Input::default() })
 }
 
-/// Parses the header lines up to `DATA`.
 fn header(path: &Path, lines: &mut Lines) -> Result<Header, Error> {
     let (mut names, mut sizes, mut kinds, mut counts) = (Vec::new(), Vec::new(), Vec::new(), None);
     let (mut width, mut height, mut points) = (None, 1, None);
@@ -137,7 +130,7 @@ fn header(path: &Path, lines: &mut Lines) -> Result<Header, Error> {
             let expected = format!("one value of type F, I or U for {name}");
             refuse(&expected, format!("{kind} {} {}", field.size, field.count))
         })?;
-        // The sums cannot overflow, because the totals were checked above.
+        // The totals were checked above.
         let before = &fields[..at];
         let value = before.iter().map(|field| field.count).sum();
         Ok(Axis { value, byte: before.iter().map(bytes).sum(), scalar })
@@ -182,7 +175,7 @@ fn ascii(mut lines: Lines, header: &Header) -> Result<Vec<[f64; 3]>, Error> {
     Ok(positions)
 }
 
-/// Reads the points, and returns how many more points fit into the rest of the file.
+/// Reads the points, and returns how many more fit into the rest of the file.
 fn binary(mut bytes: Bytes, header: &Header) -> Result<(Vec<[f64; 3]>, u64), Error> {
     let (n, stride) = (header.n, header.stride);
     bytes.expect_rows(n, "points", stride)?;
@@ -197,8 +190,7 @@ fn binary(mut bytes: Bytes, header: &Header) -> Result<(Vec<[f64; 3]>, u64), Err
     Ok((positions, if bytes.is_padding()? { 0 } else { more }))
 }
 
-/// Reads compressed points. The decompressed data has all values of the first field, then of the
-/// next one.
+/// The decompressed data has all values of the first field, then of the next one.
 fn compressed(mut bytes: Bytes, header: &Header) -> Result<Vec<[f64; 3]>, Error> {
     let packed = u64::from(bytes.u32("the size of the compressed points")?);
     let size = u64::from(bytes.u32("the size of the points")?);
