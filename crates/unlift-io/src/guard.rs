@@ -1,3 +1,5 @@
+//! Turns panics of decoders into errors.
+
 use unlift::guard::caught;
 
 /// Runs `step` and returns `None` if it panics, without a message.

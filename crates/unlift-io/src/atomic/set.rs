@@ -1,3 +1,5 @@
+//! Several output files in one folder.
+
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};

@@ -1,3 +1,5 @@
+//! Line segments as OBJ.
+
 use super::{Segment, finite};
 use crate::Error;
 use crate::atomic::{self, Access, CLOUD_COMMENT};

@@ -1,3 +1,5 @@
+//! Point clouds as binary PLY.
+
 use super::{error_color, finite};
 use crate::Error;
 use crate::atomic::{self, Access, CLOUD_COMMENT};

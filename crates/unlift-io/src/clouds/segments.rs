@@ -1,3 +1,5 @@
+//! Segments of lines and rays inside a box.
+
 use unlift::geometry::frame::Bounds;
 use unlift::released::{Obfuscation, Released};
 

@@ -1,3 +1,5 @@
+//! The features of one image.
+
 use std::path::{Path, PathBuf};
 
 use half::f16;

@@ -1,3 +1,5 @@
+//! Writes features in hloc's layout.
+
 use std::io::{self, Cursor, Seek, Write};
 use std::path::Path;
 

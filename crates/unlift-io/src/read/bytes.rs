@@ -1,3 +1,5 @@
+//! Reads binary files.
+
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};

@@ -1,3 +1,5 @@
+//! Columns and coordinates of points.
+
 use super::lines::{Lines, number, quoted};
 use super::scalar::Scalar;
 use crate::error::Error;

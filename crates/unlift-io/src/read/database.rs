@@ -1,3 +1,5 @@
+//! Descriptors of points: means over their observations in images.
+
 use std::collections::HashMap;
 use std::path::Path;
 

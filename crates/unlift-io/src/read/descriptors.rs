@@ -1,3 +1,5 @@
+//! Reads descriptors of the points of a map.
+
 use std::collections::HashMap;
 use std::fs::File;
 use std::io::Read;

@@ -1,3 +1,5 @@
+//! Reads text files line by line.
+
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};

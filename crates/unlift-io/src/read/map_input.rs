@@ -1,3 +1,5 @@
+//! The result of all readers of maps.
+
 use std::path::PathBuf;
 
 use crate::seen::Seen;

@@ -1,3 +1,5 @@
+//! Finds the COLMAP model of a folder.
+
 use std::fs;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};

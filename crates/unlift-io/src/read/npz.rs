@@ -1,3 +1,5 @@
+//! Reads positions from NumPy archives.
+
 use std::io::{self, BufReader, Read, Seek};
 use std::path::Path;
 

@@ -1,3 +1,5 @@
+//! Camera poses.
+
 /// Returns the center `-R^T t` of a camera with the pose `x_cam = R x + t`, and the direction
 /// `up_cam` of its frame in the world.
 pub fn camera(

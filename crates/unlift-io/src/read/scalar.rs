@@ -1,3 +1,5 @@
+//! Numeric types of files.
+
 use half::f16;
 
 /// The type of a number in a file.

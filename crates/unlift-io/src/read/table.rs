@@ -1,3 +1,5 @@
+//! Reads text tables with a point per line.
+
 use std::path::Path;
 
 use super::columns::{axes, coordinate, is_called, plain};

@@ -1,3 +1,5 @@
+//! Detects files with more points than they declare.
+
 /// Returns a doubt if `more` points follow the `n` declared ones.
 pub(crate) fn undeclared(n: u64, more: u64) -> Option<String> {
     (more > 0).then(|| {

@@ -1,3 +1,5 @@
+//! Converts columns of files to the types that are used here.
+
 use crate::Error;
 use arrow_array::cast::AsArray;
 use arrow_array::types::{

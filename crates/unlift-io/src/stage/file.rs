@@ -1,3 +1,5 @@
+//! Opens and decodes a Parquet file.
+
 use super::footer;
 use super::header::KEY;
 use crate::Error;

@@ -1,3 +1,5 @@
+//! Writes many images to one stage file.
+
 use super::header::{Kind, to_text};
 use super::images::{IMAGE, IMAGE_META};
 use super::write::{Written, properties, to_io, writer};

@@ -1,3 +1,5 @@
+//! Reads many images from one stage file.
+
 use super::header::{Kind, Meta};
 use super::neighborhoods::neighborhoods_of;
 use super::pages::Stay;

@@ -1,3 +1,5 @@
+//! The manifest of a folder of parts.
+
 use super::header::to_text;
 use crate::{Error, input};
 use serde_json::{Map, Value, json};

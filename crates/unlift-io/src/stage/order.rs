@@ -1,3 +1,5 @@
+//! Sorts rows that state their slot or point.
+
 use crate::Error;
 use std::path::Path;
 

@@ -1,3 +1,5 @@
+//! Reads one Parquet file or a folder of parts.
+
 use super::file::{self, ParquetFile};
 use super::manifest::Manifest;
 use super::pages::{self, Stay};

@@ -1,3 +1,5 @@
+//! Describes a stage file without reading its columns.
+
 use super::header::Kind;
 use super::table::Table;
 use crate::Error;

@@ -1,3 +1,5 @@
+//! Recovered points: a position or a reason per slot.
+
 use super::column::{Batch, Type, coordinate_names};
 use super::header::{Kind, insert_about, new_meta};
 use super::order::permutation;

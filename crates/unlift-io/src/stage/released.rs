@@ -1,3 +1,5 @@
+//! Released maps: records by family, and descriptors.
+
 use super::column::{Batch, Type, coordinate_names};
 use super::header::{Kind, insert_fingerprint, new_meta};
 use super::table::Table;

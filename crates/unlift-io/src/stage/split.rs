@@ -1,3 +1,5 @@
+//! Splits a stage file into a folder of parts.
+
 use super::header::{Kind, Meta};
 use super::manifest::{MANIFEST, Manifest, Part};
 use super::pages::Stay;

@@ -1,3 +1,5 @@
+//! Writes columns to a Parquet file.
+
 use super::header::to_text;
 use crate::Error;
 use crate::atomic::{self, Access};

@@ -1,3 +1,5 @@
+//! Writes HDF5 files.
+
 use std::collections::BTreeMap;
 use std::io::{self, Seek, SeekFrom, Write};
 

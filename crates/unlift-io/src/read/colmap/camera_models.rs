@@ -1,3 +1,5 @@
+//! The camera models of COLMAP.
+
 /// A camera model as files store it. Audits of points do not need its projection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CameraModel {

@@ -1,3 +1,5 @@
+//! The parts of a COLMAP model that an audit needs.
+
 use super::camera_models::CameraModel;
 use crate::read::pose::scaled_rotation;
 
