@@ -158,7 +158,7 @@ impl Database {
 
 fn refuse(path: &Path, place: &str, error: &rusqlite::Error) -> Error {
     let found = match error.sqlite_error_code() {
-        Some(ErrorCode::OperationInterrupted) => "a query without end".to_owned(),
+        Some(ErrorCode::OperationInterrupted) => "a query that does not end".to_owned(),
         _ => error.to_string(),
     };
     Error::new(path, place, "a COLMAP database", found)
@@ -279,7 +279,7 @@ mod tests {
         };
         assert_eq!(count(1000).unwrap(), 1000);
         let error = refuse(Path::new("f"), "", &count(i64::MAX).unwrap_err());
-        let line = "f: expected a COLMAP database, found a query without end";
+        let line = "f: expected a COLMAP database, found a query that does not end";
         assert_eq!(error.to_string(), line);
         assert!((0..300).all(|_| count(1000).is_ok()));
     }

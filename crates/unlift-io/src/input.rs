@@ -77,7 +77,7 @@ impl Budget {
         self.admit(place.clone(), bytes)?;
         let mut room = Vec::new();
         let there = usize::try_from(n).is_ok_and(|n| room.try_reserve_exact(n).is_ok());
-        let expected = "as much as fits into memory";
+        let expected = "data that fits into memory";
         there.then_some(room).ok_or_else(|| Error::new(&self.path, place, expected, size(bytes)))
     }
 

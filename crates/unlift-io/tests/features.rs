@@ -107,7 +107,7 @@ fn one_image_is_a_file_of_its_own() {
     fs::write(&path, encode(&made("a/b.jpg", 5), &path).unwrap()).unwrap();
     assert_eq!(decode(&path, "a/b.jpg").unwrap(), made("a/b.jpg", 5));
     let error = decode(&path, "c.jpg").unwrap_err().to_string();
-    assert!(error.ends_with("part: expected the image c.jpg alone, found 1 images"), "{error}");
+    assert!(error.ends_with("part: expected only the image c.jpg, found 1 images"), "{error}");
 }
 
 #[test]
@@ -116,7 +116,7 @@ fn names_and_columns_that_do_not_fit_are_refused() {
     let line = |image: &ImageFeatures| encode(image, path).unwrap_err().to_string();
     assert_eq!(
         line(&made("a//b", 1)),
-        "f.h5: image \"a//b\": expected a name of parts that are not empty, . or .., found \"a//b\""
+        "f.h5: image \"a//b\": expected a name whose parts are not empty, . or .., found \"a//b\""
     );
     let short = ImageFeatures { scores: Some(vec![1.0]), ..made("a", 2) };
     assert_eq!(line(&short), "f.h5: image \"a\", scores: expected 2, one per keypoint, found 1");

@@ -50,7 +50,7 @@ fn maps_are_read_as_their_makers_meant_them() {
         ("f07-nvm-names/space.nvm", 300, 2, 1e-4, ""),
         ("f07-nvm-names/tab.nvm", 300, 2, 1e-4, ""),
         ("f08-nvm-models/small_first.nvm", 300, 2, 1e-4, "the largest of 2 models (300 points)"),
-        ("f08-nvm-models/unplaced_last.nvm", 300, 2, 1e-4, "2 photos without a place"),
+        ("f08-nvm-models/unplaced_last.nvm", 300, 2, 1e-4, "2 photos without a pose"),
         ("f09-ply-lists/faces_first.ply", 300, 0, 1e-4, ""),
         ("f09-ply-lists/views.ply", 300, 0, 1e-4, ""),
         ("f09-ply-lists/views_ascii.ply", 300, 0, 1e-4, ""),
@@ -89,7 +89,7 @@ fn features_are_taken_or_told_in_one_line() {
     let Some(field) = field().map(|field| field.join("f15-other-h5")) else { return };
     for (name, found) in [
         ("matches.h5", "found matches of pairs of images"),
-        ("keypoints.h5", "found arrays in no group"),
+        ("keypoints.h5", "found arrays outside any group"),
     ] {
         let line = FeatureSource::open(&field.join(name)).err().unwrap().to_string();
         assert!(line.contains("expected a group per image") && line.ends_with(found), "{line}");

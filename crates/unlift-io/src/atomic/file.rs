@@ -62,7 +62,7 @@ impl OutputFile {
         }
         let folder = parent_of(&target);
         if !folder.is_dir() {
-            return Err(Error::new(folder, "", "a folder to write in", "none"));
+            return Err(Error::new(folder, "", "an existing folder", "none"));
         }
         Ok(target)
     }

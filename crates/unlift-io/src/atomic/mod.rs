@@ -76,7 +76,7 @@ fn resolved(path: &Path) -> Result<PathBuf, Error> {
     }
     fs::canonicalize(path).map_err(|source| match fs::read_link(path) {
         Ok(to) if source.kind() == io::ErrorKind::NotFound => {
-            let found = format!("a link to {}, which is not there", to.display());
+            let found = format!("a link to {}, which does not exist", to.display());
             Error::new(path, "", "a file, a folder, or nothing", found)
         }
         _ => Error::write(path, source),

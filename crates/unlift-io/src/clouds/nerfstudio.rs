@@ -34,10 +34,10 @@ pub fn write_transforms(path: &Path, cameras: &[Camera], images: &[Image]) -> Re
         let camera =
             camera.ok_or_else(|| wrong("a camera", format!("no camera {}", image.camera_id)))?;
         let (kind, mut frame) = lens(camera)
-            .ok_or_else(|| wrong("a lens that nerfstudio has", camera.model.name.to_owned()))?;
+            .ok_or_else(|| wrong("a camera model of nerfstudio", camera.model.name.to_owned()))?;
         let known = *model.get_or_insert(kind);
         if known != kind {
-            return Err(wrong(&format!("one kind of lens, {known}"), kind.to_owned()));
+            return Err(wrong(&format!("one camera model, {known}"), kind.to_owned()));
         }
         let row = |c: usize| {
             let r = &image.rotation;
@@ -49,7 +49,7 @@ pub fn write_transforms(path: &Path, cameras: &[Camera], images: &[Image]) -> Re
         frames.push(Value::Object(frame));
     }
     let Some(model) = model else {
-        return Err(Error::new(path, "", "images, which nerfstudio needs", "none"));
+        return Err(Error::new(path, "", "at least one image", "none"));
     };
     let document = json!({
         "unlift": env!("CARGO_PKG_VERSION"),
@@ -144,17 +144,17 @@ mod tests {
         let fov = camera(1, b"FOV", &[1.0; 5]);
         assert_eq!(
             line(&[fov], &[image(7, 1)]),
-            "t.json: image 7: expected a lens that nerfstudio has, found FOV"
+            "t.json: image 7: expected a camera model of nerfstudio, found FOV"
         );
         let two = [camera(1, b"PINHOLE", &[1.0; 4]), camera(2, b"OPENCV_FISHEYE", &[1.0; 8])];
         assert_eq!(
             line(&two, &[image(1, 1), image(2, 2)]),
-            "t.json: image 2: expected one kind of lens, OPENCV, found OPENCV_FISHEYE"
+            "t.json: image 2: expected one camera model, OPENCV, found OPENCV_FISHEYE"
         );
         assert_eq!(
             line(&two, &[image(1, 3)]),
             "t.json: image 1: expected a camera, found no camera 3"
         );
-        assert_eq!(line(&two, &[]), "t.json: expected images, which nerfstudio needs, found none");
+        assert_eq!(line(&two, &[]), "t.json: expected at least one image, found none");
     }
 }

@@ -21,14 +21,14 @@ impl Hloc {
             Err(Error::new(path, "", expected, found))
         };
         if store.paths().is_empty() && !store.alone().is_empty() {
-            return wrong("arrays in no group");
+            return wrong("arrays outside any group");
         }
         let first = if store.paths().is_empty() { Vec::new() } else { store.names(0)? };
         let has = |name: &str| first.iter().any(|its| its == name);
         match () {
             () if has("keypoints") => Ok(Self(store)),
             () if has("matches0") || has("matches") => wrong("matches of pairs of images"),
-            () if has("global_descriptor") => wrong("global descriptors, of whole images"),
+            () if has("global_descriptor") => wrong("global descriptors of whole images"),
             () => Ok(Self(store)),
         }
     }
@@ -60,7 +60,7 @@ pub fn decode(path: &Path, name: &str) -> Result<ImageFeatures, Error> {
         [only] if only == name => image(&store, 0),
         other => {
             let found = format!("{} images", other.len());
-            Err(Error::new(path, "", format!("the image {name} alone"), found))
+            Err(Error::new(path, "", format!("only the image {name}"), found))
         }
     }
 }
@@ -130,7 +130,7 @@ fn keypoints(array: &Array) -> Result<Vec<[f64; 2]>, Wrong> {
     match rows.iter().position(|row| !row.iter().all(|value| value.is_finite())) {
         None => Ok(rows),
         Some(at) => Err((
-            format!("a finite place in row {at}"),
+            format!("finite coordinates in row {at}"),
             format!("({}, {})", rows[at][0], rows[at][1]),
         )),
     }
@@ -157,7 +157,7 @@ fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
         Numbers::F32(values) => floats(values),
         Numbers::F64(doubles) => floats(doubles.iter().map(|&value| value as f32).collect()),
         Numbers::I64(_) => {
-            return Err(("floats, or bytes without sign".to_owned(), "other integers".to_owned()));
+            return Err(("floats, or unsigned bytes".to_owned(), "other integers".to_owned()));
         }
     };
     Descriptors::try_new(values, dim)

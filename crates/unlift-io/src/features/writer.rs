@@ -86,7 +86,7 @@ fn check(writer: &Writer, image: &ImageFeatures, path: &Path) -> Result<(), Erro
     let place = || format!("image {}", quoted(image.name.as_bytes()));
     let parts = || image.name.split('/');
     if parts().any(|part| part.is_empty() || part == "." || part == ".." || part.contains('\0')) {
-        let expected = "a name of parts that are not empty, . or ..";
+        let expected = "a name whose parts are not empty, . or ..";
         return Err(Error::new(path, place(), expected, quoted(image.name.as_bytes())));
     }
     let deep = parts().count();
@@ -95,7 +95,7 @@ fn check(writer: &Writer, image: &ImageFeatures, path: &Path) -> Result<(), Erro
         return Err(Error::new(path, place(), expected, deep.to_string()));
     }
     if !writer.is_free(&image.name) {
-        let found = "one that is there already, or within another image";
+        let found = "one that exists already or is inside another image";
         return Err(Error::new(path, place(), "a new name", found));
     }
     let n = image.keypoints.len();

@@ -39,7 +39,7 @@ impl Bytes {
             return Ok(false);
         }
         let mut rest = vec![0; n as usize];
-        self.fill(&mut rest, "what follows the points")?;
+        self.fill(&mut rest, "data after the points")?;
         Ok(rest.iter().all(|&byte| byte == 0))
     }
 

@@ -98,9 +98,7 @@ impl Input {
             notes.push(format!("{n} of {of} points are at exactly one place, {place:?}"));
         }
         if self.is_geographic {
-            self.doubts.push(
-                "coordinates are degrees, which are no lengths: project them first".to_owned(),
-            );
+            self.doubts.push("coordinates are degrees, not lengths: project them first".to_owned());
         }
         notes.append(&mut self.notes);
         self.notes = notes;

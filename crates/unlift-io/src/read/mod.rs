@@ -71,12 +71,12 @@ const EXPECTED: &str = "a COLMAP folder, a map of OpenSfM, OpenMVG, Meshroom, ne
 fn not_read(extension: &str) -> String {
     let more = match extension {
         "" => return "a file without extension".to_owned(),
-        "laz" => " (pdal translate IN.laz OUT.las makes one that is read)",
+        "laz" => " (convert it: pdal translate IN.laz OUT.las)",
         "h5" | "hdf5" => {
-            " (features of images: unlift audit images, or --descriptors of a COLMAP model)"
+            " (features of images: use unlift audit images, or --descriptors with a COLMAP model)"
         }
         "spz" | "ksplat" | "sog" => " (export it as .ply)",
-        "abc" => " (in Meshroom, ConvertSfMFormat makes an .sfm)",
+        "abc" => " (convert it to .sfm with ConvertSfMFormat of Meshroom)",
         _ => "",
     };
     format!("a .{extension} file{more}")
@@ -97,7 +97,7 @@ fn check_fetched(path: &Path) -> Result<(), Error> {
         .read_to_end(&mut head)
         .map_err(|error| Error::read(path, error))?;
     if head == POINTER {
-        let found = "a pointer of Git LFS (git lfs pull fetches the file)";
+        let found = "a pointer of Git LFS (run git lfs pull)";
         return Err(Error::new(path, "", "a map", found));
     }
     Ok(())
@@ -137,7 +137,7 @@ fn colmap_points(path: &Path) -> Result<Input, Error> {
         positions: points.positions,
         ids: points.ids,
         format: "COLMAP points",
-        notes: vec!["camera centers: give the folder of the model to have them".to_owned()],
+        notes: vec!["camera centers: not read (give the folder of the model)".to_owned()],
         ..Input::default()
     })
 }
@@ -205,9 +205,7 @@ fn colmap_model(model: &Model) -> Result<Input, Error> {
     if model.points.extension().is_some_and(|extension| extension == "ply") {
         let points = ply::read(&model.points)?;
         (input.positions, input.format) = (points.positions, points.format);
-        input
-            .notes
-            .push("points3D.ply: read, as there are no points3D.bin and points3D.txt".to_owned());
+        input.notes.push("points3D.ply: read (no points3D.bin, no points3D.txt)".to_owned());
         return Ok(input);
     }
     let points = colmap::read_points(&model.points, false)?;

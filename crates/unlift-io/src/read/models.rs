@@ -98,7 +98,7 @@ impl Candidate {
 
     fn model(&self, mut notes: Vec<String>) -> Model {
         if self.extension == "bin" && self.folder.join("points3D.txt").is_file() {
-            notes.insert(0, "points3D.txt: the binary form beside it was read".to_owned());
+            notes.insert(0, "points3D.txt: not read, because points3D.bin exists".to_owned());
         }
         let Self { folder, extension, points, .. } = self;
         Model { folder: folder.clone(), extension, points: points.clone(), notes }

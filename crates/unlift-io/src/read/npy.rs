@@ -74,9 +74,9 @@ pub(super) fn of_points(bytes: &mut Bytes, format: &'static str) -> Result<Input
         let is_numbered = |from: usize| firsts().all(|(row, x)| x == (row + from) as f64);
         if found.positions.len() >= TELLING && (is_numbered(0) || is_numbered(1)) {
             let expected = "x, y and z in the first columns";
-            return Err(bytes.error(expected, "the number of the row"));
+            return Err(bytes.error(expected, "the row number"));
         }
-        found.notes.push(format!("the first 3 of {columns} columns are taken for x, y and z"));
+        found.notes.push(format!("the first 3 of {columns} columns are read as x, y and z"));
     }
     Ok(found)
 }

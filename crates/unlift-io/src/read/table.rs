@@ -130,7 +130,7 @@ pub fn read(path: &Path) -> Result<Option<Input>, Error> {
 fn check_count(lines: &Lines, announced: Option<(u64, u64)>, n: u64) -> Result<(), Error> {
     match announced {
         Some((of, before)) if n - before != of => {
-            let expected = format!("{of} points, as the line before them says");
+            let expected = format!("{of} points, as declared in the line before them");
             Err(lines.error(expected, format!("{} up to here", n - before)))
         }
         _ => Ok(()),
@@ -187,7 +187,7 @@ impl Columns {
             Some((comment, names)) if !names.iter().any(|name| is_quantity(name)) => {
                 let what = quoted(comment);
                 let doubt = format!(
-                    "columns: the first three are taken for x, y and z, and the comment {what} for no names"
+                    "columns: the first three are read as x, y and z, because the comment {what} has no known names"
                 );
                 Ok(Self { doubt: Some(doubt), ..FIRST })
             }
@@ -335,7 +335,7 @@ impl Form {
         let numbered = self.n >= TELLING && self.numbered.contains(&true) && !self.colmap;
         numbered.then_some((
             "x, y and z first, or a line that names the columns",
-            "the number of the row before them",
+            "the row number in the first column",
         ))
     }
 }

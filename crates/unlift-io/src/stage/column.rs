@@ -243,7 +243,7 @@ impl<'a> Batch<'a> {
         let exact = (0..self.len()).map(|row| (row, values(row))).map(|(row, x)| {
             match x as f64 as i128 == x {
                 true => Ok(x as f64),
-                false => Err(self.wrong(name, row, "a number that a double holds", x.to_string())),
+                false => Err(self.wrong(name, row, "a number that is exact in f64", x.to_string())),
             }
         });
         exact.collect()

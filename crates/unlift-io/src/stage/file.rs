@@ -52,7 +52,7 @@ impl ParquetFile {
         let n_rows = match u64::try_from(footer.num_rows()) {
             Ok(n_rows) if n_rows <= most && in_groups == Some(n_rows) => n_rows,
             Ok(n_rows) if n_rows <= most => {
-                let expected = format!("row groups of {n_rows} rows, as its footer says");
+                let expected = format!("row groups of {n_rows} rows, as declared in its footer");
                 let found = in_groups.map_or("others".to_owned(), |n| n.to_string());
                 return Err(Error::new(path, "", expected, found));
             }
@@ -156,7 +156,7 @@ impl Batches {
             Some(batch) => self.decoded += batch.num_rows() as u64,
             None if self.decoded == self.n_rows => {}
             None => {
-                let expected = format!("{} rows, as its footer says", self.n_rows);
+                let expected = format!("{} rows, as declared in its footer", self.n_rows);
                 return Err(Error::new(&self.path, "", expected, self.decoded.to_string()));
             }
         }

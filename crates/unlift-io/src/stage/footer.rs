@@ -94,7 +94,9 @@ fn schema(walk: &mut Walk<'_>, n: u64) -> Result<(), Wrong> {
             Ok(0) => {}
             Ok(children) if children <= left => open.push(children),
             _ => {
-                let found = format!("an element of {children} where {left} follow in the schema");
+                let found = format!(
+                    "a schema element with {children} children where {left} elements follow"
+                );
                 return Err(Wrong::Content(found));
             }
         }

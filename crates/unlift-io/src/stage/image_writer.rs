@@ -135,7 +135,7 @@ impl<'a> ImageWriter<'a> {
                 started.writer.write(&batch).map_err(|error| failed(&self.path, error))
             }
             _ => {
-                let expected = "the same family and kind of descriptors as of the first image";
+                let expected = "the family and type of descriptors of the first image";
                 Err(Error::new(&self.path, format!("image {name}"), expected, "others"))
             }
         }

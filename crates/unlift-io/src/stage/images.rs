@@ -88,7 +88,7 @@ impl<'a> ImageFile<'a> {
         name.hash(&mut hasher);
         if !self.seen.insert(hasher.finish()) {
             let found = format!("{name} again");
-            return Err(self.wrong("the rows of an image together", found));
+            return Err(self.wrong("contiguous rows of each image", found));
         }
         let meta_text = self.meta_text(&first)?;
         let meta = self.whole.meta().of_image(meta_text.as_deref());

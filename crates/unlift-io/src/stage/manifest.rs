@@ -81,7 +81,7 @@ impl Manifest {
         }
         match found.difference(&known).next() {
             Some(other) => {
-                wrong(format!("the parts of {MANIFEST} alone"), format!("{} too", other.display()))
+                wrong(format!("only the parts of {MANIFEST}"), format!("also {}", other.display()))
             }
             None => Ok(()),
         }
@@ -95,7 +95,7 @@ impl Manifest {
     ) -> Result<(), Error> {
         let name = path.file_name().unwrap_or_default();
         let Some(part) = self.parts.get(at).filter(|part| Path::new(&part.file) == name) else {
-            return Err(Error::new(path, "", "parts in the order of their names", MANIFEST));
+            return Err(Error::new(path, "", "parts in the order of their names", "another order"));
         };
         if (part.n_rows, part.n_bytes) == found {
             return Ok(());

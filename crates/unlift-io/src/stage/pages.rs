@@ -145,7 +145,9 @@ impl Column<'_> {
                 u64::try_from(header.stored),
                 u64::try_from(header.n_values),
             ) else {
-                return Err(self.wrong("pages with sizes", format!("one without at byte {at}")));
+                return Err(
+                    self.wrong("pages with sizes", format!("one without sizes at byte {at}"))
+                );
             };
             if stored > end - at {
                 let expected = format!("a page of at most {} bytes at byte {at}", end - at);
@@ -167,7 +169,7 @@ impl Column<'_> {
             if descriptor.physical_type() == Type::BYTE_ARRAY && !OF_TEXT.contains(&header.encoding)
             {
                 let found = format!("encoding {} of Parquet", header.encoding);
-                return Err(self.wrong("text as it is, or by a dictionary", found));
+                return Err(self.wrong("text in plain or dictionary encoding", found));
             }
             at += stored;
         }

@@ -50,8 +50,8 @@ impl<'a> Parts<'a> {
             }
             match (file.meta_text(), &meta_text) {
                 (Some(found), Some(expected)) if found != expected => {
-                    let expected = "that of the other parts";
-                    return Err(Error::new(file.path(), "metadata unlift", expected, "another"));
+                    let expected = "the metadata of the other parts";
+                    return Err(Error::new(file.path(), "metadata unlift", expected, "others"));
                 }
                 (Some(found), None) => meta_text = Some(found.to_owned()),
                 _ => {}

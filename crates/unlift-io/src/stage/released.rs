@@ -151,7 +151,8 @@ pub(super) fn released_of<const D: usize>(table: &Table<'_>) -> Result<Released<
     let found = released.fingerprint();
     match meta.fingerprint()? {
         Some(said) if said != found => {
-            let expected = format!("that of the content, {found} (or none: the file was changed)");
+            let expected =
+                format!("the fingerprint of the content, {found}, or none (the file was changed)");
             Err(meta.wrong("fingerprint", expected))
         }
         _ => Ok(released),

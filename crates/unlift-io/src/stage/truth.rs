@@ -120,7 +120,7 @@ pub(super) fn truth_of<const D: usize>(table: &Table<'_>) -> Result<(Original<D>
     })?;
     let Rows { originals, positions, slots, hidden, axes, descriptor_rows, dropped } = rows;
     if let Some(&slot) = slots.iter().find(|&&slot| slot as usize >= slots.len()) {
-        let expected = format!("slots below {}, as many have one", slots.len());
+        let expected = format!("slots below {}, the number of slots", slots.len());
         return Err(Error::new(path, "column slot", expected, slot.to_string()));
     }
     let order = permutation(path, "slot", &slots)?;

@@ -150,7 +150,7 @@ pub fn paths() -> Vec<Row> {
         row("folder with a file's name", vec![("a.ply/", vec![])], "a.ply",
             "a.ply: expected points3D.bin or points3D.txt in it, or in sparse, model, models, colmap/sparse or a numbered folder of these, found none"),
         alone("unknown extension", "a.laz", "LASF",
-            "a.laz: expected a COLMAP folder, a map of OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .asc, .pts, .npy, .npz, .las, .pcd, .e57 or .splat file, found a .laz file (pdal translate IN.laz OUT.las makes one that is read)"),
+            "a.laz: expected a COLMAP folder, a map of OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .asc, .pts, .npy, .npz, .las, .pcd, .e57 or .splat file, found a .laz file (convert it: pdal translate IN.laz OUT.las)"),
         alone("no extension", "cloud", "1 2 3",
             "cloud: expected a COLMAP folder, a map of OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .asc, .pts, .npy, .npz, .las, .pcd, .e57 or .splat file, found a file without extension"),
         alone("images given by themselves", "images.bin", "",

@@ -47,7 +47,7 @@ fn comments_name_the_columns_of_a_table() {
     // The comment has as many words as columns but no known names: read with a doubt.
     let input = open("a.xyz", table("# my first room\n", plain));
     assert!(
-        input.doubts[0].starts_with("columns: the first three are taken"),
+        input.doubts[0].starts_with("columns: the first three are read as"),
         "{:?}",
         input.doubts
     );
@@ -74,7 +74,7 @@ fn a_count_before_points_is_that() {
     let line = refused("a.pts", table("4\n", row));
     assert_eq!(
         line,
-        "a.pts:4: expected 4 points, as the line before them says, found 3 up to here"
+        "a.pts:4: expected 4 points, as declared in the line before them, found 3 up to here"
     );
 }
 
@@ -98,7 +98,7 @@ fn rows_that_are_no_points_are_refused() {
     }
     let numbered: String = (1..=20).map(|at| format!("{at} 0.5 {at} 3\n")).collect();
     let line = refused("a.xyz", numbered);
-    assert!(line.ends_with("found the number of the row before them"), "{line}");
+    assert!(line.ends_with("found the row number in the first column"), "{line}");
 }
 
 #[test]
@@ -296,7 +296,7 @@ fn arrays_may_have_more_columns_or_names() {
     let six = bytes(POINTS.iter().flat_map(|&[x, y, z]| [x, y, z, 1.0, 2.0, 3.0]), f4);
     let input = open("a.npy", npy("'<f4'", "(3, 6)", &six));
     assert_eq!(input.positions, POINTS);
-    assert_eq!(input.notes, ["the first 3 of 6 columns are taken for x, y and z"]);
+    assert_eq!(input.notes, ["the first 3 of 6 columns are read as x, y and z"]);
     let halves = bytes([0.5, 1.0, 2.0], |x| f16::from_f64(x).to_le_bytes());
     assert_eq!(open("a.npy", npy("'<f2'", "(1, 3)", &halves)).positions, [[0.5, 1.0, 2.0]]);
     let whole = bytes([-5.0, 1e6, 2.0], |x| (x as i64).to_le_bytes());
@@ -320,10 +320,7 @@ fn arrays_may_have_more_columns_or_names() {
         POINTS.iter().flat_map(|point| [vec![1, 0, 0, 0], bytes(*point, f4)].concat()).collect();
     assert_eq!(open("a.npy", npy(descr, "(3,)", &rows)).positions, POINTS);
     let numbered = bytes((0..10).flat_map(|row| [f64::from(row), 5.0, 6.0, 7.0]), f4);
-    assert!(
-        refused("a.npy", npy("'<f4'", "(10, 4)", &numbered))
-            .ends_with("found the number of the row")
-    );
+    assert!(refused("a.npy", npy("'<f4'", "(10, 4)", &numbered)).ends_with("found the row number"));
     assert!(
         refused("a.npy", npy("[('a', '<f4')]", "(1,)", &[0; 4]))
             .contains("fields of numbers called x, y and z")
@@ -462,7 +459,7 @@ fn json_of_others_is_told() {
     let spaced = r#"{"views": [], "poses": [], "structure": [{"X": [" 0.5", "-1.25", " 3"]}]}"#;
     assert_eq!(open("scene.sfm", spaced).positions, [POINTS[0]]);
     let line = refused("a.sfm", r#"{"version": [], "views": [{}], "intrinsics": []}"#);
-    assert!(line.contains("ConvertSfMFormat") && line.ends_with("found cameras alone"), "{line}");
+    assert!(line.contains("ConvertSfMFormat") && line.ends_with("found only cameras"), "{line}");
     for other in [r#"{"points": [[1, 2, 3]]}"#, r#"{"frames": [{}]}"#] {
         let line = refused("a.json", other);
         assert!(line.contains("a map of OpenSfM, OpenMVG, Meshroom or nerfstudio"), "{line}");
@@ -475,10 +472,7 @@ fn a_file_that_was_not_fetched_is_told() {
     let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 179\n";
     for name in ["a.ply", "a.las", "a.pts"] {
         let line = refused(name, pointer);
-        assert!(
-            line.ends_with("found a pointer of Git LFS (git lfs pull fetches the file)"),
-            "{line}"
-        );
+        assert!(line.ends_with("found a pointer of Git LFS (run git lfs pull)"), "{line}");
     }
 }
 

@@ -290,7 +290,7 @@ fn files_with_more_points_than_they_declare_are_doubted() {
         ("a.nvm", nvm(), "\n3\n", "\n2\n"),
         ("a.ply", ply, "vertex 3", "vertex 2"),
     ] {
-        let told = "2 points are declared, and 1 more seem to follow, which are not read: a part of the map at most";
+        let told = "2 points are declared, and 1 more seem to follow, which are not read: results are about a part of the map";
         let [whole, less] = doubts(name, text, all, few);
         assert!(whole.is_empty(), "{name}: {whole:?}");
         assert_eq!(less, [told], "{name}");

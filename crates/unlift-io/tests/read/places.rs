@@ -46,7 +46,7 @@ fn what_lies_beside_the_model_is_noted_or_ignored() {
         notes.replace('\\', "/"),
         "/sparse/0/rigs.bin: header (byte 0): expected 8 bytes of the number of rigs, \
          found 1 byte before the end of the file\n\
-         points3D.txt: the binary form beside it was read\n\
+         points3D.txt: not read, because points3D.bin exists\n\
          sparse/0: read, the largest of 2 models (8 points)\n\
          sparse/1: another model (8 points), give its path to read it"
     );

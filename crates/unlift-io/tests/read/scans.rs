@@ -68,7 +68,7 @@ fn e57_turns_by_quaternions_of_any_length_but_zero() {
     }
     std::fs::write(&path, to(0.0)).unwrap();
     let notes = read::open(&path).unwrap().notes;
-    assert_eq!(notes[0], "scan 2: a rotation of zeros, taken for none");
+    assert_eq!(notes[0], "scan 2: the rotation is zero and is ignored");
 }
 
 #[test]
@@ -146,7 +146,7 @@ fn a_file_with_holes_is_one_line() {
     // Some file systems do not support such files.
     if file.set_len(head.len() as u64 + 12 * 200_000_000_000).is_ok() {
         let error = read::open(&path).unwrap_err().to_string();
-        assert!(error.contains("expected as much as fits into memory, found "), "{error}");
+        assert!(error.contains("expected data that fits into memory, found "), "{error}");
     }
 }
 

@@ -51,7 +51,7 @@ fn schemas_deeper_or_larger_than_tables() {
     assert_eq!(deep, expected);
     let wide = line(with_schema(&[i64::from(i32::MAX), 0]));
     assert!(
-        wide.ends_with("found an element of 2147483647 where 1 follow in the schema"),
+        wide.ends_with("found a schema element with 2147483647 children where 1 elements follow"),
         "{wide}"
     );
     let many = line(with_schema(&vec![0; (1 << 16) + 1]));

@@ -233,7 +233,7 @@ fn images_are_told_by_name() {
     let found = line(of(good, [0.0, f64::NAN, 0.0], None));
     assert_eq!(found, "image a, column x, row 1: expected a finite number, found NaN");
     let found = line(of([Some("a"), Some("b"), Some("a")], [0.0; 3], None));
-    assert_eq!(found, "column image, row 2: expected the rows of an image together, found a again");
+    assert_eq!(found, "column image, row 2: expected contiguous rows of each image, found a again");
     let found = line(of([Some("a"), None, Some("b")], [0.0; 3], None));
     assert_eq!(found, "column image, row 1: expected the name of an image, found null");
     let found = line(of(good, [0.0; 3], Some(r#"{"bounds":[0,1]}"#)));

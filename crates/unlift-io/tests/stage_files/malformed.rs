@@ -111,7 +111,7 @@ fn a_changed_map_is_told() {
     let other = with(lines(), "foot_x", Some(floats([0.0, 1.0, 2.5])));
     let line = released(&meta, other);
     assert!(
-        line.contains("metadata unlift, fingerprint: expected that of the content, "),
+        line.contains("metadata unlift, fingerprint: expected the fingerprint of the content, "),
         "{line}"
     );
     assert!(line.ends_with(&format!("found \"{}\"", map.fingerprint())), "{line}");
@@ -125,7 +125,7 @@ fn columns() {
     let wide = ints([1, (1 << 53) + 1, 3]);
     let rows = [
         ("foot_x", text, ": expected floats, found type Utf8"),
-        ("foot_x", wide, ", row 1: expected a number that a double holds, found 9007199254740993"),
+        ("foot_x", wide, ", row 1: expected a number that is exact in f64, found 9007199254740993"),
         ("foot_x", floats([0.0, f64::NAN, 0.0]), ", row 1: expected a finite number, found NaN"),
         (
             "foot_x",

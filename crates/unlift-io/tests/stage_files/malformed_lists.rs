@@ -180,7 +180,7 @@ fn truth() {
     let two = |first, second| maybe_ints([Some(first), second, None]);
     let odd = Some("odd_point");
     let rows = [
-        ("slot", two(0, Some(2)), ": expected slots below 2, as many have one, found 2"),
+        ("slot", two(0, Some(2)), ": expected slots below 2, the number of slots, found 2"),
         ("slot", two(0, Some(0)), ", row 1: expected each slot once, found 0 as in row 0"),
         ("original", ints([2, 2, 1]), ", row 1: expected each original once, found 2 as in row 0"),
         ("original", ints([2, 0, 3]), ", row 2: expected a whole number below 3, found 3"),

@@ -91,7 +91,11 @@ fn what_is_missing_or_other_is_told() {
     // A part of another kind.
     let (original, secret) = maps::truth::<3>(1, 40);
     stage::write_truth(&second, &original, &secret).unwrap();
-    assert!(line().ends_with("expected that of the other parts, found another"), "{}", line());
+    assert!(
+        line().ends_with("expected the metadata of the other parts, found others"),
+        "{}",
+        line()
+    );
     fs::write(&second, "PAR1").unwrap();
     assert!(line().contains("part-000001.parquet: expected a Parquet file"), "{}", line());
     let empty = tempfile::tempdir().unwrap();

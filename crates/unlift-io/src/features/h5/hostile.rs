@@ -96,7 +96,7 @@ fn groups_with_more_paths_than_can_be_walked_are_refused() {
         inner = group.0;
     }
     let line = opened(&file.finish(group)).err().unwrap();
-    let expected = ": expected groups that one link leads to, found a second link, or a circle";
+    let expected = ": expected one link to each group of groups, found a second link, or a cycle";
     assert!(line.starts_with("f: group \"b/b/b/") && line.ends_with(expected), "{line}");
 }
 
@@ -128,8 +128,8 @@ fn a_link_in_a_group_of_the_old_form_is_told() {
     file.0[entry + 16] = 2;
     file.0[entry + 24] = 8;
     let line = opened(&file.finish(root)).err().unwrap();
-    let expected = "f: image \"b.jpg\": expected features of an image, found a link to \"a.jpg\" in the old form (h5py \
-                    makes one that is read with libver=\"latest\")";
+    let expected = "f: image \"b.jpg\": expected features of an image, found a link to \"a.jpg\" in the old form (write it with \
+                    libver=\"latest\" of h5py)";
     assert_eq!(line, expected);
 }
 

@@ -90,7 +90,7 @@ impl FeatureStore {
             let place = || format!("group {}", quoted(path.as_bytes()));
             if depth > DEEPEST {
                 let expected = format!("groups nested at most {DEEPEST} deep");
-                return Err(Error::new(&self.path, place(), expected, "deeper ones, or a circle"));
+                return Err(Error::new(&self.path, place(), expected, "deeper ones, or a cycle"));
             }
             // The library keeps a copy of the path.
             memory += PER_GROUP + 2 * path.len() as u64;
@@ -104,8 +104,8 @@ impl FeatureStore {
                 // A second link to an image is a second image. A second link to a group of groups
                 // could make exponentially many paths.
                 Some([_, true]) => {
-                    let expected = "groups that one link leads to";
-                    let found = "a second link, or a circle";
+                    let expected = "one link to each group of groups";
+                    let found = "a second link, or a cycle";
                     return Err(Error::new(&self.path, place(), expected, found));
                 }
                 Some(&known) => known,
@@ -115,7 +115,7 @@ impl FeatureStore {
                         links.iter().find(|(_, target)| matches!(target, Target::Old(_)))
                     {
                         let found = format!(
-                            "a link to {} in the old form (h5py makes one that is read with libver=\"latest\")",
+                            "a link to {} in the old form (write it with libver=\"latest\" of h5py)",
                             quoted(to.as_bytes())
                         );
                         return Err(self.no_image(&within(&path, name), found));
@@ -296,7 +296,7 @@ impl FeatureStore {
         if source::is_spent() {
             let most = size(source::most(self.len));
             let expected = format!("at most {most} to read in a file of {}", size(self.len));
-            return self.error(path, name, expected, "the same parts again and again");
+            return self.error(path, name, expected, "parts that are read again and again");
         }
         self.error(path, name, "readable HDF5", error.to_string())
     }

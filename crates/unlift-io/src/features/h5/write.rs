@@ -75,7 +75,7 @@ impl Writer {
         bytes.extend(messages::dataset(array, address, len, attributes));
         self.put(out, &bytes)?;
         let taken = || {
-            let text = format!("{path}: {name} is there already");
+            let text = format!("{path}: {name} exists already");
             io::Error::new(io::ErrorKind::AlreadyExists, text)
         };
         let mut members = &mut self.root;

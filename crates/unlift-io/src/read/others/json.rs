@@ -52,8 +52,8 @@ pub fn read(path: &Path) -> Result<Input, Error> {
         found.notes.push(format!("read, the largest of {n} reconstructions ({points} points)"));
     }
     if found.positions.is_empty() && format != "nerfstudio" {
-        let expected = "points (Meshroom: ConvertSfMFormat of the .abc file; OpenMVG: the file of the reconstruction)";
-        return Err(Error::new(path, "", expected, "cameras alone"));
+        let expected = "points (Meshroom: convert the .abc file with ConvertSfMFormat; OpenMVG: the file of the reconstruction)";
+        return Err(Error::new(path, "", expected, "only cameras"));
     }
     let n_poses = found.cameras.len() + found.n_unplaced;
     found.n_unplaced += n_views.saturating_sub(n_poses);

@@ -71,7 +71,7 @@ pub fn read(path: &Path) -> Result<Input, Error> {
         largest.notes.push(format!("read, the largest of {n_models} models ({points} points)"));
     }
     if n_without > 0 {
-        largest.notes.push(format!("{n_without} photos without a place"));
+        largest.notes.push(format!("{n_without} photos without a pose"));
     }
     Ok(Input { format: "NVM", ..largest })
 }

@@ -68,7 +68,7 @@ fn scans(path: &Path) -> Result<Input, Error> {
         let place = || Place::from(format!("scan {}", at + 1));
         check(path, cloud, &budget, place())?;
         let frame = Frame::of(cloud).unwrap_or_else(|| {
-            notes.push(format!("scan {}: a rotation of zeros, taken for none", at + 1));
+            notes.push(format!("scan {}: the rotation is zero and is ignored", at + 1));
             Frame::shifted(cloud)
         });
         left.set(AHEAD);
@@ -199,7 +199,7 @@ impl Read for Watched {
         let n = self.reader.read(buffer)?;
         match self.left.get().checked_sub(n as u64) {
             Some(left) => self.left.set(left),
-            None => return Err(io::Error::other("no point in a long stretch of the file")),
+            None => return Err(io::Error::other("no point in a large part of the file")),
         }
         Ok(n)
     }

@@ -29,7 +29,7 @@ const COMPRESSED: u8 = 0b1100_0000;
 pub fn read(path: &Path) -> Result<Input, Error> {
     let mut bytes = Bytes::open(path)?;
     let mut head = [0; HEAD_1_4];
-    bytes.fill(&mut head[..HEAD], "the head")?;
+    bytes.fill(&mut head[..HEAD], "the header")?;
     if &head[..4] != b"LASF" {
         return Err(bytes.error("\"LASF\", as every LAS file begins", quoted(&head[..4])));
     }
@@ -39,8 +39,8 @@ pub fn read(path: &Path) -> Result<Input, Error> {
         return Err(bytes.error("LAS 1.0 to 1.4", found));
     }
     if format & COMPRESSED != 0 {
-        let found = "compressed points, LAZ (pdal translate IN.laz OUT.las makes one that is read)";
-        return Err(bytes.error("points as they are", found));
+        let found = "compressed points, LAZ (convert it: pdal translate IN.laz OUT.las)";
+        return Err(bytes.error("uncompressed points", found));
     }
     let short = |at: usize| u16::from_le_bytes([head[at], head[at + 1]]);
     let (head_size, record) = (short(94), short(105));
@@ -63,13 +63,13 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     let offset: [f64; 3] = std::array::from_fn(|axis| double(155 + 8 * axis));
     let mut at = HEAD as u64;
     if version.1 == 4 && usize::from(head_size) >= HEAD_1_4 {
-        bytes.fill(&mut head[HEAD..], "the head")?;
+        bytes.fill(&mut head[HEAD..], "the header")?;
         at = HEAD_1_4 as u64;
         let all = wide(&head, COUNT_1_4);
         n = if all == 0 { n } else { all };
     }
     if start < at {
-        let expected = format!("points behind the head of {at} bytes");
+        let expected = format!("points after the header of {at} bytes");
         return Err(bytes.error(expected, format!("at byte {start}")));
     }
     // The offsets of data that may follow the points.
@@ -79,11 +79,11 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     };
     let mut system = System::default();
     if let Some(gap) = u64::from(head_size).checked_sub(at).filter(|gap| at + gap <= start) {
-        bytes.skip(gap, "the head")?;
+        bytes.skip(gap, "the header")?;
         system.look(&mut bytes, long(&head, 100), start - at - gap, false)?;
     }
     let gap = start - bytes.at();
-    bytes.skip(gap, "what stands before the points")?;
+    bytes.skip(gap, "data before the points")?;
     bytes.expect_rows(n, "points", u64::from(record))?;
     let mut row = vec![0; usize::from(record)];
     let mut positions = bytes.room("points", n)?;
@@ -103,7 +103,7 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     let doubts = undeclared(n, more).filter(|_| version.1 != 3).into_iter().collect();
     let (gap, number) = (behind[1].checked_sub(end), long(&head, EXTENDED_1_4 + 8));
     if let Some(gap) = gap.filter(|&gap| number > 0 && gap <= bytes.remaining()) {
-        bytes.skip(gap, "what stands behind the points")?;
+        bytes.skip(gap, "data after the points")?;
         let left = bytes.remaining();
         system.look(&mut bytes, number, left, true)?;
     }

@@ -118,7 +118,7 @@ fn header(path: &Path, lines: &mut Lines) -> Result<Header, Error> {
     };
     let bytes = |field: &Field| field.size.saturating_mul(field.count);
     let (Some(n_values), Some(stride)) = (sum(&|f| f.count, &fields), sum(&bytes, &fields)) else {
-        return Err(refuse("points of a size that fits", "more".to_owned()));
+        return Err(refuse("points of less than 2^64 bytes", "more".to_owned()));
     };
     let at = columns::axes(names.iter().map(Vec::as_slice));
     let at = at.map_err(|name| refuse(&format!("a field {name}"), "none".to_owned()))?;
@@ -208,8 +208,8 @@ fn compressed(mut bytes: Bytes, header: &Header) -> Result<Vec<[f64; 3]>, Error>
     let mut values = vec![0; packed as usize];
     bytes.fill(&mut values, "compressed points")?;
     let Some(values) = unpacked(&values, size as usize) else {
-        let expected = format!("{size} bytes when unpacked");
-        return Err(bytes.error(expected, "others, or damaged ones"));
+        let expected = format!("{size} bytes after decompression");
+        return Err(bytes.error(expected, "another size, or damaged data"));
     };
     let at = |axis: &Axis, point: u64| {
         let start = n * axis.byte + axis.scalar.size() as u64 * point;
