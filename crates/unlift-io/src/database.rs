@@ -1,4 +1,4 @@
-//! COLMAP's `database.db`: what is stored per image.
+//! Reader of COLMAP's `database.db`.
 //!
 //! Source: COLMAP's documentation, "Database Format".
 
@@ -17,15 +17,14 @@ use crate::error::Error;
 use crate::input::{self, Budget};
 use crate::read::lines::quoted;
 
-/// How one image's descriptors are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Bytes,
-    /// Little-endian `f32`, whose bytes the table counts as columns.
+    /// Little-endian `f32`. The table states the row length in bytes.
     Floats,
 }
 
-/// The matrix of one image: `n` rows of `row_bytes` each, `data` their bytes.
+/// A matrix of one image: `n` rows of `row_bytes` bytes each.
 pub(crate) struct Rows {
     pub kind: Kind,
     pub n: usize,
@@ -33,30 +32,26 @@ pub(crate) struct Rows {
     pub data: Vec<u8>,
 }
 
-/// What is read of a database.
 const TABLES: [&str; 4] = ["images", "cameras", "keypoints", "descriptors"];
-/// Steps of SQLite between two looks at how many there were.
+/// SQLite steps between two checks of the limit.
 const STEPS_AT_A_TIME: u64 = 1000;
-/// Steps of one query: so many, and as many for every byte of the file. A row takes ten or so.
+/// The step limit of one query is `LEAST_STEPS`, plus `STEPS_PER_BYTE` for every byte of the file.
+/// A row takes about ten steps.
 const LEAST_STEPS: u64 = 1_000_000;
 const STEPS_PER_BYTE: u64 = 4;
 
-/// An open database: image ids by name, and whether descriptors have a type.
+/// An open database, with image ids by name.
 pub(crate) struct Database {
     path: PathBuf,
     connection: Connection,
     image_ids: HashMap<Vec<u8>, i64>,
-    /// Since COLMAP 4 a column says which extractor wrote a row.
+    /// True if a column `type` states the extractor (COLMAP 4 and later).
     has_type: bool,
-    /// Steps that the query which runs has taken.
     steps: Arc<AtomicU64>,
 }
 
 impl Database {
     /// Opens `path` for reading.
-    ///
-    /// # Errors
-    /// When it is no regular file or no database, or when what it calls a table is a view or a program.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI;
         let (_, len) = input::open(path)?;
@@ -74,14 +69,12 @@ impl Database {
         Ok(Self { path: path.to_owned(), connection, image_ids, has_type, steps })
     }
 
-    /// The names of all images, sorted by their bytes.
     pub fn names(&self) -> Vec<Vec<u8>> {
         let mut names: Vec<Vec<u8>> = self.image_ids.keys().cloned().collect();
         names.sort_unstable();
         names
     }
 
-    /// An error about one image.
     pub fn error(
         &self,
         name: &[u8],
@@ -96,13 +89,13 @@ impl Database {
         found.ok_or_else(|| self.error(name, "this image of the model", "no such image"))
     }
 
-    /// The descriptors of the image called `name`.
     pub fn descriptors(&self, name: &[u8]) -> Result<Rows, Error> {
         let found = self.matrix(name, "descriptors")?;
         found.ok_or_else(|| self.error(name, "descriptors", "none"))
     }
 
-    /// The same, or the keypoints (floats), as `table` says; `None` when the image has no row there.
+    /// Returns the descriptors or the keypoints (floats) of an image, or `None` if `table` has no
+    /// row for it.
     pub fn matrix(&self, name: &[u8], table: &str) -> Result<Option<Rows>, Error> {
         let image_id = self.image_id(name)?;
         let of_keypoints = table == "keypoints";
@@ -114,16 +107,16 @@ impl Database {
             Ok((n, cols, kind, data.unwrap_or_default().to_vec()))
         })?;
         let Some((n, cols, kind, data)) = found else { return Ok(None) };
-        // -1 is a database from before there were types, 0 is SIFT; the others are learned, in floats.
+        // -1 is a database without types, 0 is SIFT, others are learned descriptors.
         let kind = if kind <= 0 && !of_keypoints { Kind::Bytes } else { Kind::Floats };
-        // Columns of keypoints are values, those of descriptors are bytes.
+        // `cols` counts values of keypoints, but bytes of descriptors.
         let bytes_each = if of_keypoints { 4 } else { 1 };
         let row_bytes = usize::try_from(cols).ok().and_then(|cols| cols.checked_mul(bytes_each));
         let (Some(n), Some(row_bytes)) = (usize::try_from(n).ok(), row_bytes) else {
             return Err(self.error(name, format!("sizes of {table}"), format!("{n} x {cols}")));
         };
         if n == 0 && data.is_empty() {
-            // An image without features; some exporters state no columns then.
+            // Some exporters state no columns for an image without features.
             return Ok(Some(Rows { kind, n, row_bytes: row_bytes.max(8), data }));
         }
         if n.checked_mul(row_bytes) != Some(data.len())
@@ -136,7 +129,6 @@ impl Database {
         Ok(Some(Rows { kind, n, row_bytes, data }))
     }
 
-    /// What `read` makes of the row that `query` finds for `image_id`, if there is one.
     fn row<T>(
         &self,
         query: &str,
@@ -151,7 +143,7 @@ impl Database {
         found.map_err(|error| refuse(&self.path, place, &error))
     }
 
-    /// Width and height in pixels of the image called `name`, if its camera states them.
+    /// Returns width and height in pixels of an image, if its camera states them.
     pub fn size(&self, name: &[u8]) -> Result<Option<[u32; 2]>, Error> {
         let query = "SELECT cameras.width, cameras.height FROM images JOIN cameras \
                      ON images.camera_id = cameras.camera_id WHERE image_id = ?";
@@ -166,14 +158,14 @@ impl Database {
 
 fn refuse(path: &Path, place: &str, error: &rusqlite::Error) -> Error {
     let found = match error.sqlite_error_code() {
-        Some(ErrorCode::OperationInterrupted) => "a query without end".to_owned(),
+        Some(ErrorCode::OperationInterrupted) => "a query that does not end".to_owned(),
         _ => error.to_string(),
     };
     Error::new(path, place, "a COLMAP database", found)
 }
 
-/// A database may hold programs (views, triggers, computed columns): none is trusted, no value is larger
-/// than the budget, and every query ends after a number of steps that the length of the file sets.
+/// Limits what a database can do: no trusted views, triggers or computed columns, values within the
+/// memory budget, and a step limit per query.
 fn confine(
     connection: &mut Connection,
     budget: &Budget,
@@ -198,7 +190,6 @@ fn confine(
     connection.progress_handler(STEPS_AT_A_TIME as i32, Some(is_over))
 }
 
-/// Whether what is called `table` is one, if there is such a thing.
 fn check_table(connection: &Connection, path: &Path, table: &str) -> Result<(), Error> {
     let query = "SELECT type, rootpage FROM sqlite_master WHERE name = ? COLLATE NOCASE \
                  AND type IN ('table', 'view')";
@@ -211,7 +202,6 @@ fn check_table(connection: &Connection, path: &Path, table: &str) -> Result<(), 
         .map_err(|e| refuse(path, &place, &e))?;
     match found {
         Some((kind, _)) if kind == "view" => Err(Error::new(path, place, "a table", "a view")),
-        // The rows of these are made by a module of SQLite.
         Some((_, 0)) => Err(Error::new(path, place, "a table", "a virtual table")),
         _ => Ok(()),
     }
@@ -229,7 +219,7 @@ fn image_ids(
     while let Some(row) = rows.next().map_err(failed)? {
         let name = row.get_ref(1).map_err(failed)?;
         let name = name.as_bytes().map_err(|e| failed(e.into()))?;
-        // A column may be computed, and then its names are stored nowhere.
+        // Names of a computed column are stored nowhere, so the file size does not limit them.
         bytes += 64 + name.len() as u64;
         budget.admit("table images", bytes)?;
         image_ids.insert(name.to_vec(), row.get(0).map_err(failed)?);
@@ -237,16 +227,15 @@ fn image_ids(
     Ok(image_ids)
 }
 
-/// The URI of a database that is read and never written, not even its journal.
+/// Returns the URI of a database that is opened read-only, without writing a journal.
 ///
-/// `immutable` lets a database in a folder without write permission open although COLMAP left it in
-/// write-ahead mode. It must not be used while a journal of either kind waits beside the file: its rows would be missed, or those
-/// of a transaction taken that never was.
+/// `immutable` opens a database in write-ahead mode in a folder without write permission. While a
+/// journal exists, it would miss rows or read uncommitted ones.
 fn uri(path: &Path) -> OsString {
     let mut uri = "file:".to_owned();
     let bytes = path.as_os_str().as_encoded_bytes();
     if bytes.starts_with(b"//") {
-        // Else what follows would be taken for the name of a host.
+        // Otherwise SQLite would parse the next component as a host name.
         uri.push_str("//");
     }
     if cfg!(windows) && bytes.get(1) == Some(&b':') {
@@ -290,9 +279,8 @@ mod tests {
         };
         assert_eq!(count(1000).unwrap(), 1000);
         let error = refuse(Path::new("f"), "", &count(i64::MAX).unwrap_err());
-        let line = "f: expected a COLMAP database, found a query without end";
+        let line = "f: expected a COLMAP database, found a query that does not end";
         assert_eq!(error.to_string(), line);
-        // Counted for every query on its own.
         assert!((0..300).all(|_| count(1000).is_ok()));
     }
 }

@@ -1,4 +1,4 @@
-//! The crate's error: a file that is not what it should be, as one line for the person who has it.
+//! The error of this crate.
 
 use std::fmt;
 use std::io;
@@ -8,21 +8,21 @@ use unlift::OneLine;
 
 use crate::atomic::final_place;
 
-/// Where in a file something is wrong.
+/// The place of an error in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
     /// The file (or folder) as a whole.
     Whole,
     /// A line of a text file, counted from 1.
     Line(u64),
-    /// A byte of a binary file, counted from 0, inside what `what` names (`record 12`, `header`).
+    /// A byte of a binary file.
     Byte {
-        /// What was being read: `record 12`, `header`.
+        /// The structure that was read: `record 12`, `header`.
         what: String,
-        /// Offset of the first byte of it.
+        /// Offset of its first byte, counted from 0.
         at: u64,
     },
-    /// Anything else that has a name: a column, a table, a row.
+    /// Another named place: a column, a table, a row.
     Named(String),
 }
 
@@ -33,17 +33,15 @@ impl From<&str> for Place {
 }
 
 impl From<String> for Place {
-    /// A named place; the empty name is the whole file.
     fn from(name: String) -> Self {
         if name.is_empty() { Self::Whole } else { Self::Named(name) }
     }
 }
 
-/// A file that cannot be read or written, or that does not hold what it should.
+/// A file that cannot be read or written, or whose content is wrong.
 ///
-/// Prints as one line: `points.txt:17: expected 3 coordinates, found 2`, or
-/// `points3D.bin: record 12 (byte 4711): expected 8 bytes, found end of file`. Control characters
-/// in names and values are escaped, so that it stays one line whatever the file holds.
+/// Prints as one line: `points.txt:17: expected 3 coordinates, found 2`, or `points3D.bin: record
+/// 12 (byte 4711): expected 8 bytes, found end of file`. Control characters are escaped.
 #[derive(Debug)]
 pub struct Error {
     path: PathBuf,
@@ -59,9 +57,10 @@ enum Kind {
 }
 
 impl Error {
-    /// An error about the contents of `path`: the rule at `place`, and what stood there instead.
+    /// Creates an error about the content of `path`: what was expected at `place`, and what was
+    /// found.
     ///
-    /// An empty string as `place` means the whole file.
+    /// An empty `place` means the whole file.
     pub fn new(
         path: impl Into<PathBuf>,
         place: impl Into<Place>,
@@ -78,22 +77,24 @@ impl Error {
         }
     }
 
-    /// `path` could not be read: missing, a folder, no permission, or a broken disk.
+    /// Creates an error for a `path` that cannot be read.
     pub fn read(path: impl Into<PathBuf>, source: io::Error) -> Self {
         Self { path: path.into(), kind: Kind::Read(source) }
     }
 
-    /// `path` could not be written; what is built apart is named by the place it is for.
+    /// Creates an error for a `path` that cannot be written. A temporary path is replaced by its
+    /// final place.
     pub fn write(path: impl Into<PathBuf>, source: io::Error) -> Self {
         Self { path: final_place(path.into()), kind: Kind::Write(source) }
     }
 
-    /// The library refused values that came from `path`.
+    /// Creates an error for values from `path` that the core library refused.
     pub fn core(path: impl Into<PathBuf>, source: unlift::Error) -> Self {
         Self { path: path.into(), kind: Kind::Core(source) }
     }
 
-    /// The same error as part of something larger: `images.parquet: image a.jpg, column x: expected ...`.
+    /// Adds a prefix to the place of the error: `images.parquet: image a.jpg, column x: expected
+    /// ...`.
     pub(crate) fn within(self, what: &str) -> Self {
         let kind = match self.kind {
             Kind::Content { place: Place::Whole, expected, found } => {
@@ -108,13 +109,13 @@ impl Error {
         Self { kind, ..self }
     }
 
-    /// The same error about another file: the one that a user knows of.
+    /// Replaces the path of the error by one that the user gave.
     #[must_use]
     pub fn at(self, path: impl Into<PathBuf>) -> Self {
         Self { path: path.into(), ..self }
     }
 
-    /// The file or folder the error is about.
+    /// The file or folder that the error is about.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -147,7 +148,7 @@ impl fmt::Display for Error {
     }
 }
 
-/// The usual causes in our own words: those of the system differ between platforms.
+/// Common causes in our own words, because system messages differ between platforms.
 fn read_cause(kind: io::ErrorKind) -> Option<&'static str> {
     Some(match kind {
         io::ErrorKind::NotFound => "expected a file or folder, found nothing",
@@ -176,7 +177,7 @@ fn write_cause(kind: io::ErrorKind) -> Option<&'static str> {
 }
 
 impl std::error::Error for Error {
-    // The text above already holds the cause, so that a caller who prints the chain does not print it twice.
+    // The text already contains the cause.
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         None
     }

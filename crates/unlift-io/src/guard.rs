@@ -1,11 +1,10 @@
-//! Damaged data must be an error, whatever the decoder makes of it.
+//! Turns panics of decoders into errors.
 
 use unlift::guard::caught;
 
-/// Runs `step`; `None` when it panics, which is then silent.
+/// Runs `step` and returns `None` if it panics, without a message.
 ///
-/// The `parquet` crate checks what it reads, but not all of it: with single bytes of a page or the
-/// footer changed, a handful of its assertions still fail (59.3). `hdf5-pure` is held to the same.
+/// `parquet` 59.3 still panics for some damaged pages and footers. `hdf5-pure` is guarded, too.
 pub(crate) fn without_panic<T>(step: impl FnOnce() -> T) -> Option<T> {
     caught(step).ok()
 }

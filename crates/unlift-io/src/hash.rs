@@ -1,4 +1,4 @@
-//! Hashes of input files, so that a result names exactly what it came from.
+//! Hashes of input files, so that a result identifies its inputs.
 
 use crate::Error;
 use crate::features::ImageFeatures;
@@ -11,7 +11,7 @@ use std::path::Path;
 use unlift::Descriptors;
 use unlift::descriptors::Values;
 
-/// The SHA-256 of one file's content, as 64 hexadecimal digits; read in pieces.
+/// Returns the SHA-256 of a file's content, as 64 hexadecimal digits.
 ///
 /// # Errors
 /// When the file cannot be read.
@@ -30,11 +30,10 @@ pub fn hash_file(path: &Path) -> Result<String, Error> {
     }
 }
 
-/// One SHA-256, as 64 hexadecimal digits, over the names and contents of `paths`.
+/// Returns one SHA-256, as 64 hexadecimal digits, over the names and contents of `paths`.
 ///
-/// The rule: the SHA-256 of the lines `HASH  NAME\n`, one per file in ascending byte order of its
-/// name without folders (then of its hash); what `sha256sum` prints in the folder of the files, in
-/// the C locale:
+/// It is the SHA-256 of the lines `HASH  NAME\n`, sorted by bytes of the name without folders, then
+/// by hash. In the folder of the files, in the C locale, this is
 ///
 /// ```sh
 /// sha256sum cameras.bin images.bin points3D.bin | sha256sum
@@ -52,17 +51,17 @@ pub fn hash_files<P: AsRef<Path>>(paths: &[P]) -> Result<String, Error> {
     Ok(hash_list(lines))
 }
 
-/// [`hash_files`] of the files of a map that was read.
+/// Returns [`hash_files`] of the files of a map that was read.
 ///
 /// # Errors
-/// When one cannot be read, or is not what it was when reading began.
+/// When a file cannot be read, or has changed since it was first read.
 pub fn hash_input(input: &Input) -> Result<String, Error> {
     let hash = hash_files(&input.files)?;
     input.seen.check()?;
     Ok(hash)
 }
 
-/// The hash of a stage file; of a folder of parts, [`hash_files`] of these.
+/// Returns the hash of a stage file, or [`hash_files`] of a folder of parts.
 ///
 /// # Errors
 /// When a file cannot be read.
@@ -70,7 +69,7 @@ pub fn hash_stage(path: &Path) -> Result<String, Error> {
     if path.is_dir() { hash_files(&part_files(path)?) } else { hash_file(path) }
 }
 
-/// The same of what is no file, from its names and hashes.
+/// Combines names and hashes like [`hash_files`], also for data that is not in files.
 pub fn hash_list(mut named: Vec<(String, String)>) -> String {
     named.sort();
     let mut hasher = Sha256::new();
@@ -80,8 +79,9 @@ pub fn hash_list(mut named: Vec<(String, String)>) -> String {
     hex(hasher)
 }
 
-/// SHA-256 of features in memory, as far as an audit looks at them: width and height as little-endian `u32` (0 where they are
-/// not known), the coordinates of keypoints in order as `f64`, and the values of descriptors row by row, bytes or `f32`.
+/// Returns the SHA-256 of the features that an audit uses: width and height as little-endian `u32`
+/// (0 if unknown), the coordinates of keypoints as `f64`, and the values of descriptors row by row,
+/// as bytes or `f32`.
 pub fn hash_features(features: &ImageFeatures) -> String {
     let mut hasher = Sha256::new();
     for side in features.size.unwrap_or([0; 2]) {
@@ -100,7 +100,7 @@ pub fn hash_features(features: &ImageFeatures) -> String {
     hex(hasher)
 }
 
-/// SHA-256 of positions made in memory: their coordinates in order, as little-endian `f64`.
+/// Returns the SHA-256 of positions as little-endian `f64`.
 pub fn hash_positions(positions: &[[f64; 3]]) -> String {
     let mut hasher = Sha256::new();
     for coordinate in positions.as_flattened() {
@@ -109,12 +109,12 @@ pub fn hash_positions(positions: &[[f64; 3]]) -> String {
     hex(hasher)
 }
 
-/// The SHA-256 of `bytes`, as 64 hexadecimal digits.
+/// Returns the SHA-256 of `bytes`, as 64 hexadecimal digits.
 pub fn hash_bytes(bytes: &[u8]) -> String {
     hex(Sha256::new_with_prefix(bytes))
 }
 
-/// SHA-256 of what is added piece by piece.
+/// Computes the SHA-256 of data that is added piece by piece.
 #[derive(Clone, Debug, Default)]
 pub struct Hasher(Sha256);
 
@@ -124,7 +124,7 @@ impl Hasher {
         self.0.update(bytes);
     }
 
-    /// The hash, as 64 hexadecimal digits.
+    /// Returns the hash, as 64 hexadecimal digits.
     pub fn hex(self) -> String {
         hex(self.0)
     }

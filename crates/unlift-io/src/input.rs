@@ -1,5 +1,4 @@
-//! What is read, and how much memory it may take: regular files only, and no more than a budget that
-//! the size of the file sets, whatever the file declares.
+//! Opens regular files only, and limits the memory for their content by their size.
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -7,14 +6,14 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use crate::error::{Error, Place};
 
-/// Opens `path` for reading; with its length in bytes.
+/// Opens `path` for reading and returns it with its length in bytes.
 ///
 /// # Errors
-/// When it is missing, may not be read, or is a folder, a pipe, a socket or a device: these have no
-/// length that bounds what is read, and may never end or never begin.
+/// When it is missing, cannot be read, or is a folder, a pipe, a socket or a device, which may
+/// never end.
 pub fn open(path: &Path) -> Result<(File, u64), Error> {
     let failed = |source| Error::read(path, source);
-    // Before it is opened, since opening a pipe that nobody writes to waits for ever.
+    // Checked before opening, because opening a pipe without a writer blocks forever.
     regular(path, &fs::metadata(path).map_err(failed)?)?;
     let file = File::open(path).map_err(failed)?;
     let metadata = file.metadata().map_err(failed)?;
@@ -30,26 +29,26 @@ fn regular(path: &Path, metadata: &fs::Metadata) -> Result<(), Error> {
     Err(Error::new(path, "", "a file", found))
 }
 
-/// Every input may take as much, however small it is: formats repeat and compress.
+/// The least budget, because small files may repeat or compress data.
 const LEAST: u64 = 256 << 20;
-/// Bytes in memory per byte of the file: values are widened by up to eight times, and real features
-/// and lists hardly compress.
+/// Bytes of memory per byte of the file. Decoding widens values by up to eight times, and real
+/// features hardly compress.
 const MULTIPLE: u64 = 64;
 
 static LIMIT: AtomicU64 = AtomicU64::new(u64::MAX);
 
-/// Sets the most memory in bytes that any one input may take from now on, in this process.
+/// Sets the maximum memory in bytes for each input file that this process opens later.
 pub fn limit_memory(bytes: u64) {
     LIMIT.store(bytes, Relaxed);
 }
 
-/// What [`limit_memory`] set; `None` before.
+/// The limit set by [`limit_memory`], or `None`.
 pub fn limit() -> Option<u64> {
     Some(LIMIT.load(Relaxed)).filter(|&bytes| bytes < u64::MAX)
 }
 
-/// How much memory what is decoded of one file may take at a time: 64 times its size, but at least
-/// 256 MiB, and never more than [`limit_memory`] allows.
+/// The memory that decoding one file may use: 64 times its size, at least 256 MiB, and at most the
+/// limit of [`limit_memory`].
 #[derive(Clone, Debug)]
 pub struct Budget {
     path: PathBuf,
@@ -58,34 +57,34 @@ pub struct Budget {
 }
 
 impl Budget {
-    /// The budget of the file `path` of `len` bytes.
+    /// Creates the budget of the file `path` of `len` bytes.
     pub fn new(path: &Path, len: u64) -> Self {
         let most = len.saturating_mul(MULTIPLE).max(LEAST).min(LIMIT.load(Relaxed));
         Self { path: path.to_owned(), len, most }
     }
 
-    /// Bytes that fit.
+    /// The budget in bytes.
     pub fn most(&self) -> u64 {
         self.most
     }
 
-    /// An empty list with room for `n` entries of what stands at `place`.
+    /// Returns an empty vector with capacity for `n` entries of `place`.
     ///
     /// # Errors
-    /// When they do not fit, here or into the memory of the machine: a file with holes declares as much as it likes.
+    /// When they exceed the budget or the memory of the machine. A sparse file may have any length.
     pub fn room<T>(&self, place: impl Into<Place> + Clone, n: u64) -> Result<Vec<T>, Error> {
         let bytes = n.saturating_mul(std::mem::size_of::<T>() as u64);
         self.admit(place.clone(), bytes)?;
         let mut room = Vec::new();
         let there = usize::try_from(n).is_ok_and(|n| room.try_reserve_exact(n).is_ok());
-        let expected = "as much as fits into memory";
+        let expected = "data that fits into memory";
         there.then_some(room).ok_or_else(|| Error::new(&self.path, place, expected, size(bytes)))
     }
 
-    /// Whether `bytes` fit, which what stands at `place` is about to take.
+    /// Checks that `bytes` for `place` are within the budget.
     ///
     /// # Errors
-    /// When they do not.
+    /// When they are not.
     pub fn admit(&self, place: impl Into<Place>, bytes: u64) -> Result<(), Error> {
         if bytes <= self.most {
             return Ok(());
@@ -96,7 +95,7 @@ impl Budget {
     }
 }
 
-/// `1.5 GiB`, `300 KiB`, `17 bytes`.
+/// Formats a number of bytes: `1.5 GiB`, `300 KiB`, `17 bytes`.
 pub fn size(bytes: u64) -> String {
     let units = [("GiB", 1u64 << 30), ("MiB", 1 << 20), ("KiB", 1 << 10)];
     match units.iter().find(|(_, unit)| bytes >= *unit) {

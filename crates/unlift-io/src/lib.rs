@@ -1,8 +1,8 @@
-//! Files of unlift: maps in ([`read`]), features of images in and out ([`features`]), stages in and out
-//! ([`stage`]), clouds out ([`clouds`]).
+//! Files of unlift: reads maps ([`read`]), reads and writes features of images ([`features`]) and
+//! stages ([`stage`]), and exports clouds ([`clouds`]).
 //!
-//! Bad input gets one line that names the file, the place, what was expected and what was found;
-//! outputs appear whole or not at all, and never in place of what is not theirs ([`atomic`]).
+//! An error is one line that names the file, the place, what was expected and what was found. File
+//! writes are atomic and replace only files that unlift wrote ([`atomic`]).
 //!
 //! ```
 //! use unlift::obfuscate::{obfuscate, olc::Olc};
@@ -16,14 +16,14 @@
 //! let map = read::open(&folder.join("map.csv"))?;
 //! let original = Original::new(PointSet::try_new(map.positions, Unit::Meter)?);
 //!
-//! // What an attacker sees, and what its owner keeps.
+//! // The released data is public. The owner keeps the ground truth.
 //! let (released, secret) = obfuscate(&Olc, &original, None, &Key::from_seed(0))?;
 //! stage::write_released(&folder.join("released.parquet"), &released)?;
 //! stage::write_truth(&folder.join("truth.parquet"), &original, &secret)?;
 //! let read_again = stage::read_released::<3>(&folder.join("released.parquet"))?;
 //! assert_eq!(read_again.fingerprint(), released.fingerprint());
 //!
-//! // Bad input is one line.
+//! // An error about bad input is one line.
 //! std::fs::write(folder.join("bad.csv"), "x,y,z\n0,0\n")?;
 //! let error = read::open(&folder.join("bad.csv")).unwrap_err().to_string();
 //! assert!(error.contains("bad.csv:2: ") && error.contains("expected") && error.contains("found"));

@@ -1,4 +1,4 @@
-//! Whether files are still what they were when they were first looked at.
+//! Detects changes of files since they were first read.
 
 use std::fs::{self, Metadata};
 use std::path::{Path, PathBuf};
@@ -7,17 +7,16 @@ use std::time::SystemTime;
 use crate::error::Error;
 use crate::stage::part_files;
 
-/// Files as they were before they were read: told by what their file system says of them (length, time of the last change and, on Unix,
-/// which entry has the name), not by their content.
+/// Metadata of files before they were read: length, time of the last change and, on Unix, the
+/// inode.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Seen(Vec<(PathBuf, Option<Stamp>)>);
 
-/// What is said of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Stamp {
     len: u64,
     modified: Option<SystemTime>,
-    /// Device, number, and seconds and nanoseconds of the last change of the entry itself.
+    /// Device, inode number, and seconds and nanoseconds of the last inode change.
     entry: (u64, u64, i64, i64),
 }
 
@@ -40,7 +39,7 @@ fn entry(_: &Metadata) -> (u64, u64, i64, i64) {
 }
 
 impl Seen {
-    /// Looks at files, before anything is read of them.
+    /// Records the metadata of files. Call it before reading them.
     pub fn new<P: Into<PathBuf>>(paths: impl IntoIterator<Item = P>) -> Self {
         let seen = |path: P| {
             let path = path.into();
@@ -50,27 +49,27 @@ impl Seen {
         Self(paths.into_iter().map(seen).collect())
     }
 
-    /// The same of stage files, and of the parts in folders of these.
+    /// Records the metadata of stage files, and of the parts in folders of parts.
     pub fn of_stages<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Self {
         let files = |path: &'a Path| match path.is_dir() {
-            // What is wrong with them is said when they are read.
+            // Errors are reported when the files are read.
             true => part_files(path).unwrap_or_default(),
             false => vec![path.to_owned()],
         };
         Self::new(paths.into_iter().flat_map(files))
     }
 
-    /// Number of files.
+    /// The number of files.
     pub fn len(&self) -> usize {
         self.0.len()
     }
 
-    /// Whether there is none.
+    /// Returns true if there are no files.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// The first of the files `which` (by their place among those that were looked at) that is not what it was, or not there.
+    /// Returns the first of the files `which` (by index) that has changed or is missing.
     ///
     /// # Panics
     /// When there is no such file.
@@ -80,10 +79,10 @@ impl Seen {
         others.next().map(|(path, _)| path.as_path())
     }
 
-    /// Refuses files that are not what they were.
+    /// Checks that no file has changed.
     ///
     /// # Errors
-    /// When one is not, or is not there.
+    /// When a file has changed or is missing.
     pub fn check(&self) -> Result<(), Error> {
         match self.changed(0..self.0.len()) {
             None => Ok(()),
@@ -119,7 +118,7 @@ mod tests {
         let seen = Seen::new([&a]);
         fs::write(&a, "grown").unwrap();
         assert_eq!(seen.changed([0]), Some(&*a));
-        // What was never there is not what it was.
+        // A file that never existed counts as changed.
         assert_eq!(Seen::new([&b]).changed([0]), Some(&*b));
     }
 }

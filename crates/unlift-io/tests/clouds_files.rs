@@ -1,4 +1,4 @@
-//! Clouds and lines for other programs, byte by byte.
+//! Tests the bytes of exported clouds and lines.
 
 use std::fs;
 use unlift::Unit;

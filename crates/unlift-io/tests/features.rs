@@ -1,4 +1,4 @@
-//! Features of images: what h5py and pycolmap wrote is what is read, and what is written is read again.
+//! Tests features of images: files of h5py and pycolmap, and round trips.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -25,7 +25,6 @@ fn floats(image: &ImageFeatures) -> &[f32] {
     }
 }
 
-/// An image with every column, its values told by `n`.
 fn made(name: &str, n: usize) -> ImageFeatures {
     let values = |factor: f32| (0..n).map(|at| factor * at as f32).collect();
     let descriptors = (0..n * 128).map(|at| (at * 7 % 251) as u8).collect();
@@ -72,7 +71,7 @@ fn files_of_h5py_are_read_in_every_type_and_form() {
 fn what_is_written_is_read_again_and_the_bytes_are_the_same() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("features.h5");
-    // More names than one node of the tree holds, at several depths.
+    // More names than a node of the tree holds, at several depths.
     let mut images: Vec<ImageFeatures> =
         (0..700).map(|at| made(&format!("seq{}/ü {at}.jpg", at % 2), at % 4)).collect();
     images.push(made("at the top.png", 300));
@@ -108,7 +107,7 @@ fn one_image_is_a_file_of_its_own() {
     fs::write(&path, encode(&made("a/b.jpg", 5), &path).unwrap()).unwrap();
     assert_eq!(decode(&path, "a/b.jpg").unwrap(), made("a/b.jpg", 5));
     let error = decode(&path, "c.jpg").unwrap_err().to_string();
-    assert!(error.ends_with("part: expected the image c.jpg alone, found 1 images"), "{error}");
+    assert!(error.ends_with("part: expected only the image c.jpg, found 1 images"), "{error}");
 }
 
 #[test]
@@ -117,7 +116,7 @@ fn names_and_columns_that_do_not_fit_are_refused() {
     let line = |image: &ImageFeatures| encode(image, path).unwrap_err().to_string();
     assert_eq!(
         line(&made("a//b", 1)),
-        "f.h5: image \"a//b\": expected a name of parts that are not empty, . or .., found \"a//b\""
+        "f.h5: image \"a//b\": expected a name whose parts are not empty, . or .., found \"a//b\""
     );
     let short = ImageFeatures { scores: Some(vec![1.0]), ..made("a", 2) };
     assert_eq!(line(&short), "f.h5: image \"a\", scores: expected 2, one per keypoint, found 1");
@@ -131,7 +130,6 @@ fn names_and_columns_that_do_not_fit_are_refused() {
     }
 }
 
-/// The fixture's database, with keypoints of `columns` columns.
 fn database(columns: usize) -> (tempfile::TempDir, PathBuf) {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("database.db");
@@ -180,7 +178,6 @@ fn a_database_in_floats_is_read_as_floats() {
     assert_eq!(images[0].keypoints[0], [-0.5, -0.5]);
 }
 
-/// A file beside the repository, or a message that the test is skipped.
 fn shared(name: &str) -> Option<PathBuf> {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/redkitchen");
     let path = Path::new(folder).join(name);
@@ -211,7 +208,7 @@ fn real_features_make_the_round_trip() {
     }
 }
 
-/// Found by a fuzzer: 4 GiB were asked for before anything was read.
+/// A fuzzer found this file: a reader allocated 4 GiB before reading.
 #[test]
 fn chunks_beyond_the_end_of_the_file_are_refused() {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus/features");
@@ -222,7 +219,8 @@ fn chunks_beyond_the_end_of_the_file_are_refused() {
     assert!(lines.iter().any(|line| line.contains(expected)), "{lines:?}");
 }
 
-/// A name of 20,000 folders overflowed the stack, and one of 10,000 became a file that is not read.
+/// A name of 20,000 folders overflowed the stack, and one of 10,000 made a file that could not be
+/// read.
 #[test]
 fn names_are_as_deep_as_can_be_read() {
     let deep = |n: usize| made(&format!("{}x.jpg", "a/".repeat(n - 1)), 2);

@@ -1,11 +1,10 @@
-//! Files as people have them: inputs beside the repository, where they are at hand, with the right answer for each.
+//! Tests real inputs of users, if they are present, against the right result.
 
 use std::path::{Path, PathBuf};
 
 use unlift_io::features::FeatureSource;
 use unlift_io::read::{self, Input};
 
-/// The folder of the inputs, or a message that the test is skipped.
 fn field() -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/field");
     if !path.is_dir() {
@@ -15,7 +14,7 @@ fn field() -> Option<PathBuf> {
     Some(path)
 }
 
-/// Whether `found` are `n` of the `expected` points, in any order.
+/// Returns true if `found` are `n` of the `expected` points, in any order.
 fn same(found: &[[f64; 3]], expected: &[[f64; 3]], n: usize, tolerance: f64) -> bool {
     let near =
         |a: &[f64; 3], b: &[f64; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= tolerance);
@@ -30,7 +29,7 @@ fn maps_are_read_as_their_makers_meant_them() {
     let expected = read::open(&field.join("expected.npy")).unwrap().positions;
     assert_eq!(expected.len(), 300);
     let millimeters: Vec<[f64; 3]> = expected.iter().map(|p| p.map(|x| 1000.0 * x)).collect();
-    // What is read, how many points and cameras, how exactly, and what a note says.
+    // Input, number of points and of cameras, tolerance, text of a note.
     let rows: &[(&str, usize, usize, f64, &str)] = &[
         ("f02-named-in-comment/hash_id_first.txt", 300, 0, 1e-4, ""),
         ("f02-named-in-comment/hash_normals_first.txt", 300, 0, 1e-4, ""),
@@ -51,7 +50,7 @@ fn maps_are_read_as_their_makers_meant_them() {
         ("f07-nvm-names/space.nvm", 300, 2, 1e-4, ""),
         ("f07-nvm-names/tab.nvm", 300, 2, 1e-4, ""),
         ("f08-nvm-models/small_first.nvm", 300, 2, 1e-4, "the largest of 2 models (300 points)"),
-        ("f08-nvm-models/unplaced_last.nvm", 300, 2, 1e-4, "2 photos without a place"),
+        ("f08-nvm-models/unplaced_last.nvm", 300, 2, 1e-4, "2 photos without a pose"),
         ("f09-ply-lists/faces_first.ply", 300, 0, 1e-4, ""),
         ("f09-ply-lists/views.ply", 300, 0, 1e-4, ""),
         ("f09-ply-lists/views_ascii.ply", 300, 0, 1e-4, ""),
@@ -90,7 +89,7 @@ fn features_are_taken_or_told_in_one_line() {
     let Some(field) = field().map(|field| field.join("f15-other-h5")) else { return };
     for (name, found) in [
         ("matches.h5", "found matches of pairs of images"),
-        ("keypoints.h5", "found arrays in no group"),
+        ("keypoints.h5", "found arrays outside any group"),
     ] {
         let line = FeatureSource::open(&field.join(name)).err().unwrap().to_string();
         assert!(line.contains("expected a group per image") && line.ends_with(found), "{line}");

@@ -1,6 +1,7 @@
-//! One answer: the stages through files, and the audit in memory, give the same row, bit for bit.
+//! Tests that stages through files and an audit in memory give the same row, bit for bit, for every
+//! scheme and source.
 //!
-//! Every scheme with every source. What files do not keep (the trials of `ransac`) is left out.
+//! The trials of `ransac`, which files do not store, are left out.
 
 use std::sync::Arc;
 
@@ -24,10 +25,10 @@ use unlift::{Descriptors, PointSet, Unit};
 use unlift_io::atomic::{Access, OutputFile};
 use unlift_io::stage::{self, ImageFile, ImageWriter, Kind};
 
-/// A seed that is no default anywhere: all stages are given it.
+/// A seed that is nowhere the default.
 const SEED: u64 = 7;
 
-/// SIFT-like bytes that change slowly over the map: waves of several lengths in every direction.
+/// Creates SIFT-like bytes that change slowly over the map.
 fn descriptors<const D: usize>(points: &[[f64; D]], extent: f64) -> Descriptors {
     let value = |point: &[f64; D], bin: usize| {
         let mut draws = Draws::new(99, Stage::Synthetic, bin as u64);
@@ -38,7 +39,6 @@ fn descriptors<const D: usize>(points: &[[f64; D]], extent: f64) -> Descriptors 
     Descriptors::try_new(Values::U8(bytes.collect()), 128).unwrap()
 }
 
-/// Every source: the oracle at two ratios with three kinds of noise, all that work alone, and lists by point.
 fn sources<const D: usize>(k: usize) -> Vec<NeighborsBy<D>> {
     let names = ["similarity", "overlap", "geometric"];
     let named = names.map(|name| Named::parse(name).unwrap().with_k(k));
@@ -58,7 +58,7 @@ fn given(n: usize) -> NeighborsBy<3> {
     NeighborsBy::Given(PointNeighbors { name: "file".into(), offsets, neighbors, scores: None })
 }
 
-/// The rows of the stages, one per variant and solver: every arrow between two stages goes through a file.
+/// Returns the rows of the stages. All data between two stages goes through a file.
 fn staged<const D: usize>(
     folder: &Path,
     scheme: &dyn Scheme<D>,
@@ -94,7 +94,6 @@ fn staged<const D: usize>(
     rows
 }
 
-/// The lists of one variant, made from files alone.
 fn lists<const D: usize>(
     folder: &Path,
     variant: &Variant<'_, D>,
@@ -119,7 +118,7 @@ fn lists<const D: usize>(
     }
 }
 
-/// `row` without what a file of recovered points cannot say.
+/// Removes the fields of `row` that a file of recovered points does not store.
 fn without_name(row: &Row) -> Row {
     Row {
         scheme: String::new(),
@@ -129,18 +128,17 @@ fn without_name(row: &Row) -> Row {
         k: 0,
         solver: String::new(),
         distinct: None,
-        // Of the lists alone, as their ratio and K.
+        // These depend on the lists only.
         metrics: Default::default(),
         ..row.clone()
     }
 }
 
-/// The plan of the scheme called `name`.
 fn plan<const D: usize>(unit: Unit, name: &str, sources: Vec<NeighborsBy<D>>) -> Plan<D> {
     let mut plan = Plan::new(unit);
     plan.schemes.retain(|scheme| scheme.name() == name);
     plan.neighbors = sources;
-    // Planes alone tell nothing.
+    // Records of planes alone say nothing about neighbors.
     plan.neighbors.retain(|by| name != "plane" || !by.name().contains("geometric"));
     plan.k = 8;
     plan.oracle_noise = vec![Noise::Uniform, Noise::Near, Noise::Clustered];
@@ -189,7 +187,6 @@ fn maps() {
     }
 }
 
-/// Keeps nothing: rows come with the image.
 struct Unseen;
 
 impl Observer<2> for Unseen {
@@ -210,7 +207,6 @@ impl audit::Watcher<2> for Rows {
     }
 }
 
-/// Random keypoints in a picture of 640 x 480.
 fn keypoints(seed: u64, n: usize) -> (Original<2>, Descriptors) {
     let mut draws = Draws::new(seed, Stage::Synthetic, 1);
     let points: Vec<[f64; 2]> =
@@ -221,8 +217,8 @@ fn keypoints(seed: u64, n: usize) -> (Original<2>, Descriptors) {
     (Original::within(set, bounds).unwrap(), descriptors)
 }
 
-/// Many images in one file of each kind, read and written image by image: the pooled row of the audit. One image has
-/// fewer records than a list, one a single keypoint, which some schemes do not release.
+/// One image has fewer records than a list has entries, one has a single keypoint, which some
+/// schemes do not release.
 #[test]
 fn many_images_in_one_file() {
     let folder = tempfile::tempdir().unwrap();
@@ -247,7 +243,6 @@ fn many_images_in_one_file() {
         let audited =
             audit::run_many::<2, unlift::Error>(of_audit, &plan, &mut audit::Silent).unwrap();
         for (row, source) in audited.rows.iter().zip(["oracle", "overlap"]) {
-            // Hidden.
             let mut truth = OutputFile::create(&path("truth"), Access::Private).unwrap();
             let mut released = OutputFile::create(&path("released"), Access::Usual).unwrap();
             let mut truths = ImageWriter::start(&mut truth, Kind::Truth);
@@ -263,7 +258,6 @@ fn many_images_in_one_file() {
             maps.finish().unwrap();
             truth.commit().unwrap();
             released.commit().unwrap();
-            // Listed.
             let (truth, released) = (path("truth"), path("released"));
             assert!(stage::has_images(&truth).unwrap());
             let mut truths = ImageFile::open(&truth, Kind::Truth).unwrap();
@@ -288,7 +282,6 @@ fn many_images_in_one_file() {
             }
             lists.finish().unwrap();
             output.commit().unwrap();
-            // Recovered.
             let lists = path("lists");
             let mut lists = ImageFile::open(&lists, Kind::Neighborhoods).unwrap();
             let mut maps = ImageFile::open(&released, Kind::Released).unwrap();
@@ -305,7 +298,6 @@ fn many_images_in_one_file() {
             }
             back.finish().unwrap();
             output.commit().unwrap();
-            // Evaluated.
             let back = path("back");
             let mut back = ImageFile::open(&back, Kind::Recovered).unwrap();
             let mut truths = ImageFile::open(&truth, Kind::Truth).unwrap();
@@ -329,7 +321,6 @@ fn many_images_in_one_file() {
     }
 }
 
-/// One image in one file, without its name.
 #[test]
 fn images() {
     let folder = tempfile::tempdir().unwrap();
@@ -343,7 +334,7 @@ fn images() {
         };
         let mut audited = Rows(Vec::new());
         audit::run_many::<2, unlift::Error>([Ok(image)], &plan, &mut audited).unwrap();
-        // The randomness of an image is that of its name: FNV-1a of no bytes.
+        // The seed of an image depends on its name: FNV-1a of no bytes.
         let name = 0xCBF2_9CE4_8422_2325;
         let key = Key::from_seed(SEED).of_item(Stage::Image, name);
         let owner = (&key, Draws::new(SEED, Stage::Image, name).bits());

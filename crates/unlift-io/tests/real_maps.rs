@@ -1,5 +1,5 @@
-//! Real maps, where they are at hand: sums as pycolmap and NumPy give them, and what descriptors
-//! tell about neighborhoods.
+//! Tests real maps, if they are present: sums by pycolmap and NumPy, and neighborhoods from
+//! descriptors.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -18,7 +18,6 @@ use unlift::truth::Original;
 use unlift::{PointSet, Unit};
 use unlift_io::read;
 
-/// The folder of a data set, or a message that the test is skipped.
 fn dataset(name: &str) -> Option<PathBuf> {
     let data = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data");
     let path = Path::new(data).join(name);
@@ -128,7 +127,7 @@ fn patches_of_a_real_map_name_neighbors() {
     let search = oracle::search(&original).unwrap();
     let options = SchemeOptions { voxel: 1.0 };
     for (name, by, at_least) in [
-        // Measured on olc: 5.1 % and 14.5 %. On pairs the list of a slot is that of its descriptor
+        // Measured on olc: 5.1 % and 14.5 %. On pairs, the list of a slot is that of its descriptor
         // row.
         ("olc", "similarity", 0.045),
         ("olc", "overlap", 0.14),
@@ -181,8 +180,8 @@ fn what_is_said_about_a_real_map_comes_true() {
             eprintln!("{name}: said {said:.3}, was {was:.3}, {} points", bin.n);
             off += bin.n as f64 * (said - was).abs();
             points += bin.n as f64;
-            // Never much more than comes true (measured: by 0.01); less is said in the middle, where few points are (by
-            // 0.082), and near 0.86 (by 0.071).
+            // The stated probability is never much too high (measured: by 0.01). It is too low in
+            // the middle, where few points are (by 0.082), and near 0.86 (by 0.071).
             let most = if said > 0.8 { 0.075 } else { 0.09 };
             let off = was - said;
             assert!((-0.02..=most).contains(&off), "{name}: said {said:.3}, was {was:.3}");

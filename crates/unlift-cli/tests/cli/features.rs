@@ -255,7 +255,7 @@ fn features_of_a_database_are_copied() {
     assert_eq!(stdout, "1 images, 8 features, in d.h5\n");
     assert_eq!(
         stderr,
-        "unlift: d.h5: image \"../x.jpg\": expected a name of parts that are not empty, . or .., \
+        "unlift: d.h5: image \"../x.jpg\": expected a name whose parts are not empty, . or .., \
          found \"../x.jpg\"\n\
          unlift: d.db: image \"i3.jpg\": expected descriptors, found none\n\
          unlift: d.db: expected 3 images that can be used, found 1\n"

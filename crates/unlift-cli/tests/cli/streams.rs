@@ -73,7 +73,7 @@ fn a_place_that_cannot_be_written_is_an_error_of_the_command_line() {
     assert_eq!(
         place.complains("features photos --out link.h5", 2),
         "unlift: --out: link.h5: expected a file, a folder, or nothing, found a link to \
-         gone/features.h5, which is not there\n"
+         gone/features.h5, which does not exist\n"
     );
 }
 

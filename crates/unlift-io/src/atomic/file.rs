@@ -8,13 +8,11 @@ use super::unfinished::{Unfinished, live};
 use super::{Access, parent_of, resolved};
 use crate::Error;
 
-/// Writes the file `path` through `fill`; whatever stood there stays until the new file is whole.
-///
-/// As [`OutputFile`], for what is written in one go.
+/// Writes the file `path` with `fill` and keeps the old file until the new one is complete.
 ///
 /// # Errors
-/// When the folder does not exist, `path` is a folder or a device, `fill` fails, or the disk does.
-/// Nothing is left behind then.
+/// When the folder does not exist, `path` is a folder or a device, or writing fails. No temporary
+/// file is left then.
 pub fn write_file(
     path: &Path,
     access: Access,
@@ -25,11 +23,11 @@ pub fn write_file(
     output.commit()
 }
 
-/// A file that is built in a temporary sibling and takes its place on [`commit`](Self::commit).
+/// A file that is written under a temporary name in its folder and renamed by
+/// [`commit`](Self::commit).
 ///
-/// The bytes go to a temporary file in the same folder, which is flushed to disk and renamed, as is the name then. A
-/// symbolic link is followed: the file it names is replaced, not the link. Dropped without a commit,
-/// it leaves no trace.
+/// The target of a symbolic link is replaced, not the link. Dropping the value without a commit
+/// removes the temporary file.
 #[derive(Debug)]
 pub struct OutputFile {
     path: PathBuf,
@@ -39,7 +37,7 @@ pub struct OutputFile {
 }
 
 impl OutputFile {
-    /// Starts a file that will become `path`; what stands there stays as it is until the commit.
+    /// Starts the output file `path`.
     ///
     /// # Errors
     /// When the folder does not exist, `path` is a folder or a device, or the disk fails.
@@ -51,12 +49,12 @@ impl OutputFile {
         Ok(Self { path: path.to_owned(), target, writer, unfinished })
     }
 
-    /// Where a file at `path` will stand, links followed; an error where none can be put.
+    /// Returns the place of an output file at `path`, with links resolved.
     pub(super) fn check(path: &Path) -> Result<PathBuf, Error> {
         let target = resolved(path)?;
         match fs::metadata(&target) {
             Ok(found) if found.is_dir() => return Err(Error::new(path, "", "a file", "a folder")),
-            // Renaming over a device or a pipe would replace it in the system.
+            // A rename would replace a device or a pipe.
             Ok(found) if !found.is_file() => {
                 return Err(Error::new(path, "", "a regular file", "a device or a pipe"));
             }
@@ -64,25 +62,25 @@ impl OutputFile {
         }
         let folder = parent_of(&target);
         if !folder.is_dir() {
-            return Err(Error::new(folder, "", "a folder to write in", "none"));
+            return Err(Error::new(folder, "", "an existing folder", "none"));
         }
         Ok(target)
     }
 
-    /// The path as it was given, for errors.
+    /// The path as the caller gave it, for errors.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Where the bytes go.
+    /// The buffered writer of the temporary file.
     pub fn writer(&mut self) -> &mut BufWriter<File> {
         &mut self.writer
     }
 
-    /// Puts the file in its place.
+    /// Moves the file to its place.
     ///
     /// # Errors
-    /// When the disk fails; what stood there is still there then.
+    /// When the disk fails. An existing file is unchanged then.
     pub fn commit(mut self) -> Result<(), Error> {
         let failed = |source| Error::write(&self.path, source);
         self.writer.flush().map_err(failed)?;

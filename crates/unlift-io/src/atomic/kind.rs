@@ -1,4 +1,4 @@
-//! Whose file stands at a place: known by its content, as a name proves nothing.
+//! Recognizes files that unlift wrote by their content.
 
 use std::fmt;
 use std::fs::File;
@@ -9,60 +9,59 @@ use serde_json::Value;
 
 use crate::stage;
 
-/// What unlift writes.
+/// A kind of file that unlift writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// `audit.json`: an object with a text `unlift` and a number `schema`.
+    /// `audit.json`: an object with a string `unlift` and a number `schema`.
     AuditJson,
     /// `report.html`: its head names unlift as the generator.
     Page,
     /// A Parquet file whose metadata names this kind.
     Stage(stage::Kind),
-    /// What a folder of parts holds: an object with an object `unlift` and a list `parts`.
+    /// The manifest of a folder of parts: an object with an object `unlift` and a list `parts`.
     Manifest,
     /// A PLY or OBJ file that begins with the comment `CLOUD_COMMENT`.
     Cloud,
-    /// A file of a COLMAP model in text whose first line is `MODEL_MARK`.
+    /// A text file of a COLMAP model whose first line is `MODEL_MARK`.
     Model,
-    /// nerfstudio's cameras: an object with a text `unlift` and a list `frames`.
+    /// Cameras for nerfstudio: an object with a string `unlift` and a list `frames`.
     Transforms,
-    /// HDF5 with `FEATURES_MARK` behind the superblock.
+    /// An HDF5 file with `FEATURES_MARK` after the superblock.
     Features,
-    /// A PNG whose first chunk of text names unlift, as [`marked_picture`] has it.
+    /// A PNG whose first text chunk names unlift, as written by [`marked_picture`].
     Picture,
-    /// JUnit XML whose root is named unlift.
+    /// JUnit XML whose root element is named unlift.
     Junit,
     /// SARIF whose first run is by unlift.
     Sarif,
-    /// A table of figures: CSV with `TABLE_COLUMNS` first, or LaTeX or Markdown with a comment that names unlift first.
+    /// A table of figures: CSV with the columns of `TABLE_MARKS`, or LaTeX or Markdown with a
+    /// comment that names unlift.
     Table,
-    /// An SVG whose comment in the first line names unlift.
+    /// An SVG whose first line has a comment that names unlift.
     Curves,
 }
 
-/// The comment in clouds.
 pub(crate) const CLOUD_COMMENT: &str = "unlift";
 const CLOUD_MARKS: [&str; 2] =
     ["ply\nformat binary_little_endian 1.0\ncomment unlift\n", "# unlift\n"];
-/// The first line of the files of a model.
+/// The first line of each file of a COLMAP model.
 pub(crate) const MODEL_MARK: &str = "# unlift model";
 const JUNIT_MARK: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"unlift\"";
-/// A table begins with these columns (CSV) or with a comment.
 const TABLE_MARKS: [&str; 3] =
     ["scheme,neighbors,oracle_noise,inlier_ratio,", "% unlift ", "<!-- unlift "];
 const CURVES_MARK: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?><!-- unlift ";
-/// In the head of a page, which ends before its style.
+/// The head of a page ends before the style.
 const PAGE_MARK: &str = "<meta name=\"generator\" content=\"unlift\">";
 const PAGE_HEAD: usize = 2048;
-/// Between the superblock and the first array of features: no structure of HDF5 refers to it.
+/// A mark after the superblock. No HDF5 structure refers to it.
 pub(crate) const FEATURES_MARK: &[u8; 32] = b"unlift features, format 1\0\0\0\0\0\0\0";
 const SUPERBLOCK: usize = 96;
-/// A chunk of a PNG: its length, the text "Software: unlift", its checksum.
+/// A PNG chunk: length, the text "Software: unlift", checksum.
 const PICTURE_MARK: &[u8; 27] = b"\0\0\0\x0ftEXtSoftware\0unlift\xfe\xc8\xcb\xd5";
-/// Signature and first chunk of a PNG, behind which others may stand.
+/// Bytes of the signature and first chunk of a PNG.
 const PNG_HEAD: usize = 33;
 
-/// The bytes of a PNG, known as one of ours.
+/// Adds the mark of [`Kind::Picture`] to the bytes of a PNG.
 #[must_use]
 pub fn marked_picture(png: &[u8]) -> Vec<u8> {
     let (head, rest) = png.split_at(PNG_HEAD.min(png.len()));
@@ -70,7 +69,7 @@ pub fn marked_picture(png: &[u8]) -> Vec<u8> {
 }
 
 impl Kind {
-    /// Whether the file at `path` is one of this kind. What cannot be read is none.
+    /// Returns true if the file at `path` is of this kind, and false if it cannot be read.
     pub fn is_at(self, path: &Path) -> bool {
         match self {
             Self::AuditJson => {
@@ -118,7 +117,7 @@ impl fmt::Display for Kind {
     }
 }
 
-/// The first `n` bytes of a file; fewer where it is shorter or cannot be read.
+/// Returns the first `n` bytes of a file, or fewer if it is shorter or cannot be read.
 fn start(path: &Path, n: usize) -> Vec<u8> {
     let mut head = Vec::new();
     let _ = File::open(path).and_then(|file| file.take(n as u64).read_to_end(&mut head));
@@ -144,7 +143,7 @@ mod tests {
     use super::*;
     use std::fs;
 
-    /// Stage files, features, models and pictures are written and read again in other tests.
+    /// Stage files, features, models and pictures are tested elsewhere.
     const OURS: [(Kind, &str); 10] = [
         (Kind::AuditJson, r#"{"unlift": "0.1.0", "schema": 1, "results": []}"#),
         (Kind::Manifest, r#"{"unlift": {}, "parts": []}"#),
@@ -161,7 +160,6 @@ mod tests {
         "",
         "{}",
         r#"["unlift", "schema", "parts"]"#,
-        // What `npm audit --json` writes, in short.
         r#"{"auditReportVersion": 2, "vulnerabilities": {}, "metadata": {}}"#,
         r#"{"frames": [], "ply_file_path": "sparse_pc.ply"}"#,
         r#"{"version": "2.1.0", "runs": [{"tool": {"driver": {"name": "other"}}}]}"#,

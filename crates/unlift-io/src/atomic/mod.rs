@@ -1,9 +1,9 @@
-//! Outputs that appear whole or not at all, and that never cost anybody a file.
+//! Atomic outputs: a file is written completely or not at all, and no file of another program is
+//! lost.
 //!
-//! Everything is built under a temporary name (`unfinished`) beside its place and renamed when it is whole. What
-//! stands at the place is replaced only if it is of the kind that is written there ([`Kind`], by content), and never
-//! if it is an input of the same run ([`Rules`]). Nothing else is touched: a folder that is written to may hold
-//! anything.
+//! An output is built under a temporary name (`unfinished`) and renamed when it is complete. It
+//! replaces an existing file only if that is of the same kind ([`Kind`]) and no input of the run
+//! ([`Rules`]).
 
 mod file;
 mod kind;
@@ -27,19 +27,20 @@ pub use set::OutputSet;
 pub(crate) use unfinished::final_place;
 pub use unfinished::{abandon, sweep};
 
-/// Who may read what is written.
+/// The permissions of outputs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
-    /// As any new file or folder.
+    /// The default permissions of a new file or folder.
     Usual,
-    /// Its owner alone: truth, recovered points, pages that show them. Unix: files 0600, folders 0700.
+    /// Only the owner can read it: ground truth, recovered points, pages that show them (Unix:
+    /// 0600, folders 0700).
     Private,
 }
 
-/// Makes `folder` and its missing parents, to stay.
+/// Creates `folder` and its missing parents.
 ///
 /// # Errors
-/// When one cannot be made.
+/// When a folder cannot be created.
 pub fn make_folders(folder: &Path, access: Access) -> Result<(), Error> {
     let mut made = unfinished::Unfinished::default();
     made.make_folders(folder, access).map_err(|source| Error::write(folder, source))?;
@@ -47,10 +48,10 @@ pub fn make_folders(folder: &Path, access: Access) -> Result<(), Error> {
     Ok(())
 }
 
-/// Waits until no other run puts files in their places in `folder`, and keeps others out until the result is dropped.
+/// Locks `folder` against other runs that replace files in it, until the result is dropped.
 ///
-/// `None` where folders cannot be locked, or where the lock (`flock`) is held for seconds, as by `flock(1)` around a
-/// command: the work goes on without.
+/// Returns `None` if folders cannot be locked, or another process holds the lock (`flock`) for 5
+/// seconds. Work then continues without the lock.
 #[must_use]
 pub fn alone_in(folder: &Path) -> Option<File> {
     const PATIENCE: Duration = Duration::from_secs(5);
@@ -67,7 +68,7 @@ pub fn alone_in(folder: &Path) -> Option<File> {
     }
 }
 
-/// Where a symbolic link points, or the path itself.
+/// Resolves a symbolic link. Other paths are returned unchanged.
 fn resolved(path: &Path) -> Result<PathBuf, Error> {
     let named = path.file_name().is_some();
     if !path.is_symlink() && (named || !path.exists()) {
@@ -75,14 +76,13 @@ fn resolved(path: &Path) -> Result<PathBuf, Error> {
     }
     fs::canonicalize(path).map_err(|source| match fs::read_link(path) {
         Ok(to) if source.kind() == io::ErrorKind::NotFound => {
-            let found = format!("a link to {}, which is not there", to.display());
+            let found = format!("a link to {}, which does not exist", to.display());
             Error::new(path, "", "a file, a folder, or nothing", found)
         }
         _ => Error::write(path, source),
     })
 }
 
-/// Makes the names in `folder` outlast a loss of power, where folders can be flushed.
 fn flush_names(folder: &Path) {
     if cfg!(unix) {
         let _ = File::open(folder).and_then(|folder| folder.sync_all());
@@ -96,7 +96,6 @@ fn parent_of(path: &Path) -> &Path {
     }
 }
 
-/// The names in a folder, sorted.
 #[cfg(test)]
 fn entries(folder: &Path) -> Vec<String> {
     let name = |entry: io::Result<fs::DirEntry>| entry.unwrap().file_name().into_string().unwrap();

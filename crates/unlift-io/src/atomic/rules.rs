@@ -1,4 +1,4 @@
-//! What an output may replace: nothing that is read in the same run, and nothing of others unless told so.
+//! Rules for replacing files.
 
 use std::collections::{HashMap, HashSet, VecDeque};
 use std::fs;
@@ -8,34 +8,37 @@ use std::sync::{Arc, OnceLock};
 use super::{Kind, OutputFile};
 use crate::Error;
 
-/// What a run reads, and whether it may replace files of others.
+/// The inputs of a run, and the permission to replace files of other programs.
 #[derive(Clone, Debug, Default)]
 pub struct Rules {
     inputs: Vec<PathBuf>,
-    /// The files that are read, by what all paths to one share: found when it is first asked.
+    /// The input files by identity, found on first use.
     files: Arc<OnceLock<HashMap<Identity, PathBuf>>>,
     force: bool,
 }
 
-/// Folders in folders that are looked into: a project's models and photos.
+/// The maximum depth of the search for inputs in folders.
 const DEPTH: usize = 8;
-/// Endings of what is read from folders: models, databases, photos, parts of stage files.
+/// Extensions of models, databases, photos and parts of stage files.
 const READ_FROM_FOLDERS: [&str; 10] =
     ["bin", "txt", "db", "jpg", "jpeg", "jpe", "jfif", "png", "webp", "parquet"];
 
 impl Rules {
-    /// The rules of a run that reads `inputs`: files, and folders with the models, databases and photos below
-    /// them. With `force` files of others are replaced; inputs never are.
+    /// Creates the rules of a run that reads `inputs`: files, and folders with the models,
+    /// databases and photos below them.
+    ///
+    /// `force` permits replacing files of other programs, but never inputs.
     pub fn new<'a>(inputs: impl IntoIterator<Item = &'a Path>, force: bool) -> Self {
         let inputs = inputs.into_iter().map(Path::to_owned).collect();
         Self { inputs, files: Arc::default(), force }
     }
 
-    /// Whether `kind` may be written at `path`; where it will stand, links followed.
+    /// Checks that a file of `kind` may be written at `path`, and returns its place with links
+    /// resolved.
     ///
     /// # Errors
-    /// When no file can be written there, an input stands there (under whatever name), or a file that is not of
-    /// this kind does and that is not forced.
+    /// When no file can be written there, the place is an input, or it has a file of another kind
+    /// and `force` is not set.
     pub fn check(&self, path: &Path, kind: Kind) -> Result<PathBuf, Error> {
         let target = OutputFile::check(path)?;
         if !target.exists() {
@@ -52,7 +55,7 @@ impl Rules {
         Ok(target)
     }
 
-    /// As [`check`](Self::check), for the file `name` of a folder that may still have to be made.
+    /// Checks the file `name` of a folder that may not exist yet.
     pub(super) fn check_in(&self, folder: &Path, name: &Path, kind: Kind) -> Result<(), Error> {
         let place = folder.join(name);
         if place.exists() || place.is_symlink() {
@@ -61,19 +64,20 @@ impl Rules {
         Ok(())
     }
 
-    /// The input that is the same file as `target`, by whatever path or link.
+    /// Returns the input that is the same file as `target`, under any path.
     pub fn input_at(&self, target: &Path) -> Option<&Path> {
         let files = self.files.get_or_init(|| files(&self.inputs));
         files.get(&identity(target)?).map(PathBuf::as_path)
     }
 }
 
-/// The files that are `inputs` or in folders below them. Every folder is looked into once, however many links lead there.
+/// Finds the files among and below `inputs`. Each folder is visited once, even if several links
+/// lead to it.
 fn files(inputs: &[PathBuf]) -> HashMap<Identity, PathBuf> {
     let (mut files, mut folders) = (HashMap::new(), HashSet::new());
     let mut waiting: VecDeque<(PathBuf, usize)> =
         inputs.iter().map(|path| (path.clone(), DEPTH)).collect();
-    // The least deep first: of a folder that is met twice as much is seen as can be.
+    // Breadth first: a folder that is reached twice is searched at its smallest depth.
     while let Some((path, depth)) = waiting.pop_front() {
         let Some(identity) = identity(&path) else { continue };
         if !path.is_dir() {
@@ -88,9 +92,8 @@ fn files(inputs: &[PathBuf]) -> HashMap<Identity, PathBuf> {
     files
 }
 
-/// A path by which two names of one place are equal, also where nothing stands yet.
-///
-/// It is absolute, without links and without steps up.
+/// Returns an absolute path, without links and `..`, that is equal for all names of one place, even
+/// if nothing exists there yet.
 pub fn place_of(path: &Path) -> PathBuf {
     let mut place = std::path::absolute(Path::new(".")).unwrap_or_default();
     for step in path.components() {
@@ -99,7 +102,6 @@ pub fn place_of(path: &Path) -> PathBuf {
             Component::CurDir => {}
             step => place.push(step),
         }
-        // What is not there is no link.
         place = fs::canonicalize(&place).unwrap_or(place);
     }
     place
@@ -110,7 +112,6 @@ fn is_read_from_folders(path: &Path) -> bool {
     ending.is_some_and(|ending| READ_FROM_FOLDERS.contains(&ending.as_str()))
 }
 
-/// What all paths to one file share.
 #[cfg(unix)]
 type Identity = (u64, u64);
 #[cfg(not(unix))]
@@ -144,14 +145,13 @@ mod tests {
         let rule = "expected nothing, or an audit.json of an earlier run (else --force), found another file";
         assert!(error.ends_with(rule), "{error}");
         assert!(told("missing", true).is_ok());
-        // Earlier outputs in an input folder are no inputs.
         assert!(told(".", true).is_ok());
         fs::hard_link(at("audit.json"), at("link")).unwrap();
         fs::create_dir_all(at("deep/er")).unwrap();
         fs::hard_link(at("audit.json"), at("deep/er/p.JPG")).unwrap();
         #[cfg(unix)]
         for name in 0..30 {
-            // To the folder that it is in: 30 times 30 times .. paths to one photo.
+            // Links to their own folder make 30 times 30 times .. paths to one photo.
             std::os::unix::fs::symlink(".", at(&format!("l{name}"))).unwrap();
         }
         for input in ["audit.json", "link", "deep", "."] {

@@ -1,4 +1,4 @@
-//! Several outputs in one folder that may hold anything else.
+//! Several output files in one folder.
 
 use std::fs;
 use std::io;
@@ -8,30 +8,30 @@ use super::unfinished::{MARK, Unfinished, live, sweep};
 use super::{Access, Kind, Rules, alone_in, flush_names, parent_of, resolved};
 use crate::Error;
 
-/// Files of a folder that are built apart and take their places together on [`commit`](Self::commit).
+/// Several output files of one folder that [`commit`](Self::commit) moves to their places together.
 ///
-/// Only these files are written and replaced, by name; nothing is deleted. Every check comes before the first
-/// rename, and each file is whole before that. Dropped without a commit, it leaves no trace.
+/// All checks precede the first rename. Dropping the value without a commit removes the temporary
+/// files.
 #[derive(Debug)]
 pub struct OutputSet {
-    /// The folder as it was given, for errors.
+    /// The folder as the caller gave it, for errors.
     path: PathBuf,
-    /// The same, links followed.
     target: PathBuf,
     rules: Rules,
     access: Access,
     files: Vec<(PathBuf, Kind)>,
-    // Removed on drop, before the folders around it.
+    // Removed on drop, before the folders that contain it.
     staging: Unfinished,
     made: Unfinished,
 }
 
-/// A file that was replaced: its place, and what stood there before.
+/// A place, and a second name of the file that was there before.
 type Replaced = (PathBuf, Option<PathBuf>);
 
 impl OutputSet {
-    /// Starts outputs in the folder `path`, which is made if it is missing (with its parents, by `access`);
-    /// `first` are files that will be among them: refused now, before hours of work, not then.
+    /// Starts outputs in the folder `path`, which is created if missing.
+    ///
+    /// `first` are files that will be written: they are checked now, before hours of work.
     ///
     /// # Errors
     /// When `path` is a file, cannot be written, or [`Rules::check`] refuses one of `first`.
@@ -42,7 +42,7 @@ impl OutputSet {
         first: &[(&str, Kind)],
     ) -> Result<Self, Error> {
         let target = resolved(path)?;
-        // Asked once: another program may make or remove the folder meanwhile.
+        // Checked once: another program may create or remove the folder meanwhile.
         if fs::metadata(&target).is_ok_and(|found| !found.is_dir()) {
             return Err(Error::new(path, "", "a folder, or nothing", "a file"));
         }
@@ -53,7 +53,8 @@ impl OutputSet {
         let begun = loop {
             tries += 1;
             match begin(&target, access) {
-                // Another run that gives up removes the folder that it had made, if it is still empty.
+                // Another run that is dropped removes the folder that it created, if it is still
+                // empty.
                 Err(error) if error.kind() == io::ErrorKind::NotFound && tries < 10 => {}
                 begun => break begun,
             }
@@ -63,14 +64,14 @@ impl OutputSet {
         Ok(Self { path, target, rules, access, files, staging, made })
     }
 
-    /// Where to write the file that will be `name` (with slashes, in folders below), of this kind.
+    /// Returns the temporary path for the output `name` of this kind. `name` may contain slashes.
     ///
     /// # Errors
-    /// When [`Rules::check`] refuses the place, or a folder for it cannot be made.
+    /// When [`Rules::check`] refuses the place, or a folder cannot be created.
     pub fn stage(&mut self, name: &str, kind: Kind) -> Result<PathBuf, Error> {
         let name = PathBuf::from(name);
         self.rules.check_in(&self.target, &name, kind)?;
-        // The partial folder itself is never made again: what an interrupt has just removed must not come back.
+        // Do not create the temporary folder itself again: an interrupt may just have removed it.
         let mut folder = self.staging.path().to_owned();
         for part in parent_of(&name).components() {
             folder.push(part);
@@ -84,18 +85,17 @@ impl OutputSet {
         Ok(staged)
     }
 
-    /// Puts every file in its place, in the order in which they were asked for.
+    /// Moves all files to their places, in the order of [`stage`](Self::stage).
     ///
     /// # Errors
-    /// When something else has come to stand at a place meanwhile, or a rename fails. The earlier files are put
-    /// back then.
+    /// When another file has appeared at a place, or a rename fails. Replaced files are restored
+    /// then.
     pub fn commit(mut self) -> Result<(), Error> {
         for (name, kind) in &self.files {
             self.rules.check_in(&self.target, name, *kind)?;
             let made = self.made.make_folders(parent_of(&self.target.join(name)), self.access);
             made.map_err(|source| Error::write(&self.path, source))?;
         }
-        // Files of two runs are not mixed.
         let alone = alone_in(&self.target);
         self.replace_all()?;
         drop((alone, self.staging));
@@ -107,14 +107,13 @@ impl OutputSet {
         Ok(())
     }
 
-    /// Puts all files in their places, or none of them.
     fn replace_all(&self) -> Result<(), Error> {
         let _undisturbed = live();
         let mut done = Vec::new();
         for at in 0..self.files.len() {
             if let Err(error) = self.replace(at, &mut done) {
                 for (place, earlier) in done.into_iter().rev() {
-                    // Best effort: the error that is told is the one that led here.
+                    // Best effort: the first error is the one to report.
                     let _ = match earlier {
                         Some(earlier) => fs::rename(earlier, place),
                         None => fs::remove_file(place),
@@ -126,7 +125,8 @@ impl OutputSet {
         Ok(())
     }
 
-    /// Puts one file in its place. What stands there gets a second name first, so that at no time nothing stands there.
+    /// Moves one file to its place. The old file gets a second name first, so that the place is
+    /// never empty.
     fn replace(&self, at: usize, done: &mut Vec<Replaced>) -> Result<(), Error> {
         let (name, kind) = &self.files[at];
         let failed = |source| Error::write(self.path.join(name), source);
@@ -134,7 +134,7 @@ impl OutputSet {
         let place = resolved(&self.target.join(name))?;
         if !place.exists() {
             match fs::hard_link(&staged, &place) {
-                // It has come there meanwhile.
+                // Another program has just created the file.
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
                     return Err(failed(error));
                 }
@@ -145,11 +145,11 @@ impl OutputSet {
             return Ok(());
         }
         let earlier = self.staging.path().join(format!("{MARK}-{at}"));
-        // Links are not known to every disk, nor allowed for every file of others.
+        // Some file systems have no hard links, and some forbid links to files of other users.
         let kept =
             fs::hard_link(&place, &earlier).or_else(|_| fs::copy(&place, &earlier).map(drop));
         kept.map_err(failed)?;
-        // What was checked may have been another file.
+        // The file may have been exchanged after the first check.
         let checked = self.rules.check(&earlier, *kind);
         checked.map_err(|error| error.at(self.path.join(name)))?;
         fs::rename(&staged, &place).map_err(failed)?;
@@ -158,7 +158,7 @@ impl OutputSet {
     }
 }
 
-/// Makes the folder where it is missing, sweeps it, and makes one in it to build in.
+/// Creates the folder, sweeps it, and creates a temporary folder in it.
 fn begin(target: &Path, access: Access) -> io::Result<(Unfinished, Unfinished)> {
     let mut made = Unfinished::default();
     made.make_folders(target, access)?;
@@ -189,7 +189,6 @@ mod tests {
         let mut set = create(&target).unwrap();
         write(&mut set, "audit.json", "1");
         write(&mut set, "other.json", "1");
-        // Somebody's file has come meanwhile.
         fs::write(target.join("other.json"), "mine").unwrap();
         assert!(set.commit().is_err());
         assert_eq!(entries(&target), ["other.json"]);
@@ -198,7 +197,7 @@ mod tests {
         let mut set = create(&target).unwrap();
         write(&mut set, "audit.json", "1");
         set.commit().unwrap();
-        // A file that came after the first checks, and one that was asked for and never written.
+        // A file that appeared after the first checks, and one that was staged and never written.
         for last in ["other.json", "missing.json"] {
             let mut set = create(&target).unwrap();
             write(&mut set, "new.json", "2");

@@ -1,8 +1,8 @@
-//! How an unfinished output goes away: by its owner, on a signal, or by a later run.
+//! Temporary files and folders: removed by their owner, on a signal, or by a later run.
 //!
-//! What is built lies beside its place, as `.NAME.unlift-xxxxxx.partial`. The process that builds it holds a lock on it
-//! (`flock`), which the system releases when the process ends in any way. So a later run can tell what a dead process
-//! left from what a living one is building, on every machine that shares the disk and its locks.
+//! A temporary file is beside its place, as `.NAME.unlift-xxxxxx.partial`. Its process holds a lock
+//! on it (`flock`), which the system releases when the process ends. So a later run can remove the
+//! files of dead processes only, on all machines that share the disk and its locks.
 
 use std::fs::{self, File, OpenOptions};
 use std::io;
@@ -13,49 +13,49 @@ use super::{Access, flush_names, parent_of};
 
 const SIGN: &str = ".unlift-";
 const ENDING: &str = ".partial";
-/// Random letters in a name.
 const RANDOM: usize = 6;
 
-/// A file in every partial folder, made first and removed last. A folder that has it is ours, with all that is in it.
+/// A file in every temporary folder, created first and removed last, which proves that unlift made
+/// the folder.
 pub(super) const MARK: &str = ".unlift-unfinished";
 
-/// What this process is building, and the folders that it made for it, in order.
+/// The temporary files of this process, and the folders created for them, in order of creation.
 ///
-/// Whoever makes, renames or removes one holds the lock, so that [`abandon`] meets nothing half done.
+/// Code that creates, renames or removes one holds the lock, so that [`abandon`] finds complete
+/// steps only.
 static LIVE: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// Locks the list of what is being built: [`abandon`] waits until it is released.
 pub(super) fn live() -> MutexGuard<'static, Vec<PathBuf>> {
-    // A list of paths is in order whatever panicked.
+    // A panic cannot leave a list of paths in a bad state.
     LIVE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes everything that this process has not finished, and lets nothing new begin: the process is about to end.
-///
-/// What was put in its place is whole and stays.
+/// Removes all temporary files of this process and blocks new ones. Call it when the process is
+/// about to end.
 pub fn abandon() {
     let mut live = live();
     for path in live.drain(..).rev() {
         remove(&path);
     }
-    // Kept for good: a thread that works on must not begin another file.
+    // Never unlocked: a thread that still runs must not start another file.
     std::mem::forget(live);
 }
 
-/// Removes what dead processes left unfinished in `folder`. What a living process builds stays.
+/// Removes the temporary files in `folder` that dead processes left.
 ///
-/// A file is known by its name and the lack of a lock, a folder also by the mark in it. Nothing else is touched.
+/// A file is recognized by its name and the missing lock, a folder also by its mark.
 pub fn sweep(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for entry in entries.flatten() {
         let path = entry.path();
-        // Neither links, which lead elsewhere, nor pipes, which would be waited for.
+        // Skips links, which lead elsewhere, and pipes, which block when they are opened.
         let may_be = entry.file_type().is_ok_and(|kind| kind.is_file() || kind.is_dir());
         if may_be && is_partial_name(&path) {
-            // Folders can be locked on Unix alone: elsewhere nothing is swept.
+            // Only Unix can lock folders. Elsewhere nothing is swept.
             let file = File::open(&path).ok();
             let dead = file.filter(|file| cfg!(unix) && file.try_lock().is_ok());
-            // The lock is held until the path is gone. A process that has just made it waits for the lock, and begins anew.
+            // The lock is held until the path is removed. A process that has just created it waits
+            // for the lock and starts again.
             if let Some(_locked) = dead {
                 remove(&path);
             }
@@ -63,12 +63,12 @@ pub fn sweep(folder: &Path) {
     }
 }
 
-/// Removes a partial file, a partial folder with all that is in it, or another folder if it is empty.
+/// Removes a temporary file, a temporary folder with its content, or an empty folder.
 fn remove(path: &Path) {
     let is_ours = is_partial_name(path);
     let is_folder = fs::symlink_metadata(path).is_ok_and(|found| found.is_dir());
     if is_ours && is_folder && path.join(MARK).is_file() {
-        // Another thread may be writing in it.
+        // Another thread may still write to it.
         for _ in 0..10 {
             if remove_marked(path).is_ok() {
                 return;
@@ -81,7 +81,7 @@ fn remove(path: &Path) {
     }
 }
 
-/// Removes the mark last: what a kill leaves on the way is still known as ours.
+/// Removes the mark last, so that a later run can continue after a kill.
 fn remove_marked(folder: &Path) -> io::Result<()> {
     let entries: Vec<_> = fs::read_dir(folder)?.collect::<Result<_, _>>()?;
     for entry in entries.iter().filter(|entry| entry.file_name() != MARK) {
@@ -94,7 +94,6 @@ fn remove_marked(folder: &Path) -> io::Result<()> {
     fs::remove_dir(folder)
 }
 
-/// Whether the last part of `path` is the name of something unfinished.
 fn is_partial_name(path: &Path) -> bool {
     let Some(name) = path.file_name().and_then(|name| name.to_str()) else { return false };
     let random = name.strip_suffix(ENDING).and_then(|name| name.rsplit_once(SIGN));
@@ -104,7 +103,7 @@ fn is_partial_name(path: &Path) -> bool {
         })
 }
 
-/// Where what is built at `path` will stand, for errors: the path without partial folders.
+/// Removes temporary folders from a path, for errors.
 pub(crate) fn final_place(path: PathBuf) -> PathBuf {
     if !path.ancestors().any(is_partial_name) {
         return path;
@@ -112,16 +111,15 @@ pub(crate) fn final_place(path: PathBuf) -> PathBuf {
     path.components().filter(|part| !is_partial_name(part.as_ref())).collect()
 }
 
-/// Paths that are gone when this is dropped, unless they were [kept](Self::keep).
+/// Temporary paths that are removed on drop, unless they are [kept](Self::keep).
 #[derive(Debug, Default)]
 pub(super) struct Unfinished {
     paths: Vec<PathBuf>,
-    /// Holds the lock.
     _locked: Option<File>,
 }
 
 impl Unfinished {
-    /// Makes a file beside `target`.
+    /// Creates a temporary file beside `target`.
     pub fn file(target: &Path, access: Access) -> io::Result<(Self, File)> {
         let name = target.file_name().unwrap_or_default().to_string_lossy();
         make(parent_of(target), &name, |path| {
@@ -135,7 +133,7 @@ impl Unfinished {
         })
     }
 
-    /// Makes a folder in `folder`, of which only its owner may see what is built there.
+    /// Creates a private temporary folder in `folder`.
     pub fn folder(folder: &Path) -> io::Result<Self> {
         let made = make(folder, "output", |path| {
             make_folder(path, Access::Private)?;
@@ -148,12 +146,11 @@ impl Unfinished {
         made.map(|(folder, _)| folder)
     }
 
-    /// Where it is.
     pub fn path(&self) -> &Path {
         &self.paths[0]
     }
 
-    /// Makes `folder` and its missing parents; when this is dropped, those that are empty are removed.
+    /// Creates `folder` and its missing parents. Those that are empty are removed on drop.
     pub fn make_folders(&mut self, folder: &Path, access: Access) -> io::Result<()> {
         let is_missing = |path: &&Path| !path.as_os_str().is_empty() && !path.exists();
         let missing: Vec<&Path> = folder.ancestors().take_while(is_missing).collect();
@@ -164,7 +161,7 @@ impl Unfinished {
                     live.push(path.to_owned());
                     self.paths.push(path.to_owned());
                 }
-                // Another program made it meanwhile: it is not ours to remove.
+                // Another program created it, so it must not be removed.
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(error),
             }
@@ -172,7 +169,6 @@ impl Unfinished {
         Ok(())
     }
 
-    /// What was made stays, or was renamed.
     pub fn keep(mut self) {
         let kept = std::mem::take(&mut self.paths);
         live().retain(|path| !kept.contains(path));
@@ -190,13 +186,13 @@ impl Drop for Unfinished {
     }
 }
 
-/// Makes and locks what will be `name`, under a partial name in `folder`.
+/// Creates and locks a temporary file or folder for `name` in `folder`.
 fn make(
     folder: &Path,
     name: &str,
     mut new: impl FnMut(&Path) -> io::Result<File>,
 ) -> io::Result<(Unfinished, File)> {
-    // File names end at 255 bytes, and this one is longer than `name`.
+    // File names have at most 255 bytes.
     let prefix = format!(".{}{SIGN}", name.chars().take(40).collect::<String>());
     let mut builder = tempfile::Builder::new();
     builder.prefix(&prefix).suffix(ENDING).rand_bytes(RANDOM);
@@ -204,12 +200,11 @@ fn make(
     loop {
         let (file, path) = builder.make_in(folder, &mut new)?.into_parts();
         let path = path.keep().map_err(|refused| refused.error)?;
-        // As the user wrote it, for errors; tempfile makes it absolute.
+        // Errors show the path as the user wrote it; tempfile makes it absolute.
         let path = path.file_name().map_or(path.clone(), |name| folder.join(name));
-        // Where there are no locks nothing is swept.
         let to_lock = if cfg!(unix) { File::open(&path).ok() } else { None };
         let _locked = to_lock.filter(|file| file.lock().is_ok());
-        // Before it is locked it looks dead, and may have been swept.
+        // Another run may have swept it before it was locked.
         if path.exists() {
             live.push(path.clone());
             return Ok((Unfinished { paths: vec![path], _locked }, file));
@@ -242,7 +237,7 @@ mod tests {
             ".a.bin.unlift-abc+ef.partial",
             ".a.bin.unlift-abcde.partial",
             ".a.bin.unlift-abcdef.partial~",
-            // A folder without the mark is somebody's.
+            // A folder without the mark belongs to another program.
             ".output.unlift-ABC125.partial",
             "a.bin.unlift-abcdef.partial",
         ];
@@ -251,7 +246,7 @@ mod tests {
             fs::write(at(name).join("thesis.txt"), "mine").unwrap();
         }
         fs::write(at(".a.bin.unlift-abcdef.partial"), "of a dead process").unwrap();
-        // Killed in the middle, and right after the first step.
+        // Leftovers of a process killed in the middle, and right after the first step.
         let dead = at(".output.unlift-ABC123.partial");
         fs::create_dir_all(dead.join("a/b")).unwrap();
         for name in [MARK, "a/truth", "truth"] {
@@ -260,7 +255,7 @@ mod tests {
         fs::create_dir(at(".output.unlift-ABC124.partial")).unwrap();
         #[cfg(unix)]
         {
-            // A link is not followed, and a pipe is not waited for.
+            // Links are not followed, and pipes do not block.
             fs::create_dir(at("precious")).unwrap();
             fs::write(at("precious").join(MARK), "mine").unwrap();
             let link = |path| std::os::unix::fs::symlink(at("precious"), path).unwrap();

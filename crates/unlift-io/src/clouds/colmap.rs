@@ -1,6 +1,6 @@
-//! Points, cameras and images as a COLMAP model in text: `cameras.txt`, `images.txt`, `points3D.txt`.
+//! Points, cameras and images as a COLMAP model in text, without observations.
 //!
-//! Source: COLMAP's documentation, "Output Format". Nothing is said of observations: recovered points were seen by nobody.
+//! Source: COLMAP's documentation, "Output Format".
 
 use std::io::Write;
 use std::path::Path;
@@ -29,10 +29,10 @@ pub fn write_cameras(path: &Path, cameras: &[Camera]) -> Result<(), Error> {
     })
 }
 
-/// Writes `images.txt`: poses and names, and no 2D points.
+/// Writes `images.txt`: poses and names, without 2D points.
 ///
 /// # Errors
-/// When a name holds what a line of text cannot, or the file cannot be written.
+/// When a name is empty or contains spaces or control characters, or the file cannot be written.
 pub fn write_images(path: &Path, images: &[Image]) -> Result<(), Error> {
     let is_one_word = |name: &[u8]| !name.is_empty() && name.iter().all(|&byte| byte > b' ');
     if let Some(image) = images.iter().find(|image| !is_one_word(&image.name)) {
@@ -47,14 +47,15 @@ pub fn write_images(path: &Path, images: &[Image]) -> Result<(), Error> {
             let [tx, ty, tz] = image.rotation.map(|row| -dot(&row, &image.center));
             write!(w, "{} {qw} {qx} {qy} {qz} {tx} {ty} {tz} {} ", image.id, image.camera_id)?;
             w.write_all(&image.name)?;
-            // The line of 2D points is there and empty.
+            // The line of 2D points is required, and empty.
             writeln!(w, "\n")?;
         }
         Ok(())
     })
 }
 
-/// Writes `points3D.txt`: those of `points` `(n, 3)` that have a position, with their row as the id, gray.
+/// Writes `points3D.txt`: the points of `points` `(n, 3)` that have a position, in gray. The id is
+/// the row, counted from 1.
 ///
 /// # Errors
 /// When a coordinate is not finite, or the file cannot be written.
@@ -66,7 +67,6 @@ pub fn write_model_points(path: &Path, points: &[Option<[f64; 3]>]) -> Result<()
         writeln!(w, "{MODEL_MARK}\n# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]")?;
         for (row, point) in points.iter().enumerate() {
             if let Some([x, y, z]) = point {
-                // COLMAP counts from 1.
                 writeln!(w, "{} {x} {y} {z} 128 128 128 0", row + 1)?;
             }
         }
@@ -78,9 +78,9 @@ fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// The unit quaternion (w, x, y, z) of a rotation, `w` not negative.
+/// Returns the unit quaternion (w, x, y, z) of a rotation, with `w >= 0`.
 fn quaternion(r: &[[f64; 3]; 3]) -> [f64; 4] {
-    // Four times the square of each component; the largest one divides.
+    // Four times the square of each component.
     let squares = [
         1.0 + r[0][0] + r[1][1] + r[2][2],
         1.0 + r[0][0] - r[1][1] - r[2][2],
@@ -111,7 +111,7 @@ mod tests {
     use super::*;
     use crate::read::colmap::{CameraModel, read_points, read_views};
 
-    /// About each axis and in between, also by half turns.
+    /// Rotations about each axis and an oblique one, including half turns.
     fn rotations() -> Vec<[[f64; 3]; 3]> {
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.6, -0.48, 0.64]];
         let angles = [0.0, 0.3, 1.9, std::f64::consts::PI, 4.5];

@@ -1,6 +1,7 @@
-//! The colors of errors.
+//! Colors of errors.
 
-/// Viridis (matplotlib, CC0) at nine even steps: even to the eye, also in gray and to the color-blind.
+/// Viridis (matplotlib, CC0) at nine even steps: perceptually uniform, also for color-blind
+/// readers.
 const VIRIDIS: [[u8; 3]; 9] = [
     [0x44, 0x01, 0x54],
     [0x47, 0x2d, 0x7b],
@@ -13,8 +14,8 @@ const VIRIDIS: [[u8; 3]; 9] = [
     [0xfd, 0xe7, 0x25],
 ];
 
-/// The color of an error: dark violet at 0, through green at half, to yellow at `full_scale` and
-/// beyond. Linear between nine steps of viridis; an error that is not a number is yellow.
+/// Returns the color of an error, by interpolation of viridis: dark violet at 0, green at half of
+/// `full_scale`, yellow from `full_scale` on and for NaN.
 pub fn error_color(error: f64, full_scale: f64) -> [u8; 3] {
     let last = VIRIDIS.len() - 1;
     let share = error / full_scale;

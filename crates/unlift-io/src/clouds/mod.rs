@@ -1,4 +1,4 @@
-//! Points and lines for any viewer: PLY clouds colored by error, OBJ lines in a box, COLMAP models, nerfstudio's cameras.
+//! Exports of points and lines for other programs.
 
 mod colmap;
 mod color;
@@ -18,7 +18,7 @@ pub use obj::write_lines;
 pub use ply::{write_points, write_recovered};
 pub use segments::{Segment, record_segments};
 
-/// Refuses what is not finite: the row `row` of what is called `what`.
+/// Returns an error if a coordinate of the `row`-th `what` is not finite.
 fn finite<const D: usize, const N: usize>(
     path: &Path,
     (what, row): (&str, usize),

@@ -1,7 +1,7 @@
-//! Cameras as nerfstudio's `transforms.json`, which names a cloud beside it.
+//! Cameras as nerfstudio's `transforms.json`.
 //!
-//! Source: nerfstudio's documentation, "Data conventions". Its cameras look along -z with y up; poses are from the camera to
-//! the world, which stays as it is.
+//! Source: nerfstudio's documentation, "Data conventions". Its cameras look along -z with y up.
+//! Poses map from camera to world.
 
 use std::io::Write;
 use std::path::Path;
@@ -12,14 +12,15 @@ use crate::Error;
 use crate::atomic::{self, Access};
 use crate::read::colmap::{Camera, Image};
 
-/// The name of the cloud beside the cameras, as nerfstudio's own programs call it.
+/// The name of the point cloud beside the cameras, as in nerfstudio's own programs.
 pub const NERFSTUDIO_CLOUD: &str = "sparse_pc.ply";
 
-/// Writes `transforms.json` of these images, whose cameras are among `cameras`; the cloud is written apart.
+/// Writes `transforms.json` for these images and their `cameras`. The point cloud is a separate
+/// file.
 ///
 /// # Errors
-/// When there is no image, a name is no text, nerfstudio has no such lens or would need two kinds of them, or the file
-/// cannot be written.
+/// When there is no image, a name is not UTF-8, nerfstudio does not support a camera model, the
+/// images need two camera models, or the file cannot be written.
 pub fn write_transforms(path: &Path, cameras: &[Camera], images: &[Image]) -> Result<(), Error> {
     let mut model = None;
     let mut frames = Vec::with_capacity(images.len());
@@ -33,10 +34,10 @@ pub fn write_transforms(path: &Path, cameras: &[Camera], images: &[Image]) -> Re
         let camera =
             camera.ok_or_else(|| wrong("a camera", format!("no camera {}", image.camera_id)))?;
         let (kind, mut frame) = lens(camera)
-            .ok_or_else(|| wrong("a lens that nerfstudio has", camera.model.name.to_owned()))?;
+            .ok_or_else(|| wrong("a camera model of nerfstudio", camera.model.name.to_owned()))?;
         let known = *model.get_or_insert(kind);
         if known != kind {
-            return Err(wrong(&format!("one kind of lens, {known}"), kind.to_owned()));
+            return Err(wrong(&format!("one camera model, {known}"), kind.to_owned()));
         }
         let row = |c: usize| {
             let r = &image.rotation;
@@ -48,7 +49,7 @@ pub fn write_transforms(path: &Path, cameras: &[Camera], images: &[Image]) -> Re
         frames.push(Value::Object(frame));
     }
     let Some(model) = model else {
-        return Err(Error::new(path, "", "images, which nerfstudio needs", "none"));
+        return Err(Error::new(path, "", "at least one image", "none"));
     };
     let document = json!({
         "unlift": env!("CARGO_PKG_VERSION"),
@@ -61,10 +62,10 @@ pub fn write_transforms(path: &Path, cameras: &[Camera], images: &[Image]) -> Re
     atomic::write_file(path, Access::Private, |w| writeln!(w, "{text}"))
 }
 
-/// The kind of a lens, and its numbers by the names that nerfstudio has for them; `None` of one that it does not have.
+/// Returns nerfstudio's camera model and its parameters by name, if it has such a model.
 fn lens(camera: &Camera) -> Option<(&'static str, Map<String, Value>)> {
     let p = &camera.params;
-    // Focal lengths, the principal point, then k1, k2, p1, p2, or k1 to k4 of a fisheye.
+    // Focal lengths and principal point, then k1, k2, p1, p2, or k1 to k4 of a fisheye.
     let (kind, four, rest) = match camera.model.name {
         "SIMPLE_PINHOLE" => ("OPENCV", [p[0], p[0], p[1], p[2]], &[][..]),
         "PINHOLE" => ("OPENCV", [p[0], p[1], p[2], p[3]], &[][..]),
@@ -99,7 +100,7 @@ mod tests {
         Camera { id, model, width_px: 640, height_px: 480, params: params.to_vec() }
     }
 
-    /// Turned a quarter about what it looks along.
+    /// An image rotated by 90 degrees about its viewing direction.
     fn image(id: u32, camera_id: u32) -> Image {
         let rotation = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
         let center = [f64::from(id), 2.0, -5.0];
@@ -143,17 +144,17 @@ mod tests {
         let fov = camera(1, b"FOV", &[1.0; 5]);
         assert_eq!(
             line(&[fov], &[image(7, 1)]),
-            "t.json: image 7: expected a lens that nerfstudio has, found FOV"
+            "t.json: image 7: expected a camera model of nerfstudio, found FOV"
         );
         let two = [camera(1, b"PINHOLE", &[1.0; 4]), camera(2, b"OPENCV_FISHEYE", &[1.0; 8])];
         assert_eq!(
             line(&two, &[image(1, 1), image(2, 2)]),
-            "t.json: image 2: expected one kind of lens, OPENCV, found OPENCV_FISHEYE"
+            "t.json: image 2: expected one camera model, OPENCV, found OPENCV_FISHEYE"
         );
         assert_eq!(
             line(&two, &[image(1, 3)]),
             "t.json: image 1: expected a camera, found no camera 3"
         );
-        assert_eq!(line(&two, &[]), "t.json: expected images, which nerfstudio needs, found none");
+        assert_eq!(line(&two, &[]), "t.json: expected at least one image, found none");
     }
 }

@@ -6,8 +6,7 @@ use crate::atomic::{self, Access, CLOUD_COMMENT};
 use std::io::Write;
 use std::path::Path;
 
-/// Writes `segments` as an OBJ file: two `v` records and one `l` record each, coordinates with as
-/// many digits as it takes to read them back equal; z is 0 in 2D.
+/// Writes `segments` as an OBJ file: two `v` records and one `l` record each. In 2D, z is 0.
 ///
 /// # Errors
 /// When a coordinate is not finite, or the file cannot be written.

@@ -6,8 +6,10 @@ use crate::atomic::{self, Access, CLOUD_COMMENT};
 use std::io::{self, Write};
 use std::path::Path;
 
-/// Writes `points` `(n, D)` as binary little-endian PLY (`double x, y, z`; z is 0 in 2D), with
-/// `colors` `(n, 3)` as `uchar red, green, blue` when given.
+/// Writes `points` `(n, D)` as binary little-endian PLY.
+///
+/// The columns are `double x, y, z` (z is 0 in 2D), and `uchar red, green, blue` if `colors` `(n,
+/// 3)` are given.
 ///
 /// # Errors
 /// When a coordinate is not finite, `colors` has another length, or the file cannot be written.
@@ -37,9 +39,9 @@ pub fn write_points<const D: usize>(
     })
 }
 
-/// Writes recovered points as PLY, colored by their `errors` (distance to the original): the columns
-/// of [`write_points`], then `float error`. Lost points (`None`) are omitted.
+/// Writes recovered points as PLY, colored by their `errors` (distance to the original).
 ///
+/// The columns are those of [`write_points`], then `float error`. Lost points (`None`) are omitted.
 /// Colors are those of [`error_color`] with `full_scale`, in the unit of the points.
 ///
 /// # Errors

@@ -1,14 +1,16 @@
-//! What of an endless line lies in a box.
+//! Segments of lines and rays inside a box.
 
 use unlift::geometry::frame::Bounds;
 use unlift::released::{Obfuscation, Released};
 
-/// The two ends of a piece of a line.
+/// The two ends of a line segment.
 pub type Segment<const D: usize> = [[f64; D]; 2];
 
-/// The lines or rays of a released map inside the box from `low` to `high`, all in the map's frame
-/// (the origin is added), in record order; records that miss the box are left out. Empty for
-/// families that are neither.
+/// Returns the segments of the released lines or rays inside the box from `low` to `high`, in
+/// record order.
+///
+/// Coordinates are in the map's frame (the origin is added). Records that miss the box are left
+/// out. Other families have no segments.
 pub fn record_segments<const D: usize>(
     released: &Released<D>,
     low: &[f64; D],
@@ -36,13 +38,12 @@ pub fn record_segments<const D: usize>(
     }
 }
 
-/// Where a line begins, and where a ray does: in lengths of its direction from its point.
+/// The start of a line and of a ray, in lengths of the direction.
 const LINE: f64 = f64::NEG_INFINITY;
 const RAY: f64 = 0.0;
 
-/// The part of the line or ray through `point` along `direction` inside the box from `low` to `high`.
-///
-/// `None` when it misses the box, only touches it, or has no direction.
+/// Returns the segment of the line or ray through `point` along `direction` inside the box, or
+/// `None` if it misses the box, only touches it, or has no direction.
 fn clip<const D: usize>(
     point: &[f64; D],
     direction: &[f64; D],
@@ -57,7 +58,7 @@ fn clip<const D: usize>(
     if !(from < to && is_box && finite(point) && finite(direction)) {
         return None;
     }
-    // Rounding may leave the box by an ulp: the ends are held inside it.
+    // Rounding may leave the box by an ulp.
     let at = |t: f64| std::array::from_fn(|c| (point[c] + t * direction[c]).clamp(low[c], high[c]));
     Some([at(from), at(to)])
 }
@@ -74,11 +75,11 @@ mod tests {
         let (x, y, nan) = ([1.0, -1.0, 0.0], [0.0, 1.0, 0.0], [f64::NAN, 0.0, 1.0]);
         let full = Some([[0.5, 0.0, 1.0], [0.5, 2.0, 1.0]]);
         for (point, direction, start, expected) in [
-            // A line ends on faces, and a ray starts at its center.
+            // A line ends on faces of the box, and a ray starts at its center.
             ([0.5, 9.0, 1.0], y, LINE, full),
             ([0.5, 1.0, 1.0], y, RAY, Some([[0.5, 1.0, 1.0], [0.5, 2.0, 1.0]])),
             ([0.5, 9.0, 1.0], y, RAY, None),
-            // Misses, touches, and what has no direction.
+            // Lines that miss the box, touch it, or have no direction.
             ([5.0, 5.0, 5.0], y, LINE, None),
             ([1.0, 2.0, 0.0], x, LINE, None),
             ([0.5; 3], [0.0; 3], LINE, None),

@@ -1,4 +1,4 @@
-//! Images of a COLMAP database as features.
+//! Features of the images of a COLMAP database.
 
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
@@ -10,16 +10,14 @@ use super::image::ImageFeatures;
 use crate::database::{Database, Kind, Rows};
 use crate::error::Error;
 
-/// An open `database.db`.
 pub(super) struct Colmap {
-    // A connection may not be used by two threads at once.
+    // A connection cannot be used by two threads at once.
     database: Mutex<Database>,
     raw: Vec<Vec<u8>>,
     names: Vec<String>,
 }
 
 impl Colmap {
-    /// Opens `path` and lists its images.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let database = Database::open(path)?;
         let raw = database.names();
@@ -51,7 +49,7 @@ impl Colmap {
             return Err(database.error(name, expected, found));
         }
         let mut image = ImageFeatures { name: self.names[at].clone(), size, ..Default::default() };
-        // The middle of the first pixel is (0.5, 0.5) in COLMAP.
+        // COLMAP places the center of the first pixel at (0.5, 0.5).
         let place = |row: &[f32]| [f64::from(row[0]) - 0.5, f64::from(row[1]) - 0.5];
         image.keypoints = values.chunks(columns).map(place).collect();
         if columns > 2 {
@@ -76,8 +74,8 @@ fn floats(bytes: &[u8]) -> Vec<f32> {
     bytes.as_chunks::<4>().0.iter().map(|&four| f32::from_le_bytes(four)).collect()
 }
 
-/// Scale in pixels and orientation in degrees of a keypoint with 4 columns (they are stored) or 6 (an
-/// affine shape, whose columns are the turned and scaled axes).
+/// Returns scale in pixels and orientation in degrees of a keypoint with 4 columns (stored
+/// directly) or 6 (an affine shape, whose columns are the rotated and scaled axes).
 fn shape(row: &[f32]) -> (f32, f32) {
     match *row {
         [_, _, scale, turn] => (scale, turn.to_degrees()),

@@ -1,4 +1,4 @@
-//! hloc's layout: a group per image, an array per kind of feature.
+//! Reads features in hloc's layout: a group per image, an array per kind of feature.
 
 use std::path::Path;
 
@@ -11,11 +11,9 @@ use super::writer::UPRIGHT;
 use crate::atomic::Kind;
 use crate::error::Error;
 
-/// An open file of features.
 pub(super) struct Hloc(FeatureStore);
 
 impl Hloc {
-    /// Opens `path` and lists its images.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let store = FeatureStore::open(path)?;
         let wrong = |found: &str| {
@@ -23,19 +21,18 @@ impl Hloc {
             Err(Error::new(path, "", expected, found))
         };
         if store.paths().is_empty() && !store.alone().is_empty() {
-            return wrong("arrays in no group");
+            return wrong("arrays outside any group");
         }
         let first = if store.paths().is_empty() { Vec::new() } else { store.names(0)? };
         let has = |name: &str| first.iter().any(|its| its == name);
         match () {
             () if has("keypoints") => Ok(Self(store)),
             () if has("matches0") || has("matches") => wrong("matches of pairs of images"),
-            () if has("global_descriptor") => wrong("global descriptors, of whole images"),
+            () if has("global_descriptor") => wrong("global descriptors of whole images"),
             () => Ok(Self(store)),
         }
     }
 
-    /// What is no image, one error each.
     pub fn refused(&self) -> &[Error] {
         self.0.broken()
     }
@@ -44,7 +41,6 @@ impl Hloc {
         self.0.paths()
     }
 
-    /// Whether the keypoints of the first image are in pixels of the upright photo.
     pub fn is_upright(&self) -> bool {
         !self.0.paths().is_empty() && is_upright(&self.0, 0).unwrap_or(false)
     }
@@ -54,22 +50,22 @@ impl Hloc {
     }
 }
 
-/// The one image of a file that [`encode`](super::encode) made.
+/// Reads the one image of a file that [`encode`](super::encode) made.
 ///
 /// # Errors
-/// When `path` cannot be read, is cut off, or does not hold exactly the image `name`.
+/// When `path` cannot be read, or does not contain exactly the image `name`.
 pub fn decode(path: &Path, name: &str) -> Result<ImageFeatures, Error> {
     let store = FeatureStore::open(path)?;
     match store.paths() {
         [only] if only == name => image(&store, 0),
         other => {
             let found = format!("{} images", other.len());
-            Err(Error::new(path, "", format!("the image {name} alone"), found))
+            Err(Error::new(path, "", format!("only the image {name}"), found))
         }
     }
 }
 
-/// What the file says; in files of the first version of unlift, which did not say it, what it extracted was upright.
+/// unlift's first version wrote upright features without this attribute.
 fn is_upright(store: &FeatureStore, at: usize) -> Result<bool, Error> {
     let number = |key: &str| store.number(at, "keypoints", key);
     Ok(match number(UPRIGHT)? {
@@ -117,14 +113,14 @@ fn image(store: &FeatureStore, at: usize) -> Result<ImageFeatures, Error> {
     })
 }
 
-/// What was expected and what was found.
+/// The expected and the found value.
 type Wrong = (String, String);
 
-/// Rows of at least two columns; what follows x and y is not read.
+/// Columns after x and y are ignored.
 fn keypoints(array: &Array) -> Result<Vec<[f64; 2]>, Wrong> {
     let columns = match array.shape[..] {
         [_, columns] if columns >= 2 => columns as usize,
-        // An image without keypoints, as some exporters write it.
+        // Some exporters write an image without keypoints like this.
         [0] | [0, _] | [2, 0] => return Ok(Vec::new()),
         _ => return Err(("shape (N, 2)".to_owned(), shape_text(&array.shape))),
     };
@@ -134,17 +130,16 @@ fn keypoints(array: &Array) -> Result<Vec<[f64; 2]>, Wrong> {
     match rows.iter().position(|row| !row.iter().all(|value| value.is_finite())) {
         None => Ok(rows),
         Some(at) => Err((
-            format!("a finite place in row {at}"),
+            format!("finite coordinates in row {at}"),
             format!("({}, {})", rows[at][0], rows[at][1]),
         )),
     }
 }
 
-/// `(D, N)` as rows of `D`.
+/// Converts a `(D, N)` array to rows of `D` values.
 fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
     let expected = || format!("shape (D, N) with N = {n}, one column per keypoint");
     let dim = match array.shape[..] {
-        // Of an image without keypoints, written in any way.
         ref sides if n == 0 && array.values.len() == 0 => {
             sides.iter().copied().max().unwrap_or(0).max(1) as usize
         }
@@ -155,7 +150,6 @@ fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
         }
         _ => return Err((expected(), shape_text(&array.shape))),
     };
-    // Columns of points, which are wanted as rows.
     let floats = |values: Vec<f32>| Values::F32(transposed(&values, dim));
     let values = match array.values {
         Numbers::U8(bytes) => Values::U8(transposed(&bytes, dim)),
@@ -163,14 +157,13 @@ fn descriptors(array: Array, n: usize) -> Result<Descriptors, Wrong> {
         Numbers::F32(values) => floats(values),
         Numbers::F64(doubles) => floats(doubles.iter().map(|&value| value as f32).collect()),
         Numbers::I64(_) => {
-            return Err(("floats, or bytes without sign".to_owned(), "other integers".to_owned()));
+            return Err(("floats, or unsigned bytes".to_owned(), "other integers".to_owned()));
         }
     };
     Descriptors::try_new(values, dim)
         .map_err(|error| (error.expected().to_owned(), describe(&error)))
 }
 
-/// What was found, with the row and value it stands in.
 fn describe(error: &unlift::Error) -> String {
     match error.what() {
         "descriptors" => error.found().to_owned(),

@@ -1,4 +1,4 @@
-//! The features of one image, whatever they came from.
+//! The features of one image.
 
 use std::path::{Path, PathBuf};
 
@@ -8,16 +8,16 @@ use unlift::Descriptors;
 use crate::error::Error;
 use crate::read::lines::quoted;
 
-/// What is known of one image, whatever it came from.
+/// Features of one image, independent of the file format.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ImageFeatures {
     /// Path relative to the folder of photos, with slashes.
     pub name: String,
     /// Width and height in pixels.
     pub size: Option<[u32; 2]>,
-    /// `n` places `(x, y)` in pixels, all finite; the middle of the first pixel is `(0, 0)`.
+    /// `n` finite coordinates `(x, y)` in pixels. The center of the first pixel is `(0, 0)`.
     pub keypoints: Vec<[f64; 2]>,
-    /// `(n, dim)`: bytes are RootSIFT times 512, floats what a network made; never dummies. `None` when
+    /// `(n, dim)` descriptors: bytes are RootSIFT times 512, floats are from a network. `None` when
     /// the source has none; see [`described`](Self::described).
     pub descriptors: Option<Descriptors>,
     /// `n` confidences of the detector.
@@ -26,20 +26,20 @@ pub struct ImageFeatures {
     pub scales: Option<Vec<f32>>,
     /// `n` orientations in degrees, from x to y.
     pub orientations_deg: Option<Vec<f32>>,
-    /// Standard deviation of a keypoint's place in pixels, as the detector states it.
+    /// Standard deviation of a keypoint's position in pixels, as stated by the detector.
     pub uncertainty_px: Option<f64>,
-    /// Keypoints are in pixels of the photo that was turned upright by its EXIF orientation, not of the photo as it is
-    /// stored, as those of COLMAP and hloc are.
+    /// True if keypoints are in pixels of the photo rotated upright by its EXIF orientation. COLMAP
+    /// and hloc use the photo as stored.
     pub upright: bool,
-    /// The photo itself, where the source is a folder of them.
+    /// The path of the photo, if the source is a folder of photos.
     pub photo: Option<PathBuf>,
 }
 
 impl ImageFeatures {
-    /// The descriptors, for those who cannot do without.
+    /// Returns the descriptors.
     ///
     /// # Errors
-    /// A line that names `source` (the file) and the image when there are none.
+    /// When there are none: one line that names `source` (the file) and the image.
     pub fn described(&self, source: &Path) -> Result<&Descriptors, Error> {
         let place = || format!("image {}", quoted(self.name.as_bytes()));
         let missing = || Error::new(source, place(), "descriptors", "none");
@@ -47,7 +47,8 @@ impl ImageFeatures {
     }
 }
 
-/// Rounds descriptors of a network to half floats, as hloc stores them: what is in memory is what a file would hold.
+/// Rounds descriptors of a network to half floats, as hloc stores them, so that memory and files
+/// have equal values.
 pub fn round_to_half(values: &mut [f32]) {
     values.iter_mut().for_each(|value| *value = f16::from_f32(*value).to_f32());
 }

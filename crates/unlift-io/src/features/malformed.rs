@@ -1,5 +1,7 @@
-//! Malformed features: the exact line each is refused with, and no panic for any cut or changed byte.
-//! In here because the files are made with the writer's inside: from outside it writes good ones only.
+//! Tests of malformed features: the exact error line of each, and no panic for any cut or changed
+//! byte.
+//!
+//! They use the internal writer, because the public one writes only valid files.
 
 use std::fs;
 use std::io::Cursor;
@@ -9,10 +11,10 @@ use super::h5::{Array, Numbers, Writer};
 use super::{FeatureSource, encode};
 use crate::features::ImageFeatures;
 
-/// An array under a name of the image `a.jpg`.
+/// A name, a shape, values.
 type Made = (&'static str, Vec<u64>, Numbers);
 
-/// A file with the image `a.jpg`, which has these arrays, and the good image `b.jpg`.
+/// Creates a file with the image `a.jpg`, which has these arrays, and the valid image `b.jpg`.
 fn file(arrays: Vec<Made>) -> Vec<u8> {
     let mut out = Cursor::new(Vec::new());
     let mut writer = Writer::start(&mut out).unwrap();
@@ -34,7 +36,6 @@ fn descriptors() -> Made {
     ("descriptors", vec![4, 3], Numbers::U8((0..12).collect()))
 }
 
-/// The error of opening `bytes` or of its first image, without the folder.
 fn line(bytes: &[u8]) -> String {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("f");
@@ -42,7 +43,6 @@ fn line(bytes: &[u8]) -> String {
     let error = match FeatureSource::open(&path) {
         Err(error) => error,
         Ok(source) => {
-            // The other image is not lost.
             if let Some(at) = source.names().iter().position(|name| name == "b.jpg") {
                 assert_eq!(source.get(at).unwrap().keypoints.len(), 3);
             }
@@ -62,7 +62,7 @@ fn shown(dir: &Path, line: &str) -> String {
 }
 
 #[test]
-#[rustfmt::skip] // A row is read as a row.
+#[rustfmt::skip] // One row per line.
 fn every_malformed_file_of_features_is_refused_with_its_line() {
     let floats = |shape: &[u64], value: f32| {
         let n = shape.iter().product::<u64>() as usize;
@@ -87,16 +87,16 @@ fn every_malformed_file_of_features_is_refused_with_its_line() {
         ("no keypoints", file(vec![descriptors()]),
             "f: image \"a.jpg\": expected an array keypoints, found only descriptors"),
         ("global descriptors", file(vec![named("global_descriptor", floats(&[4096], 0.5))]),
-            "f: expected a group per image with keypoints and descriptors, found global descriptors, of whole images"),
+            "f: expected a group per image with keypoints and descriptors, found global descriptors of whole images"),
         ("no descriptors", file(vec![keypoints()]), "f: image \"a.jpg\": expected descriptors, found none"),
         ("keypoints in one column", file(vec![named("keypoints", floats(&[3, 1], 1.0)), descriptors()]),
             "f: image \"a.jpg\", keypoints: expected shape (N, 2), found (3, 1)"),
         ("flat keypoints", file(vec![named("keypoints", floats(&[6], 1.0)), descriptors()]),
             "f: image \"a.jpg\", keypoints: expected shape (N, 2), found (6,)"),
         ("NaN", file(vec![("keypoints", vec![3, 2], Numbers::F32(vec![1.0, 2.0, 3.0, f32::NAN, 5.0, 6.0])), descriptors()]),
-            "f: image \"a.jpg\", keypoints: expected a finite place in row 1, found (3, NaN)"),
+            "f: image \"a.jpg\", keypoints: expected finite coordinates in row 1, found (3, NaN)"),
         ("infinity", file(vec![("keypoints", vec![1, 2], Numbers::F64(vec![f64::INFINITY, 2.0])), descriptors()]),
-            "f: image \"a.jpg\", keypoints: expected a finite place in row 0, found (inf, 2)"),
+            "f: image \"a.jpg\", keypoints: expected finite coordinates in row 0, found (inf, 2)"),
         ("(N, D)", file(vec![keypoints(), ("descriptors", vec![3, 4], Numbers::U8((0..12).collect()))]),
             "f: image \"a.jpg\", descriptors: expected shape (D, N) with N = 3, one column per keypoint, found (3, 4), rows and columns exchanged"),
         ("another number of descriptors", file(vec![keypoints(), named("descriptors", floats(&[4, 5], 0.5))]),
@@ -110,7 +110,7 @@ fn every_malformed_file_of_features_is_refused_with_its_line() {
         ("NaN in descriptors", file(vec![keypoints(), named("descriptors", floats(&[4, 3], f32::NAN))]),
             "f: image \"a.jpg\", descriptors: expected a finite value, found NaN (descriptor 0, value 0)"),
         ("wide integers", file(vec![keypoints(), ("descriptors", vec![4, 3], Numbers::I64((0..12).collect()))]),
-            "f: image \"a.jpg\", descriptors: expected floats, or bytes without sign, found other integers"),
+            "f: image \"a.jpg\", descriptors: expected floats, or unsigned bytes, found other integers"),
         ("scores of others", file(vec![keypoints(), descriptors(), named("scores", floats(&[2], 0.5))]),
             "f: image \"a.jpg\", scores: expected one value per keypoint, (3,), found (2,)"),
         ("a size of one side", file(vec![keypoints(), descriptors(), doubles("image_size", vec![5.0])]),
@@ -127,7 +127,7 @@ fn every_malformed_file_of_features_is_refused_with_its_line() {
 }
 
 #[test]
-#[rustfmt::skip] // A row is read as a row.
+#[rustfmt::skip] // One row per line.
 fn every_malformed_database_is_refused_with_its_line() {
     let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/project/database.db");
     let filled = "INSERT INTO keypoints SELECT image_id, 8, 2, zeroblob(64) FROM images; ";
@@ -202,7 +202,7 @@ fn no_cut_and_no_changed_byte_makes_a_panic() {
         }
     };
     for file in &files {
-        // Every length and every byte of a small file; of the others a part, to stay within seconds.
+        // A part of the bytes of large files, to finish within seconds.
         let step = file.len().div_ceil(500);
         (0..file.len()).step_by(step).for_each(|at| visit(&file[..at]));
         for at in (0..file.len()).step_by(step) {

@@ -1,8 +1,8 @@
-//! Features of images in and out: hloc's HDF5 files and COLMAP databases.
+//! Reads and writes features of images: hloc's HDF5 files and COLMAP databases.
 //!
-//! One convention holds everywhere behind this module: **hloc's**. Keypoints are in pixels, `(x, y)`,
-//! and the middle of the first pixel is `(0, 0)`; COLMAP's, whose middle is `(0.5, 0.5)`, are brought
-//! to it where they are read. Names of images are relative to their folder, with slashes.
+//! The coordinates are **hloc's** in this module. Keypoints are `(x, y)` in pixels, and the center
+//! of the first pixel is `(0, 0)`. COLMAP's, where it is `(0.5, 0.5)`, are converted when they are
+//! read. Names of images are relative to their folder, with slashes.
 //!
 //! ```no_run
 //! use unlift_io::features::FeatureSource;
@@ -38,9 +38,9 @@ pub use hloc::decode;
 pub use image::{ImageFeatures, round_to_half};
 pub use writer::{FeatureWriter, encode};
 
-/// Features in a file, one image at a time: memory does not grow with the number of images.
+/// An open file of features that is read one image at a time.
 ///
-/// Shared by threads: [`get`](Self::get) may be called from many at once.
+/// Several threads may call [`get`](Self::get) at once.
 pub struct FeatureSource {
     kind: Kind,
     seen: Seen,
@@ -55,10 +55,10 @@ const SQLITE: &[u8; 8] = b"SQLite f";
 const HDF5: &[u8; 8] = b"\x89HDF\r\n\x1a\n";
 
 impl FeatureSource {
-    /// Opens hloc's HDF5 features or a COLMAP `database.db`; its first bytes decide which.
+    /// Opens hloc's HDF5 features or a COLMAP `database.db`, distinguished by the first bytes.
     ///
     /// # Errors
-    /// When the file cannot be read, is neither, is cut off, or lists no image.
+    /// When the file cannot be read, is of another format, is truncated, or contains no image.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let seen = Seen::new([path]);
         let (file, len) = input::open(path)?;
@@ -83,7 +83,7 @@ impl FeatureSource {
         Ok(source)
     }
 
-    /// Whether keypoints are in pixels of photos that were turned upright, as the file says of its first image.
+    /// Returns true if the first image states that keypoints are in pixels of the upright photo.
     pub fn is_upright(&self) -> bool {
         match &self.kind {
             Kind::Hloc(file) => file.is_upright(),
@@ -91,12 +91,12 @@ impl FeatureSource {
         }
     }
 
-    /// The file, if it is not what it was when it was opened.
+    /// Returns the path of the file if it has changed since it was opened.
     pub fn changed(&self) -> Option<&Path> {
         self.seen.changed([0])
     }
 
-    /// What the file has in place of images, one error each.
+    /// One error for each entry of the file that is not an image.
     pub fn refused(&self) -> &[Error] {
         match &self.kind {
             Kind::Hloc(file) => file.refused(),
@@ -104,7 +104,7 @@ impl FeatureSource {
         }
     }
 
-    /// The images, sorted by the bytes of their names.
+    /// The names of the images, sorted by bytes.
     pub fn names(&self) -> &[String] {
         match &self.kind {
             Kind::Hloc(file) => file.names(),
@@ -112,10 +112,10 @@ impl FeatureSource {
         }
     }
 
-    /// The features of image `at` of [`names`](Self::names).
+    /// Reads the features of image `at` of [`names`](Self::names).
     ///
     /// # Errors
-    /// One line when this image is not as it should be; others may be.
+    /// When this image is malformed. Others may still be readable.
     ///
     /// # Panics
     /// When there is no such image.

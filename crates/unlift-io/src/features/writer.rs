@@ -1,4 +1,4 @@
-//! Features out: one image after the other, in hloc's layout.
+//! Writes features in hloc's layout.
 
 use std::io::{self, Cursor, Seek, Write};
 use std::path::Path;
@@ -12,21 +12,22 @@ use crate::atomic::{Access, OutputFile};
 use crate::error::Error;
 use crate::read::lines::quoted;
 
-/// The attribute of keypoints that says whether they are in pixels of upright photos: 1 or 0.
+/// 1 if keypoints are in pixels of upright photos, else 0.
 pub(super) const UPRIGHT: &str = "upright";
 
-/// A file of features that is written image by image and appears whole.
+/// A feature file in hloc's layout that is written image by image, and moved to its place when it
+/// is complete.
 ///
-/// Per image a group under its name with `keypoints` `(N, 2)` and, where they are known, `descriptors`
-/// `(D, N)`, `scores`, `scales` and `oris` `(N,)` and `image_size` `(2,)`; see `docs/formats.md`.
-/// Memory grows by names only. The same images in the same order give the same bytes.
+/// Each image is a group with `keypoints` `(N, 2)` and, if present, `descriptors` `(D, N)`,
+/// `scores`, `scales` and `oris` `(N,)` and `image_size` `(2,)`; see `docs/formats.md`. Only names
+/// stay in memory. The same images in the same order give the same bytes.
 pub struct FeatureWriter {
     output: OutputFile,
     writer: Writer,
 }
 
 impl FeatureWriter {
-    /// Starts a file that will become `path`.
+    /// Starts the feature file `path`.
     ///
     /// # Errors
     /// When no file can be written there.
@@ -36,11 +37,11 @@ impl FeatureWriter {
         Ok(Self { output, writer })
     }
 
-    /// Whether an image can be written, as far as it decides that.
+    /// Checks that an image can be written.
     ///
     /// # Errors
-    /// When the name has an empty part, `.` or `..`, is taken, or leads into another image, or when a
-    /// column has not one row per keypoint.
+    /// When a part of the name is empty, `.` or `..`, the name exists or is inside another image,
+    /// or a column has not one row per keypoint.
     pub fn check(&self, image: &ImageFeatures) -> Result<(), Error> {
         check(&self.writer, image, self.output.path())
     }
@@ -48,17 +49,17 @@ impl FeatureWriter {
     /// Writes one image.
     ///
     /// # Errors
-    /// As [`check`](Self::check), or when the disk fails.
+    /// When [`check`](Self::check) fails, or the disk fails.
     pub fn append(&mut self, image: &ImageFeatures) -> Result<(), Error> {
         let path = self.output.path().to_owned();
         self.check(image)?;
         write(&mut self.writer, self.output.writer(), image).map_err(|e| Error::write(&path, e))
     }
 
-    /// Puts the file in its place.
+    /// Moves the file to its place.
     ///
     /// # Errors
-    /// When the disk fails; nothing is left behind then.
+    /// When the disk fails. No temporary file is left then.
     pub fn finish(mut self) -> Result<(), Error> {
         let path = self.output.path().to_owned();
         let finished = self.writer.finish(self.output.writer());
@@ -67,10 +68,10 @@ impl FeatureWriter {
     }
 }
 
-/// The bytes of a file with one image.
+/// Returns the bytes of a file with one image.
 ///
 /// # Errors
-/// As [`FeatureWriter::append`], naming `path` as the place they are for.
+/// When [`FeatureWriter::append`] would fail. Errors name `path`.
 pub fn encode(image: &ImageFeatures, path: &Path) -> Result<Vec<u8>, Error> {
     let failed = |e| Error::write(path, e);
     let mut out = Cursor::new(Vec::new());
@@ -85,7 +86,7 @@ fn check(writer: &Writer, image: &ImageFeatures, path: &Path) -> Result<(), Erro
     let place = || format!("image {}", quoted(image.name.as_bytes()));
     let parts = || image.name.split('/');
     if parts().any(|part| part.is_empty() || part == "." || part == ".." || part.contains('\0')) {
-        let expected = "a name of parts that are not empty, . or ..";
+        let expected = "a name whose parts are not empty, . or ..";
         return Err(Error::new(path, place(), expected, quoted(image.name.as_bytes())));
     }
     let deep = parts().count();
@@ -94,7 +95,7 @@ fn check(writer: &Writer, image: &ImageFeatures, path: &Path) -> Result<(), Erro
         return Err(Error::new(path, place(), expected, deep.to_string()));
     }
     if !writer.is_free(&image.name) {
-        let found = "one that is there already, or within another image";
+        let found = "one that exists already or is inside another image";
         return Err(Error::new(path, place(), "a new name", found));
     }
     let n = image.keypoints.len();
@@ -150,7 +151,7 @@ fn write(
     Ok(())
 }
 
-/// The same as half floats, as hloc stores what a network made, where nothing is lost by it.
+/// Converts `values` to half floats, as hloc stores descriptors of networks, if all are exact.
 fn halves(values: &[f32]) -> Option<Vec<f16>> {
     let exact = |&value: &f32| Some(f16::from_f32(value)).filter(|half| half.to_f32() == value);
     values.iter().map(exact).collect()

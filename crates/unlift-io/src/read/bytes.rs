@@ -1,4 +1,4 @@
-//! Binary files: buffered, and never trusting a declared size before the file is known to hold it.
+//! Reads binary files.
 
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -7,20 +7,18 @@ use std::path::{Path, PathBuf};
 use crate::error::{Error, Place};
 use crate::input::{self, Budget};
 
-/// A little-endian reader that knows where it is and how much is left.
-///
-/// Every error names the part of the file that was being read, and the byte.
+/// A little-endian reader of binary files. It checks declared sizes against the remaining bytes,
+/// and errors name the current part of the file and the byte.
 pub(crate) struct Bytes {
     path: PathBuf,
     reader: BufReader<File>,
     part: Part,
-    /// Where the value that was read last begins.
     value_at: u64,
     at: u64,
     len: u64,
 }
 
-/// What is being read; formatted only when something is wrong.
+/// Formatted only for errors.
 enum Part {
     Header,
     Record(u64),
@@ -28,65 +26,55 @@ enum Part {
 }
 
 impl Bytes {
-    /// A reader at the start of `path`.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let (file, len) = input::open(path)?;
         Ok(Self::continuing(path, BufReader::new(file), 0, len))
     }
 
-    /// Whether what is left is zeros, up to a page of memory: PCL's writer stretched its files so far. Reads it, if it is so short.
+    /// Reads the rest and returns true if it is at most 64 KiB of zeros, which PCL's writer
+    /// appends.
     pub fn is_padding(&mut self) -> Result<bool, Error> {
         let n = self.remaining();
         if n > 1 << 16 {
             return Ok(false);
         }
         let mut rest = vec![0; n as usize];
-        self.fill(&mut rest, "what follows the points")?;
+        self.fill(&mut rest, "data after the points")?;
         Ok(rest.iter().all(|&byte| byte == 0))
     }
 
-    /// A reader of a file of `len` bytes of which `at` were already read from `reader`.
+    /// Creates a reader of a file of `len` bytes of which `at` were already read.
     pub fn continuing(path: &Path, reader: BufReader<File>, at: u64, len: u64) -> Self {
         Self { path: path.to_owned(), reader, part: Part::Header, value_at: at, at, len }
     }
 
-    /// Errors from here on name record `number`, counted from 1.
+    /// Makes later errors name record `number`, counted from 1.
     pub fn record(&mut self, number: u64) {
         self.part = Part::Record(number);
     }
 
-    /// An empty list with room for `n` entries of what stands at `place`, within the budget of the file.
-    ///
-    /// # Errors
-    /// When there is not so much memory.
     pub fn room<T>(&self, place: impl Into<Place> + Clone, n: u64) -> Result<Vec<T>, Error> {
         Budget::new(&self.path, self.len).room(place, n)
     }
 
-    /// Whether `bytes` fit into the budget of the file, which what stands at `place` is about to take.
-    ///
-    /// # Errors
-    /// When they do not.
     pub fn admit(&self, place: &str, bytes: u64) -> Result<(), Error> {
         Budget::new(&self.path, self.len).admit(place, bytes)
     }
 
-    /// Where the next byte is.
     pub fn at(&self) -> u64 {
         self.at
     }
 
-    /// Bytes between here and the end of the file.
     pub fn remaining(&self) -> u64 {
         self.len.saturating_sub(self.at)
     }
 
-    /// An error in the value that was read last.
+    /// Returns an error about the last value.
     pub fn error(&self, expected: impl Into<String>, found: impl Into<String>) -> Error {
         self.error_at(self.value_at, expected, found)
     }
 
-    /// An error in what follows.
+    /// Returns an error about the next value.
     pub fn error_ahead(&self, expected: impl Into<String>, found: impl Into<String>) -> Error {
         self.error_at(self.at, expected, found)
     }
@@ -100,7 +88,8 @@ impl Bytes {
         Error::new(&self.path, Place::Byte { what, at }, expected, found)
     }
 
-    /// Refuses `n` rows of `stride` bytes that are more than is left; how many bytes they are.
+    /// Returns the size of `n` rows of `stride` bytes, or an error if the file has fewer bytes
+    /// left.
     pub fn expect_rows(&self, n: u64, what: &str, stride: u64) -> Result<u64, Error> {
         let size = n.checked_mul(stride).filter(|&size| size <= self.remaining());
         size.ok_or_else(|| {
@@ -123,7 +112,6 @@ impl Bytes {
         Err(self.error_ahead(format!("{bytes} {unit} of {what}"), found))
     }
 
-    /// Fills `buffer` with the next bytes, which are the `what` of this part.
     pub fn fill(&mut self, buffer: &mut [u8], what: &str) -> Result<(), Error> {
         self.check(buffer.len() as u64, what)?;
         self.value_at = self.at;
@@ -132,7 +120,6 @@ impl Bytes {
         Ok(())
     }
 
-    /// Skips `bytes`, which are the `what` of this part.
     pub fn skip(&mut self, bytes: u64, what: &str) -> Result<(), Error> {
         self.check(bytes, what)?;
         let offset = i64::try_from(bytes).expect("bounded by the size of the file");
@@ -148,27 +135,22 @@ impl Bytes {
         Ok(buffer)
     }
 
-    /// The next byte.
     pub fn u8(&mut self, what: &str) -> Result<u8, Error> {
         Ok(self.array::<1>(what)?[0])
     }
 
-    /// The next little-endian `u32`.
     pub fn u32(&mut self, what: &str) -> Result<u32, Error> {
         self.array(what).map(u32::from_le_bytes)
     }
 
-    /// The next little-endian `i32`.
     pub fn i32(&mut self, what: &str) -> Result<i32, Error> {
         self.array(what).map(i32::from_le_bytes)
     }
 
-    /// The next little-endian `u64`.
     pub fn u64(&mut self, what: &str) -> Result<u64, Error> {
         self.array(what).map(u64::from_le_bytes)
     }
 
-    /// The next `N` little-endian doubles.
     pub fn doubles<const N: usize>(&mut self, what: &str) -> Result<[f64; N], Error> {
         self.check(8 * N as u64, what)?;
         let start = self.at;
@@ -180,7 +162,7 @@ impl Bytes {
         Ok(values)
     }
 
-    /// Bytes up to the next zero byte, which is not part of them.
+    /// Reads bytes up to the next zero byte, which is not included.
     pub fn zero_terminated(&mut self, what: &str) -> Result<Vec<u8>, Error> {
         let start = self.at;
         let mut bytes = Vec::new();
@@ -196,10 +178,10 @@ impl Bytes {
         }
     }
 
-    /// The next `u64`, the number of `what` that follow, each of at least `bytes_each` bytes.
+    /// Reads a `u64` count of `what`, each of at least `bytes_each` bytes.
     ///
-    /// # Errors
-    /// When the rest of the file cannot hold that many: so nothing is allocated for a false count.
+    /// A count that the rest of the file cannot hold is an error, so that nothing is allocated for
+    /// it.
     pub fn count(&mut self, what: &str, bytes_each: u64) -> Result<u64, Error> {
         if self.remaining() < 8 {
             self.check(8, &format!("the number of {what}"))?;
@@ -208,7 +190,7 @@ impl Bytes {
         self.check_count(count, what, bytes_each)
     }
 
-    /// The same for a count stored as `u32`.
+    /// Reads a `u32` count like [`count`](Self::count).
     pub fn count_u32(&mut self, what: &str, bytes_each: u64) -> Result<u64, Error> {
         if self.remaining() < 4 {
             self.check(4, &format!("the number of {what}"))?;
@@ -231,8 +213,6 @@ impl Bytes {
         Err(self.error(expected, count.to_string()))
     }
 
-    /// # Errors
-    /// When something follows.
     pub fn end(&mut self) -> Result<(), Error> {
         self.part = Part::End;
         match self.remaining() {

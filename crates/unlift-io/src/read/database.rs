@@ -1,4 +1,4 @@
-//! Descriptors of points as the mean over their observations, from COLMAP's `database.db` or hloc's features.
+//! Descriptors of points: means over their observations in images.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -13,13 +13,13 @@ use crate::read::colmap::{self, Image};
 use crate::read::lines::quoted;
 use crate::read::map_input::Input;
 
-/// L2 norm of the descriptors COLMAP stores as bytes.
+/// L2 norm of the descriptors that COLMAP stores as bytes.
 const BYTE_NORM: f64 = 512.0;
 
-/// Descriptors of an image: its rows, one after the other, and how long each is.
+/// Row-major descriptors and their dimension.
 type Stored = (Values, usize);
 
-/// Descriptors for every point of `input`, which must be a COLMAP model, from the database at `path`.
+/// Reads descriptors for every point of `input`, a COLMAP model, from the database at `path`.
 ///
 /// Source: COLMAP's documentation, "Database Format".
 pub fn of_database(path: &Path, input: &Input) -> Result<Descriptors, Error> {
@@ -37,8 +37,8 @@ pub fn of_database(path: &Path, input: &Input) -> Result<Descriptors, Error> {
     })
 }
 
-/// Descriptors of the map's points from hloc's features at `path`: the mean over each track. Keypoints are numbered as
-/// the 2D points of the model.
+/// Reads descriptors for every point of `input`, a COLMAP model, from hloc's features at `path`.
+/// Keypoints must have the indices of the model's 2D points.
 pub fn of_features(path: &Path, input: &Input) -> Result<Descriptors, Error> {
     let features = FeatureSource::open(path)?;
     mean(path, input, |image| {
@@ -57,7 +57,8 @@ pub fn of_features(path: &Path, input: &Input) -> Result<Descriptors, Error> {
     })
 }
 
-/// The mean over the observations of each point of `input`, of which `stored` gives those in an image.
+/// Returns the mean over the observations of each point. `stored` reads the descriptors of an
+/// image.
 fn mean(
     path: &Path,
     input: &Input,
@@ -77,8 +78,8 @@ fn mean(
     let images = points_path.with_file_name("images").with_extension(extension);
     let images = colmap::read_images(&images)?;
     let row_of_id: HashMap<u64, usize> = points.ids.iter().copied().zip(0..).collect();
-    // By image, so that one image's descriptors are in memory at a time; by id, so that sums of floats
-    // do not depend on a hash.
+    // Sorted by image, so that one image is in memory at a time, and by id, so that sums of floats
+    // are deterministic.
     let mut observations = Vec::new();
     for (out, id) in input.ids.iter().enumerate() {
         let place = || format!("point {id}");
@@ -134,7 +135,7 @@ fn mean(
     let (kind, dim) = layout.unwrap_or(("bytes", 1));
     let values = if kind == "bytes" {
         normalize(&mut sums, dim, BYTE_NORM);
-        // Ties to even, as NumPy rounds.
+        // Ties to even, like NumPy.
         let byte = |x: &f64| x.round_ties_even().clamp(0.0, 255.0) as u8;
         Values::U8(sums.iter().map(byte).collect())
     } else {
@@ -148,7 +149,7 @@ fn add<T: Copy + Into<f64>>(sums: &mut [f64], values: &[T]) {
     sums.iter_mut().zip(values).for_each(|(sum, &value)| *sum += value.into());
 }
 
-/// Brings every row to an L2 norm (so that a sum is as good as a mean); rows of zeros stay.
+/// Scales every row to an L2 norm, so that a sum equals a mean.
 fn normalize(rows: &mut [f64], dim: usize, norm: f64) {
     for row in rows.chunks_mut(dim) {
         let length = row.iter().map(|x| x * x).sum::<f64>().sqrt();

@@ -1,4 +1,4 @@
-//! Descriptors of the points of a map: from our binary form, a NumPy array, a COLMAP database or hloc's features.
+//! Reads descriptors of the points of a map.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -20,20 +20,20 @@ const MAGIC: &[u8; 8] = b"P3DESC01";
 const SQLITE: &[u8; 8] = b"SQLite f";
 const HDF5: &[u8; 8] = b"\x89HDF\r\n\x1a\n";
 
-/// The descriptors of the points of `input`, one row each in its order.
+/// Reads the descriptors of the points of `input`, one row each in the same order.
 ///
 /// `path` is one of
 ///
-/// - a file of the form `P3DESC01` (joined by point id), bytes or floats as they are stored;
-/// - an `.npy` array `(n, dim)` with a row per point in the order of `input`: of a COLMAP model by
-///   ascending point id, else as the file has them;
-/// - a COLMAP `database.db`, or hloc's `features.h5`: then a point's row is the mean of the descriptors of its
-///   observations, found through the model's tracks, with images joined by name. Bytes are brought to L2 norm 512,
-///   rounded and clipped to 0..=255; floats to norm 1.
+/// - a file of the format `P3DESC01` (joined by point id), with bytes or floats;
+/// - an `.npy` array `(n, dim)` with a row per point: by ascending point id for a COLMAP model,
+///   else in the order of the file;
+/// - a COLMAP `database.db`, or hloc's `features.h5`: a row is the mean of the descriptors in the
+///   point's track, with images joined by name. Bytes are scaled to L2 norm 512, rounded and
+///   clipped to 0..=255; floats are scaled to norm 1.
 ///
 /// # Errors
-/// When the file cannot be read, is neither form, is malformed, lacks a point or an observation (the
-/// error names the first), or holds dummies (all zero, or every row the same).
+/// When the file cannot be read, is malformed or of another format, lacks a point or an observation
+/// (the error names the first), or contains placeholders (all zero, or every row the same).
 pub fn descriptors(path: &Path, input: &Input) -> Result<Descriptors, Error> {
     let mut magic = [0; 8];
     let (mut file, len) = input::open(path)?;
@@ -45,7 +45,7 @@ pub fn descriptors(path: &Path, input: &Input) -> Result<Descriptors, Error> {
         SQLITE => database::of_database(path, input),
         HDF5 => database::of_features(path, input),
         _ if magic.starts_with(npy::MAGIC) => {
-            // A row per point that was read, or per point of the file.
+            // Rows either exclude or include points without finite coordinates.
             let (values, dim) = npy::descriptors(path, [input.ids.len(), input.n_rows()])?;
             let all = Descriptors::try_new(values, dim).map_err(|e| Error::core(path, e))?;
             if all.len() == input.ids.len() {
@@ -103,7 +103,7 @@ fn binary(path: &Path, input: &Input) -> Result<Descriptors, Error> {
             Err(Error::new(path, format!("point {id}"), "a descriptor", found))
         }
     };
-    // Of more points than rows, one has none: the file alone says how many values there can be.
+    // With more points than rows, the loop ends with an error, so the file limits the memory.
     let n_values = input.ids.len().min(n as usize) * dim;
     let values = if scalar == Scalar::U8 {
         let mut values = Vec::with_capacity(n_values);

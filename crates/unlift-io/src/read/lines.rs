@@ -1,4 +1,4 @@
-//! Text files, a line at a time.
+//! Reads text files line by line.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -8,46 +8,39 @@ use super::bytes::Bytes;
 use crate::error::{Error, Place};
 use crate::input::{self, Budget};
 
-/// Bytes of a line at most: as many as a point takes that a million photos show. A file of one endless
-/// line is not read to its end.
+/// The maximum length of a line in bytes, enough for the track of a point in a million photos.
 pub(crate) const LONGEST_LINE: u64 = 16 << 20;
-/// Bytes of a head before data at most: long comments are fine, a file of comments alone is not read to its end.
+/// The maximum length of a header in bytes, enough for long comments.
 const LONGEST_HEADER: u64 = 1 << 20;
 
-/// Lines of a text file, counted from 1, as bytes: names need not be UTF-8.
+/// A reader of text lines, counted from 1, as bytes: names need not be UTF-8.
 pub(crate) struct Lines {
     path: PathBuf,
     reader: BufReader<File>,
     line: Vec<u8>,
     number: u64,
-    /// Where the next line begins.
     at: u64,
     len: u64,
 }
 
 impl Lines {
-    /// A reader at the start of `path`.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let (file, len) = input::open(path)?;
         let reader = BufReader::new(file);
         Ok(Self { path: path.to_owned(), reader, line: Vec::new(), number: 0, at: 0, len })
     }
 
-    /// What follows the current line, as binary data.
+    /// Returns a binary reader of the bytes after the current line.
     pub fn into_bytes(self) -> Bytes {
         Bytes::continuing(&self.path, self.reader, self.at, self.len)
     }
 
-    /// An empty list with room for `n` entries of what stands at `place`, within the budget of the file.
-    ///
-    /// # Errors
-    /// When there is not so much memory.
     pub fn room<T>(&self, place: impl Into<Place> + Clone, n: u64) -> Result<Vec<T>, Error> {
         Budget::new(&self.path, self.len).room(place, n)
     }
 
-    /// Refuses `n` rows of `n_values` values that do not fit into the rest of the file: a value takes a digit and a
-    /// separator, the last one of the file only the digit.
+    /// Returns an error if `n` rows of `n_values` values, with a digit and a separator each, exceed
+    /// the rest of the file.
     pub fn expect_room(&self, n: u64, what: &str, n_values: u64) -> Result<(), Error> {
         let most = (self.len.saturating_sub(self.at) + 1) / n_values.saturating_mul(2);
         if n <= most {
@@ -57,7 +50,7 @@ impl Lines {
         Err(Error::new(&self.path, "header", expected, n.to_string()))
     }
 
-    /// Reads the next line of a head, which is not the last line of the file.
+    /// Reads the next line of a header, which must not be the last line of the file.
     pub fn advance_in_header(&mut self, expected: &str) -> Result<(), Error> {
         if !self.advance()? {
             return Err(self.end_error(expected));
@@ -68,10 +61,8 @@ impl Lines {
         Ok(())
     }
 
-    /// Reads the next line, whatever it holds; false at the end of the file.
-    ///
-    /// # Errors
-    /// When the line holds a zero byte: the file is not text; when it is longer than [`LONGEST_LINE`].
+    /// Reads the next line. Returns false at the end of the file. A zero byte or a line over
+    /// [`LONGEST_LINE`] is an error.
     pub fn advance(&mut self) -> Result<bool, Error> {
         self.line.clear();
         let mut limited = self.reader.by_ref().take(LONGEST_LINE + 1);
@@ -95,7 +86,8 @@ impl Lines {
         Ok(true)
     }
 
-    /// Reads up to the next line that is neither blank nor a comment; false at the end of the file.
+    /// Reads up to the next line that is neither blank nor a comment. Returns false at the end of
+    /// the file.
     pub fn advance_to_data(&mut self) -> Result<bool, Error> {
         while self.advance()? {
             let line = self.line();
@@ -106,40 +98,35 @@ impl Lines {
         Ok(false)
     }
 
-    /// The current line without the space around it.
     pub fn line(&self) -> &[u8] {
         self.line.trim_ascii()
     }
 
-    /// The current line without its end: between tabs, a first field may be empty.
+    /// The current line without its line end. The first of tab-separated fields may be empty.
     pub fn untrimmed(&self) -> &[u8] {
         let line = self.line.strip_suffix(b"\n").unwrap_or(&self.line);
         line.strip_suffix(b"\r").unwrap_or(line)
     }
 
-    /// An error in the current line.
     pub fn error(&self, expected: impl Into<String>, found: impl Into<String>) -> Error {
         Error::new(&self.path, Place::Line(self.number), expected, found)
     }
 
-    /// An error at the end of the file, where another line should be.
+    /// Returns an error at the end of the file, where another line was expected.
     pub fn end_error(&self, expected: impl Into<String>) -> Error {
         let place = Place::Line(self.number + 1);
         Error::new(&self.path, place, expected, "end of file")
     }
 }
 
-/// Words of a line between spaces and tabs.
 pub(crate) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
 }
 
-/// The number written as `word`, if it is one.
 pub(crate) fn number<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
     std::str::from_utf8(word).ok()?.parse().ok()
 }
 
-/// A word as it appears in an error: quoted, and cut when it is long.
 pub(crate) fn quoted(word: &[u8]) -> String {
     const LONGEST: usize = 40;
     let text = String::from_utf8_lossy(word);

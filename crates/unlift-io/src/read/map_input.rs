@@ -1,4 +1,4 @@
-//! What any reader gives back: points, cameras, and what must be known of them.
+//! The result of all readers of maps.
 
 use std::path::PathBuf;
 
@@ -7,53 +7,52 @@ use crate::seen::Seen;
 /// A map as it was read, in the units of its file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Input {
-    /// Points `(n, 3)`, all finite, at least one. COLMAP's are in ascending order of their ids,
-    /// others in the order of the file.
+    /// Points `(n, 3)`, all finite, at least one. COLMAP's are sorted by id, others are in the
+    /// order of the file.
     pub positions: Vec<[f64; 3]>,
-    /// Ids `(n,)`, ascending: those of COLMAP's points, else the row in the file, from 0.
+    /// Ids `(n,)`, ascending: those of COLMAP, else rows of the file, counted from 0.
     pub ids: Vec<u64>,
-    /// Rows of points that are left out as they have no place: a coordinate is not finite. Ascending, among all points
-    /// in the order of `positions`.
+    /// Rows of points that are left out because a coordinate is not finite, among all points in the
+    /// order of `positions`.
     pub left_out: Vec<u64>,
-    /// Camera centers `(m, 3)`; empty when the format has none.
+    /// Camera centers `(m, 3)`. Empty if the format has none.
     pub cameras: Vec<[f64; 3]>,
-    /// Cameras that are left out as they have no place.
+    /// The number of cameras that are left out because they have no finite pose.
     pub n_unplaced: usize,
-    /// The mean of what is up in the photos, of unit length: up in the world, as people hold cameras;
-    /// `None` without cameras.
+    /// The mean up direction of the photos, of unit length. `None` without cameras.
     pub up: Option<[f64; 3]>,
-    /// Every file that was read, for hashes in a report.
+    /// All files that were read, for hashes in a report.
     pub files: Vec<PathBuf>,
-    /// Size and time of these files before they were read, to see whether one changes meanwhile. Files that are named in
-    /// another file are not among them.
+    /// Size and time of the input files before they were read, to detect changes. Files that
+    /// another file names are not included.
     pub seen: Seen,
-    /// The name of the format, for people: `COLMAP binary`, `ply ascii`.
+    /// The format, as shown to users: `COLMAP binary`, `ply ascii`.
     pub format: &'static str,
-    /// What was found but not used, and what else whoever reads figures must know, one line each.
+    /// Notes for readers of the results, one line each.
     pub notes: Vec<String>,
-    /// Why figures may be wrong: no gate holds on them.
+    /// Reasons why results may be wrong. No gate holds with one.
     pub doubts: Vec<String>,
-    /// Coordinates are degrees of longitude and latitude, which are no lengths, as the file says.
+    /// True if the file states that coordinates are degrees of longitude and latitude.
     pub is_geographic: bool,
-    /// The folder of the COLMAP model, when the input is one: descriptors are found through its tracks.
+    /// The folder of the COLMAP model, if the input is one.
     pub model: Option<PathBuf>,
-    /// The COLMAP database of the project, if there is one where such projects have it.
+    /// The COLMAP database of the project, if one is found.
     pub database: Option<PathBuf>,
 }
 
-/// The largest share of points without a place with which a map is still taken for whole.
+/// The largest share of points without finite coordinates that is a note instead of a doubt.
 const MOST_LEFT_OUT: f64 = 0.05;
-/// Points at one place that are told: so many, and at least this share.
+/// The smallest number and share of points at one position that make a note.
 const MANY: usize = 10;
 const MANY_SHARE: f64 = 0.01;
 
 impl Input {
-    /// How many points its files have, with those that are left out.
+    /// The number of points in the file, including those left out.
     pub fn n_rows(&self) -> usize {
         self.positions.len() + self.left_out.len()
     }
 
-    /// Adds a camera: its center and what is up in its photo; `None` if it was not placed.
+    /// Adds a camera: its center and up direction, or `None` without a pose.
     pub(crate) fn camera(&mut self, pose: Option<([f64; 3], [f64; 3])>) {
         let is_finite = |x: &[f64; 3]| x.iter().all(|x| x.is_finite());
         match pose.filter(|(center, up)| is_finite(center) && is_finite(up)) {
@@ -66,7 +65,7 @@ impl Input {
         }
     }
 
-    /// What holds for all formats: points without a place are left out, and counted.
+    /// Leaves out points without finite coordinates, and adds notes and doubts for all formats.
     pub(crate) fn settle(mut self) -> Self {
         let n = self.positions.len();
         if self.ids.is_empty() {
@@ -99,9 +98,7 @@ impl Input {
             notes.push(format!("{n} of {of} points are at exactly one place, {place:?}"));
         }
         if self.is_geographic {
-            self.doubts.push(
-                "coordinates are degrees, which are no lengths: project them first".to_owned(),
-            );
+            self.doubts.push("coordinates are degrees, not lengths: project them first".to_owned());
         }
         notes.append(&mut self.notes);
         self.notes = notes;
@@ -113,9 +110,9 @@ impl Input {
     }
 }
 
-/// The place at which most points are, and how many.
+/// Returns the most frequent position and its number of points.
 pub(crate) fn most_at_one_place(positions: &[[f64; 3]]) -> Option<(usize, [f64; 3])> {
-    // Zeros of either sign are the same place.
+    // Zeros of either sign are equal.
     let bits = |position: &[f64; 3]| position.map(|x| (x + 0.0).to_bits());
     let mix = |[x, y, z]: [u64; 3]| {
         let step = |hash: u64, bits: u64| (hash ^ bits).wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -126,7 +123,7 @@ pub(crate) fn most_at_one_place(positions: &[[f64; 3]]) -> Option<(usize, [f64; 
     hashes.sort_unstable();
     let most = hashes.chunk_by(|a, b| a == b).max_by_key(|same| same.len())?[0];
     let place = *positions.iter().find(|position| mix(bits(position)) == most)?;
-    // By the bits: two places may have one hash.
+    // Two positions may have the same hash.
     let n = positions.iter().filter(|position| bits(position) == bits(&place)).count();
     Some((n, place))
 }

@@ -1,4 +1,4 @@
-//! The first stage: a map in somebody else's format becomes positions, ids and camera centers.
+//! Reads maps in many formats as positions, ids and camera centers.
 
 pub(crate) mod bytes;
 pub mod colmap;
@@ -29,14 +29,15 @@ use crate::input;
 use crate::seen::Seen;
 use models::Model;
 
-/// Reads the map at `path`: a COLMAP model folder or a project folder that holds one (of several, the
-/// one with the most points; `notes` says which), a map of OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler or VisualSFM (NVM),
-/// or a point cloud: see `EXPECTED` for the endings.
+/// Reads the map at `path`.
 ///
-/// Points whose coordinates are not finite are left out and counted.
+/// `path` is a COLMAP model folder, a project folder that contains one (of several, the one with
+/// the most points), a map of OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler or VisualSFM (NVM),
+/// or a point cloud; `EXPECTED` lists the extensions. Points whose coordinates are not finite are
+/// left out and counted.
 ///
 /// # Errors
-/// When nothing readable is there, a file is malformed, or no point has a place.
+/// When nothing readable is there, a file is malformed, or no point has finite coordinates.
 pub fn open(path: &Path) -> Result<Input, Error> {
     let metadata = std::fs::metadata(path).map_err(|e| Error::read(path, e))?;
     let input = if metadata.is_dir() {
@@ -58,31 +59,29 @@ pub fn open(path: &Path) -> Result<Input, Error> {
     Ok(input)
 }
 
-/// Whether `path` is a folder in which [`open`] finds a map.
+/// Returns true if `path` is a folder in which [`open`] finds a map.
 pub fn is_project(path: &Path) -> bool {
     path.is_dir() && (matches!(Model::find(path), Ok(Some(_))) || others::in_folder(path).is_some())
 }
 
-/// What is read, for people.
 const EXPECTED: &str = "a COLMAP folder, a map of OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler or NVM, or a .ply, \
                         .csv, .xyz, .txt, .asc, .pts, .npy, .npz, .las, .pcd, .e57 or .splat file";
 
-/// What a file is that is not read, and what makes one of it that is.
+/// Describes an unsupported file, and how to convert it.
 fn not_read(extension: &str) -> String {
     let more = match extension {
         "" => return "a file without extension".to_owned(),
-        "laz" => " (pdal translate IN.laz OUT.las makes one that is read)",
+        "laz" => " (convert it: pdal translate IN.laz OUT.las)",
         "h5" | "hdf5" => {
-            " (features of images: unlift audit images, or --descriptors of a COLMAP model)"
+            " (features of images: use unlift audit images, or --descriptors with a COLMAP model)"
         }
         "spz" | "ksplat" | "sog" => " (export it as .ply)",
-        "abc" => " (in Meshroom, ConvertSfMFormat makes an .sfm)",
+        "abc" => " (convert it to .sfm with ConvertSfMFormat of Meshroom)",
         _ => "",
     };
     format!("a .{extension} file{more}")
 }
 
-/// A table, or COLMAP's points under another name.
 fn table_of(path: &Path) -> Result<Input, Error> {
     match table::read(path)? {
         Some(input) => Ok(input),
@@ -90,7 +89,6 @@ fn table_of(path: &Path) -> Result<Input, Error> {
     }
 }
 
-/// Refuses what Git LFS leaves in the place of a file that it did not fetch.
 fn check_fetched(path: &Path) -> Result<(), Error> {
     const POINTER: &[u8] = b"version https://git-lfs";
     let mut head = Vec::new();
@@ -99,7 +97,7 @@ fn check_fetched(path: &Path) -> Result<(), Error> {
         .read_to_end(&mut head)
         .map_err(|error| Error::read(path, error))?;
     if head == POINTER {
-        let found = "a pointer of Git LFS (git lfs pull fetches the file)";
+        let found = "a pointer of Git LFS (run git lfs pull)";
         return Err(Error::new(path, "", "a map", found));
     }
     Ok(())
@@ -133,14 +131,13 @@ fn file(path: &Path) -> Result<Input, Error> {
     Ok(input)
 }
 
-/// The points of a COLMAP model given by themselves.
 fn colmap_points(path: &Path) -> Result<Input, Error> {
     let points = colmap::read_points(path, false)?;
     Ok(Input {
         positions: points.positions,
         ids: points.ids,
         format: "COLMAP points",
-        notes: vec!["camera centers: give the folder of the model to have them".to_owned()],
+        notes: vec!["camera centers: not read (give the folder of the model)".to_owned()],
         ..Input::default()
     })
 }
@@ -179,7 +176,7 @@ fn colmap_model(model: &Model) -> Result<Input, Error> {
     input.files.push(model.points.clone());
     input.seen = Seen::new(&input.files);
 
-    // Nothing an audit needs is in cameras, rigs and frames, so that a fault in them is told but not fatal.
+    // An audit needs nothing from these files, so their errors are notes.
     let mut told = |error: Error| input.notes.push(error.to_string());
     let cameras = cameras.and_then(|path| colmap::read_cameras(&path).map_err(&mut told).ok());
     for check in
@@ -208,9 +205,7 @@ fn colmap_model(model: &Model) -> Result<Input, Error> {
     if model.points.extension().is_some_and(|extension| extension == "ply") {
         let points = ply::read(&model.points)?;
         (input.positions, input.format) = (points.positions, points.format);
-        input
-            .notes
-            .push("points3D.ply: read, as there are no points3D.bin and points3D.txt".to_owned());
+        input.notes.push("points3D.ply: read (no points3D.bin, no points3D.txt)".to_owned());
         return Ok(input);
     }
     let points = colmap::read_points(&model.points, false)?;

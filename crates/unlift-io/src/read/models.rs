@@ -1,4 +1,4 @@
-//! Which COLMAP model of a folder is read: where programs put them, and the largest of several.
+//! Finds the COLMAP model of a folder.
 
 use std::fs;
 use std::io::{self, BufRead, BufReader, Read};
@@ -8,34 +8,28 @@ use super::ply;
 use crate::error::Error;
 use crate::input;
 
-/// Where models lie, each in itself or in numbered folders inside: COLMAP's `sparse`, hloc's `models`
-/// (the best one stands in the folder itself), nerfstudio's `colmap/sparse`.
+/// Places of models, themselves or in numbered subfolders: COLMAP's `sparse`, hloc's `models` (its
+/// best model is in the folder itself), nerfstudio's `colmap/sparse`.
 const PLACES: [&str; 6] = ["", "sparse", "model", "models", "colmap", "colmap/sparse"];
-/// Where undistorted ones lie: in `sparse` of that folder, or of numbered folders inside. They are read if there is no other.
+/// The place of undistorted models: `sparse` in it or in its numbered subfolders. They are read
+/// only if there is no other model.
 const UNDISTORTED: &str = "dense";
-/// Where a database lies beside a model.
 const DATABASES: [&str; 2] = ["database.db", "colmap/database.db"];
-/// The same where the folder that was given is the model itself.
+/// Places of a database if the folder that was given is the model itself.
 const DATABASES_ABOVE: [&str; 2] = ["../database.db", "../../database.db"];
 
-/// A model in a folder.
 pub(super) struct Model {
-    /// Its own folder.
     pub folder: PathBuf,
-    /// `bin` or `txt`: the form that is read.
+    /// `bin` or `txt`.
     pub extension: &'static str,
     /// The file of its points, which may be a PLY.
     pub points: PathBuf,
-    /// What people should know about other models and forms.
     pub notes: Vec<String>,
 }
 
 impl Model {
-    /// The model in `path`: that of the folder itself, else the one with the most points (the first of
-    /// these, in the order of [`PLACES`] and of numbers); `None` when there is none.
-    ///
-    /// # Errors
-    /// When there are several, and the points of one cannot be counted.
+    /// Finds the model in `path`: the one in the folder itself, else the one with the most points.
+    /// Ties go to the first in the order of [`PLACES`] and of numbers.
     pub fn find(path: &Path) -> Result<Option<Self>, Error> {
         let found = candidates(path);
         let Some(first) = found.first() else { return Ok(None) };
@@ -73,20 +67,18 @@ impl Model {
     }
 }
 
-/// The database that belongs to the model `model`, found in `path`.
+/// Finds the database of the model `model` in `path`.
 pub(super) fn database(path: &Path, model: &Path) -> Option<PathBuf> {
     let above: &[&str] = if model == path { &DATABASES_ABOVE } else { &[] };
     let places = DATABASES.iter().chain(above);
     places.map(|place| path.join(place)).find(|file| file.is_file())
 }
 
-/// Where to look, for people.
 pub(super) const EXPECTED: &str = "points3D.bin or points3D.txt in it, or in sparse, model, models, colmap/sparse \
                                    or a numbered folder of these";
 
-/// A folder with a model.
 struct Candidate {
-    /// Relative to the folder that was given, with slashes; empty for that folder.
+    /// Relative to the folder that was given, with slashes. Empty for that folder.
     name: String,
     folder: PathBuf,
     extension: &'static str,
@@ -94,7 +86,6 @@ struct Candidate {
 }
 
 impl Candidate {
-    /// The model in `folder`, if one is there.
     fn in_folder(name: String, folder: PathBuf) -> Option<Self> {
         let file = |stem: &str, extension: &str| folder.join(format!("{stem}.{extension}"));
         let there = |extension: &&str| file("points3D", extension).is_file();
@@ -107,13 +98,13 @@ impl Candidate {
 
     fn model(&self, mut notes: Vec<String>) -> Model {
         if self.extension == "bin" && self.folder.join("points3D.txt").is_file() {
-            notes.insert(0, "points3D.txt: the binary form beside it was read".to_owned());
+            notes.insert(0, "points3D.txt: not read, because points3D.bin exists".to_owned());
         }
         let Self { folder, extension, points, .. } = self;
         Model { folder: folder.clone(), extension, points: points.clone(), notes }
     }
 
-    /// How many points its file says that it holds.
+    /// Returns the number of points that the file declares.
     fn n_points(&self) -> Result<u64, Error> {
         let path = &self.points;
         let wrong = |error| Error::read(path, error);
@@ -125,14 +116,14 @@ impl Candidate {
         if ends("bin") {
             let mut count = Vec::new();
             file.take(8).read_to_end(&mut count).map_err(wrong)?;
-            // A file that is cut off counts as empty; if it is read after all, its reader tells.
+            // A truncated file counts as empty. If it is chosen, its reader returns the error.
             return Ok(count.try_into().map_or(0, u64::from_le_bytes));
         }
         n_lines(file).map_err(wrong)
     }
 }
 
-/// Lines that are neither blank nor a comment, none of which is held in memory.
+/// Counts lines that are neither blank nor comments.
 fn n_lines(mut file: impl BufRead) -> io::Result<u64> {
     let mut n = 0;
     let mut is_start = true;
@@ -154,7 +145,7 @@ fn n_lines(mut file: impl BufRead) -> io::Result<u64> {
     }
 }
 
-/// All models in `path`, each once, in the order of search.
+/// Lists all models in `path` without repetition, in the order of search.
 fn candidates(path: &Path) -> Vec<Candidate> {
     let mut found: Vec<Candidate> = Vec::new();
     let mut seen = Vec::new();
@@ -166,7 +157,7 @@ fn candidates(path: &Path) -> Vec<Candidate> {
             let name = name + inside;
             let folder = if name.is_empty() { path.to_owned() } else { path.join(&name) };
             let Some(candidate) = Candidate::in_folder(name, folder) else { continue };
-            // Links make one model appear twice.
+            // Links can make one model appear twice.
             let real = fs::canonicalize(&candidate.folder);
             let real = real.unwrap_or_else(|_| candidate.folder.clone());
             if !seen.contains(&real) {
@@ -184,11 +175,10 @@ fn candidates(path: &Path) -> Vec<Candidate> {
     found
 }
 
-/// The folders of `parent` whose names are numbers, rising.
 fn numbered(parent: &Path) -> Vec<u32> {
     let Ok(entries) = fs::read_dir(parent) else { return Vec::new() };
     let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
-    // Only as programs write them: 007 could not be found again by its number.
+    // Names like 007 are skipped, because the number does not give the name back.
     let number = |name: String| name.parse::<u32>().ok().filter(|n| n.to_string() == name);
     let mut numbers: Vec<u32> = names.filter_map(number).collect();
     numbers.sort_unstable();

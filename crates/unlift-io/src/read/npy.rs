@@ -1,7 +1,6 @@
-//! NumPy arrays: positions, and descriptors.
+//! Reads positions and descriptors from NumPy arrays.
 //!
-//! A reader of our own rather than a crate: the arrays we take are of few types, and a header that
-//! declares 2^62 rows must be an error on one line, not an overflow.
+//! Our own reader: few types are needed, and a header that declares 2^62 rows must be an error.
 
 use std::path::Path;
 
@@ -14,27 +13,25 @@ use super::scalar::Scalar;
 use crate::error::Error;
 use crate::read::map_input::Input;
 
-/// How every array begins.
 pub(crate) const MAGIC: &[u8; 6] = b"\x93NUMPY";
 
-/// Columns of an array of points at most: what has more are descriptors.
+/// The maximum number of columns of points. Wider arrays are descriptors.
 const MOST_COLUMNS: u64 = 16;
-/// How an array, or a field of three values, is called that holds all coordinates.
+/// Names of arrays, or of fields of three values, that contain all coordinates.
 pub(super) const PLACES: [&str; 7] =
     ["xyz", "position", "positions", "points", "points3d", "coordinates", "pts"];
-/// Rows of fewer points may begin with their number by accident.
+/// The least number of points at which a column of row numbers is an error. Fewer may match by
+/// accident.
 const TELLING: usize = 10;
 
-/// Reads positions from an `.npy` file of numbers: an array `(n, 3)` or with more columns, of which the first three are
-/// x, y and z, or a structured one with fields of these names; in either byte and memory order.
+/// Reads positions from an `.npy` file, in either byte and memory order.
 ///
-/// # Errors
-/// When the file cannot be read, is malformed, holds another type or shape, or begins rows with their number.
+/// The array has the shape `(n, 3)`, or more columns of which the first three are x, y and z, or
+/// fields of these names. A first column of row numbers is an error.
 pub fn positions(path: &Path) -> Result<Input, Error> {
     of_points(&mut Bytes::open(path)?, "npy")
 }
 
-/// Reads positions from the array that `bytes` begin with.
 pub(super) fn of_points(bytes: &mut Bytes, format: &'static str) -> Result<Input, Error> {
     let header = Header::read(bytes)?;
     let mut found = Input { format, ..Input::default() };
@@ -77,26 +74,25 @@ pub(super) fn of_points(bytes: &mut Bytes, format: &'static str) -> Result<Input
         let is_numbered = |from: usize| firsts().all(|(row, x)| x == (row + from) as f64);
         if found.positions.len() >= TELLING && (is_numbered(0) || is_numbered(1)) {
             let expected = "x, y and z in the first columns";
-            return Err(bytes.error(expected, "the number of the row"));
+            return Err(bytes.error(expected, "the row number"));
         }
-        found.notes.push(format!("the first 3 of {columns} columns are taken for x, y and z"));
+        found.notes.push(format!("the first 3 of {columns} columns are read as x, y and z"));
     }
     Ok(found)
 }
 
-/// Where the coordinates of a point are in an array.
 pub(super) enum Layout {
     Matrix {
         columns: u64,
     },
-    /// In records: where each stands, and whether its most significant byte comes first.
+    /// Records of `size` bytes: the field of each coordinate, and true if it is big-endian.
     Rows {
         fields: [(Field, bool); 3],
         size: u64,
     },
 }
 
-/// How a value of a type is stored, and whether its most significant byte comes first.
+/// Parses a type: how a value is stored, and true if it is big-endian.
 fn stored(text: &str) -> Option<(Scalar, bool)> {
     let (big, text) = (text.starts_with('>'), text.trim_start_matches(['<', '>', '|', '=']));
     let kind = *text.as_bytes().first()?;
@@ -106,21 +102,20 @@ fn stored(text: &str) -> Option<(Scalar, bool)> {
     ))
 }
 
-/// Bytes of a value of a type.
+/// The size in bytes of a value of a type.
 fn size_of(text: &str) -> Option<u64> {
     let text = text.trim_start_matches(['<', '>', '|', '=']);
     let digits = text.get(1..)?.split('[').next()?;
     let n: u64 = number(digits.as_bytes())?;
-    // Text is stored in four bytes a letter.
+    // Text has four bytes per letter.
     n.checked_mul(if text.starts_with('U') { 4 } else { 1 })
 }
 
-/// Reads descriptors `(n, dim)` from an `.npy` file of bytes or of 2-, 4- or 8-byte floats, in either
-/// byte and memory order: their values, row-major, and `dim`. Floats of 8 bytes are rounded to 4.
+/// Reads descriptors `(n, dim)` from an `.npy` file of bytes or of floats of 2, 4 or 8 bytes, in
+/// either byte and memory order.
 ///
-/// # Errors
-/// When the file cannot be read, is malformed, holds another type, has none of these `counts` of rows, or has a
-/// value that is not finite as a float of 4 bytes.
+/// Returns the row-major values and `dim`. Floats of 8 bytes are rounded to 4. The number of rows
+/// must be one of `counts`.
 pub fn descriptors(path: &Path, counts: [usize; 2]) -> Result<(Values, usize), Error> {
     let mut bytes = Bytes::open(path)?;
     let header = Header::read(&mut bytes)?;
@@ -180,8 +175,6 @@ struct Array {
 }
 
 impl Array {
-    /// # Errors
-    /// When the rest of the file is not what the header promises.
     fn check(&self, bytes: &Bytes) -> Result<(), Error> {
         check_size(bytes, self.rows, self.columns.checked_mul(self.scalar.size() as u64))
     }
@@ -207,7 +200,6 @@ impl Array {
     }
 }
 
-/// Refuses a file whose rest is not `rows` of so many bytes.
 fn check_size(bytes: &Bytes, rows: u64, row: Option<u64>) -> Result<(), Error> {
     if row.and_then(|row| rows.checked_mul(row)) == Some(bytes.remaining()) {
         return Ok(());
@@ -217,11 +209,10 @@ fn check_size(bytes: &Bytes, rows: u64, row: Option<u64>) -> Result<(), Error> {
     Err(bytes.error_ahead(expected, format!("{} bytes", bytes.remaining())))
 }
 
-/// The header of an array: a Python dictionary of three known keys.
+/// The header of an array: a Python dictionary with three keys.
 pub(super) struct Header(Vec<u8>);
 
 impl Header {
-    /// Reads up to the first value.
     pub(super) fn read(bytes: &mut Bytes) -> Result<Self, Error> {
         let mut magic = [0; 8];
         bytes.fill(&mut magic, "magic and version")?;
@@ -246,14 +237,14 @@ impl Header {
         Ok(Self(header))
     }
 
-    /// The text of a value.
     fn value(&self, key: &str) -> Option<&str> {
         let header = std::str::from_utf8(&self.0).ok()?;
         let at = [format!("'{key}'"), format!("\"{key}\"")]
             .iter()
             .find_map(|key| header.find(key).map(|at| at + key.len()))?;
         let text = header[at..].trim_start().strip_prefix(':')?.trim_start();
-        // A tuple ends with its parenthesis, a list with its bracket, anything else with a comma or the end of the dictionary.
+        // A tuple or a list ends with its bracket, other values with a comma or the end of the
+        // dictionary.
         let end = match text.as_bytes().first()? {
             b'(' => text.find(')')? + 1,
             b'[' => text.find(']')? + 1,
@@ -266,7 +257,6 @@ impl Header {
         self.value("descr").unwrap_or_default().trim_matches(['\'', '"']).as_bytes()
     }
 
-    /// How a value is stored, and whether its first byte is the most significant one.
     fn scalar(&self) -> Option<(Scalar, bool)> {
         stored(std::str::from_utf8(self.type_text()).ok()?)
     }
@@ -275,7 +265,8 @@ impl Header {
         self.type_text().starts_with(b"[")
     }
 
-    /// How many points there are, and where they have their coordinates; `None` of what cannot be points.
+    /// Returns the number of points and the places of their coordinates, if the array can be
+    /// points.
     pub(super) fn points(&self) -> Option<(u64, Layout)> {
         if !self.is_structured() {
             let [rows, columns] = self.sides().filter(|_| self.scalar().is_some())?;
@@ -285,11 +276,11 @@ impl Header {
         let rows = self.value("shape")?.strip_prefix('(')?.split([',', ')']).next()?;
         let (mut names, mut fields, mut size) = (Vec::new(), Vec::new(), 0u64);
         let mut places = None;
-        // ('x', '<f4'), ('xyz', '<f4', (3,))
+        // Examples: ('x', '<f4'), ('xyz', '<f4', (3,))
         for entry in self.value("descr")?.split("('").skip(1) {
             let mut parts = entry.split(['\'', ',', '(', ')', ' ']).filter(|part| !part.is_empty());
             let (name, kind) = match entry.starts_with('\'') {
-                // Bytes between fields have no name.
+                // Padding between fields has no name.
                 true => ("", parts.next()?),
                 false => (parts.next()?, parts.next()?),
             };
@@ -318,7 +309,7 @@ impl Header {
         bytes.error(expected, quoted(self.type_text()))
     }
 
-    /// Whether columns, not rows, are contiguous.
+    /// Returns true if columns are contiguous, false if rows are.
     fn fortran(&self, bytes: &Bytes) -> Result<bool, Error> {
         match self.value("fortran_order") {
             Some("True") => Ok(true),
@@ -334,7 +325,6 @@ impl Header {
         quoted(self.value("shape").unwrap_or_default().as_bytes())
     }
 
-    /// Rows and columns of an array of two dimensions.
     fn sides(&self) -> Option<[u64; 2]> {
         let inner = self.value("shape")?.strip_prefix('(')?.strip_suffix(')')?;
         let mut parts = inner.split(',').map(str::trim);

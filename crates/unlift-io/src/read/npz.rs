@@ -1,4 +1,4 @@
-//! NumPy's archives of arrays: the positions in one.
+//! Reads positions from NumPy archives.
 
 use std::io::{self, BufReader, Read, Seek};
 use std::path::Path;
@@ -15,23 +15,20 @@ use crate::guard::without_panic;
 use crate::input::{self, Budget};
 use crate::read::map_input::Input;
 
-/// Reads positions from the one array of an `.npz` archive that holds some.
-///
-/// # Errors
-/// When the file is no such archive, or several arrays or none may be points.
+/// Reads positions from the array of points in a NumPy archive. Several or none are an error.
 pub fn positions(path: &Path) -> Result<Input, Error> {
     let damaged = || Error::new(path, "", "an archive of NumPy arrays", "a damaged one");
     without_panic(|| in_archive(path)).unwrap_or_else(|| Err(damaged()))
 }
 
 fn in_archive(path: &Path) -> Result<Input, Error> {
-    /// Bytes that hold the header of an array.
+    /// The maximum size of an array header.
     const HEADER: u64 = 1 << 16;
     let (file, len) = input::open(path)?;
     let wrong =
         |error: ZipError| Error::new(path, "", "an archive of NumPy arrays", error.to_string());
     let mut archive = ZipArchive::new(BufReader::new(file)).map_err(wrong)?;
-    // Arrays are unpacked into a file that has no name: nothing but its header is read in memory.
+    // Arrays are unpacked into an anonymous temporary file, so that only headers are in memory.
     let unpacked = |entry: ZipFile<'_, _>, most: u64| -> Result<Bytes, Error> {
         let mut file = tempfile::tempfile().map_err(|error| Error::read(path, error))?;
         let copied = io::copy(&mut entry.take(most), &mut file);
@@ -53,7 +50,7 @@ fn in_archive(path: &Path) -> Result<Input, Error> {
         all.push(name);
     }
     let has = |start: &str| all.iter().any(|name| name.starts_with(start));
-    // Places, sizes and angles of keypoints stand in one array, and their descriptors beside it.
+    // Some programs store position, size and angle of keypoints in one array, beside descriptors.
     let beside_descriptors = has("descriptors") && n_columns.iter().all(|&n| n > 3);
     if has("keypoints") || has("OPENSFM_FEATURES") || beside_descriptors {
         return Err(Error::new(path, "", "points of a map", "features of an image"));

@@ -1,4 +1,4 @@
-//! PLY point clouds: the positions of the element `vertex`, ascii or binary, and the centers of splats.
+//! Reads the vertices of PLY point clouds, and the centers of splats.
 
 use std::path::Path;
 
@@ -38,7 +38,7 @@ fn scalar(name: &[u8]) -> Option<Scalar> {
 struct Property {
     name: Vec<u8>,
     scalar: Scalar,
-    /// How the number of values is stored, of a list.
+    /// The type of the length, for a list.
     list: Option<Scalar>,
 }
 
@@ -60,7 +60,7 @@ impl Element {
         self.properties.iter().map(size).sum()
     }
 
-    /// Which properties, none of them a list, are called so.
+    /// Finds the properties with these names that are not lists.
     fn find<const N: usize>(&self, names: [&'static str; N]) -> Result<[usize; N], &'static str> {
         let mut found = [0; N];
         for (found, name) in found.iter_mut().zip(names) {
@@ -76,10 +76,7 @@ struct Header {
     elements: Vec<Element>,
 }
 
-/// Reads the positions of the vertices, of any type; other properties and elements are passed over.
-///
-/// # Errors
-/// When the file cannot be read, is malformed, or declares more or fewer vertices than it holds.
+/// Reads the positions of the vertices, of any numeric type.
 pub fn read(path: &Path) -> Result<Input, Error> {
     let mut lines = Lines::open(path)?;
     let header = header(path, &mut lines)?;
@@ -94,7 +91,6 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     }
     let mut rows = match header.encoding {
         Encoding::Ascii => {
-            // A value takes a digit and a separator.
             lines.expect_room(element.count, "vertices", element.properties.len() as u64)?;
             Rows::Ascii(lines)
         }
@@ -135,13 +131,12 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     })
 }
 
-/// What is said of Gaussian splats.
 const SPLATS: &str = "Gaussian splats: only their centers are read";
-/// Packed splats that lie in one box, whose corners are these.
+/// The number of packed splats that share a box, and the corners of that box.
 const PER_BOX: u64 = 256;
 const BOX: [&str; 6] = ["min_x", "min_y", "min_z", "max_x", "max_y", "max_z"];
 
-/// A center in 11, 10 and 11 bits of a box, as PlayCanvas packs it.
+/// Decodes a center in 11, 10 and 11 bits of a box, as PlayCanvas packs it.
 fn unpacked(packed: u32, sides: &[f64; 6]) -> [f64; 3] {
     let parts = [(packed >> 21, 2047), (packed >> 11 & 1023, 1023), (packed & 2047, 2047)];
     std::array::from_fn(|axis| {
@@ -150,7 +145,8 @@ fn unpacked(packed: u32, sides: &[f64; 6]) -> [f64; 3] {
     })
 }
 
-/// Reads the centers of splats as the web viewer of antimatter15 has them: 32 bytes each, which begin with three floats.
+/// Reads the centers of splats in antimatter15's format: 32 bytes each, which begin with three
+/// floats.
 pub fn splats(path: &Path) -> Result<Input, Error> {
     const SPLAT: u64 = 32;
     let mut bytes = Bytes::open(path)?;
@@ -228,15 +224,14 @@ fn header(path: &Path, lines: &mut Lines) -> Result<Header, Error> {
     Ok(Header { encoding, elements })
 }
 
-/// Rows of elements, one element after the other.
 enum Rows {
     Ascii(Lines),
-    /// Whether the most significant byte comes first.
+    /// True if the file is big-endian.
     Binary(Bytes, bool),
 }
 
 impl Rows {
-    /// The values of the properties `wanted` in every row of `element`; none if none are wanted.
+    /// Reads the values of the properties `wanted` in every row of `element`.
     fn read<const N: usize>(
         &mut self,
         element: &Element,
@@ -248,10 +243,8 @@ impl Rows {
         }
     }
 
-    /// How many more vertices there is room for than `vertex` declares, with the elements `behind` it.
-    ///
-    /// # Errors
-    /// When anything follows the last element that has vertices.
+    /// Returns how many undeclared vertices fit into the rest of the file, given the elements after
+    /// `vertex`. If there are none, the file must end.
     fn more(&mut self, vertex: &Element, behind: &[Element]) -> Result<u64, Error> {
         match self {
             Self::Ascii(lines) => {
@@ -267,7 +260,7 @@ impl Rows {
                 Ok(n_rows.saturating_sub(declared))
             }
             Self::Binary(bytes, _) => {
-                // Of lists only their values say how long they are.
+                // The size of lists is unknown until they are read.
                 if behind.iter().any(Element::has_list) {
                     return Ok(0);
                 }
@@ -342,7 +335,7 @@ fn binary<const N: usize>(
         bytes.skip(size, "an element before vertex")?;
         return Ok(Vec::new());
     }
-    // Values up to a list stand together: how many bytes, which of them are wanted, and the list.
+    // A run is the values up to a list: their size in bytes, the wanted fields, and the list.
     let mut runs = vec![(0, Vec::new(), None)];
     for (number, Property { scalar, list, .. }) in element.properties.iter().enumerate() {
         let (len, fields, its_list) = runs.last_mut().expect("there is one");

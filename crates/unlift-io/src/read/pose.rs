@@ -1,7 +1,7 @@
-//! Poses of cameras, whatever the format.
+//! Camera poses.
 
-/// The center `-R^T t` of a camera whose pose is `x_cam = R x + t`, and the direction that `up_cam` of its own frame has in the
-/// world.
+/// Returns the center `-R^T t` of a camera with the pose `x_cam = R x + t`, and the direction
+/// `up_cam` of its frame in the world.
 pub fn camera(
     rotation: &[[f64; 3]; 3],
     translation: &[f64; 3],
@@ -13,7 +13,7 @@ pub fn camera(
     (transposed(translation).map(|x| -x), transposed(&up_cam))
 }
 
-/// The rotation of a quaternion (w, x, y, z) of any length, times the square of that length, and this square.
+/// Returns the rotation of a quaternion (w, x, y, z) times its squared norm, and the squared norm.
 pub fn scaled_rotation([w, x, y, z]: [f64; 4]) -> ([[f64; 3]; 3], f64) {
     let rows = [
         [w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
@@ -23,9 +23,9 @@ pub fn scaled_rotation([w, x, y, z]: [f64; 4]) -> ([[f64; 3]; 3], f64) {
     (rows, w * w + x * x + y * y + z * z)
 }
 
-/// What is up in a photo whose y grows downward.
+/// Up in the frame of a camera whose y axis points down.
 pub const DOWNWARD: [f64; 3] = [0.0, -1.0, 0.0];
-/// The same where y grows upward.
+/// Up in the frame of a camera whose y axis points up.
 pub const UPWARD: [f64; 3] = [0.0, 1.0, 0.0];
 
 #[cfg(test)]

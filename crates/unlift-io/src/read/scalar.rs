@@ -1,8 +1,8 @@
-//! How one number of an array is stored.
+//! Numeric types of files.
 
 use half::f16;
 
-/// A number in a file: a float, or an integer with a sign or without.
+/// The type of a number in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Scalar {
     /// `f`, `i` or `u`.
@@ -16,7 +16,8 @@ impl Scalar {
     pub const F32: Self = Self { kind: b'f', size: 4 };
     pub const F64: Self = Self { kind: b'f', size: 8 };
 
-    /// The number of `size` bytes of a kind: `f` float, `i` integer, `u` integer without sign, in either case.
+    /// Returns a type by its size in bytes and kind: `f` float, `i` signed, `u` unsigned, in either
+    /// case.
     pub fn of_kind(kind: u8, size: u64) -> Option<Self> {
         let kind = kind.to_ascii_lowercase();
         let sizes: &[u64] = match kind {
@@ -27,15 +28,11 @@ impl Scalar {
         sizes.contains(&size).then_some(Self { kind, size: size as usize })
     }
 
-    /// Bytes of one number.
     pub fn size(self) -> usize {
         self.size
     }
 
-    /// The number in `bytes`, of which there are [`size`](Self::size), the most significant one first if `big`.
-    ///
-    /// # Panics
-    /// When there are fewer.
+    /// Reads a number from the first [`size`](Self::size) `bytes`, big-endian if `big` is set.
     pub fn read(self, bytes: &[u8], big: bool) -> f64 {
         let mut little = [0; 8];
         little[..self.size].copy_from_slice(&bytes[..self.size]);
@@ -46,7 +43,6 @@ impl Scalar {
         match (self.kind, self.size) {
             (b'u', _) => u64::from_le_bytes(little) as f64,
             (b'i', size) => {
-                // The sign is the last bit that is stored.
                 let unused = 64 - 8 * size;
                 (i64::from_le_bytes(little) << unused >> unused) as f64
             }

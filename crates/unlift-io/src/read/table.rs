@@ -1,4 +1,4 @@
-//! Tables: a point per line. What the file says of its columns decides which are read.
+//! Reads text tables with a point per line.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use super::lines::{Lines, number, quoted, words};
 use crate::error::Error;
 use crate::read::map_input::Input;
 
-/// What stands between the values of a line; decided by the first line for the whole file.
+/// The separator of values. The first line decides it for the whole file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Separator {
     Byte(u8),
@@ -20,7 +20,8 @@ impl Separator {
         [b';', b','].into_iter().find(|byte| line.contains(byte)).map_or(Self::Space, Self::Byte)
     }
 
-    /// The separator of a header line: names may hold spaces and fields may be empty, so that a tab counts.
+    /// Returns the separator of a header line. A tab is one, because names may contain spaces and
+    /// fields may be empty.
     fn of_header(line: &[u8]) -> Self {
         match Self::of(line) {
             Self::Space if line.contains(&b'\t') => Self::Byte(b'\t'),
@@ -36,23 +37,21 @@ impl Separator {
     }
 }
 
-/// Bytes of comments before the first point that are looked at.
+/// The maximum number of bytes of comments that are searched for names.
 const COMMENTS: usize = 1 << 16;
-/// Columns that COLMAP's points have before their tracks.
+/// Columns before the tracks in COLMAP's points.
 const COLMAP_COLUMNS: usize = 8;
-/// Rows of fewer points may be in an order by accident.
+/// The least number of points at which a column of row numbers is an error. Fewer may match by
+/// accident.
 const TELLING: usize = 10;
 
-/// Reads positions from lines of numbers between commas, semicolons, spaces or tabs; `None` if they are the points of a
-/// COLMAP model in text.
+/// Reads positions from lines of numbers separated by commas, semicolons, spaces or tabs. Returns
+/// `None` for the points of a COLMAP model in text.
 ///
-/// The first three columns are x, y and z, unless the first line names its columns, or a comment (`#` or `//`) before it:
-/// then those called `x`, `y` and `z` (in either case). A line of one number before points is how many follow, as Leica's
-/// PTS and CloudCompare have it. Other columns are passed over, and so are blank lines and comments.
-///
-/// # Errors
-/// When the file cannot be read, a line does not hold three numbers, columns are named otherwise, or rows are poses of
-/// cameras or begin with their number.
+/// The first three columns are x, y and z, unless the first line or a comment (`#` or `//`) before
+/// it names columns `x`, `y` and `z` (in either case). A line of one number before points is their
+/// count, as in Leica's PTS and in CloudCompare. Rows that are camera poses or begin with the row
+/// number are an error.
 pub fn read(path: &Path) -> Result<Option<Input>, Error> {
     let mut lines = Lines::open(path)?;
     let mut positions = Vec::new();
@@ -128,18 +127,16 @@ pub fn read(path: &Path) -> Result<Option<Input>, Error> {
     Ok(Some(Input { positions, format: "table", doubts, ..Input::default() }))
 }
 
-/// Refuses another number of points than the one that stands before them.
 fn check_count(lines: &Lines, announced: Option<(u64, u64)>, n: u64) -> Result<(), Error> {
     match announced {
         Some((of, before)) if n - before != of => {
-            let expected = format!("{of} points, as the line before them says");
+            let expected = format!("{of} points, as declared in the line before them");
             Err(lines.error(expected, format!("{} up to here", n - before)))
         }
         _ => Ok(()),
     }
 }
 
-/// Which columns are x, y and z.
 #[derive(Debug)]
 struct Columns {
     at: [usize; 3],
@@ -150,7 +147,6 @@ struct Columns {
 const FIRST: Columns = Columns { at: [0, 1, 2], named: false, doubt: None };
 
 impl Columns {
-    /// By the names in the first line.
     fn of_header(lines: &Lines, names: &[&[u8]]) -> Result<Self, Error> {
         match axes(names.iter().copied()) {
             Ok(at) => Ok(Self { at, named: true, ..FIRST }),
@@ -161,8 +157,8 @@ impl Columns {
         }
     }
 
-    /// By the comment that names the `n` columns of the first point, if there is one: the last that has x, y and z, else
-    /// one of as many words.
+    /// Finds the columns by a comment that names the `n` columns of the first point: the last
+    /// comment with x, y and z, else one with `n` words.
     fn of_comments(lines: &Lines, comments: &[Vec<u8>], n: usize) -> Result<Self, Error> {
         let refuse = |expected: &str, comment: &[u8], names: &[&[u8]]| {
             Err(lines.error(expected, of_poses(names).unwrap_or_else(|| quoted(comment))))
@@ -171,7 +167,7 @@ impl Columns {
         for comment in comments.iter().rev() {
             let names = names(comment, n);
             if let Ok(at) = axes(names.iter().copied()) {
-                // Prose may speak of x, y and z: of three columns they are these.
+                // Prose may mention x, y and z. With three columns they are the first three.
                 return match names.len() {
                     len if len == n || at == FIRST.at => Ok(Self { at, named: true, ..FIRST }),
                     _ if n == 3 => Ok(FIRST),
@@ -191,7 +187,7 @@ impl Columns {
             Some((comment, names)) if !names.iter().any(|name| is_quantity(name)) => {
                 let what = quoted(comment);
                 let doubt = format!(
-                    "columns: the first three are taken for x, y and z, and the comment {what} for no names"
+                    "columns: the first three are read as x, y and z, because the comment {what} has no known names"
                 );
                 Ok(Self { doubt: Some(doubt), ..FIRST })
             }
@@ -200,7 +196,7 @@ impl Columns {
     }
 }
 
-/// Names of columns in a comment: between the separators of the table, or words; behind a colon, without units in brackets.
+/// Splits a comment into names of columns, without text before a colon and units in brackets.
 fn names(comment: &[u8], n: usize) -> Vec<&[u8]> {
     let start = comment.iter().rposition(|&byte| byte == b':').map_or(0, |at| at + 1);
     let list = comment[start..].trim_ascii();
@@ -212,14 +208,13 @@ fn names(comment: &[u8], n: usize) -> Vec<&[u8]> {
     words.filter(|word| !word.is_empty() && !b"[(".contains(&word[0])).map(plain).collect()
 }
 
-/// Whether a word may name a column: no number, and of letters, digits and what joins them.
 fn is_name(word: &[u8]) -> bool {
     let joins =
         |byte: &u8| byte.is_ascii_alphanumeric() || b"_-./ ".contains(byte) || *byte >= 0x80;
     number::<f64>(word).is_none() && word.iter().all(joins)
 }
 
-/// Whether a column of that name is surely no length along an axis.
+/// Returns true if a column with this name is certainly not a coordinate along an axis.
 fn is_quantity(name: &[u8]) -> bool {
     const NAMES: &str = "alpha class confidence error frame intensity label name point_id qx reflectance tx \
                          lat latitude lon lng long longitude r g b red green blue range azimuth elevation theta \
@@ -227,7 +222,6 @@ fn is_quantity(name: &[u8]) -> bool {
     NAMES.split(' ').any(|known| is_called(name, known.as_bytes()))
 }
 
-/// What columns of these names are, if they are poses of cameras.
 fn of_poses(names: &[&[u8]]) -> Option<String> {
     let has = |starts: [&str; 2]| {
         names.iter().any(|name| {
@@ -240,10 +234,8 @@ fn of_poses(names: &[&[u8]]) -> Option<String> {
 
 const POSES: &str = "a trajectory, poses of cameras";
 
-/// Whether the first row is three coordinates, and no row of COLMAP's points that is cut off after its id and two coordinates.
-///
-/// # Errors
-/// When the file cannot be read.
+/// Returns true if the first row has three coordinates, and is not a truncated row of COLMAP's
+/// points (id and two coordinates).
 pub(super) fn has_three_columns(path: &Path) -> Result<bool, Error> {
     let mut lines = Lines::open(path)?;
     if !lines.advance_to_data()? {
@@ -255,25 +247,25 @@ pub(super) fn has_three_columns(path: &Path) -> Result<bool, Error> {
     Ok(fields.len() == 3 && !begins_with_id)
 }
 
-/// Whether a comment names the columns of COLMAP's points.
 fn is_colmap_header(comment: &[u8]) -> bool {
     let comment = comment.to_ascii_uppercase();
     let has = |word: &[u8]| comment.windows(word.len()).any(|part| part == word);
     has(b"POINT3D_ID") && has(b"TRACK")
 }
 
-/// What rows without names look like, as far as all of them agree.
+/// Properties that hold for all rows so far.
 #[derive(Debug)]
 struct Form {
     n: usize,
-    /// As COLMAP's points: an id, a place, a color, an error, a track.
+    /// COLMAP's points: an id, a position, a color, an error, a track.
     colmap: bool,
     has_track: bool,
     ascending: bool,
-    /// As a trajectory: a time, a place, a quaternion of length 1; or the three rows of a rotation and a place.
+    /// A trajectory: a time, a position and a unit quaternion, or the three rows of a rotation and
+    /// a position.
     pose: bool,
     time: f64,
-    /// The number of the row before the coordinates, from 0 or 1.
+    /// The first value is the row number, counted from 0 or from 1.
     numbered: [bool; 2],
 }
 
@@ -330,12 +322,12 @@ impl Form {
         }
     }
 
-    /// Whether these are the points of a COLMAP model: with tracks, or at least with ids that rise.
+    /// Returns true if rows are COLMAP's points: with tracks, or at least with ascending ids.
     fn is_colmap(&self) -> bool {
         self.n > 0 && self.colmap && (self.has_track || self.ascending)
     }
 
-    /// What was expected of rows that are no points, and what they are.
+    /// Returns the expected and the found text if rows are not points.
     fn refusal(&self) -> Option<(&'static str, &'static str)> {
         if self.pose && self.n > 1 {
             return Some(("points", POSES));
@@ -343,7 +335,7 @@ impl Form {
         let numbered = self.n >= TELLING && self.numbered.contains(&true) && !self.colmap;
         numbered.then_some((
             "x, y and z first, or a line that names the columns",
-            "the number of the row before them",
+            "the row number in the first column",
         ))
     }
 }

@@ -1,8 +1,8 @@
-//! Files that hold more points than they say.
+//! Detects files with more points than they declare.
 
-/// What to say of a file with room for so many `more` points behind the `n` that it declares.
+/// Returns a doubt if `more` points follow the `n` declared ones.
 pub(crate) fn undeclared(n: u64, more: u64) -> Option<String> {
     (more > 0).then(|| {
-        format!("{n} points are declared, and {more} more seem to follow, which are not read: a part of the map at most")
+        format!("{n} points are declared, and {more} more seem to follow, which are not read: results are about a part of the map")
     })
 }

@@ -1,4 +1,4 @@
-//! Columns as third parties write them, to the one type that is used here.
+//! Converts columns of files to the types that are used here.
 
 use crate::Error;
 use arrow_array::cast::AsArray;
@@ -12,20 +12,17 @@ use std::fmt;
 use std::ops::Range;
 use std::path::Path;
 
-/// What a column must hold; its width does not matter.
+/// The type that a column must have. Any width is accepted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Type {
     /// Half, single or double floats.
     Float,
     /// Signed or unsigned integers.
     Integer,
-    /// Text.
     Text,
-    /// Lists of floats.
     Floats,
-    /// Lists of integers.
     Integers,
-    /// Lists of either.
+    /// Lists of integers or floats.
     Numbers,
 }
 
@@ -33,8 +30,7 @@ impl Type {
     pub(super) fn admits(self, found: &DataType) -> bool {
         let float = DataType::is_floating;
         match (self, found) {
-            // Whole numbers in a column of the other kind lose nothing: a table without decimals, or one of
-            // pandas, which makes floats of integers beside a null.
+            // Some tables have no decimals, and pandas converts integers with nulls to floats.
             (Self::Float | Self::Integer, found) => float(found) || found.is_integer(),
             (Self::Text, found) => *found == DataType::Utf8,
             (Self::Floats | Self::Numbers, DataType::List(of)) => {
@@ -62,17 +58,16 @@ impl fmt::Display for Type {
     }
 }
 
-/// The names of the coordinates of a vector column: `foot_x`, `foot_y`, ... for `foot_`.
+/// Returns the column names of a vector: `foot_x`, `foot_y`, ... for `foot_`.
 pub(super) fn coordinate_names<const D: usize>(prefix: &str) -> [String; D] {
     std::array::from_fn(|axis| format!("{prefix}{}", ["x", "y", "z"][axis]))
 }
 
-/// Some rows of a table. Columns are asked for by name, after [`super::table::Table::read`] has
-/// checked that they are there and of the right type.
+/// Some rows of a table. [`super::table::Table::read`] has checked that the columns exist and have
+/// the right type.
 #[derive(Debug)]
 pub(super) struct Batch<'a> {
     path: &'a Path,
-    /// The columns that were read.
     columns: &'a [(&'a str, Type)],
     batch: &'a RecordBatch,
     first_row: u64,
@@ -87,12 +82,11 @@ impl<'a> Batch<'a> {
         Self { path, columns, batch, first_row }
     }
 
-    /// Number of rows here.
     pub(super) fn len(&self) -> usize {
         self.batch.num_rows()
     }
 
-    /// The error about `row` (of this batch) of the column `name`.
+    /// Returns an error about `row` of this batch.
     pub(super) fn wrong(
         &self,
         name: &str,
@@ -104,7 +98,6 @@ impl<'a> Batch<'a> {
         Error::new(self.path, place, expected, found)
     }
 
-    /// Finite floats.
     pub(super) fn floats(&self, name: &str) -> Result<Vec<f64>, Error> {
         self.no_null(name, FINITE)?;
         let values = self.widened(name)?;
@@ -114,7 +107,8 @@ impl<'a> Batch<'a> {
         }
     }
 
-    /// Finite floats; null and NaN, which are the same to many programs, are none, as are all of a column that was not read.
+    /// Returns finite floats. Null, NaN (which many programs use for null), and columns that were
+    /// not read are `None`.
     pub(super) fn optional_floats(&self, name: &str) -> Result<Vec<Option<f64>>, Error> {
         let Some(column) = self.found(name) else { return Ok(vec![None; self.len()]) };
         let values = self.widened(name)?.into_iter().enumerate();
@@ -126,7 +120,7 @@ impl<'a> Batch<'a> {
         checked.collect()
     }
 
-    /// Vectors from one column of finite floats per axis, appended to `to`.
+    /// Appends vectors to `to`, from one column of finite floats per axis.
     pub(super) fn vectors<const D: usize>(
         &self,
         names: &[String; D],
@@ -140,15 +134,15 @@ impl<'a> Batch<'a> {
         Ok(())
     }
 
-    /// Integers from 0 to below `below` (at most 2^32).
+    /// Returns integers below `below` (at most 2^32).
     pub(super) fn integers(&self, name: &str, below: u64) -> Result<Vec<u32>, Error> {
         let values = self.optional_integers(name, below)?.into_iter().enumerate();
         let null = |row| self.wrong(name, row, whole_below(below), "null");
         values.map(|(row, x)| x.ok_or_else(|| null(row))).collect()
     }
 
-    /// Integers from 0 to below `below` (at most 2^32); null, or NaN among floats, is none, as are all of a column that was not
-    /// read.
+    /// Returns integers below `below` (at most 2^32). Null, NaN in float columns, and columns that
+    /// were not read are `None`.
     pub(super) fn optional_integers(
         &self,
         name: &str,
@@ -174,14 +168,15 @@ impl<'a> Batch<'a> {
         checked.collect()
     }
 
-    /// Texts or null; null in every row where the column was not read.
     pub(super) fn texts(&self, name: &str) -> Vec<Option<&'a str>> {
         let Some(column) = self.found(name) else { return vec![None; self.len()] };
         column.as_string::<i32>().iter().collect()
     }
 
-    /// Lists of integers from 0 to below `below` (at most 2^32): values appended to `to`, the end of
-    /// each list to `offsets`. Null is an empty list. Lists longer than `most` are refused before they are copied.
+    /// Appends lists of integers below `below` (at most 2^32) to `to`, and the end of each list to
+    /// `offsets`.
+    ///
+    /// Null is an empty list. Lists longer than `most` are an error before they are copied.
     pub(super) fn integer_lists(
         &self,
         name: &str,
@@ -202,8 +197,9 @@ impl<'a> Batch<'a> {
         Ok(())
     }
 
-    /// Lists of finite floats: values appended to `to`, and returned the length of each list. Null is an empty list.
-    /// Lists longer than `most` are refused before they are copied.
+    /// Appends lists of finite floats to `to`, and returns the length of each list.
+    ///
+    /// Null is an empty list. Lists longer than `most` are an error before they are copied.
     pub(super) fn float_lists(
         &self,
         name: &str,
@@ -233,12 +229,11 @@ impl<'a> Batch<'a> {
         Ok(lengths)
     }
 
-    /// Whether the column `name` is null in every row here.
     pub(super) fn is_null(&self, name: &str) -> bool {
         self.column(name).null_count() == self.len()
     }
 
-    /// Floats, or integers that a double holds exactly; what stands at nulls has no meaning.
+    /// Returns floats, or integers that are exact in a double. Values at nulls are undefined.
     fn widened(&self, name: &str) -> Result<Vec<f64>, Error> {
         let column = self.column(name);
         if column.data_type().is_floating() {
@@ -248,13 +243,12 @@ impl<'a> Batch<'a> {
         let exact = (0..self.len()).map(|row| (row, values(row))).map(|(row, x)| {
             match x as f64 as i128 == x {
                 true => Ok(x as f64),
-                false => Err(self.wrong(name, row, "a number that a double holds", x.to_string())),
+                false => Err(self.wrong(name, row, "a number that is exact in f64", x.to_string())),
             }
         });
         exact.collect()
     }
 
-    /// A column, if it was read.
     fn found(&self, name: &str) -> Option<&'a ArrayRef> {
         let was_read = self.columns.iter().any(|(column, _)| *column == name);
         self.batch.column_by_name(name).filter(|_| was_read)
@@ -290,7 +284,7 @@ impl<'a> Batch<'a> {
     fn lists(&self, name: &str) -> Result<Lists, Error> {
         let lists = self.column(name).as_list::<i32>();
         let offsets = lists.value_offsets();
-        // What stands at a null may have a length.
+        // A null list may have a length.
         let range = |row: usize| match lists.is_valid(row) {
             true => offsets[row] as usize..offsets[row + 1] as usize,
             false => 0..0,
@@ -309,7 +303,7 @@ impl<'a> Batch<'a> {
     }
 }
 
-/// Where lists lie in their values, and these.
+/// The ranges of lists in their values, and the values.
 type Lists = (Vec<Range<usize>>, ArrayRef);
 
 const FINITE: &str = "a finite number";
@@ -318,11 +312,10 @@ fn whole_below(below: u64) -> String {
     format!("a whole number below {below}")
 }
 
-/// Values by their place in an array: widened as they are asked for, since all of them would take
-/// sixteen times the memory of bytes.
+/// A function from an index to a widened value. Widening all values at once would take 16 times the
+/// memory of bytes.
 type Values<'a, T> = Box<dyn Fn(usize) -> T + 'a>;
 
-/// The values of an array of one of these types, as one wider type.
 macro_rules! widened {
     ($array:expr, $wide:ident, $null:expr, $($variant:ident => $of:ty),*) => {
         match $array.data_type() {
@@ -330,14 +323,13 @@ macro_rules! widened {
                 let values = $array.as_primitive::<$of>().values();
                 Box::new(move |at| $wide::from(values[at]))
             })*
-            // Nothing but nulls.
             DataType::Null => Box::new(|_| $null),
             other => unreachable!("the type {other} was checked"),
         }
     };
 }
 
-/// The values of an array of integers; what stands at nulls has no meaning.
+/// Values at nulls are undefined.
 fn integers(array: &ArrayRef) -> Values<'_, i128> {
     widened!(
         array, i128, 0,
@@ -346,7 +338,7 @@ fn integers(array: &ArrayRef) -> Values<'_, i128> {
     )
 }
 
-/// The values of an array of floats; what stands at nulls has no meaning.
+/// Values at nulls are undefined.
 fn floats(array: &ArrayRef) -> Values<'_, f64> {
     widened!(
         array, f64, f64::NAN,

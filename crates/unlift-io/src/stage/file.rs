@@ -1,4 +1,4 @@
-//! A Parquet file: opened, checked, and decoded batch by batch.
+//! Opens and decodes a Parquet file.
 
 use super::footer;
 use super::header::KEY;
@@ -19,14 +19,13 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-/// Rows decoded at a time: with 128-byte descriptors a megabyte, with 4096 floats 128.
+/// Rows of a batch: 1 MiB for descriptors of 128 bytes, 128 MiB for 4096 floats.
 const BATCH_ROWS: usize = 1 << 13;
 
-/// More rows than this per byte of the file are a declared count that nothing stands behind: even
-/// equal rows, run-length encoded in pages of 20,000, take more room.
+/// The maximum number of rows per byte of a file. Even equal rows, run-length encoded in pages of
+/// 20,000, take more space.
 const ROWS_PER_BYTE: u64 = 1000;
 
-/// An open Parquet file whose footer was read.
 #[derive(Debug)]
 pub(super) struct ParquetFile {
     path: PathBuf,
@@ -37,24 +36,23 @@ pub(super) struct ParquetFile {
 }
 
 impl ParquetFile {
-    /// Opens `path` and reads its footer.
     pub(super) fn open(path: &Path) -> Result<Self, Error> {
         let (mut file, n_bytes) = input::open(path)?;
         check_magic(path, &mut file, n_bytes)?;
         footer::check(path, &mut file, n_bytes)?;
-        // The Arrow schema that Arrow writers embed is left aside: the Parquet schema says all that
-        // counts, and then large, fixed-size and dictionary columns need no code of their own.
+        // Without the embedded Arrow schema, large, fixed-size and dictionary columns need no
+        // special code.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
         let parquet = guarded(path, || ArrowReaderMetadata::load(&file, options))?;
         let footer = parquet.metadata().file_metadata();
         let most = (i32::MAX as u64).min(n_bytes.saturating_mul(ROWS_PER_BYTE));
         let mut groups = parquet.metadata().row_groups().iter().map(|group| group.num_rows());
-        // Each is checked: negative ones could make the right sum.
+        // Negative numbers could make the right sum.
         let in_groups = groups.try_fold(0_u64, |sum, n| sum.checked_add(u64::try_from(n).ok()?));
         let n_rows = match u64::try_from(footer.num_rows()) {
             Ok(n_rows) if n_rows <= most && in_groups == Some(n_rows) => n_rows,
             Ok(n_rows) if n_rows <= most => {
-                let expected = format!("row groups of {n_rows} rows, as its footer says");
+                let expected = format!("row groups of {n_rows} rows, as declared in its footer");
                 let found = in_groups.map_or("others".to_owned(), |n| n.to_string());
                 return Err(Error::new(path, "", expected, found));
             }
@@ -66,24 +64,23 @@ impl ParquetFile {
         Ok(Self { path: path.to_owned(), file, n_bytes, parquet, n_rows })
     }
 
-    /// Number of rows, as the footer declares it.
     pub(super) fn n_rows(&self) -> u64 {
         self.n_rows
     }
 
-    /// The columns, as their Parquet types say.
     pub(super) fn schema(&self) -> &SchemaRef {
         self.parquet.schema()
     }
 
-    /// The text under the metadata key of unlift, if there is any.
+    /// The text under unlift's metadata key.
     pub(super) fn meta_text(&self) -> Option<&str> {
         let entries = self.parquet.metadata().file_metadata().key_value_metadata();
         let entry = entries.and_then(|all| all.iter().find(|entry| entry.key == KEY));
         entry.and_then(|entry| entry.value.as_deref())
     }
 
-    /// Whether the file itself says that no row has a value in the column `name`, which is no list.
+    /// Returns true if statistics in the file show that the column `name`, which is no list, has
+    /// only nulls.
     pub(super) fn is_all_null(&self, name: &str) -> bool {
         let groups = self.parquet.metadata().row_groups();
         groups.iter().all(|group| {
@@ -94,28 +91,24 @@ impl ParquetFile {
         })
     }
 
-    /// The file itself.
     pub(super) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Its length.
     pub(super) fn n_bytes(&self) -> u64 {
         self.n_bytes
     }
 
-    /// What its footer says.
     pub(super) fn metadata(&self) -> &ParquetMetaData {
         self.parquet.metadata()
     }
 
-    /// The open file, to be read apart.
     pub(super) fn handle(&self) -> Result<File, Error> {
         self.file.try_clone().map_err(|source| Error::read(&self.path, source))
     }
 
-    /// Starts to decode the columns at `roots`, in the order of the file, at most `most_rows` at a time. What they declare was
-    /// [checked](super::pages::check).
+    /// Starts decoding the columns at `roots`, at most `most_rows` at a time.
+    /// [`pages::check`](super::pages::check) has checked their sizes.
     pub(super) fn batches(&self, roots: &[usize], most_rows: usize) -> Result<Batches, Error> {
         let file = self.handle()?;
         let reader = guarded(&self.path, || {
@@ -127,7 +120,7 @@ impl ParquetFile {
         Ok(Batches { path: self.path.clone(), reader, decoded: 0, n_rows: self.n_rows })
     }
 
-    /// Refuses compression by code that this program was built without.
+    /// Returns an error if the column `name` uses an unsupported compression.
     pub(super) fn check_codec(&self, name: &str) -> Result<(), Error> {
         let groups = self.parquet.metadata().row_groups().iter();
         let chunks = groups.flat_map(|group| group.columns());
@@ -138,7 +131,7 @@ impl ParquetFile {
         match of_column.find(|chunk| !known(chunk.compression())) {
             None => Ok(()),
             Some(chunk) => {
-                // `GZIP(GzipLevel(6))`: the level does not matter here.
+                // Removes the level, as in `GZIP(GzipLevel(6))`.
                 let codec = chunk.compression().to_string();
                 let found = codec.split('(').next().unwrap_or_default();
                 let place = format!("column {name}");
@@ -148,7 +141,6 @@ impl ParquetFile {
     }
 }
 
-/// Rows as they are decoded, some thousand at a time.
 pub(super) struct Batches {
     path: PathBuf,
     reader: ParquetRecordBatchReader,
@@ -157,14 +149,14 @@ pub(super) struct Batches {
 }
 
 impl Batches {
-    /// The next rows; `None` at the end, where there were as many as the footer says.
+    /// Returns the next rows, or `None` at the end. A wrong number of rows is an error.
     pub(super) fn next(&mut self) -> Result<Option<RecordBatch>, Error> {
         let batch = guarded(&self.path, || self.reader.next().transpose())?;
         match &batch {
             Some(batch) => self.decoded += batch.num_rows() as u64,
             None if self.decoded == self.n_rows => {}
             None => {
-                let expected = format!("{} rows, as its footer says", self.n_rows);
+                let expected = format!("{} rows, as declared in its footer", self.n_rows);
                 return Err(Error::new(&self.path, "", expected, self.decoded.to_string()));
             }
         }
@@ -172,7 +164,7 @@ impl Batches {
     }
 }
 
-/// Tells a file that never was Parquet from one that was cut short: the usual accidents.
+/// Distinguishes files that are not Parquet from truncated ones.
 fn check_magic(path: &Path, file: &mut File, n_bytes: u64) -> Result<(), Error> {
     let failed = |source| Error::read(path, source);
     let wrong = |found: String| Err(Error::new(path, "", "a Parquet file", found));
@@ -196,8 +188,7 @@ fn check_magic(path: &Path, file: &mut File, n_bytes: u64) -> Result<(), Error> 
     Ok(())
 }
 
-/// Runs a step of the `parquet` crate on bytes nobody vouches for: its error, or a panic on damaged
-/// data that it did not foresee, becomes an error about the file.
+/// Runs a step of the `parquet` crate on untrusted bytes. A panic becomes an error about the file.
 fn guarded<T, E: Into<ParquetError>>(
     path: &Path,
     step: impl FnOnce() -> Result<T, E>,

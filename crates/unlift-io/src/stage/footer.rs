@@ -1,5 +1,5 @@
-//! The footer of a Parquet file, looked through before the `parquet` crate builds a schema of it: that
-//! descends as deep, and asks for as much memory, as the footer says.
+//! Checks the footer of a Parquet file first, because the `parquet` crate recurses and allocates as
+//! it declares.
 
 use super::thrift::{Field, Walk, Wrong};
 use crate::Error;
@@ -7,19 +7,16 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// Columns in columns at most: a list of numbers has three levels.
+/// A list of numbers has three levels.
 const DEEPEST: usize = 32;
-/// Elements of a schema at most: two for a column, four for one of lists.
+/// Two elements for a column, four for a column of lists.
 const MOST_ELEMENTS: u64 = 1 << 16;
-/// As many row groups as Parquet can number.
+/// The number of row groups that Parquet can count.
 const MOST_GROUPS: u64 = 1 << 15;
-/// What ends the file: the length of the footer, and `PAR1`.
+/// The length of the footer, and `PAR1`.
 const TAIL: u64 = 8;
 
 /// Checks the footer of the Parquet file `path` of `n_bytes` bytes.
-///
-/// # Errors
-/// When it does not lie in the file, is malformed, or its schema is deeper or larger than any table's.
 pub(super) fn check(path: &Path, file: &mut File, n_bytes: u64) -> Result<(), Error> {
     let failed = |source| Error::read(path, source);
     let mut tail = [0; TAIL as usize];
@@ -38,7 +35,7 @@ pub(super) fn check(path: &Path, file: &mut File, n_bytes: u64) -> Result<(), Er
     walk(&footer).map_err(wrong)
 }
 
-/// Walks `FileMetaData` of the Parquet format.
+/// Checks `FileMetaData` of the Parquet format.
 fn walk(footer: &[u8]) -> Result<(), Wrong> {
     Walk::new(footer).fields(|walk, (id, kind)| {
         match id {
@@ -65,7 +62,8 @@ fn row_group(walk: &mut Walk<'_>, (id, kind): Field) -> Result<bool, Wrong> {
     Ok(id == 1)
 }
 
-/// A column of a row group has a few dozen bytes: what has fewer stands for the memory of many.
+/// Checks a column of a row group. A real one has a few dozen bytes; a shorter one would take far
+/// more memory than it has bytes.
 fn column(walk: &mut Walk<'_>) -> Result<(), Wrong> {
     const LEAST: usize = 16;
     let before = walk.remaining();
@@ -76,9 +74,9 @@ fn column(walk: &mut Walk<'_>) -> Result<(), Wrong> {
     Ok(())
 }
 
-/// The schema is a tree of `n` elements, each before those in it.
+/// Checks the schema: a tree of `n` elements in depth-first order.
 fn schema(walk: &mut Walk<'_>, n: u64) -> Result<(), Wrong> {
-    // How many elements are still to come in each of those that the next one lies in.
+    // The number of missing children of each open element.
     let mut open: Vec<u64> = Vec::new();
     for at in 0..n {
         let mut children = 0;
@@ -96,7 +94,9 @@ fn schema(walk: &mut Walk<'_>, n: u64) -> Result<(), Wrong> {
             Ok(0) => {}
             Ok(children) if children <= left => open.push(children),
             _ => {
-                let found = format!("an element of {children} where {left} follow in the schema");
+                let found = format!(
+                    "a schema element with {children} children where {left} elements follow"
+                );
                 return Err(Wrong::Content(found));
             }
         }

@@ -1,4 +1,4 @@
-//! What kind of stage file this is: the JSON object under the metadata key `unlift`.
+//! The metadata of a stage file: a JSON object under the key `unlift`.
 
 use crate::Error;
 use serde_json::{Map, Value, json};
@@ -7,13 +7,12 @@ use std::path::Path;
 use unlift::geometry::frame::Bounds;
 use unlift::{About, Fingerprint, ListsBy, RowOrder, Unit};
 
-/// The Parquet key-value metadata key that holds the JSON object.
 pub(super) const KEY: &str = "unlift";
 
-/// The version written, and the only one read.
+/// The version that is written, and the only one that is read.
 pub(super) const VERSION: u64 = 1;
 
-/// What a stage file holds.
+/// The content of a stage file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// An obfuscated map: the attacker's side.
@@ -29,7 +28,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Every kind.
+    /// All kinds.
     pub const ALL: [Kind; 5] = [
         Self::Released,
         Self::Truth,
@@ -49,7 +48,7 @@ impl Kind {
         }
     }
 
-    /// The kind called `name`, if there is one.
+    /// Returns the kind with the name `name`, if there is one.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
@@ -67,7 +66,6 @@ impl fmt::Display for Kind {
     }
 }
 
-/// The metadata object of a file, with the file's name for messages.
 #[derive(Debug)]
 pub(super) struct Meta<'a> {
     path: &'a Path,
@@ -75,7 +73,7 @@ pub(super) struct Meta<'a> {
 }
 
 impl<'a> Meta<'a> {
-    /// Parses `text`; no text is an empty object.
+    /// Parses `text`. `None` is an empty object.
     pub(super) fn parse(path: &'a Path, text: Option<&str>) -> Result<Self, Error> {
         let place = "metadata unlift";
         let object = match text.map(serde_json::from_str::<Value>) {
@@ -91,19 +89,17 @@ impl<'a> Meta<'a> {
         Ok(Self { path, object })
     }
 
-    /// The same for one image, of which `text` says more: what it says goes before what is said of all.
+    /// Adds the metadata `text` of one image, which replaces that of the file.
     pub(super) fn of_image(&self, text: Option<&str>) -> Result<Self, Error> {
         let mut object = self.object.clone();
         object.extend(Self::parse(self.path, text)?.object);
         Ok(Self { path: self.path, object })
     }
 
-    /// The object itself.
     pub(super) fn into_object(self) -> Map<String, Value> {
         self.object
     }
 
-    /// What `read` makes of the value of `key`, if it is given.
     fn given<T>(
         &self,
         key: &str,
@@ -114,7 +110,6 @@ impl<'a> Meta<'a> {
         read(value).map(Some).ok_or_else(|| self.wrong(key, expected))
     }
 
-    /// Kind of the file, if it is declared.
     pub(super) fn kind(&self) -> Result<Option<Kind>, Error> {
         let is_known = |version: &Value| (version.as_u64() == Some(VERSION)).then_some(());
         self.given("version", VERSION.to_string(), is_known)?;
@@ -122,29 +117,25 @@ impl<'a> Meta<'a> {
         self.given("kind", expected, |kind| Kind::from_name(kind.as_str()?))
     }
 
-    /// 2 or 3, if it is declared.
     pub(super) fn dimension(&self) -> Result<Option<usize>, Error> {
         let known = |value: &Value| [2, 3].into_iter().find(|&d| value.as_u64() == Some(d as u64));
         self.given("dimension", "2 or 3", known)
     }
 
-    /// The unit of every length, if it is declared.
     pub(super) fn unit(&self) -> Result<Option<Unit>, Error> {
         self.given("unit", UNITS, |unit| Unit::from_name(unit.as_str()?))
     }
 
-    /// The error about a unit that is needed.
     pub(super) fn wrong_unit(&self) -> Error {
         self.wrong("unit", UNITS)
     }
 
-    /// The origin; 0 when it is not given.
+    /// The origin, by default 0.
     pub(super) fn origin<const D: usize>(&self) -> Result<[f64; D], Error> {
         let origin = self.given("origin", format!("a list of {D} numbers"), vector)?;
         Ok(origin.unwrap_or([0.0; D]))
     }
 
-    /// The table of centers of a ray cloud.
     pub(super) fn centers<const D: usize>(&self) -> Result<Vec<[f64; D]>, Error> {
         let expected = format!("a list of lists of {D} numbers");
         let rows = |value: &Value| value.as_array()?.iter().map(vector).collect();
@@ -152,24 +143,23 @@ impl<'a> Meta<'a> {
         centers.ok_or_else(|| self.wrong("centers", expected))
     }
 
-    /// The box that holds all hidden points, in the frame of the map, if it is given.
+    /// The bounding box of all hidden points in the frame of the map.
     pub(super) fn bounds<const D: usize>(&self) -> Result<Option<Bounds<D>>, Error> {
         self.given("bounds", rule_of_corners::<D>(), corners)
     }
 
-    /// Per center the box that holds its points, about the origin, if they are given.
+    /// The bounding box of the points of each center, relative to the origin.
     pub(super) fn regions<const D: usize>(&self) -> Result<Option<Vec<Bounds<D>>>, Error> {
         let expected = format!("per center {}", rule_of_corners::<D>());
         self.given("regions", expected, |rows| rows.as_array()?.iter().map(corners).collect())
     }
 
-    /// The released map that the file is about, if it says.
     pub(super) fn fingerprint(&self) -> Result<Option<Fingerprint>, Error> {
         let expected = "32 hexadecimal digits, the fingerprint of a released map";
         self.given("fingerprint", expected, |value| Fingerprint::from_hex(value.as_str()?))
     }
 
-    /// The released map, and what rows are counted by, as far as the file says.
+    /// The released map, the order of rows, and the author of lists, as far as given.
     pub(super) fn about(&self) -> Result<About, Error> {
         let names = RowOrder::STATED.map(|order| order.name().unwrap_or_default());
         let expected = format!("one of {}", names.join(", "));
@@ -185,36 +175,33 @@ impl<'a> Meta<'a> {
         })
     }
 
-    /// A text, if the key is there and is one.
+    /// Returns the text of `key`, or `None` if it is missing or has another type.
     pub(super) fn text(&self, key: &str) -> Option<&str> {
         self.object.get(key).and_then(Value::as_str)
     }
 
-    /// A text, if the key is there.
     pub(super) fn optional_text(&self, key: &str) -> Result<Option<String>, Error> {
         self.given(key, "text", |value| value.as_str().map(str::to_owned))
     }
 
-    /// A whole number of at least 1, if it is given.
+    /// Returns a whole number of at least 1.
     pub(super) fn count(&self, key: &str) -> Result<Option<usize>, Error> {
         self.given(key, "a whole number of at least 1", |value| {
             usize::try_from(value.as_u64()?).ok().filter(|&n| n >= 1)
         })
     }
 
-    /// A number, if it is given.
     pub(super) fn number(&self, key: &str) -> Result<Option<f64>, Error> {
         self.given(key, "a number", Value::as_f64)
     }
 
-    /// A number of at least 0; 0 when it is not given.
+    /// Returns a number of at least 0, by default 0.
     pub(super) fn number_or_0(&self, key: &str) -> Result<f64, Error> {
         let number = self
             .given(key, "a number of at least 0", |value| value.as_f64().filter(|&x| x >= 0.0))?;
         Ok(number.unwrap_or(0.0))
     }
 
-    /// The error about `key`.
     pub(super) fn wrong(&self, key: &str, expected: impl Into<String>) -> Error {
         let found = self.object.get(key).map_or("nothing".into(), short);
         Error::new(self.path, format!("metadata unlift, {key}"), expected, found)
@@ -237,7 +224,6 @@ fn rule_of_corners<const D: usize>() -> String {
     format!("a low and a high corner of {D} numbers")
 }
 
-/// The first characters of a JSON value: enough to recognize it.
 fn short(value: &Value) -> String {
     let text = value.to_string();
     match text.char_indices().nth(60) {
@@ -246,7 +232,6 @@ fn short(value: &Value) -> String {
     }
 }
 
-/// The metadata of a file of `kind`, to be completed.
 pub(super) fn new_meta(kind: Kind) -> Map<String, Value> {
     let mut object = Map::new();
     object.insert("kind".into(), json!(kind.name()));
@@ -254,20 +239,18 @@ pub(super) fn new_meta(kind: Kind) -> Map<String, Value> {
     object
 }
 
-/// Adds the released map that a file is about, where it is known.
 pub(super) fn insert_fingerprint(meta: &mut Map<String, Value>, map: Option<Fingerprint>) {
     meta.extend(map.map(|map| ("fingerprint".to_owned(), json!(map.to_string()))));
 }
 
-/// Adds the released map, what rows are counted by, and who made the lists, where they are known.
 pub(super) fn insert_about(meta: &mut Map<String, Value>, about: About) {
     insert_fingerprint(meta, about.map);
     meta.extend(about.order.name().map(|name| ("rows_by".to_owned(), json!(name))));
     meta.extend(about.lists_by.name().map(|name| ("lists_by".to_owned(), json!(name))));
 }
 
-/// `meta` as text. Keys are written in alphabetical order whatever map `serde_json` is built with,
-/// so that equal values make equal bytes.
+/// Formats `meta` with sorted keys, so that equal values make equal bytes with any map type of
+/// `serde_json`.
 pub(super) fn to_text(meta: Map<String, Value>) -> String {
     let mut entries: Vec<(String, Value)> = meta.into_iter().collect();
     entries.sort_by(|a, b| a.0.cmp(&b.0));

@@ -1,4 +1,4 @@
-//! Many images to one stage file, one after the other.
+//! Writes many images to one stage file.
 
 use super::header::{Kind, to_text};
 use super::images::{IMAGE, IMAGE_META};
@@ -21,20 +21,20 @@ use unlift::recover::Recovered;
 use unlift::released::Released;
 use unlift::truth::{Original, Secret};
 
-/// Row groups of images end after this many rows: about 8 MB of descriptors are in memory until then.
+/// Rows of a row group: up to about 8 MB of descriptors are in memory.
 const GROUP_ROWS: usize = 1 << 16;
 
-/// What is said of all images at once; everything else is said of each.
+/// Metadata keys of the file. All others are stored per image.
 const OF_ALL: [&str; 6] = ["kind", "version", "dimension", "unit", "family", "slots_per_record"];
 
-/// A stage file that is written image by image, into an [`OutputFile`] that the caller commits.
+/// A writer of a stage file of images, into an [`OutputFile`] that the caller commits.
 ///
-/// Memory grows by a row group, not by the number of images. The same images in the same order give the same
-/// bytes. Images without rows leave no trace.
+/// Memory holds one row group. The same images in the same order give the same bytes. Images
+/// without rows are not stored.
 pub struct ImageWriter<'a> {
     path: PathBuf,
     kind: Kind,
-    /// Until the first image, whose columns are those of all.
+    /// Until the first image defines the columns.
     file: Option<&'a mut BufWriter<File>>,
     started: Option<Started<'a>>,
 }
@@ -55,15 +55,15 @@ impl<'a> ImageWriter<'a> {
     /// Adds a released image.
     ///
     /// # Errors
-    /// When it differs from the first one in its family or kind of descriptors, or the disk fails.
+    /// When its family or type of descriptors differs from the first image, or the disk fails.
     pub fn released(&mut self, name: &str, released: &Released<2>) -> Result<(), Error> {
         self.append(name, released::written(released))
     }
 
-    /// Adds the truth of an image.
+    /// Adds the ground truth of an image.
     ///
     /// # Errors
-    /// When the secret is not of these points, or the disk fails.
+    /// When the secret does not belong to these points, or the disk fails.
     pub fn truth(
         &mut self,
         name: &str,
@@ -86,17 +86,17 @@ impl<'a> ImageWriter<'a> {
     /// Adds the recovered points of an image.
     ///
     /// # Errors
-    /// When they have no finite evidence, or the disk fails.
+    /// When an evidence or delta is not finite, or the disk fails.
     pub fn recovered(&mut self, name: &str, recovered: &Recovered<2>) -> Result<(), Error> {
         let written = recovered::written(&self.path, recovered);
         let written = written.map_err(|error| error.within(&format!("image {name}")))?;
         self.append(name, written)
     }
 
-    /// Ends the file; it is in its place once its [`OutputFile`] is committed.
+    /// Completes the file. The caller must then commit its [`OutputFile`].
     ///
     /// # Errors
-    /// When there was no image with rows, or the disk fails.
+    /// When no image had rows, or the disk fails.
     pub fn finish(self) -> Result<(), Error> {
         let Some(started) = self.started else {
             return Err(Error::new(self.path, "", "an image with points", "none"));
@@ -135,7 +135,7 @@ impl<'a> ImageWriter<'a> {
                 started.writer.write(&batch).map_err(|error| failed(&self.path, error))
             }
             _ => {
-                let expected = "the same family and kind of descriptors as of the first image";
+                let expected = "the family and type of descriptors of the first image";
                 Err(Error::new(&self.path, format!("image {name}"), expected, "others"))
             }
         }
@@ -143,7 +143,8 @@ impl<'a> ImageWriter<'a> {
 }
 
 impl<'a> Started<'a> {
-    /// Starts with the columns of the first image, and those that only some images may have.
+    /// Starts a file with the columns of the first image, and the columns that only some images
+    /// have.
     fn with(
         file: &'a mut BufWriter<File>,
         path: &Path,

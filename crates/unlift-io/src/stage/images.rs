@@ -1,4 +1,4 @@
-//! Many images in one stage file: their rows stand together, and are read image by image.
+//! Reads many images from one stage file.
 
 use super::header::{Kind, Meta};
 use super::neighborhoods::neighborhoods_of;
@@ -20,17 +20,17 @@ use unlift::recover::Recovered;
 use unlift::released::Released;
 use unlift::truth::{Original, Secret};
 
-/// The column that names the image of a row.
+/// The column with the image of a row.
 pub(super) const IMAGE: &str = "image";
-/// The column with what the metadata says of one image, the same in all of its rows.
+/// The column with the metadata of an image, equal in all of its rows.
 pub(super) const IMAGE_META: &str = "image_meta";
 
-/// Every column that a stage file of images may have: others are not decoded.
+/// All columns that a stage file of images may have. Others are not decoded.
 const COLUMNS: &str = "image image_meta foot_x foot_y direction_x direction_y center axis offset x y descriptor \
                        descriptor_0 descriptor_1 slot original swapped_axis descriptor_row dropped records scores \
                        status support evidence found error_scale point neighbors";
 
-/// Whether the stage file `path` holds images: it has a column `image`.
+/// Returns true if the stage file `path` contains images: it has a column `image`.
 ///
 /// # Errors
 /// When it is not a Parquet file.
@@ -38,16 +38,15 @@ pub fn has_images(path: &Path) -> Result<bool, Error> {
     Ok(Table::open(path)?.has(IMAGE))
 }
 
-/// A stage file of images, read from the first image to the last. One image and some thousand rows are in memory.
+/// A reader of a stage file of images, whose rows are contiguous. One image and a few thousand rows
+/// are in memory.
 pub struct ImageFile<'a> {
     path: &'a Path,
-    /// Whose metadata holds for all images.
     whole: Table<'a>,
     kind: Kind,
     batches: Batches,
-    /// Rows that were taken.
     n_taken: u64,
-    /// Hashes of the names so far, so that an image whose rows are scattered is told.
+    /// Hashes of the names so far, to detect rows that are not contiguous.
     seen: HashSet<u64>,
 }
 
@@ -60,10 +59,10 @@ pub struct ImageRows<'a> {
 }
 
 impl<'a> ImageFile<'a> {
-    /// Opens `path`, which should hold images of `kind`.
+    /// Opens `path`, a file of images of `kind`.
     ///
     /// # Errors
-    /// When it is no stage file of this kind, or has no column `image`.
+    /// When it is not a stage file of this kind, or has no column `image`.
     pub fn open(path: &'a Path, kind: Kind) -> Result<Self, Error> {
         let whole = Table::open_kind(path, kind)?;
         if !whole.has(IMAGE) {
@@ -78,10 +77,10 @@ impl<'a> ImageFile<'a> {
         Ok(Self { path, whole, kind, batches, n_taken: 0, seen: HashSet::new() })
     }
 
-    /// The next image; `None` at the end.
+    /// Reads the next image. Returns `None` at the end.
     ///
     /// # Errors
-    /// When the file is damaged, a row names no image, or rows of one image do not stand together.
+    /// When the file is damaged, a row names no image, or the rows of an image are not contiguous.
     pub fn next_image(&mut self) -> Result<Option<ImageRows<'a>>, Error> {
         let Some(first) = self.rows()? else { return Ok(None) };
         let name = self.name(&first, 0)?;
@@ -89,7 +88,7 @@ impl<'a> ImageFile<'a> {
         name.hash(&mut hasher);
         if !self.seen.insert(hasher.finish()) {
             let found = format!("{name} again");
-            return Err(self.wrong("the rows of an image together", found));
+            return Err(self.wrong("contiguous rows of each image", found));
         }
         let meta_text = self.meta_text(&first)?;
         let meta = self.whole.meta().of_image(meta_text.as_deref());
@@ -111,10 +110,10 @@ impl<'a> ImageFile<'a> {
         Ok(Some(ImageRows { name, path: self.path, meta, held }))
     }
 
-    /// The next image, which must be `name`: as in the file `of`, with which this one is read.
+    /// Reads the next image, which must be `name` as in the file `of`.
     ///
     /// # Errors
-    /// As [`next_image`](Self::next_image), or when it is another one.
+    /// When [`next_image`](Self::next_image) fails, or the image is another one.
     pub fn expect(&mut self, name: &str, of: &Path) -> Result<ImageRows<'a>, Error> {
         match self.next_image()? {
             Some(rows) if rows.name == name => Ok(rows),
@@ -126,10 +125,10 @@ impl<'a> ImageFile<'a> {
         }
     }
 
-    /// Refuses images after the last one that was asked for.
+    /// Checks that no image follows, as in the file `of`.
     ///
     /// # Errors
-    /// When there is one.
+    /// When one follows.
     pub fn expect_end(&mut self, of: &Path) -> Result<(), Error> {
         match self.next_image()? {
             None => Ok(()),
@@ -140,12 +139,11 @@ impl<'a> ImageFile<'a> {
         }
     }
 
-    /// What the file holds.
+    /// The kind of the file.
     pub fn kind(&self) -> Kind {
         self.kind
     }
 
-    /// Rows that were not taken yet; none of them is empty.
     fn rows(&mut self) -> Result<Option<RecordBatch>, Error> {
         loop {
             match self.batches.next()? {
@@ -177,7 +175,6 @@ impl<'a> ImageFile<'a> {
         Ok(texts.map(|texts| texts.value(0).to_owned()))
     }
 
-    /// How many rows from the first on are of the image `name`.
     fn n_of(&self, rows: &RecordBatch, name: &str) -> Result<usize, Error> {
         let names = self.texts(rows, IMAGE)?;
         let is_other = |row: &usize| {
@@ -203,26 +200,27 @@ impl ImageRows<'_> {
         &self.name
     }
 
-    /// The released image.
+    /// Returns the released image.
     ///
     /// # Errors
-    /// As `read_released`, naming the image; rows are counted within it.
+    /// When `read_released` would fail. Errors name the image; rows are counted within it.
     pub fn released(self) -> Result<Released<2>, Error> {
         self.read(released_of)
     }
 
-    /// The truth of the image.
+    /// Returns the ground truth of the image.
     ///
     /// # Errors
-    /// As `read_truth`.
+    /// When `read_truth` would fail.
     pub fn truth(self) -> Result<(Original<2>, Secret), Error> {
         self.read(truth_of)
     }
 
-    /// The neighborhoods of an image of `n_records` records with `slots_per_record` slots each.
+    /// Returns the neighborhoods of an image of `n_records` records with `slots_per_record` slots
+    /// each.
     ///
     /// # Errors
-    /// As `read_neighborhoods`.
+    /// When `read_neighborhoods` would fail.
     pub fn neighborhoods(
         self,
         n_records: usize,
@@ -231,10 +229,10 @@ impl ImageRows<'_> {
         self.read(|table| neighborhoods_of(table, n_records, slots_per_record))
     }
 
-    /// The recovered points of the image.
+    /// Returns the recovered points of the image.
     ///
     /// # Errors
-    /// As `read_recovered`.
+    /// When `read_recovered` would fail.
     pub fn recovered(self) -> Result<Recovered<2>, Error> {
         self.read(|table| recovered_of(table, None))
     }

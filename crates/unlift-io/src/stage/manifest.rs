@@ -1,4 +1,4 @@
-//! What a folder of parts holds: `_manifest.json`, so that a part that is lost or changed is told.
+//! The manifest of a folder of parts.
 
 use super::header::to_text;
 use crate::{Error, input};
@@ -7,21 +7,18 @@ use std::collections::BTreeSet;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
-/// The file in a folder of parts; engines pass over names that begin so.
+/// The manifest of a folder of parts, which detects missing and changed parts. Engines skip names
+/// that begin with `_`.
 pub(super) const MANIFEST: &str = "_manifest.json";
 
-/// A part, as the manifest has it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Part {
-    /// Its file, in the folder.
     pub(super) file: String,
-    /// How many rows it has.
     pub(super) n_rows: u64,
-    /// Its length.
     pub(super) n_bytes: u64,
 }
 
-/// The parts of a folder, in order, and the metadata that each of them has.
+/// The parts of a folder, in order, and their common metadata.
 #[derive(Debug)]
 pub(super) struct Manifest {
     meta: Map<String, Value>,
@@ -33,10 +30,7 @@ impl Manifest {
         Self { meta, parts }
     }
 
-    /// Reads that of a folder; `None` where there is none.
-    ///
-    /// # Errors
-    /// When it is not as it was written.
+    /// Reads the manifest of a folder, if there is one.
     pub(super) fn read(folder: &Path) -> Result<Option<Self>, Error> {
         let path = folder.join(MANIFEST);
         if !path.exists() {
@@ -70,12 +64,11 @@ impl Manifest {
         Ok(Some(Self { meta, parts }))
     }
 
-    /// The metadata, as the parts have it.
     pub(super) fn meta_text(&self) -> String {
         to_text(self.meta.clone())
     }
 
-    /// Refuses a folder with other files than these.
+    /// Returns an error if the folder contains other parts than the manifest.
     pub(super) fn check_names(&self, folder: &Path, names: &[PathBuf]) -> Result<(), Error> {
         let wrong = |expected: String, found: String| Err(Error::new(folder, "", expected, found));
         let (known, found): (BTreeSet<&Path>, BTreeSet<&Path>) = (
@@ -88,13 +81,12 @@ impl Manifest {
         }
         match found.difference(&known).next() {
             Some(other) => {
-                wrong(format!("the parts of {MANIFEST} alone"), format!("{} too", other.display()))
+                wrong(format!("only the parts of {MANIFEST}"), format!("also {}", other.display()))
             }
             None => Ok(()),
         }
     }
 
-    /// Refuses the part `at`, in order of names, with another number of rows or bytes.
     pub(super) fn check_part(
         &self,
         at: usize,
@@ -103,7 +95,7 @@ impl Manifest {
     ) -> Result<(), Error> {
         let name = path.file_name().unwrap_or_default();
         let Some(part) = self.parts.get(at).filter(|part| Path::new(&part.file) == name) else {
-            return Err(Error::new(path, "", "parts in the order of their names", MANIFEST));
+            return Err(Error::new(path, "", "parts in the order of their names", "another order"));
         };
         if (part.n_rows, part.n_bytes) == found {
             return Ok(());
@@ -113,7 +105,7 @@ impl Manifest {
         Err(Error::new(path, "", expected, told(found)))
     }
 
-    /// Writes it: equal values, equal bytes.
+    /// Writes the manifest. Equal values make equal bytes.
     pub(super) fn write(&self, to: &mut impl Write) -> std::io::Result<()> {
         let n_rows: u64 = self.parts.iter().map(|part| part.n_rows).sum();
         write!(to, "{{\n\"unlift\": {},\n\"rows\": {n_rows},\n\"parts\": [", self.meta_text())?;

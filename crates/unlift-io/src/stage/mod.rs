@@ -1,12 +1,13 @@
-//! Stage files: what passes between the commands, as Parquet tables.
+//! Stage files: the Parquet tables that commands exchange, each of one kind, or a folder of its
+//! parts.
 //!
-//! One file per kind, or a folder of its parts, described for writers in other languages in `docs/formats.md`. A file holds
-//! one kind only, and released maps, neighborhoods and recovered points hold nothing of the truth:
-//! no ids, names or times of their source, so that equal values make equal bytes.
+//! `docs/formats.md` describes them for writers in other languages. Released maps, neighborhoods
+//! and recovered points contain nothing of the ground truth: no ids, names or times of their
+//! source. Equal values make equal bytes.
 //!
-//! Readers are lenient where nothing is lost: any width of numbers, any kind of list, null or NaN for what is not
-//! there, metadata only where columns do not tell, columns only where they mean something. Everything else that is not as
-//! documented is one line naming the file, the column and row (counted from 0), what was expected and what was found.
+//! Readers accept numbers of any width, lists of any type, null or NaN for missing values, and
+//! missing metadata and columns that can be inferred. Any other deviation is one line that names
+//! the file, the column and row (counted from 0), what was expected and what was found.
 
 mod column;
 mod file;

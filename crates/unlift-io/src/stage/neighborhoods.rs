@@ -13,8 +13,8 @@ use std::path::Path;
 use unlift::RecordId;
 use unlift::neighbors::Neighborhoods;
 
-/// Lists of original points, one per point: neighborhoods as the owner of a map has them, before an
-/// obfuscation says in which record each point sits.
+/// Lists of original points, one per point: neighborhoods before an obfuscation assigns points to
+/// records.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointNeighborhoods {
     offsets: Vec<u64>,
@@ -23,12 +23,12 @@ pub struct PointNeighborhoods {
 }
 
 impl PointNeighborhoods {
-    /// Number of points.
+    /// The number of points.
     pub fn n_points(&self) -> usize {
         self.offsets.len() - 1
     }
 
-    /// The rows of the original points listed for `point`, in the order of the file.
+    /// The rows of the original points in the list of `point`.
     ///
     /// # Panics
     /// When there is no such point.
@@ -36,24 +36,24 @@ impl PointNeighborhoods {
         &self.neighbors[self.offsets[point] as usize..self.offsets[point + 1] as usize]
     }
 
-    /// Where each list starts in [`neighbors`](Self::neighbors), and the end of the last:
+    /// The start of each list in [`neighbors`](Self::neighbors), and the end of the last:
     /// `(n_points + 1)`.
     pub fn offsets(&self) -> &[u64] {
         &self.offsets
     }
 
-    /// All lists end to end: rows of original points.
+    /// All lists, concatenated: rows of original points.
     pub fn neighbors(&self) -> &[u32] {
         &self.neighbors
     }
 
-    /// A score beside each neighbor, if the file has any.
+    /// The score of each neighbor, if the file has scores.
     pub fn scores(&self) -> Option<&[f32]> {
         self.scores.as_deref()
     }
 }
 
-/// Writes neighborhoods, one row per slot: `slot`, `records` and, if there are any, `scores`.
+/// Writes neighborhoods, one row per slot: `slot`, `records` and, if present, `scores`.
 ///
 /// # Errors
 /// When the file cannot be written.
@@ -61,13 +61,11 @@ pub fn write_neighborhoods(path: &Path, neighborhoods: &Neighborhoods) -> Result
     write_table((path, Access::Private), &written(neighborhoods))
 }
 
-/// What is written of neighborhoods.
 pub(super) fn written(neighborhoods: &Neighborhoods) -> Written<'_> {
     let mut meta = new_meta(Kind::Neighborhoods);
     insert_about(&mut meta, neighborhoods.about());
     let mut written = Written::new(meta, neighborhoods.n_slots());
     written.numbers::<UInt32Type>("slot", |slot| slot as u32);
-    // Where the lists of some slots are, and how long each is.
     let lists = |slots: Range<usize>| {
         let offsets = &neighborhoods.offsets()[slots.start..=slots.end];
         let lengths = offsets.windows(2).map(|w| (w[1] - w[0]) as usize).collect();
@@ -86,13 +84,14 @@ pub(super) fn written(neighborhoods: &Neighborhoods) -> Written<'_> {
     written
 }
 
-/// Reads neighborhoods for a released map of `n_records` records with `slots_per_record` slots each.
+/// Reads neighborhoods for a released map of `n_records` records with `slots_per_record` slots
+/// each.
 ///
-/// Rows are in slot order or, when there is a column `slot`, in any. Every slot has a row; its list
-/// may be empty or null. Metadata may be missing, but not say another kind.
+/// Rows are in the order of slots, or in any order if there is a column `slot`. Every slot has a
+/// row; its list may be empty or null.
 ///
 /// # Errors
-/// When the file is not as `docs/formats.md` describes it: another number of rows than slots, or a
+/// When the file differs from `docs/formats.md`, such as another number of rows than slots, or a
 /// list with a record that is out of range, listed twice or the slot's own.
 pub fn read_neighborhoods(
     path: &Path,
@@ -102,7 +101,6 @@ pub fn read_neighborhoods(
     neighborhoods_of(&Table::open_kind(path, Kind::Neighborhoods)?, n_records, slots_per_record)
 }
 
-/// The neighborhoods of a table.
 pub(super) fn neighborhoods_of(
     table: &Table<'_>,
     n_records: usize,
@@ -118,7 +116,7 @@ pub(super) fn neighborhoods_of(
     let lists =
         Lists::read(table, key, "records", n_slots, n_records)?.by_key(path, key, n_slots)?;
     for slot in 0..n_slots {
-        // The core checks this too, but cannot name the file's column.
+        // The core checks this, too, but cannot name the column.
         let own = (slot / slots_per_record) as u32;
         check_list(path, "records", ("slot", slot), ("record", own), lists.of(slot))?;
     }
@@ -129,14 +127,13 @@ pub(super) fn neighborhoods_of(
         .map_err(|source| table.refused(source))
 }
 
-/// Reads neighborhoods in the point form: columns `point`, `neighbors` (both rows of the original
-/// points, of which there are `n_points`) and, optionally, `scores`.
+/// Reads neighborhoods in the point form: columns `point`, `neighbors` (both rows of the `n_points`
+/// original points) and, optionally, `scores`.
 ///
-/// Rows may stand in any order; points without a row have an empty list. Metadata may be missing,
-/// but not say another kind.
+/// Rows may be in any order; points without a row have an empty list.
 ///
 /// # Errors
-/// When the file is not as `docs/formats.md` describes it: a point that is out of range or has two
+/// When the file differs from `docs/formats.md`, such as a point that is out of range or has two
 /// rows, or a list with a point that is out of range, listed twice or the list's own.
 pub fn read_point_neighborhoods(path: &Path, n_points: usize) -> Result<PointNeighborhoods, Error> {
     let table = Table::open_kind(path, Kind::PointNeighborhoods)?;
@@ -154,7 +151,6 @@ pub fn read_point_neighborhoods(path: &Path, n_points: usize) -> Result<PointNei
     Ok(PointNeighborhoods { offsets: lists.offsets, neighbors: lists.ids, scores: lists.scores })
 }
 
-/// Lists as they stand in a file.
 struct Lists {
     keys: Vec<u32>,
     offsets: Vec<u64>,
@@ -163,8 +159,8 @@ struct Lists {
 }
 
 impl Lists {
-    /// Reads the lists in `column` of ids below `n_ids`, with the keys (below `n_keys`) in the column
-    /// `key`, if any, and `scores`, if any.
+    /// Reads the lists of ids below `n_ids` in `column`, the keys below `n_keys` in the column
+    /// `key`, and `scores`, if present.
     fn read(
         table: &Table,
         key: Option<&str>,
@@ -183,13 +179,13 @@ impl Lists {
                 keys.extend(batch.integers(key, n_keys as u64)?);
             }
             let first = offsets.len() - 1;
-            // Each id once: no list is longer than there are ids.
+            // Ids are unique, so no list is longer than the number of ids.
             batch.integer_lists(column, n_ids as u64, n_ids as u64, &mut offsets, &mut ids)?;
             if !with_scores || batch.is_null("scores") {
                 n_unscored += batch.len();
                 return Ok(());
             }
-            // Compared with the lists: those are short.
+            // Their lengths are compared with the lists, which are limited.
             let lengths = batch.float_lists("scores", u64::MAX, &mut scores)?;
             for (row, (length, ends)) in lengths.iter().zip(offsets[first..].windows(2)).enumerate()
             {
@@ -205,7 +201,7 @@ impl Lists {
         Ok(Self { keys, offsets, ids, scores: with_scores.then_some(scores) })
     }
 
-    /// The lists of keys 0 to `n - 1` in this order; those that no row has are empty.
+    /// Sorts the lists by key, from 0 to `n - 1`. The list of a missing key is empty.
     fn by_key(self, path: &Path, key: Option<&str>, n: usize) -> Result<Self, Error> {
         let in_order = |keys: &[u32]| keys.iter().enumerate().all(|(row, &k)| row == k as usize);
         let Some(key) = key.filter(|_| self.keys.len() != n || !in_order(&self.keys)) else {
@@ -240,7 +236,8 @@ impl Lists {
     }
 }
 
-/// Refuses a list that holds its own id or an id twice; `of` and `own` are a word and a number.
+/// Returns an error if a list contains its own id, or an id twice. `of` and `own` are a word and a
+/// number each.
 fn check_list(
     path: &Path,
     column: &str,

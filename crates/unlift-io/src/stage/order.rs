@@ -1,13 +1,10 @@
-//! Rows that say which slot or point they are about may stand in any order.
+//! Sorts rows that state their slot or point.
 
 use crate::Error;
 use std::path::Path;
 
-/// The row of each key from 0 to `n - 1`, where row `r` has key `keys[r]`; `None` where no row has
-/// it.
-///
-/// # Errors
-/// When two rows have the same key. `column` names the keys in the message; keys are below `n`.
+/// Returns the row of each key from 0 to `n - 1`, where row `r` has key `keys[r]` below `n`, or
+/// `None` for a key without a row. Two rows with the same key are an error, which names `column`.
 pub(super) fn rows_by_key(
     path: &Path,
     column: &str,
@@ -28,10 +25,7 @@ pub(super) fn rows_by_key(
     Ok(rows)
 }
 
-/// The row of each of as many keys as there are rows.
-///
-/// # Errors
-/// As [`rows_by_key`]; then no key is missing either.
+/// Returns the row of each key, where each of the keys 0 to `keys.len() - 1` has one row.
 pub(super) fn permutation(path: &Path, column: &str, keys: &[u32]) -> Result<Vec<u32>, Error> {
     let rows = rows_by_key(path, column, keys, keys.len())?;
     Ok(rows.into_iter().flatten().collect())

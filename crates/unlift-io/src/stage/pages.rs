@@ -1,5 +1,5 @@
-//! What the columns of a Parquet file declare that they hold, checked before they are decoded: counts
-//! and sizes in the footer and before each page, against the file and the memory that it may take.
+//! Checks the counts and sizes that columns declare, in the footer and in page headers, before they
+//! are decoded.
 
 use super::file::ParquetFile;
 use super::thrift::{Walk, Wrong};
@@ -14,31 +14,28 @@ use std::sync::Arc;
 
 /// Bytes of a repetition and a definition level in memory.
 const LEVELS: u64 = 4;
-/// How texts may be encoded: as they are, or by number. What else there is for them declares its counts
-/// within compressed data.
+/// Encodings of text: plain, and by dictionary. Others declare counts inside compressed data, where
+/// they cannot be checked.
 const OF_TEXT: [i64; 3] = [0, 2, 8];
 
-/// How long what is decoded stays in memory.
+/// How long decoded data stays in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stay {
-    /// Until all of it is there.
+    /// Until the whole table is decoded.
     Whole,
-    /// Until the next rows come.
+    /// Until the next rows are decoded.
     Rows,
 }
 
-/// Checks the columns at `roots` of `files`, the parts of one table; the most bytes that one text of theirs can have.
-///
-/// # Errors
-/// When they do not lie in the file, declare more values or bytes than the budget allows for as long as they stay, or their
-/// pages are not what the footer says.
+/// Checks the columns at `roots` of `files`, the parts of one table, against the files and the
+/// budget. Returns the maximum size in bytes of one text.
 pub(super) fn check(
     files: &[Arc<ParquetFile>],
     roots: &[Vec<usize>],
     (budget, stay): (&Budget, Stay),
 ) -> Result<u64, Error> {
     let mut longest = 0;
-    // The numbers of the values that make up a column: of a list, its own.
+    // Lists have nested values.
     let leaves = |file: &ParquetFile, root: usize| -> Vec<usize> {
         let schema = file.metadata().file_metadata().schema_descr();
         let leaves = 0..schema.num_columns();
@@ -57,7 +54,6 @@ pub(super) fn check(
                 longest: 0,
             };
             for (file, roots) in files.iter().zip(roots) {
-                // Every part has the same columns.
                 let Some(&leaf) = leaves(file, roots[wanted]).get(at) else { continue };
                 column.path = file.path();
                 let mut handle = file.handle()?;
@@ -65,7 +61,7 @@ pub(super) fn check(
                     if stay == Stay::Rows {
                         (column.n_values, column.n_bytes) = (0, 0);
                     }
-                    // The crate has checked that a row group has every column of the schema.
+                    // The crate has checked that a row group has every column.
                     if let Some(chunk) = group.columns().get(leaf) {
                         column.chunk(&mut handle, file.n_bytes(), chunk)?;
                         if chunk.column_type() == Type::BYTE_ARRAY {
@@ -79,25 +75,23 @@ pub(super) fn check(
     Ok(longest)
 }
 
-/// A column, through all row groups of all parts.
 struct Column<'a> {
     path: &'a Path,
     place: String,
     budget: &'a Budget,
     n_values: u64,
-    /// Of its pages, as they are before compression.
+    /// The decompressed size of its pages.
     n_bytes: u64,
-    /// Bytes of its largest page.
+    /// The decompressed size of its largest page.
     longest: u64,
 }
 
-/// What stands before a page.
 #[derive(Default)]
 struct Header {
     is_dictionary: bool,
-    /// Bytes before compression.
+    /// The decompressed size in bytes.
     whole: i64,
-    /// Bytes in the file.
+    /// The size in the file in bytes.
     stored: i64,
     n_values: i64,
     encoding: i64,
@@ -142,7 +136,7 @@ impl Column<'_> {
             return Err(self.wrong(expected, format!("{length} bytes from byte {at}")));
         }
         let mut left = n_values;
-        // A page of nothing but its header takes a few bytes, so that there is an end.
+        // Ends, because every page has a header.
         while at < end {
             let (header, length) = self.header(file, at, end)?;
             at += length;
@@ -151,7 +145,9 @@ impl Column<'_> {
                 u64::try_from(header.stored),
                 u64::try_from(header.n_values),
             ) else {
-                return Err(self.wrong("pages with sizes", format!("one without at byte {at}")));
+                return Err(
+                    self.wrong("pages with sizes", format!("one without sizes at byte {at}"))
+                );
             };
             if stored > end - at {
                 let expected = format!("a page of at most {} bytes at byte {at}", end - at);
@@ -160,7 +156,7 @@ impl Column<'_> {
             self.longest = self.longest.max(whole);
             self.n_bytes = self.n_bytes.saturating_add(whole);
             self.budget.admit(self.place.as_str(), self.n_bytes)?;
-            // Every value of a dictionary has a byte of its own.
+            // Every value of a dictionary takes at least a byte.
             let most = if header.is_dictionary { whole } else { left };
             if n > most {
                 let expected =
@@ -173,16 +169,16 @@ impl Column<'_> {
             if descriptor.physical_type() == Type::BYTE_ARRAY && !OF_TEXT.contains(&header.encoding)
             {
                 let found = format!("encoding {} of Parquet", header.encoding);
-                return Err(self.wrong("text as it is, or by a dictionary", found));
+                return Err(self.wrong("text in plain or dictionary encoding", found));
             }
             at += stored;
         }
         Ok(())
     }
 
-    /// The header at byte `at` of a column that ends at `end`, and how long it is.
+    /// Returns the page header at byte `at` of a column that ends at `end`, and its length.
     fn header(&self, file: &mut File, at: u64, end: u64) -> Result<(Header, u64), Error> {
-        // Most are shorter; some repeat the least and the largest value.
+        // Most headers are shorter; some contain the minimum and maximum value.
         let mut length = 256;
         loop {
             let most = end - at;
@@ -202,14 +198,14 @@ impl Column<'_> {
     }
 }
 
-/// Walks `PageHeader` of the Parquet format.
+/// Parses `PageHeader` of the Parquet format.
 fn page(walk: &mut Walk<'_>) -> Result<Header, Wrong> {
     let mut header = Header { whole: -1, stored: -1, ..Header::default() };
     walk.fields(|walk, (id, kind)| {
         match id {
             2 => header.whole = walk.integer(kind)?,
             3 => header.stored = walk.integer(kind)?,
-            // Data, a dictionary, data of the second version.
+            // A data page, a dictionary page, a data page of version 2.
             5 | 7 | 8 => {
                 header.is_dictionary = id == 7;
                 let encoding = if id == 8 { 4 } else { 2 };

@@ -1,4 +1,4 @@
-//! The rows of a stage file: of one Parquet file, or of a folder of them, part after part.
+//! Reads one Parquet file or a folder of parts.
 
 use super::file::{self, ParquetFile};
 use super::manifest::Manifest;
@@ -11,23 +11,21 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The ending of a part. What else is in a folder, and names that begin with `_` or a dot, are no rows: engines leave them there.
+/// The extension of a part. Other files, and names that begin with `_` or a dot, are skipped:
+/// engines write them.
 pub(super) const ENDING: &str = "parquet";
 
-/// One open Parquet file, or all of a folder in the order of their names; at least one.
+/// One open Parquet file, or all parts of a folder in the order of their names. At least one.
 #[derive(Debug)]
 pub(super) struct Parts<'a> {
     path: &'a Path,
     files: Vec<Arc<ParquetFile>>,
-    /// The metadata of unlift, as the parts or the manifest have it.
     meta_text: Option<String>,
 }
 
 impl<'a> Parts<'a> {
-    /// Opens the file or folder `path` and reads its footers.
-    ///
-    /// # Errors
-    /// When a part is no Parquet file, has other columns or metadata than the first, or is not as the manifest has it.
+    /// Opens the file or folder `path` and reads its footers. All parts must have the same columns
+    /// and metadata, as in the manifest.
     pub(super) fn open(path: &'a Path) -> Result<Self, Error> {
         if !path.is_dir() {
             let file = ParquetFile::open(path)?;
@@ -52,8 +50,8 @@ impl<'a> Parts<'a> {
             }
             match (file.meta_text(), &meta_text) {
                 (Some(found), Some(expected)) if found != expected => {
-                    let expected = "that of the other parts";
-                    return Err(Error::new(file.path(), "metadata unlift", expected, "another"));
+                    let expected = "the metadata of the other parts";
+                    return Err(Error::new(file.path(), "metadata unlift", expected, "others"));
                 }
                 (Some(found), None) => meta_text = Some(found.to_owned()),
                 _ => {}
@@ -72,27 +70,23 @@ impl<'a> Parts<'a> {
         Ok(parts)
     }
 
-    /// Number of rows, as the footers declare it.
     pub(super) fn n_rows(&self) -> u64 {
         self.files.iter().map(|file| file.n_rows()).sum()
     }
 
-    /// The columns, as their Parquet types say.
     pub(super) fn schema(&self) -> &SchemaRef {
         self.files[0].schema()
     }
 
-    /// The text under the metadata key of unlift, if there is any.
     pub(super) fn meta_text(&self) -> Option<&str> {
         self.meta_text.as_deref()
     }
 
-    /// Whether the files themselves say that no row has a value in the column `name`, which is no list.
     pub(super) fn is_all_null(&self, name: &str) -> bool {
         self.files.iter().all(|file| file.n_rows() == 0 || file.is_all_null(name))
     }
 
-    /// Starts to decode the columns at `roots`, in order; what is decoded will `stay` in memory so long.
+    /// Starts decoding the columns at `roots`, in order.
     pub(super) fn batches(&self, roots: &[usize], stay: Stay) -> Result<Batches, Error> {
         let names: Vec<&str> =
             roots.iter().map(|&root| self.schema().field(root).name().as_str()).collect();
@@ -101,7 +95,7 @@ impl<'a> Parts<'a> {
             for name in &names {
                 file.check_codec(name)?;
             }
-            // Every part has these columns, in whatever order.
+            // Parts may have another order of columns.
             let at = names.iter().filter_map(|name| file.schema().index_of(name).ok());
             of_files.push(at.collect::<Vec<usize>>());
         }
@@ -116,18 +110,16 @@ impl<'a> Parts<'a> {
     }
 }
 
-/// Rows as they are decoded, some thousand at a time.
 pub(super) struct Batches {
-    /// The last one is next.
+    /// In reverse order.
     waiting: Vec<(Arc<ParquetFile>, Vec<usize>)>,
     current: Option<file::Batches>,
     most_rows: usize,
-    /// Rows that were given back.
+    /// Rows that [`take`](Self::take) has put back.
     rest: Option<RecordBatch>,
 }
 
 impl Batches {
-    /// The next rows; `None` at the end, where there were as many as the footers say.
     pub(super) fn next(&mut self) -> Result<Option<RecordBatch>, Error> {
         if let Some(rest) = self.rest.take() {
             return Ok(Some(rest));
@@ -143,7 +135,7 @@ impl Batches {
         }
     }
 
-    /// The first `n` of `rows`; the others, if there are any, come next.
+    /// Returns the first `n` of `rows`, and puts the others back.
     pub(super) fn take(&mut self, rows: RecordBatch, n: usize) -> RecordBatch {
         if n < rows.num_rows() {
             self.rest = Some(rows.slice(n, rows.num_rows() - n));
@@ -152,7 +144,7 @@ impl Batches {
     }
 }
 
-/// The files of which a stage file is made: itself or, of a folder, its parts in order.
+/// Returns the files of a stage file: itself, or the parts of a folder in order.
 ///
 /// # Errors
 /// When the folder cannot be read.
@@ -163,7 +155,6 @@ pub fn part_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(names_in(path)?.into_iter().map(|name| path.join(name)).collect())
 }
 
-/// The names of the parts in a folder, in order.
 pub(super) fn names_in(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     let failed = |source| Error::read(folder, source);
     let mut names = Vec::new();
@@ -178,7 +169,6 @@ pub(super) fn names_in(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(names)
 }
 
-/// Refuses a part whose columns are not those of the first.
 fn same_columns(first: &ParquetFile, other: &ParquetFile) -> Result<(), Error> {
     let columns = |file: &ParquetFile| {
         let fields = file.schema().fields().iter();

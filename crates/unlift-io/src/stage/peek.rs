@@ -1,26 +1,26 @@
-//! What a stage file is, before it is read.
+//! Describes a stage file without reading its columns.
 
 use super::header::Kind;
 use super::table::Table;
 use crate::Error;
 use std::path::Path;
 
-/// What can be said of a stage file without reading its columns.
+/// The description of a stage file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Header {
-    /// What the file holds.
+    /// The kind of the file.
     pub kind: Kind,
-    /// 2 or 3, where the kind has a dimension.
+    /// The dimension, 2 or 3, for kinds that have one.
     pub dimension: Option<usize>,
-    /// Number of rows: records, slots or points, as the kind has them.
+    /// The number of rows: records, slots or points, depending on the kind.
     pub n_rows: u64,
 }
 
-/// Reads kind, dimension and number of rows of the stage file `path`: what decides which reader and
-/// which `D` to call.
+/// Reads kind, dimension and number of rows of the stage file `path`, which decide the reader and
+/// `D`.
 ///
 /// # Errors
-/// When the file is not a Parquet file, or not a stage file of a known kind and version.
+/// When the file is not a stage file of a known kind and version.
 pub fn peek(path: &Path) -> Result<Header, Error> {
     let table = Table::open(path)?;
     let kind = table.kind()?;
@@ -32,7 +32,8 @@ pub fn peek(path: &Path) -> Result<Header, Error> {
     Ok(Header { kind, dimension, n_rows })
 }
 
-/// The kind that the metadata of the file at `path` names; `None` where it names none, and where no stage file is.
+/// Returns the kind that the metadata of the file at `path` declares, if it is a stage file and
+/// declares one.
 pub fn declared_kind(path: &Path) -> Option<Kind> {
     Table::open(path).ok()?.meta().kind().ok()?
 }

@@ -1,4 +1,4 @@
-//! Recovered points: a position or a reason, per slot.
+//! Recovered points: a position or a reason per slot.
 
 use super::column::{Batch, Type, coordinate_names};
 use super::header::{Kind, insert_about, new_meta};
@@ -17,13 +17,14 @@ use std::sync::Arc;
 use unlift::Unit;
 use unlift::recover::{Confidence, Estimate, Recovered, Status, Unknown};
 
-/// Why it is not known how sure the attacker is.
+/// The reason why confidence is unknown.
 const WHY_UNKNOWN: &str = "confidence_unknown";
 
-/// Writes recovered points, one row per slot; positions in the map's frame (the origin is added).
+/// Writes recovered points, one row per slot. Positions are in the map's frame (the origin is
+/// added).
 ///
-/// Adding the origin loses digits of points that lie within 2^-29 of its size from it (2 mm at
-/// coordinates of 10^6 m), by at most 10^-10 m there; no position in the map's frame changes.
+/// Adding the origin loses digits of points that are closer to it than 2^-29 of its size (2 mm at
+/// coordinates of 10^6 m), by at most 10^-10 m. No position in the map's frame changes.
 ///
 /// # Errors
 /// When an evidence or delta is not finite, or the file cannot be written.
@@ -31,10 +32,6 @@ pub fn write_recovered<const D: usize>(path: &Path, recovered: &Recovered<D>) ->
     write_table((path, Access::Private), &written(path, recovered)?)
 }
 
-/// What is written of recovered points.
-///
-/// # Errors
-/// When an evidence or delta is not finite; `path` is for the message.
 pub(super) fn written<'a, const D: usize>(
     path: &Path,
     recovered: &'a Recovered<D>,
@@ -71,7 +68,7 @@ pub(super) fn written<'a, const D: usize>(
     written.numbers::<Float32Type>("evidence", |slot| recovered.evidence()[slot]);
     if let Some(confidence) = recovered.confidence() {
         written.numbers::<Float32Type>("found", |slot| confidence[slot].found);
-        // A lost slot has no error.
+        // A lost slot has no error scale.
         let scale = |slot: usize| Some(confidence[slot].scale).filter(|scale| scale.is_finite());
         written.optional_numbers::<Float32Type>("error_scale", scale);
     }
@@ -86,29 +83,26 @@ pub(super) fn written<'a, const D: usize>(
 
 /// Reads recovered points of dimension `D` (see [`peek`](super::peek)).
 ///
-/// Only the coordinates are needed: without `status`, a point is `ok` or, where they are null or NaN,
-/// `no_support`; `support` and `evidence` default to 0. Confidence is known where both of its
-/// columns are there. Rows are in slot order or, when there is a
-/// column `slot`, in any.
+/// Only the coordinates are required. Without `status`, a point is `ok`, or `no_support` if its
+/// coordinates are null or NaN; `support` and `evidence` default to 0. Confidence requires both of
+/// its columns. Rows are in the order of slots, or in any order if there is a column `slot`.
 ///
 /// # Errors
-/// When the file is not as `docs/formats.md` describes it.
+/// When the file differs from `docs/formats.md`.
 pub fn read_recovered<const D: usize>(path: &Path) -> Result<Recovered<D>, Error> {
     let table = Table::open_kind(path, Kind::Recovered)?;
     recovered_of(&table, None)
 }
 
-/// As [`read_recovered`], for positions that are compared with a map in `unit`: what does not say its unit has that
-/// of the map.
+/// Reads recovered points like [`read_recovered`], with `unit` as the default unit.
 ///
 /// # Errors
-/// As [`read_recovered`].
+/// When [`read_recovered`] would fail for another reason than a missing unit.
 pub fn read_recovered_in<const D: usize>(path: &Path, unit: Unit) -> Result<Recovered<D>, Error> {
     let table = Table::open_kind(path, Kind::Recovered)?;
     recovered_of(&table, Some(unit))
 }
 
-/// The recovered points of a table.
 pub(super) fn recovered_of<const D: usize>(
     table: &Table<'_>,
     usual: Option<Unit>,
@@ -179,7 +173,7 @@ pub(super) fn recovered_of<const D: usize>(
         .map_err(|source| table.refused(source))
 }
 
-/// The confidence of one batch, appended to `to`. Of lost points (see `estimates`) nothing need be known.
+/// Appends the confidence of one batch to `to`. It may be null for lost points.
 fn read_confidence<const D: usize>(
     batch: &Batch<'_>,
     estimates: &[Estimate<D>],
@@ -204,7 +198,6 @@ fn read_confidence<const D: usize>(
     Ok(())
 }
 
-/// The estimates of one batch, appended to `to`.
 fn read_estimates<const D: usize>(
     table: &Table<'_>,
     batch: &Batch<'_>,

@@ -15,12 +15,12 @@ use unlift::descriptors::Values;
 use unlift::geometry::frame::Bounds;
 use unlift::released::{AxisCandidates, AxisPlanes, Lines, Obfuscation, Rays, Released};
 
-/// The longest descriptor that is read: known ones have up to 4,096 values.
+/// Known descriptors have up to 4,096 values.
 const MOST_VALUES: u64 = 1 << 16;
 
 /// Writes a released map, one row per record.
 ///
-/// Nothing of the truth is in it: no ids, names or times, and records in the order of `released`.
+/// It contains nothing of the ground truth: no ids, names or times.
 ///
 /// # Errors
 /// When the file cannot be written.
@@ -28,7 +28,6 @@ pub fn write_released<const D: usize>(path: &Path, released: &Released<D>) -> Re
     write_table((path, Access::Usual), &written(released))
 }
 
-/// What is written of a released map.
 pub(super) fn written<const D: usize>(released: &Released<D>) -> Written<'_> {
     let obfuscation = released.obfuscation();
     let per_record = released.slots_per_record();
@@ -89,14 +88,13 @@ pub(super) fn written<const D: usize>(released: &Released<D>) -> Written<'_> {
     written
 }
 
-/// Adds a column per axis.
 fn vectors<'a, const D: usize>(written: &mut Written<'a>, prefix: &str, rows: &'a [[f32; D]]) {
     for (axis, name) in coordinate_names::<D>(prefix).into_iter().enumerate() {
         written.numbers::<Float32Type>(name, move |row| rows[row][axis]);
     }
 }
 
-/// The rows `slots` of a matrix of `dim` columns, end to end, and how long each is.
+/// Returns the rows `slots` of a matrix of `dim` columns, concatenated, and their lengths.
 fn cut<T: Copy>(
     values: &[T],
     dim: usize,
@@ -108,26 +106,25 @@ fn cut<T: Copy>(
 
 /// Reads a released map of dimension `D` (see [`peek`](super::peek)).
 ///
-/// Directions need not have unit length, nor feet lie nearest the origin: records are brought to
-/// normal form. A map without records has no descriptors. What the metadata does not say is told from the columns,
-/// where they tell it.
+/// Directions need not have unit length, and feet need not be nearest to the origin: records are
+/// normalized. Missing metadata is inferred from the columns where possible.
 ///
 /// # Errors
-/// When the file is not a released map of this dimension as `docs/formats.md` describes it.
+/// When the file differs from `docs/formats.md`, or has another dimension.
 pub fn read_released<const D: usize>(path: &Path) -> Result<Released<D>, Error> {
     released_of(&Table::open_kind(path, Kind::Released)?)
 }
 
-/// What the released map at `path` calls its scheme; `None` where it does not say. unlift writes no such name.
+/// Returns the name of the scheme that the released map at `path` states, if any. unlift writes
+/// none.
 ///
 /// # Errors
-/// When it is no Parquet file, or the name is no text.
+/// When it is not a Parquet file, or the name is not text.
 pub fn scheme_name(path: &Path) -> Result<Option<String>, Error> {
     let table = Table::open(path)?;
     table.meta().optional_text("scheme")
 }
 
-/// The released map of a table.
 pub(super) fn released_of<const D: usize>(table: &Table<'_>) -> Result<Released<D>, Error> {
     let core = |source| table.refused(source);
     let meta = table.meta();
@@ -154,14 +151,14 @@ pub(super) fn released_of<const D: usize>(table: &Table<'_>) -> Result<Released<
     let found = released.fingerprint();
     match meta.fingerprint()? {
         Some(said) if said != found => {
-            let expected = format!("that of the content, {found} (or none: the file was changed)");
+            let expected =
+                format!("the fingerprint of the content, {found}, or none (the file was changed)");
             Err(meta.wrong("fingerprint", expected))
         }
         _ => Ok(released),
     }
 }
 
-/// The kinds of records, by their columns.
 enum Family {
     Lines,
     Rays,
@@ -169,7 +166,6 @@ enum Family {
     AxisCandidates,
 }
 
-/// The family that the metadata names or, where it names none, the one that the columns are of.
 fn family(table: &Table<'_>) -> Result<Family, Error> {
     let names = "lines, rays, axis_planes or axis_candidates";
     match table.meta().text("family") {
@@ -186,12 +182,10 @@ fn family(table: &Table<'_>) -> Result<Family, Error> {
     }
 }
 
-/// A box in the metadata: its low and its high corner.
 fn corners<const D: usize>(bounds: &Bounds<D>) -> Value {
     json!([bounds.low.to_vec(), bounds.high.to_vec()])
 }
 
-/// `descriptor`, or one column per slot: `descriptor_0`, `descriptor_1`.
 fn descriptor_names(per_record: usize) -> impl Iterator<Item = String> {
     (0..per_record).map(move |slot| match per_record {
         1 => "descriptor".into(),
@@ -242,7 +236,6 @@ fn read_axis_planes<const D: usize>(table: &Table<'_>) -> Result<Obfuscation<D>,
     planes.map(Obfuscation::AxisPlanes).map_err(|source| table.refused(source))
 }
 
-/// Vector columns by their prefixes.
 fn read_vectors<const D: usize, const N: usize>(
     table: &Table<'_>,
     prefixes: [&str; N],
@@ -260,14 +253,14 @@ fn read_vectors<const D: usize, const N: usize>(
     Ok(vectors)
 }
 
-/// The descriptor columns, if there is any: bytes from integers, `f32` from floats.
+/// Reads the descriptor columns: integers as bytes, floats as `f32`.
 fn read_descriptors(table: &Table<'_>, per_record: usize) -> Result<Option<Descriptors>, Error> {
     let names: Vec<String> = descriptor_names(per_record).collect();
     if !names.iter().any(|name| table.has(name)) || table.n_rows() == 0 {
         return Ok(None);
     }
     let bytes = table.is(&names[0], Type::Integers);
-    // Either is good for the first column, and the second must be like it.
+    // Either type is accepted; the second column must have the type of the first.
     let class = match bytes {
         true => Type::Integers,
         false if table.is(&names[0], Type::Floats) => Type::Floats,
@@ -294,9 +287,10 @@ fn read_descriptors(table: &Table<'_>, per_record: usize) -> Result<Option<Descr
     descriptors.transpose().map_err(|source| table.refused(source))
 }
 
-/// The values of all lists in `columns`, row by row, and how long each list is; `None` where there is no list.
+/// Reads the values of all lists in `columns`, row by row, and the common length of the lists.
+/// Returns `None` if there are no lists.
 ///
-/// `read` gives the values of a column end to end, and the length of each list. All have the length of the first.
+/// `read` returns the values of a column, concatenated, and the length of each list.
 fn descriptor_rows<T: Copy>(
     table: &Table<'_>,
     columns: &[(&str, Type)],

@@ -1,4 +1,4 @@
-//! A stage file as a folder of parts, for engines that read many files at once.
+//! Splits a stage file into a folder of parts.
 
 use super::header::{Kind, Meta};
 use super::manifest::{MANIFEST, Manifest, Part};
@@ -12,8 +12,11 @@ use arrow_schema::Field;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// A stage file (or folder of parts) on its way to parts of so many rows each, the last one of fewer, and a manifest. Rows keep
-/// their order, columns their types, every part has the metadata of the whole.
+/// A stage file (or folder of parts) that is split into parts and a manifest, for engines that read
+/// many files in parallel.
+///
+/// The order of rows and the types of columns do not change. Every part has the metadata of the
+/// whole.
 #[derive(Debug)]
 pub struct Split<'a> {
     path: &'a Path,
@@ -24,11 +27,11 @@ pub struct Split<'a> {
 }
 
 impl<'a> Split<'a> {
-    /// Opens `path`, for parts of `rows` rows: rounded up to an even number, so that both slots of a line through two points lie
-    /// in one part.
+    /// Opens `path`, to be split into parts of `rows` rows, rounded up to an even number, so that
+    /// both slots of a paired line are in one part.
     ///
     /// # Errors
-    /// When it is no stage file, or its parts are not one.
+    /// When it is not a stage file, or its parts do not match.
     pub fn open(path: &'a Path, rows: u64) -> Result<Self, Error> {
         let kind = Table::open(path)?.kind()?;
         let parts = Parts::open(path)?;
@@ -45,35 +48,36 @@ impl<'a> Split<'a> {
         Ok(Self { path, parts, kind, rows, names })
     }
 
-    /// What the file and its parts hold.
+    /// The kind of the file and its parts.
     pub fn kind(&self) -> Kind {
         self.kind
     }
 
-    /// Rows of all parts.
+    /// The total number of rows.
     pub fn n_rows(&self) -> u64 {
         self.parts.n_rows()
     }
 
-    /// Number of parts; one that is empty if there are no rows.
+    /// The number of parts. A file without rows has one empty part.
     pub fn n_parts(&self) -> usize {
         self.names.len()
     }
 
-    /// Starts parts in the folder `out`.
+    /// Starts the outputs in the folder `out`.
     ///
     /// # Errors
-    /// When it holds parts of something else, or cannot be written.
+    /// When it contains other parts, or cannot be written.
     pub fn outputs(&self, out: &Path, rules: Rules) -> Result<OutputSet, Error> {
         refuse_others(out, &self.names)?;
         let part = (self.names[0].as_str(), atomic::Kind::Stage(self.kind));
         OutputSet::create(out, rules, self.access(), &[part, (MANIFEST, atomic::Kind::Manifest)])
     }
 
-    /// Writes the parts and the manifest. Some thousand rows are in memory, and a row group that is written.
+    /// Writes the parts and the manifest. A few thousand rows and the current row group are in
+    /// memory.
     ///
     /// # Errors
-    /// When rows cannot be read, or parts not be written. Nothing is left behind then.
+    /// When reading or writing fails. No temporary file is left then.
     pub fn write(self, mut outputs: OutputSet) -> Result<(), Error> {
         let access = self.access();
         let Self { path, parts, kind, rows, names } = self;
@@ -115,7 +119,6 @@ impl<'a> Split<'a> {
     }
 }
 
-/// Refuses a folder with parts that would stay beside `names`.
 fn refuse_others(out: &Path, names: &[String]) -> Result<(), Error> {
     if !out.is_dir() {
         return Ok(());

@@ -1,4 +1,5 @@
-//! A table of one kind: from a Parquet file or a folder of its parts, or the rows of one image in it.
+//! A table of one kind: from a Parquet file or a folder of its parts, or the rows of one image in
+//! it.
 
 use super::column::{Batch, Type};
 use super::header::{Kind, Meta};
@@ -10,7 +11,7 @@ use arrow_schema::SchemaRef;
 use std::path::Path;
 use unlift::Unit;
 
-/// A table whose columns are asked for by name.
+/// A table with columns that are read by name.
 #[derive(Debug)]
 pub(super) struct Table<'a> {
     path: &'a Path,
@@ -18,33 +19,30 @@ pub(super) struct Table<'a> {
     meta: Meta<'a>,
 }
 
-/// Where the rows of a table are.
 #[derive(Debug)]
 enum Rows<'a> {
     Stored(Parts<'a>),
-    /// In memory: those of one image, at least one batch.
+    /// The rows of one image. At least one batch.
     Held(Vec<RecordBatch>),
 }
 
 impl<'a> Table<'a> {
-    /// Opens `path`, a file or a folder of parts, and reads its footers.
     pub(super) fn open(path: &'a Path) -> Result<Self, Error> {
         let parts = Parts::open(path)?;
         let meta = Meta::parse(path, parts.meta_text())?;
         Ok(Self { path, rows: Rows::Stored(parts), meta })
     }
 
-    /// The rows of one image, which were read already.
     pub(super) fn held(path: &'a Path, meta: Meta<'a>, held: Vec<RecordBatch>) -> Self {
         Self { path, rows: Rows::Held(held), meta }
     }
 
-    /// Opens `path`, which should hold `kind`.
+    /// Opens `path`, which must be of `kind`.
     pub(super) fn open_kind(path: &'a Path, kind: Kind) -> Result<Self, Error> {
         let table = Self::open(path)?;
         let found = match table.meta.kind()? {
             Some(found) => found,
-            // What could be several kinds is the one that is asked for.
+            // An ambiguous table is taken for the requested kind.
             None => table.kind_by_columns().unwrap_or(kind),
         };
         if found == kind {
@@ -54,13 +52,13 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// What the file holds: by its metadata or, where it does not say, by its columns.
+    /// The kind by the metadata, else by the columns.
     pub(super) fn kind(&self) -> Result<Kind, Error> {
         let kind = self.meta.kind()?.or_else(|| self.kind_by_columns());
         kind.ok_or_else(|| Error::new(self.path, "", "a stage file of unlift", NO_METADATA))
     }
 
-    /// What only one kind has columns for; `None` where it could be several kinds, or none.
+    /// Returns the kind, if only one has such columns.
     fn kind_by_columns(&self) -> Option<Kind> {
         let any = |names: &[&str]| names.iter().any(|name| self.has(name));
         if self.has("point") && self.has("neighbors") {
@@ -78,22 +76,19 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The file, for errors.
     pub(super) fn path(&self) -> &'a Path {
         self.path
     }
 
-    /// The error about values that the core refused.
     pub(super) fn refused(&self, source: unlift::Error) -> Error {
         Error::core(self.path, source)
     }
 
-    /// The metadata object.
     pub(super) fn meta(&self) -> &Meta<'a> {
         &self.meta
     }
 
-    /// 2 or 3, as declared or as the columns have it.
+    /// The dimension by the metadata, else by the columns.
     pub(super) fn dimension(&self) -> Result<usize, Error> {
         if let Some(declared) = self.meta.dimension()? {
             return Ok(declared);
@@ -109,7 +104,6 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Refuses a table of another dimension than `D`.
     pub(super) fn expect_dimension<const D: usize>(&self) -> Result<(), Error> {
         let found = self.dimension()?;
         if found == D {
@@ -122,14 +116,13 @@ impl<'a> Table<'a> {
         Err(Error::new(self.path, "", format!("{D} dimensions"), found))
     }
 
-    /// The unit of every length, as declared or `usual`; in the plane it is pixels.
+    /// The unit of all lengths: as declared, else `usual`, else pixels in 2D.
     pub(super) fn unit<const D: usize>(&self, usual: Option<Unit>) -> Result<Unit, Error> {
         let in_plane = (D == 2).then_some(Unit::Pixel);
         let unit = self.meta.unit()?.or(usual).or(in_plane);
         unit.ok_or_else(|| self.meta.wrong_unit())
     }
 
-    /// Number of rows.
     pub(super) fn n_rows(&self) -> u64 {
         match &self.rows {
             Rows::Stored(parts) => parts.n_rows(),
@@ -137,25 +130,25 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Whether there is a column called `name` with a value in it, as far as can be told without reading it.
+    /// Returns true if there is a column `name` that may have a value, as far as file metadata
+    /// shows.
     pub(super) fn has(&self, name: &str) -> bool {
         let field = self.schema().column_with_name(name);
         let named = field.is_some_and(|(_, field)| !field.data_type().is_null());
         named && (self.n_rows() == 0 || !self.is_all_null(name))
     }
 
-    /// Selects the `columns` that are present with a value.
     pub(super) fn present<'c>(&self, columns: &[(&'c str, Type)]) -> Vec<(&'c str, Type)> {
         columns.iter().copied().filter(|(name, _)| self.has(name)).collect()
     }
 
-    /// Whether the column `name` is there and of type `class`.
     pub(super) fn is(&self, name: &str, class: Type) -> bool {
         let field = self.schema().column_with_name(name);
         field.is_some_and(|(_, field)| class.admits(field.data_type()))
     }
 
-    /// Decodes `columns`, a few thousand rows at a time, and hands them to `each` in row order.
+    /// Decodes `columns`, a few thousand rows at a time, and passes them to `each` in the order of
+    /// rows.
     pub(super) fn read(
         &self,
         columns: &[(&str, Type)],
@@ -185,10 +178,8 @@ impl<'a> Table<'a> {
         Ok(())
     }
 
-    /// Whether the column `name`, of which `n_null` rows were passed over as whole batches of nulls, has no value.
-    ///
-    /// # Errors
-    /// When some rows have one and others do not.
+    /// Returns true if the column `name` has no values. `n_null` is the number of rows in batches
+    /// that are all null. Values in some rows only are an error.
     pub(super) fn is_without(&self, name: &str, n_null: usize) -> Result<bool, Error> {
         if n_null == 0 || n_null as u64 == self.n_rows() {
             return Ok(n_null > 0);
@@ -215,7 +206,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The index of the column `name`, which must be there once and be of type `class`.
+    /// Returns the index of the column `name`, which must exist once and have the type `class`.
     fn find(&self, name: &str, class: Type) -> Result<usize, Error> {
         let wrong = |found: String| {
             Error::new(self.path, format!("column {name}"), class.to_string(), found)

@@ -1,27 +1,23 @@
-//! Thrift's compact form, in which Parquet writes its footer and the headers of its pages.
+//! Parses Thrift's compact protocol, the encoding of Parquet's footer and page headers.
 //!
-//! The `parquet` crate descends as deep, and asks for as much memory, as these declare, and hands out no header of a page.
-//! So they are walked here before it reads them.
+//! The `parquet` crate recurses and allocates as these declare, and gives no access to page
+//! headers.
 
-/// Values in values at most: Parquet itself has seven.
+/// Parquet itself has seven levels.
 const DEEPEST: u32 = 32;
 
-/// Types of values, as they are written. As a field, a truth value is its type alone.
+/// A boolean field is stored in its type alone.
 const BOOLS: [u8; 2] = [1, 2];
 const LIST: u8 = 9;
 const STRUCT: u8 = 12;
 
-/// Why bytes could not be walked.
 #[derive(Debug)]
 pub(super) enum Wrong {
-    /// They end within a value.
     End,
-    /// What was found.
     Content(String),
 }
 
 impl Wrong {
-    /// For an error's `found`.
     pub(super) fn found(self) -> String {
         match self {
             Self::End => "one that is cut off".to_owned(),
@@ -30,15 +26,14 @@ impl Wrong {
     }
 }
 
-/// A field of a struct: its number and its type.
+/// The number and the type of a struct field.
 pub(super) type Field = (i64, u8);
 
-/// Refuses another type than Parquet gives a field or a list: its values would be read as something else.
+/// Values of a wrong type would be misread.
 fn expect(is_right: bool, kind: u8) -> Result<(), Wrong> {
     if is_right { Ok(()) } else { Err(Wrong::Content(format!("a value of type {kind}"))) }
 }
 
-/// Bytes that are walked from the first to the last.
 pub(super) struct Walk<'a> {
     rest: &'a [u8],
 }
@@ -48,7 +43,6 @@ impl<'a> Walk<'a> {
         Self { rest: bytes }
     }
 
-    /// Bytes that were not walked yet.
     pub(super) fn remaining(&self) -> usize {
         self.rest.len()
     }
@@ -82,13 +76,12 @@ impl<'a> Walk<'a> {
         Ok((value >> 1) as i64 ^ -((value & 1) as i64))
     }
 
-    /// The integer in a field of this type.
     pub(super) fn integer(&mut self, kind: u8) -> Result<i64, Wrong> {
         expect((4..=6).contains(&kind), kind)?;
         self.signed()
     }
 
-    /// Begins the list in a field of this type: at most `most` structs, which are called `what`; how many there are.
+    /// Starts a list of at most `most` structs and returns their number. Errors name them `what`.
     pub(super) fn structs(&mut self, kind: u8, most: u64, what: &str) -> Result<u64, Wrong> {
         expect(kind == LIST, kind)?;
         let (kind, n) = self.list()?;
@@ -99,7 +92,7 @@ impl<'a> Walk<'a> {
         Ok(n)
     }
 
-    /// Begins a list; the type of its values, and how many there are: no more than bytes are left.
+    /// Returns the type and the number of values of a list. The remaining bytes limit the number.
     fn list(&mut self) -> Result<(u8, u64), Wrong> {
         let head = self.byte()?;
         let n = match head >> 4 {
@@ -112,7 +105,6 @@ impl<'a> Walk<'a> {
         Ok((head & 15, n))
     }
 
-    /// Walks the struct in a field of this type: see [`fields`](Self::fields).
     pub(super) fn structure(
         &mut self,
         kind: u8,
@@ -122,7 +114,8 @@ impl<'a> Walk<'a> {
         self.fields(each)
     }
 
-    /// Walks a struct: `each` walks the value of a field and returns true, or leaves it to be skipped.
+    /// Parses a struct. `each` parses the value of a field and returns true, or returns false to
+    /// skip it.
     pub(super) fn fields(
         &mut self,
         mut each: impl FnMut(&mut Self, Field) -> Result<bool, Wrong>,
@@ -161,18 +154,18 @@ impl<'a> Walk<'a> {
             return Err(Wrong::Content(format!("values nested more than {DEEPEST} deep")));
         }
         match kind {
-            // A truth value in a list, or a byte.
+            // A boolean in a list, or a byte.
             1..=3 => self.pass(1),
-            // Integers of 16 to 64 bits, which are written alike.
+            // Integers of 16 to 64 bits have the same encoding.
             4..=6 => self.unsigned().map(drop),
             // A double.
             7 => self.pass(8),
-            // Text, or other bytes.
+            // Text or binary.
             8 => {
                 let n = self.unsigned()?;
                 self.pass(n)
             }
-            // A list, or a set.
+            // A list or a set.
             LIST | 10 => {
                 let (kind, n) = self.list()?;
                 (0..n).try_for_each(|_| self.skip(kind, depth + 1))
@@ -223,7 +216,7 @@ mod tests {
         let deep = [0x1c; 5000];
         let Err(Wrong::Content(found)) = skip(&deep) else { panic!("5000 structs in structs") };
         assert_eq!(found, "values nested more than 32 deep");
-        // Lists of lists as well, and counts that nothing follows.
+        // Nested lists, and counts without values.
         assert!(matches!(skip(&[0x19; 180]), Err(Wrong::Content(_))));
         assert!(matches!(skip(&[0x19, 0xf8, 0xff, 0xff, 0xff, 0xff, 7]), Err(Wrong::End)));
         assert!(matches!(skip(&[0x18, 0xff, 0xff, 0xff, 0xff, 7]), Err(Wrong::End)));

@@ -1,4 +1,4 @@
-//! The owner's file: originals, and which slot hides which.
+//! The owner's file: originals, and the slot that hides each of them.
 
 use super::column::{Batch, Type, coordinate_names};
 use super::header::{Kind, insert_fingerprint, new_meta};
@@ -17,11 +17,11 @@ use std::sync::Arc;
 use unlift::truth::{DropReason, Dropped, Original, Secret};
 use unlift::{OriginalId, PointSet};
 
-/// Writes the truth of an obfuscation, one row per original point: first the slots in their order,
-/// then the points that were dropped, with their reason.
+/// Writes the ground truth of an obfuscation, one row per original point: first the slots in order,
+/// then the dropped points with their reasons.
 ///
 /// # Errors
-/// When `secret` is about another number of points, or the file cannot be written.
+/// When `secret` has another number of points, or the file cannot be written.
 pub fn write_truth<const D: usize>(
     path: &Path,
     original: &Original<D>,
@@ -30,10 +30,6 @@ pub fn write_truth<const D: usize>(
     write_table((path, Access::Private), &written(path, original, secret)?)
 }
 
-/// What is written of a truth.
-///
-/// # Errors
-/// When `secret` is about another number of points; `path` is for the message.
 pub(super) fn written<'a, const D: usize>(
     path: &Path,
     original: &'a Original<D>,
@@ -75,24 +71,22 @@ pub(super) fn written<'a, const D: usize>(
     Ok(written)
 }
 
-/// Reads the truth of an obfuscation of dimension `D` (see [`peek`](super::peek)): the owner's side
-/// only.
+/// Reads the ground truth of an obfuscation of dimension `D` (see [`peek`](super::peek)).
 ///
-/// Columns are needed where they mean something: `slot` and `original` where they are not the order of rows,
-/// `dropped` where a point is in no record, `descriptor_row` where records hide two points.
+/// Some columns are optional: `slot` and `original` if they equal the order of rows, `dropped` if
+/// every point is in a record, `descriptor_row` if records have one slot.
 ///
 /// # Errors
-/// When the file is not as `docs/formats.md` describes it.
+/// When the file differs from `docs/formats.md`.
 pub fn read_truth<const D: usize>(path: &Path) -> Result<(Original<D>, Secret), Error> {
     truth_of(&Table::open_kind(path, Kind::Truth)?)
 }
 
-/// The rows of a truth, as they stand.
 #[derive(Default)]
 struct Rows<const D: usize> {
     originals: Vec<u32>,
     positions: Vec<[f64; D]>,
-    /// Of the points that are in a record, in the order of rows.
+    /// The points that are in a record, in the order of rows.
     slots: Vec<u32>,
     hidden: Vec<OriginalId>,
     axes: Vec<u8>,
@@ -100,7 +94,6 @@ struct Rows<const D: usize> {
     dropped: Vec<Dropped>,
 }
 
-/// The truth of a table.
 pub(super) fn truth_of<const D: usize>(table: &Table<'_>) -> Result<(Original<D>, Secret), Error> {
     let path = table.path();
     let core = |source| table.refused(source);
@@ -127,7 +120,7 @@ pub(super) fn truth_of<const D: usize>(table: &Table<'_>) -> Result<(Original<D>
     })?;
     let Rows { originals, positions, slots, hidden, axes, descriptor_rows, dropped } = rows;
     if let Some(&slot) = slots.iter().find(|&&slot| slot as usize >= slots.len()) {
-        let expected = format!("slots below {}, as many have one", slots.len());
+        let expected = format!("slots below {}, the number of slots", slots.len());
         return Err(Error::new(path, "column slot", expected, slot.to_string()));
     }
     let order = permutation(path, "slot", &slots)?;
@@ -143,13 +136,12 @@ pub(super) fn truth_of<const D: usize>(table: &Table<'_>) -> Result<(Original<D>
         n_rows as usize,
     );
     let secret = secret.map_err(core)?;
-    // Files of earlier versions do not say: where descriptor rows are crossed, records hide two points.
+    // Earlier versions did not state the number of slots; crossed descriptor rows imply two.
     let slots = declared.unwrap_or(secret.slots_per_record());
     let secret = secret.of_map(table.meta().fingerprint()?, slots).map_err(core)?;
     Ok((Original::new(points), secret))
 }
 
-/// What one batch says of slots and choices, appended to `to`.
 fn read_rows<const D: usize>(
     table: &Table<'_>,
     batch: &Batch<'_>,

@@ -1,4 +1,4 @@
-//! Columns to a Parquet file: equal values, equal bytes.
+//! Writes columns to a Parquet file.
 
 use super::header::to_text;
 use crate::Error;
@@ -20,41 +20,36 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Rows that are turned into columns at a time.
+/// Rows that are converted at a time.
 const CHUNK_ROWS: usize = 1 << 14;
 
-/// Row groups end after this many rows, so that an engine can give them to many machines.
+/// The maximum number of rows of a row group, so that an engine can distribute groups to machines.
 pub(super) const GROUP_ROWS: usize = 1 << 20;
 
-/// They end earlier at this many bytes: a row group is held in memory until it is whole.
+/// The maximum size of a row group in bytes, because a group is in memory until it is complete.
 const GROUP_BYTES: usize = 256 << 20;
 
-/// What is written of one value: its metadata, and its rows by column.
+/// A table to write. Equal values make equal bytes.
 pub(super) struct Written<'a> {
-    /// To be completed by nobody.
     pub(super) meta: Map<String, Value>,
-    /// Number of rows.
     pub(super) n_rows: usize,
     fields: Vec<Field>,
     columns: Vec<Column<'a>>,
 }
 
-/// Some rows of a column.
+/// A function that returns some rows of a column.
 type Column<'a> = Box<dyn Fn(Range<usize>) -> ArrayRef + 'a>;
 
 impl<'a> Written<'a> {
-    /// No column yet.
     pub(super) fn new(meta: Map<String, Value>, n_rows: usize) -> Self {
         Self { meta, n_rows, fields: Vec::new(), columns: Vec::new() }
     }
 
-    /// Adds a column.
     pub(super) fn column(&mut self, field: Field, rows: impl Fn(Range<usize>) -> ArrayRef + 'a) {
         self.fields.push(field);
         self.columns.push(Box::new(rows));
     }
 
-    /// Adds a column of numbers without nulls, by row.
     pub(super) fn numbers<T: ArrowPrimitiveType>(
         &mut self,
         name: impl Into<String>,
@@ -65,7 +60,6 @@ impl<'a> Written<'a> {
         });
     }
 
-    /// Adds a column of numbers and nulls, by row.
     pub(super) fn optional_numbers<T: ArrowPrimitiveType>(
         &mut self,
         name: impl Into<String>,
@@ -76,9 +70,8 @@ impl<'a> Written<'a> {
         });
     }
 
-    /// Adds a column of lists without nulls.
-    ///
-    /// `lists` gives the values of some rows, end to end, and the length of each list.
+    /// Adds a column of lists. `lists` returns the values of some rows, concatenated, and the
+    /// length of each list.
     pub(super) fn lists<T: ArrowPrimitiveType>(
         &mut self,
         name: impl Into<String>,
@@ -93,18 +86,15 @@ impl<'a> Written<'a> {
         });
     }
 
-    /// The columns.
     pub(super) fn fields(&self) -> &[Field] {
         &self.fields
     }
 
-    /// The columns of some rows, in the order of [`fields`](Self::fields).
     pub(super) fn rows(&self, rows: &Range<usize>) -> Vec<ArrayRef> {
         self.columns.iter().map(|column| column(rows.clone())).collect()
     }
 }
 
-/// Writes one value for those whom `access` names.
 pub(super) fn write_table(to: (&Path, Access), written: &Written<'_>) -> Result<(), Error> {
     let properties = properties(to_text(written.meta.clone()), &written.fields, GROUP_ROWS);
     let schema = Arc::new(Schema::new(written.fields.clone()));
@@ -117,14 +107,14 @@ pub(super) fn write_table(to: (&Path, Access), written: &Written<'_>) -> Result<
     })
 }
 
-/// Writes the rows that `next` gives, until it gives none.
+/// Writes rows from `next` until it returns `None`.
 pub(super) fn write_batches(
     (path, access): (&Path, Access),
     schema: SchemaRef,
     properties: WriterProperties,
     mut next: impl FnMut() -> Result<Option<RecordBatch>, Error>,
 ) -> Result<(), Error> {
-    // What cannot be read is told as that, not as a file that cannot be written.
+    // An error of reading is returned as it is.
     let mut unread = None;
     let done = atomic::write_file(path, access, |file| {
         let mut writer = writer(file, schema, properties).map_err(to_io)?;
@@ -143,7 +133,6 @@ pub(super) fn write_batches(
     unread.map_or(done, Err)
 }
 
-/// Starts a Parquet file.
 pub(super) fn writer<W: io::Write + Send>(
     file: W,
     schema: SchemaRef,
@@ -156,10 +145,9 @@ pub(super) fn writer<W: io::Write + Send>(
     ArrowWriter::try_new_with_options(file, schema, options)
 }
 
-/// How a file with this metadata and these columns is written, in row groups of at most `group_rows` rows.
 pub(super) fn properties(meta: String, fields: &[Field], group_rows: usize) -> WriterProperties {
     let mut properties = WriterProperties::builder()
-        // Not the version of a crate: an upgrade changes no byte by its name.
+        // A new version of the crate must not change bytes.
         .set_created_by("unlift version 1".into())
         .set_compression(Compression::SNAPPY)
         .set_max_row_group_row_count(Some(group_rows))
@@ -170,7 +158,7 @@ pub(super) fn properties(meta: String, fields: &[Field], group_rows: usize) -> W
         .set_key_value_metadata(Some(vec![KeyValue::new(super::header::KEY.into(), meta)]));
     for field in fields {
         let name = field.name().clone();
-        // Parquet has no 8-bit values: bytes and names take a fourth of the room in a dictionary.
+        // Parquet has no 8-bit type. A dictionary reduces bytes and names to a quarter.
         let path = match field.data_type() {
             DataType::UInt8 | DataType::Utf8 => vec![name],
             DataType::List(of) if *of.data_type() == DataType::UInt8 => {
@@ -183,7 +171,7 @@ pub(super) fn properties(meta: String, fields: &[Field], group_rows: usize) -> W
     properties.build()
 }
 
-/// The disk's own error where there is one, so that a full disk is called so.
+/// Extracts the I/O error, so that a full disk is reported as one.
 pub(super) fn to_io(error: ParquetError) -> io::Error {
     match error {
         ParquetError::External(source) => match source.downcast::<io::Error>() {

@@ -1,12 +1,13 @@
-//! Scans as other programs write them, made here: three points, and for formats that know it one without a place.
+//! Creates scans in the formats of other programs: three points, and one without coordinates if the
+//! format allows it.
 
-// Every test program has a copy of this file and uses its own part of it.
+// Every test program uses a part of this file.
 #![allow(dead_code)]
 
-/// The points; in LAS they are thousandths, so that these are exact in none of the formats but are near.
 pub const POINTS: [[f64; 3]; 3] = [[0.5, -1.25, 3.0], [1000.0, 2.0, -0.0625], [0.125, 0.25, 0.375]];
 
-/// LAS of a version `1.minor`: a head, a record before the points, and points of format 0 in `record` bytes.
+/// Creates LAS of version `1.minor`, with a record before the points, and points of format 0 in
+/// `record` bytes.
 pub fn las(minor: u8, record: u16) -> Vec<u8> {
     let head: u16 = if minor == 4 { 375 } else { 227 };
     let mut file = vec![0; usize::from(head)];
@@ -17,7 +18,7 @@ pub fn las(minor: u8, record: u16) -> Vec<u8> {
     put(96, &(u32::from(head) + 60).to_le_bytes());
     put(100, &1u32.to_le_bytes());
     put(105, &record.to_le_bytes());
-    // Version 1.4 has the number in a place of its own, and may leave this one out.
+    // Version 1.4 has another field for the number of points.
     let n = POINTS.len() as u64;
     match minor {
         4 => put(247, &n.to_le_bytes()),
@@ -40,7 +41,8 @@ pub fn las(minor: u8, record: u16) -> Vec<u8> {
     file
 }
 
-/// A LAS file with a record on its coordinate system, before the points or, if `long`, behind them.
+/// Creates a LAS file with a record about its coordinate system, before the points or, if `long`,
+/// after them.
 pub fn las_with(minor: u8, id: u16, record: &[u8], long: bool) -> Vec<u8> {
     let mut file = las(minor, 20);
     let mut head = vec![0; 2];
@@ -61,7 +63,7 @@ pub fn las_with(minor: u8, id: u16, record: &[u8], long: bool) -> Vec<u8> {
     if long {
         file.extend(head);
     } else {
-        // In place of the record that is there.
+        // Replaces the existing record.
         let start = if minor == 4 { 375 } else { 227 };
         file[96..100].copy_from_slice(&(start as u32 + head.len() as u32).to_le_bytes());
         file.splice(start..start + 60, head);
@@ -69,7 +71,7 @@ pub fn las_with(minor: u8, id: u16, record: &[u8], long: bool) -> Vec<u8> {
     file
 }
 
-/// The head of a PCD of `n` points with a color between coordinates.
+/// Creates the header of a PCD of `n` points with a color between coordinates.
 pub fn pcd_head(n: usize, data: &str) -> String {
     format!(
         "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x rgb y z normal\nSIZE 4 4 8 4 2\nTYPE F U F F I\n\
@@ -77,7 +79,6 @@ pub fn pcd_head(n: usize, data: &str) -> String {
     )
 }
 
-/// Bytes of such a point.
 pub const PCD_STRIDE: usize = 4 + 4 + 8 + 4 + 2 * 2;
 
 fn pcd_fields(x: f64, y: f64, z: f64) -> [Vec<u8>; 5] {
@@ -90,7 +91,7 @@ fn pcd_fields(x: f64, y: f64, z: f64) -> [Vec<u8>; 5] {
     ]
 }
 
-/// PCD in the three forms, the second point without a place.
+/// Creates a PCD. The second point has no coordinates.
 pub fn pcd(data: &str) -> Vec<u8> {
     let [a, b, c] = POINTS;
     let points = [a, [f64::NAN; 3], b, c];
@@ -107,7 +108,7 @@ pub fn pcd(data: &str) -> Vec<u8> {
             let by_field: Vec<u8> = (0..5)
                 .flat_map(|field| rows.iter().flat_map(move |row| row[field].clone()))
                 .collect();
-            // Runs that stand there themselves, but for the colors: 12 bytes, from 4 back.
+            // Literal runs, except for the colors: a copy of 12 bytes from distance 4.
             let colors = 4 * rows.len();
             let runs = |bytes: &[u8]| -> Vec<u8> {
                 bytes.chunks(32).flat_map(|run| [&[run.len() as u8 - 1], run].concat()).collect()
@@ -123,8 +124,8 @@ pub fn pcd(data: &str) -> Vec<u8> {
     file
 }
 
-/// E57 with a scan in places and one in angles, turned a quarter about z and moved; the latter has two points, one of which no
-/// beam came back from.
+/// Creates E57 with a scan in Cartesian and one in spherical coordinates. The second is rotated by
+/// 90 degrees about z and shifted, and one of its two points is a beam without a return.
 pub fn e57(path: &std::path::Path) {
     use e57::{
         E57Writer, Quaternion, Record, RecordDataType, RecordName, RecordValue, Transform,
@@ -168,7 +169,7 @@ pub fn e57(path: &std::path::Path) {
         rotation: Quaternion { w: half, x: 0.0, y: 0.0, z: half },
         translation: Translation { x: 1.0, y: 2.0, z: 3.0 },
     }));
-    // The third point, turned back: (x, y) of the scan is (y, -x) of it.
+    // The third point in the frame of its scan, where (x, y) is the point's (y, -x).
     let [x, y, z] = [POINTS[2][1] - 2.0, 1.0 - POINTS[2][0], POINTS[2][2] - 3.0];
     let range = (x * x + y * y + z * z).sqrt();
     for invalid in [0, 2] {
@@ -181,10 +182,10 @@ pub fn e57(path: &std::path::Path) {
     writer.finalize().unwrap();
 }
 
-/// An E57 file with `from` in its XML replaced by `to` of the same length, and the checksums of its pages made anew.
+/// Replaces `from` in the XML of an E57 file by `to` of the same length, and updates the checksums.
 pub fn e57_with(mut file: Vec<u8>, from: &str, to: &str) -> Vec<u8> {
     assert_eq!(from.len(), to.len());
-    // Text that crosses a page has a checksum in it: then it is not found.
+    // Text that crosses a page contains a checksum and is not found.
     let found: Vec<usize> = (0..file.len() - from.len())
         .filter(|&at| file[at..].starts_with(from.as_bytes()))
         .collect();
@@ -195,7 +196,7 @@ pub fn e57_with(mut file: Vec<u8>, from: &str, to: &str) -> Vec<u8> {
     sealed(file)
 }
 
-/// The same file with right checksums: CRC-32C of each page of 1024 bytes, in its last four.
+/// Updates the checksums: CRC-32C of each page of 1024 bytes, in its last four bytes.
 pub fn sealed(mut file: Vec<u8>) -> Vec<u8> {
     for page in file.chunks_exact_mut(1024) {
         let (data, sum) = page.split_at_mut(1020);

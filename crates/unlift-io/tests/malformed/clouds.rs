@@ -1,8 +1,8 @@
-//! Point clouds and paths.
+//! Malformed point clouds and paths.
 
 use super::{Row, alone, appended, fixture, patched, row};
 
-#[rustfmt::skip] // A row is read as a row.
+#[rustfmt::skip] // One row per line.
 pub fn ply() -> Vec<Row> {
     const XYZ: &str = "property float x\nproperty float y\nproperty float z\n";
     let file = |format: &str, elements: &str, body: &[u8]| {
@@ -68,7 +68,7 @@ pub fn ply() -> Vec<Row> {
     ]
 }
 
-#[rustfmt::skip] // A row is read as a row.
+#[rustfmt::skip] // One row per line.
 pub fn tables() -> Vec<Row> {
     let csv = |what, text: &str, line| alone(what, "a.csv", text, line);
     vec![
@@ -92,7 +92,7 @@ pub fn tables() -> Vec<Row> {
     ]
 }
 
-#[rustfmt::skip] // A row is read as a row.
+#[rustfmt::skip] // One row per line.
 pub fn arrays() -> Vec<Row> {
     let npy = |what, bytes: Vec<u8>, line| alone(what, "a.npy", bytes, line);
     let good = fixture("f8.npy");
@@ -140,7 +140,7 @@ pub fn arrays() -> Vec<Row> {
     ]
 }
 
-#[rustfmt::skip] // A row is read as a row.
+#[rustfmt::skip] // One row per line.
 pub fn paths() -> Vec<Row> {
     vec![
         row("missing", vec![], "nothing.ply", "nothing.ply: expected a file or folder, found nothing"),
@@ -150,7 +150,7 @@ pub fn paths() -> Vec<Row> {
         row("folder with a file's name", vec![("a.ply/", vec![])], "a.ply",
             "a.ply: expected points3D.bin or points3D.txt in it, or in sparse, model, models, colmap/sparse or a numbered folder of these, found none"),
         alone("unknown extension", "a.laz", "LASF",
-            "a.laz: expected a COLMAP folder, a map of OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .asc, .pts, .npy, .npz, .las, .pcd, .e57 or .splat file, found a .laz file (pdal translate IN.laz OUT.las makes one that is read)"),
+            "a.laz: expected a COLMAP folder, a map of OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .asc, .pts, .npy, .npz, .las, .pcd, .e57 or .splat file, found a .laz file (convert it: pdal translate IN.laz OUT.las)"),
         alone("no extension", "cloud", "1 2 3",
             "cloud: expected a COLMAP folder, a map of OpenSfM, OpenMVG, Meshroom, nerfstudio, Bundler or NVM, or a .ply, .csv, .xyz, .txt, .asc, .pts, .npy, .npz, .las, .pcd, .e57 or .splat file, found a file without extension"),
         alone("images given by themselves", "images.bin", "",

@@ -1,20 +1,18 @@
-//! COLMAP models: every record cut, every count and number falsified.
+//! Malformed COLMAP models: every record truncated, every count and number falsified.
 
 use super::{MANY, Row, alone, appended, fixture, patched, row};
 
-/// The classic model, whose files the rows cut and change.
+/// The model without rigs and frames.
 pub const MODEL: &str = "project/sparse/0";
 
 fn model_file(name: &str) -> Vec<u8> {
     fixture(&format!("{MODEL}/{name}"))
 }
 
-/// The first `n` bytes of a file of the model.
 fn cut(name: &str, n: usize) -> Vec<u8> {
     model_file(name)[..n].to_vec()
 }
 
-/// The classic model with one file replaced.
 fn in_model(what: &'static str, name: &'static str, bytes: Vec<u8>, line: &'static str) -> Row {
     let mut files: Vec<_> = ["cameras.bin", "images.bin", "points3D.bin"]
         .into_iter()
@@ -24,7 +22,7 @@ fn in_model(what: &'static str, name: &'static str, bytes: Vec<u8>, line: &'stat
     row(what, files, "", line)
 }
 
-/// Offsets in the classic model: a count of 8 bytes, then records.
+/// Offsets in the files of the model: a count of 8 bytes, then records.
 mod at {
     /// In `points3D.bin`: id, coordinates, color, error, number of observations, observations.
     pub const POINT: usize = 8;
@@ -48,7 +46,7 @@ mod at {
     pub const PARAMS: usize = HEIGHT + 8;
 }
 
-#[rustfmt::skip] // A row is read as a row.
+#[rustfmt::skip] // One row per line.
 pub fn binary() -> Vec<Row> {
     let points = || model_file("points3D.bin");
     let images = || model_file("images.bin");
@@ -103,9 +101,9 @@ pub fn binary() -> Vec<Row> {
         .collect()
 }
 
-/// The last record of each file cut inside every field. (Cut in an earlier one, a file is refused by
-/// its count or by the next record, which the sweeps below cover.)
-#[rustfmt::skip] // A row is read as a row.
+/// The last record of each file, cut inside every field. Cuts in earlier records are errors of the
+/// count or of the next record.
+#[rustfmt::skip] // One row per line.
 pub fn last_record_cuts() -> Vec<Row> {
     let files = [
         model_file("points3D.bin"),
@@ -159,7 +157,7 @@ pub fn last_record_cuts() -> Vec<Row> {
         .collect()
 }
 
-#[rustfmt::skip] // A row is read as a row.
+#[rustfmt::skip] // One row per line.
 pub fn text() -> Vec<Row> {
     let points = |what, text: &str, line| alone(what, "points3D.txt", text, line);
     let model = |what, name, text: &str, line| {
@@ -199,8 +197,8 @@ pub fn text() -> Vec<Row> {
     ]
 }
 
-/// What is told of cameras: nobody needs them for points.
-#[rustfmt::skip] // A row is read as a row.
+/// Errors in cameras are notes, because points do not need cameras.
+#[rustfmt::skip] // One row per line.
 pub fn cameras() -> Vec<Row> {
     let cameras = || model_file("cameras.bin");
     let camera_rows = [

@@ -1,4 +1,4 @@
-//! Files of descriptors: the binary form and databases.
+//! Malformed files of descriptors.
 
 use std::fs;
 
@@ -7,20 +7,20 @@ use unlift_io::read;
 
 use super::{MANY, appended, fixture, fixtures, patched, shown};
 
-/// What is wrong with a file of descriptors: its bytes, or a statement run on the database.
+/// The bytes of a file, or a statement that is run on the database.
 enum Wrong {
     Bytes(Vec<u8>),
     Sql(&'static str),
 }
 
-/// Descriptors of the six points of the project, of a type of floats, whose values are all `value`.
+/// Descriptors of the six points of the project, of a float type, whose values are all `value`.
 fn floats(dtype: u8, value: &[u8]) -> Vec<u8> {
     let good = fixture("project/descriptors.bin");
     let header = patched(good[..24 + 6 * 8].to_vec(), 20, &[dtype]);
     appended(header, &value.repeat(6 * 128))
 }
 
-/// An array whose header ends at byte 128.
+/// Creates an array whose header ends at byte 128.
 fn array(descr: &str, shape: &str, values: &[u8]) -> Vec<u8> {
     let text = format!("{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}}}");
     let head = appended(b"\x93NUMPY\x01\0\x76\0".to_vec(), format!("{text:118}").as_bytes());
@@ -28,7 +28,7 @@ fn array(descr: &str, shape: &str, values: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-#[rustfmt::skip] // A row is read as a row.
+#[rustfmt::skip] // One row per line.
 fn every_malformed_file_of_descriptors_is_refused_with_its_line() {
     let good = fixture("project/descriptors.bin");
     let input = read::open(&fixtures().join("project")).unwrap();
@@ -157,7 +157,7 @@ fn descriptors_need_a_database_or_a_model_that_fit() {
     );
 }
 
-/// No rows of any length fill no bytes: the dimension alone must not ask for memory, here 17 TB.
+/// Without rows, any dimension matches the file size. It must not allocate memory, here 17 TB.
 #[test]
 fn a_dimension_without_rows_takes_no_memory() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,4 +1,5 @@
-//! Malformed files: the exact line each is refused with, and no panic for any cut or changed byte.
+//! Tests of malformed files: the exact error line of each, and no panic for any cut or changed
+//! byte.
 
 mod clouds;
 mod colmap;
@@ -19,7 +20,6 @@ fn fixture(name: &str) -> Vec<u8> {
     fs::read(fixtures().join(name)).unwrap()
 }
 
-/// A file with other bytes at `at`.
 fn patched(mut file: Vec<u8>, at: usize, bytes: &[u8]) -> Vec<u8> {
     file[at..at + bytes.len()].copy_from_slice(bytes);
     file
@@ -30,10 +30,11 @@ fn appended(mut file: Vec<u8>, bytes: &[u8]) -> Vec<u8> {
     file
 }
 
-/// A count that no file holds.
+/// A count that exceeds any file.
 const MANY: [u8; 8] = 1_000_000_000_000_000_000_u64.to_le_bytes();
 
-/// One way to be wrong: files (or, ending in `/`, a folder), which of them is opened, and the line.
+/// A malformed input: its files (or, ending in `/`, a folder), the path to open, and the error
+/// line.
 struct Row {
     what: &'static str,
     files: Vec<(&'static str, Vec<u8>)>,
@@ -50,7 +51,6 @@ fn row(
     Row { what, files, open, line }
 }
 
-/// A single file of any kind.
 fn alone(
     what: &'static str,
     name: &'static str,
@@ -60,7 +60,6 @@ fn alone(
     row(what, vec![(name, bytes.as_ref().to_vec())], name, line)
 }
 
-/// Makes the files of a row in `dir`; the path to open.
 fn make(dir: &Path, row: &Row) -> PathBuf {
     for (name, bytes) in &row.files {
         let path = dir.join(name);
@@ -74,7 +73,6 @@ fn make(dir: &Path, row: &Row) -> PathBuf {
     if row.open.is_empty() { dir.to_owned() } else { dir.join(row.open) }
 }
 
-/// The error without the temporary folder.
 fn shown(dir: &Path, error: &unlift_io::Error) -> String {
     let dir = dir.to_str().unwrap();
     let line = error.to_string();
@@ -131,7 +129,7 @@ fn a_file_that_may_not_be_read_is_refused() {
     );
 }
 
-/// A pipe that nobody writes to, and a device that never ends: refused before they are opened.
+/// They must be an error before they are opened.
 #[cfg(unix)]
 #[test]
 fn what_is_no_regular_file_is_refused() {
@@ -176,7 +174,6 @@ fn what_is_no_regular_file_is_refused() {
     assert_eq!(shown(dir.path(), &unlift_io::stage::peek(&pipe).unwrap_err()), line);
 }
 
-/// A file of one line: refused after 16 MiB of it, not after all of it.
 #[test]
 fn a_line_without_end_is_refused() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Clouds of scanners.
+//! Malformed scans.
 
 #[path = "../made/mod.rs"]
 mod made;
@@ -9,7 +9,6 @@ pub use made::sealed;
 
 use super::{MANY, Row, alone, patched};
 
-/// An E57 file.
 pub fn e57_file() -> Vec<u8> {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.e57");
@@ -17,7 +16,7 @@ pub fn e57_file() -> Vec<u8> {
     std::fs::read(&path).unwrap()
 }
 
-/// E57 of points in steps of a half, which may only be 7: a bit each, or none.
+/// E57 of points in steps of a half whose value is 7 to `most`: a bit per coordinate, or none.
 fn of_steps(most: i64) -> Vec<u8> {
     use e57::{E57Writer, Record, RecordDataType, RecordName, RecordValue};
     let dir = tempfile::tempdir().unwrap();
@@ -35,7 +34,6 @@ fn of_steps(most: i64) -> Vec<u8> {
     made::e57_with(file, "maximum=\"8\"", &format!("maximum=\"{most}\""))
 }
 
-/// Writes every kind of scan into `folder`; their names.
 pub fn write_all(folder: &Path) -> [&'static str; 5] {
     let put = |name: &str, bytes: Vec<u8>| std::fs::write(folder.join(name), bytes).unwrap();
     put("a.las", made::las(2, 20));
@@ -46,23 +44,23 @@ pub fn write_all(folder: &Path) -> [&'static str; 5] {
     ["a.las", "ascii.pcd", "binary.pcd", "compressed.pcd", "a.e57"]
 }
 
-#[rustfmt::skip] // A row is read as a row.
+#[rustfmt::skip] // One row per line.
 pub fn las() -> Vec<Row> {
     let file = || made::las(2, 20);
     let las = |what, bytes: Vec<u8>, line| alone(what, "a.las", bytes, line);
     vec![
-        las("empty", vec![], "a.las: header (byte 0): expected 179 bytes of the head, found end of file"),
+        las("empty", vec![], "a.las: header (byte 0): expected 179 bytes of the header, found end of file"),
         las("another file", vec![b'x'; 200],
             "a.las: header (byte 0): expected \"LASF\", as every LAS file begins, found \"xxxx\""),
         las("version 2", patched(file(), 24, &[2]), "a.las: header (byte 0): expected LAS 1.0 to 1.4, found 2.2"),
         las("compressed", patched(file(), 104, &[0x80]),
-            "a.las: header (byte 0): expected points as they are, found compressed points, LAZ (pdal translate IN.laz OUT.las makes one that is read)"),
+            "a.las: header (byte 0): expected uncompressed points, found compressed points, LAZ (convert it: pdal translate IN.laz OUT.las)"),
         las("format 11", patched(file(), 104, &[11]),
             "a.las: header (byte 0): expected a point format from 0 to 10, found 11"),
         las("points too small for their format", patched(file(), 104, &[3]),
             "a.las: header (byte 0): expected points of at least 34 bytes, as format 3 has them, found 20"),
         las("points in the head", patched(file(), 96, &[0; 4]),
-            "a.las: header (byte 0): expected points behind the head of 179 bytes, found at byte 0"),
+            "a.las: header (byte 0): expected points after the header of 179 bytes, found at byte 0"),
         las("count of 10^9", patched(file(), 107, &1_000_000_000u32.to_le_bytes()),
             "a.las: header (byte 287): expected 1000000000 points, 20 bytes each, found 60 bytes"),
         las("count of 10^18", patched(made::las(4, 20), 247, &MANY),
@@ -72,7 +70,7 @@ pub fn las() -> Vec<Row> {
     ]
 }
 
-#[rustfmt::skip] // A row is read as a row.
+#[rustfmt::skip] // One row per line.
 pub fn pcd() -> Vec<Row> {
     let head = |from: &str, to: &str, data: &str| made::pcd_head(2, data).replace(from, to);
     let pcd = |what, text: String, line| alone(what, "a.pcd", text, line);
@@ -99,7 +97,7 @@ pub fn pcd() -> Vec<Row> {
         pcd("no count", head("POINTS 2\n", "", "ascii").replace("WIDTH 2\n", ""),
             "a.pcd: header: expected POINTS, or WIDTH and HEIGHT, found neither"),
         pcd("points of 2^66 bytes", head("COUNT 1 1 1 1 2", "COUNT 1 9223372036854775807 9223372036854775807 1 1", "binary"),
-            "a.pcd: header: expected points of a size that fits, found more"),
+            "a.pcd: header: expected points of less than 2^64 bytes, found more"),
         pcd("ascii: count of 10^18", head("POINTS 2", "POINTS 1000000000000000000", "ascii"),
             "a.pcd: header: expected at most 0 points (by the size of the file), found 1000000000000000000"),
         pcd("ascii: too few", head("", "", "ascii") + "0.00 1 0.00 0.00 1 2\n# and that is all of it\n",
@@ -120,11 +118,11 @@ pub fn pcd() -> Vec<Row> {
         alone("compressed: another size", "a.pcd", packed(size - 1, &[0, 0]),
             "a.pcd: header (byte 202): expected 2 points, 24 bytes each, found 47 bytes"),
         alone("compressed: damaged", "a.pcd", packed(size, &[0, 0]),
-            "a.pcd: header (byte 206): expected 48 bytes when unpacked, found others, or damaged ones"),
+            "a.pcd: header (byte 206): expected 48 bytes after decompression, found another size, or damaged data"),
     ]
 }
 
-#[rustfmt::skip] // A row is read as a row.
+#[rustfmt::skip] // One row per line.
 pub fn e57() -> Vec<Row> {
     let e57 = |what, bytes: Vec<u8>, line| alone(what, "a.e57", bytes, line);
     let file = e57_file;

@@ -1,4 +1,5 @@
-//! Every file of the fixtures, cut at every length and with every byte changed: no panic, one line.
+//! Every file of the fixtures, cut at every length and with every byte changed: no panic, and
+//! errors of one line.
 
 use std::fs::{self, File};
 use std::io::{Seek, SeekFrom, Write};
@@ -9,7 +10,7 @@ use unlift_io::read;
 use super::colmap::MODEL;
 use super::{fixture, fixtures, patched, scans, shown};
 
-/// Opens what lies at `path`; an error must be one line that begins with a path in `dir`.
+/// Returns true on success. An error must be one line that begins with a path in `dir`.
 fn opens_or_one_line(dir: &Path, path: &Path) -> bool {
     match read::open(path) {
         Ok(_) => true,
@@ -21,7 +22,8 @@ fn opens_or_one_line(dir: &Path, path: &Path) -> bool {
     }
 }
 
-/// Calls `check` with a copy of a fixture: its folder, what to open, the file `name` and its bytes.
+/// Calls `check` with a copy of a fixture: its folder, the path to open, the file `name` and its
+/// bytes.
 fn sweep(folder: &str, name: &str, mut check: impl FnMut(&Path, &Path, &Path, &[u8])) {
     let dir = tempfile::tempdir().unwrap();
     let is_model = !folder.is_empty();
@@ -41,7 +43,6 @@ fn sweep(folder: &str, name: &str, mut check: impl FnMut(&Path, &Path, &Path, &[
     check(dir.path(), opened, &path, &original);
 }
 
-/// Every file that can be opened.
 const FIXTURES: [(&str, &str); 17] = [
     (MODEL, "cameras.bin"),
     (MODEL, "images.bin"),
@@ -62,7 +63,7 @@ const FIXTURES: [(&str, &str); 17] = [
     ("", "f4-big-endian.npy"),
 ];
 
-/// A file that is cut and changed in place: rewriting it each time would wait for the disk.
+/// Rewriting a file for each change is slow.
 struct InPlace(File);
 
 impl InPlace {
@@ -84,7 +85,8 @@ impl InPlace {
 fn files_cut_at_any_length_open_or_are_refused() {
     for (folder, name) in FIXTURES {
         sweep(folder, name, |dir, opened, path, original| {
-            // A text may end after any line; cameras, rigs and frames are not needed. The others have counts.
+            // Text may end after any line, and cameras, rigs and frames are optional. Other files
+            // have counts.
             let is_needed = !["cameras.bin", "rigs.bin", "frames.bin"].contains(&name);
             let needs_all = is_needed && !name.ends_with(".txt");
             let file = InPlace::open(path);
@@ -116,7 +118,7 @@ fn files_with_any_byte_changed_open_or_are_refused() {
 #[test]
 fn descriptors_cut_at_any_length_or_with_any_byte_changed_are_read_or_refused() {
     let input = read::open(&fixtures().join("project")).unwrap();
-    // Databases in steps: SQLite has tests of its own.
+    // In steps, because SQLite has its own tests.
     for (name, step) in [("descriptors.bin", 1), ("database.db", 37), ("floats.db", 37)] {
         sweep("project", name, |_, _, path, original| {
             let mut file = InPlace::open(path);
@@ -150,9 +152,9 @@ fn scans_cut_at_any_length_or_with_any_byte_changed_open_or_are_refused() {
             }
             file.change(at, byte);
         }
-        // Whoever damages a file on purpose makes its checksums right.
+        // An attacker updates the checksums.
         for at in (0..original.len()).filter(|_| name.ends_with(".e57")) {
-            // A digit: most of what is declared is XML.
+            // A digit, because most declarations are in XML.
             let damaged = patched(original.clone(), at, b"9");
             fs::write(&path, scans::sealed(damaged)).unwrap();
             opens_or_one_line(dir.path(), &path);
@@ -162,7 +164,7 @@ fn scans_cut_at_any_length_or_with_any_byte_changed_open_or_are_refused() {
         assert!(opens_or_one_line(dir.path(), &path), "{name}: it is as it was");
         for n in (0..original.len()).rev() {
             file.cut(n);
-            // The last line of a text may lack its end.
+            // The last line of a text may lack its line end.
             let opens = opens_or_one_line(dir.path(), &path);
             assert!(
                 !opens || (name == "ascii.pcd" && n + 2 >= original.len()),

@@ -1,4 +1,4 @@
-//! Point clouds: PLY, tables and arrays, the same in every form.
+//! Tests point clouds: PLY, tables and arrays give the same points in every form.
 
 use unlift_io::read;
 
@@ -75,7 +75,7 @@ fn ply_written_by_pycolmap_holds_the_model() {
     let cloud = read::open(&data("cloud.ply")).unwrap();
     let model = read::open(&data("rig-bin")).unwrap();
     assert_eq!(cloud.positions.len(), 8);
-    // In `float`: 16 times the rounding of the largest coordinate, 15.
+    // In `float`: 16 times the rounding error of the largest coordinate, 15.
     close(total(&cloud.positions), total(&model.positions), 1e-5);
 }
 

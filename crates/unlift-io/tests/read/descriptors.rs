@@ -1,4 +1,4 @@
-//! Descriptors of an input's points: binary files, arrays and databases.
+//! Tests descriptors of an input's points.
 
 use std::fs;
 
@@ -33,12 +33,11 @@ fn descriptors_follow_the_ids_of_the_input() {
     }
 }
 
-/// The descriptor of keypoint `at` of the image `id`.
 fn row(id: u32, at: u32) -> [f32; 3] {
     [id as f32, at as f32 - 2.0, 1.0]
 }
 
-/// Features as hloc writes them of the images of the project; that called `odd` has a keypoint too many.
+/// Writes hloc's features of the images of the project. The image `odd` has an extra keypoint.
 fn features(path: &std::path::Path, odd: &str) {
     let images = colmap::read_images(&data("project/sparse/0/images.bin")).unwrap();
     let mut writer = FeatureWriter::create(path).unwrap();
@@ -82,14 +81,13 @@ fn features_of_hloc_are_descriptors_of_the_points_that_they_made() {
     assert!(line.ends_with(told), "{line}");
 }
 
-/// The descriptors of the project as floats: of norm 1, so that halves hold them too.
+/// The descriptors of the project as floats of norm 1, exact in half floats.
 fn unit_floats(input: &Input) -> Vec<f32> {
     let bytes = read::descriptors(&data("project/descriptors.bin"), input).unwrap();
     let Values::U8(bytes) = bytes.values() else { panic!("bytes expected") };
     bytes.iter().map(|&byte| f32::from(byte) / 512.0).collect()
 }
 
-/// The head of a file of the form `P3DESC01` for points `ids` in this order.
 fn p3desc(ids: &[u64], dtype: u32) -> Vec<u8> {
     let mut file = b"P3DESC01".to_vec();
     file.extend((ids.len() as u64).to_le_bytes());
@@ -104,7 +102,7 @@ fn binary_descriptors_may_be_floats_of_16_or_32_bits() {
     let input = read::open(&data("project")).unwrap();
     let floats = unit_floats(&input);
     for dtype in [2, 3] {
-        // One point more than the map has, and rows in another order: ids join.
+        // An extra point, and another order of rows: points are joined by id.
         let mut file = p3desc(&[1000, 11, 9, 6, 4, 3, 2], dtype);
         let rows = std::iter::once(&[0.5; 128][..]).chain(floats.chunks(128).rev());
         for value in rows.flatten() {
@@ -170,7 +168,7 @@ fn float_descriptors_keep_their_type_and_get_norm_1() {
 #[test]
 fn a_database_without_types_is_read_as_bytes() {
     let dir = tempfile::tempdir().unwrap();
-    // A name that a URI would misread.
+    // A URI would misread this name.
     let path = dir.path().join("a?b#c%20 d.db");
     fs::copy(data("project/database.db"), &path).unwrap();
     let database = rusqlite::Connection::open(&path).unwrap();
@@ -199,7 +197,7 @@ fn a_database_in_write_ahead_mode_is_read_whole() {
     assert!(error.contains("no such image"), "the journal counts: {error}");
 }
 
-/// The writer was killed within a transaction: the file holds rows that never were, and the journal beside it those to put back.
+/// The file contains uncommitted rows, and the journal beside it the rows to restore.
 #[test]
 fn a_database_with_a_transaction_that_was_not_done_is_refused() {
     let dir = tempfile::tempdir().unwrap();
@@ -212,7 +210,7 @@ fn a_database_with_a_transaction_that_was_not_done_is_refused() {
     for _ in 0..20 {
         writer.execute_batch("INSERT INTO pad VALUES(zeroblob(4000))").unwrap();
     }
-    // As they are at this moment.
+    // Copies during the transaction.
     let killed = dir.path().join("killed.db");
     fs::copy(&path, &killed).unwrap();
     fs::copy(dir.path().join("database.db-journal"), dir.path().join("killed.db-journal")).unwrap();

@@ -1,4 +1,5 @@
-//! How people's files deviate from what formats say: read as meant, or refused with what they are.
+//! Tests files that deviate from their format in common ways: they are read as intended, or the
+//! error explains what they are.
 
 use std::fs;
 use std::path::Path;
@@ -21,7 +22,6 @@ fn refused(name: &str, contents: impl AsRef<[u8]>) -> String {
     line.replace(&format!("{}/", dir.path().display()), "")
 }
 
-/// Rows of three numbers and what `more` adds around each.
 fn table(head: &str, row: impl Fn(usize, [f64; 3]) -> String) -> String {
     let rows = POINTS.iter().enumerate().map(|(at, &point)| row(at, point) + "\n");
     head.to_owned() + &rows.collect::<String>()
@@ -44,10 +44,10 @@ fn comments_name_the_columns_of_a_table() {
         let input = open("a.asc", table(head, plain));
         assert_eq!((&input.positions[..], input.doubts.len()), (&POINTS[..], 0), "{head}");
     }
-    // As many words as columns, and nobody knows of what: read, but no gate holds.
+    // The comment has as many words as columns but no known names: read with a doubt.
     let input = open("a.xyz", table("# my first room\n", plain));
     assert!(
-        input.doubts[0].starts_with("columns: the first three are taken"),
+        input.doubts[0].starts_with("columns: the first three are read as"),
         "{:?}",
         input.doubts
     );
@@ -74,7 +74,7 @@ fn a_count_before_points_is_that() {
     let line = refused("a.pts", table("4\n", row));
     assert_eq!(
         line,
-        "a.pts:4: expected 4 points, as the line before them says, found 3 up to here"
+        "a.pts:4: expected 4 points, as declared in the line before them, found 3 up to here"
     );
 }
 
@@ -98,7 +98,7 @@ fn rows_that_are_no_points_are_refused() {
     }
     let numbered: String = (1..=20).map(|at| format!("{at} 0.5 {at} 3\n")).collect();
     let line = refused("a.xyz", numbered);
-    assert!(line.ends_with("found the number of the row before them"), "{line}");
+    assert!(line.ends_with("found the row number in the first column"), "{line}");
 }
 
 #[test]
@@ -133,7 +133,7 @@ fn points_without_a_place_are_left_out_and_counted() {
         assert_eq!(input.notes, ["1 of 40 points have no place"]);
         assert!(input.doubts.is_empty());
     }
-    // More than one in twenty: of what map the figures are nobody knows.
+    // More than 5 % of the points are a doubt.
     let text =
         table("", |at, [x, y, z]| if at == 0 { "nan 1 2".into() } else { format!("{x} {y} {z}") });
     let input = open("a.xyz", text);
@@ -277,7 +277,6 @@ fn pcd_is_spelled_in_many_ways() {
     }
 }
 
-/// An array of NumPy.
 fn npy(descr: &str, shape: &str, values: &[u8]) -> Vec<u8> {
     let text = format!("{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}\n");
     let head = [b"\x93NUMPY\x01\0".as_slice(), &(text.len() as u16).to_le_bytes(), text.as_bytes()];
@@ -297,7 +296,7 @@ fn arrays_may_have_more_columns_or_names() {
     let six = bytes(POINTS.iter().flat_map(|&[x, y, z]| [x, y, z, 1.0, 2.0, 3.0]), f4);
     let input = open("a.npy", npy("'<f4'", "(3, 6)", &six));
     assert_eq!(input.positions, POINTS);
-    assert_eq!(input.notes, ["the first 3 of 6 columns are taken for x, y and z"]);
+    assert_eq!(input.notes, ["the first 3 of 6 columns are read as x, y and z"]);
     let halves = bytes([0.5, 1.0, 2.0], |x| f16::from_f64(x).to_le_bytes());
     assert_eq!(open("a.npy", npy("'<f2'", "(1, 3)", &halves)).positions, [[0.5, 1.0, 2.0]]);
     let whole = bytes([-5.0, 1e6, 2.0], |x| (x as i64).to_le_bytes());
@@ -321,10 +320,7 @@ fn arrays_may_have_more_columns_or_names() {
         POINTS.iter().flat_map(|point| [vec![1, 0, 0, 0], bytes(*point, f4)].concat()).collect();
     assert_eq!(open("a.npy", npy(descr, "(3,)", &rows)).positions, POINTS);
     let numbered = bytes((0..10).flat_map(|row| [f64::from(row), 5.0, 6.0, 7.0]), f4);
-    assert!(
-        refused("a.npy", npy("'<f4'", "(10, 4)", &numbered))
-            .ends_with("found the number of the row")
-    );
+    assert!(refused("a.npy", npy("'<f4'", "(10, 4)", &numbered)).ends_with("found the row number"));
     assert!(
         refused("a.npy", npy("[('a', '<f4')]", "(1,)", &[0; 4]))
             .contains("fields of numbers called x, y and z")
@@ -335,7 +331,6 @@ fn arrays_may_have_more_columns_or_names() {
     );
 }
 
-/// NumPy's archive of these arrays, every second one compressed.
 fn archive(arrays: &[(&str, Vec<u8>)]) -> Vec<u8> {
     use std::io::Write;
     use zip::write::{SimpleFileOptions, ZipWriter};
@@ -378,7 +373,7 @@ fn cameras_are_not_needed_for_points() {
             "SPHERICAL",
             "expected a camera model of COLMAP for camera",
         ),
-        // A pose that is no number, and one of zeros.
+        // A pose with NaN, and one of zeros.
         ("images.txt", "\n3 0.2448454332437206 ", "\n3 nan ", "1 of 20 cameras have no place"),
         (
             "images.txt",
@@ -417,7 +412,7 @@ fn models_of_undistorted_images_are_found_where_there_is_no_other() {
     }
 }
 
-/// OpenSfM's features: place, size and angle of keypoints beside their descriptors.
+/// OpenSfM stores position, size and angle of keypoints beside their descriptors.
 #[test]
 fn an_archive_of_features_is_no_map() {
     let array = |shape: [usize; 2]| {
@@ -441,11 +436,11 @@ fn points3d_of_others_are_a_table() {
         });
         assert_eq!(open("points3D.txt", text.join("\n")).positions, POINTS);
     }
-    // A row of COLMAP's that is damaged is not read as a point.
+    // A damaged row of COLMAP must not be read as a point.
     assert!(refused("points3D.txt", "1 0.5 0.5 0.5\n").contains("points3D.txt:1: expected"));
 }
 
-/// Python's writer of JSON knows numbers that JSON does not.
+/// Python writes NaN and Infinity, which JSON does not allow.
 #[test]
 fn json_with_numbers_that_are_none_has_points_left_out() {
     let point = |x: &str| format!(r#"{{"coordinates": [{x}, 2.0, 3.0]}}"#);
@@ -464,7 +459,7 @@ fn json_of_others_is_told() {
     let spaced = r#"{"views": [], "poses": [], "structure": [{"X": [" 0.5", "-1.25", " 3"]}]}"#;
     assert_eq!(open("scene.sfm", spaced).positions, [POINTS[0]]);
     let line = refused("a.sfm", r#"{"version": [], "views": [{}], "intrinsics": []}"#);
-    assert!(line.contains("ConvertSfMFormat") && line.ends_with("found cameras alone"), "{line}");
+    assert!(line.contains("ConvertSfMFormat") && line.ends_with("found only cameras"), "{line}");
     for other in [r#"{"points": [[1, 2, 3]]}"#, r#"{"frames": [{}]}"#] {
         let line = refused("a.json", other);
         assert!(line.contains("a map of OpenSfM, OpenMVG, Meshroom or nerfstudio"), "{line}");
@@ -477,14 +472,11 @@ fn a_file_that_was_not_fetched_is_told() {
     let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 179\n";
     for name in ["a.ply", "a.las", "a.pts"] {
         let line = refused(name, pointer);
-        assert!(
-            line.ends_with("found a pointer of Git LFS (git lfs pull fetches the file)"),
-            "{line}"
-        );
+        assert!(line.ends_with("found a pointer of Git LFS (run git lfs pull)"), "{line}");
     }
 }
 
-/// PCL's writer of binary files left zeros behind the points.
+/// PCL's writer of binary files left zeros after the points.
 #[test]
 fn zeros_behind_the_points_of_a_pcd_are_no_points() {
     let head = "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 3\nHEIGHT 1\nPOINTS 3\nDATA binary\n";

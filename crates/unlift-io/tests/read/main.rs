@@ -1,4 +1,4 @@
-//! Valid files: what pycolmap and NumPy wrote is what is read.
+//! Tests valid files: what pycolmap and NumPy wrote is read exactly.
 
 mod clouds;
 mod descriptors;

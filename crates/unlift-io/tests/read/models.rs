@@ -1,4 +1,4 @@
-//! The files of a model: cameras, images, points, rigs and frames, binary and as text.
+//! Tests the files of a COLMAP model, binary and text.
 
 use std::fs;
 use std::path::Path;

@@ -1,11 +1,11 @@
-//! Maps of other programs: two cameras that look at three points, in each of their forms.
+//! Tests maps of other programs: two cameras and three points, in each format.
 
 use std::fs;
 use std::path::Path;
 
 use unlift_io::read::{self, Input};
 
-/// The first camera stands at (0, 0, -5) and looks along z; the second has turned a quarter about what it looks along, at (1, 2, -5).
+/// The first camera looks along z. The second is rotated by 90 degrees about its viewing direction.
 const CENTERS: [[f64; 3]; 2] = [[0.0, 0.0, -5.0], [1.0, 2.0, -5.0]];
 const POINTS: [[f64; 3]; 3] = [[0.5, -1.25, 3.0], [1e3, 2.0, -0.0625], [0.1, 0.2, 0.3]];
 
@@ -14,7 +14,7 @@ const ROTATIONS: [[[f64; 3]; 3]; 2] = [
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
     [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
 ];
-/// What is up in the photos: -y of the camera.
+/// The up directions of the photos: -y of the camera.
 const UP: [[f64; 3]; 2] = [[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0]];
 
 fn translation(at: usize) -> [f64; 3] {
@@ -41,7 +41,7 @@ fn bundler() -> String {
         let t = translation(at);
         text += &format!("{}\n", words(&[t[0], -t[1], -t[2]]));
     }
-    // One that was not registered.
+    // A camera that was not registered.
     text += "0 0 0\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n";
     for point in POINTS {
         text += &format!("{}\n255 0 7\n2 0 11 1.5 -2.5 1 12 3.5 4.5\n", words(&point));
@@ -65,7 +65,7 @@ fn nvm() -> String {
 }
 
 fn opensfm(points: &[[f64; 3]]) -> String {
-    // A quarter turn about z, as axis times angle.
+    // A rotation by 90 degrees about z, as axis times angle.
     let vectors = [[0.0; 3], [0.0, 0.0, std::f64::consts::FRAC_PI_2]];
     let shots: Vec<String> = (0..2)
         .map(|at| {
@@ -87,7 +87,7 @@ fn opensfm(points: &[[f64; 3]]) -> String {
     )
 }
 
-/// Three views, of which two were placed.
+/// Three views, two of them with a pose.
 fn openmvg() -> String {
     let poses: Vec<String> = (0..2)
         .map(|at| {
@@ -112,7 +112,7 @@ fn openmvg() -> String {
     )
 }
 
-/// Numbers are text, and matrices stand column by column.
+/// Numbers are strings, and matrices are column-major.
 fn meshroom() -> String {
     let text = |values: &[f64]| {
         format!("[{}]", values.iter().map(|x| format!("\"{x}\"")).collect::<Vec<_>>().join(", "))
@@ -139,7 +139,8 @@ fn meshroom() -> String {
 fn nerfstudio(cloud: &str) -> String {
     let frames: Vec<String> = (0..2)
         .map(|at| {
-            // To the world, of a camera whose y is up and that looks along -z: columns of the rotation, two of them turned.
+            // From camera (y up, looking along -z) to world: columns of the rotation, two of them
+            // negated.
             let r = &ROTATIONS[at];
             let row = |c: usize| array(&[r[0][c], -r[1][c], -r[2][c], CENTERS[at][c]]);
             let rows = [row(0), row(1), row(2), array(&[0.0, 0.0, 0.0, 1.0])];
@@ -200,7 +201,6 @@ fn every_form_gives_the_same_points_and_cameras() {
     let input = read::open(&put("nerf/transforms.json", &nerfstudio("\"sparse_pc.ply\""))).unwrap();
     same(&input, "nerfstudio");
     assert_eq!(input.files.len(), 2);
-    // Given as folders.
     for (name, format) in
         [("bundler", "Bundler"), ("sfm", "OpenSfM"), ("mvg", "OpenMVG"), ("nerf", "nerfstudio")]
     {
@@ -249,7 +249,7 @@ fn what_is_wrong_is_told_with_its_line() {
     assert!(line("b.json", &text).contains("invalid length 2, expected an array of length 3"));
     assert!(line("c.json", "[").contains("EOF while parsing"));
     let deep = format!("[{{\"x\": {}1{}}}]", "[".repeat(500), "]".repeat(500));
-    // What is not asked for is passed over, however deep it is.
+    // Unused values are skipped at any depth.
     assert!(line("d.json", &deep).ends_with("found JSON with x"));
     let text = nerfstudio("\"../elsewhere.ply\"");
     assert_eq!(
@@ -268,7 +268,8 @@ fn what_is_wrong_is_told_with_its_line() {
     assert!(read::open(Path::new("no such folder")).is_err());
 }
 
-/// What is said against the points of a file, and of one that declares fewer of them, as `few` in place of `all` does.
+/// Returns the doubts of a file, and of the file that declares fewer points, with `few` instead of
+/// `all`.
 fn doubts(name: &str, text: String, all: &str, few: &str) -> [Vec<String>; 2] {
     assert!(text.contains(all), "{text}");
     let less = text.replacen(all, few, 1);
@@ -280,7 +281,6 @@ fn doubts(name: &str, text: String, all: &str, few: &str) -> [Vec<String>; 2] {
     })
 }
 
-/// The file was put together wrongly, or somebody wrote a smaller number: the figures are about a part of the map.
 #[test]
 fn files_with_more_points_than_they_declare_are_doubted() {
     let faces = "element face 1\nproperty list uchar int vertex_indices\nend_header";
@@ -290,7 +290,7 @@ fn files_with_more_points_than_they_declare_are_doubted() {
         ("a.nvm", nvm(), "\n3\n", "\n2\n"),
         ("a.ply", ply, "vertex 3", "vertex 2"),
     ] {
-        let told = "2 points are declared, and 1 more seem to follow, which are not read: a part of the map at most";
+        let told = "2 points are declared, and 1 more seem to follow, which are not read: results are about a part of the map";
         let [whole, less] = doubts(name, text, all, few);
         assert!(whole.is_empty(), "{name}: {whole:?}");
         assert_eq!(less, [told], "{name}");

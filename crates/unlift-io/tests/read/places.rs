@@ -1,4 +1,4 @@
-//! Where in a project its model and its database are, and what is said of all else.
+//! Tests which model and database of a project are found.
 
 use std::fs;
 use std::path::Path;
@@ -7,7 +7,6 @@ use unlift_io::read;
 
 use super::data;
 
-/// A copy of the fixture `from` at `to` in `root`.
 fn copy(from: &str, root: &Path, to: &str) {
     let to = root.join(to);
     fs::create_dir_all(&to).unwrap();
@@ -47,7 +46,7 @@ fn what_lies_beside_the_model_is_noted_or_ignored() {
         notes.replace('\\', "/"),
         "/sparse/0/rigs.bin: header (byte 0): expected 8 bytes of the number of rigs, \
          found 1 byte before the end of the file\n\
-         points3D.txt: the binary form beside it was read\n\
+         points3D.txt: not read, because points3D.bin exists\n\
          sparse/0: read, the largest of 2 models (8 points)\n\
          sparse/1: another model (8 points), give its path to read it"
     );
@@ -81,7 +80,7 @@ fn models_are_found_where_programs_put_them() {
 
 #[test]
 fn of_several_models_the_largest_is_read_and_told() {
-    // As hloc leaves models that it did not choose, and COLMAP models that it could not join.
+    // hloc leaves models that it did not choose, and COLMAP models that it could not merge.
     let dir = tempfile::tempdir().unwrap();
     copy("project/sparse/0", dir.path(), "sparse/0");
     copy("rig-txt", dir.path(), "sparse/10");
@@ -97,7 +96,8 @@ fn of_several_models_the_largest_is_read_and_told() {
             "models/2: another model (6 points), give its path to read it",
         ]
     );
-    // The folder that was named is meant, be it smaller: hloc's best one stands there.
+    // The folder that was named has priority, even if its model is smaller: hloc's best model is
+    // there.
     copy("project/sparse/0", dir.path(), "");
     let input = read::open(dir.path()).unwrap();
     assert_eq!(input.positions.len(), 6);

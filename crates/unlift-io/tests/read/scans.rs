@@ -1,4 +1,4 @@
-//! Clouds of scanners: LAS, PCD, E57.
+//! Tests scans: LAS, PCD, E57.
 
 #[path = "../made/mod.rs"]
 mod made;
@@ -8,7 +8,7 @@ use unlift_io::read::{self, Input};
 use super::write;
 use made::POINTS;
 
-/// What is said of one point of four, more than is let pass.
+/// The doubt about one point of four.
 const NO_PLACE: &str = "1 of 4 points have no place: what is audited is not the whole map";
 
 fn same(input: &Input, format: &str, tolerance: f64) {
@@ -58,7 +58,7 @@ fn e57_turns_by_quaternions_of_any_length_but_zero() {
     let path = dir.path().join("a.e57");
     made::e57(&path);
     let file = std::fs::read(&path).unwrap();
-    // Both numbers of the quaternion, in as many digits.
+    // Replaces both numbers of the quaternion, with as many digits.
     let half = 0.5_f64.sqrt().to_string();
     let to = |x: f64| made::e57_with(file.clone(), &half, &format!("{x:.*}", half.len() - 2));
     let expected = read::open(&path).unwrap().positions;
@@ -68,7 +68,7 @@ fn e57_turns_by_quaternions_of_any_length_but_zero() {
     }
     std::fs::write(&path, to(0.0)).unwrap();
     let notes = read::open(&path).unwrap().notes;
-    assert_eq!(notes[0], "scan 2: a rotation of zeros, taken for none");
+    assert_eq!(notes[0], "scan 2: the rotation is zero and is ignored");
 }
 
 #[test]
@@ -96,7 +96,7 @@ fn degrees_of_las_are_told() {
                 let (_dir, path) = write("a.las", made::las_with(minor, id, &record, long));
                 let input = read::open(&path).unwrap();
                 let expected = is_geographic && (minor == 4 || !long);
-                // Old files have no records behind their points: what is there may be points.
+                // Old files have no records after their points: extra data may be points.
                 let n_doubts = usize::from(expected) + usize::from(minor == 2 && long);
                 assert_eq!(
                     (input.is_geographic, input.doubts.len()),
@@ -109,7 +109,6 @@ fn degrees_of_las_are_told() {
     }
 }
 
-/// Numbers that are too small: the rest of the points is there, and is not read.
 #[test]
 fn files_with_more_points_than_they_declare_are_doubted() {
     let doubts = |name: &str, bytes: Vec<u8>| {
@@ -122,7 +121,7 @@ fn files_with_more_points_than_they_declare_are_doubted() {
         file[at] = 1;
         assert_eq!(doubts("a.las", file.clone()).len(), 1, "{minor}");
         if minor == 4 {
-            // What follows are records of another kind, as the head says.
+            // The header declares records of another kind after the points.
             let end = file.len() - 2 * 34;
             file[235..243].copy_from_slice(&(end as u64).to_le_bytes());
             assert!(doubts("a.las", file).is_empty(), "{minor}");
@@ -137,21 +136,22 @@ fn files_with_more_points_than_they_declare_are_doubted() {
     assert!(less[0].starts_with("2 points are declared, and 2 more seem to follow"), "{less:?}");
 }
 
-/// A file with holes is as large as it likes: nothing of that size is asked for.
+/// It must not allocate memory of that size.
 #[test]
 fn a_file_with_holes_is_one_line() {
     let head = "ply\nformat binary_little_endian 1.0\nelement vertex 200000000000\nproperty float x\n\
                 property float y\nproperty float z\nend_header\n";
     let (_dir, path) = write("a.ply", head);
     let file = std::fs::OpenOptions::new().write(true).open(&path).unwrap();
-    // Some file systems have no files of that size.
+    // Some file systems do not support such files.
     if file.set_len(head.len() as u64 + 12 * 200_000_000_000).is_ok() {
         let error = read::open(&path).unwrap_err().to_string();
-        assert!(error.contains("expected as much as fits into memory, found "), "{error}");
+        assert!(error.contains("expected data that fits into memory, found "), "{error}");
     }
 }
 
-/// `fuzz/seeds` asks for these files: a byte that says of which kind, as the target `points` reads it, and the scan.
+/// Writes the files for `fuzz/seeds`: a byte with the kind, which the target `points` reads, and
+/// the scan.
 #[test]
 #[ignore = "writes seeds of fuzzing into the folder UNLIFT_SEEDS"]
 fn seeds_of_fuzzing() {

@@ -1,4 +1,4 @@
-//! Files cut short or with bytes changed: an error, never a panic.
+//! Tests truncated files and files with changed bytes: errors, never a panic.
 
 use crate::maps;
 use std::fs::{self, OpenOptions};
@@ -10,7 +10,6 @@ const N: usize = 60;
 
 type Read = fn(&Path) -> Result<(), Error>;
 
-/// A valid file of every kind and family, with its reader.
 fn valid_files(folder: &Path) -> Vec<(PathBuf, Read)> {
     let mut files: Vec<(PathBuf, Read)> = Vec::new();
     for (at, released) in maps::released::<3>(8, N).iter().enumerate() {
@@ -41,7 +40,7 @@ fn cut_short_anywhere_is_an_error_of_one_line() {
         let mut cuts: Vec<usize> = (0..length).step_by(step).chain(0..40).collect();
         cuts.extend(length.saturating_sub(40)..length);
         cuts.sort();
-        // Shorter and shorter in place: to rewrite a file may wait for the disk.
+        // Truncates the file in place, because rewriting it is slow.
         let file = OpenOptions::new().write(true).open(&path).unwrap();
         for &cut in cuts.iter().rev() {
             file.set_len(cut as u64).unwrap();
@@ -52,8 +51,10 @@ fn cut_short_anywhere_is_an_error_of_one_line() {
     }
 }
 
-/// The footer, where the counts stand, is changed at every `step`, the data at `n` places. Without some bytes lengths and places
-/// that follow shift into each other's: of 3.8 kB without 36 bytes a reader that trusted them was busy for half a minute.
+/// Changes the footer, which has the counts, at every `step`, and the data at `n` places.
+///
+/// Missing bytes turn later lengths and offsets into others: a reader that trusted them took half a
+/// minute for 3.8 kB without 36 bytes.
 #[test]
 fn changed_or_missing_bytes_are_an_error_or_another_value() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! The snippets of docs/formats.md are run with python3 and pyarrow, and what they wrote is read.
+//! Runs the snippets of docs/formats.md with python3 and pyarrow, and reads their output.
 
 use crate::python::{python, run};
 use std::path::Path;
@@ -8,8 +8,8 @@ use unlift::truth::DropReason;
 use unlift::{RecordId, Unit};
 use unlift_io::stage::{self, ImageFile, Kind};
 
-/// What the document takes as given: 12 points on a grid and a line through each, all but the last two of which
-/// are released, in reverse order.
+/// The data that the document assumes: 12 points on a grid and a line through each, of which all
+/// but the last two are released, in reverse order.
 const GIVEN: &str = r#"
 import numpy as np
 points = np.array([[x, y, z] for x in range(3) for y in range(2) for z in range(2)], float)
@@ -22,7 +22,7 @@ photos = {f"{n}.jpg": ((640, 480), np.full((n, 2), 9.0 * n), np.ones((n, 2))) fo
 found = np.where(np.arange(10)[:, None] % 5 == 4, np.nan, points[hidden])
 "#;
 
-/// All Python of the document, the part that writes and the part that reads.
+/// The part that writes and the part that reads.
 fn snippets() -> (String, String) {
     let document = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/formats.md");
     let document = std::fs::read_to_string(document).unwrap();
@@ -74,7 +74,7 @@ fn what_the_snippets_write_is_read_and_the_other_way_round() {
     }
     assert!(images.next_image().unwrap().is_none());
 
-    // The other way round: the snippets read what unlift wrote.
+    // The snippets read what unlift wrote.
     stage::write_released(&at("released.parquet"), &released).unwrap();
     stage::write_neighborhoods(&at("neighborhoods.parquet"), &lists).unwrap();
     stage::write_truth(&at("truth.parquet"), &original, &secret).unwrap();

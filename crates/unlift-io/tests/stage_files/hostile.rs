@@ -1,4 +1,4 @@
-//! Files that declare more than they hold: refused before memory or time is spent on it.
+//! Tests files that declare more than they contain: errors before memory or time is spent.
 
 use crate::tables::message;
 use arrow_array::types::Int32Type;
@@ -9,7 +9,6 @@ use std::fs;
 use std::sync::Arc;
 use unlift_io::stage;
 
-/// Numbers as Thrift writes them.
 fn unsigned(mut value: u64) -> Vec<u8> {
     let mut bytes = Vec::new();
     while value >= 0x80 {
@@ -24,12 +23,12 @@ fn integer(value: i64) -> Vec<u8> {
     unsigned(((value << 1) ^ (value >> 63)) as u64)
 }
 
-/// A file without rows whose schema has these numbers of children.
+/// Creates a file without rows whose schema elements have these numbers of children.
 fn with_schema(children: &[i64]) -> Vec<u8> {
     let mut footer = [&[0x15][..], &integer(1), &[0x19, 0xfc]].concat();
     footer.extend(unsigned(children.len() as u64));
     for &n in children {
-        // A name, and how many elements are in this one.
+        // The name and the number of children.
         footer.extend([0x48, 1, b'a', 0x15]);
         footer.extend(integer(n));
         footer.push(0);
@@ -52,7 +51,7 @@ fn schemas_deeper_or_larger_than_tables() {
     assert_eq!(deep, expected);
     let wide = line(with_schema(&[i64::from(i32::MAX), 0]));
     assert!(
-        wide.ends_with("found an element of 2147483647 where 1 follow in the schema"),
+        wide.ends_with("found a schema element with 2147483647 children where 1 elements follow"),
         "{wide}"
     );
     let many = line(with_schema(&vec![0; (1 << 16) + 1]));
@@ -64,7 +63,7 @@ fn schemas_deeper_or_larger_than_tables() {
     assert!(beyond.starts_with("footer: expected at most "), "{beyond}");
 }
 
-/// One list of equal values: 272 MB in memory of a file of two kilobytes.
+/// One list of equal values: 272 MB in memory, 2 kB in the file.
 #[test]
 fn values_that_nothing_stands_behind() {
     const N: usize = 34_000_000;

@@ -1,4 +1,4 @@
-//! What other programs write is taken where nothing is lost.
+//! Tests files of other programs that deviate without loss: they are read.
 
 use crate::tables::{
     Columns, floats, ints, lists, maybe, maybe_ints, maybe_lists, message, texts, with, write,
@@ -44,7 +44,7 @@ fn of_a_released_map_columns_tell_all_but_the_unit() {
     assert_eq!((map.slots_per_record(), map.origin()), (1, [0.0; 3]));
     let header = stage::peek(&path).unwrap();
     assert_eq!((header.kind, header.dimension), (Kind::Released, Some(3)));
-    // It does not declare its kind, so it is never replaced as one of ours.
+    // It declares no kind, so it is never replaced as a file of unlift.
     assert_eq!(stage::declared_kind(&path), None);
 
     write(&path, "", lines());
@@ -55,7 +55,7 @@ fn of_a_released_map_columns_tell_all_but_the_unit() {
     let line = message(&path, stage::read_truth::<3>(&path));
     assert_eq!(line, "expected a truth file, found a released map");
 
-    // In the plane lengths are pixels: nothing need be said.
+    // In 2D the default unit is pixels.
     write(&path, "", points()[..2].to_vec());
     let map = stage::read_released::<2>(&path).unwrap();
     assert_eq!((map.obfuscation().family(), map.unit()), ("axis_candidates", Unit::Pixel));
@@ -100,7 +100,7 @@ fn a_truth_is_its_points_in_the_order_of_slots() {
     assert_eq!(secret.descriptor_row(), [0, 1, 2]);
     assert!(secret.hidden().iter().enumerate().all(|(slot, id)| id.index() == slot));
 
-    // With a reason where a point is in no record, and null columns beside.
+    // A reason for a point that is in no record, and null columns.
     let dropped = texts([None, Some("other"), None]);
     let mut columns = with(points(), "dropped", Some(dropped));
     columns.push(("slot", Arc::new(NullArray::new(3))));
@@ -115,7 +115,7 @@ fn a_truth_is_its_points_in_the_order_of_slots() {
     );
     assert_eq!(secret.swapped_axis(), None);
 
-    // What pandas makes of integers beside a null.
+    // pandas converts integers with nulls to floats.
     let slots = maybe([Some(1.0), Some(f64::NAN), Some(0.0)]);
     let with_slots = |reasons| {
         let columns = with(points(), "slot", Some(slots.clone()));
@@ -125,7 +125,7 @@ fn a_truth_is_its_points_in_the_order_of_slots() {
     let (_, secret) = stage::read_truth::<3>(&path).unwrap();
     assert_eq!(secret.hidden().iter().map(|id| id.0).collect::<Vec<_>>(), [2, 0]);
 
-    // Points that drop out of the shares without a word would make a map look safer.
+    // Points that are missing from the shares would make a map look safer.
     write(&path, UNIT, with_slots(None));
     let line = message(&path, stage::read_truth::<3>(&path));
     let end = "other, as slot is null, found null";
@@ -135,7 +135,7 @@ fn a_truth_is_its_points_in_the_order_of_slots() {
     assert_eq!(line, "column slot, row 2: expected a whole number below 3, found 1.5");
 }
 
-/// Which descriptor belongs to which of two points is no order of rows.
+/// The order of rows does not state which descriptor belongs to which of two points.
 #[test]
 fn records_of_two_points_need_their_descriptor_rows() {
     let (_folder, path) = place();
@@ -187,7 +187,7 @@ fn lost_positions_are_null_or_nan() {
         ("axis", maybe_ints([Some(2), None, None])),
         ("descriptor_row", Arc::new(Int64Array::new_null(3))),
     ];
-    // Without a unit, that of the map it is compared with.
+    // The default unit is that of the map they are compared with.
     write(&path, "", found.clone());
     let read = stage::read_recovered_in::<3>(&path, Unit::KthNeighbor).unwrap();
     assert_eq!(read.status(), [Status::Ok, Status::Degenerate, Status::NoSupport]);
@@ -204,7 +204,7 @@ fn lost_positions_are_null_or_nan() {
     assert_eq!(line, "column found, row 0: expected a probability, found null");
 }
 
-/// What is wrong with images in one file is said of the image.
+/// Errors about images in one file name the image.
 #[test]
 fn images_are_told_by_name() {
     let (_folder, path) = place();
@@ -233,7 +233,7 @@ fn images_are_told_by_name() {
     let found = line(of(good, [0.0, f64::NAN, 0.0], None));
     assert_eq!(found, "image a, column x, row 1: expected a finite number, found NaN");
     let found = line(of([Some("a"), Some("b"), Some("a")], [0.0; 3], None));
-    assert_eq!(found, "column image, row 2: expected the rows of an image together, found a again");
+    assert_eq!(found, "column image, row 2: expected contiguous rows of each image, found a again");
     let found = line(of([Some("a"), None, Some("b")], [0.0; 3], None));
     assert_eq!(found, "column image, row 1: expected the name of an image, found null");
     let found = line(of(good, [0.0; 3], Some(r#"{"bounds":[0,1]}"#)));

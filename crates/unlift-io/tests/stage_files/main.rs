@@ -1,4 +1,4 @@
-//! Stage files, as a user of the public API sees them.
+//! Tests stage files through the public API.
 
 mod damaged;
 mod document;

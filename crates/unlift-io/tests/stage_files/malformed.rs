@@ -1,4 +1,4 @@
-//! Every way a released map can differ from docs/formats.md, and the line that says so.
+//! Tests all deviations of a released map from docs/formats.md, and their error lines.
 
 use crate::tables::{
     Columns, check, check_columns, float_lists, floats, ints, lists, maybe, message, texts, with,
@@ -98,7 +98,7 @@ fn metadata() {
     ]);
 }
 
-/// A file whose content is not what its fingerprint says was changed; without one it is taken as it is.
+/// A fingerprint that differs from the content is an error; without one the file is accepted.
 #[test]
 fn a_changed_map_is_told() {
     let folder = tempfile::tempdir().unwrap();
@@ -111,7 +111,7 @@ fn a_changed_map_is_told() {
     let other = with(lines(), "foot_x", Some(floats([0.0, 1.0, 2.5])));
     let line = released(&meta, other);
     assert!(
-        line.contains("metadata unlift, fingerprint: expected that of the content, "),
+        line.contains("metadata unlift, fingerprint: expected the fingerprint of the content, "),
         "{line}"
     );
     assert!(line.ends_with(&format!("found \"{}\"", map.fingerprint())), "{line}");
@@ -125,7 +125,7 @@ fn columns() {
     let wide = ints([1, (1 << 53) + 1, 3]);
     let rows = [
         ("foot_x", text, ": expected floats, found type Utf8"),
-        ("foot_x", wide, ", row 1: expected a number that a double holds, found 9007199254740993"),
+        ("foot_x", wide, ", row 1: expected a number that is exact in f64, found 9007199254740993"),
         ("foot_x", floats([0.0, f64::NAN, 0.0]), ", row 1: expected a finite number, found NaN"),
         (
             "foot_x",

@@ -1,4 +1,4 @@
-//! Every way neighborhoods, recovered points and truth can differ from docs/formats.md.
+//! Tests all deviations of neighborhoods, recovered points and ground truth from docs/formats.md.
 
 use crate::tables::{
     Columns, check, check_columns, float_lists, floats, ints, lists, maybe, maybe_ints,
@@ -169,7 +169,8 @@ fn truth() {
         ("dropped", texts([None, None, Some("odd_point")])),
     ];
     write(&path, META, good.clone());
-    // Files of earlier versions do not say how many points share a record; crossed rows do.
+    // Files of earlier versions do not state the number of slots per record; crossed rows imply
+    // two.
     let (_, secret) = stage::read_truth::<2>(&path).unwrap();
     assert_eq!((secret.slots_per_record(), secret.map()), (2, None));
     let read = |columns: Columns| {
@@ -179,7 +180,7 @@ fn truth() {
     let two = |first, second| maybe_ints([Some(first), second, None]);
     let odd = Some("odd_point");
     let rows = [
-        ("slot", two(0, Some(2)), ": expected slots below 2, as many have one, found 2"),
+        ("slot", two(0, Some(2)), ": expected slots below 2, the number of slots, found 2"),
         ("slot", two(0, Some(0)), ", row 1: expected each slot once, found 0 as in row 0"),
         ("original", ints([2, 2, 1]), ", row 1: expected each original once, found 2 as in row 0"),
         ("original", ints([2, 0, 3]), ", row 2: expected a whole number below 3, found 3"),

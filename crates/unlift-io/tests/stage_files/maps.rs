@@ -1,4 +1,4 @@
-//! Values of every kind, drawn from a seed.
+//! Random values of every kind, from a seed.
 
 use unlift::descriptors::Values;
 use unlift::neighbors::Neighborhoods;
@@ -59,7 +59,7 @@ pub fn released<const D: usize>(seed: u64, n: usize) -> Vec<Released<D>> {
     families.into_iter().map(with_rest).collect()
 }
 
-/// A truth with `n` slots and a few dropped points; `swapped_axis` for every second seed.
+/// A ground truth with `n` slots and a few dropped points; `swapped_axis` for every second seed.
 pub fn truth<const D: usize>(seed: u64, n: usize) -> (Original<D>, Secret) {
     let mut draws = draws(seed);
     let n_all = n + draws.below(6) as usize;
@@ -102,7 +102,6 @@ pub fn neighborhoods(seed: u64, n_records: usize, slots_per_record: usize) -> Ne
     lists.unwrap().with_about(about(seed))
 }
 
-/// Every order, and a fingerprint for two of three seeds.
 fn about(seed: u64) -> About {
     let mut orders = RowOrder::STATED.to_vec();
     orders.push(RowOrder::Unstated);

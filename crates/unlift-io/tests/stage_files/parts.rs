@@ -1,4 +1,4 @@
-//! A folder of parts is what the file is: whoever wrote it, and not if anything is missing.
+//! Tests that a folder of parts equals the file, and that missing parts are errors.
 
 use crate::maps;
 use std::fs;
@@ -79,7 +79,8 @@ fn what_is_missing_or_other_is_told() {
     fs::write(parts.join("_manifest.json"), "{}").unwrap();
     assert!(line().contains("_manifest.json: unlift: expected the metadata of the parts"));
 
-    // Without one, as an engine writes it: rows by their slots, other files passed over.
+    // Without a manifest, as an engine writes it: rows are ordered by slot, other files are
+    // skipped.
     fs::remove_file(parts.join("_manifest.json")).unwrap();
     for name in ["_SUCCESS", ".part-000000.parquet.crc", "notes.txt"] {
         fs::write(parts.join(name), "x").unwrap();
@@ -87,10 +88,14 @@ fn what_is_missing_or_other_is_told() {
     assert!(read().is_ok());
     fs::rename(parts.join("part-000000.parquet"), parts.join("part-zzz.parquet")).unwrap();
     assert!(read().unwrap() == stage::read_neighborhoods(&whole, 100, 1).unwrap());
-    // Of something else.
+    // A part of another kind.
     let (original, secret) = maps::truth::<3>(1, 40);
     stage::write_truth(&second, &original, &secret).unwrap();
-    assert!(line().ends_with("expected that of the other parts, found another"), "{}", line());
+    assert!(
+        line().ends_with("expected the metadata of the other parts, found others"),
+        "{}",
+        line()
+    );
     fs::write(&second, "PAR1").unwrap();
     assert!(line().contains("part-000001.parquet: expected a Parquet file"), "{}", line());
     let empty = tempfile::tempdir().unwrap();
@@ -110,7 +115,7 @@ fn parts_of_an_earlier_split_never_stay_beside_new_ones() {
     lists(&whole, 90);
     assert_eq!(split(&whole, 20, &parts).unwrap(), 5);
     assert!(stage::read_neighborhoods(&parts, 90, 1).is_ok());
-    // What is read is not written over.
+    // An input is never replaced.
     let split = Split::open(&parts, 20).unwrap();
     let rules = Rules::new([parts.as_path()], true);
     let error = split.outputs(&parts, rules).unwrap_err().to_string();

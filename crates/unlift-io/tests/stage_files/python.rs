@@ -1,9 +1,8 @@
-//! Scripts of somebody else, where there is a Python with pyarrow.
+//! Runs Python scripts, if Python with pyarrow is installed.
 
 use std::path::Path;
 use std::process::Command;
 
-/// The Python to use; `None`, with a message, where it or pyarrow is not installed.
 pub fn python() -> Option<String> {
     let python = "python3".to_owned();
     let has = Command::new(&python).args(["-c", "import numpy, pyarrow.parquet"]).output();
@@ -14,7 +13,6 @@ pub fn python() -> Option<String> {
     None
 }
 
-/// Runs `script` in `folder`, and returns what it printed.
 pub fn run(python: &str, folder: &Path, script: &str) -> String {
     let output = Command::new(python).args(["-c", script]).current_dir(folder).output().unwrap();
     let told = String::from_utf8_lossy(&output.stderr);

@@ -1,4 +1,4 @@
-//! What is written is read back equal, and equal values make equal bytes.
+//! Tests that files are read back equal, and that equal values make equal bytes.
 
 use crate::maps;
 use std::fs;
@@ -14,7 +14,6 @@ use unlift_io::stage::{self, Kind};
 
 const SIZES: [usize; 5] = [2, 3, 40, 1000, 20_000];
 
-/// Writes twice, compares the bytes, and returns them.
 fn written_twice(folder: &Path, write: impl Fn(&Path)) -> Vec<u8> {
     let paths = [folder.join("a.parquet"), folder.join("b.parquet")];
     for path in &paths {
@@ -49,7 +48,8 @@ fn released_maps() {
     released_law::<3>();
 }
 
-/// What is public about an image is released with it: without its size recovery would know less.
+/// Public data about an image is released with it: without the image size, recovery has less
+/// information.
 #[test]
 fn released_images() {
     let folder = tempfile::tempdir().unwrap();
@@ -112,7 +112,7 @@ fn recovered_law<const D: usize>() {
         let bytes = written_twice(folder.path(), write(&recovered));
         let path = folder.path().join("a.parquet");
         let read = stage::read_recovered::<D>(&path).unwrap();
-        // NaN is not equal to itself: the bytes are compared, and what is not in them.
+        // NaN is not equal to itself, so bytes are compared, and fields that are not stored.
         assert!(bytes == written_twice(folder.path(), write(&read)));
         for slot in 0..n {
             assert_eq!(read.position(slot), recovered.position(slot));

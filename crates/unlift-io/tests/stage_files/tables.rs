@@ -1,4 +1,4 @@
-//! Parquet files of a third party, made of a few columns, and their error lines.
+//! Parquet files of other programs, made of a few columns, and their error lines.
 
 use arrow_array::types::{Float64Type, Int64Type};
 use arrow_array::{ArrayRef, Float64Array, Int64Array, ListArray, RecordBatch, StringArray};
@@ -11,7 +11,7 @@ use unlift_io::Error;
 
 pub type Columns = Vec<(&'static str, ArrayRef)>;
 
-/// Writes a Parquet file with this text as metadata `unlift`, if it is not empty.
+/// Writes a Parquet file with the metadata `meta` under the key `unlift`, if it is not empty.
 pub fn write(path: &Path, meta: &str, columns: Columns) {
     let nullable = columns.into_iter().map(|(name, column)| (name, column, true));
     let batch = RecordBatch::try_from_iter_with_nullable(nullable).unwrap();
@@ -58,14 +58,13 @@ pub fn float_lists(rows: &[&[f64]]) -> ArrayRef {
     Arc::new(ListArray::from_iter_primitive::<Float64Type, _, _>(rows))
 }
 
-/// `columns` with the one called `name` replaced, or left out.
 pub fn with(columns: Columns, name: &'static str, column: Option<ArrayRef>) -> Columns {
     let mut columns: Columns = columns.into_iter().filter(|(other, _)| *other != name).collect();
     columns.extend(column.map(|column| (name, column)));
     columns
 }
 
-/// The error after the file's name, which must come first; one line.
+/// Returns the error without the path at its start. It must be one line.
 pub fn message<T>(path: &Path, result: Result<T, Error>) -> String {
     let text = result.err().expect("a malformed file was read").to_string();
     assert!(!text.contains('\n'), "{text}");
@@ -73,7 +72,6 @@ pub fn message<T>(path: &Path, result: Result<T, Error>) -> String {
     text.strip_prefix(&prefix).expect("the file comes first").to_owned()
 }
 
-/// Compares lines with what they should be, and shows all that differ.
 pub fn check(table: Vec<(String, &str)>) {
     let wrong: Vec<String> = table
         .into_iter()
@@ -83,8 +81,8 @@ pub fn check(table: Vec<(String, &str)>) {
     assert!(wrong.is_empty(), "found (and expected):\n{}", wrong.join("\n"));
 }
 
-/// The tables that `read` refuses when a column is replaced by another of its name: the column and the line. A line that
-/// begins with a comma or a colon stands behind the name of the column.
+/// Checks the errors of `read` when a column is replaced by another of the same name. A line that
+/// begins with a comma or a colon follows the name of the column.
 pub fn check_columns<const N: usize>(
     good: Columns,
     read: impl Fn(Columns) -> String,

@@ -1,4 +1,4 @@
-//! Files written by pyarrow (tests/data/third_party.py) are read.
+//! Tests files written by pyarrow (tests/data/third_party.py).
 
 use std::path::{Path, PathBuf};
 use unlift::RecordId;

@@ -1,5 +1,5 @@
-//! Files that list, declare or compress far more than they hold: one line each, whatever their size; and
-//! large files that do not, which must open in time.
+//! Tests of files that list, declare or compress far more than they contain, and of large valid
+//! files.
 
 use std::fs;
 use std::io::Cursor;
@@ -11,7 +11,6 @@ use super::tree::{self, Entry};
 use super::write::superblock;
 use super::{Array, FeatureStore, Numbers, Writer};
 
-/// A file of `n` images without keypoints.
 fn images(n: usize) -> Vec<u8> {
     let mut out = Cursor::new(Vec::new());
     let mut writer = Writer::start(&mut out).unwrap();
@@ -23,7 +22,6 @@ fn images(n: usize) -> Vec<u8> {
     out.into_inner()
 }
 
-/// What `bytes` are opened as, or the line they are refused with.
 fn opened(bytes: &[u8]) -> Result<FeatureStore, String> {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("f");
@@ -35,7 +33,6 @@ fn shown(path: &Path, error: &crate::Error) -> String {
     error.to_string().replace(path.to_str().unwrap(), "f")
 }
 
-/// A file that is put together piece by piece.
 struct Pieces(Vec<u8>);
 
 impl Pieces {
@@ -49,7 +46,7 @@ impl Pieces {
         at
     }
 
-    /// A group of these names, which lead to these headers; with its header, tree and heap.
+    /// Adds a group. `members` are names and header offsets.
     fn group(&mut self, members: &[(&str, u64)]) -> (u64, [u64; 2]) {
         let entry = |&(name, header)| Entry { name, header, group: None };
         let entries: Vec<Entry<'_>> = members.iter().map(entry).collect();
@@ -64,7 +61,6 @@ impl Pieces {
         self.0
     }
 
-    /// An image of one keypoint.
     fn image(&mut self) -> u64 {
         let array = Array { shape: vec![1, 2], values: Numbers::F32(vec![1.0, 2.0]) };
         let values = self.put(&array.values.bytes());
@@ -94,13 +90,13 @@ fn groups_with_more_paths_than_can_be_walked_are_refused() {
     let mut file = Pieces::new();
     let mut inner = file.image();
     let mut group = (0, [0; 2]);
-    // Every group is linked twice by the next one: 2^40 paths.
+    // Every group has two links to the previous one: 2^40 paths.
     for _ in 0..41 {
         group = file.group(&[("a", inner), ("b", inner)]);
         inner = group.0;
     }
     let line = opened(&file.finish(group)).err().unwrap();
-    let expected = ": expected groups that one link leads to, found a second link, or a circle";
+    let expected = ": expected one link to each group of groups, found a second link, or a cycle";
     assert!(line.starts_with("f: group \"b/b/b/") && line.ends_with(expected), "{line}");
 }
 
@@ -118,21 +114,22 @@ fn an_image_with_two_names_is_two_images() {
     assert_eq!(store.array(0, "keypoints").unwrap(), store.array(1, "keypoints").unwrap());
 }
 
-/// As h5py writes a soft link if nothing else is asked of it.
+/// h5py writes a soft link in this form by default.
 #[test]
 fn a_link_in_a_group_of_the_old_form_is_told() {
     let mut file = Pieces::new();
     let image = file.image();
     let start = file.0.len();
     let root = file.group(&[("a.jpg", image), ("b.jpg", UNDEFINED)]);
-    // The second entry of the leaf leads to no object but to the text in the heap at byte 8, which is "a.jpg".
+    // The second entry of the leaf points to the text at byte 8 of the heap, "a.jpg", instead of an
+    // object.
     let leaf = file.0[start..].windows(4).position(|word| word == b"SNOD").unwrap();
     let entry = start + leaf + 8 + 40;
     file.0[entry + 16] = 2;
     file.0[entry + 24] = 8;
     let line = opened(&file.finish(root)).err().unwrap();
-    let expected = "f: image \"b.jpg\": expected features of an image, found a link to \"a.jpg\" in the old form (h5py \
-                    makes one that is read with libver=\"latest\")";
+    let expected = "f: image \"b.jpg\": expected features of an image, found a link to \"a.jpg\" in the old form (write it with \
+                    libver=\"latest\" of h5py)";
     assert_eq!(line, expected);
 }
 
@@ -148,7 +145,6 @@ fn a_list_whose_nodes_are_the_same_again_and_again_is_refused() {
         let (bytes, [_, heap]) = tree::names(&[entry], file.0.len() as u64);
         file.put(&bytes);
         let mut leaf = b"SNOD\x01\0\x08\0".to_vec();
-        // The name stands behind the empty one.
         (0..8).for_each(|_| leaf.extend(Entry { name: "", header: image, group: None }.bytes(8)));
         let mut child = file.put(&leaf);
         for level in 0..levels {
@@ -173,7 +169,7 @@ fn arrays_that_take_more_than_the_file_may_are_refused_before_they_are_read() {
         let start = "f: image \"a\", keypoints: expected at most 256 MiB in memory of a file of ";
         assert!(line.starts_with(start) && line.ends_with(place), "{line}");
     };
-    // Nothing of it is stored.
+    // No values are stored.
     let mut out = Cursor::new(Vec::new());
     let mut writer = Writer::start(&mut out).unwrap();
     let array = Array { shape: vec![1 << 27, 2], values: Numbers::F32(Vec::new()) };
@@ -181,7 +177,7 @@ fn arrays_that_take_more_than_the_file_may_are_refused_before_they_are_read() {
     writer.finish(&mut out).unwrap();
     fs::write(&path, out.into_inner()).unwrap();
     line("found 2 GiB");
-    // Compressed to a thousandth.
+    // Values that deflate to a thousandth of their size.
     let mut builder = hdf5_pure::FileBuilder::new();
     let mut group = builder.create_group("a");
     group

@@ -1,34 +1,33 @@
-//! Links of a group that are paths: the library passes over them, or fails.
+//! Finds links by path in a group, which the HDF5 library skips, or fails on.
 //!
-//! Source: HDF5 File Format Specification 3.0, IV.A (object headers), IV.A.2.g (the link message), and III.A to III.D (groups of
-//! the old form). Links of large groups in a heap of their own are not looked for.
+//! Source: HDF5 File Format Specification 3.0, IV.A (object headers), IV.A.2.g (the link message),
+//! and III.A to III.D (groups of the old form). Links of large groups, in a separate heap, are not
+//! searched.
 
-/// Where a link leads.
 #[derive(Debug, PartialEq)]
 pub(super) enum Target {
-    /// To a path in the file.
+    /// A path in the file.
     Path(String),
-    /// The link stands in a group of the old form, whose names the library cannot list.
+    /// A path in the file. The link is in a group of the old form, which the library cannot list.
     Old(String),
-    /// To another file.
     Elsewhere,
 }
 
 const LINK: u16 = 0x06;
 const SYMBOL_TABLE: u16 = 0x11;
 const CONTINUATION: u16 = 0x10;
-/// Bytes of headers that are looked through.
+/// The maximum number of header bytes that are searched.
 const MOST: u64 = 1 << 20;
 
-/// Names of the links in the object header at `address` that are paths, and where they lead; `read` gives the bytes of the
-/// file. What is no such header has none.
+/// Returns names and targets of the links by path in the object header at `address`. `read(offset,
+/// length)` returns bytes of the file.
 pub(super) fn links(
     read: impl Fn(u64, u64) -> Option<Vec<u8>>,
     address: u64,
 ) -> Option<Vec<(String, Target)>> {
     let start = read(address, 16)?;
     let is_new = start.starts_with(b"OHDR");
-    // Messages of the new form have numbers if a flag says so.
+    // A flag states that messages have numbers.
     let (first, numbers) = if is_new {
         let flags = start[5];
         let before =
@@ -57,7 +56,7 @@ pub(super) fn links(
                 }
                 CONTINUATION if body.len() >= 16 => {
                     let (at, size) = (number(&body[..8]), number(&body[8..16]));
-                    // Between a signature and a checksum.
+                    // The block is between a signature and a checksum.
                     blocks.push(if is_new { (at + 4, size.checked_sub(8)?) } else { (at, size) });
                 }
                 _ => {}
@@ -67,7 +66,7 @@ pub(super) fn links(
     Some(found)
 }
 
-/// The link in a message, if it is a path.
+/// Parses a link message, if it is a path.
 fn link(body: &[u8]) -> Option<(String, Target)> {
     let flags = *body.get(1)?;
     let kind = if flags & 8 != 0 { *body.get(2)? } else { 0 };
@@ -91,7 +90,7 @@ fn link(body: &[u8]) -> Option<(String, Target)> {
     }
 }
 
-/// The links in a group of the old form, whose names are in the tree and heap at these addresses.
+/// Returns the links of a group of the old form with its tree and heap at these addresses.
 fn old_links(
     read: &impl Fn(u64, u64) -> Option<Vec<u8>>,
     tree: u64,
@@ -100,7 +99,7 @@ fn old_links(
     let names = number(&read(heap.checked_add(24)?, 8)?);
     let text = |at: u64| {
         let (mut at, mut text) = (names.checked_add(at)?, Vec::new());
-        // Names begin and end at multiples of eight bytes.
+        // Names are padded to multiples of eight bytes.
         while !text.contains(&0) && text.len() as u64 <= MOST {
             text.extend(read(at, 8)?);
             at = at.checked_add(8)?;
@@ -128,7 +127,6 @@ fn old_links(
     Some(found)
 }
 
-/// Up to eight bytes, the least significant one first.
 fn number(bytes: &[u8]) -> u64 {
     bytes.iter().rev().fold(0, |number, &byte| number << 8 | u64::from(byte))
 }

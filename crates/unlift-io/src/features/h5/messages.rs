@@ -1,13 +1,13 @@
-//! Object headers of HDF5: what says that some bytes are an array of floats of this shape.
+//! Writes HDF5 object headers of groups and arrays.
 //!
-//! Source: HDF5 File Format Specification 3.0, IV.A, headers of version 1, which every reader knows.
+//! Source: HDF5 File Format Specification 3.0, IV.A, headers of version 1, which every reader
+//! supports.
 
 use super::{Array, Numbers};
 
-/// No address, or no length.
+/// The undefined address or length.
 pub(super) const UNDEFINED: u64 = u64::MAX;
 
-/// Appends zeros up to a multiple of eight.
 pub(super) fn pad(bytes: &mut Vec<u8>) {
     bytes.resize(bytes.len().next_multiple_of(8), 0);
 }
@@ -20,7 +20,6 @@ fn message(header: &mut Vec<u8>, kind: u16, mut body: Vec<u8>) {
     header.extend(body);
 }
 
-/// A header of version 1 around its messages.
 fn header(messages: u16, body: &[u8]) -> Vec<u8> {
     let mut bytes = vec![1, 0];
     bytes.extend(messages.to_le_bytes());
@@ -31,7 +30,7 @@ fn header(messages: u16, body: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// The header of a group whose names are in the tree and heap at these addresses.
+/// Writes the header of a group with its tree and heap at these addresses.
 pub(super) fn group(tree: u64, heap: u64) -> Vec<u8> {
     let mut body = Vec::new();
     let addresses = [tree.to_le_bytes(), heap.to_le_bytes()].concat();
@@ -39,7 +38,7 @@ pub(super) fn group(tree: u64, heap: u64) -> Vec<u8> {
     header(1, &body)
 }
 
-/// The header of a dataset whose `len` bytes stand at `address`, with attributes that are doubles.
+/// Writes the header of a dataset with `len` bytes at `address` and with `f64` attributes.
 pub(super) fn dataset(
     array: &Array,
     address: u64,
@@ -49,7 +48,7 @@ pub(super) fn dataset(
     let mut body = Vec::new();
     message(&mut body, 0x01, dataspace(&array.shape));
     message(&mut body, 0x03, datatype(&array.values));
-    // Space is allocated late, a fill value is written if one is set, and none is.
+    // Fill value message: late allocation, fill value written if set, none set.
     message(&mut body, 0x05, vec![2, 2, 2, 1, 0, 0, 0, 0]);
     let mut layout = vec![3, 1];
     layout.extend(if len == 0 { UNDEFINED } else { address }.to_le_bytes());
@@ -87,7 +86,7 @@ fn integer(size: u32, signed: bool) -> Vec<u8> {
 
 fn float(size: u32, mantissa: u8, exponent: u8, bias: u32) -> Vec<u8> {
     let bits = 8 * size as u16;
-    // Little-endian, the leading one of the mantissa is implied, the sign is the last bit.
+    // Little-endian, implied leading bit of the mantissa, sign in the highest bit.
     let mut bytes = vec![0x11, 0x20, bits as u8 - 1, 0];
     bytes.extend(size.to_le_bytes());
     bytes.extend([0, 0]);
@@ -97,7 +96,6 @@ fn float(size: u32, mantissa: u8, exponent: u8, bias: u32) -> Vec<u8> {
     bytes
 }
 
-/// A scalar attribute of version 1.
 fn attribute(name: &str, value: f64) -> Vec<u8> {
     let mut parts =
         [[name.as_bytes(), &[0]].concat(), datatype(&Numbers::F64(Vec::new())), dataspace(&[])];

@@ -1,8 +1,8 @@
-//! Arrays by path in an HDF5 file: all that the rest of the crate knows of HDF5.
+//! Reads and writes arrays by path in an HDF5 file.
 //!
-//! Reading is a library's work ([`FeatureStore`], which with `source` alone names it). Writing is our own
-//! ([`Writer`]): a feature file is larger than memory, and the library's writer either holds it whole or
-//! rewrites a folder's list of names at every addition, which is quadratic in images.
+//! A library reads ([`FeatureStore`]). Our own code writes ([`Writer`]): the library's writer keeps
+//! the whole file in memory, or rewrites a group's list of names at every addition, which is
+//! quadratic in images.
 
 #[cfg(test)]
 mod hostile;
@@ -18,7 +18,7 @@ use half::f16;
 pub(crate) use read::{DEEPEST, FeatureStore};
 pub(crate) use write::Writer;
 
-/// Values of an array, row-major.
+/// The values of an array, row-major.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Numbers {
     U8(Vec<u8>),
@@ -28,7 +28,6 @@ pub(crate) enum Numbers {
     I64(Vec<i64>),
 }
 
-/// An array and its shape.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Array {
     pub shape: Vec<u64>,
@@ -36,7 +35,6 @@ pub(crate) struct Array {
 }
 
 impl Numbers {
-    /// How many.
     pub fn len(&self) -> usize {
         match self {
             Self::U8(v) => v.len(),
@@ -47,7 +45,6 @@ impl Numbers {
         }
     }
 
-    /// The same, little-endian.
     fn bytes(&self) -> Vec<u8> {
         match self {
             Self::U8(v) => v.clone(),
@@ -58,7 +55,6 @@ impl Numbers {
         }
     }
 
-    /// The same as doubles.
     pub fn to_f64(&self) -> Vec<f64> {
         match self {
             Self::U8(v) => v.iter().map(|&x| f64::from(x)).collect(),
@@ -70,7 +66,6 @@ impl Numbers {
     }
 }
 
-/// The transpose of a matrix of `rows` rows.
 pub(crate) fn transposed<T: Copy>(values: &[T], rows: usize) -> Vec<T> {
     let columns = values.len().checked_div(rows).unwrap_or(0);
     let mut transposed = Vec::with_capacity(values.len());
@@ -80,7 +75,7 @@ pub(crate) fn transposed<T: Copy>(values: &[T], rows: usize) -> Vec<T> {
     transposed
 }
 
-/// A shape as people write it: `(128, 40)`.
+/// Formats a shape like NumPy: `(128, 40)`.
 pub(crate) fn shape_text(shape: &[u64]) -> String {
     match shape {
         [n] => format!("({n},)"),

@@ -1,4 +1,4 @@
-//! Reading HDF5: with `source`, the one place that names the library which does it.
+//! Reads HDF5 with the library `hdf5_pure`.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -16,44 +16,37 @@ use crate::guard::without_panic;
 use crate::input::{Budget, size};
 use crate::read::lines::quoted;
 
-/// Values of one array at most: a header can claim any size in a few bytes.
+/// A header can declare any size in a few bytes.
 const MOST_VALUES: u64 = 1 << 28;
-/// How deep groups nest: links may lead in circles.
+/// The maximum depth of groups, because links may form cycles.
 pub(crate) const DEEPEST: usize = 64;
-/// What the library and we hold of a group beside its path, of a chunk beside its bytes, and of a value
-/// once it is read: at least, in bytes.
+/// The least memory in bytes for a group besides its path, a chunk besides its bytes, and a value.
 const PER_GROUP: u64 = 256;
 const PER_CHUNK: u64 = 128;
 const PER_VALUE: u64 = 8;
 
-/// Groups with their paths, links that lead nowhere, arrays in no group.
+/// Groups with their paths, broken links, arrays outside groups.
 type Listed = (Vec<(String, Group)>, Vec<Error>, Vec<String>);
 
-/// The path of `name` in the group `path`.
 fn within(path: &str, name: &str) -> String {
     if path.is_empty() { name.to_owned() } else { format!("{path}/{name}") }
 }
 
-/// An open HDF5 file: groups that hold arrays, and the arrays. Reads one array at a time.
+/// An open HDF5 file, which is read one array at a time.
 pub(crate) struct FeatureStore {
     path: PathBuf,
     len: u64,
     budget: Budget,
-    /// Sorted by their bytes.
     paths: Vec<String>,
-    /// Held open: by its path, a group would be looked for in all the names of the groups above it.
+    /// Open handles: finding a group by path searches all names of the groups above it.
     groups: Vec<Group>,
-    /// Links that lead to no group of the file.
+    /// Errors about links that lead to no group.
     broken: Vec<Error>,
-    /// Arrays that stand in no group.
     alone: Vec<String>,
 }
 
 impl FeatureStore {
     /// Opens `path` and finds its groups.
-    ///
-    /// # Errors
-    /// When it cannot be read, is no HDF5 file, is cut off, or its groups link in circles.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let (source, len) = Bounded::open(path)?;
         let mut store = Self {
@@ -83,35 +76,36 @@ impl FeatureStore {
         Ok(store)
     }
 
-    /// All groups that hold arrays directly, with their paths; links that lead nowhere; arrays in no group.
+    /// Lists all groups that contain arrays directly, broken links, and arrays outside groups.
     fn list(&self, file: &File) -> Result<Listed, Error> {
         let (mut found, mut broken, mut alone) = (Vec::new(), Vec::new(), Vec::new());
         let root = file.root();
         let raw = Bounded::open(&self.path)?.0;
         let raw = |at: u64, n: u64| raw.read_exact_at(at, usize::try_from(n).ok()?).ok();
         let mut waiting = vec![(String::new(), root, 0)];
-        // Whether a group holds arrays and whether it holds groups, by the address of its header.
+        // By header address: the group contains arrays, and it contains groups.
         let mut seen: HashMap<u64, [bool; 2]> = HashMap::new();
         let mut memory = 0;
         while let Some((path, group, depth)) = waiting.pop() {
             let place = || format!("group {}", quoted(path.as_bytes()));
             if depth > DEEPEST {
                 let expected = format!("groups nested at most {DEEPEST} deep");
-                return Err(Error::new(&self.path, place(), expected, "deeper ones, or a circle"));
+                return Err(Error::new(&self.path, place(), expected, "deeper ones, or a cycle"));
             }
-            // The library keeps the path of a group, too.
+            // The library keeps a copy of the path.
             memory += PER_GROUP + 2 * path.len() as u64;
             self.budget.admit("list of groups", memory)?;
             let refuse = |error| self.refuse(&path, "", error);
-            // The group of no name is the group itself: its header is read, and nothing else.
+            // Opening the empty name, the group itself, reads its header only, which gives the
+            // address.
             let (itself, address) = source::first_read(|| group.group(""));
             itself.map_err(refuse)?;
             let [arrays, _] = match address.and_then(|address| seen.get(&address)) {
-                // An image under a second name is one more image; groups in it would be as many
-                // paths as there are ways to them.
+                // A second link to an image is a second image. A second link to a group of groups
+                // could make exponentially many paths.
                 Some([_, true]) => {
-                    let expected = "groups that one link leads to";
-                    let found = "a second link, or a circle";
+                    let expected = "one link to each group of groups";
+                    let found = "a second link, or a cycle";
                     return Err(Error::new(&self.path, place(), expected, found));
                 }
                 Some(&known) => known,
@@ -121,7 +115,7 @@ impl FeatureStore {
                         links.iter().find(|(_, target)| matches!(target, Target::Old(_)))
                     {
                         let found = format!(
-                            "a link to {} in the old form (h5py makes one that is read with libver=\"latest\")",
+                            "a link to {} in the old form (write it with libver=\"latest\" of h5py)",
                             quoted(to.as_bytes())
                         );
                         return Err(self.no_image(&within(&path, name), found));
@@ -155,7 +149,7 @@ impl FeatureStore {
         Ok((found, broken, alone))
     }
 
-    /// The group that a link of `group` leads to, or what it is instead.
+    /// Returns the group that a link leads to, or a description of the broken link.
     fn target(&self, file: &File, group: &Group, target: &Target) -> Result<Group, String> {
         let (Target::Path(to) | Target::Old(to)) = target else {
             return Err("a link to another file".to_owned());
@@ -168,18 +162,15 @@ impl FeatureStore {
         self.error(path, "", "features of an image", found)
     }
 
-    /// Links that lead to no group of the file, one error each.
     pub fn broken(&self) -> &[Error] {
         &self.broken
     }
 
-    /// Names of arrays that stand in no group.
     pub fn alone(&self) -> &[String] {
         &self.alone
     }
 
-    /// Runs `step` about the array `name` of `path`: it reads no more than the size of the file allows,
-    /// and a panic of the library is an error.
+    /// Runs `step`, limits how much it reads, and turns a panic of the library into an error.
     fn step<T>(
         &self,
         path: &str,
@@ -190,17 +181,15 @@ impl FeatureStore {
         source::bounded(self.len, || without_panic(step).unwrap_or_else(panicked))
     }
 
-    /// The file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Paths of all groups that hold arrays directly, sorted by their bytes.
+    /// Paths of all groups that contain arrays directly, sorted by bytes.
     pub fn paths(&self) -> &[String] {
         &self.paths
     }
 
-    /// Names of the arrays of the group `at` of [`paths`](Self::paths), sorted.
     pub fn names(&self, at: usize) -> Result<Vec<String>, Error> {
         let path = &self.paths[at];
         let mut names = self.step(path, "", || {
@@ -210,11 +199,7 @@ impl FeatureStore {
         Ok(names)
     }
 
-    /// The array `name` of the group `at`: floats of 16, 32 or 64 bits, or integers.
-    ///
-    /// # Errors
-    /// When it is cut off, not an array of numbers, larger than 2^28 values, or more than a file of this
-    /// size may take.
+    /// Reads the array `name` of the group `at`: floats of 16, 32 or 64 bits, or integers.
     pub fn array(&self, at: usize, name: &str) -> Result<Array, Error> {
         self.step(&self.paths[at], name, || self.read(at, name))
     }
@@ -234,7 +219,6 @@ impl FeatureStore {
         }
         let datatype = dataset.datatype().map_err(refuse)?;
         let values = match dataset.dtype().map_err(refuse)? {
-            // Nothing is stored, so there is nothing to read.
             DType::U8 if count == 0 => Numbers::U8(Vec::new()),
             _ if count == 0 => Numbers::F32(Vec::new()),
             DType::F32 => Numbers::F32(dataset.read_f32().map_err(refuse)?),
@@ -265,7 +249,7 @@ impl FeatureStore {
         Ok(Array { shape, values })
     }
 
-    /// Whether the array and what decodes it fit: it may be compressed, or not be stored at all.
+    /// Checks the memory for the array and for decoding it.
     fn admit(&self, at: usize, name: &str, dataset: &Dataset, shape: &[u64]) -> Result<(), Error> {
         let path = &self.paths[at];
         let refuse = |error| self.refuse(path, name, error);
@@ -281,7 +265,7 @@ impl FeatureStore {
         }
         let sides = shape.iter().zip(&chunk).map(|(&side, &chunk)| side.div_ceil(chunk));
         let most = product(&sides.collect::<Vec<_>>(), 1);
-        // Every chunk is decoded, and the last ones stand over the edge.
+        // Every chunk is decoded whole, and the last ones extend over the edge.
         let each = product(&chunk, element).saturating_add(PER_CHUNK);
         self.budget.admit(&*place, most.saturating_mul(each))?;
         let stored = dataset.chunks().map_err(refuse)?;
@@ -289,7 +273,7 @@ impl FeatureStore {
             let expected = format!("at most {most} chunks");
             return Err(self.error(path, name, expected, stored.len().to_string()));
         }
-        // Memory is taken for what an index declares before it is read.
+        // The library allocates what an index declares before it reads.
         let end = |chunk: &Chunk| chunk.address.saturating_add(chunk.storage_size);
         if let Some(end) = stored.iter().map(end).find(|&end| end > self.len) {
             let expected = format!("chunks within the {} bytes of the file", self.len);
@@ -298,7 +282,6 @@ impl FeatureStore {
         Ok(())
     }
 
-    /// The attribute `key` of that array, if it is a number.
     pub fn number(&self, at: usize, name: &str, key: &str) -> Result<Option<f64>, Error> {
         let path = &self.paths[at];
         self.step(path, name, || {
@@ -313,12 +296,12 @@ impl FeatureStore {
         if source::is_spent() {
             let most = size(source::most(self.len));
             let expected = format!("at most {most} to read in a file of {}", size(self.len));
-            return self.error(path, name, expected, "the same parts again and again");
+            return self.error(path, name, expected, "parts that are read again and again");
         }
         self.error(path, name, "readable HDF5", error.to_string())
     }
 
-    /// An error about the image `path` and its array `name` (empty: the image as a whole).
+    /// Returns an error about the image `path` and its array `name`, which may be empty.
     pub fn error(
         &self,
         path: &str,
@@ -338,7 +321,7 @@ impl FeatureStore {
     }
 }
 
-/// How to read two bytes of `datatype` if it is IEEE's float of 16 bits.
+/// Returns the decoder of `datatype` if it is the IEEE float of 16 bits.
 fn half_order(datatype: &Datatype) -> Option<fn([u8; 2]) -> f16> {
     let Datatype::FloatingPoint { size: 2, byte_order, layout } = datatype else { return None };
     let bits = (layout.exponent_location, layout.exponent_size, layout.mantissa_size);

@@ -1,7 +1,7 @@
-//! The bytes of an HDF5 file, and how many of them may be read in one step.
+//! Reads the bytes of an HDF5 file, with a limit per step.
 //!
-//! A list of names is a tree whose nodes may be the same ones again and again, a chunk may be listed a
-//! million times: what the library does is bounded by what it reads, and that is bounded here.
+//! Nodes of a tree may repeat, and a chunk may be listed a million times. Limiting the bytes that
+//! the library reads also limits its time and memory.
 
 use std::cell::Cell;
 use std::fs::File;
@@ -14,23 +14,22 @@ use hdf5_pure::{FormatError, Source};
 use crate::error::Error;
 use crate::input;
 
-/// Small reads are served from pages: a header is read in a dozen pieces.
+/// The library reads a header in a dozen pieces, so pages are cached.
 const PAGE: u64 = 8 << 10;
 const PAGES: u64 = 64;
-/// What a read costs beside its bytes.
+/// The cost of a read besides its bytes.
 const READ: u64 = 64;
-/// Every step may read as much, however small the file is, and else so many times its length.
+/// A step may read `LEAST` bytes, or `MULTIPLE` times the length of the file if that is more.
 const LEAST: u64 = 256 << 20;
 const MULTIPLE: u64 = 64;
 
 thread_local! {
-    // The library reads in the thread that asks.
+    // The library reads in the calling thread.
     static LEFT: Cell<u64> = const { Cell::new(0) };
     static FIRST: Cell<Option<u64>> = const { Cell::new(None) };
     static LONGEST_NAME: Cell<u64> = const { Cell::new(0) };
 }
 
-/// A file that is read at any place, by many threads.
 pub(super) struct Bounded {
     pages: Mutex<Pages>,
     len: u64,
@@ -38,12 +37,11 @@ pub(super) struct Bounded {
 
 struct Pages {
     file: File,
-    /// The number of a page and its bytes, at the place that the number modulo [`PAGES`] gives.
+    /// Page numbers and bytes, at index number modulo [`PAGES`].
     held: Vec<(u64, Vec<u8>)>,
 }
 
 impl Bounded {
-    /// Opens the regular file `path`; with its length.
     pub fn open(path: &Path) -> Result<(Self, u64), Error> {
         let (file, len) = input::open(path)?;
         let held = (0..PAGES).map(|_| (u64::MAX, Vec::new())).collect();
@@ -51,7 +49,6 @@ impl Bounded {
     }
 }
 
-/// Runs `step`, which may read a number of bytes that `len`, the length of the file, sets.
 pub(super) fn bounded<T>(len: u64, step: impl FnOnce() -> T) -> T {
     let outer = LEFT.replace(most(len));
     let result = step();
@@ -59,17 +56,15 @@ pub(super) fn bounded<T>(len: u64, step: impl FnOnce() -> T) -> T {
     result
 }
 
-/// Bytes that one step may read.
 pub(super) fn most(len: u64) -> u64 {
     len.saturating_mul(MULTIPLE).max(LEAST)
 }
 
-/// Whether this step has read all that it may.
 pub(super) fn is_spent() -> bool {
     LEFT.get() == 0
 }
 
-/// The result of `step` and where it read first.
+/// Returns the result of `step` and the offset of its first read.
 pub(super) fn first_read<T>(step: impl FnOnce() -> T) -> (T, Option<u64>) {
     FIRST.set(None);
     let result = step();
@@ -78,7 +73,6 @@ pub(super) fn first_read<T>(step: impl FnOnce() -> T) -> (T, Option<u64>) {
 
 #[cfg(test)]
 thread_local! {
-    /// What all reads of this thread have cost.
     pub(super) static READ_SO_FAR: Cell<u64> = const { Cell::new(0) };
 }
 
@@ -109,8 +103,8 @@ impl Source for Bounded {
 
     fn read_metadata_at(&self, offset: u64, len: usize) -> Result<Vec<u8>, FormatError> {
         let bytes = self.read_exact_at(offset, len)?;
-        // Entries of a list of names (40 bytes each) may all have the same name, however long, and each
-        // becomes a text of its own: they cost what the heap read before them may make of them.
+        // The library copies the name of each entry (40 bytes), and all entries may share one long
+        // name. So each entry costs the longest name of the heap read before.
         if bytes.starts_with(b"SNOD") {
             charge(len as u64 / 40 * LONGEST_NAME.get())?;
         } else if !bytes.starts_with(b"TREE") {
@@ -144,7 +138,6 @@ impl Pages {
     fn page(&mut self, number: u64) -> io::Result<&[u8]> {
         let (held, bytes) = &mut self.held[(number % PAGES) as usize];
         if *held != number {
-            // Nothing is held if reading fails.
             *held = u64::MAX;
             bytes.clear();
             self.file.seek(SeekFrom::Start(number * PAGE))?;

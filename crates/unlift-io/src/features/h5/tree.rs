@@ -1,15 +1,15 @@
-//! Names of a group: a heap that holds them and a tree that finds them.
+//! Writes the names of a group: a heap, and a tree that finds them.
 //!
-//! Source: HDF5 File Format Specification 3.0, III.A, III.B and III.D. The old form of groups: a
-//! reader finds one name of ten thousand in a few steps, and every reader knows it.
+//! Source: HDF5 File Format Specification 3.0, III.A, III.B and III.D. Every reader supports this
+//! old form of groups.
 
 use super::messages::{UNDEFINED, pad};
 
-/// Half of the names in a leaf, and half of the children of a node: the library's own choices.
+/// Half of the names in a leaf, and half of the children of a node, as in the HDF5 library.
 pub(super) const LEAF: u16 = 4;
 pub(super) const NODE: u16 = 16;
 
-/// A name, where its object header is, and, of a group, where its tree and heap are.
+/// A name, the address of its object header, and for a group those of its tree and heap.
 pub(super) struct Entry<'a> {
     pub name: &'a str,
     pub header: u64,
@@ -17,7 +17,7 @@ pub(super) struct Entry<'a> {
 }
 
 impl Entry<'_> {
-    /// The 40 bytes of an entry whose name is at `name_at` of the heap.
+    /// Returns the 40 bytes of an entry whose name is at `name_at` of the heap.
     pub fn bytes(&self, name_at: u64) -> Vec<u8> {
         let mut bytes = [name_at.to_le_bytes(), self.header.to_le_bytes()].concat();
         bytes.extend(u32::from(self.group.is_some()).to_le_bytes());
@@ -27,10 +27,10 @@ impl Entry<'_> {
     }
 }
 
-/// Bytes of the heap and the tree over `entries`, sorted by name, which will stand at `start`; with
-/// the addresses of the tree and of the heap.
+/// Returns the bytes of heap and tree for sorted `entries`, to be written at `start`, and the
+/// addresses of tree and heap.
 pub(super) fn names(entries: &[Entry<'_>], start: u64) -> (Vec<u8>, [u64; 2]) {
-    // The empty name comes first: it is the lower end of the first leaf.
+    // The first name is empty: it is the lower bound of the first leaf.
     let mut heap = vec![0; 8];
     let mut offsets = Vec::with_capacity(entries.len());
     for entry in entries {
@@ -46,7 +46,7 @@ pub(super) fn names(entries: &[Entry<'_>], start: u64) -> (Vec<u8>, [u64; 2]) {
     bytes.extend((start + 32).to_le_bytes());
     bytes.extend(heap);
 
-    // Leaves, then nodes over them, until there is one. A child is its address and its last name.
+    // Leaves, then levels of nodes up to a single root. A child is its address and its last name.
     let mut children: Vec<(u64, u64)> = Vec::new();
     let leaves = entries.chunks(2 * usize::from(LEAF)).zip(offsets.chunks(2 * usize::from(LEAF)));
     for (entries, offsets) in leaves {
@@ -84,7 +84,6 @@ pub(super) fn names(entries: &[Entry<'_>], start: u64) -> (Vec<u8>, [u64; 2]) {
 
 const NODE_BYTES: usize = 24 + (4 * NODE as usize + 1) * 8;
 
-/// A node over `children`: their addresses and their last names.
 pub(super) fn node(level: u8, children: &[(u64, u64)], lower: u64, siblings: [u64; 2]) -> Vec<u8> {
     let mut bytes = b"TREE\0".to_vec();
     bytes.push(level);

@@ -1,4 +1,4 @@
-//! An HDF5 file as a stream: arrays as they come, then the tree of their names, then the superblock.
+//! Writes HDF5 files.
 
 use std::collections::BTreeMap;
 use std::io::{self, Seek, SeekFrom, Write};
@@ -10,7 +10,7 @@ use crate::atomic::FEATURES_MARK;
 
 const SUPERBLOCK_BYTES: u64 = 96;
 
-/// The first bytes of a file of `len` bytes, whose root group has its header, tree and heap there.
+/// Returns the superblock of a file of `len` bytes with its root group at these addresses.
 pub(super) fn superblock(len: u64, header: u64, group: [u64; 2]) -> Vec<u8> {
     let mut bytes = b"\x89HDF\r\n\x1a\n\0\0\0\0\0\x08\x08\0".to_vec();
     bytes.extend(tree::LEAF.to_le_bytes());
@@ -22,33 +22,31 @@ pub(super) fn superblock(len: u64, header: u64, group: [u64; 2]) -> Vec<u8> {
     bytes
 }
 
-/// A member of a group.
 enum Member {
     /// The address of its header.
     Dataset(u64),
     Group(BTreeMap<String, Member>),
 }
 
-/// Writes arrays under paths; only names and addresses stay in memory.
+/// Writes an HDF5 file as a stream: arrays, then the tree of their names, then the superblock.
 ///
-/// The same arrays in the same order give the same bytes: nothing of the machine or the time is stored.
+/// Only names and addresses stay in memory. The same arrays in the same order give the same bytes.
 pub(crate) struct Writer {
     at: u64,
     root: BTreeMap<String, Member>,
 }
 
 impl Writer {
-    /// Starts at the beginning of `out`. A file without its end is no HDF5 file: the signature is
-    /// written last.
+    /// Starts a file. The signature is written last, so an unfinished file is not valid HDF5.
     pub fn start(out: &mut impl Write) -> io::Result<Self> {
         out.write_all(&[0; SUPERBLOCK_BYTES as usize])?;
-        // Nothing refers to it: readers of HDF5 pass it over.
+        // HDF5 readers skip it, because nothing refers to it.
         out.write_all(FEATURES_MARK)?;
         let at = SUPERBLOCK_BYTES + FEATURES_MARK.len() as u64;
         Ok(Self { at, root: BTreeMap::new() })
     }
 
-    /// Whether the group `path` can be made: nothing is there yet, and no array stands in its way.
+    /// Returns true if the group `path` does not exist and no array is in its way.
     pub fn is_free(&self, path: &str) -> bool {
         let mut members = &self.root;
         for name in path.split('/') {
@@ -61,7 +59,7 @@ impl Writer {
         !members.values().any(|member| matches!(member, Member::Dataset(_)))
     }
 
-    /// Writes `array` as the dataset `name` of the group `path`, which slashes lead to.
+    /// Writes `array` as the dataset `name` of the group `path`, with slashes.
     pub fn array(
         &mut self,
         out: &mut impl Write,
@@ -77,7 +75,7 @@ impl Writer {
         bytes.extend(messages::dataset(array, address, len, attributes));
         self.put(out, &bytes)?;
         let taken = || {
-            let text = format!("{path}: {name} is there already");
+            let text = format!("{path}: {name} exists already");
             io::Error::new(io::ErrorKind::AlreadyExists, text)
         };
         let mut members = &mut self.root;
@@ -98,7 +96,6 @@ impl Writer {
         out.write_all(bytes)
     }
 
-    /// Writes all groups and the superblock: now it is a file.
     pub fn finish(mut self, out: &mut (impl Write + Seek)) -> io::Result<()> {
         let root = std::mem::take(&mut self.root);
         let (header, group) = self.group(out, &root)?;
@@ -106,7 +103,8 @@ impl Writer {
         out.write_all(&superblock(self.at, header, group))
     }
 
-    /// Writes a group after its members; the addresses of its header and of its names.
+    /// Writes the members of a group, then the group. Returns the addresses of its header, and of
+    /// its tree and heap.
     fn group(
         &mut self,
         out: &mut impl Write,

@@ -1,4 +1,4 @@
-//! The binary form: little-endian, each file a count and that many records.
+//! Reads COLMAP's binary files.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use super::model::{Camera, Image, Points, Tracks, place};
 use crate::error::Error;
 use crate::read::bytes::Bytes;
 
-/// Smallest record of each kind, in bytes: what bounds a declared count.
+/// The smallest size of each record in bytes, which limits a declared count.
 const CAMERA_BYTES: u64 = 4 + 4 + 8 + 8 + 2 * 8;
 const IMAGE_BYTES: u64 = 4 + 7 * 8 + 4 + 1 + 8;
 const POINT2D_BYTES: u64 = 8 + 8 + 8;
@@ -99,7 +99,7 @@ pub fn rigs(path: &Path) -> Result<u64, Error> {
         let n_sensors = bytes.count_u32("sensors", SENSOR_BYTES)?;
         for sensor in 0..n_sensors {
             bytes.skip(SENSOR_BYTES, "sensor")?;
-            // The first sensor is the reference of the rig: it has no pose and no flag for one.
+            // The first sensor is the reference of the rig, without a pose and its flag.
             if sensor > 0 && bytes.u8("pose flag")? != 0 {
                 bytes.skip(7 * 8, "sensor pose")?;
             }

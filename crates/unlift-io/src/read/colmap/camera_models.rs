@@ -1,13 +1,13 @@
-//! The camera models of COLMAP: numbers, names and how many parameters each stores.
+//! The camera models of COLMAP.
 
-/// A camera model: how a file stores it (the mathematics is not needed to audit points).
+/// A camera model as files store it. Audits of points do not need its projection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CameraModel {
-    /// The number in binary files and databases.
+    /// The id in binary files and databases.
     pub id: i32,
     /// The name in text files.
     pub name: &'static str,
-    /// Number of parameters that follow.
+    /// The number of parameters.
     pub n_params: usize,
 }
 
@@ -15,7 +15,7 @@ const fn model(id: i32, name: &'static str, n_params: usize) -> CameraModel {
     CameraModel { id, name, n_params }
 }
 
-/// Every model COLMAP 4.2 writes; row `i` has id `i`.
+/// All models of COLMAP 4.2. Row `i` has id `i`.
 pub const CAMERA_MODELS: [CameraModel; 18] = [
     model(0, "SIMPLE_PINHOLE", 3),
     model(1, "PINHOLE", 4),
@@ -38,12 +38,12 @@ pub const CAMERA_MODELS: [CameraModel; 18] = [
 ];
 
 impl CameraModel {
-    /// The model with this number.
+    /// Returns the model with this id.
     pub fn from_id(id: i32) -> Option<&'static Self> {
         CAMERA_MODELS.get(usize::try_from(id).ok()?)
     }
 
-    /// The model with this name.
+    /// Returns the model with this name.
     pub fn from_name(name: &[u8]) -> Option<&'static Self> {
         CAMERA_MODELS.iter().find(|m| m.name.as_bytes() == name)
     }

@@ -1,7 +1,7 @@
-//! COLMAP models: `cameras`, `images` and `points3D`, as `.bin` or `.txt`.
+//! Reads COLMAP models: `cameras`, `images` and `points3D`, as `.bin` or `.txt`.
 //!
-//! Models written since COLMAP 3.12 have `rigs` and `frames` beside them. They repeat what `images`
-//! says about poses, so they are checked ([`check_rigs`], [`check_frames`]) but not needed.
+//! Models of COLMAP 3.12 and later also have `rigs` and `frames`, which repeat the poses of
+//! `images`. They are checked ([`check_rigs`], [`check_frames`]) but not used.
 //!
 //! Source: COLMAP's documentation, "Output Format".
 
@@ -17,15 +17,14 @@ pub use model::{Camera, Image, Points, Tracks};
 
 use crate::error::Error;
 
-/// Whether `path` is text, by its extension.
 fn is_text(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("txt"))
 }
 
-/// Reads `cameras.bin` or `cameras.txt`, by ascending id.
+/// Reads `cameras.bin` or `cameras.txt`, sorted by id.
 ///
 /// # Errors
-/// When the file cannot be read, is malformed, names an unknown model or repeats an id.
+/// When the file cannot be read, is malformed, names an unknown camera model or repeats an id.
 pub fn read_cameras(path: &Path) -> Result<Vec<Camera>, Error> {
     let mut cameras = if is_text(path) { text::cameras(path)? } else { binary::cameras(path)? };
     cameras.sort_by_key(|c| c.id);
@@ -33,7 +32,7 @@ pub fn read_cameras(path: &Path) -> Result<Vec<Camera>, Error> {
     Ok(cameras)
 }
 
-/// Reads `images.bin` or `images.txt`, by ascending id.
+/// Reads `images.bin` or `images.txt`, sorted by id.
 ///
 /// # Errors
 /// When the file cannot be read, is malformed or repeats an id.
@@ -44,10 +43,12 @@ pub fn read_images(path: &Path) -> Result<Vec<Image>, Error> {
     Ok(images)
 }
 
-/// Reads the cameras and images of the model in the folder `model`, in the form that [`super::open`] reads.
+/// Reads the cameras and images of the model in the folder `model`, in the form that
+/// [`super::open`] reads.
 ///
 /// # Errors
-/// As [`read_cameras`] and [`read_images`]; when an image names a camera that is not there, or has no pose.
+/// When [`read_cameras`] or [`read_images`] fails, or an image names a missing camera or has no
+/// pose.
 pub fn read_views(model: &Path) -> Result<(Vec<Camera>, Vec<Image>), Error> {
     let extension = if model.join("images.bin").is_file() { "bin" } else { "txt" };
     let cameras = read_cameras(&model.join(format!("cameras.{extension}")))?;
@@ -68,7 +69,8 @@ pub fn read_views(model: &Path) -> Result<(Vec<Camera>, Vec<Image>), Error> {
     Ok((cameras, images))
 }
 
-/// Reads `points3D.bin` or `points3D.txt`, by ascending id; the tracks only `with_tracks`.
+/// Reads `points3D.bin` or `points3D.txt`, sorted by id. Tracks are read only if `with_tracks` is
+/// set.
 ///
 /// # Errors
 /// When the file cannot be read, is malformed or repeats an id.
@@ -83,7 +85,7 @@ pub fn read_points(path: &Path, with_tracks: bool) -> Result<Points, Error> {
     Ok(points)
 }
 
-/// Reads through `rigs.bin` or `rigs.txt`; the number of rigs.
+/// Checks `rigs.bin` or `rigs.txt` and returns the number of rigs.
 ///
 /// # Errors
 /// When the file cannot be read or is malformed.
@@ -91,7 +93,7 @@ pub fn check_rigs(path: &Path) -> Result<u64, Error> {
     if is_text(path) { text::rigs(path) } else { binary::rigs(path) }
 }
 
-/// Reads through `frames.bin` or `frames.txt`; the number of frames.
+/// Checks `frames.bin` or `frames.txt` and returns the number of frames.
 ///
 /// # Errors
 /// When the file cannot be read or is malformed.
@@ -115,7 +117,7 @@ fn refuse_repeated(
     Ok(())
 }
 
-/// Points by ascending id: older COLMAP writes them in the order of a hash map.
+/// Older COLMAP versions write points in the order of a hash map.
 fn sorted(points: Points) -> Points {
     if points.ids.is_sorted() {
         return points;

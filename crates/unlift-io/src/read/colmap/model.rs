@@ -1,9 +1,9 @@
-//! What a COLMAP model holds, as far as an audit needs it.
+//! The parts of a COLMAP model that an audit needs.
 
 use super::camera_models::CameraModel;
 use crate::read::pose::scaled_rotation;
 
-/// One camera: a lens and a sensor, shared by any number of images.
+/// A camera, shared by any number of images.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
     /// The id that images refer to.
@@ -14,30 +14,30 @@ pub struct Camera {
     pub width_px: u64,
     /// Height of the images in pixels.
     pub height_px: u64,
-    /// Parameters, `model.n_params` of them, in the order COLMAP documents.
+    /// The `model.n_params` parameters, in the order of COLMAP's documentation.
     pub params: Vec<f64>,
 }
 
-/// One registered image: what an audit needs of it.
+/// A registered image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
     /// The id that tracks refer to. A database may use other ids for the same names.
     pub id: u32,
-    /// The name, a path below the image folder, as the bytes in the file (UTF-8 or not).
+    /// The path below the image folder, as bytes of the file. It may not be UTF-8.
     pub name: Vec<u8>,
     /// The id of its camera.
     pub camera_id: u32,
-    /// Position of the camera's center in the world, in units of the model; not finite where the file gives no pose.
+    /// The camera center in the world, in units of the model. Not finite if the file has no pose.
     pub center: [f64; 3],
-    /// How the camera is turned: a point `x` of the world is at `rotation (x - center)` from the camera, whose axes
-    /// point to the right, down and ahead.
+    /// The rotation from world to camera: a world point `x` is at `rotation (x - center)`. Camera
+    /// axes point right, down and forward.
     pub rotation: [[f64; 3]; 3],
-    /// Number of 2D points, triangulated or not.
+    /// The number of 2D points, triangulated or not.
     pub n_points2d: u64,
 }
 
 impl Image {
-    /// Its camera among `cameras`, which are by ascending id.
+    /// Finds the camera of this image in `cameras`, which are sorted by id.
     pub fn camera<'a>(&self, cameras: &'a [Camera]) -> Option<&'a Camera> {
         cameras
             .binary_search_by_key(&self.camera_id, |camera| camera.id)
@@ -45,27 +45,27 @@ impl Image {
             .map(|at| &cameras[at])
     }
 
-    /// The direction in the world that is up in the photo, of unit length.
+    /// The unit vector in the world that points up in the photo.
     pub fn up(&self) -> [f64; 3] {
         self.rotation[1].map(|x| -x)
     }
 }
 
-/// The points of a model, by ascending id.
+/// The points of a model, sorted by id.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Points {
-    /// Ids, `(n,)`, ascending, each once.
+    /// Ids `(n,)`, ascending and unique.
     pub ids: Vec<u64>,
-    /// Coordinates, `(n, 3)`, in units of the model, not finite where the file gives no place.
+    /// Coordinates `(n, 3)` in units of the model. Not finite if the file has no position.
     pub positions: Vec<[f64; 3]>,
-    /// Observations of each point, when they were asked for.
+    /// The observations of each point, if requested.
     pub tracks: Option<Tracks>,
 }
 
-/// Which 2D points see each point: row `i` is `observations[offsets[i]..offsets[i + 1]]`.
+/// The 2D points that observe each point: row `i` is `observations[offsets[i]..offsets[i + 1]]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tracks {
-    /// `(n + 1,)`, from 0, ascending.
+    /// Offsets `(n + 1,)`, ascending from 0.
     pub offsets: Vec<usize>,
     /// Image id and index of the 2D point in that image.
     pub observations: Vec<(u32, u32)>,
@@ -76,7 +76,7 @@ impl Tracks {
         Self { offsets: vec![0], observations: Vec::new() }
     }
 
-    /// Observations of the point in `row`.
+    /// Returns the observations of the point in `row`.
     ///
     /// # Panics
     /// When there is no such row.
@@ -85,10 +85,10 @@ impl Tracks {
     }
 }
 
-/// The center `-R^T t` of a camera whose pose `x_cam = R x + t` is a quaternion (w, x, y, z) and `t`,
-/// and `R`; not finite when a number is not or the quaternion is zero.
+/// Returns the center `-R^T t` and the rotation `R` of a camera with the pose `x_cam = R x + t`,
+/// given as a quaternion (w, x, y, z) and `t`. Not finite for a zero quaternion.
 pub(super) fn place(quaternion: [f64; 4], t: [f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
-    // Rotating by the conjugate, with the norm divided out once: files hold norms like 0.9999999.
+    // Divides by the squared norm, because files contain norms such as 0.9999999.
     let (r, norm2) = scaled_rotation(quaternion);
     let c: [f64; 3] =
         std::array::from_fn(|j| -(r[0][j] * t[0] + r[1][j] * t[1] + r[2][j] * t[2]) / norm2);
@@ -101,7 +101,7 @@ mod tests {
 
     #[test]
     fn center_is_where_the_pose_maps_to_zero() {
-        // A quarter turn about z: x_cam = (-y, x, z) + t.
+        // A rotation by 90 degrees about z: x_cam = (-y, x, z) + t.
         let half = 0.5_f64.sqrt();
         let (c, rotation) = place([half, 0.0, 0.0, half], [1.0, 2.0, 3.0]);
         for (found, expected) in c.iter().zip([-2.0, 1.0, -3.0]) {

@@ -1,4 +1,4 @@
-//! The text form: a line per record (two for images), words between spaces, `#` for comments.
+//! Reads COLMAP's text files.
 
 use std::path::Path;
 
@@ -8,7 +8,6 @@ use crate::error::Error;
 use crate::read::columns::coordinates;
 use crate::read::lines::{Lines, number, quoted, words};
 
-/// The next word of the line as a number, or an error that says which one it should have been.
 fn next<'a, T: std::str::FromStr>(
     lines: &Lines,
     words: &mut impl Iterator<Item = &'a [u8]>,
@@ -58,7 +57,7 @@ pub fn images(path: &Path) -> Result<Vec<Image>, Error> {
         if name.is_empty() {
             return Err(lines.error("an image name", "end of line"));
         }
-        // The line of 2D points may be empty, and some tools leave it out after the last image.
+        // The line of 2D points may be empty, and some tools omit it after the last image.
         let n_words = if lines.advance()? { self::words(lines.line()).count() } else { 0 };
         if !n_words.is_multiple_of(3) {
             let expected = "2D points of 3 numbers (x, y, point id)";
@@ -76,7 +75,7 @@ pub fn images(path: &Path) -> Result<Vec<Image>, Error> {
     Ok(images)
 }
 
-/// What follows the first `n` words of a line: names may hold spaces.
+/// Returns the rest of a line after `n` words. Names may contain spaces.
 fn after_words(mut line: &[u8], n: usize) -> &[u8] {
     for _ in 0..n {
         let end = line.iter().position(u8::is_ascii_whitespace);
@@ -123,7 +122,6 @@ pub fn frames(path: &Path) -> Result<u64, Error> {
     ids(path, "a frame id", "a rig id")
 }
 
-/// Checks the first two numbers of every line.
 fn ids(path: &Path, first: &str, second: &str) -> Result<u64, Error> {
     let mut lines = Lines::open(path)?;
     let mut n = 0;

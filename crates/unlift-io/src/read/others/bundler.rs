@@ -1,4 +1,4 @@
-//! Bundler's `bundle.out`: a line with counts, five lines per camera, three per point.
+//! Reads Bundler's `bundle.out`: a line with counts, five lines per camera, three per point.
 
 use std::path::Path;
 
@@ -9,7 +9,6 @@ use crate::read::map_input::Input;
 use crate::read::pose::{UPWARD, camera};
 use crate::read::undeclared::undeclared;
 
-/// Exactly `N` numbers in the current line.
 fn numbers<const N: usize>(lines: &Lines, what: &str) -> Result<[f64; N], Error> {
     let mut values = [0.0; N];
     let mut words = words(lines.line());
@@ -27,10 +26,6 @@ fn next(lines: &mut Lines, what: &str) -> Result<(), Error> {
     if lines.advance_to_data()? { Ok(()) } else { Err(lines.end_error(what)) }
 }
 
-/// Reads points and cameras.
-///
-/// # Errors
-/// When the file is not one of Bundler.
 pub fn read(path: &Path) -> Result<Input, Error> {
     let mut lines = Lines::open(path)?;
     next(&mut lines, "numbers of cameras and points")?;
@@ -65,7 +60,7 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     while lines.advance_to_data()? {
         more += 1;
     }
-    // Three lines a point.
+    // A point has three lines.
     found.doubts.extend(undeclared(*n_points, more / 3));
     Ok(found)
 }

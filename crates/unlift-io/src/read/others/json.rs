@@ -1,5 +1,5 @@
-//! Maps in JSON, told apart by the names in them: OpenSfM, OpenMVG's `sfm_data.json`, Meshroom's `.sfm`, nerfstudio's
-//! `transforms.json`. A file is read as it comes: only points and poses are kept.
+//! Reads maps in JSON as a stream, distinguished by their keys: OpenSfM, OpenMVG's `sfm_data.json`,
+//! Meshroom's `.sfm`, nerfstudio's `transforms.json`.
 
 use std::fmt;
 use std::io::{self, BufRead, BufReader, Read};
@@ -15,10 +15,7 @@ use crate::read::map_input::Input;
 use crate::read::ply;
 use crate::read::pose::{DOWNWARD, camera};
 
-/// Reads points and cameras: of several reconstructions, those of the largest.
-///
-/// # Errors
-/// When the file is no JSON, or none of these maps; when the cloud that nerfstudio's names cannot be read.
+/// Reads points and cameras of the largest reconstruction.
 pub fn read(path: &Path) -> Result<Input, Error> {
     let (file, _) = input::open(path)?;
     let mut json = serde_json::Deserializer::from_reader(Strict::new(BufReader::new(file)));
@@ -27,7 +24,6 @@ pub fn read(path: &Path) -> Result<Input, Error> {
         if error.is_io() {
             return Error::read(path, error.into());
         }
-        // The line is told by its number; the rest is what is wrong there.
         let text = error.to_string();
         let what = text.split(" at line ").next().unwrap_or_default().to_owned();
         let (expected, what) = match error.is_data() {
@@ -56,8 +52,8 @@ pub fn read(path: &Path) -> Result<Input, Error> {
         found.notes.push(format!("read, the largest of {n} reconstructions ({points} points)"));
     }
     if found.positions.is_empty() && format != "nerfstudio" {
-        let expected = "points (Meshroom: ConvertSfMFormat of the .abc file; OpenMVG: the file of the reconstruction)";
-        return Err(Error::new(path, "", expected, "cameras alone"));
+        let expected = "points (Meshroom: convert the .abc file with ConvertSfMFormat; OpenMVG: the file of the reconstruction)";
+        return Err(Error::new(path, "", expected, "only cameras"));
     }
     let n_poses = found.cameras.len() + found.n_unplaced;
     found.n_unplaced += n_views.saturating_sub(n_poses);
@@ -67,13 +63,12 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     Ok(found)
 }
 
-/// What is read, for people.
 const MAPS: &str = "a map of OpenSfM, OpenMVG, Meshroom or nerfstudio";
 
-/// JSON as other programs write it, with `NaN` and `Infinity`, read as JSON: an empty text in the place of each.
+/// A reader that replaces `NaN` and `Infinity`, which other programs write, by an empty string.
 struct Strict<R> {
     bytes: io::Bytes<R>,
-    /// What comes next, the last byte first.
+    /// The bytes to return next, in reverse order.
     ahead: Vec<u8>,
     in_text: bool,
     is_escaped: bool,
@@ -96,7 +91,7 @@ impl<R: BufRead> Strict<R> {
         }
         match byte {
             b'"' => self.in_text = true,
-            // Letters that JSON has in no other place.
+            // Outside strings, JSON has no such letters.
             b'N' => return self.no_number(2),
             b'I' => return self.no_number(7),
             b'-' => match self.bytes.next().transpose()? {
@@ -108,7 +103,6 @@ impl<R: BufRead> Strict<R> {
         Ok(Some(byte))
     }
 
-    /// An empty text in place of a number that is none, of which so many letters are left.
     fn no_number(&mut self, n: usize) -> io::Result<Option<u8>> {
         for _ in 0..n {
             self.bytes.next().transpose()?;
@@ -130,13 +124,13 @@ impl<R: BufRead> Read for Strict<R> {
     }
 }
 
-/// Adds the points of the cloud that nerfstudio's file at `path` names.
+/// Adds the points of the point cloud that nerfstudio's file names.
 fn with_cloud(path: &Path, found: &mut Input, cloud: Option<PathBuf>) -> Result<(), Error> {
     let Some(cloud) = cloud else {
         let expected = "ply_file_path, a point cloud beside the cameras";
         return Err(Error::new(path, "", expected, "none"));
     };
-    // Whoever sends a file does not say which files of the reader's are opened.
+    // A file of unknown origin must not name files outside its folder.
     if !cloud.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir)) {
         let found = cloud.display().to_string();
         return Err(Error::new(path, "ply_file_path", "a path within the folder", found));
@@ -149,13 +143,12 @@ fn with_cloud(path: &Path, found: &mut Input, cloud: Option<PathBuf>) -> Result<
     Ok(())
 }
 
-/// A file: an object, or OpenSfM's list of them, of which the one with the most points is kept.
+/// An object, or OpenSfM's list of objects, of which the one with the most points is kept.
 enum Top {
     One(Object),
     Several(Object, usize),
 }
 
-/// What is known of an object.
 #[derive(Default)]
 struct Object {
     names: Vec<String>,
@@ -165,7 +158,6 @@ struct Object {
 }
 
 impl Object {
-    /// The program that writes objects with such names.
     fn format(&self) -> Option<&'static str> {
         let has = |name: &str| self.names.iter().any(|its| its == name);
         Some(match () {
@@ -180,7 +172,7 @@ impl Object {
     }
 }
 
-/// A number, also where it is written as text; NaN where there is none.
+/// A number, possibly written as a string. A missing one is NaN.
 struct Number(f64);
 
 impl<'de> Deserialize<'de> for Number {
@@ -210,7 +202,7 @@ impl<'de> Deserialize<'de> for Number {
             }
 
             fn visit_str<E: de::Error>(self, value: &str) -> Result<f64, E> {
-                // Text may begin with a space. None is what stands for NaN here.
+                // Strings may begin with a space. An empty one replaces NaN (`Strict`).
                 match value.trim() {
                     "" => Ok(f64::NAN),
                     value => value
@@ -227,7 +219,7 @@ fn numbers<const N: usize>(numbers: [Number; N]) -> [f64; N] {
     numbers.map(|number| number.0)
 }
 
-/// OpenSfM's shot, whose rotation is axis times angle.
+/// A shot of OpenSfM. Its rotation is the axis times the angle.
 #[derive(Deserialize)]
 struct Shot {
     rotation: [Number; 3],
@@ -239,7 +231,7 @@ struct Point {
     coordinates: [Number; 3],
 }
 
-/// A point of OpenMVG, in its `value`, or of Meshroom.
+/// A point of OpenMVG (in its `value`) or of Meshroom.
 #[derive(Deserialize)]
 struct Landmark {
     value: Option<Box<Landmark>>,
@@ -265,17 +257,17 @@ struct PoseOfView {
 
 #[derive(Deserialize)]
 struct Transform {
-    /// Column by column, as the matrix lies in memory.
+    /// Column-major.
     transform: Pose<[Number; 9]>,
 }
 
 #[derive(Deserialize)]
 struct Frame {
-    /// From the camera, whose y is up, to the world.
+    /// The pose from camera (y is up) to world.
     transform_matrix: Vec<[Number; 4]>,
 }
 
-/// The rotation by the length of `vector` about it.
+/// Returns the rotation about `vector` by its length.
 fn rotation(vector: [f64; 3]) -> [[f64; 3]; 3] {
     let angle = vector.iter().map(|x| x * x).sum::<f64>().sqrt();
     let axis = if angle > 0.0 { vector.map(|x| x / angle) } else { [0.0; 3] };
@@ -290,13 +282,13 @@ fn rotation(vector: [f64; 3]) -> [[f64; 3]; 3] {
     })
 }
 
-/// A camera at `center`, turned as `x_cam = R (x - center)` with y down.
+/// Returns center and up direction of a camera with `x_cam = R (x - center)` and y down.
 fn turned(rotation: &[[f64; 3]; 3], center: [f64; 3]) -> ([f64; 3], [f64; 3]) {
     (center, camera(rotation, &[0.0; 3], DOWNWARD).1)
 }
 
 impl Object {
-    /// Reads one value of the object, under the name that was pushed last.
+    /// Reads the value of the last key in `names`.
     fn take<'de, A: MapAccess<'de>>(&mut self, json: &mut A) -> Result<(), A::Error> {
         let Self { names, found, n_views, cloud } = self;
         match names.last().map_or("", String::as_str) {
@@ -380,7 +372,7 @@ impl<'de> Visitor<'de> for OfAny {
     }
 }
 
-/// Values of a list or of an object, one after the other.
+/// Applies a function to each value of a list or an object.
 struct Items<T, F>(F, PhantomData<T>);
 
 impl<T, F: FnMut(T)> Items<T, F> {

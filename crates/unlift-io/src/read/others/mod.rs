@@ -1,4 +1,4 @@
-//! Maps as other programs write them: what they say of points and cameras, as COLMAP's would be read.
+//! Reads maps of other programs, in COLMAP's conventions.
 
 pub mod bundler;
 pub mod json;
@@ -6,7 +6,7 @@ pub mod nvm;
 
 use std::path::{Path, PathBuf};
 
-/// Files that are looked for in a folder without a COLMAP model, in this order.
+/// The files to look for in a folder without a COLMAP model, in this order.
 const IN_FOLDERS: [&str; 6] = [
     "reconstruction.json",
     "opensfm/reconstruction.json",
@@ -16,7 +16,6 @@ const IN_FOLDERS: [&str; 6] = [
     "bundle/bundle.out",
 ];
 
-/// The file of another program's map in the folder `path`.
 pub(super) fn in_folder(path: &Path) -> Option<PathBuf> {
     IN_FOLDERS.map(|name| path.join(name)).into_iter().find(|file| file.is_file())
 }

@@ -1,4 +1,4 @@
-//! VisualSFM's NVM, version 3: models of a line per camera and a line per point, of which the largest is the map.
+//! Reads VisualSFM's NVM, version 3: models with a line per camera and a line per point.
 
 use std::path::Path;
 
@@ -9,31 +9,27 @@ use crate::read::map_input::Input;
 use crate::read::pose::{DOWNWARD, camera, scaled_rotation};
 use crate::read::undeclared::undeclared;
 
-/// The count in the current line.
 fn count(lines: &Lines, what: &str) -> Result<u64, Error> {
     number(lines.line()).ok_or_else(|| lines.error(what, quoted(lines.line())))
 }
 
-/// The camera in the current line: its name, which may hold spaces, and ten numbers.
+/// Parses the camera in the current line: its name, which may contain spaces, and ten numbers.
 fn pose(lines: &Lines, what: &str) -> Result<([f64; 3], [f64; 3]), Error> {
     let all: Vec<&[u8]> = words(lines.line()).collect();
     let start = all.len().checked_sub(10).filter(|&start| start > 0);
     let start = start.ok_or_else(|| lines.error(what, format!("{} words", all.len())))?;
     let values = coordinates::<10>(lines, &mut all[start..].iter().copied(), what)?;
     let [_focal, w, x, y, z, a, b, c, ..] = values;
-    // The pose is a rotation and the center itself.
+    // NVM stores the rotation and the center itself.
     let (rotation, norm2) = scaled_rotation([w, x, y, z]);
     let rotation = rotation.map(|row| row.map(|value| value / norm2));
     Ok(([a, b, c], camera(&rotation, &[0.0; 3], DOWNWARD).1))
 }
 
 /// Reads points and cameras of the largest model.
-///
-/// # Errors
-/// When the file is not NVM, or is cut off.
 pub fn read(path: &Path) -> Result<Input, Error> {
     let mut lines = Lines::open(path)?;
-    // NVM_V3_R9T, with matrices for quaternions, is another form.
+    // NVM_V3_R9T, with matrices instead of quaternions, is another format.
     let is_nvm = lines.advance_to_data()? && words(lines.line()).next() == Some(b"NVM_V3");
     if !is_nvm {
         return Err(lines.error("NVM_V3, as VisualSFM writes it", quoted(lines.line())));
@@ -42,14 +38,14 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     let mut more = 0;
     loop {
         if !lines.advance_to_data()? {
-            // A zero ends the list of models; some writers leave it out.
+            // A zero ends the list of models; some programs omit it.
             if n_models + n_without == 0 {
                 return Err(lines.end_error("a number of cameras"));
             }
             break;
         }
         let n_cameras = match count(&lines, "a number of cameras") {
-            // Behind a model, a point that it does not declare.
+            // A line that is no count is a point beyond the declared number.
             Err(_) if n_models + n_without > 0 => {
                 more += 1;
                 continue;
@@ -75,7 +71,7 @@ pub fn read(path: &Path) -> Result<Input, Error> {
         largest.notes.push(format!("read, the largest of {n_models} models ({points} points)"));
     }
     if n_without > 0 {
-        largest.notes.push(format!("{n_without} photos without a place"));
+        largest.notes.push(format!("{n_without} photos without a pose"));
     }
     Ok(Input { format: "NVM", ..largest })
 }

@@ -1,7 +1,7 @@
-//! E57: scans of a survey, each in a frame of its own, which are brought into one.
+//! Reads E57: scans, each in its own frame, which are transformed to the common frame.
 //!
-//! Read by the crate `e57`, which is asked for no more than what was looked at before: how long its XML is, how many points
-//! a scan has, and how many values of them may come from a byte.
+//! The crate `e57` decodes. Its memory is limited by checks of the length of the XML, the number of
+//! points, and the number of values per byte.
 //!
 //! Source: ASTM E2807.
 
@@ -24,21 +24,17 @@ use crate::input::{self, Budget};
 use crate::read::map_input::Input;
 use crate::read::pose::scaled_rotation;
 
-/// Bytes of the head, and where in it the length of the XML stands.
+/// The size of the header, and the offset of the XML's length.
 const HEAD: usize = 48;
 const XML_LENGTH: usize = 32;
-/// Bytes in memory per byte of XML at most: the shortest element, of four, is a node of a tree.
+/// Bytes of memory per byte of XML. The shortest element has four bytes and becomes a node.
 const TREE: u64 = 32;
-/// Bytes that are read before a point comes out, at most. A packet, of which four fit, holds values of every field: more of
-/// them pile up only where a file is damaged.
+/// The maximum number of bytes read per point. Four packets fit, and each has values of every
+/// field; only damaged files need more.
 const AHEAD: u64 = 1 << 18;
-/// Bytes in memory of a value, in a list that has grown.
+/// Bytes of memory per value.
 const VALUE: u64 = 32;
 
-/// Reads the points of all scans.
-///
-/// # Errors
-/// When the file is damaged or would take more memory than its size explains.
 pub fn read(path: &Path) -> Result<Input, Error> {
     let damaged = || Error::new(path, "", "an E57 file", "a damaged one");
     without_panic(|| scans(path)).unwrap_or_else(|| Err(damaged()))
@@ -72,12 +68,12 @@ fn scans(path: &Path) -> Result<Input, Error> {
         let place = || Place::from(format!("scan {}", at + 1));
         check(path, cloud, &budget, place())?;
         let frame = Frame::of(cloud).unwrap_or_else(|| {
-            notes.push(format!("scan {}: a rotation of zeros, taken for none", at + 1));
+            notes.push(format!("scan {}: the rotation is zero and is ignored", at + 1));
             Frame::shifted(cloud)
         });
         left.set(AHEAD);
         let fields = Fields::of(cloud);
-        // As they are stored: what the crate makes of them is by functions that differ between machines.
+        // The crate converts spherical coordinates with functions that differ between machines.
         let points = reader.pointcloud_raw(cloud);
         for values in points.map_err(|error| wrong(path, place(), &error))? {
             let values = values.map_err(|error| wrong(path, place(), &error))?;
@@ -94,19 +90,19 @@ fn scans(path: &Path) -> Result<Input, Error> {
     Ok(Input { positions, format: "E57", notes, is_geographic, ..Input::default() })
 }
 
-/// Refuses a scan of which a few packets would become more than the budget, or that has values for which no byte stands:
-/// these would come without end.
+/// Returns an error for a scan whose packets would exceed the budget, or whose values all take no
+/// bits, which would never end.
 fn check(path: &Path, cloud: &PointCloud, budget: &Budget, place: Place) -> Result<(), Error> {
     let bits = || cloud.prototype.iter().map(|record| bits(&record.data_type));
     let Some(least) = bits().filter(|&bits| bits > 0).min() else {
         return Err(Error::new(path, place, "points with a value that takes a bit", "none"));
     };
-    // Of values that take no bit as many are made as of the shortest of the others.
+    // Values of no bits are repeated as often as the shortest other value.
     let lists = 1 + bits().filter(|&bits| bits == 0).count() as u64;
     budget.admit(place, (8 * AHEAD / least).saturating_mul(VALUE * lists))
 }
 
-/// Which values of a point say where it is, and whether they do.
+/// Indices of the values with the position of a point, and of the flags that it is invalid.
 struct Fields {
     cartesian: Option<[usize; 3]>,
     cartesian_state: Option<usize>,
@@ -126,7 +122,8 @@ impl Fields {
         }
     }
 
-    /// Where a point is, in the frame of its scan; `None` of a beam that nothing threw back.
+    /// Returns the position of a point in the frame of its scan, or `None` for a beam without a
+    /// return.
     fn place(&self, cloud: &PointCloud, values: &RawValues) -> e57::Result<Option<[f64; 3]>> {
         let number = |at: usize| values[at].to_f64(&cloud.prototype[at].data_type);
         let of = |fields: Option<[usize; 3]>, state: Option<usize>| -> e57::Result<_> {
@@ -145,7 +142,6 @@ impl Fields {
     }
 }
 
-/// From the frame of a scan to that of all.
 struct Frame {
     rotation: [[f64; 3]; 3],
     translation: [f64; 3],
@@ -154,13 +150,12 @@ struct Frame {
 const UPRIGHT: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 impl Frame {
-    /// The pose of `cloud` without its rotation.
     fn shifted(cloud: &PointCloud) -> Self {
         let t = cloud.transform.as_ref().map(|pose| &pose.translation);
         Self { rotation: UPRIGHT, translation: t.map_or([0.0; 3], |t| [t.x, t.y, t.z]) }
     }
 
-    /// The pose of `cloud`. Its quaternion may have any length; `None` where that is zero.
+    /// Returns the pose of `cloud`, unless its quaternion is zero.
     fn of(cloud: &PointCloud) -> Option<Self> {
         let shifted = Self::shifted(cloud);
         let Some(pose) = &cloud.transform else { return Some(shifted) };
@@ -178,7 +173,6 @@ impl Frame {
     }
 }
 
-/// Bits of a value in the file.
 fn bits(kind: &RecordDataType) -> u64 {
     match kind {
         RecordDataType::Single { .. } => 32,
@@ -190,12 +184,11 @@ fn bits(kind: &RecordDataType) -> u64 {
     }
 }
 
-/// An error of the crate, whose text has its causes.
 fn wrong(path: &Path, place: Place, error: &e57::Error) -> Error {
     Error::new(path, place, "an E57 file", error.to_string())
 }
 
-/// A file of which no more is read than somebody said is left.
+/// A file of which at most `left` bytes are read.
 struct Watched {
     reader: BufReader<File>,
     left: Rc<Cell<u64>>,
@@ -206,7 +199,7 @@ impl Read for Watched {
         let n = self.reader.read(buffer)?;
         match self.left.get().checked_sub(n as u64) {
             Some(left) => self.left.set(left),
-            None => return Err(io::Error::other("no point in a long stretch of the file")),
+            None => return Err(io::Error::other("no point in a large part of the file")),
         }
         Ok(n)
     }

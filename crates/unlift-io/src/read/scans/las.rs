@@ -1,7 +1,7 @@
-//! LAS 1.0 to 1.4, uncompressed: a head that says where points begin, how long each is and what its integers are multiplied by.
+//! Reads LAS 1.0 to 1.4, uncompressed.
 //!
-//! A reader of our own rather than the crate `las`: that takes as much memory as a record behind the points says that it
-//! has, so that all heads would have to be read before it is asked; behind them, positions are three integers.
+//! Our own reader: the crate `las` allocates what records after the points declare, and a position
+//! is just three integers.
 //!
 //! Source: ASPRS, "LAS Specification 1.4 - R15".
 
@@ -14,27 +14,22 @@ use crate::read::lines::quoted;
 use crate::read::map_input::Input;
 use crate::read::undeclared::undeclared;
 
-/// Bytes of the heads of all versions up to the numbers that positions are made with.
+/// The common part of all headers, up to scale and offset of positions.
 const HEAD: usize = 179;
-/// Where version 1.4 has the number of points, and the bytes of its head.
+/// The offset of the number of points in version 1.4, and the size of its header.
 const COUNT_1_4: usize = 247;
 const HEAD_1_4: usize = 375;
-/// Bytes of a point at least, by format.
+/// The minimum size of a point in bytes, by point format.
 const LEAST: [u16; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
-/// Where the heads of versions 1.3 and 1.4 say that waveforms begin, and that of 1.4 more records.
+/// Header offsets: where waveforms start (1.3, 1.4), and where extended records start (1.4).
 const WAVES: usize = 227;
 const EXTENDED_1_4: usize = 235;
-/// Formats have these bits where a program compressed the points.
 const COMPRESSED: u8 = 0b1100_0000;
 
-/// Reads the positions.
-///
-/// # Errors
-/// When the file is none, is compressed, or is cut off.
 pub fn read(path: &Path) -> Result<Input, Error> {
     let mut bytes = Bytes::open(path)?;
     let mut head = [0; HEAD_1_4];
-    bytes.fill(&mut head[..HEAD], "the head")?;
+    bytes.fill(&mut head[..HEAD], "the header")?;
     if &head[..4] != b"LASF" {
         return Err(bytes.error("\"LASF\", as every LAS file begins", quoted(&head[..4])));
     }
@@ -44,8 +39,8 @@ pub fn read(path: &Path) -> Result<Input, Error> {
         return Err(bytes.error("LAS 1.0 to 1.4", found));
     }
     if format & COMPRESSED != 0 {
-        let found = "compressed points, LAZ (pdal translate IN.laz OUT.las makes one that is read)";
-        return Err(bytes.error("points as they are", found));
+        let found = "compressed points, LAZ (convert it: pdal translate IN.laz OUT.las)";
+        return Err(bytes.error("uncompressed points", found));
     }
     let short = |at: usize| u16::from_le_bytes([head[at], head[at + 1]]);
     let (head_size, record) = (short(94), short(105));
@@ -68,27 +63,27 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     let offset: [f64; 3] = std::array::from_fn(|axis| double(155 + 8 * axis));
     let mut at = HEAD as u64;
     if version.1 == 4 && usize::from(head_size) >= HEAD_1_4 {
-        bytes.fill(&mut head[HEAD..], "the head")?;
+        bytes.fill(&mut head[HEAD..], "the header")?;
         at = HEAD_1_4 as u64;
         let all = wide(&head, COUNT_1_4);
         n = if all == 0 { n } else { all };
     }
     if start < at {
-        let expected = format!("points behind the head of {at} bytes");
+        let expected = format!("points after the header of {at} bytes");
         return Err(bytes.error(expected, format!("at byte {start}")));
     }
-    // What may stand behind the points.
+    // The offsets of data that may follow the points.
     let behind = match at > HEAD as u64 {
         true => [wide(&head, WAVES), wide(&head, EXTENDED_1_4)],
         false => [0; 2],
     };
     let mut system = System::default();
     if let Some(gap) = u64::from(head_size).checked_sub(at).filter(|gap| at + gap <= start) {
-        bytes.skip(gap, "the head")?;
+        bytes.skip(gap, "the header")?;
         system.look(&mut bytes, long(&head, 100), start - at - gap, false)?;
     }
     let gap = start - bytes.at();
-    bytes.skip(gap, "what stands before the points")?;
+    bytes.skip(gap, "data before the points")?;
     bytes.expect_rows(n, "points", u64::from(record))?;
     let mut row = vec![0; usize::from(record)];
     let mut positions = bytes.room("points", n)?;
@@ -104,11 +99,11 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     let end = bytes.at();
     let next = behind.into_iter().filter(|&next| next >= end).min();
     let more = next.map_or(bytes.remaining(), |next| next - end) / u64::from(record);
-    // Of 1.3 the head does not say where waveforms are.
+    // The start of waveforms in version 1.3 is not read, so data after the points is not a doubt.
     let doubts = undeclared(n, more).filter(|_| version.1 != 3).into_iter().collect();
     let (gap, number) = (behind[1].checked_sub(end), long(&head, EXTENDED_1_4 + 8));
     if let Some(gap) = gap.filter(|&gap| number > 0 && gap <= bytes.remaining()) {
-        bytes.skip(gap, "what stands behind the points")?;
+        bytes.skip(gap, "data after the points")?;
         let left = bytes.remaining();
         system.look(&mut bytes, number, left, true)?;
     }
@@ -116,7 +111,6 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     Ok(Input { positions, format: "LAS", is_geographic, doubts, ..Input::default() })
 }
 
-/// What records of a file say of its coordinate system.
 #[derive(Default)]
 struct System {
     wkt: Option<bool>,
@@ -124,10 +118,10 @@ struct System {
 }
 
 impl System {
-    /// Looks through at most `number` records in `left` bytes; records behind the points are `long`. One that is
-    /// cut off is the last: points do not depend on it.
+    /// Reads at most `number` records in `left` bytes. Records after the points are `long`. Points
+    /// do not depend on records, so a truncated one is not an error.
     fn look(&mut self, bytes: &mut Bytes, number: u64, left: u64, long: bool) -> Result<(), Error> {
-        /// Text is shorter.
+        /// Descriptions of coordinate systems are shorter.
         const LONGEST: u64 = 1 << 20;
         let mut head = [0; 60];
         let head = if long { &mut head[..] } else { &mut head[..54] };
@@ -162,13 +156,12 @@ impl System {
         Ok(())
     }
 
-    /// Text is newer than keys, and goes first.
+    /// WKT is newer than GeoTIFF keys.
     fn is_geographic(&self) -> bool {
         self.wkt.or(self.keys).unwrap_or(false)
     }
 }
 
-/// Whether GeoTIFF's directory of keys says that coordinates are degrees.
 fn is_geographic_by_keys(directory: &[u8]) -> bool {
     const MODEL: u16 = 1024;
     const GEOGRAPHIC_SYSTEM: u16 = 2048;

@@ -1,11 +1,8 @@
-//! LZF, by which PCD files are compressed: runs of bytes, and of bytes that stood before.
-//!
-//! By hand: it is this page, and what comes out may not be longer than was said.
+//! LZF, the compression of PCD files: literal runs, and copies of earlier bytes.
 
-/// Largest control byte of a run that stands there itself.
 const LITERAL: u8 = 31;
 
-/// The `n` bytes that `packed` stands for; `None` when it stands for more, for fewer, or for what is before its start.
+/// Decompresses `packed` to exactly `n` bytes, or returns `None`.
 pub fn unpacked(mut packed: &[u8], n: usize) -> Option<Vec<u8>> {
     let mut out: Vec<u8> = Vec::with_capacity(n);
     while let Some((&control, rest)) = packed.split_first() {
@@ -18,7 +15,7 @@ pub fn unpacked(mut packed: &[u8], n: usize) -> Option<Vec<u8>> {
             packed = rest;
             continue;
         }
-        // Three bits of length, of which seven says that a byte more follows.
+        // The length seven means that another length byte follows.
         let (longer, rest) = match control >> 5 {
             7 => rest.split_first().map(|(&longer, rest)| (usize::from(longer), rest))?,
             _ => (0, rest),
@@ -30,7 +27,7 @@ pub fn unpacked(mut packed: &[u8], n: usize) -> Option<Vec<u8>> {
         if length > n - out.len() {
             return None;
         }
-        // Byte by byte: what is copied may have just been written.
+        // A copy may overlap its own output.
         for at in start..start + length {
             out.push(out[at]);
         }
@@ -46,9 +43,9 @@ mod tests {
     #[test]
     fn runs_stand_there_or_are_copied() {
         assert_eq!(unpacked(&[2, b'a', b'b', b'c'], 3).unwrap(), b"abc");
-        // Three from two back: what was just written.
+        // A copy of three bytes from distance two overlaps its output.
         assert_eq!(unpacked(&[1, b'a', b'b', 0x20, 1], 5).unwrap(), b"ababa");
-        // 7 + 3 + 2 from one back.
+        // 7 + 3 + 2 bytes from distance one.
         let long = unpacked(&[0, b'x', 0xe0, 3, 0], 13).unwrap();
         assert_eq!(long, [b'x'; 13]);
     }

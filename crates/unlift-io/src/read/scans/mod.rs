@@ -1,14 +1,15 @@
-//! Clouds as scanners and the programs around them store them: LAS, PCD, E57. Positions, nothing else.
+//! Reads positions from point clouds of scanners.
 
 pub mod e57;
 pub mod las;
 mod lzf;
 pub mod pcd;
 
-/// Whether a coordinate system, written as well-known text, measures longitude and latitude, which are no lengths.
+/// Returns true if a coordinate system in well-known text is in degrees of longitude and latitude.
 fn is_geographic(wkt: &str) -> bool {
     let wkt: String = wkt.chars().filter(|c| !c.is_whitespace()).collect::<String>().to_uppercase();
-    // A projected system names the geographic one that it was made of, and a geocentric one is in meters.
+    // A projected system contains the geographic one that it is based on. A geocentric system is in
+    // meters.
     let lengths = ["PROJCS[", "PROJCRS[", "PROJECTEDCRS[", "GEOCCS[", "LOCAL_CS[", "CS[CARTESIAN"];
     let degrees = ["GEOGCS[", "GEOGCRS[", "GEOGRAPHICCRS[", "GEODCRS[", "GEODETICCRS["];
     !lengths.iter().any(|word| wkt.contains(word)) && degrees.iter().any(|word| wkt.contains(word))

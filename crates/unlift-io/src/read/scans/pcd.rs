@@ -1,6 +1,7 @@
-//! PCD, as the Point Cloud Library writes it: `ascii`, `binary` and `binary_compressed`.
+//! Reads PCD files of the Point Cloud Library.
 //!
-//! A reader of our own: the crate `pcd-rs` takes what the head declares, and knows no compressed files.
+//! Our own reader: the crate `pcd-rs` allocates what the header declares, and does not support
+//! compression.
 //!
 //! Source: PCL's documentation, "The PCD (Point Cloud Data) file format", version 0.7.
 
@@ -15,16 +16,14 @@ use crate::read::map_input::Input;
 use crate::read::scalar::Scalar;
 use crate::read::undeclared::undeclared;
 
-/// One column, or several of a name.
 #[derive(Clone, Copy, Debug)]
 struct Field {
-    /// Bytes of a value.
+    /// Bytes per value.
     size: u64,
-    /// Values in it.
     count: u64,
 }
 
-/// A coordinate: the number of its value in a line, its byte in a row, and how it is stored.
+/// A coordinate: its index in a line, its offset in a binary row, and its type.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
     value: u64,
@@ -35,24 +34,20 @@ struct Axis {
 #[derive(Debug)]
 struct Header {
     axes: [Axis; 3],
-    /// Values of a point.
+    /// Values per point.
     n_values: u64,
-    /// Bytes of a point.
+    /// Bytes per point.
     stride: u64,
     n: u64,
     data: Vec<u8>,
 }
 
-/// Reads the positions.
-///
-/// # Errors
-/// When the file is malformed, has no `x`, `y` and `z`, or is cut off.
 pub fn read(path: &Path) -> Result<Input, Error> {
     let mut lines = Lines::open(path)?;
     let header = header(path, &mut lines)?;
     let mut doubt = None;
     let (positions, format) = match &*header.data {
-        // Nothing says how much there is to read.
+        // Without points, the file size limits nothing.
         _ if header.n == 0 => (Vec::new(), "PCD"),
         b"ascii" => (ascii(lines, &header)?, "PCD ascii"),
         b"binary" => {
@@ -65,7 +60,6 @@ pub fn read(path: &Path) -> Result<Input, Error> {
     Ok(Input { positions, format, doubts: doubt.into_iter().collect(), ..Input::default() })
 }
 
-/// The lines up to `DATA`, each a word and its values.
 fn header(path: &Path, lines: &mut Lines) -> Result<Header, Error> {
     let (mut names, mut sizes, mut kinds, mut counts) = (Vec::new(), Vec::new(), Vec::new(), None);
     let (mut width, mut height, mut points) = (None, 1, None);
@@ -124,7 +118,7 @@ fn header(path: &Path, lines: &mut Lines) -> Result<Header, Error> {
     };
     let bytes = |field: &Field| field.size.saturating_mul(field.count);
     let (Some(n_values), Some(stride)) = (sum(&|f| f.count, &fields), sum(&bytes, &fields)) else {
-        return Err(refuse("points of a size that fits", "more".to_owned()));
+        return Err(refuse("points of less than 2^64 bytes", "more".to_owned()));
     };
     let at = columns::axes(names.iter().map(Vec::as_slice));
     let at = at.map_err(|name| refuse(&format!("a field {name}"), "none".to_owned()))?;
@@ -136,7 +130,7 @@ fn header(path: &Path, lines: &mut Lines) -> Result<Header, Error> {
             let expected = format!("one value of type F, I or U for {name}");
             refuse(&expected, format!("{kind} {} {}", field.size, field.count))
         })?;
-        // What all of them come to was counted above.
+        // The totals were checked above.
         let before = &fields[..at];
         let value = before.iter().map(|field| field.count).sum();
         Ok(Axis { value, byte: before.iter().map(bytes).sum(), scalar })
@@ -181,7 +175,7 @@ fn ascii(mut lines: Lines, header: &Header) -> Result<Vec<[f64; 3]>, Error> {
     Ok(positions)
 }
 
-/// The points, and how many more there is room for behind them.
+/// Reads the points, and returns how many more fit into the rest of the file.
 fn binary(mut bytes: Bytes, header: &Header) -> Result<(Vec<[f64; 3]>, u64), Error> {
     let (n, stride) = (header.n, header.stride);
     bytes.expect_rows(n, "points", stride)?;
@@ -196,7 +190,7 @@ fn binary(mut bytes: Bytes, header: &Header) -> Result<(Vec<[f64; 3]>, u64), Err
     Ok((positions, if bytes.is_padding()? { 0 } else { more }))
 }
 
-/// All values of a field stand together, field by field, and the whole is compressed.
+/// The decompressed data has all values of the first field, then of the next one.
 fn compressed(mut bytes: Bytes, header: &Header) -> Result<Vec<[f64; 3]>, Error> {
     let packed = u64::from(bytes.u32("the size of the compressed points")?);
     let size = u64::from(bytes.u32("the size of the points")?);
@@ -214,8 +208,8 @@ fn compressed(mut bytes: Bytes, header: &Header) -> Result<Vec<[f64; 3]>, Error>
     let mut values = vec![0; packed as usize];
     bytes.fill(&mut values, "compressed points")?;
     let Some(values) = unpacked(&values, size as usize) else {
-        let expected = format!("{size} bytes when unpacked");
-        return Err(bytes.error(expected, "others, or damaged ones"));
+        let expected = format!("{size} bytes after decompression");
+        return Err(bytes.error(expected, "another size, or damaged data"));
     };
     let at = |axis: &Axis, point: u64| {
         let start = n * axis.byte + axis.scalar.size() as u64 * point;
