@@ -1,5 +1,3 @@
-//! Results of an audit of a map or of images, before and after they are written.
-
 use std::path::{Path, PathBuf};
 
 use unlift::OneLine;
@@ -18,7 +16,6 @@ pub struct Audited {
     /// The figures.
     pub document: Document,
     pub(crate) scene: Option<Scene3d>,
-    /// Curves and pictures of the page.
     pub(crate) drawn: RenderOptions,
 }
 

@@ -1,5 +1,3 @@
-//! Checks that recovered points, ground truth and a released map belong together.
-
 use unlift::audit::Threshold;
 use unlift::evaluate::{are_strangers, away_from_own, belongs, nearer_to_own, recovered_away};
 use unlift::recover::Recovered;

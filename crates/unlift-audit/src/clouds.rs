@@ -102,7 +102,6 @@ pub fn earlier(out: &Path) -> Vec<String> {
     names.filter(is_ours).map(|name| format!("{FOLDER}/{name}")).collect()
 }
 
-/// Returns the temporary path of a cloud.
 fn stage(out: &mut OutputSet, name: &str) -> Result<PathBuf, Error> {
     out.stage(&format!("{FOLDER}/{name}"), Kind::Cloud)
 }

@@ -5,7 +5,6 @@ use unlift::audit::{Cell, Observer, Row};
 
 use crate::progress::Progress;
 
-/// Steps of an error curve.
 const CURVE_POINTS: i32 = 80;
 
 /// The errors of an error curve: from 0.01 to 10 times the largest threshold, evenly on a
@@ -15,9 +14,7 @@ pub fn curve_errors(largest_threshold: f64) -> impl Iterator<Item = f64> {
     (0..=CURVE_POINTS).map(move |step| largest_threshold * 10f64.powf(exponent(step)))
 }
 
-/// The error curve of one cell.
 struct Curve {
-    /// The row of one item.
     cell: Row,
     within: Vec<usize>,
     n: usize,

@@ -119,7 +119,6 @@ pub fn document<const D: usize>(
     }
 }
 
-/// Maps threshold labels, as typed, to percentages.
 fn by_threshold(thresholds: &[Threshold], percents: &[f64]) -> report::ByThreshold {
     ordered(thresholds.iter().map(|t| t.label.clone()).zip(percents.iter().copied()))
 }

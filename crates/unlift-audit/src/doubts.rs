@@ -33,7 +33,6 @@ const SHORT: usize = 5;
 /// The doubts about an audit of a map.
 #[derive(Debug, Default)]
 pub(crate) struct Doubts {
-    /// Per row, why its figures may be too small.
     pub(crate) of_rows: Vec<Option<String>>,
     /// Notes of the whole audit.
     pub(crate) notes: Vec<String>,
@@ -105,17 +104,11 @@ pub(crate) struct Spread {
 
 impl Spread {
     /// Measures the spread of a map on a sample of its points.
-    ///
-    /// # Errors
-    /// If points cannot be searched.
     pub(crate) fn of(points: &[[f64; 3]], k: usize) -> Result<Self, unlift::Error> {
         Ok(Self::of_distances(distances(points, k, SAMPLE)?, points.len()))
     }
 
     /// Measures the spread of a map in tiles. Neighbors are searched within a tile.
-    ///
-    /// # Errors
-    /// If points cannot be searched.
     pub(crate) fn of_tiles(
         original: &Original<3>,
         tiles: &[Tile],
@@ -138,7 +131,6 @@ impl Spread {
     }
 }
 
-/// Returns the distances to the K-th neighbor of about `sample` points.
 fn distances(points: &[[f64; 3]], k: usize, sample: usize) -> Result<Vec<f64>, unlift::Error> {
     let knn = Knn::new(points)?;
     let mut found = Vec::new();

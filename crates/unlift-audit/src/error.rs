@@ -1,5 +1,3 @@
-//! The error of an audit: one line, and advice if there is any.
-
 use std::fmt;
 
 /// An error of an audit.

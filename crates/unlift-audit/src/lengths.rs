@@ -48,9 +48,9 @@ fn across(points: &[[f64; 3]]) -> f64 {
 
 /// Plausible sizes of a map in meters: from a grain of dust to beyond the orbit of the moon.
 const ACROSS_M: [f64; 2] = [1e-6, 1e9];
-/// If nearest neighbors are this many times the largest threshold apart, no attack can come near.
+/// If nearest neighbors are this many times the largest threshold apart, no attack can come near
+/// ([`HOPELESS`]), or the lengths are doubtful ([`UNUSUAL`]).
 const HOPELESS: f64 = 100.0;
-/// If nearest neighbors are this many times the largest threshold apart, the lengths are doubtful.
 const UNUSUAL: f64 = 10.0;
 
 /// Checks a scale against the points as they were read.
@@ -160,9 +160,6 @@ pub fn check_thresholds(
 }
 
 /// Checks the thresholds of gates: a gate that no attack can break means nothing.
-///
-/// # Errors
-/// If nearest neighbors are too far apart for a threshold.
 pub(crate) fn check_lengths_of_gates(points: &PointSet<3>, gates: &[Gate]) -> Result<(), Error> {
     let by_size = |a: &&Gate, b: &&Gate| a.threshold.total_cmp(&b.threshold);
     let Some(gate) = gates.iter().min_by(by_size) else { return Ok(()) };

@@ -1,5 +1,3 @@
-//! Memory that the program used, and memory of the machine.
-
 /// Returns the peak resident memory of this process in bytes, if the system reports it (Linux).
 pub fn peak_bytes() -> Option<u64> {
     kibibytes(&std::fs::read_to_string("/proc/self/status").ok()?, "VmHWM:")

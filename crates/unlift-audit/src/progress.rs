@@ -1,5 +1,3 @@
-//! Progress and cancellation of long work.
-
 /// Receives the progress of an audit, from any thread.
 pub trait Progress: Send + Sync {
     /// Reports that `done` of `total` items are finished and that `what` comes next.

@@ -115,7 +115,6 @@ pub fn shapes(
     }
 }
 
-/// Returns a point relative to `middle`.
 pub fn near(point: &[f64; 3], middle: &[f64; 3]) -> [f32; 3] {
     std::array::from_fn(|c| (point[c] - middle[c]) as f32)
 }

@@ -21,9 +21,6 @@ pub struct Tile {
 
 impl Tile {
     /// Returns the tile as an item of an audit. Its random seed depends on its number.
-    ///
-    /// # Errors
-    /// Never for points of a map.
     pub fn item(
         &self,
         original: &Original<3>,
@@ -113,7 +110,6 @@ fn split(
     split(positions, right, n_tiles - left_tiles, plan, found);
 }
 
-/// Returns the lowest and the highest corner of some points.
 fn bounds(positions: &[[f64; 3]], rows: &[u32]) -> [[f64; 3]; 2] {
     let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
     for &row in rows {
@@ -124,18 +120,13 @@ fn bounds(positions: &[[f64; 3]], rows: &[u32]) -> [[f64; 3]; 2] {
     bounds
 }
 
-/// The results of all tiles of a map.
 pub(crate) struct Found<'a> {
     pub(crate) outcome: Outcome,
-    /// The rows of every tile.
     pub(crate) rows: Vec<Vec<Row>>,
     pub(crate) curves: Curves<'a>,
 }
 
 /// Runs `plan` on every tile of a map, one after the other.
-///
-/// # Errors
-/// If the plan does not fit a tile, or `progress` stops the audit.
 pub(crate) fn run<'a>(
     (original, descriptors): (&Original<3>, Option<&Descriptors>),
     tiles: &[Tile],
@@ -151,7 +142,6 @@ pub(crate) fn run<'a>(
     Ok(Found { outcome, rows: watcher.rows, curves: watcher.curves })
 }
 
-/// Reports progress and keeps the figures of every tile.
 struct Watcher<'a> {
     progress: &'a dyn Progress,
     most: f64,

@@ -40,7 +40,6 @@ fn plan(names: &[&str]) -> Plan<3> {
     }
 }
 
-/// Audits `prepared`, or its release `hidden`, by `plan` with one gate.
 fn audit(
     prepared: &Prepared,
     hidden: Option<&(Released<3>, Secret)>,

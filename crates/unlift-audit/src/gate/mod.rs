@@ -70,7 +70,6 @@ pub struct Candidate<'a> {
     pub baseline_percent: f64,
 }
 
-/// Returns the larger figure, or NaN if one is NaN.
 fn worse(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }

@@ -60,7 +60,6 @@ impl Gate {
     }
 }
 
-/// The name of the source that has an inlier ratio to set.
 const ORACLE: &str = "oracle";
 
 /// Counts the names left of `<=`: all parts before the first number. Without a number, all known
@@ -79,7 +78,6 @@ fn solver_name(text: &str) -> Option<&'static str> {
     Builtin::from_name(text.trim()).ok().map(|solver| solver.name())
 }
 
-/// Returns the name of a source as in rows.
 fn source_name(text: &str) -> Option<String> {
     match text.trim() {
         name @ (ORACLE | "file") => Some(name.to_owned()),
@@ -118,7 +116,6 @@ fn qualifiers(names: &[&str]) -> Result<(Option<&'static str>, Option<String>), 
     Ok((solver, source))
 }
 
-/// Parses a finite number above zero.
 fn positive(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
@@ -126,7 +123,6 @@ fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Parses a number from 0 to 1.
 fn ratio(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),

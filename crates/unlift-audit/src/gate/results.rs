@@ -32,7 +32,6 @@ fn candidates<'a, const D: usize>(
     candidates
 }
 
-/// Describes the figure of `gate`, for the threshold at index `at` of `row`.
 fn in_words(gate: &Gate, found: f64, row: &Row, at: usize, threshold: &Threshold) -> String {
     // If the row's own figure is smaller, a baseline without neighborhoods decides.
     let is_own = gate.figure == Figure::Gain || found == row.recovered_percent[at];

@@ -135,7 +135,6 @@ fn beside(job: &ImagesJob<'_>) -> Seen {
     Seen::new(job.photos.as_deref().map(of_folder).unwrap_or_default())
 }
 
-/// Describes the input; of photos, the used ones.
 fn input(job: &ImagesJob<'_>, tally: &Tally, outcome: &Outcome) -> Result<Input, Error> {
     let (mut path, names) = (Some(job.path.display().to_string()), job.source.names());
     let sha256 = match job.source {
@@ -172,7 +171,6 @@ struct Watcher<'a> {
     tally: &'a RefCell<Tally>,
     plan: &'a Plan<2>,
     figures: Vec<ImageFigures>,
-    /// The largest threshold.
     most: f64,
     curves: Curves<'a>,
 }

@@ -13,7 +13,6 @@ use super::pictures::Album;
 use super::stream::{Needs, Stream, Tally};
 use crate::Error;
 
-/// Longest side of an embedded photo in pixels.
 const PREVIEW: u32 = 640;
 /// The inlier ratio by which images are compared; the nearest tested one is used.
 const USUAL_RATIO: f64 = 0.5;

@@ -103,7 +103,6 @@ impl Wanted {
         }
     }
 
-    /// Rejects an option of other features.
     fn refuse(&self, name: &str, given: bool, fits: DescriptorKind) -> Result<(), Error> {
         if !given {
             return Ok(());

@@ -1,5 +1,3 @@
-//! A folder of photos, and the features of each.
-
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -132,7 +130,6 @@ impl Folder {
         })
     }
 
-    /// Returns as text everything that features depend on besides the photo.
     pub(crate) fn settings(&self) -> String {
         let sha256 = self.extractor.sha256().unwrap_or_default();
         format!("{:?} {:?} {sha256}", self.extraction, self.turn)
@@ -182,7 +179,6 @@ fn of_network(features: LearnedFeatures) -> ImageFeatures {
 struct Found {
     photos: Vec<(String, PathBuf)>,
     refused: Vec<Error>,
-    /// Number of skipped images by ending.
     others: BTreeMap<String, usize>,
 }
 
@@ -194,7 +190,6 @@ impl Found {
         (!others.is_empty()).then(|| others.join(", "))
     }
 
-    /// Adds the files in `root` and its subfolders.
     fn visit(&mut self, root: &Path) {
         let mut seen = HashSet::new();
         let mut waiting = Waiting::default();

@@ -1,10 +1,7 @@
-//! Images in memory, or made by the caller on request.
-
 use unlift_io::features::ImageFeatures;
 
 use crate::Error;
 
-/// Makes the features of the image with a number.
 type Get = Box<dyn Fn(usize) -> Result<ImageFeatures, Error> + Send + Sync>;
 
 /// Images by name, each made on request. An audit requests a few at a time, and the drawn ones

@@ -1,5 +1,3 @@
-//! The inputs of an audit of images.
-
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;

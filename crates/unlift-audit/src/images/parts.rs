@@ -15,7 +15,6 @@ use super::folder::Folder;
 /// Changes when the same photo and options may give different features.
 const VERSION: &str = concat!("unlift ", env!("CARGO_PKG_VERSION"), " features 1");
 const ENDING: &str = ".part.h5";
-/// Characters of a key, and of a hash of content.
 const KEY: usize = 32;
 const HASH: usize = 64;
 
@@ -30,7 +29,6 @@ pub struct Parts {
     options: String,
     /// Parts of earlier runs: hashes of their contents by key.
     earlier: HashMap<String, Vec<String>>,
-    /// Holds the lock of the folder.
     _locked: Option<File>,
 }
 

@@ -17,9 +17,7 @@ use crate::progress::Progress;
 pub struct Album<'a> {
     inverter: Option<Arc<Inversion>>,
     steps: &'a dyn Progress,
-    /// Finished pictures.
     pub pictures: Vec<Picture>,
-    /// Pictures that a network made of these images.
     pub inversions: Vec<Inverted>,
 }
 
@@ -51,7 +49,6 @@ impl<'a> Watcher<2> for Album<'a> {
     }
 }
 
-/// The picture of an image in progress.
 pub struct Page<'a> {
     inverter: Option<Arc<Inversion>>,
     steps: &'a dyn Progress,
@@ -124,7 +121,6 @@ fn best(cell: &Cell<'_, 2>, slot: usize) -> Vec<[f32; 2]> {
     order.iter().take(GRAPH_NEIGHBORS).filter_map(place).collect()
 }
 
-/// Returns the released records by original.
 fn marks(released: &Released<2>, slot_of: &[Option<usize>]) -> Option<Marks> {
     let origin = released.origin();
     let bounds = released.bounds()?;

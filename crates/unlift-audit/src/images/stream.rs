@@ -19,7 +19,6 @@ use unlift_io::hash::hash_features;
 use super::FeatureSource;
 use crate::progress::Progress;
 
-/// Images per thread that are read ahead.
 const PER_THREAD: usize = 2;
 
 /// Counts of the images that were read so far.

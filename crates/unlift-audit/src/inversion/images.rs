@@ -1,5 +1,3 @@
-//! Pictures of images, made from recovered keypoints.
-
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -17,10 +15,8 @@ use super::{Judged, Painter, SHOWN, boxed, figures, needed, painted, shown, size
 
 /// A photo at the size of its pictures, and the baseline of its true points.
 struct Truth {
-    /// The photo at half its size.
     photo: ColorImage,
     objects: Vec<Detection>,
-    /// The picture made from the true points.
     picture: ColorImage,
     /// The figures of that picture: no attack on positions can be expected to do better.
     baseline: Judged,
@@ -80,7 +76,6 @@ impl Inversion {
         Ok(())
     }
 
-    /// Returns the photo of the image of `cell`, and the picture of its true keypoints.
     fn truth(&self, cell: &Cell<'_, 2>) -> Result<Arc<Truth>, Error> {
         let name = cell.name.unwrap_or_default();
         if let Some(known) = lock(&self.known).get(name) {

@@ -29,14 +29,11 @@ const LEAST_SIDE: usize = 16;
 struct Seen {
     name: String,
     view: View,
-    /// The photo at half its size.
     photo: ColorImage,
     objects: Vec<Detection>,
-    /// The picture of the true points.
     truth: OnceLock<Result<Picture, Error>>,
 }
 
-/// A picture, and its comparison with the photo.
 type Picture = (ColorImage, Judged);
 
 /// Makes pictures of a map and compares them with the photos.
@@ -162,7 +159,6 @@ impl MapInversion {
         Ok(())
     }
 
-    /// Makes the pictures of `cell` by the first `n` cameras.
     fn pictures(&self, cell: &Cell<'_>, n: usize) -> Result<Vec<Picture>, Error> {
         let of_one = |seen: &Seen| {
             let picture = self.painter.map(&seen.view, cell.released, cell.recovered)?;
@@ -172,7 +168,6 @@ impl MapInversion {
         self.seen.par_iter().take(n).map(of_one).collect()
     }
 
-    /// Returns the picture of the true points.
     fn truth<'a>(&'a self, seen: &'a Seen, cell: &Cell<'_>) -> Result<&'a Picture, Error> {
         let make = || {
             let originals = cell.original.reveal().positions();
@@ -221,7 +216,6 @@ fn records(cell: &Cell<'_>) -> (Shapes, [f64; 3]) {
     (shapes(&bounds, &middle, cell.released, &chosen), middle)
 }
 
-/// Projects records into `view`, in pixels.
 fn marks(view: &View, shapes: &Shapes, middle: &[f64; 3]) -> Result<Marks, Error> {
     let place = |p: [f32; 3]| Some([0, 1, 2].map(|c| f64::from(p[c]) + middle[c]));
     let line = |a: [f32; 3], b: [f32; 3]| -> Result<Option<[[f32; 2]; 2]>, Error> {
@@ -262,7 +256,6 @@ fn one(
         .map_err(|error| error.within(&path.display().to_string().escape_debug().to_string()))
 }
 
-/// Prepares a photo for comparisons.
 fn seen(painter: &Painter, name: String, view: View, photo: &ColorImage) -> Result<Seen, Error> {
     let [width, height] = view.size;
     if [photo.width(), photo.height()] != view.size {

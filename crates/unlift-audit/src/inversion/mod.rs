@@ -24,14 +24,11 @@ pub use maps::{MapInversion, view};
 /// Points with a lower probability of being near their recovered place are omitted: they would
 /// paint wrong content over correct content.
 const LEAST: f64 = 0.2;
-/// Longest side of a picture on the page in pixels.
 const SHOWN: usize = 320;
-/// Suffix of the names of figures of true points.
 const BASELINE: &str = "_baseline";
 /// Limit of PSNR, which is infinite for equal pictures.
 const MOST_DB: f64 = 100.0;
 
-/// Name of the share of a photo's objects that are found in a picture.
 const OBJECTS: &str = "objects_found";
 /// Minimum confidence of the detector for an object.
 const SURE: f32 = 0.3;
@@ -56,7 +53,6 @@ pub struct Painter {
 #[derive(Clone, Debug)]
 struct Judged {
     metrics: Metrics,
-    /// The objects detected in the picture.
     objects: Vec<Detection>,
     /// The class of every object of the photo, and whether it is found in the picture.
     found: Vec<(usize, bool)>,
@@ -132,7 +128,6 @@ impl Painter {
         Ok(!view.project(&positions)?.points.is_empty())
     }
 
-    /// Makes the picture of points as `view` sees them, without hidden ones.
     fn seen(
         &self,
         view: &View,
@@ -147,17 +142,14 @@ impl Painter {
         self.inverter.invert(&points, view.size)
     }
 
-    /// Returns the SHA-256 of the painting network, in hexadecimal.
     fn sha256(&self) -> &str {
         self.inverter.sha256()
     }
 
-    /// Detects the objects in a photo.
     fn objects(&self, photo: &ColorImage) -> Result<Vec<Detection>, Error> {
         self.detector.find(photo, SURE)
     }
 
-    /// Compares `picture` with a photo that has these objects.
     fn judge(
         &self,
         picture: &ColorImage,
@@ -193,7 +185,6 @@ impl Judged {
     }
 }
 
-/// Returns named figures of a picture and of the baseline.
 fn figures(found: &Judged, baseline: &Judged) -> Vec<(String, f64)> {
     let named = |(judged, of): (&Judged, &str)| {
         let Metrics { ssim, psnr, lpips } = judged.metrics;
@@ -205,7 +196,6 @@ fn figures(found: &Judged, baseline: &Judged) -> Vec<(String, f64)> {
     [(found, ""), (baseline, BASELINE)].into_iter().flat_map(named).collect()
 }
 
-/// Returns a picture of recovered points for the page.
 fn shown(row: &Row, picture: &ColorImage, judged: &Judged) -> Result<InvertedView, Error> {
     Ok(InvertedView {
         scheme: row.scheme.clone(),
@@ -215,7 +205,6 @@ fn shown(row: &Row, picture: &ColorImage, judged: &Judged) -> Result<InvertedVie
     })
 }
 
-/// Returns a picture and its figures for the page.
 fn painted(picture: &ColorImage, judged: &Judged) -> Result<Painted, Error> {
     Ok(Painted {
         jpeg: jpeg_of(picture, SHOWN)?,
@@ -224,7 +213,6 @@ fn painted(picture: &ColorImage, judged: &Judged) -> Result<Painted, Error> {
     })
 }
 
-/// Returns the boxes of objects, as shares of the picture's size.
 fn boxed(objects: &[Detection], picture: &ColorImage) -> Vec<Object> {
     let size = [picture.width(), picture.height()].map(|side| side as f32);
     let share = |object: &Detection| std::array::from_fn(|at| object.sides[at] / size[at % 2]);
@@ -235,7 +223,6 @@ fn boxed(objects: &[Detection], picture: &ColorImage) -> Vec<Object> {
     objects.iter().map(boxed).collect()
 }
 
-/// Returns the descriptors, or an error if there are none.
 fn needed(descriptors: Option<&Descriptors>) -> Result<&Descriptors, Error> {
     descriptors.ok_or_else(|| Error::new("pictures", "descriptors", "none"))
 }
@@ -271,7 +258,6 @@ fn in_sight(
     Ok((kept, weights))
 }
 
-/// Returns width and height of a released image in pixels.
 fn size(released: &Released<2>) -> Result<[usize; 2], Error> {
     let bounds = released.bounds();
     let bounds = bounds.ok_or_else(|| Error::new("image size", "known", "none"))?;

@@ -4,7 +4,6 @@ use unlift::audit::Recovery;
 use unlift::recover::Delta;
 use unlift_io::hash::Hasher;
 
-/// Returns a hash of the program and of all inputs of `recovery`.
 pub(super) fn key(program: &str, recovery: &Recovery<'_, 3>) -> String {
     let Recovery { released, lists, solver, options } = recovery;
     let mut hasher = Hasher::default();

@@ -23,7 +23,6 @@ use unlift_io::stage::{read_recovered, write_recovered};
 use crate::{Error, Progress};
 use key::key;
 
-/// End of the file names.
 const ENDING: &str = ".recovered.parquet";
 
 /// A folder of recovered points.
@@ -65,7 +64,6 @@ impl<'a> Journal<'a> {
         Ok(Self { folder, program, progress, keys: BTreeSet::new(), n_recalled: 0, is_full: false })
     }
 
-    /// Reads what an earlier run recovered, if there is any.
     pub(crate) fn recall(&mut self, recovery: &Recovery<'_, 3>) -> Option<Recovered<3>> {
         if !can_keep(recovery) {
             return None;
@@ -84,7 +82,6 @@ impl<'a> Journal<'a> {
         }
     }
 
-    /// Keeps a recovery.
     pub(crate) fn keep(&mut self, recovery: &Recovery<'_, 3>, recovered: &Recovered<3>) {
         if self.is_full || !can_keep(recovery) {
             return;
@@ -122,7 +119,6 @@ impl<'a> Journal<'a> {
         fs::rename(&unnamed, &path).map_err(|source| unlift_io::Error::write(&path, source))
     }
 
-    /// Lists the files of the folder whose names fulfill `is`, in order.
     fn files(&self, is: impl Fn(&str) -> bool) -> Vec<PathBuf> {
         let Ok(entries) = fs::read_dir(&self.folder) else { return Vec::new() };
         let entries = entries.filter_map(Result::ok);
@@ -146,7 +142,6 @@ impl<'a> Journal<'a> {
         None
     }
 
-    /// Returns the key of `recovery`.
     fn key(&mut self, recovery: &Recovery<'_, 3>) -> String {
         let key = key(&self.program, recovery);
         self.keys.insert(key.clone());
@@ -173,7 +168,6 @@ impl<'a> Journal<'a> {
     }
 }
 
-/// Returns the name of a file of `key` whose content has the hash `content`.
 fn named(key: &str, content: &str) -> String {
     let mut both = Hasher::default();
     both.add(key.as_bytes());

@@ -316,9 +316,7 @@ struct Ran {
     scene: Option<Scene3d>,
     curves: Vec<(Row, Vec<(f64, f64)>)>,
     sheets: Vec<Sheet>,
-    /// The rows of every tile, if the map is in tiles.
     tile_rows: Vec<Vec<Row>>,
-    /// The note of the journal.
     note: Option<String>,
 }
 

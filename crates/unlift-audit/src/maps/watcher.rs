@@ -1,5 +1,3 @@
-//! The observer that reports progress and collects what the page draws.
-
 use std::sync::Arc;
 
 use unlift::audit::{Cell, Observer, Plan, Recovery, Row};
@@ -21,9 +19,7 @@ pub(super) struct Watcher<'a, 'j> {
     pub(super) journal: Option<&'a mut Journal<'j>>,
     pub(super) progress: &'a dyn Progress,
     pub(super) pictures: Option<Pictures>,
-    /// The error curve of every cell.
     pub(super) curves: Vec<(Row, Vec<(f64, f64)>)>,
-    /// Names of the solvers whose points are drawn.
     pub(super) drawn: Vec<String>,
     pub(super) clouds: Option<(Clouds, &'a mut OutputSet)>,
     pub(super) thresholds: Vec<f64>,

@@ -47,7 +47,6 @@ pub fn reproduce(request: &Request<'_>) -> Result<Reproduction, Error> {
     Ok(result)
 }
 
-/// Keeps the requested scenes.
 fn chosen(request: &Request<'_>, scenes: &mut Vec<Scene>) -> Result<(), Error> {
     for name in &request.scenes {
         let known = request.dataset.scenes();

@@ -1,5 +1,3 @@
-//! The options of a reproduction.
-
 use std::path::Path;
 
 use unlift_io::atomic::Rules;
@@ -82,7 +80,6 @@ impl Request<'_> {
         self.parts.contains(&part)
     }
 
-    /// Returns the wanted numbers of the paper.
     pub(super) fn numbers(&self) -> Vec<Printed> {
         let mut numbers = printed(self.dataset.published());
         numbers.retain(|number| Part::of(number).iter().all(|&part| self.wants(part)));

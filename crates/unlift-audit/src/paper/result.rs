@@ -1,5 +1,3 @@
-//! The results of a reproduction: tables as text, `paper.json` and `paper.csv`.
-
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -48,7 +46,6 @@ pub struct Sheet {
 }
 
 impl Reproduction {
-    /// Creates the result of `run` for these scenes.
     pub(super) fn new(request: &Request<'_>, scenes: &[Scene], run: Run<'_>) -> Self {
         let mut missing = from_layout(request, scenes);
         missing.extend(run.missing);
@@ -73,9 +70,6 @@ impl Reproduction {
     }
 
     /// Writes both files, or none.
-    ///
-    /// # Errors
-    /// If they cannot be written.
     pub(super) fn write(&self, mut out: OutputSet) -> Result<(), Error> {
         let json = serde_json::to_string_pretty(&self.json())? + "\n";
         for (name, kind, text) in
@@ -227,7 +221,6 @@ fn row_name(points: Points) -> String {
     }
 }
 
-/// Returns the source of neighbors and its inlier ratio.
 fn points_of(points: Points) -> (&'static str, Option<f64>) {
     match points {
         Points::Oracle(ratio) => ("oracle", Some(ratio)),

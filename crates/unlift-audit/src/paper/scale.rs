@@ -71,7 +71,6 @@ fn name(image: &Image) -> String {
     String::from_utf8_lossy(&image.name).into_owned()
 }
 
-/// Positions of a camera in the map and in the dataset.
 type Twice = ([f64; 3], [f64; 3]);
 
 /// Returns ratios of camera distances, dataset to map. Each camera is paired with the one half of

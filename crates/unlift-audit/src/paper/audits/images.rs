@@ -1,5 +1,3 @@
-//! The audit of the photos of a scene's test split.
-
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;

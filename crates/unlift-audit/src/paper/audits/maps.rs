@@ -1,5 +1,3 @@
-//! The audit of a scene's map.
-
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -20,7 +18,6 @@ use crate::paper::request::Part;
 use crate::paper::scale;
 use crate::{Error, Preparation, Progress, Shown, open_audit};
 
-/// Number of photos that pictures are compared with, as in any audit of a map.
 const PHOTOS: usize = 12;
 /// K as in the paper's runtime table; its other tables do not state it.
 const K: usize = 50;

@@ -1,5 +1,3 @@
-//! The state and the shared parts of the audits of all scenes.
-
 use std::path::PathBuf;
 
 use serde_json::{Map, Value, json};
@@ -97,7 +95,6 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Adds a line about something missing, once.
     pub(super) fn lacks(&mut self, line: String) {
         if !self.missing.contains(&line) {
             self.missing.push(line);

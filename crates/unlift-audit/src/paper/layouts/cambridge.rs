@@ -19,10 +19,6 @@ const TRAIN: &str = "dataset_train.txt";
 /// Words of a line: a name, a position and a quaternion.
 const WORDS: usize = 8;
 
-/// Opens the scene `name` below `root`.
-///
-/// # Errors
-/// If a list is malformed.
 pub fn open(root: &Path, name: &str) -> Result<Scene, Error> {
     let folder = root.join(name);
     let mut poses = listed(&folder.join(TRAIN))?;
@@ -72,7 +68,6 @@ fn listed(path: &Path) -> Result<BTreeMap<String, [f64; 3]>, Error> {
     Ok(poses)
 }
 
-/// Returns true if a name is not that of a file below the scene.
 fn leads_out(name: &str) -> bool {
     let inside = |part| matches!(part, std::path::Component::Normal(_));
     !Path::new(name).components().all(inside)

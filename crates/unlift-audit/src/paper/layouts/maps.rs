@@ -10,7 +10,6 @@ use super::dataset::Dataset;
 /// Folders of a map inside the folder of the scene. [`read::open`] finds `sparse/0` and similar
 /// folders itself.
 const INSIDE: [&str; 5] = ["", "triangulated", "model_train", "sfm", "sfm_sift"];
-/// The map file of Cambridge Landmarks.
 const NVM: &str = "reconstruction.nvm";
 
 /// Returns the folder beside the scenes into which hloc unpacks published maps.

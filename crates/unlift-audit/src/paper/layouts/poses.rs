@@ -1,5 +1,3 @@
-//! Camera poses of a dataset.
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -46,7 +44,6 @@ fn number_of(word: &str) -> Option<f64> {
     if is_lost { Some(f64::NAN) } else { word.parse().ok() }
 }
 
-/// Reads the last column of the matrix.
 fn of_file(path: &Path) -> Result<Option<[f64; 3]>, Error> {
     let lines = lines(path)?;
     let mut center = [0.0; 3];

@@ -1,5 +1,3 @@
-//! A scene of a dataset.
-
 use std::path::PathBuf;
 
 use super::poses::Poses;

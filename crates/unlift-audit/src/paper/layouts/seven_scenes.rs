@@ -15,10 +15,6 @@ pub const SCENES: [&str; 7] =
 
 const SPLIT: &str = "TestSplit.txt";
 
-/// Opens the scene `name` below `root`.
-///
-/// # Errors
-/// If its split is malformed.
 pub fn open(root: &Path, name: &str) -> Result<Scene, Error> {
     let folder = root.join(name);
     let split = folder.join(SPLIT);

@@ -29,7 +29,6 @@ pub fn lines(path: &Path) -> Result<Vec<(u64, String)>, Error> {
 
 /// Returns an error about a line.
 pub fn wrong(path: &Path, line: u64, expected: &str, found: &str) -> Error {
-    /// Maximum number of characters of `found`.
     const MOST: usize = 40;
     let cut: String = found.chars().take(MOST).collect();
     let dots = if cut.len() < found.len() { "..." } else { "" };

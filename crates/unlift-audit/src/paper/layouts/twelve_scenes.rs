@@ -30,10 +30,6 @@ const SPLIT: &str = "split.txt";
 const FRAME: &str = "frame-";
 const PHOTO: &str = ".color.jpg";
 
-/// Opens the scene `name` below `root`.
-///
-/// # Errors
-/// If its split is malformed.
 pub fn open(root: &Path, name: &str) -> Result<Scene, Error> {
     let folder = root.join(name);
     let (split, photos) = (folder.join(SPLIT), folder.join("data"));
