@@ -60,7 +60,7 @@ pub(crate) fn doubts(
     let share = plan.k as f64 / n_points.max(1) as f64;
     if plan.asks_oracle() && plan.k > SHORT && share > LONG {
         found.notes.push(format!(
-            "K = {} is {:.0} % of the map's points: of so long lists less comes back than of shorter ones (--k)",
+            "K = {} is {:.0} % of the map's points: such long lists lower recovery (try a smaller --k)",
             plan.k,
             100.0 * share
         ));
@@ -73,8 +73,8 @@ pub(crate) fn doubts(
             .filter(|_| row.solver != REFERENCE);
         let of_delta = unusual.map(|delta| {
             format!(
-                "{}: delta, {}, is far from the usual distance to the K-th neighbor, {} to {}, so that less may have come back \
-                 than could (try --delta, --outlier-filter, or parts of the map by themselves)",
+                "{}: delta, {}, is far from the usual distance to the K-th neighbor, {} to {}: recovery may be too low \
+                 (try --delta, --outlier-filter, or separate parts of the map)",
                 row.scheme,
                 in_unit(delta, unit),
                 short(low),
@@ -156,8 +156,8 @@ fn not_its_own(
 pub(crate) fn stray_truth(away: &[f64], thresholds: &[Threshold], unit: Unit) -> Option<String> {
     let strays = strays(away, thresholds, unit)?;
     Some(format!(
-        "truth: {strays} away from their own records, where no attack could find them: is it that of this map, in its \
-         frame, scale and order?"
+        "truth: {strays} away from their own records, where no attack can find them: check that it is of this map, in its \
+         frame, scale and order"
     ))
 }
 
@@ -169,8 +169,8 @@ pub(crate) fn stray_positions(
 ) -> Option<String> {
     let strays = strays(away, thresholds, unit)?;
     Some(format!(
-        "recovered: {strays} away from their own records, where no hidden point is: are they of this map, in its frame, \
-         scale and order?"
+        "recovered: {strays} away from their own records, where no hidden point is: check that they are of this map, in its \
+         frame, scale and order"
     ))
 }
 
@@ -188,8 +188,8 @@ fn mistaken_unit(unit: Unit, k: usize, middle: f64) -> Option<String> {
     let is_usual = (UNIT[0]..=UNIT[1]).contains(&middle);
     (unit == Unit::KthNeighbor && !is_usual).then(|| {
         format!(
-            "unit: expected a usual distance to the K-th neighbor (K = {k}) of about 1, as lengths are said to be in multiples of it, found \
-             {}: thresholds mean something else than they say",
+            "unit: expected a usual distance to the K-th neighbor (K = {k}) of about 1, because the file \
+             states lengths in multiples of it, found {}: thresholds do not have their stated meaning",
             short(middle)
         )
     })

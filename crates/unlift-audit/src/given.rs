@@ -71,8 +71,8 @@ fn doubts(offsets: &[u64], neighbors: &[u32], prepared: &Prepared) -> Vec<String
     // Of random points half are nearer; two standard deviations are added.
     if n > 0 && nearer as f64 <= 0.5 * n as f64 + (n as f64).sqrt() {
         doubts.push(format!(
-            "lists: the neighbors in the file are no nearer than any points ({nearer} of {n}): of another map, or in \
-             another order of rows?"
+            "lists: the neighbors in the file are no nearer than random points ({nearer} of {n}): check that they are \
+             of this map and in its order of rows"
         ));
     }
     doubts

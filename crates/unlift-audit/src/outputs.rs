@@ -67,7 +67,7 @@ pub fn open_audit(
         Shown::Clouds => first.extend(earlier.iter().map(|name| (name.as_str(), Kind::Cloud))),
         Shown::Figures if !earlier.is_empty() => {
             let folder = out.join(clouds::FOLDER);
-            let what = "clouds of an earlier audit show points, and stay";
+            let what = "clouds of an earlier audit show points and are kept";
             progress.say(&format!("note: {}: {what}", folder.display()));
         }
         Shown::Figures | Shown::Points => {}

@@ -74,7 +74,7 @@ pub fn prepare<'a>(
         let n = n_read - rows.len();
         if n > 0 {
             notes.push(format!(
-                "--outlier-filter: {n} of {n_read} points are left out, as if never mapped"
+                "--outlier-filter: {n} of {n_read} points are left out of the audit"
             ));
         }
     }
@@ -82,8 +82,8 @@ pub fn prepare<'a>(
         && rows.len() > most
     {
         notes.push(format!(
-            "--max-points: {most} of {n_read} points are audited, and neighbors are farther apart: of the whole map \
-             more comes back"
+            "--max-points: {most} of {n_read} points are audited; the whole map is denser, so more of it is \
+             recovered"
         ));
         Draws::new(preparation.seed, Stage::Subset, 0).shuffle(&mut rows);
         rows.truncate(most);
@@ -208,10 +208,7 @@ mod tests {
         let prepared =
             prepare(&points, None, &Preparation { outlier_filter: filter, ..PLAIN }).unwrap();
         assert_eq!(prepared.rows, (0..30).collect::<Vec<u32>>());
-        assert_eq!(
-            prepared.notes,
-            ["--outlier-filter: 1 of 31 points are left out, as if never mapped"]
-        );
+        assert_eq!(prepared.notes, ["--outlier-filter: 1 of 31 points are left out of the audit"]);
         let prepared =
             prepare(&points, None, &Preparation { max_points: Some(10), ..PLAIN }).unwrap();
         assert_eq!(prepared.rows.len(), 10);

@@ -136,7 +136,7 @@ pub(crate) fn run<'a>(
     let most = plan.thresholds.iter().map(|t| t.value).fold(0.0, f64::max);
     let mut watcher =
         Watcher { progress, most, rows: Vec::new(), curves: Curves::new(most, progress) };
-    progress.show(0, tiles.len(), "cutting the map into tiles");
+    progress.show(0, tiles.len(), "splitting the map into tiles");
     let items = tiles.iter().map(|tile| tile.item(original, descriptors));
     let outcome = run_many(items, plan, &mut watcher)?;
     Ok(Found { outcome, rows: watcher.rows, curves: watcher.curves })

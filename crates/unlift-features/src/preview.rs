@@ -27,7 +27,7 @@ pub fn jpeg(path: &Path, longest: u32, turn: Turn) -> Result<Vec<u8>, Error> {
     };
     encoded(&photo.to_rgb8()).map_err(|error| {
         let name = path.display().to_string();
-        Error::new(name, "a photo that can be shrunk", error.to_string())
+        Error::new(name, "a photo that can be downsized", error.to_string())
     })
 }
 

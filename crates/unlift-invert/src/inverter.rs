@@ -68,7 +68,7 @@ impl Inverter {
         if found == self.kind {
             return Ok(());
         }
-        let expected = format!("descriptors as the network knows them ({:?})", self.kind);
+        let expected = format!("descriptors of the network's kind ({:?})", self.kind);
         Err(Error::new("pictures", expected, format!("{found:?}")))
     }
 }

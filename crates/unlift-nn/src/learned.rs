@@ -17,7 +17,7 @@ const NAME: &str = "learned";
 /// The sources that need a network, in addition to [`unlift::neighbors::sources::SOURCES`].
 pub const SOURCES: &[SourceEntry] = &[SourceEntry {
     name: NAME,
-    summary: "records that a network, trained on photos, takes for near ones; SIFT or ALIKED descriptors",
+    summary: "records that a network trained on photos scores as near; SIFT or ALIKED descriptors",
     in_2d: Some(|| Arc::new(Learned::default())),
     in_3d: Some(|| Arc::new(Learned::default())),
 }];

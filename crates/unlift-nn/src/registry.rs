@@ -115,8 +115,8 @@ pub static MODELS: &[Entry] = &[
     },
     Entry {
         name: "inverter-superpoint",
-        purpose: "pictures from keypoints or points of a map and their SuperPoint descriptors, trained by those who have \
-                  SuperPoint: training/inversion",
+        purpose: "pictures from keypoints or points of a map and their SuperPoint descriptors, trained by users who \
+                  have SuperPoint: training/inversion",
         licence: "yours",
         owner: "training/inversion/README.md of https://github.com/unlift/unlift",
         // Users train it themselves.
@@ -166,7 +166,7 @@ pub static MODELS: &[Entry] = &[
     },
     Entry {
         name: "neighbors-superpoint",
-        purpose: "near points by their SuperPoint descriptors (the source `learned`), trained by those who have SuperPoint: \
+        purpose: "near points by their SuperPoint descriptors (the source `learned`), trained by users who have SuperPoint: \
                   training/neighbors",
         licence: "yours",
         owner: "training/neighbors/README.md of https://github.com/unlift/unlift",
@@ -181,9 +181,9 @@ pub static MODELS: &[Entry] = &[
     },
     Entry {
         name: "superpoint",
-        purpose: "keypoints and descriptors of photos (SuperPoint), made of the owner's superpoint_v1.pth by \
+        purpose: "keypoints and descriptors of photos (SuperPoint), converted from the owner's superpoint_v1.pth by \
                   training/export/superpoint.py",
-        licence: "non-commercial research only, not to be passed on",
+        licence: "non-commercial research only, no redistribution",
         owner: "https://github.com/magicleap/SuperPointPretrainedNetwork",
         // The bytes depend on the exporter's version; the script checks the hash of the published
         // weights.

@@ -112,7 +112,7 @@ impl Gate {
             let wanted = self.inlier_ratio.filter(|wanted| !ratios.contains(wanted))?;
             let expected = match oracle {
                 true => listed(ratios.iter().map(f64::to_string).collect()),
-                false => "none, as measured ratios have no gates of their own".to_owned(),
+                false => "none, because measured ratios have no gates".to_owned(),
             };
             Some((format!("inlier ratio: {expected}"), wanted.to_string()))
         };

@@ -38,7 +38,7 @@ pub fn shown(
             |expected: &str| Error::request(format!("--show: expected {expected}, found {name}"));
         let at = at.map_err(|_| found(&format!("an image of {place}")))?;
         if !chosen.contains(&at) {
-            return Err(found("an image that --max-images leaves in"));
+            return Err(found("an image that --max-images keeps"));
         }
         if !numbers.contains(&at) {
             numbers.push(at);

@@ -249,7 +249,7 @@ impl Found {
                 }
                 Some(name) if is_photo => self.photos.push((name, path)),
                 None if is_folder || is_photo => {
-                    let found = "bytes that are no text";
+                    let found = "another encoding";
                     self.refused.push(Error::new(&path, "", "a name in UTF-8", found));
                 }
                 _ => {}

@@ -48,7 +48,7 @@ impl Parts {
         let folder = PathBuf::from(folder);
         let locked = locked(&folder).map_err(|source| match source.kind() {
             io::ErrorKind::WouldBlock => {
-                Error::new(target, "", "one run at a time", "another run at work")
+                Error::new(target, "", "no other run with this output", "one in progress")
             }
             _ => Error::write(target, source),
         })?;

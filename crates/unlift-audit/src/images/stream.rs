@@ -71,8 +71,8 @@ impl Tally {
         let share = (high[0] - low[0]) * (high[1] - low[1]);
         (share < FILLED).then(|| {
             format!(
-                "sizes: keypoints fill {:.0} % of the declared size of the images: if that is not theirs, more may come \
-                 back",
+                "sizes: keypoints fill {:.0} % of the declared size of the images: if it is wrong, recovery may be too \
+                 low",
                 100.0 * share
             )
         })

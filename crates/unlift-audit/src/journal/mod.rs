@@ -95,11 +95,7 @@ impl<'a> Journal<'a> {
     /// Returns a note about recoveries that were read from the journal, if there are any.
     pub(crate) fn note(&self) -> Option<String> {
         let n = self.n_recalled;
-        (n > 0).then(|| {
-            format!(
-                "{n} recoveries were taken from a journal, as a run that was interrupted left them"
-            )
-        })
+        (n > 0).then(|| format!("{n} recoveries were read from the journal of an interrupted run"))
     }
 
     /// Removes all files of the keys that this run used, and the folder if it is empty then.

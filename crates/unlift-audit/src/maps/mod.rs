@@ -191,7 +191,9 @@ pub fn zeros(descriptors: &Descriptors) -> Option<String> {
         row.iter().all(|&value| value == 0.0)
     };
     let (n, of) = ((0..descriptors.len()).filter(|at| zero(at)).count(), descriptors.len());
-    (n > 0).then(|| format!("{n} of {of} descriptors are all zero, and tell an attacker nothing"))
+    (n > 0).then(|| {
+        format!("{n} of {of} descriptors are all zero and give an attacker no information")
+    })
 }
 
 /// Runs the job and writes its files, all or none.

@@ -60,8 +60,8 @@ pub fn scale((path, images): &(PathBuf, Vec<Image>), scene: &Scene) -> Result<Op
     let at = |share: f64| ratios[(share * (ratios.len() - 1) as f64).round() as usize];
     let (low, middle, high) = (at(0.1), at(0.5), at(0.9));
     if high > (1.0 + SPREAD) * middle || low < (1.0 - SPREAD) * middle {
-        let found = format!("{low:.3} to {high:.3} times as far apart");
-        let expected = "cameras as the dataset places them, all farther apart by one factor";
+        let found = format!("ratios from {low:.3} to {high:.3}");
+        let expected = "camera distances that have one ratio to those in the dataset";
         return Err(Error::new(path, "", expected, found));
     }
     Ok(Some(if (middle - 1.0).abs() <= SAME { 1.0 } else { middle }))

@@ -43,7 +43,7 @@ impl Run<'_> {
         let Some(scale) = scale else {
             let (tables, path) = (tables_of(request, 3, "sift"), path.display());
             self.lacks(format!(
-                "{tables}: meters of the map of {name}: fewer than 4 images of {path} have a pose in the dataset (else \
+                "{tables}: meters of the map of {name}: fewer than 4 images of {path} have a pose in the dataset (try \
                  --scale)"
             ));
             return Ok(None);

@@ -62,7 +62,7 @@ impl Dataset {
                 "7scenes_sfm_triangulated.zip, \
                  https://github.com/cvg/Hierarchical-Localization/tree/master/hloc/pipelines/7Scenes"
             }
-            Self::TwelveScenes => "none is published with it: COLMAP makes one of its photos",
+            Self::TwelveScenes => "none is published with it: make one from its photos with COLMAP",
             Self::Cambridge => {
                 "CambridgeLandmarks_Colmap_Retriangulated_1024px.zip, \
                  https://github.com/cvg/Hierarchical-Localization/tree/master/hloc/pipelines/Cambridge, \

@@ -22,7 +22,7 @@ pub fn lines(path: &Path) -> Result<Vec<(u64, String)>, Error> {
     let mut bytes = Vec::new();
     file.take(LONGEST).read_to_end(&mut bytes).map_err(|source| Error::read(path, source))?;
     let text = String::from_utf8(bytes);
-    let text = text.map_err(|_| Error::new(path, "", "text", "bytes that are no text"))?;
+    let text = text.map_err(|_| Error::new(path, "", "text in UTF-8", "another encoding"))?;
     let lines = text.lines().zip(1..).map(|(line, number)| (number, line.trim().to_owned()));
     Ok(lines.filter(|(_, line)| !line.is_empty()).collect())
 }
