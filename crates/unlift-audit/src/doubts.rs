@@ -174,8 +174,7 @@ pub(crate) fn stray_positions(
     ))
 }
 
-/// Describes the distances of at least the smallest threshold, if they are more than [`STRAY`] of
-/// all.
+/// Counts the distances of at least the smallest threshold; `None` up to a share of [`STRAY`].
 fn strays(away: &[f64], thresholds: &[Threshold], unit: Unit) -> Option<String> {
     let least = thresholds.iter().map(|t| t.value).fold(f64::INFINITY, f64::min);
     let (n, of) = (away.iter().filter(|&&away| away >= least).count(), away.len());

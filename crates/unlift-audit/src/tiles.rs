@@ -34,7 +34,7 @@ impl Tile {
     }
 }
 
-/// How a map is split.
+/// The split of a map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tiles {
     /// Maximum number of points of a tile.

@@ -1,4 +1,4 @@
-//! Where model files are: in the user's folders, or embedded in the program.
+//! The places of model files: in the user's folders, or embedded in the program.
 
 use std::path::PathBuf;
 

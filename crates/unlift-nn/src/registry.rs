@@ -13,7 +13,7 @@ pub struct Entry {
     pub purpose: &'static str,
     /// License of the weights, as an SPDX identifier if there is one.
     pub licence: &'static str,
-    /// Where its owner publishes it.
+    /// The page or file that publishes it.
     pub owner: &'static str,
     /// SHA-256 of the file, in hexadecimal; `None` if users make the file themselves, so that its
     /// bytes vary.

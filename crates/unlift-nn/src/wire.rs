@@ -171,7 +171,7 @@ mod tests {
         let largest = [&[0x08][..], &[0xff; 9], &[1]].concat();
         assert_eq!(check(&largest), Ok(()));
         assert!(check(&[&[0x08][..], &[0xff; 9], &[2]].concat()).is_err());
-        // The same fault within a tensor's numbers, in a graph.
+        // This fault within a tensor's numbers, in a graph.
         let tensor = [&[7 << 3 | 2, 10][..], &[0xff; 10]].concat();
         let graph = [&[5 << 3 | 2, 12][..], &tensor].concat();
         let model = [&[7 << 3 | 2, 14][..], &graph].concat();

@@ -63,7 +63,7 @@ impl Observer<2> for Page<'_> {
 
     fn cell(&mut self, cell: &Cell<'_, 2>) {
         if let Some(inverter) = self.inverter.clone() {
-            // The same error was reported when the image was measured.
+            // This error was reported when the image was measured.
             let _ = inverter.add(cell, &mut self.painted);
         }
         let picture = &mut self.picture;

@@ -27,7 +27,7 @@ pub struct Reproduction {
     pub compared: Vec<Compared>,
     /// Pages of the audits of scenes.
     pub pages: Vec<PathBuf>,
-    /// What is missing for complete tables, one line each.
+    /// Missing data for complete tables, one line each.
     pub missing: Vec<String>,
     /// Tables that other commands reproduce, one line each.
     pub elsewhere: Vec<&'static str>,

@@ -22,9 +22,9 @@ pub struct Run<'a> {
     features: Vec<(&'static str, Extraction)>,
     /// Finished audits and the paths of their pages.
     pub done: Vec<(OfScene, PathBuf)>,
-    /// What is missing, one line each.
+    /// Missing data, one line each.
     pub missing: Vec<String>,
-    /// Why audits failed, one line each.
+    /// Failed audits, one line each.
     pub failed: Vec<String>,
 }
 

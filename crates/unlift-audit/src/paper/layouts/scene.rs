@@ -13,7 +13,7 @@ pub struct Scene {
     pub photos: PathBuf,
     /// Names of the existing photos of the test split, sorted.
     pub test: Vec<String>,
-    /// Why photos of the split are missing, if any are.
+    /// The reason for missing photos of the split, if any are missing.
     pub lacking: Option<String>,
     /// The map, as a path for [`unlift_io::read::open`].
     pub map: Option<PathBuf>,
