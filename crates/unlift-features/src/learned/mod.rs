@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! ColorImage ──> network ──> scores ──> maxima ──> keypoints ──> descriptors ──> LearnedFeatures
-//!                       └──> maps ───────────────────────────────┘
+//!                        └──> maps ───────────────────────────────┘
 //! ```
 
 mod aliked;
